@@ -13,8 +13,9 @@
 
 namespace km {
 
-/// Writes `file` by `writer(std::ostream&)`; nothing if the name is empty. See write_file(): whole
-/// or not at all. Throws std::runtime_error that names the file and why.
+/// Writes `file` with `writer(std::ostream&)`; does nothing if the name is empty. The file appears
+/// complete or not at all, see write_file(). Throws std::runtime_error that names the file and the
+/// reason.
 inline void write_output(const std::filesystem::path& file, const auto& writer) {
   if (file.empty()) return;
   std::ostringstream out;
@@ -22,8 +23,8 @@ inline void write_output(const std::filesystem::path& file, const auto& writer) 
   write_file(file, out.view());
 }
 
-/// Makes the folder where it is absent. Throws std::runtime_error that names it and why nothing can
-/// be written there: told before the work is done, not after.
+/// Makes the folder if it is absent. Throws std::runtime_error that names the folder and the reason
+/// if it cannot be written to. Call it before the work, so that the error comes early.
 inline void make_output_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -35,8 +36,7 @@ inline void make_output_folder(const std::filesystem::path& folder) {
                              std::generic_category().message(errno) + "; choose another folder");
 }
 
-/// Likewise throws if there is no folder to write `file` to, or if it is one (empty: none asked
-/// for).
+/// Throws if there is no folder for `file`, or if `file` is a folder (empty: no file requested).
 inline void check_output_folder(const std::filesystem::path& file) {
   if (file.empty()) return;
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();

@@ -14,7 +14,7 @@ namespace km {
 struct ReportFiles {
   std::filesystem::path json, plot;
 
-  /// Defines --json and --plot, with what they have in them. A plot is a page: other names are
+  /// Defines --json and --plot, and describes their content. A plot is a page: other file names are
   /// refused.
   void define(CLI::App& app, const std::string& in_json, const std::string& in_plot) {
     app.add_option("--json", json, "Also write " + in_json + " to this file, as JSON");
@@ -27,13 +27,14 @@ struct ReportFiles {
         });
   }
 
-  /// As check_output_folder(), before the work.
+  /// Checks the folders of the files, see check_output_folder(); call it before the work.
   void check() const {
     check_output_folder(json);
     check_output_folder(plot);
   }
 
-  /// `write_json(std::ostream&)`; `draw()` makes the plots of the page called `title`.
+  /// Writes the files: `write_json(std::ostream&)`; `draw()` makes the plots of the page called
+  /// `title`.
   void write(const auto& write_json, const std::string& title, const auto& draw) const {
     write_output(json, write_json);
     write_output(plot, [&](std::ostream& out) { out << chart_page(title, draw()); });

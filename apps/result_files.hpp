@@ -10,32 +10,32 @@
 
 namespace km {
 
-/// Names and colours of the labels, beside a mesh that has some.
+/// Names and colours of the labels, beside a labelled mesh.
 inline constexpr const char* kLabelPalette = "label_palette.csv";
 
 /// Written at the end of a run.
 inline constexpr const char* kSummary = "summary.json";
 
-/// What a robot leaves in its output folder.
+/// Results of a robot in its output folder.
 inline constexpr std::array kResultFiles = {
     "odometry.tum",  "optimized.tum", "pose_graph.g2o",     "keyframes.csv", "loop_closures.csv",
     "optimizer.csv", "traffic.csv",   "process.csv",        "timing.csv",    "config.yaml",
     kSummary,        "mesh.ply",      "mesh_optimized.ply", kLabelPalette};
 
-/// Those that grow during the run, and go on when it is taken up.
+/// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};
 
-/// The rig with the stamps and mounting of the cameras as a run found them, for --rig of the next
-/// one, which may have the same folder: it stays until it is written anew.
+/// The rig with the stamps and mounting of the cameras as estimated by a run, for --rig of the next
+/// run. That run may have the same folder, so the file stays until it is replaced.
 inline constexpr const char* kEstimatedRig = "rig_estimated.yaml";
 
-/// What a run needs to be taken up, or to be joined as one of the past.
+/// Input of --resume and --session.
 inline constexpr const char* kJournal = "run.journal";
 
 /// The map of such a run.
 inline constexpr const char* kMap = "run.map";
 
-/// What viewers open. A run that is taken up goes on in record_2.mcap, and so on.
+/// Record for viewers. A resumed run continues in record_2.mcap, and so on.
 inline constexpr const char* kRecord = "record.mcap";
 
 /// The folders that robots write or have written to: `folder` itself, or those in it, by name.
@@ -54,12 +54,12 @@ inline constexpr const char* kRecord = "record.mcap";
   return found;
 }
 
-/// What is wrong with the folder of a robot that has no summary yet.
+/// Error text for the folder of a robot without a summary.
 [[nodiscard]] inline std::string unfinished(const std::filesystem::path& folder) {
   return folder.string() + ": no " + kSummary + ": the robot still runs, or was killed";
 }
 
-/// And the way out.
+/// Remedy for that error.
 [[nodiscard]] inline std::string way_on(const std::filesystem::path& folder) {
   return "if it was killed: the same command with --resume " + folder.string() +
          " in place of --output goes on with it";
@@ -74,13 +74,13 @@ inline constexpr const char* kRecord = "record.mcap";
 /// Folder of the meshes that other robots sent, robot<id>.ply each.
 inline constexpr const char* kPeerMeshes = "peer_meshes";
 
-/// Removes a robot's results from `folder`, other than its journal and map, so that those of an
-/// earlier run cannot be taken for those of one that fails. Where that run goes on, what grows
-/// stays, too. Throws std::filesystem::filesystem_error naming the file.
+/// Removes a robot's results from `folder`, except for its journal and map, so that those of an
+/// earlier run are not mistaken for those of one that fails. If the run continues (`goes_on`), its
+/// growing files stay, too. Throws std::filesystem::filesystem_error naming the file.
 inline void remove_results(const std::filesystem::path& folder, bool goes_on = false) {
   for (const std::string file : kResultFiles) {
     if (goes_on && std::ranges::find(kGrowingFiles, file) != kGrowingFiles.end()) continue;
-    for (const char* ending : {"", ".part"})  // that of a file cut short by the process's end
+    for (const char* ending : {"", ".part"})  // file cut short by the end of the process
       std::filesystem::remove(folder / (file + ending));
   }
   std::filesystem::remove_all(folder / kPeerMeshes);

@@ -10,12 +10,12 @@
 
 namespace km {
 
-/// Writes results, each on its own: what keeps one from being written is logged (at a limited rate)
-/// and kept, and all others are written as if nothing were. Thread-safe.
+/// Writes results independently of each other. The reason why a result could not be written is
+/// logged (at a limited rate) and kept, and the others are written all the same. Thread-safe.
 class ResultWriter {
  public:
-  /// Calls `writer(file)`, which throws what keeps the file from being written. One that could not
-  /// be written before and now can is lost no more.
+  /// Calls `writer(file)`, which throws if the file cannot be written. A file that failed before
+  /// and is written now is no longer lost.
   void write(const std::filesystem::path& file, const auto& writer) try {
     writer(file);
     const std::lock_guard lock(mutex_);
@@ -24,7 +24,7 @@ class ResultWriter {
     note(file, error.what());
   }
 
-  /// Notes that `file` is lost, and why. The reason may name the file or leave it to this.
+  /// Notes that `file` is lost, with the reason. The reason may include the name of the file.
   void note(const std::filesystem::path& file, std::string why) {
     if (why.find(file.string()) == std::string::npos) why = file.string() + ": " + why;
     log::limited(log::Level::kError, "results", file.string()) << why;
@@ -32,7 +32,7 @@ class ResultWriter {
     lost_[file.string()] = std::move(why);
   }
 
-  /// Why each file that is lost is, ascending by name: "out/mesh.ply: cannot be written: No space
+  /// The reason for each lost file, ascending by name: "out/mesh.ply: cannot be written: No space
   /// left on device".
   [[nodiscard]] std::map<std::string, std::string> lost() const {
     const std::lock_guard lock(mutex_);

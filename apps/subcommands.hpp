@@ -10,10 +10,10 @@
 
 namespace km {
 
-/// The main() of a program whose first word is a subcommand: each of `adders` adds one to the
-/// CLI::App it is handed, which runs as soon as the command line names it. The exit code: 0 if it
-/// was done, or help was asked for; 1 with a message on stderr for what it threw and for a command
-/// line that cannot be used.
+/// The main() of a program whose first word is a subcommand. Each of `adders` adds one to its
+/// CLI::App; the subcommand runs as soon as the command line names it. The exit code is 0 if the
+/// subcommand succeeded or help was requested. It is 1 for an exception, with a message on stderr,
+/// and for an invalid command line.
 inline int run_subcommands(const std::string& program, const char* about,
                            std::initializer_list<void (*)(CLI::App&)> adders, int argc,
                            char** argv) try {
@@ -25,7 +25,7 @@ inline int run_subcommands(const std::string& program, const char* about,
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    // A word that is not understood is why something is missing more often than not.
+    // An unknown word is often the reason why another one is missing.
     const auto unknown = app.remaining(true);
     const bool missing = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
     missing && !unknown.empty() ? app.exit(CLI::ExtrasError(app.get_name(), unknown))

@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// Time that only goes forward, from any origin [s].
+/// Steady time [s] with any origin.
 [[nodiscard]] double steady_now_s();
 
 /// Time since 1970 [s].
@@ -30,13 +30,13 @@ class ReplayClock {
   /// Waits until `stamp` is due. False if stopped: the source should end.
   bool wait_until(Stamp stamp);
 
-  /// When `stamp` is due; the first call, at `now`, fixes the origin. Nullopt: at once.
+  /// Time at which `stamp` is due; the first call, at `now`, fixes the origin. Nullopt: at once.
   [[nodiscard]] std::optional<TimePoint> due(Stamp stamp, TimePoint now);
 
   /// The same now, as steady_now_s() counts.
   [[nodiscard]] std::optional<double> due_s(Stamp stamp);
 
-  /// Everything that is not yet due is due later by `s`; a wait that has begun stays as it is.
+  /// Delays everything that is not yet due by `s`; a wait that has begun is unchanged.
   void pause(double s);
 
   /// Ends every wait, now and later. Idempotent.
@@ -46,7 +46,7 @@ class ReplayClock {
   std::optional<TimePoint> due_locked(Stamp stamp, TimePoint now);
 
   const double rate_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::condition_variable wake_;
   bool started_ = false;
   bool stopped_ = false;

@@ -11,9 +11,9 @@
 
 namespace km {
 
-/// A configuration put together from files and command-line overrides: what is added later wins,
-/// key by key. Problems are collected over all layers and sections and thrown together by
-/// finish(), each with the file and line it comes from:
+/// A configuration composed of files and command-line overrides: a later layer replaces keys of
+/// earlier ones. Problems are collected over all layers and sections and thrown together by
+/// finish(), each with its file and line:
 ///
 ///     ConfigLayers layers;
 ///     layers.add_file("config/robot.yaml");
@@ -43,10 +43,10 @@ class ConfigLayers {
     return config;
   }
 
-  /// Throws ConfigError that lists every problem, sections nobody loaded included.
+  /// Throws ConfigError that lists every problem, including sections that no module loaded.
   void finish() const;
 
-  /// What was loaded, as a file that gives the same configuration again.
+  /// The loaded configuration as the text of a file that gives it again.
   [[nodiscard]] const std::string& effective() const { return effective_; }
 
  private:

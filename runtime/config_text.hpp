@@ -11,7 +11,7 @@
 
 namespace km {
 
-/// A value as it is written in YAML; empty if there is none.
+/// A value as YAML text; empty if it cannot be written.
 template <typename T, typename Accepted>
 [[nodiscard]] std::string yaml_text(const T& value, const Accepted& accepted) {
   if constexpr (std::is_enum_v<T>)
@@ -37,8 +37,8 @@ template <typename T, typename Accepted>
   return '[' + list + ']';
 }
 
-/// Visitor that writes a config struct as YAML, with each field's text and bounds beside it. What
-/// it writes of fields that have values can be read back and gives the same values.
+/// Visitor that writes a config struct as YAML, with the description and bounds of each field
+/// beside it. Fields with values can be read back and then have the same values.
 class ConfigText : public FieldVisitor<ConfigText> {
  public:
   /// `indent`: before every line.

@@ -2,9 +2,8 @@
 
 // Every program links this file. A robot frees a frame's images, pyramids and depth and then
 // allocates those of the next frame. By default glibc returns the freed memory to the kernel at
-// once, and the next frame faults it in again, page by page: 3000 page faults a frame on EuRoC's
-// MH_01. With the settings below a process keeps the memory that it frees. The most that it keeps
-// is its peak.
+// once. The next frame faults it in again, page by page: 3000 page faults a frame on EuRoC's MH_01.
+// With the settings below a process keeps the memory that it frees, at most its peak.
 namespace km {
 namespace {
 

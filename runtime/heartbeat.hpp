@@ -7,13 +7,13 @@
 
 namespace km {
 
-/// Shows a watchdog whether a thread gets on with its steps. A step that waits, for room in the
-/// queue of another worker or for its time to come, is not stuck: the other one may be. What waits
-/// in a circle is therefore not found. Thread-safe.
+/// Shows a watchdog whether a thread makes progress. A step that waits, for room in the queue of
+/// another worker or for its time, is not stuck: the other worker may be. So a circular wait is not
+/// detected. Thread-safe.
 class Heartbeat {
  public:
-  /// `give_up` is called, from another thread, when nobody waits for the step any more: it frees
-  /// those who wait for this thread.
+  /// `give_up` is called, from another thread, when the step is abandoned: it releases the threads
+  /// that wait for this one.
   explicit Heartbeat(std::function<void()> give_up = {}) : give_up_(std::move(give_up)) {}
   Heartbeat(const Heartbeat&) = delete;
   Heartbeat& operator=(const Heartbeat&) = delete;

@@ -6,14 +6,14 @@
 
 namespace km {
 
-/// The newest message of a kind, until it is taken: for large ones of which only the newest counts.
-/// In the queue of a slow node they would pile up, each held in memory until its turn. Thread-safe.
+/// The newest message of a kind, until it is taken. For large messages of which only the newest
+/// counts: in the queue of a slow node they would accumulate in memory. Thread-safe.
 template <typename T>
 class Latest {
  public:
   using Message = std::shared_ptr<const T>;
 
-  /// Replaces what was not taken. Nothing after close().
+  /// Replaces a value that has not been taken. Does nothing after close().
   void put(Message message) {
     const std::lock_guard lock(mutex_);
     if (!closed_) message_.swap(message);
@@ -25,7 +25,7 @@ class Latest {
     return std::exchange(message_, nullptr);
   }
 
-  /// What was put can still be taken.
+  /// Closes the channel; the last value can still be taken.
   void close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;

@@ -16,7 +16,7 @@
 namespace km {
 
 RateLimit::Verdict RateLimit::ask(const std::string& key, double now_s) {
-  constexpr std::size_t kMaxKeys = 1000;  // keys may hold what strangers sent
+  constexpr std::size_t kMaxKeys = 1000;  // bounded, because keys may contain text of other robots
   if (entries_.size() >= kMaxKeys && !entries_.contains(key)) entries_.clear();
   const auto [entry, fresh] = entries_.try_emplace(key, Entry{now_s, 0});
   if (fresh) return {true, 0};
@@ -36,7 +36,7 @@ constexpr double kLimitedInterval_s = 5.0;
 
 // The terminal is one per process, and so is this: log lines and the status line share it.
 struct Console {
-  std::mutex mutex;  // guards what follows
+  std::mutex mutex;  // guards the members below
   std::ostream* log_output = &unblocked_stderr();
   log::Listener listener;
   RateLimit rate_limit{kLimitedInterval_s};
@@ -46,7 +46,7 @@ struct Console {
   double plain_interval_s = 5.0;
   double last_plain_s = -1e9;
   std::string status;  // the last one given
-  std::string drawn;   // what is on the screen or was printed last
+  std::string drawn;   // text that is on the screen or was printed last
 };
 
 Console& console() {

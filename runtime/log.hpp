@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// Lets a message of a kind through at most once per interval, and counts what it held back.
+/// Passes a message of a kind at most once per interval, and counts the suppressed ones.
 /// Memory is bounded. Not thread-safe.
 class RateLimit {
  public:
@@ -70,7 +70,7 @@ inline Line debug(std::string_view tag) {
   return {Level::kDebug, tag};
 }
 
-/// At most one line per `key` in 5 s; the next one says how many were held back.
+/// At most one line per `key` in 5 s; the next one states how many were suppressed.
 inline Line limited(Level level, std::string_view tag, std::string key) {
   return {level, tag, std::move(key)};
 }
@@ -78,8 +78,8 @@ inline Line limited(Level level, std::string_view tag, std::string key) {
 /// Lines less important than `level` are dropped. Default kInfo. Thread-safe.
 void set_level(Level level);
 
-/// Where lines go, unblocked_stderr() by default: no thread waits for whoever reads them. Returns
-/// where they went. For tests.
+/// Sets the output of log lines, by default unblocked_stderr(), so that no thread waits for the
+/// reader of the log. Returns the former output. For tests.
 std::ostream* set_output(std::ostream* output);
 
 }  // namespace log
@@ -88,7 +88,7 @@ std::ostream* set_output(std::ostream* output);
 /// seconds. Log lines go above it and never into it. One per process. Thread-safe.
 class StatusLine {
  public:
-  /// On unblocked_stdout(); a terminal if isatty() says so.
+  /// Writes to unblocked_stdout(); treats it as a terminal if isatty() is true.
   StatusLine();
   /// For tests: `output` outlives this.
   StatusLine(std::ostream& output, bool terminal, double plain_interval_s = 5.0);

@@ -14,9 +14,9 @@ struct Entry {
 
 using Listener = std::function<void(const Entry&)>;
 
-/// From now on `listener` hears every line that is written, one at a time, on the thread that
-/// writes it: it must only enqueue, and not log. Empty: nobody does. Thread-safe; when it returns,
-/// the one before is not heard any more.
+/// `listener` receives every line written from now on, one at a time, on the thread that writes it:
+/// it must only enqueue, and not log. An empty one removes the listener. Thread-safe; after the
+/// return the former listener is not called any more.
 void set_listener(Listener listener);
 
 }  // namespace km::log

@@ -10,8 +10,8 @@
 
 namespace km {
 
-/// Calls `tick` on its own thread at a fixed rate, at once when stopped never again. A tick that
-/// takes too long delays the following ones; missed ones are not made up for. `tick` should post
+/// Calls `tick` on its own thread at a fixed rate; after stop() no further tick begins. A tick that
+/// takes too long delays the following ones, and missed ticks are not repeated. `tick` should post
 /// into a worker rather than compute.
 class Periodic {
  public:
@@ -23,7 +23,7 @@ class Periodic {
   Periodic(const Periodic&) = delete;
   Periodic& operator=(const Periodic&) = delete;
 
-  /// The first tick comes at once. Call once.
+  /// The first tick follows at once. Call once.
   void start();
 
   /// Waits for a tick that is running. Idempotent. Not callable from the tick.
@@ -38,7 +38,7 @@ class Periodic {
   const Duration period_;
   const std::function<void()> tick_;
   const std::string name_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::condition_variable wake_;
   bool stop_ = false;
   std::exception_ptr error_;

@@ -85,7 +85,7 @@ RunResult Supervisor::run(const Finished& finished, double poll_interval_s) {
   const bool failed_before = result.failure.has_value();
   for (Entry& entry : nodes_)
     if (!wait_for_end(entry)) result.left_behind.emplace_back(entry.node->name());
-  // A node may also fail on what was left to do.
+  // A node may also fail on its remaining inputs.
   if (!failed_before) result.failure = first_failure();
   if (result.failure && !failed_before)
     log::error("supervisor") << result.failure->node << " failed: " << result.failure->message;
@@ -99,7 +99,7 @@ void Supervisor::start_all() {
   lookouts_ = std::make_unique<Periodic>(
       std::chrono::milliseconds(100),
       [this, last_s = steady_now_s()]() mutable {
-        // What is longer than this the process did not run, or not enough to blame a node.
+        // A longer interval means that the process did not run, or too little to blame a node.
         constexpr double kLongest_s = 0.5;
         const double now_s = steady_now_s();
         watchdog_->tick(std::min(now_s - std::exchange(last_s, now_s), kLongest_s));

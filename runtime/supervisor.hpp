@@ -31,8 +31,8 @@ class SignalWatch {
   /// Waits up to `timeout_s` for a signal; its number, or nullopt.
   std::optional<int> wait(double timeout_s);
 
-  /// From now on SIGINT and SIGTERM end the process at once, as if nobody watched. SIGHUP does
-  /// nothing more: a terminal that closes may send it several times.
+  /// Restores the default: SIGINT and SIGTERM now end the process at once. SIGHUP has no effect any
+  /// more, because a closing terminal may send it several times.
   void give_up();
 
   /// The signals that were blocked before.
@@ -41,8 +41,8 @@ class SignalWatch {
  private:
   sigset_t watched_{};
   sigset_t previous_{};
-  void (*previous_pipe_)(int) = nullptr;    // what SIGPIPE did before
-  void (*previous_hangup_)(int) = nullptr;  // likewise
+  void (*previous_pipe_)(int) = nullptr;    // former handler of SIGPIPE
+  void (*previous_hangup_)(int) = nullptr;  // former handler of SIGHUP
 };
 
 /// Why a robot stopped.
@@ -52,8 +52,8 @@ struct RunResult {
     std::string message;
     bool hung = false;  ///< It did not fail but did not get on: see Watchdog.
   };
-  std::optional<Failure> failure;  ///< Of the first node that failed.
-  bool interrupted = false;        ///< By a signal.
+  std::optional<Failure> failure;  ///< Failure of the first node that failed.
+  bool interrupted = false;        ///< True if a signal ended the run.
   /// Nodes that could not be stopped: their threads still run. Neither they nor what they use may
   /// be destroyed.
   std::vector<std::string> left_behind = {};
@@ -61,10 +61,10 @@ struct RunResult {
   [[nodiscard]] bool is_left_behind(std::string_view node) const;
 };
 
-/// Owns the nodes of a robot and runs them: starts them, sources last, so that what one publishes
-/// finds the others at work, watches them, and stops them, sources first, so that what is in flight
-/// is still processed downstream. A node that does not get on is named, given up (see Watchdog),
-/// and keeps no other from ending.
+/// Owns the nodes of a robot and runs them. It starts them with sources last, so that receivers run
+/// before messages are published, and watches them. It stops them with sources first, so that
+/// inputs in queues are still processed downstream. A node without progress is named and abandoned
+/// (see Watchdog), and does not keep other nodes from ending.
 class Supervisor {
  public:
   /// Asks for the state of the run now and then; true ends it. Runs on the supervisor's thread.
@@ -78,8 +78,8 @@ class Supervisor {
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  /// Adds a node in the order of the data flow; the bridge to the other robots comes last.
-  /// Throws std::invalid_argument if a node of that name is there already.
+  /// Adds a node in the order of the data flow, with the bridge to the other robots last. Throws
+  /// std::invalid_argument if a node with that name exists.
   void add(std::unique_ptr<Node> node);
 
   /// Builds a node in place and returns it.

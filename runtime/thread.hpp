@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// A thread to which no signal to the process is delivered: others are there for those.
+/// Starts a thread that receives no signals of the process, because another thread handles them.
 template <typename Work>
 [[nodiscard]] std::thread start_without_signals(Work&& work) {
   sigset_t all;
@@ -29,16 +29,16 @@ inline void name_this_thread(const std::string& name) {
   if (!name.empty()) pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
 }
 
-/// Makes the calling thread give way to the others of this host where processors are scarce: Linux
-/// then gives it about a tenth of what a thread of ordinary priority gets. For handlers of work
-/// that may be late, so that it does not slow down what may not. Later calls do nothing.
+/// Lowers the priority of the calling thread. If processors are scarce, Linux gives it about a
+/// tenth of the time of an ordinary thread. For handlers of work that may be late, so that it does
+/// not slow down urgent work. Later calls have no effect.
 inline void work_in_background() {
   static thread_local const int outcome = [] {
     constexpr int kNiceness = 10;
     const auto self = static_cast<id_t>(gettid());
     return setpriority(PRIO_PROCESS, self, std::max(kNiceness, getpriority(PRIO_PROCESS, self)));
   }();
-  static_cast<void>(outcome);  // where it is not allowed, the thread competes as before
+  static_cast<void>(outcome);  // if not permitted, the thread keeps its priority
 }
 
 }  // namespace km

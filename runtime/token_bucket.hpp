@@ -6,10 +6,10 @@
 
 namespace km {
 
-/// Tokens that flow in at a constant rate, to be spent. Who spends more than there are makes a
-/// debt, which what flows in then pays first: over any time t from a moment without debt on,
-/// per_second * t + capacity are spent at most, and what the last one was too much.
-/// Pure: time comes in [s], any origin, and does not go backwards.
+/// Tokens that arrive at a constant rate. Spending more than are available makes a debt, which
+/// later tokens pay first. Over any time t after a moment without debt, at most per_second * t +
+/// capacity are spent, plus the excess of the last spending. Deterministic: time comes in [s], with
+/// any origin, and does not decrease.
 class TokenBucket {
  public:
   /// `per_second` is positive; infinite: it is always full. It begins with `level`.

@@ -29,10 +29,10 @@ struct OutputQueue::State {
 
   const int descriptor;
   const std::size_t capacity;  // [bytes]
-  std::mutex mutex;            // guards what follows
+  std::mutex mutex;            // guards the members below
   std::condition_variable changed;
   std::deque<Piece> waiting;
-  std::size_t bytes = 0;  // of what waits and of what is being written
+  std::size_t bytes = 0;  // bytes that wait or are being written
   std::uint64_t lost = 0;
   bool writing = false;
   bool closed = false;
@@ -54,13 +54,14 @@ struct OutputQueue::State {
 
 namespace {
 
-// Blocks where nobody reads. False if the rest cannot be written.
+// Blocks while the reader does not read. False if the rest cannot be written.
 bool write_all(int descriptor, std::string_view text) {
   while (!text.empty()) {
     const ssize_t n = ::write(descriptor, text.data(), text.size());
     if (n > 0) {
       text.remove_prefix(static_cast<std::size_t>(n));
-    } else if (n < 0 && errno == EAGAIN) {  // somebody who shares it has made it non-blocking
+    } else if (n < 0 && errno == EAGAIN) {  // another process that shares it has made it
+                                            // non-blocking
       pollfd room{descriptor, POLLOUT, 0};
       poll(&room, 1, -1);
     } else if (n == 0 || errno != EINTR) {
@@ -133,7 +134,7 @@ bool OutputQueue::drain(double grace_s) {
 
 namespace {
 
-// Passes on what was written at every flush.
+// Forwards the written text at every flush.
 class QueueBuffer final : public std::stringbuf {
  public:
   explicit QueueBuffer(OutputQueue& queue) : std::stringbuf(std::ios::out), queue_(queue) {}
@@ -167,7 +168,7 @@ struct StandardStreams {
 };
 
 StandardStreams& standard_streams() {
-  // Never destroyed: what logs while the program ends finds it.
+  // Never destroyed, because destructors may log while the program ends.
   static auto* const streams = new StandardStreams;
   static const struct AtExit {
     ~AtExit() {

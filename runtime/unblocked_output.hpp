@@ -8,14 +8,13 @@
 
 namespace km {
 
-/// Writes text to a file descriptor on a thread of its own: who has something to say never waits
-/// for a terminal, a pipe or a disk. What does not fit any more, or cannot be written, is lost and
-/// counted; "12 lines lost: output blocked or failed" stands where they would have been.
-/// Thread-safe.
+/// Writes text to a file descriptor on a thread of its own, so that callers never wait for a
+/// terminal, a pipe or a disk. Text that does not fit, or cannot be written, is lost and counted:
+/// "12 lines lost: output blocked or failed" stands in its place. Thread-safe.
 class OutputQueue {
  public:
-  /// `descriptor` stays open as long as this lives, and is not changed to non-blocking: others may
-  /// share it.
+  /// `descriptor` stays open as long as this object exists. It is not changed to non-blocking,
+  /// because other processes may share it.
   explicit OutputQueue(int descriptor, std::size_t capacity_bytes = std::size_t{1} << 20);
   /// Waits as drain() does, at most kGrace_s. A thread that is still blocked then is left behind.
   ~OutputQueue();
@@ -36,11 +35,11 @@ class OutputQueue {
   std::thread writer_;
 };
 
-/// Standard output and standard error through an OutputQueue each, or one for both where they are
-/// the same file, so that the order is kept. A flush passes on what was written since the last.
-/// The program's end waits for what is queued, at most OutputQueue::kGrace_s; what is written to
-/// std::cout or std::cerr beside them comes out of turn, unless drain_standard_output() is called
-/// before. Each stream is for one thread at a time.
+/// Standard output and standard error, each through an OutputQueue, or through a common one if they
+/// are the same file, so that the order is kept. A flush forwards the text since the last one. The
+/// program's end waits for the queued text, at most OutputQueue::kGrace_s. Text written directly to
+/// std::cout or std::cerr may appear out of order, unless drain_standard_output() is called before.
+/// Each stream is for one thread at a time.
 std::ostream& unblocked_stdout();
 std::ostream& unblocked_stderr();
 

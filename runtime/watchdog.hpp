@@ -10,19 +10,19 @@
 
 namespace km {
 
-/// Tells which nodes do not get on: one that has not finished a step for kNotice_s is named in the
-/// log, one that has not for its step_limit_s() is given up. Thread-safe.
+/// Finds nodes without progress. A node that has not finished a step for kNotice_s is named in the
+/// log. One that has not for its step_limit_s() is abandoned. Thread-safe.
 class Watchdog {
  public:
   static constexpr double kNotice_s = 4.0;
-  /// Of a node without heartbeats to end: it may have much to send over a thin link.
+  /// Time for a node without heartbeats to end: it may have much to send over a slow link.
   static constexpr double kStopLimit_s = 120.0;
 
   /// `nodes` outlive this. `patience` multiplies all limits of giving up.
   Watchdog(const std::vector<Node*>& nodes, double patience);
 
-  /// Looks at all nodes; `dt_s` have passed since the last time. Time in which nobody looked, as in
-  /// a process that was stopped, should not be in it.
+  /// Checks all nodes; `dt_s` have passed since the last check. It should exclude time in which the
+  /// process did not run.
   void tick(double dt_s);
 
   /// `node` is to end: from now on it gets on only as long as it makes steps.

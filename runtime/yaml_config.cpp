@@ -37,10 +37,10 @@ std::string one_line(const YAML::Node& node) {
   return emitter.c_str();
 }
 
-// Of all problems together, and of one: a file that is no configuration makes a million.
+// Bounds for all problems together, and for one: a file that is no configuration causes a million.
 constexpr std::size_t kMaxMessage = 4000, kMaxProblem = 500;
 
-// A problem: what files say in it may be long, or not printable.
+// Text from files in a problem may be long, or not printable.
 std::string line_of(const std::string& problem) {
   return readable(problem, kMaxProblem) + '\n';
 }

@@ -29,7 +29,7 @@ std::string last_name(const std::string& topic) {
   return topic.substr(topic.rfind('/') + 1);
 }
 
-// Those of ROS that DDS has discovered so far.
+// Publishers of ROS topics that DDS has discovered so far.
 class PublisherList {
  public:
   explicit PublisherList(const RosNetwork& network)
@@ -84,7 +84,8 @@ Finding silent(const ListenedTopic& wanted, const std::vector<ListenedTopic>& to
                const std::vector<TopicPublisher>& publishers) {
   Finding finding{.id = "live.silent", .severity = Severity::kError};
   const auto same = std::ranges::find(publishers, wanted.topic, &TopicPublisher::topic);
-  // Of that type, and no other sensor's: the one whose name begins most alike.
+  // The topic of this type, not named by the rig, whose name shares the longest prefix with the
+  // wanted one.
   const auto alike = [&](const TopicPublisher& other) {
     if (std::ranges::find(topics, other.topic, &ListenedTopic::topic) != topics.end()) return 0L;
     const auto [end, rest] = std::ranges::mismatch(wanted.topic, other.topic);

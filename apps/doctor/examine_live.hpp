@@ -6,25 +6,26 @@
 
 namespace km {
 
-/// Somebody who publishes a topic of ROS 2.
+/// A publisher of a ROS 2 topic.
 struct TopicPublisher {
-  std::string topic;  ///< As ROS has it: "/imu0".
+  std::string topic;  ///< Name in ROS: "/imu0".
   std::string type;   ///< "sensor_msgs/msg/Imu"
   bool is_reliable = false;
 };
 
-/// A topic that a rig file names, and what was heard of it.
+/// A topic that a rig file names, and the number of its messages received.
 struct ListenedTopic {
   std::string topic, type;
   std::size_t messages = 0;
 };
 
-/// Ids: live.silent, live.other_type, live.similar_name, live.nobody.
+/// Ids: `live.silent`, `live.other_type`, `live.similar_name`, `live.nobody`.
 [[nodiscard]] Examination examine_topics(const std::vector<ListenedTopic>& topics,
                                          const std::vector<TopicPublisher>& publishers,
                                          double listened_s, int domain);
 
-/// Listens to the sensors' topics of a rig for `listen_s` [s], and to who publishes.
+/// Listens to the sensors' topics of a rig for `listen_s` [s], and to the announcements of
+/// publishers.
 [[nodiscard]] Examination examine_live_topics(const SensorTopicNames& names,
                                               const RosConfig& config, double listen_s,
                                               const TellProgress& tell);

@@ -25,7 +25,7 @@ Finding unfinished_run(const fs::path& folder) {
           .to_do = way_on(folder)};
 }
 
-// What another program may have left out, or a run that was cut short.
+// Note on a missing file: another program may have left it out, or the run was cut short.
 Finding missing(const char* file, const std::string& why) {
   return {.id = std::string("results.") + file,
           .severity = Severity::kNote,
@@ -92,7 +92,7 @@ Examination examine_results(const fs::path& folder) {
     for (const Finding& finding : runs.back().summary.findings)
       if (finding.id == kFailedRun) result.findings.push_back(finding);
   }
-  // A robot alone knew at its end whom it had heard; of a team all are known.
+  // A single robot knew at its end which robots it had heard; its own findings include this.
   const bool is_alone = runs.size() == 1 && !runs.front().summary.findings.empty();
   const std::vector<Finding> found = is_alone ? runs.front().summary.findings : findings_of(runs);
   for (const Finding& finding : found)

@@ -25,10 +25,8 @@ namespace fs = std::filesystem;
 constexpr int kUnusable = 2;
 
 constexpr const char* kAbout =
-    "Tells what is wrong with a recording, with live sensors, with the network between robots, or "
-    "with a run, before hours are spent on it: each finding with its number, what it means and "
-    "what "
-    "to do.";
+    "Finds faults of a recording, of live sensors, of the network between robots, or of a run, "
+    "before hours are spent on them: each finding has its number, its meaning and a remedy.";
 
 constexpr const char* kFooter = R"(
 PATH is a recording (EuRoC/ASL folder; a bag of ROS 1 or 2 or an MCAP file, with --rig), or the results of
@@ -48,7 +46,8 @@ Examples
   For programs:
     kimera_multi_doctor MH_01_easy --json doctor.json
 
-What the motion or the images cannot tell is said so and is no finding: turn the camera about two axes.
+A quantity that motion and images do not determine is listed, and is no finding. Turn the camera about two
+axes to determine it.
 Exit codes: 0 sound; 1 warnings; 2 it will not work, or this command line or PATH cannot be used.)";
 
 struct Options {
@@ -183,7 +182,7 @@ int diagnose(const Options& options) {
 
 int main(int argc, char** argv) try {
   const km::Options options = km::parse_options(argc, argv);
-  km::log::set_level(km::log::Level::kError);  // what counts is told as findings
+  km::log::set_level(km::log::Level::kError);  // faults are reported as findings instead
   cv::setNumThreads(1);
   return km::diagnose(options);
 } catch (const std::exception& error) {

@@ -17,10 +17,10 @@ constexpr std::size_t kPrefixAt = 8, kHeaderBytes = 20, kSubmessageHeaderBytes =
                       kDataFieldsBytes = 20;
 constexpr std::uint8_t kData = 0x15;
 constexpr std::uint8_t kLittleEndian = 1, kInlineQos = 2, kHasPayload = 4;
-constexpr std::uint32_t kParticipantWriter = 0x100c2;  // of SPDP
+constexpr std::uint32_t kParticipantWriter = 0x100c2;  // entity id of the SPDP writer
 constexpr std::uint16_t kSentinel = 1, kDomainId = 0x0f, kUserData = 0x2c, kDomainTag = 0x4014;
 
-// Reads numbers of either order; never beyond the end.
+// Reads numbers of either byte order; never beyond the end.
 class Bytes {
  public:
   Bytes(std::span<const std::uint8_t> bytes, bool is_little)
@@ -50,7 +50,7 @@ class Bytes {
   bool is_little_;
 };
 
-// Calls use(id, offset of the value) for each parameter; the offset behind them.
+// Calls use(id, offset of the value) for each parameter; returns the offset behind them.
 std::size_t for_each_parameter(const Bytes& bytes, std::size_t at, const auto& use) {
   while (at + 4 <= bytes.size()) {
     const auto id = static_cast<std::uint16_t>(bytes.number(at, 2));
@@ -175,7 +175,7 @@ void examine_buffers(const NetworkFacts& facts, Examination& result) {
   result.figures.push_back({"receive buffer", bytes_text(static_cast<double>(granted)) +
                                                   " at most (net.core.rmem_max), asked for " +
                                                   bytes_text(static_cast<double>(asked))});
-  constexpr long kUsual = 212992;  // of Linux
+  constexpr long kUsual = 212992;  // default of Linux
   if (granted >= asked) return;
   result.findings.push_back(
       {.id = "network.buffers",
@@ -186,7 +186,7 @@ void examine_buffers(const NetworkFacts& facts, Examination& result) {
        .to_do = "sysctl -w net.core.rmem_max=" + std::to_string(asked)});
 }
 
-// Robots by what keeps them from this team.
+// Robots by the reason why they are not in this team.
 struct Robots {
   std::vector<Announced> of_team, of_other_team, on_other_domain, other_protocol;
   std::size_t other_programs = 0;

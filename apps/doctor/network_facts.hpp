@@ -17,36 +17,37 @@ namespace km {
 
 /// A DDS participant as it announces itself on the link.
 struct Announced {
-  /// Of its process; zero where it is not known.
+  /// GUID prefix of its process; zero if unknown.
   std::array<std::uint8_t, 12> guid_prefix = {};
   int domain = 0;
   std::string team = {};                       ///< Its domain tag.
   std::string from = {};                       ///< Address.
-  std::string user_data = {};                  ///< As it came; empty of other programs.
-  std::optional<RobotIdentity> identity = {};  ///< Of a robot whose user data can be read.
+  std::string user_data = {};                  ///< As received; empty for other programs.
+  std::optional<RobotIdentity> identity = {};  ///< For a robot with readable user data.
 };
 
-/// What a packet of DDS discovery announces; nullopt for bytes that are none. `from`, `domain`: of
-/// the socket that it came from. RTPS 2.5, 8.5.3 and 9.6.3.2 (SPDPdiscoveredParticipantData).
+/// The participant that a packet of DDS discovery announces; nullopt for other bytes. `from`:
+/// sender; `domain`: that of the socket that received it. RTPS 2.5, 8.5.3 and 9.6.3.2
+/// (SPDPdiscoveredParticipantData).
 [[nodiscard]] std::optional<Announced> parse_announcement(const std::vector<std::uint8_t>& packet,
                                                           int domain, const std::string& from);
 
-/// A peer that was asked for echoes.
+/// Result of echo requests to a peer.
 struct PeerEcho {
   std::string host;
   std::size_t sent = 0, received = 0;
   double median_s = 0.0, worst_s = 0.0;  ///< Round trip; NaN without any.
-  bool may_ask = true;                   ///< False: this user may not send ICMP.
+  bool may_ask = true;                   ///< False: this user has no permission for ICMP.
 };
 
-/// How far the wall clock of a robot is ahead of this one, by the stamps of its messages: the least
-/// of the differences, so that the time on the way adds at most its least. [s]
+/// Offset of the wall clock of a robot from this one, by the stamps of its messages [s]. It is the
+/// least of the differences, so its error is at most the least transmission time.
 struct ClockDifference {
   std::string robot;
   double ahead_s = 0.0;
 };
 
-/// What can be found out about the network without taking part in a session.
+/// Facts about the network that are found without taking part in a session.
 struct NetworkFacts {
   DdsConfig config = {};
   std::vector<NetworkInterface> interfaces = {};
@@ -54,11 +55,12 @@ struct NetworkFacts {
   std::string no_interface = {};  ///< Why none was chosen.
   std::optional<int> mtu = {};
   std::optional<std::string> no_multicast =
-      {};  ///< Why an own datagram to the group did not come back.
-  std::optional<std::string> no_unicast = {};       ///< Likewise to the own address.
+      {};  ///< Reason why an own datagram to the group did not come back.
+  std::optional<std::string> no_unicast =
+      {};  ///< Reason why an own datagram to the own address did not come back.
   std::optional<long> largest_receive_buffer = {};  ///< net.core.rmem_max [B].
   std::vector<Announced> announced = {};            ///< On any domain up to kLastQuietDomain.
-  std::vector<Announced> heard = {};  ///< By DDS itself, as configured: also by address.
+  std::vector<Announced> heard = {};  ///< Received by DDS itself, as configured: also by address.
   double listened_s = 0.0;
   std::vector<PeerEcho> echoes = {};
   std::vector<ClockDifference> clocks = {};
@@ -67,7 +69,7 @@ struct NetworkFacts {
 /// Ids: network.interface, network.several_interfaces, network.loopback, network.no_multicast_flag,
 /// network.multicast, network.firewall, network.mtu, network.buffers, network.domain_ports,
 /// network.other_domain, network.other_team, network.protocol, network.same_id,
-/// network.other_programs, network.nobody, network.unreachable, network.loss, network.slow,
+/// network.other_programs, `network.nobody`, network.unreachable, network.loss, network.slow,
 /// network.clock.
 [[nodiscard]] Examination examine_network(const NetworkFacts& facts);
 

@@ -27,7 +27,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr const char* kGroup = "239.255.0.1";  // of DDS discovery (RTPS 2.5, Sec. 9.6.1.4)
+constexpr const char* kGroup = "239.255.0.1";  // group of DDS discovery (RTPS 2.5, Sec. 9.6.1.4)
 constexpr milliseconds kPatience{500};
 
 std::uint16_t discovery_port(int domain) {
@@ -47,12 +47,12 @@ std::optional<long> largest_receive_buffer() {
     const std::string text = read_input_file("/proc/sys/net/core/rmem_max");
     const auto bytes = parse_int64(std::string_view(text).substr(0, text.find('\n')));
     return bytes ? std::optional(static_cast<long>(*bytes)) : std::nullopt;
-  } catch (const InputFileError&) {  // hidden in a container
+  } catch (const InputFileError&) {  // not readable in a container
     return std::nullopt;
   }
 }
 
-// Bytes that nobody else sends, and that DDS drops as none of its own.
+// Random bytes that no other program sends, and that DDS drops as invalid.
 std::vector<std::uint8_t> own_bytes() {
   std::vector<std::uint8_t> bytes = {'K', 'M', 'D', 'R'};
   std::random_device device;
@@ -60,7 +60,7 @@ std::vector<std::uint8_t> own_bytes() {
   return bytes;
 }
 
-// Why a datagram to `address` did not come back; it may be among others.
+// Reason why a datagram to `address` did not come back. Other datagrams may arrive before it.
 std::optional<std::string> echo_to(DatagramSocket& socket, const std::string& address) {
   const std::vector<std::uint8_t> bytes = own_bytes();
   if (auto problem = socket.send(address, socket.port(), bytes)) return problem;
@@ -84,7 +84,7 @@ std::optional<std::string> try_unicast(const NetworkInterface& chosen) {
   return echo_to(socket, chosen.address);
 }
 
-// One announcement of each process.
+// Keeps one announcement of each process.
 void keep(std::vector<Announced>& all, const Announced& one) {
   const auto is_same = [&one](const Announced& other) {
     return other.domain == one.domain && other.team == one.team && other.from == one.from &&
@@ -93,7 +93,7 @@ void keep(std::vector<Announced>& all, const Announced& one) {
   if (std::ranges::none_of(all, is_same)) all.push_back(one);
 }
 
-// Hears what participants announce to all, whatever their domain and team.
+// Receives the multicast announcements of participants, whatever their domain and team.
 class DiscoveryListener {
  public:
   DiscoveryListener(const DdsConfig& config, const NetworkInterface& chosen) {
@@ -105,12 +105,13 @@ class DiscoveryListener {
         if (socket.join(kGroup, chosen.address)) continue;
         sockets_.push_back(std::move(socket));
         domains_.push_back(domain);
-      } catch (const std::system_error&) {  // another program's port: nothing of it can be heard
+      } catch (const std::system_error&) {  // another program owns the port, so nothing is received
+                                            // on it
       }
     }
   }
 
-  // All but `self`.
+  // Collects all announcements except for those of `self`.
   void listen(milliseconds patience, const Guid& self, std::vector<Announced>& heard) {
     std::vector<pollfd> waiting;
     for (const DatagramSocket& socket : sockets_)
@@ -131,7 +132,7 @@ class DiscoveryListener {
   std::vector<int> domains_;
 };
 
-// Takes part in DDS discovery as any program may that is no robot: robots do not mind it.
+// A DDS participant that is no robot: it takes part in discovery only, and robots ignore it.
 class Bystander {
  public:
   explicit Bystander(const DdsConfig& config)
@@ -155,18 +156,18 @@ class Bystander {
     return to_guid(guid);
   }
 
-  // What DDS has heard so far.
+  // Adds the participants that DDS has discovered so far.
   void take(std::vector<Announced>& heard) {
     for_each(participants_, [&](const dds_sample_info_t& info, const void* sample) {
       const auto& found = *static_cast<const dds_builtintopic_participant_t*>(sample);
       if (!info.valid_data) return;
       Announced one{.guid_prefix = {},
                     .domain = domain_.config().domain,
-                    .team = domain_.config().team,  // others are not heard
+                    .team = domain_.config().team,  // only this team is discovered
                     .from = {},
                     .user_data = user_data_of(found.qos),
                     .identity = {}};
-      if (!claims_to_be_a_robot(one.user_data)) return;  // this one is among them
+      if (!claims_to_be_a_robot(one.user_data)) return;  // other programs, among them this one
       if (const auto announcement = parse_user_data(one.user_data).value) {
         one.identity = announcement->identity;
         of_participant_[info.instance_handle] = to_string(*one.identity);
@@ -175,7 +176,7 @@ class Bystander {
     });
   }
 
-  // Of each writer of statuses, the least that its stamps were ahead of the clock here.
+  // For each writer of statuses, keeps the least offset of its stamps from the clock of this host.
   void take_clocks() {
     const double now_s = wall_now_s();
     for_each(statuses_, [&](const dds_sample_info_t& info, const void* /*sample*/) {
@@ -232,7 +233,7 @@ std::uint16_t checksum(const std::vector<std::uint8_t>& bytes) {
   return static_cast<std::uint16_t>(~sum);
 }
 
-// RFC 792: type 8, code 0, checksum, identifier and sequence number, and what comes back: `data`.
+// RFC 792: type 8, code 0, checksum, identifier and sequence number, and the echoed bytes: `data`.
 std::vector<std::uint8_t> echo_request(const std::vector<std::uint8_t>& data) {
   std::vector<std::uint8_t> bytes(8, 0);
   bytes[0] = 8;
@@ -248,7 +249,7 @@ bool is_echo(const std::vector<std::uint8_t>& bytes, const std::vector<std::uint
          std::equal(data.begin(), data.end(), bytes.begin() + 8);
 }
 
-// One after the other, each waited for.
+// Sends echo requests one after the other, and waits for each.
 PeerEcho ask(const std::string& host) {
   PeerEcho echo{.host = host,
                 .median_s = std::numeric_limits<double>::quiet_NaN(),
@@ -268,7 +269,7 @@ PeerEcho ask(const std::string& host) {
       times_s.push_back(steady_now_s() - start_s);
       break;
     }
-    if (times_s.empty() && echo.sent >= 3) return echo;  // nobody there: no need to wait on
+    if (times_s.empty() && echo.sent >= 3) return echo;  // no answer: waiting longer is of no use
   }
   echo.received = times_s.size();
   if (times_s.empty()) return echo;

@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// What a socket received.
+/// A received datagram.
 struct Datagram {
   std::string from;  ///< Address, dotted.
   std::vector<std::uint8_t> bytes;
@@ -17,10 +17,10 @@ struct Datagram {
 /// An IPv4 socket for datagrams: UDP, or ICMP echoes. Not thread-safe.
 class DatagramSocket {
  public:
-  /// UDP on `port` (0: any) of all addresses, shared with whoever listens there. Throws
+  /// UDP on `port` (0: any) of all addresses, shared with other programs that listen there. Throws
   /// std::system_error.
   [[nodiscard]] static DatagramSocket udp(std::uint16_t port);
-  /// For ICMP echoes; nullopt if this user may not.
+  /// Socket for ICMP echoes; nullopt if this user has no permission.
   [[nodiscard]] static std::optional<DatagramSocket> icmp();
   ~DatagramSocket();
   DatagramSocket(DatagramSocket&& other) noexcept;
@@ -29,23 +29,23 @@ class DatagramSocket {
   [[nodiscard]] int handle() const { return socket_; }
   [[nodiscard]] std::uint16_t port() const;
 
-  /// Receives what is sent to `group` on the interface with this address, and sends there through
-  /// it, itself included. Why not, if that fails.
+  /// Joins `group` on the interface with this address: receives its datagrams, and sends to it
+  /// through that interface, also to itself. Returns the reason if this fails.
   [[nodiscard]] std::optional<std::string> join(const std::string& group,
                                                 const std::string& interface_address);
 
-  /// Why it could not be sent, if so.
+  /// Sends a datagram. Returns the reason if this fails.
   [[nodiscard]] std::optional<std::string> send(const std::string& address, std::uint16_t port,
                                                 const std::vector<std::uint8_t>& bytes);
 
-  /// The next datagram, waited for as long; nullopt without one.
+  /// The next datagram; nullopt if none arrives within `patience`.
   [[nodiscard]] std::optional<Datagram> receive(std::chrono::milliseconds patience);
 
  private:
   explicit DatagramSocket(int socket, bool has_ip_header = false)
       : socket_(socket), has_ip_header_(has_ip_header) {}
   int socket_;
-  bool has_ip_header_;  // before what is received
+  bool has_ip_header_;  // received bytes begin with an IP header
 };
 
 /// Address of a host, dotted, by its name or address, with or without ":port"; nullopt if unknown.

@@ -31,7 +31,7 @@ struct ClosuresCommand {
 
 constexpr std::string_view kKeyframes = "keyframes.csv", kClosures = "loop_closures.csv";
 
-// What the robots of one folder of results, or of one record, found.
+// Keyframes and closures of the robots of one results folder, or of one record.
 struct Found {
   std::vector<KeyframeRecord> keyframes;
   std::vector<ClosureRecord> closures;
@@ -56,7 +56,7 @@ Found found_in(const fs::path& results) {
   return all;
 }
 
-// When a robot was there, as far as its keyframes tell, and what was given of it.
+// Time span of a robot's keyframes, and its inputs.
 struct RobotSpan {
   RobotId robot = 0;
   Stamp first = 0, last = 0;
@@ -85,7 +85,7 @@ std::vector<RobotSpan> spans_of(const std::vector<KeyframeRecord>& keyframes,
   return all;
 }
 
-// Why numbers may be of no use: true poses that are those of another robot, or of nobody.
+// Reasons why the numbers may be useless: the true poses belong to another robot, or to none.
 std::string notes_on(const std::vector<RobotSpan>& spans) {
   const auto name = [](const RobotSpan& span) {
     return "robot " + std::to_string(span.robot) + " (" + span.results.string() + ')';
@@ -133,9 +133,9 @@ void run(const ClosuresCommand& command) {
 }
 
 constexpr const char* kClosuresDetails =
-    "Loop closures of a finished run against the truth, per stage: how many there are, which "
+    "Loop closures of a finished run against the truth, per stage: their number, the "
     "share\n"
-    "is true (precision), and which share of what there was to be found it found (recall)\n\n"
+    "of true ones (precision), and the share of the possible ones that was found (recall)\n\n"
     "A candidate is true if both keyframes see the same place: --min-overlap of either's image, "
     "at\n"
     "the median depth that the keyframe sees, lies in the other's. A verified closure and an "

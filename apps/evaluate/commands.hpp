@@ -6,9 +6,9 @@ class App;
 
 namespace km {
 
-/// Add a subcommand of kimera_multi_evaluate to `app`, which runs as soon as the command line names
-/// it: it prints tables and writes the files asked for. Input that cannot be used throws an
-/// exception whose message is one line.
+/// Each adds a subcommand of kimera_multi_evaluate to `app`, which runs as soon as the command line
+/// names it. A subcommand prints tables and writes the requested files. Unusable input throws an
+/// exception with a message of one line.
 void add_trajectory(CLI::App& app);
 void add_closures(CLI::App& app);
 void add_images(CLI::App& app);

@@ -31,8 +31,9 @@ struct ImagesCommand {
   RecordingWindow window;
   std::optional<double> compare_from_s;  // Window of the other; by default the same.
   std::optional<double> compare_to_s;
-  std::optional<double> still_from_s;  // Where the camera also stands still, in recordings with
-  std::optional<double> still_to_s;    // `window`; by default there is no such place.
+  std::optional<double>
+      still_from_s;  // times in which the camera also stands still, in recordings with
+  std::optional<double> still_to_s;  // `window`; none by default
   ImageStatisticsOptions options;
   std::filesystem::path json;  // Not written if empty.
 };
@@ -97,7 +98,7 @@ std::vector<ImageFigure> figures_of_other(const ImagesCommand& command) {
 
 void run(const ImagesCommand& command) {
   check_output_folder(command.json);
-  // Opened for its errors alone: they come now, not after the minutes the first one takes.
+  // Opened only to report its errors now, instead of minutes later after the first recording.
   if (!command.compare.empty())
     static_cast<void>(open_euroc(command.compare, options_of(window_of_other(command))));
   const auto figures =
@@ -121,9 +122,10 @@ void run(const ImagesCommand& command) {
 }
 
 constexpr const char* kImagesDetails =
-    "What the images of a recording are like: corners, how long they can be tracked, how well "
-    "they\n"
-    "are found in the other camera, gradients, grey levels, exposure, blur and noise\n\n"
+    "Statistics of the images of a recording: corners, how long they can be tracked, how well "
+    "they\nare found in the other camera, gradients, grey levels, exposure, blur and "
+    "noise\n\nTracking depends on motion most of all: compare two recordings by the rows \"flow "
+    "A-B px\",\n"
     "Tracking depends on motion most of all: compare two recordings by the rows \"flow A-B px\",\n"
     "frames of like median flow. Rows that differ by more than 25 % are marked. Noise over time\n"
     "needs the camera to stand still for a second; --still-from and --still-to say where.\n\n"
@@ -146,7 +148,7 @@ void define(CLI::App& app, ImagesCommand& command) {
                  "Also look for standing still from here on [s]");
   app.add_option("--still-to", command.still_to_s, "Also look for standing still up to here [s]");
   app.add_option("--stride", command.options.stride,
-                 "Match ORB and stereo, and start KLT tracks, at every so many pairs")
+                 "Interval of the pairs at which ORB and stereo are matched and KLT tracks start")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--json", command.json, "Also write the figures to this file, as JSON");

@@ -30,7 +30,7 @@ struct MeshCommand {
   std::filesystem::path json;     // Not written if empty.
 };
 
-// Where the robots' trajectories put the meshes.
+// Transform of the meshes by the robots' trajectories.
 SE3 placed_by(const MeshCommand& command) {
   const std::size_t estimates = command.trajectories.size();
   const std::size_t truths = command.true_trajectories.size();
@@ -87,17 +87,17 @@ constexpr const char* kMeshDetails =
     "and distances go from each sample to the nearest one on the other side. Three tables:\n"
     "  each true point         \"mean\" is the mesh error of the Kimera-Multi paper. A true world "
     "is\n"
-    "                          larger than what was seen of it: only points within --crop of the\n"
+    "                          larger than its visible part: only points within --crop of the\n"
     "                          estimate are judged; \"covered\" is their share\n"
     "  only those in front     without those past the rim of the estimate or behind it, which no\n"
     "                          robot can have seen: ground below cars, backs of walls\n"
-    "  each estimated point    what is further than --crop counts as --crop; \"covered\" is the "
+    "  each estimated point    distances above --crop count as --crop; \"covered\" is the "
     "rest\n"
     "Samples of equal surfaces are still 0.5 / sqrt(density) apart, 16 mm at 1000 per square "
     "metre;\n"
     "\"surface\" is the mean without that floor, to the triangles nearby. Labels are judged where\n"
     "the other side is nearer than --max-distance; unknown counts as not right.\n\n"
-    "A robot's mesh lies in the frame of its trajectory. Where that is not the truth's, "
+    "A robot's mesh lies in the frame of its trajectory. If that frame is not that of the truth, "
     "--trajectory\n"
     "and --trajectory-truth place it before ICP.\n\n"
     "Examples:\n"
@@ -122,10 +122,11 @@ void define(CLI::App& app, MeshCommand& command) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--max-samples", options.max_samples,
-                 "Of either side: with more, the density is lowered, and said so")
+                 "Largest number for the estimate, and for the truth: beyond it the density is "
+                 "reduced, with a note")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--seed", options.seed, "Of the samples")->capture_default_str();
+  app.add_option("--seed", options.seed, "Seed of the samples")->capture_default_str();
   app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
   app.add_option("--crop", options.crop_m,
                  "True points further from the estimate are not judged [m]; errors count up to it")

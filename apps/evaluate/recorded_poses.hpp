@@ -18,16 +18,16 @@ struct RecordTopic {
   [[nodiscard]] std::string robot() const { return topic.substr(1, topic.find('/', 1) - 1); }
 };
 
-/// nullopt for what is not of that form.
+/// nullopt for a text without this form.
 [[nodiscard]] std::optional<RecordTopic> split_record(const std::filesystem::path& input);
 
-/// Inputs with each MCAP file replaced by the trajectories in it, FILE:/NAME/path of every robot,
-/// or else FILE:/NAME/odometry. Throws InputFileError for a record that cannot be read or has none.
+/// Inputs with each MCAP file replaced by its trajectories: FILE:/NAME/path of every robot, or else
+/// FILE:/NAME/odometry. Throws InputFileError for a record that cannot be read or has none.
 [[nodiscard]] std::vector<std::filesystem::path> expand_records(
     const std::vector<std::filesystem::path>& inputs);
 
 /// Poses in order of time, from a topic of a record, from the only trajectory of a record, or as
-/// read_trajectory() reads them. Of a nav_msgs/Path the last one counts; nav_msgs/Odometry and
+/// read_trajectory() reads them. The last nav_msgs/Path counts; nav_msgs/Odometry and
 /// geometry_msgs/PoseStamped give one pose each. Throws InputFileError and TrajectoryFileError, in
 /// one line.
 [[nodiscard]] std::vector<StampedPose> read_estimate(const std::filesystem::path& input);

@@ -28,15 +28,16 @@ namespace fs = std::filesystem;
 struct RenderCommand {
   std::vector<std::filesystem::path> meshes;        // PLY.
   std::vector<std::filesystem::path> trajectories;  // TUM or EuRoC CSV, in the meshes' frame.
-  std::vector<std::filesystem::path> references;    // Of the first trajectories, in the frame to
-                                                    // draw in; by default the meshes'.
-  std::vector<std::string> views = {"top"};         // See parse_view().
-  std::string color = "auto";                       // auto, label, own, shade, robot.
+  std::vector<std::filesystem::path>
+      references;  // References for the first trajectories, in the frame to draw in; by default
+                   // that of the meshes.
+  std::vector<std::string> views = {"top"};  // See parse_view().
+  std::string color = "auto";                // auto, label, own, shade, robot.
   std::string size = "1600x1200";
   double above_m = std::numeric_limits<double>::infinity();
   bool both_sides = false;
   std::filesystem::path palette;  // By default the one beside the first mesh.
-  std::filesystem::path output;   // PNG; of several views the second is NAME_2.png.
+  std::filesystem::path output;   // PNG; the file of the second view is NAME_2.png.
 };
 
 constexpr int kMinSide_px = 64;
@@ -140,7 +141,7 @@ constexpr const char* kRenderDetails =
     "  top, front, oblique     parallel, fill the picture\n"
     "  x,y,z,yaw,pitch         perspective from there [m, deg]: yaw 90 looks along y, pitch -30 "
     "down\n"
-    "  x,y,z,qx,qy,qz,qw       likewise, a camera's pose (its z forward, y down)\n"
+    "  x,y,z,qx,qy,qz,qw       pose of the camera (its z forward, y down)\n"
     "Write --view=-1,... for one that begins with a minus sign.\n\n"
     "A team's frame is the odometry frame of the robot with the lowest id, so upright. "
     "--reference\n"
@@ -155,18 +156,18 @@ constexpr const char* kRenderDetails =
 
 void define(CLI::App& app, RenderCommand& command) {
   app.add_option("--mesh", command.meshes, "Meshes (PLY) in one frame")->required();
-  app.add_option("--output", command.output, "PNG; of several views the second is NAME_2.png")
+  app.add_option("--output", command.output, "PNG; the file of the second view is NAME_2.png")
       ->required();
-  app.add_option("--view", command.views, "Where from, see above; several: a picture each")
+  app.add_option("--view", command.views, "Viewpoint, see above; several give a picture each")
       ->capture_default_str();
   app.add_option("--trajectory", command.trajectories,
                  "Poses drawn on top (TUM, EuRoC CSV, or a record: see trajectory)");
   app.add_option("--reference", command.references,
                  "Poses of the first trajectories in the frame to draw in: the truth puts the map "
                  "into the world, the first robot's odometry.tum stands it upright");
-  app.add_option(
-         "--color", command.color,
-         "Of the label, the vertices' own, none, or one per mesh; auto: labels if there are")
+  app.add_option("--color", command.color,
+                 "Colours by label, of the vertices, none, or one per mesh; auto: by label if "
+                 "there are labels")
       ->check(CLI::IsMember({"auto", "label", "own", "shade", "robot"}))
       ->capture_default_str();
   app.add_option("--size", command.size, "WIDTHxHEIGHT without the legend [px]")

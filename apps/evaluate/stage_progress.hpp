@@ -10,8 +10,8 @@
 
 namespace km {
 
-/// A line on standard error that is rewritten, once the work takes more than two seconds, with
-/// the time that the stage will still take; silent where nobody looks.
+/// Progress line on standard error, rewritten once the work takes more than two seconds. It shows
+/// the remaining time of the stage. Nothing is printed if standard error is no terminal.
 class StageProgress {
  public:
   StageProgress() = default;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kDecimals = 2;
 
-// "30 of 714" closures of a kind, inside robots or between them.
+// Number of closures inside robots or between them, as "30 of 714".
 std::string part_text(const Json& root, const std::string& place, const char* part,
                       const char* other) {
   const auto count = [&](const char* name) {
@@ -48,7 +48,7 @@ std::vector<ReportCell> row_of(const CosmoSet& set, const Json& root,
           {number_text(of_last("/critical_path_s"), 3)}};
 }
 
-// Not further from the truth than the best that was published.
+// Target: the error is not larger than the smallest published one.
 void add_target(const CosmoSet& set, const Json& root, const PublishedTeamErrors& published,
                 ReportInput& input) {
   std::vector<double> errors_m = published.irls_gnc_m;
@@ -56,7 +56,7 @@ void add_target(const CosmoSet& set, const Json& root, const PublishedTeamErrors
   const auto ate_m = number_at(root, "/ate/team_m");
   if (!ate_m || errors_m.empty()) return;
   const double best_m = *std::min_element(errors_m.begin(), errors_m.end());
-  constexpr double kRounding_m = 0.005;  // of the published values
+  constexpr double kRounding_m = 0.005;  // rounding of the published values
   input.add_target({"ATE on COSMO-Bench", set.title,
                     "at most " + fixed(best_m, kDecimals) + " m, the best published",
                     fixed(*ate_m, kDecimals) + " m", *ate_m < best_m + kRounding_m});

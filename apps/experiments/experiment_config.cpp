@@ -19,7 +19,7 @@ const WorldConfig* find_world(const std::vector<WorldConfig>& worlds, const std:
   return found == worlds.end() ? nullptr : &*found;
 }
 
-// Trajectories do not depend on the map: runs that only tell their spread do without.
+// Trajectories do not depend on the map, so runs that only show the spread have none.
 WorldConfig repetition(const WorldConfig& world, const std::string& kind, unsigned number) {
   WorldConfig other = world;
   other.name += '-' + kind + std::to_string(number);
@@ -37,7 +37,7 @@ void set_seed(Texts& arguments, unsigned seed) {
     arguments.insert(arguments.end(), {"--seed", std::to_string(seed)});
 }
 
-// What a world and its repetitions are called, and differ in.
+// Sets the names of a world and its repetitions, and the options in which they differ.
 void add_with_repetitions(WorldConfig world, const std::string& name,
                           std::vector<WorldConfig>& worlds) {
   world.name = world.recordings = name;
@@ -51,7 +51,8 @@ void add_with_repetitions(WorldConfig world, const std::string& name,
   }
 }
 
-// The paper's pipeline on the recordings of a world. It is no repetition: it is another method.
+// The paper's pipeline on the recordings of a world. It is another method and therefore no
+// repetition.
 WorldConfig run_by_pipeline(const WorldConfig& world, const Texts& robot_options) {
   WorldConfig other = world;
   other.name += kPaperRun;

@@ -9,12 +9,12 @@
 
 namespace km {
 
-/// A world, the recordings that robots make in it, and how a team is run on them: a map of
+/// A world, the recordings that robots make in it, and the run of a team on them: a map of
 /// worlds.yaml.
 struct WorldConfig {
   std::string name;
-  std::string repeats = {};     ///< Name of the world this is another run of; or empty.
-  std::string recordings = {};  ///< Name of the world whose recordings it is run on.
+  std::string repeats = {};     ///< Name of the world that this repeats, or empty.
+  std::string recordings = {};  ///< Name of the world that provides the recordings.
   std::string title;
   std::vector<std::string> robots;
   std::filesystem::path simulation;
@@ -31,28 +31,33 @@ struct WorldConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("title", title, "for people; default: its name");
-    visitor.field("robots", robots, "their names, in the order of their ids");
+    visitor.field("robots", robots, "names of the robots, in the order of their ids");
     visitor.field("simulation", simulation, Input{}, "file of options of kimera_multi_simulate");
-    visitor.field("simulate", simulate, "more options of it, over the file's");
+    visitor.field("simulate", simulate,
+                  "more options of kimera_multi_simulate, which override the file");
     visitor.field("flights", flights,
                   "the robots move as EuRoC's recordings of their names did, with the recorded "
                   "inertial data; the original images are used where --euroc has them");
-    visitor.field("original_config", original_config, Input{}, "of robots on EuRoC's own images");
+    visitor.field("original_config", original_config, Input{},
+                  "configuration of robots on EuRoC's own images");
     visitor.field("team", team, "options of kimera_multi_team");
     visitor.field("robot", robot, "options of every robot");
-    visitor.field("runs", runs, {1, 99},
-                  "how often the team is run, for the spread; all but the first without a map");
-    visitor.field("seeds", seeds, {0, ~0U},
-                  "further seeds of the world: simulated and run like it, without a map");
+    visitor.field(
+        "runs", runs, {1, 99},
+        "number of runs of the team, for the spread; all except for the first without a map");
+    visitor.field(
+        "seeds", seeds, {0, ~0U},
+        "further seeds of the world: each is simulated and run in the same way, without a map");
     visitor.field("picture", picture, "options of kimera_multi_evaluate render");
     visitor.field("simulate_s", simulate_s, {1e-3, 1e6},
-                  "[s] how long simulating takes on two cores, roughly, for the time left");
-    visitor.field("team_s", team_s, {1e-3, 1e6}, "[s] the same of the team");
+                  "[s] approximate time to simulate on two cores, for the remaining time");
+    visitor.field("team_s", team_s, {1e-3, 1e6},
+                  "[s] approximate time to run the team on two cores, for the remaining time");
     visitor.required({"robots"});
   }
 };
 
-/// Clique search against the size of the graph: pcm.yaml.
+/// Time of the clique search by the size of the graph: pcm.yaml.
 struct PcmExperiment {
   std::string graph;
   std::size_t closures = 0;
@@ -63,13 +68,14 @@ struct PcmExperiment {
 
   void visit_fields(auto& visitor) {
     visitor.field("graph", graph, "g2o file, looked for in --graphs");
-    visitor.field("closures", closures, {0, 1000000}, "of the file's, drawn at random; 0: all");
-    visitor.field("outliers", outliers, {0, 1000000}, "random false ones added");
+    visitor.field("closures", closures, {0, 1000000},
+                  "number of closures drawn at random from the file; 0: all");
+    visitor.field("outliers", outliers, {0, 1000000}, "number of random false closures added");
     visitor.field("seeds", seeds, {0, ~0U},
-                  "of the random closures: a run each; the report has medians and ranges");
+                  "seeds of the random closures: one run each; the report has medians and ranges");
     visitor.field("searches", searches, "exact, incremental, batch");
     visitor.field("seed_s", seed_s, {1e-3, 1e6},
-                  "[s] how long a seed takes, roughly, for the time left");
+                  "[s] approximate time of a seed, for the remaining time");
     visitor.required({"graph", "seeds", "searches"});
     for (const std::string& search : searches)
       visitor.check(search == "exact" || search == "incremental" || search == "batch", "searches",
@@ -97,16 +103,16 @@ struct CosmoExperiment {
   std::vector<CosmoSet> sets;
 };
 
-/// One robot without others and without a map.
+/// One robot without a team and without a map.
 struct AloneExperiment {
   std::string world;
   std::string robot;
   std::vector<std::string> arguments;
 
   void visit_fields(auto& visitor) {
-    visitor.field("world", world, "whose recording it is run on");
-    visitor.field("robot", robot, "of that world");
-    visitor.field("arguments", arguments, "of kimera_multi_robot");
+    visitor.field("world", world, "world with its recording");
+    visitor.field("robot", robot, "robot of that world");
+    visitor.field("arguments", arguments, "options of kimera_multi_robot");
     visitor.required({"world", "robot"});
   }
 };
@@ -121,28 +127,29 @@ struct PgoMethodConfig {
     visitor.field("name", name,
                   "local, rbcd, rbcd50, dgs and centralized are compared with the paper");
     visitor.field("title", title, "for people; default: its name");
-    visitor.field("arguments", arguments, "of kimera_multi_pgo solve");
+    visitor.field("arguments", arguments, "options of kimera_multi_pgo solve");
     visitor.required({"name", "arguments"});
   }
 };
 
-/// What the files in config/experiments/ say.
+/// Content of the files in config/experiments/.
 struct ExperimentConfig {
   bool quick = false;  ///< Small versions of the experiments.
-  /// Those of worlds.yaml, each followed by its repetitions: WORLD-run2 on the same recordings,
-  /// WORLD-seed2 on those of another seed. Last WORLD-paper, the run of the paper's pipeline.
+  /// Worlds of worlds.yaml, each followed by its repetitions: WORLD-run2 on the same recordings,
+  /// WORLD-seed2 on those of another seed. WORLD-paper, the run of the
+  /// paper's pipeline, is last.
   std::vector<WorldConfig> worlds;
   PcmExperiment pcm;
   CosmoExperiment cosmo;
-  AloneExperiment alone;                       ///< Without a world: there is no such experiment.
-  std::vector<std::string> trajectory_worlds;  ///< Names in `worlds`, as those below.
+  AloneExperiment alone;                       ///< An empty world disables this experiment.
+  std::vector<std::string> trajectory_worlds;  ///< Names in `worlds`, as in the lists below.
   std::vector<PgoMethodConfig> methods;
   std::vector<std::string> paper_pipeline;  ///< Options of robots that run the paper's pipeline.
   std::vector<std::string> resources_worlds;
   std::vector<std::string> mesh_worlds;
   std::vector<std::string> semantics_worlds;
 
-  /// Precondition: there is one of that name.
+  /// Precondition: a world of that name exists.
   [[nodiscard]] const WorldConfig& world(const std::string& name) const;
 
   /// The run of a world's team by the paper's pipeline; nullptr if there is none.
@@ -153,12 +160,11 @@ struct ExperimentConfig {
 };
 
 /// Reads worlds.yaml, pcm.yaml, cosmo.yaml, trajectory.yaml, resources.yaml, mesh.yaml and
-/// semantics.yaml.
-/// With `quick` the keys below `quick:` replace those beside it. Throws ConfigError with every
-/// problem of all files, by file and line; names of worlds must be in worlds.yaml.
+/// semantics.yaml. With `quick` the keys below `quick:` replace those beside it. Throws ConfigError
+/// with every problem of all files, by file and line. Names of worlds must be in worlds.yaml.
 [[nodiscard]] ExperimentConfig read_experiments(const std::filesystem::path& folder, bool quick);
 
-/// The keys of a world, with their defaults and meaning.
+/// Documentation of the keys of a world, with their defaults.
 [[nodiscard]] std::string world_keys();
 
 }  // namespace km

@@ -22,7 +22,7 @@ std::vector<fs::path> entries_named(const fs::path& place, const std::string& na
   for (; !error && walk != fs::recursive_directory_iterator(); walk.increment(error)) {
     const std::string entry = walk->path().filename().string();
     if (entry.starts_with(name)) found.push_back(walk->path());
-    // Inside a recording there are only its thousands of images.
+    // Recordings are not searched, because they contain only thousands of images.
     if (walk.depth() + 1 >= kDepth || entry == "mav0" || entry.starts_with(name))
       walk.disable_recursion_pending();
   }
@@ -30,7 +30,7 @@ std::vector<fs::path> entries_named(const fs::path& place, const std::string& na
   return found;
 }
 
-// Time between the first and the last image of the left camera for which there is a file [s].
+// Time between the first and the last image of the left camera with a file [s].
 double recorded_s(const fs::path& folder) {
   const fs::path camera = folder / "mav0/cam0";
   std::error_code error;
@@ -53,7 +53,7 @@ void take(const fs::path& file, fs::path& place) {
   if (place.empty() && fs::is_regular_file(file)) place = file;
 }
 
-// True if EuRoC's own images are there of all robots.
+// True if EuRoC's own images of all robots exist.
 bool has_original_images(const WorldConfig& world, const ExperimentPaths& paths) {
   return world.flights && !paths.euroc.empty() &&
          std::all_of(world.robots.begin(), world.robots.end(), [&](const std::string& robot) {
@@ -73,7 +73,7 @@ std::string team_step_name(const WorldConfig& world) {
   return "team-" + world.name;
 }
 
-// The simulator notes whether it came to its end.
+// The simulator writes whether it was completed.
 bool is_complete(const fs::path& simulation_json) try {
   return fs::is_regular_file(simulation_json) &&
          YAML::LoadFile(simulation_json.string())["complete"].as<bool>(false);
@@ -81,7 +81,7 @@ bool is_complete(const fs::path& simulation_json) try {
   return false;
 }
 
-// Options that make the robots move as recorded; what is not there is noted in the step.
+// Options that make the robots move as recorded; missing files are noted in the step.
 void add_flights(const WorldConfig& world, const ExperimentPaths& paths, Step& step) {
   std::vector<std::string> truths, imus;
   for (const std::string& robot : world.robots) {
@@ -150,7 +150,7 @@ std::vector<fs::path> of_robots(const WorldConfig& world, const fs::path& run, c
   return paths;
 }
 
-// Of each robot; nothing if they are not known of all.
+// True poses of each robot; empty if those of some robot are unknown.
 std::vector<fs::path> true_poses(const WorldConfig& world, const WorldFiles& files,
                                  const ExperimentPaths& paths) {
   if (!files.original)
@@ -163,7 +163,7 @@ std::vector<fs::path> true_poses(const WorldConfig& world, const WorldFiles& fil
   return truths;
 }
 
-// A run that was made elsewhere is not repeated: its tables are.
+// A run that was made elsewhere is not repeated, but its tables are made again.
 bool made_elsewhere(const Step& step, const std::vector<fs::path>& summaries,
                     const ExperimentPaths& paths) {
   if (!all_exist(summaries)) return false;
@@ -202,10 +202,11 @@ Step team_step(const WorldConfig& world, const ExperimentPaths& paths) {
   return step;
 }
 
-// Recordings of a world, unless they are another's or EuRoC's own, and the team's run on them.
+// Recordings of a world, unless another world or EuRoC provides them, and the team's run on them.
 std::vector<Step> world_steps(const WorldConfig& world, const ExperimentPaths& paths) {
   std::vector<Step> steps;
-  const bool has_own = world.recordings == world.name;  // else the world that it repeats makes them
+  const bool has_own =
+      world.recordings == world.name;  // otherwise the world that it repeats makes the recordings
   if (has_own && !has_original_images(world, paths)) steps.push_back(simulate_step(world, paths));
   steps.push_back(team_step(world, paths));
   return steps;
@@ -232,7 +233,7 @@ std::vector<Step> picture_steps(const WorldConfig& world, const ExperimentPaths&
     for (const fs::path& trajectory : trajectories) step.command.push_back(trajectory.string());
     step.inputs = meshes;
     step.inputs.insert(step.inputs.end(), trajectories.begin(), trajectories.end());
-    if (!truths.empty()) {  // they stand the map upright
+    if (!truths.empty()) {  // they turn the map upright
       step.command.emplace_back("--reference");
       for (const fs::path& truth : truths) step.command.push_back(truth.string());
     }
@@ -307,7 +308,7 @@ std::vector<Step> pgo_steps(const WorldConfig& world, const std::vector<PgoMetho
   return steps;
 }
 
-// The recording of its world, and the robot on it.
+// Makes the recording of the world, and runs the robot on it.
 std::vector<Step> alone_steps(const ExperimentConfig& config, const ExperimentPaths& paths) {
   const WorldConfig& world = config.world(config.alone.world);
   const AloneFiles files = alone_files(config, paths);
@@ -321,7 +322,7 @@ std::vector<Step> alone_steps(const ExperimentConfig& config, const ExperimentPa
       .expected_s = 0.25 * world.team_s};
   append(step.command, config.alone.arguments);
   std::vector<Step> steps = world_steps(world, paths);
-  steps.pop_back();  // the team
+  steps.pop_back();  // removes the run of the team
   if (world_files(world, paths).original) {
     if (!world.original_config.empty())
       append(step.command, {"--config", world.original_config.string()});

@@ -11,23 +11,23 @@
 
 namespace km {
 
-/// What there is of one of EuRoC's recordings.
+/// Existing files of one of EuRoC's recordings.
 struct RecordedFlightFiles {
   std::filesystem::path folder;  ///< ASL folder with images of both cameras; or empty.
   std::filesystem::path truth;   ///< True poses (CSV or TUM, perhaps gzipped); or empty.
   std::filesystem::path imu;     ///< Inertial data; or empty.
 };
 
-/// Looks below `place` for the recording `name`: for an ASL folder whose name begins with it
-/// (V1_01_easy, with mav0 in it), and for files NAME*.csv or NAME*.txt, perhaps with .gz, of true
-/// poses or, with "imu" in their name, of inertial data. Of an ASL folder the images count as there
-/// if those of the left camera span at least `least_s` (an excerpt is not the flight). At most
-/// three levels deep; of several the first by name counts.
+/// Searches below `place` for the recording `name`, at most three levels deep. Finds an ASL folder
+/// whose name begins with it (V1_01_easy, with mav0 in it), and files NAME*.csv or NAME*.txt,
+/// perhaps with .gz. Files with "imu" in their name are inertial data, others true poses. An ASL
+/// folder counts only if its left images span at least `least_s`, because an excerpt is not the
+/// flight. The first by name counts.
 [[nodiscard]] RecordedFlightFiles find_recorded_flight(const std::filesystem::path& place,
                                                        const std::string& name,
                                                        double least_s = 30.0);
 
-/// Where things are.
+/// Folders of inputs and outputs.
 struct ExperimentPaths {
   std::filesystem::path programs;  ///< Folder of the other programs.
   std::filesystem::path data;      ///< Recordings and results of the teams' runs.
@@ -36,7 +36,7 @@ struct ExperimentPaths {
   std::filesystem::path euroc;   ///< EuRoC's recordings, see find_recorded_flight(); or empty.
 };
 
-/// Name, and what it is about.
+/// Name and subject of an experiment.
 struct ExperimentName {
   const char* name;
   const char* about;
@@ -61,7 +61,7 @@ struct WorldFiles {
 
 [[nodiscard]] WorldFiles world_files(const WorldConfig& world, const ExperimentPaths& paths);
 
-/// What a method makes of the graph of a world.
+/// Results of a method on the graph of a world.
 struct PgoFiles {
   std::filesystem::path json, poses;
 };
@@ -71,7 +71,7 @@ struct PgoFiles {
 [[nodiscard]] PgoFiles pgo_files(const WorldConfig& world, const PgoMethodConfig& method,
                                  const ExperimentPaths& paths);
 
-/// What a robot leaves that is run alone.
+/// Files of a robot that runs alone.
 struct AloneFiles {
   std::filesystem::path recording;
   std::filesystem::path run;
@@ -84,21 +84,21 @@ struct PcmFiles {
 [[nodiscard]] PcmFiles pcm_files(unsigned seed, const ExperimentPaths& paths);
 
 [[nodiscard]] std::string cosmo_step_name(const CosmoSet& set);
-/// What solving a set of COSMO-Bench has come to, as JSON.
+/// JSON with the result on a set of COSMO-Bench.
 [[nodiscard]] std::filesystem::path cosmo_file(const CosmoSet& set, const ExperimentPaths& paths);
 
 /// PNG of the meshes of all robots.
 [[nodiscard]] std::filesystem::path picture_file(const WorldConfig& world, bool corrected,
                                                  const ExperimentPaths& paths);
 
-/// The steps of an experiment, each after those it needs. What is there decides how: recordings and
-/// team results that were made elsewhere are used as they are. Nothing is written.
+/// The steps of an experiment, in the order of their dependences. They depend on existing files:
+/// recordings and team results that were made elsewhere are used as they are. Nothing is written.
 /// Precondition: `experiment` is one of kExperiments.
 [[nodiscard]] std::vector<Step> plan_experiment(const std::string& experiment,
                                                 const ExperimentConfig& config,
                                                 const ExperimentPaths& paths);
 
-/// Those of several experiments, common ones once.
+/// The steps of several experiments; common ones appear once.
 [[nodiscard]] std::vector<Step> plan_experiments(const std::vector<std::string>& experiments,
                                                  const ExperimentConfig& config,
                                                  const ExperimentPaths& paths);

@@ -21,13 +21,14 @@ constexpr const char* kAbout =
     "optimisers, and writes every table and figure beside the paper's.\n\n"
     "An experiment is a list of steps, each a command of another program of this system; `list`\n"
     "shows them. A step is done once: its result is kept with the command, the time, the machine\n"
-    "and the commit, and made anew only if its command or its inputs change. Ctrl-C keeps what is\n"
-    "done; the same command goes on. Recordings and results of teams that are in --data already\n"
+    "and the commit, and made again only if its command or its inputs change. Ctrl-C keeps\n"
+    "finished steps; the same command continues. Recordings and results of teams that are in "
+    "--data already\n"
     "are used as they are.\n\n"
     "Configuration: config/experiments/*.yaml (worlds, seeds, methods). --data, --graphs, "
     "--euroc,\n"
-    "--config and --quick are kept with the results they led to: `list`, `report` and later runs\n"
-    "need only --results, and take what they are given instead.\n"
+    "--config and --quick are kept with the results: `list`, `report` and later runs\n"
+    "need only --results; options given there override them.\n"
     "Exit code: 0 if all is done, 1 for input that cannot be used, 3 if a step failed or lacks\n"
     "something, 130 if it was stopped.\n\n"
     "Examples:\n"
@@ -37,7 +38,7 @@ constexpr const char* kAbout =
     "  kimera_multi_experiments run cosmo --graphs ~/cosmo    # COSMO-Bench's *.jrl are there\n"
     "  kimera_multi_experiments run trajectory --euroc ~/euroc\n"
     "  kimera_multi_experiments report\n\n"
-    "--euroc DIR is for the Vicon rooms: of V1_01 to V2_03 either the original folders, whose\n"
+    "--euroc DIR is for the Vicon rooms: for V1_01 to V2_03 either the original folders, whose\n"
     "images are then used, or only their true poses and inertial data (CSV, perhaps gzipped), on\n"
     "which rooms are rendered.";
 
@@ -88,7 +89,7 @@ fs::path shipped_config() {
   throw std::runtime_error("no config/experiments here or near the program; give --config");
 }
 
-// What to do, and with what: the command line, else what was kept with the results.
+// Options of the run: from the command line, otherwise from the inputs stored with the results.
 struct Setup {
   km::ExperimentPaths paths;
   fs::path config;
@@ -103,7 +104,7 @@ Setup setup_of(const Options& options, bool is_run) {
   };
   paths.results = options.results.empty() ? below(kResults) : options.results;
   const km::RunInputs kept = km::read_run_inputs(paths.results).value_or(km::RunInputs{});
-  // A folder that was named holds one kind of results: a full run would replace the quick one's.
+  // A named folder holds results of one kind: a full run would replace those of the quick one.
   if (!is_run || !options.results.empty()) setup.quick = setup.quick || kept.quick;
   const auto first = [](const fs::path& given, const fs::path& then) {
     return given.empty() ? then : given;
@@ -135,7 +136,7 @@ std::vector<std::string> chosen(const Options& options) {
   return all == options.names.end() && !options.names.empty() ? options.names : all_names();
 }
 
-// Some of it may be kept from an earlier run.
+// Some of the paths may come from an earlier run.
 void print(const km::ExperimentPaths& paths) {
   std::cout << "data: " << paths.data.string() << ", graphs: " << paths.graphs.string();
   if (!paths.euroc.empty()) std::cout << ", euroc: " << paths.euroc.string();
@@ -179,7 +180,7 @@ int run(const Options& options, const Setup& setup, const km::ExperimentConfig& 
       km::run_steps(steps, setup.paths.results, options.again, signals, display);
   std::cout << outcome.made << " steps made, " << outcome.kept << " were done before\n";
   for (const std::string& problem : outcome.problems) std::cerr << problem << '\n';
-  // Results stay with the inputs they are of, and so does their report, until others make some.
+  // Results and their report keep the inputs that they were made from, until a run makes others.
   const bool fruitless = outcome.made == 0 && !outcome.problems.empty();
   if (before && fruitless && before != km::read_run_inputs(setup.paths.results)) {
     km::write_run_inputs(setup.paths.results, *before);
@@ -191,7 +192,7 @@ int run(const Options& options, const Setup& setup, const km::ExperimentConfig& 
   return outcome.problems.empty() ? 0 : 3;
 }
 
-// A report that is there stays if there is nothing to write a new one of.
+// An existing report stays if there are no results for a new one.
 void report(const km::ExperimentConfig& config, const km::ExperimentPaths& paths) {
   const std::vector<km::Step> steps = km::plan_experiments(all_names(), config, paths);
   const bool any = std::any_of(steps.begin(), steps.end(), [&](const km::Step& step) {

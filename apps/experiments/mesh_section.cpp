@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Robots, then all together.
+// The meshes of the robots, then that of all together.
 struct NamedMesh {
   std::string name;
   MeshPair mesh;
@@ -25,7 +25,7 @@ std::optional<double> centimetres(const std::optional<double>& metres) {
   return metres ? std::optional<double>(100.0 * *metres) : std::nullopt;
 }
 
-// The better of the two stands out.
+// Marks the better one.
 void mark_better(ReportCell& before, ReportCell& after, const std::optional<double>& b,
                  const std::optional<double>& a, bool less_is_better) {
   if (!a || !b) return;

@@ -7,7 +7,7 @@
 
 namespace km {
 
-/// Table II of one world. Keypoints and images: of a centralised system.
+/// Table II of one world. Keypoints and images are those of a centralised system.
 struct PaperResources {
   int poses, edges;
   double place_recognition_mb, verification_mb, pgo_mb, total_mb;
@@ -16,8 +16,8 @@ struct PaperResources {
   double rbcd_s, rbcd50_s, se_sync_s;
 };
 
-/// What Chang, Tian, How and Carlone, "Kimera-Multi: a System for Distributed Multi-Robot
-/// Metric-Semantic Simultaneous Localization and Mapping", ICRA 2021, report of one world.
+/// Values for one world from Chang, Tian, How and Carlone, "Kimera-Multi: a System for Distributed
+/// Multi-Robot Metric-Semantic Simultaneous Localization and Mapping", ICRA 2021.
 struct PaperWorld {
   const char* world;  ///< As in config/experiments/worlds.yaml.
   /// Table I, in the order local PGO, RBCD, RBCD stopped after 50 rounds, DGS, SE-Sync.
@@ -33,7 +33,7 @@ struct PaperLabels {
   std::array<double, 4> before_percent, after_percent;
 };
 
-/// nullptr for a world that the paper has not.
+/// nullptr for a world that is not in the paper.
 [[nodiscard]] const PaperWorld* paper_world(const std::string& world);
 [[nodiscard]] const PaperLabels* paper_labels(const std::string& world);
 
@@ -43,7 +43,7 @@ struct PaperLabels {
 struct PublishedTeamErrors {
   const char* set;                  ///< Name of the file without its extension.
   std::vector<double> irls_gnc_m;   ///< Variants of iteratively reweighted GNC.
-  std::vector<double> gtsam_gnc_m;  ///< GTSAM's GNC, Geman-McClure; empty: not there.
+  std::vector<double> gtsam_gnc_m;  ///< GTSAM's GNC, Geman-McClure; empty if not published.
 };
 
 /// nullptr for a set without published values.

@@ -22,7 +22,7 @@ struct SearchRun {
     for (const double s : search_s) sum += s;
     return sum;
   }
-  // Median over the last kWindow additions before there were so many vertices.
+  // Median over the last kWindow additions before the graph has `vertices` vertices.
   double recent_ms(std::size_t vertices) const {
     const std::size_t begin = vertices > kWindow ? vertices - kWindow : 0;
     return 1e3 * statistics_of({search_s.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -31,7 +31,7 @@ struct SearchRun {
   }
 };
 
-// The same search, a run per seed.
+// One search, with a run per seed.
 struct Search {
   std::string name;
   std::vector<SearchRun> runs;
@@ -56,7 +56,7 @@ void add_runs(const std::filesystem::path& file, std::vector<Search>& searches) 
   for (const Json& run : root) add(run);
 }
 
-// Vertices that all runs came to.
+// Number of vertices that all runs reached.
 std::size_t common_size(const std::vector<Search>& searches) {
   std::size_t size = searches.front().runs.front().clique.size();
   for (const Search& search : searches)

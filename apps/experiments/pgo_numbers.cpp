@@ -30,7 +30,7 @@ std::vector<Stamp> read_stamps(const fs::path& keyframes_csv) {
   return stamps;
 }
 
-// The solved poses are numbered robot by robot in the order of their ids, as TeamGraph is.
+// Solved poses are numbered robot by robot in the order of ids, as in TeamGraph.
 std::vector<std::vector<StampedPose>> poses_of_robots(const std::vector<StampedPose>& poses,
                                                       const std::vector<RobotPlan>& robots,
                                                       const fs::path& run) {
@@ -50,13 +50,13 @@ std::vector<std::vector<StampedPose>> poses_of_robots(const std::vector<StampedP
   return in_order;
 }
 
-// Error of the keyframes of all robots under one alignment, where the truth is known.
+// Error of the keyframes of all robots under one alignment, if the truth is known.
 void add_error(const WorldConfig& world, const PgoFiles& files, const ExperimentPaths& paths,
                PgoNumbers& numbers) {
   const WorldFiles places = world_files(world, paths);
   const TeamPlan plan = read_team_file(places.team_file, {});
   const auto estimates = poses_of_robots(read_trajectory(files.poses), plan.robots, places.run);
-  std::list<std::vector<StampedPose>> truths;  // what the inputs refer to stays where it is
+  std::list<std::vector<StampedPose>> truths;  // a list, because the inputs refer to its elements
   std::vector<TrajectoryInput> inputs;
   for (std::size_t r = 0; r < plan.robots.size(); ++r) {
     if (plan.robots[r].truth.empty() || estimates[r].empty()) return;
@@ -68,7 +68,7 @@ void add_error(const WorldConfig& world, const PgoFiles& files, const Experiment
   numbers.plot = plot_from_above(inputs, error);
 }
 
-// The first of the rounds is the start.
+// The first entry is the state before the first round.
 void add_rounds(const Json& rounds, bool decides, PgoNumbers& numbers) {
   if (rounds.empty()) return;
   const auto at = [&](std::size_t k, const char* key) {

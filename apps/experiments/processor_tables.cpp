@@ -55,7 +55,7 @@ double share_percent(const RobotNumbers& robot, const std::string& module) {
   return found == robot.module_s.end() || !(all_s > 0.0) ? 0.0 : 100.0 * found->second / all_s;
 }
 
-// Robots whose mean is a column.
+// Robots whose mean is shown in a column.
 struct Profiled {
   std::string title;
   std::vector<std::reference_wrapper<const RobotNumbers>> robots;
@@ -67,14 +67,14 @@ struct Profiled {
   }
 };
 
-// Modules whose steps take most of a robot's time; those that only wait for others are left out.
+// Modules whose steps take most of a robot's time, without those that only wait for others.
 ReportTable profile_table(const std::vector<Profiled>& columns) {
   constexpr double kLeastModule_percent = 0.5;
   ReportTable table{.caption =
                         "Where the time goes: share of each module in that of all steps [%], "
                         "mean of the robots",
                     .columns = {"module"}};
-  std::map<std::string, double> most;  // percent in the column where it is largest
+  std::map<std::string, double> most;  // percentage in the column where it is largest
   for (const Profiled& column : columns) {
     table.columns.push_back(column.title);
     for (const RobotNumbers& robot : column.robots)

@@ -7,8 +7,8 @@
 
 namespace km {
 
-/// Appends what robots take of a processor and of memory, whole ones of `worlds` and the one that
-/// was run alone, and in which modules; their numbers to reach are added to `input`.
+/// Appends the processor time and memory of robots, by module: for whole robots of `worlds`, and
+/// for the one that ran alone. Adds their targets to `input`.
 void add_processor_tables(ReportInput& input, const std::vector<ReportInput::World>& worlds,
                           const std::optional<RobotNumbers>& alone, ReportSection& section);
 

@@ -26,7 +26,7 @@ std::string cell_text(const ReportCell& cell) {
   return cell.paper.empty() ? text : text + " (" + in_cell(cell.paper) + ')';
 }
 
-// Markdown has one row of headings: a group's title goes before each of its columns'.
+// Markdown has one row of headings, so a group's title precedes each of its columns' titles.
 std::vector<std::string> headings(const ReportTable& table) {
   std::vector<std::string> titles;
   std::size_t column = 0;
@@ -231,7 +231,7 @@ class HtmlWriter {
   std::string text() const { return out_.str() + plot_scripts(plots_); }
 
  private:
-  // Its plots are drawn there by the scripts.
+  // Scripts draw its plots there.
   void place(const ReportFigure& figure) {
     const std::string id = "figure-" + figure.name;
     out_ << "<div class=\"plots\" id=\"" << id << "\"></div>\n";

@@ -26,10 +26,11 @@ struct ColumnGroup {
 struct ReportTable {
   std::string caption;
   std::vector<ColumnGroup> groups = {};  ///< Empty: no second row of headings.
-  std::vector<std::string> columns;      ///< Of the first, too: it names the rows.
+  std::vector<std::string>
+      columns;  ///< Headings, including that of the first column, which names the rows.
   std::vector<std::vector<ReportCell>> rows = {};
   std::string note = {};
-  bool words = false;  ///< Columns are text, not numbers: to the left.
+  bool words = false;  ///< Columns are text, aligned to the left.
 };
 
 struct ReportParagraph {
@@ -38,7 +39,7 @@ struct ReportParagraph {
 
 /// One picture of a row of them: plots, or a PNG file.
 struct ReportFigure {
-  std::string name;  ///< figure-NAME is its anchor; of a picture, stem of its file.
+  std::string name;  ///< figure-NAME is its anchor; for a PNG file, the stem of the file.
   std::string caption;
   std::vector<Plot> plots = {};
   std::filesystem::path png = {};
@@ -48,20 +49,20 @@ struct ReportFigures {
   std::vector<ReportFigure> figures;
 };
 
-/// How the numbers were got; the steps are folded away where that can be.
+/// Origin of the numbers; in HTML the steps are collapsed.
 struct ReportProvenance {
   struct Row {
     std::string what, command, when, machine;
   };
-  std::string common;             ///< What all rows have in common: their machine, say.
-  std::vector<Row> rows;          ///< What was done.
-  std::vector<std::string> open;  ///< What was not, and why.
+  std::string common;             ///< Properties common to all rows, for instance the machine.
+  std::vector<Row> rows;          ///< Steps that were done.
+  std::vector<std::string> open;  ///< Steps that were not done, with the reason.
 };
 
 using ReportBlock = std::variant<ReportParagraph, ReportTable, ReportFigures, ReportProvenance>;
 
 struct ReportSection {
-  std::string id;  ///< Of its anchor.
+  std::string id;  ///< Id of its anchor.
   std::string title;
   std::vector<ReportBlock> blocks = {};
 
@@ -71,15 +72,15 @@ struct ReportSection {
 
 struct ReportDocument {
   std::string title;
-  std::string lead;  ///< What this is, in a sentence or two.
+  std::string lead;  ///< Description in one or two sentences.
   std::vector<ReportSection> sections;
 };
 
-/// One page without references to anything outside: styles, plots and pictures are in it. Throws
-/// std::runtime_error for a picture that cannot be read.
+/// One page without external references: styles, plots and pictures are embedded. Throws
+/// std::runtime_error for an unreadable picture.
 [[nodiscard]] std::string to_html(const ReportDocument& document);
 
-/// The same as Markdown; its pictures are figures/NAME.png, its plots those of report.html.
+/// The document as Markdown; its pictures are figures/NAME.png, its plots those of report.html.
 [[nodiscard]] std::string to_markdown(const ReportDocument& document);
 
 }  // namespace km

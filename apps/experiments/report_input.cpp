@@ -16,7 +16,7 @@ std::string machine_text(const Machine& machine) {
          fixed(machine.memory_gb, 0) + " GB";
 }
 
-// Folders that most commands name, and how they are called in the report.
+// Folders that most commands name, with their names in the report.
 using Folders = std::vector<std::pair<std::string, std::string>>;
 
 Folders folders_of(const ExperimentPaths& paths) {
@@ -47,7 +47,7 @@ ReportProvenance::Row row_of(const Step& step, const StepRecord& record, const F
           ""};
 }
 
-// Machine and commit of the rows' steps: what all have in common is said once, the rest with each.
+// Adds machine and commit of the rows' steps: common values once, the others with each row.
 void add_machines(const std::vector<const StepRecord*>& records, ReportProvenance& provenance) {
   std::set<std::string> machines, commits;
   for (const StepRecord* record : records) {
@@ -133,7 +133,7 @@ ReportProvenance ReportInput::provenance() const {
   ReportProvenance provenance;
   const Folders folders = folders_of(paths_);
   std::vector<const StepRecord*> records;
-  std::map<std::string, std::string> open;  // why: steps
+  std::map<std::string, std::string> open;  // reason: steps
   for (const Step& step : plan_experiments(all_experiments(), config_, paths_)) {
     const auto record = records_.find(step.name);
     if (record != records_.end()) {

@@ -12,56 +12,56 @@
 
 namespace km {
 
-/// A number to reach.
+/// A target: a number to reach.
 struct Target {
   std::string what;      ///< "ATE of odometry".
   std::string where;     ///< World or recording.
   std::string wanted;    ///< "at most 0.08 m".
   std::string measured;  ///< "0.029 m".
   bool met = false;
-  bool full_size = false;  ///< Small versions of the experiments cannot answer it.
+  bool full_size = false;  ///< Small versions of the experiments cannot decide it.
   bool judged = true;      ///< Set by ReportInput.
 };
 
-/// What the report is made of: results that belong to the configuration as it is now. Worlds and
-/// graphs are read once.
+/// Input of the report: results that belong to the present configuration. Worlds and graphs are
+/// read once.
 class ReportInput {
  public:
-  /// Looks for what is there of all experiments.
+  /// Searches for the results of all experiments.
   ReportInput(const ExperimentConfig& config, const ExperimentPaths& paths);
 
   [[nodiscard]] const ExperimentConfig& config() const { return config_; }
   [[nodiscard]] const ExperimentPaths& paths() const { return paths_; }
 
-  /// True if the step's result is there and up to date.
+  /// True if the step's result exists and is up to date.
   [[nodiscard]] bool has(const std::string& step) const { return records_.contains(step); }
 
-  /// Worlds of `names` of whose team there are results, with these.
+  /// Worlds among `names` with results of their team.
   struct World {
     const WorldConfig* config;
     const WorldResults* results;
   };
   [[nodiscard]] std::vector<World> worlds(const std::vector<std::string>& names);
 
-  /// The world and its repetitions, as far as there are results.
+  /// The world and its repetitions, as far as results exist.
   [[nodiscard]] std::vector<World> runs_of(const WorldConfig& world);
 
   /// The run of a world's team by the paper's pipeline; nullptr if there are no results.
   [[nodiscard]] const WorldResults* paper_run(const WorldConfig& world);
 
-  /// nullptr if the method's result is not there.
+  /// nullptr if the method has no result.
   [[nodiscard]] const PgoNumbers* pgo(const WorldConfig& world, const PgoMethodConfig& method);
-  /// The same of the method of that name; nullptr also if it is not configured.
+  /// Result of the method with that name; nullptr also if it is not configured.
   [[nodiscard]] const PgoNumbers* pgo(const WorldConfig& world, const std::string& method);
 
-  /// The robot that was run alone, if it was.
+  /// The robot that ran alone; nullopt without results.
   [[nodiscard]] std::optional<RobotNumbers> alone() const;
 
-  /// How all results were made; of what is not there the reason.
+  /// Origin of all results, and the reason for each missing one.
   [[nodiscard]] ReportProvenance provenance() const;
 
   void add_target(Target target);
-  /// Those that the sections added.
+  /// Targets that the sections added.
   [[nodiscard]] const std::vector<Target>& targets() const { return targets_; }
 
  private:
@@ -73,13 +73,13 @@ class ReportInput {
   std::map<std::string, PgoNumbers> pgo_;
 };
 
-/// "0.113", "-" for what is not there.
+/// "0.113"; "-" for a missing value.
 [[nodiscard]] std::string number_text(const std::optional<double>& value, int decimals);
 
 /// `digits` significant digits, without exponent from 1e-5 to 1e6: "1316", "0.0538", "< 0.00001".
 [[nodiscard]] std::string significant(double value, int digits = 3);
 
-/// A value of the paper as it stands there: "0.455", "168532", "97".
+/// A value of the paper as printed there: "0.455", "168532", "97".
 [[nodiscard]] std::string paper_text(double value);
 
 /// A command as a person would type it, without the program's folder.

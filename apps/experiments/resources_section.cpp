@@ -9,10 +9,11 @@
 namespace km {
 namespace {
 
-constexpr double kBytesPerPixel = 2.0;  // two cameras of one byte, as the paper's numbers have it
+constexpr double kBytesPerPixel =
+    2.0;  // two cameras with one byte per pixel, as in the paper's numbers
 constexpr double kMostShare_percent = 38.0, kAimedShare_percent = 10.0;
 
-// Megabytes of one world, the paper's way: one solve of the final graph.
+// Megabytes of one world, counted as in the paper: one solve of the final graph.
 struct Communication {
   double place_recognition = 0.0, verification = 0.0, pgo = 0.0, newton_pgo = 0.0, live_pgo = 0.0;
   double images = 0.0, keypoints = 0.0;
@@ -138,7 +139,7 @@ std::vector<Communication> of_all_runs(ReportInput& input, const ReportInput::Wo
   return runs;
 }
 
-// Of worlds whose team was run more than once.
+// Worlds whose team was run more than once.
 ReportTable resource_spread_table(ReportInput& input,
                                   const std::vector<ReportInput::World>& worlds) {
   ReportTable table{
@@ -162,7 +163,7 @@ ReportTable resource_spread_table(ReportInput& input,
   return table;
 }
 
-// The paper counts one solve; what the team sent in fact is judged by the same number.
+// The paper counts one solve. The bytes that the team actually sent have the same target.
 void add_targets(ReportInput& input, const ReportInput::World& world) {
   const std::vector<Communication> runs = of_all_runs(input, world);
   const auto add = [&](const char* what, const std::string& wanted, const auto& sent) {

@@ -28,7 +28,7 @@ std::optional<RunInputs> read_run_inputs(const fs::path& results) try {
                    .config = path("config"),
                    .quick = json.at("quick").get<bool>()};
 } catch (const std::exception&) {
-  return std::nullopt;  // cut short: the next run writes it anew
+  return std::nullopt;  // cut short: the next run writes it again
 }
 
 void write_run_inputs(const fs::path& results, const RunInputs& inputs) {

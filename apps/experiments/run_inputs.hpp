@@ -5,8 +5,8 @@
 
 namespace km {
 
-/// Where a run took its inputs from: kept in its folder of results, so that `list`, `report` and
-/// later runs look there without being told again. Paths are absolute; empty: none was given.
+/// Inputs of a run, stored with its results, so that `list`, `report` and later runs use them
+/// without options. Paths are absolute; empty: not given.
 struct RunInputs {
   std::filesystem::path data;
   std::filesystem::path graphs;
@@ -17,7 +17,7 @@ struct RunInputs {
   bool operator==(const RunInputs&) const = default;
 };
 
-/// nullopt if nothing was kept in `results`, or nothing that can be read.
+/// nullopt if `results` has no readable inputs.
 [[nodiscard]] std::optional<RunInputs> read_run_inputs(const std::filesystem::path& results);
 
 /// Makes the folder. Throws std::runtime_error naming the file.

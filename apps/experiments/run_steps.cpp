@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kQuiet_s = 2.0;  // shorter steps only show their end
+constexpr double kQuiet_s = 2.0;  // shorter steps show only their end
 constexpr double kRedrawInterval_s = 0.2;
 constexpr int kPoll_ms = 100;
 constexpr std::size_t kLastLines = 12;
@@ -57,10 +57,10 @@ std::string now_text() {
   return text;
 }
 
-// The files beside those that a step makes, and when each was last written.
+// Files beside the outputs of a step, with the time of their last change.
 std::map<fs::path, fs::file_time_type> written(const Step& step) {
   std::map<fs::path, fs::file_time_type> times;
-  std::error_code error;  // of folders and files that are not there (any more)
+  std::error_code error;  // for missing folders and files
   for (const fs::path& output : step.outputs)
     for (const auto& file : fs::directory_iterator(fs::absolute(output).parent_path(), error)) {
       if (!file.is_regular_file(error)) continue;  // records are written in a folder beside them
@@ -105,7 +105,7 @@ class StepsRun {
   }
 
  private:
-  // What it took last time, or what is thought of it; nothing if it is done.
+  // Time of the last run of the step, or the expected one; 0 if the step is done.
   double thought_s(const Step& step) {
     const StepState state = state_of(step, results_);
     if (state == StepState::kMissing) return 0.0;
@@ -118,7 +118,7 @@ class StepsRun {
     return record && record->seconds > 0.0 ? record->seconds : step.expected_s;
   }
 
-  // The step whose failure holds up `step`.
+  // The failed step that prevents `step`.
   std::optional<std::string> failure_before(const Step& step) const {
     for (const std::string& need : step.needs)
       if (const auto found = failure_of_.find(need); found != failure_of_.end())
@@ -126,7 +126,8 @@ class StepsRun {
     return std::nullopt;
   }
 
-  // Steps that fail for one reason in a row, all methods on one graph say, share a message.
+  // Consecutive steps that fail for the same reason, for instance all methods on one graph, share a
+  // message.
   void fail(const Step& step, const std::string& why) {
     failure_of_[step.name] = step.name;
     const std::string reason = why.substr(0, why.find(kLogHint));
@@ -149,7 +150,7 @@ class StepsRun {
     ++outcome_.kept;
   }
 
-  // The record without a fingerprint says that what there is now is not the result.
+  // A record without a fingerprint marks the existing outputs as invalid.
   void prepare(const Step& step, const StepRecord& begun) const {
     write_record(results_, begun);
     for (const fs::path& output : step.outputs)
@@ -178,8 +179,8 @@ class StepsRun {
     std::string problem;
     try {
       prepare(step, record);
-      record.fingerprint =
-          fingerprint_of(step);  // before: what changes meanwhile counts as changed
+      record.fingerprint = fingerprint_of(
+          step);  // before the command: later changes of the inputs make the result outdated
       problem = run_command(step);
     } catch (const std::exception& error) {
       problem = error.what();
@@ -189,7 +190,7 @@ class StepsRun {
       write_record(results_, record);
       ++outcome_.made;
     } else {
-      // What was not touched still is what the earlier record says.
+      // If no file was changed, the earlier record is still valid.
       if (earlier && written(step) == written_before) write_record(results_, *earlier);
       fail(step, problem);
     }
@@ -199,7 +200,7 @@ class StepsRun {
                     steady_now_s());
   }
 
-  // Empty if the program ended well and made its outputs.
+  // Empty if the program succeeded and made its outputs.
   std::string run_command(const Step& step) {
     const fs::path log = results_ / "logs" / (step.name + ".log");
     if (access(step.command.front().c_str(), X_OK) != 0)
@@ -227,7 +228,7 @@ class StepsRun {
       for (const fs::path& output : step.outputs)
         if (problem.empty() && !fs::exists(output)) problem = "it made no " + output.string();
     if (problem.empty()) return {};
-    // Not every program says what is wrong on standard error.
+    // Not every program prints its error to standard error.
     for (const auto& words : process.last_words().empty() ? last_lines : process.last_words())
       problem += "\n    " + words;
     return problem + kLogHint + log.string() + ')';
@@ -238,10 +239,11 @@ class StepsRun {
   bool again_;
   SignalWatch& signals_;
   StepDisplay& display_;
-  std::set<std::string> pending_;                  // steps that will be run, for the time left
-  std::map<std::string, std::string> failure_of_;  // step: the one whose failure holds it up
-  std::map<std::string, std::string> held_up_;     // that one: the names of those it holds up
-  std::string last_reason_;                        // of the last failure
+  std::set<std::string> pending_;                  // steps to be run, for the remaining time
+  std::map<std::string, std::string> failure_of_;  // by step: the failed step that prevents it
+  std::map<std::string, std::string>
+      held_up_;              // by failed step: names of the steps that it prevents
+  std::string last_reason_;  // reason of the last failure
   StepsOutcome outcome_;
 };
 
@@ -274,7 +276,7 @@ std::string StepDisplay::text(const std::string& line, double now_s) const {
   const double elapsed_s = now_s - start_s_;
   double later_s = 0.0;
   for (std::size_t k = index_ + 1; k < steps_.size(); ++k) later_s += expected_s(k);
-  // What takes longer than expected may end at once or late: no promise then.
+  // A step that takes longer than expected may end soon or late, so no time is shown.
   const std::string left =
       elapsed_s <= expected_s(index_)
           ? rough_duration(expected_s(index_) - elapsed_s + later_s) + " left"
@@ -298,7 +300,7 @@ void StepDisplay::update(const std::string& line, double now_s) {
 void StepDisplay::finish(const std::string& result, double now_s) {
   output_ << (terminal_ ? "\r\x1b[K" : "") << heading() << ": " << result << " in "
           << duration(now_s - start_s_) << std::endl;
-  if (result != "done") return;  // says nothing of how long the next ones take
+  if (result != "done") return;  // not representative for the next steps
   const auto& [title, program, thought_s] = steps_.at(index_);
   Pace& pace = paces_[program];
   pace.took_s += now_s - start_s_;

@@ -27,7 +27,7 @@ fs::path record_file(const fs::path& results, const std::string& step) {
   return results / "steps" / (step + ".json");
 }
 
-// It tells changes, it does not resist attacks.
+// Detects changes; it is not secure against attacks.
 class Fingerprint {
  public:
   void add(const std::string& text) {
@@ -78,7 +78,7 @@ std::string last_name(const fs::path& path) {
   return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
-// A text without the folders of what it names.
+// A text in which every path is reduced to its last name.
 std::string without_folders(const std::string& text) {
   std::string names;
   for (const char c : text)
@@ -119,7 +119,7 @@ std::optional<StepRecord> read_record(const fs::path& results, const std::string
   if (!file) return std::nullopt;
   return nlohmann::json::parse(file).get<StepRecord>();
 } catch (const nlohmann::json::exception&) {
-  return std::nullopt;  // cut short by a full disk, say: the step is done again
+  return std::nullopt;  // cut short, for instance by a full disk: the step is run again
 }
 
 void write_record(const fs::path& results, const StepRecord& record) {
@@ -147,7 +147,7 @@ const char* to_string(StepState state) {
 StepState state_of(const Step& step, const fs::path& results) {
   const auto record = read_record(results, step.name);
   const bool made = all_exist(step.outputs);
-  // What was made elsewhere does not depend on the command that would have made it.
+  // A result that was made elsewhere does not depend on the command of the step.
   if (made && record && record->command.empty() && step.adoptable) return StepState::kDone;
   if (made && record && record->fingerprint == fingerprint_of(step)) return StepState::kDone;
   if (made && !record && step.adoptable) return StepState::kFound;

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-constexpr double kMostRbcdGap_percent = 7.0;  // the paper's largest
+constexpr double kMostRbcdGap_percent = 7.0;  // largest gap in the paper
 constexpr double kMostDrift_percent = 0.5;
 
 double error_m(const PgoNumbers& numbers) {
@@ -19,7 +19,7 @@ double published_m(const WorldResults* results) {
   return results == nullptr ? NAN : results->joint_error_m.value_or(NAN);
 }
 
-// Rounding leaves the cost of the optimum itself a hair below or above.
+// Rounding moves the cost of the optimum itself slightly below or above.
 double gap_percent(const PgoNumbers& numbers) {
   const double percent = 100.0 * (numbers.cost / numbers.optimum - 1.0);
   return percent < 0.0 ? 0.0 : percent;
@@ -50,7 +50,7 @@ ReportTable inputs_table(const std::vector<ReportInput::World>& worlds) {
   return table;
 }
 
-// The best distributed method stands out, as in the paper; with it those that read the same.
+// Marks the best distributed method, as in the paper, and those with the same text.
 void mark_best(std::vector<ReportCell>& row, const std::vector<double>& values) {
   const auto best = std::min_element(values.begin(), values.end());
   if (best == values.end() || !std::isfinite(*best)) return;
@@ -105,7 +105,7 @@ ReportTable half_table(ReportInput& input, const std::vector<ReportInput::World>
   return table;
 }
 
-// The centralised method finds the optimum itself; the default has another cost, without the
+// The centralised method finds the optimum itself. The default has another cost, without the
 // closures that it rejects.
 bool has_gap(const PgoMethodConfig& method) {
   return method.name != "centralized" && method.name != "newton";
@@ -167,7 +167,7 @@ ReportTable odometry_table(const std::vector<ReportInput::World>& worlds) {
   return table;
 }
 
-// Of worlds whose team was run more than once.
+// Worlds whose team was run more than once.
 ReportTable trajectory_spread_table(ReportInput& input,
                                     const std::vector<ReportInput::World>& worlds) {
   ReportTable table{.caption = "How much runs differ: median, and lowest to highest",
@@ -206,7 +206,7 @@ ReportTable trajectory_spread_table(ReportInput& input,
   return table;
 }
 
-// Judged by the median of all runs, costs by the highest.
+// Trajectories are judged by the median of all runs, costs by the highest.
 void add_optimisation_targets(ReportInput& input, const ReportInput::World& world) {
   const std::vector<ReportInput::World> runs = input.runs_of(*world.config);
   const PaperWorld* const paper = paper_world(world.config->name);

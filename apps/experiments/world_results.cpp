@@ -28,13 +28,13 @@ MeshNumbers mesh_numbers(const Json& mesh) {
           number_at(mesh, "/estimate_to_truth/point/mean_m")};
 }
 
-// A part of the document; null if it is not there.
+// A part of the document; null if absent.
 Json part_of(const Json& json, const char* pointer) {
   const Json::json_pointer at(pointer);
   return json.contains(at) ? json.at(at) : Json();
 }
 
-// The entry of a list of objects that has this name; empty if there is none.
+// The entry with this name in a list of objects; empty if there is none.
 Json named(const Json& json, const char* list, const std::string& name) {
   for (const Json& entry : part_of(json, list))
     if (entry.value("name", "") == name) return entry;
@@ -53,7 +53,7 @@ std::string text_of(const fs::path& file) {
 
 constexpr double kKeypointBytes = 40.0;  // idl/loop_closure.idl
 
-// Sums of traffic.csv grow with time: the last row of each peer counts.
+// Sums of traffic.csv grow with time, so the last row of each peer counts.
 std::optional<double> mean_keyframe_bytes(const fs::path& traffic) {
   const std::string text = text_of(traffic);
   std::map<std::string, std::pair<double, double>> per_peer;  // messages, bytes
@@ -89,10 +89,11 @@ void add_truth(const fs::path& truth, RobotNumbers& robot) {
   robot.recorded_s = 1e-9 * static_cast<double>(poses.back().stamp - poses.front().stamp);
 }
 
-// What the robot took of its host.
+// Adds processor time and memory of the robot.
 void add_process(const fs::path& run, const RunSummary& summary, RobotNumbers& robot) {
   robot.module_s = module_seconds(run / "timing.csv");
-  if (!(summary.process.cpu_s > 0.0)) return;  // made by an older robot, which did not say
+  if (!(summary.process.cpu_s > 0.0))
+    return;  // the run is from an older version without these values
   robot.processor_s = summary.process.cpu_s;
   robot.peak_memory_mb = 1e-6 * static_cast<double>(summary.process.peak_memory_bytes);
 }

@@ -138,7 +138,7 @@ void add_revoke(CLI::App& parent) {
   CLI::App& app = *parent.add_subcommand(
       "revoke",
       "Take a robot's certificates back, for a robot that is lost or whose secret was read. The\n"
-      "new list must reach the other robots: until then they still believe it.\n"
+      "new list must reach the other robots: until then they still accept the robot.\n"
       "  kimera_multi_keys revoke survey beta");
   const auto command = std::make_shared<KeysCommand>();
   app.add_option("TEAM", command->team, "Folder of the team")->required();

@@ -5,8 +5,8 @@
 
 namespace km {
 
-/// Add a subcommand to `app`, which runs as soon as the command line names it and prints to stdout.
-/// What cannot be done throws a std::exception.
+/// Each adds a subcommand to `app`, which runs as soon as the command line names it and prints to
+/// stdout. Failures throw a std::exception.
 void add_make(CLI::App& app);
 void add_add(CLI::App& app);
 void add_revoke(CLI::App& app);

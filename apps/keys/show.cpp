@@ -32,7 +32,7 @@ std::vector<std::string> row_of(const Certificate& certificate, const Revocation
           lapse == nullptr ? "holds" : lapse};
 }
 
-// What is wrong with the folder of a robot, if it is still here.
+// Prints the faults of a robot's folder, if the folder is still here.
 void report_folder(const fs::path& folder, const Revocations& revocations) {
   if (!fs::is_directory(folder)) return;
   try {
@@ -81,7 +81,7 @@ void add_show(CLI::App& parent) {
       "  kimera_multi_keys show survey\n"
       "  kimera_multi_keys show keys          # on the robot");
   const auto folder = std::make_shared<fs::path>();
-  app.add_option("FOLDER", *folder, "Of a team, or of a robot's keys")
+  app.add_option("FOLDER", *folder, "Folder of a team, or of a robot's keys")
       ->required()
       ->check(CLI::ExistingDirectory);
   app.callback([folder] {

@@ -10,7 +10,8 @@
 namespace km {
 namespace {
 
-constexpr double kSoon_s = 0.05;  // at a start the first second of images waits: not these
+constexpr double kSoon_s =
+    0.05;  // the images of the first second wait at the start and are not counted
 
 double quantile(std::vector<double> values, double share) {
   const auto at =

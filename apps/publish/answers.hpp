@@ -12,14 +12,14 @@
 
 namespace km {
 
-/// How long a robot takes from an image to the pose it tells with the image's stamp: a
-/// nav_msgs/Odometry. Thread-safe.
+/// Measures the time from an image to the robot's pose with the image's stamp: a nav_msgs/Odometry.
+/// Thread-safe.
 class Answers {
  public:
   Answers(std::shared_ptr<const RosNetwork> network, const std::string& topic);
   ~Answers();
 
-  /// An image with this stamp is about to be published.
+  /// Call before an image with this stamp is published.
   void sent(Stamp stamp);
 
   /// "/robot0/odometry: 318 of 333 images answered, after 12.3 ms (median), 20.1 ms (95 %), 3 of
@@ -31,8 +31,8 @@ class Answers {
 
   std::string topic_;
   RosSubscription subscription_;
-  mutable std::mutex mutex_;        // guards what follows
-  std::map<Stamp, double> sent_s_;  // steady clock; without an answer so far
+  mutable std::mutex mutex_;        // guards the members below
+  std::map<Stamp, double> sent_s_;  // on the steady clock; images without an answer so far
   std::vector<double> latencies_s_;
   std::size_t sent_ = 0;
   std::jthread listener_;  // last member: ends first

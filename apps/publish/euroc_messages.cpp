@@ -42,7 +42,7 @@ RosImage message_of(Stamp stamp, const DepthImage& image) {
 RosImu message_of(const ImuSample& sample) {
   RosImu message;
   message.header = {sample.stamp, "imu0"};
-  message.orientation_covariance[0] = -1.0;  // none is measured
+  message.orientation_covariance[0] = -1.0;  // no orientation is measured
   message.angular_velocity = sample.gyro;
   message.linear_acceleration = sample.accel;
   return message;

@@ -10,9 +10,9 @@
 
 namespace km {
 
-/// A recording of sensors as the messages that its drivers would have sent: sensor_msgs/Image on
-/// /cam0/image_raw and /cam1/image_raw, or /depth0/image_raw, and sensor_msgs/Imu on /imu0; logged
-/// at their stamps.
+/// A EuRoC recording as the messages of its drivers: sensor_msgs/Image on /cam0/image_raw and
+/// /cam1/image_raw, or /depth0/image_raw, and sensor_msgs/Imu on /imu0. They are logged at their
+/// stamps.
 class EurocMessages final : public BagReader {
  public:
   explicit EurocMessages(std::unique_ptr<DatasetReader> dataset);

@@ -22,7 +22,7 @@ namespace {
 constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 constexpr const char* kAbout =
-    "Plays a recording as live topics of ROS 2, without ROS: a stand-in for the drivers of a "
+    "Plays a recording as live topics of ROS 2, without ROS, in place of the drivers of a "
     "robot.";
 
 constexpr const char* kFooter = R"(
@@ -69,14 +69,15 @@ Options parse_options(int argc, char** argv) {
                  "Topic of a robot's nav_msgs/Odometry (/robot0/odometry): how long after an image "
                  "its pose comes");
   app.add_flag("--reliable", options.play.reliable,
-               "What is lost is sent again; else best effort, as drivers of sensors are");
-  app.add_option("--delay", options.play.delay_s, "Of every message [s]")
+               "Send lost messages again; otherwise best effort, as drivers of sensors do");
+  app.add_option("--delay", options.play.delay_s, "Delay of every message [s]")
       ->check(CLI::Range(0., 60.));
-  app.add_option("--jitter", options.play.jitter_s, "Beside it, at random from 0 to this [s]")
+  app.add_option("--jitter", options.play.jitter_s,
+                 "Additional random delay, uniform from 0 to this [s]")
       ->check(CLI::Range(0., 60.));
   app.add_option("--drop", options.play.drop_share, "Share of messages that are lost, at random")
       ->check(CLI::Range(0., 1.));
-  app.add_option("--seed", options.play.seed, "Of what is random")->capture_default_str();
+  app.add_option("--seed", options.play.seed, "Seed of the random numbers")->capture_default_str();
   const char* const domain = std::getenv("ROS_DOMAIN_ID");
   options.ros.domain = domain != nullptr ? std::atoi(domain) : 0;
   app.add_option("--domain", options.ros.domain,
@@ -114,7 +115,7 @@ std::string table(const std::vector<PlayedTopic>& topics) {
   return align_columns(rows);
 }
 
-// Says how far it is, every few seconds.
+// Prints the progress every few seconds.
 class Progress {
  public:
   [[nodiscard]] bool is_due() {
@@ -128,8 +129,8 @@ class Progress {
   double told_s_ = steady_now_s();
 };
 
-// True once there are enough readers, which have a moment to find the topics for their part; false
-// after a signal.
+// True once there are enough readers and they had time to discover the topics; false after a
+// signal.
 bool wait_for_readers(const MessagePlayer& player, std::size_t wanted, SignalWatch& signals) {
   Progress progress;
   while (true) {
@@ -169,7 +170,7 @@ void play(const Options& options, SignalWatch& signals) {
   ended = true;
   std::cout << table(player.topics());
   if (!answers) return;
-  static_cast<void>(signals.wait(1.0));  // the last ones are on their way
+  static_cast<void>(signals.wait(1.0));  // time for the last messages to arrive
   std::cout << answers->text() << '\n';
 }
 

@@ -17,43 +17,43 @@
 
 namespace km {
 
-/// How a recording is played, and what goes wrong on the way.
+/// Parameters of the playback, with errors of the transmission.
 struct PlayOptions {
   double rate = 1.0;        ///< Times real time.
-  double delay_s = 0.0;     ///< Of every message.
-  double jitter_s = 0.0;    ///< Beside it, uniform from 0 to this.
-  double drop_share = 0.0;  ///< Of the messages.
-  bool reliable = false;    ///< Else best effort, as drivers of sensors are.
+  double delay_s = 0.0;     ///< Delay of every message.
+  double jitter_s = 0.0;    ///< Additional delay, uniform from 0 to this.
+  double drop_share = 0.0;  ///< Share of the messages that are dropped.
+  bool reliable = false;    ///< Otherwise best effort, as drivers of sensors are.
   unsigned seed = 0;
-  std::vector<std::string> topics = {};  ///< Those to play; all without any.
-  /// The part to play [s since the first message]; of the time before it only what is latched.
+  std::vector<std::string> topics = {};  ///< Topics to play; empty: all.
+  /// Part to play [s since the first message]; of earlier messages only latched ones are published.
   double from_s = 0.0, to_s = std::numeric_limits<double>::infinity();
 };
 
-/// What became of one topic.
+/// Statistics of one topic.
 struct PlayedTopic {
   std::string topic, type;
   std::size_t published = 0;
   std::size_t dropped = 0;
-  std::size_t refused = 0;  ///< Not messages of their type.
+  std::size_t refused = 0;  ///< Messages with an invalid content.
 };
 
-/// The messages of a recording as live topics of ROS 2, as they were recorded or worse. Messages of
-/// ROS 1 are written anew as those of ROS 2.
+/// Publishes the messages of a recording as live topics of ROS 2, as recorded or with errors.
+/// Messages of ROS 1 are converted to ROS 2.
 class MessagePlayer {
  public:
-  /// Topics of types that a RosNetwork does not know are left out: `left_out()`. Throws
+  /// Topics with types unknown to RosNetwork are left out: `left_out()`. Throws
   /// std::invalid_argument for topics to play that the recording does not have.
   MessagePlayer(std::unique_ptr<BagReader> recording,
                 const std::shared_ptr<const RosNetwork>& network, const PlayOptions& options);
 
-  /// The topics that fewer than so many read.
+  /// The topics with fewer than `readers` readers.
   [[nodiscard]] std::vector<std::string> topics_short_of(std::size_t readers) const;
 
   /// Publishes the next message when it is due; false after the last one, and after stop().
   bool step();
 
-  /// Tells the stamp of each image of the first topic with images before it is published.
+  /// Calls `tell` with the stamp of each image of the first image topic before it is published.
   void on_image(std::function<void(Stamp)> tell) { tell_image_ = std::move(tell); }
 
   /// Ends step(). Thread-safe.
@@ -61,13 +61,13 @@ class MessagePlayer {
 
   [[nodiscard]] const std::vector<PlayedTopic>& topics() const { return topics_; }
   [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
-  /// Of what was published last, in the recording's time since its first message.
+  /// Time of the last published message, in the recording's time since its first message.
   [[nodiscard]] double played_s() const { return played_s_; }
 
  private:
   struct Due {
     Stamp stamp = 0;
-    std::uint64_t number = 0;  // in the order of the recording
+    std::uint64_t number = 0;  // index in the order of the recording
     std::size_t topic = 0;
     std::vector<std::uint8_t> bytes;
     bool operator>(const Due& other) const {

@@ -12,22 +12,20 @@
 
 namespace km {
 
-/// What a robot says of itself on /diagnostics.
-
-/// What the sensors gave: a warning if frames were skipped, or anything was faulty.
+/// Status of the sensors: a warning if frames were skipped or a fault occurred.
 [[nodiscard]] RosDiagnosticStatus sensors_status(std::size_t published, std::size_t skipped,
                                                  const ReaderReport& faults);
 
-/// How busy the modules' threads are. Not thread-safe.
+/// Load of the modules' threads. Not thread-safe.
 class ModuleLoads {
  public:
-  /// The nodes outlive it.
+  /// The nodes outlive this.
   explicit ModuleLoads(std::vector<const Node*> nodes);
 
-  /// By name, the share of the time since the last call that each spent in its steps.
+  /// By node name, the share of the time since the last call that the node spent in its steps.
   [[nodiscard]] std::vector<std::pair<std::string, double>> shares();
 
-  /// These; a warning where one hardly rests.
+  /// Status with these shares; a warning if a node is busy nearly all the time.
   [[nodiscard]] RosDiagnosticStatus status();
 
  private:

@@ -30,7 +30,7 @@ void GrowingFile::flush() {
 void GrowingFile::append() {
   if (keep_bytes_ && is_there(file_)) std::filesystem::resize_file(file_, *keep_bytes_);
   keep_bytes_.reset();
-  // The first part may end in the middle of a row; what follows is the rest of it.
+  // The first part may end in the middle of a row; the next part is its continuation.
   if (!waiting_.empty()) append_to_file(file_, waiting_);
   if (rows_lost_)
     throw std::runtime_error(file_.string() + ": rows are missing, the disk was full for too long");

@@ -11,25 +11,25 @@
 
 namespace km {
 
-/// A result that grows during the run, so that what is recorded survives a crash. Where the disk is
-/// full it goes on once there is room, without a row lost or torn unless more than kMaxWaiting
-/// bytes wait. Not thread-safe.
+/// A result file that grows during the run, so that recorded rows survive a crash. While the disk
+/// is full, rows wait in memory and are written once there is room. No row is lost or cut in two
+/// unless more than kMaxWaiting bytes wait. Not thread-safe.
 class GrowingFile {
  public:
   static constexpr std::size_t kMaxWaiting_bytes = std::size_t{4} << 20;
 
-  /// `results` outlives this, and learns whether the file is whole.
+  /// `results` outlives this; it records whether the file is complete.
   GrowingFile(std::filesystem::path file, ResultWriter& results)
       : file_(std::move(file)), results_(results) {}
 
-  /// Goes on with what an earlier process has left; its rows. One that is torn is cut off with the
-  /// next flush(). Call before that, if at all.
+  /// Continues the file of an earlier process and returns its rows. The next flush() cuts off an
+  /// incomplete last row. If called, then before the first flush().
   [[nodiscard]] std::string go_on();
 
-  /// Where rows go.
+  /// Stream to which rows are written.
   [[nodiscard]] std::ostream& rows() { return rows_; }
 
-  /// Writes the rows that have come.
+  /// Writes the rows added since the last call.
   void flush();
 
  private:
@@ -38,7 +38,8 @@ class GrowingFile {
   const std::filesystem::path file_;
   ResultWriter& results_;
   std::ostringstream rows_;
-  std::optional<std::uintmax_t> keep_bytes_ = {};  // of what is there, until the rest is cut off
+  std::optional<std::uintmax_t> keep_bytes_ =
+      {};  // length of the earlier file without its incomplete last row
   std::string waiting_;
   bool rows_lost_ = false;
 };

@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// How far into its input a robot is: from the first stamp that came to the latest. Thread-safe.
+/// Progress of a robot in its input: time from the first stamp to the latest. Thread-safe.
 class InputTime {
  public:
   void reach(Stamp stamp) {
@@ -17,7 +17,7 @@ class InputTime {
     last_ = std::max(last_, stamp);
   }
 
-  /// [s]; 0 before anything came.
+  /// [s]; 0 before the first stamp.
   [[nodiscard]] double seconds() const {
     const std::lock_guard lock(mutex_);
     return first_ ? seconds_between(*first_, last_) : 0.0;

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 using Rows = std::vector<std::vector<std::string>>;
 
-// Seconds with so many decimals that milliseconds of a clock that counts from 1970 are seen.
+// Seconds with enough decimals to show milliseconds of a clock that counts from 1970.
 std::string seconds_text(Stamp stamp) {
   constexpr Stamp kMillisecond_ns = 1'000'000;
   const Stamp ms = stamp / kMillisecond_ns;
@@ -79,7 +79,7 @@ std::string text_of(const std::vector<TopicSummary>& topics) {
   return text;
 }
 
-// Topics of a EuRoC folder: what has a data.csv, whose rows begin with a stamp.
+// Topics of a EuRoC folder: folders with a data.csv whose rows begin with a stamp.
 std::vector<TopicSummary> euroc_topics(const fs::path& folder) {
   std::vector<fs::path> places;
   std::error_code error;

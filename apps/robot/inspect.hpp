@@ -5,15 +5,15 @@
 
 namespace km {
 
-/// What is in a recording, for people: a bag of ROS 1 or 2, an MCAP file, or a EuRoC folder. A
-/// table of its topics with how regularly they come, one of the pairs of cameras with how well
-/// their stamps agree, and what was skipped. Throws InputFileError, a line with file and place, for
-/// what is none.
+/// Description of a recording for people: a bag of ROS 1 or 2, an MCAP file, or a EuRoC folder. One
+/// table shows how regular the messages of each topic are, another how well the stamps of camera
+/// pairs agree. Skipped parts follow. Throws InputFileError with one line (file and place) if
+/// `path` is no recording.
 [[nodiscard]] std::string inspect_recording(const std::filesystem::path& path);
 
-/// Likewise, of a bag, and writes `rig`, a rig file (see RigFile) with the topics that are most
-/// likely its sensors. Throws InputFileError if `rig` is there already, too, and what write_file()
-/// throws.
+/// Description of a bag, as above. Also writes `rig`, a rig file (see RigFile) with the topics that
+/// are most likely the sensors of the bag. Throws InputFileError also if `rig` exists already, and
+/// the exceptions of write_file().
 [[nodiscard]] std::string inspect_recording(const std::filesystem::path& path,
                                             const std::filesystem::path& rig);
 

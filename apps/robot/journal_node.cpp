@@ -8,9 +8,9 @@
 namespace km {
 namespace {
 
-// A disk that stands still for a minute holds nobody up.
+// Long enough that a disk which stalls for a minute blocks no node.
 constexpr std::size_t kJournalQueue = 16384;
-// Keyframes wait for it: soon, but few enough syncs for flash memory.
+// Keyframes wait for the sync, so it comes soon, but rarely enough for flash memory.
 constexpr std::chrono::milliseconds kSyncPeriod{500};
 
 JournalFile begin_or_go_on(const std::filesystem::path& file, const RestoredRun* restored) {

@@ -32,37 +32,39 @@ struct JournalTopics {
   In<OdometryState> states;
   In<KeyframeOdometry> odometry;
   In<Keyframe> new_keyframes;
-  In<Closure> new_closures;    ///< Found here.
-  In<PeerEvent> new_restarts;  ///< In order with them: what follows is with another life.
+  In<Closure> new_closures;  ///< Found by this robot.
+  In<PeerEvent>
+      new_restarts;  ///< In order with new_closures: later closures belong to a new incarnation.
   In<Closure> peer_closures;
   In<ClosureOutcome> outcomes;
   In<PeerEvent> peer_events;
-  // The new ones in the same order, once they are on the disk.
+  // Published in the same order once they are on the disk.
   Out<Keyframe> keyframes;
   Out<Closure> closures;
   Out<PeerEvent> restarts;
 };
 
-/// Writes down what a robot must not lose with its process, several times a second, whatever
-/// becomes of the machine. Keyframes and closures are handed on once they are written: what others
-/// learn of is never forgotten, so that an index stands for one keyframe for ever, and both ends of
-/// a closure know the same measurements. A disk that is full, or fails, keeps nothing back: it is
-/// told, and the run goes on.
+/// Writes everything that a robot must not lose with its process to the disk, several times a
+/// second, so that it survives a crash of the machine. Keyframes and closures are published only
+/// after they are written. Everything that other robots receive can therefore be restored: an index
+/// always stands for one keyframe, and both ends of a closure know the same measurements. If the
+/// disk is full or fails, nothing is held back: the failure is reported and the run continues.
 class JournalNode final : public Node {
  public:
-  /// Goes on with the journal of `restored`, or begins a new one. `results` outlives this. What is
-  /// found of the cameras is written on top of `correction`, by which the rig came: it holds
-  /// whatever the rig of a later process is corrected by.
+  /// Continues the journal of `restored`, or begins a new one. `results` outlives this. The
+  /// estimated camera calibration is composed with `correction`, the correction already applied to
+  /// the rig. The journal therefore does not depend on the correction that a later process applies
+  /// to its rig.
   JournalNode(std::filesystem::path file, ResultWriter& results, const JournalStart& start,
               const RestoredRun* restored, const CameraCalibration& correction,
               const JournalTopics& topics);
   ~JournalNode() override { stop(); }
 
-  /// Writes that this process has the run that it goes on with: no later one takes itself for it.
+  /// Writes the boot id of this process to the journal, so that no later process uses it again.
   /// Call before start().
   void take_up() { step(Tick()); }
 
-  /// A keyframe of this run as it was written; null where it is not on the disk. Thread-safe.
+  /// A keyframe of this run as it was written; null if it is not on the disk. Thread-safe.
   [[nodiscard]] std::shared_ptr<const Keyframe> recall(KeyframeIndex keyframe) const;
 
   /// True while a keyframe waits for the disk. Thread-safe.
@@ -70,11 +72,11 @@ class JournalNode final : public Node {
 
   std::string_view name() const override { return "journal"; }
   void start() override;
-  /// Writes what is left.
+  /// Writes the remaining entries.
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// Disks that spin up, or wait for others, take their time.
+  /// Disks that spin up or wait for other requests take long.
   double step_limit_s() const override { return 120.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
@@ -108,14 +110,15 @@ class JournalNode final : public Node {
   const CameraCalibration correction_;
   const JournalTopics topics_;
   JournalFile journal_;
-  // What a journal that is gone on with holds already: it is published once more.
+  // Number of keyframes in the continued journal: RestoreNode publishes them once more.
   const std::size_t known_keyframes_;
   std::set<std::pair<KeyframeId, KeyframeId>> known_closures_;
   bool added_ = false;                          // since the last sync
-  std::atomic<std::size_t> new_keyframes_ = 0;  // that are not handed on
+  std::atomic<std::size_t> new_keyframes_ = 0;  // number of keyframes not yet published
   std::vector<HeldBack> held_back_;
-  mutable std::mutex mutex_;          // guards places_
-  std::vector<JournalPlace> places_;  // of keyframes 0, 1, ..., as far as the journal is whole
+  mutable std::mutex mutex_;  // guards places_
+  std::vector<JournalPlace>
+      places_;  // places of keyframes 0, 1, ..., up to the first that is not on the disk
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };

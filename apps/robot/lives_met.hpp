@@ -8,16 +8,16 @@
 
 namespace km {
 
-/// Which life of each other robot the own closures are with. Thread-safe.
+/// For each other robot, the incarnation with which this robot has closures. Thread-safe.
 class LivesMet {
  public:
-  /// From now on, with this one.
+  /// From now on, new closures are with this incarnation.
   void meet(const TeamPeer& peer) {
     const std::lock_guard lock(mutex_);
     boots_[peer.robot] = peer.boot;
   }
 
-  /// A boot of it; 0 if the robot has not been met.
+  /// A boot id of the incarnation; 0 if the robot has not been met.
   [[nodiscard]] std::uint64_t of(RobotId robot) const {
     const std::lock_guard lock(mutex_);
     const auto found = boots_.find(robot);

@@ -25,13 +25,13 @@ Examples
   Two robots on two hosts of one network (any ids, they find each other):
     hostA$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 7  --name alice --dataset A --output results/a
     hostB$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 12 --name bob   --dataset B --output results/b
-  Where multicast is not allowed:   --peers 10.0.0.2,10.0.0.3 --interface wlan0 --link wifi
-  After a crash or a lost battery, the same run goes on (the command as before, --resume for --output):
+  Without multicast:   --peers 10.0.0.2,10.0.0.3 --interface wlan0 --link wifi
+  After a crash or an empty battery, continue the same run (same command, --resume in place of --output):
     kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_01_easy --resume results/a
-  A robot that finds itself in the map of an earlier run, which takes part as robot 0:
+  A robot that localises itself in the map of an earlier run, which takes part as robot 0:
     kimera_multi_robot --robot 0 --session results/a --output results/yesterday
     kimera_multi_robot --config config/datasets/euroc.yaml --robot 1 --dataset MH_02_easy --output results/b
-  What is in a recording, and how regular its stamps are; and a robot on it, its topics as rig.yaml says:
+  Topics of a recording and the regularity of their stamps; then a robot on the topics that rig.yaml names:
     kimera_multi_robot --inspect recording.bag rig.yaml
     kimera_multi_robot --robot 0 --dataset recording.bag --rig rig.yaml --output results/a
   On the sensors of this robot, whose drivers run on ROS 2:
@@ -55,7 +55,8 @@ double parse_rate(const std::string& text) {
   if (text == "max") return std::numeric_limits<double>::infinity();
   char* end = nullptr;
   const double rate = std::strtod(text.c_str(), &end);
-  constexpr Bounds<double> kRate{1e-3, 1e6};  // a clock counts no longer waits
+  constexpr Bounds<double> kRate{1e-3,
+                                 1e6};  // beyond these bounds waiting times overflow the clock
   if (end == text.c_str() || *end != '\0' || !kRate.contains(rate))
     throw CLI::ValidationError(
         "--rate", text + " is neither a positive number nor max nor auto (" + kRate.text() + ")");
@@ -100,7 +101,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
       ->check(CLI::ExistingFile);
   group
       ->add_option("--session", options.session,
-                   "Results of a finished run: its robot stands still, and the others find "
+                   "Results of a finished run: its robot stands still, and the others localise "
                    "themselves in its map")
       ->check(CLI::ExistingDirectory);
   group->require_option(1);
@@ -126,7 +127,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
       ->default_str("1.0");
 }
 
-// Before the dataset is opened, in the words of the command line.
+// Runs before the dataset is opened, so that the error names the options.
 void check_window(const RobotOptions& options) {
   if (!options.from_s || !options.to_s || *options.from_s < *options.to_s) return;
   std::ostringstream message;
@@ -143,10 +144,12 @@ void add_network(CLI::App& app, RobotOptions& options) {
   app.add_option("--peers", options.peers, "Addresses of the other hosts, where multicast is off")
       ->delimiter(',');
   app.add_option("--interface", options.interface_name, "Network interface, e.g. wlan0");
-  app.add_flag("--view", options.view,
-               "Let anybody in the domain watch (kimera_multi_viewer): trajectory, mesh, images");
+  app.add_flag(
+      "--view", options.view,
+      "Allow every program in the domain to watch (kimera_multi_viewer): trajectory, mesh, images");
   app.add_option("--security", options.security,
-                 "Folder of this robot's keys (kimera_multi_keys): only the team reads and speaks")
+                 "Folder of this robot's keys (kimera_multi_keys): only robots of the team can "
+                 "read and send messages")
       ->check(CLI::ExistingDirectory);
 }
 
@@ -178,7 +181,7 @@ void add_output(CLI::App& app, RobotOptions& options) {
   app.add_flag("--record-images", options.record_images, "With --record: the left images, too");
 }
 
-// Exits the process for --help and mistakes, after telling.
+// Prints --help or the error of a wrong command line, and exits the process in both cases.
 RobotOptions parse_options(int argc, char** argv) {
   RobotOptions options;
   CLI::App app{"One robot of the team: odometry, place recognition, and the team's pose graph."};
@@ -232,9 +235,9 @@ log::Level level_of(const std::string& name) {
 
 int main(int argc, char** argv) try {
   const km::RobotOptions options = km::parse_options(argc, argv);
-  km::SignalWatch signals;  // before any thread: they inherit the blocked signals
+  km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::log::set_level(km::level_of(options.log_level));
-  cv::setNumThreads(1);  // every module has its own thread; OpenCV's pool would fight them
+  cv::setNumThreads(1);  // every module has its own thread; OpenCV's pool would compete with them
   return km::run_robot(options, signals);
 } catch (const std::exception& error) {
   km::unblocked_stderr() << "kimera_multi_robot: " << error.what() << std::endl;

@@ -4,21 +4,21 @@
 
 namespace km {
 
-/// What a robot makes of its images beside its trajectory.
+/// Map that a robot builds from its images.
 enum class MappingMode {
   kOff,       ///< Nothing.
   kMetric,    ///< A mesh.
   kSemantic,  ///< A mesh with labels.
 };
 
-/// Where depth, or labels, of all pixels come from.
+/// Source of the depths, or labels, of all pixels.
 enum class DenseSource {
-  kAuto,      ///< The recording's images where it has them, else computed.
+  kAuto,      ///< Images of the recording if it has them, else computed.
   kRecorded,  ///< The recording's images.
   kComputed,  ///< Stereo matching; the network of `segmentation:`.
 };
 
-/// Parameters of a robot's map that are not those of a module.
+/// Parameters of a robot's map that belong to no module.
 struct MappingConfig {
   static constexpr const char* kSection = "mapping";
 
@@ -30,31 +30,31 @@ struct MappingConfig {
   double mesh_interval_s = 3.0;
 
   void visit_fields(auto& visitor) {
-    visitor.field(
-        "mode", mode,
-        {{"off", MappingMode::kOff},
-         {"metric", MappingMode::kMetric},
-         {"semantic", MappingMode::kSemantic}},
-        "what is made of the images beside the trajectory: nothing, a mesh, a mesh with labels");
+    visitor.field("mode", mode,
+                  {{"off", MappingMode::kOff},
+                   {"metric", MappingMode::kMetric},
+                   {"semantic", MappingMode::kSemantic}},
+                  "map to build from the images: none, a mesh, or a mesh with labels");
     visitor.field("depth", depth,
                   {{"auto", DenseSource::kAuto},
                    {"recorded", DenseSource::kRecorded},
                    {"stereo", DenseSource::kComputed}},
-                  "auto: the recording's images where it has them, else computed");
+                  "auto: the recording's images if it has them, else computed");
     visitor.field("labels", labels,
                   {{"auto", DenseSource::kAuto},
                    {"recorded", DenseSource::kRecorded},
                    {"network", DenseSource::kComputed}},
-                  "likewise; network: that of segmentation");
+                  "auto: the recording's images if it has them, else computed; network: the one of "
+                  "segmentation");
     visitor.field("rate_hz", rate_hz, {0.01, 100.0},
-                  "[1/s] frames that go into the map, by their stamps; a mapper too slow for it "
-                  "leaves some out, at --rate max it holds the others up");
+                  "[1/s] frames that go into the map, by their stamps; a mapper that is too slow "
+                  "skips frames, except at --rate max, where the recording waits for it");
     visitor.field("max_depth_error_m", max_depth_error_m, {0.001, 100.0},
-                  "[m] standard deviation expected of depths: larger stay out; beyond half of "
-                  "semantic_mapping's truncation surfaces come out torn; an error is a quarter of "
-                  "a pixel of disparity, see usable_range_m()");
+                  "[m] largest expected standard deviation of depths that are used; beyond half of "
+                  "semantic_mapping's truncation surfaces have holes and steps; the standard "
+                  "deviation follows from a quarter of a pixel of disparity, see usable_range_m()");
     visitor.field("mesh_interval_s", mesh_interval_s, {0.1, 3600.0},
-                  "[s] between meshes: to be corrected, and written to files");
+                  "[s] interval between meshes, which are corrected and written to files");
   }
 };
 

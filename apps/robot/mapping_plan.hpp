@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// How a robot comes by depth and labels for its map.
+/// Sources of depth and labels for the map of a robot.
 struct MappingPlan {
   DenseSensorConfig sensor;
   LabelPalette palette;  ///< Empty without labels.
@@ -21,33 +21,34 @@ struct MappingPlan {
   [[nodiscard]] bool reads_labels() const { return sensor.labels == LabelsFrom::kImages; }
 };
 
-/// What a map can be made of.
+/// Image sources from which a map can be built.
 struct ImageSources {
-  std::string place;  ///< Where they are, for messages: a folder, or a file of topics.
+  std::string place;  ///< Location for messages: a folder, or a file of topics.
   bool right = false;
   bool depth = false;
   bool labels = false;
-  std::filesystem::path palette;  ///< File of the labels' classes, also where labels are computed.
+  std::filesystem::path palette;  ///< File of the label classes, used also for computed labels.
 };
 
-/// Those of a EuRoC folder, by what is in it.
+/// Image sources of a EuRoC folder, by its contents.
 [[nodiscard]] ImageSources image_sources(const std::filesystem::path& dataset);
 
-/// Those of a bag or a live robot: no labels.
+/// Image sources of a bag or of live sensors: no labels.
 [[nodiscard]] ImageSources image_sources(const SensorTopicNames& topics,
                                          const std::filesystem::path& rig);
 
-/// What `config` asks for, with the sources that there are (nullopt: no images at all); nullopt if
-/// mapping is off. Throws ConfigError if it cannot be had, with what can.
+/// Plan for the map that `config` requests, with the available `sources` (nullopt: no images at
+/// all). Returns nullopt if mapping is off. Throws ConfigError that lists the possible values if
+/// the request cannot be met.
 [[nodiscard]] std::optional<MappingPlan> plan_mapping(const MappingConfig& config,
                                                       const StereoDepthConfig& stereo,
                                                       const SegmentationConfig& segmentation,
                                                       const std::optional<ImageSources>& sources);
 
-/// Distance at which the depth of `rig` is off by `max_error_m`, one standard deviation, if its
-/// disparities are by a quarter of a pixel: sqrt(max_error_m * f * baseline / 0.25 px). With an
-/// RGB-D rig the baseline is the virtual one, see rgbd_rig(); beside stereo cameras depth images
-/// are taken to be no better than theirs.
+/// Distance at which the standard deviation of the depth of `rig` is `max_error_m`, if that of a
+/// disparity is a quarter of a pixel: sqrt(max_error_m * f * baseline / 0.25 px). With an RGB-D rig
+/// the baseline is the virtual one, see rgbd_rig(). With stereo cameras, depth images are assumed
+/// to be no better than stereo depth.
 [[nodiscard]] double usable_range_m(const StereoRig& rig, double max_error_m);
 
 }  // namespace km

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-// Of each kind the newest is kept beside the queue: one piece of news tells of all.
+// The newest message of each kind is kept beside the queue, so one queued News stands for all.
 constexpr std::size_t kMeshQueue = 1;
 
 }  // namespace

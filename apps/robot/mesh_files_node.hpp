@@ -22,20 +22,21 @@ namespace km {
 /// Channels of the mesh writer; they must outlive it.
 struct MeshFilesTopics {
   In<KeyframeOdometry> keyframes;
-  In<Trajectory> trajectory;  ///< Of this robot.
+  In<Trajectory> trajectory;  ///< Trajectory of this robot.
   In<MapMesh> maps;
   In<OptimizedMesh> optimized;
 };
 
 /// Keeps a robot's meshes on disk while it runs, each file whole at any time.
 ///
-/// mesh.ply is the mapper's mesh, as odometry built it; as a whole it is moved to where the first
-/// keyframe belongs in the team's frame, so that it can be laid over others. mesh_optimized.ply is
-/// the mesh bent to the optimised keyframes, in the team's frame. run.map is the mapper's mesh for
-/// the process that takes the run up.
+/// mesh.ply is the mapper's mesh, as odometry built it. It is moved rigidly so that its first
+/// keyframe has its optimised pose in the team's frame. mesh_optimized.ply is the mesh deformed to
+/// the optimised keyframes, in the team's frame. run.map is the mapper's mesh for a process that
+/// resumes the run.
 class MeshFilesNode final : public Node {
  public:
-  /// `results` outlives this, and learns which meshes could not be written: no reason to end.
+  /// `results` outlives this and records meshes that could not be written. Such a failure does not
+  /// end the node.
   MeshFilesNode(std::filesystem::path folder, ResultWriter& results, const MeshFilesTopics& topics);
 
   std::string_view name() const override { return "mesh_files"; }
@@ -43,7 +44,7 @@ class MeshFilesNode final : public Node {
   void stop() noexcept override { worker_.stop(); }
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// A disk may stand still for long, and nobody waits for it meanwhile.
+  /// A disk may stall for long, and no other thread waits for this node.
   double step_limit_s() const override { return 300.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
@@ -57,7 +58,7 @@ class MeshFilesNode final : public Node {
   void finish(const std::optional<Trajectory>& trajectory);
 
  private:
-  struct News {};  // something is to be taken
+  struct News {};  // at least one of the newest messages has changed
 
   template <typename T>
   void follow(In<T> topic, Latest<T>& newest) {
@@ -71,8 +72,8 @@ class MeshFilesNode final : public Node {
 
   const std::filesystem::path folder_;
   ResultWriter& results_;
-  std::optional<SE3> T_odom_first_;   // the first keyframe
-  std::optional<SE3> T_world_first_;  // likewise, optimised
+  std::optional<SE3> T_odom_first_;   // odometry pose of the first keyframe
+  std::optional<SE3> T_world_first_;  // optimised pose of the first keyframe
   std::shared_ptr<const MapMesh> map_;
   Latest<KeyframeOdometry> first_keyframe_;
   Latest<Trajectory> trajectory_;

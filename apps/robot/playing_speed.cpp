@@ -11,16 +11,16 @@
 namespace km {
 namespace {
 
-constexpr double kMostPlayed_s = 4.0;  // that is played at most
-constexpr double kMostSpent_s = 2.0;   // and for no longer
-constexpr double kLeastPlayed_s = 0.5;      // of recording: less tells nothing
+constexpr double kMostPlayed_s = 4.0;   // longest part of the recording to play
+constexpr double kMostSpent_s = 2.0;    // longest time to spend
+constexpr double kLeastPlayed_s = 0.5;  // a shorter part of the recording gives no reliable speed
 
-// Processor time of a whole robot over that of what is measured. In the demo 6.0 s over 5.1 s: place
-// recognition, loop closures, the pose graph, meshes and messages are the rest. They come in bursts,
-// for which there must be room.
+// Processor time of a whole robot divided by that of odometry and map. In the demo the ratio is 6.0
+// s / 5.1 s: place recognition, loop closures, the pose graph, meshes and messages are the
+// difference. They come in bursts, so the factor is larger than that ratio.
 constexpr double kWholeRobot = 1.5;
 
-// The map as its nodes make it, in the calling thread.
+// The map as its nodes build it, in the calling thread.
 class TrialMap {
  public:
   TrialMap(const StereoRig& rig, const RobotConfig& config, const MappingPlan& plan)
@@ -36,9 +36,9 @@ class TrialMap {
     const DenseImages images = sensor_.sense(*located.frame);
     if (images.problem != DenseProblem::kNone) return;
     last_ = stamp;
-    (void)mapper_.integrate(
-        *images.depth, images.labels.get(),
-        located.T_odom_body * located.T_body_rig * sensor_.camera().T_body_cam, located.keyframe);
+    (void)mapper_.integrate(*images.depth, images.labels.get(),
+                            located.T_odom_body * located.T_body_rig * sensor_.camera().T_body_cam,
+                            located.keyframe);
     if (!meshed_) meshed_ = stamp;
     if (seconds_between(*meshed_, stamp) < mesh_interval_s_) return;
     meshed_ = stamp;

@@ -12,11 +12,11 @@ struct PoseHole {
   Stamp from = 0, to = 0;
 };
 
-/// Those that last longer than kHole_s and than kHoleIntervals times the median interval, in the
-/// order of time: where nobody knows how the robot went. `path` is in that order. O(n).
+/// Holes longer than kHole_s and than kHoleIntervals times the median interval, in the order of
+/// time: times in which the motion of the robot is unknown. `path` ascends by time. O(n).
 [[nodiscard]] std::vector<PoseHole> pose_holes(std::span<const StampedPose> path);
 
-/// The page of the viewer (Robot in model.js) has the same.
+/// The page of the viewer (Robot in model.js) uses the same values.
 inline constexpr double kHole_s = 1.0;
 inline constexpr double kHoleIntervals = 5.0;
 

@@ -9,33 +9,32 @@
 
 namespace km {
 
-/// What this process has taken of the machine, all its threads together.
+/// Processor time and memory of this process, over all its threads.
 struct ProcessUsage {
   double cpu_s = 0.0;                ///< Processor time, user and system.
   double system_s = 0.0;             ///< Processor time in the kernel.
   std::uint64_t page_faults = 0;     ///< Without input from a disk (minor faults).
-  std::uint64_t resident_bytes = 0;  ///< Now; shared libraries included.
-  std::uint64_t peak_bytes = 0;      ///< Most there ever were resident.
+  std::uint64_t resident_bytes = 0;  ///< Present value; shared libraries included.
+  std::uint64_t peak_bytes = 0;      ///< Largest value since the start.
 };
 
-/// As the kernel has it; resident_bytes is 0 where /proc cannot be read.
+/// Values from the kernel; resident_bytes is 0 if /proc cannot be read.
 [[nodiscard]] ProcessUsage process_usage();
 
 /// Writes process.csv, a row for each sample: time_s, cpu_s, resident_bytes, system_s, page_faults.
 class ProcessCsv {
  public:
-  /// Writes the header line, or continues after the rows of `former` processes: processor times
-  /// and page faults are sums over all processes.
-  /// `output` outlives this.
+  /// Writes the header line, or continues after the rows of `former` processes: processor times and
+  /// page faults are sums over all processes. `output` outlives this.
   explicit ProcessCsv(std::ostream& output, std::string_view former = {});
 
   /// Time of the last row of former processes [s]; 0 without any.
   [[nodiscard]] double former_s() const { return former_s_; }
 
-  /// `time_s` ascends, from former_s() on.
+  /// `time_s` ascends, starting at former_s().
   void append(double time_s, const ProcessUsage& usage);
 
-  /// Of all samples of this process; those of time and of the peak are the last one's.
+  /// Summary of all samples of this process; times and the peak are those of the last sample.
   [[nodiscard]] ProcessSummary summary() const;
 
  private:

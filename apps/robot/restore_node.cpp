@@ -9,7 +9,8 @@ namespace km {
 
 void RestoreNode::start() {
   RestoredRun run = std::exchange(run_, {});
-  // Before the keyframes: what came of a candidate is known when it is found again.
+  // Published before the keyframes, so that the outcome of a candidate is known when it is found
+  // again.
   for (ClosureOutcome& outcome : run.outcomes) topics_.outcomes.publish(std::move(outcome));
   for (OdometryState& state : run.states) topics_.states.publish(std::move(state));
   for (std::size_t i = 0; i < run.keyframes.size(); ++i) {

@@ -13,7 +13,7 @@
 
 namespace km {
 
-/// Where a restored run goes. All topics must outlive the node.
+/// Topics on which a restored run is published. All topics must outlive the node.
 struct RestoreTopics {
   Out<OdometryState> states;
   Out<KeyframeOdometry> odometry;
@@ -23,14 +23,14 @@ struct RestoreTopics {
   Out<ClosureOutcome> outcomes;
 };
 
-/// Publishes a run that was restored, once and before any source starts: the nodes behind it come
-/// to where they were, as if they had seen it all. Has no thread: start() returns when all is
-/// published.
+/// Publishes a restored run once, before any source starts. The nodes that read it reach the state
+/// that they had, as if they had received all messages. Has no thread: start() returns when
+/// everything is published.
 class RestoreNode final : public Node {
  public:
   explicit RestoreNode(const RestoreTopics& topics) : topics_(topics) {}
 
-  /// What to publish. Call before start().
+  /// Sets the run to publish. Call before start().
   void set(RestoredRun run) { run_ = std::move(run); }
 
   std::string_view name() const override { return "restore"; }

@@ -38,7 +38,7 @@ void write_keyframes(std::ostream& out, const RunRecord& record) {
         << record.median_depth_m(keyframe.id.index) << '\n';
 }
 
-// The pose of `to` in the frame of `from`, if it was measured.
+// The pose of `to` in the frame of `from`; nullopt without a measurement.
 std::optional<SE3> measured_pose(const RunRecord& record, const ClosureOutcome& outcome) {
   const auto closure = record.closures().find(outcome.id);
   if (outcome.stage < ClosureStage::kVerified || closure == record.closures().end())
@@ -69,7 +69,7 @@ void write_closures(std::ostream& out, const RunRecord& record) {
         << ",\"" << row.reason << "\"\n";
 }
 
-// The covariance of a step of odometry with the noise that the pose graph was optimised with.
+// The covariance of a step of odometry, scaled by the noise that the optimiser used.
 Matrix6 judged_covariance(const Matrix6& claimed, const OptimizerProgress& progress) {
   Vector6 scale;
   scale.head<3>().setConstant(progress.odometry_rotation_noise);
@@ -77,8 +77,8 @@ Matrix6 judged_covariance(const Matrix6& claimed, const OptimizerProgress& progr
   return scale.asDiagonal() * claimed * scale.asDiagonal();
 }
 
-// The robot's own poses with every edge that touches them: odometry, and the inlier closures of
-// either finder; and the verticals. Poses of other robots stay in their files.
+// The robot's own poses with every edge that touches them: odometry, and the inlier closures found
+// by either robot. Also the verticals. Poses of other robots stay in their files.
 G2oGraph graph_of(const RunRecord& record) {
   G2oGraph graph;
   const auto& keyframes = record.keyframes();
@@ -167,7 +167,8 @@ void write_poses(std::ostream& out, const std::vector<StampedPose>& poses) {
     const Eigen::Vector3d& t = pose.T.translation();
     const Eigen::Quaterniond q(pose.T.linear());
     char line[256];
-    // Whole and fractional seconds apart: a double holds epoch nanoseconds to 0.2 us only.
+    // Whole and fractional seconds are separate, because a double holds epoch nanoseconds only to
+    // 0.2 us.
     std::snprintf(line, sizeof line,
                   "%" PRId64 ".%09" PRId64 " %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n",
                   pose.stamp / 1'000'000'000, pose.stamp % 1'000'000'000, t.x(), t.y(), t.z(),

@@ -8,14 +8,15 @@
 
 namespace km {
 
-/// odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv and loop_closures.csv into `folder`.
+/// Writes odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv and loop_closures.csv to
+/// `folder`.
 void write_results(const std::filesystem::path& folder, const RunRecord& record,
                    ResultWriter& results);
 
-/// Every candidate of the robot, as viewers are told of it.
+/// Every candidate of the robot, in the form in which viewers receive it.
 [[nodiscard]] std::vector<ToldClosure> told_closures(const RunRecord& record);
 
-/// As far as the record knows: its other fields are those of the process and its network.
+/// Summary of the record; the fields that concern the process and its network keep their defaults.
 [[nodiscard]] RunSummary summary_of(const RunRecord& record);
 
 }  // namespace km

@@ -24,7 +24,7 @@ bool is_depth(const TopicSummary& topic) {
   return encoding == "16UC1" || encoding == "32FC1" || has_word(topic, "depth");
 }
 
-// What names the left one of two cameras, and the right one.
+// Parts of names that mark the left and the right camera.
 constexpr std::array<std::pair<const char*, const char*>, 4> kSides = {
     {{"left", "right"}, {"infra1", "infra2"}, {"cam0", "cam1"}, {"cam_0", "cam_1"}}};
 
@@ -38,8 +38,8 @@ const TopicSummary& named(const std::vector<TopicSummary>& topics, const std::st
   return *std::ranges::find(topics, name, &TopicSummary::topic);
 }
 
-// Two cameras whose names say that they are the sides of one, else any two that are as often
-// together as any.
+// Prefers two cameras whose names mark them as left and right. Otherwise takes the pair with the
+// most common stamps.
 void propose_stereo(const std::vector<TopicSummary>& topics, RigFile& rig) {
   std::size_t best = 0;
   for (const TopicPair& pair : pairs_of_images(topics)) {
@@ -64,7 +64,8 @@ void propose_depth(const std::vector<TopicSummary>& topics, RigFile& rig) {
   rig.depth.topic = depth->topic;
 }
 
-// Of several the one whose name begins most like that of the left camera: "/Alpha/...".
+// Among several topics, takes the one that shares the longest prefix with the topic of the left
+// camera: "/Alpha/...".
 void propose_imu(const std::vector<TopicSummary>& topics, RigFile& rig) {
   const auto likeness = [&rig](const std::string& topic) {
     const std::string& left = rig.left.topic;
@@ -82,7 +83,7 @@ void propose_imu(const std::vector<TopicSummary>& topics, RigFile& rig) {
   if (!rig.imu.topic.empty()) rig.imu.gyro_topic = rig.imu.accel_topic = "";
 }
 
-// Where drivers tell the camera of these images; empty if nobody does.
+// Topic on which a driver publishes the CameraInfo of these images; empty if there is none.
 void propose_info(const std::vector<TopicSummary>& topics, RigFile::Camera& camera) {
   const std::string beside = camera_info_beside(camera.topic);
   const bool is_there = std::ranges::any_of(topics, [&beside](const TopicSummary& topic) {

@@ -7,9 +7,10 @@
 
 namespace km {
 
-/// The topics that are most likely a robot's cameras and inertial sensor, by their types, rates and
-/// names, for a person to look at: of several rigs in a recording it is the one that comes first.
-/// What is not found is empty; the calibration is not known, but topics of CameraInfo are.
+/// Topics that are most likely the cameras and the inertial sensor of a robot, judged by types,
+/// rates and names. A person should check them: of several rigs in a recording the first one is
+/// taken. Topics that are not found are empty. The calibration is unknown, except for topics of
+/// CameraInfo.
 [[nodiscard]] RigFile propose_rig(const std::vector<TopicSummary>& topics);
 
 }  // namespace km

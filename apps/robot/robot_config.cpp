@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Which link profile the files or the command line choose: it must be read before all of them.
+// Link profile that the files or the command line choose. It must be read before all of them.
 std::string chosen_link(const RobotOptions& options) {
   if (!options.link.empty()) return options.link;
   ConfigLayers layers;

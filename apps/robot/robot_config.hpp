@@ -38,27 +38,29 @@ struct RobotOptions {
   std::string name;  ///< "robot<id>" if not given.
 
   std::filesystem::path dataset;   ///< EuRoC/ASL folder, or a bag; exclusive with `graph`.
-  std::filesystem::path rig;       ///< Of a bag: which topics are the sensors (see RigFile).
-  std::filesystem::path odometry;  ///< Poses of another odometry, in place of the own.
-  bool is_live = false;            ///< The topics of `rig` are those of drivers that run now.
+  std::filesystem::path rig;       ///< File that names the sensor topics of a bag (see RigFile).
+  std::filesystem::path odometry;  ///< Poses of another odometry, which replaces the robot's own.
+  bool is_live = false;            ///< True if drivers that run now publish the topics of `rig`.
   std::filesystem::path graph;     ///< Recorded pose graph: g2o, CSV or JRL.
-  std::filesystem::path session;   ///< Results of a run of the past; exclusive with both.
+  std::filesystem::path session;   ///< Results of a finished run; exclusive with both.
   std::optional<double> from_s;    ///< Part of the recording [s since its first image].
   std::optional<double> to_s;
-  double rate = 1.0;       ///< Times real time; infinity for as fast as possible.
-  bool auto_rate = false;  ///< In place of `rate`: what this computer can do, see playing_speed().
+  double rate = 1.0;  ///< Times real time; infinity for as fast as possible.
+  bool auto_rate =
+      false;  ///< In place of `rate`: speed that this computer can keep, see playing_speed().
 
   std::optional<int> domain;  ///< DDS domain; from the configuration if absent.
   std::string link;           ///< Name or file of a link profile; from the configuration if empty.
   std::vector<std::string> peers;
   std::string interface_name;
-  std::filesystem::path security;  ///< Folder of this robot's keys; messages are sealed if given.
+  std::filesystem::path
+      security;  ///< Folder of this robot's keys; if given, messages are encrypted and signed.
 
   std::filesystem::path output;
-  bool resume = false;  ///< Go on with the run whose results are in `output`.
+  bool resume = false;                          ///< Continue the run whose results are in `output`.
   std::optional<std::filesystem::path> record;  ///< MCAP file for viewers; empty: in `output`.
-  bool record_images = false;                   ///< The left ones, too.
-  bool view = false;             ///< Viewers in the domain are sent what the robot knows.
+  bool record_images = false;                   ///< Record the left images, too.
+  bool view = false;             ///< Send the state of the robot to viewers in the domain.
   double serve_limit_s = 120.0;  ///< Longest time to serve peers after the input has ended.
   std::string log_level = "info";
 };
@@ -86,7 +88,7 @@ struct RobotConfig {
   MeshChunksConfig mesh_chunks;
   ViewConfig view;
 
-  std::string effective;  ///< As YAML: a file that gives this configuration again.
+  std::string effective;  ///< YAML text of a file that gives this configuration again.
 
   /// Calls visit(section) for every section, in the order of files.
   void visit_sections(const auto& visit) {
@@ -97,13 +99,15 @@ struct RobotConfig {
   }
 };
 
-/// Link profile, then --config files, then --set, then the options of the command line: what comes
-/// later wins. Throws ConfigError with every problem, by file and line.
+/// Configuration from the link profile, then --config files, then --set, then the other options of
+/// the command line; a later source overrides an earlier one. Throws ConfigError with every
+/// problem, by file and line.
 [[nodiscard]] RobotConfig load_robot_config(const RobotOptions& options);
 
-/// A file that comes with the program, such as "vocabulary/indoor.kmvoc" or "qos/wifi.yaml": `name`
-/// as it is, else below config/ of the source tree or of the installation this program runs from.
-/// Throws ConfigError that names every place looked at.
+/// Path of a file that comes with the program, such as "vocabulary/indoor.kmvoc" or
+/// "qos/wifi.yaml". Tries `name` as it is, then below config/ of the source tree or of the
+/// installation from which this program runs. Throws ConfigError that names all places that were
+/// tried.
 [[nodiscard]] std::filesystem::path find_shipped_file(const std::string& name);
 
 }  // namespace km

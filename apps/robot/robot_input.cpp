@@ -27,12 +27,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of ROS, recorded or live; else a EuRoC folder.
+// True for messages of ROS, recorded or live; false for a EuRoC folder.
 bool has_messages(const RobotOptions& options) {
   return options.is_live || (!options.dataset.empty() && may_be_bag(options.dataset));
 }
 
-// The run to go on with; none where its process had not come to a keyframe yet.
+// The run to continue; nullopt if its process ended before its first keyframe.
 std::optional<RestoredRun> restore(const RobotOptions& options, const std::string& input) {
   const fs::path file = options.output / kJournal;
   if (!options.resume) return std::nullopt;
@@ -56,7 +56,7 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
   return run;
 }
 
-// A map that is lost, or of a run that is not taken up, is no reason not to go on.
+// A map that is missing or belongs to another run does not prevent the resumption.
 std::optional<ContinuedMap> restore_map(const RobotOptions& options, const RestoredRun& run) try {
   const fs::path file = options.output / kMap;
   if (is_absent(file)) return std::nullopt;
@@ -74,7 +74,8 @@ RestoredRun open_session(const RobotOptions& options) {
   return alone_as(options.robot, std::move(run));
 }
 
-// Sensors by DDS: of images only the newest few count, inertial samples are all needed.
+// Subscribes to sensors over DDS: of images only the newest few are needed, of inertial samples
+// all.
 std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
                                      const SensorTopicNames& topics) {
   constexpr int kImages = 10, kSamples = 4000;
@@ -91,7 +92,7 @@ std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
   return std::make_unique<LiveBag>(std::move(network), std::move(wanted));
 }
 
-// Ends a wait for messages when a signal comes.
+// Ends the wait for messages when a signal arrives.
 class SignalStop {
  public:
   SignalStop(SignalWatch& signals, LiveBag& bag)
@@ -108,7 +109,7 @@ class SignalStop {
   std::jthread watcher_;
 };
 
-// nullopt: a signal came.
+// nullopt: a signal arrived.
 std::optional<Rig> hear_calibration(const PartialRig& rig,
                                     const std::shared_ptr<const RosNetwork>& ros,
                                     SignalWatch& signals) {
@@ -134,7 +135,7 @@ std::optional<Rig> hear_calibration(const PartialRig& rig,
   }
 }
 
-// What the rig file does not tell of the calibration. nullopt: a signal came.
+// Completes the calibration of the rig file from messages. nullopt: a signal arrived.
 std::optional<Rig> complete(const RobotOptions& options, const PartialRig& rig,
                             const std::shared_ptr<const RosNetwork>& ros, SignalWatch& signals) {
   if (rig.is_complete()) return rig.rig;
@@ -142,7 +143,7 @@ std::optional<Rig> complete(const RobotOptions& options, const PartialRig& rig,
                          : complete_rig(options.dataset.string(), *open_bag(options.dataset), rig);
 }
 
-// Those of the rig that are used.
+// Topics of the rig that the configuration uses.
 SensorTopicNames used_topics(const RobotOptions& options, const RobotConfig& config,
                              const std::optional<MappingPlan>& mapping, const PartialRig& rig) {
   SensorTopicNames topics = rig.rig.topics;
@@ -156,8 +157,8 @@ SensorTopicNames used_topics(const RobotOptions& options, const RobotConfig& con
   return topics;
 }
 
-// Null: a signal came. Live sensors are heard before the calibration is complete: a driver may wait
-// for its readers.
+// Null: a signal arrived. Live sensors are subscribed before the calibration is complete, because a
+// driver may wait for its readers.
 std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const RobotConfig& config,
                                              const std::optional<MappingPlan>& mapping,
                                              const RigInput& input,
@@ -180,7 +181,7 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
 }
 
 [[noreturn]] void refuse_without_rig(const std::string& bag) {
-  const auto reader = open_bag(bag);  // says what is none
+  const auto reader = open_bag(bag);  // throws if the file is no recording
   const auto is_image = [](const BagChannel& channel) {
     return is_of_type(channel, RosImage::kType) || is_of_type(channel, RosCompressedImage::kType);
   };
@@ -192,7 +193,7 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
                               "--inspect " + bag + " rig.yaml writes one");
 }
 
-// Null: a signal came.
+// Null: a signal arrived.
 std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const RobotConfig& config,
                                             const std::optional<MappingPlan>& mapping,
                                             const RigInput& rig,
@@ -215,7 +216,7 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
   return std::make_unique<EurocReader>(open_euroc(options.dataset, euroc));
 }
 
-// Those of a file, if one is named.
+// Adds the odometry poses of a file if one is named.
 std::unique_ptr<DatasetReader> with_poses(const RobotOptions& options, const RigInput& rig,
                                           std::unique_ptr<DatasetReader> reader) {
   const fs::path file =
@@ -229,7 +230,7 @@ std::unique_ptr<DatasetReader> with_poses(const RobotOptions& options, const Rig
   return std::make_unique<PoseFileReader>(std::move(reader), file);
 }
 
-// What the run has found of the cameras, beyond the rig as it is corrected now.
+// Converts the restored camera calibration so that it is relative to the rig as corrected now.
 void find_beyond(const CameraCalibration& correction, RestoredRun& run) {
   for (KeyframeOdometry& keyframe : run.odometry)
     if (keyframe.calibration)
@@ -263,7 +264,7 @@ std::optional<RobotInput> open_robot_input(const RobotOptions& options, const Ro
   const fs::path& path = options.is_live ? options.rig
                          : is_dataset    ? options.dataset
                                          : options.graph;
-  const std::string name = (path / "").parent_path().filename();  // wherever it is mounted
+  const std::string name = (path / "").parent_path().filename();  // independent of the mount point
   std::optional<RestoredRun> restored = restore(options, name);
   std::shared_ptr<const RosNetwork> ros;
   if (options.is_live || config.ros.publish.value_or(false))

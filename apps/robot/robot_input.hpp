@@ -18,33 +18,35 @@
 
 namespace km {
 
-/// Nothing: a run of the past, whose robot stands still and serves the others.
+/// No input: the robot of a finished run stands still and serves the others.
 struct PastRun {};
 
-/// What the robot perceives: a recording of sensors, or a recorded pose graph; and what it knows
-/// from before.
+/// Input of the robot: a recording of sensors or a recorded pose graph, and the restored run if
+/// there is one.
 struct RobotInput {
   std::variant<std::unique_ptr<DatasetReader>, RecordedGraph, PastRun> source;
   std::string name;  ///< For the journal.
   std::optional<RestoredRun> restored = {};
-  std::optional<ContinuedMap> map = {};  ///< Of the restored run, where there is mapping.
-  std::shared_ptr<const RosNetwork> ros = nullptr;  ///< Null unless it hears or tells something.
-  CameraCalibration rig_correction = {};            ///< By which the sensors' rig came.
+  std::optional<ContinuedMap> map = {};  ///< Map of the restored run; absent without mapping.
+  std::shared_ptr<const RosNetwork> ros =
+      nullptr;  ///< Null unless the robot reads or publishes topics of ROS.
+  CameraCalibration rig_correction = {};  ///< Correction already applied to the rig of the sensors.
 };
 
-/// What --rig says of the sensors. A EuRoC folder has its own calibration, and takes a correction.
+/// Content of the --rig file. A EuRoC folder has its own calibration, to which only a correction
+/// applies.
 struct RigInput {
-  std::optional<PartialRig> messages;  ///< Of messages.
-  CameraCalibration correction;        ///< What the calibration is corrected by.
+  std::optional<PartialRig> messages;  ///< Rig of sensors that come as messages.
+  CameraCalibration correction;        ///< Correction of the calibration.
 };
 
 /// Throws ConfigError and DatasetError, see read_rig_file() and read_rig_correction().
 [[nodiscard]] RigInput read_rig_input(const RobotOptions& options);
 
-/// Opens what the options name, and with --resume the journal of the run to go on with. nullopt:
-/// one of `signals` came while live topics were to complete the calibration. Throws DatasetError,
-/// DdsError, InputFileError and std::invalid_argument with one line that names the file and what
-/// helps.
+/// Opens the input that the options name, and with --resume the journal of the run to continue.
+/// nullopt: one of `signals` arrived during the wait for the calibration from live topics. Throws
+/// DatasetError, DdsError, InputFileError and std::invalid_argument with one line that names the
+/// file and a remedy.
 [[nodiscard]] std::optional<RobotInput> open_robot_input(const RobotOptions& options,
                                                          const RobotConfig& config,
                                                          const std::optional<MappingPlan>& mapping,

@@ -14,11 +14,11 @@ namespace km {
 /// OptimizerProgress.
 class RoundsCsv {
  public:
-  /// Writes the header line, or goes on behind the rows of `former` processes, whose rounds and
+  /// Writes the header line, or continues after the rows of `former` processes, whose rounds and
   /// time are added. `output` outlives this.
   explicit RoundsCsv(std::ostream& output, std::string_view former = {});
 
-  /// `rounds`: all of this process so far. Writes those that are new.
+  /// `rounds`: all rounds of this process so far. Writes those that are new.
   void append(const std::vector<OptimizerProgress>& rounds);
 
  private:

@@ -43,7 +43,8 @@ bool is_fault_of_disk(const std::error_code& error) {
          error == std::errc::io_error;
 }
 
-// A disk that fails does not keep a robot from its team; a mistake on the command line is told.
+// A disk that fails does not separate a robot from its team. A mistake on the command line ends the
+// program with an error.
 void change_output(const RobotOptions& options, ResultWriter& results,
                    const std::function<void(const fs::path&)>& change) try {
   change(options.output);
@@ -60,7 +61,7 @@ void make_output(const fs::path& folder) {
     throw fs::filesystem_error("", std::error_code(errno, std::generic_category()));
 }
 
-// Not before all is sound that a run needs: results are lost with it.
+// Call when all inputs of the run have been checked, because earlier results are removed.
 void remove_former(const fs::path& folder, bool goes_on, bool resume) {
   if (!resume && is_file(folder / kSummary))
     log::info("robot") << folder.string() << ": the results of an earlier run are replaced";
@@ -125,7 +126,7 @@ std::string count_text(std::size_t count) {
   return count < 1'000'000 ? fixed(value * 1e-3, 0) + " k" : fixed(value * 1e-6, 2) + " M";
 }
 
-// Nothing where mapping is off.
+// Empty if mapping is off.
 std::string map_text(const std::optional<MappingProgress>& mapping) {
   if (!mapping) return "";
   return " | map: " + std::to_string(mapping->size.blocks) + " blocks, " +
@@ -133,19 +134,20 @@ std::string map_text(const std::optional<MappingProgress>& mapping) {
          " faces";
 }
 
-// Nothing where nothing waits.
+// Empty if no message waits.
 std::string waiting_text(const TrafficSnapshot& traffic) {
   std::uint64_t bytes = 0;
   for (const TopicTraffic& topic : traffic.topics) bytes += topic.held.waiting.bytes;
   return bytes == 0 ? "" : ", waiting " + bytes_text(static_cast<double>(bytes));
 }
 
-// How the robot is doing, in one line:
+// Status line of the robot:
 //     7.4 s, 148 images, 21 keyframes | peers: bob alive | closures: own 3>2>2, bob 14>12>10
 //     | pgo: cost 12.4, round 31, with 2 | map: 812 blocks, 53 k vertices, 101 k faces
 //     | out: place 81.3 kB, verify 210.4 kB, pgo 5.0 kB, other 2.1 kB, waiting 12.1 kB | 143 MB
-// Closures are candidates > verified > inliers with each robot, counted by who found them; what
-// waits for the budget is told where there is some; last comes the memory that the robot occupies.
+// Closures are counted as candidates > verified > inliers for each robot, by the robot that found
+// them. Bytes that wait for the budget are shown if there are any. The last number is the resident
+// memory.
 std::string status_text(double dataset_time_s, const RunRecord& record,
                         const std::vector<Peer>& peers, const TrafficSnapshot& traffic,
                         std::uint64_t resident_bytes) {
@@ -163,10 +165,10 @@ std::string status_text(double dataset_time_s, const RunRecord& record,
          fixed(1e-6 * static_cast<double>(resident_bytes), 0) + " MB";
 }
 
-// What happens beside the modules while they run: phase, status line, traffic and memory over time.
+// Work beside the modules while they run: phase, status line, traffic and memory over time.
 class Watch {
  public:
-  /// `goes_on`: with the run whose results are there.
+  /// `goes_on`: continues the run whose results are in the folder.
   Watch(const RobotOptions& options, const RobotConfig& config, bool goes_on, Robot& robot,
         ResultWriter& results)
       : robot_(robot),
@@ -181,12 +183,13 @@ class Watch {
         rounds_file_(options.output / "optimizer.csv", results),
         rounds_csv_(rounds_file_.rows(), goes_on ? rounds_file_.go_on() : std::string()) {}
 
-  /// True when the robot may leave, or must: its id is another's. Called ten times a second.
+  /// True when the robot may leave, or must because its id belongs to another. Called ten times a
+  /// second.
   bool poll() {
     const double now_s = steady_now_s() - start_s_;
     const TrafficSnapshot traffic = robot_.bridge().traffic();
     const bool ended = robot_.input_ended() && !waits_for_company(now_s);
-    // If it is at work, the next time will do: this thread waits for no other.
+    // If the recorder is at work, the next call reads it: this thread does not wait.
     (void)robot_.recorder().try_with_record([&](const RunRecord& record) {
       say(now_s, record, traffic);
       rounds_csv_.append(record.rounds());
@@ -198,7 +201,7 @@ class Watch {
       const auto unheard = std::count_if(team.begin(), team.end(), [&](RobotId member) {
         return member != record.robot() && !peers.contains(member);
       });
-      // What still waits for the budget may change the graphs of others.
+      // Messages that wait for the budget may change the graphs of other robots.
       const bool settled = record.settled() && !robot_.bridge().holds_back();
       const auto told = departure_.update(now_s, {.input_ended = ended,
                                                   .graph_settled = settled,
@@ -228,15 +231,17 @@ class Watch {
  private:
   static constexpr double kInterval_s = 1.0;  // between rows of a CSV, and status lines
   static constexpr double kGoodbye_s = 1.5;   // three times the period of the status
-  // A chain of robots leaves one after the other, and the first are gone before the last hears.
+  // In a chain, robots leave one after the other: the first are gone before the last receives a
+  // notice.
   static constexpr double kHearsay_s = 2.0 * kGoodbye_s;
 
-  // A run of the past is there for others: it stays until one has come, or none does.
+  // The robot of a finished run serves others: it stays until another robot has come, or until the
+  // limit.
   bool waits_for_company(double now_s) const {
     return is_past_ && now_s < serve_limit_s_ && robot_.bridge().peers().list().empty();
   }
 
-  // Tells the others before going, so that they go with the same solution.
+  // Sends the leave message before the robot ends, so that all robots end with the same solution.
   bool said_goodbye(double now_s) {
     if (!leaving_since_s_) {
       leaving_since_s_ = now_s;
@@ -246,7 +251,7 @@ class Watch {
     return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kGoodbye_s;
   }
 
-  // Less often than poll(): counting closures takes the longer the more there are.
+  // Less often than poll(), because the time to count closures grows with their number.
   void say(double now_s, const RunRecord& record, const TrafficSnapshot& traffic) {
     if (now_s - said_s_ < kInterval_s) return;
     said_s_ = now_s;
@@ -254,7 +259,7 @@ class Watch {
                                     traffic, process_usage().resident_bytes));
   }
 
-  // A peer that last said that it leaves, and is not heard any more, has left.
+  // A peer whose last status announced that it leaves, and that is silent now, has left.
   std::map<RobotId, Absentees::Known> known_peers() const {
     using enum Absentees::Contact;
     std::map<RobotId, Absentees::Known> known;
@@ -282,8 +287,8 @@ class Watch {
     return known;
   }
 
-  // A peer that is there but has not said how far it is counts as running, whatever its former
-  // process has said.
+  // A peer that is present but has not yet sent a status counts as running, regardless of the last
+  // status of its former process.
   std::map<RobotId, Departure::Present> present_peers() const {
     std::map<TeamPeer, Departure::Present> told;
     for (const RobotStatus& status : robot_.status_node().peers())
@@ -336,13 +341,13 @@ std::string timings(const Robot& robot) {
   return out.str();
 }
 
-// Call when the robot has stopped; `record` is what it has recorded.
+// Call when the robot has stopped. `record` is final.
 RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& result,
               const char* departure, const RunRecord& record) {
   RunEnd end{options.robot, result, robot.id_taken(), departure};
   end.is_live = options.is_live;
   if (const SensorsNode* sensors = robot.sensors()) {
-    // The last image of those before comes once more.
+    // The last image of the earlier processes is played once more.
     const std::size_t before = std::max<std::size_t>(robot.restored_images(), 1) - 1;
     end.images = ImageCounts{before + sensors->listed(), before + sensors->published(),
                              sensors->skipped(), record.odometry().size()};
@@ -350,7 +355,7 @@ RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& 
   return end;
 }
 
-// The last line of a run.
+// Last line of a run.
 void say(const RobotOptions& options, const RunEnd& end, const Verdict& verdict) {
   const std::string images = end.images ? ", " + to_string(*end.images) : "";
   if (verdict.exit_code != 0)
@@ -386,7 +391,7 @@ HeldBackSums held_back(Robot& robot) {
   return sums;
 }
 
-// What the others sent of their maps, as far as it arrived.
+// Writes the meshes of the other robots as far as they were received.
 void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers, ResultWriter& results) {
   for (const RobotMesh& peer : peers.snapshot()) {
     if (peer.mesh.faces.empty()) continue;
@@ -399,7 +404,7 @@ void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers, Result
   }
 }
 
-// What viewers open ends with what the other results say, and with those that tell of closures.
+// Completes the MCAP record: attaches the other results, among them the list of closures.
 void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRecord& record,
                    const RunResult& result, ResultWriter& results) {
   if (result.is_left_behind(node.name()))
@@ -413,7 +418,7 @@ void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRe
                         << options.record->string() << ": they came faster than they were written";
 }
 
-// All but the summary. What a module that hangs was at cannot be read.
+// Writes all results except for the summary. The state of a hung module cannot be read.
 void write_all(const RobotOptions& options, Robot& robot, const RunRecord& record,
                const RunResult& result, ResultWriter& results) {
   write_results(options.output, record, results);
@@ -441,7 +446,7 @@ std::vector<Finding> what_stands_out(const RunFacts& facts, const Verdict& verdi
   return findings;
 }
 
-// Writes what the run leaves; the exit code.
+// Writes the results of the run and returns the exit code.
 int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robot,
              std::optional<Watch>& watch, const RunResult& result, const RunRecord& record,
              ResultWriter& results) {
@@ -472,21 +477,23 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
   for (const auto& [peer, keyframes] : record.other_vocabulary())
     summary.other_vocabulary[names.contains(peer) ? names.at(peer) : std::to_string(peer)] =
         keyframes;
-  watch.reset();  // the status line ends before the last log lines
+  watch.reset();  // ends the status line before the last log lines
   write_all(options, robot, record, result, results);
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;
   summary.findings =
       what_stands_out({summary, record.closure_tallies(), names, config.pcm}, verdict_of(end));
-  results.write(options.output / "summary.json",  // last: it tells what was lost before
-                [&summary](const auto& file) { write_summary(file, summary); });
+  results.write(
+      options.output / "summary.json",  // last, because it lists the results that were lost
+      [&summary](const auto& file) { write_summary(file, summary); });
   end.lost_results = results.lost();
   const Verdict verdict = verdict_of(end);
   say(options, end, verdict);
   return verdict.exit_code;
 }
 
-// What is estimated is beyond what the run began with. A EuRoC folder keeps its own calibration.
+// The estimate is relative to the rig with which the run began. A EuRoC folder keeps its own
+// calibration.
 void write_estimated_rig(const RobotOptions& options, const RigInput& rig, const RunRecord& record,
                          ResultWriter& results) {
   const std::optional<UncertainCalibration> found = record.calibration();
@@ -499,8 +506,8 @@ void write_estimated_rig(const RobotOptions& options, const RigInput& rig, const
   });
 }
 
-// Where the record goes, if there is to be one: a run that goes on does so in a file of its own.
-// Throws std::runtime_error for a file that was asked for and has no folder.
+// Path of the MCAP record, if one is requested; a resumed run writes a new file. Throws
+// std::runtime_error if the folder of the requested file does not exist.
 std::optional<fs::path> record_file(const RobotOptions& options, bool goes_on) {
   if (!options.record) return std::nullopt;
   const bool is_named = !options.record->empty();
@@ -512,8 +519,8 @@ std::optional<fs::path> record_file(const RobotOptions& options, bool goes_on) {
   return numbered(file, number);
 }
 
-// Plays the beginning of the recording, which is opened once more for it. Nullopt where there is
-// nothing to measure.
+// Opens the recording a second time and plays its beginning. Nullopt if there is no recording to
+// measure.
 std::optional<double> chosen_rate(const RobotOptions& options, const RobotConfig& config,
                                   const std::optional<MappingPlan>& mapping, const RigInput& rig,
                                   SignalWatch& signals) {
@@ -587,7 +594,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   const int exit_code = result.is_left_behind("recorder") ? end(RunRecord(options.robot))
                                                           : robot.recorder().with_record(end);
   if (result.left_behind.empty()) return exit_code;
-  // The threads left behind use what a return would destroy. The others see the robot leave.
+  // Hung threads use objects that a return would destroy. The others see the robot leave.
   if (!result.is_left_behind(robot.bridge().name())) robot.leave();
   drain_standard_output();
   std::_Exit(exit_code);

@@ -6,7 +6,7 @@
 
 namespace km {
 
-/// What a robot needs beside its modules.
+/// Parameters of a robot that belong to no module.
 struct RunConfig {
   static constexpr const char* kSection = "run";
 
@@ -17,15 +17,16 @@ struct RunConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("vocabulary", vocabulary,
-                  "of place recognition: a file, or one that comes with the program");
-    visitor.field("link", link, "profile, see config/qos: wired, wifi, intermittent, or a file");
+                  "vocabulary of place recognition: a file, or one that comes with the program");
+    visitor.field("link", link,
+                  "link profile, see config/qos: wired, wifi, intermittent, or a file");
     visitor.field(
         "settle_s", settle_s, {0.1, 600.0},
-        "[s] the robot leaves when it and all present peers have had nothing to do for so long");
+        "[s] the robot leaves when it and all present peers have been idle for this time");
     visitor.field("patience", patience, {0.1, 100.0},
-                  "on slow computers more: times 30 s (pose graph and map: 120 s, mesh files: 300 "
-                  "s) that a module may take "
-                  "for one step before it is taken for hung and the robot ends without it");
+                  "increase on slow computers: factor on the limit of 30 s (pose graph and map: "
+                  "120 s, mesh files: 300 s) for one step of a module; a module that exceeds the "
+                  "limit counts as hung, and the robot ends without it");
   }
 };
 

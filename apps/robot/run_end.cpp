@@ -7,14 +7,14 @@
 namespace km {
 namespace {
 
-constexpr int kNothingEstimated = 1;  // as for input that cannot be used
+constexpr int kNothingEstimated = 1;  // same code as for unusable input
 constexpr int kFailed = 3;
 constexpr int kResultsLost = 4;
 constexpr int kHung = 5;
 
 constexpr const char* kAllSettled = "all present robots have settled";
 
-// Each image is in one of the counts.
+// Each image is in exactly one of the counts.
 std::string why_no_pose(const ImageCounts& images) {
   const std::size_t given = images.read + images.skipped;
   const std::size_t unusable = images.listed > given ? images.listed - given : 0;
@@ -24,7 +24,7 @@ std::string why_no_pose(const ImageCounts& images) {
          " were read but odometry did not start on them";
 }
 
-// Of a robot that has settled itself.
+// settled_links of a settled robot: one more than the smallest value among its present peers.
 std::uint8_t settled_links(std::span<const Departure::Present> peers) {
   std::uint8_t links = kManyLinks;
   for (const Departure::Present& peer : peers)
@@ -41,16 +41,18 @@ Departure::Present Departure::update(double now_s, const Inputs& inputs) {
   if (!inputs.input_ended) return {RobotPhase::kRunning, 0};
   if (!ended_s_) ended_s_ = now_s;
 
-  // Half of the time quiet before saying so: the other half is for the peers to answer.
+  // The robot reports itself as settled after half of the settling time. The other half is for the
+  // peers to answer.
   const bool settled = inputs.graph_settled && now_s - active_s_ >= 0.5 * settle_s_;
   const std::uint8_t links = settled ? settled_links(inputs.present_peers) : 0;
   const bool peers_settled = links > 1;
-  // A robot that is not heard is at most as many links away as there are such robots, and one more.
+  // The distance in links to a robot that is not heard is at most the number of such robots plus
+  // one.
   const bool all_settled =
       peers_settled && links > std::min(inputs.unheard + 1, std::size_t{kManyLinks} - 1);
   if (!all_settled) all_settled_s_.reset();
   if (all_settled && !all_settled_s_) all_settled_s_ = now_s;
-  // Who leaves has waited for all.
+  // A peer that leaves has waited for all others.
   const bool told =
       peers_settled &&
       std::any_of(inputs.present_peers.begin(), inputs.present_peers.end(),
@@ -81,7 +83,7 @@ void Absentees::update(double now_s, const std::map<RobotId, Known>& known,
   ever_members_.insert(members.begin(), members.end());
 }
 
-// Since when it is missed for this reason.
+// Keeps the time since which the robot is missed, as long as the reason is the same.
 void Absentees::miss(RobotId robot, const Missed& missed, std::map<RobotId, Missed>& now) const {
   const auto before = missed_.find(robot);
   const bool goes_on = before != missed_.end() && before->second.why == missed.why;

@@ -17,28 +17,28 @@ namespace km {
 
 /// Decides how far a robot is with its run, and when it may leave its team.
 ///
-/// A robot whose input has ended goes on serving its team: it leaves when it and every robot of the
-/// team, heard or not, have been settled for `settle_s`, or `serve_limit_s` after its input ended.
-/// Pure: time comes in [s], any origin.
+/// A robot whose input has ended continues to serve its team. It leaves when it and every robot of
+/// the team, heard or not, have been settled for `settle_s`, or `serve_limit_s` after its input
+/// ended. Pure: time is an argument [s], with any origin.
 class Departure {
  public:
   Departure(double settle_s, double serve_limit_s)
       : settle_s_(settle_s), serve_limit_s_(serve_limit_s) {}
 
-  /// A robot that is heard, as it tells of itself.
+  /// Progress that a present robot reports in its status.
   struct Present {
     RobotPhase phase = RobotPhase::kRunning;
     std::uint8_t settled_links = 0;  ///< See RobotStatus.
   };
   struct Inputs {
-    bool input_ended = false;    ///< And what was in flight has been processed.
+    bool input_ended = false;    ///< The input and all messages made from it have been processed.
     bool graph_settled = false;  ///< The optimiser has nothing left to do.
-    std::uint64_t activity = 0;  ///< Changes whenever a module has done something new.
+    std::uint64_t activity = 0;  ///< Changes whenever a module has done new work.
     std::span<const Present> present_peers = {};
-    std::size_t unheard = 0;  ///< Robots of the team that only others hear.
+    std::size_t unheard = 0;  ///< Number of robots of the team that only other robots hear.
   };
 
-  /// Takes the state at `now_s`; what to tell the others.
+  /// Takes the state at `now_s` and returns the progress to publish.
   Present update(double now_s, const Inputs& inputs);
 
   /// Why the robot may leave, or nullptr if it should stay; as of the last update().
@@ -48,39 +48,42 @@ class Departure {
   double settle_s_;
   double serve_limit_s_;
   std::optional<double> ended_s_;
-  std::optional<double> all_settled_s_;  // since when, without a break
+  std::optional<double> all_settled_s_;  // begin of the uninterrupted time in which all are settled
   std::uint64_t activity_ = 0;
   double active_s_ = 0.0;  // last change of activity
   const char* reason_ = nullptr;
 };
 
-/// Why a robot ends without another one of its team. kSilent: it went silent without a word and has
-/// not come back: out of reach, or dead. kApart: it is heard, but they are not in one frame.
+/// Reason why a robot ends without another one of its team. kSilent: the other robot went silent
+/// without a leave message and has not come back: out of reach, or dead. kApart: it is heard, but
+/// has no frame in common with this robot.
 enum class Absence { kSilent, kApart };
 
 struct MissedPeer {
   std::string name;
   Absence why = Absence::kSilent;
-  double missed_s = 0.0;  ///< For how long, at the end.
+  double missed_s = 0.0;  ///< Duration until the end of the run.
 };
 
-/// Keeps since when a robot misses others of its team. Pure: time comes in [s], any origin.
+/// Records since when this robot misses others of its team. Pure: time is an argument [s], with any
+/// origin.
 class Absentees {
  public:
-  /// kLeft: it said good-bye. kTold: only others have heard it.
+  /// kLeft: the robot has sent its leave message. kTold: only other robots hear it.
   enum class Contact { kHeard, kSilent, kLeft, kTold };
   struct Known {
     std::string name;
     Contact contact = Contact::kHeard;
   };
 
-  /// `members`: the robots in one frame with this one, itself included, whether it hears them or
-  /// others do.
+  /// `members`: all robots in one frame with this one, itself included, heard directly or only by
+  /// others.
   void update(double now_s, const std::map<RobotId, Known>& known,
               std::span<const RobotId> members);
 
-  /// As of the last update(), ascending by id. Former members that were never heard are told once
-  /// they have been missed for `hearsay_s`: they may have left in order, as only others know.
+  /// Missed robots as of the last update(), ascending by id. A former member that was never heard
+  /// is listed only after it has been missed for `hearsay_s`. It may have left in order, which only
+  /// other robots know.
   [[nodiscard]] std::vector<MissedPeer> missed(double hearsay_s) const;
 
  private:
@@ -97,37 +100,37 @@ class Absentees {
   std::map<RobotId, Missed> missed_;
 };
 
-/// What became of the images of a recording.
+/// Number of images of a recording by their use.
 struct ImageCounts {
   std::size_t listed = 0;     ///< Stereo pairs of the part that was to be played.
-  std::size_t read = 0;       ///< Handed to odometry.
+  std::size_t read = 0;       ///< Passed to odometry.
   std::size_t skipped = 0;    ///< Left out because processors were short.
-  std::size_t with_pose = 0;  ///< That odometry estimated a pose of.
+  std::size_t with_pose = 0;  ///< Images with an estimated pose.
 };
 
-/// How a run came to its end.
+/// Outcome of a run.
 struct RunEnd {
   RobotId robot = 0;
   RunResult result;
-  bool id_taken = false;                   ///< Another living robot had the same id first.
-  const char* departure = nullptr;         ///< Why the robot left its team, if it did.
+  bool id_taken = false;                   ///< Another running robot had the same id first.
+  const char* departure = nullptr;         ///< Reason why the robot left its team, if it did.
   std::optional<ImageCounts> images = {};  ///< Absent for a robot without sensors.
-  bool is_live = false;                    ///< A signal is the usual end of live sensors.
-  /// Why each result that could not be written is lost, by file.
+  bool is_live = false;                    ///< With live sensors, a signal is the usual end.
+  /// By file, the reason why a result could not be written.
   std::map<std::string, std::string> lost_results = {};
-  std::vector<MissedPeer> missed = {};  ///< Whom the robot left without.
+  std::vector<MissedPeer> missed = {};  ///< Robots of the team that were missing at the end.
 };
 
-/// What the robot says of its run, to people and to the process that started it.
+/// Exit code and reason, for people and for the process that started the robot.
 struct Verdict {
   int exit_code = 0;
   std::string reason;  ///< One line.
 };
 
-/// 5 if a module hung. 3 if one failed, or another robot claimed the id: whose data the team then
-/// used is anybody's guess. 1 if the run came to its end and not one image has a pose, or live
-/// sensors gave no image. 4 if results could not be written. 0 otherwise. A robot that left without
-/// others of its team says whom, why, and for how long it had missed them.
+/// 5 if a module hung. 3 if a module failed, or another robot claimed the id: the team may then
+/// have used the data of either. 1 if the run ended and no image has a pose, or live sensors gave
+/// no image. 4 if results could not be written. 0 otherwise. If others of the team were missing,
+/// the reason names them, why, and for how long.
 [[nodiscard]] Verdict verdict_of(const RunEnd& end);
 
 /// "2910 of 2912 images have a pose".

@@ -28,7 +28,8 @@ std::string commonest(const std::map<std::string, std::uint64_t>& reasons, std::
          ')';
 }
 
-// That closures did not join two robots, whose names go before it, why, and what follows.
+// Finding that closures did not join two robots, with the reason and its consequence. The caller
+// adds the names of the robots in front.
 Finding not_joined(const ClosureTally& tally, const PcmConfig& pcm, bool has_one_vocabulary,
                    bool was_lost) {
   Finding finding{.id = "team.not_joined", .severity = Severity::kWarning};
@@ -85,7 +86,7 @@ Finding not_joined(const ClosureTally& tally, const PcmConfig& pcm, bool has_one
   return finding;
 }
 
-// By pairs, whichever of both found them.
+// Tallies by robot pair, over the closures that either robot found.
 Tallies tallies_of(std::span<const RunFacts> runs) {
   Tallies tallies;
   for (const RunFacts& run : runs)
@@ -195,8 +196,8 @@ void add_noisy_odometry(const RunSummary& run, std::vector<Finding>& findings) {
                 "odometry claims"});
 }
 
-// Samples and messages are more than frames: a share of the frames makes their faults look no
-// rarer.
+// There are more samples and messages than frames. A share of the frames keeps their faults
+// visible.
 void add_sensor_faults(const RunSummary& run, std::vector<Finding>& findings) {
   constexpr double kFew = 0.01;
   const double most = kFew * static_cast<double>(run.frames);

@@ -45,7 +45,7 @@ void RunRecord::add(const Closure& closure) {
   if (closure.from.id.robot != robot_ && closure.to.id.robot != robot_) return;
   const RelativePose measured = closure.relative_pose();
   const auto edge = pose_edge(measured);
-  if (!edge) return;  // the optimiser refuses it, too
+  if (!edge) return;  // the optimiser refuses this covariance, too
   const ClosureId id = closure.id();
   const RobotId other = id.from.robot == robot_ ? id.to.robot : id.from.robot;
   if (other != robot_ && closures_to_[other] >= OwnGraph::kMaxClosures && !closures_.contains(id))

@@ -30,39 +30,42 @@
 
 namespace km {
 
-/// Everything one run leaves behind, as plain data: filled by the recorder's thread, written to
-/// files by write_results(). Not thread-safe.
+/// Data that one run leaves behind: filled by the recorder's thread, written to files by
+/// write_results(). Not thread-safe.
 class RunRecord {
  public:
   explicit RunRecord(RobotId robot) : robot_(robot) {}
 
-  void add(const OdometryState& state);  ///< Replaces those of this instant and later.
+  void add(const OdometryState& state);  ///< Replaces states of this and later stamps.
   void add(const KeyframeOdometry& keyframe);
   void add(const VioStatistics& statistics) { odometry_statistics_ = statistics; }
-  void add(const Keyframe& keyframe);  ///< Of this robot: what depth it sees.
+  void add(const Keyframe& keyframe);  ///< Keyframe of this robot, for the depth that it sees.
   void add(const Closure& closure);
-  void add(const InlierSet& set);  ///< Kept if newer than the pair's last.
+  void add(const InlierSet& set);  ///< Kept if newer than the last set of the pair.
   void add(const ClosureOutcome& outcome);
-  void add(const PlaceQuery& query);       ///< Of which those count that are not compared.
-  void add(const Trajectory& trajectory);  ///< Of this robot.
-  void add(const PeerEvent& event);        ///< Of a robot that restarts all closures are dropped.
+  void add(const PlaceQuery& query);       ///< Counts keyframes that cannot be compared.
+  void add(const Trajectory& trajectory);  ///< Trajectory of this robot.
+  void add(const PeerEvent& event);        ///< Drops all closures with a robot that restarts.
   void add(const OptimizerProgress& progress);
   void add(const ClosureVerdicts& verdicts);
   void add(const DenseSensingProgress& progress) { dense_sensing_ = progress; }
   void add(const MappingProgress& progress) { mapping_ = progress; }
-  void add(const MapMesh& /*map*/) { ++activity_; }  // its correction follows
+  void add(const MapMesh& /* the correction of this mesh follows */) {
+    ++activity_;
+  }  // its correction follows
   void add(const OptimizedMesh& mesh);
 
   [[nodiscard]] RobotId robot() const { return robot_; }
 
-  /// True if the optimiser has nothing left to do (or never had).
+  /// True if the optimiser has nothing left to improve, or never had.
   [[nodiscard]] bool settled() const { return keyframes_.size() < 2 || progress_.settled; }
 
   /// Changes with every keyframe, closure, outcome, round and mesh.
   [[nodiscard]] std::uint64_t activity() const { return activity_; }
 
   [[nodiscard]] const std::vector<StampedPose>& odometry() const { return odometry_; }
-  /// What stays of a KeyframeOdometry: of the rest, which is larger, only the last counts.
+  /// Part of a KeyframeOdometry that is kept for every keyframe. The larger rest is kept for the
+  /// last one only.
   struct RecordedKeyframe {
     KeyframeId id;
     Stamp stamp = 0;
@@ -74,30 +77,30 @@ class RunRecord {
   /// Median depth of a keyframe's keypoints in its left camera [m]; 0: unknown.
   [[nodiscard]] double median_depth_m(std::uint32_t keyframe) const;
 
-  /// Keypoints of all keyframes.
+  /// Number of keypoints in all keyframes.
   [[nodiscard]] std::size_t keypoints() const { return keypoints_; }
 
-  /// As of the last event; none with an odometry from outside.
+  /// Statistics of the last event; absent with an external odometry.
   [[nodiscard]] const std::optional<VioStatistics>& odometry_statistics() const {
     return odometry_statistics_;
   }
-  /// Of the cameras, as known last; absent where it is not estimated.
+  /// Last known calibration of the cameras; absent if it is not estimated.
   [[nodiscard]] const std::optional<UncertainCalibration>& calibration() const {
     return calibration_;
   }
 
-  /// Absent where mapping is off, or no frame has come yet.
+  /// Absent if mapping is off, or before the first frame.
   [[nodiscard]] const std::optional<DenseSensingProgress>& dense_sensing() const {
     return dense_sensing_;
   }
   [[nodiscard]] const std::optional<MappingProgress>& mapping() const { return mapping_; }
 
-  /// Corrections of the mesh.
+  /// Number of corrections of the mesh.
   struct MeshCorrections {
     std::size_t deformed = 0;         ///< By Local Mesh Optimization.
-    std::size_t moved = 0;            ///< As a whole.
-    double seconds = 0.0;             ///< Time of all.
-    MeshDeformationReport last = {};  ///< Of the last optimization.
+    std::size_t moved = 0;            ///< Rigid motions of the whole mesh.
+    double seconds = 0.0;             ///< Total time.
+    MeshDeformationReport last = {};  ///< Report of the last optimisation.
   };
   [[nodiscard]] const MeshCorrections& mesh_corrections() const { return mesh_corrections_; }
 
@@ -107,27 +110,27 @@ class RunRecord {
   /// State of the optimiser after each round.
   [[nodiscard]] const std::vector<OptimizerProgress>& rounds() const { return rounds_; }
 
-  /// Closures that touch this robot, with what was measured, by whichever of its ends: to each
-  /// other robot as many as the optimiser keeps.
+  /// Relative poses of the closures that touch this robot, measured by either end. For each other
+  /// robot there are at most as many as the optimiser keeps.
   [[nodiscard]] const std::map<ClosureId, RelativePose>& closures() const { return closures_; }
 
-  /// Closures of this robot that are inliers, with its own and its peers' measurements.
+  /// Inlier closures of this robot, measured by itself or by its peers.
   [[nodiscard]] std::vector<RelativePose> inlier_closures() const;
 
-  /// Every candidate of this robot in the order of ids, the stage raised to kInlier, or the reason
-  /// filled in, by the newest inlier sets and by what the optimiser has rejected of them.
+  /// Every candidate of this robot in the order of ids. The newest inlier sets raise the stage to
+  /// kInlier. Closures that the inlier sets lack, or that the optimiser rejected, get their reason.
   [[nodiscard]] std::vector<ClosureOutcome> outcomes() const;
 
-  /// Poses in the team's frame: of every image, or of every keyframe where there are no images.
+  /// Poses in the team's frame: of every image, or of every keyframe if there are no images.
   [[nodiscard]] std::vector<StampedPose> optimized() const;
 
-  /// Closures with each other robot (or inside this one) that this robot found.
+  /// Closures that this robot found, by the other robot (or itself).
   [[nodiscard]] std::map<RobotId, ClosureCounts> closures_per_peer() const;
 
-  /// Likewise, by the stage they reached and why they went no further.
+  /// Closures that this robot found, by the stage they reached and the reason why no further.
   [[nodiscard]] std::map<RobotId, ClosureTally> closure_tallies() const;
 
-  /// Keyframes of each other robot that its vocabulary kept from being compared.
+  /// By robot, the number of its keyframes that could not be compared because of its vocabulary.
   [[nodiscard]] const std::map<RobotId, std::uint64_t>& other_vocabulary() const {
     return other_vocabulary_;
   }
@@ -143,9 +146,9 @@ class RunRecord {
   std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
   std::size_t keypoints_ = 0;
   std::map<ClosureId, RelativePose> closures_;
-  std::map<RobotId, std::size_t> closures_to_;  // by the other robot; of `closures_`
+  std::map<RobotId, std::size_t> closures_to_;  // by the other robot; sizes within `closures_`
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
-  std::set<ClosureId> rejected_;  // by the optimiser, of the inlier sets
+  std::set<ClosureId> rejected_;  // closures of the inlier sets that the optimiser rejected
   std::map<ClosureId, ClosureOutcome> outcomes_;
   std::map<RobotId, std::uint64_t> other_vocabulary_;
   std::optional<Trajectory> trajectory_;
@@ -177,17 +180,19 @@ class RecorderNode final : public Node {
     });
   }
 
-  /// What comes from now on is not recorded: the robot leaves with what it has. Thread-safe.
+  /// Later messages are not recorded: the results stay as they are when the robot leaves.
+  /// Thread-safe.
   void freeze() { frozen_ = true; }
 
-  /// Calls `read` with the record, which no other thread changes meanwhile. Thread-safe.
+  /// Calls `read` with the record, which no other thread changes during the call. Thread-safe.
   template <typename Reader>
   auto with_record(const Reader& read) const {
     const std::lock_guard lock(mutex_);
     return read(record_);
   }
 
-  /// Likewise, but not while the recorder is at work: then false, and `read` is not called.
+  /// Like with_record(), except that it returns false without a call of `read` while the recorder
+  /// is at work.
   template <typename Reader>
   [[nodiscard]] bool try_with_record(const Reader& read) const {
     const std::unique_lock lock(mutex_, std::try_to_lock);

@@ -13,7 +13,7 @@
 
 namespace km {
 
-/// Closures by the stage they reached; each number includes the next.
+/// Number of closures by the stage they reached; each number includes the next.
 struct ClosureCounts {
   std::uint64_t candidates = 0;
   std::uint64_t verified = 0;
@@ -27,16 +27,16 @@ struct ClosureCounts {
   bool operator==(const ClosureCounts&) const = default;
 };
 
-/// Of the team's optimiser, as this robot knows it.
+/// State of the team's optimiser, as this robot knows it.
 struct OptimizerSummary {
   std::uint64_t rounds = 0;
-  double seconds = 0.0;  ///< Of this robot's work.
+  double seconds = 0.0;  ///< Time of this robot's work.
   double cost = 0.0;
   double gradient_norm = 0.0;
   std::optional<RobotId> anchor;  ///< Robot whose frame the poses are in.
   bool settled = false;
   std::vector<RobotId> members;
-  /// Noise of odometry in multiples of what it claims.
+  /// Ratio of the actual noise of odometry to the stated one.
   double odometry_rotation_noise = 1.0, odometry_translation_noise = 1.0;
 
   void visit_fields(auto& visitor) {
@@ -53,13 +53,13 @@ struct OptimizerSummary {
   bool operator==(const OptimizerSummary&) const = default;
 };
 
-/// Frames that went into the map, why others did not, and the mesh in the end.
+/// Frames that went into the map, reasons for skipped ones, and size of the final mesh.
 struct MappingSummary {
   std::uint64_t frames = 0;
   std::uint64_t gave_way = 0;  ///< Frames left out because processors were short.
   std::uint64_t skipped_wrong_size = 0, skipped_bad_pose = 0, skipped_too_late = 0;
   std::uint64_t without_labels = 0, label_pixels_outside_palette = 0;
-  std::uint64_t blocks_refused = 0;  ///< For want of semantic_mapping.max_blocks.
+  std::uint64_t blocks_refused = 0;  ///< Blocks beyond semantic_mapping.max_blocks.
   std::uint64_t blocks = 0, vertices = 0, faces = 0, superseded_faces_dropped = 0;
   std::uint64_t corrections = 0, moves_as_a_whole = 0;
   double correction_seconds = 0.0;
@@ -86,7 +86,7 @@ struct MappingSummary {
   bool operator==(const MappingSummary&) const = default;
 };
 
-/// By category of the traffic.
+/// Sums by category of the traffic.
 struct TrafficSums {
   std::map<std::string, std::uint64_t> messages, bytes;
 
@@ -97,7 +97,7 @@ struct TrafficSums {
   bool operator==(const TrafficSums&) const = default;
 };
 
-/// What the budget has held back, once per message: see HeldBack of the runtime.
+/// Messages that the budget held back, each counted once: see HeldBack of the runtime.
 struct HeldBackSums {
   TrafficSums delayed, superseded, dropped;
 
@@ -109,16 +109,16 @@ struct HeldBackSums {
   bool operator==(const HeldBackSums&) const = default;
 };
 
-/// What the process took of the machine.
+/// Processor time and memory of the process.
 struct ProcessSummary {
-  double cpu_s = 0.0;     ///< User and system.
-  double system_s = 0.0;  ///< In the kernel.
+  double cpu_s = 0.0;     ///< User and system time.
+  double system_s = 0.0;  ///< Time in the kernel.
   std::uint64_t page_faults = 0;
   std::uint64_t peak_memory_bytes = 0;
   std::uint64_t memory_at_start_bytes = 0;
   std::uint64_t memory_at_end_bytes = 0;
-  /// Slope of the line of least squares through the second half of the time; absent if that is
-  /// less than a minute: what is taken at the start is no growth.
+  /// Slope of the line of least squares through the second half of the time. Absent if that half is
+  /// shorter than a minute, because allocations at the start are no growth.
   std::optional<double> memory_growth_bytes_per_minute;
 
   void visit_fields(auto& visitor) {
@@ -133,11 +133,13 @@ struct ProcessSummary {
   bool operator==(const ProcessSummary&) const = default;
 };
 
-/// How both cameras stand to the inertial sensor beyond what the rig says, and standard
-/// deviations: that of rotation and translation is the largest of any direction.
+/// Offset of both cameras to the inertial sensor relative to the rig, with standard deviations.
+/// Those of rotation and translation are the largest over all directions.
 struct CamerasSummary {
-  double offset_s = 0.0, offset_sigma_s = 0.0;  ///< Added to stamps of images: the sensor's.
-  /// T_body_cam is T of these times that of the rig; a rotation vector, about the body's axes.
+  double offset_s = 0.0,
+         offset_sigma_s = 0.0;  ///< Added to stamps of images, gives those of the sensor.
+  /// T_body_cam is this transform times the one of the rig; a rotation vector, about the axes of
+  /// the body.
   double rotation_x_rad = 0.0, rotation_y_rad = 0.0, rotation_z_rad = 0.0;
   double rotation_sigma_rad = 0.0;
   double translation_x_m = 0.0, translation_y_m = 0.0, translation_z_m = 0.0;
@@ -158,15 +160,15 @@ struct CamerasSummary {
   bool operator==(const CamerasSummary&) const = default;
 };
 
-/// What odometry by cameras and inertial sensor met with.
+/// Events of the odometry by cameras and inertial sensor.
 struct OdometrySummary {
-  std::uint64_t starts = 0;         ///< More than one: it began anew on the way.
+  std::uint64_t starts = 0;         ///< Larger than one if odometry restarted during the run.
   std::uint64_t divergences = 0;    ///< New starts because the estimate was impossible.
   std::uint64_t inertial_gaps = 0;  ///< Times without samples for more than vio.max_imu_gap_s.
   std::uint64_t refused_images = 0, refused_samples = 0;
   std::uint64_t images_without_pose = 0;
-  std::uint64_t vision_losses = 0;  ///< Times that too little was seen to hold the pose.
-  double blind_seconds = 0.0;       ///< Time of them.
+  std::uint64_t vision_losses = 0;  ///< Periods with too few features to hold the pose.
+  double blind_seconds = 0.0;       ///< Total time of these periods.
 
   void visit_fields(auto& visitor) {
     visitor.field("starts", starts);
@@ -184,9 +186,9 @@ struct OdometrySummary {
 /// Times without a pose: see pose_holes().
 struct HolesSummary {
   std::uint64_t count = 0;
-  double seconds = 0.0;  ///< Of all.
+  double seconds = 0.0;  ///< Total time.
   double longest_s = 0.0;
-  double longest_from_s = 0.0;  ///< Where the longest begins, since the first pose.
+  double longest_from_s = 0.0;  ///< Begin of the longest hole, since the first pose.
 
   void visit_fields(auto& visitor) {
     visitor.field("count", count);
@@ -197,39 +199,42 @@ struct HolesSummary {
   bool operator==(const HolesSummary&) const = default;
 };
 
-/// What a robot's run came to: summary.json, and the robot's part of a team's --json. The names in
-/// visit_fields are the keys; they are written and read in this order. An absent optional has no
+/// Totals of a robot's run: summary.json, and the robot's part of a team's --json. The names in
+/// visit_fields are the keys, which are written and read in this order. An absent optional has no
 /// key; NaN is written as null.
 struct RunSummary {
   RobotId robot = 0;
   std::string name;
-  std::string version, commit;  ///< Of the program: see built_version() and built_commit().
+  std::string version,
+      commit;  ///< Version and commit of the program: see built_version() and built_commit().
   std::uint64_t keyframes = 0;
-  std::uint64_t keypoints = 0;       ///< Of all keyframes.
+  std::uint64_t keypoints = 0;       ///< Number in all keyframes.
   std::uint64_t frames = 0;          ///< Stereo pairs played.
   std::uint64_t frames_skipped = 0;  ///< Pairs left out because processors were short.
   std::optional<double> rate;        ///< Chosen by --rate auto; absent otherwise.
-  double paused_s = 0.0;             ///< That the recording's clock paused for the same reason.
-  /// What is wrong with the recording, or the live topics, and how often: see ReaderFault.
+  double paused_s = 0.0;  ///< Time for which the recording's clock paused for the same reason.
+  /// By kind, the number of faults of the recording or the live topics: see ReaderFault.
   std::map<std::string, std::uint64_t> sensor_faults;
-  ClosureCounts closures;  ///< That this robot found.
+  ClosureCounts closures;  ///< Closures found by this robot.
   OptimizerSummary pgo;
-  std::optional<OdometrySummary> odometry;       ///< Absent with an odometry from outside.
-  std::optional<HolesSummary> holes;             ///< Of the live trajectory; absent without any.
-  std::optional<CamerasSummary> cameras;         ///< Absent without vio.calibrate.
-  std::optional<MappingSummary> mapping;         ///< Absent where mapping is off.
+  std::optional<OdometrySummary> odometry;  ///< Absent with an external odometry.
+  std::optional<HolesSummary> holes;        ///< Holes of the live trajectory; absent without any.
+  std::optional<CamerasSummary> cameras;    ///< Absent without vio.calibrate.
+  std::optional<MappingSummary> mapping;    ///< Absent if mapping is off.
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
   std::optional<HeldBackSums> held_back;         ///< Absent without a budget.
   ProcessSummary process;
   double seconds = 0.0;  ///< Wall time of the run.
-  /// Robots that went silent and did not come back, and for how long they had been silent [s].
+  /// By name, robots that went silent and did not return, with the time of their silence [s].
   std::map<std::string, double> lost_peers;
-  /// Robots that were heard, and for how long they had not been in one frame with this one [s].
+  /// By name, robots that were heard but not in one frame with this one, with the time of that
+  /// state [s].
   std::map<std::string, double> apart_peers;
-  /// Robots of another vocabulary, and how many of their keyframes could not be compared for it.
+  /// By name, robots with another vocabulary, with the number of keyframes that could not be
+  /// compared.
   std::map<std::string, std::uint64_t> other_vocabulary;
   std::string exit_reason;
-  std::vector<Finding> findings;  ///< What stands out, the gravest first: see findings_of().
+  std::vector<Finding> findings;  ///< Findings, the gravest first: see findings_of().
 
   void visit_fields(auto& visitor) {
     visitor.field("robot", robot);

@@ -11,16 +11,15 @@
 
 namespace km {
 
-// The tables of numbers that a robot leaves. Readers throw std::runtime_error naming the file, and
-// the line where one cannot be used.
+// Tables of numbers among the results of a robot. Readers throw std::runtime_error that names the
+// file, and the line if a line cannot be used.
 
 /// A row of process.csv (3 columns) or optimizer.csv (5) as finite numbers.
 using NumberRow = std::vector<double>;
 [[nodiscard]] std::vector<NumberRow> read_number_rows(const std::filesystem::path& file,
                                                       std::size_t columns);
 
-/// A row of traffic.csv: messages and bytes until a time of the run, what was sent again among
-/// them.
+/// A row of traffic.csv: messages and bytes until a time of the run, including retransmissions.
 struct TrafficRow {
   double time_s = 0.0;
   bool out = false;
@@ -33,25 +32,25 @@ struct TrafficRow {
 struct ModuleTiming {
   std::string module;
   double calls = 0.0;
-  double median_ms = 0.0, p95_ms = 0.0, max_ms = 0.0;  ///< Of a step.
+  double median_ms = 0.0, p95_ms = 0.0, max_ms = 0.0;  ///< Times of a step.
   double total_s = 0.0;
 };
 [[nodiscard]] std::vector<ModuleTiming> read_timing(const std::filesystem::path& file);
 
-/// A robot's traffic, gone through in time.
+/// Reads the traffic of a robot in the order of time.
 class TrafficUntil {
  public:
-  /// `rows` ascending by time, and outliving this.
+  /// `rows` ascend by time and outlive this.
   explicit TrafficUntil(const std::vector<TrafficRow>& rows) : rows_(rows) {}
 
-  /// Goes on to `time_s`, which is not before that of the last call.
+  /// Advances to `time_s`, which is not before that of the last call.
   void advance(double time_s);
 
   /// Bytes sent so far, by category.
   [[nodiscard]] const std::map<std::string, double>& sent() const { return sent_; }
   [[nodiscard]] double sent(const std::string& category) const;
 
-  /// The robots heard so far, and for how long not [s].
+  /// Robots heard so far, and the time since they were last heard [s].
   [[nodiscard]] std::map<RobotId, double> silent_s() const;
 
  private:

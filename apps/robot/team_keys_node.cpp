@@ -41,7 +41,7 @@ void TeamKeysNode::step() try {
     log::warn("keys") << "robot " << peer.robot << " is a member no more: revoked or expired";
   if (change.new_key) tell_keys_();
 } catch (const std::exception& error) {
-  // A list that is being copied may be incomplete for a moment; the one in use stays.
+  // A list may be incomplete while it is copied; the old one stays in use.
   log::limited(log::Level::kWarn, "keys", "revocations") << error.what();
 }
 

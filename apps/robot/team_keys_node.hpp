@@ -12,14 +12,13 @@
 
 namespace km {
 
-/// The seal of this process, from the robot's folder of keys; null without a folder. Throws
-/// std::runtime_error and std::invalid_argument that say what is wrong with the keys and what
-/// helps.
+/// Seal of this process, from the robot's folder of keys; null without a folder. Throws
+/// std::runtime_error and std::invalid_argument that name the fault of the keys and a remedy.
 [[nodiscard]] std::shared_ptr<SharedSeal> make_team_seal(const std::filesystem::path& folder,
                                                          const RobotIdentity& own);
 
-/// Looks now and then whether members have expired, or the folder's list of revocations has
-/// changed, and has keys told anew where they have.
+/// Checks periodically whether certificates of members have expired or the folder's list of
+/// revocations has changed. If so, sends new keys to the members.
 class TeamKeysNode final : public Node {
  public:
   /// `tell_keys` sends this process's new key to the others. `seal` outlives this.

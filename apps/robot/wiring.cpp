@@ -39,7 +39,7 @@ void forward(In<T> from, Out<T> to) {
   from.subscribe([to](const auto& message) { to.publish(message); });
 }
 
-// A run that is taken up goes on with its life.
+// A resumed run continues its incarnation.
 std::uint64_t boot_of(const RobotInput& input) {
   const bool goes_on = input.restored && !std::holds_alternative<PastRun>(input.source);
   return goes_on ? next_boot(input.restored->boot) : random_boot_id();
@@ -105,13 +105,15 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
 
 void Robot::add_past() {
   add_restore();
-  // What it finds out now is not kept: tomorrow it is found again.
+  // Closures that the robot of a finished run finds now are not written to its journal, because
+  // they can be found again.
   forward<Closure>(topics_.new_closures, topics_.own_closures);
   forward<PeerEvent>(topics_.new_closure_restarts, topics_.closure_restarts);
   source_ended_ = true;
 }
 
-// Behind the source, since it starts before it.
+// Call after the source is added: the supervisor starts nodes in reverse order, so this one starts
+// first.
 void Robot::add_restore() {
   if (!restored_) return;
   restored_images_ = restored_->final_states();
@@ -127,7 +129,8 @@ void Robot::add_restore() {
                                                     .outcomes = topics_.restored_outcomes});
 }
 
-// Behind all that finds closures, and before what they are handed on to: none is lost at the end.
+// Call after the nodes that find closures and before those that read them, so that none is lost at
+// the end.
 void Robot::add_journal(const RobotOptions& options, const RobotInput& input,
                         ResultWriter& results) {
   journal_ = &add<JournalNode>(false, options.output / kJournal, results,
@@ -200,8 +203,8 @@ void Robot::add_place_recognition(const RobotConfig& config) {
                                                    .queries = topics_.place_queries});
 }
 
-// A mapper that is too slow leaves frames out; at --rate max, where no frame is late, it holds the
-// others up, so that the map does not depend on the machine.
+// A mapper that is too slow skips frames. At --rate max no frame is late, and the mapper holds the
+// other nodes up, so that the map does not depend on the machine.
 void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                         const MappingPlan& plan, std::optional<ContinuedMap> before) {
   const Overflow overflow = std::isinf(rate) ? Overflow::kBlock : Overflow::kDropOldest;
@@ -241,7 +244,7 @@ void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem
                                                     .optimized = topics_.optimized_meshes});
 }
 
-// Others may hold the robot's map without having one themselves, and the other way round.
+// A robot may send its mesh without collecting others, and the other way round.
 CrossingEnds Robot::share_meshes(const MeshChunksConfig& config) {
   const CrossingEnds ends{.send = config.publish && mesh_deformation_ != nullptr,
                           .receive = config.collect};
@@ -343,11 +346,12 @@ void Robot::add_network(CrossingEnds meshes) {
   using enum TrafficCategory;
   DdsBridge& dds = *bridge_;
   Topics& t = topics_;
-  // All that crosses between robots: for what, and what its bytes are counted under.
+  // All crossings between robots, with their kind and the category under which their bytes are
+  // counted.
   dds.exchange(t.bows, kEvent, kPlaceRecognition, {}, {},
                relay_->guard<KeyframeBow>(
                    RelayKind::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); }));
-  // A request of 60 bytes is answered with up to 24 kB.
+  // The reply to a request of 60 bytes has up to 24 kB.
   dds.exchange(t.requests, kRequest, kGeometricVerification, {}, {.per_second = 30, .burst = 60});
   dds.exchange(t.replies, kRequest, kGeometricVerification, {}, {},
                relay_->guard<KeyframeReply>(RelayKind::kReply, keyframe_of));
@@ -357,7 +361,7 @@ void Robot::add_network(CrossingEnds meshes) {
   dds.exchange(t.relay_parcels, kRequest, kOther, {}, {}, relay_->guard_parcels());
   dds.exchange(t.chunks, kState, kOther, meshes);
   dds.exchange(t.status, kStatus, kOther);
-  // A closure, and whether it is an inlier, is of use to the robots it joins and to no others.
+  // Closures and inlier sets are sent only to the robots that they connect.
   t.own_closures.subscribe(
       [this, to = Out<Addressed<Closure>>(t.told_closures)](const auto& closure) {
         const RobotId other = closure->to.id.robot;
@@ -403,7 +407,7 @@ void Robot::add_records() {
   topics_.packets.subscribe(
       [this](const auto& packet) { input_time_.reach(packet->frame->stamp); });
   topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
-    input_time_.reach(keyframe->stamp);  // a pose graph, or a former process, has no packets
+    input_time_.reach(keyframe->stamp);  // a pose graph and a former process have no packets
     ++keyframes_;
   });
   status_ = &add<RobotStatusNode>(
@@ -442,12 +446,13 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
   if (node == kRecordNode) record_ = &output;
 }
 
-// Files of several robots are put together: each has a map frame of its own, which is the team's as
-// far as its record says so. It has its own node, so that no viewer waits for a disk.
+// Files of several robots can be merged: each has a map frame of its own, and the file states when
+// it coincides with the team's. The record has its own node, so that viewers do not wait for the
+// disk.
 void Robot::add_record(const RobotOptions& options, const RosConfig& config,
                        ResultWriter& results) {
-  constexpr double kState_bytes_per_s = 200e3;  // of meshes, paths and closures, not compressed
-  constexpr std::size_t kQueue = 10000;         // a minute of a disk that stands still
+  constexpr double kState_bytes_per_s = 200e3;  // rate of uncompressed meshes, paths and closures
+  constexpr std::size_t kQueue = 10000;         // messages of a minute in which the disk stalls
   const std::filesystem::path& file = *options.record;
   add_ros_output(
       kRecordNode,
@@ -516,7 +521,7 @@ ViewState Robot::view_state(ModuleLoads& loads) const {
         TrafficCategory::kPoseGraphOptimization, TrafficCategory::kOther})
     state.sent_bytes.push_back(
         {to_string(category), static_cast<double>(traffic.bytes(Direction::kOut, category))});
-  constexpr double kIdle = 0.005;  // is not worth a line
+  constexpr double kIdle = 0.005;  // share below which a module gets no line
   for (const auto& [name, share] : loads.shares())
     if (share > kIdle) state.loads.push_back({name, share});
   return state;

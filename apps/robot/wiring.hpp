@@ -44,7 +44,7 @@
 
 namespace km {
 
-/// Every channel of a robot. What is no Crossing stays inside.
+/// Every channel of a robot. Channels that are no Crossing stay inside the process.
 struct Topics {
   Topic<SensorPacket> packets;
   Topic<SensorsEnd> sensors_end;
@@ -53,7 +53,7 @@ struct Topics {
   Topic<GraphPlaybackEnd> playback_end;
   Topic<OdometryState> odometry, restored_odometry;
   Topic<KeyframeOdometry> keyframe_odometry;
-  Topic<Keyframe> new_keyframes, keyframes;  // the latter: those that are on the disk
+  Topic<Keyframe> new_keyframes, keyframes;  // keyframes: only those that are on the disk
   Topic<LocatedFrame> located_frames;
   Topic<VioStatistics> odometry_statistics;
   Topic<TrackedImage> tracked_images;
@@ -67,17 +67,18 @@ struct Topics {
   Topic<PlaceQuery> place_queries;
   Topic<LoopCandidate> candidates;
   Topic<PeerEvent> candidate_restarts, new_closure_restarts,
-      closure_restarts;  // where candidates and closures begin anew
+      closure_restarts;  // points at which candidates and closures restart
   Topic<ClosureOutcome> outcomes, restored_outcomes;
-  // Found here; those of them that are on the disk; these and received ones.
+  // new_closures: found by this robot; own_closures: those on the disk; closures: own_closures and
+  // received ones.
   Topic<Closure> new_closures, own_closures, closures;
   Topic<InlierSet> own_inlier_sets;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   Topic<ClosureVerdicts> closure_verdicts;
 
-  // What RelayNode takes to the crossings below or around them, and what comes from either.
-  Topic<PeerEvent> ways;  // peer events, and who can be asked now though it is not heard
+  // Inputs and outputs of RelayNode, which connects them to the crossings below.
+  Topic<PeerEvent> ways;  // peer events, and peers that can be reached through other robots only
   Topic<KeyframeBow> peer_bows;
   Topic<Addressed<KeyframeRequest>> own_requests;
   Topic<KeyframeRequest> peer_requests;
@@ -99,40 +100,40 @@ struct Topics {
   Crossing<RobotStatus> status;
 };
 
-/// All nodes of one robot and how they are joined: the system on one page (wiring.cpp).
+/// All nodes of one robot and their connections: the system on one page (wiring.cpp).
 class Robot {
  public:
-  /// Builds and joins everything; nothing runs yet. Without `mapping` there is no map. `results`,
-  /// which outlives this, takes the meshes. Throws ConfigError and DdsError.
+  /// Builds and connects all nodes; none runs yet. Without `mapping` there is no map. `results`,
+  /// which outlives this, receives the meshes. Throws ConfigError and DdsError.
   Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
         const std::optional<MappingPlan>& mapping, ResultWriter& results, SignalWatch& signals);
 
-  /// Runs until the robot may leave its team, a node fails, or a signal. The folder of the results
-  /// is there.
+  /// Runs until the robot may leave its team, a node fails, or a signal arrives. The results folder
+  /// must exist.
   [[nodiscard]] RunResult run(const Supervisor::Finished& finished) {
     if (journal_ != nullptr && restore_ != nullptr) journal_->take_up();
     return supervisor_.run(finished);
   }
 
-  /// True once the input is over and what was in flight before the recorder has been processed: no
-  /// more keyframes come. Does not wait.
+  /// True once the input has ended and the recorder has processed all messages that follow from it:
+  /// no more keyframes come. Does not wait.
   bool input_ended();
 
-  /// Takes the robot from the network, as its destructor does. For a robot that cannot be
-  /// destroyed, call after run() and end the process.
+  /// Takes the robot off the network, as its destructor does. For a robot that cannot be destroyed,
+  /// call after run() and end the process.
   void leave();
 
   [[nodiscard]] const RecorderNode& recorder() const { return *recorder_; }
   [[nodiscard]] DdsBridge& bridge() { return *bridge_; }
   [[nodiscard]] const RobotStatusNode& status_node() const { return *status_; }
   [[nodiscard]] const SensorsNode* sensors() const { return sensors_; }  ///< Null without sensors.
-  /// Whose poses come from an earlier process.
+  /// Number of images with a pose from an earlier process.
   [[nodiscard]] std::size_t restored_images() const { return restored_images_; }
   /// Null without mapping.
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// Null unless meshes of the other robots are collected.
   [[nodiscard]] const TeamMeshNode* peer_meshes() const { return peer_meshes_; }
-  /// True if another living robot had this robot's id first.
+  /// True if another running robot had this robot's id first.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   /// Null without --record.
   [[nodiscard]] RosOutputNode* record() { return record_; }
@@ -141,12 +142,12 @@ class Robot {
     phase_ = told.phase;
     settled_links_ = told.settled_links;
   }
-  /// No robot will find another closure.
+  /// Reports that no robot will find another closure.
   void expect_no_more_closures() { pcm_->expect_no_more(); }
-  /// Nothing is recorded from now on, and the mesh is corrected by what is known now.
+  /// Stops recording; the mesh is then corrected with the present trajectory.
   void freeze_record();
   [[nodiscard]] double dataset_time_s() const { return input_time_.seconds(); }
-  /// For tests: what the nodes publish.
+  /// For tests: messages that the nodes publish.
   [[nodiscard]] Topics& topics() { return topics_; }
   [[nodiscard]] const std::vector<const Node*>& nodes() const { return nodes_; }
 
@@ -178,7 +179,7 @@ class Robot {
   [[nodiscard]] std::string name_of(RobotId robot) const;
   [[nodiscard]] RobotStatus own_status() const;
 
-  /// Adds a node to the supervisor; `feeds` marks those that the end of the input drains.
+  /// Adds a node to the supervisor; `feeds` marks nodes that are drained when the input ends.
   template <typename NodeType, typename... Arguments>
   NodeType& add(bool feeds, Arguments&&... arguments);
 
@@ -186,8 +187,8 @@ class Robot {
   std::shared_ptr<SharedSeal> seal_;  // null without keys
   DdsParticipant participant_;
   Topics topics_;
-  std::optional<RestoredRun> restored_;           // until the robot is built
-  std::shared_ptr<const Vocabulary> vocabulary_;  // null where nothing is perceived
+  std::optional<RestoredRun> restored_;           // empty once the robot is built
+  std::shared_ptr<const Vocabulary> vocabulary_;  // null if the robot has no images
   std::atomic<bool> source_ended_ = false;
   std::atomic<bool> id_taken_ = false;
   InputTime input_time_;
@@ -195,7 +196,7 @@ class Robot {
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;
   LivesMet lives_;
-  std::vector<Node*> feeding_;  // from the source to the last that makes keyframes
+  std::vector<Node*> feeding_;  // from the source to the last node that makes keyframes
   std::vector<const Node*> nodes_;
   SensorsNode* sensors_ = nullptr;
   std::size_t restored_images_ = 0;
@@ -210,7 +211,8 @@ class Robot {
   RosOutputNode* record_ = nullptr;
   DdsBridge* bridge_ = nullptr;
   std::optional<RelayNode> relay_;
-  Supervisor supervisor_;  // last member: stops the nodes before what they use
+  Supervisor
+      supervisor_;  // last member: stops the nodes before the objects that they use are destroyed
 };
 
 }  // namespace km

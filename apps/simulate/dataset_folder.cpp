@@ -56,7 +56,8 @@ void DatasetFolder::lock() {
   lock_ = open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (lock_ < 0)
     throw std::runtime_error(path_.string() + ": cannot be read: " + std::strerror(errno));
-  if (flock(lock_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;  // some disks cannot
+  if (flock(lock_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)
+    return;  // some disks do not support locks
   close(lock_);
   throw std::runtime_error(path_.string() + ": another run is writing to it");
 }
@@ -84,7 +85,8 @@ void DatasetFolder::open_record(const DatasetRecord& wanted) {
 void DatasetFolder::mark_finished(const std::string& robot) {
   std::vector<std::string>& robots = record_.finished_robots;
   if (std::find(robots.begin(), robots.end(), robot) == robots.end()) robots.push_back(robot);
-  std::sort(robots.begin(), robots.end());  // whoever was first
+  std::sort(robots.begin(),
+            robots.end());  // fixes the order, which otherwise depends on the threads
   write_record();
 }
 

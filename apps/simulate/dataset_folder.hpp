@@ -8,13 +8,13 @@
 
 namespace km {
 
-/// The folder a run writes to: new, or one that a run with the same parameters began. No other run
-/// can have it at the same time.
+/// The output folder of a run: new, or begun by a run with the same parameters. Only one run at a
+/// time can use it.
 class DatasetFolder {
  public:
-  /// Makes the folder where it is missing. Throws std::runtime_error that says what to do for one
-  /// with other things in it, one made with other parameters, one another run writes to, and one
-  /// that cannot be written.
+  /// Makes the folder if it is missing. Throws std::runtime_error with a remedy in these cases: the
+  /// folder has other content, was made with other parameters, is in use by another run, or cannot
+  /// be written to.
   DatasetFolder(const std::filesystem::path& path, const DatasetRecord& wanted);
   ~DatasetFolder();
   DatasetFolder(const DatasetFolder&) = delete;
@@ -26,10 +26,10 @@ class DatasetFolder {
 
   void mark_finished(const std::string& robot);
   void mark_complete();
-  /// It turned out not to be complete.
+  /// Marks the folder as incomplete.
   void mark_incomplete();
 
-  /// Room on the disk [bytes].
+  /// Free space on the disk [bytes].
   [[nodiscard]] std::uintmax_t free_space() const;
 
  private:

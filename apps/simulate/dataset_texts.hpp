@@ -9,10 +9,10 @@
 namespace km {
 
 /// team.yaml: the robots, their true poses and the true mesh, for kimera_multi_team. Robots with
-/// depth make a map, with labels where those were recorded.
+/// depth build a map, with labels if those were recorded.
 [[nodiscard]] std::string team_yaml(const SimulationOptions& options);
 
-/// README.md: how the folder was made and what is in it.
+/// README.md: parameters and content of the folder.
 [[nodiscard]] std::string dataset_readme(const SimulationOptions& options,
                                          const DatasetRecord& record, const World& world,
                                          const std::vector<RobotScenario>& robots);

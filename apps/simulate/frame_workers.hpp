@@ -12,7 +12,7 @@
 namespace km {
 
 /// Threads that take the numbers 0 .. count - 1 in turn and call `body` with each. The first
-/// exception, or stop(), ends them after the calls under way.
+/// exception, or stop(), ends them after the running calls.
 class FrameWorkers {
  public:
   FrameWorkers(int threads, std::size_t count, std::function<void(std::size_t)> body)
@@ -28,10 +28,10 @@ class FrameWorkers {
 
   void stop() { stopped_ = true; }
 
-  /// True when no call is under way and none will come.
+  /// True when no call is running and none will follow.
   [[nodiscard]] bool is_finished() const { return idle_ == threads_.size(); }
 
-  /// Waits for the calls under way; throws what a call threw.
+  /// Waits for the running calls; rethrows the exception of a call.
   void join() {
     wait();
     if (const std::exception_ptr error = std::exchange(error_, nullptr))

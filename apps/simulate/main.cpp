@@ -7,7 +7,7 @@
 
 namespace {
 
-constexpr int kInterrupted = 130;  // as shells count SIGINT
+constexpr int kInterrupted = 130;  // exit code of shells for SIGINT
 
 constexpr const char* kAbout =
     "Makes recordings of robots that move through a built-in world: EuRoC/ASL folders with "
@@ -16,7 +16,7 @@ constexpr const char* kAbout =
     "Worlds: city and camp have roads for vehicles, vicon_room is for flying robots. The same "
     "seed\n"
     "makes the same bytes, whatever the number of threads. Ctrl-C stops in order, a second one at\n"
-    "once; the same command goes on where it was stopped.\n\n"
+    "once; the same command continues a stopped run.\n\n"
     "Examples:\n"
     "  kimera_multi_simulate --world city --robots 2 --duration 60 --output city\n"
     "  kimera_multi_simulate --world camp --rig rgbd --labels --depth-rate 5 --output camp\n"

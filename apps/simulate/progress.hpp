@@ -6,26 +6,26 @@
 
 namespace km {
 
-/// How far a run is and how long it will still take: one line redrawn on a terminal, elsewhere a
-/// line every kPlainInterval_s.
+/// Progress and remaining time of a run: one line redrawn on a terminal, otherwise a line every
+/// kPlainInterval_s.
 class Progress {
  public:
   static constexpr double kPlainInterval_s = 10.0;
 
-  /// On standard output.
+  /// Prints to standard output.
   Progress();
   Progress(std::ostream& output, bool terminal, int width);
 
-  /// Begins to count: `present` of `total` frames are there already. Times are of any clock [s].
+  /// Begins to count: `present` of `total` frames exist already. Times are of any clock [s].
   void start(std::size_t present, std::size_t total, double now_s);
 
-  /// `done` frames are there now.
+  /// Sets the number of existing frames to `done`.
   void update(std::size_t done, double now_s);
 
-  /// The last line, and the end of the redrawing.
+  /// Prints the last line and ends the redrawing.
   void finish(std::size_t done, double now_s);
 
-  /// What a line says.
+  /// Text of a line.
   [[nodiscard]] std::string text(std::size_t done, double now_s) const;
 
  private:

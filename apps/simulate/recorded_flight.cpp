@@ -16,9 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxNormError = 0.01;  // of a quaternion
+constexpr double kMaxNormError = 0.01;  // for quaternions
 
-// A file's text, unpacked if it is gzipped (zlib passes other files through), and its check sum.
+// Text of a file, decompressed if it is gzipped (zlib passes other files through), and its check
+// sum.
 struct Table {
   fs::path file;
   std::string text;
@@ -124,7 +125,7 @@ std::vector<StampedPose> poses_of(const std::vector<TrueState>& truth) {
   return poses;
 }
 
-// What was done to gaps, in words; empty if there are none.
+// Description of the bridged gaps; empty if there are none.
 std::string bridging(const BridgedPoses& motion) {
   if (motion.gaps + motion.open_gaps == 0) return {};
   std::array<char, 200> text{};
@@ -136,7 +137,7 @@ std::string bridging(const BridgedPoses& motion) {
   return text.data();
 }
 
-// In words what was done.
+// Removes the tremble of the rotations, and describes the change.
 std::string take_tremble_out(RecordedFlight& flight) {
   const SteadiedPoses steadied = steady_rotations(poses_of(flight.truth), flight.imu);
   for (std::size_t k = 0; k < flight.truth.size(); ++k)

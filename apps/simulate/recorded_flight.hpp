@@ -10,19 +10,20 @@
 
 namespace km {
 
-/// A recorded motion: true states and what the inertial sensor measured on the way.
+/// A recorded motion: true states and inertial samples.
 struct RecordedFlight {
-  std::vector<TrueState> truth;  ///< Velocity and biases are zero where the file has none.
+  std::vector<TrueState> truth;  ///< Velocity and biases are zero if the file has none.
   std::vector<ImuSample> imu;
-  BridgedPoses motion;      ///< The true poses, and those in their gaps as bridge_gaps() has them.
-  std::string fingerprint;  ///< Names and check sums of both files, and what was done to poses.
+  BridgedPoses motion;  ///< The true poses, with gaps filled by bridge_gaps().
+  std::string
+      fingerprint;  ///< Names and check sums of both files, and the corrections of the poses.
 };
 
 /// Reads true poses (EuRoC's state CSV, or TUM text with stamps in seconds) and inertial data
-/// (EuRoC's CSV); both may be gzipped. Rows with the stamp of the row before are left out, as
-/// published truths have some. With `steady` the poses are as steady_rotations() has them. Throws
-/// std::runtime_error that names file and line for rows that cannot be used, and for files that do
-/// not overlap in time.
+/// (EuRoC's CSV); both may be gzipped. Rows that repeat the stamp of the row before are left out,
+/// because published truths have some. With `steady` steady_rotations() corrects the poses. Throws
+/// std::runtime_error that names file and line for unusable rows, and for files that do not overlap
+/// in time.
 [[nodiscard]] RecordedFlight read_recorded_flight(const std::filesystem::path& truth,
                                                   const std::filesystem::path& imu,
                                                   bool steady = false);

@@ -14,12 +14,12 @@
 namespace km {
 namespace {
 
-constexpr double kImuLead_s = 1.0;           // the reader begins so much before the first image
-constexpr double kImuTail_s = 0.1;           // the last image is covered
-constexpr Stamp kEpoch = 1'000'000'000'000;  // readers want stamps above 0
-constexpr std::uint64_t kMotion = 1, kImu = 2, kNoise = 3;  // what a robot's seeds are for
+constexpr double kImuLead_s = 1.0;           // inertial data begin this long before the first image
+constexpr double kImuTail_s = 0.1;           // inertial data end this long after the last image
+constexpr Stamp kEpoch = 1'000'000'000'000;  // readers require stamps above 0
+constexpr std::uint64_t kMotion = 1, kImu = 2, kNoise = 3;  // parts of a robot's seed
 
-// First + k / rate for all that are not after `last`.
+// First + k / rate, up to `last`.
 std::vector<Stamp> image_stamps(Stamp first, Stamp last, double rate_hz) {
   std::vector<Stamp> stamps;
   for (std::size_t k = 0;; ++k) {
@@ -78,7 +78,7 @@ RobotScenario simulated_robot(const World& world, const SimulationOptions& optio
   return scenario;
 }
 
-// Values of `rows` from `from` to `to`, and one more on either side if there is.
+// Rows from `from` to `to`, and one more on either side if it exists.
 template <typename Row>
 std::vector<Row> part_of(const std::vector<Row>& rows, Stamp from, Stamp to) {
   const auto before = [](const Row& row, Stamp stamp) { return row.stamp < stamp; };
@@ -89,7 +89,7 @@ std::vector<Row> part_of(const std::vector<Row>& rows, Stamp from, Stamp to) {
   return {first, last};
 }
 
-// When images are taken: where truth and inertial data both are.
+// Stamps of images, within the time of both truth and inertial data.
 std::vector<Stamp> recorded_stamps(const RecordedFlight& flight, const SimulationOptions& options) {
   const Stamp origin = flight.truth.front().stamp;
   Stamp last = std::min(flight.truth.back().stamp, flight.imu.back().stamp);
@@ -99,7 +99,7 @@ std::vector<Stamp> recorded_stamps(const RecordedFlight& flight, const Simulatio
       std::lower_bound(flight.imu.begin(), flight.imu.end(), start,
                        [](const ImuSample& sample, Stamp stamp) { return sample.stamp < stamp; });
   if (first == flight.imu.end()) return {};
-  // Cameras of such rigs are triggered with an inertial sample.
+  // Such rigs trigger the cameras with an inertial sample.
   return image_stamps(std::max(first->stamp, origin), last, options.rate_hz);
 }
 

@@ -47,7 +47,7 @@ World make_world(const SimulationOptions& options) {
   return make_vicon_room(options.seed);
 }
 
-// Bytes of one frame's images: a little above what pixels took in city, camp and room.
+// Bytes of one frame's images: a little above the measured sizes in city, camp and room.
 double frame_bytes(const SimulationOptions& options) {
   const double pixels = static_cast<double>(options.width) * options.height;
   const double gray = options.format == ImageFormat::kJpeg ? 0.5 : 0.7;
@@ -58,7 +58,7 @@ double frame_bytes(const SimulationOptions& options) {
   return bytes * pixels;
 }
 
-// Of all that is written of a rig.
+// Fingerprint of all files that describe a rig.
 std::string fingerprint(const SensorRig& rig) {
   const std::string text = camera_yaml(rig.stereo.cameras[0], 1.0, "left") +
                            camera_yaml(rig.stereo.cameras[1], 1.0, "right") +
@@ -89,7 +89,7 @@ RenderRequest merged(const RenderRequest& a, const RenderRequest& b) {
   return {a.radiance || b.radiance, a.rgb || b.rgb, a.depth || b.depth, a.labels || b.labels};
 }
 
-// What a frame has, without or with a depth image.
+// Channels of a frame, with or without a depth image.
 std::vector<ImageChannel> channels_of(const SimulationOptions& options, bool depth) {
   std::vector<ImageChannel> channels = {ImageChannel::kLeft};
   if (options.cameras == CameraKind::kStereo) channels.push_back(ImageChannel::kRight);
@@ -124,8 +124,9 @@ std::size_t missing_images(const RecordingLayout& layout, ImageChannel channel) 
   return missing;
 }
 
-// How many files of the recordings that `options` (completed()) made are gone, or are images cut
-// short. Images of a list that is gone itself are not counted: only the list tells of them.
+// Number of files of the recordings made with `options` (completed()) that are missing, or are
+// truncated images. If an image list is missing, its images are not counted, because only the list
+// names them.
 std::size_t missing_files(const SimulationOptions& options) {
   const fs::path& folder = options.output;
   std::size_t missing = missing_of({folder / "README.md", folder / "team.yaml",
@@ -142,8 +143,8 @@ std::size_t missing_files(const SimulationOptions& options) {
   return missing;
 }
 
-// The cameras of one robot: takes and stores its images, frame by frame, in any order and from
-// several threads; a frame's bytes depend on nothing but the scenario.
+// The cameras of one robot: renders and stores its images, frame by frame, in any order and from
+// several threads. The bytes of a frame depend only on the scenario.
 class RobotCameras {
  public:
   // All three outlive this.
@@ -164,7 +165,7 @@ class RobotCameras {
   [[nodiscard]] const RecordingLayout& layout() const { return layout_; }
   [[nodiscard]] std::size_t frame_count() const { return scenario_.images.size(); }
 
-  // What frame `i` consists of.
+  // Channels of frame `i`.
   [[nodiscard]] std::vector<ImageChannel> channels(std::size_t i) const {
     return channels_of(options_, depth_step_ > 0 && i % depth_step_ == 0);
   }
@@ -177,12 +178,12 @@ class RobotCameras {
     return stamps;
   }
 
-  // Light that frame `i` gets, for its exposure; cheap.
+  // Small view of frame `i` for its exposure; fast.
   [[nodiscard]] RenderedView meter(std::size_t i) const {
     return renderer_.render(meter_, scenario_.motion(scenario_.images[i]).T_world_body, {});
   }
 
-  // The exposure of every frame, in order; before the first record().
+  // Sets the exposure of every frame, in order; call before the first record().
   void set_exposures(std::vector<Exposure> exposures) { exposures_ = std::move(exposures); }
 
   // Renders frame `i` and writes the images that are missing. Throws RecordingError.
@@ -247,7 +248,7 @@ class RobotCameras {
   const RobotScenario& scenario_;
   const Renderer& renderer_;
   const SimulationOptions& options_;
-  std::size_t depth_step_ = 0;  // frames from one depth image to the next, 0: none
+  std::size_t depth_step_ = 0;  // number of frames between depth images, 0: no depth images
   RecordingLayout layout_;
   PixelRays left_;
   PixelRays right_;
@@ -258,16 +259,16 @@ class RobotCameras {
   std::vector<Exposure> exposures_;
 };
 
-// One run: what the folder holds, who drives, and the cameras that fill it.
+// One run: the content of the folder, the robots, and the cameras that fill it.
 class Simulation {
  public:
-  // All but `record` outlive this.
+  // All arguments except for `record` outlive this.
   Simulation(const SimulationOptions& options, DatasetFolder& folder, DatasetRecord record,
              const std::vector<RecordedFlight>& flights)
       : options_(options), folder_(folder), record_(std::move(record)), flights_(flights) {}
 
-  // Everything the frames need, and everything of the recordings but images and their lists; false
-  // if a signal came, which ends it after the step under way.
+  // Prepares everything that frames need, and writes all parts of the recordings except for images
+  // and their lists. False after a signal, which ends it after the present step.
   bool prepare(SignalWatch& signals) {
     const double start_s = steady_now_s();
     std::cout << "Preparing world " << name_of(options_.world) << " ..." << std::endl;
@@ -300,7 +301,7 @@ class Simulation {
       workers.join();
       finish_robots();
     } catch (...) {
-      progress.finish(done_, steady_now_s());  // the message gets a line of its own
+      progress.finish(done_, steady_now_s());  // gives the message a line of its own
       throw;
     }
     progress.finish(done_, steady_now_s());
@@ -346,7 +347,7 @@ class Simulation {
     }
   }
 
-  // The exposure of a frame depends on those before it: one thread for each robot.
+  // The exposure of a frame depends on the frames before it: one thread for each robot.
   void meter() const {
     FrameWorkers workers(options_.threads, robots_.size(), [this](std::size_t r) {
       RobotCameras& cameras = *cameras_[r];
@@ -375,7 +376,7 @@ class Simulation {
     if (!signals.wait(kPoll_s)) return false;
     stopped_ = true;
     workers.stop();
-    signals.give_up();  // a second one ends at once
+    signals.give_up();  // a second signal ends the program at once
     return true;
   }
 
@@ -408,7 +409,7 @@ class Simulation {
     return figures;
   }
 
-  // The lists come last: a recording without them is none.
+  // The lists come last, because a recording without them is invalid.
   void finish_robots() {
     for (std::size_t r = 0; r < robots_.size(); ++r) {
       if (is_finished_[r] || *remaining_[r] > 0) continue;
@@ -432,11 +433,11 @@ class Simulation {
   std::optional<Renderer> renderer_;
   std::vector<RobotScenario> robots_;
   std::vector<std::unique_ptr<RobotCameras>> cameras_;
-  std::vector<Frame> frames_;  // of all robots
+  std::vector<Frame> frames_;  // frames of all robots
   std::vector<std::unique_ptr<std::atomic<std::size_t>>> remaining_;
   std::vector<bool> is_finished_;
   std::atomic<std::size_t> done_ = 0;
-  std::atomic<bool> stopped_ = false;  // by a signal
+  std::atomic<bool> stopped_ = false;  // true after a signal
 };
 
 }  // namespace

@@ -8,9 +8,9 @@ namespace km {
 
 enum class SimulationOutcome { kComplete, kInterrupted };
 
-/// Makes the recordings that `options` (completed()) ask for, or what is missing of them. A signal
-/// ends it after the step or frames under way, a second one at once. Throws an exception whose
-/// message says what to do for input that cannot be used and for what cannot be written.
+/// Makes the recordings of `options` (completed()), or their missing parts. A signal ends it after
+/// the present step or frames, a second one at once. For unusable input and unwritable files throws
+/// an exception with a remedy in its message.
 [[nodiscard]] SimulationOutcome simulate(const SimulationOptions& options, SignalWatch& signals,
                                          Progress& progress);
 

@@ -22,8 +22,8 @@ constexpr bool kIsList = false;
 template <typename T>
 constexpr bool kIsList<std::vector<T>> = true;
 
-// Visitor that makes each field an option of the command line. What is given is kept as a value of
-// the same key, as if a file said so.
+// Visitor that makes each field an option of the command line. A given value is stored under the
+// same key, as if a file contained it.
 class OptionFields : public FieldVisitor<OptionFields> {
  public:
   OptionFields(CLI::App& app, ConfigSection& given) : app_(app), given_(given) {}
@@ -64,7 +64,7 @@ std::optional<std::pair<int, int>> parse_resolution(const std::string& text) {
   return std::pair(width, height);
 }
 
-// Over the file of options, if there is one, what the command line gave.
+// Reads the file of options if there is one, then overrides it with the command line.
 void read_options(const std::string& file, const ConfigSection& given, SimulationOptions& options) {
   ConfigProblems problems;
   const ConfigContext context{problems};
@@ -126,7 +126,7 @@ void complete_recorded(SimulationOptions& options) {
   options.robots = static_cast<int>(options.truths.size());
 }
 
-// With them the cameras' resolution is not for the options to say.
+// Sets the rig of `calibrations`, which also determines the resolution.
 void complete_rig(SimulationOptions& options) {
   RigChoice choice;
   if (options.cameras == CameraKind::kRgbd) choice = {.right = {}, .depth = DepthChoice{}};

@@ -26,7 +26,7 @@ inline constexpr Choice<ImageFormat> kFormats[] = {{"jpg", ImageFormat::kJpeg},
 /// True for "752x480": both sides from 16 to 8192.
 [[nodiscard]] bool is_resolution(const std::string& text);
 
-/// What kimera_multi_simulate is asked for, by its command line and its file of options.
+/// Options of kimera_multi_simulate, from its command line and its file of options.
 struct SimulationOptions {
   WorldKind world = WorldKind::kCity;
   int robots = 3;
@@ -52,22 +52,22 @@ struct SimulationOptions {
   std::filesystem::path output;
   int threads = 0;
 
-  int width = 752;               ///< [px], as `resolution` says, or `rig`.
+  int width = 752;               ///< [px], from `resolution` or `rig`.
   int height = 480;              ///< [px]
-  std::optional<SensorRig> rig;  ///< As `calibrations` say.
+  std::optional<SensorRig> rig;  ///< Rig of the files in `calibrations`.
 
   [[nodiscard]] bool is_recorded() const { return !truths.empty(); }
 
   void visit_fields(auto& visitor) {
     constexpr double kDay_s = 24.0 * 3600.0;
     visitor.required({"world", "output"});
-    visitor.field("world", world, kWorlds, "What there is to see");
-    visitor.field("robots", robots, {1, 99}, "How many robots move through it");
+    visitor.field("world", world, kWorlds, "World that the robots see");
+    visitor.field("robots", robots, {1, 99}, "Number of robots that move through the world");
     visitor.field("seed", seed, {0U, 9'999'999'999'999'999'999U},
-                  "Of everything random: the same seed, the same bytes");
-    visitor.field("duration", duration_s, {0.5, kDay_s}, "Of the recordings [s]");
+                  "Seed of all random numbers: the same seed gives the same bytes");
+    visitor.field("duration", duration_s, {0.5, kDay_s}, "Duration of the recordings [s]");
     visitor.field("rig", cameras, kCameras, "Cameras of each robot");
-    visitor.field("resolution", resolution, "Of the images, WIDTHxHEIGHT [px]");
+    visitor.field("resolution", resolution, "Size of the images, WIDTHxHEIGHT [px]");
     visitor.field("rate", rate_hz, {0.1, 200.0}, "Images per second");
     visitor.field("depth", depth, "Also depth images of the left camera (16 bit, mm)");
     visitor.field("depth-rate", depth_rate_hz, {0.0, 200.0},
@@ -82,32 +82,36 @@ struct SimulationOptions {
                   "or TUM text, also gzipped; in the frame of the world");
     visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
     visitor.field("steady", steady,
-                  "Recorded rotations turn as the gyroscope did: motion capture trembles by "
-                  "milliradians, which images along it would show and a gyroscope denies");
+                  "Correct recorded rotations by the gyroscope: motion capture has errors of "
+                  "milliradians that change fast, so images along it would show turns that the "
+                  "gyroscope does not measure");
     visitor.field("calibration", calibrations, Input{},
                   "The sensors of recorded motion: a folder of EuRoC, one or two files of Kalibr, "
                   "or one of Basalt (default: EuRoC's, its cameras scaled to the resolution)");
     visitor.field("names", names, "Names of the robots of recorded motion (default: the files')");
     visitor.field("start", start_s, {0.0, kDay_s},
-                  "Of recorded motion: first image [s since the first true pose]");
-    visitor.field("end", end_s, {0.0, kDay_s}, "Likewise the last image [s], 0: the flight's end");
-    visitor.field("output", output, "Folder of the recordings; one that was stopped goes on");
-    visitor.field("threads", threads, {0, 256}, "That render; 0: one per processor");
+                  "For recorded motion: first image [s since the first true pose]");
+    visitor.field("end", end_s, {0.0, kDay_s},
+                  "For recorded motion: last image [s], 0: the flight's end");
+    visitor.field("output", output, "Folder of the recordings; a stopped run is continued");
+    visitor.field("threads", threads, {0, 256},
+                  "Number of threads that render; 0: one per processor");
     visitor.check(is_resolution(resolution), "resolution",
                   "is not WIDTHxHEIGHT with both from 16 to 8192");
   }
 };
 
-/// Adds the options to a command line, and --config for a file of them: a YAML map, over which the
-/// command line has the last word. What is wrong with either is refused together, by name and line.
+/// Adds the options to a command line, and --config for a file of them: a YAML map. The command
+/// line has priority over the file. All errors of both are reported together, by name and line.
 void define(CLI::App& app, SimulationOptions& options);
 
-/// What follows from what was given: names, the number of robots, the depth's rate, the rig of the
-/// files of calibration. Throws std::invalid_argument for options that contradict each other, and
-/// DatasetError as read_rig() does.
+/// Options with derived values filled in: names, the number of robots, the rate of depth images,
+/// and the rig of the calibration files. Throws std::invalid_argument for contradicting options,
+/// and DatasetError as read_rig() does.
 [[nodiscard]] SimulationOptions completed(SimulationOptions options);
 
-/// Everything the bytes of the recordings depend on; neither threads nor the output's place.
+/// All parameters that the bytes of the recordings depend on; neither the threads nor the output
+/// folder.
 [[nodiscard]] ParameterList parameters(const SimulationOptions& options);
 
 /// The command that makes the same recordings, with DIR for the output.

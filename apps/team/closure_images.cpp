@@ -22,11 +22,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Closures of one kind, the first kind to be shown first.
+// Closures by kind; the kind to show first comes first.
 using Kinds = std::array<std::vector<ClosureId>, 3>;
 
 Kinds kinds_of(const std::vector<RobotResult>& robots) {
-  std::map<ClosureId, ClosureStage> stages;  // a pair that two robots looked at is there twice
+  std::map<ClosureId, ClosureStage> stages;  // two robots may have the same candidate
   for (const RobotResult& robot : robots)
     for (const ClosureRecord& closure : robot.closures) {
       ClosureStage& stage = stages[closure.id];
@@ -42,7 +42,7 @@ Kinds kinds_of(const std::vector<RobotResult>& robots) {
   return kinds;
 }
 
-// Keyframes of at most so many closures; what is left out is noted.
+// Keyframes of at most `max_closures` closures; `notes` receives the number of closures left out.
 std::set<KeyframeId> keyframes_to_show(const Kinds& kinds, std::size_t max_closures,
                                        std::vector<std::string>& notes) {
   std::set<KeyframeId> keyframes;
@@ -62,7 +62,7 @@ std::set<KeyframeId> keyframes_to_show(const Kinds& kinds, std::size_t max_closu
   return keyframes;
 }
 
-// What follows `option` on the command line of the robot.
+// The value of `option` on the command line of the robot.
 fs::path argument(const RobotPlan& plan, const std::string& option) {
   const auto found = std::ranges::find(plan.arguments, option);
   if (found != plan.arguments.end() && std::next(found) != plan.arguments.end())
@@ -72,7 +72,7 @@ fs::path argument(const RobotPlan& plan, const std::string& option) {
   return {};
 }
 
-// Keyframes whose left images are looked for, and what is called with each that is there.
+// Wanted: keyframes whose left images are requested, by stamp. Take: called with each image found.
 using Wanted = std::map<Stamp, KeyframeId>;
 using Take = std::function<void(const KeyframeId&, const cv::Mat&)>;
 

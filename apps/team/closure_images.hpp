@@ -11,20 +11,21 @@ namespace km {
 
 struct ClosureImageOptions {
   std::size_t max_closures = 200;  ///< About 2 MB of a page.
-  int width_px = 160;              ///< Smaller ones stay as they are.
-  int quality = 60;                ///< Of JPEG, 0 to 100.
+  int width_px = 160;              ///< Narrower images keep their width.
+  int quality = 60;                ///< JPEG quality, 0 to 100.
 };
 
-/// What robots saw where they closed loops, for people.
+/// Images of the keyframes of closures, for people.
 struct ClosureImages {
-  std::map<KeyframeId, std::string> jpegs;  ///< Bytes of files, of left images.
-  std::vector<std::string> notes;           ///< What is left out, and why, a line each.
+  std::map<KeyframeId, std::string> jpegs;  ///< Left images as JPEG files.
+  std::vector<std::string> notes;           ///< Parts left out with the reason, one per line.
 };
 
-/// The images of both keyframes of each closure that was kept, or verified and then rejected, from
-/// the recordings that the plans name: EuRoC folders, and bags by the --rig of their robot. Of too
-/// many closures those that were rejected come first, then those between robots, of the last that
-/// are shown every so many. A recording that cannot be read any more is a note.
+/// Images of both keyframes of every closure that was kept, or verified and then rejected. They are
+/// read from the recordings that the plans name: EuRoC folders, and bags with the --rig of their
+/// robot. If there are more than `max_closures`, rejected closures come first, then closures
+/// between robots, then closures of one robot. From the last kind shown, evenly spaced ones are
+/// taken. An unreadable recording adds a note.
 [[nodiscard]] ClosureImages closure_images(const std::vector<RobotResult>& robots,
                                            const ClosureImageOptions& options = {});
 

@@ -19,7 +19,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMaxFrame_bytes = 65536;
-constexpr int kFramesAtOnce = 64;  // of one robot, before the others have their turn
+constexpr int kFramesAtOnce = 64;  // frames taken from one robot before the next robot's turn
 
 std::runtime_error carry_error(const std::string& what) {
   return std::runtime_error("links: " + what + ": " + std::generic_category().message(errno));
@@ -89,7 +89,7 @@ void EmulatedLinks::take_frames(std::size_t robot, double now_s) {
 void EmulatedLinks::hand_over(const LinkDelivery& delivery) {
   const EthernetFrame& frame = delivery.frame;
   const ssize_t n = write(networks_[delivery.to].frames(), frame.data(), frame.size());
-  // As on a wire, who is too slow to take a frame, or has its interface down, does not get it.
+  // As on a wire, a robot that is too slow to take a frame, or has its interface down, loses it.
   if (n < 0 && !is_passing(errno) && errno != ENOBUFS && errno != ENOMEM && errno != EIO)
     throw carry_error("writing frames for robot " + std::to_string(delivery.to));
 }

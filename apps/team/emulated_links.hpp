@@ -12,12 +12,12 @@
 
 namespace km {
 
-/// Networks for the robots of a team, and a thread that carries frames between them as a script
-/// says. Its time begins with the construction.
+/// Network namespaces for the robots of a team, and a thread that carries frames between them
+/// according to a script. The time of the script begins with the construction.
 class EmulatedLinks {
  public:
-  /// Throws what RobotNetwork and LinkEmulator throw. Make it where no other thread of the program
-  /// holds a lock: it forks.
+  /// Throws the exceptions of RobotNetwork and LinkEmulator. Construct it while no other thread of
+  /// the program holds a lock, because it forks.
   explicit EmulatedLinks(LinkScript script);
   ~EmulatedLinks();
   EmulatedLinks(const EmulatedLinks&) = delete;
@@ -25,7 +25,7 @@ class EmulatedLinks {
 
   [[nodiscard]] const RobotNetwork& network(std::size_t robot) const { return networks_[robot]; }
 
-  /// Ends the thread; what is on its way does not arrive. The emulator, with its counts. Throws
+  /// Ends the thread; frames in flight do not arrive. Returns the emulator with its counts. Throws
   /// std::runtime_error if frames could not be carried to the end.
   const LinkEmulator& finish();
 
@@ -36,12 +36,12 @@ class EmulatedLinks {
   void wait_for_frames(std::optional<double> due_in_s);
   void stop();
 
-  LinkEmulator emulator_;  // the thread's until it has ended
+  LinkEmulator emulator_;  // used by the thread only, until it has ended
   std::vector<RobotNetwork> networks_;
   Descriptor wake_;
   double start_s_;
   std::atomic<bool> stopped_ = false;
-  std::exception_ptr failure_;  // of the thread
+  std::exception_ptr failure_;  // exception of the thread
   std::thread carrier_;
 };
 

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
-// `usual`, and over it what `own` says.
+// The values of `own`, and those of `usual` for missing ones.
 LinkKeys merged(LinkKeys usual, const LinkKeys& own) {
   const auto take = [](auto& value, const auto& over) {
     if (over) value = over;

@@ -25,22 +25,23 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kAbout =
-    "Runs a team of robots on this host, one process each, and compares what they estimated.\n\n"
+    "Runs a team of robots on this host, one process each, and compares their estimates with the "
+    "truth.\n\n"
     "A team file lists the robots and their inputs: see below, and config/teams/.\n\n"
     "True poses are in one world for all robots: where they are given, the tables show errors of "
     "the\n"
     "trajectories and how many closures are true (see kimera_multi_evaluate closures --help), "
     "with\ntruth_mesh also how far the robots' meshes are from it.\n\n"
     "report.html in the folder of the results shows all of it, with charts over time, every "
-    "closure\nand what stands out: one file for any browser, without a network.\n\n"
-    "Exit code: 0 if every robot ended well, 1 for input that cannot be used and results that "
+    "closure\nand the findings: one file for any browser, without a network.\n\n"
+    "Exit code: 0 if every robot ended without a failure, 1 for unusable input and results that "
     "cannot\nbe written, 3 if a robot failed.\n"
-    "Ctrl-C asks the robots to end in order and prints what there is; a second one ends them. If "
+    "Ctrl-C asks the robots to end in order and prints the results; a second one ends them. If "
     "this\nprogram is killed, the robots end in order and write their results.\n\n"
     "Examples:\n"
     "  kimera_multi_team --config config/teams/euroc_two_robots.yaml --dataset MH_01_easy\n"
     "  kimera_multi_team --config config/teams/tunnels.yaml --dataset tunnels_8robots --rate max\n"
-    "  kimera_multi_team --config team.yaml -- --set mapping.mode=off   # after --: of every "
+    "  kimera_multi_team --config team.yaml -- --set mapping.mode=off   # after --: for every "
     "robot\n"
     "  kimera_multi_team --config team.yaml --links config/links/lossy.yaml\n"
     "  kimera_multi_team --config team.yaml --record   # for Foxglove, Rerun, ...: team.mcap\n"
@@ -64,7 +65,7 @@ void define(CLI::App& app, TeamOptions& options) {
              km::links_file_keys());
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
   app.add_option("--config", options.config, "Team file")->required();
-  app.add_option("--dataset", options.dataset, "What ${DATASET} stands for in the team file");
+  app.add_option("--dataset", options.dataset, "Value of ${DATASET} in the team file");
   app.add_option(
          "--rate", options.rate,
          "Times real time, max, or auto, see kimera_multi_robot --help (default: the file's, 1.0)")
@@ -94,15 +95,16 @@ void define(CLI::App& app, TeamOptions& options) {
          "end they become one file (default: team.mcap in the folder of the results)")
       ->expected(0, 1)
       ->type_name("[FILE.mcap]");
-  app.add_flag("--view", options.view,
-               "Robots let anybody in the domain watch them: kimera_multi_viewer --domain N");
+  app.add_flag(
+      "--view", options.view,
+      "Robots allow every program in the domain to watch them: kimera_multi_viewer --domain N");
   app.add_flag("--report", options.report,
                "Start nothing: the tables of a run that has ended, from its folders in --output")
       ->excludes("--links");
   app.add_option("arguments", options.arguments, "After --: more arguments of every robot");
 }
 
-// The command line has the last word over the team file.
+// Options of the command line override the team file.
 km::TeamPlan make_plan(const TeamOptions& options) {
   km::TeamPlan plan = km::read_team_file(options.config, options.dataset);
   if (!options.rate.empty()) plan.rate = options.rate;
@@ -110,7 +112,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   if (options.domain) plan.domain = options.domain;
   if (options.time_limit_s) plan.time_limit_s = options.time_limit_s;
   if (!plan.domain) {
-    // Teams of one host must not meet; the lower half is left to who chooses.
+    // Teams on one host must not meet. The lower half remains for domains chosen by people.
     std::random_device device;
     plan.domain = std::uniform_int_distribution<std::uint32_t>(km::kLastQuietDomain / 2 + 1,
                                                                km::kLastQuietDomain)(device);
@@ -118,7 +120,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   plan.record = options.record.has_value();
   plan.view = options.view;
   if (!options.security.empty()) plan.security = options.security;
-  if (!options.truth.empty()) plan.notes.clear();  // they are about the truths of the file
+  if (!options.truth.empty()) plan.notes.clear();  // the notes concern the truths of the team file
   for (km::RobotPlan& robot : plan.robots) {
     if (!options.truth.empty()) robot.truth = options.truth;
     robot.arguments.insert(robot.arguments.end(), options.arguments.begin(),
@@ -127,7 +129,8 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   return plan;
 }
 
-// What became of the frames; a run has ended and is told whether or not this can be.
+// Writes the fates of the frames to links.csv. A failure is logged and does not end the program,
+// because the run has ended.
 void write_links(const km::TeamPlan& plan, km::EmulatedLinks& links, km::ResultWriter& results) {
   std::vector<std::string> names;
   for (const km::RobotPlan& robot : plan.robots) names.push_back(robot.name);
@@ -164,7 +167,8 @@ std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamP
   return runs;
 }
 
-// Names and colours of the labels beside the team's mesh: those of the first robot that has some.
+// Copies names and colours of the labels beside the team's mesh, from the first robot that has
+// them.
 void copy_palette(const km::TeamPlan& plan) {
   for (const km::RobotPlan& robot : plan.robots) {
     const fs::path own = plan.output / robot.name / km::kLabelPalette;
@@ -174,7 +178,7 @@ void copy_palette(const km::TeamPlan& plan) {
   }
 }
 
-// The robots' records as one; in the frame of those that are joined, where there are some.
+// Merges the records of all robots, in the frame of the joined robots if there are some.
 void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs::path& file) {
   std::vector<fs::path> records;
   std::string root;
@@ -190,8 +194,8 @@ void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs
   km::merge_records(records, root, file);
 }
 
-// The JSON, the report and the mesh of the whole team; `told` hears where all but the
-// first are.
+// Writes the JSON, the report and the mesh of the whole team. Prints the files to `told`, except
+// for the JSON.
 void write_results(const TeamOptions& options, const km::TeamPlan& plan, const km::TeamResult& team,
                    km::ResultWriter& results, std::ostream& told) {
   if (!options.json.empty())
@@ -218,7 +222,7 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
 
 int run(const TeamOptions& options) {
   const km::TeamPlan plan = make_plan(options);
-  if (!options.report) km::make_output_folder(plan.output);  // where the files below may be
+  if (!options.report) km::make_output_folder(plan.output);  // the files below may be in it
   km::check_output_folder(options.json);
   if (options.record) km::check_output_folder(*options.record);
   km::ResultWriter results;
@@ -241,7 +245,7 @@ int main(int argc, char** argv) try {
   TeamOptions options;
   define(app, options);
   try {
-    // CLI11 takes "--" behind --record for the end of its values, and no more.
+    // CLI11 takes "--" after --record only as the end of its values.
     char** const robots = std::find(argv, argv + argc, std::string_view("--"));
     app.parse(static_cast<int>(robots - argv), argv);
     if (robots != argv + argc)

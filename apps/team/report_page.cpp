@@ -27,9 +27,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostPoints = 1500;  // of a series: a page is no wider
+constexpr std::size_t kMostPoints = 1500;  // per series; a page is no wider
 
-// Every k-th element, and the last.
+// Every k-th element, and the last one.
 template <typename T>
 std::vector<T> thinned(std::vector<T> all) {
   const std::size_t stride = all.size() / kMostPoints + 1;
@@ -40,7 +40,7 @@ std::vector<T> thinned(std::vector<T> all) {
   return kept;
 }
 
-// A page needs no more digits of a metre and a second.
+// Millimetres and milliseconds are enough for a page.
 double in_thousandths(double value) {
   return std::round(value * 1e3) / 1e3;
 }
@@ -52,7 +52,7 @@ Stamp first_stamp(const RobotPaths& paths) {
   return first;
 }
 
-// A point for each item, and one of nulls, at which lines end, in each hole.
+// A point for each item. In each hole a point of nulls, which interrupts the line.
 template <typename Item, typename PointOf>
 Json broken_line(std::vector<Item> items, const std::vector<PoseHole>& holes, PointOf point_of) {
   Json points = Json::array();
@@ -74,7 +74,7 @@ Json from_above(const std::vector<StampedPose>& path, const std::vector<PoseHole
   });
 }
 
-// Distance from the truth over time, between the poses that trajectory_error() compares.
+// Position error over time, at the poses that trajectory_error() compares.
 Json position_error(const RobotPaths& paths, const std::vector<StampedPose>& estimate,
                     const std::vector<PoseHole>& holes, Stamp first) {
   if (paths.truth.empty() || estimate.empty()) return Json::array();
@@ -88,7 +88,7 @@ Json position_error(const RobotPaths& paths, const std::vector<StampedPose>& est
       });
 }
 
-// Where the robot was at its keyframes; those of which that is not known are left out.
+// Positions of the robot at its keyframes; keyframes without a known pose are left out.
 Json keyframes_from_above(const RobotResult& robot) {
   constexpr double kMaxGap_s = 0.5;
   Json points = Json::array();
@@ -101,7 +101,7 @@ Json keyframes_from_above(const RobotResult& robot) {
   return points;
 }
 
-// Reasons are few, closures many.
+// Numbers the reasons, because there are few reasons for many closures.
 class Reasons {
  public:
   std::size_t number(const std::string& reason) {
@@ -142,7 +142,7 @@ Json timing_of(const fs::path& file) {
   return rows;
 }
 
-// Bytes sent until each time that the table knows, by category.
+// Bytes sent until each time of the table, by category.
 Json sent_of(const fs::path& file) {
   const std::vector<TrafficRow> rows = read_traffic(file);
   std::vector<double> times_s;
@@ -157,7 +157,7 @@ Json sent_of(const fs::path& file) {
   return sent;
 }
 
-// What robots that ran no such part do not leave is no fault.
+// A missing table is no fault: the robot did not run that part.
 Json table(const fs::path& file, Json (*read)(const fs::path&), Json& notes) try {
   return is_there(file) ? read(file) : Json::array();
 } catch (const std::exception& error) {
@@ -174,7 +174,8 @@ Json report_data(const TeamPlan& plan, const TeamResult& team) {
     const fs::path folder = plan.output / robot.plan.name;
     const RobotPaths& paths = robot.paths;
     const Stamp first = first_stamp(paths);
-    const std::vector<PoseHole> holes = pose_holes(paths.odometry);  // there are fewer keyframes
+    const std::vector<PoseHole> holes =
+        pose_holes(paths.odometry);  // odometry has more poses than keyframes
     robots.push_back({{"id", robot.plan.id},
                       {"name", robot.plan.name},
                       {"truth", from_above(paths.truth, pose_holes(paths.truth), first)},

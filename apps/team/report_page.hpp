@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// What the report shows. Times [s] are since the robot's first pose, or (sent, process) the start
-/// of its process; positions [m] are those of RobotPaths, seen from above:
+/// Data of the report. Times [s] are since the robot's first pose, or (sent, process) since the
+/// start of its process. Positions [m] are those of RobotPaths, seen from above:
 ///
 ///   {folder, team: as to_json(TeamResult), reasons: [text...], notes: [text...],
 ///    images: {"robot:keyframe": address with a small JPEG in it}, of closures, as closure_images()
@@ -24,16 +24,15 @@ namespace km {
 ///              process: [[t, cpu_s, bytes]...],
 ///              timing: [[module, calls, median_ms, p95_ms, max_ms, total_s]...]}]}
 ///
-/// Of long series so many points are left out that about 1500 stay. Reads the tables that the
-/// robots left below `plan.output`: one that is not there leaves its part empty, one that cannot be
-/// used a note.
+/// Long series are thinned to about 1500 points. Reads the tables that the robots left below
+/// `plan.output`. A missing table leaves its part empty; an unreadable one adds a note.
 [[nodiscard]] Json report_data(const TeamPlan& plan, const TeamResult& team);
 
-/// The report as one HTML document that needs no other file and no network. Whatever text is in
-/// `data` is shown as text.
+/// The report as one HTML document that needs no other file and no network. All text in `data` is
+/// shown as text.
 [[nodiscard]] std::string report_page(const Json& data);
 
-/// The page of the run. Throws std::runtime_error naming the file.
+/// Writes the report of the run. Throws std::runtime_error naming the file.
 void write_report(const std::filesystem::path& file, const TeamPlan& plan, const TeamResult& team);
 
 }  // namespace km

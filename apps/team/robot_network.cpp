@@ -28,7 +28,7 @@ namespace {
 
 constexpr const char* kInterface = "eth0";
 constexpr const char* kTunDevice = "/dev/net/tun";
-constexpr std::size_t kHosts = 250;  // of the last number of an address
+constexpr std::size_t kHosts = 250;  // values of the last number of an address
 constexpr std::size_t kMaxDescriptors = 3;
 
 struct NetworkError : std::runtime_error {
@@ -45,7 +45,7 @@ void write_setting(const std::string& file, const std::string& text) {
   require(stream.good(), file);
 }
 
-// As the same user as outside: files of the robots belong to whom they should.
+// Enters a user namespace as the same user, so that files of the robots belong to that user.
 void enter_user_namespace() {
   const std::string user = std::to_string(geteuid()), group = std::to_string(getegid());
   require(unshare(CLONE_NEWUSER) == 0, "a user namespace");
@@ -63,7 +63,7 @@ ifreq request_for(const char* interface) {
 void set_up(int socket, const char* interface) {
   ifreq request = request_for(interface);
   require(ioctl(socket, SIOCGIFFLAGS, &request) == 0, interface);
-  request.ifr_flags |= IFF_UP;  // beside multicast, which DDS needs
+  request.ifr_flags |= IFF_UP;  // keeps multicast, which DDS needs
   require(ioctl(socket, SIOCSIFFLAGS, &request) == 0, std::string(interface) + " up");
 }
 
@@ -82,7 +82,8 @@ Descriptor make_tap(std::size_t robot) {
   ifreq request = request_for(kInterface);
   request.ifr_flags = IFF_TAP | IFF_NO_PI;
   require(ioctl(tap.get(), TUNSETIFF, &request) == 0, "a TAP device");
-  // It goes with the namespace and not with its descriptor: DDS cannot end without its address.
+  // The device ends with the namespace and not with its descriptor, because DDS cannot shut down
+  // without its address.
   require(ioctl(tap.get(), TUNSETPERSIST, 1) == 0, "a TAP device that stays");
 
   const Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
@@ -99,14 +100,14 @@ Descriptor make_tap(std::size_t robot) {
   return tap;
 }
 
-// A message with descriptors in it, or with what went wrong.
+// A message with descriptors, or with the text of an error.
 struct Answer {
   std::array<char, 512> text{};
   std::array<int, kMaxDescriptors> descriptors{-1, -1, -1};
   std::size_t count = 0;
 };
 
-// The part of sendmsg() and recvmsg() that is the same.
+// Common part of sendmsg() and recvmsg().
 struct Envelope {
   explicit Envelope(Answer& answer) : text{answer.text.data(), answer.text.size()} {
     message.msg_iov = &text;
@@ -146,7 +147,7 @@ Answer receive_answer(int socket) {
   return answer;
 }
 
-// In a process of its own: makes the network, and hands its descriptors over.
+// Runs in a process of its own: makes the network and sends its descriptors.
 [[noreturn]] void make_and_hand_over(int socket, std::size_t robot) {
   Answer answer;
   try {

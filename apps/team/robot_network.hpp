@@ -5,7 +5,7 @@
 
 namespace km {
 
-/// A file descriptor, closed with this.
+/// A file descriptor, closed by the destructor.
 class Descriptor {
  public:
   explicit Descriptor(int fd = -1) : fd_(fd) {}
@@ -19,19 +19,19 @@ class Descriptor {
   int fd_;
 };
 
-/// A network of a robot's own on this host: a network namespace with loopback and one Ethernet
-/// interface, eth0, whose frames this program reads and writes. Made as root, or in a user
-/// namespace. It belongs to descriptors alone: with this and the programs in it, it vanishes,
-/// however they end.
+/// A network of a robot on this host: a network namespace with loopback and one Ethernet interface,
+/// eth0, whose frames this program reads and writes. It is made as root, or in a user namespace.
+/// Only descriptors keep it, so that it vanishes with this object and the programs in it, however
+/// they end.
 class RobotNetwork {
  public:
-  /// The network of robot `robot`, with ethernet_address() and 10.77.x.y/16, counted
-  /// from 10.77.0.1. Throws std::runtime_error that says what the system does not allow, and the
-  /// way out.
+  /// The network of robot `robot`, with ethernet_address() and 10.77.x.y/16, counted from
+  /// 10.77.0.1. Throws std::runtime_error that names the operation that the system refuses, and a
+  /// remedy.
   explicit RobotNetwork(std::size_t robot);
 
-  /// Frames that the robot sends, one for each read, and that it is to get, one for each write.
-  /// Does not block.
+  /// Each read returns a frame that the robot sent; each write delivers a frame to it. Does not
+  /// block.
   [[nodiscard]] int frames() const { return tap_.get(); }
 
   /// Moves the calling process, which must have one thread, into the network. Async-signal-safe.
@@ -44,7 +44,7 @@ class RobotNetwork {
   Descriptor network_;
 };
 
-/// "10.77.0.1" of robot 0.
+/// "10.77.0.1" for robot 0.
 [[nodiscard]] std::string network_address(std::size_t robot);
 
 }  // namespace km

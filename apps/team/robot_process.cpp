@@ -25,7 +25,7 @@ std::runtime_error system_error(const std::string& what) {
   return std::runtime_error(what + ": " + std::generic_category().message(errno));
 }
 
-// Read end without blocking, both ends closed on exec.
+// Pipe whose read end does not block; both ends are closed on exec.
 std::array<int, 2> make_pipe() {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) throw system_error("pipe");
@@ -33,7 +33,7 @@ std::array<int, 2> make_pipe() {
   return ends;
 }
 
-// Says why on standard error, as `errno` has it.
+// Prints the meaning of `errno` to standard error and exits.
 [[noreturn]] void give_up() {
   const char* const reason = strerrordesc_np(errno);
   [[maybe_unused]] ssize_t written = write(STDERR_FILENO, "cannot be started: ", 19);
@@ -41,16 +41,17 @@ std::array<int, 2> make_pipe() {
   _exit(127);
 }
 
-// In the child between fork and exec: async-signal-safe calls only.
+// Runs in the child between fork and exec: async-signal-safe calls only.
 [[noreturn]] void become(char* const* arguments, int out, int err, const sigset_t& blocked,
                          pid_t parent, const RobotNetwork* network) {
   dup2(out, STDOUT_FILENO);
   dup2(err, STDERR_FILENO);
-  // Before the next line: other privileges clear what it sets.
+  // Before prctl(): a change of privileges clears its setting.
   if (network != nullptr && !network->enter()) give_up();
-  // Not SIGTERM: whoever has asked for the end already would see a second one, which ends at once.
+  // Not SIGTERM: after a first request to end, the robot would take it as the second, which ends at
+  // once.
   prctl(PR_SET_PDEATHSIG, SIGHUP);
-  if (getppid() != parent) _exit(127);  // it died before the line above
+  if (getppid() != parent) _exit(127);  // the parent died before the line above
   setpgid(0, 0);
   signal(SIGHUP, SIG_DFL);  // also under nohup
   signal(SIGPIPE, SIG_DFL);
@@ -77,7 +78,7 @@ RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset
     : log_(log) {
   if (!log_) throw std::runtime_error(log.string() + ": cannot be written");
   std::vector<char*> arguments;
-  std::vector<std::string> texts = command;  // execv wants them mutable
+  std::vector<std::string> texts = command;  // execv needs mutable texts
   arguments.reserve(texts.size() + 1);
   for (std::string& text : texts) arguments.push_back(text.data());
   arguments.push_back(nullptr);
@@ -98,7 +99,7 @@ RobotProcess::~RobotProcess() {
   if (!exit_ && pid_ > 0) {
     ask_to_end();
     const double end_s = steady_now_s() + kGrace_s;
-    // What it prints meanwhile is taken: full pipes might hold it up.
+    // Full pipes might block the process, so its output is read meanwhile.
     while (!exit_ && steady_now_s() < end_s) {
       std::array<pollfd, 2> polled{{{out_.fd, POLLIN, 0}, {err_.fd, POLLIN, 0}}};
       poll(polled.data(), polled.size(), kPoll_ms);
@@ -136,7 +137,7 @@ std::vector<std::string> RobotProcess::drain(Pipe& pipe) {
 
 std::vector<std::string> RobotProcess::read() {
   int status = 0;
-  // Asked before the pipes are read: after an end they hold all there is.
+  // Called before the pipes are read: if the process has ended, they hold all of its output.
   const bool ended = !exit_ && waitpid(pid_, &status, WNOHANG) == pid_;
   std::vector<std::string> lines = drain(out_);
   for (std::string& line : drain(err_)) {

@@ -15,7 +15,7 @@
 
 namespace km {
 
-/// How a process ended.
+/// Exit status of a process.
 struct ProcessExit {
   int code = 0;    ///< Exit code; meaningless if `signal` is not 0.
   int signal = 0;  ///< Signal that ended it.
@@ -26,17 +26,17 @@ struct ProcessExit {
 /// "exit code 3" or "ended by signal 9 (Killed)".
 [[nodiscard]] std::string to_string(const ProcessExit& exit);
 
-/// A child process with its output on pipes. Its standard input is empty, it is in a process group
-/// of its own (so that a terminal's Ctrl-C does not reach it), and it is sent SIGHUP if this
-/// program, or the thread that started it, ends first, however it ends. Not thread-safe.
+/// A child process with its output on pipes. Its standard input is empty. It has a process group of
+/// its own, so that Ctrl-C of a terminal does not reach it. It receives SIGHUP when this program or
+/// the thread that started it ends in any way. Not thread-safe.
 class RobotProcess {
  public:
   /// Starts `command` (the program first), with the signals in `blocked` blocked and all others
-  /// free, in `network` if it is to have one of its own. What it prints also goes to `log`. Throws
-  /// std::runtime_error.
+  /// unblocked. It runs in `network` if that is not null. Its output is also written to `log`.
+  /// Throws std::runtime_error.
   RobotProcess(const std::vector<std::string>& command, const sigset_t& blocked,
                const std::filesystem::path& log, const RobotNetwork* network = nullptr);
-  /// If it is still running, asks it to end and kills it 20 s later.
+  /// If the process is still running, sends SIGTERM, and kills it 20 s later.
   ~RobotProcess();
   RobotProcess(const RobotProcess&) = delete;
   RobotProcess& operator=(const RobotProcess&) = delete;
@@ -44,17 +44,17 @@ class RobotProcess {
   /// File descriptors to poll for input; -1 once closed.
   [[nodiscard]] std::array<int, 2> descriptors() const { return {out_.fd, err_.fd}; }
 
-  /// Takes what it printed without waiting, and notes its end. Returns the new lines of standard
-  /// output.
+  /// Reads the available output without waiting, and detects the end of the process. Returns the
+  /// new lines of standard output.
   std::vector<std::string> read();
 
-  /// Sends a signal if it is still running.
+  /// Sends a signal if the process is still running.
   void send(int signal);
 
-  /// Sends SIGTERM, unless it has been sent a signal before: a second one ends a robot at once.
+  /// Sends SIGTERM unless a signal was sent before: a second one ends a robot at once.
   void ask_to_end();
 
-  /// How it ended; nullopt while it runs or has output left.
+  /// Exit status; nullopt while the process runs or has unread output.
   [[nodiscard]] const std::optional<ProcessExit>& exit() const { return exit_; }
 
   /// The last lines of standard error.
@@ -63,12 +63,12 @@ class RobotProcess {
  private:
   struct Pipe {
     int fd = -1;
-    std::string partial;  // a line not complete yet
+    std::string partial;  // last line, not complete yet
   };
   std::vector<std::string> drain(Pipe& pipe);
 
   pid_t pid_ = -1;
-  bool asked_ = false;  // to end, by some signal
+  bool asked_ = false;  // true once any signal was sent
   Pipe out_;
   Pipe err_;
   std::ofstream log_;

@@ -19,9 +19,10 @@ namespace fs = std::filesystem;
 
 constexpr int kTeamPoll_ms = 100;
 constexpr double kTeamGrace_s = 30.0;
-constexpr std::size_t kLastLines = 10;  // of a log
+constexpr std::size_t kLastLines = 10;  // lines of a log
 
-// What robots, or those who started them elsewhere, left of an earlier run: --report would show it.
+// Removes results of an earlier run, which --report would show. Robots on other hosts may have left
+// them.
 void remove_earlier_run(const TeamPlan& plan) {
   for (const RobotPlan& robot : plan.robots) {
     const auto folder = plan.output / robot.name;
@@ -33,7 +34,7 @@ void remove_earlier_run(const TeamPlan& plan) {
     fs::remove(plan.output / file);
 }
 
-// The processes of a team, and what has been asked of them.
+// Processes of a team, and the signals sent to them.
 class RunningTeam {
  public:
   RunningTeam(const fs::path& binary, const TeamPlan& plan, SignalWatch& signals,
@@ -50,7 +51,7 @@ class RunningTeam {
     }
   }
 
-  // Where something has failed here, robots may still be running: all are asked before each is
+  // After a failure robots may still be running: all receive the request to end before the first is
   // waited for.
   ~RunningTeam() {
     for (const auto& robot : robots_) robot->ask_to_end();
@@ -75,8 +76,8 @@ class RunningTeam {
   }
 
  private:
-  // Others may run on for long before the team says it. Indented lines are the details of the one
-  // above.
+  // Reason why a robot failed. It is shown at once, because the other robots may run for long.
+  // Indented lines are details of the line above.
   static std::string why(const RobotProcess& robot) {
     const auto& words = robot.last_words();
     const auto cause = std::find_if(words.rbegin(), words.rend(), [](const std::string& line) {
@@ -124,7 +125,7 @@ class RunningTeam {
   bool asked_to_end_ = false;
 };
 
-// A file that is not a number counts as absent: it may be half written.
+// A file without a number counts as absent, because it may be half written.
 int exit_code(const fs::path& folder) {
   std::ifstream file(folder / "exit_code");
   int code = 0;

@@ -13,40 +13,40 @@
 
 namespace km {
 
-/// What became of the frames between the robots, in the team's output folder.
+/// Table of the frames between the robots, in the team's output folder.
 inline constexpr const char* kLinksTable = "links.csv";
 
-/// The records of all robots, likewise.
+/// Merged records of all robots, in the team's output folder.
 inline constexpr const char* kTeamRecord = "team.mcap";
 
-/// The report of the run, likewise.
+/// Report of the run, in the team's output folder.
 inline constexpr const char* kReportPage = "report.html";
 
-/// How one robot's process ended.
+/// Exit status of the process of one robot.
 struct RobotRun {
   ProcessExit exit;
   std::deque<std::string> last_words;
 };
 
-/// The robot's command line.
+/// The command line of a robot.
 [[nodiscard]] std::vector<std::string> robot_command(const std::filesystem::path& binary,
                                                      const TeamPlan& plan, const RobotPlan& robot);
 
-/// Starts a process per robot and waits for all of them; in the order of the plan, whose domain is
-/// set. With `links`, each is in its network there, by its number in the plan. Signals are passed
-/// on to the robots: the first asks them to end in order, as does the time limit, the second ends
-/// them at once. 30 s after the time limit they are killed. Output folders are made, and results of
-/// an earlier run in them removed. Throws std::runtime_error if a process cannot be started; none
-/// is left then.
+/// Starts one process per robot and waits for all of them. Returns their ends in the order of
+/// `plan`, whose domain must be set. With `links`, each robot runs in the network that has its
+/// index in the plan. Signals are passed to the robots: the first asks them to end in order, as the
+/// time limit does; the second ends them at once. Robots are killed 30 s after the time limit.
+/// Makes the output folders and removes earlier results from them. Throws std::runtime_error if a
+/// process cannot be started; no process is left then.
 [[nodiscard]] std::vector<RobotRun> run_team(const std::filesystem::path& binary,
                                              const TeamPlan& plan, SignalWatch& signals,
                                              TeamDisplay& display,
                                              const EmulatedLinks* links = nullptr);
 
-/// How the robots of a run fared that has ended elsewhere, on other hosts or in containers, from
-/// the folders they left below `plan.output`; in the order of the plan. The exit code is that in
-/// the file `exit_code`, if whoever ran the robot wrote one; else 0 for a robot that left its
-/// summary.json, and 1 for one that did not. The last words are the last lines of `robot.log`.
+/// Ends of the robots of a run that has ended elsewhere, on other hosts or in containers, from
+/// their folders below `plan.output`; in the order of the plan. The exit code is the content of the
+/// file `exit_code`, if there is one. Otherwise it is 0 for a robot with a summary.json, and 1
+/// without. The last words are the last lines of `robot.log`.
 [[nodiscard]] std::vector<RobotRun> finished_runs(const TeamPlan& plan);
 
 }  // namespace km

@@ -6,11 +6,11 @@
 
 namespace km {
 
-/// One line per robot, redrawn in place on a terminal; elsewhere every line as it comes, with the
-/// robot's name in front.
+/// One line per robot, redrawn in place on a terminal. Otherwise prints every line with the robot's
+/// name in front.
 class TeamDisplay {
  public:
-  /// On unblocked_stdout(); a terminal if isatty() says so.
+  /// Prints to unblocked_stdout(); isatty() decides whether it is a terminal.
   explicit TeamDisplay(std::vector<std::string> names);
   /// For tests: `output` outlives this. `width` [characters] cuts lines on a terminal.
   TeamDisplay(std::vector<std::string> names, std::ostream& output, bool terminal, int width);

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The file of true poses; empty, with a note, if there is none: a run is worth having without.
+// Finds the file of true poses. Empty, with a note, if there is none: a run is useful without it.
 fs::path find_truth(const fs::path& place, std::vector<std::string>& notes) {
   if (place.empty()) return {};
   const auto file = find_trajectory(place);
@@ -24,7 +24,7 @@ fs::path find_truth(const fs::path& place, std::vector<std::string>& notes) {
 }  // namespace
 
 bool is_rate(const std::string& text) {
-  constexpr Bounds<double> kRate{1e-3, 1e6};  // of kimera_multi_robot
+  constexpr Bounds<double> kRate{1e-3, 1e6};  // bounds of --rate of kimera_multi_robot
   if (text == "max" || text == "auto") return true;
   char* end = nullptr;
   const double rate = std::strtod(text.c_str(), &end);

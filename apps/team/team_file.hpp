@@ -13,7 +13,7 @@
 
 namespace km {
 
-/// True for what --rate of a robot takes: a positive number, max, or auto.
+/// True for a valid --rate of a robot: a positive number, max, or auto.
 [[nodiscard]] bool is_rate(const std::string& text);
 
 /// One robot of a team and its input: a sensor recording or a pose graph.
@@ -33,14 +33,14 @@ struct RobotPlan {
 
   void visit_fields(auto& visitor) {
     visitor.field("id", id, {0, 65535}, "unique in the team");
-    visitor.field("name", name, "unique, and that of its folder of results; default: robot<id>");
+    visitor.field("name", name, "unique; also the name of its results folder; default: robot<id>");
     visitor.field("dataset", dataset, Input{}, "EuRoC/ASL folder; or");
     visitor.field("graph", graph, Input{}, "recorded pose graph: g2o, CSV or JRL");
     visitor.field("from", from_s, {0.0, 1e9}, "[s since the first image] part of the recording");
     visitor.field("to", to_s, {0.0, 1e9}, "[s since the first image]");
     visitor.field("truth", truth, Input{.must_exist = false},
                   "true poses of this robot; default: the team's");
-    visitor.field("arguments", arguments, "more of its command line");
+    visitor.field("arguments", arguments, "further options of its command line");
     visitor.required({"id"});
     visitor.check(name.empty() || is_folder_name(name), "name",
                   "is not made of letters, digits, _, - and .");
@@ -60,26 +60,27 @@ struct TeamPlan {
   std::filesystem::path truth_mesh;
   ClosureTruthOptions closure_truth;
   std::vector<std::string> arguments;
-  std::vector<RobotPlan> robots;   ///< As read: with what the team gives them.
-  std::vector<std::string> notes;  ///< What cannot be had, for the table.
-  bool record = false;             ///< Each robot leaves one for viewers; not in the file.
-  bool view = false;               ///< Robots run with --view; not in the file.
+  std::vector<RobotPlan> robots;   ///< Robots with the team's settings applied.
+  std::vector<std::string> notes;  ///< Missing inputs, for the table.
+  bool record = false;  ///< Each robot writes a record for viewers; not a key of the file.
+  bool view = false;    ///< Robots run with --view; not a key of the file.
 
   void visit_fields(auto& visitor) {
     visitor.field("config", configs, Input{}, "one or several files, as for kimera_multi_robot");
     visitor.field("rate", rate, "times real time, max, or auto");
-    visitor.field("domain", domain, {0, 230}, "of DDS; default: drawn at random");
+    visitor.field("domain", domain, {0, 230}, "DDS domain; default: drawn at random");
     visitor.field("output", output,
                   "folder of the results, relative to the working directory; default: results/ "
                   "and this file's name");
-    visitor.field("time_limit_s", time_limit_s, {0.0, 1e9}, "[s] then the team is asked to end");
+    visitor.field("time_limit_s", time_limit_s, {0.0, 1e9},
+                  "[s] after this time the team is asked to end");
     visitor.field("security", security, Input{},
                   "team folder of kimera_multi_keys: each robot uses the keys in its folder there");
     visitor.field("truth", truth, Input{.must_exist = false},
-                  "true poses, in one world for all robots");
-    visitor.field("truth_mesh", truth_mesh, Input{}, "PLY file in the world of the true poses");
-    visitor.section("closure_truth", closure_truth, "when a closure counts as true");
-    visitor.field("arguments", arguments, "more of the command line of every robot");
+                  "true poses, in one common frame for all robots");
+    visitor.field("truth_mesh", truth_mesh, Input{}, "PLY file in the frame of the true poses");
+    visitor.section("closure_truth", closure_truth, "criteria for a true closure");
+    visitor.field("arguments", arguments, "further options of the command line of every robot");
     visitor.sections("robots", robots);
     visitor.required({"robots"});
     visitor.check(is_rate(rate), "rate", "is neither a positive number nor max nor auto");
@@ -94,12 +95,12 @@ struct TeamPlan {
 };
 
 /// Reads a team file. Relative paths of inputs are relative to the file's folder; ${DATASET} in
-/// them stands for `dataset`. A truth may be a folder that holds the file; one that does not exist
-/// is a note. Throws ConfigError with every problem by file and line.
+/// them is replaced by `dataset`. A truth may be a folder that contains the file. A missing truth
+/// adds a note. Throws ConfigError with every problem by file and line.
 [[nodiscard]] TeamPlan read_team_file(const std::filesystem::path& file,
                                       const std::filesystem::path& dataset);
 
-/// The keys of a team file, with their defaults and meaning.
+/// Documentation of the keys of a team file, with their defaults.
 [[nodiscard]] std::string team_file_keys();
 
 }  // namespace km

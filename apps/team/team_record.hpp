@@ -7,14 +7,13 @@
 
 namespace km {
 
-/// The records that a robot left in its folder, in order; empty if there is none.
+/// Records in the folder of a robot, in order; empty if there is none.
 [[nodiscard]] std::vector<std::filesystem::path> robot_records(const std::filesystem::path& folder);
 
-/// Puts records into one file by time. Topics of equal name and type become one; files in them are
-/// named after the robots' folders, "alice/keyframes.csv". Where `root` names
-/// a robot, its map frame is that of the team: /tf_static tells that it is `map`. Throws
-/// InputFileError for a record that cannot be read, and std::runtime_error for what keeps `file`
-/// from being written.
+/// Merges records into one file by time. Topics of equal name and type become one. Attached files
+/// are named after the robots' folders, "alice/keyframes.csv". If `root` names a robot, its map
+/// frame is that of the team: /tf_static publishes it as `map`. Throws InputFileError for an
+/// unreadable record, and std::runtime_error if `file` cannot be written.
 void merge_records(std::span<const std::filesystem::path> records, const std::string& root,
                    const std::filesystem::path& file);
 

@@ -17,11 +17,11 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-constexpr double kManySkipped = 0.05;  // of the frames: beyond, odometry is not what it could be
+constexpr double kManySkipped = 0.05;  // share of the frames above which odometry loses accuracy
 
 constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", "other"};
 
-// Absolute error, drift and share of the recording; "-" for what there is not.
+// Absolute error, drift and covered share of the recording; "-" for missing values.
 std::vector<std::string> error_cells(const TrajectoryError* error) {
   if (error == nullptr) return {"-", "-", "-", "-"};
   const auto mean = [](const Statistics& statistics, int decimals) {
@@ -162,7 +162,7 @@ std::vector<std::string> mesh_row(const std::string& name, const TeamMeshes& mes
           right_labels(meshes.optimized, after)};
 }
 
-// A row per robot and one for all as one; empty without comparisons.
+// A row per robot and one for all together; empty without comparisons.
 std::string mesh_table(const TeamMeshes& meshes) {
   const auto& any = meshes.optimized ? meshes.optimized : meshes.odometry;
   if (!any) return "";
@@ -182,7 +182,7 @@ std::string mesh_table(const TeamMeshes& meshes) {
          "can have seen. Labels: share of\nthese that is right.\n";
 }
 
-// Empty unless processors were short for the rate.
+// Empty unless processors were too slow for the rate.
 std::string skipped_remark(const RobotResult& robot) {
   const RunSummary summary = robot.summary.value_or(RunSummary{});
   if (summary.rate.value_or(1.0) < 1.0)
@@ -198,7 +198,7 @@ std::string skipped_remark(const RobotResult& robot) {
          " % of its frames: use a lower --rate, or max, which waits, or fewer robots\n";
 }
 
-// A robot that left nothing has one reason for all that is missing: how it failed.
+// For a robot without results, one reason stands for all that is missing: how it failed.
 std::string notes(const TeamResult& team) {
   std::string text;
   for (const std::string& note : team.notes) text.append("note: ").append(note).append("\n");
@@ -211,7 +211,7 @@ std::string notes(const TeamResult& team) {
   return text;
 }
 
-// Robots that failed alike, by a mistyped option of all say, are told of once.
+// Robots that failed in the same way, for instance by a mistyped option for all, are listed once.
 std::string failures(const TeamResult& team) {
   struct Failure {
     std::string exit, last_words, names;

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What `make` returns; nullopt if it throws, and why in the notes.
+// The result of `make`; nullopt if it throws, with the reason in the notes.
 auto attempt(std::vector<std::string>& notes, const auto& make, const std::string& what = {})
     -> std::optional<decltype(make())> {
   try {
@@ -28,7 +28,7 @@ auto attempt(std::vector<std::string>& notes, const auto& make, const std::strin
   }
 }
 
-// By robot, in the order of the plan; those that left none are not in it.
+// By robot, in the order of the plan; without the robots that left none.
 using Meshes = std::vector<std::pair<std::string, LabelledMesh>>;
 
 Meshes read_meshes(const TeamPlan& plan, const char* file, std::vector<std::string>& notes) {
@@ -45,7 +45,8 @@ Meshes read_meshes(const TeamPlan& plan, const char* file, std::vector<std::stri
   return meshes;
 }
 
-// Of a city the table would else take longer than the run; kimera_multi_evaluate mesh takes more.
+// Without a limit, the comparison for a city would take longer than the run. kimera_multi_evaluate
+// mesh takes more samples.
 constexpr std::size_t kMostSamples = 2'000'000;
 
 std::optional<MeshReport> compare(const LabelledMesh& truth, const Meshes& meshes,
@@ -67,20 +68,20 @@ void note_uncorrected(const Meshes& before, const Meshes& after, std::vector<std
     if (!corrected.contains(name)) notes.push_back(name + " left a mesh, but none corrected");
 }
 
-// The left camera of the team: that of the first robot that has one.
+// Left camera of the team: that of the first robot with a camera.
 std::optional<Camera> camera_of(const TeamPlan& plan) {
   for (const RobotPlan& robot : plan.robots)
     if (!robot.dataset.empty()) return open_euroc(robot.dataset).rig().stereo.cameras[0];
   return std::nullopt;
 }
 
-// Trajectories of the robots, read once: the inputs of the evaluation refer to them.
+// Trajectories of the robots, read once, because the inputs of the evaluation refer to them.
 class Trajectories {
  public:
   explicit Trajectories(const TeamPlan& plan) : plan_(plan) {}
 
-  // The robot's `file` with its truth, if it can be judged; else why not, and nullopt. The result
-  // stays valid.
+  // The robot's `file` with its truth if it can be compared; otherwise nullopt, with the reason in
+  // the notes. The result stays valid.
   std::optional<TrajectoryInput> input(const RobotPlan& robot, const char* file,
                                        std::vector<std::string>& notes) {
     if (robot.truth.empty()) return std::nullopt;
@@ -88,7 +89,7 @@ class Trajectories {
       const auto& truth = read(robot.truth);
       const auto& estimate = read(plan_.output / robot.name / file);
       TrajectoryInput input{robot.name, truth, estimate, recorded_window(robot)};
-      static_cast<void>(trajectory_error({&input, 1}));  // throws if it cannot be compared
+      static_cast<void>(trajectory_error({&input, 1}));  // throws if there is nothing to compare
       return input;
     });
   }
@@ -134,7 +135,8 @@ void judge_odometry(const TrajectoryInput& input, RobotResult& robot) {
   robot.paths.truth = beside(input.truth, input.estimate);
 }
 
-// Judges the optimised poses of the robots in the team's frame, and moves them to the truth.
+// Compares the optimised poses of the robots in the team's frame with the truth, and moves them to
+// it.
 void judge_optimized(TeamResult& team, Trajectories& trajectories) {
   std::vector<TrajectoryInput> inputs;
   for (RobotResult& robot : team.robots)
@@ -145,13 +147,14 @@ void judge_optimized(TeamResult& team, Trajectories& trajectories) {
   const Alignment alignment = team.optimized ? team.optimized->alignment : Alignment{};
   for (RobotResult& robot : team.robots) {
     if (!robot.in_team_frame || robot.left_nothing()) continue;
-    std::vector<std::string> known;  // what judging them has noted, or nobody asked for
+    std::vector<std::string>
+        known;  // not reported: the comparison has noted the reason, or there is no truth
     const auto poses = attempt(known, [&] { return trajectories.optimized(robot.plan); });
     if (poses) robot.paths.optimized = moved(*poses, alignment);
   }
 }
 
-// Keyframes and closures. What keeps a robot out is noted with the team.
+// Reads keyframes and closures. The team's notes say why those of a robot are missing.
 void read_all_closures(const TeamPlan& plan, std::vector<RobotResult>& robots,
                        std::vector<std::string>& notes) {
   for (RobotResult& robot : robots) {
@@ -169,8 +172,7 @@ void read_all_closures(const TeamPlan& plan, std::vector<RobotResult>& robots,
   }
 }
 
-// The closures of all robots whose truth is known against it; nullopt where there is nothing to
-// judge.
+// Compares the closures of all robots with a known truth; nullopt if there is nothing to compare.
 std::optional<ClosureScores> judge_closures(const TeamPlan& plan,
                                             const std::vector<RobotResult>& robots,
                                             Trajectories& trajectories,
@@ -217,7 +219,7 @@ void find_team_frame(std::vector<RobotResult>& robots) {
   std::map<RobotId, int> sizes;
   for (const RobotResult& robot : robots)
     if (const auto frame = frame_of(robot)) ++sizes[*frame];
-  // The first of equal ones is that of the lowest anchor.
+  // Among equal sizes max_element takes the first: the lowest anchor.
   const auto team = std::max_element(
       sizes.begin(), sizes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   for (RobotResult& robot : robots) {

@@ -27,32 +27,33 @@ namespace {
 constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 constexpr const char* kAbout =
-    "Shows a team in a browser, while it runs or afterwards. It prints the address to open.\n\n"
-    "The page has the map, trajectories and loop closures in 3D, and what the robots say of "
-    "themselves:\nwho hears whom, cost, bytes, loads, memory. Its time slider goes back to any "
-    "moment while the run goes\non.";
+    "Shows a team in a browser, while it runs or afterwards. It prints the address to "
+    "open.\\n\\nThe page has the map, trajectories and loop closures in 3D, and the state of the "
+    "robots:\nwho hears whom, cost, bytes, loads, memory. Its time slider goes back to any moment "
+    "while the run\ncontinues.";
 
 constexpr const char* kFooter = R"(
-With --domain it joins the team's DDS domain and listens; it says nothing there, and robots neither wait
-for it nor count it. Robots that run with --view send what a page needs: about 2 kB/s, the map's pieces as
-they change, and small camera images of a robot while a page shows them.
+With --domain it joins the team's DDS domain as a listener: robots neither wait for it nor count
+it. Robots that run with --view send the data of a page: about 2 kB/s, chunks of the map as they change,
+and small camera images of a robot while a page shows them.
 
-RESULTS is the folder of kimera_multi_team, or of one robot. Results do not say when all was known:
-a piece of the mesh is shown from when the robot came nearest to it, and robots join with the first
-closure of theirs that was kept: before it, the page has what odometry made, then what came of it.
+RESULTS is the folder of kimera_multi_team, or of one robot. Results do not contain all times:
+a chunk of the mesh is shown from the time at which the robot came nearest to it, and robots join with
+their first kept closure. Before it, the page has the estimates of odometry, afterwards the optimised
+ones.
 
-In the page: drag to turn, right button to move, wheel to come near; double click on a robot's name to
+In the page: drag to turn, right button to move, wheel to zoom; double click on a robot's name to
 follow it; measure: two clicks on the map. Keys: space plays and stops, T from above, F all in view.
 
-Without --listen only this host can open the page. With it, who knows the address can, so the address
-has a random token that is another one every time; what is sent is not encrypted.
+Without --listen only this host can open the page. With it, every program that knows the address can.
+The address therefore has a random token, a new one for every run; the content is not encrypted.
 
 Examples
   kimera_multi_viewer --domain 7                     # a team that runs
-  kimera_multi_viewer --domain 7 --peers 10.0.0.2,10.0.0.3   # where multicast is off
-  kimera_multi_viewer --domain 7 --record team.mcap  # and keep what is told, for Foxglove and others
+  kimera_multi_viewer --domain 7 --peers 10.0.0.2,10.0.0.3   # without multicast
+  kimera_multi_viewer --domain 7 --record team.mcap  # also write a record, for Foxglove and others
   kimera_multi_viewer results/demo                   # a run that has ended
-  kimera_multi_viewer results/demo --rate 2          # as if it were live, twice as fast
+  kimera_multi_viewer results/demo --rate 2          # replay it, twice as fast
   kimera_multi_viewer results/demo --listen 0.0.0.0  # for other hosts
 
 Exit codes: 0 ended by Ctrl-C; 1 for input that cannot be used, an address that cannot be had, and a
@@ -67,7 +68,7 @@ struct ViewerOptions {
   std::optional<double> rate;
 };
 
-// ADDRESS:PORT is both; an address of IPv6 has more colons.
+// ADDRESS:PORT sets both; an IPv6 address has more than one colon.
 void split_port(PageServerOptions& server) {
   const std::size_t colon = server.address.find(':');
   if (colon == std::string::npos || colon != server.address.rfind(':')) return;
@@ -92,9 +93,9 @@ void define(CLI::App& app, ViewerOptions& options) {
   app.add_option("--peers", options.dds.peers, "Addresses of its hosts, where multicast is off")
       ->delimiter(',')
       ->needs(domain);
-  auto* const record = app.add_option(
-      "--record", options.record,
-      "Write what robots tell into this MCAP file, replacing it: the topics of their own records");
+  auto* const record = app.add_option("--record", options.record,
+                                      "Write the messages of the robots to this MCAP file, "
+                                      "replacing it: the topics of a robot's own record");
   record->needs(domain);
   app.add_flag("--record-images", options.record_images,
                "And all their camera images, small; else those that a page shows")
@@ -103,7 +104,7 @@ void define(CLI::App& app, ViewerOptions& options) {
          "--palette", options.palette,
          "label_palette.csv with names and colours of the labels (default: that of RESULTS)")
       ->check(CLI::ExistingFile);
-  app.add_option("--port", options.server.port, "Of the page; 0: any that is free")
+  app.add_option("--port", options.server.port, "Port of the page; 0: any free port")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   app.add_option(
@@ -112,8 +113,8 @@ void define(CLI::App& app, ViewerOptions& options) {
          "loopback, the URL has a token")
       ->capture_default_str();
   app.add_option("--memory", options.memory_MB,
-                 "What is kept at most [MB]: beyond, images, then meshes that newer ones have "
-                 "replaced go, the oldest first")
+                 "Memory for messages [MB]: beyond it, images, then superseded meshes are dropped, "
+                 "the oldest first")
       ->check(CLI::Range(10.0, 1e6))
       ->capture_default_str();
   app.add_option("--page", options.server.page_folder,
@@ -126,7 +127,7 @@ void define(CLI::App& app, ViewerOptions& options) {
   });
 }
 
-// Tells the store, at `rate` or at once; false after a signal.
+// Adds the updates to the store, at `rate` or all at once; false after a signal.
 bool play(const std::vector<ViewUpdate>& updates, std::optional<double> rate, ViewStore& store,
           SignalWatch& signals) {
   const double start_s = steady_now_s();
@@ -170,7 +171,7 @@ void show_run(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   wait_for_end(signals);
 }
 
-// Whose images are asked for: those that pages show, and those that are recorded. Thread-safe.
+// Robots whose images are requested: by pages that show them, and for the record. Thread-safe.
 class ImageRequests {
  public:
   explicit ImageRequests(ViewListener& listener) : listener_(listener) {}
@@ -189,7 +190,7 @@ class ImageRequests {
   }
 
   ViewListener& listener_;
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the members below
   std::set<RobotId> shown_, recorded_, asked_;
 };
 
@@ -237,7 +238,7 @@ int main(int argc, char** argv) try {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : km::kBadCommandLine;
   }
-  km::SignalWatch signals;  // before any thread: they inherit the blocked signals
+  km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));
   (options.results.empty() ? km::show_team : km::show_run)(options, store, signals);
   return 0;

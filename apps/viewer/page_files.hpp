@@ -4,8 +4,8 @@
 
 namespace km {
 
-/// All of the page: those in apps/viewer/page, what it shares with other programs' pages, and
-/// three.js where its modules look for each other.
+/// All files of the page: those in apps/viewer/page, the parts shared with other programs' pages,
+/// and three.js under the names that its modules import.
 [[nodiscard]] std::span<const PageFile> page_files();
 
 }  // namespace km

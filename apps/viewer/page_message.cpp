@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-// To 1 / `scale`: JSON writes no more digits than it takes.
+// Rounds to 1 / `scale`, so that JSON has fewer digits.
 double rounded_to(double value, double scale) {
   return std::round(value * scale) / scale;
 }
@@ -49,7 +49,7 @@ const char* name_of(ViewVerdict verdict) {
   return "candidate";
 }
 
-// Adds the members of a content to the object, and of some the bytes that go behind it.
+// Writes the members of a content to the object, and binary data to `data`.
 struct Writer {
   Json& json;
   std::string& data;
@@ -91,7 +91,7 @@ struct Writer {
     for (const Stamp stamp : keyframes.stamps) json["stamps_s"].push_back(seconds_of(stamp));
   }
 
-  // Each [robot, keyframe, robot, keyframe, verdict, matches, inliers, reason].
+  // Each closure: [robot, keyframe, robot, keyframe, verdict, matches, inliers, reason].
   void operator()(const ViewClosures& closures) const {
     json["kind"] = "closures";
     json["closures"] = Json::array();
@@ -143,7 +143,7 @@ PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
                {"boot", boot.str()}};
   std::string data;
   std::visit(Writer{json, data}, update.content);
-  // What is not UTF-8 in a robot's name or reason must not end the viewer.
+  // Invalid UTF-8 in a robot's name or reason must not end the viewer.
   std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   const bool binary = std::holds_alternative<MeshChunk>(update.content) ||
                       std::holds_alternative<ViewImage>(update.content);

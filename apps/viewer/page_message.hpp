@@ -9,29 +9,28 @@
 
 namespace km {
 
-/// What the page is told, as one frame of its WebSocket: text (one JSON object), or binary.
+/// Message to the page as one frame of its WebSocket: text (one JSON object), or binary.
 struct PageMessage {
   bool binary = false;
   std::string bytes;
 };
 
-/// An update for the page: an object with n (`number`), t (when it was told [ms since 1970]),
+/// An update for the page: an object with n (`number`), t (time of reception [ms since 1970]),
 /// robot, boot (hexadecimal), kind ("state", "pose", "keyframes", "closures", "mesh", "image") and
-/// the members of the content under their names; poses are [x, y, z, qx, qy, qz, qw] to 0.1 mm and
+/// the members of the content under their names. Poses are [x, y, z, qx, qy, qz, qw] to 0.1 mm and
 /// 1e-5. Meshes and images are binary, little-endian: length of the object [u32], the object,
-/// blanks up to a multiple of 4, then of a mesh its offsets (u16), faces (u16), labels (u8), of an
-/// image features (f32) and JPEG.
+/// blanks up to a multiple of 4, then the data. A mesh has offsets (u16), faces (u16) and labels
+/// (u8); an image has features (f32) and JPEG.
 [[nodiscard]] PageMessage page_message(const ViewUpdate& update, std::uint64_t number);
 
-/// What a page shows.
+/// Source of the messages that a page shows.
 enum class PageSource {
-  kTeam,    ///< That runs: "live".
-  kReplay,  ///< A finished run, as if it were live: "replay".
-  kRun,     ///< All of a finished run: "run".
+  kTeam,    ///< A running team: "live".
+  kReplay,  ///< A finished run in real time: "replay".
+  kRun,     ///< A complete finished run: "run".
 };
 
-/// What the page is told first: what it shows (`source`), of what (`title`), and the colours of
-/// labels.
+/// First message to the page: the source (`source`), its name (`title`), and the colours of labels.
 [[nodiscard]] std::string page_greeting(PageSource source, const std::string& title,
                                         const LabelPalette& palette);
 

@@ -32,7 +32,7 @@ bool is_loopback(const std::string& address) {
   return address.starts_with("127.") || address == "localhost" || address == "::1";
 }
 
-// 128 bits as letters and digits.
+// 128 random bits as letters and digits.
 std::string random_token() {
   if (sodium_init() < 0) throw std::runtime_error("no random numbers for a token");
   std::array<unsigned char, 16> bytes{};
@@ -65,7 +65,7 @@ bool send(mg_connection* connection, int kind, std::string_view bytes) {
   return mg_websocket_write(connection, kind, bytes.data(), bytes.size()) > 0;
 }
 
-// What a page wants: {"images": robot, "on": true}; anything else is none.
+// Request of a page: {"images": robot, "on": true}. Other text is no request.
 struct Wish {
   RobotId robot = 0;
   bool on = false;
@@ -92,7 +92,7 @@ class PageServer::Impl {
 
   ~Impl() {
     stopping_ = true;
-    mg_stop(context_);  // closes all connections, whose pages end
+    mg_stop(context_);  // closes all connections, which ends their threads
     mg_exit_library();
   }
 
@@ -108,10 +108,10 @@ class PageServer::Impl {
   }
 
  private:
-  // A page that is open: its thread sends what it does not have yet.
+  // An open page; its thread sends the messages that the page lacks.
   struct Page {
     std::atomic<bool> closed = false;
-    std::set<RobotId> images;  // of whom it wants some
+    std::set<RobotId> images;  // robots whose images the page requests
     std::thread sender;
   };
 
@@ -174,7 +174,7 @@ class PageServer::Impl {
         this);
   }
 
-  // Neither a page of another site, nor one that reached this by a name of its own.
+  // Refuses pages of other sites, and pages that reached this server under another host name.
   bool is_welcome(const mg_connection* connection) const {
     const std::string_view host = header(connection, "Host"), origin = header(connection, "Origin");
     if (!origin.empty() && origin != "http://" + std::string(host)) return false;
@@ -222,7 +222,7 @@ class PageServer::Impl {
     page->sender = std::thread([this, connection, page] { tell(connection, *page); });
   }
 
-  // Frames of text hold an array of messages, or the greeting.
+  // A text frame holds an array of messages, or the greeting.
   void tell(mg_connection* connection, const Page& page) {
     if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.greeting + ']')) return;
     ViewStore::Cursor cursor;
@@ -272,8 +272,8 @@ class PageServer::Impl {
     });
   }
 
-  // Tells of whom images are wanted, if that is another set of robots now. Under the lock: the last
-  // word must be that of the last change.
+  // Passes the set of robots whose images are requested, if it has changed. Holds the lock, so that
+  // the calls are in the order of the changes.
   void ask(const std::function<void()>& change) {
     const std::set<RobotId> before = wanted();
     change();
@@ -306,7 +306,7 @@ class PageServer::Impl {
   const std::string token_;
   std::atomic<bool> stopping_ = false;
   mg_context* context_ = nullptr;
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the members below
   std::map<const mg_connection*, std::shared_ptr<Page>> pages_;
 };
 

@@ -24,10 +24,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kPoseInterval_s = 0.2;
-constexpr double kMaxPoseGap_s = 0.5;                             // of the estimate, at a keyframe
-constexpr std::size_t kMostClosures = 200, kMostKeyframes = 500;  // of one update
+constexpr double kMaxPoseGap_s = 0.5;  // largest gap of the estimate at a keyframe
+constexpr std::size_t kMostClosures = 200, kMostKeyframes = 500;  // limits of one update
 
-// What a robot left; times are since its start [s].
+// Results of a robot; times are since its start [s].
 struct RobotFiles {
   RobotId id = 0;
   RunSummary summary;
@@ -47,7 +47,7 @@ std::vector<ViewNumber> read_loads(const fs::path& file, double seconds) {
   return loads;
 }
 
-// Reads what there is; what cannot be read is noted.
+// Reads the available results; `notes` list those that cannot be read.
 RobotFiles read_robot(const fs::path& folder, std::vector<std::string>& notes) {
   RobotFiles robot;
   robot.summary = read_summary(folder / kSummary);
@@ -74,8 +74,8 @@ RobotFiles read_robot(const fs::path& folder, std::vector<std::string>& notes) {
   return robot;
 }
 
-// One robot's time: that of its images runs as that of its process does, unless the recording was
-// played faster.
+// Maps stamps of one robot to times of its process. Both run at the same speed unless the recording
+// was played faster.
 class RobotTimes {
  public:
   RobotTimes(const RobotFiles& robot, Stamp begin) : begin_(begin) {
@@ -115,10 +115,10 @@ std::vector<ViewLink> links_of(const TrafficUntil& traffic) {
 }
 
 constexpr double kNever_s = std::numeric_limits<double>::infinity();
-constexpr double kAnswer_s = 0.5;  // from a candidate to what becomes of it
+constexpr double kAnswer_s = 0.5;  // from a candidate to its outcome
 
-// When each row of optimizer.csv was: those of the robot alone evenly until it joined, those with
-// others by the share of the bytes that were sent for them from then on.
+// Time of each row of optimizer.csv. Rounds of the robot alone are spread evenly until it joined.
+// Rounds with others are placed by the share of the bytes that were sent for them afterwards.
 std::vector<double> times_of_rounds(const RobotFiles& robot, double joined_s, double end_s) {
   const auto alone = static_cast<std::size_t>(std::count_if(
       robot.rounds.begin(), robot.rounds.end(), [](const NumberRow& r) { return r[2] < 2.0; }));
@@ -144,7 +144,7 @@ std::vector<double> times_of_rounds(const RobotFiles& robot, double joined_s, do
   return times_s;
 }
 
-// Tells what one robot told.
+// Makes the updates of one robot.
 class RobotPlayback {
  public:
   RobotPlayback(const RobotFiles& robot, Stamp begin, std::vector<ViewUpdate>& updates)
@@ -153,8 +153,8 @@ class RobotPlayback {
                                    : robot.process.back()[0];
   }
 
-  // `kept_s`: when the first closure with another robot that was kept was found; in the end, if no
-  // robot tells of one.
+  // `kept_s`: time at which the first kept closure with another robot was found; the end of the run
+  // if there is none.
   void join(double kept_s) {
     const bool joined = std::any_of(robot_.rounds.begin(), robot_.rounds.end(),
                                     [](const NumberRow& round) { return round[2] > 1.0; });
@@ -208,7 +208,7 @@ class RobotPlayback {
   void tell_keyframes() {
     for (std::size_t i = 0; i < robot_.keyframes.size(); ++i) {
       const auto pose = pose_at_keyframe(robot_.odometry, i);
-      if (!pose) break;  // an index stands for those before it
+      if (!pose) break;  // an index stands for all poses before it, so none can be missing
       tell(*seen_s(static_cast<KeyframeIndex>(i)), ViewKeyframes{false,
                                                                  robot_.id,
                                                                  static_cast<std::uint32_t>(i),
@@ -232,7 +232,7 @@ class RobotPlayback {
     }
   }
 
-  // `seen_s`: when a robot made a keyframe, of all.
+  // `seen_s`: time of any keyframe of any robot.
   void tell_closures(const std::function<std::optional<double>(const KeyframeId&)>& seen_s) {
     std::map<double, ViewClosures> at;
     for (const ClosureRecord& record : robot_.closures) {
@@ -259,7 +259,7 @@ class RobotPlayback {
       return;
     }
     tell_mesh(robot_.mesh, robot_.id, robot_.odometry, 0.0);
-    // From its joining on nothing is in the robot's own frame.
+    // After its joining nothing is in the robot's own frame.
     std::vector<MeshChunk> ended;
     for (std::size_t i = before; i < updates_.size(); ++i)
       if (updates_[i].told <= times_.told(joined_s_))
@@ -286,7 +286,7 @@ class RobotPlayback {
     }
   }
 
-  // Each piece when the robot was nearest to it, not before `from_s`.
+  // Each chunk appears when the robot is nearest to it, but not before `from_s`.
   void tell_mesh(const LabelledMesh& mesh, RobotId anchor, const std::vector<StampedPose>& way,
                  double from_s) {
     constexpr std::size_t kMostPlaces = 500;
@@ -340,11 +340,11 @@ class RobotPlayback {
   RobotTimes times_;
   std::vector<ViewUpdate>& updates_;
   double end_s_ = 0.0;
-  double joined_s_ = kNever_s;  // its first round with others
+  double joined_s_ = kNever_s;  // time of its first round with others
   std::vector<double> round_times_s_;
 };
 
-// Those of robots that have ended; of others it is noted. Throws if there are none.
+// Folders of robots that have ended; `notes` list the others. Throws if there are none.
 std::vector<fs::path> ended_runs(const fs::path& folder, std::vector<std::string>& notes) {
   if (is_file(folder))
     throw std::runtime_error(

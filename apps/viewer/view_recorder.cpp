@@ -18,11 +18,12 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueue = 10000;         // as of a robot's record, as is what follows
-constexpr double kState_bytes_per_s = 200e3;  // of paths, meshes and closures, not compressed
+constexpr std::size_t kQueue =
+    10000;  // as for the record of a robot; the same holds for the values below
+constexpr double kState_bytes_per_s = 200e3;  // rate of uncompressed paths, meshes and closures
 constexpr int kMeshPoints = 200000;
-constexpr double kMeshPeriod_s = 5.0;  // to put the pieces of a mesh together takes a while
-constexpr double kSteady_s = 1.0;      // poses farther apart say nothing of velocity
+constexpr double kMeshPeriod_s = 5.0;  // because merging the chunks of a mesh takes long
+constexpr double kSteady_s = 1.0;      // poses farther apart give no velocity
 
 ClosureStage stage_of(ViewVerdict verdict) {
   if (verdict == ViewVerdict::kKept) return ClosureStage::kInlier;
@@ -45,7 +46,7 @@ RosDiagnosticStatus status_of(const ViewState& state) {
   return status;
 }
 
-// In order, or known already.
+// Sets or appends the element; true if it was appended.
 template <typename T>
 bool put(std::vector<T>& list, std::size_t index, const T& value) {
   if (index < list.size()) list[index] = value;
@@ -56,7 +57,7 @@ bool put(std::vector<T>& list, std::size_t index, const T& value) {
 
 }  // namespace
 
-// The one file of all robots, whose threads write it.
+// The one file of all robots; their threads write to it.
 class ViewRecorder::File {
  public:
   explicit File(const std::filesystem::path& file)
@@ -75,12 +76,12 @@ class ViewRecorder::File {
   }
 
  private:
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::string failure_;
   McapSink sink_;
 };
 
-// Where one robot's messages go.
+// Sink for the messages of one robot.
 class ViewRecorder::Sink final : public RosSink {
  public:
   explicit Sink(std::shared_ptr<File> file) : file_(std::move(file)) {}
@@ -100,14 +101,14 @@ class ViewRecorder::Sink final : public RosSink {
   std::shared_ptr<File> file_;
 };
 
-// What one process of a robot has told.
+// Messages of one process of a robot.
 class ViewRecorder::Robot {
  public:
   Robot(RobotId id, std::uint64_t process) : boot(process) {
     trajectory.robot = trajectory.anchor = id;
   }
 
-  // From here on it is written, what is known already first.
+  // From now on messages are written, beginning with those received so far.
   void begin(const std::string& name, const std::shared_ptr<File>& file, double gone_s,
              const std::function<std::string(RobotId)>& name_of) {
     images_ = std::make_unique<Sink>(file);
@@ -139,7 +140,7 @@ class ViewRecorder::Robot {
   }
   [[nodiscard]] bool has_begun() const { return node_.has_value(); }
 
-  // It tells something, whatever it is.
+  // Notes that a message of the robot arrived.
   void hear() {
     const std::lock_guard lock(mutex_);
     heard_s_ = steady_now_s();
@@ -183,7 +184,7 @@ class ViewRecorder::Robot {
     closures_now_ = std::move(now);
   }
 
-  // The mesh as it is, if it has changed and it is time.
+  // Writes the present mesh if it has changed and is due.
   void tell_mesh(const LabelPalette& palette, double now_s) {
     if (!mesh_changed_ || !node_ || now_s < mesh_due_s_) return;
     mesh_changed_ = false;
@@ -195,7 +196,7 @@ class ViewRecorder::Robot {
     node_->offer(std::make_shared<const LabelledMesh>(std::move(mesh)));
   }
 
-  // Messages for which there was no time.
+  // Ends the output and returns the number of messages that were left out.
   std::size_t finish(const LabelPalette& palette) {
     if (!node_) return 0;
     mesh_due_s_ = 0.0;
@@ -206,7 +207,7 @@ class ViewRecorder::Robot {
   }
 
   const std::uint64_t boot;
-  std::vector<StampedPose> odometry;  // of keyframes
+  std::vector<StampedPose> odometry;  // odometry poses of keyframes
   Trajectory trajectory;
   std::map<ClosureId, ViewClosure> closures;
 
@@ -220,7 +221,7 @@ class ViewRecorder::Robot {
     odometry_topic_.publish(std::move(state));
   }
 
-  // The state of its image comes first: that is how the frames of a robot hang together.
+  // The state of the keyframe's image comes first, because it connects the frames of the robot.
   void publish_keyframe(std::size_t index) {
     const auto& [stamp, T_odom_kf] = odometry[index];
     publish_state(stamp, T_odom_kf);
@@ -241,9 +242,9 @@ class ViewRecorder::Robot {
   std::unique_ptr<Sink> images_;
   std::size_t image_topic_ = 0;
   std::string camera_;
-  std::mutex mutex_;  // guards what the node asks for
+  std::mutex mutex_;  // guards the members that the node reads
   RosDiagnosticStatus status_;
-  double heard_s_ = 0.0;  // steady clock
+  double heard_s_ = 0.0;  // on the steady clock
   bool has_left_ = false;
   std::optional<std::vector<ToldClosure>> closures_now_;
   std::optional<RosOutputNode> node_;  // last member: stops first
@@ -291,7 +292,7 @@ void ViewRecorder::step(const Input& update) {
   std::visit([&](const auto& content) { robot.hear(content); }, update->content);
 }
 
-// What another process of it told is over.
+// Replaces the robot if the update comes from a new process of it.
 ViewRecorder::Robot& ViewRecorder::robot_of(const ViewUpdate& update) {
   auto& robot = robots_[update.robot];
   if (robot != nullptr && robot->boot != update.boot) finish_robot(*std::exchange(robot, nullptr));

@@ -17,30 +17,30 @@
 
 namespace km {
 
-/// Writes what robots tell those who watch into one MCAP file: of each robot what its own record
-/// has (see RosOutputNode) but for log lines, by the time of its sensors. What robots do not tell
-/// is made of what they do: velocities of poses, and where the other end of a closure is, of
-/// keyframes as they were optimised. It works on threads of its own: no page waits for a disk. A
-/// viewer that is killed leaves what came up to a second before.
+/// Writes the messages of the robots for viewers into one MCAP file. For each robot it has the
+/// topics of the robot's own record (see RosOutputNode) except for log lines, by the time of its
+/// sensors. Values that robots do not send are computed: velocities from poses, and the far ends of
+/// closures from optimised keyframes. It runs on threads of its own, so that no page waits for a
+/// disk. If the viewer is killed, the file lacks the last second.
 class ViewRecorder {
  public:
-  /// With the first message `file` is replaced. `palette`: colours of meshes. Of a robot that has
-  /// left, or been silent for `gone_s`, nothing more is written until it tells something.
+  /// The first message replaces `file`. `palette`: colours of meshes. After a robot has left, or
+  /// been silent for `gone_s`, nothing is written for it until it sends a message.
   ViewRecorder(const std::filesystem::path& file, LabelPalette palette, double gone_s = 10.0);
   ~ViewRecorder();
 
-  /// Thread-safe. Where the disk stands still for long, the oldest updates are left out.
+  /// Thread-safe. If the disk stalls for long, the oldest updates are left out.
   void add(const ViewUpdate& update) { worker_.post(update); }
 
-  /// Ends the file: call once, nothing follows. Throws std::runtime_error if it is not whole, and
-  /// says why.
+  /// Ends the file: call once, after the last update. Throws std::runtime_error with the reason if
+  /// the file is incomplete.
   void finish();
 
  private:
   class File;
   class Sink;
   class Robot;
-  using Input = std::optional<ViewUpdate>;  // nullopt: a second is over
+  using Input = std::optional<ViewUpdate>;  // nullopt: a second has passed
 
   void step(const Input& update);
   Robot& robot_of(const ViewUpdate& update);
@@ -54,8 +54,8 @@ class ViewRecorder {
   mutable std::mutex mutex_;  // guards names_
   std::map<RobotId, std::string> names_;
   std::map<RobotId, std::unique_ptr<Robot>> robots_;
-  bool closures_changed_ = false;  // they, or the poses of their keyframes
-  std::size_t lost_ = 0;           // messages for which there was no time
+  bool closures_changed_ = false;  // true if closures or the poses of their keyframes changed
+  std::size_t lost_ = 0;           // number of messages that were left out
   Worker<Input> worker_;
   Periodic clock_;  // last member: stops first
 };

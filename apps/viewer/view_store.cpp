@@ -8,15 +8,16 @@
 namespace km {
 namespace {
 
-// Ranks of what may go, the first first; the second number of a key.
+// Ranks of messages that may be dropped, first to drop first; a rank is the second number of a key.
 constexpr std::int64_t kImage = 0, kMesh = 1, kKeyframes = 2, kPose = 3, kState = 4;
 
-// Whether what has a key is told again as it was: poses, states and images never are.
+// True for meshes and keyframe poses, which robots send again unchanged; false for poses, states
+// and images.
 bool is_state_of_things(const auto& key) {
   return key && ((*key)[1] == kMesh || (*key)[1] == kKeyframes);
 }
 
-// Of what it says, whenever it is told.
+// Hash of the content, independent of the time of reception.
 std::size_t hash_of(ViewUpdate update) {
   update.told = 0;
   return std::hash<std::string>{}(page_message(update, 0).bytes);
@@ -64,7 +65,7 @@ void ViewStore::add(ViewUpdate update) {
   added_.notify_all();
 }
 
-// Nothing that an ended process of the robot told counts any more.
+// Marks the messages of the robot's earlier process as superseded.
 void ViewStore::note_boot(const ViewUpdate& update) {
   const auto [known, is_new] = boots_.emplace(update.robot, update.boot);
   if (is_new || known->second == update.boot) return;
@@ -84,7 +85,7 @@ bool ViewStore::is_known(const std::optional<Key>& key, std::size_t hash) const 
   return known != newest_.end() && known->second.hash == hash && messages_[known->second.number];
 }
 
-// Takes out those that have been told just so; false if none is left.
+// Removes closures that are known with the same values; false if none is left.
 bool ViewStore::leave_new_closures(RobotId robot, ViewClosures& all) {
   auto& known = closures_[robot];
   std::erase_if(all.closures, [&](const ViewClosure& closure) {
@@ -106,7 +107,7 @@ void ViewStore::supersede(const Key& key, const Newest& newest) {
 void ViewStore::forget_until_it_fits() {
   for (auto& queue : superseded_)
     while (bytes_ > max_bytes_ && !queue.empty()) {
-      if (messages_[queue.front()]) {  // else refused when it came
+      if (messages_[queue.front()]) {  // null: it was refused on arrival
         drop(queue.front());
         forgotten_.push_back(queue.front());
       }

@@ -17,8 +17,8 @@ namespace km {
 namespace {
 
 struct EvaluateCommand : VocabularyCommand {
-  std::vector<std::string> known;    ///< Images of the robot that is asked.
-  std::vector<std::string> queries;  ///< Images of the robot that asks.
+  std::vector<std::string> known;    ///< Images of the robot whose keyframes are searched.
+  std::vector<std::string> queries;  ///< Images of the robot that searches.
   std::string truth;                 ///< Poses: TUM or EuRoC.
   double max_distance_m = 2.0;
   double max_angle_deg = 45.0;
@@ -55,7 +55,7 @@ struct Pair {
   bool same_place;
 };
 
-// Of the pairs of one query, only the best can become candidates.
+// Among the pairs of one query, only the best can become candidates.
 void drop_all_but_best(std::span<Pair> pairs, std::size_t count) {
   std::vector<Pair*> order;
   for (Pair& pair : pairs) order.push_back(&pair);
@@ -87,9 +87,9 @@ std::vector<Pair> compare(const std::vector<View>& queries, const std::vector<Vi
 struct Row {
   double threshold = 0.0;
   std::size_t candidates = 0;  // pairs at or above the threshold
-  std::size_t correct = 0;     // of these, same place
+  std::size_t correct = 0;     // candidates that show the same place
   std::size_t queries = 0;     // queries that see a known place
-  std::size_t recognised = 0;  // of these, with a correct candidate
+  std::size_t recognised = 0;  // such queries with a correct candidate
   double precision() const { return candidates == 0 ? 1.0 : ratio(correct, candidates); }
   double query_recall() const { return queries == 0 ? 1.0 : ratio(recognised, queries); }
   static double ratio(std::size_t a, std::size_t b) {

@@ -83,7 +83,7 @@ std::vector<OrbDescriptor> orb_descriptors(const std::filesystem::path& image, i
   cv::Mat grey;
   try {
     grey = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
-  } catch (const cv::Exception&) {  // a header that promises more pixels than OpenCV takes
+  } catch (const cv::Exception&) {  // a header with more pixels than OpenCV accepts
   }
   if (grey.empty()) throw std::runtime_error(image.string() + " cannot be decoded as an image");
   std::vector<cv::KeyPoint> keypoints;

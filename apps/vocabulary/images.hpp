@@ -10,22 +10,22 @@
 
 namespace km {
 
-/// The images that `inputs` stand for, in order, every `stride`-th of each input. An input is
+/// The images of `inputs` in order, every `stride`-th of each input. An input is
 ///   - an image file;
 ///   - a EuRoC/ASL folder (with mav0/cam0/data.csv, or mav0 itself): its left images;
 ///   - any other folder: its .png, .jpg and .jpeg files by name, sub-folders not included;
 ///   - a text file (.txt, .csv): one image per line, its last field, relative to the text file.
-/// Throws std::runtime_error that names what does not exist or holds no image.
+/// Throws std::runtime_error that names an input which does not exist or has no image.
 std::vector<std::filesystem::path> list_images(const std::vector<std::string>& inputs, int stride);
 
-/// The stamp in an image's name: its leading digits [ns]. Throws std::runtime_error if it has none.
+/// The stamp in an image's name: its leading digits [ns]. Throws std::runtime_error without digits.
 Stamp stamp_of_image(const std::filesystem::path& image);
 
 /// ORB descriptors of an image, at most `features`. Throws std::runtime_error that names the file
 /// if it cannot be decoded.
 std::vector<OrbDescriptor> orb_descriptors(const std::filesystem::path& image, int features);
 
-/// Those of several images, in order, with progress on stderr.
+/// Descriptors of several images, in order, with progress on stderr.
 std::vector<std::vector<OrbDescriptor>> orb_descriptors(
     std::span<const std::filesystem::path> images, int features);
 

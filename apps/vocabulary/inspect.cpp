@@ -39,9 +39,10 @@ std::vector<std::size_t> leaves_by_depth(const VocabularyData& data) {
 struct Usage {
   std::size_t images = 0;
   std::size_t descriptors = 0;
-  double words_per_image = 0.0;         // of weight
+  double words_per_image = 0.0;         // words with a weight above 0
   std::vector<std::size_t> popularity;  // [0] words never seen, [b] 2^(b-1) to 2^b - 1 times
-  double effective_words = 0.0;         // exp of the entropy: equally used words that say as much
+  double effective_words =
+      0.0;  // exp of the entropy: number of equally used words with the same information
 };
 
 Usage usage_of(const Vocabulary& vocabulary,

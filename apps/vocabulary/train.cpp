@@ -27,7 +27,7 @@ void define(CLI::App& app, TrainCommand& command) {
   app.add_option("-L,--depth", command.depth,
                  "Levels of the tree: at most k^L words, about 37 bytes each")
       ->capture_default_str();
-  app.add_option("--seed", command.seed, "Of the random start of clustering")
+  app.add_option("--seed", command.seed, "Seed of the random start of clustering")
       ->capture_default_str();
   command.VocabularyCommand::define(app);
 }

@@ -14,14 +14,14 @@
 namespace km {
 namespace {
 
-constexpr double kMapSteps = 4000.0;  // a range of which a screen shows no more
+constexpr double kMapSteps = 4000.0;  // more steps over a range than any screen shows
 constexpr int kDigits = 6;
 
 bool is_finite(const PlotPoint& point) {
   return std::isfinite(point.x) && std::isfinite(point.y);
 }
 
-// The longer side of the box around all points.
+// The longer side of the bounding box of all points.
 double range_of(const std::vector<PlotSeries>& all) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   PlotPoint low{kInfinity, kInfinity}, high{-kInfinity, -kInfinity};

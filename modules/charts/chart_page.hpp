@@ -8,12 +8,12 @@
 
 namespace km {
 
-/// A document for a browser with the plots below each other, drawn by charts.js: values under the
-/// pointer, series that can be hidden, maps that can be moved, and each to be saved as SVG. It
-/// needs no other file and no network; text of the plots is shown as text.
+/// A document for a browser with the plots below each other, drawn by charts.js. It shows values
+/// under the pointer. Series can be hidden, maps can be moved, and each plot can be saved as SVG.
+/// It needs no other file and no network. Text of the plots is shown as text.
 [[nodiscard]] std::string chart_page(const std::string& title, const std::vector<Plot>& plots);
 
-/// The same within another page: script elements that show plots in its elements of these ids.
+/// For use in another page: script elements that show plots in its elements of these ids.
 [[nodiscard]] std::string plot_scripts(const std::map<std::string, std::vector<Plot>>& plots);
 
 }  // namespace km

@@ -18,7 +18,7 @@ std::string html_page(const HtmlPage& page) {
 
 std::string data_script(std::string_view id, const Json& data) {
   std::string text = "<script type=\"application/json\" id=\"" + xml_escaped(id) + "\">";
-  // In JSON "<" is in strings alone, where an escape says the same.
+  // In JSON "<" occurs only in strings, where an escape sequence is equivalent.
   for (const char c : data.dump(-1, ' ', false, Json::error_handler_t::replace)) {
     if (c == '<')
       text += "\\u003c";

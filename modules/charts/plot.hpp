@@ -13,40 +13,42 @@ struct PlotPoint {
   double y = 0.0;
 };
 
-/// Points that belong together.
+/// Points of one series.
 struct PlotSeries {
   static constexpr std::size_t kGrey = static_cast<std::size_t>(-1);
   enum class Style {
     kLine,
-    kMarkedLine,  ///< With a disc at every point: few points, or only one.
-    kDots,        ///< Faint single points.
-    kBars,        ///< From 0 to y, its value beside it; x is the number of a group.
+    kMarkedLine,  ///< With a disc at every point, for few points.
+    kDots,        ///< Faint separate points.
+    kBars,        ///< From 0 to y, with the value beside it; x is the number of a group.
   };
 
-  std::string name = {};  ///< Of one name: once in the legend, shown and hidden together.
+  /// Series with equal names have one entry in the legend and are hidden together.
+  std::string name = {};
   std::vector<PlotPoint> points = {};
-  std::size_t colour = 0;  ///< Number of it, as of robots, or kGrey.
+  std::size_t colour = 0;  ///< Number of the colour, as for robots, or kGrey.
   Style style = Style::kLine;
-  double width_px = 1.6;  ///< Of a line.
+  double width_px = 1.6;  ///< Width of a line.
 };
 
-/// Series over common axes. Points that are not finite are not drawn, and part a line; on a
-/// logarithmic axis, those that are not positive likewise.
+/// Series over common axes. Points that are not finite are not drawn and interrupt a line. On a
+/// logarithmic axis, points that are not positive are not drawn either.
 struct Plot {
   std::string title = {};
   std::string x_label = {};
   std::string y_label = {};
   bool log_y = false;
-  bool is_map = false;                   ///< Positions from above [m]: one scale for both axes.
-  std::vector<std::string> groups = {};  ///< Names of x = 0, 1, ...: of bars.
-  int decimals = 1;                      ///< Of the values of bars.
+  /// Positions from above [m], with one scale for both axes.
+  bool is_map = false;
+  std::vector<std::string> groups = {};  ///< Names of the groups x = 0, 1, ... of bars.
+  int decimals = 1;                      ///< Decimals of the values of bars.
   std::vector<PlotSeries> series = {};
 };
 
 /// {title, x_label, y_label, log_y, map, groups, decimals, series: [{name, colour (null: grey),
 /// style: line, marked, dots or bars, width, points: [[x, y]...]}]}, as charts.js reads it. Numbers
-/// have six digits, null is one that is not finite. Of a map, points that are nearer to the one
-/// before than a 4000th of its range are left out.
+/// have six digits; null stands for a number that is not finite. In a map, a point nearer to the
+/// one before than a 4000th of the map's range is dropped.
 void to_json(Json& json, const Plot& plot);
 
 }  // namespace km

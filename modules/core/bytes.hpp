@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// What an FNV-1a hash begins with.
+/// Initial value of an FNV-1a hash.
 inline constexpr std::uint64_t kFnv1aBasis = 0xcbf29ce484222325ULL;
 
 /// Mixes `value` into `hash`, byte by byte: FNV-1a (Fowler, Noll, Vo), 64 bits.
@@ -23,8 +23,8 @@ inline void mix_fnv1a(std::uint64_t& hash, std::uint64_t value) {
   }
 }
 
-/// Mixes `bytes` into `hash`, eight at a time, the least significant first. The last eight may lack
-/// some, which count as zeros: mix in the number of bytes, too.
+/// Mixes `bytes` into `hash`, eight at a time, the least significant first. Missing bytes of the
+/// last eight count as zeros, so the number of bytes must be mixed in too.
 inline void mix_fnv1a(std::uint64_t& hash, std::span<const std::uint8_t> bytes) {
   for (std::size_t begin = 0; begin < bytes.size(); begin += 8) {
     const auto eight = bytes.subspan(begin, std::min<std::size_t>(8, bytes.size() - begin));
@@ -34,7 +34,7 @@ inline void mix_fnv1a(std::uint64_t& hash, std::span<const std::uint8_t> bytes) 
   }
 }
 
-/// Puts numbers one after the other, least significant byte first, whatever the machine.
+/// Writes numbers one after the other, least significant byte first, on any machine.
 class ByteWriter {
  public:
   void u8(std::uint8_t value) { bytes_.push_back(value); }
@@ -50,14 +50,14 @@ class ByteWriter {
     u8(static_cast<std::uint8_t>(value));
   }
 
-  /// As they are, without their number.
+  /// Writes the bytes without their number.
   void bytes(std::span<const std::uint8_t> values) {
     bytes_.insert(bytes_.end(), values.begin(), values.end());
   }
 
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
 
-  /// What has been written; the writer is empty afterwards.
+  /// Returns the written bytes; the writer is empty afterwards.
   [[nodiscard]] std::vector<std::uint8_t> release() { return std::exchange(bytes_, {}); }
 
  private:
@@ -70,9 +70,9 @@ class ByteWriter {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Reads what ByteWriter wrote, and trusts nothing. A read past the end, or of what cannot be
-/// right, gives zero and fails the reader for good: check done() or failed() once, at the end.
-/// The bytes outlive it.
+/// Reads the bytes of a ByteWriter without trusting them. A read past the end, or of an impossible
+/// value, returns zero and fails the reader permanently. Check done() or failed() once, at the end.
+/// The bytes must outlive the reader.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
@@ -84,8 +84,8 @@ class ByteReader {
   [[nodiscard]] float f32() { return std::bit_cast<float>(fixed<std::uint32_t>()); }
   [[nodiscard]] double f64() { return std::bit_cast<double>(fixed<std::uint64_t>()); }
 
-  /// Fails for numbers above `max` and for those written with more bytes than they need, so that
-  /// equal numbers have equal bytes.
+  /// Fails for a number above `max`, and for one with more bytes than necessary, so that equal
+  /// numbers have equal bytes.
   [[nodiscard]] std::uint64_t varint(
       std::uint64_t max = std::numeric_limits<std::uint64_t>::max()) {
     std::uint64_t value = 0;
@@ -106,16 +106,16 @@ class ByteReader {
     return static_cast<T>(varint(std::numeric_limits<T>::max()));
   }
 
-  /// How many elements follow, a varint. Fails, with 0, for more than `max_elements` and for more
-  /// than can be in what is left if each takes at least `bytes_per_element`: memory may be reserved
-  /// for that many.
+  /// The number of elements that follow, a varint. Fails and returns 0 if there are more than
+  /// `max_elements`, or more than fit into the remaining bytes at `bytes_per_element` each. Memory
+  /// for that number may therefore be reserved.
   [[nodiscard]] std::size_t count(std::size_t max_elements, std::size_t bytes_per_element) {
     const std::uint64_t elements = varint(max_elements);
     if (bytes_per_element > 0 && elements > rest_.size() / bytes_per_element) return fail();
     return static_cast<std::size_t>(elements);
   }
 
-  /// The next `size` bytes; empty if there are not as many.
+  /// The next `size` bytes; empty if there are fewer.
   [[nodiscard]] std::span<const std::uint8_t> bytes(std::size_t size) {
     if (failed_ || size > rest_.size()) {
       fail();
@@ -131,7 +131,7 @@ class ByteReader {
   /// True if everything was read and nothing failed.
   [[nodiscard]] bool done() const { return !failed_ && rest_.empty(); }
 
-  /// Marks what was read as unusable; nothing is left afterwards. Returns 0.
+  /// Marks the input as unusable; no bytes remain afterwards. Returns 0.
   std::uint8_t fail() {
     failed_ = true;
     rest_ = {};

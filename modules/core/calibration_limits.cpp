@@ -12,7 +12,7 @@ constexpr double kMaxNonOrthonormality = 1e-3;
 constexpr Bounds<double> kFocal_px{1.0, 1e6};
 constexpr Bounds<double> kCenter_px{-1e6, 1e6};
 constexpr Bounds<double> kCoefficient{-1e3, 1e3};
-constexpr Bounds<double> kLever_m{-1e3, 1e3};  // of a sensor on a robot
+constexpr Bounds<double> kLever_m{-1e3, 1e3};  // position of a sensor on a robot
 constexpr double kMaxSide_px = 65536.0, kMaxArea_px = 1e8;
 constexpr double kMinBaseline_m = 1e-3;
 

@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// A central camera: a lens before an image plane. A bearing is a point on the plane z = 1 of the
-/// camera frame, undistorted; only what lies within the lens's disc has one (see Lens).
+/// A central camera: a lens and an image plane. A bearing is a point on the plane z = 1 of the
+/// camera frame, undistorted. Only points within the lens's disc have one (see Lens).
 struct Camera {
   int width = 0;                                  ///< [px]
   int height = 0;                                 ///< [px]
@@ -21,15 +21,15 @@ struct Camera {
   /// such bearing.
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector2d& bearing) const;
 
-  /// Where what lies along `ray`, of any length, in the camera frame comes to [px]. nullopt, too,
-  /// if it is not in front of the camera.
+  /// Pixel of a ray of any length in the camera frame [px]. nullopt also if the ray does not point
+  /// forward.
   [[nodiscard]] std::optional<Eigen::Vector2d> project_ray(const Eigen::Vector3d& ray) const;
 
-  /// Bearing of a distorted pixel [px]; nullopt if the lens has none that comes there.
+  /// Bearing of a distorted pixel [px]; nullopt if no bearing of the lens has that pixel.
   [[nodiscard]] std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
 };
 
-/// Where the depth of single image points comes from.
+/// Source of the depth of single image points.
 enum class DepthSource {
   kRightImage,  ///< Stereo: cameras[1] takes the right image.
   kDepthImage,  ///< RGB-D: frames have a depth image and no right one; cameras[1] is virtual.
@@ -37,9 +37,9 @@ enum class DepthSource {
 
 /// Two cameras on one body; [0] is the left, the reference for keypoints and depth.
 ///
-/// With an RGB-D rig the right camera is a virtual one (see rgbd_rig()): depth z is worth the
-/// disparity f * baseline / z there, so that whatever works on stereo observations works on it, and
-/// an error of one pixel stands for one of z^2 / (f * baseline) in depth (as in Mur-Artal and
+/// In an RGB-D rig the right camera is a virtual one (see rgbd_rig()): depth z corresponds to the
+/// disparity f * baseline / z. Algorithms for stereo observations therefore work with it too. An
+/// error of one pixel corresponds to an error of z^2 / (f * baseline) in depth (as in Mur-Artal and
 /// Tardos, "ORB-SLAM2: an open-source SLAM system for monocular, stereo and RGB-D cameras", 2017).
 struct StereoRig {
   std::array<Camera, 2> cameras;
@@ -51,14 +51,14 @@ struct StereoRig {
   [[nodiscard]] double baseline_m() const { return T_left_right().translation().norm(); }
 };
 
-/// An RGB-D camera: `camera` beside a virtual one like it, `baseline_m` to the right. The larger
-/// the baseline, the more the depth is trusted; that of a sensor that measures depth by stereo or
-/// structured light, or any b for which depth errors are about z^2 * 1 px / (f * b). Throws
-/// std::invalid_argument unless the baseline is positive and finite.
+/// Rig of an RGB-D camera: `camera` and a virtual copy of it, `baseline_m` to the right. The larger
+/// the baseline, the larger the weight of the depth. Use the baseline of a sensor that measures
+/// depth by stereo or structured light, or else a b for which depth errors are about z^2 * 1 px /
+/// (f * b). Throws std::invalid_argument unless the baseline is positive and finite.
 [[nodiscard]] StereoRig rgbd_rig(const Camera& camera, double baseline_m);
 
-/// Distances along the optical axis that a depth sensor measures [m]; others are none in its
-/// images.
+/// Distances along the optical axis that a depth sensor measures [m]; values outside count as no
+/// depth.
 struct DepthRange {
   double min_m = 0.0;
   double max_m = 65.0;
@@ -73,7 +73,7 @@ struct ImuNoise {
   double rate_hz = 200.0;
 };
 
-/// Everything fixed about a robot's sensors.
+/// All constant properties of a robot's sensors.
 struct SensorRig {
   StereoRig stereo;
   ImuNoise imu;

@@ -10,26 +10,28 @@ namespace km {
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
 
-/// How the cameras stand to the inertial sensor, beyond what the rig says of both in common.
+/// Correction of the rig: offset in time and motion of both cameras relative to the inertial
+/// sensor.
 struct CameraCalibration {
-  double offset_s = 0.0;             ///< A stamp of an image and this is the inertial sensor's.
+  /// Added to the stamp of an image to get the inertial sensor's time.
+  double offset_s = 0.0;
   SE3 T_body_rig = SE3::Identity();  ///< T_body_cam = T_body_rig * the rig's T_body_cam.
 
-  /// Moved by [offset; rotation; translation], the latter about the body's axes and in front:
-  /// T_body_rig becomes retract(identity, [rotation; translation]) * T_body_rig.
+  /// Perturbed by [offset; rotation; translation], the latter about the body's axes and on the
+  /// left: T_body_rig becomes retract(identity, [rotation; translation]) * T_body_rig.
   [[nodiscard]] CameraCalibration moved(const Vector7& delta) const;
 
-  /// The delta by which `to` has moved from here.
+  /// The delta for which moved(delta) is `to`.
   [[nodiscard]] Vector7 offset_to(const CameraCalibration& to) const;
 
-  /// Beyond another rig, of which this one came by `correction`. The covariance by moved() is the
-  /// same.
+  /// The correction relative to another rig, from which `correction` made this one. The covariance
+  /// by moved() does not change.
   [[nodiscard]] CameraCalibration on_top_of(const CameraCalibration& correction) const;
 
-  /// Inverse of on_top_of(): beyond the rig that `correction` makes of this one.
+  /// Inverse of on_top_of(): relative to the rig that `correction` makes of this one.
   [[nodiscard]] CameraCalibration without(const CameraCalibration& correction) const;
 
-  /// Moves the cameras.
+  /// Moves the cameras of `rig`.
   void apply_to(StereoRig& rig) const;
 };
 

@@ -13,8 +13,8 @@ struct WeighedClosure {
   bool kept = true;
 };
 
-/// What graduated non-convexity makes of a robot's closures, those of one session; for each of them
-/// the latest counts.
+/// Results of graduated non-convexity for a robot's closures of one session. The latest result of
+/// each closure counts.
 struct ClosureVerdicts {
   std::vector<WeighedClosure> closures;
 

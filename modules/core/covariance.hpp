@@ -23,18 +23,18 @@ struct UncertainPose {
 /// T_b_a with Sigma_ba = Ad(T_a_b) Sigma_ab Ad(T_a_b)^T.
 [[nodiscard]] UncertainPose inverse(const UncertainPose& T_a_b);
 
-/// T_b_c between two poses of ONE chain from a, where c comes after b: the part of the chain's
-/// covariance that was added between b and c, Sigma_bc = Sigma_ac - Ad(T_c_b) Sigma_ab Ad(T_c_b)^T.
-/// It is the exact inverse of compose(); negative eigenvalues left by rounding are set to zero.
+/// T_b_c between two poses of one chain from a, with c after b. Its covariance is the part that was
+/// added between b and c, Sigma_bc = Sigma_ac - Ad(T_c_b) Sigma_ab Ad(T_c_b)^T. It is the exact
+/// inverse of compose(). Negative eigenvalues from rounding are set to zero.
 [[nodiscard]] UncertainPose between_on_chain(const UncertainPose& T_a_b,
                                              const UncertainPose& T_a_c);
 
 /// True if every element is finite, the matrix symmetric to 1e-6 of its largest element, and no
-/// eigenvalue below -1e-9 of the largest. For matrices that come from outside.
+/// eigenvalue below -1e-9 of the largest. For untrusted matrices.
 [[nodiscard]] bool is_covariance(const Matrix6& Sigma);
 
-/// True if odometry can go on from a state with this covariance: symmetric, variances from 1e-16 to
-/// 1e6, and no eigenvalue of the correlations below 1e-9. For matrices that come from outside.
+/// True if odometry can continue from a state with this covariance: symmetric, variances from 1e-16
+/// to 1e6, and no eigenvalue of the correlations below 1e-9. For untrusted matrices.
 [[nodiscard]] bool is_usable(const StateCovariance& Sigma);
 
 }  // namespace km

@@ -5,7 +5,7 @@
 
 namespace km {
 
-/// Result of decoding untrusted bytes: a value, or why there is none (a string literal).
+/// Result of decoding untrusted bytes: a value, or the reason for its absence (a string literal).
 template <typename T>
 struct [[nodiscard]] Decoded {
   std::optional<T> value;

@@ -8,14 +8,15 @@
 
 namespace km {
 
-/// Depth, and labels where known, of every pixel of one camera at one instant, ready for a map. The
-/// camera is fixed for a robot, and not always one that took images (see DenseSensor).
+/// Depth, and labels if known, of every pixel of one camera at one instant, ready for a map. The
+/// camera is the same for all frames of a robot, and may be a virtual one (see DenseSensor).
 struct DenseFrame {
   Stamp stamp = 0;
-  std::shared_ptr<const DepthImage> depth;             ///< Not null.
-  std::shared_ptr<const LabelImage> labels = nullptr;  ///< Of the same camera. Null: none.
-  SE3 T_odom_cam = SE3::Identity();                    ///< In the frame of T_odom_kf.
-  KeyframeIndex keyframe = 0;                          ///< The robot's last one by then.
+  std::shared_ptr<const DepthImage> depth;  ///< Not null.
+  /// From the same camera; null if there are none.
+  std::shared_ptr<const LabelImage> labels = nullptr;
+  SE3 T_odom_cam = SE3::Identity();  ///< In the frame of T_odom_kf.
+  KeyframeIndex keyframe = 0;        ///< Last keyframe of the robot at that time.
 };
 
 }  // namespace km

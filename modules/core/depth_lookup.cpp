@@ -18,7 +18,7 @@ bool has_size(int width, int height, std::size_t pixels, const Camera& camera) {
 
 std::optional<double> inverse_depth_at(const DepthImage& image, const Eigen::Vector2d& px,
                                        double max_spread) {
-  // Also false for what is not a number.
+  // The condition is also false for NaN.
   if (!(px.x() >= 0.0 && px.y() >= 0.0 && px.x() <= image.width - 1 && px.y() <= image.height - 1))
     return std::nullopt;
   const auto depth_mm = [&image](int x, int y) {

@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// Counts of what a reader met, with the first example of each kind. `Fault` is an enumeration with
-/// a to_string that gives a short plural: "malformed rows".
+/// Counts of the faults that a reader found, with the first example of each kind. `Fault` is an
+/// enumeration with a to_string that gives a short plural: "malformed rows".
 template <typename Fault>
 class FaultReport {
  public:
@@ -18,7 +18,7 @@ class FaultReport {
     std::string first;  ///< Names the place; one line.
   };
 
-  /// `count` of them, at least one.
+  /// Adds `count` faults, at least one.
   void add(Fault fault, const std::string& example, std::size_t count = 1) {
     constexpr std::size_t kMaxExample = 500;  // room for the paths of two files
     Entry& entry = entries_[fault];
@@ -26,7 +26,7 @@ class FaultReport {
     entry.count += count;
   }
 
-  /// What another reader met, too.
+  /// Adds the faults of another reader.
   void add(const FaultReport& other) {
     for (const auto& [fault, entry] : other.entries_) {
       Entry& own = entries_[fault];

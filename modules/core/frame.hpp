@@ -17,8 +17,8 @@ struct GrayImage {
   std::vector<std::uint8_t> pixels;
 };
 
-/// Distances along the optical axis of the left camera, pixel by pixel: of its size, through its
-/// lens. Row-major: millimetres.size() == width * height.
+/// Distances along the optical axis of the left camera, pixel by pixel, with its size and its lens.
+/// Row-major: millimetres.size() == width * height.
 struct DepthImage {
   int width = 0;                           ///< [px]
   int height = 0;                          ///< [px]
@@ -33,14 +33,14 @@ struct LabelImage {
   std::vector<std::uint8_t> ids;  ///< 0: unknown.
 };
 
-/// What the cameras of a robot saw at one instant: a stereo pair, or, with an RGB-D rig (see
+/// Images of a robot's cameras at one instant: a stereo pair, or, with an RGB-D rig (see
 /// DepthSource), a left image with depth. Depth and labels may come at a lower rate than images.
 struct StereoFrame {
   Stamp stamp = 0;
   GrayImage left;
   GrayImage right;                                     ///< 0 x 0 with an RGB-D rig.
-  std::shared_ptr<const DepthImage> depth = nullptr;   ///< Null: none.
-  std::shared_ptr<const LabelImage> labels = nullptr;  ///< Null: none.
+  std::shared_ptr<const DepthImage> depth = nullptr;   ///< Null if there is none.
+  std::shared_ptr<const LabelImage> labels = nullptr;  ///< Null if there are none.
 };
 
 /// One inertial sample in the body frame.
@@ -50,19 +50,20 @@ struct ImuSample {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< Specific force [m/s^2]: at rest, minus g.
 };
 
-/// Where an odometry from outside says that the body is. Its frame `odom` is that odometry's own.
+/// Pose of the body from an external odometry, in the frame `odom` of that odometry.
 struct MeasuredPose {
   SE3 T_odom_body = SE3::Identity();
-  Matrix6 covariance = Matrix6::Zero();  ///< Of its perturbation on the right; zero: not known.
+  /// Covariance of a perturbation on the right; zero if unknown.
+  Matrix6 covariance = Matrix6::Zero();
 };
 
-/// A frame and the inertial samples since the one before, in order of time. The last sample
-/// is the first at or after the frame's stamp, so that the interval is covered; it is repeated as
-/// the first of the next packet.
+/// A frame and the inertial samples since the one before, in order of time. The last sample is the
+/// first at or after the frame's stamp, so that the interval is covered. It is repeated as the
+/// first sample of the next packet.
 struct SensorPacket {
   std::shared_ptr<const StereoFrame> frame;
   std::vector<ImuSample> imu;
-  std::optional<MeasuredPose> pose = {};  ///< At the frame, where there is such an odometry.
+  std::optional<MeasuredPose> pose = {};  ///< At the frame, if there is an external odometry.
 };
 
 }  // namespace km

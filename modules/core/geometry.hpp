@@ -14,7 +14,7 @@ using SE3 = Eigen::Isometry3d;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-/// Degrees in a radian: for texts and tables that people read.
+/// Degrees in a radian, for texts and tables for people.
 inline constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 /// Rotation angle of `R`, in [0, pi] [rad].

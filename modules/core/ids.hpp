@@ -8,13 +8,13 @@
 
 namespace km {
 
-/// Any 16-bit number, unique in the team; ids need be neither dense nor known in advance.
+/// Any 16-bit number, unique in the team; ids may have gaps and need not be known in advance.
 using RobotId = std::uint16_t;
 
-/// A keyframe within its robot, counted from 0 without gaps.
+/// Index of a keyframe of its robot, counted from 0 without gaps.
 using KeyframeIndex = std::uint32_t;
 
-/// A keyframe: its robot and its index there.
+/// A keyframe: its robot and its index.
 struct KeyframeId {
   RobotId robot = 0;
   KeyframeIndex index = 0;

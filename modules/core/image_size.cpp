@@ -9,12 +9,12 @@ std::uint32_t big_endian(std::string_view bytes) {
   return value;
 }
 
-// The size in the frame header of a JPEG file: that of the first marker SOF0 to SOF15, of which
-// three are something else (ITU T.81, table B.1).
+// The size in the frame header of a JPEG file: that of the first marker SOF0 to SOF15. Three of
+// these markers have another meaning (ITU T.81, table B.1).
 std::optional<ImageSize> jpeg_size(std::string_view bytes) {
   for (std::size_t at = 2; at + 9 <= bytes.size() && bytes[at] == '\xFF';) {
     const int marker = static_cast<unsigned char>(bytes[at + 1]);
-    if (marker == 0xFF) {  // fills
+    if (marker == 0xFF) {  // fill byte
       ++at;
       continue;
     }
@@ -30,7 +30,8 @@ std::optional<ImageSize> jpeg_size(std::string_view bytes) {
 
 std::optional<ImageSize> stated_image_size(std::string_view bytes) {
   if (bytes.starts_with("\xFF\xD8")) return jpeg_size(bytes);
-  constexpr std::size_t kWidth = 16, kHeight = 20, kEnd = 24;  // of the chunk IHDR, the first
+  // Offsets of the chunk IHDR, the first
+  constexpr std::size_t kWidth = 16, kHeight = 20, kEnd = 24;
   if (!bytes.starts_with("\x89PNG") || bytes.size() < kEnd) return std::nullopt;
   return ImageSize{.width = big_endian(bytes.substr(kWidth, 4)),
                    .height = big_endian(bytes.substr(kHeight, 4))};

@@ -13,8 +13,8 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
 };
 
-/// The size that the bytes of a PNG or JPEG file say it has, which no pixel is looked at for.
-/// nullopt for what does not say.
+/// The size in the header of a PNG or JPEG file, read without decoding pixels. nullopt if there is
+/// none.
 [[nodiscard]] std::optional<ImageSize> stated_image_size(std::string_view bytes);
 
 }  // namespace km

@@ -87,7 +87,8 @@ InputFile open_input_file(const fs::path& file, std::uintmax_t max_bytes) {
   struct stat status {};
   if (opened.number() < 0 || fstat(opened.number(), &status) != 0)
     fail(file, "cannot be opened: " + std::generic_category().message(errno));
-  const bool is_regular = S_ISREG(status.st_mode);  // of a pipe what comes out of it is counted
+  // The bytes from a pipe are counted while they are read
+  const bool is_regular = S_ISREG(status.st_mode);
   if (is_regular && static_cast<std::uintmax_t>(status.st_size) > max_bytes)
     fail_as_too_large(file, max_bytes);
 

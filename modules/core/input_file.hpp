@@ -12,33 +12,34 @@ struct InputFileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Files are read whole: more than this is no input of ours but a mistake, or an endless device.
+/// Files are read whole. A larger input is a mistake, or an endless device.
 inline constexpr std::uintmax_t kMaxInputFile_bytes = std::uintmax_t{8} << 30U;
 
-/// Why there is no file to read at `file`: "no such file", "a folder, not a file", or what the
-/// system says of a loop of symbolic links, a name too long, a folder without permission. Empty if
-/// there is one; pipes count. Does not throw.
+/// The reason why there is no file to read at `file`: "no such file", "a folder, not a file", or
+/// the system's message. The system reports, for example, a loop of symbolic links, a name too
+/// long, or a folder without permission. Empty if there is a file; pipes count. Does not throw.
 [[nodiscard]] std::string problem_of_file(const std::filesystem::path& file);
 
-/// A regular file, a folder, or either is there. As std::filesystem's, but false where those throw.
+/// True if there is a regular file, a folder, or either. Like the functions of std::filesystem, but
+/// false where those throw.
 [[nodiscard]] bool is_file(const std::filesystem::path& path) noexcept;
 [[nodiscard]] bool is_folder(const std::filesystem::path& path) noexcept;
 [[nodiscard]] bool is_there(const std::filesystem::path& path) noexcept;
 
-/// Nothing is there, not even what cannot be read: a file that may be left out was left out.
+/// True if there is nothing, not even an unreadable file: an optional file was omitted.
 [[nodiscard]] bool is_absent(const std::filesystem::path& path) noexcept;
 
 /// The bytes of `file`, at most `max_bytes`. Throws InputFileError.
 [[nodiscard]] std::string read_input_file(const std::filesystem::path& file,
                                           std::uintmax_t max_bytes = kMaxInputFile_bytes);
 
-/// A file as it was read: kind and permissions are those of what the bytes come from, whatever has
-/// its name before or afterwards.
+/// A file with its bytes. Kind and permissions are those of the file that was read, even if another
+/// file has taken its name.
 struct InputFile {
   std::string bytes;
   std::filesystem::file_status status;
 };
-/// Likewise.
+/// Reads `file` like read_input_file(), together with its status.
 [[nodiscard]] InputFile open_input_file(const std::filesystem::path& file,
                                         std::uintmax_t max_bytes = kMaxInputFile_bytes);
 

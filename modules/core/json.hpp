@@ -7,15 +7,15 @@
 
 namespace km {
 
-/// A JSON document whose keys keep their order. What makes or reads one includes
-/// <nlohmann/json.hpp>, which takes two seconds to compile: in .cpp files only.
+/// A JSON document whose keys keep their order. Code that makes or reads one includes
+/// <nlohmann/json.hpp>, which takes two seconds to compile, so include it only in .cpp files.
 using Json = nlohmann::ordered_json;
 
-/// The document, indented, and a line end. Doubles keep the digits that tell them apart; NaN and
-/// infinities become null, bytes that are not UTF-8 the replacement character.
+/// The document, indented, with a line end. Doubles have enough digits to distinguish them. NaN and
+/// infinities become null. Bytes that are not UTF-8 become the replacement character.
 [[nodiscard]] std::string json_text(const Json& json);
 
-/// Throws std::runtime_error naming the file if it is missing or no JSON.
+/// Throws std::runtime_error with the file name if the file is missing or not JSON.
 [[nodiscard]] Json read_json(const std::filesystem::path& file);
 
 /// The number at a JSON pointer like "/optimized/joint/position_m/rmse"; nullopt if there is none.

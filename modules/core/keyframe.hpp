@@ -13,7 +13,7 @@ namespace km {
 /// 256-bit binary descriptor (ORB).
 using OrbDescriptor = std::array<std::uint8_t, 32>;
 
-/// An image point of the left camera with its depth, if stereo gave one.
+/// An image point of the left camera with its depth if stereo measured it.
 struct Keypoint {
   Eigen::Vector2f bearing = Eigen::Vector2f::Zero();  ///< On z = 1 of the left camera, undistorted.
   float inverse_depth = 0.0F;  ///< 1/z in the left camera [1/m]; 0: depth unknown.
@@ -26,8 +26,8 @@ struct Keypoint {
   }
 };
 
-/// What another robot needs to align itself with a keyframe: points, descriptors, and the numbers
-/// of the rig that give their noise a meaning. keypoints and descriptors have equal length.
+/// Features with which another robot aligns itself to a keyframe: points, descriptors, and the
+/// properties of the rig that determine their noise. keypoints and descriptors have equal length.
 struct KeyframeFeatures {
   SE3 T_body_cam = SE3::Identity();  ///< Left camera.
   double focal_px = 0.0;
@@ -44,7 +44,7 @@ struct OdometryPose {
   Matrix6 covariance = Matrix6::Zero();
 };
 
-/// A keyframe with what place recognition and verification work on.
+/// A keyframe with the data for place recognition and verification.
 struct Keyframe {
   OdometryPose odometry;
   Stamp stamp = 0;

@@ -8,12 +8,12 @@
 namespace km {
 namespace {
 
-constexpr double kConverged = 1e-24;  // squared error in focal lengths, of a target of at most one
+constexpr double kConverged = 1e-24;  // squared error in focal lengths, for a target of at most one
 constexpr int kMaxSteps = 20;
-constexpr double kOnAxis = 1e-9;  // nearer, equidistant lenses leave bearings where they are
+constexpr double kOnAxis = 1e-9;  // nearer to the axis, equidistant lenses do not move bearings
 
-// The first value within [0, end] at which `holds` does not hold; `end` if there is none. Spans of
-// less than a thousandth in which it does not are missed.
+// The first value within [0, end] for which `holds` is false; `end` if there is none. Intervals of
+// less than a thousandth of the range may be missed.
 template <typename Condition>
 double first_failure(double end, const Condition& holds) {
   constexpr int kCells = 1000;
@@ -35,8 +35,8 @@ struct Slope {
   double value, slope;
 };
 
-// Where `function`, which is 0 at 0 and rises up to `end`, is `target`; nullopt if not within
-// [0, end]. Newton's method between bounds that close in.
+// Argument at which `function` has the value `target`; nullopt if it is not within [0, end].
+// `function` is 0 at 0 and increases up to `end`. Newton's method with bounds that shrink.
 template <typename Function>
 std::optional<double> inverse_rising(double target, double end, const Function& function) {
   const double tolerance = kConverged * std::max(1.0, target * target);
@@ -83,10 +83,10 @@ class RadialTangential {
     return result;
   }
 
-  // The radius, at most `end`, up to which J is positive definite. J is symmetric: the distortion
-  // is the gradient of a function that is convex on that disc, and so one-to-one there. The
-  // eigenvalues of the radial part are g and g + 2 r^2 g', those of the tangential part are at
-  // least -6 |(p1, p2)| r.
+  // The largest radius, at most `end`, up to which J is positive definite. J is symmetric: the
+  // distortion is the gradient of a function that is convex on that disc, and therefore one-to-one
+  // there. The eigenvalues of the radial part are g and g + 2 r^2 g', those of the tangential part
+  // are at least -6 |(p1, p2)| r.
   [[nodiscard]] double max_radius(double end) const {
     const double tangential = 6.0 * std::hypot(k_[2], k_[3]);
     return first_failure(end, [&](double r) {
@@ -127,8 +127,8 @@ class RadialTangential {
             y * factor + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y};
   }
 
-  const double* k_;  // k1, k2, p1, p2, k3, k4, k5, k6: those of an omnidirectional lens end in 0
-  bool four_;        // the others are 0, as for most lenses: less to compute
+  const double* k_;  // k1, k2, p1, p2, k3, k4, k5, k6; zeros at the end for an omnidirectional lens
+  bool four_;        // the last four are 0, as for most lenses: less to compute
 };
 
 // Newton's method on the disc of radius `max_radius`.
@@ -147,9 +147,9 @@ std::optional<Eigen::Vector2d> newton(const RadialTangential& distortion, Eigen:
   return std::nullopt;
 }
 
-// The point of the disc that comes to `target`. Newton's method finds it from `target` itself where
-// the radial factor only falls or only rises, as that of most lenses; else, from where the radial
-// part alone has it.
+// The point of the disc with the image `target`. Newton's method finds it from `target` itself if
+// the radial factor is monotonic, as for most lenses. Otherwise it starts at the solution of the
+// radial part alone.
 std::optional<Eigen::Vector2d> inverse_of(const RadialTangential& distortion,
                                           const Eigen::Vector2d& target, double max_radius) {
   if (const auto found = newton(distortion, target, target, max_radius)) return found;
@@ -180,8 +180,8 @@ std::optional<Eigen::Vector2d> bearing_of(const Eigen::Vector2d& plane, double s
   return bearing;
 }
 
-// The bearing of a point on that plane (their lifting function). Roots of what is negative are not
-// numbers: such points have none.
+// The bearing of a point on that plane (their lifting function). If a root is of a negative number,
+// the result is NaN, and the point has no bearing.
 std::optional<Eigen::Vector2d> lifted(double xi, const Eigen::Vector2d& m, double max_bearing) {
   const double r2 = m.squaredNorm();
   const double eta = (xi + std::sqrt(1.0 + (1.0 - xi * xi) * r2)) / (r2 + 1.0);
@@ -207,8 +207,8 @@ std::optional<Eigen::Vector2d> inverse_double_sphere(double xi, double alpha,
   return bearing_of(m, scale, scale * m_z - xi, max_bearing);
 }
 
-// Up to where it puts bearings farther out the farther they are. The paper's region of valid points
-// is that of a positive denominator; with a xi near -1 the image folds back within it.
+// The bearing up to which the image radius increases with the bearing. The paper's region of valid
+// points is that of a positive denominator; with a xi near -1 the image folds back within it.
 double max_double_sphere_bearing(double xi, double alpha) {
   return first_failure(Lens::kMaxBearing, [&](double r) {
     const double z = 1.0 + xi * std::sqrt(1.0 + r * r), dz = xi * r / std::sqrt(1.0 + r * r);
@@ -247,7 +247,7 @@ void require_usable(LensModel model, const std::vector<double>& k) {
     throw std::invalid_argument(lens + "alpha = " + std::to_string(k[1]) + " is not within [0, 1]");
 }
 
-// The largest radius of radial-tangential distortion's points, given that of the bearings.
+// The largest radius of points of radial-tangential distortion, from the largest bearing.
 double plane_radius(double xi, double bearing) {
   return bearing * sphere_scale(xi, bearing * bearing);
 }

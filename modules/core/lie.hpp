@@ -32,15 +32,15 @@ Vector6 se3_log(const SE3& T);
 /// Adjoint: T * exp(xi) = exp(adjoint(T) * xi) * T.
 Matrix6 adjoint(const SE3& T);
 
-/// The pose that estimators reach from `T` by the step `delta` = [rotation; translation]:
-/// R' = R exp(rotation), made a rotation again, and t' = t + R translation. It equals
-/// T * exp(delta) to first order (Forster et al., Sec. III-C, Eq. (21)).
+/// The pose that estimators reach from `T` by the step `delta` = [rotation; translation]: R' = R
+/// exp(rotation), normalised to a rotation, and t' = t + R translation. It equals T * exp(delta) to
+/// first order (Forster et al., Sec. III-C, Eq. (21)).
 SE3 retract(const SE3& T, const Eigen::Ref<const Vector6>& delta);
 
 /// Inverse of retract(): the delta from `from` to `to`.
 Vector6 local_coordinates(const SE3& from, const SE3& to);
 
-/// The shortest rotation that takes the direction of `up` to z.
+/// The shortest rotation that maps the direction of `up` to z.
 Eigen::Matrix3d turn_to_z(const Eigen::Vector3d& up);
 
 /// The rotation nearest to `M` in the Frobenius norm (projection by SVD).

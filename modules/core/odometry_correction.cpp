@@ -25,7 +25,7 @@ std::vector<Correction> corrections(std::span<const StampedPose> odometry,
 }
 
 // Pose of the body under the corrections at both ends of an interval, blended by `share` in [0, 1].
-// Blending the corrected poses, not the corrections, keeps the result free of lever arms.
+// Blending the corrected poses instead of the corrections avoids the effect of lever arms.
 SE3 blend(const Correction& from, const Correction& to, double share, const SE3& T_odom_body) {
   const SE3 a = from.T_world_odom * T_odom_body;
   const SE3 b = to.T_world_odom * T_odom_body;
@@ -41,7 +41,7 @@ std::vector<StampedPose> correct_odometry(std::span<const StampedPose> odometry,
   const std::vector<Correction> anchors = corrections(odometry, keyframes);
   std::vector<StampedPose> result(odometry.begin(), odometry.end());
   if (anchors.empty()) return result;
-  std::size_t next = 0;  // first anchor after the pose
+  std::size_t next = 0;  // first keyframe after the pose
   for (StampedPose& pose : result) {
     while (next < anchors.size() && anchors[next].stamp <= pose.stamp) ++next;
     const Correction& after = anchors[std::min(next, anchors.size() - 1)];

@@ -20,8 +20,8 @@ struct RelativePose {
   Matrix6 covariance = Matrix6::Identity();  ///< At T_from_to, see covariance.hpp.
 };
 
-/// Two keyframes that place recognition takes for the same place. `match` is always one of this
-/// robot's own; `query` is a peer's, or a later one of its own.
+/// Two keyframes that place recognition considers the same place. `match` is always one of this
+/// robot's own keyframes; `query` is a peer's, or a later one of its own.
 struct LoopCandidate {
   KeyframeId query;
   KeyframeId match;
@@ -29,7 +29,8 @@ struct LoopCandidate {
   int support = 1;          ///< See PlaceCandidate.
 };
 
-/// Identity of a loop closure: a pair of keyframes, whoever measured it and from which side.
+/// Identity of a loop closure: a pair of keyframes, independent of the robot and the direction of
+/// the measurement.
 struct ClosureId {
   KeyframeId from;  ///< The lower one: see closure_id().
   KeyframeId to;
@@ -40,13 +41,13 @@ struct ClosureId {
   return b < a ? ClosureId{b, a} : ClosureId{a, b};
 }
 
-/// True if one of its keyframes is of this robot.
+/// True if one of its keyframes belongs to this robot.
 [[nodiscard]] constexpr bool touches(const ClosureId& closure, RobotId robot) {
   return closure.from.robot == robot || closure.to.robot == robot;
 }
 
 /// A geometrically verified loop closure with the odometry of both ends, so that every robot can
-/// test its consistency without having heard of those keyframes before.
+/// test its consistency without having received those keyframes before.
 struct Closure {
   OdometryPose from;
   OdometryPose to;
@@ -61,8 +62,8 @@ struct Closure {
   }
 };
 
-/// The closures between robots a <= b (or inside one, a == b) that agree with each other. Decided
-/// by one robot for the pair, a, so that both ends hold the same edges; the newest version counts.
+/// The closures between robots a <= b (or within one, a == b) that agree with each other. Robot a
+/// decides for the pair, so that both robots use the same edges; the newest version counts.
 struct InlierSet {
   RobotId a = 0;
   RobotId b = 0;
@@ -70,14 +71,15 @@ struct InlierSet {
   std::vector<ClosureId> closures;  ///< Ascending.
 };
 
-/// How far a candidate of place recognition got, and why it stopped: a row of loop_closures.csv.
+/// The last stage that a candidate of place recognition reached, and the reason for its end: a row
+/// of loop_closures.csv.
 enum class ClosureStage { kCandidate, kRequested, kReceived, kVerified, kInlier };
 
 struct ClosureOutcome {
   ClosureId id;
   double similarity = 0.0;
   ClosureStage stage = ClosureStage::kCandidate;
-  std::string reason;  ///< Why it went no further; empty if it is not over.
+  std::string reason;  ///< Reason for its rejection; empty if it was not rejected.
   int matches = 0;     ///< Descriptor matches.
   int inliers = 0;     ///< Correspondences that support the pose.
 };
@@ -85,20 +87,21 @@ struct ClosureOutcome {
 /// A robot's optimised keyframe poses, index i being keyframe i of `robot`.
 struct Trajectory {
   RobotId robot = 0;
-  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; `robot` itself when alone.
+  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; `robot` itself if it is alone.
   std::vector<SE3> T_world_kf;
 };
 
-/// State of distributed optimisation as one robot sees it, for status lines and tables.
+/// State of distributed optimisation as seen by one robot, for status lines and tables.
 struct OptimizerProgress {
   RobotId anchor = 0;
   std::vector<RobotId> members;  ///< Robots that optimise together, ascending.
-  std::uint32_t round = 0;       ///< Rounds in all: in one, every member sends once.
+  std::uint32_t round = 0;       ///< Number of rounds; in a round every member sends once.
   double cost = 0.0;             ///< Team cost, chordal without 1/2.
-  double gradient_norm = 0.0;    ///< Of the team: Riemannian, or (newton) its Newton decrement.
-  double seconds = 0.0;          ///< Time spent optimising.
-  bool settled = false;          ///< Nothing left to improve with what is known.
-  /// Noise of this robot's odometry in multiples of what it claims, see OdometryNoise.
+  /// Norm of the team's Riemannian gradient, or (newton) its Newton decrement.
+  double gradient_norm = 0.0;
+  double seconds = 0.0;  ///< Time spent optimising.
+  bool settled = false;  ///< Nothing is left to improve with the current data.
+  /// Noise of this robot's odometry as a multiple of the stated noise, see OdometryNoise.
   double odometry_rotation_noise = 1.0;
   double odometry_translation_noise = 1.0;
 };

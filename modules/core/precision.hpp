@@ -11,13 +11,13 @@ namespace km {
 ///     F = sum kappa ||R_j - R_i R_ij||_F^2 + tau ||t_j - t_i - R_i t_ij||^2   (no factor 1/2).
 struct Precision {
   double kappa = 1.0;  ///< Concentration of the rotation (isotropic Langevin) [1/rad^2].
-  double tau = 1.0;    ///< Of the translation [1/m^2].
+  double tau = 1.0;    ///< Weight of the translation [1/m^2].
 };
 
 /// Isotropic weights of a 6x6 covariance, tangent [rotation; translation]: kappa = 3 / (2 tr
 /// Sigma_R), tau = 3 / tr Sigma_t, as SE-Sync reads pose graphs (Rosen et al., "SE-Sync", IJRR
-/// 2019; with g2o's information matrices block-diagonal the two agree exactly, cross terms are
-/// dropped). Throws std::invalid_argument unless both traces are positive and finite.
+/// 2019). With block-diagonal information matrices of g2o the two agree exactly; cross terms are
+/// dropped. Throws std::invalid_argument unless both traces are positive and finite.
 [[nodiscard]] inline Precision precision_of(const Matrix6& covariance) {
   const double rotation = covariance.topLeftCorner<3, 3>().trace();
   const double translation = covariance.bottomRightCorner<3, 3>().trace();

@@ -14,7 +14,7 @@ struct ProcessedFrame {
   std::optional<double> tracked_share = {};
 };
 
-/// What a robot leaves out because its processors are short; see LoadShedding.
+/// Frames that a robot drops because its processors are too slow; see LoadShedding.
 struct ShedLoad {
   bool map = false;  ///< No new frames for the map.
   int stride = 1;    ///< Odometry gets every stride-th image.

@@ -7,20 +7,21 @@
 
 namespace km {
 
-/// How much of what a robot told another one holds without a gap, from the first on.
+/// Number of messages of one robot that another robot holds without a gap, from the first on.
 struct RelayHeld {
   TeamPeer origin;
-  std::uint32_t bags = 0;     ///< 0 of an origin that is heard directly.
-  std::uint32_t letters = 0;  ///< See RelayStore.
+  std::uint32_t bags = 0;     ///< 0 for an origin that is received directly.
+  std::uint32_t letters = 0;  ///< Other messages, see RelayStore.
 
   bool operator==(const RelayHeld&) const = default;
 };
 
-/// What a robot tells of its part in the relay, ascending by robot. Where all robots hear each
-/// other `holds` is empty.
+/// Part of a robot in the relay, as it publishes it, ascending by robot. If all robots receive each
+/// other directly, `holds` is empty.
 struct RelaySummary {
-  std::vector<RobotId> hears;         ///< Directly.
-  std::vector<RelayHeld> holds = {};  ///< Of each robot known but not heard, or with letters.
+  std::vector<RobotId> hears;  ///< Robots that are received directly.
+  /// For each known robot that is not received directly, or whose other messages are held.
+  std::vector<RelayHeld> holds = {};
 
   bool operator==(const RelaySummary&) const = default;
 };

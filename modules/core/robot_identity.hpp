@@ -9,13 +9,13 @@
 
 namespace km {
 
-/// Version of the protocol between robots as a whole: robots of different versions do not talk.
-/// Fields appended to a topic type do not change it, see idl/README.md.
+/// Version of the protocol between robots as a whole. Robots of different versions do not
+/// communicate. Fields appended to a topic type do not change it, see idl/README.md.
 inline constexpr std::uint16_t kProtocolVersion = 1;
 
-/// A process of a robot has a boot of its own, not zero: the upper 48 bits name the robot's life,
-/// the lower 16 count how often that was resumed. Another process of one life has the same
-/// keyframes; in another life an index stands for another keyframe.
+/// Each process of a robot has its own boot id, not zero. The upper 48 bits are the incarnation,
+/// the lower 16 count how often it was resumed. Processes of one incarnation have the same
+/// keyframes. In another incarnation an index means another keyframe.
 inline constexpr unsigned kResumeBits = 16;
 
 [[nodiscard]] constexpr bool is_same_life(std::uint64_t a, std::uint64_t b) {
@@ -26,8 +26,8 @@ inline constexpr unsigned kResumeBits = 16;
   return static_cast<std::uint32_t>(boot & ((1U << kResumeBits) - 1U));
 }
 
-/// Of the process that resumes the life of `boot`. Throws std::overflow_error if there have been
-/// too many.
+/// Boot id of the process that resumes the incarnation of `boot`. Throws std::overflow_error if
+/// there have been too many.
 [[nodiscard]] inline std::uint64_t next_boot(std::uint64_t boot) {
   if (!is_same_life(boot, boot + 1))
     throw std::overflow_error("a robot's life was resumed " + std::to_string(resume_count(boot)) +
@@ -35,19 +35,19 @@ inline constexpr unsigned kResumeBits = 16;
   return boot + 1;
 }
 
-/// A process of a robot: a restarted or resumed robot keeps its id and gets another boot.
+/// A process of a robot: a restarted or resumed robot keeps its id and gets another boot id.
 struct TeamPeer {
   RobotId robot = 0;
   std::uint64_t boot = 0;
   auto operator<=>(const TeamPeer&) const = default;
 };
 
-/// What a robot tells of itself before anything else.
+/// Identity that a robot publishes before anything else.
 struct RobotIdentity {
   RobotId robot = 0;
   std::string name;  ///< 1 to 64 printable ASCII characters without ';'.
   std::uint16_t protocol = kProtocolVersion;
-  std::uint64_t boot = 0;  ///< Tells this process from the robot's former ones.
+  std::uint64_t boot = 0;  ///< Distinguishes this process from the robot's former ones.
 
   bool operator==(const RobotIdentity&) const = default;
 };

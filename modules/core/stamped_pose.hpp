@@ -5,7 +5,7 @@
 
 namespace km {
 
-/// A pose at an instant; the frames are named where it is used.
+/// A pose at an instant; its user defines the frames.
 struct StampedPose {
   Stamp stamp = 0;
   SE3 T = SE3::Identity();

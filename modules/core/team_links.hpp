@@ -9,24 +9,24 @@
 
 namespace km {
 
-/// Who hears whom in a team, as its robots tell it. A link counts if both of its ends say that they
-/// hear the other one: robots that are told the same see the same graph. Not thread-safe.
+/// Graph of the links in a team, from the reports of its robots. A link counts if both ends report
+/// that they receive the other one. Robots with equal reports see the same graph. Not thread-safe.
 class TeamLinks {
  public:
-  /// `robot` hears `heard` and nobody else. True if that is news.
+  /// Reports that `robot` receives the robots `heard` and no others. True if this is a change.
   bool tell(RobotId robot, std::set<RobotId> heard);
-  /// What `robot` said about itself does not hold any more.
+  /// Removes the report of `robot`.
   void forget(RobotId robot) { heard_by_.erase(robot); }
 
-  /// True if `a` says that it hears `b`.
+  /// True if `a` reports that it receives `b`.
   [[nodiscard]] bool hears(RobotId a, RobotId b) const;
   [[nodiscard]] bool linked(RobotId a, RobotId b) const { return hears(a, b) && hears(b, a); }
-  /// Ascending.
+  /// Ascending robot ids.
   [[nodiscard]] std::vector<RobotId> neighbours(RobotId robot) const;
 
-  /// Number of links to all robots that links lead to from `robot`; 0 for itself.
+  /// Number of links to each robot that can be reached from `robot`; 0 for itself.
   [[nodiscard]] std::map<RobotId, std::size_t> distances(RobotId robot) const;
-  /// All robots that links lead to from `self`, itself included.
+  /// All robots that can be reached from `self`, including itself.
   [[nodiscard]] std::set<RobotId> component(RobotId self) const;
 
  private:

@@ -12,7 +12,7 @@ namespace km {
 /// `value` with `decimals` decimals; "-" if it is not finite.
 [[nodiscard]] std::string fixed(double value, int decimals);
 
-/// `value` with so many digits that count, trailing zeros left out: "0.012", "2.5e+07".
+/// `value` with `digits` significant digits, without trailing zeros: "0.012", "2.5e+07".
 [[nodiscard]] std::string rounded(double value, int digits);
 
 /// "812 B", "34.5 kB", "1.2 MB".

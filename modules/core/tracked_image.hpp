@@ -7,10 +7,11 @@
 
 namespace km {
 
-/// A stereo pair as odometry saw it, with or without a pose: for people to look at.
+/// A stereo pair processed by odometry, with or without a pose, for display.
 struct TrackedImage {
   std::shared_ptr<const StereoFrame> frame;
-  std::vector<Eigen::Vector2d> bearings;  ///< Of its features, on z = 1 of the left camera.
+  /// Bearings of its features, on z = 1 of the left camera.
+  std::vector<Eigen::Vector2d> bearings;
 };
 
 }  // namespace km

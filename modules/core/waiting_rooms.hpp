@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// Messages that wait until more is known, in one room for each that they are from. A room has a
-/// bound, and all together have one. Not thread-safe.
+/// Messages that wait until more is known, in one queue per sender. Each queue has a bound, and all
+/// together have one. Not thread-safe.
 template <typename From, typename Message>
 class WaitingRooms {
  public:
@@ -21,7 +21,8 @@ class WaitingRooms {
   WaitingRooms() = default;
   explicit WaitingRooms(const Bounds& bounds) : bounds_(bounds) {}
 
-  /// False, and `message` is dropped, if there is no room for its `bytes`. Time in [s], any origin.
+  /// Returns false, and drops `message`, if there is no room for its `bytes`. Time in [s], any
+  /// origin.
   [[nodiscard]] bool push(const From& from, Message message, std::size_t bytes, double now_s) {
     const auto room = rooms_.find(from);
     const std::size_t bytes_of_one = room == rooms_.end() ? 0 : room->second.bytes;
@@ -33,8 +34,8 @@ class WaitingRooms {
     return true;
   }
 
-  /// Offers the oldest message of each room to `take(from, message, waited_s)`, which says whether
-  /// it is done with it. Returns how many it is done with.
+  /// Offers the oldest message of each queue to `take(from, message, waited_s)`, which returns true
+  /// if the message can be removed. Returns the number of removed messages.
   template <typename Take>
   std::size_t serve(double now_s, const Take& take) {
     std::size_t taken = 0;

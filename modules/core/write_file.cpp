@@ -15,7 +15,7 @@ std::system_error cannot_write(const fs::path& file, int error) {
   return {error, std::generic_category(), file.string() + ": cannot be written"};
 }
 
-// What is written and the error that ended it, or 0.
+// Number of bytes written, and the error that ended writing, or 0.
 struct Written {
   std::size_t bytes = 0;
   int error = 0;
@@ -51,7 +51,7 @@ void write_file(const fs::path& file, std::string_view bytes, const WriteOptions
   }
   fs::path partial = file;
   partial += ".part";
-  // One that is left may have another mode, or be a link to anything.
+  // A remaining partial file may have another mode, or be a link to any file.
   if (!options.through_links || fs::is_symlink(fs::symlink_status(partial, unknown)))
     unlink(partial.c_str());
   const int how = options.through_links ? O_TRUNC | O_NOFOLLOW : O_EXCL;

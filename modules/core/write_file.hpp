@@ -6,23 +6,23 @@
 
 namespace km {
 
-/// How a file is written.
+/// Options of writing a file.
 struct WriteOptions {
   unsigned mode = 0666;       ///< Permissions of the file, less the umask.
-  bool through_links = true;  ///< Else whatever is there is replaced, never written to.
-  bool durable = false;       ///< Returns once the bytes are on the disk.
+  bool through_links = true;  ///< False: an existing file or link is replaced and never written to.
+  bool durable = false;       ///< Return only after the bytes are on the disk.
 };
 
-/// Writes `bytes` to `file`, which appears under its name only when it is whole: until then what
-/// was there before stays. What is no plain file (a device, a pipe, a link) is written in place,
-/// but a link that has the name of a partial file is not followed. Throws std::system_error with
-/// one line that names the file and why, and leaves nothing behind.
+/// Writes `bytes` to `file`. The file appears under its name only when it is complete; until then
+/// the former file stays. A device, a pipe or a link is written in place, but a link with the name
+/// of the partial file is not followed. Throws std::system_error with one line with the file and
+/// the reason, and leaves no partial file.
 void write_file(const std::filesystem::path& file, std::string_view bytes,
                 const WriteOptions& options = {});
 
-/// Appends `waiting` to a file that need not exist, and takes what is written out of it. Throws
-/// like write_file() where something is left, the disk being full, which the next call goes on
-/// with; or where what is written may not be on the disk, as is asked for.
+/// Appends `waiting` to a file, which need not exist, and removes the written bytes from `waiting`.
+/// If the disk is full, some bytes remain, with which the next call continues. Throws like
+/// write_file() if bytes remain, or if a durable write may not have reached the disk.
 void append_to_file(const std::filesystem::path& file, std::string& waiting,
                     const WriteOptions& options = {});
 

@@ -11,7 +11,8 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueuedFrames = 4;  // so that of images without depth between, none displaces
+// Large enough that images without depth displace none with depth.
+constexpr std::size_t kQueuedFrames = 4;
 constexpr double kStampJitter_s = 2e-3;
 
 double interval_of(double rate_hz) {

@@ -19,30 +19,31 @@ namespace km {
 /// Channels of the dense sensing node; they must outlive it.
 struct DenseSensingTopics {
   In<LocatedFrame> located;  ///< In order of time.
-  In<ShedLoad> load;         ///< Whether the map gives way to odometry.
+  In<ShedLoad> load;         ///< Whether the map gets no frames, to relieve odometry.
   Out<DenseFrame> frames;
-  Out<DenseSensingProgress> progress;  ///< With every frame that was due.
+  Out<DenseSensingProgress> progress;  ///< With every due frame.
 };
 
-/// Makes depth and labels of the frames that are due, as a thread: one DenseSensor.
+/// Makes depth and labels of the frames that are due, as a thread with one DenseSensor.
 class DenseSensingNode final : public Node {
  public:
-  /// At most `rate_hz` frames a second are handed on, by their stamps. `overflow`: whether a full
-  /// queue holds odometry up or drops the oldest frame. Throws std::invalid_argument unless the
-  /// rate is positive.
+  /// At most `rate_hz` frames a second are published, by their stamps. `overflow`: whether a full
+  /// queue delays odometry or drops the oldest frame. Throws std::invalid_argument unless the rate
+  /// is positive.
   DenseSensingNode(DenseSensor sensor, LabelsFrom labels, double rate_hz, Overflow overflow,
                    const DenseSensingTopics& topics);
   ~DenseSensingNode() override { stop(); }
 
   std::string_view name() const override { return "dense_sensing"; }
   void start() override { worker_.start(); }
-  /// Finishes queued frames and says in the log what was wrong with frames, if anything.
+  /// Finishes queued frames and logs problems of frames, if any.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return sensing_.histogram(); }
 
-  /// Handles one frame synchronously. The thread calls only this; so can tests and replay.
+  /// Handles one frame synchronously. The thread calls only this function; tests and replay can
+  /// call it too.
   void step(const LocatedFrame& located);
 
  private:
@@ -53,7 +54,7 @@ class DenseSensingNode final : public Node {
   std::atomic<bool> gives_way_ = false;
   std::optional<Stamp> last_;
   DenseSensingProgress progress_;
-  Timing sensing_;  // of the frames that were due
+  Timing sensing_;  // time of the due frames
   bool stopped_ = false;
   Worker<Topic<LocatedFrame>::Message> worker_;  // last member: stops first
 };

@@ -12,13 +12,13 @@
 
 namespace km {
 
-/// Where the depth of all pixels comes from.
+/// Source of the depth of all pixels.
 enum class DepthFrom {
   kImages,  ///< The depth images of the frames.
   kStereo,  ///< Matching left and right images.
 };
 
-/// Where the labels of all pixels come from.
+/// Source of the labels of all pixels.
 enum class LabelsFrom {
   kNone,
   kImages,   ///< The label images of the frames.
@@ -32,30 +32,30 @@ struct DenseSensorConfig {
   SegmentationConfig segmentation = {};  ///< With kNetwork.
 };
 
-/// What kept a frame from giving depth.
+/// Reason why a frame gives no depth.
 enum class DenseProblem {
   kNone,
-  kNoDepthImage,  ///< This frame has none; they may come at a lower rate.
-  kWrongSize,     ///< An image is missing or has not its camera's size.
+  kNoDepthImage,  ///< This frame has none; depth images may come at a lower rate.
+  kWrongSize,     ///< An image is missing or has another size than its camera.
 };
 
 /// Depth and labels of one frame, both seen by DenseSensor::camera().
 struct [[nodiscard]] DenseImages {
   DenseProblem problem = DenseProblem::kNone;
   std::shared_ptr<const DepthImage> depth;   ///< Null if there is a problem.
-  std::shared_ptr<const LabelImage> labels;  ///< Null: none.
-  bool wrong_label_size = false;             ///< Labels not of the left camera's size: left out.
-  std::size_t classes_outside = 0;           ///< Of the network, see Segmentation.
+  std::shared_ptr<const LabelImage> labels;  ///< Null if there are none.
+  bool wrong_label_size = false;    ///< Labels of another size than the left camera's are dropped.
+  std::size_t classes_outside = 0;  ///< From the network, see Segmentation.
 };
 
-/// Turns what a robot's cameras saw into depth and labels of every pixel of one camera. Not
-/// thread-safe.
+/// Computes depth and labels of every pixel of one camera from a robot's images. Not thread-safe.
 class DenseSensor {
  public:
-  /// Throws ConfigError and std::invalid_argument as StereoDepth and SegmentationNetwork do.
+  /// Throws ConfigError and std::invalid_argument under the conditions of StereoDepth and
+  /// SegmentationNetwork.
   DenseSensor(const StereoRig& rig, const DenseSensorConfig& config);
 
-  /// The left camera, or, with stereo matching, an ideal one in its place.
+  /// The left camera, or, with stereo matching, an ideal camera at its pose.
   [[nodiscard]] const Camera& camera() const { return stereo_ ? stereo_->camera() : left_; }
 
   DenseImages sense(const StereoFrame& frame);
@@ -70,14 +70,14 @@ class DenseSensor {
   std::optional<SegmentationNetwork> network_;
 };
 
-/// What became of the frames that were due for the map, so far.
+/// Counts of the frames that were due for the map, so far.
 struct DenseSensingProgress {
-  std::uint64_t frames = 0;            ///< Handed on, with depth.
-  std::uint64_t gave_way = 0;          ///< Left out because processors were short.
-  std::uint64_t without_depth = 0;     ///< Without a depth image: the next frame was taken.
-  std::uint64_t wrong_size = 0;        ///< Images missing, or not of their camera's size.
-  std::uint64_t without_labels = 0;    ///< Handed on without labels that were wanted.
-  std::uint64_t wrong_label_size = 0;  ///< Of these, with labels of the wrong size.
+  std::uint64_t frames = 0;            ///< Published with depth.
+  std::uint64_t gave_way = 0;          ///< Dropped because processors were too slow.
+  std::uint64_t without_depth = 0;     ///< No depth image; the next frame was used.
+  std::uint64_t wrong_size = 0;        ///< Images missing, or of another size than their camera.
+  std::uint64_t without_labels = 0;    ///< Published without the requested labels.
+  std::uint64_t wrong_label_size = 0;  ///< Part of without_labels: labels of the wrong size.
   std::uint64_t classes_outside = 0;   ///< Pixels of classes that the label map lacks.
 };
 

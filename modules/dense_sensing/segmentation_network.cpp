@@ -16,7 +16,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kClasses = 256;  // at most, as labels
+constexpr std::size_t kClasses = 256;  // largest number of classes, that of labels
 
 std::array<std::optional<LabelId>, kClasses> labels_of(const SegmentationConfig& config) {
   std::array<std::optional<LabelId>, kClasses> labels;
@@ -41,7 +41,8 @@ SegmentationConfig checked_network(SegmentationConfig config) {
   return config;
 }
 
-// OpenCV says where in its sources, then in brackets what; the last part is for people.
+// OpenCV states the place in its sources, and then the reason in brackets. Only the reason is of
+// use.
 std::string reason(const cv::Exception& error) {
   std::string text = error.err.empty() ? error.what() : error.err;
   while (!text.empty() && text.back() == '\n') text.pop_back();
@@ -67,7 +68,7 @@ std::string shape_text(const cv::Mat& blob) {
   return text;
 }
 
-// A network's output as one plane of scores per class, or a single one of class numbers.
+// A network's output as one plane of scores per class, or a single plane of class numbers.
 struct Planes {
   int count = 0, height = 0, width = 0;
   const float* values = nullptr;
@@ -87,7 +88,7 @@ std::optional<Planes> planes_of(const cv::Mat& output) {
   return usable ? std::optional(planes) : std::nullopt;
 }
 
-// Class of every pixel of the output: the number there, or that of the plane with the best score.
+// Class of every pixel of the output: the number in the plane, or the plane with the best score.
 std::vector<float> classes_of(const Planes& planes) {
   const auto size =
       static_cast<std::size_t>(planes.height) * static_cast<std::size_t>(planes.width);

@@ -30,14 +30,14 @@ constexpr int kSteps = 16;
 constexpr float kMaxMove_px = 0.5F;
 constexpr float kMinTexture = 4.0F;  // mean squared gradient in the window [grey levels^2 / px^2]
 
-// The images do not agree in a window where what remains of their difference is more than noise
-// (standard deviation) and more than this share of the left image's variance.
+// The images disagree in a window if the rest of their difference exceeds both the noise (standard
+// deviation) and this share of the left image's variance.
 constexpr float kNoise = 5.0F;  // [grey levels]
 constexpr float kMaxRest = 0.4F;
 
-// What a window sums up over its pixels that have a disparity. g: gradient of the right image along
-// the row [grey levels / 32 px], e: right minus left [grey levels / 16], l: left. Whole numbers:
-// what goes into a running sum comes out again without a rest.
+// Sums over the pixels of a window that have a disparity. g: gradient of the right image along the
+// row [grey levels / 32 px], e: right minus left [grey levels / 16], l: left. Integers, so that a
+// pixel that leaves a running sum leaves no rounding error.
 struct Sums {
   std::int32_t n = 0, g = 0, e = 0, gg = 0, ge = 0, ee = 0, l = 0, ll = 0;
 
@@ -51,7 +51,7 @@ struct Sums {
   }
 };
 
-// Of every pixel of a row by itself.
+// Sums of each single pixel of a row.
 void fill_row(const std::uint8_t* left, const std::uint8_t* right, const std::int16_t* steps,
               int width, std::vector<Sums>& row) {
   for (int x = 0; x < width; ++x) {
@@ -78,10 +78,10 @@ float spread(std::int32_t product, std::int32_t a, std::int32_t b, float n) {
   return static_cast<float>(product) - static_cast<float>(a) * static_cast<float>(b) / n;
 }
 
-// `disparity` moved to where the window agrees best, up to a difference in brightness common to all
-// its pixels; 0 if it does not agree there.
+// `disparity` moved to the best agreement of the window, up to a difference in brightness common to
+// all its pixels; 0 if the images disagree there.
 float refined(float disparity, const Sums& w) {
-  if (w.n == 0) return disparity;  // too near the rim to compare
+  if (w.n == 0) return disparity;  // too near the rim for a comparison
   const auto n = static_cast<float>(w.n);
   const float texture = spread(w.gg, w.g, w.g, n) / 1024.0F;
   const float match = spread(w.ge, w.g, w.e, n) / 512.0F;
@@ -93,17 +93,19 @@ float refined(float disparity, const Sums& w) {
   return agrees ? disparity + move : 0.0F;
 }
 
-// Disparities [px], 32-bit floats, moved to where the left image and the right one, shifted by
-// them, agree best around each pixel: one Gauss-Newton step on the squared difference in a window,
-// brightness apart. `steps` is what OpenCV's matchers give, sixteenths of a pixel, not positive
-// where there is none; there the result is 0, and where the images, although both have texture, do
-// not agree in the window. Moves of more than half a pixel are not made, nor any where the window
-// has no texture. Both images are 8-bit grey of the same size as `steps`.
+// Disparities [px], 32-bit floats, refined so that the left image agrees best with the right one
+// shifted by them. The refinement is one Gauss-Newton step on the squared difference in a window
+// around each pixel, up to a constant difference in brightness. Moves of more than half a pixel,
+// and moves in windows without texture, are not made.
+//
+// `steps` is the output of OpenCV's matchers in sixteenths of a pixel, not positive if there is
+// none. The result is 0 there, and where both images have texture but disagree in the window. Both
+// images are 8-bit grey of the same size as `steps`.
 cv::Mat refined_disparities(const cv::Mat& left, const cv::Mat& right, const cv::Mat& steps) {
   const int width = steps.cols, height = steps.rows;
   const auto columns_count = static_cast<std::size_t>(width);
   constexpr std::size_t kRows = 2 * kHalf + 1;
-  // The rows of the window, and their sum, column by column: both move down with it.
+  // The rows of the window, and their sum per column. Both move down with the window.
   std::array<std::vector<Sums>, kRows> rows;
   for (auto& row : rows) row.resize(columns_count);
   std::vector<Sums> columns(columns_count);
@@ -131,7 +133,7 @@ cv::Mat refined_disparities(const cv::Mat& left, const cv::Mat& right, const cv:
   return result;
 }
 
-constexpr int kDisparityUnit = 16;  // the matcher searches multiples of it
+constexpr int kDisparityUnit = 16;  // the number of searched disparities is a multiple of it
 
 StereoDepthConfig checked_depths(StereoDepthConfig config) {
   config = checked(config);
@@ -155,7 +157,7 @@ int disparity_count(const StereoRectification& rectification, const StereoDepthC
   return units * kDisparityUnit;
 }
 
-// The smoothness penalties are those OpenCV's documentation proposes, for one channel.
+// The smoothness penalties are those that OpenCV's documentation proposes, for one channel.
 cv::Ptr<cv::StereoSGBM> make_matcher(const StereoDepthConfig& config, int disparities) {
   const int area = config.block_px * config.block_px;
   constexpr int kPrefilterCap = 31;
@@ -230,7 +232,7 @@ void StereoDepth::fill(const cv::Mat& disparities_px, DepthImage& depth) const {
     const auto* disparity = disparities_px.ptr<float>(y);
     const auto* seen = rectification_.seen().ptr(y);
     for (int x = 0; x < disparities_px.cols; ++x) {
-      const float z_mm = depth_of_one_px / disparity[x];  // infinite for none
+      const float z_mm = depth_of_one_px / disparity[x];  // infinite without a disparity
       const bool used = seen[x] != 0 && min_mm <= z_mm && z_mm <= max_mm;
       depth.millimetres.push_back(used ? static_cast<std::uint16_t>(z_mm + 0.5F) : 0);
     }

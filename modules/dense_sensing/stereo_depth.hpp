@@ -13,8 +13,8 @@
 
 namespace km {
 
-/// What the virtual cameras of a Rectification see, of images and of labels, at a size that is the
-/// left camera's over `downscale`.
+/// Images and labels as the virtual cameras of a Rectification see them, at the left camera's size
+/// divided by `downscale`.
 class StereoRectification {
  public:
   /// Throws std::invalid_argument for a rig that Rectification refuses.
@@ -24,14 +24,14 @@ class StereoRectification {
   [[nodiscard]] const Camera& camera() const { return camera_; }
   [[nodiscard]] double baseline_m() const { return baseline_m_; }
 
-  /// What the virtual camera on `side` (0: left) saw of `image`; 0 where the real one saw nothing.
-  /// Throws std::invalid_argument if `image` is not of that camera's size.
+  /// The image of the virtual camera on `side` (0: left), made from `image`; 0 outside the real
+  /// camera's view. Throws std::invalid_argument if `image` has another size than that camera.
   [[nodiscard]] cv::Mat rectified(const GrayImage& image, std::size_t side) const;
 
-  /// Pixels that the real left camera saw: 255, else 0.
+  /// 255 for pixels in the real left camera's view, else 0.
   [[nodiscard]] const cv::Mat& seen() const { return seen_; }
 
-  /// The labels of the nearest pixels; 0 where there are none. Precondition: `labels` has the left
+  /// The labels of the nearest pixels; 0 if there are none. Precondition: `labels` has the left
   /// camera's size.
   [[nodiscard]] LabelImage rectified(const LabelImage& labels) const;
 
@@ -43,27 +43,28 @@ class StereoRectification {
   double baseline_m_;
   cv::Size label_size_;
   cv::Mat seen_;
-  std::vector<std::int32_t> left_pixel_;  // of each virtual one: index of the nearest real one
+  std::vector<std::int32_t> left_pixel_;  // for each virtual pixel, index of the nearest real one
 };
 
 /// Depth of every pixel from a stereo pair, by semi-global matching (Hirschmueller, "Stereo
 /// Processing by Semiglobal Matching and Mutual Information", PAMI 2008) in OpenCV's variant, on
-/// images rectified as the calibration says. Left with a depth are pixels whose match is unique,
-/// the same from right to left, no speckle, and within range. The matcher's fractions of a pixel
-/// lean towards whole ones by up to a quarter; one step of image alignment (Lucas and Kanade, "An
-/// Iterative Image Registration Technique with an Application to Stereo Vision", 1981) puts that
-/// right. Deterministic. Not thread-safe.
+/// rectified images. A pixel keeps its depth if its match is unique, equal from right to left, no
+/// speckle, and within range.
+///
+/// The matcher's fractions of a pixel are biased towards whole numbers by up to a quarter. One step
+/// of image alignment (Lucas and Kanade, "An Iterative Image Registration Technique with an
+/// Application to Stereo Vision", 1981) corrects this. Deterministic. Not thread-safe.
 class StereoDepth {
  public:
-  /// Throws ConfigError if `config` is out of bounds or its depths leave nothing to search, and
-  /// std::invalid_argument for a rig that StereoRectification refuses.
+  /// Throws ConfigError if `config` is out of bounds or its depths leave no disparity to search.
+  /// Throws std::invalid_argument for a rig that StereoRectification refuses.
   StereoDepth(const StereoRig& rig, const StereoDepthConfig& config);
 
-  /// The camera of the depth images: without distortion, in the place of the left one.
+  /// The camera of the depth images: without distortion, at the pose of the left one.
   [[nodiscard]] const Camera& camera() const { return rectification_.camera(); }
   [[nodiscard]] const StereoRectification& rectification() const { return rectification_; }
 
-  /// Disparities that are searched, from 0 on [px].
+  /// Number of searched disparities, from 0 on [px].
   [[nodiscard]] int disparities() const { return disparities_; }
 
   /// Precondition: both images have their camera's size.

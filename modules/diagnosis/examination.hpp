@@ -8,13 +8,13 @@
 
 namespace km {
 
-/// A number that was measured, as text with its unit; or "not told: why".
+/// A measured number as text with its unit, or the reason for its absence.
 struct Figure {
   std::string name;
   std::string value;
 };
 
-/// What was looked at, and what of it stands out.
+/// The figures of an examination and its findings.
 struct Examination {
   std::vector<Figure> figures;
   std::vector<Finding> findings;

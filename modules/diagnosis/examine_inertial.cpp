@@ -20,7 +20,7 @@ double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return so3_log(a.transpose() * b).norm();
 }
 
-// What the fit to the gyroscope needs to say anything, and where it says more.
+// Rotation below which the fit to the gyroscope makes no statement, and bounds for more statements.
 constexpr double kToldRate_radps = 0.02;
 constexpr double kRelated = 0.6, kUnrelated = 0.3;  // share explained
 constexpr double kSecondAxis_radps = 0.02;          // about a second axis, for directions

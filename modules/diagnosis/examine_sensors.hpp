@@ -7,11 +7,11 @@
 
 namespace km {
 
-// What a recording says of its sensors against what it shows. Each finding has a bound that sound
-// recordings keep by a wide margin; what the motion or the images do not tell gives no finding but
-// a figure that says so.
+// Compare the calibration of a recording with its data. Each finding has a bound that sound
+// recordings keep by a wide margin. If motion or images do not determine a quantity, there is no
+// finding, and a figure states the reason.
 
-/// Rates, gaps and what the reader had to skip. Ids: frames.rate, frames.gap, imu.rate, imu.gap,
+/// Rates, gaps and faults of the reader. Ids: frames.rate, frames.gap, imu.rate, imu.gap,
 /// recording.no_frames, recording.<fault>.
 [[nodiscard]] Examination examine_streams(const SensorSample& sample, const ReaderReport& report);
 

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-// Words for a fault of the pair.
+// Texts for a fault of the pair.
 struct FaultWords {
   const char* id;
   const char* what;

@@ -31,8 +31,8 @@ Finding fault_finding(ReaderFault fault, const ReaderReport::Entry& entry, doubl
           .to_do = "repair or record it anew, where there are many"};
 }
 
-// How many of what a fault counts there are without it. Images missing between others are counted
-// camera by camera, lost messages topic by topic.
+// Total number of the items of which a fault counts some. Images missing between others are counted
+// per camera, lost messages per topic.
 double sound_ones(ReaderFault fault, const SensorSample& sample) {
   const auto frames = static_cast<double>(sample.frames.size());
   const auto samples = static_cast<double>(sample.imu.size());

@@ -8,9 +8,9 @@
 
 namespace km {
 
-/// How well the words of a vocabulary tell the features of these images apart: the number of words
-/// that would be as informative if all were as frequent, exp(entropy), against the number of
-/// features and of words. Id: vocabulary.coverage.
+/// How well the words of a vocabulary distinguish the features of these images. The measure is the
+/// number of equally frequent words that would be as informative, exp(entropy), relative to the
+/// number of features and of words. Id: vocabulary.coverage.
 [[nodiscard]] Examination examine_words(std::span<const std::vector<OrbDescriptor>> images,
                                         const Vocabulary& vocabulary);
 

@@ -8,40 +8,41 @@
 
 namespace km {
 
-/// What a finding means for a run.
+/// Consequence of a finding for a run.
 enum class Severity {
-  kNote,     ///< Worth knowing; nothing is wrong.
-  kWarning,  ///< It works, but worse than it could.
-  kError,    ///< It will not work.
+  kNote,     ///< For information; nothing is wrong.
+  kWarning,  ///< The run works, but worse than it could.
+  kError,    ///< The run will not work.
 };
 
 /// "note", "warning" or "error".
 [[nodiscard]] const char* to_string(Severity severity);
 
-/// Something that stands out, in words: of a recording, a network, or a run.
+/// A statement on a recording, a network, or a run.
 struct Finding {
   std::string id;  ///< Stable, for programs: "stereo.swapped".
   Severity severity = Severity::kNote;
-  std::string what = {};   ///< One sentence with the number behind it.
-  std::string means = {};  ///< What follows from it.
-  std::string to_do = {};  ///< Empty where there is nothing to do.
+  std::string what = {};   ///< One sentence with the number.
+  std::string means = {};  ///< Consequence for the run.
+  std::string to_do = {};  ///< Advice; empty if there is nothing to do.
 
   bool operator==(const Finding&) const = default;
 };
 
-/// The exit code of a program that found these: 0 without warnings, 1 with some, 2 with an error.
+/// Exit code of a program with these findings: 0 without warnings, 1 with warnings, 2 with an
+/// error.
 [[nodiscard]] int exit_code_of(std::span<const Finding> findings);
 
-/// The gravest first, otherwise in their order.
+/// The most severe first, otherwise in their order.
 void sort_by_severity(std::vector<Finding>& findings);
 
-/// For people: "warning stereo.swapped: WHAT", and below it, indented, what it means and what to
-/// do. Empty if there are none.
+/// For people: "warning stereo.swapped: WHAT", and below it, indented, the consequence and the
+/// advice. Empty if there are none.
 [[nodiscard]] std::string to_text(std::span<const Finding> findings);
 
 /// {"id", "severity", "what", "means", "to_do"}.
 void to_json(Json& json, const Finding& finding);
-/// Throws std::runtime_error for a severity that is none; what `json` lacks stays empty.
+/// Throws std::runtime_error for an unknown severity. Fields that `json` lacks stay empty.
 void from_json(const Json& json, Finding& finding);
 
 }  // namespace km

@@ -12,20 +12,20 @@
 namespace km {
 namespace {
 
-constexpr double kFactorStep = 1e-4;  // for the derivative; less is none
+constexpr double kFactorStep = 1e-4;  // for the derivative; the iteration ends below it
 constexpr double kSystematic_px = 0.01;
 
-using Shared = Eigen::Matrix<double, 7, 1>;  // turn of the mounting, constant, factor
+using Shared = Eigen::Matrix<double, 7, 1>;  // rotation of the mounting, constant, factor
 using SharedSquare = Eigen::Matrix<double, 7, 7>;
 
 struct Step {
-  Eigen::Vector3d rate;  // of the gyroscope, about its axes [rad/s]
+  Eigen::Vector3d rate;  // rate of the gyroscope, about its axes [rad/s]
   double seconds = 0.0;
   std::vector<TrackedPoint> points;                     // with depth
   Eigen::Vector3d t_from_to = Eigen::Vector3d::Zero();  // [m]
 };
 
-// A point as a rig has it.
+// A point as bearings and inverse depth of a rig.
 struct SeenPoint {
   Eigen::Vector3d from;  // z = 1
   double inverse_depth = 0.0;
@@ -63,7 +63,7 @@ std::vector<Step> steps_of(std::span<const TrackedStep> tracked, const StereoRig
   return steps;
 }
 
-// The normal equations: of what is shared, after those of each step's translation.
+// The normal equations of the shared variables, after elimination of each step's translation.
 struct Normal {
   SharedSquare H = SharedSquare::Zero();
   Shared g = Shared::Zero();
@@ -82,7 +82,7 @@ class FocalProblem {
   FocalProblem(std::vector<Step> steps, const StereoRig& rig, const InertialFit& fit)
       : steps_(std::move(steps)), rig_(rig), Q_(fit.Q), constant_(fit.constant) {}
 
-  // One step of Gauss-Newton; how far the factor went.
+  // One step of Gauss-Newton; returns the change of the factor.
   double iterate(double scale_px) {
     const Rigs rigs(rig_, factor_);
     normal_ = {};
@@ -110,7 +110,7 @@ class FocalProblem {
   }
 
  private:
-  // With the focal lengths times `factor`, and a little more.
+  // The rig with the focal lengths times `factor`, and with a slightly larger factor.
   struct Rigs {
     Rigs(const StereoRig& rig, double factor)
         : now(scaled(rig, factor)), beyond(scaled(rig, factor + kFactorStep)) {}
@@ -124,7 +124,7 @@ class FocalProblem {
     SE3 T_right_left = now.T_left_right().inverse();
   };
 
-  // Where a point comes to, as a multiple of its depth before.
+  // Position of a point after the motion, as a multiple of its depth before.
   static Eigen::Vector3d moved(const SeenPoint& point, const Eigen::Matrix3d& R,
                                const Eigen::Vector3d& t) {
     return R.transpose() * (point.from - point.inverse_depth * t);
@@ -136,7 +136,7 @@ class FocalProblem {
     Eigen::Matrix<double, 2, 3> J_t;
   };
 
-  // nullopt for a point that is, or comes, behind the camera.
+  // nullopt for a point that is behind the camera before or after.
   [[nodiscard]] std::optional<Linear> linear(const TrackedPoint& tracked, const Step& step,
                                              const Eigen::Matrix3d& R, const Rigs& rigs) const {
     const auto point = seen_by(rigs.now, rigs.T_right_left, tracked);
@@ -144,7 +144,7 @@ class FocalProblem {
     if (!point || !beyond) return std::nullopt;
     const Eigen::Vector3d m = moved(*point, R, step.t_from_to);
     const Eigen::Vector3d m_beyond = moved(*beyond, R, step.t_from_to);
-    constexpr double kMinDepth = 0.05;  // in its depth before
+    constexpr double kMinDepth = 0.05;  // relative to its depth before
     if (!(m.z() > kMinDepth && m_beyond.z() > kMinDepth)) return std::nullopt;
     const double px = rigs.now.cameras[0].fx, px_beyond = rigs.beyond.cameras[0].fx;
     Eigen::Matrix<double, 2, 3> J_m;
@@ -159,7 +159,7 @@ class FocalProblem {
     return result;
   }
 
-  // Adds to normal_ what the step says once its translation is what fits best.
+  // Adds the equations of the step to normal_ after eliminating its translation.
   StepNormal linearize(const Step& step, const Rigs& rigs, double scale_px) {
     StepNormal own;
     const Eigen::Matrix3d R = so3_exp(Eigen::Vector3d(step.seconds * (Q_ * step.rate + constant_)));

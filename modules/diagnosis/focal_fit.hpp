@@ -9,23 +9,24 @@
 
 namespace km {
 
-/// What a gyroscope says of the focal lengths of a stereo pair.
+/// Estimate of the focal lengths of a stereo pair from a gyroscope.
 struct FocalFit {
   std::size_t steps = 0, points = 0;
-  double factor = 1.0;    ///< Of both cameras: the focal length that fits best over the given one.
-  double sigma = 0.0;     ///< Of the factor.
-  double error_px = 0.0;  ///< Rms of the points about where they should be, robust.
+  /// Ratio of the best focal length to the given one, common to both cameras.
+  double factor = 1.0;
+  double sigma = 0.0;     ///< Standard deviation of the factor.
+  double error_px = 0.0;  ///< Robust rms of the reprojection errors.
 };
 
-/// Points with depths of the right image move from one image to the next as the rotation that the
-/// gyroscope measures, any translation, and the focal length have it. The least sum of squares with
-/// Geman-McClure weights, over the translation of each step (taken out by Schur complements), the
-/// gyroscope's mounting and constant, and the factor; Gauss-Newton from `fit`. As the gyroscope
-/// tells the rotation, a translation cannot take what a wrong focal length leaves, as it can where
-/// images tell both.
+/// The fit uses points with depths from the right image. Their motion to the next image follows
+/// from the rotation that the gyroscope measures, any translation, and the focal length. The fit
+/// minimises the sum of squares with Geman-McClure weights by Gauss-Newton from `fit`. Its
+/// variables are the translation of each step (eliminated by Schur complements), the gyroscope's
+/// mounting and constant, and the factor. Because the gyroscope determines the rotation, a
+/// translation cannot absorb the error of a wrong focal length, as it can if images determine both.
 ///
-/// `sigma` is of the noise and of a systematic error of 0.01 px, the least that trackers have.
-/// nullopt for fewer than 20 steps of 30 points with depth, or where it does not converge.
+/// `sigma` covers the noise and a systematic error of 0.01 px, the smallest that trackers have.
+/// nullopt for fewer than 20 steps of 30 points with depth, or if the fit does not converge.
 [[nodiscard]] std::optional<FocalFit> fit_focal(std::span<const TrackedStep> steps,
                                                 const StereoRig& rig,
                                                 std::span<const ImuSample> samples,

@@ -7,15 +7,15 @@
 
 namespace km {
 
-/// The integral of a gyroscope's rates, linear between samples. Keeps the span.
+/// The integral of a gyroscope's rates, linear between samples. Refers to the span.
 class GyroIntegral {
  public:
   explicit GyroIntegral(std::span<const ImuSample> samples);
 
-  /// Whether until() knows it from `from` to `to`.
+  /// Whether samples cover the interval.
   [[nodiscard]] bool covers(Stamp from, Stamp to) const;
 
-  /// From the first sample on [rad]. Precondition: covered.
+  /// Integral from the first sample on [rad]. Precondition: covered.
   [[nodiscard]] Eigen::Vector3d until(Stamp stamp) const;
 
   /// Mean rate [rad/s]. Precondition: covered, from < to.
@@ -25,7 +25,7 @@ class GyroIntegral {
 
  private:
   std::span<const ImuSample> samples_;
-  std::vector<Eigen::Vector3d> sums_;  // until each sample
+  std::vector<Eigen::Vector3d> sums_;  // integral up to each sample
 };
 
 }  // namespace km

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kMinBearings = 20;
 constexpr double kMinShare = 0.5;
 constexpr double kGate = 3.0;         // sigmas of an inlier
-constexpr double kFirstScale = 20.0;  // of the robust weight, in sigmas
+constexpr double kFirstScale = 20.0;  // initial scale of the robust weight, in sigmas
 constexpr int kIterations = 15;
 
 using Vector5 = Eigen::Matrix<double, 5, 1>;
@@ -32,7 +32,7 @@ double weight_of(double residual, double scale) {
   return w * w;
 }
 
-// Sampson distance [bearings] and what the constraint is divided by for it.
+// Sampson distance [bearings], and the divisor that converts the constraint to it.
 struct Sampson {
   double distance = 0.0, gradient = 1.0;
 };
@@ -47,7 +47,7 @@ Sampson sampson(const EpipolarState& state, const BearingStep& step) {
   return {step.from.homogeneous().dot(line_from) / gradient, gradient};
 }
 
-// Rotation that brings `to` onto `from` without any translation.
+// Rotation that aligns `to` with `from` without translation.
 Eigen::Matrix3d rotation_alone(std::span<const BearingStep> steps, double sigma) {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   double scale = kFirstScale * sigma;
@@ -58,7 +58,7 @@ Eigen::Matrix3d rotation_alone(std::span<const BearingStep> steps, double sigma)
       const Eigen::Vector3d from = step.from.homogeneous().normalized();
       const Eigen::Vector3d turned = R * step.to.homogeneous().normalized();
       const Eigen::Vector3d residual = turned - from;
-      const Eigen::Matrix3d J = -skew(turned);  // of R <- exp(x) R
+      const Eigen::Matrix3d J = -skew(turned);  // derivative for R <- exp(x) R
       const double w = weight_of(residual.norm(), scale);
       H += w * J.transpose() * J;
       g += w * J.transpose() * residual;
@@ -68,7 +68,7 @@ Eigen::Matrix3d rotation_alone(std::span<const BearingStep> steps, double sigma)
   return R;
 }
 
-// t . (R to x from) = 0 for all points: the direction that fits best.
+// t . (R to x from) = 0 for all points: the best direction.
 Eigen::Vector3d best_direction(std::span<const BearingStep> steps, const Eigen::Matrix3d& R) {
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
   for (const BearingStep& step : steps) {
@@ -79,7 +79,7 @@ Eigen::Vector3d best_direction(std::span<const BearingStep> steps, const Eigen::
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(M).eigenvectors().col(0);
 }
 
-// Two directions that are orthogonal to t.
+// Two directions orthogonal to t.
 Eigen::Matrix<double, 3, 2> tangents(const Eigen::Vector3d& t) {
   const Eigen::Vector3d a = t.unitOrthogonal();
   Eigen::Matrix<double, 3, 2> basis;
@@ -97,7 +97,7 @@ EpipolarState refined(std::span<const BearingStep> steps, EpipolarState state, d
       const Sampson found = sampson(state, step);
       const Eigen::Vector3d from = step.from.homogeneous();
       const Eigen::Vector3d turned = state.R * step.to.homogeneous();
-      // from . (t x exp(x) turned), by x and by t.
+      // from . (t x exp(x) turned), derivatives by x and by t.
       Vector5 J;
       J << turned.cross(from.cross(state.t)), basis.transpose() * turned.cross(from);
       J /= found.gradient;

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-constexpr double kNoise_px = 0.3;  // of a tracked corner
+constexpr double kNoise_px = 0.3;  // noise of a tracked corner
 constexpr std::size_t kMinDepths = 30;
 
 std::vector<BearingStep> bearings_of(const TrackedStep& step, const Camera& camera) {

@@ -9,17 +9,16 @@
 
 namespace km {
 
-/// Rotations of the left camera, and of how many steps the right image told the depths. Without
-/// depths a rotation and a translation across the image look much alike: the rotation that is found
-/// depends on the focal length in either direction, and says nothing of it.
+/// Rotations of the left camera, and the number of steps with depths from the right image. Without
+/// depths a rotation and a translation across the image are hard to distinguish. The estimated
+/// rotation then depends on the focal length, and cannot be used to estimate it.
 struct SeenRotations {
   std::vector<SeenRotation> steps;
   std::size_t with_depth = 0;
 };
 
-/// With the depths of `rig` where it is a stereo rig that the images fit, `use_depth` (see
-/// estimate_motion() of the tracker); else by rotation_between(). Steps that do not tell are left
-/// out. Deterministic.
+/// Uses depths if `use_depth` and `rig` is a stereo rig that the images fit (see estimate_motion()
+/// of the tracker), and else rotation_between(). Undetermined steps are dropped. Deterministic.
 [[nodiscard]] SeenRotations seen_rotations(std::span<const TrackedStep> steps, const StereoRig& rig,
                                            bool use_depth);
 

@@ -38,7 +38,7 @@ std::vector<OrbDescriptor> descriptors_of(const OrbImage& orb) {
   return descriptors;
 }
 
-// The best match of each row of `a`, where it is clearly better than the second; -1: none.
+// The best match of each row of `a` if it is clearly better than the second; -1: none.
 std::vector<int> best_matches(const cv::Mat& a, const cv::Mat& b) {
   std::vector<int> best(static_cast<std::size_t>(a.rows), -1);
   if (a.rows == 0 || b.rows < 2) return best;
@@ -66,7 +66,7 @@ StereoMatches match(const OrbImage& left, const OrbImage& right) {
   return matches;
 }
 
-// Where the match that begins nearest went.
+// Shift of the match that is nearest in the left image.
 cv::Point2f shift_near(const StereoMatches& matches, const cv::Point2f& point) {
   const Eigen::Vector2d here = vector_of(point);
   const auto nearest = std::ranges::min_element(
@@ -137,7 +137,7 @@ void SensorSampler::add_step(const StereoFrame& frame, const cv::Mat& left) {
 void SensorSampler::begin_step(const StereoFrame& frame, KltImage image) {
   last_ = std::move(image);
   last_stamp_ = frame.stamp;
-  corners_ = corners_of(last_.image);  // the strongest first
+  corners_ = corners_of(last_.image);  // strongest first
   corners_.resize(std::min(corners_.size(), kCorners));
   right_.assign(corners_.size(), std::nullopt);
   if (sample_.stereo.empty() || sample_.stereo.back().pairs.empty()) return;

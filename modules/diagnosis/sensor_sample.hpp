@@ -11,13 +11,13 @@
 
 namespace km {
 
-/// One point seen in two images: where each shows it [px].
+/// One point in two images, with its position in each [px].
 struct PixelPair {
   Eigen::Vector2d a = Eigen::Vector2d::Zero();
   Eigen::Vector2d b = Eigen::Vector2d::Zero();
 };
 
-/// Points of a left image (a) found in the right one (b), wherever they lie there.
+/// Points of a left image (a) found in the right one (b), at any position there.
 struct StereoMatches {
   std::vector<PixelPair> pairs;
 };
@@ -33,35 +33,35 @@ struct TrackedStep {
   std::vector<TrackedPoint> points;
 };
 
-/// What one left image is like.
+/// Brightness, sharpness and texture of one left image.
 struct ImageLook {
-  double mean_level = 0.0;       ///< Of 0 to 255.
-  double saturated_share = 0.0;  ///< Pixels of 250 and above.
-  /// Strongest gradients (99 %) over those of the image at half its size: about 1 where edges are
-  /// as sharp as pixels allow, towards 0.5 the more they are blurred. NaN without any gradient.
+  double mean_level = 0.0;       ///< Mean grey level, 0 to 255.
+  double saturated_share = 0.0;  ///< Share of pixels of 250 and above.
+  /// Strongest gradients (99 %) relative to those of the image at half its size. About 1 if edges
+  /// are as sharp as pixels permit; it approaches 0.5 with more blur. NaN without any gradient.
   double sharpness = 0.0;
-  std::size_t corners = 0;  ///< FAST, at a threshold of 12.
+  std::size_t corners = 0;  ///< FAST corners at a threshold of 12.
 };
 
-/// What a part of a recording shows, free of any calibration: so that calibrations can be held
-/// against it. An excerpt: some of the images, all of the inertial samples.
+/// Data of a part of a recording, independent of any calibration, so that calibrations can be
+/// compared with it. It contains some of the images and all inertial samples.
 struct SensorSample {
   ImageSize left_size, right_size;
   std::vector<StereoMatches> stereo;
   std::vector<TrackedStep> steps;
   std::vector<ImageLook> looks;
-  std::vector<std::vector<OrbDescriptor>> descriptors;  ///< Of the images of `stereo`.
+  std::vector<std::vector<OrbDescriptor>> descriptors;  ///< Descriptors of the images of `stereo`.
   std::vector<Stamp> frames;
   std::vector<ImuSample> imu;
 };
 
 /// Collects a SensorSample, deterministic for equal packets. Not thread-safe.
 ///
-/// Stereo: OpenCV's ORB, 800 features, brute force both ways over the whole image with a ratio test
-/// of 0.8, of a pair every half second, kMaxStereo at most; looks likewise. Steps: the 200
-/// strongest corners, followed by KLT and back (1 px), from an image to the first at least 90 ms
-/// later, unless that is more than 250 ms; and to the right image, from where the nearest ORB match
-/// went.
+/// Stereo: OpenCV's ORB, 800 features, brute force in both directions over the whole image with a
+/// ratio test of 0.8. Stereo and looks use a pair every half second, kMaxStereo at most. Steps: KLT
+/// tracks the 200 strongest corners forward and back (1 px), from an image to the first one at
+/// least 90 ms later. There is no step if that image is more than 250 ms later. The corners are
+/// also tracked to the right image, starting with the shift of the nearest ORB match.
 class SensorSampler {
  public:
   static constexpr std::size_t kMaxStereo = 60;
@@ -75,11 +75,12 @@ class SensorSampler {
   void begin_step(const StereoFrame& frame, KltImage image);
 
   SensorSample sample_;
-  // What a step begins in.
+  // First image of a step.
   KltImage last_;
   Stamp last_stamp_ = 0;
   std::vector<cv::Point2f> corners_;
-  std::vector<std::optional<Eigen::Vector2d>> right_;  // of the corners
+  // Positions of the corners in the right image
+  std::vector<std::optional<Eigen::Vector2d>> right_;
   Stamp last_stereo_ = 0;
 };
 

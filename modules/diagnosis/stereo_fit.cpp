@@ -12,8 +12,8 @@
 namespace km {
 namespace {
 
-constexpr double kMinParallax_px = 1.5;  // less may have any sign
-constexpr double kClearGain = 0.15;      // of the share on_line
+constexpr double kMinParallax_px = 1.5;  // a smaller one may have any sign
+constexpr double kClearGain = 0.15;      // gain in the share on_line
 constexpr double kFair = 0.5;            // share on_line of a calibration that may be right
 
 Camera with_pose_of(Camera camera, const SE3& T_body_cam) {
@@ -34,7 +34,7 @@ std::vector<StereoMatches> swapped(std::span<const StereoMatches> images) {
   return result;
 }
 
-// The ratio that fits best, of those within 20 %.
+// The best ratio within 20 %.
 StereoAlternative best_focal_ratio(std::span<const StereoMatches> images, const StereoRig& rig) {
   constexpr int kSteps = 40;
   constexpr double kStep = 0.005;
@@ -58,11 +58,11 @@ std::optional<StereoPoint> stereo_point(const StereoRig& rig, const SE3& T_right
   const Eigen::Vector3d turned = T_right_left.linear() * left->homogeneous();
   const Eigen::Vector3d seen = right->homogeneous();
   if (turned.z() <= 0.0) return std::nullopt;
-  const Eigen::Vector3d line = skew(t) * turned;  // of the right image, on z = 1
+  const Eigen::Vector3d line = skew(t) * turned;  // epipolar line of the right image, on z = 1
   const double length = line.head<2>().norm();
   if (length < 1e-12) return std::nullopt;
   const double focal_px = rig.cameras[1].fx;
-  // z_right * seen = z_left * turned + t, with the least squared distance.
+  // Minimises the squared distance of z_right * seen = z_left * turned + t.
   Eigen::Matrix<double, 3, 2> A;
   A << turned, -seen;
   return StereoPoint{.left = *left,
@@ -134,7 +134,7 @@ StereoAlternative best_alternative(std::span<const StereoMatches> images, const 
        {StereoFault::kInvertedPair, StereoFault::kInvertedCameras, StereoFault::kInvertedLeft,
         StereoFault::kInvertedRight, StereoFault::kExchangedLenses})
     consider({.fault = fault, .fit = fit_of(images, undone(rig, fault))});
-  // Of a calibration that is wrong altogether the focal length would make good some of it.
+  // With an entirely wrong calibration another focal length would compensate some of the error.
   if (best.fit.on_line < given.fit.on_line + kClearGain) consider(best_focal_ratio(images, rig));
   const bool is_clear =
       best.fit.on_line > given.fit.on_line + kClearGain && best.fit.on_line > kFair;

@@ -39,7 +39,7 @@ std::optional<SE3> pose_at(std::span<const StampedPose> poses, Stamp stamp, doub
   };
   auto nearest = after;
   if (after == poses.end() || (inside && difference_s(std::prev(after)) < difference_s(after))) {
-    if (after == poses.begin()) return std::nullopt;  // no poses
+    if (after == poses.begin()) return std::nullopt;  // there are no poses
     nearest = std::prev(after);
   }
   if (difference_s(nearest) > max_difference_s) return std::nullopt;

@@ -40,7 +40,7 @@ void check(const ClosureTruthOptions& options) {
     throw std::invalid_argument("score_closures: default_depth_m is not positive");
 }
 
-// The grid of an image as bearings on z = 1; pixels that the lens leaves without one are out.
+// The grid of an image as bearings on z = 1, without pixels for which the lens has no bearing.
 std::vector<Eigen::Vector3d> grid_of(const Camera& camera) {
   std::vector<Eigen::Vector3d> bearings;
   for (int row = 0; row < kGridRows; ++row)
@@ -66,7 +66,7 @@ double overlap(const Camera& camera, const std::vector<Eigen::Vector3d>& grid, c
   return grid.empty() ? 0.0 : share(seen, grid.size());
 }
 
-// Keyframes with their true poses, and which of them see the same place.
+// Keyframes with their true poses, and the pairs of them that see the same place.
 class Places {
  public:
   Places(std::span<const TrueKeyframe> keyframes, const Camera& camera,
@@ -90,7 +90,7 @@ class Places {
            overlap(camera_, grid_, T_a_b.inverse(), depth_of(b)) >= options_.min_overlap;
   }
 
-  // Pairs of keyframes of two robots that do.
+  // Pairs of keyframes of two robots that see the same place.
   std::set<Pair> true_pairs() const {
     std::set<Pair> pairs;
     for (auto a = keyframes_.begin(); a != keyframes_.end(); ++a)
@@ -111,7 +111,7 @@ class Places {
   std::map<KeyframeId, const TrueKeyframe*> keyframes_;
 };
 
-// What is summed up into a StageScore.
+// Counts for a StageScore.
 class StageCounter {
  public:
   explicit StageCounter(const std::set<Pair>& true_pairs) : true_pairs_(true_pairs) {}
@@ -211,12 +211,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxTruthGap_s = 0.1;  // as for trajectories: between poses further apart none is
+constexpr double kMaxTruthGap_s = 0.1;  // as for trajectories: longer gaps are not interpolated
 constexpr double kMaxTruthDifference_s = 0.01;
-constexpr double kMaxClosureNormError = 0.01;  // of a quaternion
+constexpr double kMaxClosureNormError = 0.01;  // norm of a quaternion
 constexpr std::size_t kPoseColumn = 8;
-constexpr Stamp kMaxKeyframeStamp = std::numeric_limits<Stamp>::max() / 2;  // differences fit
-constexpr double kMaxNumber = 1e9;  // no column of a run's results comes near
+// So that differences fit
+constexpr Stamp kMaxKeyframeStamp = std::numeric_limits<Stamp>::max() / 2;
+constexpr double kMaxNumber = 1e9;  // larger than any number in a run's results
 
 constexpr std::array<std::pair<const char*, ClosureStage>, 5> kStages = {
     {{"candidate", ClosureStage::kCandidate},
@@ -253,7 +254,8 @@ class Fields {
 
   [[nodiscard]] std::string_view text(std::size_t i) const { return row_.fields[i]; }
 
-  // The text of field `i` and those behind it, which its commas have made, without its quotes.
+  // The text of field `i` and of all fields after it, which its commas have separated, without
+  // quotes.
   [[nodiscard]] std::string rest(std::size_t i) const {
     std::string all;
     for (; i < row_.fields.size(); ++i) all.append(all.empty() ? "" : ", ").append(row_.fields[i]);

@@ -18,11 +18,11 @@
 
 namespace km {
 
-/// A keyframe where it truly was. The worlds of all keyframes are one.
+/// A keyframe with its true pose, in one world for all keyframes.
 struct TrueKeyframe {
   KeyframeId id;
   SE3 T_world_body = SE3::Identity();
-  double scene_depth_m = 0.0;  ///< Median depth of what its left camera sees; 0: unknown.
+  double scene_depth_m = 0.0;  ///< Median depth in its left camera; 0: unknown.
 };
 
 /// A loop closure that a robot considered.
@@ -32,10 +32,10 @@ struct ClosureRecord {
   std::optional<SE3> T_from_to;  ///< Measured pose of body `to` in body `from`; from kVerified on.
   int matches = 0;               ///< Descriptor matches.
   int inliers = 0;               ///< Correspondences that support the pose.
-  std::string reason = {};       ///< Why it went no further; empty if it is not over.
+  std::string reason = {};       ///< Reason for its rejection; empty if it was not rejected.
 };
 
-/// When a closure counts as true.
+/// Conditions under which a closure counts as true.
 struct ClosureTruthOptions {
   double max_translation_m = 0.5;
   double max_rotation_deg = 5.0;
@@ -44,29 +44,30 @@ struct ClosureTruthOptions {
 
   void visit_fields(auto& visitor) {
     visitor.field("max_translation_m", max_translation_m, {1e-6, 1000.0},
-                  "[m] by which a measured pose that is true is off at most");
-    visitor.field("max_rotation_deg", max_rotation_deg, {1e-6, 180.0}, "[deg] the same");
+                  "[m] largest error of a measured pose that counts as true");
+    visitor.field("max_rotation_deg", max_rotation_deg, {1e-6, 180.0},
+                  "[deg] largest error of a measured pose that counts as true");
     visitor.field("min_overlap", min_overlap, {1e-6, 1.0},
-                  "two keyframes see the same place if at least this share of either's image lies "
-                  "in the other's, see view_overlap()");
+                  "two keyframes see the same place if at least this share of the image of each is "
+                  "in the other's view, see view_overlap()");
     visitor.field("default_depth_m", default_depth_m, {1e-6, 1000.0},
-                  "[m] of the scene, for keyframes that do not know theirs");
+                  "[m] depth of the scene, for keyframes without a measured depth");
   }
 };
 
-/// Share of the image of a camera at `a` that one at `b` sees, 0 to 1, assumed that everything lies
-/// `depth_m` before `a` (z in its frame): a grid of 8x6 pixels, lifted to that depth, counts where
-/// it projects into the other's image with between half and twice that depth. T_a_b: of the
-/// cameras.
+/// Share of the image of a camera at `a` that a camera at `b` sees, 0 to 1. All points are assumed
+/// to be at depth `depth_m` in front of `a` (z in its frame). A point of a grid of 8x6 pixels, at
+/// this depth, counts if it projects into the other image with between half and twice that depth.
+/// T_a_b: relative pose of the cameras.
 [[nodiscard]] double view_overlap(const Camera& camera, const SE3& T_a_b, double depth_m);
 
-/// How many closures of one stage are true. Each direction of a pair is a closure of its own.
+/// Number of true closures of one stage. Each direction of a pair is a closure of its own.
 struct StageScore {
-  std::size_t judged = 0;          ///< Closures both of whose keyframes have a true pose.
-  std::size_t correct = 0;         ///< Of those, the true ones.
+  std::size_t judged = 0;          ///< Closures whose keyframes both have a true pose.
+  std::size_t correct = 0;         ///< True closures among them.
   std::size_t pairs_found = 0;     ///< True pairs of keyframes of two robots with a true closure.
   std::size_t frames_found = 0;    ///< Keyframes that have such a pair with a true closure.
-  Statistics translation_error_m;  ///< Of measured poses; none in the candidates' stage.
+  Statistics translation_error_m;  ///< Errors of measured poses; empty for candidates.
   Statistics rotation_error_deg;
 
   [[nodiscard]] double precision() const;  ///< correct / judged; NaN without one.
@@ -74,43 +75,45 @@ struct StageScore {
 
 /// All closures of a team against the truth.
 struct ClosureScores {
-  StageScore candidates;        ///< All; true: both keyframes see the same place.
-  StageScore verified;          ///< Stages kVerified and kInlier; true: the measured pose is.
-  StageScore inliers;           ///< Stage kInlier; true: the measured pose is.
-  std::size_t true_pairs = 0;   ///< Pairs of keyframes of two robots that see the same place.
-  std::size_t true_frames = 0;  ///< Keyframes that see a place which another robot's sees.
-  std::size_t unjudged = 0;     ///< Closures with a keyframe whose true pose is unknown.
+  StageScore candidates;       ///< All closures; true if both keyframes see the same place.
+  StageScore verified;         ///< Stages kVerified and kInlier; true if the measured pose is.
+  StageScore inliers;          ///< Stage kInlier; true if the measured pose is.
+  std::size_t true_pairs = 0;  ///< Pairs of keyframes of two robots that see the same place.
+  /// Keyframes that see the same place as some keyframe of another robot.
+  std::size_t true_frames = 0;
+  std::size_t unjudged = 0;  ///< Closures with a keyframe whose true pose is unknown.
 
   /// Share of the true pairs that a stage found. NaN without a true pair.
   [[nodiscard]] double pair_recall(const StageScore& stage) const;
-  /// Share of the keyframes that see another robot's place for which a stage found one: what a
-  /// system that takes the best match per keyframe can reach. NaN without one.
+  /// Share of the keyframes with a place common to another robot for which a stage found a closure.
+  /// A system that uses the best match per keyframe can reach 1. NaN without such keyframes.
   [[nodiscard]] double frame_recall(const StageScore& stage) const;
 };
 
 /// Judges the closures of a team.
 ///
-/// A candidate is true if its two keyframes see the same place: the overlap of their left cameras'
-/// views, the smaller of both directions, is at least min_overlap. So its limits on distance and
-/// angle scale with the depth of the scene. A verified closure and an inlier are true if
-/// E = (T_world_from^-1 T_world_to)^-1 T_from_to is within the limits. Precision counts closures
-/// inside a robot too, recall only pairs of keyframes of two robots, each pair once: one is found
-/// by a stage if it sees the same place and has, in either direction, a closure there that is true.
-/// `camera` is the left one of every robot. Throws std::invalid_argument for a keyframe given
-/// twice, a closure past kVerified without a pose, and options out of range. O(k^2) for k
-/// keyframes.
+/// A candidate is true if its two keyframes see the same place: the smaller of both overlaps of
+/// their left cameras' views is at least min_overlap. Its limits on distance and angle therefore
+/// scale with the depth of the scene. A verified closure and an inlier are true if E =
+/// (T_world_from^-1 T_world_to)^-1 T_from_to is within the limits.
+///
+/// Precision includes closures within a robot. Recall counts only pairs of keyframes of two robots,
+/// each pair once. A stage has found a pair if the keyframes see the same place and it has a true
+/// closure between them, in either direction.
+///
+/// `camera` is the left one of every robot. Throws std::invalid_argument for a repeated keyframe, a
+/// closure past kVerified without a pose, and options out of range. O(k^2) for k keyframes.
 [[nodiscard]] ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
                                            std::span<const ClosureRecord> closures,
                                            const Camera& camera,
                                            const ClosureTruthOptions& options = {});
 
-/// A robot's file about its closures that cannot be used. what() is one line that names file and
-/// line.
+/// A file with a robot's closures that cannot be used. what() is one line with file and line.
 struct ClosureFileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A keyframe as its robot recorded it.
+/// A keyframe as recorded by its robot.
 struct KeyframeRecord {
   KeyframeId id;
   Stamp stamp = 0;
@@ -122,26 +125,27 @@ struct KeyframeRecord {
 [[nodiscard]] std::vector<KeyframeRecord> read_keyframes(const std::filesystem::path& file);
 
 /// Reads a robot's loop_closures.csv: `from_robot, from_keyframe, to_robot, to_keyframe,
-/// similarity, stage, matches, inliers, tx, ty, tz, qx, qy, qz, qw, reason` below a header; the
-/// pose [m] is empty where there is none, and the reason may be. Throws ClosureFileError, also for
-/// a closure that is verified but has none.
+/// similarity, stage, matches, inliers, tx, ty, tz, qx, qy, qz, qw, reason` below a header. The
+/// pose [m] is empty if there is none, and the reason may be empty. Throws ClosureFileError, also
+/// for a verified closure without a pose.
 [[nodiscard]] std::vector<ClosureRecord> read_closures(const std::filesystem::path& file);
 
-/// The same of the text of a file; `name` stands for it in messages.
+/// Parse the text of a file; `name` replaces the file name in messages.
 [[nodiscard]] std::vector<KeyframeRecord> parse_keyframes(std::string_view text,
                                                           const std::string& name);
 [[nodiscard]] std::vector<ClosureRecord> parse_closures(std::string_view text,
                                                         const std::string& name);
 
-/// The keyframes whose stamps lie within the true poses `truth` (ascending), with their pose there.
+/// The keyframes with stamps within the true poses `truth` (ascending), with their true pose.
 [[nodiscard]] std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,
                                                         std::span<const StampedPose> truth);
 
-/// A table for people: a line per stage with how many closures are true, precision, recall over
-/// pairs and over keyframes, and the errors of the measured poses; below, what recall counts.
+/// A table for people. It has a line per stage with the number of true closures, precision, recall
+/// over pairs and over keyframes, and the errors of the measured poses. Below are the totals for
+/// recall.
 [[nodiscard]] std::string to_table(const ClosureScores& scores);
 
-/// The same numbers as one JSON object: {true_pairs, true_frames, unjudged, candidates:
+/// The scores as one JSON object: {true_pairs, true_frames, unjudged, candidates:
 /// {judged, correct, precision, pairs_found, pair_recall, frames_found, frame_recall,
 /// translation_error_m: {...}, rotation_error_deg: {...}}, verified: {...}, inliers: {...}}.
 void to_json(Json& json, const ClosureScores& scores);

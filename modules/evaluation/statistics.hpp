@@ -7,7 +7,7 @@
 
 namespace km {
 
-/// Summary of a sample of magnitudes. All zero for an empty one.
+/// Summary of a sample of magnitudes. All values are zero for an empty sample.
 struct Statistics {
   std::size_t count = 0;
   double rmse = 0.0;
@@ -18,8 +18,8 @@ struct Statistics {
 
 [[nodiscard]] Statistics statistics_of(std::vector<double> values);
 
-/// The value below which a share `p` in [0, 1] of the sample lies, linear between neighbours in
-/// order of size; NaN for an empty sample. O(n).
+/// The value below which a share `p` in [0, 1] of the sample lies, linear between sorted
+/// neighbours; NaN for an empty sample. O(n).
 template <typename T = double>
 [[nodiscard]] double quantile(std::vector<T> values, double p) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();

@@ -78,7 +78,7 @@ void append(std::vector<double>& to, const std::vector<double>& from) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-// Raw errors of one or several estimates, before they are summed up.
+// Errors of one or several estimates before they are summarised.
 struct Errors {
   std::vector<double> position_m, rotation_deg, rpe_translation_m, rpe_rotation_deg;
   SegmentErrors segments;
@@ -100,7 +100,8 @@ struct Errors {
 };
 
 TrajectoryError summary(const std::string& name, const Errors& errors) {
-  std::vector<double> lengths_m = errors.segments.lengths_m;  // of several robots: repeated
+  // Repeated if there are several robots
+  std::vector<double> lengths_m = errors.segments.lengths_m;
   std::sort(lengths_m.begin(), lengths_m.end());
   lengths_m.erase(std::unique(lengths_m.begin(), lengths_m.end()), lengths_m.end());
   return {.name = name,
@@ -133,7 +134,7 @@ void add_absolute_errors(std::span<const PosePair> pairs, const Alignment& align
 void add_relative_errors(std::span<const PosePair> pairs, const Alignment& alignment,
                          double delta_s, Errors& errors) {
   const double tolerance_s = 0.1 * delta_s;
-  constexpr double kJitter = 0.01;  // of the delta, by which stamps may miss it at the end
+  constexpr double kJitter = 0.01;  // share of the delta by which the last stamps may be early
   std::size_t j = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (seconds_between(pairs[i].stamp, pairs.back().stamp) < (1.0 - kJitter) * delta_s) break;

@@ -18,9 +18,10 @@ namespace {
 constexpr std::size_t kFields = 8;
 constexpr double kMaxNormError = 0.01;
 constexpr double kMaxCoordinate_m = 1e9;  // far beyond the earth; squares keep their digits
-constexpr Stamp kMaxStamp = std::numeric_limits<Stamp>::max() / 2;  // 146 years; differences fit
+// 146 years, so that differences fit
+constexpr Stamp kMaxStamp = std::numeric_limits<Stamp>::max() / 2;
 
-// Seconds to nanoseconds without the rounding of a double, which is 240 ns today.
+// Converts seconds to nanoseconds without the rounding of a double, which is 240 ns today.
 std::optional<Stamp> parse_seconds(std::string_view field) {
   long double seconds = 0.0L;
   const char* const end = field.data() + field.size();

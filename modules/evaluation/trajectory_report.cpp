@@ -30,7 +30,7 @@ bool lacks_relative(const TrajectoryError& error) {
   return error.rpe_translation_m.count == 0;
 }
 
-// Null for what an empty sample does not have: zeros would be perfect scores.
+// Null for the statistics of an empty sample, because zeros would be perfect scores.
 Json to_json(const Statistics& statistics) {
   const auto number = [&](double value) { return statistics.count > 0 ? Json(value) : Json(); };
   return {{"rmse", number(statistics.rmse)},
@@ -87,8 +87,8 @@ PlotPoint from_above(const SE3& T) {
   return {T.translation().x(), T.translation().y()};
 }
 
-// Each truth once, over the time that its estimates cover: the rest of a long recording would only
-// make what is compared small.
+// Each truth once, over the time that its estimates cover. The rest of a long recording would make
+// the compared part small.
 std::vector<PlotSeries> truth_series(std::span<const TrajectoryInput> inputs) {
   struct Drawn {
     std::span<const StampedPose> truth;

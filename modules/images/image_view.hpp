@@ -7,8 +7,8 @@
 
 namespace km {
 
-/// Pixels as OpenCV sees them, without a copy: row-major, of OpenCV's `type`. OpenCV has no
-/// read-only view: not to be written to.
+/// Pixels as an OpenCV matrix without a copy: row-major, of OpenCV's `type`. OpenCV has no
+/// read-only view, so the caller must not write to it.
 template <typename Pixel>
 [[nodiscard]] cv::Mat view(int width, int height, int type, const std::vector<Pixel>& pixels) {
   return {height, width, type, const_cast<Pixel*>(pixels.data())};

@@ -18,8 +18,8 @@ void require_usable(const StereoRig& rig) {
       throw std::invalid_argument("rectification: a camera without pixels or focal length");
 }
 
-// Axes of the virtual cameras in the left one: x along the baseline, z midway between both real
-// ones as far as x leaves it free.
+// Axes of the virtual cameras in the left one: x along the baseline, z as near to midway between
+// the real ones as x permits.
 Eigen::Matrix3d rectified_axes(const StereoRig& rig) {
   constexpr double kMinAlignment = 0.87;  // cosine of 30 degrees
   const SE3 T_left_right = rig.T_left_right();

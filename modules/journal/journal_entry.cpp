@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMaxText_bytes = 65536;
 constexpr std::size_t kMaxKeypoints = 65536;
-// What follows a keyframe's step.
+// Flags of the optional parts after the step of a keyframe.
 constexpr unsigned kHasVertical = 1;
 constexpr unsigned kHasStateCovariance = 2;
 constexpr unsigned kHasCalibration = 4;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kMagic = "KMJRNL1\n";
 
-// The check sum after an entry.
+// Updates the check sum by an entry.
 std::uint64_t mixed(std::uint64_t check_sum, std::span<const std::uint8_t> bytes) {
   mix_fnv1a(check_sum, bytes.size());
   mix_fnv1a(check_sum, bytes);

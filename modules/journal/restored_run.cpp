@@ -17,11 +17,11 @@ bool is_final(const ClosureOutcome& outcome) {
          (outcome.stage == ClosureStage::kReceived && !outcome.reason.empty());
 }
 
-// Puts the entries of a journal together. A process that takes a run up goes on behind the last
-// full keyframe: what its predecessor wrote beyond that counts no more.
+// Restores a run from the entries of its journal. A resumed process continues after the last full
+// keyframe, so later entries of the former process are discarded.
 class RunRestorer {
  public:
-  // Throws std::invalid_argument for an entry that cannot follow those before.
+  // Throws std::invalid_argument for an entry that cannot follow the former ones.
   void take(JournalEntry entry, JournalPlace place);
 
   // Call once, after the last entry.
@@ -39,9 +39,10 @@ class RunRestorer {
   void forget_closures(const std::function<bool(const KeyframeId&)>& with);
 
   RestoredRun run_;
-  JournalPlace place_;  // of the entry that is being taken
+  JournalPlace place_;  // place of the present entry
   bool started_ = false;
-  bool first_state_ = true;                                        // of its process
+  bool first_state_ = true;                                        // the next state is the first of
+                                                                   // its process
   std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends as measured
   std::map<ClosureId, ClosureOutcome> outcomes_;
 };
@@ -64,7 +65,7 @@ void RunRestorer::add(JournalStart start) {
   run_.input = std::move(start.input);
 }
 
-// What a later process has estimated anew takes the place of what was there.
+// States that a resumed process has estimated replace those of the former process.
 void RunRestorer::add(OdometryState state) {
   if (std::exchange(first_state_, false))
     std::erase_if(run_.states, [&](const auto& former) { return former.stamp >= state.stamp; });
@@ -111,7 +112,7 @@ void RunRestorer::forget_closures(const std::function<bool(const KeyframeId&)>& 
                 [&](const auto& entry) { return with(entry.first.from) || with(entry.first.to); });
 }
 
-// The keyframes of another life are others.
+// A new incarnation has other keyframes, so its former closures are removed.
 void RunRestorer::add(JournalPeer peer) {
   const auto known = run_.peers.find(peer.robot);
   if (known != run_.peers.end() && !is_same_life(known->second.boot, peer.boot))

@@ -11,31 +11,30 @@
 
 namespace km {
 
-/// A run up to the last keyframe that its journal knows in full: from there on odometry goes on, on
-/// the image of that keyframe.
+/// A run up to the last keyframe that its journal contains in full. Odometry continues from the
+/// image of that keyframe.
 struct RestoredRun {
   RobotId robot = 0;
-  std::uint64_t boot = 0;  ///< Of the last process.
+  std::uint64_t boot = 0;  ///< Boot id of the last process.
   std::string input;       ///< See JournalStart.
 
   std::vector<KeyframeOdometry> odometry;  ///< Index i is keyframe i.
-  std::vector<Keyframe> keyframes;         ///< Likewise, equally many.
-  std::vector<JournalPlace> places;        ///< Of these in the journal.
-  /// Of all images: those behind the last keyframe's stand until they are estimated anew.
+  std::vector<Keyframe> keyframes;         ///< Index i is keyframe i, as in `odometry`.
+  std::vector<JournalPlace> places;        ///< Places of the keyframes in the journal.
+  /// States of all images. Those after the last keyframe stay until they are estimated again.
   std::vector<OdometryState> states;
-  std::vector<Closure> closures;  ///< Own and of the others, each once from either side.
-  /// Of candidates that nothing more becomes of: those verified, whose closures are there, and
-  /// those refused.
+  std::vector<Closure> closures;  ///< Closures of this robot and of others, each once.
+  /// Final outcomes of candidates: those verified whose closures are known, and those refused.
   std::vector<ClosureOutcome> outcomes;
-  std::map<RobotId, JournalPeer> peers;  ///< As last met.
+  std::map<RobotId, JournalPeer> peers;  ///< Last known identities.
 
-  JournalExtent journal = {};  ///< Where to go on writing.
+  JournalExtent journal = {};  ///< Position at which writing continues.
 
   /// Number of states up to the last keyframe; 0 without one.
   [[nodiscard]] std::size_t final_states() const;
 };
 
-/// The run under another id, without its sensors, and what it shared with the others of its time.
+/// The run with another robot id, without its sensors and without its results with other robots.
 [[nodiscard]] RestoredRun alone_as(RobotId robot, RestoredRun run);
 
 /// Reads the journal of a run. Throws InputFileError, also for entries that contradict each other.

@@ -15,7 +15,7 @@
 
 namespace km {
 
-/// Part of a run [s since its start]; its end is no part of it.
+/// Part of a run [s since its start], without its end.
 struct RunSpan {
   double from_s = 0.0;
   double to_s = std::numeric_limits<double>::infinity();
@@ -23,36 +23,39 @@ struct RunSpan {
   [[nodiscard]] bool contains(double time_s) const { return from_s <= time_s && time_s < to_s; }
 };
 
-/// What the way from one robot to another is like.
+/// Properties of the link from one robot to another.
 struct LinkPlan {
   LinkTrace course{{{.bytes_per_s = std::numeric_limits<double>::infinity()}}};
-  double jitter_s = 0.0;  ///< Further delay, uniform from 0 to this: frames may overtake others.
-  double loss = 0.0;      ///< Probability of a frame.
-  double queue_bytes = 64e3;  ///< What waits to be sent off, and is; a frame beyond it is dropped.
+  double jitter_s = 0.0;  ///< Additional delay, uniform from 0 to this value, by which frames may
+                          ///< overtake others.
+  double loss = 0.0;      ///< Probability that a frame is lost.
+  double queue_bytes = 64e3;  ///< Maximum size of the waiting frames and the one being sent; frames
+                              ///< beyond it are dropped.
   std::vector<RunSpan> outages = {};
-  double range_m = std::numeric_limits<double>::infinity();  ///< Further apart: not heard.
+  double range_m = std::numeric_limits<double>::infinity();  ///< Maximum distance of two robots
+                                                             ///< that receive each other.
 };
 
-/// For a while, robots of different groups do not hear each other.
+/// Interval in which robots of different groups do not receive each other.
 struct LinkPartition {
   RunSpan when;
   std::vector<std::size_t> group_of;  ///< By robot.
 };
 
-/// A robot's position in the world of all at an instant of the run.
+/// Position of a robot in the common world frame at an instant of the run.
 struct TimedPosition {
   double time_s = 0.0;
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< [m]
 };
 
-/// What the links between some robots, numbered from 0, go through in a run.
+/// Links between some robots, numbered from 0, during a run.
 struct LinkScript {
   unsigned seed = 1;
   std::size_t robots = 0;
-  std::vector<LinkPlan> links;  ///< That from a to b at [a * robots + b].
+  std::vector<LinkPlan> links;  ///< The link from a to b is at [a * robots + b].
   std::vector<LinkPartition> partitions = {};
-  /// Of each robot, with increasing times; straight lines between positions, before the first and
-  /// after the last as there. Needed where a link has a range.
+  /// Positions of each robot with increasing times. They are interpolated linearly, and constant
+  /// before the first and after the last. Required if a link has a range.
   std::vector<std::vector<TimedPosition>> paths = {};
 
   [[nodiscard]] LinkPlan& link(std::size_t from, std::size_t to) {
@@ -60,10 +63,10 @@ struct LinkScript {
   }
 };
 
-/// Why a frame is lost.
+/// Reason why a frame is lost.
 enum class LinkLoss { kPartition, kOutage, kRange, kQueue, kChance };
 inline constexpr std::size_t kLinkLosses = 5;
-/// In the order of the enum, as in names of columns.
+/// The names are in the order of the enum, and are used in names of columns.
 inline constexpr std::array<const char*, kLinkLosses> kLinkLossNames = {"partition", "outage",
                                                                         "range", "queue", "loss"};
 
@@ -73,7 +76,7 @@ using EthernetFrame = std::string;
 /// Address of robot `robot`, locally administered.
 [[nodiscard]] std::array<std::uint8_t, 6> ethernet_address(std::size_t robot);
 
-/// A frame that is there.
+/// A frame that has arrived.
 struct LinkDelivery {
   std::size_t from = 0;
   std::size_t to = 0;
@@ -93,43 +96,44 @@ struct FrameTally {
   bool operator==(const FrameTally&) const = default;
 };
 
-/// What became of the frames of a link. What is in none of `delivered` and `lost` is on its way.
+/// Statistics of the frames of a link. Frames in none of `delivered` and `lost` are still on their
+/// way.
 struct LinkCounts {
   FrameTally in;
   FrameTally delivered;
   std::array<FrameTally, kLinkLosses> lost;  ///< By LinkLoss.
-  double delay_sum_s = 0.0;                  ///< From in to out, of what is delivered.
+  double delay_sum_s = 0.0;                  ///< Sum over the delivered frames.
   double delay_max_s = 0.0;
 
   bool operator==(const LinkCounts&) const = default;
 };
 
-/// The air, or the wires, between robots: takes frames of each and decides for every other robot
-/// that a frame is for whether it arrives there, and when. A frame is lost if at the time it is
-/// sent the two are in different groups of a partition, the link is out, the robots are too far
-/// apart, or the queue is full, which is emptied at the link's rate; or by chance, after it has
-/// been sent off. What is on its way arrives, also when the link goes out meanwhile.
+/// Radio or cables between robots: takes the frames of each robot and decides for every addressee
+/// whether and when the frame arrives. A frame is lost if its robots are in different groups of a
+/// partition or too far apart when it is sent. It is also lost if the link is out or its queue is
+/// full; the queue drains at the rate of the link. A frame can also be lost by chance after it has
+/// left the queue. A frame on its way arrives even if the link fails meanwhile.
 ///
-/// The same script and the same frames at the same times give the same result. Every ordered pair
-/// has a random stream of its own, of which each frame takes as much whatever becomes of it: the
-/// chance of the n-th frame from a to b depends on the seed, a, b and n alone. Pure: time comes in
-/// [s since the start of the run]. Not thread-safe.
+/// Equal scripts and equal frames at equal times give equal results. Every ordered pair has a
+/// random stream of its own, and each frame takes equally many numbers from it. So the chance of
+/// the n-th frame from a to b depends on the seed, a, b and n only. Deterministic: time comes in [s
+/// since the start of the run]. Not thread-safe.
 class LinkEmulator {
  public:
-  /// Throws std::invalid_argument if the script lacks links, paths that a range needs or groups, or
-  /// a number in it cannot be.
+  /// Throws std::invalid_argument if the script lacks links, paths that a range needs, or groups,
+  /// or if a number is impossible.
   explicit LinkEmulator(LinkScript script);
 
-  /// A frame that robot `from` sends: to the robot whose ethernet_address() it bears, or, by
-  /// broadcast and multicast, to all others. Frames for anybody else vanish uncounted. Times must
-  /// not decrease.
+  /// Sends a frame of robot `from` to the robot whose ethernet_address() it bears, or, by broadcast
+  /// and multicast, to all others. Frames to other addresses are dropped and not counted. Times
+  /// must not decrease.
   void send(std::size_t from, double now_s, const EthernetFrame& frame);
 
-  /// The frames that are due, in the order in which they are; of several at once, as they were
-  /// sent.
+  /// The frames that are due, in the order of their times; frames due at one time are in the order
+  /// of sending.
   [[nodiscard]] std::vector<LinkDelivery> due(double now_s);
 
-  /// When the next frame is due, if one is on its way.
+  /// Time at which the next frame is due, if one is on its way.
   [[nodiscard]] std::optional<double> next_s() const;
 
   [[nodiscard]] std::size_t robots() const { return script_.robots; }
@@ -138,7 +142,8 @@ class LinkEmulator {
  private:
   struct State {
     std::mt19937 rng;
-    double sent_off = -std::numeric_limits<double>::infinity();  // as LinkTrace::capacity_until()
+    double sent_off = -std::numeric_limits<double>::infinity();  // in the unit of
+                                                                 // LinkTrace::capacity_until()
     LinkCounts counts = {};
   };
   void send_over(std::size_t from, std::size_t to, double now_s, const EthernetFrame& frame);
@@ -151,9 +156,10 @@ class LinkEmulator {
   std::multimap<double, LinkDelivery> on_the_way_;  // by time; equal ones in the order of insertion
 };
 
-/// A table of what became of the frames of each ordered pair of robots, called by `names`: columns
-/// from, to, frames and bytes in and delivered, frames and bytes lost by each of kLinkLossNames,
-/// and mean and greatest delay [s] of what is delivered, empty if nothing is.
+/// A table of the frames of each ordered pair of robots, with their `names`.
+/// Columns: from, to, frames and bytes in and delivered, frames and bytes lost by each of
+/// kLinkLossNames, mean and greatest delay [s] of the delivered frames. The delays are empty if no
+/// frame was delivered.
 [[nodiscard]] std::string links_csv(const LinkEmulator& emulator,
                                     const std::vector<std::string>& names);
 

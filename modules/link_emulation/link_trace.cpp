@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::size_t kColumns = 3;
 
-// Why `rows` are no trace, and which of them; empty if they are one.
+// The number of the row at which `rows` are no trace, and the reason; an empty reason if they are a
+// trace.
 std::pair<std::size_t, std::string> problem_of(const std::vector<LinkTraceRow>& rows) {
   if (rows.empty()) return {0, "holds no row"};
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -28,7 +29,7 @@ std::pair<std::size_t, std::string> problem_of(const std::vector<LinkTraceRow>& 
   return {};
 }
 
-// Bytes from `a` until `dt_s` later, where the rate changes by `slope` [bytes/s^2].
+// Bytes from `a` until `dt_s` later if the rate changes by `slope` [bytes/s^2].
 double carried(const LinkTraceRow& a, double slope, double dt_s) {
   return dt_s * (a.bytes_per_s + 0.5 * slope * dt_s);
 }
@@ -88,15 +89,15 @@ double LinkTrace::time_of(double bytes) const {
   const LinkTraceRow& first = rows_.front();
   if (bytes < 0.0)
     return first.bytes_per_s > 0.0 ? first.time_s + bytes / first.bytes_per_s : kNever;
-  // The last row before which less has been carried.
+  // The last row with less capacity before it.
   const auto reached = std::ranges::lower_bound(capacity_, bytes);
   const auto i =
       static_cast<std::size_t>(std::max<std::ptrdiff_t>(reached - capacity_.begin() - 1, 0));
   const double missing = bytes - capacity_[i];
   if (missing <= 0.0) return rows_[i].time_s;
   const double slope = i + 1 < rows_.size() ? slope_between(rows_[i], rows_[i + 1]) : 0.0;
-  // The root of carried() = missing, in the form that holds where the slope is zero; rounding may
-  // bring what is under the square root below zero where a rate falls to zero.
+  // The root of carried() = missing, in the form that holds for a slope of zero. If the rate falls
+  // to zero, rounding may make the radicand negative.
   const double rate = rows_[i].bytes_per_s;
   const double divisor = rate + std::sqrt(std::max(rate * rate + 2.0 * slope * missing, 0.0));
   return divisor > 0.0 ? rows_[i].time_s + 2.0 * missing / divisor : kNever;

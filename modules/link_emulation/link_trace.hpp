@@ -13,15 +13,15 @@ struct LinkTraceError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What a link can do at an instant of the run.
+/// Rate and delay of a link at an instant of the run.
 struct LinkTraceRow {
   double time_s = 0.0;
-  double bytes_per_s = 0.0;  ///< Infinite: the link has no limit, at any time.
-  double delay_s = 0.0;      ///< Until a frame that has been sent off arrives.
+  double bytes_per_s = 0.0;  ///< Infinite if the link has no limit at any time.
+  double delay_s = 0.0;      ///< Time from leaving the queue to arrival.
 };
 
-/// Throughput and latency of a link over time: straight lines between rows; before the first row
-/// as there, after the last row as there.
+/// Rate and delay of a link over time, linear between rows and constant before the first and after
+/// the last row.
 class LinkTrace {
  public:
   /// Throws std::invalid_argument unless there is a row, times increase strictly, nothing is
@@ -33,7 +33,7 @@ class LinkTrace {
   /// [s]
   [[nodiscard]] double delay_s(double time_s) const;
 
-  /// What the link can carry from the first row until `time_s` [bytes]; negative before that row.
+  /// Bytes that the link can carry from the first row until `time_s`; negative before that row.
   /// Needs a limit. O(log rows).
   [[nodiscard]] double capacity_until(double time_s) const;
 
@@ -42,16 +42,16 @@ class LinkTrace {
 
  private:
   std::vector<LinkTraceRow> rows_;
-  std::vector<double> capacity_;  // until each row
+  std::vector<double> capacity_;  // at the time of each row
 };
 
-/// A trace from a table with the columns time_s, bytes_per_s, delay_s, which may be named in its
-/// first row. Throws LinkTraceError, with `name` for the file, for a row with another number of
-/// fields, a field that is not a finite number or below zero, times that do not increase, and a
+/// Parses a table with the columns time_s, bytes_per_s, delay_s, which may be named in its first
+/// row. `name` stands for the file in messages. Throws LinkTraceError for a row with another number
+/// of fields, a field that is negative or not a finite number, times that do not increase, and a
 /// table without rows.
 [[nodiscard]] LinkTrace parse_link_trace(std::string_view text, const std::string& name);
 
-/// The same from a file. Throws LinkTraceError.
+/// Reads the table from a file. Throws LinkTraceError.
 [[nodiscard]] LinkTrace read_link_trace(const std::filesystem::path& file);
 
 }  // namespace km

@@ -25,9 +25,10 @@ constexpr double kUniqueness = 1.15;
 constexpr int kNeighbour = 2;               // [px]
 constexpr int kMaxLeftRightDifference = 1;  // [px]
 constexpr double kMaxRefinement_px = 1.5;   // in disparity
-constexpr double kMaxRowOffset_px = 1.5;    // what calibration leaves of the epipolar constraint
+constexpr double kMaxRowOffset_px = 1.5;    // remaining violation of the epipolar constraint after
+                                            // calibration
 
-// Local mean removed: what is left does not depend on exposure.
+// Subtracts the local mean, so that the result does not depend on exposure.
 cv::Mat flattened(const cv::Mat& image) {
   cv::Mat mean, difference;
   cv::blur(image, mean, {21, 21});
@@ -133,7 +134,8 @@ std::optional<Refined> refine(const NormalisedPatch& reference, const cv::Mat& t
     H << patch.dx.square().sum(), (patch.dx * patch.dy).sum(), (patch.dx * patch.dy).sum(),
         patch.dy.square().sum();
     const Eigen::Vector2f g((patch.dx * error).sum(), (patch.dy * error).sum());
-    H.diagonal().array() += 1e-6F;  // an edge along the row: stay where the search put it
+    H.diagonal().array() += 1e-6F;  // regularises an edge along the row, so that the match stays
+                                    // there
     const Eigen::Vector2d delta = H.ldlt().solve(g).cast<double>();
     if (delta.norm() < kConverged_px || i == kSteps)
       return Refined{position, (reference.value * patch.value).sum()};

@@ -11,12 +11,12 @@
 
 namespace km {
 
-/// Depth of single points of the left image, from the right one.
+/// Depth of single points of the left image by stereo matching.
 ///
 /// Both images are resampled so that epipolar lines become rows and equal focal lengths make the
 /// disparity f * baseline / z. A patch is searched along its row by the sum of absolute
-/// differences, the minimum checked from right to left and against the second best, and refined to
-/// a fraction of a pixel by Lucas-Kanade steps in disparity, row, gain and offset. Const members
+/// differences. The minimum is checked from right to left and against the second best. Lucas-Kanade
+/// steps in disparity, row, gain and offset then refine it to a fraction of a pixel. Const members
 /// are safe to call from several threads.
 class EpipolarMatcher {
  public:

@@ -18,7 +18,7 @@ constexpr float kScale = 1.2F;
 constexpr int kLevels = 8;
 constexpr int kEdge = 31;
 
-// Corners to choose from, per corner kept: more give a more even cover and cost time.
+// Candidate corners per kept corner: more give a more even cover and cost time.
 constexpr int kCandidatesPerKeypoint = 4;
 
 // Strongest first; ties by position, so that the order does not depend on the detector's.
@@ -30,8 +30,8 @@ void sort_by_response(std::vector<cv::KeyPoint>& corners) {
   });
 }
 
-// Of corners sorted by response, those with no stronger one of the same octave closer than
-// `radius` (grown with the octave); cells of half the radius make the test cheap.
+// The corners, sorted by response, without those that have a stronger one of the same octave closer
+// than `radius` (which grows with the octave). Cells of half the radius make the test cheap.
 std::vector<cv::KeyPoint> suppressed(const std::vector<cv::KeyPoint>& corners, double radius,
                                      cv::Size size) {
   std::vector<cv::KeyPoint> kept;
@@ -105,7 +105,7 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) con
   corners =
       spread(std::move(corners), static_cast<std::size_t>(config_.max_keypoints), image.size());
   cv::Mat descriptors;
-  orb->compute(image, corners, descriptors);  // drops what is too near the border
+  orb->compute(image, corners, descriptors);  // drops keypoints that are too near the border
 
   KeyframeFeatures features;
   features.T_body_cam = rig_.cameras[0].T_body_cam;

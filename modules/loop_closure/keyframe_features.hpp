@@ -13,10 +13,10 @@
 
 namespace km {
 
-/// Makes of a frame what place recognition and verification work on: ORB keypoints of the left
-/// image, evenly spread, with depth where the right image or the depth image gives one (Rublee et
-/// al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011), the strongest first. Const
-/// members are safe to call from several threads.
+/// Extracts the features of a frame for place recognition and verification: evenly spread ORB
+/// keypoints of the left image, the strongest first (Rublee et al., "ORB: an efficient alternative
+/// to SIFT or SURF", ICCV 2011). They have a depth if the right image or the depth image yields
+/// one. Const members are safe to call from several threads.
 class KeyframeFeatureExtractor {
  public:
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
@@ -38,7 +38,7 @@ class KeyframeFeatureExtractor {
 };
 
 /// The first `count` keypoints, those with a known depth before all others: enough to verify a
-/// closure with, at a part of the bytes.
+/// closure, with a part of the bytes.
 [[nodiscard]] KeyframeFeatures reduced(const KeyframeFeatures& features, std::size_t count);
 
 }  // namespace km

@@ -56,7 +56,7 @@ bool KeyframeRequests::arrived(const KeyframeId& keyframe) {
   const auto peer = peers_.find(keyframe.robot);
   if (peer == peers_.end()) return false;
   const auto request = peer->second.requests.find(keyframe.index);
-  // It may come while it waits to be asked for again: an earlier answer was late.
+  // A late reply may arrive while the keyframe waits for another request.
   if (request == peer->second.requests.end() || request->second.attempts == 0) return false;
   if (request->second.asked) {
     --peer->second.outstanding;
@@ -75,7 +75,7 @@ void KeyframeRequests::absent(const KeyframeId& keyframe, double now_s) {
   Request& request = found->second;
   request.asked = false;
   request.next_s = now_s + timeout_s_;
-  request.attempts = 1;  // the peer is there: no reason to slow down
+  request.attempts = 1;  // the peer replies, so no longer time-out is needed
   --peer->second.outstanding;
   peer->second.waiting.push_back(keyframe.index);
 }

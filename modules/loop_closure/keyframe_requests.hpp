@@ -14,8 +14,8 @@
 
 namespace km {
 
-/// Asks the owner of `keyframe` for its odometry, points and descriptors, of which those come that
-/// keyframe `own` of the requester may show, too.
+/// Asks the owner of `keyframe` for its odometry, points and descriptors. The reply prefers points
+/// that keyframe `own` of the requester may also show.
 struct KeyframeRequest {
   RobotId requester = 0;
   std::uint32_t number = 0;  ///< Counts the requester's requests.
@@ -23,43 +23,43 @@ struct KeyframeRequest {
   KeyframeIndex own = 0;
 };
 
-/// The answer. `found` is false where the owner has no such keyframe (yet): then only the
+/// The reply. `found` is false if the owner does not have the keyframe (yet): then only the
 /// keyframe's id is set.
 struct KeyframeReply {
-  std::uint32_t number = 0;  ///< Of the request.
+  std::uint32_t number = 0;  ///< Number of the request.
   bool found = false;
   Keyframe keyframe;
 };
 
-/// When to ask which peer for which keyframe. Every keyframe wanted is asked for until it arrives:
-/// a few at a time per peer, again after a time-out that doubles up to eightfold while there is no
-/// answer, so that a peer that vanished costs little and is served soon after it returns. A
-/// keyframe its owner does not have (yet) makes room for the others and is asked for again later.
-/// Time comes from outside and must not go backwards. Not thread-safe.
+/// Schedules the requests for keyframes of peers. Every wanted keyframe is requested until it
+/// arrives, a few at a time per peer. Requests are repeated after a time-out that doubles up to
+/// eightfold without a reply. So a vanished peer costs little and is served soon after it returns.
+/// A keyframe that its owner does not have (yet) is requested again later, after others. Time is an
+/// argument and must not decrease. Not thread-safe.
 class KeyframeRequests {
  public:
   /// Throws std::invalid_argument unless both are positive.
   KeyframeRequests(double timeout_s, int max_outstanding_per_peer);
 
-  /// Adds a keyframe of a peer; nothing if it is wanted already.
+  /// Adds a keyframe of a peer, unless it is wanted already.
   void want(const KeyframeId& keyframe);
 
-  /// Keyframes to ask for now, repeated ones first. They count as asked at `now_s`.
+  /// Keyframes to request now, repeated ones first. They count as requested at `now_s`.
   [[nodiscard]] std::vector<KeyframeId> due(double now_s);
 
-  /// The keyframe has come. False if it was not asked for.
+  /// Notes that the keyframe has arrived. False if it was not requested.
   [[nodiscard]] bool arrived(const KeyframeId& keyframe);
 
   /// Its owner does not have it at `now_s`.
   void absent(const KeyframeId& keyframe, double now_s);
 
-  /// The peer is there (again): what it has not answered is due at once.
+  /// Notes that the peer has returned: its unanswered requests are due at once.
   void returned(RobotId robot);
 
-  /// The peer's keyframes are others now: none of them is wanted.
+  /// Drops the requests to a peer, because its keyframe indices now mean other keyframes.
   void forget(RobotId robot) { peers_.erase(robot); }
 
-  /// Keyframes that have not come.
+  /// Number of keyframes that have not arrived.
   [[nodiscard]] std::size_t size() const;
 
  private:
@@ -96,7 +96,7 @@ class KeyframeCache {
     by_use_.pop_back();
   }
 
-  /// Null if it is not (or no longer) there.
+  /// Null if the keyframe is not (or no longer) stored.
   std::shared_ptr<const Keyframe> get(const KeyframeId& id) {
     const auto found = place_.find(id);
     if (found == place_.end()) return nullptr;
@@ -104,7 +104,7 @@ class KeyframeCache {
     return by_use_.front();
   }
 
-  /// Drops those of a robot.
+  /// Drops the keyframes of a robot.
   void forget(RobotId robot) {
     std::erase_if(by_use_, [&](const auto& kept) { return kept->odometry.id.robot == robot; });
     std::erase_if(place_, [&](const auto& entry) { return entry.first.robot == robot; });

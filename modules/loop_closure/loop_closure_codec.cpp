@@ -198,7 +198,7 @@ Decoded<Closure> Codec<Closure>::decode(const Wire& wire, const TeamPeer& writer
   const auto T_from_to = from_wire(wire.T_from_to);
   const auto covariance = from_wire(wire.covariance);
   if (!T_from_to || !covariance) return Result::refuse("it is not a pose with a covariance");
-  // Who weighs the closure inverts it.
+  // The pose graph inverts the covariance to weigh the closure.
   if (covariance->llt().info() != Eigen::Success) return Result::refuse("a singular covariance");
   if (wire.inliers > kMaxInliers) return Result::refuse("too many inliers");
   if (!in_range(wire.similarity, kMaxSimilarity)) return Result::refuse("similarity out of range");

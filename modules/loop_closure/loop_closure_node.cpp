@@ -26,21 +26,23 @@ constexpr std::chrono::milliseconds kTickPeriod(100);
 // worth its bytes.
 constexpr int kFirstReplies = 12;
 constexpr std::size_t kFirstFactor = 3;
-constexpr std::size_t kLeastPart = 4;  // of reply_keypoints, whatever the words say
+constexpr std::size_t kLeastPart = 4;  // reciprocal of the least part of reply_keypoints,
+                                       // independent of the words
 
-// How many of one image's keypoints to send.
+// Number of keypoints of one image to send.
 struct KeypointBudget {
-  std::size_t least = 0;  // If there are so many.
+  std::size_t least = 0;  // bound if there are enough keypoints
   std::size_t most = 0;
 };
 
 // The keypoints of `features` that are worth sending to a robot whose own image of the place has
-// the words `theirs`, ascending: those with a known depth whose word occurs there, too, within
-// `budget`; below its least, others with a known depth come after them. The words say as much
-// about corresponding points as they cost nothing, since they have been told before (Galvez-Lopez
-// and Tardos, TRO 2012, use the same association to spare comparisons), and where few are shared
-// the two seldom are one place. On 229 pairs of EuRoC V1_01 that 400 keypoints with depth verify,
-// 200 of them verify 183 so chosen and 135 without the words.
+// the words `theirs`, ascending. These are keypoints with a known depth whose word occurs there,
+// too, within `budget`. If they are fewer than its least number, others with a known depth follow.
+// The shared words indicate corresponding points and cost no bytes, because bags of words are
+// published anyway (Galvez-Lopez and Tardos, TRO 2012, use the same association to save
+// comparisons). If few words are shared, the two images seldom show one place. With
+// depth, 400 keypoints verify 229 pairs of EuRoC V1_01. If 200 keypoints are so chosen, they verify
+// 183 of these pairs, and 135 without the words.
 KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const KeypointBudget& budget,
                                  const Vocabulary& vocabulary,
                                  std::span<const std::uint32_t> theirs) {
@@ -169,9 +171,9 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
 void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
   const KeyframeId& id = reply->keyframe.odometry.id;
   if (!reply->found) return requests_.absent(id, now_s_);
-  // Also the answer to a repeated request, or one nobody asked for.
+  // Ignores the reply to a repeated request, or one without a request.
   if (!requests_.arrived(id)) return;
-  // A copy: the message itself counts as under way for as long as it is held.
+  // A copy is stored, because the message itself counts as queued while it is referenced.
   const auto keyframe = std::make_shared<const Keyframe>(reply->keyframe);
   peers_.put(keyframe);
   arrived(keyframe);
@@ -230,7 +232,7 @@ void LoopClosureNode::accept(const Work& work) {
         << to_string(to);
     return;
   }
-  // Of two own keyframes place recognition may see either first.
+  // Place recognition may report two own keyframes in either order.
   if (!work.measured && known_.contains({to, from})) return;
   if (!known_.insert(work.id).second) return;
   report(work, ClosureStage::kCandidate);
@@ -261,8 +263,8 @@ KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features
   return chosen_by_words(features, {reply_keypoints_ / kLeastPart, most}, *vocabulary_, *words);
 }
 
-// Goes on with what is there; waits for what is not, a peer's keyframe by asking for it.
-// True if that led to a closure.
+// Continues with the keyframes that are available, and waits for or requests the others. True if
+// the work led to a closure.
 bool LoopClosureNode::advance(const Work& work) {
   const KeyframePtr from = find(work.id.from);
   const KeyframePtr to = find(work.id.to);

@@ -35,40 +35,42 @@ struct LoopClosureTopics {
   In<RelativePose> measured_closures;  ///< Known ones, from own keyframes.
   In<KeyframeRequest> peer_requests;   ///< For own keyframes.
   In<KeyframeReply> peer_replies;      ///< To this robot's requests.
-  In<PeerEvent> peer_events;           ///< Who comes and goes.
-  In<PeerEvent> restarts;              ///< kRestarted, before the first candidate of that life.
+  In<PeerEvent> peer_events;           ///< Links to peers that begin and end.
+  In<PeerEvent> restarts;              ///< kRestarted, before the first candidate of the new
+                                       ///< incarnation.
   In<KeyframeBow> peer_bows;           ///< Words of the peers' keyframes.
-  In<ClosureOutcome> restored;         ///< What became of candidates in an earlier process.
+  In<ClosureOutcome> restored;         ///< Outcomes of candidates in a former process.
   Out<Addressed<KeyframeRequest>> own_requests;
   Out<Addressed<KeyframeReply>> own_replies;
   Out<Closure> own_closures;     ///< Verified.
   Out<PeerEvent> own_restarts;   ///< kRestarted, after the last closure with a former keyframe.
-  Out<ClosureOutcome> outcomes;  ///< Whenever a candidate gets further or stops.
+  Out<ClosureOutcome> outcomes;  ///< Published whenever a candidate reaches a further stage or
+                                 ///< stops.
 };
 
-/// Time passes: requests that are due are sent.
+/// A clock tick: due requests are sent.
 struct LoopClosureTick {
   double now_s = 0.0;  ///< From any origin, not decreasing.
 };
 
-/// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A): gets the
-/// keyframes of peers from their owners, verifies, and publishes. A candidate is never given up for
-/// want of an answer, but not every one is worth asking for (see RequestEconomy). Measured closures
-/// go the same way, but need only the odometry of the other end. Serves the peers' requests for own
-/// keyframes.
+/// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A): requests the
+/// keyframes of peers from their owners, verifies, and publishes. A candidate is never dropped
+/// because a reply is missing, but not every candidate is worth a request (see RequestEconomy).
+/// Measured closures are processed in the same way, but need only the odometry of the other end.
+/// The node also replies to the peers' requests for own keyframes.
 ///
 /// A closure starts at an own keyframe: `from` is the candidate's match, `to` its query. Each pair
 /// is verified once here; its other robot may find and verify it as well, with the ends exchanged.
 ///
-/// When a robot has restarted, its keyframes are others: all work on closures with it is dropped,
-/// measured ones, too, and begins anew.
+/// When a robot has restarted, its keyframe indices mean other keyframes. All work on closures with
+/// it is dropped, also on measured ones, and begins again.
 class LoopClosureNode final : public Node {
  public:
-  /// An own keyframe as it was given, from the disk; null where it is not there. Any thread.
+  /// Reads an own keyframe from the disk; null if it is not there. Called on any thread.
   using Recall = std::function<std::shared_ptr<const Keyframe>(KeyframeIndex)>;
 
-  /// `vocabulary` may be null: then keypoints are sent without regard to their words. Without
-  /// `recall` all stays in memory that is kept. Throws ConfigError if `config` is out of bounds.
+  /// If `vocabulary` is null, keypoints are chosen without regard to their words. Without `recall`,
+  /// all stored keyframes stay in memory. Throws ConfigError if `config` is out of bounds.
   LoopClosureNode(const LoopClosureConfig& config, RobotId self,
                   std::shared_ptr<const Vocabulary> vocabulary, const LoopClosureTopics& topics,
                   Recall recall = {});
@@ -100,7 +102,7 @@ class LoopClosureNode final : public Node {
                    LoopClosureTick>;
   using KeyframePtr = std::shared_ptr<const Keyframe>;
 
-  /// A candidate, or a measured closure, on its way.
+  /// A candidate or a measured closure that is not finished.
   struct Work {
     ClosureId id;
     double similarity = 0.0;
@@ -130,14 +132,14 @@ class LoopClosureNode final : public Node {
   const Verifier verifier_;
   const Recall recall_;
   std::map<KeyframeId, KeyframePtr> own_;  // null: on the disk
-  std::map<RobotId, int> replies_;         // sent
+  std::map<RobotId, int> replies_;         // number of replies sent
   PeerWords words_;
   KeyframeCache peers_;
   KeyframeRequests requests_;
   RequestEconomy economy_;
   const std::size_t reply_keypoints_;
   const KeyframeIndex full_keyframes_;
-  std::map<KeyframeId, std::vector<Work>> waiting_;  // for this keyframe
+  std::map<KeyframeId, std::vector<Work>> waiting_;  // work that waits for this keyframe
   std::set<ClosureId> known_;                        // candidates and measured closures seen
   double now_s_ = 0.0;
   std::uint32_t next_request_ = 0;

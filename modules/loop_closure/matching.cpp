@@ -189,7 +189,7 @@ std::vector<Match> match_guided(const SE3& T_a_b, const KeyframeFeatures& a,
     if (best) found.push_back({best->index, j, best->distance});
   }
 
-  // Each keypoint once, the most alike pairs first.
+  // Each keypoint once, the most similar pairs first.
   std::sort(found.begin(), found.end(), [](const Match& l, const Match& r) {
     return std::tie(l.distance, l.a, l.b) < std::tie(r.distance, r.a, r.b);
   });

@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// Keypoint `a` of one keyframe and `b` of another that look alike.
+/// Keypoint `a` of one keyframe and similar keypoint `b` of another.
 struct Match {
   std::uint32_t a = 0;
   std::uint32_t b = 0;
@@ -18,7 +18,7 @@ struct Match {
   auto operator<=>(const Match&) const = default;
 };
 
-/// What a pair of descriptors must satisfy to be a match.
+/// Conditions for a pair of descriptors to be a match.
 struct MatchRules {
   double max_ratio = 0.85;  ///< Best distance over second best, as seen from a.
   int max_distance = 64;    ///< [bit]
@@ -26,22 +26,22 @@ struct MatchRules {
 
 /// Pairs that are each other's nearest descriptor and pass `rules` (the ratio is that of Lowe,
 /// "Distinctive Image Features from Scale-Invariant Keypoints", IJCV 2004), in ascending order of
-/// `a`. Of equally near descriptors the first counts. Without a second descriptor in `b` there is
+/// `a`. The first of equally near descriptors counts. Without a second descriptor in `b` there is
 /// no ratio and so no match. O(|a| |b|): see the benchmark.
 [[nodiscard]] std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
                                                    std::span<const OrbDescriptor> b,
                                                    const MatchRules& rules);
 
-/// Where and how alike a match must be once the pose is roughly known.
+/// Conditions for a match when the pose is roughly known.
 struct GuidedMatchRules {
   double radius_px = 8.0;  ///< Around the projection, at the finest level.
   double max_ratio = 0.9;  ///< Best distance over second best inside the radius.
   int max_distance = 64;   ///< [bit]
 };
 
-/// Matches under a known pose: every point with depth of one keyframe is projected into the other,
-/// both ways, and compared with the descriptors near its projection whose depth does not
-/// contradict it. Pairs that are each other's best, ascending in a.
+/// Matches under a known pose. Every point with depth of one keyframe is projected into the other,
+/// both ways. It is compared with the descriptors near its projection whose depth does not
+/// contradict it. Returns pairs that are each other's best, ascending in a.
 [[nodiscard]] std::vector<Match> match_guided(const SE3& T_a_b, const KeyframeFeatures& a,
                                               const KeyframeFeatures& b,
                                               const GuidedMatchRules& rules);

@@ -9,20 +9,21 @@
 
 namespace km {
 
-/// Which words the peers' keyframes have, so that a reply holds what both may see. Of each robot
-/// the newest keyframes are kept, as many as have kMaxWordsPerRobot words. Not thread-safe.
+/// Words of the peers' keyframes, so that a reply contains points that both keyframes may show. For
+/// each robot it keeps the newest keyframes that have kMaxWordsPerRobot words together. Not
+/// thread-safe.
 class PeerWords {
  public:
   static constexpr std::size_t kMaxWordsPerRobot = 2U << 20U;  ///< 8 MB
 
-  /// `words` ascending; those of a keyframe that is known already are replaced.
+  /// `words` are ascending; they replace those of a known keyframe.
   void put(const KeyframeId& id, std::vector<std::uint32_t> words);
 
-  /// Its keyframes are others now.
+  /// Removes the words of a robot, because its keyframe indices now mean other keyframes.
   void forget(RobotId robot) { robots_.erase(robot); }
 
-  /// nullptr if they are not known (any more). Valid until the next put() or
-  /// forget().
+  /// nullptr if the words are not known (any more). Valid until the next put(), or until the robot
+  /// is removed.
   [[nodiscard]] const std::vector<std::uint32_t>* find(const KeyframeId& id) const;
 
  private:

@@ -31,8 +31,8 @@ Eigen::Vector3d carried(const SE3& T_b_a, const Eigen::Vector3d& m) {
   return T_b_a.linear() * Eigen::Vector3d(m.x(), m.y(), 1.0) + m.z() * T_b_a.translation();
 }
 
-// Least ratio of the second to the first singular value of Arun's H, a ratio of variances: below
-// it the points lie on a line for all that can be told.
+// Least ratio of the second to the first singular value of Arun's H, a ratio of variances. With a
+// smaller ratio the points lie on a line within their noise.
 constexpr double kLeastSpread = 1e-4;
 
 // 99 % quantiles of the chi-squared distribution with 2 and 3 degrees of freedom.
@@ -134,7 +134,7 @@ class ThreePointProblem {
  private:
   struct Solid {
     Eigen::Vector3d a, b;
-    double range_variance;  // of both together
+    double range_variance;  // variance of both points together
     std::size_t pair;
   };
 

@@ -16,7 +16,7 @@
 
 namespace km {
 
-/// Standard deviations of what a keyframe measures, at the finest level of the pyramid.
+/// Standard deviations of the measurements of a keyframe, at the finest level of the pyramid.
 struct ImageNoise {
   double keypoint_px = 1.0;   ///< Position in the image; grows by 1.2 with each octave.
   double disparity_px = 0.5;  ///< Stereo disparity at the keyframe's focal length.
@@ -26,7 +26,8 @@ struct ImageNoise {
 /// inverse depth [1/m]. Stereo noise is Gaussian in m, whatever the depth, unlike in the point.
 struct ImagePoint {
   Eigen::Vector3d m = Eigen::Vector3d::Zero();
-  Eigen::Vector3d variance = Eigen::Vector3d::Ones();  ///< Of the entries of m, independent.
+  Eigen::Vector3d variance = Eigen::Vector3d::Ones();  ///< Independent variances of the entries of
+                                                       ///< m.
   bool has_depth = false;
 
   /// Precondition: has_depth.
@@ -38,10 +39,11 @@ struct ImagePoint {
 [[nodiscard]] ImagePoint image_point(const KeyframeFeatures& features, std::size_t index,
                                      const ImageNoise& noise);
 
-/// A point of keyframe a, carried into keyframe b by T_b_a, against what b measured.
+/// Error of a point of keyframe a, transformed into keyframe b by T_b_a, relative to the
+/// measurement in b.
 ///
 /// The homogeneous point (x, y, 1, rho) maps to h = R (x, y, 1) + rho t, which is the measurement
-/// (h_x / h_z, h_y / h_z, rho / h_z) in b: no division by the depth in a, so that points far away
+/// (h_x / h_z, h_y / h_z, rho / h_z) in b. This does not divide by the depth in a, so far points
 /// are as harmless as near ones. `Sigma` is the covariance of r to first order from the noise of
 /// BOTH points: minimising chi2 is maximum likelihood over the pose and the true points. If b has
 /// no depth the third entry is absent: zero residual, zero rows.
@@ -58,10 +60,10 @@ struct TransferError {
 [[nodiscard]] TransferError transfer_error(const SE3& T_b_a, const ImagePoint& a,
                                            const ImagePoint& b);
 
-/// The same with the map linearised about `m` in place of a's measurement: what to minimise over
-/// the pose with m = transfer_error(T_b_a, a, b).likely. About the measurement itself, its noise is
-/// in the residual and in the derivative alike, and the pose is drawn towards no motion, by the
-/// relative variance of the disparities ("attenuation", Fuller, "Measurement Error Models", 1987).
+/// Transfer error with the map linearised about `m` instead of a's measurement: minimise it over
+/// the pose with m = transfer_error(T_b_a, a, b).likely. Linearised about the measurement, residual
+/// and derivative contain the same noise. The estimated motion then is too small, by the relative
+/// variance of the disparities ("attenuation", Fuller, "Measurement Error Models", 1987).
 [[nodiscard]] TransferError transfer_error(const SE3& T_b_a, const ImagePoint& a,
                                            const ImagePoint& b, const Eigen::Vector3d& m);
 
@@ -149,14 +151,14 @@ template <typename Model, typename Problem>
 [[nodiscard]] std::optional<SE3> align_points(std::span<const Eigen::Vector3d> points_a,
                                               std::span<const Eigen::Vector3d> points_b);
 
-/// Two image points taken for the same scene point. At least one has depth.
+/// Two image points, presumably of one scene point. At least one has depth.
 struct ImagePair {
   ImagePoint a;
   ImagePoint b;
 };
 
-/// Squared error of a pair in standard deviations and its degrees of freedom, from the side that
-/// has depth (from a if both have).
+/// Squared error of a pair in standard deviations and its degrees of freedom, measured from the
+/// side that has depth (from a if both have).
 struct PairError {
   double chi2 = 0.0;
   int dim = 0;  ///< 0: behind a camera.
@@ -182,19 +184,19 @@ struct PoseFit {
                                                  std::span<const std::size_t> indices,
                                                  int max_iterations);
 
-/// What is left of `fit.information` when the `share` of the pairs that hold the pose the most
-/// (largest trace of their information in units of the whole) is taken away, at least two. A pose
-/// that a few pairs decide, which may be wrong ones that fit by chance, loses most of it.
+/// `fit.information` without the `share` of the pairs that determine the pose the most, at least
+/// two. Those are the pairs whose information has the largest trace in units of the whole. If a few
+/// pairs decide a pose, which may be wrong pairs that fit by chance, little information remains.
 [[nodiscard]] Matrix6 information_without_strongest(const PoseFit& fit,
                                                     std::span<const ImagePair> pairs,
                                                     std::span<const std::size_t> indices,
                                                     double share);
 
-/// Relative pose of two stereo cameras from matches with outliers: Arun's method on three pairs
-/// with depth on both sides (as Chang et al., "Kimera-Multi", ICRA 2021, Sec. III-A), polished on
-/// those three by their image errors (which count far more than the depths), inside RANSAC. Inliers
-/// are decided in the images (pair_error()), not by a metric radius, so that far points count for
-/// what they are worth.
+/// Relative pose of two stereo cameras from matches with outliers, by RANSAC. A sample is Arun's
+/// method on three pairs with depth on both sides (as Chang et al., "Kimera-Multi", ICRA 2021, Sec.
+/// III-A), refined by their image errors, which are much more accurate than the depths. Inliers are
+/// decided in the images (pair_error()), not by a metric radius, so that far points count according
+/// to their accuracy.
 [[nodiscard]] RansacResult<SE3> ransac_pose(std::span<const ImagePair> pairs,
                                             const RansacOptions& options, std::mt19937& rng);
 

@@ -39,7 +39,7 @@ RequestEconomy::Verdict RequestEconomy::judge(const LoopCandidate& candidate) {
   const auto kind_number =
       std::min<std::size_t>(static_cast<std::size_t>(candidate.support), peer.kinds.size() - 1);
   Kind& kind = peer.kinds[kind_number];
-  if (peer.in_vain != query) ++kind.passed_over;  // of a query's candidates one counts
+  if (peer.in_vain != query) ++kind.passed_over;  // only one of a query's candidates counts
   const int failures = std::max(0, kind.failures - kForgivenFailures);
   if (kind.passed_over <= config_.failure_patience * failures) {
     peer.in_vain = query;

@@ -11,20 +11,21 @@
 
 namespace km {
 
-/// Whether a candidate is worth the bytes of asking a peer for its keyframe, which are nearly all
-/// that loop closure sends.
+/// Decides whether a candidate is worth the bytes of requesting a keyframe from a peer. These
+/// requests cause nearly all traffic of loop closure.
 ///
 /// Two robots that share a street or a room produce a candidate with every keyframe. The first
-/// closures join their maps; one more beside them adds little. So a candidate is passed over near a
-/// verified closure of the same two robots, near meaning that both its keyframes are no more
-/// keyframes away than max_link_separation, or, while there are few, than the number of this peer's
-/// keyframes that have led to a closure: the first ones may be dense. It is also passed over next
-/// to one that has been asked for already; before the first closure all are asked for.
+/// closures join their maps, and further ones near them add little. So a candidate is skipped near
+/// a verified closure of the same two robots: both its keyframes are within max_link_separation
+/// keyframes. While few keyframes of this peer have led to closures, their number replaces that
+/// distance, so that the first closures may be dense. A candidate is also skipped near one that has
+/// been requested already. Before the first closure all are requested.
 ///
-/// In a world that repeats itself most candidates are wrong. Right ones come in company: the views
-/// around the match resemble the query, too. Candidates are told apart by peer and by how many of
-/// their query support each other, and of a kind that has failed n + 4 times, only every n-th is
-/// asked for (n times failure_patience): what never leads to anything costs ever less.
+/// In an environment with similar places most candidates are wrong. Right ones come in groups,
+/// because the views around the match resemble the query, too. Candidates are grouped by peer and
+/// by how many candidates of their query support each other. After n + 4 failures in a group, only
+/// every n-th candidate (n times failure_patience) is requested, so a group that never succeeds
+/// costs less and less.
 ///
 /// Deterministic, no randomness. Not thread-safe.
 class RequestEconomy {
@@ -33,13 +34,13 @@ class RequestEconomy {
     kAsk,
     kLinked,  ///< Near a verified closure.
     kTried,   ///< Near a keyframe that was asked for.
-    kVain,    ///< Its like have mostly failed.
+    kVain,    ///< Most candidates of its group have failed.
   };
 
   explicit RequestEconomy(const LoopClosureConfig& config);
 
-  /// What to do about a candidate whose query is a peer's keyframe that is not at hand. After kAsk
-  /// it counts as asked for.
+  /// Decides about a candidate whose query is a peer's keyframe that is not available here. After
+  /// kAsk the candidate counts as requested.
   [[nodiscard]] Verdict judge(const LoopCandidate& candidate);
 
   /// A closure between own keyframe `from` and a peer's `to` was verified.
@@ -48,7 +49,7 @@ class RequestEconomy {
   /// The peer's keyframes are others now.
   void forget(RobotId peer) { peers_.erase(peer); }
 
-  /// A keyframe that was asked for has come, and has led to closures or to none.
+  /// Notes that a requested keyframe has arrived and whether it has led to closures.
   void conclude(const KeyframeId& keyframe, bool verified);
 
  private:
@@ -61,9 +62,10 @@ class RequestEconomy {
     std::set<std::pair<KeyframeIndex, KeyframeIndex>> links;  ///< (the peer's, own).
     std::set<std::pair<KeyframeIndex, KeyframeIndex>> tried;
     int successes = 0;
-    std::array<Kind, 6> kinds;                     ///< By support, 5 and more alike.
-    std::map<KeyframeIndex, std::size_t> kind_of;  ///< Of keyframes under way.
-    std::optional<KeyframeIndex> in_vain;          ///< The last one passed over as such.
+    std::array<Kind, 6> kinds;                     ///< By support; 5 and more share a kind.
+    std::map<KeyframeIndex, std::size_t> kind_of;  ///< Kinds of the requested keyframes.
+    std::optional<KeyframeIndex> in_vain;          ///< The last candidate that was skipped as
+                                                   ///< kVain.
   };
 
   LoopClosureConfig config_;

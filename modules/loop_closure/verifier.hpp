@@ -19,34 +19,38 @@ enum class VerificationStatus {
 /// "accepted", "too few matches", ...
 const char* to_string(VerificationStatus status);
 
-/// A verified closure, or why there is none, with the numbers behind it. Numbers of steps that were
-/// not reached are zero.
+/// A verified closure or the reason of the rejection, with the numbers behind it. Numbers of steps
+/// that were not reached are zero.
 struct Verification {
   VerificationStatus status = VerificationStatus::kTooFewMatches;
-  SE3 T_from_to = SE3::Identity();           ///< Of the bodies. Set if accepted, like covariance.
+  SE3 T_from_to = SE3::Identity();           ///< Relative pose of the bodies; set if accepted, like
+                                             ///< covariance.
   Matrix6 covariance = Matrix6::Identity();  ///< At T_from_to, see modules/core/covariance.hpp.
-  int matches = 0;                ///< Alike descriptors, at least one of them with depth.
-  int consensus = 0;              ///< Matches that agree with the best sampled pose.
-  int iterations = 0;             ///< Samples drawn.
-  int inliers = 0;                ///< Correspondences, found with the pose known, that support it.
-  double position_sigma_m = 0.0;  ///< Without the strongest inliers; all three axes together.
-  double rotation_sigma_rad = 0.0;  ///< Likewise.
+  int matches = 0;                  ///< Pairs of similar descriptors, at least one of them with
+                                    ///< depth.
+  int consensus = 0;                ///< Matches that agree with the best sampled pose.
+  int iterations = 0;               ///< Samples drawn.
+  int inliers = 0;                  ///< Correspondences found with the known pose that support it.
+  double position_sigma_m = 0.0;    ///< Without the strongest inliers; all three axes together.
+  double rotation_sigma_rad = 0.0;  ///< Without the strongest inliers; all three axes together.
 };
 
-/// Geometric verification of loop closures: two keyframes to the relative pose of their bodies
-/// with its covariance, or why not.
+/// Geometric verification of loop closures: computes the relative pose of the bodies of two
+/// keyframes with its covariance, or the reason of the rejection.
 ///
 ///  1. Matches by descriptor alone (match_descriptors()).
-///  2. A pose that many of them agree with (ransac_pose(); Chang et al., "Kimera-Multi", ICRA 2021,
+///  2. A pose with which many of them agree (ransac_pose(); Chang et al., "Kimera-Multi", ICRA
+///     2021,
 ///     Sec. III-A).
-///  3. Matching again where the pose says, in narrowing circles, and refinement on the inliers:
-///     most correspondences are found only now, since similar corners elsewhere no longer compete.
-///  4. Tests, each against a way of being wrong that was seen on recorded images.
+///  3. Matching again near the predicted places, in narrowing circles, and refinement on the
+///     inliers.
+///     Most correspondences are found in this step, because similar corners elsewhere are excluded.
+///  4. Tests, each against an error that was seen on recorded images.
 ///
 /// The covariance is that of the refinement (both images' noise, scaled up if the residuals are
-/// larger) times a factor for what neighbouring points err in common, plus systematic errors.
+/// larger), times a factor for common errors of neighbouring points, plus systematic errors.
 ///
-/// Pure: the same features give the same result. verify() is safe to call from several threads.
+/// Deterministic: equal features give equal results. verify() is safe to call from several threads.
 class Verifier {
  public:
   /// Throws ConfigError if `config` is out of bounds.

@@ -22,7 +22,7 @@ void ChunkSchedule::update(std::vector<MeshChunk> chunks) {
   for (auto known = pieces_.begin(); known != pieces_.end(); ++known) {
     while (chunk != chunks.end() && chunk->key < known->first) {
       const MeshChunkKey key = chunk->key;
-      want(pieces_[key], std::move(*chunk++));  // a new place before `known`
+      want(pieces_[key], std::move(*chunk++));  // a new piece before `known`
     }
     if (chunk != chunks.end() && chunk->key == known->first)
       want(known->second, std::move(*chunk++));

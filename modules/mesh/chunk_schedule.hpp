@@ -12,42 +12,41 @@
 
 namespace km {
 
-/// Which chunks of a mesh that changes are to be sent, and in which order: those never sent first,
-/// then those sent longest ago, so that each has its turn however often the mesh changes. Of a
-/// piece that changed twice only the newest state is sent, of one that changed back nothing.
+/// Selects the chunks of a changing mesh that are to be sent, and their order. Chunks that were
+/// never sent come first, then those sent longest ago, so that each has its turn at any rate of
+/// changes. Only the newest state of a piece is sent, and nothing if it equals the sent state.
 ///
-/// Keeps what was sent last, as large as the mesh. Not thread-safe.
+/// Stores the sent state, which is as large as the mesh. Not thread-safe.
 class ChunkSchedule {
  public:
   /// See differ().
   explicit ChunkSchedule(double min_move_m) : min_move_m_(min_move_m) {}
 
-  /// The mesh as it is now, all of it: keys ascending. Pieces that are no longer there will be
-  /// sent once more, empty.
+  /// The whole current mesh, keys ascending. Each piece that has vanished is sent once more, empty.
   void update(std::vector<MeshChunk> chunks);
 
-  /// From now on all is to be sent again, as to somebody who has nothing. Pieces that were sent and
-  /// are not in what update() is given next are sent empty to those who have them. What was sent
-  /// takes no memory until then.
+  /// Restarts: the whole mesh is sent again, for receivers that have nothing. Pieces that were
+  /// sent, but are not in the next update(), are sent empty for receivers that have them. Until
+  /// then the sent state takes no memory.
   void begin_again();
 
-  /// The next chunk to send, which counts as sent then; nullopt if nothing has changed.
+  /// The next chunk to send, which then counts as sent; nullopt if nothing has changed.
   [[nodiscard]] std::optional<MeshChunk> next();
 
   [[nodiscard]] std::size_t waiting() const { return order_.size(); }
 
  private:
   struct Piece {
-    MeshChunk sent;          // empty: not there, or to be sent again
-    bool is_out = false;     // somebody may have it
-    std::uint64_t turn = 0;  // when it was sent; 0: never
+    MeshChunk sent;          // empty: the piece is absent, or is to be sent again
+    bool is_out = false;     // a receiver may have it
+    std::uint64_t turn = 0;  // order of sending; 0: never sent
     std::optional<MeshChunk> waiting;
   };
   void want(Piece& piece, MeshChunk chunk);
 
   double min_move_m_;
   std::map<MeshChunkKey, Piece> pieces_;
-  std::set<std::pair<std::uint64_t, MeshChunkKey>> order_;  // of those that wait
+  std::set<std::pair<std::uint64_t, MeshChunkKey>> order_;  // the waiting pieces
   std::uint64_t turn_ = 0;
 };
 

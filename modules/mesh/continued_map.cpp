@@ -8,7 +8,8 @@
 namespace km {
 namespace {
 
-// What one of two arrays beside vertices lacks is filled up with zeros, as LabelledMesh does.
+// Appends one array of vertex properties to another. A missing part becomes zeros, as in
+// LabelledMesh.
 template <typename T>
 void append(std::vector<T>& to, std::size_t before, const std::vector<T>& other, std::size_t now) {
   if (to.empty() && other.empty()) return;
@@ -26,7 +27,7 @@ void keep(std::vector<T>& array, const std::vector<std::uint32_t>& kept) {
   array = std::move(result);
 }
 
-// Without the vertices that no face has.
+// Removes the vertices that no face has.
 void drop_unused(MapMesh& map) {
   std::vector<std::uint32_t> place(map.mesh.vertices.size(), 0);
   for (const LabelledMesh::Face& face : map.mesh.faces)

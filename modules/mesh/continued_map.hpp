@@ -6,22 +6,21 @@
 
 namespace km {
 
-/// The map of a robot that was taken up: what its former process has mapped stays as it is, but for
-/// what is seen anew, and what its mapper makes now comes behind it, under ids that follow.
-/// Not thread-safe.
+/// The map of a resumed robot. The map of the former process stays unchanged, except for surface
+/// that is mapped again. The new mapper's map is appended under ids that follow. Not thread-safe.
 class ContinuedMap {
  public:
-  /// `before` has ids; the robot had `keyframes` > 0 then, and views of later ones count as the
-  /// last one's.
+  /// `before` has ids. `keyframes` > 0 is the number of keyframes that the robot had then; views of
+  /// later ones count as views of the last one.
   ContinuedMap(MapMesh before, KeyframeIndex keyframes);
 
   [[nodiscard]] const MapMesh& before() const { return before_; }
 
-  /// Both in one.
+  /// Both maps in one.
   [[nodiscard]] MapMesh with(const MapMesh& now) const;
 
-  /// Drops faces of the former map all of whose vertices are listed; what is left for the mapper,
-  /// under its own ids: vertices whose heirs are its own, too.
+  /// Drops faces of the former map whose vertices are all listed. Returns the rest for the mapper,
+  /// under its own ids: vertices of the mapper whose heirs are the mapper's too.
   [[nodiscard]] SupersededSurface drop(const SupersededSurface& superseded);
 
  private:

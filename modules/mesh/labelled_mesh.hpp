@@ -11,8 +11,8 @@
 
 namespace km {
 
-/// Triangle mesh whose vertices carry what was seen there. The arrays beside `vertices` are either
-/// empty (nothing known) or as long as `vertices`.
+/// Triangle mesh whose vertices have labels and colours. Each of these arrays is either empty
+/// (unknown) or as long as `vertices`.
 struct LabelledMesh {
   using Face = std::array<std::uint32_t, 3>;
   using Color = std::array<std::uint8_t, 3>;
@@ -24,10 +24,10 @@ struct LabelledMesh {
 
   [[nodiscard]] bool empty() const { return vertices.empty(); }
 
-  /// The label that two vertices of the face have, else that of its first; 0 without labels.
+  /// The label that two vertices of the face have, or else that of its first; 0 without labels.
   [[nodiscard]] LabelId face_label(std::size_t face) const;
 
-  /// Adds `other`. An array that only one of the two has is filled up with zeros.
+  /// Appends `other`. An array that only one of the two meshes has is filled with zeros.
   void append(const LabelledMesh& other);
 
   /// Moves every vertex: p_a = T_a_b * p_b.

@@ -23,7 +23,7 @@ std::uint64_t check_sum_of(std::span<const std::uint8_t> bytes) {
   return sum;
 }
 
-// Calls `element` for each of an array that has its length before it.
+// Calls `put` for each element of an array, after its length.
 template <typename Array, typename Put>
 void put_all(ByteWriter& out, const Array& array, const Put& put) {
   out.varint(array.size());

@@ -6,12 +6,12 @@
 
 namespace km {
 
-/// Writes a map as it is, to the last bit, with a check sum. Throws std::system_error as
-/// write_file() does.
+/// Writes a map bit by bit with a check sum. Throws std::system_error under the conditions of
+/// write_file().
 void write_map_file(const std::filesystem::path& file, const MapMesh& map);
 
-/// Reads what write_map_file() wrote. Throws InputFileError for everything else: faces and views
-/// are of vertices that there are, positions finite, ids ascending.
+/// Reads a file of write_map_file(). Throws InputFileError for any other content: faces and views
+/// must refer to existing vertices, positions must be finite, ids ascending.
 [[nodiscard]] MapMesh read_map_file(const std::filesystem::path& file);
 
 }  // namespace km

@@ -15,7 +15,7 @@ namespace {
 using GridPoint = std::array<std::int32_t, 3>;  // [steps]
 using Face = LabelledMesh::Face;
 
-constexpr double kFarthest_steps = 1U << 30U;  // so that the sum of three fits 64 bits by far
+constexpr double kFarthest_steps = 1U << 30U;  // so that the sum of three fits into 64 bits
 constexpr std::int64_t kMaxOffset = std::numeric_limits<std::uint16_t>::max();
 constexpr std::int64_t kThirdOfMaxOffset = kMaxOffset / 3;
 constexpr double kFarthest_m = 1e7;  // no robot is farther from the origin of a frame
@@ -42,7 +42,7 @@ std::int64_t floor_div(std::int64_t a, std::int64_t b) {
   return a >= 0 ? a / b : -((b - 1 - a) / b);
 }
 
-// Cuts one mesh.
+// Splits one mesh into chunks.
 class Splitter {
  public:
   Splitter(const LabelledMesh& mesh, const MeshChunk& blank, const ChunkGrid& grid)
@@ -67,7 +67,7 @@ class Splitter {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto [low, high] =
           std::minmax({points_[face[0]][axis], points_[face[1]][axis], points_[face[2]][axis]});
-      // A third of the range: two such faces of one cell of at most that size fit together.
+      // A third of the range, so that two such faces of one cell of at most that size fit together.
       if (std::int64_t{high} - low > kThirdOfMaxOffset) return false;
     }
     return true;
@@ -85,7 +85,7 @@ class Splitter {
 
   void sort_into_cells() {
     GridPoint last_cell = {};
-    std::vector<Face>* last = nullptr;  // neighbours in the list are mostly neighbours in space
+    std::vector<Face>* last = nullptr;  // neighbours in the list are usually neighbours in space
     for (Face face : mesh_.faces) {
       if (!fits_offsets(face)) {
         ++pieces_.oversized_faces;
@@ -113,7 +113,7 @@ class Splitter {
     }
   }
 
-  // Collects the vertices of as many faces as one chunk holds; the end of these.
+  // Collects the vertices of as many faces as fit into one chunk; returns the end of these faces.
   std::size_t take_faces(const std::vector<Face>& faces, std::size_t begin,
                          std::vector<std::uint32_t>& vertices) {
     ++part_;
@@ -157,14 +157,14 @@ class Splitter {
   std::int64_t cell_steps_;
   std::vector<GridPoint> points_;
   std::map<GridPoint, std::vector<Face>> faces_of_cell_;
-  std::vector<std::uint32_t> part_of_vertex_;  // the last part that has it
+  std::vector<std::uint32_t> part_of_vertex_;  // the last part that contains the vertex
   std::uint32_t part_ = 0;
-  std::vector<std::uint16_t> local_index_;  // there
+  std::vector<std::uint16_t> local_index_;  // index in that part
   MeshPieces pieces_;
 };
 
 void check(const LabelledMesh& mesh, const ChunkGrid& grid) {
-  // Faces reach up to a third of the range of offsets beyond their cell on both sides.
+  // Faces extend up to a third of the range of offsets beyond their cell on both sides.
   if (!(grid.step_m > 0.0) || !(grid.cell_m > grid.step_m) ||
       !(grid.cell_m / grid.step_m <= static_cast<double>(kThirdOfMaxOffset)))
     throw std::invalid_argument("mesh chunks: cells of " + std::to_string(grid.cell_m) +
@@ -181,7 +181,7 @@ void check(const LabelledMesh& mesh, const ChunkGrid& grid) {
                                     std::to_string(mesh.vertices.size()));
 }
 
-// A vertex as all chunks see it.
+// A vertex in the form that is equal in all chunks.
 struct SharedVertex {
   GridPoint point;
   LabelId label;
@@ -197,7 +197,7 @@ struct SharedVertexHash {
   }
 };
 
-// Steps that split_mesh() makes, at a place where a robot may be.
+// The step is positive, and the position is one where a robot may be.
 bool are_positions_usable(const MeshChunk& chunk) {
   if (!(chunk.step_m > 0.0F)) return false;
   return std::ranges::all_of(chunk.origin, [&](std::int32_t c) {

@@ -13,7 +13,7 @@
 
 namespace km {
 
-/// Identity of a chunk: the newest one with a key replaces all before.
+/// Identity of a chunk: the newest chunk with a key replaces all earlier ones.
 struct MeshChunkKey {
   RobotId robot = 0;
   std::array<std::int32_t, 3> cell = {0, 0, 0};
@@ -21,28 +21,28 @@ struct MeshChunkKey {
   auto operator<=>(const MeshChunkKey&) const = default;
 };
 
-/// A piece of a robot's mesh that stands for itself: a chunk has all vertices of its faces. Their
-/// positions are rounded to a grid that all chunks share, so that a vertex which several chunks
-/// have is at the same place in all: position = step_m * (origin + offset).
+/// A self-contained part of a robot's mesh: a chunk has all vertices of its faces. Their positions
+/// are rounded to a grid that all chunks share, so that a vertex has the same position in all
+/// chunks that contain it: position = step_m * (origin + offset).
 ///
-/// A chunk without faces says that the piece with its key is no more.
+/// A chunk without faces means that the piece with its key has vanished.
 struct MeshChunk {
   using Triple = std::array<std::uint16_t, 3>;
 
   MeshChunkKey key;
-  std::uint64_t boot = 0;  ///< Process of the robot that sent it; of received chunks only.
+  std::uint64_t boot = 0;  ///< Process of the robot that sent it; only set in received chunks.
   RobotId anchor = 0;      ///< Robot whose odometry frame is `world`.
   float step_m = 0.001F;
   std::array<std::int32_t, 3> origin = {0, 0, 0};  ///< [step_m] in `world`.
-  std::vector<Triple> offsets = {};                ///< Of each vertex [step_m].
-  std::vector<LabelId> labels = {};                ///< Of each vertex, or empty.
+  std::vector<Triple> offsets = {};                ///< Offset of each vertex [step_m].
+  std::vector<LabelId> labels = {};                ///< Label of each vertex, or empty.
   std::vector<Triple> faces = {};                  ///< Counter-clockwise seen from free space.
 
   [[nodiscard]] bool empty() const { return faces.empty(); }
   bool operator==(const MeshChunk&) const = default;
 };
 
-/// No chunk is larger than this on the wire, everything included.
+/// Largest size of a chunk on the wire, including everything.
 inline constexpr std::size_t kMaxChunkBytes = 32000;
 
 /// Upper bound on the bytes of a chunk on the wire.
@@ -55,38 +55,41 @@ inline constexpr std::size_t kMaxChunkBytes = 32000;
   return wire_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty());
 }
 
-/// Why this cannot be a chunk that split_mesh() makes (a string literal), or null: what has come
-/// from somewhere else is used only after this.
+/// The reason why this cannot be a chunk of split_mesh() (a string literal), or null. Received
+/// chunks are used only after this check.
 [[nodiscard]] const char* fault_of(const MeshChunk& chunk);
 
-/// The grid that a mesh is cut along, and the one its positions are rounded to.
+/// The grid of cells by which a mesh is split, and the grid to which positions are rounded.
 struct ChunkGrid {
   double cell_m = 2.0;
   double step_m = 0.001;
 };
 
-/// A mesh in pieces.
+/// A mesh split into chunks.
 struct MeshPieces {
-  std::vector<MeshChunk> chunks;    ///< Keys ascending, none empty.
-  std::size_t oversized_faces = 0;  ///< Left out: longer than the range of offsets, 65 535 steps.
+  std::vector<MeshChunk> chunks;  ///< Keys ascending, none empty.
+  /// Dropped faces: longer than the range of offsets, 65 535 steps.
+  std::size_t oversized_faces = 0;
 };
 
-/// Cuts a mesh in `world` into chunks of at most kMaxChunkBytes. Positions are off by up to half a
-/// step per axis; colours and vertices without faces are left out. A face belongs to the cell of
-/// its centroid. A piece of mesh that did not change gives the same chunk as long as its vertices
-/// are in the same order; the order of faces does not matter. Throws std::invalid_argument for a
-/// grid that is not positive, cells that are no longer than a step, a vertex that is not finite or
-/// beyond 2^30 steps, and a face that names a vertex which does not exist. Linear but for sorting
-/// the faces of a cell.
+/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes. Positions err by up to half a
+/// step per axis. Colours, and vertices without faces, are dropped. A face belongs to the cell of
+/// its centroid. An unchanged piece of mesh gives the same chunk if its vertices are in the same
+/// order; the order of faces does not matter.
+///
+/// Throws std::invalid_argument for a grid that is not positive and for cells that are no longer
+/// than a step. Also throws it for a vertex that is not finite or beyond 2^30 steps, and for a face
+/// with a vertex that does not exist. Linear except for sorting the faces of a cell.
 [[nodiscard]] MeshPieces split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
                                     const ChunkGrid& grid);
 
-/// One mesh of the chunks, which must have one step_m: vertices at the same place with the same
-/// label become one, faces that rounding has left without area go. Labels where any chunk has some.
+/// One mesh of the chunks, which must have one step_m. Vertices with the same position and label
+/// are merged, and faces that rounding has left without area are removed. The mesh has labels if
+/// any chunk has labels.
 [[nodiscard]] LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks);
 
-/// True if a viewer would see a difference: other faces, labels or frame, or a vertex that moved by
-/// more than `min_move_m` along an axis.
+/// True if a viewer would show a difference: other faces, labels or frame, or a vertex that moved
+/// by more than `min_move_m` along an axis.
 [[nodiscard]] bool differ(const MeshChunk& a, const MeshChunk& b, double min_move_m);
 
 }  // namespace km

@@ -10,13 +10,13 @@
 namespace km {
 namespace {
 
-// Longer than cutting up a mesh takes to be through: nobody waits for it.
+// Larger than the number of meshes that can arrive while one is split, so that no sender waits.
 constexpr std::size_t kQueue = 4096;
 
-// Chunks leave in small bursts: what may pass between two ticks.
+// Chunks are sent in small bursts, each with the budget of one tick.
 constexpr double kTick_s = 0.1;
 
-// Unused budget is kept this long.
+// Unused budget is kept for this time.
 constexpr double kBurst_s = 0.5;
 
 TokenBucket full_budget(double bytes_per_s) {
@@ -72,7 +72,7 @@ void MeshChunksNode::take(const Offer& offer) {
   schedule_.update(std::move(pieces.chunks));
 }
 
-// A chunk leaves while there is no debt, and may make one.
+// A chunk is sent while there is no debt. It may cause a debt.
 void MeshChunksNode::send(double now_s) {
   while (budget_bytes_.wait_s(0.0, now_s) <= 0.0) {
     std::optional<MeshChunk> chunk = schedule_.next();

@@ -19,35 +19,36 @@
 
 namespace km {
 
-/// Sends the robot's mesh in chunks, at most max_bytes_per_s: cell by cell what changed since it
-/// was last sent, the newest state of each. The mesh comes by offer(), from whichever module has
-/// the robot's best.
+/// Publishes the robot's mesh in chunks, at most max_bytes_per_s. Cells that have changed since
+/// they were last sent are sent in their newest state. The module that has the robot's best mesh
+/// passes it to offer().
 class MeshChunksNode final : public Node {
  public:
-  /// A mesh in the frame `world` of the robot `anchor`; null for the passing of time.
+  /// A mesh in the frame `world` of the robot `anchor`; a null mesh is a tick of the clock.
   struct Offer {
     RobotId anchor = 0;
     std::shared_ptr<const LabelledMesh> mesh;
   };
 
-  /// Throws ConfigError if `config` is out of bounds. `chunks` go to the peers.
+  /// Throws ConfigError if `config` is out of bounds. `chunks` are published to the peers.
   MeshChunksNode(const MeshChunksConfig& config, RobotId self, Out<MeshChunk> chunks);
   ~MeshChunksNode() override { stop(); }
 
-  /// The newest mesh counts. Thread-safe; returns at once.
+  /// Only the newest mesh counts. Thread-safe; returns at once.
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
 
   std::string_view name() const override { return MeshChunksConfig::kSection; }
   void start() override;
-  void stop() noexcept override;  ///< What has not been sent by then is not sent.
+  void stop() noexcept override;  ///< Drops the chunks that have not been sent.
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Chunks that wait for their turn. Thread-safe.
+  /// Number of waiting chunks. Thread-safe.
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
 
-  /// Handles one offer synchronously at time `now_s`. The thread calls only this; so can tests.
+  /// Handles one offer synchronously at time `now_s`. The thread calls only this function; tests
+  /// can call it too.
   void step(const Offer& offer, double now_s);
 
  private:
@@ -64,14 +65,14 @@ class MeshChunksNode final : public Node {
   Periodic ticks_;  // last member: stops before the worker it posts to
 };
 
-/// Holds the meshes that other robots send.
+/// Stores the meshes that other robots send.
 class TeamMeshNode final : public Node {
  public:
-  /// `chunks`: received ones.
+  /// `chunks`: received chunks.
   explicit TeamMeshNode(In<MeshChunk> chunks);
   ~TeamMeshNode() override { stop(); }
 
-  /// Meshes as far as they have arrived, by robot. Takes time in proportion. Thread-safe.
+  /// The received parts of all meshes, by robot. Time proportional to their size. Thread-safe.
   [[nodiscard]] std::vector<RobotMesh> snapshot() const;
 
   std::string_view name() const override { return "team_mesh"; }

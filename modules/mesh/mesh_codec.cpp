@@ -16,7 +16,7 @@ std::vector<std::uint16_t> flat(const std::vector<Triple>& triples) {
   return numbers;
 }
 
-// Precondition: a multiple of three.
+// Precondition: the number of elements is a multiple of three.
 std::vector<Triple> triples(std::span<const std::uint16_t> numbers) {
   std::vector<Triple> result;
   result.reserve(numbers.size() / 3);

@@ -10,9 +10,9 @@
 
 namespace km {
 
-/// A robot sends its own mesh only. Refused are chunks above kMaxChunkBytes, offsets, labels and
-/// faces that do not fit each other, faces that name vertices which do not exist, and positions
-/// that are not finite or absurdly far away.
+/// A robot sends only its own mesh. A chunk is refused if it is larger than kMaxChunkBytes, if its
+/// offsets, labels and faces do not match, or if a face names a missing vertex. It is also refused
+/// if positions are not finite or too far away.
 template <>
 struct Codec<MeshChunk> {
   using Wire = km_wire_MeshChunk;

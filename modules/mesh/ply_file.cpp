@@ -32,7 +32,7 @@ struct PlyProperty {
   std::string name;
   PlyType type = PlyType::kFloat;
   bool is_list = false;
-  PlyType count_type = PlyType::kUint8;  // Of a list's length.
+  PlyType count_type = PlyType::kUint8;  // type of the length of a list
 };
 
 struct PlyElement {
@@ -105,7 +105,7 @@ bool parse_line(const std::string& line, PlyHeader& header, bool& has_format) {
   return true;
 }
 
-// Reads up to and with `end_header`. Throws std::runtime_error with what is wrong and the line.
+// Reads up to and including `end_header`. Throws std::runtime_error with the problem and the line.
 PlyHeader read_ply_header(std::istream& stream) {
   PlyHeader header;
   bool has_format = false;
@@ -127,7 +127,7 @@ PlyHeader read_ply_header(std::istream& stream) {
   throw std::runtime_error("header without end_header");
 }
 
-// Values of the body one after the other, whatever the encoding.
+// Values of the body one by one, in any encoding.
 class Body {
  public:
   Body(std::istream& stream, PlyFormat format) : stream_(stream), format_(format) {}
@@ -251,7 +251,7 @@ std::uint32_t as_index(double value, std::size_t face, std::size_t vertices) {
                            std::to_string(value) + " of " + std::to_string(vertices));
 }
 
-// Faces may come before the vertices: `vertices` is the number the header promises.
+// Faces may precede the vertices: `vertices` is their number according to the header.
 std::vector<LabelId> read_faces(const PlyElement& element, std::size_t vertices, Body& body,
                                 std::vector<LabelledMesh::Face>& faces) {
   const int label = find(element, "label");

@@ -7,22 +7,22 @@
 
 namespace km {
 
-/// A mesh file that cannot be read or written. what() is one line that names the file and why.
+/// A mesh file that cannot be read or written. what() is one line with the file and the reason.
 struct MeshFileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Reads a PLY file: ascii, binary little or big endian. Used are the properties x, y, z, red,
+/// Reads a PLY file: ascii, binary little or big endian. It uses the properties x, y, z, red,
 /// green, blue and label of `vertex`, and vertex_indices (or vertex_index) and label of `face`, all
-/// of any scalar type; others are skipped. Polygons are cut into fans. Where only faces carry
-/// labels, a vertex takes that of the last face it belongs to. Throws MeshFileError for a file that
-/// is missing, truncated or not PLY, for coordinates that are not finite and for faces that name
-/// vertices which do not exist.
+/// of any scalar type. Other properties are skipped. Polygons are divided into fans. If only faces
+/// have labels, a vertex gets the label of its last face. Throws MeshFileError for a file that is
+/// missing, truncated or not PLY, for coordinates that are not finite, and for faces with vertices
+/// that do not exist.
 [[nodiscard]] LabelledMesh read_ply(const std::filesystem::path& file);
 
-/// Writes binary little endian PLY, read back unchanged by read_ply(): vertices as float, then
-/// uchar red, green, blue and label where the mesh has them. See write_file(): whole or not at all.
-/// Throws MeshFileError.
+/// Writes binary little endian PLY, which read_ply() reads back unchanged: vertices as float, then
+/// uchar red, green, blue and label if the mesh has them. A failure leaves no partial file (see
+/// write_file()). Throws MeshFileError.
 void write_ply(const std::filesystem::path& file, const LabelledMesh& mesh);
 
 }  // namespace km

@@ -26,16 +26,17 @@ struct Traits : OpenMesh::DefaultTraits {
 using Surface = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 using Decimater = OpenMesh::Decimater::DecimaterT<Surface>;
 
-// Weight of the spread of a merged region, its area times the squared length of the edge, beside
-// the quadric error, area times squared distance. On flat and gently curved surface it decides,
-// at corners shape does: nodes are there for bending, and bending is everywhere.
+// Weight of the spread of a merged region, its area times the squared length of the edge, relative
+// to the quadric error, area times squared distance. The spread decides on flat and gently curved
+// surface, the shape decides at corners. Nodes serve to bend the mesh, and it can bend everywhere.
 constexpr double kSpread = 0.1;
 
 std::uint32_t index_of(OpenMesh::VertexHandle vertex) {
   return static_cast<std::uint32_t>(vertex.idx());
 }
 
-// OpenMesh reports faces that it refuses on its error stream: quiet in this scope.
+// OpenMesh reports the faces that it refuses on its error stream. This class suppresses the reports
+// in its scope.
 class QuietErrors {
  public:
   QuietErrors() { omerr().disable(); }
@@ -44,7 +45,7 @@ class QuietErrors {
   QuietErrors& operator=(const QuietErrors&) = delete;
 };
 
-// Quadric error plus spread; notes what was merged into what.
+// Quadric error plus spread; records the merges.
 template <typename SurfaceT>
 class SpreadQuadricsT : public OpenMesh::Decimater::ModQuadricT<SurfaceT> {
  public:
@@ -80,11 +81,12 @@ class SpreadQuadricsT : public OpenMesh::Decimater::ModQuadricT<SurfaceT> {
  private:
   const std::vector<SeenBy>* seen_by_ = nullptr;
   KeyframeIndex window_keyframes_ = 0;
-  std::vector<double> area_m2_;  // of the region merged into each vertex
+  std::vector<double> area_m2_;  // area merged into each vertex
   std::vector<std::uint32_t>* merged_into_ = nullptr;
 };
 
-// The triangles as a manifold. Vertex i is point i; corners of faces that would not fit are copies.
+// The triangles as a manifold. Vertex i is point i. Corners of faces that would violate the
+// manifold are copies.
 struct ManifoldSurface {
   Surface surface;
   std::vector<std::uint32_t> point_of_vertex;
@@ -116,7 +118,7 @@ std::size_t vertices_with_faces(const Surface& surface) {
       surface.vertices(), [&](OpenMesh::VertexHandle v) { return !surface.is_isolated(v); }));
 }
 
-// A third of the faces around each vertex.
+// A third of the area of the faces around each vertex.
 std::vector<double> vertex_areas(const Surface& surface) {
   std::vector<double> areas(surface.n_vertices(), 0.0);
   for (const auto face : surface.faces()) {
@@ -131,7 +133,7 @@ std::vector<double> vertex_areas(const Surface& surface) {
   return areas;
 }
 
-// Follows merged_into to its end, for every vertex. Shortens the paths on the way.
+// Follows merged_into to its end, for every vertex, and shortens the paths.
 void resolve(std::vector<std::uint32_t>& merged_into) {
   for (std::uint32_t v = 0; v < merged_into.size(); ++v) {
     std::uint32_t end = v;
@@ -154,7 +156,7 @@ void decimate(ManifoldSurface& manifold, std::size_t target, KeyframeIndex windo
   decimater.decimate(count - target);
 }
 
-// Gives vertices to clusters, one at a time.
+// Assigns vertices to clusters, one at a time.
 class Clustering {
  public:
   Clustering(double width_m, KeyframeIndex window_keyframes)
@@ -192,7 +194,7 @@ class Clustering {
   std::vector<Seed> seeds_;
 };
 
-// The vertex of every cluster that is nearest to the cluster's centroid.
+// For every cluster, the vertex nearest to its centroid.
 std::vector<std::uint32_t> central_vertices(const std::vector<Eigen::Vector3f>& vertices,
                                             const std::vector<std::uint32_t>& cluster_of_vertex,
                                             std::size_t count) {
@@ -230,9 +232,9 @@ std::vector<LabelledMesh::Face> cluster_faces(const std::vector<LabelledMesh::Fa
 }
 
 constexpr double kClustersPerSpacing = 2.0;
-constexpr double kNearSpacings = 0.5;  // nodes closer than this are one
+constexpr double kNearSpacings = 0.5;  // nodes closer than this are merged
 
-// Joins vertices to nodes that are there already.
+// Assigns vertices to existing nodes.
 void join_near_nodes(SimplifiedMesh& simplified, const MapMesh& map, const NodeGrid& grid) {
   if (simplified.nodes.empty()) return;
   for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v)
@@ -251,13 +253,13 @@ double area_of(const TimedTriangles& triangles) {
   return 0.5 * twice;
 }
 
-// Points of a triangular lattice with this spacing on that area.
+// Number of points of a triangular lattice with this spacing on that area.
 std::size_t lattice_points(double area_m2, double spacing_m) {
   const double cell_m2 = 0.5 * std::sqrt(3.0) * spacing_m * spacing_m;
   return static_cast<std::size_t>(std::ceil(area_m2 / cell_m2));
 }
 
-// The node of every cluster; nodes are added where none is near.
+// The node of every cluster; a node is added if none is near.
 std::vector<std::uint32_t> nodes_of_clusters(const VertexClusters& clusters,
                                              const CollapsedPoints& collapsed, NodeGrid& grid,
                                              std::vector<MeshNode>& nodes) {

@@ -13,68 +13,69 @@
 
 namespace km {
 
-/// Triangles between points that were each seen for some time.
+/// Triangles between points, each with the keyframes that saw it.
 struct TimedTriangles {
   std::vector<Eigen::Vector3d> points;  ///< [m]
-  std::vector<SeenBy> seen_by;          ///< Of each point.
+  std::vector<SeenBy> seen_by;          ///< Keyframes that saw each point.
   std::vector<LabelledMesh::Face> faces;
 };
 
-/// Points that are left, and the one that each point was merged into.
+/// Remaining points, and for each point the one into which it was merged.
 struct CollapsedPoints {
-  std::vector<std::uint32_t> kept;     ///< Index of a point; twice where surfaces cross there.
+  std::vector<std::uint32_t> kept;     ///< Index of a point; twice if surfaces cross there.
   std::vector<std::uint32_t> kept_of;  ///< For each point an index into `kept`.
 };
 
-/// Decimates by half-edge collapses in OpenMesh until `target` points are left that belong to
-/// faces, or no collapse is possible. See extend() for their order; points seen further apart in
-/// time than the window are not merged. Faces may meet in any way: where more than two share an
-/// edge, the surface is cut open.
+/// Decimates by half-edge collapses in OpenMesh until `target` points with faces remain, or no
+/// collapse is possible. extend() describes their order. Points whose times of sight differ by more
+/// than the window are not merged. Faces may meet in any way: if more than two share an edge, the
+/// surface is cut open.
 [[nodiscard]] CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t target,
                                              KeyframeIndex window_keyframes);
 
-/// Vertices of a mesh put together by cells of a grid, and the triangles between them.
+/// Vertices of a mesh clustered by the cells of a grid, and the triangles between the clusters.
 struct VertexClusters {
-  TimedTriangles triangles;           ///< A point per cluster: that of its vertex.
-  std::vector<std::uint32_t> vertex;  ///< Of each cluster the vertex nearest to its centroid.
-  std::vector<std::uint32_t> cluster_of_vertex;  ///< kNoIndex for vertices that were left out.
+  TimedTriangles triangles;           ///< One point per cluster: that of its vertex.
+  std::vector<std::uint32_t> vertex;  ///< For each cluster the vertex nearest to its centroid.
+  std::vector<std::uint32_t> cluster_of_vertex;  ///< kNoIndex for vertices without a cluster.
 };
 
 /// Clusters those vertices of `map` whose `node_of_vertex` is kNoIndex, in cells of `width_m`.
-/// Vertices of a cell are in one cluster if they were seen within the window of its first. Faces
-/// whose corners lie in three clusters remain, each once. Linear.
+/// Vertices of a cell are in one cluster if they were seen within the window of its first vertex.
+/// Faces with corners in three clusters remain, each once. Linear.
 [[nodiscard]] VertexClusters cluster_vertices(const MapMesh& map,
                                               std::span<const std::uint32_t> node_of_vertex,
                                               double width_m, KeyframeIndex window_keyframes);
 
-/// How coarse the simplified mesh is, and what it keeps apart.
+/// Resolution of the simplified mesh, and the surfaces that it does not merge.
 struct DecimationScale {
-  double spacing_m = 0.5;               ///< Between neighbouring nodes.
-  KeyframeIndex window_keyframes = 50;  ///< Surfaces seen further apart in time are not joined.
+  double spacing_m = 0.5;               ///< Distance between neighbouring nodes.
+  KeyframeIndex window_keyframes = 50;  ///< Surfaces seen further apart in time are not merged.
 };
 
-/// The mesh of a map, subsampled: nodes, and the node that stands for each vertex. The vertices of
-/// one node are its region.
+/// The simplified mesh of a map: nodes, and the node of each vertex. The vertices of one node are
+/// its region.
 struct SimplifiedMesh {
   std::vector<MeshNode> nodes;
-  std::vector<std::uint32_t> node_of_vertex;  ///< kNoIndex: not yet given to one.
+  std::vector<std::uint32_t> node_of_vertex;  ///< kNoIndex: not yet assigned.
 };
 
-/// Gives every vertex of `map` that has no node in `simplified` to one. Vertices within half a
-/// spacing of a node join it; the rest is simplified to new nodes, appended to the old: first
-/// vertices are clustered on a grid of half the spacing (what makes it fast), then the mesh
-/// of the clusters is decimated by OpenMesh to the number of nodes that its area asks for. The
-/// order of collapses is that of quadric error (Garland and Heckbert, "Surface Simplification Using
-/// Quadric Error Metrics", 1997) plus the spread of the merged region, which distributes the
-/// nodes over flat surface: it bends too. Nodes that come closer than half a spacing are one.
+/// Assigns every vertex of `map` that has no node in `simplified` to one. Vertices within half a
+/// spacing of a node are assigned to it. The others are simplified to new nodes, which are
+/// appended. For speed they are first clustered on a grid of half the spacing. Then OpenMesh
+/// decimates the mesh of the clusters to the number of nodes for its area.
 ///
-/// `simplified.node_of_vertex` is first filled up with kNoIndex to the length of map.mesh.vertices.
-/// Precondition: map passed check_map_mesh(). Linear in the new vertices but for the decimation of
-/// the clusters (n log n).
+/// The order of collapses is that of quadric error (Garland and Heckbert, "Surface Simplification
+/// Using Quadric Error Metrics", 1997) plus the spread of the merged region. The spread distributes
+/// nodes over flat surface too, because it also bends. Nodes closer than half a spacing are merged.
+///
+/// `simplified.node_of_vertex` is first extended with kNoIndex to the length of map.mesh.vertices.
+/// Precondition: check_map_mesh() accepts the map. Linear in the new vertices except for the
+/// decimation of the clusters (n log n).
 void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScale& scale);
 
 /// Pairs of nodes a < b, ascending, whose regions share a face: the mesh edges of the simplified
-/// mesh. Pairs seen further apart in time than the window are left out.
+/// mesh. Pairs whose times of sight differ by more than the window are excluded.
 [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> region_edges(
     const SimplifiedMesh& simplified, std::span<const LabelledMesh::Face> faces,
     KeyframeIndex window_keyframes);

@@ -17,7 +17,8 @@
 namespace km {
 namespace {
 
-// Appends count values from first to last, both included, evenly spread; fewer if there are fewer.
+// Appends `count` values from `first` to `last`, both included, evenly spread, or all of them if
+// there are fewer.
 void spread(KeyframeIndex first, KeyframeIndex last, std::size_t count, std::uint32_t node,
             std::vector<KeyframeTie>& ties) {
   const std::size_t steps = std::min<std::size_t>(count - 1, last - first);
@@ -29,20 +30,20 @@ void spread(KeyframeIndex first, KeyframeIndex last, std::size_t count, std::uin
     ties.push_back({first + static_cast<KeyframeIndex>((last - first) * i / steps), node});
 }
 
-// How a keyframe's surroundings move: to its pose `to` from where they were at `from`.
+// Motion of the surface at a keyframe from its pose `from` to its pose `to`.
 SE3 correction(const SE3& to, const SE3& from) {
   return to * from.inverse();
 }
 
-// First tie of every node; ties.size() where it has none.
+// First tie of every node; ties.size() if it has none.
 std::vector<std::size_t> first_ties(const DeformationGraph& graph) {
   std::vector<std::size_t> first(graph.nodes.size(), graph.ties.size());
   for (std::size_t i = graph.ties.size(); i-- > 0;) first[graph.ties[i].node] = i;
   return first;
 }
 
-// The terms for Ceres. A pose block is a quaternion x, y, z, w, then a translation. Costs deliver
-// derivatives by the six tangent coordinates in the first six of the seven columns of a block; the
+// The terms for Ceres. A pose block is a quaternion x, y, z, w, then a translation. Costs return
+// derivatives by the six tangent coordinates in the first six of the seven columns of a block. The
 // manifold's PlusJacobian passes these on.
 
 using GraphPose = std::array<double, 7>;
@@ -118,7 +119,8 @@ class MeshEdgeCost final : public ceres::SizedCostFunction<6, 7, 7> {
   double weight_;
 };
 
-// Rigidity between a keyframe and a node it saw, and how both turned. Blocks: keyframe, node.
+// Rigidity between a keyframe and a node it saw, and their relative rotation. Blocks: keyframe,
+// node.
 class KeyframeTieCost final : public ceres::SizedCostFunction<6, 7, 7> {
  public:
   // Weights are 1 / sigma: [1/m], [1/rad].
@@ -178,15 +180,15 @@ class AnchorCost final : public ceres::SizedCostFunction<6, 7> {
   double translation_weight_;
 };
 
-// Standard deviation of a node's turn against a keyframe that saw it. Weak: neighbours half a metre
-// away within 2 cm hold a node's rotation to 2 degrees each, this to 30.
+// Standard deviation of a node's rotation against a keyframe that saw it. It is weak: neighbours
+// half a metre away within 2 cm hold a node's rotation to 2 degrees each, this term to 30.
 constexpr double kRotationNoise_rad = 0.5;
 
-// Ends when a step changes the poses by less than this share of their own size: far below what a
-// mesh in floats can show.
+// The solver stops when a step changes the poses by less than this share of their size. That is far
+// below the resolution of a mesh in floats.
 constexpr double kParameterTolerance = 1e-10;
 
-// The problem with its poses and costs, which Ceres only borrows.
+// The problem with its poses and costs, to which Ceres only refers.
 class GraphProblem {
  public:
   GraphProblem(const DeformationGraph& graph, std::span<const SE3> anchors,
@@ -269,17 +271,17 @@ class GraphProblem {
   std::vector<GraphPose> keyframes_;
   std::vector<GraphPose> nodes_;
   std::vector<bool> tied_;
-  // Costs stay where they are put.
+  // Costs must not move in memory.
   std::deque<KeyframeTieCost> ties_;
   std::deque<MeshEdgeCost> edges_;
   std::deque<AnchorCost> anchors_;
-  ceres::Problem problem_;  // last: goes first
+  ceres::Problem problem_;  // last member: destroyed first
 };
 
 ceres::Solver::Options solver_options(const DeformationStop& stop) {
   ceres::Solver::Options options;
-  // Keyframes meet in nodes only: they are eliminated, the rest is solved by conjugate gradients to
-  // the share of accuracy (eta) that a step can use. Sparse Cholesky factors take ten times as
+  // Keyframes are connected only through nodes. They are eliminated, and conjugate gradients solve
+  // the rest to the accuracy (eta) that a step can use. Sparse Cholesky factors take ten times as
   // long.
   options.linear_solver_type = ceres::ITERATIVE_SCHUR;
   options.preconditioner_type = ceres::SCHUR_JACOBI;
@@ -324,7 +326,8 @@ RotationTerm rotation_term(const Eigen::Matrix3d& R_odom_kf, const SE3& T_world_
   const Eigen::Matrix3d J_r_inverse = so3_right_jacobian_inverse(term.residual);
   term.by_node.leftCols<3>() = J_r_inverse;
   term.by_node.rightCols<3>().setZero();
-  // R_kf_node turns by exp(-d) from the left: the same as exp(-R_kf_node^T d) from the right.
+  // R_kf_node is perturbed by exp(-d) from the left, which equals exp(-R_kf_node^T d) from the
+  // right.
   term.by_keyframe.leftCols<3>() = -J_r_inverse * R_kf_node.transpose();
   term.by_keyframe.rightCols<3>().setZero();
   return term;
@@ -400,7 +403,7 @@ DeformationPoses carried_over_poses(const DeformationGraph& graph, const Deforma
                                     std::span<const SE3> T_world_kf_last,
                                     std::span<const SE3> T_world_kf) {
   DeformationPoses poses = initial_poses(graph, T_world_kf);
-  std::vector<SE3> moved;  // of each keyframe that was there, since
+  std::vector<SE3> moved;  // motion of each known keyframe since the last solution
   for (std::size_t i = 0; i < std::min(T_world_kf_last.size(), T_world_kf.size()); ++i) {
     moved.push_back(correction(T_world_kf[i], T_world_kf_last[i]));
     if (i < last.T_world_kf.size()) poses.T_world_kf[i] = moved[i] * last.T_world_kf[i];
@@ -421,7 +424,7 @@ DeformationSolution solve(const DeformationGraph& graph, std::span<const SE3> T_
                           const DeformationNoise& noise, const DeformationStop& stop,
                           DeformationPoses initial) {
   DeformationSolution solution;
-  if (graph.ties.empty()) {  // nothing pulls
+  if (graph.ties.empty()) {  // no node is held
     solution.poses = std::move(initial);
     solution.poses.T_world_kf.assign(T_world_kf.begin(), T_world_kf.end());
     return solution;

@@ -19,22 +19,23 @@ struct KeyframeTie {
   std::uint32_t node = 0;
 };
 
-/// What the energy of Kimera-Multi (Chang et al., ICRA 2021, Sec. IV, Eq. (1)) sums over, in the
+/// Terms of the energy of Kimera-Multi (Chang et al., ICRA 2021, Sec. IV, Eq. (1)), in the
 /// undeformed configuration: the robot's odometry frame. It is a deformation graph as in Sumner,
 /// Schmid, Pauly, "Embedded Deformation for Shape Manipulation", SIGGRAPH 2007.
 struct DeformationGraph {
   std::vector<Eigen::Vector3d> nodes;               ///< g_k [m].
-  std::vector<SE3> T_odom_kf;                       ///< Keyframe i's pose when it saw the nodes.
+  std::vector<SE3> T_odom_kf;                       ///< Pose of keyframe i when it saw the nodes.
   std::vector<std::array<std::uint32_t, 2>> edges;  ///< Neighbouring nodes, each pair once.
-  std::vector<KeyframeTie> ties;                    ///< By node.
+  std::vector<KeyframeTie> ties;                    ///< Ascending nodes.
 
   /// Both directions of every mesh edge; position and rotation of every tie.
   [[nodiscard]] std::size_t term_count() const { return 2 * edges.size() + 2 * ties.size(); }
 };
 
-/// At most `keyframes_per_node` keyframes for each node, of those that saw it: the first, the last,
-/// and others spread over the time in between, where it is no longer than the window (over a longer
-/// time the surface was left and seen again, and nothing is known about the keyframes between).
+/// At most `keyframes_per_node` keyframes for each node, from those that saw it: the first, the
+/// last, and others spread evenly between them. If the time between is longer than the window, only
+/// the first and the last are used. The surface was then left and seen again, and the keyframes in
+/// between may not have seen it.
 [[nodiscard]] std::vector<KeyframeTie> choose_ties(std::span<const MeshNode> nodes,
                                                    std::size_t keyframes_per_node,
                                                    KeyframeIndex window_keyframes);
@@ -43,9 +44,9 @@ struct DeformationGraph {
 
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
-/// Where a pose a puts a point that it carries, against where vertex b is: second and third term of
-/// Eq. (1) in Kimera-Multi (Chang et al., ICRA 2021, Sec. IV); between two nodes the regularisation
-/// of Sumner et al., "Embedded Deformation for Shape Manipulation", SIGGRAPH 2007.
+/// Difference between a point moved by pose a and vertex b: second and third term of Eq. (1) in
+/// Kimera-Multi (Chang et al., ICRA 2021, Sec. IV). Between two nodes it is the regularisation of
+/// Sumner et al., "Embedded Deformation for Shape Manipulation", SIGGRAPH 2007.
 struct RigidityTerm {
   Eigen::Vector3d residual;  ///< T_world_a * point_a - t_world_b [m].
   Matrix36 by_a;
@@ -54,8 +55,8 @@ struct RigidityTerm {
 [[nodiscard]] RigidityTerm rigidity_term(const SE3& T_world_a, const Eigen::Vector3d& point_a,
                                          const SE3& T_world_b);
 
-/// How a node is turned against a keyframe that saw it: log(R_odom_kf R_world_kf^T R_world_node),
-/// zero if both turned alike since.
+/// Rotation of a node against a keyframe that saw it: log(R_odom_kf R_world_kf^T R_world_node). It
+/// is zero if both have rotated equally since then.
 struct RotationTerm {
   Eigen::Vector3d residual;  ///< [rad]
   Matrix36 by_keyframe;
@@ -80,7 +81,7 @@ struct DeformationNoise {
   double keyframe_tie_m = 0.02;
 };
 
-/// When solve() ends.
+/// Conditions under which solve() ends.
 struct DeformationStop {
   int max_iterations = 30;
   double energy_tolerance = 1e-7;  ///< A step changed the energy by less than this share.
@@ -95,7 +96,7 @@ struct DeformationPoses {
 enum class DeformationStatus {
   kConverged,
   kIterationLimit,  ///< Poses are the best found.
-  kFailed,          ///< The solver gave up: poses are the initial ones.
+  kFailed,          ///< The solver failed: poses are the initial ones.
 };
 
 /// "converged", "iteration limit", "failed"
@@ -109,27 +110,29 @@ struct [[nodiscard]] DeformationSolution {
   double final_cost = 0.0;
 };
 
-/// First guess without an earlier solution: keyframes at their anchors, each node where the
-/// keyframes that are tied to it put it on average, turned like the first of them. `T_world_kf` are
-/// the optimised poses, as many as graph.T_odom_kf. Exact for every motion that is rigid.
+/// First guess without an earlier solution. Keyframes are at their anchors. Each node is at the
+/// mean of the positions that its keyframes predict, with the rotation of its first keyframe.
+/// `T_world_kf` are the optimised poses, as many as graph.T_odom_kf. Exact for every rigid motion.
 [[nodiscard]] DeformationPoses initial_poses(const DeformationGraph& graph,
                                              std::span<const SE3> T_world_kf);
 
-/// First guess from the solution `last` for the anchors `T_world_kf_last`: every vertex moves like
-/// its (first) keyframe's anchor moved since. Vertices that `last` lacks are as in initial_poses();
-/// those it has must be the graph's first ones.
+/// First guess from the solution `last` for the anchors `T_world_kf_last`: every vertex of the
+/// graph moves like the anchor of its (first) keyframe since then. Vertices that `last` lacks are
+/// as in initial_poses(). Those that `last` has must be the first ones of the graph.
 [[nodiscard]] DeformationPoses carried_over_poses(const DeformationGraph& graph,
                                                   const DeformationPoses& last,
                                                   std::span<const SE3> T_world_kf_last,
                                                   std::span<const SE3> T_world_kf);
 
-/// Minimises eq. (1): anchors of the keyframes, rigidity between neighbouring nodes in both
-/// directions, rigidity between keyframes and the nodes they saw; Levenberg-Marquardt on SE(3) with
-/// analytic, sparse Jacobians and conjugate gradients on the Schur complement of the keyframes
-/// (Ceres), one thread. To the paper's terms a weak
-/// one is added that turns each node with its keyframes (see kRotationNoise_rad in the source): it
-/// makes the minimum unique where a node has few neighbours, or all in one line. Keyframes without
-/// a tie stay at their anchors; without any tie the result is `initial`.
+/// Minimises Eq. (1): anchors of the keyframes, rigidity between neighbouring nodes in both
+/// directions, rigidity between keyframes and the nodes they saw. The method is Levenberg-Marquardt
+/// on SE(3) with analytic, sparse Jacobians and conjugate gradients on the Schur complement of the
+/// keyframes (Ceres), on one thread.
+///
+/// A weak term is added to those of the paper. It rotates each node with its keyframes (see
+/// kRotationNoise_rad in the source). The minimum is then unique even if a node has few neighbours
+/// or all of them are on one line. Keyframes without a tie stay at their anchors; without any tie
+/// the result is `initial`.
 [[nodiscard]] DeformationSolution solve(const DeformationGraph& graph,
                                         std::span<const SE3> T_world_kf,
                                         const DeformationNoise& noise, const DeformationStop& stop,

@@ -18,7 +18,7 @@
 namespace km {
 namespace {
 
-// A node and its squared distance [m^2] from where it was asked for.
+// A node and its squared distance [m^2] from the query point.
 struct NearNode {
   double distance2 = 0.0;
   std::uint32_t node = kNoIndex;
@@ -29,7 +29,7 @@ struct Nodes {
   std::vector<SeenBy> seen_by;
   std::vector<std::uint32_t> indices;
 
-  // What nanoflann asks of a set of points.
+  // Interface that nanoflann requires of a set of points.
   [[nodiscard]] std::size_t kdtree_get_point_count() const { return positions.size(); }
   [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
     return positions[i][static_cast<Eigen::Index>(axis)];
@@ -40,7 +40,7 @@ struct Nodes {
   }
 };
 
-// The nearest points so far, for nanoflann; passes over those of another time. Of points at equal
+// The nearest points so far, for nanoflann. Points outside the window of time are ignored. At equal
 // distance the lower index comes first.
 class NearestInTime {
  public:
@@ -70,7 +70,7 @@ class NearestInTime {
     return true;
   }
 
-  void sort() {}  // nanoflann 1.5 calls it at the end: they are in order already
+  void sort() {}  // nanoflann 1.5 calls it at the end; the points are sorted already
 
  private:
   const Nodes& nodes_;
@@ -81,16 +81,16 @@ class NearestInTime {
   std::size_t count_ = 0;
 };
 
-// Nearest nodes in space among those that are near in time: a k-d tree of fixed nodes.
+// Nearest nodes in space among those within the window of time: a k-d tree of fixed nodes.
 class NodeTree {
  public:
-  // Of those of `nodes` that are listed. They are copied.
+  // Copies those of `nodes` that are listed.
   NodeTree(std::span<const MeshNode> nodes, std::span<const std::uint32_t> listed,
            KeyframeIndex window_keyframes)
       : nodes_(chosen(nodes, listed)), window_(window_keyframes), index_(3, nodes_) {}
 
   // Fills `found` with the nearest nodes whose time of sight is within the window of `seen_by`, by
-  // distance, closer than the root of `limit2`. Returns how many there are.
+  // distance, closer than the square root of `limit2`. Returns their number.
   std::size_t nearest(const Eigen::Vector3d& point, const SeenBy& seen_by,
                       std::span<NearNode> found,
                       double limit2 = std::numeric_limits<double>::infinity()) const {
@@ -119,16 +119,16 @@ class NodeTree {
 };
 
 constexpr std::size_t kMaxNeighbours = 8;
-constexpr double kNoWeight = 1e-12;  // of a sum whose terms are at most one
+constexpr double kNoWeight = 1e-12;  // bound on a sum whose terms are at most one
 
-// Nodes of one vertex and how far a node that would change them may be away.
+// Nodes of one vertex, and the distance below which a new node would change them.
 struct Binding {
   std::array<std::uint32_t, kMaxNeighbours> nodes;
   std::array<double, kMaxNeighbours> weights;
   float reach_m = std::numeric_limits<float>::infinity();
 };
 
-// Eq. (3) for the nearest nodes, the last of which gives d_max.
+// Eq. (3) for the nearest nodes; the last of them gives d_max.
 Binding weigh(std::span<const NearNode> nearest, bool all_found) {
   Binding binding;
   binding.nodes.fill(kNoIndex);
@@ -143,7 +143,7 @@ Binding weigh(std::span<const NearNode> nearest, bool all_found) {
     binding.weights[j] = root * root;
     sum += root * root;
   }
-  for (std::size_t j = 0; j < used; ++j)  // all equally far: equal weights
+  for (std::size_t j = 0; j < used; ++j)  // all equally far, so equal weights
     binding.weights[j] =
         sum > kNoWeight ? binding.weights[j] / sum : 1.0 / static_cast<double>(used);
   if (all_found)
@@ -159,7 +159,8 @@ Binding bind_vertex(const NodeTree& tree, const Eigen::Vector3f& vertex, const S
   return weigh(std::span(found).first(count), count == neighbours + 1);
 }
 
-// What moves the surroundings of a node: v' - v = turn (v - g) + shift. Zero for a node that stays.
+// Motion of the surface around a node: v' - v = turn (v - g) + shift. Zero for a node that does not
+// move.
 struct NodeMotion {
   Eigen::Matrix3d turn;
   Eigen::Vector3d shift;
@@ -236,7 +237,7 @@ std::vector<Eigen::Vector3f> Interpolation::deform(std::span<const Eigen::Vector
       deformed.push_back((T_world_odom_of_kf[seen_by[v][0]] * vertex).cast<float>());
       continue;
     }
-    Eigen::Vector3d displacement = Eigen::Vector3d::Zero();  // Eq. (2), less the vertex
+    Eigen::Vector3d displacement = Eigen::Vector3d::Zero();  // Eq. (2) minus the vertex
     for (std::size_t j = 0; j < neighbours_ && nodes_here[j] != kNoIndex; ++j) {
       const NodeMotion& motion = motions[nodes_here[j]];
       displacement += weights[j] * (motion.turn * (vertex - motion.g) + motion.shift);

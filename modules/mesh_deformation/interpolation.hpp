@@ -16,32 +16,31 @@ namespace km {
 /// 2021, Sec. IV, Eq. (2) and (3), after Sumner et al., "Embedded Deformation for Shape
 /// Manipulation", SIGGRAPH 2007):
 ///   v' = sum_j w_j [R_j (v - g_j) + t_j],   w_j = (1 - |v - g_j| / d_max)^2, normalised,
-/// over the k nearest nodes, d_max being the distance of the next one. Of these only nodes count
-/// whose time of sight is within a window of the vertex's. With k nodes or fewer in the window, the
-/// farthest of them gives d_max; a single one moves the vertex alone; with none, the vertex is not
-/// bound and moves with the keyframe that saw it first.
+/// over the k nearest nodes, with d_max the distance of the next one. Only nodes whose time of
+/// sight is within a window of the vertex's count. With k nodes or fewer in the window, the
+/// farthest of them gives d_max. A single node moves the vertex alone. With no node, the vertex is
+/// not bound and moves with the keyframe that saw it first.
 ///
-/// Keeps which nodes move which vertex, so that a new solution costs a sum per vertex only.
+/// Stores the nodes of each vertex, so that a new solution costs only one sum per vertex.
 class Interpolation {
  public:
-  /// k nearest nodes within the window of time.
+  /// Uses the k nearest nodes within the window of time.
   Interpolation(std::size_t neighbours, KeyframeIndex window_keyframes);
 
-  /// Binds vertices to nodes anew. `vertices` [m] and `seen_by` have equal length.
+  /// Binds all vertices to nodes. `vertices` [m] and `seen_by` have equal length.
   void bind(std::span<const Eigen::Vector3f> vertices, std::span<const SeenBy> seen_by,
             std::span<const MeshNode> nodes);
 
-  /// The same result, where most is as it was: `before` gives each vertex's index in the last call,
-  /// or kNoIndex for one that is new or changed in position or time; `changed` lists the nodes that
-  /// are new or were seen again since. Binds only vertices that this can concern. Nodes keep their
-  /// indices and positions.
+  /// The result of bind() for a mesh that has changed little. `before` gives each vertex's index in
+  /// the last call, or kNoIndex if it is new or changed in position or time. `changed` lists the
+  /// nodes that are new or were seen again since then. Only vertices that this can affect are bound
+  /// again. Nodes keep their indices and positions.
   void update(std::span<const Eigen::Vector3f> vertices, std::span<const SeenBy> seen_by,
               std::span<const MeshNode> nodes, std::span<const std::uint32_t> before,
               std::span<const std::uint32_t> changed);
 
-  /// The vertices, moved to where `T_world_node` puts the nodes (M_k of the paper, undeformed:
-  /// identity rotation and g_k). An unbound vertex moves by
-  /// T_world_odom_of_kf[its first keyframe].
+  /// The vertices moved with the nodes to `T_world_node` (M_k of the paper, undeformed: identity
+  /// rotation and g_k). An unbound vertex moves by T_world_odom_of_kf[its first keyframe].
   [[nodiscard]] std::vector<Eigen::Vector3f> deform(std::span<const Eigen::Vector3f> vertices,
                                                     std::span<const SeenBy> seen_by,
                                                     std::span<const MeshNode> nodes,
@@ -51,7 +50,8 @@ class Interpolation {
   [[nodiscard]] std::size_t vertex_count() const { return reach_m_.size(); }
   [[nodiscard]] std::size_t unbound_count() const;
 
-  /// The nodes of one vertex (kNoIndex fills up) and their weights, which sum to one if bound.
+  /// The nodes of one vertex, padded with kNoIndex, and their weights, which sum to one if the
+  /// vertex is bound.
   [[nodiscard]] std::span<const std::uint32_t> nodes_of(std::size_t vertex) const;
   [[nodiscard]] std::span<const double> weights_of(std::size_t vertex) const;
 
@@ -59,7 +59,7 @@ class Interpolation {
   std::size_t neighbours_;
   KeyframeIndex window_keyframes_;
   std::vector<std::uint32_t> nodes_;  // neighbours_ per vertex
-  std::vector<double> weights_;       // likewise
+  std::vector<double> weights_;       // neighbours_ per vertex
   std::vector<float> reach_m_;        // a node that comes closer changes the binding
 };
 

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Of two poses of one keyframe, in units of the scale.
+// Distance between two poses of one keyframe, in units of the scale.
 double distance(const SE3& a, const SE3& b, const MotionScale& scale) {
   return std::max((a.translation() - b.translation()).norm() / scale.translation_m,
                   angle_of(a.linear() * b.linear().transpose()) / scale.rotation_rad);
@@ -24,7 +24,8 @@ SE3 common_motion(std::span<const SE3> before, std::span<const SE3> after,
   }
   mean_before /= static_cast<double>(before.size());
   mean_after /= static_cast<double>(before.size());
-  // A small angle is the chordal distance over sqrt(2): half the weight of a translation's square.
+  // A small angle is the chordal distance over sqrt(2), so it has half the weight of a squared
+  // translation.
   const double translation_weight = 1.0 / (scale.translation_m * scale.translation_m);
   const double rotation_weight = 0.5 / (scale.rotation_rad * scale.rotation_rad);
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();

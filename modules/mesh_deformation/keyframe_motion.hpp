@@ -7,28 +7,28 @@
 
 namespace km {
 
-/// Optimised poses of all keyframes of `T_odom_kf`: `T_world_kf`, and for those at the end that
-/// have none, the last that has one followed by odometry. Not more poses than odometry has, and at
-/// least one unless odometry has none.
+/// Optimised poses of all keyframes of `T_odom_kf`. Keyframes at the end that `T_world_kf` lacks
+/// follow its last pose by odometry. There are never more poses than in odometry, and at least one
+/// unless odometry has none.
 [[nodiscard]] std::vector<SE3> complete(std::span<const SE3> T_odom_kf,
                                         std::span<const SE3> T_world_kf);
 
-/// What counts as a change of a pose.
+/// Smallest change of a pose that counts.
 struct MotionScale {
   double translation_m = 0.01;
   double rotation_rad = 0.005;
 };
 
-/// How keyframes moved from one solution to the next.
+/// Motion of the keyframes from one solution to the next.
 struct KeyframeMotion {
-  SE3 T_after_before = SE3::Identity();  ///< Of all together: of the gauge, mostly.
-  double bending = 0.0;  ///< Largest move of any keyframe beyond that, in units of the scale.
+  SE3 T_after_before = SE3::Identity();  ///< Common motion, mostly of the gauge.
+  double bending = 0.0;  ///< Largest motion of any keyframe relative to it, in units of the scale.
 };
 
 /// Compares two solutions of the same keyframes, as many as both have. The common motion minimises
-/// the sum of squared moves beyond it, in units of `scale`, with the chordal distance of rotations:
-/// the orthogonal Procrustes problem (Umeyama, PAMI 1991) with rotations as further observations,
-/// so that it is unique for any number of poses. Identity without poses.
+/// the sum of the squared motions relative to it, in units of `scale`, with the chordal distance of
+/// rotations. This is the orthogonal Procrustes problem (Umeyama, PAMI 1991) with rotations as
+/// further observations, so that it is unique for any number of poses. Identity without poses.
 [[nodiscard]] KeyframeMotion keyframe_motion(std::span<const SE3> before,
                                              std::span<const SE3> after, const MotionScale& scale);
 

@@ -15,7 +15,7 @@ namespace km {
 namespace {
 
 constexpr float kFarthest_m = 1e7F;
-constexpr double kRigidTolerance = 1e-6;  // of the entries of R^T R
+constexpr double kRigidTolerance = 1e-6;  // entries of R^T R
 
 [[noreturn]] void refuse(const std::string& problem) {
   throw std::invalid_argument("mesh deformation: " + problem);
@@ -64,21 +64,21 @@ bool is_rigid(const SE3& T) {
   return (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigidTolerance;
 }
 
-// How vertices of two versions of a mesh correspond.
+// Correspondence of the vertices of two versions of a mesh.
 struct VertexMatch {
-  std::vector<std::uint32_t> before;     // of each new vertex the old index, or kNoIndex
-  std::vector<std::uint32_t> unchanged;  // the same, kNoIndex too if position or time differ
-  std::vector<std::uint32_t> after;      // of each old vertex the new index, or kNoIndex
+  std::vector<std::uint32_t> before;     // old index of each new vertex, or kNoIndex
+  std::vector<std::uint32_t> unchanged;  // old index, but kNoIndex if position or time differ
+  std::vector<std::uint32_t> after;      // new index of each old vertex, or kNoIndex
 };
 
-// What is kept of the last mesh.
+// Stored properties of the last mesh.
 struct KnownVertices {
   std::vector<Eigen::Vector3f> positions;
   std::vector<SeenBy> seen_by;
   std::vector<std::uint64_t> ids;
 };
 
-// By ids: one walk through two ascending lists.
+// By ids, in one pass through two ascending lists.
 std::vector<std::uint32_t> match_ids(const std::vector<std::uint64_t>& old_ids,
                                      const std::vector<std::uint64_t>& new_ids) {
   std::vector<std::uint32_t> before(new_ids.size(), kNoIndex);
@@ -144,13 +144,14 @@ struct LocalMeshOptimizer::State {
         window(static_cast<KeyframeIndex>(config.time_window_keyframes)),
         interpolation(static_cast<std::size_t>(config.interpolation_nodes), window) {}
 
-  // Nodes whose vertex was seen again; indices of their vertices in the new mesh.
+  // Nodes whose vertex was seen again, and the indices of their vertices in the new mesh.
   std::vector<std::uint32_t> follow_vertices(const VertexMatch& matched, const MapMesh& map);
 
-  // Half as many vertices have gone as there are: many a node stands for little surface, or none.
+  // More than half as many vertices have been removed as remain: many nodes represent little
+  // surface, or none.
   [[nodiscard]] bool outgrown() const { return 2 * gone > known.positions.size(); }
 
-  // Brings nodes, regions and bindings up to date with `map`. Returns the number of new nodes.
+  // Updates nodes, regions and bindings for `map`. Returns the number of new nodes.
   std::size_t take_over(const MapMesh& map);
 
   [[nodiscard]] DeformationGraph make_graph(const MapMesh& map,
@@ -164,11 +165,11 @@ struct LocalMeshOptimizer::State {
   KeyframeIndex window;
   Interpolation interpolation;
   KnownVertices known;
-  std::size_t gone = 0;  // of the vertices ever known
+  std::size_t gone = 0;  // number of vertices that were removed
   SimplifiedMesh simplified;
   bool solved = false;
-  DeformationPoses last;             // for
-  std::vector<SE3> T_world_kf_last;  // these anchors
+  DeformationPoses last;             // solution
+  std::vector<SE3> T_world_kf_last;  // anchors of that solution
 };
 
 std::vector<std::uint32_t> LocalMeshOptimizer::State::follow_vertices(const VertexMatch& matched,
@@ -255,7 +256,7 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
       solve(graph, anchors, state.noise(),
             {state.config.max_iterations, state.config.energy_tolerance}, std::move(initial));
 
-  std::vector<SE3> T_world_odom;  // as each keyframe sees it: moves what no node moves
+  std::vector<SE3> T_world_odom;  // for each keyframe; moves vertices without a node
   for (std::size_t i = 0; i < anchors.size(); ++i)
     T_world_odom.push_back(anchors[i] * T_odom_kf[i].inverse());
   result.mesh = map.mesh;

@@ -12,24 +12,26 @@
 
 namespace km {
 
-/// Throws std::invalid_argument that names the first problem: `seen_by` not as long as the
-/// vertices, first after last keyframe, a keyframe from `keyframes` on, a vertex that is not finite
-/// or beyond 10,000 km, a face that names a vertex which does not exist, ids not as long as the
-/// vertices or not ascending, certainty not as long as the vertices.
+/// Throws std::invalid_argument with the first problem:
+/// - `seen_by`, ids or certainty not as long as the vertices, or ids not ascending;
+/// - the first keyframe of a vertex after the last one, or a keyframe of `keyframes` or more;
+/// - a vertex that is not finite or beyond 10,000 km;
+/// - a face with a vertex that does not exist.
 void check_map_mesh(const MapMesh& map, std::size_t keyframes);
 
-/// Throws std::invalid_argument that names the first pose that is not finite or not rigid; `what`
-/// says which poses these are.
+/// Throws std::invalid_argument with the first pose that is not finite or not rigid; `what` is the
+/// name of the poses.
 void check_poses(std::span<const SE3> poses, std::string_view what);
 
-/// Throws std::invalid_argument for poses that check_poses() refuses, more optimised poses than
-/// keyframes, and none though there are some.
+/// Throws std::invalid_argument for poses that check_poses() refuses, for more optimised poses than
+/// keyframes, and for keyframes without any optimised pose.
 void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf);
 
 /// Sizes and outcome of one call of LocalMeshOptimizer::optimize().
 struct MeshDeformationReport {
   std::size_t vertices = 0;
-  std::size_t unbound_vertices = 0;  ///< No node was near in time: moved with their keyframe.
+  /// Vertices without a node near in time, moved with their keyframe.
+  std::size_t unbound_vertices = 0;
   std::size_t nodes = 0;
   std::size_t new_nodes = 0;
   std::size_t keyframes = 0;
@@ -47,19 +49,20 @@ struct [[nodiscard]] DeformedMesh {
   MeshDeformationReport report;
 };
 
-/// Local Mesh Optimization (Chang, Tian, How, Carlone, "Kimera-Multi", ICRA 2021, Sec. IV): bends
+/// Local Mesh Optimization (Chang, Tian, How, Carlone, "Kimera-Multi", ICRA 2021, Sec. IV): deforms
 /// the mesh that a robot's mapper built on odometry so that it agrees with the optimised poses of
-/// the keyframes. The mesh is simplified to the nodes of a deformation graph, the graph solved, and
-/// every vertex moved with the nodes around it. Faces, labels and colours are untouched.
+/// the keyframes. The mesh is simplified to the nodes of a deformation graph, the graph is solved,
+/// and every vertex is moved with the nodes around it. Faces, labels and colours do not change.
 ///
-/// Incremental: the graph is kept from call to call. Surface that is new extends it, known vertices
-/// keep their nodes, and the last solution starts the next. Vertices are known again by their ids,
-/// else by index and position. Once half as many vertices have gone as the mesh has, the graph is
-/// made anew, and the solution starts from the keyframes. reset() forgets all.
+/// Incremental: the graph is kept from call to call. New surface extends it, known vertices keep
+/// their nodes, and the last solution is the first guess of the next. Vertices are identified by
+/// their ids, or by index and position if there are none. When more than half as many vertices have
+/// been removed as remain, the graph is built again, and the solution starts from the keyframes.
+/// reset() discards everything.
 ///
-/// Deviations from the paper: surfaces seen at distant times (see MeshDeformationConfig) neither
-/// share an edge of the graph nor move each other's vertices, for drift lies between them; and the
-/// weak term of solve().
+/// Deviations from the paper: surfaces seen at distant times (see MeshDeformationConfig) share no
+/// edge of the graph. They do not move each other's vertices, because there is drift between them.
+/// The other deviation is the weak term of solve().
 ///
 /// Not thread-safe.
 class LocalMeshOptimizer {
@@ -70,12 +73,12 @@ class LocalMeshOptimizer {
   LocalMeshOptimizer(LocalMeshOptimizer&&) noexcept;
   LocalMeshOptimizer& operator=(LocalMeshOptimizer&&) noexcept;
 
-  /// The mesh corrected. `T_odom_kf` are the keyframes' poses the mesh was built with, index i
-  /// being keyframe i; `T_world_kf` their optimised poses. Keyframes at the end that have no
-  /// optimised pose yet follow the last one that has. Throws std::invalid_argument, the state
-  /// unchanged, for a mesh that check_map_mesh() refuses, poses that are not finite or not rigid,
-  /// more optimised poses than keyframes, or none though there are some, and fewer keyframes than
-  /// in the call before.
+  /// Returns the corrected mesh. `T_odom_kf` are the keyframes' poses with which the mesh was
+  /// built, index i being keyframe i; `T_world_kf` are their optimised poses. Keyframes at the end
+  /// without an optimised pose follow the last one that has one.
+  ///
+  /// Throws std::invalid_argument if check_map_mesh() or check_trajectories() refuses the input, or
+  /// if there are fewer keyframes than in the call before. The state is then unchanged.
   DeformedMesh optimize(const MapMesh& map, std::span<const SE3> T_odom_kf,
                         std::span<const SE3> T_world_kf);
 

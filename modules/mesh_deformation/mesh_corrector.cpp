@@ -34,10 +34,11 @@ MeshCorrection MeshCorrector::correct_afresh(const CorrectionInput& input) {
   return deform(input, complete(input.T_odom_kf, input.T_world_kf));
 }
 
-// Without names or size of voxels the mapper could not be told, or nothing be judged.
+// Without ids the mapper could not drop vertices, and without the size of voxels there is no scale
+// for the comparison.
 std::vector<std::uint32_t> MeshCorrector::heirs_in(const LabelledMesh& mesh,
                                                    const MapMesh& map) const {
-  constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), and what bending adds
+  constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), plus the deformation
   if (duplicate_voxels_ <= 0.0 || mesh.faces.size() <= duplicate_faces_ || map.voxel_m <= 0.0 ||
       map.ids.empty())
     return std::vector(mesh.vertices.size(), kNoIndex);

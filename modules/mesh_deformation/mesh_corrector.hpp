@@ -15,26 +15,28 @@
 
 namespace km {
 
-/// What MeshCorrector::correct() corrects.
+/// Input of MeshCorrector::correct().
 struct CorrectionInput {
   const MapMesh& map;
-  std::uint64_t map_version = 0;  ///< Differs when the map does.
+  std::uint64_t map_version = 0;  ///< Changes whenever the map does.
   std::span<const SE3> T_odom_kf;
   std::span<const SE3> T_world_kf;  ///< May be shorter: see LocalMeshOptimizer::optimize().
 };
 
 struct [[nodiscard]] MeshCorrection {
   LabelledMesh mesh;  ///< In the frame of the optimised poses, without superseded surface.
-  MeshDeformationReport report;      ///< Of the last optimisation.
-  bool deformed = true;              ///< False: that result, moved as a whole.
-  SupersededSurface superseded;      ///< Of the map; empty where nothing was deformed.
-  std::size_t superseded_faces = 0;  ///< Left out of `mesh`.
+  MeshDeformationReport report;  ///< Report of the last optimisation.
+  /// False: the result of the last optimisation, moved as a whole.
+  bool deformed = true;
+  SupersededSurface superseded;      ///< Superseded surface of the map; empty unless deformed.
+  std::size_t superseded_faces = 0;  ///< Faces missing in `mesh`.
 };
 
-/// Keeps a mesh up to date with map and trajectory, at the least cost: nothing while no keyframe
-/// moved by the configured threshold, one rigid motion where all of them moved alike, as they do
-/// when the origin of `world` changes, and Local Mesh Optimization otherwise. After that, drift is
-/// out of the mesh and copies of surface that was seen on several visits coincide: of these the
+/// Keeps a mesh consistent with map and trajectory at the lowest cost. It does nothing while no
+/// keyframe has moved by the configured threshold. If all keyframes have moved equally, as they do
+/// when the origin of `world` changes, one rigid motion suffices. Otherwise it runs Local Mesh
+/// Optimization. This removes drift from the mesh, so that copies of surface from several visits
+/// coincide. The best copy stays (see find_heirs()).
 /// best stays (see find_heirs()).
 ///
 /// Not thread-safe.
@@ -43,12 +45,12 @@ class MeshCorrector {
   /// Throws ConfigError if `config` is out of bounds.
   explicit MeshCorrector(const MeshDeformationConfig& config);
 
-  /// The mesh corrected anew, nullopt if the last one still holds. Throws as
-  /// LocalMeshOptimizer::optimize().
+  /// Returns the corrected mesh, or nullopt if the last one is still valid. Throws under the
+  /// conditions of LocalMeshOptimizer::optimize().
   [[nodiscard]] std::optional<MeshCorrection> correct(const CorrectionInput& input);
 
-  /// The mesh corrected as if for the first time: depends on nothing but `input`, bit by bit,
-  /// however often the mesh was corrected on the way. Throws likewise.
+  /// Returns the mesh as from a first correction: it depends only on `input`, bit by bit, and not
+  /// on earlier corrections. Throws under the conditions of LocalMeshOptimizer::optimize().
   [[nodiscard]] MeshCorrection correct_afresh(const CorrectionInput& input);
 
  private:
@@ -61,12 +63,12 @@ class MeshCorrector {
   const KeyframeIndex window_keyframes_;
   MotionScale scale_;
   LocalMeshOptimizer optimizer_;
-  // Of the last optimisation.
+  // State of the last optimisation.
   std::optional<std::uint64_t> map_version_;
   std::vector<SE3> anchors_;  // the trajectory, completed
   LabelledMesh optimized_;
   MeshDeformationReport report_;
-  SE3 T_published_optimized_ = SE3::Identity();  // how its result has been moved since
+  SE3 T_published_optimized_ = SE3::Identity();  // rigid motion of its result since
 };
 
 /// A robot's mesh, corrected to agree with its optimised trajectory.
@@ -74,10 +76,12 @@ struct OptimizedMesh {
   RobotId robot = 0;
   RobotId anchor = 0;            ///< Robot whose odometry frame is `world`.
   LabelledMesh mesh;             ///< In `world`.
-  MeshDeformationReport report;  ///< Of the last optimisation.
-  bool deformed = true;  ///< False: no optimisation was due, the mesh before was moved as a whole.
-  double seconds = 0.0;  ///< Time this took.
-  std::size_t superseded_faces = 0;  ///< Of the map, left out: another visit saw them better.
+  MeshDeformationReport report;  ///< Report of the last optimisation.
+  /// False: no optimisation was due, and the former mesh was moved as a whole.
+  bool deformed = true;
+  double seconds = 0.0;  ///< Duration of the correction.
+  /// Faces of the map that are missing because another visit saw them better.
+  std::size_t superseded_faces = 0;
 };
 
 }  // namespace km

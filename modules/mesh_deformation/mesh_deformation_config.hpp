@@ -26,39 +26,43 @@ struct MeshDeformationConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("node_spacing_m", node_spacing_m, {0.001, 100.0},
-                  "[m] between neighbouring graph nodes: the mesh bends at this scale; time and "
-                  "memory grow with surface / spacing^2");
+                  "[m] distance between neighbouring nodes of the graph, the scale at which the "
+                  "mesh bends; time and memory are proportional to surface / spacing^2");
     visitor.field("interpolation_nodes", interpolation_nodes, {1, 8},
-                  "that move a vertex: the paper's k");
+                  "number of nodes that move a vertex: the paper's k");
     visitor.field("time_window_keyframes", time_window_keyframes, {0, 1000000},
-                  "surface seen further apart belongs to different visits: close in space, it "
-                  "still moves on its own");
-    visitor.field(
-        "duplicate_voxels", duplicate_voxels, {0.0, 8.0},
-        "[voxels] copies from several visits no further from the best one, once all are corrected, "
-        "are dropped from the mesh and for good from the map: memory stays bounded; 0: all stay");
+                  "surface seen further apart in time belongs to different visits; it moves "
+                  "independently even if it is close in space");
+    visitor.field("duplicate_voxels", duplicate_voxels, {0.0, 8.0},
+                  "[voxels] largest distance of a copy from another visit to the best one, after "
+                  "correction, at which it is dropped permanently from mesh and map, so that "
+                  "memory is bounded; 0: all copies stay");
     visitor.field("duplicate_faces", duplicate_faces, {0, 100'000'000},
-                  "of a mesh, up to which all copies stay: together they lie nearer to the true "
-                  "surface than the best of them");
+                  "number of faces of a mesh up to which all copies stay; together they are closer "
+                  "to the true surface than the best of them");
     visitor.field("keyframes_per_node", keyframes_per_node, {1, 64},
-                  "that hold a node, of those that saw it");
+                  "largest number of keyframes that hold a node");
     visitor.field("anchor_rotation_rad", anchor_rotation_rad, {1e-9, 10.0},
                   "[rad] standard deviation of keyframes about their optimised poses");
-    visitor.field("anchor_translation_m", anchor_translation_m, {1e-9, 100.0}, "[m] the same");
+    visitor.field("anchor_translation_m", anchor_translation_m, {1e-9, 100.0},
+                  "[m] standard deviation of keyframes about their optimised poses");
     visitor.field("mesh_edge_m", mesh_edge_m, {1e-9, 100.0},
                   "[m] standard deviation of the distance vector between neighbouring nodes");
     visitor.field("keyframe_tie_m", keyframe_tie_m, {1e-9, 100.0},
-                  "[m] standard deviation of a node as seen from a keyframe");
-    visitor.field("max_iterations", max_iterations, {1, 1000}, "of one solution");
+                  "[m] standard deviation of a node relative to a keyframe that saw it");
+    visitor.field("max_iterations", max_iterations, {1, 1000},
+                  "largest number of iterations of one solution");
     visitor.field("energy_tolerance", energy_tolerance, {1e-15, 0.1},
-                  "share of the energy: a smaller step is the last; at 1e-7 vertices are within a "
-                  "millimetre of the minimum");
+                  "share of the energy; the solver stops after a step that changes less. At 1e-7 "
+                  "vertices are within a millimetre of the minimum");
     visitor.field("min_move_m", min_move_m, {1e-6, 100.0},
-                  "[m] of a keyframe against the others: the mesh is bent anew; of all alike: it "
-                  "moves as a whole");
-    visitor.field("min_rotation_rad", min_rotation_rad, {1e-6, 3.2}, "[rad] likewise");
+                  "[m] motion of a keyframe relative to the others after which the mesh is "
+                  "deformed again; after such a motion common to all, it is moved as a whole");
+    visitor.field("min_rotation_rad", min_rotation_rad, {1e-6, 3.2},
+                  "[rad] rotation of a keyframe relative to the others after which the mesh is "
+                  "deformed again; after such a rotation common to all, it is moved as a whole");
     visitor.field("period_s", period_s, {0.01, 86400.0},
-                  "[s] rest between two corrections: bounds the time they take from the robot");
+                  "[s] pause between two corrections, which bounds their share of processor time");
   }
 };
 

@@ -14,13 +14,13 @@
 namespace km {
 namespace {
 
-// Longer than any correction takes to be through: publishers must not wait for it.
+// Larger than the number of messages during any correction, so that publishers do not wait.
 constexpr std::size_t kQueue = 8192;
 
-// A correction starts at most this share of the period later than it might.
+// Largest delay of a correction, as a share of the period.
 constexpr double kTickShare = 0.125;
 
-// The keyframes that the vertices of a map refer to are these many.
+// Number of keyframes to which the vertices of a map refer.
 std::size_t keyframes_of(const MapMesh& map) {
   KeyframeIndex last = 0;
   for (const auto& seen : map.seen_by) last = std::max(last, seen[1]);
@@ -105,7 +105,7 @@ void MeshDeformationNode::take(Topic<MapMesh>::Message map) {
   ++map_version_;
 }
 
-// A map may overtake the keyframes it was made with; a trajectory may be yet to come.
+// A map may arrive before its keyframes, and the trajectory may be missing.
 bool MeshDeformationNode::can_correct() const {
   return map_ != nullptr && trajectory_ != nullptr && !trajectory_->T_world_kf.empty() &&
          !T_odom_kf_.empty() && keyframes_of_map_ <= T_odom_kf_.size();

@@ -21,16 +21,16 @@ namespace km {
 
 /// Channels of the mesh deformation node; they must outlive it.
 struct MeshDeformationTopics {
-  In<MapMesh> maps;                ///< The newest counts.
-  In<KeyframeOdometry> keyframes;  ///< Own ones, ascending.
-  In<Trajectory> trajectory;       ///< Own, the newest counts.
+  In<MapMesh> maps;                ///< Only the newest map counts.
+  In<KeyframeOdometry> keyframes;  ///< Own keyframes, ascending.
+  In<Trajectory> trajectory;       ///< Own trajectory; only the newest counts.
   Out<OptimizedMesh> optimized;
-  Out<SupersededSurface> superseded;  ///< Of the maps, for the mapper.
+  Out<SupersededSurface> superseded;  ///< Superseded surface of the maps, for the mapper.
 };
 
-/// Corrects the robot's mesh when its map or its trajectory changed: a MeshCorrector on its thread.
-/// A correction never starts earlier than mesh_deformation.period_s after the last one ended. What
-/// comes meanwhile is only kept: this node delays nobody.
+/// Corrects the robot's mesh when its map or its trajectory has changed: a MeshCorrector on its
+/// thread. A correction starts at least mesh_deformation.period_s after the end of the last one.
+/// Messages that arrive meanwhile are only stored, so that this node delays no other node.
 class MeshDeformationNode final : public Node {
  public:
   /// Throws ConfigError if `config` is out of bounds.
@@ -40,30 +40,30 @@ class MeshDeformationNode final : public Node {
 
   std::string_view name() const override { return MeshDeformationConfig::kSection; }
   void start() override;
-  void stop() noexcept override;  ///< After finish().
+  void stop() noexcept override;  ///< Call after finish().
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// A correction takes the longer the larger the mesh is.
+  /// The time of a correction is proportional to the mesh.
   double step_limit_s() const override { return 120.0; }
 
-  /// Of the corrections.
+  /// Durations of the corrections.
   DurationHistogram timing() const override { return timing_.histogram(); }
 
-  /// One last correction, afresh and whatever the time, of what has come so far: the result does
-  /// not depend on the corrections before, nor on when they were. What comes later is ignored.
-  /// Returns at once. Idempotent, thread-safe.
+  /// Requests a last correction, from scratch and without a pause, of all input so far. The result
+  /// does not depend on earlier corrections or their times. Later input is ignored. Returns at
+  /// once. Idempotent, thread-safe.
   void finish();
 
-  /// Time passes, and the end. Always null: as plain structs among pointers they set off a false
-  /// alarm of GCC 12.
+  /// A tick of the clock, and the end. Always null: with plain structs among pointers GCC 12
+  /// reports a false warning.
   using Tick = std::shared_ptr<const struct MeshTickTag>;
   using End = std::shared_ptr<const struct MeshEndTag>;
   using Input = std::variant<Tick, End, Topic<MapMesh>::Message, Topic<KeyframeOdometry>::Message,
                              Topic<Trajectory>::Message>;
 
-  /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
-  /// Throws std::invalid_argument for keyframes that are not consecutive and for what
-  /// LocalMeshOptimizer::optimize() refuses.
+  /// Handles one input synchronously at time `now_s`. The thread calls only this function; tests
+  /// can call it too. Throws std::invalid_argument for keyframes that are not consecutive and for
+  /// input that LocalMeshOptimizer::optimize() refuses.
   void step(const Input& input, double now_s);
 
  private:

@@ -15,7 +15,7 @@ namespace km {
 /// First and last keyframe that saw a piece of surface.
 using SeenBy = std::array<KeyframeIndex, 2>;
 
-/// Keyframes between two times of sight; 0 where they overlap.
+/// Keyframes between two times of sight; 0 if they overlap.
 [[nodiscard]] inline KeyframeIndex keyframe_gap(const SeenBy& a, const SeenBy& b) {
   if (a[0] > b[1]) return a[0] - b[1];
   if (b[0] > a[1]) return b[0] - a[1];
@@ -25,12 +25,14 @@ using SeenBy = std::array<KeyframeIndex, 2>;
 /// Stands for "no node" and "no vertex" in lists of indices.
 inline constexpr std::uint32_t kNoIndex = std::numeric_limits<std::uint32_t>::max();
 
-/// A mesh vertex of the deformation graph: a vertex of the map's mesh that stands for the surface
+/// A mesh vertex of the deformation graph: a vertex of the map's mesh that represents the surface
 /// around it.
 struct MeshNode {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< g_k, where the mapper saw it [m].
+  /// g_k, position according to the mapper [m].
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
   SeenBy seen_by = {0, 0};
-  std::uint32_t vertex = kNoIndex;  ///< In the map's mesh; kNoIndex once that vertex is gone.
+  /// Index in the map's mesh; kNoIndex after that vertex was removed.
+  std::uint32_t vertex = kNoIndex;
 };
 
 /// A cell of a regular grid.
@@ -54,16 +56,16 @@ struct GridCellHash {
           static_cast<std::int64_t>(cell.z())};
 }
 
-/// Nodes by position, for questions within one radius while nodes are added.
+/// Nodes by position, for searches within one radius while nodes are added.
 class NodeGrid {
  public:
-  /// Nodes seen further apart in time than the window are not near.
+  /// Nodes whose times of sight differ by more than the window are not near.
   NodeGrid(double radius_m, KeyframeIndex window_keyframes)
       : radius_m_(radius_m), window_keyframes_(window_keyframes) {}
 
   void insert(const MeshNode& node, std::uint32_t index);
 
-  /// The nearest node within the radius and the window of time; of equals the lowest index;
+  /// The nearest node within the radius and the window of time. At equal distance the lowest index;
   /// kNoIndex if there is none.
   [[nodiscard]] std::uint32_t nearest(const Eigen::Vector3d& point, const SeenBy& seen_by) const;
 

@@ -12,11 +12,11 @@
 namespace km {
 namespace {
 
-// Normals that differ by more are another surface's: cosine of 60 degrees.
+// Surfaces whose normals differ by more are different: cosine of 60 degrees.
 constexpr float kMinCosine = 0.5F;
 
-// How far beside a triangle a point still counts as on it, of the distance along the normal: where
-// faces meet at an angle, the normals of none hit the wedge between them.
+// Distance from a triangle at which a point still counts as on it, relative to the distance along
+// the normal. If faces meet at an angle, a wedge between their normals belongs to neither.
 constexpr float kBeside = 0.25F;
 
 float squared_distance_to_segment(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
@@ -49,8 +49,9 @@ class HeirSearch {
         certainty_(sightings.certainty),
         window_(same.window_keyframes),
         distance_(static_cast<float>(same.distance_m)),
-        // Of the centroid of a face from where it counts: no corner is further from the centroid
-        // than two thirds of a median, and that is shorter than the longest edge.
+        // Bound on the distance of a vertex from the centroid of a relevant face. No corner is
+        // further from the centroid than two thirds of a median, which is shorter than the longest
+        // edge.
         reach_(std::hypot(distance_, kBeside * distance_ +
                                          static_cast<float>(same.longest_edge_m) * 2.0F / 3.0F)),
         heirs_(mesh.vertices.size(), kNoIndex),
@@ -64,7 +65,7 @@ class HeirSearch {
     std::iota(order.begin(), order.end(), 0U);
     std::stable_sort(order.begin(), order.end(),
                      [this](auto a, auto b) { return rank_[a] > rank_[b]; });
-    // All faces that can supersede a corner rank above this one: they have been judged.
+    // All faces that can supersede a corner have a higher rank, so they have been judged.
     for (const std::uint32_t f : order) {
       const LabelledMesh::Face& face = mesh_.faces[f];
       for (const std::uint32_t v : face)
@@ -86,7 +87,7 @@ class HeirSearch {
     for (Eigen::Vector3f& normal : normals_) normal.normalize();
   }
 
-  // By certainty, then by time. A face ranks no higher than any of its corners.
+  // By certainty, then by time. The rank of a face is at most that of each of its corners.
   static std::uint64_t rank(std::uint8_t certainty, KeyframeIndex keyframe) {
     return std::uint64_t{certainty} << 32U | keyframe;
   }
@@ -127,7 +128,7 @@ class HeirSearch {
         for (std::int64_t z = low[2]; z <= high[2]; ++z)
           if (const auto cell = cells_.find({x, y, z}); cell != cells_.end())
             for (const std::uint32_t face : cell->second) {
-              if (rank_[face] <= own_rank) break;  // as do those after it
+              if (rank_[face] <= own_rank) break;  // and so have all following faces
               if (keyframe_gap(face_seen_by_[face], seen_by_[v]) <= window_) continue;
               if (const float d = distance_to(face, v); d < nearest) {
                 nearest = d;
@@ -137,7 +138,7 @@ class HeirSearch {
     return nearest_face == kNoIndex ? kNoIndex : nearest_corner(nearest_face, v);
   }
 
-  // Along the normal of the face; infinite if they are not the same surface.
+  // Distance along the normal of the face; infinite if the surfaces are different.
   [[nodiscard]] float distance_to(std::uint32_t face, std::uint32_t v) const {
     constexpr float kNot = std::numeric_limits<float>::infinity();
     const Eigen::Vector3f& normal = face_normals_[face];
@@ -167,10 +168,10 @@ class HeirSearch {
   float reach_;
   std::vector<Eigen::Vector3f> normals_, face_normals_;
   std::vector<SeenBy> face_seen_by_;
-  std::vector<std::uint64_t> rank_;  // of each face
+  std::vector<std::uint64_t> rank_;  // rank of each face
   std::vector<std::uint32_t> heirs_;
   std::vector<char> asked_;
-  // Faces that stay, by falling rank.
+  // Remaining faces, by descending rank.
   std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;
 };
 

@@ -87,7 +87,10 @@ class BitGraph {
       : capacity_(vertices), rows_(vertices, BitSet(vertices)), degrees_(vertices, 0) {}
 
   [[nodiscard]] std::size_t size() const { return rows_.size(); }
-  [[nodiscard]] std::size_t capacity() const { return capacity_; }  ///< Of every set of vertices.
+  [[nodiscard]] std::size_t capacity() const {
+    return capacity_;
+  }  ///< Capacity of every set of
+     ///< vertices.
   [[nodiscard]] const BitSet& neighbours(std::size_t v) const { return rows_[v]; }
   [[nodiscard]] std::size_t degree(std::size_t v) const { return degrees_[v]; }
   [[nodiscard]] bool adjacent(std::size_t u, std::size_t v) const { return rows_[u].contains(v); }

@@ -9,8 +9,8 @@ namespace {
 using Vertices = std::vector<std::size_t>;
 
 // Vertices of the k-core of the subgraph that `candidates` induce: each has at least k neighbours
-// among them. Ordered by repeatedly taking the vertex of least degree away (degeneracy order), the
-// last taken first, so that the densest part comes first.
+// among them. In degeneracy order (the vertex of least degree is removed repeatedly), reversed so
+// that the densest part comes first.
 Vertices core_in_degeneracy_order(const BitGraph& graph, std::span<const std::size_t> candidates,
                                   std::size_t k) {
   BitSet members(graph.capacity());
@@ -141,8 +141,8 @@ class BranchAndBound {
     done_ = best_size_ >= goal_.enough;
   }
 
-  // A clique takes at most one vertex of each colour: only vertices of a colour above `spare` can
-  // lead to a clique larger than the best, and only they enter `order`.
+  // A clique contains at most one vertex of each colour. Only vertices of a colour above `spare`
+  // can lead to a clique larger than the best, so only these enter `order`.
   void colour_candidates(Level& here, std::size_t spare) {
     here.order.clear();
     here.bound.clear();
@@ -166,8 +166,8 @@ class BranchAndBound {
     }
   }
 
-  // Tries to give v one of the first `spare` colours by moving the only vertex there that is in its
-  // way to another of them.
+  // Tries to give v one of the first `spare` colours by recolouring the only conflicting vertex of
+  // that colour with another of them.
   bool recolour(Level& here, std::size_t v, std::size_t spare) {
     for (std::size_t c = 0; c + 1 < spare; ++c) {
       BitSet& colour = here.colours[c];
@@ -187,7 +187,7 @@ class BranchAndBound {
   const BitGraph& graph_;
   const CliqueGoal goal_;
   std::size_t best_size_;
-  std::size_t root_bound_;  // of the cliques with any vertex not yet done at the root
+  std::size_t root_bound_;  // bound of the cliques with any vertex not yet done at the root
   Vertices clique_;
   std::deque<Level> levels_;
   CliqueSearch result_;

@@ -9,11 +9,12 @@
 
 namespace km {
 
-/// What a clique search has to find and how hard it may try.
+/// Goal and limit of a clique search.
 struct CliqueGoal {
   std::size_t more_than = 0;    ///< Smaller cliques, and those of this size, are of no interest.
   std::size_t enough = 0;       ///< Stop at the first clique of this size.
-  std::uint64_t max_nodes = 0;  ///< Of the search tree; a count, so that the result is repeatable.
+  std::uint64_t max_nodes = 0;  ///< Maximum size of the search tree; a count, so that the result is
+                                ///< repeatable.
 };
 
 struct [[nodiscard]] CliqueSearch {
@@ -26,21 +27,22 @@ struct [[nodiscard]] CliqueSearch {
 
 /// Searches the largest clique of `graph` among the vertices `candidates`.
 ///
-/// Where a greedy colouring needs no more colours than `more_than` there is none. Else vertices
-/// with too few neighbours are peeled off (k-core; Pattabiraman et al., "Fast Algorithms for the
-/// Maximum Clique Problem on Massive Graphs", Internet Mathematics 2015). What is left is searched
-/// depth-first on bit sets in degeneracy order, bounded by greedy colouring with recolouring (San
-/// Segundo et al., "An improved bit parallel exact maximum clique algorithm", Optimization Letters
-/// 2013); vertices adjacent to all other candidates are taken without branching. Exact unless the
-/// limit ends it; deterministic. Exponential at worst.
+/// If a greedy colouring needs no more colours than `more_than`, no such clique exists. Otherwise
+/// vertices with too few neighbours are removed (k-core; Pattabiraman et al., "Fast Algorithms for
+/// the Maximum Clique Problem on Massive Graphs", Internet Mathematics 2015). The remaining
+/// vertices are searched depth-first on bit sets in degeneracy order. Greedy colouring with
+/// recolouring bounds the search (San Segundo et al., "An improved bit parallel exact maximum
+/// clique algorithm", Optim. Lett. 2013). Vertices adjacent to all other candidates are taken
+/// without branching. Exact unless the limit ends it; deterministic. Exponential at worst.
 CliqueSearch find_clique(const BitGraph& graph, std::span<const std::size_t> candidates,
                          const CliqueGoal& goal);
 
 // The heuristic of Pattabiraman et al., "Fast Algorithms for the Maximum Clique Problem on Massive
-// Graphs with Applications to Overlapping Community Detection", Internet Mathematics 2015: of the
-// vertices adjacent to all taken so far, take the one of the greatest degree, and never go back.
-// Vertices whose degree is too small for a clique larger than the known one are left out. Equal
-// degrees: the vertex with the lowest number. No guarantee; O(vertices^2 / 64) per start.
+// Graphs with Applications to Overlapping Community Detection", Internet Mathematics 2015:
+// repeatedly take the vertex of greatest degree among those adjacent to all taken so far, without
+// backtracking. Vertices whose degree is too small for a clique larger than the known one are
+// excluded. Equal degrees: the vertex with the lowest number. No guarantee; O(vertices^2 / 64) per
+// start.
 
 /// The clique that this makes of `clique`, which it contains; ascending. Empty unless it has more
 /// than `more_than` vertices. Precondition: `clique` is one and not empty.

@@ -70,7 +70,8 @@ OrientedClosure CycleTest::orient(const Closure& closure) const {
 }
 
 bool CycleTest::consistent(const PreparedClosure& i, const PreparedClosure& k) const {
-  // First-order covariances depend a little on where the cycle begins: begin always alike.
+  // First-order covariances depend a little on the start of the cycle, so it always starts at the
+  // same closure.
   const PairCycle cycle = before(i, k) ? PairCycle(i, k) : PairCycle(k, i);
   if (config_.criterion == CycleCriterion::kMahalanobis)
     return cycle.within_distance(max_distance_squared_);

@@ -35,7 +35,7 @@ bool MaxClique::add(std::span<const std::size_t> neighbours) {
   const std::size_t v = graph_.add_vertex();
   for (const std::size_t u : neighbours) graph_.connect(u, v);
   const std::size_t before = clique_.size();
-  const std::size_t most = std::min(bound_, neighbours.size()) + 1;  // of any clique with v
+  const std::size_t most = std::min(bound_, neighbours.size()) + 1;  // bound of any clique with v
   if (method_ == CliqueMethod::kExact) {
     if (neighbours.size() >= before) search_exactly(v, neighbours, most);
   } else {

@@ -12,16 +12,16 @@ namespace km {
 
 /// Maximum clique of a graph that grows by one vertex at a time.
 ///
-/// A clique larger than the one known must contain the new vertex (Chang et al., "Kimera-Multi",
-/// ICRA 2021, Sec. III-B), so only its neighbours are searched, and only for cliques larger than
-/// the known one; one vertex can add no more than one to the maximum, so that a proven maximum is
-/// searched only until it has gained one. Of equally large cliques the older one is kept.
-/// Deterministic. Not thread-safe. Copyable.
+/// A clique larger than the known one must contain the new vertex (Chang et al., "Kimera-Multi",
+/// ICRA 2021, Sec. III-B). So only its neighbours are searched, and only for cliques larger than
+/// the known one. One vertex increases the maximum by at most one, so the search stops when a
+/// proven maximum has grown by one. The older of equally large cliques is kept. Deterministic. Not
+/// thread-safe. Copyable.
 ///
-/// The exact method first tries what costs next to nothing: the greedy heuristic, from the new
-/// vertex with its neighbours in the known clique and from it alone. The search tree then finds
-/// more, or proves that there is none; where its limit ends it, the better of both stands, and
-/// bound() says how much may be missing.
+/// The exact method first runs the greedy heuristic, which is cheap: from the new vertex with its
+/// neighbours in the known clique, and from the vertex alone. The search tree then finds more, or
+/// proves that there is none. If its limit ends it, the better result counts, and bound() states
+/// how much may be missing.
 class MaxClique {
  public:
   /// `max_search_nodes` bounds the search tree of one add() of the exact method.
@@ -38,7 +38,7 @@ class MaxClique {
   /// The largest clique found, ascending. Valid until the next add().
   [[nodiscard]] std::span<const std::size_t> clique() const { return clique_; }
 
-  /// No clique of the graph is larger than this. Of the heuristic methods: by degrees alone.
+  /// No clique of the graph is larger than this. Heuristic methods compute it from degrees alone.
   [[nodiscard]] std::size_t bound() const { return bound_; }
 
   /// True if clique() is a maximum for certain. False after a search that its limit ended, until a

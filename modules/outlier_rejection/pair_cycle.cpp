@@ -11,7 +11,7 @@ namespace {
 // Added to a closure's variances so that exact cycles can be weighed: 1e-6 rad and 1e-6 m.
 constexpr double kLeastClosureVariance = 1e-12;
 
-// What odometry added between two keyframes of a chain, wherever both are seen from.
+// Covariance that odometry accumulates between two keyframes of a chain, in any common frame.
 BlockCovariance added(const KeyframeId& i, const BlockCovariance& at_i, const KeyframeId& k,
                       const BlockCovariance& at_k) {
   return i.index < k.index ? at_k - at_i : at_i - at_k;

@@ -9,15 +9,16 @@
 
 namespace km {
 
-/// A symmetric 6x6 matrix, tangent [rotation; translation], by the three blocks that say it all:
-/// [rr rt; rt^T tt]. Moving it into another frame costs a third of the same with Matrix6.
+/// A symmetric 6x6 matrix, tangent [rotation; translation], as its three independent blocks: [rr
+/// rt; rt^T tt]. Transforming it into another frame costs a third of the same operation with
+/// Matrix6.
 struct BlockCovariance {
   Eigen::Matrix3d rr = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d rt = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d tt = Eigen::Matrix3d::Zero();
 
   BlockCovariance() = default;
-  /// The lower left block of `Sigma` is taken for the transpose of the upper right one.
+  /// Assumes that the lower left block of `Sigma` is the transpose of the upper right one.
   explicit BlockCovariance(const Matrix6& Sigma)
       : rr(Sigma.topLeftCorner<3, 3>()),
         rt(Sigma.topRightCorner<3, 3>()),
@@ -57,8 +58,8 @@ struct BlockCovariance {
   return moved;
 }
 
-/// A closure turned so that a.id < b.id: the direction it was measured in does not matter to a
-/// cycle. Covariances are scaled to what the test assumes.
+/// A closure oriented so that a.id < b.id, because the direction of its measurement does not matter
+/// to a cycle. Covariances are multiplied by the noise scales of the test.
 struct OrientedClosure {
   ClosureId id;
   OdometryPose a;
@@ -66,25 +67,26 @@ struct OrientedClosure {
   UncertainPose T_a_b;
 };
 
-/// What every cycle through this closure takes from it, computed once.
+/// Quantities of a closure that all cycles through it use, computed once.
 ///
-/// Seen from odom_a, where robot a began, covariances do not depend on the rest of the cycle: that
-/// of the closure is one matrix, and that of the odometry between two keyframes is the difference
-/// of what had accumulated at each.
+/// Expressed in odom_a, where robot a began, covariances do not depend on the rest of the cycle.
+/// That of the closure is one matrix. That of the odometry between two keyframes is the difference
+/// of the covariances accumulated at each.
 struct PreparedClosure {
   explicit PreparedClosure(const OrientedClosure& closure);
 
   ClosureId id;
   KeyframeId a, b;
   Eigen::Vector3d t_odoma_a;
-  SE3 T_odoma_odomb;           ///< Where b's odometry began, as this closure has it.
-  BlockCovariance odometry_a;  ///< Accumulated at a, seen from odom_a.
-  BlockCovariance odometry_b;  ///< Accumulated at b, seen from odom_b.
-  BlockCovariance measured;    ///< Of the closure, at b, seen from odom_a.
+  SE3 T_odoma_odomb;           ///< Start of b's odometry according to this closure.
+  BlockCovariance odometry_a;  ///< Covariance accumulated at a, expressed in odom_a.
+  BlockCovariance odometry_b;  ///< Covariance accumulated at b, expressed in odom_b.
+  BlockCovariance measured;    ///< Covariance of the closure, at b, expressed in odom_a.
 };
 
-/// The cycle through two closures between the same robots: from ai along closure i, the odometry of
-/// b, closure k reversed and the odometry of a; seen from odom_a, where it begins and ends.
+/// The cycle through two closures between the same robots. From ai it follows closure i, the
+/// odometry of b, closure k reversed and the odometry of a. It is expressed in odom_a, where it
+/// begins and ends.
 class PairCycle {
  public:
   /// Borrows both.

@@ -11,7 +11,7 @@
 
 namespace km {
 
-/// What became of a closure given to Pcm.
+/// Result for a closure given to Pcm.
 enum class PcmVerdict {
   kRepeated,         ///< Its pair of keyframes is known; the first measurement is tested.
   kAgainstOdometry,  ///< Refused by the odometry gate.
@@ -31,14 +31,14 @@ void check_usable(const Closure& closure, RobotId a, RobotId b);
 ///
 /// Keeps the largest set of closures that agree pairwise: the maximum clique of the graph whose
 /// vertices are closures and whose edges are pairs consistent by CycleTest (Mangelson et al., ICRA
-/// 2018), updated after every closure (MaxClique). A closure is a pair of keyframes and counts
-/// once, from whichever side and however often it was measured; the first measurement is tested.
-/// Deterministic in the order of add(); of equally large sets the older one is kept. Not
-/// thread-safe. Copyable.
+/// 2018). The set is updated after every closure (MaxClique). A pair of keyframes identifies a
+/// closure and counts once, in either order and however often it was measured; the first
+/// measurement is tested. Deterministic in the order of add(); the older of equally large sets is
+/// kept. Not thread-safe. Copyable.
 class Pcm {
  public:
-  /// Bounds the memory that a flood of closures can take, here and wherever else they are kept:
-  /// about 60 MB of a robot's in all, with what DDS keeps (test/endure floods).
+  /// Bounds the memory for a flood of closures, here and elsewhere: about 60 MB of a robot's memory
+  /// in all, including DDS (test/endure floods).
   static constexpr std::size_t kMaxClosures = 8000;
 
   /// For the closures between robots `a` and `b`; equal: those inside one robot.

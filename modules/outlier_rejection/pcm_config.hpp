@@ -42,47 +42,48 @@ struct PcmConfig {
   void visit_fields(auto& visitor) {
     visitor.field("selection", selection,
                   {{"witness", ClosureSelection::kWitness}, {"pcm", ClosureSelection::kPcm}},
-                  "witness: all of a pair that is joined, the optimiser weighs them; pcm: the "
-                  "largest set that agrees");
-    visitor.field(
-        "min_witnesses", min_witnesses, {1, 1000},
-        "witness: so many closures that agree pairwise and share no neighbourhood join two robots");
+                  "witness: all closures of a pair that is joined, because the optimiser weighs "
+                  "them; pcm: the largest set that agrees pairwise");
+    visitor.field("min_witnesses", min_witnesses, {1, 1000},
+                  "witness: number of closures that agree pairwise, share no neighbourhood and so "
+                  "join robots");
     visitor.field("witness_wait_s", witness_wait_s, {0.0, 1e6},
-                  "[s since the first closure] witness: then a pair is joined nevertheless, and it "
-                  "is logged");
+                  "[s since the first closure] witness: time after which a pair is joined without "
+                  "witnesses, with a log line");
     visitor.field(
         "criterion", criterion,
         {{"mahalanobis", CycleCriterion::kMahalanobis}, {"bounds", CycleCriterion::kBounds}},
-        "of a consistent cycle. mahalanobis: by covariance; bounds: fixed");
+        "test of a cycle. mahalanobis: by covariance; bounds: fixed bounds");
     visitor.field("confidence", confidence, {0.01, 1.0 - 1e-12},
                   "mahalanobis: quantile of chi-squared with 6 degrees of freedom (0.99: 16.8) for "
                   "the squared distance");
     visitor.field("odometry_noise_scale", odometry_noise_scale, {0.01, 1000.0},
-                  "mahalanobis: on odometry's standard deviations; larger where they are known to "
-                  "be too small");
+                  "mahalanobis: factor on odometry's standard deviations; larger if they are known "
+                  "to be too small");
     visitor.field("closure_noise_scale", closure_noise_scale, {0.01, 1000.0},
-                  "the same on closures'");
+                  "mahalanobis: factor on closures' standard deviations");
     visitor.field("max_cycle_translation_m", max_cycle_translation_m, {1e-6, 1000.0},
-                  "[m] bounds: largest of a consistent cycle");
+                  "[m] bounds: largest translation error of a consistent cycle");
     visitor.field("max_cycle_rotation_rad", max_cycle_rotation_rad, {1e-6, std::numbers::pi},
-                  "[rad] the same");
+                  "[rad] bounds: largest rotation error of a consistent cycle");
     visitor.field("bounds_per_transform", bounds_per_transform,
-                  "bounds: times the number of transforms in the cycle");
+                  "bounds: multiply the bounds by the number of transforms in the cycle");
     visitor.field("odometry_gate", odometry_gate,
-                  "closures inside one robot must agree with its odometry alone; wrong where "
-                  "odometry jumps: such a closure is the correction");
+                  "closures inside one robot must agree with its odometry alone; wrong if odometry "
+                  "jumps, because such a closure is the correction");
     visitor.field("min_inliers", min_inliers, {1, 1000},
                   "pcm: smaller sets are not trusted and not published");
-    visitor.field("search", search,
-                  {{"exact", CliqueMethod::kExact},
-                   {"incremental", CliqueMethod::kIncremental},
-                   {"batch", CliqueMethod::kBatch}},
-                  "of the largest set: exact, or one of the papers' heuristics, for comparison");
+    visitor.field(
+        "search", search,
+        {{"exact", CliqueMethod::kExact},
+         {"incremental", CliqueMethod::kIncremental},
+         {"batch", CliqueMethod::kBatch}},
+        "method for the largest set: exact, or a heuristic of the papers, for comparison");
     visitor.field("max_search_nodes", max_search_nodes, {1, 1000000000},
-                  "exact: bound on the search after one closure; beyond it the better of what it "
-                  "and the heuristic found is kept");
+                  "exact: bound on the search after one closure; beyond it the better result of "
+                  "search and heuristic is kept");
     visitor.field("publish_period_s", publish_period_s, {0.01, 60.0},
-                  "[s] sets that changed are published together this often");
+                  "[s] changed sets are published together this often");
   }
 };
 

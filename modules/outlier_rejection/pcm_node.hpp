@@ -24,18 +24,18 @@ namespace km {
 /// Channels of the PCM node; they must outlive it.
 struct PcmTopics {
   In<Closure> closures;        ///< Own and received ones, in any order, repeated or not.
-  In<PeerEvent> restarts;      ///< kRestarted, before the first closure of that life.
+  In<PeerEvent> restarts;      ///< kRestarted, before the first closure of the new incarnation.
   Out<InlierSet> inlier_sets;  ///< Versions ascending per pair.
 };
 
 /// Decides which closures are optimised, for every pair in which this robot has the lower id and
-/// for the closures inside it. Closures of other pairs are left to their deciders, unusable ones
-/// refused with a warning.
+/// for the closures inside it. Closures of other pairs are left to their deciders; unusable ones
+/// are refused with a warning.
 ///
-/// Which they are is told by PcmConfig::selection. By default all, since the optimiser weighs them;
-/// but two robots are joined only once independent closures agree (WitnessedPair), or when
-/// PcmConfig::witness_wait_s is over or no witness can come any more, which is logged. Closures
-/// inside the robot join nothing and are published at once.
+/// PcmConfig::selection states the rule. By default all closures are optimised, because the
+/// optimiser weighs them. Two robots are joined only when independent closures agree
+/// (WitnessedPair), when PcmConfig::witness_wait_s is over, or when no witness can arrive any more.
+/// The latter two are logged. Closures inside the robot join nothing and are published at once.
 class PcmNode final : public Node {
  public:
   /// The versions of its sets follow `first_version`: those of a robot that is resumed must be
@@ -46,7 +46,7 @@ class PcmNode final : public Node {
 
   std::string_view name() const override { return PcmConfig::kSection; }
   void start() override;
-  /// Publishes what is left to publish.
+  /// Publishes the remaining changes.
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
@@ -61,15 +61,15 @@ class PcmNode final : public Node {
   /// wait of a pair begins with the first call after its first closure. `now_s`: any origin.
   void publish_changes(double now_s);
 
-  /// The runs of all robots are over, and all that was found has arrived: whoever waits for a
-  /// witness waits for nothing, until a robot restarts. Safe to call from any thread, repeatedly.
+  /// The runs of all robots are over, and all their closures have arrived. So no pair waits for a
+  /// witness any more, until a robot restarts. Safe to call from any thread, repeatedly.
   void expect_no_more() { no_more_ = true; }
 
  private:
   struct Tick {};
   using Input = std::variant<Tick, Topic<Closure>::Message, Topic<PeerEvent>::Message>;
 
-  // Of this robot and another one, or inside this one.
+  // Closures between this robot and another one, or inside this one.
   struct Pair {
     std::variant<WitnessedPair, Pcm> closures;
     std::optional<double> since_s = {};  // waiting for a witness

@@ -8,13 +8,13 @@
 
 namespace km {
 
-/// Where false closures are drawn from.
+/// Distribution of false closures.
 struct RandomOutlierModel {
   RobotId robot = 0;
-  std::size_t keyframes = 0;  ///< Of the robot; both ends are among them.
+  std::size_t keyframes = 0;  ///< Number of keyframes of the robot, which contain both ends.
   bool planar = false;        ///< In the plane: no motion along z, no roll and pitch.
   double half_side_m = 20.0;  ///< Translations are uniform in a cube (square) of twice this side.
-  Matrix6 covariance = Matrix6::Identity();  ///< What an outlier claims.
+  Matrix6 covariance = Matrix6::Identity();  ///< Covariance that an outlier states.
 };
 
 /// `count` closures between uniform pairs of non-consecutive keyframes with uniform rotation: what

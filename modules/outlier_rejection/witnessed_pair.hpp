@@ -8,11 +8,11 @@
 
 namespace km {
 
-/// The closures of one robot pair, and whether independent ones bear each other out.
+/// The closures of one robot pair, and whether independent ones confirm each other.
 ///
-/// Places that look alike make several closures that agree with each other, all of them false:
-/// closures whose ends on both robots lie within kNeighbourhood keyframes of each other count as
-/// one witness. Witnesses are the closures of a largest set that agree pairwise (CycleTest) and of
+/// Places that look alike yield several false closures that agree with each other. So closures
+/// whose ends on both robots lie within kNeighbourhood keyframes of each other count as one
+/// witness. Witnesses are the closures of a largest set that agree pairwise (CycleTest) and of
 /// which no two share a neighbourhood. Not thread-safe. Copyable.
 class WitnessedPair {
  public:
@@ -31,9 +31,9 @@ class WitnessedPair {
 
   /// All that were added, ascending.
   [[nodiscard]] std::vector<ClosureId> closures() const { return {added_.begin(), added_.end()}; }
-  /// Independent closures that agree: at least so many, at most PcmConfig::min_witnesses.
+  /// Number of independent closures that agree: a lower bound, at most PcmConfig::min_witnesses.
   [[nodiscard]] std::size_t witnesses() const { return clique_.clique().size(); }
-  /// There are PcmConfig::min_witnesses.
+  /// True if there are PcmConfig::min_witnesses.
   [[nodiscard]] bool is_witnessed() const;
 
  private:
@@ -45,7 +45,7 @@ class WitnessedPair {
   std::set<ClosureId> known_;  // the refused ones too
   std::set<ClosureId> added_;
   std::vector<PreparedClosure> tested_;
-  MaxClique clique_;  // of `tested_`; those that share a neighbourhood are not connected
+  MaxClique clique_;  // clique of `tested_`; closures that share a neighbourhood are not connected
 };
 
 /// True if both ends of `x` are within WitnessedPair::kNeighbourhood keyframes of those of `y`.

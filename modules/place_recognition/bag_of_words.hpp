@@ -29,8 +29,8 @@ struct KeyframeBow {
   BagOfWords words;
 };
 
-/// Sparse TF-IDF vector of one image, of L1 norm 1 (or empty, if no word of the image says
-/// anything). words[i] has weight weights[i] > 0; words are strictly ascending.
+/// Sparse TF-IDF vector of one image with L1 norm 1. It is empty if no word of the image has a
+/// weight. words[i] has weight weights[i] > 0; words are strictly ascending.
 struct BowVector {
   std::vector<std::uint32_t> words;
   std::vector<float> weights;

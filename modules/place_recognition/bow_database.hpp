@@ -17,7 +17,7 @@ struct BowMatch {
   bool operator==(const BowMatch&) const = default;
 };
 
-/// What a query asks for.
+/// Range and bounds of a query.
 struct BowQuery {
   std::size_t first = 0;  ///< Only images first, ..., last - 1 are compared.
   std::size_t last = std::numeric_limits<std::size_t>::max();
@@ -25,15 +25,15 @@ struct BowQuery {
   std::size_t max_matches = std::numeric_limits<std::size_t>::max();
 };
 
-/// What came of it.
+/// Result of a query.
 struct BowMatches {
   std::vector<BowMatch> best;  ///< By descending score, then ascending index.
   std::size_t compared = 0;    ///< Images that share a word with the query.
-  std::size_t above = 0;       ///< Of these, images of at least min_score.
-  float best_score = 0.0F;     ///< Of all compared.
+  std::size_t above = 0;       ///< Number of compared images with at least min_score.
+  float best_score = 0.0F;     ///< Best score of all compared images.
 };
 
-/// Images by the words they contain (inverted index), searched for the ones most alike.
+/// Inverted index of images by their words, for finding the most similar images.
 ///
 /// score(), see bag_of_words.hpp, needs only the words two images share: a query walks the postings
 /// of its own words and adds up min(v_i, w_i) per image. Time is that of the postings touched, and

@@ -14,32 +14,34 @@ namespace km {
 struct PlaceCandidate {
   std::size_t index = 0;    ///< In order of add().
   double similarity = 0.0;  ///< Normalised, see CandidateFilter.
-  int support = 1;          ///< Of the candidates, those within 3 keyframes of this one.
+  int support = 1;          ///< Number of candidates within 3 keyframes of this one, including
+                            ///< itself.
 };
 
 enum class SearchStatus {
   kSearched,
-  kNoPrevious,     ///< The query has no keyframe before it to be normalised by.
-  kLowNormalizer,  ///< It resembles the keyframe before it too little.
+  kNoPrevious,     ///< The query has no predecessor by which to normalise.
+  kLowNormalizer,  ///< The query is too dissimilar to its predecessor.
 };
 
-/// What came of one query.
+/// Result of one query.
 struct CandidateSearch {
   SearchStatus status = SearchStatus::kSearched;
   double normalizer = 0.0;                 ///< s(query, keyframe before it).
   std::size_t compared = 0;                ///< Keyframes that share a word with the query.
-  std::size_t above = 0;                   ///< Of these, at or above the threshold.
-  double best_similarity = 0.0;            ///< Of all compared.
-  std::vector<PlaceCandidate> candidates;  ///< By descending similarity; a part of those `above`.
+  std::size_t above = 0;                   ///< Compared keyframes at or above the threshold.
+  double best_similarity = 0.0;            ///< Best similarity of all compared keyframes.
+  std::vector<PlaceCandidate> candidates;  ///< By descending similarity; a part of those counted in
+                                           ///< `above`.
 };
 
-/// The keyframes of one robot, in order of time, searched for places seen before.
+/// The keyframes of one robot, in order of time, in which earlier visits of a place are searched.
 ///
-/// The score of two images depends on how much texture they have; divided by the score of the query
-/// against the keyframe before it, eta = s(v_t, v_j) / s(v_t, v_(t-1)), one threshold serves all
-/// places (Galvez-Lopez and Tardos, TRO 2012; threshold 0.5 in Chang et al., "Kimera-Multi", Sec.
-/// III-A). Unlike there, candidates need no temporal consistency: geometric verification and
-/// outlier rejection follow. Const members are thread-safe.
+/// The score of two images depends on their amount of texture. It is therefore divided by the score
+/// of the query and the keyframe before it: eta = s(v_t, v_j) / s(v_t, v_(t-1)). So one threshold
+/// suits all places (Galvez-Lopez and Tardos, TRO 2012; threshold 0.5 in Chang et al.,
+/// "Kimera-Multi", Sec. III-A). Unlike there, candidates need no temporal consistency, because
+/// geometric verification and outlier rejection follow. Const members are thread-safe.
 class CandidateFilter {
  public:
   /// For vectors of a vocabulary of `words` words. Throws ConfigError if `config` is out of bounds.
@@ -74,15 +76,15 @@ class CandidateFilter {
   BowVector last_;
 };
 
-/// What the place recognition node did with a keyframe.
+/// Result of the place recognition node for one keyframe.
 enum class PlaceQueryStatus {
   kSearched,         ///< See `search`, which may have refused it as well.
-  kOtherVocabulary,  ///< The peer uses another vocabulary: nothing of it can be compared.
-  kUnknownWords,     ///< Words beyond the vocabulary, although it claims to be ours.
+  kOtherVocabulary,  ///< The peer uses another vocabulary, so its keyframes cannot be compared.
+  kUnknownWords,     ///< Words beyond the vocabulary, although the peer states the same vocabulary.
   kRepeated,         ///< This keyframe has arrived before.
 };
 
-/// A keyframe that was searched for, or why it was not: for counting and reports.
+/// A searched keyframe, or the reason why it was not searched, for statistics.
 struct PlaceQuery {
   KeyframeId query;
   PlaceQueryStatus status = PlaceQueryStatus::kSearched;

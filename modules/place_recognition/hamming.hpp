@@ -31,8 +31,8 @@ struct NearestBits {
   std::uint32_t distance = 0;
 };
 
-/// Precondition: `count` > 0. Without branches on the data: the distances of quantisation are too
-/// alike for an early exit to be predicted.
+/// Precondition: `count` > 0. No branch depends on the data, because the distances in quantisation
+/// are too similar for an early exit to be predicted.
 [[gnu::always_inline]] inline NearestBits nearest(const Bits256& query, const Bits256* candidates,
                                                   std::uint32_t count) {
   std::uint32_t best = ~0U;  // distance in the upper, index in the lower half
@@ -48,8 +48,8 @@ struct NearestBits {
 [[nodiscard]] std::vector<NearestBits> nearest_of_each(std::span<const Bits256> queries,
                                                        std::span<const Bits256> candidates);
 
-/// True if this processor counts bits in one instruction. Kernels that are worth it come twice,
-/// once compiled for such processors; always_inline functions above adapt to their caller.
+/// True if this processor counts bits in one instruction. Important kernels exist twice, once
+/// compiled for such processors; the always_inline functions above adapt to their caller.
 [[nodiscard]] bool has_popcount();
 
 }  // namespace km

@@ -47,8 +47,8 @@ class BitWriter {
   unsigned free_ = 0;  // bits of the last byte
 };
 
-/// The way back, for bytes that nobody vouches for: nullopt where they end too early, or where a
-/// number is longer than what the writer takes.
+/// Reads untrusted bytes of a BitWriter. nullopt if they end too early, or if a number is longer
+/// than the writer accepts.
 class BitReader {
  public:
   explicit BitReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

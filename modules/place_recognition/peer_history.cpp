@@ -56,7 +56,7 @@ void PeerHistory::forget_if_done(Keyframes::iterator keyframe) {
   kept_.erase(keyframe->first);
 }
 
-// What waits is kept: of that there is not more than may wait.
+// Waiting keyframes are kept; their number is bounded.
 void PeerHistory::forget_oldest_gaps() {
   for (auto oldest = kept_.begin();
        kept_.size() > kMaxGaps + deadlines_.size() && oldest != kept_.end();) {

@@ -18,22 +18,21 @@ struct PeerQuery {
   std::shared_ptr<const BowVector> previous;  ///< Its normaliser; null if there is none.
 };
 
-/// The keyframes of one peer, put into a form in which they can be searched for.
+/// The keyframes of one peer in a form for searching.
 ///
 /// A query is normalised by the keyframe before it, but messages arrive in any order, and a peer
 /// that was out of reach delivers its history in a burst. A keyframe whose predecessor is missing
-/// waits for it while `max_waiting` further keyframes arrive; then the nearest earlier keyframe
-/// stands in. Keyframe 0, one before which nothing has arrived by then, and one in a gap that is
-/// forgotten have no normaliser.
-/// What stays in memory are vectors that may still be needed: one per gap, of the kMaxGaps newest
-/// gaps, and the newest.
+/// waits for it until `max_waiting` further keyframes have arrived. Then the nearest earlier
+/// keyframe replaces the predecessor. Some keyframes have no normaliser: keyframe 0, one without
+/// any earlier keyframe by then, and one in a gap that has been removed. Memory holds the vectors
+/// that may still be needed: one for each of the kMaxGaps newest gaps, and the newest.
 class PeerHistory {
  public:
   static constexpr std::size_t kMaxGaps = 1000;
 
   explicit PeerHistory(std::size_t max_waiting) : max_waiting_(max_waiting) {}
 
-  /// Takes keyframe `index`. Returns the queries that became possible, by ascending index. Each
+  /// Adds keyframe `index`. Returns the queries that became possible, by ascending index. Each
   /// keyframe is returned once; a repeated one is ignored, see has().
   std::vector<PeerQuery> add(std::uint32_t index, BowVector vector);
 
@@ -53,8 +52,9 @@ class PeerHistory {
 
   std::size_t max_waiting_;
   Keyframes keyframes_;                             // null once it and its successor are released
-  std::set<std::uint32_t> kept_;                    // of keyframes_, those that are not null
-  std::map<std::uint32_t, std::size_t> deadlines_;  // of waiting keyframes, in keyframes_.size()
+  std::set<std::uint32_t> kept_;                    // entries of keyframes_ that are not null
+  std::map<std::uint32_t, std::size_t> deadlines_;  // deadlines of waiting keyframes, in
+                                                    // keyframes_.size()
 };
 
 }  // namespace km

@@ -17,19 +17,19 @@ struct PlaceRecognitionConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("similarity_threshold", similarity_threshold, {0.0, 10.0},
-                  "of a candidate: its score over the query's score against the keyframe before "
-                  "it; lower: more candidates, more work for verification");
+                  "least similarity of a candidate: its score over the query's score against the "
+                  "keyframe before it; lower: more candidates, more work for verification");
     visitor.field("min_normalizer", min_normalizer, {0.0, 1.0},
-                  "a query that resembles the keyframe before it less is not used: the ratio would "
-                  "say nothing (fast rotation, darkness)");
-    visitor.field("max_candidates", max_candidates, {1, 1000}, "per query, the best ones");
+                  "a query with a lower score against the keyframe before it is not used, because "
+                  "the ratio would mean nothing (fast rotation, darkness)");
+    visitor.field("max_candidates", max_candidates, {1, 1000}, "number of best ones per query");
     visitor.field("min_gap_s", min_gap_s, {0.0, 1e6},
                   "[s] keyframes of one robot closer in time are neighbours, not closures");
     visitor.field("candidate_separation_s", candidate_separation_s, {0.0, 1e6},
-                  "[s] between candidates of a query, the best of each place; 0: any");
+                  "[s] least time between candidates of a query, the best of each place; 0: any");
     visitor.field("max_waiting_keyframes", max_waiting_keyframes, {0, 10000},
-                  "of a peer, until their predecessor comes; then its nearest earlier keyframe "
-                  "takes the predecessor's part");
+                  "maximum number of keyframes of a peer that wait for their predecessor; beyond "
+                  "it the nearest earlier keyframe replaces the predecessor");
   }
 };
 

@@ -11,7 +11,7 @@ namespace {
 // A peer's history arrives in a burst; an hour of keyframes at 4 Hz fits.
 constexpr std::size_t kQueueCapacity = 16384;
 
-// A step between keyframes that is known worse leads anywhere, back to where they were, too.
+// A step of odometry with a greater standard deviation may end anywhere, also at its start.
 constexpr double kLostWay_m = 0.5;
 
 bool loses_way(const UncertainPose& before, const UncertainPose& now) {
@@ -41,7 +41,8 @@ void PlaceRecognitionNode::handle(const Input& input) {
   step(*std::get<Topic<Keyframe>::Message>(input));
 }
 
-// The event itself is handed on: what the robot sends waits while somebody holds it.
+// Publishes the event itself, because messages of the robot wait until all copies of the event are
+// released.
 void PlaceRecognitionNode::step(const Topic<PeerEvent>::Message& event) {
   if (event->kind != PeerEventKind::kRestarted) return;
   peers_.erase(event->identity.robot);

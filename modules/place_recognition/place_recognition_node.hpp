@@ -25,26 +25,27 @@ namespace km {
 /// Channels of the place recognition node; they must outlive it.
 struct PlaceRecognitionTopics {
   In<Keyframe> keyframes;     ///< Own, ascending.
-  In<KeyframeBow> peer_bows;  ///< Of peers; own ones that come back are ignored.
-  In<PeerEvent> peer_events;  ///< Whose keyframes are others from now on.
+  In<KeyframeBow> peer_bows;  ///< Bags of peers; own ones that return are ignored.
+  In<PeerEvent> peer_events;  ///< Restarts after which keyframe indices of a peer mean other
+                              ///< keyframes.
   Out<KeyframeBow> own_bows;  ///< Every own keyframe, for the peers.
   Out<LoopCandidate> candidates;
   Out<PeerEvent> restarts;  ///< kRestarted, after the last candidate with a keyframe from before.
-  Out<PlaceQuery> queries;  ///< One per keyframe heard of.
+  Out<PlaceQuery> queries;  ///< One per received keyframe.
 };
 
-/// Finds places seen before: own keyframes among earlier own ones, and keyframes of peers, as they
-/// arrive, among own ones (Chang et al., "Kimera-Multi", Sec. III-A).
+/// Finds places that were seen before. It searches own keyframes among earlier own ones, and
+/// keyframes of peers, as they arrive, among own ones (Chang et al., "Kimera-Multi", Sec. III-A).
 ///
-/// A pair of keyframes (a_i, b_j) of two robots is never missed while messages get through in both
-/// directions: either a knew a_i when b_j arrived, and finds the pair; or it did not, then a_i was
-/// published after b_j and b, which knows b_j, finds it. Both find it if the two messages crossed:
-/// with keyframes of the same instant, and with all of the past when robots meet again. Whoever
-/// takes the candidates must expect a pair from either side. Keyframe 0 of a robot has no
-/// normaliser and is found only as the one that is known already.
+/// A pair of keyframes (a_i, b_j) of two robots is never missed while messages arrive in both
+/// directions. If a knew a_i when b_j arrived, a finds the pair. Otherwise a_i was published after
+/// b_j, and b, which knows b_j, finds it. Both find it if the two messages crossed: keyframes of
+/// the same instant, and all earlier ones when robots meet again. So receivers of candidates must
+/// accept a pair from either side. Keyframe 0 of a robot has no normaliser and is found only as the
+/// earlier keyframe.
 ///
-/// A keyframe index stands for one keyframe for as long as its robot lives; one that restarts
-/// begins anew.
+/// A keyframe index means one keyframe during an incarnation of its robot. After a restart its
+/// history begins again.
 class PlaceRecognitionNode final : public Node {
  public:
   /// Throws ConfigError if `config` is out of bounds.
@@ -79,7 +80,7 @@ class PlaceRecognitionNode final : public Node {
   const PlaceRecognitionTopics topics_;
   CandidateFilter own_;
   std::optional<UncertainPose> chain_;  // up to the keyframe before
-  std::vector<KeyframeId> own_ids_;  // by index in own_
+  std::vector<KeyframeId> own_ids_;     // by index in own_
   std::map<RobotId, PeerHistory> peers_;
   Worker<Input> worker_;  // last member: stops first
 };

@@ -75,8 +75,8 @@ std::string problem_of_tree(const VocabularyData& data) {
   return {};
 }
 
-// So many descriptors descend together: while one waits for the memory of its next node, the others
-// compute.
+// Number of descriptors that descend together: while one waits for the memory of its next node, the
+// others compute.
 constexpr std::size_t kBatch = 32;
 
 void sort_words(std::vector<std::uint32_t>& words, std::size_t vocabulary_size) {

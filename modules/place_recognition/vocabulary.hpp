@@ -81,7 +81,7 @@ class Vocabulary {
   };
   struct Descent;
   std::vector<Node> nodes_;
-  std::vector<Bits256> centers_;  // of nodes_, for the descent
+  std::vector<Bits256> centers_;  // centres of nodes_, for the descent
 };
 
 }  // namespace km

@@ -24,9 +24,9 @@ namespace km {
 /// The bytes of the file of `data`.
 [[nodiscard]] std::string serialize(const VocabularyData& data);
 
-/// Reads what serialize() wrote. `name` appears in messages. Throws std::runtime_error that says
-/// what is wrong at which offset: truncated or overlong, other format or version, sizes that do not
-/// fit the file, checksum, or a tree that is none. Allocates no more than `bytes` warrants.
+/// Reads the result of serialize(). `name` appears in messages. Throws std::runtime_error that
+/// states the error and its offset: truncated or overlong, other format or version, sizes that do
+/// not fit the file, wrong checksum, or an invalid tree. Allocates no more than `bytes` warrants.
 [[nodiscard]] VocabularyData deserialize(const std::string& bytes, const std::string& name);
 
 /// Throw std::runtime_error with the path if the file cannot be read, written or understood.

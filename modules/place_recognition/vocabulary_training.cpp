@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-constexpr int kMaxRounds = 20;  // of Lloyd's iteration; few nodes need more than ten
+constexpr int kMaxRounds = 20;  // rounds of Lloyd's iteration; few nodes need more than ten
 
 // Byte b of entry v is bit b of v: eight counters of one byte in a machine word.
 constexpr std::array<std::uint64_t, 256> kSpread = [] {
@@ -58,8 +58,8 @@ class BitCounter {
   int pending_ = 0;
 };
 
-// Up to k different centres: each further one drawn with a probability proportional to its
-// distance from those before. Fewer where there are fewer different descriptors.
+// Up to k different centres. Each further one is drawn with a probability proportional to its
+// distance from the former ones. Returns fewer if there are fewer different descriptors.
 std::vector<Bits256> spread_centers(std::span<const Bits256> points, int k, std::mt19937& rng) {
   std::uniform_int_distribution<std::size_t> uniform(0, points.size() - 1);
   std::vector<Bits256> centers{points[uniform(rng)]};

@@ -21,7 +21,7 @@ struct VocabularyTrainingConfig {
   /// L: levels below the root; at most k^L words.
   int depth = 5;
 
-  /// Of the random choice of the first cluster centres.
+  /// Seed of the random choice of the first cluster centres.
   std::uint32_t seed = 1;
 
   void visit_fields(auto& visitor) {
@@ -33,12 +33,12 @@ struct VocabularyTrainingConfig {
 
 /// Trains a vocabulary: descriptors[i] holds the descriptors of image i.
 ///
-/// Every node's descriptors are split into at most k clusters by k-medians: centres start by
+/// Every node's descriptors are split into at most k clusters by k-medians. Centres start by
 /// k-means++ (Arthur and Vassilvitskii, SODA 2007; the squared Euclidean distance of binary vectors
-/// is their Hamming distance), a centre is the bitwise majority of its cluster (ties: 0), and
-/// Lloyd's iteration ends when no descriptor changes its cluster or after 20 rounds. Nodes with at
-/// most k different descriptors get one leaf each. idf_i = ln(N / n_i), N images, n_i of them with
-/// word i (Nister and Stewenius, CVPR 2006).
+/// is their Hamming distance). A centre is the bitwise majority of its cluster (ties: 0). Lloyd's
+/// iteration ends when no descriptor changes its cluster or after 20 rounds. Nodes with at most k
+/// different descriptors get one leaf each. idf_i = ln(N / n_i), N images, n_i of them with word i
+/// (Nister and Stewenius, CVPR 2006).
 ///
 /// The same input and seed give the same result on every run. `progress`, if given, is called
 /// after each level of the tree with the number of levels done.

@@ -15,8 +15,8 @@ namespace km {
 struct BagChannel {
   std::string topic;                ///< "/camera/left/image_raw".
   std::string type;                 ///< "sensor_msgs/Image", "sensor_msgs/msg/Image".
-  std::string encoding;             ///< "ros1", "cdr", or what else the recording says.
-  std::uint64_t message_count = 0;  ///< As the index says, or as found where there is none.
+  std::string encoding;             ///< "ros1", "cdr", or another name in the recording.
+  std::uint64_t message_count = 0;  ///< From the index, or counted if there is none.
 };
 
 struct BagMessage {
@@ -25,23 +25,26 @@ struct BagMessage {
   std::vector<std::uint8_t> bytes;
 };
 
-/// What can be wrong with a piece of a recording without making the rest useless. What is concerned
-/// is skipped, but after kChecksum outside of chunks, where which bytes are wrong is not known.
+/// Faults in a part of a recording that leave the rest usable. The reader skips that part. After
+/// kChecksum outside of chunks it skips nothing, because the position of the wrong bytes is
+/// unknown.
 enum class BagFault {
   kTruncated,       ///< The file ends within a record, or without an end.
-  kIndex,           ///< An index that does not fit the file: the file is read from its beginning.
-  kMalformed,       ///< A record that cannot be right.
-  kChecksum,        ///< Bytes that are not those that were written.
-  kCompression,     ///< Of an unknown kind, or that cannot be undone.
-  kUnknownChannel,  ///< A message whose channel is described nowhere before it.
-  kUnordered,       ///< A message earlier than its chunk says: later ones were given already.
-  kLost,            ///< A live message that came faster than it was taken, or only in part.
+  kIndex,           ///< The index does not fit the file: the file is read from its beginning.
+  kMalformed,       ///< An invalid record.
+  kChecksum,        ///< The bytes differ from those that were written.
+  kCompression,     ///< An unknown compression, or corrupted compressed data.
+  kUnknownChannel,  ///< A message whose channel is not described before it.
+  kUnordered,       ///< A message earlier than its chunk states: later messages have already been
+                    ///< returned.
+  kLost,            ///< A live message that was dropped because the reader was slow, or of which a
+                    ///< part was lost.
 };
 
 /// A short plural for tables and log lines: "malformed records".
 [[nodiscard]] const char* to_string(BagFault fault);
 
-/// Its examples name the file, the byte in it, and the topic where it is known.
+/// Its examples state the file, the byte position, and the topic if it is known.
 using BagReport = FaultReport<BagFault>;
 
 /// A recording of messages as one stream in order of log time, messages of equal time in that of
@@ -51,8 +54,8 @@ class BagReader {
  public:
   virtual ~BagReader() = default;
 
-  /// All that the recording's index or, where it has none, the recording describes. A channel that
-  /// is found later is appended.
+  /// All channels that the index describes or, without an index, the recording. A channel that is
+  /// found later is appended.
   [[nodiscard]] virtual const std::vector<BagChannel>& channels() const = 0;
 
   /// The next message, or nullopt at the end. Throws InputFileError if the file cannot be read any
@@ -62,10 +65,10 @@ class BagReader {
   /// Faults met so far.
   [[nodiscard]] virtual BagReport report() const = 0;
 
-  /// True for what happens now and has no end: log times are those of arrival.
+  /// True for live topics, which have no end: log times are times of arrival.
   [[nodiscard]] virtual bool is_live() const { return false; }
 
-  /// Ends next(), now and later, where it waits. Thread-safe.
+  /// Ends a present or later next() that waits. Thread-safe.
   virtual void stop() noexcept {}
 };
 

@@ -54,7 +54,7 @@ std::optional<TopicImage> image_in(const BagChannel& channel, const BagMessage& 
   return TopicImage{size.value_or(ImageSize{}), image.value->format};
 }
 
-// By which the message is placed in time; nothing if it is not of its type.
+// Stamp that places the message in time; nullopt if the message is not of its type.
 std::optional<Stamp> stamp_in(const BagChannel& channel, const BagMessage& message) {
   if (is_of_type(channel, RosTransforms::kType)) {
     const auto tree = decode_ros<RosTransforms>(channel.encoding, message.bytes);

@@ -11,14 +11,14 @@
 
 namespace km {
 
-/// What the first image of a topic is.
+/// Size and encoding of the first image of a topic.
 struct TopicImage {
   ImageSize size;
   std::string encoding;  ///< "mono8", "jpeg", ...
 };
 
-/// A topic of a recording, of which the stamps are the sensor's where its messages have them in a
-/// header, else those of the recorder.
+/// A topic of a recording. Its stamps are those of the sensor if its messages have a header,
+/// otherwise those of the recorder.
 struct TopicSummary {
   std::string topic;
   std::string type;
@@ -36,8 +36,8 @@ struct TopicPair {
   StampAgreement agreement;
 };
 
-/// Reads all that is left; topics in the order of the channels, and of their names where several
-/// channels are one topic. Takes 8 bytes for each message.
+/// Reads all remaining messages. Returns topics in the order of the channels; several channels may
+/// be one topic. Takes 8 bytes for each message.
 [[nodiscard]] std::vector<TopicSummary> summarise_topics(BagReader& reader);
 
 /// All pairs of image topics whose rates differ by at most 5 %. Stamps are a pair if they are less

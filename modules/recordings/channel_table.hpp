@@ -10,11 +10,11 @@
 
 namespace km {
 
-/// Channels of which no two have the same topic, type and encoding: a publisher that was started
-/// again, or another file of the recording, goes on with the same channel.
+/// Channels with unique topic, type and encoding. A restarted publisher, or another file of the
+/// recording, continues the same channel.
 class ChannelTable {
  public:
-  /// Its index. Message counts are added up.
+  /// Returns the index of the channel. Message counts are added up.
   std::size_t add(const BagChannel& channel) {
     const auto [known, is_new] = index_.try_emplace(
         std::tuple(channel.topic, channel.type, channel.encoding), channels_.size());

@@ -10,15 +10,15 @@
 
 namespace km {
 
-/// A part of a file that is read as one: where it lies and when its messages were recorded.
+/// A part of a file that is read in one piece: its position, and the time of its messages.
 struct ChunkPlace {
   std::uint64_t begin = 0;  ///< [bytes from the beginning of the file].
   std::uint64_t end = 0;    ///< Behind the last byte that can belong to it.
   Stamp first = 0;          ///< No message is earlier [ns].
-  bool is_bare = false;     ///< Records that lie in the file as they are, in no chunk.
+  bool is_bare = false;     ///< Records that lie directly in the file, in no chunk.
 };
 
-/// What such a part holds.
+/// Content of such a part.
 struct Chunk {
   struct Entry {
     Stamp log_time = 0;
@@ -30,16 +30,16 @@ struct Chunk {
   std::vector<Entry> entries;  ///< In the order of the file.
 };
 
-/// Gives the messages of many chunks in order of time, reading a chunk when its first message is
-/// due. Of chunks that overlap in time several are in memory, and where these come to more than
-/// kHeld_bytes, their bytes are read again when their turn comes.
+/// Returns the messages of many chunks in order of time; it reads a chunk when its first message is
+/// due. Several chunks are in memory if they overlap in time. If they exceed kHeld_bytes, their
+/// bytes are read again when they are due.
 class ChunkMerge {
  public:
   static constexpr std::uint64_t kHeld_bytes = std::uint64_t{1} << 30U;
 
-  /// Reads a chunk; one without entries if it cannot be used.
+  /// Reads a chunk; returns one without entries if the chunk is unusable.
   using Load = std::function<Chunk(const ChunkPlace&)>;
-  /// Told of a message that is lost: it is earlier than one given before.
+  /// Called for a message that is dropped because it is earlier than one returned before.
   using Lost = std::function<void(const ChunkPlace&, const Chunk::Entry&)>;
 
   ChunkMerge(std::vector<ChunkPlace> places, Load load, Lost lost,
@@ -51,16 +51,16 @@ class ChunkMerge {
   struct Open {
     ChunkPlace place;
     Chunk chunk;
-    std::size_t next = 0;  // of chunk.entries, which are in order of time
+    std::size_t next = 0;  // index into chunk.entries, which are in order of time
   };
 
   void open_due();
   void open(const ChunkPlace& place);
   void make_room();
-  // Nothing if the file has changed meanwhile.
+  // Nullopt if the file has changed meanwhile.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> bytes_of(Open& open,
                                                                   const Chunk::Entry& entry);
-  // The open chunk whose turn it is; open_ is not empty.
+  // The open chunk with the next message; open_ is not empty.
   [[nodiscard]] std::vector<Open>::iterator earliest();
 
   Load load_;

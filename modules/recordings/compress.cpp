@@ -12,7 +12,7 @@ std::vector<std::uint8_t> compress(std::string_view compression,
                                    std::span<const std::uint8_t> bytes) {
   constexpr int kFast = 1;
   std::vector<std::uint8_t> packed;
-  // Neither fails where there is as much room as it asks for.
+  // Neither function fails if the buffer has the size that it asks for.
   if (compression.empty()) {
     packed.assign(bytes.begin(), bytes.end());
   } else if (compression == "zstd") {

@@ -20,7 +20,7 @@ bool is_in_use(const fs::path& path, const char* suffix) {
   return !none && size > 0;
 }
 
-// `path` as SQLite takes it with options. Without a log or journal beside it the file is complete:
+// URI of `path` with options for SQLite. Without a log or journal beside it the file is complete:
 // "immutable" then needs no lock, and writes nothing beside it.
 std::string uri_of(const fs::path& path) {
   std::string uri = "file:";
@@ -73,7 +73,7 @@ void Db3Reader::open() {
   sqlite3_db_config(opened, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
 }
 
-// Tables and not views, whose text would be run.
+// Accepts only tables, because SQLite would execute the text of a view.
 void Db3Reader::check_tables() {
   for (const std::string name : {"topics", "messages"}) {
     const Statement found = prepare(
@@ -117,7 +117,9 @@ bool Db3Reader::step(sqlite3_stmt* rows, std::uint64_t& count) {
     add_fault(BagFault::kMalformed, sqlite3_errmsg(database_.get()));
     return false;
   }
-  if (count++ < max_rows_) return true;  // pages that name each other would go on without end
+  if (count++ < max_rows_)
+    return true;  // pages that refer to each other would continue without
+                  // end
   add_fault(BagFault::kMalformed, "more rows than the file can hold");
   return false;
 }
@@ -131,7 +133,7 @@ std::optional<BagMessage> Db3Reader::next() {
   return std::nullopt;
 }
 
-// Nothing if it cannot be used.
+// Nullopt if the message is unusable.
 std::optional<BagMessage> Db3Reader::message_in_row() {
   const std::int64_t id = sqlite3_column_int64(rows_.get(), 0);
   const auto lose = [&](BagFault fault, const std::string& why) {

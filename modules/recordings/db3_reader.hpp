@@ -39,7 +39,7 @@ class Db3Reader final : public BagReader {
   [[nodiscard]] Statement prepare(const char* sql) const;
   void read_topics();
   void count_messages();
-  // True if there is a row; at an error or beyond what the file can hold, the rows end.
+  // True if there is a row. Rows end at an error, or beyond the number that fits into the file.
   [[nodiscard]] bool step(sqlite3_stmt* rows, std::uint64_t& count);
   [[nodiscard]] std::optional<BagMessage> message_in_row();
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> data_of(std::int64_t id);
@@ -51,7 +51,7 @@ class Db3Reader final : public BagReader {
   BagReport report_;
   std::unique_ptr<sqlite3, Close> database_;  // outlives its statements
   Statement rows_;                            // in order of time
-  Statement data_;                            // of one message
+  Statement data_;                            // reads the data of one message
   std::map<std::int64_t, std::size_t> channel_of_;
   std::vector<BagChannel> channels_;
   std::uint64_t row_count_ = 0;

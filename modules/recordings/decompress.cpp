@@ -18,7 +18,7 @@ constexpr const char* kDamaged = "compressed bytes that are damaged";
 
 enum class Step { kMore, kEnd, kFailed };
 
-// Takes from the front of `in` and `out` what a call of the library used up.
+// Advances `in` and `out` by the bytes that a call of the library has used.
 struct Buffers {
   std::span<const std::uint8_t> in;
   std::span<std::uint8_t> out;

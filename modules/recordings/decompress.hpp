@@ -10,11 +10,11 @@
 
 namespace km {
 
-/// What a chunk or message of a recording may come to: more is no recording's, but a mistake.
+/// Maximum decompressed size of a chunk or message; a larger size is treated as an error.
 inline constexpr std::uint64_t kMaxDecompressed_bytes = std::uint64_t{512} << 20U;
 
-/// `size` bytes from what was compressed as recordings name it: "none" or "" (not at all), "lz4"
-/// (frames), "zstd", "bz2". Refuses what has another size. Memory grows with what comes out, not
+/// Decompresses to `size` bytes. Recordings name the compression "none" or "" (a copy), "lz4"
+/// (frames), "zstd", or "bz2". Refuses a result of another size. Memory grows with the result, not
 /// with `size`.
 Decoded<std::vector<std::uint8_t>> decompress(std::string_view compression,
                                               std::span<const std::uint8_t> bytes,

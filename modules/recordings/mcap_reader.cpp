@@ -14,16 +14,16 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint64_t kFooter_bytes = kMcapRecordHeader_bytes + kMcapFooterFields_bytes;
 constexpr std::uint64_t kMaxDefinition_bytes = std::uint64_t{64} << 20U;
-// Messages outside of chunks are read together up to so many.
+// Messages outside of chunks are read together up to this size.
 constexpr std::uint64_t kBarePart_bytes = std::uint64_t{4} << 20U;
 
 struct McapRecord {
   McapRecordHeader header;
   std::span<const std::uint8_t> content;
-  std::uint64_t begin = 0;  // of the content, in what was read
+  std::uint64_t begin = 0;  // position of the content in the bytes that were read
 };
 
-// Calls `use` with each record; false if the bytes end within one, or have what is none.
+// Calls `use` with each record; false if the bytes end within a record, or contain an invalid one.
 template <typename Use>
 bool for_each_record(std::span<const std::uint8_t> bytes, const Use& use) {
   for (std::uint64_t at = 0; at < bytes.size();) {
@@ -122,7 +122,8 @@ void McapReader::read_summary(std::uint64_t begin, std::uint64_t footer, const M
   if (describes_all(summary)) summary_ = std::move(summary);
 }
 
-// Why the summary cannot be of this file, or null. Puts its chunks in order of the file.
+// The reason why the summary does not fit this file, or null. Sorts its chunks in order of the
+// file.
 const char* McapReader::misfit_of(Summary& summary, std::uint64_t data_end) const {
   std::sort(summary.chunks.begin(), summary.chunks.end(),
             [](const auto& a, const auto& b) { return a.chunk_start < b.chunk_start; });
@@ -247,7 +248,7 @@ Chunk McapReader::load(const ChunkPlace& place) {
   Chunk chunk{.bytes = records_of(place), .entries = {}};
   const bool is_whole = for_each_record(chunk.bytes, [&](const McapRecord& read) {
     if (!read.header.is(McapOpcode::kMessage)) {
-      // What stands between messages outside of chunks was read by walk().
+      // walk() has read the records between messages outside of chunks.
       if (!place.is_bare) add_definition(read.header, read.content, place.begin);
       return;
     }
@@ -267,7 +268,7 @@ Chunk McapReader::load(const ChunkPlace& place) {
   return chunk;
 }
 
-// Empty if they cannot be had.
+// Empty if the records cannot be read.
 Bytes McapReader::records_of(const ChunkPlace& place) {
   const auto refuse = [&](BagFault fault, const std::string& why) {
     report_.add(fault, place.begin, why);

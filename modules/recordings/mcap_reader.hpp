@@ -18,11 +18,11 @@
 namespace km {
 
 /// Reads MCAP files (mcap.dev/spec), version 0: messages in chunks (not compressed, lz4, zstd) and
-/// outside of them. Where the summary at the end describes all channels and chunks, a chunk is read
-/// when its time has come; else the whole file is read once before the first message. A file
-/// without an end, of a writer that was killed, gives what is whole in it. Checksums are compared
-/// where there are some: of the summary, of chunks, and of the data section if it has messages
-/// outside of chunks. Attachments, metadata and records of other kinds are passed over.
+/// outside of them. If the summary at the end describes all channels and chunks, a chunk is read
+/// when its first message is due. Otherwise the whole file is read once before the first message. A
+/// file without an end, whose writer was killed, yields its complete parts. Checksums are verified
+/// if present: those of the summary, of chunks, and of the data section if it has messages outside
+/// of chunks. Attachments, metadata and records of other kinds are skipped.
 class McapReader final : public BagReader {
  public:
   /// Throws InputFileError if `path` is no file or does not begin as MCAP files do.
@@ -45,7 +45,7 @@ class McapReader final : public BagReader {
   [[nodiscard]] bool describes_all(const Summary& summary) const;
   void use_summary();
 
-  // What lies between indexed chunks, or everything.
+  // Reads the records between indexed chunks, or all records.
   void walk(std::uint64_t begin, std::uint64_t end, bool has_end);
   void note_bare_message(std::uint64_t begin, std::uint64_t end);
   void note_chunk(std::uint64_t begin, std::uint64_t end);

@@ -29,14 +29,14 @@ class McapIn {
     value.assign(bytes.begin(), bytes.end());
   }
   void octets(std::span<const std::uint8_t>& value) { value = reader_.bytes(reader_.u64()); }
-  // Of all before it; 0: none.
+  // Checksum of all bytes before it; 0: none.
   void crc() {
     const auto before = bytes_.first(bytes_.size() - reader_.left());
     const std::uint32_t crc = reader_.u32();
     if (!reader_.failed() && crc != 0 && crc != mcap_crc(before)) reader_.fail();
   }
 
-  // A map or list of pairs, of which the length in bytes comes first.
+  // A map or list of pairs, preceded by its length in bytes.
   template <typename Key, typename Value>
   void pairs(std::vector<std::pair<Key, Value>>& values) {
     McapIn in(reader_.bytes(reader_.u32()));
@@ -248,7 +248,7 @@ std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> byte
   message.sequence = reader.u32();
   const std::uint64_t log_time = reader.u64();
   message.log_time = static_cast<Stamp>(log_time);
-  message.publish_time = static_cast<Stamp>(reader.u64());  // of clocks that are not looked at
+  message.publish_time = static_cast<Stamp>(reader.u64());  // time of a clock that is not used
   if (reader.failed() || log_time > kLatest ||
       size - kMcapMessageFields_bytes > std::numeric_limits<std::uint32_t>::max())
     return std::nullopt;

@@ -14,9 +14,9 @@
 
 namespace km {
 
-/// Records of an MCAP file (mcap.dev/spec): an octet that says which, eight that say how many
-/// follow, little endian. Fields that come after those known here are left alone, as the
-/// specification asks for.
+/// Records of an MCAP file (mcap.dev/spec): a byte with the opcode, eight bytes with the size of
+/// the content, little endian, and the content. Unknown fields at its end are ignored, as the
+/// specification demands.
 enum class McapOpcode : std::uint8_t {
   kHeader = 0x01,
   kFooter = 0x02,
@@ -40,7 +40,7 @@ inline constexpr std::uint64_t kMcapRecordHeader_bytes = 9;
 
 struct McapRecordHeader {
   std::uint8_t opcode = 0;
-  std::uint64_t size = 0;  ///< Of what follows [bytes].
+  std::uint64_t size = 0;  ///< Size of the content that follows [bytes].
 
   [[nodiscard]] bool is(McapOpcode kind) const { return opcode == static_cast<std::uint8_t>(kind); }
 };
@@ -54,7 +54,7 @@ struct McapHeader {
 struct McapFooter {
   static constexpr McapOpcode kOpcode = McapOpcode::kFooter;
   std::uint64_t summary_start = 0;         ///< [bytes from the beginning of the file]; 0: none.
-  std::uint64_t summary_offset_start = 0;  ///< Likewise.
+  std::uint64_t summary_offset_start = 0;  ///< [bytes from the beginning of the file]; 0: none.
   std::uint32_t summary_crc = 0;           ///< 0: none.
 };
 inline constexpr std::uint64_t kMcapFooterFields_bytes = 8 + 8 + 4;
@@ -63,7 +63,7 @@ struct McapSchema {
   static constexpr McapOpcode kOpcode = McapOpcode::kSchema;
   std::uint16_t id = 0;  ///< Not 0.
   std::string name;      ///< "nav_msgs/msg/Path"
-  std::string encoding;  ///< Of the definition: "ros2msg", ...
+  std::string encoding;  ///< Encoding of the definition: "ros2msg", ...
   std::string data;      ///< The definition.
 };
 
@@ -76,7 +76,7 @@ struct McapChannel {
   std::map<std::string, std::string> metadata = {};
 };
 
-/// Of a message the fields before its data.
+/// Fields of a message before its data.
 struct McapMessage {
   static constexpr McapOpcode kOpcode = McapOpcode::kMessage;
   std::uint16_t channel_id = 0;
@@ -94,14 +94,14 @@ struct McapChunk {
   std::uint64_t uncompressed_size = 0;
   std::uint32_t uncompressed_crc = 0;  ///< 0: none.
   std::string compression;
-  std::span<const std::uint8_t> records;  ///< Into what was parsed, or is to be written.
+  std::span<const std::uint8_t> records;  ///< Into the parsed bytes, or into those to be written.
 };
 
-/// Of one channel in the chunk before it.
+/// Index of the messages of one channel in the chunk before it.
 struct McapMessageIndex {
   static constexpr McapOpcode kOpcode = McapOpcode::kMessageIndex;
   std::uint16_t channel_id = 0;
-  /// Log time, and where the record begins in the chunk's, not compressed [bytes].
+  /// Log time, and position of the record in the uncompressed records of the chunk [bytes].
   std::vector<std::pair<std::uint64_t, std::uint64_t>> messages;
 };
 
@@ -111,9 +111,9 @@ struct McapChunkIndex {
   Stamp message_end_time = 0;
   std::uint64_t chunk_start = 0;   ///< [bytes from the beginning of the file].
   std::uint64_t chunk_length = 0;  ///< With opcode and length.
-  /// By channel, where its index begins [bytes from the beginning of the file].
+  /// By channel: position of its index [bytes from the beginning of the file].
   std::vector<std::pair<std::uint16_t, std::uint64_t>> message_index_offsets = {};
-  std::uint64_t message_index_length = 0;  ///< Of the indexes right behind the chunk.
+  std::uint64_t message_index_length = 0;  ///< Length of the indexes right behind the chunk.
   std::string compression;
   std::uint64_t compressed_size = 0;
   std::uint64_t uncompressed_size = 0;
@@ -126,7 +126,7 @@ struct McapAttachment {
   Stamp create_time = 0;
   std::string name;
   std::string media_type;              ///< "text/csv", ...
-  std::span<const std::uint8_t> data;  ///< Into what was parsed, or is to be written.
+  std::span<const std::uint8_t> data;  ///< Into the parsed bytes, or into those to be written.
 };
 
 struct McapAttachmentIndex {
@@ -153,7 +153,7 @@ struct McapStatistics {
   std::vector<std::pair<std::uint16_t, std::uint64_t>> channel_message_counts;
 };
 
-/// Where the records of a kind are in the summary.
+/// Position of the records of one kind in the summary.
 struct McapSummaryOffset {
   static constexpr McapOpcode kOpcode = McapOpcode::kSummaryOffset;
   std::uint8_t group_opcode = 0;
@@ -172,13 +172,13 @@ struct McapDataEnd {
 [[nodiscard]] std::optional<McapRecordHeader> parse_mcap_record_header(
     std::span<const std::uint8_t> bytes);
 
-/// What follows a record's header; nullopt for bytes that cannot be such a record. Times beyond
-/// 2^63 - 1 ns are none, nor are attachments with another checksum than they say. For all records
-/// above but messages.
+/// Parses the content after a record's header; nullopt for bytes that are no such record. Times
+/// beyond 2^63 - 1 ns are refused, and attachments with a wrong checksum. For all records above
+/// except messages.
 template <typename Record>
 [[nodiscard]] std::optional<Record> parse_mcap(std::span<const std::uint8_t> bytes);
 
-/// `bytes` may end behind kMcapMessageFields_bytes; `size` is what they are of.
+/// `bytes` may end behind kMcapMessageFields_bytes; `size` is the full size of the content.
 [[nodiscard]] std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> bytes,
                                                             std::uint64_t size);
 
@@ -186,7 +186,7 @@ template <typename Record>
 template <typename Record>
 void put_mcap(ByteWriter& out, const Record& record);
 
-/// Likewise; what the message says of its size is not used.
+/// Writes a message record; ignores the data size in `message`.
 void put_mcap_message(ByteWriter& out, const McapMessage& message,
                       std::span<const std::uint8_t> data);
 

@@ -54,7 +54,8 @@ void McapWriter::add(const McapMessage& message, std::span<const std::uint8_t> d
   if (chunk_.records.size() >= options_.chunk_bytes) end_chunk();
 }
 
-// Before the first message of a channel, in its chunk: who reads from the beginning knows it then.
+// Writes the channel before its first message, in its chunk, for readers that start at the
+// beginning.
 void McapWriter::define(const McapChannel& channel) {
   if (!written_channels_.insert(channel.id).second) return;
   if (written_schemas_.insert(channel.schema_id).second)
@@ -129,7 +130,7 @@ void McapWriter::finish() {
 void McapWriter::put_summary() {
   std::vector<McapSummaryOffset> groups;
   McapFooter footer{.summary_start = size_};
-  crc_ = 0;  // of the summary from here on
+  crc_ = 0;  // checksum of the summary from here on
   const auto put_group = [&]<typename Record>(const std::vector<Record>& records) {
     const std::uint64_t start = size_;
     for (const Record& record : records) put(record);
@@ -159,7 +160,7 @@ void McapWriter::put_summary() {
   ByteWriter last;
   put_mcap(last, footer);
   auto bytes = last.release();
-  bytes.resize(bytes.size() - sizeof(footer.summary_crc));  // of all before itself
+  bytes.resize(bytes.size() - sizeof(footer.summary_crc));  // covers all bytes before itself
   append(bytes);
   last.u32(crc_);
   last.bytes(magic());

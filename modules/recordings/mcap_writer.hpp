@@ -12,10 +12,10 @@
 
 namespace km {
 
-/// Makes the bytes of an MCAP file (mcap.dev/spec), version 0: messages in chunks, each with its
-/// checksum and the definitions that are new in it, and behind it where its messages are; at the
-/// end checksum, definitions, statistics, and where the chunks are. A file that is cut is readable
-/// up to its last whole chunk. Not thread-safe.
+/// Produces the bytes of an MCAP file (mcap.dev/spec), version 0. Messages are in chunks with a
+/// checksum. A chunk contains the definitions that are new in it, and the index of its messages
+/// follows it. The end of the file has a checksum, definitions, statistics, and the chunk indexes.
+/// A truncated file is readable up to its last complete chunk. Not thread-safe.
 class McapWriter {
  public:
   struct Options {
@@ -73,8 +73,8 @@ class McapWriter {
   McapStatistics statistics_;
   std::map<std::uint16_t, std::uint64_t> counts_;
   std::vector<std::uint8_t> bytes_;  // to be taken
-  std::uint64_t size_ = 0;           // of the file
-  std::uint32_t crc_ = 0;            // of the file
+  std::uint64_t size_ = 0;           // bytes of the file so far
+  std::uint32_t crc_ = 0;            // checksum of the file so far
 };
 
 }  // namespace km

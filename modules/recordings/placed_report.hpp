@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// What was met in a file, with the byte where. A chunk that is read again is reported once.
+/// Faults in a file with their byte positions. A chunk that is read again is reported once.
 class PlacedReport {
  public:
   /// `file` outlives the report.

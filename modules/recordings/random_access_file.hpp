@@ -7,7 +7,7 @@
 
 namespace km {
 
-/// A file of which parts are read at any place. Not thread-safe.
+/// A file that is read at any position. Not thread-safe.
 class RandomAccessFile {
  public:
   /// Throws InputFileError if there is no regular file to read.

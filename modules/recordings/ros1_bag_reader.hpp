@@ -17,8 +17,8 @@
 namespace km {
 
 /// Reads bags of ROS 1, version 2.0: chunks that are not compressed, or by bz2 or lz4. With the
-/// index at the end a chunk is read when its time has come; a bag without one, of a recorder that
-/// was killed, is read once before the first message, and gives the chunks that are whole.
+/// index at the end, a chunk is read when its first message is due. A bag without an index, whose
+/// recorder was killed, is read once before the first message and yields its complete chunks.
 class Ros1BagReader final : public BagReader {
  public:
   /// Throws InputFileError if `path` is no file, does not begin as such bags do, or is encrypted.
@@ -33,12 +33,12 @@ class Ros1BagReader final : public BagReader {
  private:
   // A record's header in the file, its data not read yet.
   struct Place {
-    std::vector<std::uint8_t> header;  // of which `fields` are
+    std::vector<std::uint8_t> header;  // bytes to which `fields` refer
     Ros1Fields fields;
     std::uint64_t data_begin = 0;
     std::uint32_t data_size = 0;
   };
-  // nullopt if it is none, or does not end before `end`.
+  // nullopt if it is no record, or does not end before `end`.
   [[nodiscard]] std::optional<Place> record_at(std::uint64_t begin, std::uint64_t end) const;
 
   // Why the index cannot be used, or null.

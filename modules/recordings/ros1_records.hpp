@@ -30,7 +30,7 @@ inline constexpr std::string_view kRos1Magic = "#ROSBAG V2.0\n";
 /// The fields of a record's header.
 class Ros1Fields {
  public:
-  /// nullopt for bytes that are none. They outlive the result.
+  /// nullopt for bytes that are no such fields. They must outlive the result.
   [[nodiscard]] static std::optional<Ros1Fields> parse(std::span<const std::uint8_t> bytes);
 
   /// The record's kind.
@@ -54,7 +54,8 @@ struct Ros1Record {
   std::uint64_t data_begin = 0;  ///< In the bytes that the record is from.
 };
 
-/// The record at `at`, which moves behind it; nullopt if it is none or the bytes end within it.
+/// The record at `at`, which advances behind it; nullopt if the bytes are no record or end within
+/// it.
 [[nodiscard]] std::optional<Ros1Record> next_ros1_record(std::span<const std::uint8_t> bytes,
                                                          std::uint64_t& at);
 
@@ -64,7 +65,7 @@ struct Ros1Connection {
   std::string type;
 };
 
-/// Where a chunk is, and how many messages of which connection it has.
+/// Position of a chunk, and its number of messages per connection.
 struct Ros1ChunkInfo {
   std::uint64_t begin = 0;  ///< [bytes from the beginning of the file].
   Stamp first = 0;

@@ -7,17 +7,18 @@
 
 namespace km {
 
-/// Which images of a camera a topic has. sensor_msgs/CameraInfo is the same beside both.
+/// The kind of images on a topic of a camera. Both kinds have the same sensor_msgs/CameraInfo.
 enum class RosImages {
-  kRaw,        ///< image_raw: K and D are theirs, and R turns the camera to the rectified one.
-  kRectified,  ///< image_rect: P is theirs. Where D is 0 and R the identity, both are the same.
+  kRaw,        ///< image_raw: K and D describe them, and R rotates the camera to the rectified one.
+  kRectified,  ///< image_rect: P describes them. If D is 0 and R the identity, both kinds are
+               ///< equal.
 };
 
-/// The camera of a sensor_msgs/CameraInfo (its documentation defines K, D, R and P), its T_body_cam
-/// the identity. Distortion: plumb_bob (4 or 5 coefficients), rational_polynomial (8; further ones,
-/// of thin prisms and tilted sensors, must be 0), equidistant or fisheye (4), or none. Throws
-/// std::invalid_argument, naming the frame, the field and the value, for K = 0, an uncalibrated
-/// camera, for other models, binned images, images of a part of the camera, and for what
+/// The camera of a sensor_msgs/CameraInfo (its documentation defines K, D, R and P), with the
+/// identity as T_body_cam. Distortion: plumb_bob (4 or 5 coefficients), rational_polynomial (8;
+/// further ones, of thin prisms and tilted sensors, must be 0), equidistant or fisheye (4), or
+/// none. Throws std::invalid_argument that names the frame, the field and the value. It refuses K =
+/// 0 (an uncalibrated camera), other models, binned or cropped images, and calibrations that
 /// calibration_limits.hpp refuses.
 [[nodiscard]] Camera camera_of(const RosCameraInfo& info, RosImages images);
 
@@ -26,7 +27,7 @@ enum class RosImages {
 [[nodiscard]] SE3 T_frame_camera(const RosCameraInfo& info, RosImages images);
 
 /// Distance of a right camera from the left one by Tx = -fx B, the fourth number of its P [m];
-/// nullopt where it says none.
+/// nullopt if P contains none.
 [[nodiscard]] std::optional<double> baseline_m(const RosCameraInfo& right);
 
 }  // namespace km

@@ -5,9 +5,10 @@
 
 namespace km {
 
-/// The definition of a type of ros_messages.hpp that robots tell, by its name in ROS 1, as MCAP's
-/// encoding "ros2msg" has it: its fields, then, each below a line of "=" and one that names it,
-/// those of all types in it (mcap.dev/spec/registry). Throws std::invalid_argument for others.
+/// The definition of a type of ros_messages.hpp that robots write, given its name in ROS 1, in
+/// MCAP's encoding "ros2msg" (mcap.dev/spec/registry). It consists of the fields of the type and
+/// the definitions of all types in it. A line of "=" and a line with the name precede each of
+/// those. Throws std::invalid_argument for other types.
 [[nodiscard]] std::string ros_definition(std::string_view type);
 
 /// "sensor_msgs/msg/Image" of "sensor_msgs/Image".
@@ -16,7 +17,8 @@ namespace km {
 /// "sensor_msgs/Image" of "sensor_msgs/msg/Image".
 [[nodiscard]] std::string ros1_name(std::string_view type);
 
-/// A name as topics and frames may have it: what is neither letter, digit nor underscore is one.
+/// A valid name for topics and frames: other characters than letters, digits and underscores become
+/// underscores.
 [[nodiscard]] std::string ros_name(std::string name);
 
 }  // namespace km

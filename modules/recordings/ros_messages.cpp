@@ -183,7 +183,7 @@ void fields(auto& wire, Is<RosMarker> auto& marker) {
 }
 
 void fields(auto& wire, Is<RosMarkers> auto& message) {
-  constexpr std::size_t kLeast_bytes = 200;  // of a marker without points
+  constexpr std::size_t kLeast_bytes = 200;  // size of a marker without points
   wire.resize(message.markers, kLeast_bytes);
   for (auto& marker : message.markers) fields(wire, marker);
 }

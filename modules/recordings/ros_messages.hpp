@@ -15,9 +15,9 @@
 
 namespace km {
 
-/// Messages of ROS, field by field as they were recorded: units and frames are those of ROS (SI,
-/// REP 103), and nothing is checked but that the bytes are such a message. kType is the type's name
-/// in ROS 1.
+/// Messages of ROS, field by field as they were recorded. Units and frames are those of ROS (SI,
+/// REP 103). Decoding only checks that the bytes are such a message. kType is the type's name in
+/// ROS 1.
 
 /// std_msgs/Header, with which most messages begin.
 struct RosHeader {
@@ -69,7 +69,7 @@ struct RosCameraInfo {
   struct Region {
     std::uint32_t x_offset = 0, y_offset = 0, height = 0, width = 0;  ///< [px]; 0: all.
     bool do_rectify = false;
-  } region;  ///< Of the camera, that images show.
+  } region;  ///< Part of the camera that the images show.
 };
 
 /// geometry_msgs/Pose, and Transform, which has the same fields.
@@ -94,7 +94,7 @@ struct RosOdometry {
   static constexpr std::string_view kType = "nav_msgs/Odometry";
   RosHeader header;
   std::string child_frame;
-  RosPose pose;  ///< Of the child frame in the header's.
+  RosPose pose;  ///< Pose of the child frame in the header's frame.
   std::array<double, 36> pose_covariance{};
   Eigen::Vector3d linear_velocity = Eigen::Vector3d::Zero();   ///< In the child frame [m/s].
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< In the child frame [rad/s].
@@ -105,7 +105,7 @@ struct RosOdometry {
 struct RosTransform {
   RosHeader header;
   std::string child_frame;
-  RosPose pose;  ///< Of the child frame in the header's.
+  RosPose pose;  ///< Pose of the child frame in the header's frame.
 };
 
 struct RosTransforms {
@@ -153,14 +153,16 @@ struct RosDiagnostics {
 /// visualization_msgs/Marker, as of ROS 2 Humble, without textures and mesh files.
 struct RosMarker {
   static constexpr std::string_view kType = "visualization_msgs/Marker";
-  static constexpr std::int32_t kLineList = 5, kTriangleList = 11;  ///< Of points: pairs, triples.
-  static constexpr std::int32_t kDelete = 2;  ///< Takes what has its name away.
+  static constexpr std::int32_t kLineList = 5, kTriangleList = 11;  ///< Connect points to pairs and
+                                                                    ///< to triples.
+  static constexpr std::int32_t kDelete = 2;  ///< Deletes the marker with this name space and id.
   RosHeader header;
-  std::string name_space;  ///< With the id the name of what is drawn: another of it replaces it.
+  std::string name_space;  ///< Together with the id the name of a marker; a new marker replaces one
+                           ///< with its name.
   std::int32_t id = 0;
   std::int32_t type = 0;
   std::int32_t action = 0;                          ///< 0: add or replace, or kDelete.
-  RosPose pose;                                     ///< Of the points in the header's frame.
+  RosPose pose;                                     ///< Pose of the points in the header's frame.
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< x: width of lines [m].
   Eigen::Vector4f color = {1, 1, 1, 1};             ///< Red, green, blue, alpha: 0 to 1.
   std::array<std::uint32_t, 2> lifetime{};          ///< [s], [ns]; 0: for ever.
@@ -188,8 +190,8 @@ struct RosLog {
 /// True if the channel's messages are of `type`, a name of ROS 1; ROS 2 writes "/msg/" in it.
 [[nodiscard]] bool is_of_type(const BagChannel& channel, std::string_view type);
 
-/// A message of a type above in the encoding that its channel says, "ros1" or "cdr". Refuses bytes
-/// that are not one, and images with fewer pixels than they say. A RosHeader is read from the
+/// A message of a type above in the encoding of its channel, "ros1" or "cdr". Refuses bytes that
+/// are no such message, and images with fewer pixels than they state. A RosHeader is read from the
 /// beginning of any message that has one.
 template <typename Message>
 Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes);

@@ -15,7 +15,7 @@ Decoded<RosWire> RosWire::open(std::string_view encoding, std::span<const std::u
   if (encoding == "ros1") return Result::accept(RosWire(bytes, false, false));
   if (encoding != "cdr") return Result::refuse("an encoding that is not known");
   if (bytes.size() < kEncapsulation_bytes) return Result::refuse("no encapsulation header");
-  // The second octet of the identifier; its options say nothing that reading needs.
+  // The second byte of the identifier; its options do not matter for reading.
   constexpr std::uint8_t kBigEndian = 0, kLittleEndian = 1;
   if (bytes[0] != 0 || (bytes[1] != kBigEndian && bytes[1] != kLittleEndian))
     return Result::refuse("an encapsulation other than plain CDR");

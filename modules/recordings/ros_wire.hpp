@@ -14,13 +14,13 @@
 
 namespace km {
 
-/// Reads the fields of a ROS message one after the other, whichever way they were written:
+/// Reads the fields of a ROS message one after the other, in either encoding:
 ///   "ros1"  ROS 1: little endian, without gaps (wiki.ros.org/msg);
 ///   "cdr"   ROS 2: OMG's CDR as DDS writes it (DDS-XTypes, XCDR version 1, plain): an
-///           encapsulation header of four bytes that says the byte order; numbers lie at multiples
-///           of their size behind it.
-/// Trusts nothing, as ByteReader: after a read that fails all are zero or empty. The bytes outlive
-/// it.
+///           encapsulation header of four bytes that states the byte order; numbers lie at
+///           multiples of their size behind it.
+/// The bytes are untrusted, as for ByteReader: after a read that fails, all values are zero or
+/// empty. They must outlive this object.
 class RosWire {
  public:
   /// Refuses other encodings, and encapsulations with parameter lists or of XCDR version 2.
@@ -47,7 +47,7 @@ class RosWire {
   /// builtin_interfaces/Time [ns].
   void stamp(Stamp& value);
 
-  /// Why what was read is no message: it is cut or goes on; null if it is one.
+  /// Why the bytes are no such message: too short or too long; null if they are one.
   [[nodiscard]] const char* problem() const;
   [[nodiscard]] bool failed() const { return reader_.failed(); }
   void fail() { reader_.fail(); }

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-// The smallest of which at least `share` of the values are no larger; `values` is not empty.
+// The smallest value such that at least `share` of the values are no larger; `values` is not empty.
 double quantile(std::vector<double> values, double share) {
   const auto rank = static_cast<std::size_t>(
       std::max(1.0, std::ceil(share * static_cast<double>(values.size()))));

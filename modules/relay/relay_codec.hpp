@@ -12,11 +12,11 @@
 
 namespace km {
 
-/// The largest of the contents is an inlier set's, with a signature.
+/// An inlier set with its signature is the largest content.
 inline constexpr std::size_t kMaxRelayContent = 800'000 + kEndorsementBytes;
 
-/// Sent as TopicKind::kRequest: what a link that is down for longer than dds.lease_s holds up is
-/// handed over again by the RelayStore.
+/// Uses TopicKind::kRequest: the RelayStore sends a message again if a link is down for longer than
+/// dds.lease_s.
 template <>
 struct Codec<RelayParcel> {
   using Wire = km_wire_RelayParcel;

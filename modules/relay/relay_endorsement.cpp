@@ -10,7 +10,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMaxName = 64;
-constexpr char kSeparator = ';';  // which no name has
+constexpr char kSeparator = ';';  // Character that no robot name contains.
 
 Octets statement_of(const RelayMessage& message, OctetView content) {
   const bool is_lasting = message.kind == RelayKind::kBag || message.kind == RelayKind::kReply;

@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// What the relay of a team with keys asks of them; see TeamSeal for each.
+/// Signing and checking functions of TeamSeal that the relay of a team with keys uses.
 struct RelayKeys {
   std::function<Signature(OctetView statement)> endorse;
   std::function<std::optional<std::string>(const TeamPeer&)> credentials_of;
@@ -21,22 +21,22 @@ struct RelayKeys {
   std::function<const char*(const Certificate&)> why_lapsed;
 };
 
-/// Octets of the origin's signature behind RelayMessage::content, where the team has keys.
+/// Bytes of the origin's signature at the end of RelayMessage::content in a team with keys.
 inline constexpr std::size_t kEndorsementBytes = Signature().size();
 
-/// The signature of this robot, the origin, over all of the message but `hops`. Of a bag and of an
-/// answer it covers the origin's life and not its process, and not whom it is for: what a robot has
-/// told lasts as long as its life, and an answer may go to others that ask for the same.
+/// Signature of this robot, the origin, over all fields of the message except `hops`. For a bag and
+/// for a reply it covers the incarnation of the origin instead of the boot id, and not the
+/// addressee. Thus bags and replies stay valid for the whole incarnation, and other robots that
+/// request the same keyframe can use a reply.
 [[nodiscard]] Signature endorsement_of(const RelayMessage& message, const RelayKeys& keys);
 
-/// Puts that behind the content.
+/// Appends the signature to the content.
 void endorse(RelayMessage& message, const RelayKeys& keys);
 
-/// True if the content ends with the signature that the owner of `origin` has made for this
-/// message.
+/// True if the content ends with the signature of this message by the owner of `origin`.
 [[nodiscard]] bool is_endorsed(const RelayMessage& message, const PublicKey& origin);
 
-/// The content of an introduction: a name and, where the team has keys, what the origin shows.
+/// Content of an introduction: the name of the origin and, in a team with keys, its credentials.
 struct RelayIntroduction {
   std::string name;
   std::string credentials = {};
@@ -44,8 +44,8 @@ struct RelayIntroduction {
   bool operator==(const RelayIntroduction&) const = default;
 };
 [[nodiscard]] Octets to_octets(const RelayIntroduction& introduction);
-/// Nothing if that is not a robot's name, or not like credentials, whose contents are not looked
-/// at.
+/// Nullopt if the content does not begin with a valid robot name or if the rest cannot be
+/// credentials. Does not verify the credentials.
 [[nodiscard]] std::optional<RelayIntroduction> parse_introduction(OctetView content);
 
 }  // namespace km

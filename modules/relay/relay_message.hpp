@@ -8,27 +8,29 @@
 
 namespace km {
 
-/// In the order of their numbers on the wire.
+/// The enumerators are in the order of their numbers on the network.
 enum class RelayKind : std::uint8_t {
-  kIntroduction,  ///< The origin is there: `content` is a RelayIntroduction.
-  kBag,           ///< To all; `number` is the keyframe's index.
-  kClosure,       ///< A letter to `to`; letters of an origin are numbered from 0, of either kind.
-  kInlierSet,     ///< Likewise.
-  kRequest,       ///< For keyframe `number` of `to`.
-  kReply,         ///< Keyframe `number` of the origin, to `to`.
+  kIntroduction,  ///< Announces the origin; `content` is a RelayIntroduction.
+  kBag,           ///< Bag of words for all robots; `number` is the keyframe's index.
+  kClosure,       ///< Reliable message to `to`. An origin numbers its reliable messages of both
+                  ///< kinds from 0.
+  kInlierSet,     ///< Reliable message to `to`.
+  kRequest,       ///< Request for keyframe `number` of `to`.
+  kReply,         ///< Keyframe `number` of the origin, for `to`.
 };
 
-/// What robots hand on in the name of another one.
+/// Message of one robot, the origin, that other robots forward.
 struct RelayMessage {
   RelayKind kind = RelayKind::kIntroduction;
   TeamPeer origin;
-  RobotId to = 0;             ///< Not of kIntroduction and kBag.
-  std::uint64_t to_boot = 0;  ///< Of a letter: only for the life of this process; 0: for any.
+  RobotId to = 0;             ///< Unused in kIntroduction and kBag.
+  std::uint64_t to_boot = 0;  ///< In a reliable message: boot id of the only incarnation that it is
+                              ///< for, or 0 for any.
   std::uint32_t number = 0;
-  std::uint8_t hops = 0;  ///< Of a request or an answer: robots that have passed it on.
-  /// The topic's own type, serialised; of a letter that nobody needs any more, empty. In a team
-  /// with keys the origin's signature is behind it (relay_endorsement.hpp), but for an
-  /// introduction.
+  std::uint8_t hops = 0;  ///< In a request or a reply: number of robots that have forwarded it.
+  /// Serialised message of the topic. It is empty in a reliable message that a newer one has
+  /// replaced. In a team with keys the signature of the origin follows, except in an introduction
+  /// (relay_endorsement.hpp).
   std::vector<std::uint8_t> content = {};
 
   bool operator==(const RelayMessage&) const = default;
@@ -40,9 +42,9 @@ using RelayMessagePtr = std::shared_ptr<const RelayMessage>;
   return kind == RelayKind::kClosure || kind == RelayKind::kInlierSet;
 }
 
-/// From one robot to the next that hears it.
+/// Message on one hop, between a robot and a neighbour that receives it directly.
 struct RelayParcel {
-  RobotId neighbour = 0;  ///< Whom it goes to, or who has handed it over.
+  RobotId neighbour = 0;  ///< Receiver of a sent message, sender of a received one.
   RelayMessagePtr message;
 };
 

@@ -81,7 +81,8 @@ ContentGuard<RelayParcel> RelayNode::guard_parcels() {
   }};
 }
 
-// Null, or why it is nobody's word. What this robot has missed something of is no fault.
+// Returns the reason if the message is forged, otherwise null. A message that this robot does not
+// expect, because it has missed an earlier one, is not forged.
 const char* RelayNode::take(const RelayParcel& parcel) {
   RelayArrival arrival = RelayArrival::kNew;
   const char* forged = nullptr;
@@ -96,7 +97,8 @@ const char* RelayNode::take(const RelayParcel& parcel) {
   return forged;
 }
 
-// What was heard directly, for others; null, or why it is not its sender's to hand on.
+// Stores a directly received message for other robots. Returns the reason if it is forged,
+// otherwise null.
 const char* RelayNode::keep(RelayKind kind, const TeamPeer& sender, std::uint32_t number,
                             std::span<const std::uint8_t> content) {
   const char* forged = nullptr;
@@ -109,7 +111,7 @@ const char* RelayNode::keep(RelayKind kind, const TeamPeer& sender, std::uint32_
       note(store, store.keep_reply(sender, number, std::move(octets)));
     });
   } else if (const auto origin = identity_of(sender)) {
-    // A message may come before the event of its robot.
+    // A message may arrive before the PeerEvent of its sender.
     act([&](RelayStore& store) {
       note(store, store.keep_bag(*origin, number, std::move(octets)));
     });
@@ -140,7 +142,8 @@ void RelayNode::carry_out(const RelayOutput& output, std::uint64_t given_up) {
         << given_up << " messages for others are not kept, for want of room";
 }
 
-// In another life its messages are about other keyframes: not before all nodes know.
+// Messages of a new incarnation refer to other keyframes, so none is delivered before all nodes
+// know of the restart.
 void RelayNode::deliver(const RelayMessage& message) const {
   if (peers_.is_arriving(message.origin.robot)) return;
   const char* refusal = nullptr;

@@ -22,62 +22,64 @@
 
 namespace km {
 
-/// Channels of the relay; they must outlive it.
+/// Channels of the relay, which must outlive it.
 struct RelayTopics {
-  In<PeerEvent> peer_events;  ///< Who is heard directly.
-  In<RobotStatus> statuses;   ///< Of those.
+  In<PeerEvent> peer_events;  ///< Robots that this robot receives directly.
+  In<RobotStatus> statuses;   ///< Statuses of these robots.
   Out<Addressed<RelayParcel>> own_parcels;
-  Out<PeerEvent> reached;  ///< kReturned, of robots that are not heard: ways lead there now.
+  Out<PeerEvent> reached;  ///< kReturned for a robot that is not received directly, when a route to
+                           ///< it appears.
 };
 
-/// What nodes tell single robots, and hear of them.
+/// Channels of one message type that nodes address to single robots.
 template <typename T>
 struct RelayedTopics {
-  In<Addressed<T>> own;      ///< From the nodes.
-  Out<Addressed<T>> direct;  ///< To the bridge, as they are.
-  In<T> heard;               ///< From the bridge.
-  Out<T> all;                ///< To the nodes: heard or handed on.
+  In<Addressed<T>> own;      ///< Messages from the nodes of this robot.
+  Out<Addressed<T>> direct;  ///< The same messages, unchanged, to the bridge.
+  In<T> heard;               ///< Messages from the bridge.
+  Out<T> all;                ///< Direct and forwarded messages, to the nodes.
 };
 
-/// Stands between the nodes and the bridge on topics whose messages are to reach also robots that
-/// this one does not hear: what nodes tell goes to the bridge or to a RelayStore, and what arrives
-/// over either comes out of one topic. That a robot is there, or has restarted, as others tell it,
-/// comes from Peers like what is heard.
+/// Connects nodes and bridge on topics whose messages must also reach robots out of range. It
+/// passes messages of the nodes to the bridge or to a RelayStore. Both kinds of received message,
+/// direct and forwarded, arrive on one topic. When neighbours report a new or restarted robot,
+/// Peers announces that robot like one that is received directly.
 ///
-/// It has no thread: it works on those that publish to it, and publishes on them what that leads
-/// to, so that no node ever waits for another one through it. Thread-safe.
+/// Has no thread: it runs on the threads that publish to it and publishes the results on them, so
+/// that no node waits for another one through it. Thread-safe.
 class RelayNode {
  public:
-  /// `seal` is null without keys. It, `peers` and the topics outlive this. `now_s` as for
-  /// RelayStore, called by any thread.
+  /// `seal` is null in a team without keys. `seal`, `peers` and the topics outlive this object. Any
+  /// thread may call `now_s`, which has the same meaning as in RelayStore.
   RelayNode(TeamPeer self, SharedSeal* seal, Peers& peers, const RelayTopics& topics,
             std::function<double()> now_s = steady_now_s);
   RelayNode(const RelayNode&) = delete;
   RelayNode& operator=(const RelayNode&) = delete;
 
-  // Wiring, before anything is started. `number_of` tells by what a message is asked for; nullopt:
-  // it is of no use to others.
+  // Wiring, to be called before any node starts. `number_of` returns the number by which a robot
+  // requests this message, or nullopt if the message is of no use to other robots.
 
-  /// What each robot tells all: see RelayKind::kBag.
+  /// Bags of words, which each robot sends to all others: see RelayKind::kBag.
   template <typename T>
   void join_bags(In<T> heard, Out<T> to);
-  /// Closures or inlier sets. Those that replace each other have one Codec<T>::key_of().
+  /// Closures or inlier sets. Messages with equal Codec<T>::key_of() replace each other.
   template <typename T>
   void join_letters(RelayKind kind, const RelayedTopics<T>& topics);
   /// Requests or replies.
   template <typename T, typename NumberOf>
   void join_calls(RelayKind kind, const RelayedTopics<T>& topics, const NumberOf& number_of);
 
-  // For the bridge, of crossings whose messages others may hand on: with keys each is signed for
-  // that as well, and only who has signed is heard. Who hears a message keeps it.
+  // Guards for the bridge, on topics whose messages other robots may forward. In a team with keys
+  // each message carries a second signature for forwarding, and the bridge refuses messages without
+  // it. Each receiver stores the message.
 
-  /// Of a crossing of bags or of replies.
+  /// Guard of the topic of bags or of replies.
   template <typename T, typename NumberOf>
   [[nodiscard]] ContentGuard<T> guard(RelayKind kind, const NumberOf& number_of);
-  /// Of the crossing of the relay itself: its messages are read here.
+  /// Guard of the relay's own topic, which reads its messages.
   [[nodiscard]] ContentGuard<RelayParcel> guard_parcels();
 
-  /// For the status.
+  /// Summary that this robot publishes in its status.
   [[nodiscard]] RelaySummary summary() const;
 
  private:
@@ -92,7 +94,7 @@ class RelayNode {
       return detail::publish_decoded(to, origin, content, nullptr);
     };
   }
-  // Lets the store work, then does what it wants done.
+  // Runs `work` on the store and then carries out the output of the store.
   template <typename Work>
   void act(const Work& work) {
     RelayOutput output;
@@ -123,7 +125,7 @@ class RelayNode {
   const std::function<double()> now_s_;
   std::map<RelayKind, std::function<const char*(const TeamPeer&, std::span<const std::uint8_t>)>>
       readers_;
-  mutable std::mutex mutex_;  // guards what follows; never held while publishing
+  mutable std::mutex mutex_;  // Guards the members below; never held while publishing.
   RelayStore store_;
 };
 

@@ -6,8 +6,9 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kFilingBytes = 96;  // that a message takes beside its content
-constexpr std::uint8_t kMaxHops = 16;     // ways that are out of date may go in a circle
+constexpr std::size_t kFilingBytes = 96;  // Bytes that the bookkeeping of one message takes.
+constexpr std::uint8_t kMaxHops = 16;     // Hops before a message is dropped: outdated routes may
+                                          // form a loop.
 constexpr std::size_t kMaxUnmet = 10'000;
 
 std::size_t bytes_of(const RelayMessage& message) {
@@ -48,7 +49,7 @@ RelayStore::Origin* RelayStore::know(const RobotIdentity& identity) {
   return &origin;
 }
 
-// Of a process that is heard.
+// Credentials and certificate of a process that this robot receives directly.
 RelayStore::Membership RelayStore::membership_of(const RobotIdentity& identity) const {
   if (!keys_) return {};
   const auto credentials = keys_->credentials_of({identity.robot, identity.boot});
@@ -56,15 +57,16 @@ RelayStore::Membership RelayStore::membership_of(const RobotIdentity& identity) 
   return {*credentials, keys_->certified(identity, *credentials).value};
 }
 
-// Whether messages of this process can be told from others'. Of a robot that is heard they cannot
-// if its keys have just been forgotten.
+// Whether this robot can attribute messages to this process. It cannot after the keys of the
+// process have been removed, even if it receives the process directly.
 bool RelayStore::is_known(const TeamPeer& peer) const {
   return origin(peer.robot) == peer &&
          (!keys_ || origins_.at(peer.robot).membership.certificate.has_value());
 }
 
-// True for a message of a known process that this has not signed. Who is no member any more, and
-// not heard, is forgotten: nobody is to hand over more of it.
+// True if the known process that is stated as the origin has not signed the message. An origin
+// whose certificate has lapsed is removed unless it is received directly, so that neighbours stop
+// sending its messages.
 bool RelayStore::is_forged(const RelayMessage& message) {
   if (!keys_) return false;
   const RobotId robot = message.origin.robot;
@@ -89,8 +91,8 @@ RelayWays RelayStore::ways_to(RobotId robot) const {
   return {.direct = known->second.was_heard, .relay = true};
 }
 
-// Of another process of one life the letters begin anew, since it tells all closures again.
-// What it signed with another key nobody would take.
+// A resumed process sends all its closures again, so its stored reliable messages are discarded.
+// Messages that it signed with another key are discarded because no robot would accept them.
 void RelayStore::become(Origin& origin, const RobotIdentity& identity, Membership membership) {
   const std::uint64_t former = origin.identity.boot;
   const auto key_of = [](const Membership& one) {
@@ -169,7 +171,8 @@ RelayArrival RelayStore::keep_reply(const TeamPeer& from, std::uint32_t number,
 
 void RelayStore::hold_reply(RelayMessage reply) {
   Stream& replies = origins_.at(reply.origin.robot).replies;
-  // Answers choose keypoints for who asks: the one with the most serves others best.
+  // A reply contains only keypoints chosen for its requester, so the largest reply serves other
+  // requesters best.
   const RelayMessage* before = replies.find(reply.number);
   if (before != nullptr && before->content.size() >= reply.content.size()) return;
   if (!has_room_for(reply) || !replies.put(std::move(reply), kMaxReplyBytes)) ++given_up_;
@@ -199,7 +202,7 @@ void RelayStore::wrote(RelayKind kind, const TeamPeer& to, std::uint64_t slot,
   ++given_up_;
 }
 
-// What was told to a robot that is heard has been kept for it.
+// The messages to a robot that is received directly are already stored for it.
 void RelayStore::settle_unmet(RobotId robot, bool heard) {
   for (Recent& unmet : std::exchange(unmet_, {})) {
     if (unmet.message.to != robot) {
@@ -221,19 +224,20 @@ void RelayStore::write_letter(std::uint64_t slot, RelayMessage message) {
   own_slots_.erase(last);
 }
 
-// Its number stays: those behind it are handed on in order.
+// The number of the message stays in use, because messages are sent in the order of their numbers.
 void RelayStore::empty_letter(std::uint32_t number) {
   RelayMessage emptied = *own_letters_.find(number);
   emptied.content.clear();
   sign(emptied);
-  (void)own_letters_.put(std::move(emptied), kMaxLetterBytes);  // fits where there was more
+  (void)own_letters_.put(std::move(emptied), kMaxLetterBytes);  // Fits in place of the larger
+                                                                // message.
 }
 
 void RelayStore::call(RelayKind kind, RobotId to, std::uint32_t number,
                       std::vector<std::uint8_t> content) {
   RelayMessage message{
       .kind = kind, .origin = self_, .to = to, .number = number, .content = std::move(content)};
-  // Who asks asks again, and what DDS keeps need not be carried.
+  // The requester repeats its request. DDS stores replies for a robot that it can reach later.
   if (!next_hop(to, {}) && (kind == RelayKind::kRequest || ways_to(to).direct)) return;
   sign(message);
   (void)route(std::move(message), {});
@@ -261,7 +265,9 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
     origins_.at(robot).via = from;
   } else if (is_letter(message.kind)) {
     RelayMessage kept = message;
-    if (is_mine && !keys_) kept.content = {};  // nobody else needs it, but for its signature
+    if (is_mine && !keys_)
+      kept.content = {};  // No other robot needs the content, but the
+                          // signature covers it.
     arrival = keep(&Origin::letters, kMaxLetterBytes, std::move(kept));
   } else {
     if (message.kind == RelayKind::kReply) hold_reply(message);
@@ -369,7 +375,7 @@ void RelayStore::hand_on(RobotId to, const Origin& origin, double now_s) {
     const auto [introduced, first] = neighbour.introduced_s.try_emplace(peer.robot, now_s);
     if (!first && now_s - introduced->second < kPatience_s) return;
     introduced->second = now_s;
-    if (keys_ && !origin.membership.certificate) return;  // nobody would believe it
+    if (keys_ && !origin.membership.certificate) return;  // No robot would accept it.
     return send(to, {.kind = RelayKind::kIntroduction,
                      .origin = peer,
                      .content = to_octets({origin.identity.name, origin.membership.credentials})});
@@ -378,7 +384,7 @@ void RelayStore::hand_on(RobotId to, const Origin& origin, double now_s) {
   hand_on(to, origin, true, held->second.letters, now_s);
 }
 
-// From the first message on that it lacks, as many as may be under way.
+// Sends the messages from the first one that the neighbour lacks, up to the window.
 void RelayStore::hand_on(RobotId to, const Origin& origin, bool letters, std::uint32_t told,
                          double now_s) {
   Neighbour& neighbour = neighbours_.at(to);
@@ -401,14 +407,15 @@ void RelayStore::hand_on(RobotId to, const Origin& origin, bool letters, std::ui
     if (const RelayMessage* sent = stream.find(number)) under_way += bytes_of(*sent);
   for (; progress.sent < stream.whole() && under_way < kWindowBytes; ++progress.sent) {
     RelayMessage message = *stream.find(progress.sent);
-    message.origin = peer;  // in its present process
+    message.origin = peer;  // Current boot id of the origin.
     under_way += bytes_of(message);
     send(to, std::move(message));
   }
 }
 
-// Of the robots that the neighbour hears and that hold what it lacks: one that hears the origin, or
-// has the lower id.
+// True if another robot has precedence in sending these messages to the neighbour. Candidates
+// exchange messages with the neighbour directly and either receive the origin directly or hold more
+// of its messages. Those that receive the origin come first, then the lower id.
 bool RelayStore::another_should(RobotId to, const RelayHeld& held) const {
   const RobotId origin = held.origin.robot;
   const Neighbour& neighbour = neighbours_.at(to);

@@ -19,129 +19,136 @@
 
 namespace km {
 
-/// What became of a message that another robot handed over.
+/// Result for a message that a neighbour has sent.
 enum class [[nodiscard]] RelayArrival{
-    kNew,       ///< To be delivered, or passed on, or kept for others.
-    kRepeated,  ///< Known already, or its origin is heard directly.
-    kRefused,   ///< Its origin is not known in this life, or is this robot, or who hands it over is
-                ///< no neighbour.
-    kForged,    ///< Its origin has not signed it, or is no member, see RelayStore::refusal().
-    kNoRoom,    ///< Given up: its origin, or what is carried, has no room left.
+    kNew,       ///< Message to deliver, to forward or to store.
+    kRepeated,  ///< The message is already known, or its origin is received directly.
+    kRefused,   ///< The boot id of its origin is unknown, the origin is this robot, or the sender
+                ///< is not a neighbour.
+    kForged,    ///< Its origin has not signed it or is not a member; see RelayStore::refusal().
+    kNoRoom,    ///< Dropped because the storage of its origin or of messages in transit is full.
 };
 
-/// How a message for one robot gets there.
+/// Routes by which a message can reach one robot.
 struct RelayWays {
-  bool direct = true;  ///< DDS carries it, or keeps it for a robot that was heard.
+  bool direct = true;  ///< DDS delivers it now, or later to a robot that was received before.
   bool relay = false;
 
   bool operator==(const RelayWays&) const = default;
 };
 
-/// What a RelayStore wants done.
+/// Work that a RelayStore requests.
 struct RelayOutput {
-  std::vector<RelayParcel> parcels;        ///< To be sent.
-  std::vector<RelayMessagePtr> delivered;  ///< For this robot to read, in order.
-  std::vector<RobotIdentity> met;          ///< Told of by others: new, or another process.
-  std::vector<RobotId> reachable;          ///< Not heard, but from now on ways lead there.
+  std::vector<RelayParcel> parcels;        ///< Messages to send.
+  std::vector<RelayMessagePtr> delivered;  ///< Messages for this robot, in order.
+  std::vector<RobotIdentity> met;          ///< Robots that neighbours have introduced: new ones or
+                                           ///< new boot ids.
+  std::vector<RobotId> reachable;          ///< Robots out of range to which a route has appeared.
 };
 
-/// One robot's part in carrying what robots tell each other outside the pose graph to those that do
-/// not hear each other, at the same time or ever. Every robot
+/// Relay of one robot for messages outside the pose graph: it carries them between robots that do
+/// not receive each other directly, now or ever. Every robot
 ///
-/// - keeps what it hears or is handed of each other robot (the origin): its bags of words, and its
-///   letters, which are closures and inlier sets to a robot that it does not hear;
-/// - tells whom it hears, and how much it holds of those that it does not (RelaySummary). On
-///   hearing that of a neighbour it hands over what that lacks, in order, a window at a time, and
-///   again if that does not arrive. Of several that could, the first that hears the origin does;
-/// - passes requests for keyframes and their answers on, to the addressee or to a neighbour that
-///   hears it, else back the way on which its bags came. Where no way leads it answers with what it
-///   has had of that keyframe before; without that it carries the message until there is one.
+/// - stores messages of each other robot (the origin): its bags of words, and its reliable
+///   messages, which are closures and inlier sets for a robot out of its range;
+/// - reports in its status which robots it receives directly, and how much it holds of the others
+///   (RelaySummary). When a neighbour reports less, it sends the missing messages in order, one
+///   window at a time, and repeats them if they do not arrive. If several robots could send them,
+///   one that receives the origin directly does;
+/// - forwards requests for keyframes and replies, to the addressee, to a neighbour of the
+///   addressee, or back along the route of the addressee's bags. Without a route it replies with
+///   its stored copy of the keyframe. If it has no copy it keeps the request until a route appears.
 ///
-/// Where all robots hear each other nothing is sent. A robot is known once it is heard or a
-/// neighbour introduces it. Another life of it is believed of whom it was known by before and of
-/// those that hear it: so of two lives the older cannot come back from robots that have missed the
-/// change. Nothing is believed about this robot itself, nor about those that it hears.
+/// If all robots receive each other directly, the relay sends nothing. A robot becomes known when
+/// it is received directly or when a neighbour introduces it. A new boot id of a known robot is
+/// accepted only from the neighbour that introduced it before and from robots that receive it
+/// directly. Therefore robots that have missed a restart cannot bring back the older boot id.
+/// Neighbours cannot change the state of this robot itself, or of robots that it receives directly.
 ///
-/// With the keys of a team a robot is introduced with its certificate, and what each origin says
-/// carries its signature from where it is said to where it is read. All of it is checked before it
-/// is believed, kept or handed on: neighbours can hold things back, not change or invent them.
+/// In a team with keys the introduction of a robot contains its certificate. The signature of the
+/// origin stays with each message from its sender to its reader. Each robot checks signature and
+/// certificate before it uses, stores or forwards the message. Neighbours can therefore withhold
+/// messages, but not change or invent them.
 ///
-/// Memory is bounded for each origin and kind, and for all that are not heard together; full, what
-/// is newest is not taken and counts as given up. Deterministic; time comes in [s], any origin, not
-/// decreasing. Not thread-safe.
+/// Memory is bounded for each origin and kind, and for all robots out of range together. When it is
+/// full, new messages are refused and counted as given up. Deterministic; time comes in [s], with
+/// any origin, and does not decrease. Not thread-safe.
 class RelayStore {
  public:
   static constexpr std::size_t kMaxOrigins = 64;
-  /// Held of one origin [octets]: an hour of bags at 4 Hz; thousands of closures; and hundreds of
+  /// Storage for one origin [bytes]: an hour of bags at 4 Hz; thousands of closures; hundreds of
   /// keyframes.
   static constexpr std::size_t kMaxBagBytes = 8U << 20U;
   static constexpr std::size_t kMaxLetterBytes = 4U << 20U;
   static constexpr std::size_t kMaxReplyBytes = 8U << 20U;
-  /// Held of all robots together that are not heard: whoever is heard can invent such.
+  /// Storage for all robots out of range together, because a neighbour could invent any number of
+  /// them.
   static constexpr std::size_t kMaxFarBytes = 128U << 20U;
-  /// Requests and answers carried for all addressees together.
+  /// Storage for requests and replies to all addressees together.
   static constexpr std::size_t kMaxCarriedBytes = 4U << 20U;
-  /// Under way to one neighbour of one origin's bags or letters.
+  /// Bags or reliable messages of one origin in transit to one neighbour.
   static constexpr std::size_t kWindowBytes = 32U << 10U;
-  /// So long a robot must have missed another one before it is handed anything of that: at the
-  /// start, and after a short outage, it hears it itself soon.
+  /// Time for which a robot must have missed an origin before neighbours send it messages of that
+  /// origin. At the start and after a short outage it soon receives them directly.
   static constexpr double kGrace_s = 5.0;
-  /// After which what has not arrived is handed over again, or by the next robot that could.
+  /// Time after which messages that have not arrived are sent again, possibly by another robot.
   static constexpr double kPatience_s = 3.0;
-  /// What was sent to a robot so shortly before it fell silent may not have arrived.
+  /// A message sent to a robot within this time before its link failed may not have arrived.
   static constexpr double kDoubt_s = 30.0;
 
-  /// Without `keys` nothing is signed. With them what is kept of other robots comes signed and is
-  /// passed on so; what this robot says, and what it is given to read, is without signatures.
+  /// Without `keys` nothing is signed. With `keys`, messages of other robots are stored and
+  /// forwarded with their signatures. Own messages, and messages that the store delivers, are
+  /// passed without signatures.
   explicit RelayStore(TeamPeer self, std::optional<RelayKeys> keys = {})
       : self_(self), keys_(std::move(keys)) {}
 
-  /// A robot is heard directly from now on, or no more.
+  /// This robot receives `peer` directly from now on (heard), or no longer (lost).
   void heard(const RobotIdentity& peer);
   void lost(RobotId robot, double now_s);
 
-  /// A bag that its origin told directly; it may come before heard().
+  /// Stores a bag that its origin has sent directly. It may arrive before the call of heard().
   RelayArrival keep_bag(const RobotIdentity& origin, std::uint32_t number,
                         std::vector<std::uint8_t> content);
-  /// Likewise a keyframe asked for, of a robot that is known.
+  /// Stores a keyframe that a known robot has sent directly as a reply.
   RelayArrival keep_reply(const TeamPeer& origin, std::uint32_t number,
                           std::vector<std::uint8_t> content);
 
-  /// This robot has told `to` a closure or inlier set, directly if that is heard: a letter if not,
-  /// or if it falls silent soon; of a robot that has not been met yet that is seen then. Of one
-  /// kind and `slot` to one robot the last counts. It is for the life of the process `to` alone,
-  /// of boot 0 for any.
+  /// This robot has published a closure or an inlier set for `to`. If `to` is received directly,
+  /// the message becomes a reliable message only if the link fails soon afterwards. If `to` is out
+  /// of range, it becomes one at once; if `to` is unknown, the store decides at the first contact.
+  /// A newer message of equal kind, `slot` and addressee replaces an older one. Only the
+  /// incarnation of `to` receives it; with boot id 0, any incarnation.
   void wrote(RelayKind kind, const TeamPeer& to, std::uint64_t slot,
              std::vector<std::uint8_t> content, double now_s);
-  /// Sends a request or an answer to a robot that ways_to() says to be reached so.
+  /// Sends a request or a reply to a robot for which ways_to() reports a relay route.
   void call(RelayKind kind, RobotId to, std::uint32_t number, std::vector<std::uint8_t> content);
 
-  /// What a neighbour tells of itself.
+  /// Processes the summary in the status of a neighbour.
   void told(RobotId neighbour, const RelaySummary& summary, double now_s);
-  /// A message that it has handed over.
+  /// Processes a message from a neighbour.
   RelayArrival receive(const RelayParcel& parcel);
-  /// Why the last message was kForged (a string literal).
+  /// Reason why the last message was kForged (a string literal).
   [[nodiscard]] const char* refusal() const { return refusal_; }
 
   [[nodiscard]] RelaySummary summary() const;
   [[nodiscard]] bool hears(RobotId robot) const { return neighbours_.contains(robot); }
   [[nodiscard]] std::optional<TeamPeer> origin(RobotId robot) const;
   [[nodiscard]] RelayWays ways_to(RobotId robot) const;
-  /// Since the last call.
+  /// Output since the last call.
   [[nodiscard]] RelayOutput take_output() { return std::exchange(output_, {}); }
-  /// Messages that were not taken for want of room.
+  /// Number of messages refused because the storage was full.
   [[nodiscard]] std::uint64_t given_up() const { return given_up_; }
 
  private:
-  // Messages of one kind of one origin by number, and how many there are without a gap.
+  // Messages of one kind and one origin by number, with the length of the first run without a gap.
   class Stream {
    public:
     [[nodiscard]] bool has(std::uint32_t number) const { return messages_.contains(number); }
     [[nodiscard]] std::uint32_t whole() const { return whole_; }
     [[nodiscard]] std::size_t bytes() const { return bytes_; }
-    /// False if that would be more than `max_bytes`.
+    /// False if the stream would exceed `max_bytes`.
     [[nodiscard]] bool put(RelayMessage message, std::size_t max_bytes);
-    /// Null unless it is there.
+    /// Null if the message is missing.
     [[nodiscard]] const RelayMessage* find(std::uint32_t number) const;
 
    private:
@@ -149,7 +156,7 @@ class RelayStore {
     std::uint32_t whole_ = 0;
     std::size_t bytes_ = 0;
   };
-  // What shows that an origin is one of the team: nothing without keys.
+  // Proof that an origin belongs to the team; empty without keys.
   struct Membership {
     std::string credentials = {};
     std::optional<Certificate> certificate = {};
@@ -157,21 +164,23 @@ class RelayStore {
   struct Origin {
     RobotIdentity identity;
     Membership membership = {};
-    std::optional<RobotId> via = {};  // who has introduced it, or handed over its last bag
-    bool reachable = false;           // as last told
+    std::optional<RobotId> via = {};  // Neighbour that introduced the origin or sent its last bag.
+    bool reachable = false;           // Last reachability that was reported.
     bool was_heard = false;
     Stream bags = {}, letters = {}, replies = {};
   };
   struct Progress {
-    std::uint32_t told = 0;  // by the neighbour
+    std::uint32_t told = 0;  // Number of messages that the neighbour reports.
     std::uint32_t sent = 0;
-    double since_s = 0.0;  // without progress
+    double since_s = 0.0;  // Start of the time without progress.
   };
   struct Neighbour {
     std::set<RobotId> hears = {};
     std::map<RobotId, RelayHeld> holds = {};
-    std::map<std::pair<RobotId, bool>, Progress> progress = {};  // by origin; of letters, or bags
-    std::map<RobotId, double> misses_s = {};                     // others, since when
+    std::map<std::pair<RobotId, bool>, Progress> progress = {};  // By origin; true for reliable
+                                                                 // messages, false for bags.
+    std::map<RobotId, double> misses_s = {};                     // By origin: start of the time
+                                                                 // without contact.
     std::map<RobotId, double> introduced_s = {};
   };
   struct Recent {
@@ -180,7 +189,7 @@ class RelayStore {
     RelayMessage message;
   };
 
-  /// Null if there is one too many.
+  /// Null if the limit of origins is reached.
   Origin* know(const RobotIdentity& identity);
   [[nodiscard]] Membership membership_of(const RobotIdentity& identity) const;
   void become(Origin& origin, const RobotIdentity& identity, Membership membership);
@@ -211,12 +220,12 @@ class RelayStore {
   TeamPeer self_;
   std::optional<RelayKeys> keys_;
   std::map<RobotId, Origin> origins_;
-  std::map<RobotId, Neighbour> neighbours_;  // those heard
+  std::map<RobotId, Neighbour> neighbours_;  // Robots received directly.
   Stream own_letters_;
   std::map<std::tuple<RelayKind, RobotId, std::uint64_t>, std::uint32_t> own_slots_;
-  std::deque<Recent> recent_;  // oldest first
-  std::deque<Recent> unmet_;   // to robots that are not known; oldest first
-  // By addressee, then kind, origin and number.
+  std::deque<Recent> recent_;  // Oldest first.
+  std::deque<Recent> unmet_;   // Messages to unknown robots, oldest first.
+  // By addressee; then by kind, origin and number.
   std::map<RobotId, std::map<std::tuple<RelayKind, RobotId, std::uint32_t>, RelayMessage>> carried_;
   std::size_t carried_bytes_ = 0;
   RelayOutput output_;

@@ -8,18 +8,19 @@
 
 namespace km {
 
-/// What has become of a pair of keyframes.
+/// Stage of a pair of keyframes.
 struct ToldClosure {
   ClosureId id;
   ClosureStage stage = ClosureStage::kCandidate;
-  bool rejected = false;         ///< Verified, but others contradict it.
-  std::optional<SE3> T_from_to;  ///< Between those of `id`, where it was measured.
+  bool rejected = false;         ///< Verified, but rejected by the optimiser.
+  std::optional<SE3> T_from_to;  ///< Measured transform between the keyframes of `id`, if there is
+                                 ///< one.
 };
 
-/// Closures as lines between keyframes, one marker each of those that are candidates (grey),
-/// verified (yellow), rejected (red) and kept (green): all four, so that what is there no more
-/// goes. The end of a line at another robot's keyframe is where the closure puts it; one that was
-/// not measured is not drawn then, nor are keyframes that `trajectory` does not have.
+/// Draws closures as lines between keyframes, with one marker for each stage: candidates (grey),
+/// verified (yellow), rejected (red) and kept (green). It always returns all four markers, so that
+/// viewers remove old lines. A line to a keyframe of another robot ends where the closure places
+/// that keyframe. Lines to keyframes without a known pose are omitted.
 [[nodiscard]] RosMarkers closure_lines(std::span<const ToldClosure> closures,
                                        const Trajectory& trajectory, const RosHeader& header);
 

@@ -5,7 +5,7 @@
 
 namespace km {
 
-/// An image as cameras' drivers compress it: JPEG.
+/// Compresses an image to JPEG, as camera drivers do.
 [[nodiscard]] RosCompressedImage jpeg_of(const GrayImage& image, RosHeader header);
 
 }  // namespace km

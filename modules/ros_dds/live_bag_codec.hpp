@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// Live topics of ROS 2 as a recording that has no end, so that what plays recordings plays
-/// drivers. Not thread-safe but for stop().
+/// Live topics of ROS 2 as a recording without end, so that the code that plays recordings also
+/// plays drivers. Not thread-safe, except for stop().
 class LiveBag final : public BagReader {
  public:
   LiveBag(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics);
@@ -21,7 +21,7 @@ class LiveBag final : public BagReader {
   [[nodiscard]] bool is_live() const override { return true; }
   void stop() noexcept override { subscription_.stop(); }
 
-  /// As RosSubscription::give_up_after().
+  /// See RosSubscription::give_up_after().
   void give_up_after(double patience_s) { subscription_.give_up_after(patience_s); }
 
  private:

@@ -9,20 +9,20 @@
 
 namespace km {
 
-/// The frames of a robot as REP 105 has them: `odom`, in which it moves without jumps, and `map`,
-/// that of its team, in which odometry is corrected whenever the pose graph says so.
+/// Frames of a robot according to REP 105. The robot moves without jumps in `odom`. `map` is the
+/// frame of its team, and the pose graph corrects the pose of `odom` in it.
 class LiveFrames {
  public:
-  /// In order of time.
+  /// States have to be in order of time.
   void add(const OdometryState& state);
-  /// Behind the state of its image.
+  /// Call it after the state of the same image.
   void add(const KeyframeOdometry& keyframe);
-  /// The correction from here on: where the newest keyframe is that both know.
+  /// Updates the correction from the newest keyframe that both odometry and `trajectory` contain.
   void add(const Trajectory& trajectory);
 
   [[nodiscard]] const SE3& T_map_odom() const { return T_map_odom_; }
 
-  /// Stamps of the keyframes, by index; those of a former life of the robot are 0.
+  /// Stamps of the keyframes by index; 0 for keyframes of an earlier incarnation of the robot.
   [[nodiscard]] const std::vector<Stamp>& keyframe_stamps() const { return stamps_; }
 
   /// Angular rate in the body frame over the last two states [rad/s]; zero before there are two.
@@ -31,7 +31,7 @@ class LiveFrames {
  private:
   std::deque<OdometryState> recent_;
   std::vector<Stamp> stamps_;
-  std::vector<std::optional<SE3>> T_odom_kf_;  // by odometry as it was live
+  std::vector<std::optional<SE3>> T_odom_kf_;  // poses from live odometry
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();
   SE3 T_map_odom_ = SE3::Identity();
 };

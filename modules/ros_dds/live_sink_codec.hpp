@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// Messages to those who listen on ROS 2 now.
+/// Publishes messages on ROS 2 topics.
 class LiveSink final : public RosSink {
  public:
   explicit LiveSink(std::shared_ptr<const RosNetwork> network) : network_(std::move(network)) {}

@@ -60,14 +60,14 @@ void McapSink::write() try {
   const auto bytes = writer_.take();
   if (bytes.empty()) return;
   std::string waiting(bytes.begin(), bytes.end());
-  // What is no plain file (a device, a pipe, a link) is written in place.
+  // A device, a pipe or a link is written in place.
   if (written_ == 0 && is_regular_file(symlink_status(file_))) std::filesystem::remove(file_);
   append_to_file(file_, waiting);
   written_ += bytes.size();
 } catch (const std::exception& error) {
   failed_ = true;
   std::error_code unknown;
-  std::filesystem::resize_file(file_, written_, unknown);  // the rest is no whole chunk
+  std::filesystem::resize_file(file_, written_, unknown);  // removes an incomplete chunk
   fail_(error.what());
 }
 

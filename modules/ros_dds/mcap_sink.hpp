@@ -11,13 +11,15 @@
 
 namespace km {
 
-/// Messages into one MCAP file, with the definitions of their types. Of a process that is killed
-/// the file is whole up to the last flush(). Where it cannot be written, the disk being full, it
-/// ends with its last whole part, and whatever follows is left out. A message without a time is,
-/// too: on a time line it would lie half a century before the others.
+/// Writes messages into one MCAP file, with the definitions of their types. If the process is
+/// killed, the file is complete up to the last flush(). If writing fails, for example because the
+/// disk is full, the file ends with its last complete chunk and later messages are dropped.
+/// Messages without a time are dropped too, because a viewer would show them half a century before
+/// the others.
 class McapSink final : public RosSink {
  public:
-  /// With the first message `file` is replaced. `fail` is told, once, why the file ends too early.
+  /// The first message replaces `file`. `fail` is called once, with the reason, if the file ends
+  /// early.
   McapSink(std::filesystem::path file, std::function<void(const std::string& why)> fail);
 
   std::size_t open(const ToldTopic& topic) override;
@@ -33,8 +35,8 @@ class McapSink final : public RosSink {
   const std::filesystem::path file_;
   const std::function<void(const std::string&)> fail_;
   McapWriter writer_{{}};
-  std::vector<std::uint32_t> sequences_;  // by topic, whose number is its channel's less one
-  Stamp newest_ = 0;                      // of the messages
+  std::vector<std::uint32_t> sequences_;  // by topic, whose number is that of its channel less one
+  Stamp newest_ = 0;                      // newest stamp of the messages
   std::uint64_t written_ = 0;             // [bytes]
   bool failed_ = false;
 };

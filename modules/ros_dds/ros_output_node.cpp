@@ -15,7 +15,8 @@ namespace km {
 namespace {
 
 constexpr double kLate_s = 2.0;
-constexpr std::size_t kImages = 8;  // and meshes that wait for being made smaller
+constexpr std::size_t kImages = 8;  // maximum number of waiting images, and of meshes that wait for
+                                    // coarsening
 constexpr double kPiece_bytes = 65536.0;
 
 RosPose message_of(const SE3& T) {
@@ -151,13 +152,13 @@ std::string RosOutputNode::map_of(RobotId anchor) const {
   return options_.name_of ? ros_name(options_.name_of(anchor)) + "/map" : "map";
 }
 
-// That of the sensors, and after the last image time goes on.
+// Time of the sensors. After the last image it advances with the steady clock.
 std::optional<Stamp> RosOutputNode::time() const {
   if (!stamp_) return std::nullopt;
   return *stamp_ + nanoseconds(steady_now_s() - told_s_);
 }
 
-// Its size [bytes].
+// Returns the size of the message [bytes].
 template <typename Message>
 std::size_t RosOutputNode::tell(std::size_t topic, const Message& message) {
   const auto bytes = encode_ros(message);
@@ -189,7 +190,7 @@ void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
 void RosOutputNode::step(const Topic<KeyframeOdometry>::Message& keyframe) {
   frames_.add(*keyframe);
   if (stamp_ && *stamp_ >= keyframe->stamp) return;
-  stamp_ = keyframe->stamp;  // of a pose graph, which has no images
+  stamp_ = keyframe->stamp;  // the input is a pose graph without images
   told_s_ = steady_now_s();
 }
 
@@ -262,7 +263,7 @@ std::size_t RosOutputNode::tell_mesh() {
   return bytes;
 }
 
-// As many as may go now.
+// Sends as many pieces as the budget allows now.
 void RosOutputNode::tell_pieces() {
   const double now_s = steady_now_s();
   while (piece_bytes_.wait_s(0.0, now_s) <= 0.0) {
@@ -272,7 +273,7 @@ void RosOutputNode::tell_pieces() {
   }
 }
 
-// Robots that are not joined have no common frame: nothing says where one's is for the others.
+// Before robots have joined a session, no transform between their frames is known.
 void RosOutputNode::tell_link() {
   const std::string team = map_of(trajectory_->anchor);
   if (trajectory_->T_world_kf.empty() || team == map_) return;

@@ -30,32 +30,37 @@
 
 namespace km {
 
-/// Channels of what is told to viewers; they must outlive it.
+/// Channels with the inputs of the node; they must outlive it.
 struct RosOutputTopics {
   In<OdometryState> odometry;
   In<KeyframeOdometry> keyframes;
-  In<Trajectory> trajectory;               ///< Of this robot.
-  std::optional<In<SensorPacket>> images;  ///< Whose left ones are told, too.
+  In<Trajectory> trajectory;               ///< Trajectory of this robot.
+  std::optional<In<SensorPacket>> images;  ///< If given, the left images are published, too.
 };
 
-/// What is told beside, and how.
+/// Selection of optional outputs.
 struct RosOutputOptions {
-  std::string robot = {};  ///< Its name.
+  std::string robot = {};  ///< Name of the robot.
   RobotId id = 0;
-  /// Names of the robots: each has a frame NAME/map then. Without, the team's is `map` for all.
+  /// Names of the robots: each robot then has a frame NAME/map. Without it the frame of the team is
+  /// `map` for all robots.
   std::function<std::string(RobotId)> name_of = {};
-  int mesh_points = 0;  ///< Of a mesh, at most; 0: it is not told.
-  int mesh_faces = 0;   ///< Likewise, in pieces: for those who are not to be held up.
-  double mesh_bytes_per_s = std::numeric_limits<double>::infinity();  ///< Of these pieces.
-  bool draws = false;  ///< The mesh's faces and the closures, for those who have time for them.
-  bool logs = false;   ///< What is logged in this process.
-  /// Paths, meshes and closures are told again once what they took last is paid at this rate.
+  int mesh_points = 0;  ///< Maximum number of points of a mesh; 0: no points are published.
+  int mesh_faces = 0;   ///< Maximum number of faces, published in pieces so that slow viewers are
+                        ///< not blocked.
+  double mesh_bytes_per_s = std::numeric_limits<double>::infinity();  ///< Maximum rate of these
+                                                                      ///< pieces.
+  bool draws = false;  ///< Publish faces of the mesh and closures as markers.
+  bool logs = false;   ///< Publish the log of this process.
+  /// Paths, meshes and closures are published again when the budget at this rate has recovered from
+  /// their last publication.
   double state_bytes_per_s = std::numeric_limits<double>::infinity();
-  std::size_t queue =
-      1000;  ///< Inputs that may wait; then the oldest go: nobody waits for viewers.
+  /// Maximum number of waiting inputs; beyond it the oldest are dropped, so that no node waits for
+  /// viewers.
+  std::size_t queue = 1000;
 };
 
-/// Tells ROS' viewers and planners, or a file that they read, where a robot NAME is:
+/// Publishes the state of a robot NAME to ROS viewers and planners, or into a file that they read:
 ///   /NAME/odometry     nav_msgs/Odometry, NAME/odom -> NAME/base_link, for every image; no
 ///                      covariance
 ///   /NAME/pose         geometry_msgs/PoseStamped in `map`, for every image
@@ -63,24 +68,25 @@ struct RosOutputOptions {
 ///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised; a state
 ///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected; a
 ///                      state
-///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: odometry, and what it is
-///                      given
+///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: state and input of
+///                      odometry
 /// and on request:
 ///   /NAME/mesh_faces   visualization_msgs/Marker in `map`: the mesh's faces, in pieces (see
 ///                      SurfacePieces) or at once; a state
 ///   /NAME/closures     visualization_msgs/MarkerArray in `map`, see closure_lines()
 ///   /rosout            rcl_interfaces/Log
 ///   /NAME/left/image_raw/compressed  sensor_msgs/CompressedImage
-/// `map` is the frame of the team, or of the robot alone as long as it is alone. Where every robot
-/// has one of its own, as in files that are put together, /tf says once a second that it is that of
-/// the robot in whose frame the team is. base_link is the inertial sensor's frame.
+/// `map` is the frame of the team, or of the robot before it joins others. In files that are merged
+/// later, every robot has a map frame of its own. Then /tf repeats once a second which robot's
+/// frame is the frame of the team. base_link is the inertial sensor's frame.
 class RosOutputNode final : public Node {
  public:
-  /// How the rest of the robot does, by the names of its parts; nullopt while it is silent: then
-  /// nothing is told each second, and states that have changed at once. Called on the node's
-  /// thread.
+  /// Returns the diagnostics of the other parts of the robot, by name. nullopt while the robot is
+  /// silent: then nothing is published each second, and changed states are published at once.
+  /// Called on the node's thread.
   using Diagnose = std::function<std::optional<std::vector<RosDiagnosticStatus>>()>;
-  /// All closures of the robot; nullopt: as before. Called on the node's thread.
+  /// Returns all closures of the robot, or nullopt if they are unchanged. Called on the node's
+  /// thread.
   using Closures = std::function<std::optional<std::vector<ToldClosure>>()>;
 
   RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sink, RosOutputOptions options,
@@ -88,28 +94,29 @@ class RosOutputNode final : public Node {
   ~RosOutputNode() override { stop(); }
 
   std::string_view name() const override { return node_name_; }
-  /// A mesh in `map`, in place of the one before. Thread-safe; does not wait.
+  /// Replaces the mesh, given in `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const LabelledMesh> mesh) { worker_.post(std::move(mesh)); }
 
   void start() override;
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override;
-  /// A disk may stand still for long, and nobody waits for it meanwhile.
+  /// Large, because a disk may block for long and no node waits for it meanwhile.
   double step_limit_s() const override { return 300.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Call after stop(): the states as they are at the end, `closures` (nullopt: as before) and as
-  /// the path `poses`, in `map`, if there are any: those of all images; and files. Nothing follows.
+  /// Publishes the final states and files; call it after stop(), as the last call. `closures` is
+  /// nullopt if they are unchanged. `poses`, in `map`, are the poses of all images and become the
+  /// path unless empty.
   void finish(std::span<const StampedPose> poses, std::optional<std::vector<ToldClosure>> closures,
               const std::map<std::string, std::string>& files);
 
-  /// Inputs and images for which there was no time.
+  /// Number of inputs and images that were dropped because the node was too slow.
   [[nodiscard]] std::size_t left_out() const;
 
  private:
   struct Tick {};
-  // What of a mesh is to be told in pieces.
+  // A mesh to be published in pieces.
   struct CoarseMesh {
     std::shared_ptr<const LabelledMesh> mesh;
   };
@@ -120,7 +127,7 @@ class RosOutputNode final : public Node {
                    std::shared_ptr<const RosCompressedImage>>;
   using Image = std::shared_ptr<const StereoFrame>;
   using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
-  // A state that is told when it has changed and its time has come.
+  // A state that is published when it has changed and the budget allows.
   struct State {
     std::size_t topic = 0;
     bool changed = false;
@@ -162,10 +169,11 @@ class RosOutputNode final : public Node {
   State path_, mesh_, closures_;
   LiveFrames frames_;
   std::size_t poses_ = 0;
-  std::optional<Stamp> stamp_;   // of the last image or keyframe
-  std::optional<Stamp> latest_;  // of the messages told: they never go back
-  double speed_mps_ = 0.0;       // then
-  double told_s_ = 0.0;          // when it came; steady clock
+  std::optional<Stamp> stamp_;   // stamp of the last image or keyframe
+  std::optional<Stamp> latest_;  // greatest stamp that was published, because stamps must not
+                                 // decrease
+  double speed_mps_ = 0.0;       // at `stamp_`
+  double told_s_ = 0.0;          // time of arrival of `stamp_`, by the steady clock
   Topic<Trajectory>::Message trajectory_ = std::make_shared<const Trajectory>();
   std::shared_ptr<const LabelledMesh> newest_mesh_;
   SurfacePieces pieces_;

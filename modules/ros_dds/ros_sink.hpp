@@ -11,34 +11,34 @@
 
 namespace km {
 
-/// A topic that is to be told.
+/// A topic of a RosSink.
 struct ToldTopic {
   std::string name;
   std::string_view type;  ///< kType of its messages.
-  bool is_state = false;  ///< The newest message is all there is to know: late comers get it.
-  int depth = 10;         ///< Messages kept for those who take them slowly.
+  bool is_state = false;  ///< The newest message is the full state: late subscribers receive it.
+  int depth = 10;         ///< Number of messages kept for slow readers.
 };
 
-/// Where messages of ROS go: to those who listen, or into a file. Not thread-safe.
+/// Receiver of ROS messages: topics or a file. Not thread-safe.
 class RosSink {
  public:
   virtual ~RosSink() = default;
 
-  /// The topic's number.
+  /// Returns the number of the topic.
   virtual std::size_t open(const ToldTopic& topic) = 0;
 
-  /// A message as encode_ros() makes it. `time`: of the robot's sensors; nullopt while there is
-  /// none yet.
+  /// Writes a message encoded by encode_ros(). `time` is the time of the robot's sensors; nullopt
+  /// before the first stamp.
   virtual void put(std::size_t topic, std::optional<Stamp> time,
                    std::span<const std::uint8_t> message) = 0;
 
-  /// What was put is not held back any longer. Called once a second.
+  /// Writes all buffered messages. Called once a second.
   virtual void flush() {}
 
-  /// A file that belongs to what was put, if it is kept.
+  /// Attaches a text file, if the sink stores files.
   virtual void attach(const std::string& /*name*/, std::string_view /*text*/) {}
 
-  /// Nothing follows.
+  /// Ends the output.
   virtual void finish() {}
 };
 

@@ -14,7 +14,7 @@
 namespace km {
 namespace {
 
-// For each vertex the first one of its cell.
+// Maps each vertex to the first vertex of its cell.
 std::vector<std::uint32_t> first_of_cells(const LabelledMesh& mesh, float cell_m) {
   std::map<std::array<std::int64_t, 3>, std::uint32_t> first;
   std::vector<std::uint32_t> result;

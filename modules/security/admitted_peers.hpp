@@ -12,38 +12,39 @@
 
 namespace km {
 
-/// Processes of robots that keys are kept of at most, and those of one robot.
+/// Maximum number of processes whose keys are kept, in total and for one robot.
 inline constexpr std::size_t kMaxAdmitted = 256;
 inline constexpr std::size_t kMaxAdmittedPerRobot = 4;
 
-/// A key for messages to all; its owner counts the keys it draws.
+/// Key for messages to all robots, numbered by its owner.
 struct TeamKey {
   std::uint32_t number = 0;
   SealingKey key;
 };
 
-/// What is known of a process that was admitted.
+/// Keys and certificate of an admitted process.
 struct AdmittedPeer {
   Certificate certificate;
-  std::string credentials = {};  ///< As it shows them.
+  std::string credentials = {};  ///< In the form in which the process shows them.
   ExchangeKey exchange{};
   SealingKey to_peer, from_peer;
-  std::vector<TeamKey> team_keys;  ///< Its own, by number; none before its first key message.
+  std::vector<TeamKey> team_keys;  ///< Team keys of the process by number; empty before its first
+                                   ///< key message.
 };
 
-/// The processes that were admitted. There are never more than the bounds above: the one that has
-/// been silent for longest makes room; those of which no message ever opened go first, for they may
-/// be recordings. Not thread-safe.
+/// The admitted processes, at most as many as the bounds above. When a bound is reached, the
+/// process that has been silent for longest is removed. Processes without any decrypted message are
+/// removed first, because their credentials may be replayed recordings. Not thread-safe.
 class AdmittedPeers {
  public:
   /// nullptr if it is not admitted. Valid until the next change.
   [[nodiscard]] AdmittedPeer* find(const TeamPeer& peer);
   [[nodiscard]] const AdmittedPeer* find(const TeamPeer& peer) const;
 
-  /// Adds one that is not there yet.
+  /// Adds a process that is not yet admitted.
   void add(const TeamPeer& peer, AdmittedPeer admitted);
 
-  /// A message of its opened. Nothing happens if it is not known.
+  /// Notes that a message of the process has been decrypted. Does nothing for an unknown process.
   void heard(const TeamPeer& peer);
 
   void erase(const TeamPeer& peer) { peers_.erase(peer); }
@@ -68,7 +69,7 @@ class AdmittedPeers {
   };
   using Entries = std::map<TeamPeer, Entry>;
 
-  // Erases the least worth keeping of [begin, end), if there are `most` or more.
+  // Removes the process of [begin, end) that is least worth keeping, if there are `most` or more.
   void make_room(Entries::iterator begin, Entries::iterator end, std::size_t most);
 
   Entries peers_;

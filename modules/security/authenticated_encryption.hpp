@@ -10,7 +10,7 @@ namespace km {
 
 using Nonce = std::array<std::uint8_t, 24>;
 
-/// Octets that encrypt() adds: nonce 24, tag 16.
+/// Bytes that encrypt() adds: nonce 24, tag 16.
 inline constexpr std::size_t kEncryptionBytes = 24 + 16;
 
 /// A fresh nonce, drawn at random.
@@ -24,7 +24,7 @@ inline constexpr std::size_t kEncryptionBytes = 24 + 16;
 void encrypt(const SealingKey& key, const Nonce& nonce, OctetView associated, OctetView content,
              Octets& out);
 
-/// Inverse of encrypt(). nullopt unless the key's owner encrypted exactly this with exactly
+/// Inverse of encrypt(). nullopt unless the bytes were encrypted with this key and this
 /// `associated`.
 [[nodiscard]] std::optional<Octets> decrypt(const SealingKey& key, OctetView associated,
                                             OctetView encrypted);

@@ -9,18 +9,18 @@
 
 namespace km {
 
-/// What the team's authority says of a robot: it has this id, this name and this key, for a time.
+/// Statement of the team's authority that a robot has this id, name and key during a time.
 struct Certificate {
-  std::string team;  ///< For people; what tells teams apart is the authority's key.
+  std::string team;  ///< For people; the key of the authority identifies the team.
   RobotId robot = 0;
   std::string name;
   PublicKey key{};
   std::int64_t valid_from_s = 0;   ///< [s since 1970-01-01 UTC]
   std::int64_t valid_until_s = 0;  ///< [s since 1970-01-01 UTC], inclusive.
-  Signature signature{};           ///< By the authority, over all of the above.
+  Signature signature{};           ///< Signature of the authority over the fields above.
 };
 
-/// A certificate taken back before its time. Its key says which.
+/// A certificate that is revoked before its end. Its key identifies it.
 struct RevokedCertificate {
   PublicKey key{};
   RobotId robot = 0;
@@ -29,9 +29,9 @@ struct RevokedCertificate {
   bool operator==(const RevokedCertificate&) const = default;
 };
 
-/// All that the authority has taken back; a list that it signs as a whole.
+/// All revoked certificates, a list that the authority signs as a whole.
 struct Revocations {
-  std::uint64_t number = 0;  ///< Of two lists, the one with the higher number counts.
+  std::uint64_t number = 0;  ///< The list with the higher number replaces the other.
   std::vector<RevokedCertificate> revoked;
   Signature signature{};  ///< By the authority.
 };
@@ -40,16 +40,17 @@ struct Revocations {
 void sign(Certificate& certificate, const SigningKey& authority);
 void sign(Revocations& revocations, const SigningKey& authority);
 
-/// True if the authority of this public key signed exactly this.
+/// True if the authority with this public key signed exactly these fields.
 [[nodiscard]] bool is_signed_by(const PublicKey& authority, const Certificate& certificate);
 [[nodiscard]] bool is_signed_by(const PublicKey& authority, const Revocations& revocations);
 
-/// nullptr, or why a certificate of the authority's does not hold at `now_s`
-/// [s since 1970-01-01 UTC] (a string literal): not valid yet or any more, or revoked.
+/// nullptr if a certificate of the authority is valid at `now_s` [s since 1970-01-01 UTC];
+/// otherwise the reason (a string literal): not valid yet, expired, or revoked.
 [[nodiscard]] const char* lapse_of(const Certificate& certificate, const Revocations& revocations,
                                    std::int64_t now_s);
 
-/// The same, or that it is not signed by the authority. `revocations` are believed as they are.
+/// As lapse_of(), and also checks the signature of the
+/// authority. Does not check the signature of `revocations`.
 [[nodiscard]] const char* refusal_of(const Certificate& certificate, const PublicKey& authority,
                                      const Revocations& revocations, std::int64_t now_s);
 

@@ -82,7 +82,7 @@ Decoded<Credentials> parse_credentials(std::string_view text) {
   read(reader, credentials.certificate);
   read(reader, credentials.exchange);
   read(reader, credentials.signature);
-  // libsodium 1.0.18 takes some characters beyond ASCII for others.
+  // libsodium 1.0.18 accepts some characters beyond ASCII in place of others.
   if (to_text(credentials) != text) return Result::refuse("credentials are not base 64");
   return Result::accept(credentials);
 }

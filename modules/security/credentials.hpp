@@ -11,25 +11,27 @@
 
 namespace km {
 
-/// X25519 (RFC 7748): what two processes agree on a key by.
+/// X25519 (RFC 7748): public key from which two processes derive a common key.
 using ExchangeKey = std::array<std::uint8_t, 32>;
 
-/// What a process shows of itself beside its identity: of its certificate, what the identity does
-/// not say already, and a key of this start that the robot signs.
+/// Data that a process shows in addition to its identity. They are the parts of its certificate
+/// that are not in the identity, and a key of this start that the robot signs.
 struct Credentials {
-  std::array<std::uint8_t, 8> authority{};  ///< Begin of the authority's public key: which team.
+  std::array<std::uint8_t, 8> authority{};  ///< First bytes of the authority's public key, which
+                                            ///< identify the team.
   PublicKey key{};
   std::int64_t valid_from_s = 0;
   std::int64_t valid_until_s = 0;
-  Signature certificate{};  ///< By the authority.
+  Signature certificate{};  ///< Signature of the authority.
   ExchangeKey exchange{};
-  Signature signature{};  ///< By the robot, over its identity, `exchange` and `certificate`.
+  Signature signature{};  ///< Signature of the robot over its identity, `exchange` and
+                          ///< `certificate`.
 };
 
 /// Characters of to_text().
 inline constexpr std::size_t kCredentialsLength = 290;
 
-/// Makes and signs what the robot of `certificate` shows.
+/// Makes and signs the credentials of the robot of `certificate`.
 [[nodiscard]] Credentials make_credentials(const Certificate& certificate,
                                            const PublicKey& authority, const SigningKey& robot,
                                            const RobotIdentity& identity,
@@ -38,7 +40,8 @@ inline constexpr std::size_t kCredentialsLength = 290;
 /// Base 64 with '-' and '_' (RFC 4648, section 5), without padding.
 [[nodiscard]] std::string to_text(const Credentials& credentials);
 
-/// Inverse of to_text() for a text that anybody may have sent; every credentials have one spelling.
+/// Inverse of to_text() for a text from an unknown sender. Each credentials value has exactly one
+/// accepted text.
 [[nodiscard]] Decoded<Credentials> parse_credentials(std::string_view text);
 
 /// The certificate that the credentials claim for `identity`, in a team of this name.

@@ -24,7 +24,7 @@ InputFile open_key_file(const fs::path& file) try {
   throw std::runtime_error(std::string(error.what()) + "; kimera_multi_keys makes it (--help)");
 }
 
-// Of what was read, not of what has its name by now.
+// Checks the status of the file that was read, because the name may refer to another file now.
 void check_access(const fs::path& file, const fs::file_status& status) {
   const fs::perms mode = status.permissions();
   if ((mode & (fs::perms::group_all | fs::perms::others_all)) == fs::perms::none) return;

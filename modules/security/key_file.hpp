@@ -11,12 +11,12 @@
 
 namespace km {
 
-/// Who may read a file of keys.
+/// Users who may read a file of keys.
 enum class KeyFileAccess { kEveryone, kOwner };
 
 /// A text file of keys or certificates: lines "name: value", and comments that begin with '#'. Its
-/// first line with content says what it is ("format: kimera_multi certificate 1"). What is wrong
-/// throws std::runtime_error that names the file, the line, the value and the way out.
+/// first line with content states its format ("format: kimera_multi certificate 1"). Errors throw
+/// std::runtime_error that names the file, the line, the value and the remedy.
 class KeyFile {
  public:
   struct Line {
@@ -25,7 +25,8 @@ class KeyFile {
     std::string value;
   };
 
-  /// Reads a file of `format`. One for its owner is refused if anyone else may read or write it.
+  /// Reads a file of `format`. With KeyFileAccess::kOwner, refuses a file that other users may read
+  /// or write.
   static KeyFile read(const std::filesystem::path& file, std::string_view format,
                       KeyFileAccess access);
 
@@ -40,7 +41,7 @@ class KeyFile {
 
   [[noreturn]] void refuse(const Line& line, const std::string& why) const;
 
-  /// The value of a line as hexadecimal octets, a number, or a time.
+  /// Value of a line as hexadecimal bytes, a number, or a time.
   template <std::size_t N>
   [[nodiscard]] std::array<std::uint8_t, N> octets(const Line& line) const {
     std::array<std::uint8_t, N> value;
@@ -51,7 +52,7 @@ class KeyFile {
   [[nodiscard]] std::uint64_t number(const Line& line, std::uint64_t max) const;
   [[nodiscard]] std::int64_t time_s(const Line& line) const;
 
-  /// Octets that are a part of the value of a line.
+  /// Bytes given by a part of the value of a line.
   void read_hex(const Line& line, std::string_view text, std::uint8_t* octets,
                 std::size_t size) const;
 
@@ -61,8 +62,8 @@ class KeyFile {
   std::size_t at_ = 0;
 };
 
-/// Writes a file in one step: there is the former one or the new one, never a part. Throws
-/// std::runtime_error that names it.
+/// Replaces a file atomically: a crash leaves the former or the new file. Throws std::runtime_error
+/// that names it.
 void write_key_file(const std::filesystem::path& file, const std::string& text,
                     KeyFileAccess access);
 

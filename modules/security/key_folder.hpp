@@ -7,7 +7,7 @@
 
 namespace km {
 
-/// What a robot has of its team's keys: its own secret, and what it checks others by.
+/// Keys on a robot: its own secret, and the public data with which it checks other robots.
 struct RobotKeys {
   SigningKey secret;
   Certificate certificate;
@@ -16,9 +16,9 @@ struct RobotKeys {
 };
 
 /// Reads a robot's folder as `kimera_multi_keys` writes it. Throws std::runtime_error that names
-/// file, line, value and the way out: a file that is missing or not understood, a secret that
-/// others than its owner may read, parts that do not belong together, a signature that is not the
-/// authority's. Does not check the time.
+/// file, line, value and the remedy. Refuses a missing or malformed file, a secret that other users
+/// may read, parts that do not belong together, and a signature that is not the authority's. Does
+/// not check the time.
 [[nodiscard]] RobotKeys load_robot_keys(const std::filesystem::path& folder);
 
 /// Reads the folder's list of revocations alone, for TeamSeal::update(). Throws as above.

@@ -19,21 +19,21 @@ struct Authority {
   PublicKey key{};
 };
 
-/// Each throws std::runtime_error that names file, line, value and the way out. None checks a
+/// Each throws std::runtime_error that names file, line, value and the remedy. None checks a
 /// signature.
 [[nodiscard]] SigningKey read_secret_key(const std::filesystem::path& file);
 [[nodiscard]] Certificate read_certificate(const std::filesystem::path& file);
 [[nodiscard]] Authority read_authority(const std::filesystem::path& file);
 [[nodiscard]] Revocations read_revocations(const std::filesystem::path& file);
 
-/// `owner` says whose secret it is, to people.
+/// `owner` names the owner of the secret in a comment of the file.
 void write_secret_key(const std::filesystem::path& file, const SigningKey& key,
                       const std::string& owner);
 void write_certificate(const std::filesystem::path& file, const Certificate& certificate);
 void write_authority(const std::filesystem::path& file, const Authority& authority);
 void write_revocations(const std::filesystem::path& file, const Revocations& revocations);
 
-/// The first digits of a public key, enough for people to tell keys of a team apart.
+/// First digits of a public key, enough for people to distinguish keys of a team.
 [[nodiscard]] std::string fingerprint_of(const PublicKey& key);
 
 }  // namespace km

@@ -11,11 +11,11 @@ namespace km {
 using Octets = std::vector<std::uint8_t>;
 using OctetView = std::span<const std::uint8_t>;
 
-/// Ed25519 (RFC 8032): who signed.
+/// Ed25519 (RFC 8032): key and signature of a signer.
 using PublicKey = std::array<std::uint8_t, 32>;
 using Signature = std::array<std::uint8_t, 64>;
 
-/// Octets that are wiped when they are no longer needed.
+/// Bytes that are wiped when they are no longer needed.
 template <std::size_t N>
 class Secret {
  public:
@@ -23,7 +23,7 @@ class Secret {
   Secret(const Secret&) = default;
   Secret& operator=(const Secret&) = default;
   ~Secret() {
-    // A volatile write is not optimised away, though nothing reads the octets any more.
+    // A volatile write is not optimised away, although nothing reads the bytes any more.
     for (volatile std::uint8_t& octet : octets_) octet = 0;
   }
 

@@ -8,14 +8,15 @@
 namespace km {
 
 /// Starts libsodium; may be called again, from any thread. Throws std::runtime_error if the system
-/// gives no random numbers. What draws a key or a nonce calls it itself.
+/// gives no random numbers. Functions that draw a key or a nonce call it themselves.
 void start_sodium();
 
-/// The begin of what is signed or authenticated: what kind of statement it is, so that a signature
-/// under one never passes for one under another.
+/// Begin of a statement to sign or authenticate. It states the kind, so that a signature of one
+/// kind is never valid for another.
 [[nodiscard]] ByteWriter statement(std::string_view kind);
 
-/// Puts a text behind its length, so that no two sequences of fields have equal octets.
+/// Appends the length and then the text, so that different sequences of fields have different
+/// bytes.
 void put_text(ByteWriter& statement, std::string_view text);
 
 /// A fresh Ed25519 key.
@@ -30,8 +31,8 @@ void put_text(ByteWriter& statement, std::string_view text);
 /// Ed25519 (RFC 8032, pure).
 [[nodiscard]] Signature sign(OctetView statement, const SigningKey& key);
 
-/// True if the owner of `key` signed exactly this. Refuses what RFC 8032 lets a verifier refuse:
-/// other spellings of a signature, keys of small order.
+/// True if the owner of `key` signed exactly this. Also refuses non-canonical signatures and keys
+/// of small order, as RFC 8032 permits.
 [[nodiscard]] bool verify(OctetView statement, const Signature& signature, const PublicKey& key);
 
 }  // namespace km

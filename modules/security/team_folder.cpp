@@ -16,10 +16,10 @@ namespace fs = std::filesystem;
 constexpr const char* kAuthorityFolder = "authority";
 constexpr const char* kIssuedFolder = "issued";
 
-// A certificate holds already the day before it is made: clocks of robots may be behind.
+// A certificate is valid from the day before it is made, because clocks of robots may be behind.
 constexpr std::int64_t kClockTolerance_s = 86400;
 
-// A folder that holds a secret: nobody else looks into it.
+// Makes a folder that only its owner may enter, because it holds a secret.
 void make_private_folder(const fs::path& folder) {
   fs::create_directories(folder);
   fs::permissions(folder, fs::perms::owner_all);
@@ -123,7 +123,7 @@ void TeamFolder::issue_one(const RobotName& robot, std::int64_t now_s, std::int6
                           .valid_from_s = now_s - kClockTolerance_s,
                           .valid_until_s = valid_until_s};
   sign(certificate, secret_);
-  // First where it can be revoked from, then where it can be used.
+  // Writes the copy for revocation before the certificate that can be used.
   write_certificate(folder_ / kAuthorityFolder / kIssuedFolder /
                         (robot.name + '-' + fingerprint_of(certificate.key) + ".txt"),
                     certificate);

@@ -10,34 +10,35 @@
 
 namespace km {
 
-/// A robot that is to get keys.
+/// A robot that receives keys.
 struct RobotName {
   RobotId id = 0;
   std::string name;
 };
 
-/// Where a team's keys are made:
+/// Folder in which a team's keys are made:
 ///   authority/   secret_key.txt, authority.txt, revocations.txt, and issued/ with a copy of every
 ///                certificate; it stays off the robots
-///   NAME/        for each robot what goes onto it, see load_robot_keys()
-/// What cannot be done throws std::runtime_error that names the file or the robot, and the way out.
+///   NAME/        for each robot its folder of keys, see load_robot_keys()
+/// Errors throw std::runtime_error that names the file or the robot, and the remedy.
 class TeamFolder {
  public:
-  /// Makes a team with an authority, and keys of these robots as issue() does. Its name is that of
-  /// the folder, which must not exist or be empty. Nothing is written if the robots' names or ids
-  /// cannot be.
+  /// Makes a team with an authority, and keys of these robots as issue() does. The team has the
+  /// name of the folder, which must not exist or be empty. Writes nothing if names or ids of the
+  /// robots are invalid.
   static TeamFolder make(const std::filesystem::path& folder, const std::vector<RobotName>& robots,
                          std::int64_t now_s, std::int64_t valid_until_s);
 
-  /// Opens what make() made; needs the authority's secret.
+  /// Opens a folder that make() has made; needs the authority's secret.
   explicit TeamFolder(const std::filesystem::path& folder);
 
-  /// Makes keys and certificates, valid between the two times [s since 1970-01-01 UTC], or none of
-  /// them: ids and names must differ, and not be those of a certificate that holds at `now_s`.
+  /// Makes keys and certificates that are valid between the two times [s since 1970-01-01 UTC].
+  /// Makes none if ids or names are equal, or belong to a certificate that is valid at `now_s`.
   void issue(const std::vector<RobotName>& robots, std::int64_t now_s, std::int64_t valid_until_s);
 
-  /// Revokes every certificate of a robot, given by name or else by id, in the authority's list and
-  /// in the robots' folders that are here. Returns what it revoked, never nothing.
+  /// Revokes every certificate of a robot, given by name or otherwise by id, in the authority's
+  /// list and in the robots' folders that exist here. Returns the revoked certificates, at least
+  /// one.
   std::vector<RevokedCertificate> revoke(const std::string& robot);
 
   [[nodiscard]] const Authority& authority() const { return authority_; }

@@ -18,8 +18,8 @@ static_assert(ExchangeKey().size() == crypto_kx_PUBLICKEYBYTES);
 static_assert(Secret<32>::size() == crypto_kx_SECRETKEYBYTES);
 static_assert(SealingKey::size() == crypto_kx_SESSIONKEYBYTES);
 
-// Keys for messages to all that a process tells and remembers of another: what its older ones
-// sealed can still be read by those who come late.
+// Number of team keys of one process that it sends and that others keep. Late robots can read
+// messages under its older keys.
 constexpr std::size_t kTeamKeysKept = 8;
 
 void put_peer(ByteWriter& writer, const TeamPeer& peer) {
@@ -27,7 +27,7 @@ void put_peer(ByteWriter& writer, const TeamPeer& peer) {
   writer.u64(peer.boot);
 }
 
-// What the tag of a message covers beside its content.
+// Data that the tag of a message covers in addition to its content.
 Octets associated_data(const SealContext& context) {
   ByteWriter writer = statement(context.addressee ? "kimera_multi message for one 1"
                                                   : "kimera_multi message to all 1");
@@ -46,9 +46,9 @@ Octets key_message_data(const TeamPeer& from, const TeamPeer& to) {
   return writer.release();
 }
 
-// What the sender of a message to all signs. The hash is keyed with the team key: without that, a
-// sender could find one ciphertext that opens to different contents under different keys, which it
-// hands to different members.
+// Statement that the sender of a message to all signs. The hash is keyed with the team key.
+// Otherwise a sender could find one ciphertext that opens to different contents under different
+// keys, and send these keys to different members.
 Octets signed_statement(const SealingKey& key, OctetView associated, OctetView encrypted) {
   ByteWriter length;
   length.u64(associated.size());
@@ -74,7 +74,7 @@ Octets to_octets(const std::vector<TeamKey>& keys) {
   return writer.release();
 }
 
-// Empty for octets that to_octets() does not write.
+// Empty for bytes that to_octets() does not write.
 std::vector<TeamKey> team_keys_from(OctetView octets) {
   ByteReader reader(octets);
   std::vector<TeamKey> keys(std::min<std::size_t>(reader.u8(), kTeamKeysKept));
@@ -168,8 +168,8 @@ std::optional<std::string> TeamSeal::credentials_of(const TeamPeer& peer) const 
   return admitted == nullptr ? std::nullopt : std::optional(admitted->credentials);
 }
 
-// The keys in both directions, by X25519 and BLAKE2b over the shared secret and both public keys.
-// False for a public key of small order, which has no secret to share.
+// Derives the keys in both directions by X25519 and BLAKE2b over the shared secret and both public
+// keys. False for a public key of small order, which yields no shared secret.
 bool TeamSeal::agree(const TeamPeer& peer, AdmittedPeer& admitted) const {
   const auto derive = self_ < peer ? crypto_kx_client_session_keys : crypto_kx_server_session_keys;
   return derive(admitted.from_peer.data(), admitted.to_peer.data(), exchange_.data(),
@@ -221,7 +221,7 @@ const char* TeamSeal::accept_key_message(const TeamPeer& from, OctetView message
   sodium_memzero(content->data(), content->size());
   if (keys.empty()) return "key message does not hold keys";
   peers_.heard(from);
-  // A recording of an older message must not take the newer keys away.
+  // A replayed older key message must not remove the newer keys.
   if (sender->team_keys.empty() || sender->team_keys.back().number < keys.back().number)
     sender->team_keys = std::move(keys);
   return nullptr;
@@ -248,7 +248,7 @@ Opened TeamSeal::open(const SealContext& context, OctetView sealed) {
   return open_for_self(context, sealed);
 }
 
-// Number of the key, nonce, ciphertext, tag, signature.
+// Format: number of the key, nonce, ciphertext, tag, signature.
 Octets TeamSeal::seal_to_all(Octets associated, OctetView content) const {
   const TeamKey& key = team_keys_.back();
   ByteWriter number;
@@ -291,7 +291,8 @@ Opened TeamSeal::open_to_all(const SealContext& context, OctetView sealed) {
   if (key == keys.end()) return refused("message under a key that its sender gave up");
   Octets associated = associated_data(context);
   associated.insert(associated.end(), number_octets.begin(), number_octets.end());
-  // The tag first: it is much cheaper to check than a signature, and stops all strangers.
+  // The tag comes first: it is much cheaper to check than a signature, and refuses all senders
+  // outside the team.
   auto content = decrypt(key->key, associated, encrypted);
   if (!content) return refused("message is not its sender's, or was changed on its way");
   if (!verify(signed_statement(key->key, associated, encrypted), signature,

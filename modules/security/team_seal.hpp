@@ -19,131 +19,132 @@
 
 namespace km {
 
-/// Octets that sealing adds to a message for one robot: nonce 24, tag 16.
+/// Bytes that sealing adds to a message for one robot: nonce 24, tag 16.
 inline constexpr std::size_t kAddressedSealBytes = 24 + 16;
 
-/// Octets that sealing adds to a message to all: key number 4, nonce 24, tag 16, signature 64.
+/// Bytes that sealing adds to a message to all: key number 4, nonce 24, tag 16, signature 64.
 inline constexpr std::size_t kTeamSealBytes = 4 + 24 + 16 + 64;
 
-/// What goes with a message in clear. All of it is authenticated: a message opens only with the
-/// context that it was sealed with.
+/// Unencrypted fields of a message. All of them are authenticated: a message opens only with the
+/// context with which it was sealed.
 struct SealContext {
   std::string_view topic;
   TeamPeer sender;
-  std::uint64_t number = 0;            ///< Of the message, counted by its sender.
-  std::array<std::uint8_t, 16> key{};  ///< Of the envelope.
-  std::optional<TeamPeer> addressee;   ///< None: for every member of the team.
+  std::uint64_t number = 0;            ///< Number of the message, counted by its sender.
+  std::array<std::uint8_t, 16> key{};  ///< Key of the envelope.
+  std::optional<TeamPeer> addressee;   ///< None: the message is for every member of the team.
 };
 
-/// What open() made of a message.
+/// Result of open().
 struct [[nodiscard]] Opened {
   enum class Status {
     kOpened,
-    kNotYet,   ///< A key is missing that may still come: keep the message and try again after the
-               ///< next admit() or accept_key_message() for its sender. Keep a bounded number:
-               ///< strangers can make such messages, too.
-    kRefused,  ///< It will never open.
+    kNotYet,   ///< The necessary key may still arrive: keep the message and try again after the
+               ///< next admit() or accept_key_message() for its sender. Keep a bounded number,
+               ///< because senders outside the team can produce such messages, too.
+    kRefused,  ///< The message will never open.
   };
   Status status = Status::kRefused;
-  Octets content;                ///< If opened.
-  const char* reason = nullptr;  ///< If not: a string literal.
+  Octets content;                ///< Content if opened.
+  const char* reason = nullptr;  ///< Reason if not opened, a string literal.
 };
 
-/// What TeamSeal::update() changed.
+/// Changes by TeamSeal::update().
 struct [[nodiscard]] MembershipChange {
   std::vector<TeamPeer> forgotten;
   bool new_key = false;  ///< Send key_message_for() to all peers again.
 };
 
-/// Seals what one process of a robot sends to its team, and opens what it receives.
+/// Seals the messages of one process of a robot to its team, and opens messages that it receives.
 ///
-/// A message for one robot is encrypted by a key that only the two processes have: X25519 keys that
-/// each draws at its start (crypto_kx, so that either direction has its own). A message to all is
-/// encrypted by a key that its sender draws, and signed by the sender, so that no member can speak
-/// for another. Encryption is XChaCha20-Poly1305. Keys are gone when the process ends: what was
-/// recorded cannot be opened by a robot's long-lived secret found later.
+/// A message for one robot is encrypted by a key that only the two processes have. Each process
+/// draws an X25519 key at its start, from which crypto_kx derives one key for each direction. A
+/// message to all is encrypted by a key that its sender draws, and signed by the sender, so that no
+/// member can forge messages of another. Encryption is XChaCha20-Poly1305. These keys end with the
+/// process: a robot's long-lived secret that is found later does not open recorded messages.
 ///
-/// Nonces are drawn at random, 24 octets each. Two equal ones under one key would give the contents
-/// away; among 2^64 messages the probability of that is below 2^-64, and no counter has to survive
-/// a crash.
+/// Nonces are drawn at random, 24 bytes each. Two equal nonces under one key would reveal the
+/// contents. Among 2^64 messages the probability of that is below 2^-64, and no counter has to
+/// survive a crash.
 ///
-/// What the caller does:
-/// - announces credentials() with its identity; admits others by theirs, before anything else.
-///   Credentials can be recorded and shown again by a stranger: they say who could be there, not
-///   who is. A member lives once a message of its opens that is not a repeated one; only then may a
-///   new process of a robot take the place of an older one.
-/// - sends key_message_for(peer) to each newly admitted peer, again at times (a peer that forgot
-///   this process and admitted it again has lost the key), and to all when update() says so.
-/// - drops repeated messages. A sealed message can be recorded and shown again and opens again: the
-///   caller keeps which numbers of (robot, boot) it has taken.
+/// Duties of the caller:
+/// - It announces credentials() with its identity, and first of all admits others by theirs. An
+///   unknown sender can record and replay credentials, so they do not prove that the process runs.
+///   A process is proven to run when a message of it opens that is not a repeated one. Only then
+///   may a new process of a robot replace an older one.
+/// - It sends key_message_for(peer) to each newly admitted peer and, if update() says so, to all.
+///   It repeats this message at times, because a peer that has removed and admitted this process
+///   again has lost the key.
+/// - It drops repeated messages. A sealed message can be recorded and opens again when it is
+///   replayed. The caller therefore stores the numbers of received messages by (robot, boot).
 ///
 /// Not thread-safe.
 class TeamSeal {
  public:
-  /// For the process `own` at `now_s` [s since 1970-01-01 UTC]. Throws std::invalid_argument if the
-  /// keys are another robot's (id or name), lapsed or revoked.
+  /// `own` is this process, and `now_s` is [s since 1970-01-01 UTC]. Throws std::invalid_argument
+  /// if the keys belong to another robot (id or name), or are lapsed or revoked.
   TeamSeal(RobotKeys keys, const RobotIdentity& own, std::int64_t now_s);
   TeamSeal(const TeamSeal&) = delete;
   TeamSeal& operator=(const TeamSeal&) = delete;
 
-  /// What this process shows others: certificate, a key of this start, and a signature over them
-  /// and the identity. kCredentialsLength characters.
+  /// Credentials of this process: certificate, a key of this start, and a signature over them and
+  /// the identity. kCredentialsLength characters.
   [[nodiscard]] const std::string& credentials() const { return credentials_; }
 
-  /// Checks what a process shows of itself at `now_s` and remembers its keys. nullptr, or why it is
-  /// not a member (a string literal): not understood, another team's authority, lapsed, revoked,
-  /// another id or name than the certificate's, a signature that is not its own. Admitting again is
-  /// harmless. Beyond kMaxAdmitted, or kMaxAdmittedPerRobot of one robot, the one that has been
-  /// silent for longest is forgotten; those whose messages never opened come first.
+  /// Checks the credentials of a process at `now_s` and stores its keys. nullptr, or the reason why
+  /// it is not a member (a string literal): malformed, another authority, lapsed, revoked, another
+  /// id or name than in the certificate, or an invalid signature. Repeated calls are harmless. If
+  /// kMaxAdmitted or, for one robot, kMaxAdmittedPerRobot is exceeded, the process that has been
+  /// silent for longest is removed. Processes whose messages never opened are removed first.
   [[nodiscard]] const char* admit(const RobotIdentity& identity, std::string_view credentials,
                                   std::int64_t now_s);
 
-  /// The certificate of a process that shows these credentials, whoever has passed them on: refused
-  /// as by admit(), but nothing is remembered, and nothing can be sealed for that process.
+  /// Certificate of a process that has these credentials, which any robot may have forwarded.
+  /// Refuses as admit() does, but stores nothing; no message can be sealed for that process.
   [[nodiscard]] Decoded<Certificate> certified(const RobotIdentity& identity,
                                                std::string_view credentials,
                                                std::int64_t now_s) const;
 
-  /// nullptr, or why a certificate that was good does not hold at `now_s` any more (a string
-  /// literal).
+  /// nullptr, or the reason why a formerly valid certificate is no longer valid at `now_s` (a
+  /// string literal).
   [[nodiscard]] const char* why_lapsed(const Certificate& certificate, std::int64_t now_s) const {
     return lapse_of(certificate, revocations_, now_s);
   }
 
-  /// What an admitted process has shown; nullopt if it is not admitted.
+  /// Credentials of an admitted process; nullopt if it is not admitted.
   [[nodiscard]] std::optional<std::string> credentials_of(const TeamPeer& peer) const;
 
-  /// Signs with this robot's long-lived key. `statement` begins as statement() makes it, with a
-  /// kind that nothing else is signed under.
+  /// Signs with this robot's long-lived key. `statement` begins with statement(), with a kind that
+  /// no other signature uses.
   [[nodiscard]] Signature endorse(OctetView statement) const { return sign(statement, secret_); }
 
   [[nodiscard]] bool is_admitted(const TeamPeer& peer) const {
     return peers_.find(peer) != nullptr;
   }
 
-  /// A process that is gone: its keys are forgotten. Nothing happens if it is not known.
+  /// Removes the keys of a process that has gone. Does nothing for an unknown process.
   void forget(const TeamPeer& peer) { peers_.erase(peer); }
 
-  /// Takes a list of revocations (the same as before, to let time alone work) and the time: forgets
-  /// members that are revoked or lapsed, and draws a new key for messages to all if the list is
-  /// another one, or anyone who was given the last key has lapsed. Throws std::invalid_argument if
-  /// the list is not the authority's, or older than the one in use; nothing has changed then.
+  /// Applies a list of revocations and the time. Pass the list in use again to apply only the time.
+  /// Removes members that are revoked or lapsed. Draws a new key for messages to all if the list
+  /// has changed, or if a holder of the last key has lapsed. Throws std::invalid_argument without a
+  /// change if the list is not the authority's, or older than the one in use.
   MembershipChange update(const Revocations& revocations, std::int64_t now_s);
 
-  /// What lets `peer` open this process's messages to all: octets to send to it as they are, sealed
-  /// for it. nullopt if it is not admitted.
+  /// Message with the keys by which `peer` opens this process's messages to all, sealed for it.
+  /// nullopt if `peer` is not admitted.
   [[nodiscard]] std::optional<Octets> key_message_for(const TeamPeer& peer);
 
-  /// Takes what key_message_for() of `from` gave. nullptr, or why it is refused (a string literal).
-  /// The same message again changes nothing.
+  /// Processes the result of key_message_for() by `from`. Returns nullptr, or the reason for a
+  /// refusal (a string literal). Repeating a message changes nothing.
   [[nodiscard]] const char* accept_key_message(const TeamPeer& from, OctetView message);
 
   /// The sealed message. nullopt if the addressee is not admitted. Throws std::invalid_argument if
   /// `context` names another sender than this process, or this process as addressee.
   [[nodiscard]] std::optional<Octets> seal(const SealContext& context, OctetView content) const;
 
-  /// The content of a message that anybody may have sent. The work is bounded by its size; a
-  /// stranger's message costs no signature check.
+  /// Opens a message from an unknown sender. The work is bounded by the size of the message. A
+  /// message from a sender outside the team costs no signature check.
   [[nodiscard]] Opened open(const SealContext& context, OctetView sealed);
 
  private:
@@ -165,9 +166,9 @@ class TeamSeal {
   std::string credentials_;
   Revocations revocations_;
   AdmittedPeers peers_;
-  std::vector<TeamKey> team_keys_;  // own, by number; the last seals
-  // [s since 1970-01-01 UTC] when the first of those who have the newest team key is no longer a
-  // member: it may be gone from peers_ by then.
+  std::vector<TeamKey> team_keys_;  // own keys by number; the last one seals
+  // Time [s since 1970-01-01 UTC] at which the first holder of the newest team key lapses. That
+  // holder may be gone from peers_ by then.
   std::int64_t holder_lapses_s_ = std::numeric_limits<std::int64_t>::max();
 };
 

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Samples are at most one voxel apart at the greatest depth of the view.
+// Distance of samples [px], at most one voxel at the greatest depth of the view.
 int stride_of(const DepthView& view, double voxel_size_m) {
   constexpr int kLongest = 16;  // [px]
   const std::uint16_t farthest = *std::max_element(view.farthest.begin(), view.farthest.end());
@@ -18,7 +18,7 @@ int stride_of(const DepthView& view, double voxel_size_m) {
   return static_cast<int>(std::clamp(pixels, 1.0F, static_cast<float>(kLongest)));
 }
 
-// Whole part towards minus infinity, for values above -kOffset.
+// Largest integer not above the value, for values above -kOffset.
 Eigen::Vector3i floor_of(const Eigen::Vector3f& value) {
   constexpr float kOffset = 4096.0F;
   return (value.array() + kOffset).cast<int>() - static_cast<int>(kOffset);
@@ -29,7 +29,7 @@ class Selector {
   Selector(std::size_t max_blocks, std::uint64_t frame, KeyframeIndex keyframe, BlockMap& map)
       : max_blocks_(max_blocks), frame_(frame), keyframe_(keyframe), map_(map) {}
 
-  // All blocks from `low` to `high`. Neighbouring samples mostly ask for the same.
+  // Adds all blocks from `low` to `high`. Neighbouring samples mostly have the same ones.
   void add(const Eigen::Vector3i& low, const Eigen::Vector3i& high) {
     if (low == low_ && high == high_) return;
     low_ = low;
@@ -73,7 +73,8 @@ NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, doub
                               std::size_t max_blocks, std::uint64_t frame, KeyframeIndex keyframe,
                               BlockMap& map) {
   const double block_m = kBlockSide * voxel_size_m;
-  // In blocks, from that of the camera, so that float is exact enough however far the robot went.
+  // In blocks, relative to the camera's block, so that float is precise enough at any distance from
+  // the origin.
   const Eigen::Vector3d camera = T_odom_cam.translation() / block_m;
   const Eigen::Vector3d base = camera.array().floor();
   const Eigen::Vector3f origin = (camera - base).cast<float>();
@@ -100,13 +101,13 @@ NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, doub
   return selector.result();
 }
 
-// Eight voxels along x. Written as plain loops over arrays: the compiler makes vectors of them.
+// Eight voxels along x. Plain loops over arrays, which the compiler vectorises.
 struct BlockFusion::Row {
   alignas(32) std::array<float, kBlockSide> z;                // [m]
-  alignas(32) std::array<std::int32_t, kBlockSide> index;     // of the pixel
+  alignas(32) std::array<std::int32_t, kBlockSide> index;     // index of the pixel
   alignas(32) std::array<std::uint32_t, kBlockSide> pixel;    // DepthView::pixels
   alignas(32) std::array<float, kBlockSide> observed_weight;  // 0: not observed
-  bool moved = false;                                         // some distance changed
+  bool moved = false;                                         // some distance has changed
   unsigned near_bits = 0;                                     // observed near the surface
 };
 
@@ -115,7 +116,7 @@ BlockFusion::BlockFusion(const SemanticMappingConfig& config, const DepthView& v
     : view_(view), keyframe_(keyframe) {
   const SE3 T_cam_odom = T_odom_cam.inverse();
   Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
-  // Half a pixel more, so that cutting off the fraction rounds to the nearest pixel.
+  // Half a pixel is added, so that truncation rounds to the nearest pixel.
   K << static_cast<double>(view.fx), 0.0, static_cast<double>(view.cx) + 0.5,  //
       0.0, static_cast<double>(view.fy), static_cast<double>(view.cy) + 0.5,   //
       0.0, 0.0, 1.0;
@@ -161,7 +162,7 @@ BlockFusion::Relation BlockFusion::relation_to(const VoxelBlock& block) const {
   }
   if (z_high < closest_) return Relation::kNotSeen;
   const Eigen::Array2f size(static_cast<float>(view_.width), static_cast<float>(view_.height));
-  if (z_low < closest_) return Relation::kMixed;  // beside the camera: its image has no bounds
+  if (z_low < closest_) return Relation::kMixed;  // beside the camera: its image is unbounded
   if ((high < 0.0F).any() || (low >= size).any()) return Relation::kNotSeen;
 
   const bool whole = (low >= 0.0F).all() && (high < size).all();
@@ -193,7 +194,7 @@ void BlockFusion::project(const Eigen::Vector3f& start, Row& row) const {
     const float inverse = 1.0F / (z > closest ? z : closest);
     const float u = (x0 + n * dx) * inverse, v = (y0 + n * dy) * inverse;
     const bool inside = (z > closest) & (u >= 0.0F) & (v >= 0.0F) & (u < width) & (v < height);
-    // Whole numbers below 2^24 are exact in float, and SSE2 cannot multiply integers.
+    // Integers below 2^24 are exact in float, and SSE2 cannot multiply integers.
     const auto column = static_cast<float>(static_cast<std::int32_t>(inside ? u : 0.0F));
     const auto line = static_cast<float>(static_cast<std::int32_t>(inside ? v : 0.0F));
     const auto index = static_cast<std::int32_t>(line * width + column);

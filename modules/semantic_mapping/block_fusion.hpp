@@ -13,49 +13,48 @@
 
 namespace km {
 
-/// Blocks that a depth view shows surface in, or would, were there room.
+/// Blocks in which a depth view shows surface, including those for which the map has no room.
 struct NearBlocks {
   std::vector<VoxelBlock*> blocks;
-  std::size_t allocated = 0;  ///< New ones among them.
-  std::size_t refused = 0;    ///< Times that a block would have been new, but the map was full.
+  std::size_t allocated = 0;  ///< New blocks among them.
+  std::size_t refused = 0;    ///< Requests for a new block while the map was full.
 };
 
-/// The blocks within kNearVoxels of the surface, by a subsample of the pixels about one voxel apart
-/// at the view's greatest depth; new ones where the map has none, up to `max_blocks` in all. They
-/// are marked with `frame`, a number that grows with every call, and new ones as seen by
+/// The blocks within kNearVoxels of the surface, found by a subsample of the pixels about one voxel
+/// apart at the view's greatest depth. Missing blocks are allocated, up to `max_blocks` in all. All
+/// are marked with `frame`, a number that grows with every call, and new ones also as seen by
 /// `keyframe`.
 [[nodiscard]] NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam,
                                             double voxel_size_m, std::size_t max_blocks,
                                             std::uint64_t frame, KeyframeIndex keyframe,
                                             BlockMap& map);
 
-/// Fuses one depth view, taken from one pose, into blocks. fuse() changes nothing but its block: it
-/// may run on several blocks at once.
+/// Fuses one depth view, taken from one pose, into blocks. fuse() changes only its block, so it may
+/// run on several blocks at once.
 ///
 /// A voxel at depth z that projects to a pixel of depth d has the signed distance s = d - z along
-/// the optical axis. Where s > -truncation, the voxel's distance becomes the weighted mean of what
-/// it was and min(s, truncation) (Curless and Levoy, 1996). The weight is
-/// sigma_0^2 / sigma(d)^2 (see SemanticMappingConfig), falling linearly to zero from one voxel
-/// behind the surface to the truncation, since what is farther behind may belong to another
-/// surface.
+/// the optical axis. If s > -truncation, the voxel's distance becomes the weighted mean of its
+/// former value and min(s, truncation) (Curless and Levoy, 1996). The weight is sigma_0^2 /
+/// sigma(d)^2 (see SemanticMappingConfig). From one voxel behind the surface to the truncation it
+/// falls linearly to zero, because a voxel farther behind may belong to another surface.
 class BlockFusion {
  public:
   BlockFusion(const SemanticMappingConfig& config, const DepthView& view, const SE3& T_odom_cam,
               KeyframeIndex keyframe);
 
-  /// How the view and a block lie to each other.
+  /// Relation of a view and a block.
   enum class Relation {
-    kNotSeen,  ///< Outside the image, behind every surface, or no depth there.
-    kMixed,    ///< Voxel by voxel.
+    kNotSeen,  ///< Outside the image, behind every surface, or without depth.
+    kMixed,    ///< Depends on the voxel.
     kFree,     ///< In front of every surface by more than the truncation.
   };
   [[nodiscard]] Relation relation_to(const VoxelBlock& block) const;
 
-  /// Updates every voxel of the block. Its labels take part if it has an array for them and the
-  /// view has labels.
+  /// Updates every voxel of the block. Its labels are updated if the block has an array of labels
+  /// and the view has labels.
   void fuse(VoxelBlock& block) const;
 
-  /// The same for a block with Relation::kFree, faster.
+  /// fuse() for a block with Relation::kFree, faster.
   void fuse_free(VoxelBlock& block) const;
 
   /// True if no voxel of the block is near a surface: every observed one is at least three quarters
@@ -73,7 +72,7 @@ class BlockFusion {
 
   const DepthView& view_;
   KeyframeIndex keyframe_;
-  Eigen::Matrix3d M_;       // of a point in the odometry frame: (u z, v z, z) = M p + K t
+  Eigen::Matrix3d M_;       // maps a point in the odometry frame: (u z, v z, z) = M p + K t
   Eigen::Vector3d offset_;  // K t
   Eigen::Matrix3f step_;    // columns: M times one voxel along x, y, z
   double block_m_;

@@ -44,13 +44,13 @@ void BlockMap::erase(const Eigen::Vector3i& position) {
   std::size_t hole = slot_of(key_of(position));
   assert(slots_[hole].key != kFree);
   const std::uint32_t block = slots_[hole].block;
-  if (block + 1 != blocks_.size()) {  // the last block takes its place
+  if (block + 1 != blocks_.size()) {  // the last block moves to its index
     blocks_[block] = std::move(blocks_.back());
     slots_[slot_of(key_of(blocks_[block]->position))].block = block;
   }
   blocks_.pop_back();
 
-  // What follows moves up where the hole lies between it and its home.
+  // Later slots move up if the hole is between them and their home.
   const std::size_t mask = slots_.size() - 1;
   for (std::size_t next = (hole + 1) & mask; slots_[next].key != kFree; next = (next + 1) & mask) {
     const std::size_t from_home = (next - home_of(slots_[next].key)) & mask;

@@ -18,11 +18,12 @@ inline constexpr int kBlockSide = 8;
 inline constexpr std::size_t kBlockRows = 64;  ///< Rows along x.
 inline constexpr std::size_t kBlockVoxels = 512;
 
-/// Voxels nearer to a surface than this, in voxels, vote on labels and say what a keyframe saw;
-/// blocks are allocated so far around a surface. The vertices of the mesh lie between two such.
+/// Bound on the distance to a surface [voxels] within which voxels vote on labels and count as seen
+/// by a keyframe. Blocks are allocated up to this distance. The vertices of the mesh are between
+/// two such voxels.
 inline constexpr float kNearVoxels = 2.0F;
 
-/// Place of a voxel in a block's arrays; x, y, z in [0, 8).
+/// Index of a voxel in a block's arrays; x, y, z in [0, 8).
 inline constexpr std::size_t voxel_index(int x, int y, int z) {
   return static_cast<std::size_t>(x + kBlockSide * (y + kBlockSide * z));
 }
@@ -44,8 +45,8 @@ struct BlockMesh {
 struct VoxelBlock {
   Eigen::Vector3i position = Eigen::Vector3i::Zero();  ///< [blocks]
 
-  /// Signed distance along the optical axis [m], positive in free space; of a voxel that was never
-  /// observed (weight 0), nothing.
+  /// Signed distance along the optical axis [m], positive in free space; undefined for a voxel that
+  /// was never observed (weight 0).
   std::array<float, kBlockVoxels> distance = {};
   std::array<float, kBlockVoxels> weight = {};
 
@@ -58,15 +59,16 @@ struct VoxelBlock {
   /// Bit x of row y + 8 z: the voxel was seen near a surface since the block was last meshed.
   std::array<std::uint8_t, kBlockRows> near_rows = {};
 
-  std::uint64_t selected_in = 0;    ///< Number of the last frame in which it was chosen.
-  KeyframeIndex last_seen = 0;      ///< When surface was last seen in it.
-  double last_seen_m = 0.0;         ///< Way of the camera until it was last chosen for surface.
-  KeyframeIndex changed_since = 0;  ///< Of the changes not yet meshed, the first.
-  bool changed = false;             ///< Since it was last meshed.
+  std::uint64_t selected_in = 0;    ///< Last frame for which it was selected.
+  KeyframeIndex last_seen = 0;      ///< Last keyframe that saw surface in it.
+  double last_seen_m = 0.0;         ///< Distance travelled by the camera at the last selection [m].
+  KeyframeIndex changed_since = 0;  ///< First keyframe of the changes not yet meshed.
+  bool changed = false;             ///< Changed since it was last meshed.
 };
 
 /// The blocks of a map, hashed by their position (open addressing, linear probing). References to
-/// blocks stay valid until they are erased. The order of blocks() follows from the calls alone.
+/// blocks stay valid until they are erased. The order of blocks() depends only on the sequence of
+/// calls.
 class BlockMap {
  public:
   /// Positions are representable from -kReach to kReach - 1 along every axis.
@@ -84,10 +86,10 @@ class BlockMap {
   }
   [[nodiscard]] const VoxelBlock* find(const Eigen::Vector3i& position) const;
 
-  /// A new, empty block. Preconditions: none there yet, in reach.
+  /// A new, empty block. Preconditions: no block at `position`, in_reach(position).
   VoxelBlock& insert(const Eigen::Vector3i& position);
 
-  /// Precondition: there is one.
+  /// Precondition: there is a block at `position`.
   void erase(const Eigen::Vector3i& position);
 
   [[nodiscard]] std::size_t size() const { return blocks_.size(); }
@@ -102,7 +104,7 @@ class BlockMap {
 
   [[nodiscard]] static std::uint64_t key_of(const Eigen::Vector3i& position);
   [[nodiscard]] std::size_t home_of(std::uint64_t key) const;
-  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const;  // its own, or the free one
+  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const;  // its slot, or a free one
   void grow();
 
   std::vector<std::unique_ptr<VoxelBlock>> blocks_;

@@ -14,8 +14,8 @@ namespace {
 constexpr std::uint32_t kNoSource = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint32_t kOutside = 1U << 31U;  // code of a label that the palette lacks
 constexpr std::uint32_t kLabelBits = 0xFF0000U;
-constexpr std::uint32_t kNoDepth = 65535;  // beside 0, by some sensors
-constexpr double kMaxGrowth = 2.0;         // of the ideal image against the real one
+constexpr std::uint32_t kNoDepth = 65535;  // some sensors write it for no depth, in addition to 0
+constexpr double kMaxGrowth = 2.0;  // bound on the size of the ideal image relative to the real one
 
 // Extent of the bearings of an image.
 struct BearingBounds {
@@ -30,7 +30,7 @@ struct BearingBounds {
   }
 };
 
-// Not of the border alone: the corners of a fisheye image have none.
+// Uses all pixels and not only the border, because the corners of a fisheye image have no bearings.
 BearingBounds bounds_of(const Camera& camera) {
   BearingBounds bounds;
   for (int v = 0; v < camera.height; ++v)
@@ -86,7 +86,7 @@ void DepthViewMaker::plan_rectification(const Camera& camera) {
   const BearingBounds bounds = bounds_of(camera);
   const Eigen::Vector2d focal(camera.fx, camera.fy);
   const Eigen::Vector2d largest(kMaxGrowth * camera.width, kMaxGrowth * camera.height);
-  // Pixels from the principal point to the borders, scaled down where both together are too many.
+  // Pixels from the principal point to the borders, scaled down if their sum is too large.
   Eigen::Vector2d before = -focal.cwiseProduct(bounds.low), after = focal.cwiseProduct(bounds.high);
   const Eigen::Vector2d scale =
       largest.cwiseQuotient((before + after).cwiseMax(largest)).cwiseMin(1.0);
@@ -126,7 +126,7 @@ std::size_t DepthViewMaker::fill(std::size_t begin, std::size_t end, const Depth
   return outside;
 }
 
-// Least and greatest by columns first: whole lines at a time.
+// Minimum and maximum by columns first, so that whole rows are processed at a time.
 std::size_t DepthViewMaker::summarise(int row) {
   const auto width = static_cast<std::size_t>(view_.width);
   const int first = row * DepthView::kTileSide;

@@ -12,20 +12,20 @@
 
 namespace km {
 
-/// A depth image with labels, laid out for voxels to be projected into: seen by a camera without
-/// distortion, depths out of range taken away, unknown labels 0.
+/// A depth image with labels in a layout onto which voxels are projected: seen by a camera without
+/// distortion, depths out of range removed, unknown labels 0.
 struct DepthView {
   static constexpr int kTileSide = 16;  ///< [px]
 
   int width = 0, height = 0;                         ///< [px]
   float fx = 0.0F, fy = 0.0F, cx = 0.0F, cy = 0.0F;  ///< [px]
 
-  /// Depth [mm] in the low 16 bits (0: none), label in the 8 above; row-major, and one more that is
-  /// 0, for what lies outside.
+  /// Depth [mm] in the low 16 bits (0: none), label in the 8 bits above; row-major. One more pixel
+  /// at the end is 0 and stands for points outside.
   std::vector<std::uint32_t> pixels;
 
-  /// Least and greatest depth [mm] of the tiles of 16 x 16 pixels, row-major. Least 0: some pixel
-  /// has none; greatest 0: all.
+  /// Smallest and greatest depth [mm] of the tiles of 16 x 16 pixels, row-major. Smallest 0: some
+  /// pixel has no depth. Greatest 0: no pixel has a depth.
   std::vector<std::uint16_t> nearest, farthest;
   int tile_columns = 0, tile_rows = 0;
 
@@ -38,9 +38,9 @@ struct DepthView {
   static LabelId label(std::uint32_t pixel) { return static_cast<LabelId>(pixel >> 16U); }
 };
 
-/// Makes depth views of one camera's images. If it has distortion, a table says which of its pixels
-/// each pixel of an ideal camera of the same focal lengths takes; the ideal image is as large as
-/// the view, but at most twice as wide and high as the real one.
+/// Makes depth views of one camera's images. If the camera has distortion, a table maps each pixel
+/// of an ideal camera of the same focal lengths to a pixel of the real one. The ideal image covers
+/// the whole view, but is at most twice as wide and high as the real one.
 class DepthViewMaker {
  public:
   /// Throws std::invalid_argument for a camera without pixels or focal length.
@@ -52,7 +52,7 @@ class DepthViewMaker {
   const DepthView& make(const DepthImage& depth, const LabelImage* labels);
 
  private:
-  // What a strip of tiles adds to the sums of a view.
+  // Contribution of a strip of tiles to the sums of a view.
   struct StripSums {
     std::size_t with_depth = 0, labels_outside = 0;
   };
@@ -65,8 +65,8 @@ class DepthViewMaker {
 
   DepthView view_;
   std::uint32_t min_mm_ = 0, max_mm_ = 0;
-  std::array<std::uint32_t, 256> codes_ = {};  // of labels: known ones << 16, others kOutside
-  std::vector<std::uint32_t> source_;          // of each ideal pixel; empty: the same
+  std::array<std::uint32_t, 256> codes_ = {};  // by label: known ones << 16, others kOutside
+  std::vector<std::uint32_t> source_;          // source of each ideal pixel; empty: identity
   std::vector<StripSums> strips_;
 };
 

@@ -8,8 +8,8 @@
 namespace km {
 namespace {
 
-// Vertices stay off the ends of their edges, where those of several edges would coincide and faces
-// have no area; this moves them by at most a thousandth of a voxel.
+// Vertices keep this distance [voxels] from the ends of their edges. At an end, vertices of several
+// edges would coincide and faces would have no area.
 constexpr float kMargin = 1e-3F;
 
 // The blocks whose cells reach into `block`, with the offset to it in bits x + 2 y + 4 z.
@@ -21,7 +21,7 @@ void visit_lower_neighbours(const VoxelBlock& block, BlockMap& map, const Visit&
   }
 }
 
-// True if the cell reaches into the block at `offset`.
+// True if the cell extends into the block at `offset`.
 bool reaches(std::uint16_t cell, int offset) {
   const int last =
       ((cell & 7) == 7 ? 1 : 0) | ((cell >> 3 & 7) == 7 ? 2 : 0) | ((cell >> 6 & 7) == 7 ? 4 : 0);
@@ -32,7 +32,7 @@ VoxelLabels labels_of(const VoxelBlock& block, std::size_t voxel) {
   return block.labels == nullptr ? VoxelLabels() : (*block.labels)[voxel];
 }
 
-// In steps of a factor of four, from 4^-8 on.
+// Steps of a factor of four, from 4^-8 on.
 std::uint8_t certainty_of(float weight) {
   const float steps = 0.5F * std::log2(std::max(weight, std::numeric_limits<float>::min())) + 8.0F;
   return static_cast<std::uint8_t>(std::clamp(steps, 0.0F, 255.0F));
@@ -43,7 +43,7 @@ void mark_changed(VoxelBlock& block, KeyframeIndex since) {
   block.changed = true;
 }
 
-// Places of vertices by their ids.
+// Indices of vertices by their ids.
 class PlaceOfId {
  public:
   void add(std::uint64_t id, std::uint32_t place) { places_.emplace_back(id, place); }
@@ -196,8 +196,8 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
   grid[axis] += static_cast<double>(t);
   vertex.position = (voxel_m_ * grid).cast<float>();
 
-  // First the voxel behind the surface: the ray to it went through the surface right here, while
-  // that to the one in front goes on to where it meets some surface, maybe another.
+  // The labels of the voxel behind the surface come first. The ray to this voxel went through the
+  // surface here. The ray to the voxel in front continues and may meet another surface.
   const VoxelLabels near_labels = labels_of(near_block, near_voxel);
   const VoxelLabels far_labels = labels_of(far_block, far_voxel);
   vertex.labels = a < 0.0F ? near_labels : far_labels;
@@ -250,7 +250,8 @@ void IncrementalMesh::forget(VoxelBlock& block, BlockMap& map, KeyframeIndex key
 }
 
 MeshUpdateReport IncrementalMesh::finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map) {
-  // With those below, whose cells reach into them: this is the last time that they can be meshed.
+  // Includes the blocks below, whose cells extend into them, because they can be meshed for the
+  // last time now.
   std::vector<VoxelBlock*> last_time;
   const auto add = [&](VoxelBlock& block) {
     if (!block.changed) return;
@@ -262,7 +263,7 @@ MeshUpdateReport IncrementalMesh::finalise(const std::vector<VoxelBlock*>& block
     visit_lower_neighbours(*block, map, [&](VoxelBlock& lower, int) { add(lower); });
   }
   for (VoxelBlock* block : last_time) block->changed = true;
-  for (VoxelBlock* block : last_time)  // and below these: with the next update
+  for (VoxelBlock* block : last_time)  // the blocks below these are meshed by the next update
     visit_lower_neighbours(*block, map, [&](VoxelBlock& lower, int) {
       if (!lower.changed) mark_changed(lower, block->changed_since);
     });
@@ -297,7 +298,7 @@ void IncrementalMesh::finalise(VoxelBlock& block, BlockMap& map) {
   disown(block);
 }
 
-// By place; kNone for vertices that stay.
+// By index; kNone for vertices that stay.
 std::vector<std::uint32_t> IncrementalMesh::final_heirs(const SupersededSurface& superseded) const {
   PlaceOfId places;
   for (std::size_t i = 0; i < vertices_.size(); ++i)

@@ -11,47 +11,47 @@
 
 namespace km {
 
-/// What IncrementalMesh::update() did.
+/// Result of IncrementalMesh::update().
 struct MeshUpdateReport {
-  std::size_t blocks = 0;  ///< Meshed anew.
+  std::size_t blocks = 0;  ///< Number of blocks that were meshed.
   std::size_t vertices_added = 0;
   std::size_t vertices_removed = 0;
 };
 
-/// What IncrementalMesh::drop() did.
+/// Result of IncrementalMesh::drop().
 struct SurfaceDrop {
   std::size_t faces = 0;
   std::size_t vertices = 0;
 };
 
-/// The zero level of a map as triangles, kept up to date block by block.
+/// The zero level of a map as a triangle mesh, updated block by block.
 ///
 /// A vertex belongs to the grid edge it lies on, and that edge to the block of its lower voxel;
-/// cells of all blocks around share it. Vertices live while a face refers to them: so do those at
-/// the rim of final faces, which move on with the blocks that are still in the map.
+/// cells of all blocks around share it. A vertex exists while a face refers to it. Vertices at the
+/// rim of final faces exist too, and still move with the blocks that are in the map.
 class IncrementalMesh {
  public:
-  /// No face where a voxel's weight is not above `min_weight`.
+  /// Makes no face at a voxel whose weight is not above `min_weight`.
   IncrementalMesh(double voxel_size_m, const LabelModel& labels, double min_label_probability,
                   double min_weight);
 
-  /// Meshes the blocks that changed, and those below them whose cells reach into them.
+  /// Meshes the blocks that changed, and the blocks below them whose cells extend into them.
   MeshUpdateReport update(BlockMap& map);
 
-  /// To be called before a block without surface is erased, as `keyframe` showed: its faces go with
-  /// the next update().
+  /// Call before a block without surface is erased, which `keyframe` showed. The next update()
+  /// removes its faces.
   void forget(VoxelBlock& block, BlockMap& map, KeyframeIndex keyframe);
 
-  /// To be called before blocks are erased whose mesh is to stay: meshes them once more, where they
-  /// changed, and makes the faces of their cells, and of others' that reach into them, final.
+  /// Call before blocks are erased whose mesh is to stay. Meshes changed blocks once more, and
+  /// makes the faces of their cells final, and those of other cells that extend into them.
   MeshUpdateReport finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
 
-  /// Drops the final faces all of whose vertices are listed, and of these the vertices without
-  /// other faces, whose votes of labels go to their heirs. A vertex counts only if it and its heir
-  /// are final; ids that are not (or no longer) known are passed over. n log n in the mesh.
+  /// Drops the final faces whose vertices are all listed, and then those of the vertices that have
+  /// no other faces. The votes on labels of such a vertex are added to its heir. A vertex counts
+  /// only if it and its heir are final; unknown ids are ignored. n log n in the mesh.
   SurfaceDrop drop(const SupersededSurface& superseded);
 
-  /// All faces and the vertices they use. Without labels if `labelled` is false.
+  /// All faces and the vertices they use; no labels unless `labelled`.
   [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled) const;
 
   [[nodiscard]] std::size_t vertex_count() const { return vertices_.size() - free_.size(); }
@@ -65,13 +65,13 @@ class IncrementalMesh {
 
   struct Vertex {
     Eigen::Vector3f position = Eigen::Vector3f::Zero();
-    std::uint32_t uses = 0;       // by corners of faces
-    std::uint64_t id = kRemoved;  // see MapMesh::ids; kRemoved: the place is free
-    BlockMesh* owner = nullptr;   // null: its block is gone
+    std::uint32_t uses = 0;       // number of face corners that use it
+    std::uint64_t id = kRemoved;  // see MapMesh::ids; kRemoved: the entry is free
+    BlockMesh* owner = nullptr;   // null: its block was erased
     VoxelLabels labels;
     KeyframeIndex first = 0, last = 0;
-    std::uint32_t computed = 0;  // update in which position and labels were computed
-    std::uint16_t edge = 0;      // of the owner
+    std::uint32_t computed = 0;  // number of the update in which position and labels were computed
+    std::uint16_t edge = 0;      // index of the edge in the owner
     std::uint8_t certainty = 0;  // see MapMesh
   };
 
@@ -97,7 +97,7 @@ class IncrementalMesh {
   float min_weight_;
 
   std::vector<Vertex> vertices_;
-  std::vector<std::uint32_t> free_;          // places in vertices_
+  std::vector<std::uint32_t> free_;          // free indices in vertices_
   std::vector<std::uint32_t> maybe_unused_;  // lost a face since the last update
   std::vector<Face> final_faces_;
   std::vector<Face> forgotten_faces_;

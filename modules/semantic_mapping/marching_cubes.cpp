@@ -27,9 +27,9 @@ int edge_between(int a, int b) {
   return kNone;
 }
 
-// For every edge that the surface cuts, the one that follows on its loop. Around a face seen from
-// outside, the cut leads from where a run of negative corners begins to where it ends; the edge
-// where it ends is where one begins on the other face that shares the edge.
+// For every edge that the surface cuts, the next edge on its loop. On a face seen from outside, the
+// cut leads from the begin of a run of negative corners to its end. The edge at the end is the
+// begin of a run on the other face that shares the edge.
 std::array<int, MarchingCubes::kEdges> successors(unsigned negative) {
   const auto is_negative = [&](int corner) { return (negative >> corner & 1U) != 0; };
   std::array<int, MarchingCubes::kEdges> next;

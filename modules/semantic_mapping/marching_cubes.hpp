@@ -13,10 +13,12 @@ namespace km {
 /// Triangles of a cell by the signs at its corners (Lorensen and Cline, "Marching Cubes", 1987).
 ///
 /// Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge e runs along axis e / 4 from
-/// corner first_corner_of_edge(e). The table is derived, not listed: on each face of the cell,
-/// every run of negative corners is cut off from the rest (so that of a face with two negative
-/// corners across, these stay apart); the cuts join to loops, and loops are fanned into triangles.
-/// Two cells cut their common face alike, so that the surface has no cracks.
+/// corner first_corner_of_edge(e).
+///
+/// The table is derived, not listed. On each face of the cell, every run of negative corners is
+/// separated from the rest, so that two diagonally opposite negative corners are not connected. The
+/// cuts form loops, and loops are divided into fans of triangles. Two cells cut their common face
+/// equally, so that the surface has no cracks.
 class MarchingCubes {
  public:
   using Triangle = std::array<std::uint8_t, 3>;  ///< Edges, counter-clockwise from positive space.
@@ -41,16 +43,16 @@ class MarchingCubes {
   std::vector<Triangle> triangles_;
 };
 
-/// The cells of one block with the values at their corners, which reach into the first layer of the
-/// blocks above along each axis.
+/// The cells of one block with the values at their corners. The last corners are in the first layer
+/// of the next blocks along each axis.
 class BlockCells {
  public:
   /// Copies the values. Voxels of weight up to `min_weight` count as not observed. The blocks must
-  /// live as long as this.
+  /// outlive this object.
   BlockCells(VoxelBlock& block, BlockMap& map, float min_weight);
 
-  /// Cells of row (y, z), as bits by x, that the surface passes through: all corners observed, and
-  /// of both signs.
+  /// Cells of row (y, z), as bits by x, that the surface passes through: all corners are observed,
+  /// and both signs occur.
   [[nodiscard]] unsigned crossed(int y, int z) const;
 
   /// Bit c: corner c of the cell is negative (see MarchingCubes).
@@ -61,12 +63,12 @@ class BlockCells {
     return values_[row_of(y, z)][static_cast<std::size_t>(x)];
   }
 
-  /// The block that a voxel with coordinates in [0, 8] belongs to. Precondition: it was observed.
+  /// The block of a voxel with coordinates in [0, 8]. Precondition: the voxel was observed.
   [[nodiscard]] VoxelBlock& block_of(int x, int y, int z) const {
     return *blocks_[static_cast<std::size_t>((x >> 3) | (y >> 3) << 1 | (z >> 3) << 2)];
   }
 
-  /// False if no cell is crossed, cheaply.
+  /// False if no cell is crossed; a cheap test.
   [[nodiscard]] bool any() const { return any_; }
 
  private:

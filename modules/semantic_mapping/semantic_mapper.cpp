@@ -14,7 +14,8 @@
 namespace km {
 namespace {
 
-// At the end of a frame so many eighths of max_blocks are left at most: room for the next frame.
+// At most this many eighths of max_blocks remain at the end of a frame, so that there is room for
+// the next one.
 constexpr std::size_t kFullEighths = 7;
 
 LabelModel model_of(const SemanticMappingConfig& config, const LabelPalette& palette) {
@@ -53,11 +54,11 @@ const char* to_string(IntegrationStatus status) {
 }
 
 struct SemanticMapper::State {
-  // A block in view, and how it is updated.
+  // A block in view and the kind of its update.
   struct Update {
     VoxelBlock* block = nullptr;
-    bool near = false;  // surface is seen in it or beside it
-    bool free = false;  // all of it is looked through
+    bool near = false;  // surface is in it or beside it
+    bool free = false;  // it is free space entirely
   };
 
   State(const SemanticMappingConfig& settings, const Camera& its_camera,
@@ -83,11 +84,11 @@ struct SemanticMapper::State {
   DepthViewMaker views;
   BlockMap map;
   IncrementalMesh mesh;
-  MeshUpdateReport unreported;  // of blocks that became final
+  MeshUpdateReport unreported;  // from blocks that became final
   std::uint64_t frame = 0;
   KeyframeIndex keyframe = 0;
-  std::optional<Eigen::Vector3d> camera_at;  // last one
-  double way_m = 0.0;                        // of the camera
+  std::optional<Eigen::Vector3d> camera_at;  // last position
+  double way_m = 0.0;                        // distance travelled by the camera
   bool labelled = false;
   std::size_t dropped_faces = 0;
 };
@@ -162,7 +163,7 @@ void SemanticMapper::State::leave_window(IntegrationReport& report) {
 void SemanticMapper::State::make_room(IntegrationReport& report) {
   const std::size_t most = static_cast<std::size_t>(config.max_blocks) * kFullEighths / 8;
   if (map.size() <= most) return;
-  std::vector<VoxelBlock*> others;  // than those of this frame
+  std::vector<VoxelBlock*> others;  // blocks not selected for this frame
   for (const auto& block : map.blocks())
     if (block->selected_in != frame) others.push_back(block.get());
   std::stable_sort(others.begin(), others.end(), [](const VoxelBlock* a, const VoxelBlock* b) {

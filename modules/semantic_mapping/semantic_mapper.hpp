@@ -15,60 +15,60 @@
 
 namespace km {
 
-/// What became of a frame.
+/// Result for one frame.
 enum class IntegrationStatus {
   kIntegrated,
-  kDepthSizeDiffers,  ///< The depth image is not of the camera's size: frame skipped.
-  kPoseUnusable,      ///< Not finite, or not a rotation: frame skipped.
+  kDepthSizeDiffers,  ///< The depth image has another size than the camera; the frame is skipped.
+  kPoseUnusable,      ///< The pose is not finite or not rigid; the frame is skipped.
 };
 
 /// "integrated", "depth image of another size", ...
 [[nodiscard]] const char* to_string(IntegrationStatus status);
 
-/// What integrate() did. All zero but status for a frame that was skipped.
+/// Counts of one call of integrate(). All but status are zero for a skipped frame.
 struct [[nodiscard]] IntegrationReport {
   IntegrationStatus status = IntegrationStatus::kIntegrated;
-  std::size_t pixels = 0;            ///< With a depth within range, after rectification.
+  std::size_t pixels = 0;            ///< Pixels with a depth within range, after rectification.
   std::size_t labels_outside = 0;    ///< Pixels whose label the palette lacks: unknown.
-  bool label_size_differs = false;   ///< Labels not of the camera's size: integrated without.
-  std::size_t blocks_updated = 0;    ///< Near a surface that was seen.
-  std::size_t blocks_seen_free = 0;  ///< Others that were looked through.
-  std::size_t blocks_allocated = 0;  ///< New.
-  std::size_t blocks_refused = 0;    ///< Would be new, but the frame alone fills max_blocks.
-  std::size_t blocks_removed = 0;    ///< Empty after carving.
-  std::size_t blocks_finalised = 0;  ///< Left the window; now final mesh.
+  bool label_size_differs = false;   ///< Integrated without the labels, whose size is wrong.
+  std::size_t blocks_updated = 0;    ///< Blocks near an observed surface.
+  std::size_t blocks_seen_free = 0;  ///< Other blocks, observed as free space.
+  std::size_t blocks_allocated = 0;  ///< New blocks.
+  std::size_t blocks_refused = 0;    ///< New blocks for which this frame leaves no room.
+  std::size_t blocks_removed = 0;    ///< Blocks that are empty after carving.
+  std::size_t blocks_finalised = 0;  ///< Blocks that left the window and became final mesh.
 };
 
 /// Sizes of the map.
 struct MapSize {
-  std::size_t blocks = 0;         ///< In memory.
-  std::size_t vertices = 0;       ///< Final ones included.
-  std::size_t faces = 0;          ///< Likewise.
-  std::size_t final_faces = 0;    ///< Of blocks that left the window.
-  std::size_t dropped_faces = 0;  ///< Since the start: superseded, see drop().
+  std::size_t blocks = 0;         ///< Blocks in memory.
+  std::size_t vertices = 0;       ///< Vertices, including final ones.
+  std::size_t faces = 0;          ///< Faces, including final ones.
+  std::size_t final_faces = 0;    ///< Faces of blocks that left the window.
+  std::size_t dropped_faces = 0;  ///< Superseded faces dropped since the start, see drop().
 };
 
 /// Fuses depth and label images with known poses into a truncated signed distance function and
 /// keeps its zero level as a triangle mesh.
 ///
-/// Voxels lie in blocks of 8^3 that are hashed by their position (Niessner et al., "Real-time 3D
-/// Reconstruction at Scale using Voxel Hashing", 2013), allocated where a depth image shows
-/// surface. Every voxel of these blocks and, for carving, of the other blocks in view is projected
-/// into the depth image (Curless and Levoy, "A Volumetric Method for Building Complex Models from
-/// Range Images", 1996). Voxels near the surface also take part in the vote of labels (see
-/// VoxelLabels), Bayes' rule as in Rosinol et al., "Kimera: an Open-Source Library for Real-Time
+/// Voxels are in blocks of 8^3 that are hashed by their position (Niessner et al., "Real-time 3D
+/// Reconstruction at Scale using Voxel Hashing", 2013). Blocks are allocated where a depth image
+/// shows surface. Every voxel of these blocks and, for carving, of the other blocks in view is
+/// projected into the depth image (Curless and Levoy, "A Volumetric Method for Building Complex
+/// Models from Range Images", 1996). Voxels near the surface also receive votes on labels (see
+/// VoxelLabels) by Bayes' rule, as in Rosinol et al., "Kimera: an Open-Source Library for Real-Time
 /// Metric-Semantic Localization and Mapping", 2020.
 ///
-/// The mesh has no cracks: blocks share the vertices on their borders. Only blocks that changed are
-/// meshed again; a vertex is the crossing of one grid edge and keeps its identity while the surface
-/// crosses that edge. Blocks that leave the window (see SemanticMappingConfig) become final mesh
-/// that never changes again, but where it still hangs together with blocks in the window.
+/// The mesh has no cracks: blocks share the vertices on their borders. Only changed blocks are
+/// meshed again. A vertex is the crossing of one grid edge, and keeps its identity while the
+/// surface crosses that edge. Blocks that leave the window (see SemanticMappingConfig) become final
+/// mesh. It does not change any more, except for vertices shared with blocks in the window.
 ///
-/// Memory: max_blocks bounds the voxels; the mesh grows with the surface seen, and as often as it
-/// was seen anew but for what drop() is told.
+/// Memory: max_blocks bounds the voxels. The mesh grows with every visit of a surface, except for
+/// the copies that drop() removes.
 ///
-/// Deterministic: the same calls give the same mesh, bit by bit, however many threads OpenCV's pool
-/// has (cv::setNumThreads(); images and blocks are worked on in parallel). Not thread-safe.
+/// Deterministic: equal calls give the same mesh, bit by bit, for any number of threads of OpenCV's
+/// pool (cv::setNumThreads(); images and blocks are processed in parallel). Not thread-safe.
 class SemanticMapper {
  public:
   /// `camera` takes the depth and label images; its T_body_cam is not used. Labels that `palette`
@@ -86,16 +86,16 @@ class SemanticMapper {
   IntegrationReport integrate(const DepthImage& depth, const LabelImage* labels,
                               const SE3& T_odom_cam, KeyframeIndex keyframe);
 
-  /// Meshes again what changed since the last call. After every frame, or less often: a vertex that
-  /// came up in between has the first of these frames' keyframe as its first.
+  /// Meshes the blocks that changed since the last call. Call it after every frame or less often. A
+  /// new vertex gets the keyframe of the first frame since the last call as its first one.
   MeshUpdateReport update_mesh();
 
-  /// Drops final surface that another visit has mapped better (see IncrementalMesh::drop()): its
-  /// labels vote on, its faces are gone for good. Surface in the window stays.
+  /// Drops final surface that another visit has mapped better (see IncrementalMesh::drop()). Its
+  /// votes on labels are kept, its faces are permanently removed. Surface in the window stays.
   SurfaceDrop drop(const SupersededSurface& superseded);
 
-  /// The mesh as of the last update_mesh(), final and active parts together, in the odometry frame,
-  /// with labels if any frame had some; without colours (see LabelledMesh::colour_by()). Every
+  /// The mesh as of the last update_mesh(), final and active parts together, in the odometry frame.
+  /// It has labels if any frame had labels, and no colours (see LabelledMesh::colour_by()). Every
   /// vertex is part of a face. Time and memory proportional to the mesh.
   [[nodiscard]] MapMesh mesh() const;
 
@@ -108,13 +108,13 @@ class SemanticMapper {
 
 /// State of a robot's map, for status lines and tables.
 struct MappingProgress {
-  std::uint64_t integrated = 0;      ///< Frames.
-  std::uint64_t wrong_size = 0;      ///< Skipped: depth not of the camera's size.
-  std::uint64_t bad_pose = 0;        ///< Skipped: pose not finite or not a rotation.
-  std::uint64_t too_late = 0;        ///< Skipped: newer ones came while the mapper was busy.
-  std::uint64_t unlabelled = 0;      ///< Integrated without labels.
+  std::uint64_t integrated = 0;  ///< Integrated frames.
+  std::uint64_t wrong_size = 0;  ///< Skipped frames: depth of another size than the camera.
+  std::uint64_t bad_pose = 0;    ///< Skipped frames: pose not finite or not rigid.
+  std::uint64_t too_late = 0;    ///< Skipped frames: newer ones arrived while the mapper was busy.
+  std::uint64_t unlabelled = 0;  ///< Frames integrated without labels.
   std::uint64_t labels_outside = 0;  ///< Pixels whose label the palette lacks.
-  std::uint64_t blocks_refused = 0;  ///< For want of semantic_mapping.max_blocks.
+  std::uint64_t blocks_refused = 0;  ///< Blocks refused by semantic_mapping.max_blocks.
   MapSize size = {};
 };
 

@@ -19,23 +19,24 @@ namespace km {
 /// Channels of the mapping node; they must outlive it.
 struct SemanticMappingTopics {
   In<DenseFrame> frames;             ///< In order of time.
-  In<SupersededSurface> superseded;  ///< Of the maps; the newest counts.
+  In<SupersededSurface> superseded;  ///< From the newest map; the newest message counts.
   Out<MapMesh> maps;                 ///< The whole map.
   Out<MappingProgress> progress;     ///< With every frame.
 };
 
-/// Builds a robot's map as a thread: one SemanticMapper. The mesh is published every few seconds,
-/// and once more at the end.
+/// Builds a robot's map as a thread with one SemanticMapper. The mesh is published every few
+/// seconds and at the end.
 class SemanticMappingNode final : public Node {
  public:
-  /// `camera` takes the frames. A mesh every `mesh_interval_s`, by stamps. `overflow`: whether a
-  /// full queue holds the frames up or drops the oldest. Throws as SemanticMapper does.
+  /// `camera` takes the frames. A mesh is published every `mesh_interval_s`, by stamps. `overflow`:
+  /// whether a full queue delays the frames or drops the oldest. Throws under the conditions of
+  /// SemanticMapper.
   SemanticMappingNode(const SemanticMappingConfig& config, const Camera& camera,
                       const LabelPalette& palette, double mesh_interval_s, Overflow overflow,
                       const SemanticMappingTopics& topics);
   ~SemanticMappingNode() override { stop(); }
 
-  /// What is mapped comes behind the map of an earlier process. Call before start().
+  /// The mesh is appended to the map of an earlier process. Call before start().
   void continue_from(ContinuedMap before) { before_.emplace(std::move(before)); }
 
   std::string_view name() const override { return SemanticMappingConfig::kSection; }
@@ -44,12 +45,12 @@ class SemanticMappingNode final : public Node {
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// A mesh of the whole map is made in one step: it takes the longer the larger the map is.
+  /// A mesh of the whole map is made in one step, whose time is proportional to the map.
   double step_limit_s() const override { return 120.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handles one frame synchronously, after dropping what has become superseded. The thread calls
-  /// only this; so can tests and replay.
+  /// Drops superseded surface and then handles one frame, synchronously. The thread calls only this
+  /// function; tests and replay can call it too.
   void step(const DenseFrame& frame);
 
  private:
@@ -66,7 +67,7 @@ class SemanticMappingNode final : public Node {
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh
   std::optional<Stamp> published_;       // frame of the last mesh published
   bool stopped_ = false;
-  // What comes of the node's own maps may not wait for room in its queue: that could be for ever.
+  // Results of the node's own maps must not wait for room in its queue: that would be a deadlock.
   Latest<SupersededSurface> superseded_;
   Worker<Topic<DenseFrame>::Message> worker_;  // last member: stops first
 };

@@ -64,7 +64,7 @@ double VoxelLabels::probability(LabelId label, const LabelModel& model) const {
   if (model.classes < 2) return 1.0;
   const double delta = model.log_odds();
   const double top = weight_of(best());
-  double sum = 0.0;  // of exp(delta (n - top)) over all classes
+  double sum = 0.0;  // sum of exp(delta (n - top)) over all classes
   std::size_t unseen = model.classes;
   for (std::size_t i = 0; i < kPlaces && votes_[i] > 0 && unseen > 0; ++i, --unseen)
     sum += std::exp(delta * (weight_of(ids_[i]) - top));

@@ -8,28 +8,28 @@
 
 namespace km {
 
-/// How sure one observed label is.
+/// Reliability of one observed label.
 ///
 /// An observation of label m has the likelihood P(m | label l) = c for l = m and (1 - c) / (L - 1)
-/// for each other of the L classes: it sums to one over m, so that of five labels one seen at 0.8
-/// has the posterior 0.8. (With 1 - c for every other class, as some mappers have it, it would be
-/// 0.5.) From a uniform prior, observations of weights w_m, likelihoods to the power of w_m, give
+/// for each other of the L classes. It sums to one over m, so that one of five labels, seen once at
+/// 0.8, has the posterior 0.8. (With 1 - c for every other class, as in some mappers, it would be
+/// 0.5.) From a uniform prior, observations of weights w_m, with likelihoods to the power of w_m,
+/// give
 ///   P(l | all) ~ exp(delta n_l),  delta = log(c (L - 1) / (1 - c)),
-/// with n_l the sum of the weights of the observations of l: these sums are all a voxel has to
-/// keep.
+/// with n_l the sum of the weights of the observations of l. A voxel stores only these sums.
 struct LabelModel {
-  std::size_t classes = 1;  ///< L, unknown not counted.
+  std::size_t classes = 1;  ///< L, without unknown.
   double confidence = 0.8;  ///< c, at least 0.5.
 
   /// delta; infinite for a single class, which is certain.
   [[nodiscard]] double log_odds() const;
 };
 
-/// The sums n_l of one voxel in 8 bytes: of the four labels with most votes, in eighths of weight.
-/// Exact while no more than four labels were seen. A fifth takes as many votes from each of the
-/// four as it brings, and a place that falls free (Misra and Gries, "Finding Repeated Elements",
-/// 1982): a label with more than a fifth of all votes is never lost. Beyond 255 votes, all are
-/// halved: old ones fade.
+/// The sums n_l of one voxel in 8 bytes, for the four labels with most votes, in eighths of weight.
+/// Exact while no more than four labels were seen. The votes of a fifth label are subtracted from
+/// each of the four, and the fifth takes an entry that becomes free (Misra and Gries, "Finding
+/// Repeated Elements", 1982). A label with more than a fifth of all votes is therefore never lost.
+/// Beyond 255 votes all are halved, so that old ones fade.
 class VoxelLabels {
  public:
   static constexpr unsigned kVotesPerWeight = 8;
@@ -50,11 +50,11 @@ class VoxelLabels {
     }
   }
 
-  /// Adds the votes of another place on the same surface, by the same rules; beyond 255, both fade
-  /// alike.
+  /// Adds the votes of another vertex on the same surface by the rules of observe(). Beyond 255
+  /// votes both are halved.
   void add(VoxelLabels other);
 
-  /// The label with most votes, the earlier of equals; 0 without any.
+  /// The label with most votes, the earlier of equal ones; 0 without votes.
   [[nodiscard]] LabelId best() const { return ids_[0]; }
 
   /// Sum of the weights n_l kept for a label.
@@ -69,7 +69,7 @@ class VoxelLabels {
   void observe_other(LabelId label, unsigned votes);
   void halve();
 
-  std::array<LabelId, kPlaces> ids_ = {};         // by falling votes; 0: free
+  std::array<LabelId, kPlaces> ids_ = {};         // by descending votes; 0: free
   std::array<std::uint8_t, kPlaces> votes_ = {};  // 0 exactly where ids_ is
 };
 

@@ -14,7 +14,7 @@
 namespace km {
 namespace {
 
-// A frame that has come waits so long, by the log, for inertial samples up to it.
+// A complete frame waits up to this time, by the log, for inertial samples up to its stamp.
 constexpr double kImuPatience_s = 2.0;
 
 bool is_imu(const BagChannel& channel) {
@@ -71,7 +71,7 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
   refuse(message.str());
 }
 
-// With what is wrong with the bag, which may be why.
+// Adds the faults of the bag, which may be the cause.
 void BagDataset::refuse(std::string problem) const {
   std::istringstream faults(to_string(report()));
   for (std::string line; std::getline(faults, line);) problem += "; " + line;
@@ -215,14 +215,14 @@ void BagDataset::take_imu(Role role, Stamp stamp, const BagMessage& message) {
 std::optional<JoinedFrame> BagDataset::next_frame() {
   auto frame = joiner_.next();
   while (!frame && read_message()) frame = joiner_.next();
-  return frame ? frame : joiner_.next();  // the end completes frames, too
+  return frame ? frame : joiner_.next();  // at the end incomplete frames count as complete
 }
 
 bool BagDataset::has_imu() const {
   return !rig_.topics.imu.empty() || !rig_.topics.gyro.empty();
 }
 
-// What moves between frames has come up to this one.
+// True if inertial samples or poses up to the stamp of the frame have arrived.
 bool BagDataset::has_motion(const JoinedFrame& frame) {
   if (!gives_poses() && !has_imu()) return true;
   const auto reaches = [&] {
@@ -279,7 +279,7 @@ std::optional<SensorPacket> BagDataset::read_packet(const ChooseUse& choose) {
       report_.add(ReaderFault::kFrameWithoutPose, place_of(joined->left) + ": a gap of the poses");
       continue;
     }
-    // A live frame may have waited for others: its arrival is that of the newest message.
+    // A live frame may have waited for other messages: its arrival is that of the newest message.
     const FrameUse use = choose(joined->stamp, is_live() ? newest_log_time_ : 0);
     if (use == FrameUse::kNone) continue;
     auto frame = decode(*joined, use);
@@ -299,7 +299,7 @@ void BagDataset::count_gaps(const std::vector<ImuSample>& samples) {
 
 std::optional<SensorPacket> BagDataset::next(const ChooseUse& choose) {
   if (is_over_) return std::nullopt;
-  // The first packet is decoded already: it is used in any case.
+  // The first packet is decoded already, so it is used in any case.
   if (first_) (void)choose(first_->frame->stamp, 0);
   std::optional<SensorPacket> packet =
       first_ ? std::exchange(first_, std::nullopt) : read_packet(choose);

@@ -18,40 +18,41 @@
 
 namespace km {
 
-/// Which topics are a robot's sensors. Either `imu`, or `gyro` and `accel`: sensors with stamps of
-/// their own (see ImuJoiner), each as sensor_msgs/Imu. Without `right` the rig is an RGB-D one.
-/// With `odometry`, nav_msgs/Odometry of a robot that has its own, no inertial sensor is needed.
+/// Topics of a robot's sensors. Either `imu`, or `gyro` and `accel`: sensors with their own stamps
+/// (see ImuJoiner), each as sensor_msgs/Imu. Without `right` the rig is an RGB-D one. With
+/// `odometry`, the nav_msgs/Odometry of an external odometry, no inertial sensor is needed.
 struct SensorTopicNames {
   std::string left, right, depth;
   std::string imu, gyro, accel;
   std::string odometry = {};
 };
 
-/// What a recording does not say of its sensors, or not in one place.
+/// Description of the sensors that a recording itself lacks or spreads over several places.
 struct Rig {
   SensorTopicNames topics;
   SensorRig sensors;
-  double depth_scale_m = 1e-3;          ///< Of a unit in depth images of 16 bits [m].
-  double camera_time_offset_s = 0.0;    ///< Added to the stamps of images: then they are the IMU's.
-  SE3 T_child_body = SE3::Identity();   ///< Of the odometry's child frame.
-  std::vector<std::string> notes = {};  ///< On the calibration, for people, a line each.
+  double depth_scale_m = 1e-3;          ///< Depth of one unit in depth images of 16 bits [m].
+  double camera_time_offset_s = 0.0;    ///< Added to the stamps of images to get the IMU's time.
+  SE3 T_child_body = SE3::Identity();   ///< Pose of the body in the odometry's child frame.
+  std::vector<std::string> notes = {};  ///< Remarks on the calibration, one line each.
 };
 
 /// Part of a recording, in seconds since its first frame.
 struct BagWindow {
-  double from_s = 0.0;                                    ///< First instant that belongs to it.
-  double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
+  double from_s = 0.0;                                    ///< First instant of the window.
+  double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the window.
   std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
 };
 
-/// Reads sensor packets from the messages of a bag, as they come: sensor_msgs/Image and
-/// CompressedImage, sensor_msgs/Imu and nav_msgs/Odometry, whose stamps are those of their headers.
-/// Bad messages are skipped and counted. A bag may be live.
+/// Reads sensor packets from the messages of a bag as they arrive: sensor_msgs/Image and
+/// CompressedImage, sensor_msgs/Imu and nav_msgs/Odometry. Stamps are those of the headers. Bad
+/// messages are skipped and counted. A bag may be live.
 class BagDataset final : public DatasetReader {
  public:
-  /// `name` begins messages: the path of the bag. `stereo_tolerance_s`: see FrameJoiner. Reads up
-  /// to the first packet, but of a live one. Throws DatasetError for topics that the bag does not
-  /// have or that are of another type, naming those that it has, and where the window has no frame.
+  /// `name`: path of the bag, with which messages begin. `stereo_tolerance_s`: see FrameJoiner.
+  /// Reads up to the first packet unless the bag is live. Throws DatasetError if a topic is missing
+  /// or of another type, and lists the existing topics. Throws DatasetError also if the window has
+  /// no frame.
   BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig,
              std::optional<double> stereo_tolerance_s, const BagWindow& window = {});
 
@@ -92,17 +93,17 @@ class BagDataset final : public DatasetReader {
   std::vector<Role> role_of_;  // by channel
   StampOrder order_[kRoles];
   MissingImages missing_[kRoles];
-  std::size_t taken_[kRoles] = {};  // messages
+  std::size_t taken_[kRoles] = {};  // number of messages
   FrameJoiner joiner_;
   ImuStream imu_;
   ImuJoiner imu_joiner_;
   PoseStream poses_;
   ReaderReport report_;
   std::size_t pair_count_ = 0;
-  std::optional<Stamp> start_;  // of the recording: its first frame
+  std::optional<Stamp> start_;  // first frame of the recording
   Stamp newest_log_time_ = 0;
-  bool ended_ = false;                 // the bag
-  bool is_over_ = false;               // the window
+  bool ended_ = false;                 // the bag has ended
+  bool is_over_ = false;               // the window has ended
   std::optional<SensorPacket> first_;  // read ahead
 };
 

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-constexpr double kMaxNormError = 1e-3;  // of a quaternion
+constexpr double kMaxNormError = 1e-3;  // norm of a quaternion
 
 constexpr Bounds<double> kAnything{-1e300, 1e300};
 
@@ -18,7 +18,7 @@ std::vector<double> values_of(const CalibrationMap& map, std::initializer_list<c
   return values;
 }
 
-// The lens of a camera_type, and the factor that makes its focal lengths those of Camera.
+// The lens of a camera_type, and the factor that converts its focal lengths to those of Camera.
 struct TypedLens {
   Lens lens;
   double focal_factor = 1.0;
@@ -39,7 +39,7 @@ TypedLens read_lens(const CalibrationMap& camera, const CalibrationMap& k) {
     return {lens(LensModel::kDoubleSphere, values), 1.0 / (1.0 + values[0])};
   }
   if (type == "ucm") {
-    // x / (alpha d + (1 - alpha) z) is Mei's model with xi = alpha / (1 - alpha), and unit
+    // x / (alpha d + (1 - alpha) z) is Mei's model with xi = alpha / (1 - alpha) and unit
     // magnification on the axis.
     const double alpha = k.number("alpha", {0.0, 0.99});
     return {lens(LensModel::kOmnidirectional, {alpha / (1.0 - alpha), 0.0, 0.0, 0.0, 0.0})};
@@ -87,7 +87,7 @@ Camera read_basalt_camera(const CalibrationMap& root, std::size_t index) {
   return camera;
 }
 
-// A number, or the largest of one for each axis.
+// A number, or the largest of the numbers of the three axes.
 double read_noise(const CalibrationMap& root, const char* key, const Bounds<double>& bounds) {
   if (root.is_list(key)) {
     const std::vector<double> axes = root.numbers(key, 3, "of x, y and z");

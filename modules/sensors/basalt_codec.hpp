@@ -4,7 +4,7 @@
 
 namespace km {
 
-/// Basalt's file, see read_rig().
+/// Reads Basalt's file, see read_rig().
 [[nodiscard]] RigCalibration read_basalt(const CalibrationMap& map, const RigChoice& choice);
 
 }  // namespace km

@@ -16,9 +16,8 @@
 
 namespace km {
 
-/// A map of keys in a calibration file, YAML or JSON (which is YAML), and the one way to say what
-/// is wrong with it: every getter throws DatasetError with file, line and key for what is missing
-/// or not what it should be.
+/// A map of keys in a calibration file, YAML or JSON (which is YAML). Every getter throws
+/// DatasetError with file, line and key if a value is missing or invalid.
 class CalibrationMap {
  public:
   /// Reads a whole file.
@@ -35,26 +34,26 @@ class CalibrationMap {
   [[nodiscard]] std::vector<CalibrationMap> maps(const char* key) const;
 
   [[nodiscard]] std::string word(const char* key) const;
-  /// nullopt for what is not a number, infinite or not-a-number.
+  /// nullopt for a value that is not a finite number.
   [[nodiscard]] std::optional<double> number(const char* key) const;
   [[nodiscard]] double number(const char* key, const Bounds<double>& bounds) const;
-  /// The same, or `otherwise` without the key.
+  /// Returns `otherwise` if there is no such key.
   [[nodiscard]] double number(const char* key, const Bounds<double>& bounds,
                               double otherwise) const;
 
-  /// All finite numbers of a list; of a list of lists, row after row.
+  /// All finite numbers of a list, or of a list of lists, row after row.
   [[nodiscard]] std::vector<double> numbers(const char* key) const;
-  /// `count` of them. `meaning` is said where there are not as many.
+  /// Exactly `count` numbers. If there are more or fewer, the message contains `meaning`.
   [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t count,
                                             const char* meaning) const;
   /// A list of lists.
   [[nodiscard]] std::vector<std::vector<double>> lists(const char* key) const;
 
-  /// A 4x4 matrix, row by row in one list or in four, its rotation made exact; see
-  /// transform_problem() for what is refused. `name` is what messages call it.
+  /// A 4x4 matrix, row by row in one list or in four, its rotation made exact. transform_problem()
+  /// lists the reasons for refusal. `name` is used in messages.
   [[nodiscard]] SE3 transform(const char* key, const char* name) const;
 
-  /// Refuses the value of a key; of the map if there is no such key.
+  /// Refuses the value of a key, or the map if there is no such key.
   [[noreturn]] void fail(const char* key, const std::string& problem) const;
   /// "FILE line N" of a key.
   [[nodiscard]] std::string place_of(const char* key) const;

@@ -9,10 +9,10 @@
 namespace km {
 namespace {
 
-// Lists of a camera_model, and how messages call their numbers.
+// A camera_model, and the names of its numbers in messages.
 struct Projection {
   const char* name;
-  std::size_t count;  // of intrinsics
+  std::size_t count;  // number of intrinsics
   const char* meaning;
 };
 constexpr Projection kProjections[] = {{"pinhole", 4, "fu, fv, cu, cv"},
@@ -42,7 +42,7 @@ void read_resolution(const CalibrationMap& map, Camera& camera) {
   camera.height = static_cast<int>(resolution[1]);
 }
 
-// All numbers of `intrinsics`, of which the last four are in `camera`, too.
+// All numbers of `intrinsics`. The last four are stored in `camera` too.
 std::vector<double> read_intrinsics(const CalibrationMap& map, const Projection& projection,
                                     Camera& camera) {
   std::vector<double> K = map.numbers("intrinsics", projection.count, projection.meaning);

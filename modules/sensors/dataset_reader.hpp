@@ -14,15 +14,14 @@
 
 namespace km {
 
-/// What can be wrong with a piece of a recording without making the rest useless. Each is a skip of
-/// the row, sample or frame concerned, with two exceptions: a depth or label image that cannot be
-/// used leaves its frame without one, and after kImuGap, kUnknownColor, kMissingBetween and kPause
-/// reading goes on.
+/// Faults in a part of a recording that leave the rest usable. In general the row, sample or frame
+/// is skipped. An unusable depth or label image only leaves its frame without one. After kImuGap,
+/// kUnknownColor, kMissingBetween and kPause nothing is skipped.
 enum class ReaderFault {
   kMalformedRow,       ///< Too few fields, or a stamp or value that is not a number.
   kNotFinite,          ///< NaN or infinity in an inertial sample.
-  kImplausible,        ///< An inertial sample beyond what sensors measure.
-  kUnorderedStamp,     ///< Earlier than rows before, or later than rows after it.
+  kImplausible,        ///< An inertial sample beyond the range of sensors.
+  kUnorderedStamp,     ///< Earlier than previous rows, or later than following rows.
   kRepeatedStamp,      ///< Equal to a row before.
   kJumpingStamp,       ///< More than an hour away from most rows.
   kLeftWithoutRight,   ///< No right image within the tolerance.
@@ -36,22 +35,22 @@ enum class ReaderFault {
   kImageWithoutFrame,  ///< A depth or label image that belongs to no frame.
   kUnknownColor,       ///< A label image with colours that are not in the palette.
   kMalformedMessage,   ///< A message of a bag that is not of its type.
-  kNoAcceleration,     ///< A sample of a gyroscope with none of the accelerometer around it.
-  kDamagedBag,         ///< A piece of a bag that cannot be read (see BagFault).
-  kFrameWithoutPose,   ///< An odometry from outside has no pose for the frame.
-  kLostMessage,        ///< Of a live topic: it came faster than it was taken.
-  kMissingBetween,     ///< An image that is not there, by the stamps of those around it.
+  kNoAcceleration,     ///< A gyroscope sample without accelerometer samples around it.
+  kDamagedBag,         ///< A part of a bag that cannot be read (see BagFault).
+  kFrameWithoutPose,   ///< An external odometry has no pose for the frame.
+  kLostMessage,        ///< A live message dropped because the reader was too slow.
+  kMissingBetween,     ///< An image that is missing, judged by the stamps around it.
   kPause,              ///< No image for more than MissingImages::kPause_s.
 };
 
 /// A short plural for tables and log lines: "malformed rows".
 [[nodiscard]] const char* to_string(ReaderFault fault);
 
-/// Its examples name file and line.
+/// Examples of faults name file and line.
 using ReaderReport = FaultReport<ReaderFault>;
 
-/// A recording that cannot be used at all. what() is one line that names the file, the line where
-/// there is one, and the value.
+/// A recording that cannot be used at all. what() is one line with the file, the value and, if
+/// there is one, the line.
 struct DatasetError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -63,14 +62,14 @@ class DatasetReader {
 
   [[nodiscard]] virtual const SensorRig& rig() const = 0;
 
-  /// Decides about a frame before its images are decoded. `arrival`: when a live frame was complete
-  /// [ns since 1970], 0 for a recording. The stamps of a live frame do not tell its arrival: they
-  /// may be of any clock, also of a simulator's slower one.
+  /// Decides about a frame before its images are decoded. `arrival`: time at which a live frame was
+  /// complete [ns since 1970], 0 for a recording. The stamps of a live frame cannot replace the
+  /// arrival, because they may be of any clock, also of a simulator's slower one.
   using ChooseUse = std::function<FrameUse(Stamp stamp, Stamp arrival)>;
 
-  /// The next packet of a frame that `choose` uses, or nullopt at the end. Faults on the way are
-  /// skipped and counted. The samples of a frame that is skipped or left out are part of the next
-  /// packet, so that the intervals stay without a hole.
+  /// The next packet of a frame that `choose` uses, or nullopt at the end. Faults are skipped and
+  /// counted. The samples of a frame that is skipped or not used are part of the next packet, so
+  /// that the intervals have no holes.
   [[nodiscard]] virtual std::optional<SensorPacket> next(const ChooseUse& choose) = 0;
 
   /// The next packet; every frame is used.
@@ -81,20 +80,19 @@ class DatasetReader {
   /// Faults met so far.
   [[nodiscard]] virtual ReaderReport report() const = 0;
 
-  /// What a user should know of how it is read, a line each; complete with the first packet.
+  /// Remarks on how the source is read, for the user, a line each; complete with the first packet.
   [[nodiscard]] virtual std::vector<std::string> remarks() const { return {}; }
 
-  /// True if packets have the poses of an odometry from outside. Then there may be no inertial
-  /// samples.
+  /// True if packets have the poses of an external odometry. Then there may be no inertial samples.
   [[nodiscard]] virtual bool gives_poses() const { return false; }
 
-  /// True for sensors that measure now: next() waits for them, and there is no end.
+  /// True if sensors measure now: next() waits for them, and there is no end.
   [[nodiscard]] virtual bool is_live() const { return false; }
 
-  /// Ends next(), now and later, where it waits. Thread-safe.
+  /// Makes next() return nullopt, now and later, also while it waits. Thread-safe.
   virtual void stop() noexcept {}
 
-  /// Frames that next() can give at most; 0 if it is not known.
+  /// Largest number of frames that next() can return; 0 if it is not known.
   [[nodiscard]] virtual std::size_t pair_count() const = 0;
 };
 

@@ -46,7 +46,7 @@ bool is_rgbd(const SensorRig& rig) {
   return rig.stereo.depth_source == DepthSource::kDepthImage;
 }
 
-// Of a folder of recordings, for one who names it in place of one of them.
+// For the message if the user named a folder of recordings instead of one recording.
 std::string recordings_below(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   std::error_code error;

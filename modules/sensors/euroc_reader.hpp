@@ -13,43 +13,44 @@
 
 namespace km {
 
-/// What a recording says of its sensors.
+/// Calibration in a recording.
 struct EurocCalibration {
   SensorRig rig;
-  double depth_scale_m = 1e-3;  ///< Of a unit stored in depth images [m].
+  double depth_scale_m = 1e-3;  ///< Depth of one unit in depth images [m].
 };
 
-/// Part of a recording, in seconds since the first frame of the WHOLE recording, and how it is
-/// read.
+/// Part of a recording, in seconds since the first frame of the whole recording, and options for
+/// reading.
 struct EurocOptions {
-  double from_s = 0.0;                                    ///< First instant that belongs to it.
-  double to_s = std::numeric_limits<double>::infinity();  ///< First that does not.
+  double from_s = 0.0;                                    ///< First instant of the part.
+  double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the part.
   std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
-  /// Left to right (depth, label) stamp, at most; nullopt: see find_synchrony().
+  /// Largest difference of left to right (depth, label) stamps; nullopt: see find_synchrony().
   std::optional<double> stereo_tolerance_s = {};
-  CameraCalibration correction = {};  ///< Stamps here; the cameras in open_euroc().
-  bool imu = true;      ///< False: there need not be an inertial sensor, packets have no samples.
-  bool depth = false;   ///< Depth images also beside a right camera (open_euroc()).
-  bool labels = false;  ///< Label images.
+  /// The stamps are corrected here, the cameras in open_euroc().
+  CameraCalibration correction = {};
+  bool imu = true;      ///< False: no inertial sensor is needed, and packets have no samples.
+  bool depth = false;   ///< Read depth images although there is a right camera (open_euroc()).
+  bool labels = false;  ///< Read label images.
 };
 
 /// The folder of a EuRoC recording that holds cam0: `folder`/mav0, or `folder` itself.
 /// Throws DatasetError if there is neither.
 [[nodiscard]] std::filesystem::path find_mav0(const std::filesystem::path& folder);
 
-/// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv, images in any format OpenCV
-/// decodes, as the csv names them. An RGB-D rig has depth0 in place of cam1: 16-bit images of one
-/// channel. Labels: label0, 8-bit ids, or colours of label_palette.csv beside it. Both may come at
-/// a lower rate than images: a frame then has none.
+/// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv, and images that the csv names, in
+/// any format OpenCV decodes. An RGB-D rig has depth0 in place of cam1: 16-bit images of one
+/// channel. Labels are in label0, as 8-bit ids or as colours of label_palette.csv beside it. Depth
+/// and labels may come at a lower rate than images; a frame then has none.
 ///
-/// The first packet starts up to ImuStream::kLeadIn_s before its frame, also where that lies before
+/// The first packet starts up to ImuStream::kLeadIn_s before its frame, even if that is before
 /// `from_s`.
 class EurocReader final : public DatasetReader {
  public:
-  /// `folder` as find_mav0() takes it; open_euroc() of the codec reads the calibration from it.
-  /// Reads the lists, no image. Depth images are read if the rig has a depth range. Throws
-  /// DatasetError for what is missing or unusable, labels asked for included, and for a window
-  /// without a frame; std::invalid_argument for a window that is empty or not a number.
+  /// `folder` as for find_mav0(); open_euroc() of the codec reads the calibration from it. Reads
+  /// the lists, no image. Depth images are read if the rig has a depth range. Throws DatasetError
+  /// for missing or unusable files, including requested labels, and for a window without a frame.
+  /// Throws std::invalid_argument for a window that is empty or not a number.
   EurocReader(const std::filesystem::path& folder, EurocCalibration calibration,
               const EurocOptions& options = {});
 
@@ -61,7 +62,7 @@ class EurocReader final : public DatasetReader {
 
   [[nodiscard]] std::vector<std::string> remarks() const override;
 
-  /// Of the labels; empty if none are read, or for ids without one.
+  /// Palette of the labels; empty if none are read, or for ids without a palette.
   [[nodiscard]] const LabelPalette& label_palette() const { return side_images_.palette(); }
 
   /// First frame of the whole recording: the origin of the window's times.
@@ -80,9 +81,9 @@ class EurocReader final : public DatasetReader {
   ReaderReport report_;
   SensorRig rig_;
   SideImages side_images_;
-  StereoPairFiles files_;  // of the window
+  StereoPairFiles files_;  // files of the window
   const bool reads_imu_;
-  ImuStream imu_;  // of the recording
+  ImuStream imu_;  // samples of the whole recording
   Stamp recording_start_ = 0;
   std::size_t next_pair_ = 0;
 };

@@ -9,8 +9,8 @@ namespace {
 
 constexpr double kDefaultDepthScale_m = 1e-3;
 constexpr double kDefaultDepthBaseline_m = 0.1;
-constexpr double kMaxMisalignment_m = 1e-3;   // of depth0 and cam0
-constexpr double kMaxMisalignment_px = 0.05;  // of their intrinsics, and of their axes
+constexpr double kMaxMisalignment_m = 1e-3;   // between depth0 and cam0
+constexpr double kMaxMisalignment_px = 0.05;  // between their intrinsics, and between their axes
 constexpr const char* kCoefficients = "distortion_coefficients";
 
 CalibrationMap sensor_yaml(const std::filesystem::path& mav0, const char* sensor) {
@@ -39,8 +39,8 @@ ImuNoise read_imu_noise(const CalibrationMap& yaml) {
           .rate_hz = yaml.number("rate_hz", kImuRate_hz)};
 }
 
-// Throws unless a depth pixel is the left pixel of the same place. A file without distortion is
-// that of a pinhole with cam0's.
+// Throws unless a pixel of the depth image and the same pixel of the left image see the same point.
+// A file without distortion describes a pinhole with the distortion of cam0.
 void check_alignment(const CalibrationMap& yaml, const Camera& left) {
   Camera depth = left;
   if (yaml.has(kCoefficients))
@@ -74,7 +74,7 @@ DepthRange read_depth_range(const CalibrationMap& yaml) {
   return range;
 }
 
-// Of cameras that stand in the frame that the files refer to.
+// Moves the cameras from the reference frame of the files to the inertial sensor's frame.
 void move_to_imu(const CalibrationMap& imu, StereoRig& stereo) {
   const SE3 T_imu_reference = extrinsics(imu).inverse();
   for (Camera& camera : stereo.cameras) camera.T_body_cam = T_imu_reference * camera.T_body_cam;

@@ -13,42 +13,43 @@
 
 namespace km {
 
-/// Where the images of a frame are listed and lie.
+/// Files of the images of a frame.
 struct StereoPairFile {
-  Stamp stamp = 0;               ///< Of the left image.
+  Stamp stamp = 0;               ///< Stamp of the left image.
   std::filesystem::path left;    ///< Image files.
   std::filesystem::path right;   ///< Empty with an RGB-D rig.
-  int line = 0;                  ///< Of the left image's row in the list.
-  std::filesystem::path depth;   ///< Empty: none.
-  std::filesystem::path labels;  ///< Empty: none.
+  int line = 0;                  ///< Row of the left image in the list.
+  std::filesystem::path depth;   ///< Empty if there is none.
+  std::filesystem::path labels;  ///< Empty if there is none.
 };
 
-/// Stereo pairs, ascending, and how their stamps go together.
+/// Stereo pairs, ascending, and the difference of their stamps.
 struct StereoPairFiles {
   std::vector<StereoPairFile> pairs;
   Synchrony synchrony;
 };
 
 /// The stereo pairs of a EuRoC folder: rows `stamp [ns], file` of cam0/data.csv and cam1/data.csv,
-/// matched by stamps at most `tolerance_s` apart, or, without it, as find_synchrony() finds them to
-/// be. Faulty rows and images without a partner are counted in `report`. Throws DatasetError if a
-/// list is missing or holds no image.
+/// matched by stamps at most `tolerance_s` apart. Without a tolerance find_synchrony() determines
+/// it. Faulty rows and images without a partner are counted in `report`. Throws DatasetError if a
+/// list is missing or contains no image.
 [[nodiscard]] StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
                                                std::optional<double> tolerance_s,
                                                ReaderReport& report);
 
-/// The left images of a EuRoC folder alone, for an RGB-D rig. Faults and errors as above.
+/// The left images of a EuRoC folder alone, for an RGB-D rig. Faults and errors are those of
+/// list_euroc_pairs().
 [[nodiscard]] std::vector<StereoPairFile> list_euroc_lefts(const std::filesystem::path& mav0,
                                                            ReaderReport& report);
 
-/// Enters the images that `folder`/data.csv lists (depth0, label0) as the `member` of the frame
-/// whose stamp is at most `tolerance_s` away. There may be fewer of them than frames; those of no
-/// frame are counted. Throws DatasetError if the list is missing or holds no image.
+/// Assigns each image that `folder`/data.csv lists (depth0, label0) to the `member` of the frame
+/// whose stamp is at most `tolerance_s` away. There may be fewer images than frames. Images without
+/// a frame are counted. Throws DatasetError if the list is missing or contains no image.
 void list_beside(const std::filesystem::path& folder, std::filesystem::path StereoPairFile::*member,
                  double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report);
 
 /// The stereo pairs of a folder of keyframes: rows `stamp [ns], left file, right file` of its
-/// pairs.csv; ascending. Faults and errors as above.
+/// pairs.csv; ascending. Faults and errors are those of list_euroc_pairs().
 [[nodiscard]] std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
                                                               ReaderReport& report);
 
@@ -62,22 +63,22 @@ struct StereoPairResult {
 
 [[nodiscard]] StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& rig);
 
-/// Depth and label images of a EuRoC folder: depth0, label0 and label_palette.csv. One that cannot
-/// be used is counted and left out: its frame comes without. Const members are thread-safe.
+/// Depth and label images of a EuRoC folder: depth0, label0 and label_palette.csv. An unusable
+/// image is counted, and its frame has none. Const members are thread-safe.
 class SideImages {
  public:
-  /// Depth with a range, its images in units of `depth_scale_m`; labels if asked. Throws
-  /// DatasetError for a palette that cannot be read; ids need no palette.
+  /// Reads depth if there is a range, with images in units of `depth_scale_m`, and labels if
+  /// `labels`. Throws DatasetError for a palette that cannot be read; ids need no palette.
   SideImages(const std::filesystem::path& mav0, const std::optional<DepthRange>& depth,
              double depth_scale_m, bool labels);
 
   /// Finds the images of `frames`; see list_beside().
   void list(double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report) const;
 
-  /// Reads those of one frame.
+  /// Reads the images of one frame.
   void load(const StereoPairFile& files, StereoFrame& frame, ReaderReport& report) const;
 
-  /// Empty without a file, or if no labels were asked for.
+  /// Empty without a file, or unless `labels`.
   [[nodiscard]] const LabelPalette& palette() const { return palette_; }
 
  private:

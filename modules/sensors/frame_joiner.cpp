@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Of images that are of no frame.
+// Fault of an image that belongs to no frame.
 ReaderFault lonely(ImageRole role) {
   switch (role) {
     case ImageRole::kLeft:
@@ -74,7 +74,7 @@ bool FrameJoiner::knows_synchrony() {
   return knows_all;
 }
 
-// Brings the partner of the left image to the front of its stream.
+// Moves the partner of the left image to the front of its stream.
 FrameJoiner::Partner FrameJoiner::find_partner(ImageRole role) {
   Stream& stream = stream_of(role);
   if (!stream.exists) return Partner::kNone;

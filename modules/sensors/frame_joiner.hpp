@@ -14,24 +14,25 @@ enum class ImageRole { kLeft, kRight, kDepth };
 
 /// The messages with the images of one instant.
 struct JoinedFrame {
-  Stamp stamp = 0;  ///< Of the left image.
+  Stamp stamp = 0;  ///< Stamp of the left image.
   BagMessage left;
   std::optional<BagMessage> right, depth;
 };
 
-/// Joins streams of images into frames by their stamps, as they come. A frame has a left image,
-/// with a right camera also a right one, and depth where there is some for it.
+/// Joins streams of images into frames by their stamps, as they arrive. A frame has a left image, a
+/// right image if there is a right camera, and depth if there is an image for it.
 ///
-/// The first images, kSample of each stream, are held back until it is known how their stamps go
-/// together. From there on a frame waits for images of other streams until one with a later stamp
-/// has come or until the log is kPatience_s on; images without a partner are counted.
+/// The first kSample images of each stream are held back until the difference of their stamps is
+/// known. From then on a frame waits for images of other streams. It waits until one of them has a
+/// later stamp, or until the log has advanced by kPatience_s. Images without a partner are counted.
 class FrameJoiner {
  public:
   static constexpr std::size_t kSample = 20;
   static constexpr double kPatience_s = 1.0;
-  static constexpr std::size_t kMaxHeld = 200;  ///< Of a stream; the oldest goes.
+  static constexpr std::size_t kMaxHeld = 200;  ///< Per stream; the oldest image is dropped.
 
-  /// `tolerance_s`: of the stamps, with no offset; nullopt: it follows from the stamps.
+  /// `tolerance_s`: largest difference of stamps, without an offset; nullopt: determined from the
+  /// stamps.
   FrameJoiner(bool has_right, bool has_depth, std::optional<double> tolerance_s);
 
   /// Stamps of a stream ascend.
@@ -46,7 +47,8 @@ class FrameJoiner {
   /// Images that belong to no frame.
   [[nodiscard]] const ReaderReport& report() const { return report_; }
 
-  /// Of the right images, or of depth; nullopt while it is not known, or without such a stream.
+  /// Synchrony of the right images, or of depth; nullopt until it is known, or without such a
+  /// stream.
   [[nodiscard]] std::optional<Synchrony> right_synchrony() const { return right_.synchrony; }
   [[nodiscard]] std::optional<Synchrony> depth_synchrony() const { return depth_.synchrony; }
 

@@ -15,10 +15,10 @@
 namespace km {
 namespace {
 
-// No image of a camera that a rig may have is larger, whatever the format.
+// No camera of a rig has a larger image in any format.
 constexpr std::uintmax_t kMaxEncoded_bytes = std::uintmax_t{256} << 20U;
 
-// The marker must lie near the end: embedded thumbnails have one of their own.
+// The end marker must be near the end of the file, because embedded thumbnails have their own.
 bool is_truncated(std::string_view bytes) {
   const std::string_view tail =
       bytes.substr(bytes.size() - std::min<std::size_t>(64, bytes.size()));
@@ -27,7 +27,8 @@ bool is_truncated(std::string_view bytes) {
   return false;
 }
 
-// As a decoder makes room for it before it looks further, and OpenCV throws beyond 2^30 pixels.
+// The size in the header. A decoder allocates memory for it before it reads on, and OpenCV throws
+// beyond 2^30 pixels.
 std::optional<cv::Size> stated_size(std::string_view bytes) {
   const auto size = stated_image_size(bytes);
   if (!size) return std::nullopt;
@@ -41,7 +42,8 @@ std::string text(const cv::Size& size) {
 constexpr std::uint16_t kNoMeasurement = 65535;
 constexpr double kMaxStored_mm = 65535.0;
 
-// Ids of an image of BGR or BGRA pixels. Labels come in runs: one lookup for each.
+// Ids of an image of BGR or BGRA pixels. Labels form runs of equal colours, so there is one lookup
+// per run.
 void map_colors(const cv::Mat& image, const LabelPalette& palette, LabelResult& result) {
   const int channels = image.channels();
   std::optional<std::array<std::uint8_t, 3>> last;
@@ -115,7 +117,7 @@ LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& pla
 
   const cv::_InputArray encoded(reinterpret_cast<const std::uint8_t*>(bytes.data()),
                                 static_cast<int>(bytes.size()));
-  // IMREAD_UNCHANGED is -1, orientation included: a flag more would make it another mode.
+  // IMREAD_UNCHANGED is -1 and includes the orientation: another flag would change the mode.
   const int mode = flags == cv::IMREAD_UNCHANGED
                        ? flags
                        : flags | static_cast<int>(cv::IMREAD_IGNORE_ORIENTATION);

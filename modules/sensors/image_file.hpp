@@ -18,7 +18,7 @@ enum class ImageStatus { kOk, kMissing, kUnreadable, kWrongSize, kWrongFormat };
 /// How a failure is counted. Precondition: not kOk.
 [[nodiscard]] ReaderFault fault_of(ImageStatus status);
 
-/// An image from disk, or why there is none.
+/// An image from disk, or the reason for its absence.
 template <typename Image>
 struct LoadedImage {
   ImageStatus status = ImageStatus::kOk;
@@ -27,8 +27,8 @@ struct LoadedImage {
 };
 using ImageResult = LoadedImage<GrayImage>;
 
-/// Reads an image as 8-bit grey, whatever its format (PNG, JPEG and what OpenCV knows besides).
-/// PNG and JPEG files without their end marker count as unreadable: decoders fill what is missing
+/// Reads an image as 8-bit grey in any format that OpenCV decodes (PNG, JPEG and others). PNG and
+/// JPEG files without their end marker count as unreadable, because decoders fill the missing part
 /// of a truncated JPEG with grey and report success.
 [[nodiscard]] ImageResult load_gray_image(const std::filesystem::path& file, int width, int height);
 
@@ -37,19 +37,19 @@ using ImageResult = LoadedImage<GrayImage>;
 [[nodiscard]] LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
                                                 const cv::Size& size);
 
-/// Likewise, of the bytes of such a file, which come from `place`.
+/// Decodes the bytes of an image file, which come from `place`.
 [[nodiscard]] LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& place,
                                                 int flags, const cv::Size& size);
 
-/// Why an image cannot be used: "PLACE: WHY".
+/// The reason why an image cannot be used, as "PLACE: WHY".
 [[nodiscard]] LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,
                                                  const std::string& why);
 
-/// Why an image is none of this size.
+/// Failure of an image that has another size.
 [[nodiscard]] LoadedImage<cv::Mat> wrong_size(const std::string& place, const cv::Size& found,
                                               const cv::Size& size);
 
-/// What decode_image() said, for an image of another type.
+/// The failure of decode_image(), as a result for another type of image.
 template <typename Image>
 [[nodiscard]] LoadedImage<Image> failure_of(const LoadedImage<cv::Mat>& decoded) {
   return {decoded.status, decoded.problem, {}};
@@ -57,23 +57,24 @@ template <typename Image>
 
 using DepthResult = LoadedImage<DepthImage>;
 
-/// Reads a 16-bit image of one channel whose values are depths in units of `scale_m` [m]. No depth:
-/// 0, 65535 (what many sensors write), and what lies outside `range` or beyond 65.535 m.
+/// Reads a 16-bit image of one channel whose values are depths in units of `scale_m` [m]. The
+/// values 0 and 65535 (which many sensors write) and depths outside `range` or beyond 65.535 m
+/// count as no depth.
 [[nodiscard]] DepthResult load_depth_image(const std::filesystem::path& file, int width, int height,
                                            double scale_m, const DepthRange& range);
 
-/// Likewise, of an image from `place` that is decoded already; one of 32-bit floating point numbers
-/// is in metres, whatever the scale.
+/// Converts a decoded image from `place`. One of 32-bit floating point numbers is in metres,
+/// whatever the scale.
 [[nodiscard]] DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded,
                                          const std::string& place, double scale_m,
                                          const DepthRange& range);
 
 struct LabelResult : LoadedImage<LabelImage> {
-  std::size_t unknown_pixels = 0;  ///< Of a colour that the palette does not have: id 0.
+  std::size_t unknown_pixels = 0;  ///< Pixels with a colour that the palette lacks: id 0.
 };
 
-/// Reads a label image: 8 bits of one channel are ids; of three or four channels colours, mapped to
-/// ids by `palette` (Kimera-Semantics' format), transparency ignored.
+/// Reads a label image. 8 bits of one channel are ids. Three or four channels are colours, which
+/// `palette` maps to ids (Kimera-Semantics' format); transparency is ignored.
 [[nodiscard]] LabelResult load_label_image(const std::filesystem::path& file, int width, int height,
                                            const LabelPalette& palette);
 

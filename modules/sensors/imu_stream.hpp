@@ -11,52 +11,53 @@
 
 namespace km {
 
-/// Inertial samples on their way into packets.
+/// Inertial samples before they are put into packets.
 class ImuStream {
  public:
-  /// The first packet begins so long before its frame, as far as there are samples: odometry can
-  /// begin with what was felt before the first image.
+  /// The first packet begins this long before its frame if there are samples, so that odometry can
+  /// start with samples from before the first image.
   static constexpr double kLeadIn_s = 1.0;
 
-  /// Later than the one before.
+  /// Stamps must ascend.
   void add(const ImuSample& sample);
 
   [[nodiscard]] bool is_empty() const { return samples_.empty(); }
 
-  /// There were samples at or before the stamp, and there are at or after it.
+  /// starts_by(): some sample was at or before the stamp. reaches(): some sample is at or after it.
   [[nodiscard]] bool starts_by(Stamp stamp) const { return first_ && *first_ <= stamp; }
   [[nodiscard]] bool reaches(Stamp stamp) const {
     return !samples_.empty() && samples_.back().stamp >= stamp;
   }
 
-  /// The samples of the packet whose frame has this stamp (see SensorPacket), of which the last one
-  /// is the first of the next packet. Both of the above hold; stamps ascend from call to call.
+  /// The samples of the packet whose frame has this stamp (see SensorPacket). The last one is also
+  /// the first of the next packet. Preconditions: starts_by(stamp) and reaches(stamp); stamps
+  /// ascend from call to call.
   [[nodiscard]] std::vector<ImuSample> until(Stamp stamp);
 
-  /// No packet was made yet, and none will be before this stamp.
+  /// The next packet begins at this stamp. Precondition: no packet has been made.
   void begin_at(Stamp stamp);
 
  private:
   std::deque<ImuSample> samples_;
-  std::optional<Stamp> first_;  // of all that came
+  std::optional<Stamp> first_;  // first stamp of the stream
   bool has_begun_ = false;
 };
 
 /// A pause of an inertial sensor.
 struct ImuGap {
-  Stamp after = 0;  ///< The sample before it.
+  Stamp after = 0;  ///< Last sample before the pause.
   double length_s = 0.0;
 };
 
-/// Where the samples are more than 2.5 periods apart: one lost sample is no gap.
+/// Pauses of more than 2.5 periods, so that a single lost sample does not count.
 [[nodiscard]] std::vector<ImuGap> imu_gaps(std::span<const ImuSample> samples, double rate_hz);
 
 /// "0.25 s after 1403636579758555392".
 [[nodiscard]] std::string to_string(const ImuGap& gap);
 
-/// Makes inertial samples of a gyroscope and an accelerometer that have stamps of their own: one
-/// for each of the gyroscope, with the acceleration interpolated linearly between the two around
-/// it.
+/// Makes inertial samples from a gyroscope and an accelerometer that have their own stamps. There
+/// is one sample for each gyroscope reading. Its acceleration is interpolated linearly between the
+/// two readings around it.
 class ImuJoiner {
  public:
   struct Reading {
@@ -64,15 +65,15 @@ class ImuJoiner {
     Eigen::Vector3d value = Eigen::Vector3d::Zero();
   };
 
-  /// Each later than the one before.
+  /// Stamps of each must ascend.
   void add_gyro(const Reading& reading) { gyro_.push_back(reading); }
   void add_accel(const Reading& reading) { accel_.push_back(reading); }
 
   /// The next sample that is complete.
   [[nodiscard]] std::optional<ImuSample> next();
 
-  /// Readings of the gyroscope so far that no sample was made of: there are no accelerations around
-  /// them that are at most kLongestStep_s apart.
+  /// Number of gyroscope readings so far without a sample, because the accelerations around them
+  /// are missing or more than kLongestStep_s apart.
   [[nodiscard]] std::size_t lost() const { return lost_; }
 
   static constexpr double kLongestStep_s = 0.1;

@@ -20,7 +20,7 @@ bool is_flat_imu(const CalibrationMap& map) {
   return map.first_of({"gyroscope_noise_density", "accelerometer_noise_density"}) != nullptr;
 }
 
-// The files by what they hold. Both may be one.
+// The files by their content. One file may contain both.
 struct Chains {
   std::optional<CalibrationMap> cameras;
   std::optional<CalibrationMap> imu;  // the map of imu0
@@ -40,7 +40,7 @@ struct Chains {
   }
 };
 
-// T_cam_imu of camera `index`: its own, or through the cameras before it.
+// T_cam_imu of camera `index`, stated directly or through the cameras before it.
 SE3 read_T_cam_imu(const CalibrationMap& chain, std::size_t index) {
   const CalibrationMap camera = chain.map(camera_name(index).c_str());
   if (camera.has("T_cam_imu")) return camera.transform("T_cam_imu", "T_cam_imu");
@@ -59,7 +59,7 @@ SE3 read_T_cam_cam0(const CalibrationMap& chain, std::size_t index) {
   return camera.transform("T_cn_cnm1", "T_cn_cnm1") * read_T_cam_cam0(chain, index - 1);
 }
 
-// A chain of cameras that were calibrated without the inertial sensor.
+// False if the cameras were calibrated without the inertial sensor.
 bool is_placed(const CalibrationMap& chain, std::size_t index) {
   const CalibrationMap camera = chain.map(camera_name(index).c_str());
   if (camera.first_of({"T_cam_imu", "T_imu_cam"}) != nullptr) return true;
@@ -70,7 +70,7 @@ Camera read_chain_camera(const CalibrationMap& chain, std::size_t index) {
   return read_camera(chain.map(camera_name(index).c_str()), "distortion_coeffs");
 }
 
-// The cameras' T_body_cam; where there is none, in the left camera's frame.
+// Sets T_body_cam of the cameras. Unless `is_placed`, they are poses in the left camera's frame.
 void read_poses(const CalibrationMap& chain, const RigChoice& choice, Camera& left,
                 std::optional<Camera>& right, bool is_placed) {
   if (is_placed) {
@@ -91,7 +91,8 @@ std::optional<double> read_time_shift(const CalibrationMap& camera) {
   return camera.number("timeshift_cam_imu", kTimeOffset_s);
 }
 
-// That of the pair, which is taken at once: what the shifts differ by is noise of the calibration.
+// Time shift of the pair, whose images are taken at the same time. The difference of the two shifts
+// is noise of the calibration.
 std::optional<double> read_pair_shift(const CalibrationMap& left, const CalibrationMap& right) {
   const auto a = read_time_shift(left), b = read_time_shift(right);
   if (!a || !b) return a ? a : b;
@@ -112,7 +113,7 @@ void read_imu(const CalibrationMap& imu, RigCalibration& calibration) {
   calibration.imu_topic = read_topic(imu);
   if (imu.has("T_i_b") && !imu.transform("T_i_b", "T_i_b").isApprox(SE3::Identity(), 1e-6))
     imu.fail("T_i_b", "T_i_b: not the identity; the reference of a Kalibr rig is imu0 itself");
-  // Scales and axes of the sensors: those of Kalibr's extended models, and OpenVINS' names of them.
+  // Scales and axes of the sensors: keys of Kalibr's extended models, and OpenVINS' names for them.
   for (const char* key : {"gyroscopes", "accelerometers"})
     if (imu.has(key))
       calibration.notes.push_back(imu.place_of(key) + ": " + key + " are not applied to samples");

@@ -6,7 +6,7 @@
 
 namespace km {
 
-/// Kalibr's files, see read_rig().
+/// Reads Kalibr's files, see read_rig().
 [[nodiscard]] RigCalibration read_kalibr(const std::vector<CalibrationMap>& maps,
                                          const RigChoice& choice);
 

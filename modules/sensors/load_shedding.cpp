@@ -64,7 +64,7 @@ void LoadShedding::adapt(double lag_s, double now_s) {
     load_.stride = max_stride();
     changed_s_ = now_s;
   }
-  // A step helps only after the frames that are under way are finished.
+  // A step takes effect only after the frames in processing are finished.
   if (lag_s > max_lag_s_ && load_.stride < max_stride() &&
       (load_.stride == 1 || now_s - changed_s_ > 2.0 * max_lag_s_))
     take_step(now_s);

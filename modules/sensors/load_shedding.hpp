@@ -8,26 +8,26 @@
 
 namespace km {
 
-/// What a robot does with an image that has come.
+/// How a robot uses a new image.
 enum class FrameUse {
-  kNone,      ///< Left out, before it is decoded. Its inertial samples are kept.
-  kOdometry,  ///< Without depth and labels that only the map needs.
+  kNone,      ///< Not used and not decoded; its inertial samples are kept.
+  kOdometry,  ///< Used without depth and labels that only the map needs.
   kAll,
 };
 
-/// Decides which images a robot uses when its processors are short, in this order:
-///  1. odometry is more than half of max_lag_s late: the map gets no new frames;
-///  2. more than max_lag_s: odometry gets every second image, then every third and fourth, each
-///  step
-///     only after the one before has had time to help, and only while half of the features would
-///     still be tracked from one image to the next (max_stride());
-///  3. more than twice max_lag_s: a recording's clock waits for pause_s(); live images are dropped,
-///  as
-///     a camera overwrites them.
-/// In the other direction the steps are undone one by one once odometry has been on time for a
-/// while. An undone step that has to be repeated soon doubles that time.
+/// Decides which images a robot uses when its processors are too slow, in this order:
+/// 1. If odometry is late by more than half of max_lag_s, the map gets no new frames.
+/// 2. If it is late by more than max_lag_s, odometry gets every second image, then every third and
+///    fourth. Each step follows only after the one before has had time to take effect. It is taken
+///    only while at least half of the features would still be tracked from one image to the next
+///    (max_stride()).
+/// 3. If it is late by more than twice max_lag_s, a recording's clock waits for pause_s(). Live
+///    images are dropped, as a camera would overwrite them.
 ///
-/// Times are in seconds of any one clock, which is passed in. Not thread-safe.
+/// The steps are undone one by one after odometry has been on time for a while. If an undone step
+/// has to be repeated soon, that time doubles.
+///
+/// Times are in seconds of any one clock, and are arguments. Not thread-safe.
 class LoadShedding {
  public:
   static constexpr int kMaxStride = 4;
@@ -36,8 +36,8 @@ class LoadShedding {
   /// Throws std::invalid_argument unless max_lag_s >= 0.
   explicit LoadShedding(double max_lag_s);
 
-  /// The use of the next image, which was or is due at `due_s`. An image that is used counts as
-  /// unfinished until finish().
+  /// The use of the next image, which was or is due at `due_s`. A used image counts as unfinished
+  /// until finish().
   [[nodiscard]] FrameUse use_next(Stamp stamp, double due_s, double now_s);
 
   /// Odometry has finished with this frame and all before it.
@@ -45,20 +45,21 @@ class LoadShedding {
 
   [[nodiscard]] const ShedLoad& load() const { return load_; }
 
-  /// How late odometry is at `now_s`: since when the first unfinished frame is due, at least zero.
+  /// Delay of odometry at `now_s` [s]: time since the first unfinished frame was due, at least
+  /// zero.
   [[nodiscard]] double lag_s(double now_s) const;
 
-  /// How long a recording's clock has to pause before an image that is due at `due_s`: zero unless
-  /// this image, or odometry, is more than twice max_lag_s late; then until it is 1.5 times
-  /// max_lag_s late.
+  /// Pause of a recording's clock before an image that is due at `due_s` [s]. Zero unless this
+  /// image, or odometry, is late by more than twice max_lag_s; then the pause lasts until the delay
+  /// is 1.5 times max_lag_s.
   [[nodiscard]] double pause_s(double due_s, double now_s) const;
 
   /// The clock pauses: all unfinished frames are due later by `s`.
   void pause(double s);
 
-  /// Largest stride at which odometry holds on. The share of features that are lost per second is
-  /// measured; the share that survives an interval falls exponentially with the interval. At this
-  /// stride at least kMinTrackedShare survives.
+  /// Largest stride at which odometry still works. The share of features that are lost per second
+  /// is measured, and the share that survives an interval falls exponentially with the interval. At
+  /// this stride at least kMinTrackedShare survives.
   [[nodiscard]] int max_stride() const;
 
  private:
@@ -74,14 +75,14 @@ class LoadShedding {
   double max_lag_s_;
   ShedLoad load_;
   std::deque<Unfinished> unfinished_;
-  int left_out_ = 0;       // images in a row
-  double period_s_ = 0.0;  // of the images, used or not
+  int left_out_ = 0;       // unused images in a row
+  double period_s_ = 0.0;  // interval of the images, used or not
   std::optional<Stamp> last_image_, last_finished_;
   double loss_per_s_ = 0.0;  // rate at which features are lost, smoothed
-  double changed_s_ = 0.0;   // when the stride changed last
+  double changed_s_ = 0.0;   // time of the last change of the stride
   std::optional<double> calm_since_s_;
   double calm_needed_s_;
-  bool undone_ = false;  // the last change of the stride was an undone step
+  bool undone_ = false;  // the last change undid a step
 };
 
 }  // namespace km

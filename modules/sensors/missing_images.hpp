@@ -8,23 +8,23 @@
 
 namespace km {
 
-/// What an interval between two images of a camera says.
+/// Result for an interval between two images of a camera.
 struct ImageGap {
   std::size_t missing = 0;  ///< Images lost in between.
-  double pause_s = 0.0;     ///< So long its driver stood still, which loses none; 0: it did not.
+  double pause_s = 0.0;     ///< Pause of the driver, which loses no images; 0: none.
 };
 
-/// Counts, by their stamps, the images of a camera that are missing between those that come: lost
-/// on the way, or overwritten before they were taken, which nobody else tells.
+/// Counts the missing images of a camera by the stamps of the others. They were lost in
+/// transmission or overwritten before they were read, and no other component reports this.
 class MissingImages {
  public:
-  /// Between the image before and this one, `stamp` later than that: by the usual interval, the
-  /// median of the last kIntervals. Nothing until there are kFewest.
+  /// Gap between the previous image and this later one, by the usual interval, which is the median
+  /// of the last kIntervals. Zero until there are kFewest intervals.
   [[nodiscard]] ImageGap before(Stamp stamp);
 
   static constexpr std::size_t kIntervals = 31;
   static constexpr std::size_t kFewest = 10;
-  /// Networks lose images for about a second; cameras and recorders are started again in more.
+  /// Networks lose images for about a second; a restart of a camera or a recorder takes longer.
   static constexpr double kPause_s = 2.0;
 
  private:

@@ -11,7 +11,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kPose = 8, kPoseWithCovariance = 8 + 36;
-constexpr double kMaxRounding = 0.01;  // of a quaternion, as people round it
+constexpr double kMaxRounding = 0.01;  // norm of a quaternion in rounded text
 
 std::variant<Stamp, RowFault> stamp_of_seconds(const TextRow& row, std::size_t fields) {
   constexpr double kMost_s = 4e9;

@@ -8,13 +8,14 @@
 
 namespace km {
 
-/// Poses of the body by an odometry, in a text of TUM's form: `t[s] x y z qx qy qz qw`, each with
-/// or without the 36 numbers of its covariance, row by row, as geometry_msgs/PoseWithCovariance has
-/// it. Rows that break are left out and counted in `report`. Throws DatasetError without a row.
+/// Poses of the body by an odometry, in a text file of TUM's format: `t[s] x y z qx qy qz qw`. Each
+/// row may also have the 36 numbers of its covariance, row by row, as in
+/// geometry_msgs/PoseWithCovariance. Faulty rows are skipped and counted in `report`. Throws
+/// DatasetError if there is no row.
 [[nodiscard]] PoseStream read_pose_file(const std::filesystem::path& file, ReaderReport& report);
 
-/// The packets of another reader with the poses of a file in them; frames of which it does not tell
-/// the pose are left out and counted.
+/// The packets of another reader with the poses of a file. Frames without a pose in the file are
+/// skipped and counted.
 class PoseFileReader final : public DatasetReader {
  public:
   /// Throws DatasetError for a file without a pose.

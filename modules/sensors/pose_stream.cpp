@@ -29,8 +29,9 @@ std::optional<MeasuredPose> PoseStream::at(Stamp stamp) {
 
 MeasuredPose measured_pose(const SE3& T_odom_child, const Matrix6& covariance,
                            const SE3& T_child_body) {
-  // To [rotation; translation] along the child's axes, where T_odom_child * exp(xi) perturbs, then
-  // to the body by exp(xi) * T_child_body = T_child_body * exp(Ad(T_child_body^-1) xi).
+  // Converts to [rotation; translation] along the child's axes, which perturb T_odom_child *
+  // exp(xi). Then converts to the body by exp(xi) * T_child_body = T_child_body *
+  // exp(Ad(T_child_body^-1) xi).
   Matrix6 to_child = Matrix6::Zero();
   to_child.topRightCorner<3, 3>() = T_odom_child.linear().transpose();
   to_child.bottomLeftCorner<3, 3>() = T_odom_child.linear().transpose();

@@ -8,24 +8,25 @@
 
 namespace km {
 
-/// Poses of an odometry on their way into packets: those at the stamps of frames are interpolated.
+/// Poses of an odometry before they are put into packets: the poses at the stamps of frames are
+/// interpolated.
 class PoseStream {
  public:
-  /// Between poses further apart nothing is interpolated.
+  /// Longest step over which poses are interpolated.
   static constexpr double kLongestStep_s = 1.0;
 
-  /// Later than the one before.
+  /// Stamps must ascend.
   void add(Stamp stamp, const MeasuredPose& pose);
 
-  /// There were poses at or before the stamp, and there are at or after it.
+  /// starts_by(): some pose was at or before the stamp. reaches(): some pose is at or after it.
   [[nodiscard]] bool starts_by(Stamp stamp) const { return first_ && *first_ <= stamp; }
   [[nodiscard]] bool reaches(Stamp stamp) const {
     return !poses_.empty() && poses_.back().stamp >= stamp;
   }
 
-  /// The pose at an instant: on the way from the one before to the one after at constant velocity,
-  /// with a covariance between theirs. nullopt where the two are too far apart, or one is missing.
-  /// Stamps ascend from call to call.
+  /// The pose at an instant, interpolated at constant velocity, with an interpolated covariance.
+  /// nullopt if the neighbouring poses are too far apart, or one is missing. Stamps ascend from
+  /// call to call.
   [[nodiscard]] std::optional<MeasuredPose> at(Stamp stamp);
 
  private:
@@ -34,17 +35,17 @@ class PoseStream {
     MeasuredPose pose;
   };
   std::deque<Entry> poses_;
-  std::optional<Stamp> first_;  // of all that came
+  std::optional<Stamp> first_;  // first stamp of the stream
 };
 
-/// The pose of the body, by that of a frame `child` on it with a covariance as ROS has it
-/// (geometry_msgs/PoseWithCovariance: x, y, z and rotations about x, y, z, along the axes of odom;
-/// [m^2], [rad^2]).
+/// The pose of the body from the pose of a frame `child` on it. The covariance is that of
+/// geometry_msgs/PoseWithCovariance: x, y, z and rotations about x, y, z, along the axes of odom;
+/// [m^2], [rad^2].
 [[nodiscard]] MeasuredPose measured_pose(const SE3& T_odom_child, const Matrix6& covariance,
                                          const SE3& T_child_body);
 
-/// The same of a message of ROS; nullopt if its numbers are no pose. A covariance that is none, or
-/// unknown (-1 first), is zero.
+/// The pose of the body from a message of ROS; nullopt if its numbers are no pose. An invalid or
+/// unknown (-1 first) covariance becomes zero.
 [[nodiscard]] std::optional<MeasuredPose> measured_pose(const RosOdometry& message,
                                                         const SE3& T_child_body);
 

@@ -23,7 +23,7 @@ void append(std::string& list, const std::string& item) {
 
 }  // namespace
 
-// Whose messages name the body's frame.
+// Topic whose messages name the body's frame.
 const std::string& RigCompletion::body_topic() const {
   const SensorTopicNames& topics = partial_.rig.topics;
   if (topics.imu.empty() && topics.gyro.empty()) return topics.odometry;
@@ -118,7 +118,8 @@ std::optional<SE3> RigCompletion::T_body_left() const {
   return *T_body_frame * T_frame_camera(*infos_[0], partial_.images[0]);
 }
 
-// By the stereo calibration in P, whose rectified cameras lie on one line, else by the frames.
+// From the stereo calibration in P, whose rectified cameras are on one line, or else from the
+// frames.
 std::optional<SE3> RigCompletion::T_left_right() const {
   if (!infos_[0] || !infos_[1]) return std::nullopt;
   std::optional<SE3> T_frames;
@@ -191,7 +192,7 @@ Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
     throw DatasetError(name +
                        ": the calibration is not complete; missing: " + completion.missing());
   };
-  // What is not in a bag needs no search through it.
+  // If a bag lacks the topics, it need not be searched.
   for (const auto& teller : completion.tellers())
     if (!bag.is_live() && teller.is_needed &&
         std::ranges::count(bag.channels(), teller.topic, &BagChannel::topic) == 0)

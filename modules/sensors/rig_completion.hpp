@@ -15,54 +15,55 @@
 
 namespace km {
 
-/// A rig of which messages tell the rest: sensor_msgs/CameraInfo the cameras and, where it has a
-/// stereo calibration, the right one's place; /tf_static where they are on the body.
+/// A rig that messages complete. sensor_msgs/CameraInfo gives the cameras and, with a stereo
+/// calibration, the pose of the right one. /tf_static gives their poses on the body.
 struct PartialRig {
   Rig rig;
-  bool has_cameras = true;          ///< Of the rig's sensors.
-  bool is_placed = true;            ///< Else T_body_cam are poses in the left camera's frame.
-  double virtual_baseline_m = 0.1;  ///< Of an RGB-D rig, see rgbd_rig().
-  /// Of the left and the right camera; the latter is not used without its topic of images.
+  bool has_cameras = true;          ///< The rig has its cameras.
+  bool is_placed = true;            ///< False: T_body_cam are poses in the left camera's frame.
+  double virtual_baseline_m = 0.1;  ///< Used for an RGB-D rig, see rgbd_rig().
+  /// Topics of the left and the right camera; the right one is used only if it has a topic of
+  /// images.
   std::array<std::string, 2> info_topics;
   std::array<RosImages, 2> images = {RosImages::kRaw, RosImages::kRaw};
-  /// The inertial sensor's; empty: that of its messages, or the odometry's child frame where there
-  /// is no inertial sensor.
+  /// Frame of the inertial sensor. Empty: the frame in its messages, or the odometry's child frame
+  /// if there is no inertial sensor.
   std::string body_frame;
-  /// Of the complete rig, see CameraCalibration; not applied here.
+  /// Correction of the complete rig, see CameraCalibration; not applied here.
   SE3 T_body_rig = SE3::Identity();
-  std::filesystem::path pose_file;  ///< Of an odometry from outside, see read_pose_file().
+  std::filesystem::path pose_file;  ///< Poses of an external odometry, see read_pose_file().
 
   [[nodiscard]] bool is_complete() const { return has_cameras && is_placed; }
 };
 
-/// Completes a rig from messages, whichever come first.
+/// Completes a rig from messages in any order.
 class RigCompletion {
  public:
   explicit RigCompletion(PartialRig rig) : partial_(std::move(rig)) {}
 
-  /// Topics that tell something, by the type of their messages.
+  /// A topic that can supply missing parts, with the type of its messages.
   struct Teller {
     std::string topic;
     std::string_view type;
-    bool is_needed = true;  ///< False: another topic may tell the same.
+    bool is_needed = true;  ///< False: another topic may supply the same part.
   };
   [[nodiscard]] std::vector<Teller> tellers() const;
 
-  /// True if it tells something new. Throws DatasetError, naming topic and value, for a CameraInfo
-  /// that is no calibration.
+  /// True if the message supplies a new part. Throws DatasetError with topic and value for a
+  /// CameraInfo that is not a calibration.
   bool add(const BagChannel& channel, const BagMessage& message);
 
-  /// nullopt as long as something is missing(). Throws DatasetError for cameras that are no pair.
+  /// nullopt while a part is missing(). Throws DatasetError for cameras that are not a pair.
   [[nodiscard]] std::optional<Rig> rig() const;
 
-  /// What is, and which topics would tell it; "" if nothing is.
+  /// The missing parts and the topics that could supply them; "" if nothing is missing.
   [[nodiscard]] std::string missing() const;
 
  private:
   [[nodiscard]] bool has_right() const { return !partial_.rig.topics.right.empty(); }
   [[nodiscard]] const std::string& body_topic() const;
   bool take_info(std::size_t camera, const BagChannel& channel, const BagMessage& message);
-  /// Of the left or the right camera; nullopt as long as no message has told it.
+  /// Frame of the left or the right camera; nullopt until a message has supplied it.
   [[nodiscard]] std::optional<std::string> camera_frame(std::size_t camera) const;
   [[nodiscard]] std::optional<std::string> body_frame() const;
   [[nodiscard]] std::optional<SE3> T_body_left() const;
@@ -75,8 +76,9 @@ class RigCompletion {
   StaticTransforms transforms_;
 };
 
-/// Reads messages until they have completed `rig`. `name` begins messages: the path of the bag.
-/// Throws DatasetError at the end of the bag, naming all that is missing and what would tell it.
+/// Reads messages until they have completed `rig`. `name`: path of the bag, with which messages
+/// begin. At the end of the bag throws DatasetError with all missing parts and the topics that
+/// could supply them.
 [[nodiscard]] Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig);
 
 }  // namespace km

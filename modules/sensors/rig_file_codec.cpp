@@ -12,7 +12,7 @@ namespace {
 
 using RowMajor4 = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 
-// "/left" of "/left/image_raw", and of "/left/image_raw/compressed".
+// "/left" from "/left/image_raw" and from "/left/image_raw/compressed".
 std::pair<std::string, std::string> split_topic(std::string topic) {
   for (const char* transport : {"/compressed", "/compressedDepth"})
     if (topic.ends_with(transport)) topic.resize(topic.size() - std::string(transport).size());
@@ -36,7 +36,8 @@ RigChoice choice_of(const RigFile& file) {
   return choice;
 }
 
-// As written in the rig file itself, in files that it names, or all of it to be told by topics.
+// The calibration in the rig file itself, or in files that it names, or an empty one that topics
+// complete.
 RigCalibration read_calibration(const std::filesystem::path& path, bool is_inline,
                                 const RigFile& file) {
   const RigChoice choice = choice_of(file);
@@ -51,7 +52,7 @@ RigCalibration read_calibration(const std::filesystem::path& path, bool is_inlin
   return calibration;
 }
 
-// A calibration that names other topics may be that of another pair of cameras.
+// Notes if a calibration names other topics, because it may be that of another pair of cameras.
 void note_topics(const RigFile& file, const std::string& path, RigCalibration& calibration) {
   const std::pair<const std::string&, const std::string&> topics[] = {
       {calibration.image_topics[0], file.left.topic},
@@ -62,7 +63,7 @@ void note_topics(const RigFile& file, const std::string& path, RigCalibration& c
       calibration.notes.push_back(path + ": " + used + " is calibrated as " + calibrated);
 }
 
-// Of 16 numbers or none.
+// From 16 numbers or none.
 SE3 transform_of(const std::filesystem::path& path, const char* key,
                  const std::vector<double>& numbers) {
   if (numbers.empty()) return SE3::Identity();
@@ -72,7 +73,7 @@ SE3 transform_of(const std::filesystem::path& path, const char* key,
   return rigid_transform(T);
 }
 
-// The file may be read from elsewhere.
+// Makes paths absolute, because the file may be read from another folder.
 void make_absolute(YAML::Node node, const std::filesystem::path& folder) {
   if (!node) return;
   if (node.IsScalar()) node = (folder / node.as<std::string>()).lexically_normal().string();

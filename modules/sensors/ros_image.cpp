@@ -17,11 +17,11 @@ namespace {
 
 constexpr int kAsItIs = -1;
 
-// How pixels are stored, and what makes grey of them.
+// Storage of pixels, and the conversion to grey.
 struct Encoding {
   std::string_view name;
   int type;
-  int to_gray;  // of cv::cvtColor
+  int to_gray;  // code of cv::cvtColor
 };
 
 // sensor_msgs/image_encodings.hpp. OpenCV names a Bayer pattern by its second row and column.
@@ -51,7 +51,7 @@ const Encoding* find_encoding(std::string_view name) {
   return nullptr;
 }
 
-// Numbers of two or four bytes in the byte order of this machine.
+// Reverses the bytes of numbers of two or four bytes.
 template <typename Word>
 void reverse_bytes(cv::Mat& image) {
   for (int y = 0; y < image.rows; ++y)
@@ -99,7 +99,7 @@ RawImage raw_image(const BagChannel& channel, const BagMessage& message, const s
 }
 
 // image_transport puts 12 bytes with the quantisation before the PNG file of a compressed depth
-// image, which are none to the depths of 16 bits.
+// image. They have no meaning for depths of 16 bits.
 std::string_view without_depth_header(std::string_view bytes) {
   constexpr std::size_t kHeader_bytes = 12;
   const bool has_header =
@@ -140,7 +140,7 @@ ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message
   if (raw.loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(raw.loaded);
   cv::Mat gray = raw.loaded.image;
   if (raw.to_gray != kAsItIs) {
-    gray = cv::Mat();  // a Bayer pattern is not converted in its place
+    gray = cv::Mat();  // a Bayer pattern cannot be converted in place
     cv::cvtColor(raw.loaded.image, gray, raw.to_gray);
   }
   if (gray.type() == CV_16UC1) gray.convertTo(gray, CV_8UC1, 1.0 / 256.0, -0.5);

@@ -16,14 +16,14 @@ namespace km {
 [[nodiscard]] std::string_view type_of_images(std::string_view topic);
 
 /// The grey values of an image message. Encodings: mono8, mono16 (its higher byte), bgr8, rgb8,
-/// bgra8, rgba8, bayer_*8, yuv422 (UYVY), yuv422_yuy2, the 8UC1, 8UC3, 8UC4 and 16UC1 of OpenCV
-/// likewise, and compressed images of any format that OpenCV decodes. kUnreadable: not such a
-/// message; kWrongFormat: another encoding. `place` begins the problem.
+/// bgra8, rgba8, bayer_*8, yuv422 (UYVY), yuv422_yuy2, OpenCV's 8UC1, 8UC3, 8UC4 and 16UC1, and
+/// compressed images of any format that OpenCV decodes. kUnreadable: not such a message;
+/// kWrongFormat: another encoding. `place` begins the problem.
 [[nodiscard]] ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message,
                                           const std::string& place, const cv::Size& size);
 
 /// Depth from a message: 16UC1 or mono16 in units of `scale_m` [m], 32FC1 in metres, or a PNG image
-/// of 16 bits, also with image_transport's header of compressedDepth before it.
+/// of 16 bits, with or without image_transport's header of compressedDepth.
 [[nodiscard]] DepthResult depth_of_message(const BagChannel& channel, const BagMessage& message,
                                            const std::string& place, const cv::Size& size,
                                            double scale_m, const DepthRange& range);

@@ -75,7 +75,7 @@ void SensorsNode::decode() {
       if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
     }
   } catch (...) {
-    worker_.post(std::current_exception());  // the worker ends with it, as any node does
+    worker_.post(std::current_exception());  // the worker ends with the exception, as any node does
   }
 }
 
@@ -87,7 +87,7 @@ void SensorsNode::count_faults() {
   take_faults();
 }
 
-// What is live has no end at which to tell them.
+// Also logs new faults of a live source, because it has no end at which to log them.
 void SensorsNode::take_faults() {
   const ReaderReport report = reader_->report();
   {

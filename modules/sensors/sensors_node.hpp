@@ -23,26 +23,28 @@
 
 namespace km {
 
-/// The recording is over; published once, after its last packet. Not published by a stop before.
+/// The recording is over; published once, after its last packet. Not published if stop() comes
+/// first.
 struct SensorsEnd {
   std::size_t published = 0;  ///< Packets.
-  std::size_t skipped = 0;    ///< Frames left out because processors were short.
+  std::size_t skipped = 0;    ///< Frames not used because processors were too slow.
   double paused_s = 0.0;      ///< Time that the recording's clock paused for the same reason.
-  ReaderReport faults;        ///< Of the recording.
+  ReaderReport faults;        ///< Faults of the recording.
 };
 
 /// Channels of the sensors node; they must outlive it.
 struct SensorsTopics {
-  In<ProcessedFrame> processed;  ///< By odometry, for each packet. Its callback only takes a note.
+  /// From odometry, for each packet. The callback only stores the message.
+  In<ProcessedFrame> processed;
   Out<SensorPacket> packets;
-  Out<ShedLoad> load;  ///< When it changes, before the packets that it concerns.
+  Out<ShedLoad> load;  ///< At each change, before the packets that it concerns.
   Out<SensorsEnd> end;
 };
 
-/// Plays a recording, or hands on what sensors measure now. One thread decodes ahead, another
-/// publishes each packet when it is due, which is at once if it is live. A consumer whose queue is
-/// full (kBlock) holds publication up. At a finite rate, and live, LoadShedding chooses which
-/// frames are decoded; the inertial samples of all frames are kept.
+/// Plays a recording, or publishes live measurements. One thread decodes ahead. Another one
+/// publishes each packet when it is due; a live packet is due at once. A consumer with a full queue
+/// (kBlock) delays publication. At a finite rate, and live, LoadShedding chooses which frames are
+/// decoded. The inertial samples of all frames are kept.
 class SensorsNode final : public Node {
  public:
   /// `rate`: dataset seconds per second; infinity: as fast as consumers take it. Throws ConfigError
@@ -53,27 +55,28 @@ class SensorsNode final : public Node {
 
   std::string_view name() const override { return "sensors"; }
   void start() override;
-  /// Ends at once: what is decoded but not yet due has not happened.
+  /// Ends at once: packets that are decoded but not yet due are dropped.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat(), &decoding_}; }
   /// Reading and decoding a packet.
   DurationHistogram timing() const override { return reading_.histogram(); }
 
-  /// Packets published and frames left out so far. Thread-safe.
+  /// Packets published and frames not used so far. Thread-safe.
   std::size_t published() const { return published_; }
   std::size_t skipped() const { return skipped_; }
-  /// Time that the recording's clock has paused because processors are short [s]. Thread-safe.
+  /// Time for which the recording's clock has paused because processors were too slow [s].
+  /// Thread-safe.
   double paused_s() const {
     const std::lock_guard lock(shedding_mutex_);
     return paused_s_;
   }
-  /// Faults of the source, as counted up to 5 s ago, and all of them after stop(). Thread-safe.
+  /// Faults of the source, at most 5 s old; complete after stop(). Thread-safe.
   ReaderReport faults() const {
     const std::lock_guard lock(faults_mutex_);
     return faults_;
   }
-  /// Pairs of the recording, or so far, where that is more. Thread-safe.
+  /// Number of pairs of the recording, or the number so far if that is larger. Thread-safe.
   std::size_t listed() const { return std::max<std::size_t>(listed_, published_ + skipped_); }
 
  private:
@@ -107,7 +110,7 @@ class SensorsNode final : public Node {
   std::atomic<bool> stopped_ = false;
   mutable std::mutex faults_mutex_;
   ReaderReport faults_;
-  std::string told_faults_;  // of a live source
+  std::string told_faults_;  // last logged faults of a live source
   double counted_s_ = 0.0;
   Timing reading_;
   Heartbeat decoding_;  // a step reads one packet

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-// Ascents so far, by the stamp they end on: a segment tree over the stamps of the list.
+// All ascents so far, by the stamp at which they end: a segment tree over the stamps of the list.
 class Ascents {
  public:
   explicit Ascents(std::span<const Stamp> stamps)
@@ -24,7 +24,8 @@ class Ascents {
     tree_.assign(2 * keys_.size(), kNone);
   }
 
-  // The longest ascent that ends on stamps[i], its steps at most `pause`. Call with i = 0, 1, ...
+  // Adds the longest ascent that ends on stamps[i], with steps of at most `pause`. Call with i = 0,
+  // 1, ...
   void add(std::size_t i, Stamp pause) {
     before_[i] = best_within(key_of(stamps_[i] - pause), key_of(stamps_[i]));
     length_[i] = before_[i] == kNone ? 1 : length_[before_[i]] + 1;
@@ -33,7 +34,7 @@ class Ascents {
     for (node /= 2; node > 0; node /= 2) tree_[node] = better(tree_[2 * node], tree_[2 * node + 1]);
   }
 
-  // Positions of a longest ascent; of several, one that ends on the least stamp.
+  // Positions of a longest ascent; if there are several, of one that ends on the smallest stamp.
   [[nodiscard]] std::vector<std::size_t> longest() const {
     std::size_t end = 0;
     for (std::size_t i = 1; i < stamps_.size(); ++i)
@@ -51,14 +52,14 @@ class Ascents {
                                     keys_.begin());
   }
 
-  // The longer one; of equal ones that which ends first in the list.
+  // The longer one; of two equal ones, the one that ends first in the list.
   [[nodiscard]] std::size_t better(std::size_t a, std::size_t b) const {
     if (a == kNone || b == kNone) return std::min(a, b);
     if (length_[a] != length_[b]) return length_[a] > length_[b] ? a : b;
     return std::min(a, b);
   }
 
-  // Of ascents that end on keys [from, to).
+  // The best of the ascents that end on keys [from, to).
   [[nodiscard]] std::size_t best_within(std::size_t from, std::size_t to) const {
     std::size_t best = kNone;
     for (from += keys_.size(), to += keys_.size(); from < to; from /= 2, to /= 2) {
@@ -71,7 +72,7 @@ class Ascents {
   std::span<const Stamp> stamps_;
   std::vector<Stamp> keys_;  // ascending
   std::vector<std::size_t> tree_;
-  std::vector<std::size_t> before_;  // the position before in the ascent
+  std::vector<std::size_t> before_;  // previous position in the ascent
   std::vector<std::size_t> length_;
 };
 
@@ -102,7 +103,7 @@ std::vector<StampVerdict> judge_stamps(std::span<const Stamp> stamps) {
 
 StampVerdict StampOrder::judge(Stamp stamp) {
   const Stamp pause = nanoseconds(kLongestPause_s);
-  // Stamps of messages are any numbers: their differences may have no place in a Stamp.
+  // Stamps of messages are arbitrary numbers: their differences may overflow a Stamp.
   const auto is_near = [pause](Stamp a, Stamp b) {
     return std::abs(static_cast<double>(a) - static_cast<double>(b)) <= static_cast<double>(pause);
   };

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-constexpr double kMaxNormError = 1e-3;  // of a quaternion
+constexpr double kMaxNormError = 1e-3;  // norm of a quaternion
 
 std::string plain(const std::string& frame) {
   return frame.starts_with('/') ? frame.substr(1) : frame;

@@ -9,11 +9,12 @@
 
 namespace km {
 
-/// Frames that stand still to each other, as /tf_static tells them. Names are the same with a slash
-/// before them, which ROS 1 had, and without.
+/// Frames with constant relative poses, from /tf_static. A name with a leading slash, as in ROS 1,
+/// equals the name without it.
 class StaticTransforms {
  public:
-  /// Of a frame that is told again the last counts. What is no rigid transform is left out.
+  /// A later transform of a frame replaces the former one. A transform that is not rigid is
+  /// skipped.
   void add(const RosTransforms& message);
 
   /// T_a_b through any number of frames, in either direction; nullopt if no chain joins them.

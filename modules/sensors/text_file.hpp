@@ -19,13 +19,13 @@ namespace km {
 /// "FILE line N", the start of every message about a row.
 [[nodiscard]] std::string at_line(const std::filesystem::path& file, int line);
 
-/// Why a row is left out.
+/// The reason why a row is skipped.
 struct RowFault {
   ReaderFault fault = ReaderFault::kMalformedRow;
   std::string why;
 };
 
-/// A row that counts, and what was made of it.
+/// A valid row with its parsed value.
 template <typename Value>
 struct StampedRow {
   Stamp stamp = 0;
@@ -39,15 +39,15 @@ struct StampedRow {
 /// The stamp of a row that starts with one [ns] and has at least `fields` fields.
 [[nodiscard]] std::variant<Stamp, RowFault> stamp_of(const TextRow& row, std::size_t fields);
 
-/// Which of the stamps, of rows at `lines` of `file`, count (see judge_stamps()); the others go
-/// into `report`.
+/// For each stamp, of a row at `lines` of `file`, whether it is valid (see judge_stamps()). The
+/// invalid ones are counted in `report`.
 [[nodiscard]] std::vector<bool> in_order(const std::vector<Stamp>& stamps,
                                          const std::vector<int>& lines,
                                          const std::filesystem::path& file, ReaderReport& report);
 
-/// The rows of `file` that start with a stamp (`stamp_of` reads it), have at least `fields` fields
-/// and are in order of time, with what `parse(row)`, a std::variant<Value, RowFault>, makes of
-/// them. All others are counted in `report`. Throws DatasetError without `file`.
+/// The valid rows of `file` with their values. A valid row starts with a stamp (`stamp_of` reads
+/// it), has at least `fields` fields, is in order of time, and `parse(row)` returns a Value and not
+/// a RowFault. All other rows are counted in `report`. Throws DatasetError if `file` is missing.
 template <typename Value, typename Parse>
 [[nodiscard]] std::vector<StampedRow<Value>> read_ordered_rows(
     const std::filesystem::path& file, std::size_t fields, ReaderReport& report, const Parse& parse,

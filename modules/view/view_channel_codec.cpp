@@ -13,10 +13,10 @@
 namespace km {
 namespace {
 
-// Updates that not all readers have acknowledged. Who watches is gone after ViewListener's lease
-// without a word: in that time fewer come.
+// Number of updates kept until all readers acknowledge them. The writer keeps the updates for a
+// dead viewer until its lease (ViewListener) ends, so fewer than this may arise in that time.
 constexpr int kKept = 10000;
-// Of those that arrived and nobody has taken.
+// Number of updates that a reader keeps until the application takes them.
 constexpr int kMostUntaken = 20000;
 
 const char* name_of(ViewChannel channel) {
@@ -31,8 +31,8 @@ const char* name_of(ViewChannel channel) {
   return "view_images";
 }
 
-// A volatile update would be lost if it overtook the discovery of its writer. So the last one is
-// kept, and comes first to who is new.
+// A volatile update would be lost if it overtook the discovery of its writer. So the writer keeps
+// the last update and sends it to each new reader first.
 DdsQos view_qos() {
   DdsQos qos = make_dds_qos();
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
@@ -56,7 +56,7 @@ DdsQos reader_qos() {
   return qos;
 }
 
-// Of publishers and subscribers.
+// Settings for publishers and subscribers.
 DdsQos partition(ViewChannel channel, RobotId robot) {
   DdsQos qos = make_dds_qos();
   if (channel == ViewChannel::kImages)
@@ -126,7 +126,7 @@ std::size_t ViewWriter::write(const ViewContent& content) {
   wire.told = system_now();
   borrow(wire.content, bytes);
   check_dds(dds_write(writer_.handle(), &wire), std::string("cannot tell ") + name_of(channel_));
-  constexpr std::size_t kHead = 4 + 28;  // encoding header, the fields before the content
+  constexpr std::size_t kHead = 4 + 28;  // Encoding header, and the fields before the content.
   return bytes.size() + kHead;
 }
 

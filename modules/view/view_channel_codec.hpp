@@ -13,15 +13,16 @@
 
 namespace km {
 
-/// The DDS topics on which robots tell those who watch. All are reliable, keep no past but the last
-/// update, and so little for slow readers that no writer waits for them.
+/// DDS topics on which robots send their state to viewers. All are reliable, keep only the last
+/// update for late readers, and drop data for slow readers so that no writer waits for them.
 enum class ViewChannel {
-  kView,    ///< All that is small.
-  kMesh,    ///< Pieces of the mesh.
-  kImages,  ///< The newest image. In the partition of its robot's id: to read it is to ask for it.
+  kView,    ///< All small updates.
+  kMesh,    ///< Chunks of the mesh.
+  kImages,  ///< The newest image. Its DDS partition is the robot's id, so subscribing requests the
+            ///< images.
 };
 
-/// What goes over which.
+/// Channel that carries this kind of content.
 [[nodiscard]] ViewChannel channel_of(const ViewContent& content);
 
 [[nodiscard]] DdsEntity create_view_topic(dds_entity_t participant, ViewChannel channel);
@@ -32,16 +33,16 @@ class ViewWriter {
   /// `participant` outlives it.
   ViewWriter(dds_entity_t participant, ViewChannel channel, const TeamPeer& self);
 
-  /// Readers that are there. Those of a viewer that died are there until its lease is over.
+  /// Number of matched readers. Readers of a viewer that died count until its lease is over.
   [[nodiscard]] std::size_t readers() const;
-  /// Readers that have come since the last call.
+  /// Number of readers that have appeared since the last call.
   [[nodiscard]] std::size_t newcomers();
 
-  /// Tells it now; bytes that were written, each once, however many read them. Throws DdsError,
-  /// and what encode_view() throws.
+  /// Writes an update and returns its bytes, counted once for all readers. Throws DdsError, and the
+  /// exceptions of encode_view().
   std::size_t write(const ViewContent& content);
 
-  /// Waits until everybody has everything; false if that takes longer.
+  /// Waits until all readers have acknowledged all updates; false after `timeout_s`.
   bool await_readers(double timeout_s) const;
 
  private:
@@ -50,18 +51,20 @@ class ViewWriter {
   ViewChannel channel_;
   TeamPeer self_;
   DdsEntity topic_, publisher_, writer_;
-  std::size_t come_ = 0;  // since the beginning
+  std::size_t come_ = 0;  // Number since the beginning.
 };
 
-/// Reads what robots write on one channel. Not thread-safe.
+/// Reads the updates of robots on one channel. Not thread-safe.
 class ViewReader {
  public:
-  /// Of kImages: those of the robot `of`. `participant` and `topic` outlive it.
+  /// `of` selects the robot whose images are read; other channels ignore it. `participant` and
+  /// `topic` outlive it.
   ViewReader(dds_entity_t participant, dds_entity_t topic, ViewChannel channel, RobotId of = 0);
 
   [[nodiscard]] dds_entity_t handle() const { return reader_.handle(); }
 
-  /// Hands each update that has arrived to `take`; how many were refused: what robots do not write.
+  /// Passes each update that has arrived to `take`. Returns the number of invalid updates, which
+  /// are dropped.
   template <typename Take>
   std::size_t take(const Take& take_one) {
     std::size_t refused = 0;

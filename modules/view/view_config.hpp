@@ -4,7 +4,7 @@
 
 namespace km {
 
-/// Parameters of what a robot tells those who watch.
+/// Parameters of the updates for viewers.
 struct ViewConfig {
   static constexpr const char* kSection = "view";
 
@@ -16,20 +16,22 @@ struct ViewConfig {
   double images_per_s = 2.0;
 
   void visit_fields(auto& visitor) {
-    visitor.field("on", on,
-                  "send this robot's trajectory, mesh and images to anybody in the domain who asks "
-                  "(kimera_multi_viewer), as with --view; costs nothing while nobody asks");
+    visitor.field(
+        "on", on,
+        "send trajectory, mesh and images of this robot to any viewer in the domain that asks for "
+        "them (kimera_multi_viewer), as with --view; costs nothing without viewers");
     visitor.field("in_clear", in_clear,
-                  "where the team has keys: tell it nevertheless; anybody on the network can read "
-                  "it then");
-    visitor.field("bytes_per_s", bytes_per_s, {500.0, 1e9},
-                  "[B/s] at most, of all but what follows; what is beyond it is told later");
+                  "in a team with keys: send unencrypted updates nevertheless, which any computer "
+                  "on the network can read");
+    visitor.field(
+        "bytes_per_s", bytes_per_s, {500.0, 1e9},
+        "[B/s] maximum rate of state, poses and closures; updates beyond it are sent later");
     visitor.field("past_bytes_per_s", past_bytes_per_s, {500.0, 1e9},
-                  "[B/s] at most, while the past is told to one who has come");
+                  "[B/s] maximum rate while earlier data are sent to a new viewer");
     visitor.field("mesh_bytes_per_s", mesh_bytes_per_s, {1000.0, 1e9},
-                  "[B/s] at most, of the mesh; its pieces are those of mesh_chunks");
+                  "[B/s] maximum rate of the mesh, which is sent in the chunks of mesh_chunks");
     visitor.field("images_per_s", images_per_s, {0.0, 30.0},
-                  "[1/s] camera images, 640 pixels wide, while somebody asks for them; 0: none");
+                  "[1/s] camera images, 640 pixels wide, while a viewer asks for them; 0: none");
   }
 };
 

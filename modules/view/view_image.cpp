@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-// Of an update, what is left for the features and the rest.
+// The rest of an update is room for the features and the head.
 constexpr std::size_t kMaxJpegBytes = kMaxViewBytes - 20000;
 constexpr std::size_t kMaxFeatures = 2000;
 
@@ -21,7 +21,7 @@ std::vector<std::uint8_t> jpeg_of(const cv::Mat& image) {
     cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
     if (jpeg.size() <= kMaxJpegBytes) return jpeg;
   }
-  return {};  // noise, tall and narrow
+  return {};  // Even the smallest quality is too large, as for noise in a tall and narrow image.
 }
 
 }  // namespace
@@ -37,7 +37,7 @@ ViewImage view_image(const TrackedImage& image, const Camera& camera) {
   for (const Eigen::Vector2d& bearing : image.bearings) {
     const auto pixel = camera.project(bearing);
     if (!pixel || !pixel->allFinite() || result.features.size() == kMaxFeatures) continue;
-    // Pixels are counted from their centres.
+    // Integer pixel coordinates are pixel centres.
     const Eigen::Vector2f there = (scale * (pixel->array() + 0.5) - 0.5).matrix().cast<float>();
     result.features.push_back({there.x(), there.y()});
   }

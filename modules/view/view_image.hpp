@@ -6,12 +6,12 @@
 
 namespace km {
 
-/// The widest image that is told [px].
+/// Maximum width of the image that is sent [px].
 inline constexpr int kMaxViewWidth = 640;
 
-/// The left image, in grey, no wider than kMaxViewWidth, as a JPEG that fits into an update, and
-/// where `camera`, its own, shows the features. Throws std::invalid_argument for an image without
-/// pixels.
+/// The left image in grey, at most kMaxViewWidth wide, as a JPEG that fits into an update, with the
+/// pixels of the features. `camera` is the camera of this image. Throws std::invalid_argument for
+/// an image without pixels.
 [[nodiscard]] ViewImage view_image(const TrackedImage& image, const Camera& camera);
 
 }  // namespace km

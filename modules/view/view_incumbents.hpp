@@ -11,19 +11,20 @@
 
 namespace km {
 
-/// Of several processes that tell as one robot the first counts, as it does for the robots. What
-/// another one tells waits, within bounds, until the first has left or has not been heard for
-/// kSilent_s: then that one counts, from its beginning. Pure: time comes in [s], any origin, and
-/// does not go backwards. Not thread-safe.
+/// Chooses among several processes that send updates with one robot id: the first one counts, as in
+/// the team. Updates of other processes wait, within bounds, until the first one has left or has
+/// been silent for kSilent_s. Then the next process counts, with all its waiting updates.
+/// Deterministic: time comes in [s], with any origin, and does not decrease. Not thread-safe.
 class ViewIncumbents {
  public:
-  /// Robots tell their state once a second.
+  /// Time without updates after which a process no longer counts; robots send their state once a
+  /// second.
   static constexpr double kSilent_s = 5.0;
-  /// So long what others tell is kept, kMostWaiting updates of each.
+  /// Time for which updates of other processes wait, at most kMostWaiting updates of each process.
   static constexpr double kKept_s = 30.0;
   static constexpr std::size_t kMostWaiting = 1000;
 
-  /// Hands `update` to `take` if it counts now, else keeps it for serve().
+  /// Passes `update` to `take` if its process counts now, otherwise keeps it for serve().
   template <typename Take>
   void add(ViewUpdate update, double now_s, const Take& take) {
     const auto [incumbent, is_new] =
@@ -33,7 +34,7 @@ class ViewIncumbents {
     dropped_ += !waiting_.push(from, std::move(update), 1, now_s);
   }
 
-  /// Hands on what has waited long enough.
+  /// Passes the waiting updates of processes that count now to `take`.
   template <typename Take>
   void serve(double now_s, const Take& take) {
     const auto one = [&](const Process& from, ViewUpdate& update, double waited_s) {
@@ -51,14 +52,14 @@ class ViewIncumbents {
     }
   }
 
-  /// Updates that never counted.
+  /// Number of updates that never counted.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
  private:
-  using Process = std::pair<RobotId, std::uint64_t>;  // and its boot
+  using Process = std::pair<RobotId, std::uint64_t>;  // Robot id and boot id.
   struct Incumbent {
     std::uint64_t boot = 0;
-    std::optional<double> heard_s;  // last; none once it has left
+    std::optional<double> heard_s;  // Time of the last update; none after the process has left.
   };
 
   template <typename Take>
@@ -71,7 +72,8 @@ class ViewIncumbents {
 
   std::map<RobotId, Incumbent> incumbents_;
   WaitingRooms<Process, ViewUpdate> waiting_{
-      {.bytes = 4 * kMostWaiting, .bytes_of_one = kMostWaiting}};  // each counts as one
+      {.bytes = 4 * kMostWaiting, .bytes_of_one = kMostWaiting}};  // Each update has size 1, so
+                                                                   // sizes are counts.
   std::uint64_t dropped_ = 0;
 };
 

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Robots tell one who died until this is over.
+// Robots keep sending to a dead viewer until this lease ends.
 constexpr double kLease_s = 10.0;
 
 std::shared_ptr<const DdsDomain> join(DdsConfig config) {
@@ -63,7 +63,7 @@ std::optional<ViewUpdate> ViewListener::next(double patience_s) {
   return update;
 }
 
-// What is small first: it does not wait behind a mesh.
+// Small updates come first, so that they do not wait behind a mesh.
 void ViewListener::take_all() {
   const double now_s = steady_now_s();
   const auto count = [this](ViewUpdate update) { taken_.push_back(std::move(update)); };
@@ -74,7 +74,8 @@ void ViewListener::take_all() {
   incumbents_.serve(now_s, count);
 }
 
-// Wakes up anew for what comes after this: stop() is asked for behind it.
+// Resets the guard condition before it reads the requests, so that a later request or stop() wakes
+// the thread again.
 void ViewListener::follow_requests() {
   dds_set_guardcondition(wake_.handle(), false);
   const std::set<RobotId> asked = [&] {

@@ -14,14 +14,16 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueue = 4096;  // nobody waits for who watches: the oldest go
+constexpr std::size_t kQueue = 4096;  // The oldest inputs are dropped, so that no node waits for a
+                                      // viewer.
 constexpr double kTick_s = 0.1;
 constexpr double kStatePeriod_s = 1.0;
-constexpr double kBurst_s = 0.5;          // unused budget is kept this long
-constexpr double kRest_s = 2.0;           // worth of budget that is told at the end,
-constexpr double kMeshRest_s = 10.0;      // and of that for the mesh: its last correction
-constexpr double kAcknowledged_s = 0.5;   // waited for there
-constexpr double kCutShare = 1.0 / 30.0;  // of the time, at most, a mesh is cut up
+constexpr double kBurst_s = 0.5;          // Time for which unused budget is kept.
+constexpr double kRest_s = 2.0;           // Worth of budget that is sent at the end.
+constexpr double kMeshRest_s = 10.0;      // The same bound for the mesh, to include its last
+                                          // correction.
+constexpr double kAcknowledged_s = 0.5;   // Timeout for the acknowledgements of these last updates.
+constexpr double kCutShare = 1.0 / 30.0;  // Maximum share of the time for splitting the mesh.
 
 ViewWriter writer_on(const DdsParticipant& participant, ViewChannel channel) {
   const RobotIdentity& self = participant.identity();
@@ -32,7 +34,7 @@ TokenBucket budget_of(double bytes_per_s) {
   return {bytes_per_s, kBurst_s * bytes_per_s, kBurst_s * bytes_per_s};
 }
 
-// Images are pushed as wanted.
+// Images are sent at the configured rate and have no byte budget.
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 double finite(double value) {
@@ -142,7 +144,7 @@ TokenBucket& ViewNode::view_budget() {
   return teller_.tells_past() ? past_budget_ : on(ViewChannel::kView).budget;
 }
 
-// An update leaves while there is no debt, and may make one.
+// An update is sent while the budget has no debt, and may itself cause a debt.
 void ViewNode::tell_view(double now_s) {
   Channel& view = on(ViewChannel::kView);
   if (view.writer.newcomers() > 0) {
@@ -151,7 +153,7 @@ void ViewNode::tell_view(double now_s) {
   }
   if (view.writer.readers() == 0) return;
   while (view_budget().wait_s(0.0, now_s) <= 0.0) {
-    TokenBucket& budget = view_budget();  // of what comes next
+    TokenBucket& budget = view_budget();  // Budget of the update that follows.
     std::optional<ViewContent> content;
     if (now_s >= state_due_s_) {
       content = state(now_s);
@@ -184,8 +186,8 @@ void ViewNode::tell_mesh(double now_s) {
   }
 }
 
-// The larger the mesh, the longer that takes, and the less often it is done. One that cannot be
-// told harms nobody else.
+// Splitting takes longer for a larger mesh, so the interval grows with it. A mesh that cannot be
+// split is skipped.
 void ViewNode::cut_mesh(double now_s) {
   const double begin_s = steady_now_s();
   is_cut_ = true;
@@ -214,7 +216,7 @@ ViewState ViewNode::state(double now_s) {
   return state;
 }
 
-// Bytes; none if DDS did not take it.
+// Returns the bytes sent, or 0 if DDS refused the update.
 std::size_t ViewNode::write(Channel& channel, const ViewContent& content) try {
   const std::size_t bytes = channel.writer.write(content);
   channel.told_bytes += bytes;
@@ -224,14 +226,15 @@ std::size_t ViewNode::write(Channel& channel, const ViewContent& content) try {
   return 0;
 }
 
-// How it all ended, to who watches still.
+// Sends the final state to the viewers that are still present.
 void ViewNode::tell_rest() {
   const double now_s = steady_now_s();
   Channel& view = on(ViewChannel::kView);
   Channel& mesh = on(ViewChannel::kMesh);
   if (view.writer.readers() > 0) {
     auto bytes = static_cast<double>(write(view, state(now_s)));
-    const double late_s = now_s + ViewTeller::kKeyframePeriod_s;  // everything is due
+    const double late_s = now_s + ViewTeller::kKeyframePeriod_s;  // Time at which all updates are
+                                                                  // due.
     while (bytes < kRest_s * config_.past_bytes_per_s) {
       const auto content = teller_.next(late_s);
       if (!content) break;

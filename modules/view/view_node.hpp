@@ -30,14 +30,14 @@
 
 namespace km {
 
-/// Channels of what is told to those who watch; they must outlive it.
+/// Channels with the inputs for viewers; they must outlive the node.
 struct ViewTopics {
   In<OdometryState> odometry;
   In<KeyframeOdometry> keyframes;
   In<Trajectory> trajectory;
   In<OptimizerProgress> progress;
   In<ClosureOutcome> outcomes, restored_outcomes;
-  In<Closure> closures;  ///< Of both ends.
+  In<Closure> closures;  ///< Closures of both ends.
   In<InlierSet> own_inlier_sets, peer_inlier_sets;
   In<ClosureVerdicts> verdicts;
   In<PeerEvent> restarts;
@@ -45,38 +45,40 @@ struct ViewTopics {
   In<TrackedImage> images;
 };
 
-/// How a mesh is cut into what is told.
+/// Parameters for splitting the mesh into chunks.
 struct ViewMesh {
   ChunkGrid grid;
   double min_move_m = 0.01;  ///< See differ().
 };
 
-/// Tells those who watch how the robot does (see ViewUpdate), on topics of its own in the team's
-/// domain: what a ViewTeller gives, a state once a second, the mesh in chunks, and camera images
-/// if they are asked for. Each within its budget, and only while somebody reads it: else what
-/// comes is only kept. Nobody waits for who watches; what DDS cannot take is lost to them.
+/// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's
+/// domain. It sends the updates of a ViewTeller, a state once a second, the mesh in chunks, and
+/// camera images on request. Each topic has a budget. While a topic has no reader, the node only
+/// keeps the newest inputs. No node waits for a viewer; updates that DDS cannot accept are lost.
 class ViewNode final : public Node {
  public:
-  /// All of a state but anchor, round, cost, gradient and links. Called on the node's thread.
+  /// Returns all fields of a state except for anchor, round, cost, gradient and links. Called on
+  /// the node's thread.
   using Describe = std::function<ViewState()>;
 
-  /// `participant` outlives it. Throws ConfigError if `config` is out of bounds. `camera`: of the
-  /// images; without one, none are told.
+  /// `participant` outlives it. Throws ConfigError if `config` is out of bounds. `camera` belongs
+  /// to the images; without it no images are sent.
   ViewNode(const ViewConfig& config, const DdsParticipant& participant, const ViewMesh& mesh,
            const std::optional<Camera>& camera, Describe describe, const ViewTopics& topics);
   ~ViewNode() override { stop(); }
 
-  /// The newest mesh counts, in the frame of the robot `anchor`. Thread-safe; does not wait.
+  /// Replaces the mesh, given in the frame of the robot `anchor`. Thread-safe; does not wait.
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
 
   std::string_view name() const override { return ViewConfig::kSection; }
   void start() override;
-  /// Tells what is left, up to two seconds' worth of the budget, and ten of that for the mesh.
+  /// Sends the remaining updates: at most two seconds' worth of the budget, and ten seconds' worth
+  /// for the mesh.
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
-  /// A thin link may hold up the socket for as long.
+  /// Large, because a slow link may block the socket for as long.
   double step_limit_s() const override { return 120.0; }
 
   struct Tick {};
@@ -90,24 +92,25 @@ class ViewNode final : public Node {
       Topic<Closure>::Message, Topic<InlierSet>::Message, Topic<ClosureVerdicts>::Message,
       Topic<PeerEvent>::Message, Topic<RobotStatus>::Message, Topic<TrackedImage>::Message>;
 
-  /// Keeps what comes; a Tick tells what is due by the steady clock. The thread calls only this.
+  /// Stores an input; a Tick sends the updates that are due by the steady clock. The thread calls
+  /// only this.
   void step(const Input& input);
 
-  /// Tells what is due at `now_s`.
+  /// Sends the updates that are due at `now_s`.
   void tell(double now_s);
 
-  /// Bytes told since the start, on that channel. Thread-safe.
+  /// Bytes sent on that channel since the start. Thread-safe.
   [[nodiscard]] std::size_t told_bytes(ViewChannel channel) const;
 
  private:
-  /// One channel, what it may take, and what it took.
+  /// One channel with its byte budget and the bytes it has sent.
   struct Channel {
     ViewWriter writer;
     TokenBucket budget;
     std::atomic<std::size_t> told_bytes = 0;
   };
 
-  // What comes is kept.
+  // Each take() stores an input, except for a Tick, which sends.
   void take(const Tick& tick);
   void take(const MeshOffer& offer);
   void take(const Topic<OptimizerProgress>::Message& progress) { progress_ = progress; }
@@ -137,20 +140,20 @@ class ViewNode final : public Node {
   const std::optional<Camera> camera_;
   const Describe describe_;
   std::array<Channel, 3> channels_;
-  TokenBucket past_budget_;  // of kView, while the past is told
+  TokenBucket past_budget_;  // Budget of kView while earlier data are sent.
   ViewTeller teller_;
   double state_due_s_ = 0.0;
   Topic<OptimizerProgress>::Message progress_;
-  std::map<RobotId, double> heard_s_;  // of each robot, when last
-  MeshOffer mesh_;                     // the newest
-  bool is_cut_ = true;                 // it is in the schedule
+  std::map<RobotId, double> heard_s_;  // By robot: time of the last message.
+  MeshOffer mesh_;                     // The newest mesh.
+  bool is_cut_ = true;                 // True if `mesh_` is in the schedule.
   double cut_due_s_ = 0.0;
-  bool tells_mesh_ = false;  // somebody reads it
+  bool tells_mesh_ = false;  // True if the mesh channel has a reader.
   ChunkSchedule schedule_;
   std::atomic<bool> are_images_asked_ = false;
   bool stopped_ = false;
   Worker<Input> worker_;
-  Periodic ticks_;  // last member: stops before the worker it posts to
+  Periodic ticks_;  // Last member: it stops before the worker to which it posts.
 };
 
 }  // namespace km

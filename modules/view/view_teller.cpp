@@ -11,7 +11,7 @@ constexpr std::size_t kBytesOfPose = 7 * sizeof(float);
 constexpr std::size_t kPosesAtOnce = ViewTeller::kUpdateBytes / kBytesOfPose;
 constexpr std::size_t kOdometryAtOnce = ViewTeller::kUpdateBytes / (kBytesOfPose + sizeof(Stamp));
 
-// Ranks of closures: verified ones come before all else, the many others behind new keyframes.
+// Verified closures rank above all other updates, the many other closures below new keyframes.
 constexpr int kVerifiedRank = 0;
 constexpr int kCandidateRank = 1;
 
@@ -49,7 +49,7 @@ void ViewTeller::add(const OdometryState& state) {
   if (state.T_odom_body.matrix().allFinite()) pose_ = ViewPose{state.stamp, state.T_odom_body};
 }
 
-// One that was lost on its way here takes the pose and the stamp of the next.
+// A keyframe that never reached this node takes the pose and the stamp of the next one.
 void ViewTeller::add(const KeyframeOdometry& keyframe) {
   if (!keyframe.T_odom_kf.matrix().allFinite()) return;
   const auto index = static_cast<std::size_t>(keyframe.id.index);
@@ -140,7 +140,7 @@ ViewClosure ViewTeller::view_of(const ClosureId& id, const Pair& pair) const {
   return view;
 }
 
-// It waits for its turn if what was told of it is no longer so.
+// Queues the pair if its present state differs from the one that was sent.
 void ViewTeller::look_at(const ClosureId& id, Pair& pair) {
   const ViewClosure now = view_of(id, pair);
   const bool news = !pair.told || !is_same(*pair.told, now);
@@ -190,7 +190,7 @@ std::optional<ViewContent> ViewTeller::next_optimized() {
                        std::move(poses)};
 }
 
-// In turn, so that each comes to be told however often all move.
+// Starts behind the poses sent last, so that each pose is sent even if all poses keep moving.
 std::optional<ViewContent> ViewTeller::next_moved() {
   if (!any_moved_ || trajectory_ == nullptr) return std::nullopt;
   const auto& now = trajectory_->T_world_kf;

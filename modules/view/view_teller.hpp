@@ -20,41 +20,42 @@
 
 namespace km {
 
-/// What of all that a robot knows is to be told next, so that those who watch know it, too: what
-/// has changed since it was told, the most important first. Poses are told anew once they are off
-/// by more than kMaxShift_m or kMaxTurn_rad from what was told: when nothing is left to be told,
-/// what was told is within these. Not thread-safe.
+/// Chooses the next update for viewers from all that the robot knows: changes since the last
+/// update, the most important first. A pose is sent again when it differs from the last sent one by
+/// more than kMaxShift_m or kMaxTurn_rad. So when no update is left, all sent poses are within
+/// these bounds. Not thread-safe.
 class ViewTeller {
  public:
   static constexpr double kMaxShift_m = 0.01;
   static constexpr double kMaxTurn_rad = 0.5 / kDegrees;
   static constexpr double kPosePeriod_s = 0.4;
-  /// Keyframes are collected for so long, so that one update has several.
+  /// Time for which keyframes are collected, so that one update has several.
   static constexpr double kKeyframePeriod_s = 1.0;
-  /// An update is not longer than this, but for one closure with a long reason.
+  /// Maximum size of an update, except for one closure with a long reason.
   static constexpr std::size_t kUpdateBytes = 1000;
 
   explicit ViewTeller(RobotId self) : self_(self) {}
 
-  // What the robot knows. What is not finite is left out.
+  // Inputs from the robot. Values that are not finite are ignored.
 
   void add(const OdometryState& state);
-  void add(const KeyframeOdometry& keyframe);              ///< Own ones, ascending.
-  void add(std::shared_ptr<const Trajectory> trajectory);  ///< Own, the newest counts.
+  void add(const KeyframeOdometry& keyframe);              ///< Own keyframes, ascending.
+  void add(std::shared_ptr<const Trajectory> trajectory);  ///< Own trajectory; replaces the former.
   void add(const ClosureOutcome& outcome);
-  void add(const Closure& closure);           ///< Verified by one of its ends.
-  void add(const InlierSet& set);             ///< The newest version of a pair counts.
-  void add(const ClosureVerdicts& verdicts);  ///< Of each closure the latest counts.
-  /// Keyframes of this robot are others from now on: closures with them are no more.
+  void add(const Closure& closure);           ///< Closure verified by one of its ends.
+  void add(const InlierSet& set);             ///< Replaces an older version for the same robot
+                                              ///< pair.
+  void add(const ClosureVerdicts& verdicts);  ///< The latest verdict of a closure counts.
+  /// Removes the closures with this robot, because its keyframe indices now mean other keyframes.
   void restarted(RobotId peer);
 
-  /// Somebody has come: all is told again from the beginning.
+  /// A viewer has appeared: sends everything again from the beginning.
   void begin_again();
-  /// True from then on until all that there is has been told once.
+  /// True from begin_again() until everything has been sent once.
   [[nodiscard]] bool tells_past() const { return tells_past_; }
 
-  /// What is to be told now, at `now_s` [s] of any clock that does not go backwards; it counts as
-  /// told. nullopt: nothing, for now.
+  /// The update to send now, at `now_s` [s] of any clock that does not go backwards; it counts as
+  /// sent. nullopt if no update is due.
   [[nodiscard]] std::optional<ViewContent> next(double now_s);
 
  private:
@@ -63,11 +64,11 @@ class ViewTeller {
     std::uint16_t matches = 0;
     std::uint16_t inliers = 0;
     bool is_verified = false;
-    std::string reason;  // why verification stopped
+    std::string reason;  // Why verification stopped.
     std::optional<ViewClosure> told = {};
-    std::uint64_t turn = 0;  // in which it waits; 0: it does not
+    std::uint64_t turn = 0;  // Number of its turn in the queue; 0 if it is not queued.
   };
-  // By rank, then in the order of changes.
+  // Ordered by rank, then by the time of the change.
   using Turn = std::tuple<int, std::uint64_t, ClosureId>;
 
   [[nodiscard]] ViewClosure view_of(const ClosureId& id, const Pair& pair) const;
@@ -78,19 +79,19 @@ class ViewTeller {
   [[nodiscard]] std::optional<ViewContent> next_moved();
 
   RobotId self_;
-  std::optional<ViewPose> pose_;  // not told yet
+  std::optional<ViewPose> pose_;  // Pose that has not been sent yet.
   double pose_due_s_ = 0.0;
   double keyframes_due_s_ = 0.0;
-  std::vector<SE3> odometry_;  // of the keyframes
+  std::vector<SE3> odometry_;  // Poses of the keyframes.
   std::vector<Stamp> stamps_;
   std::size_t odometry_told_ = 0;
   std::shared_ptr<const Trajectory> trajectory_;
-  std::vector<SE3> optimized_told_;  // in the frame of the trajectory's anchor
-  std::size_t cursor_ = 0;           // where to look for moved ones
-  bool any_moved_ = false;           // perhaps
+  std::vector<SE3> optimized_told_;  // In the frame of the trajectory's anchor.
+  std::size_t cursor_ = 0;           // Index at which the search for moved poses starts.
+  bool any_moved_ = false;           // False if no pose has moved; true if some may have.
   std::map<ClosureId, Pair> pairs_;
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
-  std::set<ClosureId> overruled_;  // by the optimiser
+  std::set<ClosureId> overruled_;  // Closures that the optimiser rejects.
   std::set<Turn> waiting_;
   std::uint64_t turn_ = 0;
   bool tells_past_ = false;

@@ -10,11 +10,12 @@
 namespace km {
 namespace {
 
-constexpr double kUnitTolerance = 1e-3;    // a quaternion may be this far from unit length
-constexpr double kMaxTranslation_m = 1e7;  // no robot is farther from the origin of a frame
+constexpr double kUnitTolerance = 1e-3;    // Tolerance for the length of a quaternion.
+constexpr double kMaxTranslation_m = 1e7;  // Maximum distance of a robot from the origin of a
+                                           // frame.
 constexpr std::size_t kPoseBytes = 7 * sizeof(float);
 
-// The least bytes that an element of each list takes.
+// Minimum bytes of one element of each list.
 constexpr std::size_t kLinkBytes = 1 + sizeof(float);
 constexpr std::size_t kNumberBytes = 1 + sizeof(double);
 constexpr std::size_t kClosureBytes = 4 + 1 + 1 + 1 + 1;
@@ -127,7 +128,7 @@ class ContentWriter {
   ByteWriter out_;
 };
 
-// What fails a check fails the reader: everything behind it is zero and empty.
+// After a failed check the reader is in the state of failure and returns zeros and empty lists.
 class ContentReader {
  public:
   explicit ContentReader(std::span<const std::uint8_t> bytes) : in_(bytes) {}
@@ -138,7 +139,7 @@ class ContentReader {
   }
 
  private:
-  // Kinds are numbered as ViewContent has them.
+  // Kinds are numbered in the order of ViewContent.
   ViewContent any() {
     switch (in_.u8()) {
       case 0:
@@ -267,7 +268,7 @@ class ContentReader {
     const Eigen::Quaterniond q = Eigen::Quaternionf(w, x, y, z).cast<double>();
     Eigen::Vector3d t;
     for (double& value : t) value = static_cast<double>(in_.f32());
-    // Written so that NaN fails.
+    // The comparison is false for NaN, so NaN fails.
     const bool is_pose = std::abs(q.norm() - 1.0) <= kUnitTolerance && t.allFinite() &&
                          t.cwiseAbs().maxCoeff() <= kMaxTranslation_m;
     require(is_pose);

@@ -18,97 +18,99 @@
 
 namespace km {
 
-/// Whom a robot hears, and since when it has not [s].
+/// A robot that this robot receives directly, and the time since its last message [s].
 struct ViewLink {
   RobotId robot = 0;
   float silent_s = 0.0F;
 };
 
-/// A number with a name: bytes of a kind of traffic, the load of a queue.
+/// A named number: bytes of a kind of traffic, or the load of a queue.
 struct ViewNumber {
   std::string name;
   double value = 0.0;
 };
 
-/// How a robot does: once a second, the newest counts.
+/// State of a robot, sent once a second; the newest counts.
 struct ViewState {
   std::string name;
   std::string phase;            ///< "running", "finished", "settled", "leaving"
-  double dataset_time_s = 0.0;  ///< Since the start of its input.
+  double dataset_time_s = 0.0;  ///< Time since the start of its input.
   std::uint32_t keyframes = 0;
   std::uint32_t skipped_frames = 0;
   RobotId anchor = 0;       ///< Robot whose odometry frame its optimised poses are in.
-  std::uint32_t round = 0;  ///< Of optimisation.
-  double cost = 0.0;        ///< Of the team's graph, see OptimizerProgress.
+  std::uint32_t round = 0;  ///< Round of the optimisation.
+  double cost = 0.0;        ///< Cost of the team's graph, see OptimizerProgress.
   double gradient_norm = 0.0;
-  double cpu_s = 0.0;  ///< Of all threads, since the start.
+  double cpu_s = 0.0;  ///< Processor time of all threads since the start.
   double resident_MB = 0.0;
   std::vector<ViewLink> links = {};
-  std::vector<ViewNumber> sent_bytes = {};  ///< By kind, since the start.
-  std::vector<ViewNumber> loads = {};       ///< Of modules that work: share of the time.
+  std::vector<ViewNumber> sent_bytes = {};  ///< Bytes by kind since the start.
+  std::vector<ViewNumber> loads = {};       ///< Load of each module: share of the time in which it
+                                            ///< works.
 };
 
-/// Where a robot is now: a few times a second, the newest counts.
+/// Present pose of a robot, sent a few times a second; the newest counts.
 struct ViewPose {
-  Stamp stamp = 0;  ///< Of the image.
+  Stamp stamp = 0;  ///< Stamp of the image.
   SE3 T_odom_body = SE3::Identity();
 };
 
-/// Keyframes first, first + 1, ...: where odometry has them (once each), or optimisation (again
-/// whenever they have moved).
+/// Poses of the keyframes first, first + 1, ...: in odometry (each sent once), or optimised (sent
+/// again whenever they have moved).
 struct ViewKeyframes {
   bool optimized = false;
   RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
   std::uint32_t first = 0;
   std::vector<SE3> T_world_kf = {};
-  std::vector<Stamp> stamps = {};  ///< Of the same keyframes where odometry has them, else none.
+  std::vector<Stamp> stamps = {};  ///< Stamps of the same keyframes; empty for optimised poses.
 };
 
-/// What has become of a pair of keyframes, as its teller knows it; the newest of an id counts.
-/// kVerified: not, or not yet, among those that are optimised.
+/// Stage of a pair of keyframes as the sending robot knows it; the newest for an id counts.
+/// kVerified means that no inlier set contains the closure, or that none is known yet.
 enum class ViewVerdict : std::uint8_t { kCandidate, kVerified, kKept, kRejected };
 struct ViewClosure {
   ClosureId id;
   ViewVerdict verdict = ViewVerdict::kCandidate;
   std::uint16_t matches = 0;
   std::uint16_t inliers = 0;
-  std::string reason;  ///< Why it is rejected.
+  std::string reason;  ///< Reason of a rejection.
 };
 struct ViewClosures {
   std::vector<ViewClosure> closures;
 };
 
-/// A robot's camera image, small, and what it tracks in it. Only told to who asks.
+/// Small camera image of a robot with the features that odometry tracks. Sent only on request.
 struct ViewImage {
   Stamp stamp = 0;
   std::vector<std::uint8_t> jpeg = {};
-  std::vector<std::array<float, 2>> features = {};  ///< [pixel] of the small image.
+  std::vector<std::array<float, 2>> features = {};  ///< Features in the small image [pixel].
 };
 
 using ViewContent =
     std::variant<ViewState, ViewPose, ViewKeyframes, ViewClosures, MeshChunk, ViewImage>;
 
-/// What a robot tells those who watch; they tell it nothing. Updates of one process and kind arrive
-/// in the order in which they were told, and together say all: when somebody comes late, the past
-/// is told again to all, so that what is known already comes a second time.
+/// Update that a robot sends to viewers; viewers send nothing to robots. Updates of one process and
+/// kind arrive in the order of sending and together contain the full state. When a viewer appears
+/// late, the robot sends everything again to all viewers, so the others receive updates twice.
 struct ViewUpdate {
   RobotId robot = 0;
-  std::uint64_t boot = 0;  ///< Of the process: with another one, what is known of the robot goes.
+  std::uint64_t boot = 0;  ///< Boot id of the process. A viewer discards the state of the robot
+                           ///< when it changes.
   Stamp told = 0;          ///< System clock [ns].
   ViewContent content;
 };
 
-/// No content is longer; images are made to fit, and lists are cut in several.
+/// Upper bound for all contents: images are compressed to fit, and lists are split.
 inline constexpr std::size_t kMaxViewBytes = 60000;
 
-/// Little-endian, poses as float32: position [m] and quaternion. Texts are of printable ASCII: what
-/// is none becomes '?'. The robot and boot of a mesh chunk are the update's, and not written again.
-/// Precondition: numbers are finite, closures as closure_id() has them. Throws std::length_error
-/// for what is longer than kMaxViewBytes.
+/// Little-endian, poses as float32: position [m] and quaternion. Texts are printable ASCII; any
+/// other character becomes '?'. The bytes of a mesh chunk omit robot and boot id, because the
+/// update states them. Precondition: numbers are finite, and closure ids are as closure_id()
+/// returns them. Throws std::length_error if the content is longer than kMaxViewBytes.
 [[nodiscard]] std::vector<std::uint8_t> encode_view(const ViewContent& content);
 
-/// nullopt for bytes that encode_view() does not give: cut, too long, of an unknown kind, with
-/// numbers that are not finite or rotations that are none.
+/// nullopt for bytes that encode_view() cannot produce: truncated, too long, of an unknown kind,
+/// with numbers that are not finite or with invalid rotations.
 [[nodiscard]] std::optional<ViewContent> decode_view(std::span<const std::uint8_t> bytes);
 
 }  // namespace km

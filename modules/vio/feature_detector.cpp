@@ -7,9 +7,10 @@
 namespace km {
 namespace {
 
-constexpr int kRimPx = 8;             // Windows of corners nearer to the rim would hang over it.
+// Pixels at the rim without corners, because their windows would exceed the image.
+constexpr int kRimPx = 8;
 constexpr int kScoreRadius = 3;       // Window of the gradient matrix: 7 x 7.
-constexpr float kMinScore = 6.0F;     // Smaller eigenvalue, (grey levels per px)^2 in the mean.
+constexpr float kMinScore = 6.0F;     // Smaller eigenvalue, mean of (grey levels per px)^2.
 constexpr int kStrongThreshold = 35;  // FAST threshold tried first.
 
 // Smaller eigenvalue of the mean gradient matrix around `px`.
@@ -88,7 +89,7 @@ std::vector<Eigen::Vector2f> FeatureDetector::detect(const ImagePyramid& image,
   const cv::Rect inside(kRimPx, kRimPx, size.width - 2 * kRimPx, size.height - 2 * kRimPx);
   if (count <= 0 || inside.width <= 0 || inside.height <= 0) return result;
 
-  // One cell for each feature wanted.
+  // One cell for each feature.
   const int side = std::max(8, static_cast<int>(std::sqrt(inside.area() / config_.max_features)));
   const int columns = (inside.width + side - 1) / side;
   const int rows = (inside.height + side - 1) / side;
@@ -101,7 +102,7 @@ std::vector<Eigen::Vector2f> FeatureDetector::detect(const ImagePyramid& image,
     ++features[static_cast<std::size_t>(row * columns + column)];
   }
 
-  // Empty cells first; cells with features only if these do not suffice.
+  // Cells without features come first. Cells with features follow if the empty ones do not suffice.
   for (int there = 0; there < kMaxInCell && static_cast<int>(result.size()) < count; ++there) {
     candidates_.clear();
     for (int row = 0; row < rows; ++row) {

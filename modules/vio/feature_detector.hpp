@@ -13,8 +13,9 @@
 
 namespace km {
 
-/// Points of an image that keep a distance. They lie in square buckets of that side, so that all
-/// within the distance of a place are in the nine buckets around it.
+/// Points of an image with a minimum distance from each other. They are stored in square buckets of
+/// that side, so that all points within the distance of a position are in the nine buckets around
+/// it.
 class DistanceGrid {
  public:
   /// `size` of the image, `distance` in pixels.
@@ -56,11 +57,12 @@ class DistanceGrid {
   std::vector<std::vector<Eigen::Vector2f>> buckets_;
 };
 
-/// Finds new corners where an image has no features yet. Not thread-safe: it keeps its buffers.
+/// Finds new corners where an image has no features yet. Not thread-safe, because it reuses
+/// buffers.
 ///
-/// Candidates are FAST corners (Rosten and Drummond, ECCV 2006), at a high threshold first and at
-/// config.fast_threshold where that finds none. They are ranked by the smaller eigenvalue of the
-/// gradient matrix (Shi and Tomasi, CVPR 1994), which the pyramid's derivatives give at once.
+/// Candidates are FAST corners (Rosten and Drummond, ECCV 2006). The threshold is high at first,
+/// and config.fast_threshold if that finds none. Candidates are ranked by the smaller eigenvalue of
+/// the gradient matrix (Shi and Tomasi, CVPR 1994), computed from the derivatives of the pyramid.
 class FeatureDetector {
  public:
   explicit FeatureDetector(const TrackerConfig& config) : config_(config) {}
@@ -76,7 +78,7 @@ class FeatureDetector {
   struct Candidate {
     cv::Point2i px;
     float score = 0.0F;
-    int rank = 0;  // Features and better corners in its cell.
+    int rank = 0;  // Number of features and better corners in its cell.
 
     // Total orders, so that the result does not depend on how equal scores are sorted.
     static bool better(const Candidate& a, const Candidate& b) {
@@ -86,7 +88,7 @@ class FeatureDetector {
       return a.rank != b.rank ? a.rank < b.rank : better(a, b);
     }
   };
-  static constexpr int kMaxInCell = 3;  // Cells with so many features are left alone.
+  static constexpr int kMaxInCell = 3;  // A cell with this many features gets no more.
 
   void add_corners_of(const cv::Rect& cell, int features_there, const ImagePyramid& image);
 

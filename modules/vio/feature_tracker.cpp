@@ -15,11 +15,11 @@
 namespace km {
 namespace {
 
-constexpr float kMinPatchCorrelation = 0.85F;  // Of a track with the patch it began with.
-constexpr float kMaxCorrectionPx = 2.0F;       // By which the patch may correct KLT.
-constexpr int kSearchEvery = 4;                // Images, for features that stereo has not found.
-constexpr double kMaxInverseDepth = 20.0;      // [1/m]; a carried depth beyond is no use.
-constexpr float kMinSpacing = 0.4F;  // Of min_distance_px: tracks may come nearer than corners.
+constexpr float kMinPatchCorrelation = 0.85F;  // Between a track and its first patch.
+constexpr float kMaxCorrectionPx = 2.0F;       // Largest correction of KLT by the patch.
+constexpr int kSearchEvery = 4;  // Images between searches for features without a stereo match.
+constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a propagated depth beyond it is discarded.
+constexpr float kMinSpacing = 0.4F;        // Share of min_distance_px to which tracks may approach.
 
 std::vector<cv::Point2f> to_cv(std::span<const Eigen::Vector2f> points) {
   std::vector<cv::Point2f> result;
@@ -28,9 +28,9 @@ std::vector<cv::Point2f> to_cv(std::span<const Eigen::Vector2f> points) {
   return result;
 }
 
-// Where points were found in another image.
+// Positions of points in another image.
 struct KltResult {
-  std::vector<Eigen::Vector2f> px;  // One for each point; without meaning where not found.
+  std::vector<Eigen::Vector2f> px;  // One for each point; undefined if not found.
   std::vector<bool> found;          // Converged inside the image.
 };
 
@@ -45,7 +45,7 @@ KltResult track_klt(const ImagePyramid& from, const ImagePyramid& to,
   std::vector<cv::Point2f> there = to_cv(starts);
   std::vector<unsigned char> status;
   constexpr int kMaxSteps = 8;
-  constexpr double kStopPx = 0.05;         // AlignmentPatch does the rest.
+  constexpr double kStopPx = 0.05;         // AlignmentPatch refines further.
   constexpr double kMinEigenvalue = 1e-4;  // As OpenCV scales it: rejects flat windows.
   const cv::TermCriteria stop(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kMaxSteps, kStopPx);
   cv::calcOpticalFlowPyrLK(from.maps(), to.maps(), to_cv(points), there, status, cv::noArray(),
@@ -219,7 +219,8 @@ void FeatureTracker::align(std::vector<Step>& steps, const ImagePyramid& left,
                          T_current_previous) *
               track.A;
     if (track.patch && place_on_patch(track, left)) continue;
-    // It looks too different by now, or half of it is hidden: what KLT found starts anew.
+    // The patch has changed too much or is half hidden: a new patch starts at the position from
+    // KLT.
     track.patch = cut_patch(left, track.px);
     track.A.setIdentity();
   }
@@ -280,7 +281,7 @@ void FeatureTracker::match_right(const ImagePyramid& left, const StereoFrame& fr
       const Eigen::Vector2d expected =
           stereo_matcher_.right_bearing(track.left, *track.inverse_depth);
       if ((expected - matches[i]->right).norm() > threshold) {
-        // One of two depths is wrong: both go, and the next image searches again.
+        // One of the two depths is wrong: both are discarded, and the next image searches again.
         track.inverse_depth.reset();
         ++statistics_.stereo_motion;
         continue;
@@ -304,7 +305,7 @@ void FeatureTracker::drop_crowded(std::vector<Step>& steps) {
   const float spacing = kMinSpacing * static_cast<float>(config_.min_distance_px);
   DistanceGrid grid(cv::Size(rig_.cameras[0].width, rig_.cameras[0].height), spacing);
   statistics_.crowded += static_cast<int>(std::erase_if(steps, [&grid](const Step& step) {
-    if (!grid.is_free(step.now.px)) return true;  // The older of two came first.
+    if (!grid.is_free(step.now.px)) return true;  // The older track came first.
     grid.add(step.now.px);
     return false;
   }));
@@ -350,7 +351,8 @@ void FeatureTracker::drop_by_motion(std::vector<Step>& steps, const SE3& T_previ
 void FeatureTracker::drop_by_two_points(std::vector<Step>& steps, const SE3& guess) {
   std::vector<BearingPair> pairs;
   for (const Step& step : steps) pairs.push_back({step.left_before, step.now.left});
-  // Looser: here the rotation is the gyroscope's, whose bias alone may be worth two pixels.
+  // The threshold is doubled because the rotation is the gyroscope's, whose bias alone may shift
+  // points by two pixels.
   const double threshold = 2.0 * config_.max_reprojection_px / focal_px_;
   const TwoPointResult result = two_point_ransac(pairs, guess.linear(), threshold, rng_);
   std::vector<Step> kept;

@@ -19,30 +19,33 @@
 
 namespace km {
 
-/// What happened in the last image: every feature of the image before is tracked or counted under
+/// Counts of the last image: every feature of the image before is either tracked or counted under
 /// the first test that it failed.
 struct TrackerStatistics {
-  int tracked = 0;   ///< From the image before.
-  int detected = 0;  ///< New.
-  int lost = 0;      ///< KLT failed, or left the image.
-  int backward = 0;  ///< Forward-backward check.
-  int crowded = 0;   ///< Ran into another feature.
-  int motion = 0;    ///< Against the motion of the others.
+  int tracked = 0;   ///< Features continued from the image before.
+  int detected = 0;  ///< New features.
+  int lost = 0;      ///< Failed in KLT or left the image.
+  int backward = 0;  ///< Failed the forward-backward check.
+  int crowded = 0;   ///< Too near to another feature.
+  int motion = 0;    ///< Contradict the motion of the other features.
   StereoStatistics stereo;
-  int stereo_motion = 0;  ///< Right image points dropped against the motion; the left one stays.
+  int stereo_motion = 0;  ///< Right image points that contradict the motion; the left points stay.
   bool motion_known = false;  ///< The stereo features agreed on a motion.
 };
 
-/// Tracks corners through a stereo or RGB-D recording. Not thread-safe, starts no threads of its
-/// own; deterministic for equal images and config.
+/// Tracks corners through a stereo or RGB-D recording. Not thread-safe; starts no threads.
+/// Deterministic for equal images and config.
 ///
-/// Left image to left image by pyramidal KLT (Bouguet 2001) from a predicted start: the gyroscope's
-/// rotation, the last translation, and the depth of the feature or of its neighbours; then to the
-/// patch that the track began with, so that errors do not add up (AlignmentPatch). Outliers are
-/// rejected against the one motion that the stereo features agree on (estimate_motion()), by
-/// two-point RANSAC where these are too few. Then corners are added where there are none. Left to
-/// right by StereoMatcher from the depth that the motion predicts; with an RGB-D rig the right
-/// observations are those of the virtual camera, by DepthMatcher.
+/// 1. Corners are tracked from left image to left image by pyramidal KLT (Bouguet 2001). The
+///    predicted start uses the gyroscope's rotation, the last translation, and the depth of the
+///    feature or of its neighbours.
+/// 2. The result is aligned with the patch in which the track began, so that errors do not
+///    accumulate (AlignmentPatch).
+/// 3. Outliers are rejected against the one motion that most stereo features agree on
+///    (estimate_motion()). If there are too few of them, two-point RANSAC rejects outliers.
+/// 4. New corners are added in cells without features.
+/// 5. StereoMatcher matches left points to the right image, starting at the depth that the motion
+///    predicts. With an RGB-D rig DepthMatcher computes the observations of a virtual right camera.
 class FeatureTracker {
  public:
   /// Throws ConfigError, and std::invalid_argument for cameras without size or focal length.
@@ -55,7 +58,7 @@ class FeatureTracker {
   [[nodiscard]] TrackedFrame track(const StereoFrame& frame,
                                    const Eigen::Matrix3d& R_previous_current_body);
 
-  /// Of the last track().
+  /// Counts of the last track().
   [[nodiscard]] const TrackerStatistics& statistics() const { return statistics_; }
 
  private:
@@ -65,16 +68,18 @@ class FeatureTracker {
     Eigen::Vector2f px = Eigen::Vector2f::Zero();    // In the left image.
     Eigen::Vector2d left = Eigen::Vector2d::Zero();  // Bearings.
     std::optional<Eigen::Vector2d> right;
-    std::optional<double> inverse_depth;  // Measured here, or carried on by the motion [1/m].
-    std::unique_ptr<const AlignmentPatch> patch;  // From where the track began; null at the rim.
-    Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // Patch to this image.
+    // Measured in this image, or propagated by the motion [1/m].
+    std::optional<double> inverse_depth;
+    // Patch in which the track began; null at the rim.
+    std::unique_ptr<const AlignmentPatch> patch;
+    Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // Warp from the patch to this image.
   };
-  // A track in the new image, and what was known of it in the image before.
+  // A track in the new image, with its state in the image before.
   struct Step {
     Track now;
     Eigen::Vector2d left_before = Eigen::Vector2d::Zero();
-    std::optional<double> depth_before;  // Inverse, its own.
-    double depth_guess = 0.0;            // Inverse, its own or a neighbour's.
+    std::optional<double> depth_before;  // Inverse depth of this track.
+    double depth_guess = 0.0;            // Inverse depth of this track or a neighbour.
 
     [[nodiscard]] DepthPair depth_pair() const {
       return {left_before, depth_before.value_or(0.0), now.left};
@@ -102,13 +107,14 @@ class FeatureTracker {
   double focal_px_;
   FeatureDetector detector_;
   StereoMatcher stereo_matcher_;
-  std::optional<DepthMatcher> depth_matcher_;  // With an RGB-D rig.
+  std::optional<DepthMatcher> depth_matcher_;  // Only with an RGB-D rig.
   std::mt19937 rng_;
   std::uint64_t next_id_ = 0;
-  std::vector<Track> tracks_;  // Of the last image, ascending ids.
+  std::vector<Track> tracks_;  // Tracks of the last image, ascending ids.
   ImagePyramid previous_left_;
-  Stamp stamp_ = 0;                                     // Of the last image.
-  Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();  // Of the left camera, in its frame [m/s].
+  Stamp stamp_ = 0;  // Stamp of the last image.
+  // Velocity of the left camera, in its frame [m/s].
+  Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
   TrackerStatistics statistics_;
 };
 

@@ -14,19 +14,20 @@ namespace km {
 namespace {
 
 constexpr int kStartIterations = 30;
-constexpr int kMinKeyframeFeatures = 20;   // fewer are no ground to make a keyframe on
-constexpr double kStartKeyframe_s = 0.15;  // spacing of keyframes among the images of the start
-// A keyframe is for locating new landmarks: without depth it is worth waiting for an image with.
+constexpr int kMinKeyframeFeatures = 20;   // fewer do not justify a keyframe
+constexpr double kStartKeyframe_s = 0.15;  // spacing of keyframes in the images of the start
+// Keyframes locate new landmarks. If an image has no depth, a keyframe waits for one that has, up
+// to this factor on the criteria.
 constexpr double kPatience = 2.0;
 
-// True if anything in the last frame has a right observation.
+// True if any landmark in the last frame has a right observation.
 bool locates_new(const Window& window) {
   return std::any_of(window.landmarks.begin(), window.landmarks.end(), [&](const auto& landmark) {
     return tracked_now(window, landmark) && landmark.observations.back().bearings[1];
   });
 }
 
-// Samples of both that cover [from, to], as far as there are any; the former ones first.
+// Samples of both lists that cover [from, to] as far as available; those of `former` come first.
 std::vector<ImuSample> joined(std::span<const ImuSample> former, std::span<const ImuSample> later,
                               Stamp from, Stamp to) {
   std::vector<ImuSample> samples;
@@ -41,30 +42,31 @@ std::vector<ImuSample> joined(std::span<const ImuSample> former, std::span<const
   return samples;
 }
 
-// What the gyroscope measures at an instant: its last sample not after it.
+// Angular rate at an instant: the last gyroscope sample not after it.
 Eigen::Vector3d gyro_at(std::span<const ImuSample> samples, Stamp instant) {
   const auto after = std::ranges::upper_bound(samples, instant, {}, &ImuSample::stamp);
   return after == samples.begin() ? samples.front().gyro : std::prev(after)->gyro;
 }
 
-// [standard deviations] a calibration farther from what the rig says comes of an estimate that has
+// [standard deviations] A calibration farther from the rig's values comes from an estimate that has
 // diverged.
 constexpr double kMostCalibration = 10.0;
 
-// Instants stay apart, and near to the stamps.
+// Bounds that keep instants in order and near to their stamps.
 constexpr double kMostOffset_s = 0.1;
-constexpr double kMostOffsetStep = 0.25;  // of the time between two images
+constexpr double kMostOffsetStep = 0.25;  // fraction of the time between two images
 
-constexpr double kHeldPosition_m = 1e-3;  // of the first state: fixes the gauge, no more
+// Standard deviation of the first position, which fixes the gauge.
+constexpr double kHeldPosition_m = 1e-3;
 constexpr double kHeldHeading_rad = 1e-3;
-// Noise of samples that are interpolated over a gap, so weak that the images tell the motion: after
-// 0.5 s 0.35 rad and 1.4 m/s.
+// Noise of samples interpolated over a gap. It is so large (0.35 rad and 1.4 m/s after 0.5 s) that
+// the images determine the motion.
 constexpr double kBridgeGyro = 0.5;   // [rad/s/sqrt(Hz)]
 constexpr double kBridgeAccel = 2.0;  // [m/s^2/sqrt(Hz)]
 
 constexpr double kGyroBiasSigma = 0.02;  // around the guess of the start [rad/s]
 
-// Rows that hold heading, the rotation about the vertical as seen from the body, and position.
+// Rows that hold position and heading, the rotation about the vertical as seen from the body.
 Eigen::MatrixXd held_gauge(const OdometryState& state) {
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(4, 15);
   J.block<1, 3>(0, 0) = state.T_odom_body.linear().row(2) / kHeldHeading_rad;
@@ -72,7 +74,7 @@ Eigen::MatrixXd held_gauge(const OdometryState& state) {
   return J;
 }
 
-// What StateCovariance is about, by the 15 variables of a state. A velocity that only turns with
+// Maps the 15 variables of a state to those of StateCovariance. A velocity that only rotates with
 // the heading is no error.
 Eigen::Matrix<double, 11, 15> without_gauge(const OdometryState& state) {
   const Eigen::Matrix3d R = state.T_odom_body.linear();
@@ -119,7 +121,7 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
     if (!optimize(window_, kStartIterations).usable) return std::nullopt;
     reject_outliers();
   }
-  // The prior stays at the guess of the biases; heading and position have not moved.
+  // The prior keeps the guess of the biases; heading and position have not moved.
   std::vector<OdometryState> states;
   for (const WindowFrame& frame : window_.frames) states.push_back(frame.state);
   return states;
@@ -146,7 +148,7 @@ void FixedLagSmoother::recall(const UncertainCalibration& known) {
   calibration_covariance_ = known.covariance;
 }
 
-// What is known of the calibration stays, if it can be.
+// Keeps the estimated calibration if it is plausible.
 void FixedLagSmoother::clear() {
   const UncertainCalibration known = calibration();
   const Vector7 moved = CameraCalibration{}.offset_to(known.calibration);
@@ -199,8 +201,8 @@ bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state, d
   return window_.calibrates ? share_samples() && set_imu(now) : set_imu(now);
 }
 
-// An instant after its image's stamp needs samples that come with the next image, and one before it
-// has left some to the next.
+// If an instant lies after the stamp of its image, the samples between them arrive with the next
+// image. If it lies before, samples of this image belong to the next interval.
 bool FixedLagSmoother::share_samples() {
   const std::size_t now = window_.frames.size() - 1;
   WindowFrame& newest = window_.frames[now];
@@ -224,7 +226,7 @@ bool FixedLagSmoother::set_imu(std::size_t frame) {
     noise.accel_noise_density = std::max(noise.accel_noise_density, kBridgeAccel);
   }
   ImuPreintegration imu(noise, before.state.gyro_bias, before.state.accel_bias);
-  std::vector<ImuSample> held;  // the last sample, until those after it have come
+  std::vector<ImuSample> held;  // last sample, held until later samples arrive
   std::span<const ImuSample> samples = f.samples;
   if (frame + 1 == window_.frames.size() && !samples.empty() &&
       samples.back().stamp >= f.state.stamp && samples.back().stamp < f.instant()) {
@@ -311,7 +313,7 @@ void FixedLagSmoother::locate_landmarks() {
     return false;
   };
   for (WindowLandmark& landmark : window_.landmarks) {
-    // What told its distance may have left the window since.
+    // The observations that determined the distance may have left the window.
     if (landmark.located && tracked_now(window_, landmark) && behind(landmark))
       landmark.located = false;
     if (!landmark.located && landmark.observations.size() >= 2)
@@ -379,10 +381,11 @@ std::optional<StateCovariance> FixedLagSmoother::state_covariance(Stamp stamp) c
       without_gauge(frame->state).transpose();
   const auto Sigma = covariance_of(std::move(D_T));
   if (!Sigma) return std::nullopt;
-  return StateCovariance(Sigma->selfadjointView<Eigen::Upper>());  // rounding leaves none exact
+  // Rounding leaves neither triangle exact.
+  return StateCovariance(Sigma->selfadjointView<Eigen::Upper>());
 }
 
-// An instant without samples cannot be gone on from.
+// If no samples cover the instant, the next inertial factor cannot start there: the offset is 0.
 double FixedLagSmoother::first_offset_s(const InertialFrame& frame) const {
   const double offset_s = std::clamp(window_.calibration.offset_s, -kMostOffset_s, kMostOffset_s);
   const Stamp instant = frame.tracked.stamp + nanoseconds(offset_s);
@@ -463,7 +466,7 @@ bool FixedLagSmoother::slide(bool rests) {
     if (rests && frame.rests && window_.frames[k - 1].rests)
       rest_out(k);
     else if (frame.imu->rests())
-      frame.keyframe = true;  // the last one at rest: what follows is measured from it
+      frame.keyframe = true;  // the last image at rest: later poses are measured from it
     else if (!merge_out(k))
       return false;
   }
@@ -490,7 +493,8 @@ void FixedLagSmoother::rest_out(std::size_t frame) {
   const auto in_keyframe = [&](const WindowObservation& o) {
     return window_.frames[o.frame].keyframe;
   };
-  for (WindowLandmark& landmark : window_.landmarks)  // may have lost what told its distance
+  for (WindowLandmark& landmark :
+       window_.landmarks)  // may have lost the observations that determined the distance
     if (std::ranges::none_of(landmark.observations, in_keyframe)) landmark.located = false;
   WindowFrame& later = window_.frames[frame];
   later.imu = ImuFactor::at_rest(

@@ -8,22 +8,23 @@
 
 namespace km {
 
-/// The image pyramid of one camera image, built once and shared by all that track, match and score
-/// in that image. Owns its pixels.
+/// The image pyramid of one camera image, built once and shared by all code that tracks, matches
+/// and scores in that image. Owns its pixels.
 class ImagePyramid {
  public:
   ImagePyramid() = default;
 
-  /// Copies `image` into a bordered pyramid of config.pyramid_levels + 1 levels. Derivatives are
-  /// needed in the image that windows are taken from, not in the one they are searched in.
+  /// Copies `image` into a bordered pyramid of config.pyramid_levels + 1 levels. The image from
+  /// which windows are taken needs derivatives, the searched image does not.
   ImagePyramid(const GrayImage& image, const TrackerConfig& config, bool with_derivatives);
 
   [[nodiscard]] bool empty() const { return maps_.empty(); }
 
-  /// What cv::calcOpticalFlowPyrLK takes: levels, interleaved with derivatives if there are any.
+  /// Input of cv::calcOpticalFlowPyrLK: levels, interleaved with derivatives if there are any.
   [[nodiscard]] const std::vector<cv::Mat>& maps() const { return maps_; }
 
-  /// Grey image of `level`, 0 being the full one; its pixel (x, y) is (2^level x, 2^level y) there.
+  /// Grey image of `level`, 0 being the full one; its pixel (x, y) is at (2^level x, 2^level y)
+  /// there.
   [[nodiscard]] const cv::Mat& level(int level) const;
 
   /// Scharr derivatives (d/dx, d/dy) of the full image, 32 times the grey levels per pixel, as

@@ -26,7 +26,7 @@ Window empty_window(const SensorRig& rig, const VioConfig& config) {
   return window;
 }
 
-// Pose of the last frame on the landmarks located so far; false if there are too few.
+// Estimates the pose of the last frame from the located landmarks; false if there are too few.
 bool resect(Window& window) {
   SE3& T = window.frames.back().state.T_odom_body;
   ReprojectionTerm term;
@@ -57,11 +57,11 @@ bool resect(Window& window) {
   return T.matrix().allFinite();
 }
 
-// Poses of consecutive images from stereo alone, T_first_body, or nullopt if an image shares too
-// few located landmarks with those before it. `R_previous_current` are rotations to start from,
-// one for each image after the first. Landmarks are triangulated where they are first seen with
-// depth, poses found one by one on them (Gauss-Newton on the reprojection errors): rough, for the
-// smoother to refine.
+// Poses T_first_body of consecutive images from stereo alone, or nullopt if an image shares too few
+// located landmarks with earlier ones. `R_previous_current` are initial rotations, one for each
+// image after the first. Landmarks are triangulated in the first image that shows them with depth.
+// Poses are estimated one by one (Gauss-Newton on the reprojection errors). They are rough; the
+// smoother refines them.
 std::optional<std::vector<SE3>> stereo_odometry(std::span<const InertialFrame> frames,
                                                 std::span<const Eigen::Matrix3d> R_previous_current,
                                                 const SensorRig& rig, const VioConfig& config) {
@@ -93,7 +93,8 @@ std::optional<std::vector<SE3>> stereo_odometry(std::span<const InertialFrame> f
   return poses;
 }
 
-constexpr double kMaxGravityError = 0.25;    // of its length, for stereo and samples to agree
+// Relative difference of stereo and samples in the length of gravity.
+constexpr double kMaxGravityError = 0.25;
 constexpr double kStereoPosition_m = 0.003;  // noise of a relative position from stereo
 constexpr double kVelocityStep_mps = 0.005;  // noise of a preintegrated change of velocity
 constexpr int kGyroBiasSteps = 4;
@@ -112,8 +113,8 @@ std::optional<Preintegrations> preintegrate(std::span<const InertialFrame> frame
   return all;
 }
 
-// Means of the samples, and how far those of the first and the second half are apart: rotors that
-// idle make large deviations but no change of the mean.
+// Means of the samples, and the difference between the means of both halves. Idling rotors cause
+// large deviations but do not change the mean.
 struct InertialMean {
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero(), accel = Eigen::Vector3d::Zero();
   double gyro_change = 0.0, accel_change = 0.0;

@@ -9,12 +9,12 @@
 namespace km {
 
 enum class StartStatus {
-  kAtRest,          ///< Images and inertial data agree that the body stands still.
-  kInMotion,        ///< Motion from stereo, aligned with the inertial data.
-  kGoesOn,          ///< From the state where an earlier process left off; guess_start() never.
+  kAtRest,    ///< Images and inertial data agree that the body stands still.
+  kInMotion,  ///< Motion from stereo, aligned with the inertial data.
+  kGoesOn,  ///< Continues from the last state of an earlier process; not a result of guess_start().
   kTooFewImages,    ///< Fewer than kMinStartImages.
-  kTooFewFeatures,  ///< Not enough features with depth, or tracked, to follow the motion by stereo.
-  kInconsistent,    ///< Stereo and inertial data do not fit together.
+  kTooFewFeatures,  ///< Too few features with depth, or too few tracked, for motion from stereo.
+  kInconsistent,    ///< Stereo and inertial data contradict each other.
 };
 
 [[nodiscard]] constexpr bool started(StartStatus status) {
@@ -22,12 +22,14 @@ enum class StartStatus {
          status == StartStatus::kGoesOn;
 }
 
-/// A guess of the states of the first images, for FixedLagSmoother::start(), or why there is none.
+/// A guess of the states of the first images, for FixedLagSmoother::start(), or the reason for its
+/// absence.
 struct StartGuess {
   StartStatus status = StartStatus::kTooFewImages;
   std::vector<OdometryState> states;  ///< One for each image if started().
   double image_motion_px = 0.0;       ///< Median between the first and the last image.
-  double gravity_mps2 = 0.0;          ///< As measured, before its length is imposed; 0 if not.
+  /// Measured length before it is set to the known one; 0 if not measured.
+  double gravity_mps2 = 0.0;
 };
 
 inline constexpr std::size_t kMinStartImages = 5;
@@ -36,13 +38,13 @@ inline constexpr std::size_t kMinStartImages = 5;
 /// odom along R * accel and no defined heading. Throws std::invalid_argument for a zero vector.
 [[nodiscard]] Eigen::Matrix3d upright(const Eigen::Vector3d& accel);
 
-/// Where the body is and how it moves, from images and inertial samples alone.
+/// Estimates pose and motion of the body from images and inertial samples alone.
 ///
-/// At rest, when the images AND both inertial sensors say so: upright by the mean accelerometer,
-/// gyro bias its mean, no velocity. Else metric motion from stereo, after which
-/// gyro bias, then velocities, gravity and accelerometer bias follow linearly from the
-/// preintegrated samples, as in VINS-Mono (Qin et al., TRO 2018, Sec. V-B), the scale being known
-/// from stereo; gravity has the length of `config`, the accelerometer bias a prior of
+/// If the images and both inertial sensors show rest, the mean accelerometer gives the attitude,
+/// the mean gyroscope gives its bias, and the velocity is zero. Otherwise stereo gives the metric
+/// motion. Then gyro bias, velocities, gravity and accelerometer bias follow linearly from the
+/// preintegrated samples, as in VINS-Mono (Qin et al., TRO 2018, Sec. V-B), but with the scale
+/// known from stereo. Gravity has the length of `config`, the accelerometer bias a prior of
 /// accel_bias_sigma. The first position is zero, the heading free. `frames[0].samples` are not
 /// used.
 [[nodiscard]] StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& rig,

@@ -10,22 +10,26 @@
 namespace km {
 namespace {
 
-// Standard deviations [rad], [m], of a new start where the estimate before it is all there is.
+// Standard deviations [rad], [m] of the relative pose across a new start, if only the estimate
+// before the start is known.
 constexpr double kRestartRotation = 0.3;
 constexpr double kRestartTranslation = 1.0;
 
-// What nobody has seen adds to them. Over 2 s, 5 s and 10 s of five flights and walks of EuRoC and
-// TUM-VI errors are 0.3-1.4, 0.5-1.7 and 0.8-1.8 rad of heading, 0.3-0.9, 0.9-2.0 and 1.2-4.1 m.
-constexpr double kUnseenHeading = 0.5;                                   // [rad/sqrt(s)]
-constexpr double kMostHeading = std::numbers::pi / std::numbers::sqrt3;  // any
-constexpr double kUnseenShare = 0.5;                                     // of what the speed makes
+// Unmeasured time adds to these. Over 2 s, 5 s and 10 s of five flights and walks of EuRoC and
+// TUM-VI, heading errs by 0.3-1.4, 0.5-1.7 and 0.8-1.8 rad. Translation errs by 0.3-0.9, 0.9-2.0
+// and 1.2-4.1 m.
+constexpr double kUnseenHeading = 0.5;  // [rad/sqrt(s)]
+// Uniformly distributed heading.
+constexpr double kMostHeading = std::numbers::pi / std::numbers::sqrt3;
+constexpr double kUnseenShare = 0.5;  // share of the distance travelled at the speed
 constexpr double kLeastSpeed_mps = 0.5;
 constexpr double kMostTranslation_m = 1000.0;
 
-constexpr double kCoast_s = 1.0;  // a speed lasts for
+constexpr double kCoast_s = 1.0;  // time for which a speed persists
 
-// Of a relative pose between keyframes, each axis, in [rad^2] and [m^2]: no sensor knows one better
-// than to a microradian and a micrometre, and what is worse than the most is no estimate.
+// Bounds on the variance of a relative pose between keyframes, each axis, in [rad^2] and [m^2]. No
+// sensor is more accurate than a microradian and a micrometre. A variance above the upper bound
+// shows that there is no estimate.
 constexpr double kLeastVariance = 1e-12;
 constexpr double kMostVariance = 1e6;
 

@@ -5,32 +5,33 @@
 
 namespace km {
 
-/// What of a pose is handed on as a keyframe, and how well the way to it is known: the same for
-/// every odometry.
+/// Rules for publishing keyframes and for the covariance of their relative poses, common to all
+/// odometries.
 
-/// True if a keyframe is due so long after the one before, and so far from it.
+/// True if a keyframe is due `dt_s` after the previous keyframe, at pose `T_previous_kf` from it.
 [[nodiscard]] bool is_keyframe_due(const VioConfig& config, double dt_s, const SE3& T_previous_kf);
 
-/// Sigma of a relative pose over `dt_s` that is used: with the drift of which an estimate does not
-/// know. Where `Sigma` is no covariance, or too large for an estimate, restart_covariance().
+/// Covariance of a relative pose over `dt_s`: `Sigma` plus the drift that an estimate cannot know.
+/// restart_covariance() if `Sigma` is not a covariance or is too large for an estimate.
 [[nodiscard]] Matrix6 keyframe_covariance(const VioConfig& config, double dt_s,
                                           const Matrix6& Sigma);
 
-/// A stretch of the way that nothing has measured.
+/// An interval of the motion without measurements.
 struct UnseenWay {
   double lasts_s = 0.0;
-  double speed_mps = 0.0;                              ///< Before or after it, the larger.
-  Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< At its end.
+  double speed_mps = 0.0;  ///< The larger speed of before and after the interval.
+  Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Vertical at the end of the interval.
 };
 
-/// For how long a body goes on at the speed that it had before `lasts_s` in which nobody knows what
-/// it did, and comes at the one it has after them: half of the time, and less of a long one. On
-/// five flights and walks of EuRoC and TUM-VI this errs by 0.3 to 0.8 times as much over 1 s as to
-/// stand still does, by 0.4 to 1.1 over 2 s, and by 0.9 to 1.5 over 10 s.
+/// Time for which a body is assumed to continue at its former speed, and then at its later speed,
+/// in an interval of `lasts_s` without measurements. It is half of the interval, and less if the
+/// interval is long. The error was compared with that of assuming standstill, on five flights and
+/// walks of EuRoC and TUM-VI. The ratio is 0.3 to 0.8 over 1 s, 0.4 to 1.1 over 2 s, and 0.9 to 1.5
+/// over 10 s.
 [[nodiscard]] double coasting_s(double lasts_s);
 
-/// Of the relative pose across a new start, which is hardly known: the less, the longer nothing was
-/// measured and the faster the body was. Heading is known least.
+/// Covariance of the relative pose across a new start. It grows with the duration without
+/// measurements and with the speed. Heading is the most uncertain.
 [[nodiscard]] Matrix6 restart_covariance(const UnseenWay& way = {});
 
 }  // namespace km

@@ -14,7 +14,7 @@ struct ScaledEigen {
   Eigen::VectorXd scale;
   Eigen::MatrixXd V;
   Eigen::VectorXd lambda;
-  Eigen::Index first = 0;  // of the eigenvalues that count
+  Eigen::Index first = 0;  // index of the first eigenvalue that counts
 };
 
 ScaledEigen decompose(const Eigen::MatrixXd& H) {

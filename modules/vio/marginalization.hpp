@@ -16,28 +16,28 @@ struct SquareRootPrior {
   Eigen::VectorXd r;
 };
 
-/// Takes the first `count` variables out of the quadratic 1/2 dx^T H dx + g^T dx by their Schur
-/// complement and returns what is left on the others, in square-root form: J^T J and J^T r are the
-/// marginal H and g. Directions without information (below 1e-12 of the largest, after scaling the
-/// diagonal to one) get no rows. H symmetric, positive semi-definite; 0 <= count <= size. Cubic in
-/// the size. The method is that of OKVIS (Leutenegger et al., IJRR 2015, Sec. 4.3) and VINS-Mono
+/// Eliminates the first `count` variables of the quadratic 1/2 dx^T H dx + g^T dx by their Schur
+/// complement. Returns the marginal on the other variables in square-root form: J^T J and J^T r are
+/// the marginal H and g. Directions without information (below 1e-12 of the largest, after scaling
+/// the diagonal to one) get no rows. H symmetric, positive semi-definite; 0 <= count <= size. Cubic
+/// in the size. The method is that of OKVIS (Leutenegger et al., IJRR 2015, Sec. 4.3) and VINS-Mono
 /// (Qin et al., TRO 2018, Sec. VI-D).
 [[nodiscard]] SquareRootPrior marginalize(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
                                           Eigen::Index count);
 
-/// What marginalised states left behind on the oldest states of a window: a square-root prior on
-/// dx = [pose_0 (6), motion_0 (9), pose_1 (6), pose_2 (6), ..., calibration (7)], the retracted
+/// Prior of marginalised states on the oldest states of a window, a square-root prior on dx =
+/// [pose_0 (6), motion_0 (9), pose_1 (6), pose_2 (6), ..., calibration (7)]. dx are the retracted
 /// differences to `linearization` and `calibration`. Only the first state has its velocity and
-/// biases in it, and only a prior with `calibrates` the calibration.
+/// biases in dx. The calibration is in dx only if `calibrates`.
 struct StatePrior {
   std::vector<std::uint64_t> frames;         ///< Ids; equally long as linearization.
-  std::vector<OdometryState> linearization;  ///< Where the prior was made: the first estimates.
-  CameraCalibration calibration;             ///< Likewise.
+  std::vector<OdometryState> linearization;  ///< First estimates, at which the prior was made.
+  CameraCalibration calibration;             ///< First estimate of the calibration.
   bool calibrates = false;
   Eigen::MatrixXd J;
   Eigen::VectorXd r;
 
-  /// Of the states' part.
+  /// Dimension without the calibration.
   [[nodiscard]] Eigen::Index states_dimension() const {
     return frames.empty() ? 0 : 9 + 6 * static_cast<Eigen::Index>(frames.size());
   }

@@ -10,12 +10,12 @@
 namespace km {
 namespace {
 
-// Slower steps are rest, unless they lead farther than 1 s at these speeds.
+// A slower motion counts as rest until it has led farther than 1 s at these speeds.
 constexpr double kLeastSpeed_mps = 0.01;
 constexpr double kLeastRate_radps = 0.01;
 constexpr double kRest_s = 1.0;
 
-// The motion takes so long at these speeds.
+// Duration of the motion at these speeds.
 double slowest_s(const SE3& motion) {
   return std::max(motion.translation().norm() / kLeastSpeed_mps,
                   angle_of(motion.linear()) / kLeastRate_radps);
@@ -60,11 +60,11 @@ OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
   const bool is_due =
       !last_keyframe_ || result.has_jumped ||
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
-  // A first keyframe must be there for frames to hang on; one that locates points is better.
+  // Frames refer to a keyframe, so a first keyframe must exist. One that locates points is better.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
     hand_on(fix, T_odom_body, result.has_jumped, result);
   if (!last_keyframe_) return result;
-  if (is_taken_up)  // its state was given out; the covariance was not kept
+  if (is_taken_up)  // the state was published earlier; the covariance was not kept
     last_kf_ = fix;
   else
     result.state = state;
@@ -80,7 +80,7 @@ bool OutsideOdometry::is_jump(const Fix& fix) const {
   return distance_m > config_.max_speed_mps * seconds_between(last_->stamp, fix.stamp);
 }
 
-// What creeps away counts as if it went at the least speed.
+// A creeping motion counts as one at the least speed.
 void OutsideOdometry::count_motion(const Fix& fix) {
   const SE3& T_odom_body = fix.pose.T_odom_body;
   const double dt_s = seconds_between(last_->stamp, fix.stamp);

@@ -10,25 +10,27 @@
 
 namespace km {
 
-/// What came of one packet.
+/// Result of one packet.
 struct OutsideOdometryResult {
-  std::optional<OdometryState> state;        ///< nullopt: the packet has no pose that can be used.
-  std::optional<KeyframeOdometry> keyframe;  ///< A new one.
+  std::optional<OdometryState> state;        ///< nullopt: the packet has no usable pose.
+  std::optional<KeyframeOdometry> keyframe;  ///< Only if the packet makes a new one.
   std::optional<LocatedFrame> frame;
-  bool has_jumped = false;  ///< Faster than VioConfig::max_speed_mps: the body stays where it was.
+  /// The pose jumped faster than VioConfig::max_speed_mps; the body keeps its place.
+  bool has_jumped = false;
 };
 
-/// Hands on the poses of an odometry that others made (see MeasuredPose) as Vio hands on its own,
-/// with keyframes by the same rules. Of a keyframe's relative pose the covariance is what that of
-/// the odometry grew by between the two, as of a chain of independent steps (between_on_chain()),
-/// and VioConfig's drift: one that stays the same, as many drivers report, adds nothing. No
-/// verticals are handed on: whether `odom` has z up is not known. Not thread-safe.
+/// Publishes the poses of an external odometry (see MeasuredPose) in the same way as Vio publishes
+/// its own, with keyframes by the same rules. The covariance of a keyframe's relative pose is the
+/// growth of the odometry's covariance since the previous keyframe (between_on_chain()), plus the
+/// drift of VioConfig. The steps are assumed to be independent. A constant covariance, as many
+/// drivers report it, adds nothing. No verticals are published, because z of `odom` may not point
+/// up. Not thread-safe.
 class OutsideOdometry {
  public:
   /// Throws ConfigError if `config` is out of bounds.
   OutsideOdometry(RobotId robot, DepthSource depth_source, const VioConfig& config);
 
-  /// Goes on behind that keyframe, in the same odometry.
+  /// Continues after the last published keyframe of an earlier process, in the same odometry.
   void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] OutsideOdometryResult process(const SensorPacket& packet);
@@ -47,12 +49,12 @@ class OutsideOdometry {
   RobotId robot_;
   DepthSource depth_source_;
   VioConfig config_;
-  bool goes_on_ = false;               // until the first pose
+  bool goes_on_ = false;               // true until the first pose
   std::optional<Fix> last_, last_kf_;  // as measured
   std::optional<KeyframeOdometry> last_keyframe_;
-  double moved_s_ = 0.0;                // since then, without rests
-  SE3 T_odom_rest_ = SE3::Identity();   // where it last was in motion, as measured
-  SE3 T_chain_odom_ = SE3::Identity();  // from what is measured to what is handed on: after a jump
+  double moved_s_ = 0.0;                // time in motion since the last keyframe
+  SE3 T_odom_rest_ = SE3::Identity();   // measured pose at the last motion
+  SE3 T_chain_odom_ = SE3::Identity();  // from measured to published odometry; changed by a jump
 };
 
 }  // namespace km

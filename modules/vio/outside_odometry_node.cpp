@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueued = 4;  // as VioNode: what is late is skipped by the sensors
+constexpr std::size_t kQueued = 4;  // as in VioNode; the sensors drop late packets
 
 }  // namespace
 

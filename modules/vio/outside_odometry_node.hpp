@@ -10,7 +10,7 @@
 
 namespace km {
 
-/// OutsideOdometry as a thread, in the place of a VioNode.
+/// OutsideOdometry as a thread, in place of a VioNode.
 class OutsideOdometryNode final : public Node {
  public:
   OutsideOdometryNode(RobotId robot, DepthSource depth_source, const VioConfig& config,
@@ -22,7 +22,7 @@ class OutsideOdometryNode final : public Node {
 
   std::string_view name() const override { return "odometry"; }
   void start() override { worker_.start(); }
-  /// Finishes queued packets and says in the log what came.
+  /// Finishes queued packets and logs a summary.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }

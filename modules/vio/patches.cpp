@@ -9,9 +9,9 @@ namespace {
 
 constexpr int kMaxSteps = 12;
 constexpr float kSettledPx = 0.03F;    // The next step would be several times smaller.
-constexpr float kMaxShiftPx = 4.0F;    // From the start: farther away lies another minimum.
+constexpr float kMaxShiftPx = 4.0F;    // From the start: a minimum farther away is another one.
 constexpr float kMinDeviation = 2.0F;  // Grey levels.
-constexpr float kNoise = 1.0F;         // Grey levels; below, a template is noise.
+constexpr float kNoise = 1.0F;         // Grey levels; a weaker template is noise.
 
 }  // namespace
 
@@ -88,7 +88,8 @@ std::optional<PatchAlignment> AlignmentPatch::align(const cv::Mat& image,
     if (variance < kMinDeviation * kMinDeviation) return std::nullopt;
     const float scale = 1.0F / std::sqrt(variance * static_cast<float>(kPixels));
     // The patch moved by d explains the difference: values + d * gradient = samples. Mean and
-    // contrast of the samples need not be taken out first, for all that they meet has zero mean.
+    // contrast of the samples need not be removed, because the vectors that they multiply have zero
+    // mean.
     const float correlation = scale * values_.dot(samples);
     const Eigen::Vector2f g = scale * Eigen::Vector2f(dx_.dot(samples), dy_.dot(samples)) - offset_;
     const Eigen::Vector2f d = H_inverse_ * g;

@@ -8,28 +8,28 @@
 
 namespace km {
 
-/// Where a patch was found.
+/// Result of aligning a patch.
 struct PatchAlignment {
   Eigen::Vector2f px = Eigen::Vector2f::Zero();
   float correlation = 0.0F;  ///< Zero-mean and normalised, in [-1, 1].
 };
 
-/// A small window of an image, prepared to be found again in others to a fraction of a pixel, seen
-/// from elsewhere and in other light.
+/// A small window of an image, prepared to be located with subpixel accuracy in other images, from
+/// another viewpoint and in other light.
 ///
-/// Inverse compositional alignment (Baker and Matthews, IJCV 2004) over the two shifts, under an
-/// affine warp that the caller knows from the geometry, of patches reduced to zero mean and unit
-/// contrast. Contrary to tracking from image to image the errors do not add up, and contrary to
-/// unwarped windows they do not grow with the disparity of near points.
+/// Inverse compositional alignment (Baker and Matthews, IJCV 2004) over the two shifts. The caller
+/// supplies an affine warp from the geometry. Patches are reduced to zero mean and unit contrast.
+/// In contrast to tracking from image to image, the errors do not accumulate. In contrast to
+/// windows without warp, they do not grow with the disparity of near points.
 class AlignmentPatch {
  public:
   /// The window around `px`; nullopt if it leaves the image or has no texture.
   [[nodiscard]] static std::optional<AlignmentPatch> cut(const cv::Mat& image,
                                                          const Eigen::Vector2f& px);
 
-  /// Searches from `start` downhill. `A` maps offsets in the patch to offsets in `image`: there,
-  /// the point `d` from the patch's centre is at px + A * d. nullopt if the search leaves the
-  /// image, diverges or does not settle.
+  /// Descends from `start`. `A` maps offsets in the patch to offsets in `image`: the point `d` from
+  /// the patch's centre is at px + A * d. nullopt if the search leaves the image, diverges or does
+  /// not converge.
   [[nodiscard]] std::optional<PatchAlignment> align(const cv::Mat& image,
                                                     const Eigen::Vector2f& start,
                                                     const Eigen::Matrix2f& A) const;
@@ -76,14 +76,15 @@ class PatchTemplate {
  private:
   static constexpr int kPixels = kWidth * kHeight;
   alignas(16) short centred_[kPixels] = {};  // Grey levels minus their rounded mean.
-  int sum_ = 0;                              // Of centred_: what the rounding left.
+  int sum_ = 0;                              // Sum of centred_: the remainder of the rounding.
   float norm_ = 0.0F;
 };
 
-/// How an image looks from elsewhere: maps small pixel offsets around the image of a landmark in
-/// camera a to offsets around its image in camera b, for a surface that faces camera a. With the
-/// lens distortion of both. `bearing_a` on z = 1, `inverse_depth` in a [1/m], T_b_a between the
-/// cameras. Identity if the landmark is behind b, or at the rim of what a lens sees.
+/// Warp of an image between viewpoints: maps small pixel offsets around the image of a landmark in
+/// camera a to offsets around its image in camera b. The surface is assumed to face camera a. The
+/// lens distortion of both cameras is included. `bearing_a` on z = 1, `inverse_depth` in a [1/m],
+/// T_b_a between the cameras. Identity if the landmark is behind b, or at the rim of the lens'
+/// field of view.
 [[nodiscard]] Eigen::Matrix2f local_warp(const Camera& a, const Camera& b,
                                          const Eigen::Vector2d& bearing_a, double inverse_depth,
                                          const SE3& T_b_a);

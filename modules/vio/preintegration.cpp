@@ -48,7 +48,7 @@ void ImuPreintegration::add(const ImuSample& begin, const ImuSample& end) {
   B.block<3, 3>(6, 0) = 0.5 * dt * dv_dgyro;
   B.block<3, 3>(3, 3) = dv_daccel;
   B.block<3, 3>(6, 3) = 0.5 * dt * dv_daccel;
-  Vector6 variance;  // of noise held over the step
+  Vector6 variance;  // variance of noise that is constant over the step
   variance.head<3>().setConstant(noise_.gyro_noise_density * noise_.gyro_noise_density / dt);
   variance.tail<3>().setConstant(noise_.accel_noise_density * noise_.accel_noise_density / dt);
   covariance_ =
@@ -79,7 +79,8 @@ bool ImuPreintegration::add(std::span<const ImuSample> samples, Stamp from, Stam
     if (begin >= end) continue;
     const ImuSample first = begin == a.stamp ? a : interpolate(a, b, begin);
     const ImuSample last = end == b.stamp ? b : interpolate(a, b, end);
-    // Noise held over a single step leaves position a multiple of velocity: a covariance of rank 6.
+    // With constant noise over one step, position is a multiple of velocity: a covariance of
+    // rank 6.
     if (const Stamp middle = begin + (end - begin) / 2;
         begin == from && end == to && begin < middle) {
       const ImuSample half = interpolate(a, b, middle);

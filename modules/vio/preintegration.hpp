@@ -20,14 +20,15 @@ struct PreintegratedMotion {
   Eigen::Vector3d dp = Eigen::Vector3d::Zero();      ///< R_i^T (p_j - p_i - v_i dt - g dt^2/2) [m].
 };
 
-/// On-manifold preintegration of inertial samples with first-order bias correction
-/// (Forster, Carlone, Dellaert, Scaramuzza, "On-Manifold Preintegration for Real-Time
-/// Visual-Inertial Odometry", TRO 2017, Sec. V and VI): motion() by Eq. (35) to (37), covariance()
-/// by Eq. (62) and (63), corrected() by Eq. (44) with the derivatives of its appendix on bias
-/// correction, built up sample by sample.
+/// On-manifold preintegration of inertial samples with first-order bias correction (Forster,
+/// Carlone, Dellaert, Scaramuzza, "On-Manifold Preintegration for Real-Time Visual-Inertial
+/// Odometry", TRO 2017, Sec. V and VI). motion() is Eq. (35) to (37), covariance() is Eq. (62) and
+/// (63). corrected() is Eq. (44). Its derivatives accumulate sample by sample as in the paper's
+/// appendix on bias correction.
 ///
-/// Deviation: each step uses the mean of its two samples in the frame half-way through the step,
-/// second order in the sampling period where the paper's zero-order hold is first order.
+/// Deviation: each step uses the mean of its two samples in the frame half-way through the step. It
+/// is therefore of second order in the sampling period. The zero-order hold of the paper is of
+/// first order.
 class ImuPreintegration {
  public:
   /// Starts at an instant with the biases to integrate with [rad/s], [m/s^2].
@@ -75,7 +76,7 @@ class ImuPreintegration {
 };
 
 /// The state dt_s() after `state` by its biases and `imu`; gravity is [0, 0, -gravity_mps2].
-/// The stamp is left as it is. Forster et al., TRO 2017, Eq. (38) without noise, for state j.
+/// The stamp does not change. Forster et al., TRO 2017, Eq. (38) without noise, for state j.
 [[nodiscard]] OdometryState predict(const OdometryState& state, const ImuPreintegration& imu,
                                     double gravity_mps2);
 

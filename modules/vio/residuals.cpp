@@ -10,8 +10,8 @@ namespace {
 
 using Vector9 = Eigen::Matrix<double, 9, 1>;
 
-// Standard deviations of what may change at rest: a body that begins to move is noticed when the
-// image has moved by a pixel or two, 2 mrad each, of what is a few metres away.
+// Standard deviations of undetected changes at rest. The detector notices a motion when the image
+// has moved by a pixel or two. At a distance of a few metres a pixel is 2 mrad.
 constexpr double kRestRotation_rad = 4e-3;
 constexpr double kRestSpeed_mps = 0.02;
 constexpr double kRestPosition_m = 0.01;
@@ -47,7 +47,7 @@ bool linearize_reprojection(const ViewModel& view, const Eigen::Vector2d& bearin
   Eigen::Matrix<double, 2, 3> J_cam;
   J_cam << f, 0.0, -f * p_cam.x() / p_cam.z(), 0.0, f, -f * p_cam.y() / p_cam.z();
   const Eigen::Matrix<double, 2, 3> J_body = J_cam * view.R_cam_body;
-  // p_body of T retracted by [phi; rho]: exp(-phi) p_body - rho to first order.
+  // First order for T retracted by [phi; rho]: exp(-phi) p_body - rho.
   for (int row = 0; row < 2; ++row) {
     const Eigen::Vector3d J = J_body.row(row);
     term.J_pose.row(row).head<3>() = J.cross(p_body);
@@ -80,7 +80,7 @@ std::optional<ImuFactor> ImuFactor::of(const ImuPreintegration& imu, double grav
 }
 
 ImuFactor ImuFactor::at_rest(const ImuNoise& noise, double dt_s) {
-  // No sample: Eq. (45) over no time compares the states themselves.
+  // Without samples, Eq. (45) over no time compares the states themselves.
   const ImuPreintegration none(noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   Vector9 weight;
   weight << Eigen::Vector3d::Constant(1.0 / kRestRotation_rad),

@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// A camera of the rig as the residuals need it.
+/// A camera of the rig in the form that the residuals use.
 struct ViewModel {
   Eigen::Matrix3d R_cam_body = Eigen::Matrix3d::Identity();
   Eigen::Vector3d t_cam_body = Eigen::Vector3d::Zero();
@@ -35,9 +35,9 @@ inline constexpr double kMinDepth_m = 0.05;
                                       const SE3& T_odom_body, const Eigen::Vector3d& p_odom,
                                       Eigen::Vector2d& r);
 
-/// The same with derivatives. They are taken at `T_linearization` while r is that of T_odom_body:
-/// first-estimate Jacobians (Huang, Mourikis, Roumeliotis, ISER 2008) if a prior holds this pose,
-/// else pass T_odom_body twice.
+/// reprojection_error() with derivatives. They are taken at `T_linearization`, while r is the error
+/// at T_odom_body: first-estimate Jacobians (Huang, Mourikis, Roumeliotis, ISER 2008). If no prior
+/// holds this pose, pass T_odom_body twice.
 [[nodiscard]] bool linearize_reprojection(const ViewModel& view, const Eigen::Vector2d& bearing,
                                           const SE3& T_odom_body, const SE3& T_linearization,
                                           const Eigen::Vector3d& p_odom, ReprojectionTerm& term);
@@ -54,7 +54,7 @@ struct ImuTerm {
   Matrix15 J_j;
 };
 
-/// What of a state a prior holds, at the values it was first linearised at.
+/// Parts of a state that a prior holds, at the values of their first linearisation.
 struct FirstEstimate {
   std::optional<SE3> pose;
   std::optional<OdometryState> motion;  ///< Its velocity and biases.
@@ -73,9 +73,9 @@ class ImuFactor {
   [[nodiscard]] static std::optional<ImuFactor> of(const ImuPreintegration& imu,
                                                    double gravity_mps2);
 
-  /// Between two instants `dt_s` of one rest apart, in place of samples: pose and velocity are
-  /// equal as far as RestDetector can tell, biases walk. imu() is empty. Precondition: they walk by
-  /// `noise`, dt_s > 0.
+  /// Factor between two instants of one rest, `dt_s` apart, in place of samples. Pose and velocity
+  /// are equal within the tolerance of RestDetector, and the biases walk by `noise`. imu() is
+  /// empty. Precondition: dt_s > 0.
   [[nodiscard]] static ImuFactor at_rest(const ImuNoise& noise, double dt_s);
 
   [[nodiscard]] const ImuPreintegration& imu() const { return imu_; }

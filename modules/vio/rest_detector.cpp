@@ -7,9 +7,9 @@
 namespace km {
 namespace {
 
-constexpr double kSmoothing_s = 0.2;     // rotors that idle shake the sensors, but about a mean
-constexpr double kHold = 2.0;            // a rest takes more to end than to begin
-constexpr double kMostSpeed_mps = 0.05;  // of the estimate: samples cannot tell a smooth ride
+constexpr double kSmoothing_s = 0.2;     // idling rotors shake the sensors, but about a mean
+constexpr double kHold = 2.0;            // factor on the thresholds for the end of a rest
+constexpr double kMostSpeed_mps = 0.05;  // estimated; samples alone do not exclude smooth motion
 
 }  // namespace
 

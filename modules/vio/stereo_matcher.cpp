@@ -9,11 +9,13 @@
 namespace km {
 namespace {
 
-constexpr float kMinStereoCorrelation = 0.8F;  // Of a match, full resolution.
-constexpr float kMinSearchCorrelation = 0.7F;  // Half resolution, whole pixels.
-// The second best place must be this much less similar. A fence or a net has many alike.
+constexpr float kMinStereoCorrelation = 0.8F;  // Least correlation of a match, full resolution.
+// Least correlation of a search, half resolution, whole pixels.
+constexpr float kMinSearchCorrelation = 0.7F;
+// The second best place must be less similar by this amount. A fence or a net has many similar
+// places.
 constexpr float kMinDistinction = 0.05F;
-constexpr int kPeakWidth = 2;             // Steps at which a correlation peak still counts as one.
+constexpr int kPeakWidth = 2;             // Width in steps of one correlation peak.
 constexpr double kMinDisparityPx = -1.0;  // Noise of a point at infinity.
 
 }  // namespace
@@ -82,7 +84,8 @@ std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,
                                                       const Eigen::Vector2f& right_px) const {
   const std::optional<Eigen::Vector2d> right = rig_.cameras[1].unproject(right_px.cast<double>());
   if (!right) return std::nullopt;
-  // The epipolar line runs from the bearing at infinity along `along`; both components are pixels.
+  // The epipolar line starts at the bearing at infinity and has direction `along`; both components
+  // are pixels.
   const double f = rig_.cameras[1].fx;
   const Eigen::Vector2d infinity = right_bearing(query.left, 0.0);
   const Eigen::Vector2d along =

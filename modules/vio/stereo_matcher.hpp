@@ -19,27 +19,27 @@ struct StereoQuery {
   std::optional<double> inverse_depth;             ///< Expected 1/z in the left camera [1/m].
 };
 
-/// Where a query was found.
+/// Position of a query in the right image.
 struct StereoMatch {
   Eigen::Vector2d right = Eigen::Vector2d::Zero();  ///< Bearing in the right camera.
   double inverse_depth = 0.0;  ///< 1/z in the left camera [1/m]; not negative, 0 is infinity.
 };
 
-/// What became of the queries of one image.
+/// Number of queries of one image by result.
 struct StereoStatistics {
   int matched = 0;
-  int no_start = 0;    ///< No similar patch along the epipolar line, or several alike.
-  int dissimilar = 0;  ///< The patches differ too much, or lie at a rim.
+  int no_start = 0;    ///< No similar patch along the epipolar line, or several similar ones.
+  int dissimilar = 0;  ///< The patches differ too much, or exceed the image.
   int epipolar = 0;    ///< Too far from the epipolar line, or behind the cameras.
 };
 
 /// Finds points of the left image in the right one to a fraction of a pixel. Not thread-safe.
 ///
-/// Points without an expected depth are searched at half resolution along their epipolar curve (the
-/// images are not rectified) by zero-mean normalised correlation, and refused if a second place is
-/// about as similar. All are then refined by AlignmentPatch, warped as a surface at that depth
-/// looks from the right: without it near points would be off by tenths of a pixel. The refinement
-/// is not bound to the curve, so that the distance from it is a test of the match.
+/// A point without an expected depth is searched at half resolution along its epipolar curve (the
+/// images are not rectified) by zero-mean normalised correlation. It is refused if a second place
+/// is about as similar. AlignmentPatch then refines all points, with the warp of a surface at that
+/// depth seen from the right. Without this warp, near points would be off by tenths of a pixel. The
+/// refinement is not bound to the curve, so that the distance from it is a test of the match.
 class StereoMatcher {
  public:
   StereoMatcher(const StereoRig& rig, const TrackerConfig& config);
@@ -53,11 +53,11 @@ class StereoMatcher {
   [[nodiscard]] Eigen::Vector2d right_bearing(const Eigen::Vector2d& left,
                                               double inverse_depth) const;
 
-  /// Of the last match().
+  /// Counts of the last match().
   [[nodiscard]] const StereoStatistics& statistics() const { return statistics_; }
 
  private:
-  // Along which the right camera sees it, of any length.
+  // Ray of any length from the right camera to the point.
   [[nodiscard]] Eigen::Vector3d right_ray(const Eigen::Vector2d& left, double inverse_depth) const;
 
   struct Start {
@@ -80,23 +80,25 @@ class StereoMatcher {
   StereoStatistics statistics_;
 };
 
-/// What StereoMatcher finds in a right image, read from a depth image instead: where the virtual
-/// right camera of an RGB-D rig would see the points. Not thread-safe.
+/// Replaces StereoMatcher for RGB-D rigs: computes from a depth image where the virtual right
+/// camera would see the points. Not thread-safe.
 ///
-/// The right bearing is a function of the left one and the depth, so that an error of the left one
-/// is in both, where stereo has two errors of their own. The smoother takes them for independent,
-/// as ORB-SLAM2 does: it trusts the row of a point like stereo does, with two observations of it.
+/// The right bearing is a function of the left one and the depth, so that an error of the left
+/// bearing is in both. The two errors of stereo are independent. The smoother assumes independence
+/// here too, as ORB-SLAM2 does: it weights the image row of a point as if there were two
+/// observations of it.
 class DepthMatcher {
  public:
   /// Precondition: rig.depth_source is kDepthImage.
   DepthMatcher(const StereoRig& rig, const TrackerConfig& config);
 
-  /// One entry for each query; its expected depth is not used. Without an image none is found.
-  /// Nearer than TrackerConfig::min_depth_m counts as no depth. Precondition: `depth` fits the rig.
+  /// One entry for each query; its expected depth is not used. Without an image no point is found.
+  /// A depth below TrackerConfig::min_depth_m counts as none. Precondition: `depth` fits the rig.
   [[nodiscard]] std::vector<std::optional<StereoMatch>> match(const DepthImage* depth,
                                                               std::span<const StereoQuery> queries);
 
-  /// Of the last match(): `no_start` counts points without a depth, or on an edge between two.
+  /// Counts of the last match(): `no_start` counts points without a depth, or on an edge between
+  /// two.
   [[nodiscard]] const StereoStatistics& statistics() const { return statistics_; }
 
  private:

@@ -14,7 +14,7 @@ namespace km {
 namespace {
 
 constexpr int kSamples = 48;
-constexpr double kCoarseSigmas = 6.0;  // Truncation while the rotation is the gyroscope's.
+constexpr double kCoarseSigmas = 6.0;  // Truncation while the rotation is still the gyroscope's.
 
 // Truncated quadratic cost (MSAC).
 double cost_of(std::span<const DepthPair> pairs, const SE3& T, double threshold) {
@@ -40,7 +40,7 @@ void add_rows(const DepthPair& pair, const Eigen::Matrix3d& R, Eigen::Matrix3d& 
   }
 }
 
-// Translation that two landmarks give under a known rotation; nullopt if they are too far.
+// Translation from two landmarks under a known rotation; nullopt if they are too far away.
 std::optional<Eigen::Vector3d> translation_of(const DepthPair& a, const DepthPair& b,
                                               const Eigen::Matrix3d& R) {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -55,7 +55,7 @@ std::optional<Eigen::Vector3d> translation_of(const DepthPair& a, const DepthPai
   return t.allFinite() ? std::optional(t) : std::nullopt;
 }
 
-// One Gauss-Newton step over T * exp(xi), weights of Geman-McClure with scale `scale`.
+// One Gauss-Newton step over T * exp(xi) with Geman-McClure weights of scale `scale`.
 SE3 refined(std::span<const DepthPair> pairs, const SE3& T, double scale) {
   Matrix6 H = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
@@ -174,7 +174,7 @@ TwoPointResult two_point_ransac(std::span<const BearingPair> pairs,
     if (i == j) continue;
     const Eigen::Vector3d axis = plane_normal(pairs[i], R_previous_current)
                                      .cross(plane_normal(pairs[j], R_previous_current));
-    // Parallel planes leave the direction open; without parallax any will do.
+    // Parallel planes leave the direction undetermined; without parallax any direction fits.
     const Eigen::Vector3d direction =
         axis.norm() > 1e-15 ? Eigen::Vector3d(axis.normalized()) : Eigen::Vector3d::UnitX();
     const double cost = cost_of(pairs, R_previous_current, direction, threshold);

@@ -17,24 +17,26 @@ struct DepthPair {
   Eigen::Vector2d current = Eigen::Vector2d::Zero();   ///< Bearing, z = 1.
 };
 
-/// `pair`'s landmark in the current camera divided by its depth in the previous one: a direction,
-/// with the landmark's relative depth in z. Not positive z: behind the camera.
+/// Position of `pair`'s landmark in the current camera, divided by its depth in the previous one: a
+/// direction, with the landmark's relative depth in z. If z is not positive, the landmark is behind
+/// the camera.
 [[nodiscard]] Eigen::Vector3d transfer(const DepthPair& pair, const SE3& T_previous_current);
 
-/// Distance on z = 1 between pair.current and where the motion puts the landmark; infinite if that
-/// is behind the camera.
+/// Distance on z = 1 between pair.current and the landmark transferred by the motion; infinite if
+/// the landmark is behind the camera.
 [[nodiscard]] double reprojection_distance(const DepthPair& pair, const SE3& T_previous_current);
 
 /// The motion of the camera that most landmarks agree on, or nullopt if there are fewer than
 /// kMinMotionPairs or fewer than half of them agree.
 ///
 /// Samples of two landmarks give translations under the rotation of `guess` (linear, 4 equations
-/// for 3 unknowns); the translation of `guess` is tried too. The best is then refined over all six
-/// degrees of freedom with a Geman-McClure weight whose scale shrinks to `sigma`, because the
-/// gyroscope's bias alone can turn the guess by pixels. Compared with voting on 3D displacements
-/// (1-point stereo of Kimera-VIO) the test is in pixels, where the noise is known, so that it is
-/// as sharp for far landmarks as for near ones, and the right image is not needed yet: the motion
-/// can predict where to look there.
+/// for 3 unknowns). The translation of `guess` is tried too. The best is then refined over all six
+/// degrees of freedom with a Geman-McClure weight whose scale shrinks to `sigma`. The refinement
+/// includes the rotation because the gyroscope's bias alone can rotate the guess by pixels.
+///
+/// Compared with voting on 3D displacements (1-point stereo of Kimera-VIO) the test is in pixels,
+/// where the noise is known. It is therefore as sharp for far landmarks as for near ones. It does
+/// not need the right image either, so the motion can predict where to search there.
 /// `sigma`: noise of a bearing on z = 1. Deterministic for equal inputs and state of `rng`.
 [[nodiscard]] std::optional<SE3> estimate_motion(std::span<const DepthPair> pairs,
                                                  const SE3& guess_T_previous_current, double sigma,
@@ -48,10 +50,11 @@ struct BearingPair {
   Eigen::Vector2d current = Eigen::Vector2d::Zero();
 };
 
-/// Which pairs agree with one direction of translation.
+/// The direction of translation that most pairs agree with, and these pairs.
 struct TwoPointResult {
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Of t_previous_current, unit, any sign.
-  std::vector<bool> inlier;                             ///< One for each pair.
+  /// Direction of t_previous_current, unit length, any sign.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  std::vector<bool> inlier;  ///< One for each pair.
   int inliers = 0;
 };
 
@@ -60,11 +63,12 @@ struct TwoPointResult {
 [[nodiscard]] double epipolar_distance(const BearingPair& pair, const Eigen::Matrix3d& R,
                                        const Eigen::Vector3d& t);
 
-/// Rejects mono outliers with the rotation known from a gyroscope: two pairs then fix the direction
-/// of translation, t ~ (b1 x R b1') x (b2 x R b2') (Troiani et al., "2-Point-based outlier
-/// rejection for camera-IMU systems", ICRA 2014). Consensus over `kTwoPointSamples` samples of
-/// `rng`; `threshold` is an epipolar_distance(). Fewer than 3 pairs are all inliers: nothing can
-/// contradict them. In a pure rotation every direction explains every true pair, which is right.
+/// Rejects mono outliers with the rotation known from a gyroscope. Two pairs then determine the
+/// direction of translation, t ~ (b1 x R b1') x (b2 x R b2') (Troiani et al., "2-Point-based
+/// outlier rejection for camera-IMU systems", ICRA 2014). Consensus over `kTwoPointSamples` samples
+/// of `rng`; `threshold` is an epipolar_distance(). Fewer than 3 pairs are all inliers, because
+/// nothing can contradict them. In a pure rotation every direction fits every correct pair, so all
+/// of them are inliers.
 [[nodiscard]] TwoPointResult two_point_ransac(std::span<const BearingPair> pairs,
                                               const Eigen::Matrix3d& R_previous_current,
                                               double threshold, std::mt19937& rng);

@@ -11,13 +11,13 @@ namespace km {
 
 /// One landmark seen in a stereo pair. Bearings are undistorted points on z = 1 of each camera.
 struct TrackedFeature {
-  std::uint64_t id = 0;                            ///< Same id, same landmark; never reused.
+  std::uint64_t id = 0;  ///< Equal ids mean equal landmarks; never reused.
   Eigen::Vector2d left = Eigen::Vector2d::Zero();  ///< Bearing in the left camera.
   std::optional<Eigen::Vector2d> right;            ///< Bearing in the right camera, if matched.
-  int length = 1;                                  ///< Images it has been tracked in.
+  int length = 1;  ///< Number of images in which it has been tracked.
 };
 
-/// What the front end hands to the back end for one image.
+/// Output of the feature tracker for one image.
 struct TrackedFrame {
   Stamp stamp = 0;
   std::vector<TrackedFeature> features;  ///< Ascending ids.

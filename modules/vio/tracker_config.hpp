@@ -21,25 +21,31 @@ struct TrackerConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("max_features", max_features, {1, 5000},
-                  "in one image; more cost time in proportion here and in the smoother");
+                  "largest number of features in one image; the time of tracker and smoother is "
+                  "proportional to it");
     visitor.field("min_distance_px", min_distance_px, {4, 200},
-                  "[px] between features of one image: how evenly they cover it");
+                  "[px] smallest distance between features of one image; larger values spread them "
+                  "more evenly");
     visitor.field("fast_threshold", fast_threshold, {1, 100},
-                  "[grey levels] lowest FAST threshold tried; lower in dim or blurred images, "
-                  "higher in noise");
-    visitor.field("window_px", window_px, {5, 41}, "[px] side of the square that is tracked, odd");
+                  "[grey levels] lowest FAST threshold; lower for dim or blurred images, higher "
+                  "for noisy ones");
+    visitor.field("window_px", window_px, {5, 41},
+                  "[px] side of the square window around a feature, odd");
     visitor.field("pyramid_levels", pyramid_levels, {1, 6},
-                  "above the full image; the reach of a search doubles with each");
+                  "number of levels above the full image; each doubles the reach of a search");
     visitor.field("max_forward_backward_px", max_forward_backward_px, {0.0, 10.0},
-                  "[px] a feature tracked forward and back must return this close; 0: no check");
+                  "[px] largest distance to which a feature tracked forward and back must return; "
+                  "0: no check");
+    visitor.field("max_epipolar_px", max_epipolar_px, {0.1, 20.0},
+                  "[px] largest distance of a right image point from its epipolar line; larger for "
+                  "an imprecise calibration");
     visitor.field(
-        "max_epipolar_px", max_epipolar_px, {0.1, 20.0},
-        "[px] of a right image point from its epipolar line; calibration errors show up here");
-    visitor.field("max_reprojection_px", max_reprojection_px, {0.1, 50.0},
-                  "[px] from where the motion common to all features puts one");
-    visitor.field("min_depth_m", min_depth_m, {0.02, 10.0},
-                  "[m] nearest searched in stereo, or believed of a depth image");
-    visitor.field("seed", seed, {0, 2147483647}, "of the random samples");
+        "max_reprojection_px", max_reprojection_px, {0.1, 50.0},
+        "[px] largest distance of a feature from the position that the common motion predicts");
+    visitor.field(
+        "min_depth_m", min_depth_m, {0.02, 10.0},
+        "[m] smallest depth: of the stereo search, and of values of a depth image that are used");
+    visitor.field("seed", seed, {0, 2147483647}, "seed of the random samples");
   }
 };
 

@@ -14,25 +14,27 @@
 namespace km {
 namespace {
 
-constexpr double kMaxAhead_s = 1.0;  // of a sample before its image: a broken stamp would block all
-constexpr double kMaxCostPerObservation = 100.0;  // a fit has less than 1
+constexpr double kMaxAhead_s = 1.0;  // a sample further ahead of its image is refused: a wrong
+                                     // stamp would block all later ones
+constexpr double kMaxCostPerObservation = 100.0;  // a usable fit has less than 1
 
-// An estimate of which so few landmarks come, of all that could be located, for so many images in a
-// row, is wrong: features fit nowhere. As a rule there are more landmarks than features.
+// An estimate is wrong if only a small share of the landmarks that could be located fits it, for
+// several images in a row. Normally there are more landmarks than features.
 constexpr std::ptrdiff_t kSeenFeatures = 40;
 constexpr std::ptrdiff_t kFewOfSeen = 4;  // a quarter
 constexpr int kMostUnlocatedImages = 10;
 
-// After so long without vision what the dark has left is forgotten, so long after vision is back:
-// what it tells of the way through the dark has been told by then.
+// After a loss of vision longer than kLongDark_s the smoother discards its prior from the dark,
+// kMended_s after vision is back. By then images have corrected the states of the dark.
 constexpr double kLongDark_s = 3.0;
 constexpr double kMended_s = 0.8;
 
-// Features, and time, with which images alone carry the pose over a gap of inertial samples.
+// Least number of features and longest time for which images alone carry the pose over a gap of
+// inertial samples.
 constexpr int kLeastTracked = 30;
 constexpr double kLongestBridge_s = 3.0;
 
-// Between two samples; infinite without any.
+// Longest time between two samples; infinite without samples.
 double longest_step_s(const std::vector<ImuSample>& samples) {
   if (samples.empty()) return std::numeric_limits<double>::infinity();
   double longest_s = 0.0;
@@ -41,8 +43,8 @@ double longest_step_s(const std::vector<ImuSample>& samples) {
   return longest_s;
 }
 
-constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor knows better
-constexpr double kMostTiltSigma = 1.5;    // who is off by a right angle knows nothing
+constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor is more accurate
+constexpr double kMostTiltSigma = 1.5;    // a larger uncertainty means that the vertical is unknown
 
 }  // namespace
 
@@ -110,7 +112,7 @@ int Vio::take_samples(const SensorPacket& packet) {
   int refused = 0;
   for (const ImuSample& sample : packet.imu) {
     const bool repeated = !samples_.empty() && sample.stamp == samples_.back().stamp;
-    if (repeated) continue;  // the border sample of two packets
+    if (repeated) continue;  // border sample of two packets
     const bool future =
         packet.frame != nullptr && seconds_between(packet.frame->stamp, sample.stamp) > kMaxAhead_s;
     if (future || !is_plausible(sample) ||
@@ -122,7 +124,7 @@ int Vio::take_samples(const SensorPacket& packet) {
   return refused;
 }
 
-// Empty if they do not begin by `last`.
+// Empty if no sample is at or before `last`.
 std::vector<ImuSample> Vio::samples_since(Stamp last, Stamp now) const {
   std::vector<ImuSample> covering;
   for (std::size_t k = 0; k < samples_.size(); ++k) {
@@ -131,14 +133,14 @@ std::vector<ImuSample> Vio::samples_since(Stamp last, Stamp now) const {
     if (!before && !after) covering.push_back(samples_[k]);
   }
   if (covering.empty() || covering.front().stamp > last) return {};
-  if (covering.back().stamp < now) {  // held: the last sample before the image is late
+  if (covering.back().stamp < now) {  // the last sample is held until the image
     covering.push_back(covering.back());
     covering.back().stamp = now;
   }
   return covering;
 }
 
-// Images, which go on over a gap of the samples, tell the motion.
+// True if images can carry the motion over a gap of the samples.
 bool Vio::takes_over(const TrackerStatistics& tracking, double gap_s) const {
   return running_ && tracking.tracked >= kLeastTracked && gap_s <= kLongestBridge_s;
 }
@@ -155,7 +157,7 @@ bool Vio::goes_on_at(const Held& held) const {
          last_->stamp == stamp;
 }
 
-// The state of this image has been given out, and its keyframe handed on.
+// Precondition: the state of this image and its keyframe have been published.
 void Vio::go_on(const Held& held, VioResult& result) {
   start_on(held, *last_, *last_keyframe_->state_covariance);
   ++statistics_.start_attempts;
@@ -168,12 +170,13 @@ void Vio::go_on(const Held& held, VioResult& result) {
 void Vio::start_on(const Held& held, const OdometryState& state,
                    const StateCovariance& covariance) {
   InertialFrame frame = held.data;
-  frame.samples = samples_;  // also from before the image
+  frame.samples = samples_;  // includes samples from before the image
   smoother_.start(frame, state, covariance);
 }
 
 void Vio::try_start(VioResult& result) {
-  while (!held_.empty() && !locates_points(*held_.front().frame)) {  // nothing to start on
+  while (!held_.empty() &&
+         !locates_points(*held_.front().frame)) {  // no start is possible on these
     held_.erase(held_.begin());
     ++statistics_.images_without_pose;
   }
@@ -200,7 +203,7 @@ void Vio::try_start(VioResult& result) {
         locate((*states)[k], held_[k].frame, result);
       }
       held_.clear();
-      // The pose that the run was left with stands.
+      // The last pose of the earlier start is final.
       std::erase_if(result.states,
                     [this](const auto& s) { return last_ && s.stamp <= last_->stamp; });
       return;
@@ -216,12 +219,13 @@ void Vio::try_start(VioResult& result) {
   }
 }
 
-// A start defines its own first position and heading: the latter becomes that of the last pose, the
-// former where the speeds before and after what nobody has seen lead from there.
+// A start defines its own first position and heading. The heading is replaced by that of the last
+// pose. The position is replaced by the one that follows from the speeds before and after the
+// interval without measurements.
 void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
   if (!last_) return;
   const SE3 first = states.front().T_odom_body;
-  // The turn about the vertical that brings the two attitudes nearest to each other.
+  // Rotation about the vertical that minimises the difference of the two attitudes.
   const Eigen::Matrix3d Q = last_->T_odom_body.linear() * first.linear().transpose();
   const double turn = std::atan2(Q(1, 0) - Q(0, 1), Q(0, 0) + Q(1, 1));
   const Eigen::Matrix3d R = so3_exp(turn * Eigen::Vector3d::UnitZ());
@@ -251,7 +255,7 @@ void Vio::advance(const Held& held, VioResult& result) {
   if (!plausible(*result.smoother) || unlocated_images_ > kMostUnlocatedImages) {
     ++statistics_.divergences;
     result.problem = VioProblem::kDiverged;
-    last_->v_odom.setZero();  // is worth nothing
+    last_->v_odom.setZero();  // diverged, so its value is useless
     restart(held);
     return;
   }
@@ -270,14 +274,15 @@ bool Vio::has_mended(const StereoFrame& frame) const {
          locates_points(frame) && !smoother_.window().frames.back().rests;
 }
 
-// States from the dark are far off, and so are the derivatives at them that the window's prior has:
-// with those it would learn for seconds, moving the pose, what images tell at once.
+// States from the dark have large errors, and so have the derivatives of the prior at them. With
+// this prior the smoother would move the pose for seconds; without it, images correct the pose at
+// once.
 void Vio::forget_dark(const Held& held, const OdometryState& state) {
   back_since_.reset();
   if (last_keyframe_->state_covariance) start_on(held, state, *last_keyframe_->state_covariance);
 }
 
-// A start is made on what is seen.
+// An image on which a start succeeded counts as seen.
 void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
   const bool has_started = result.start && started(*result.start);
   const int seen = has_started                   ? VisionWatch::kLeastSeen
@@ -310,7 +315,8 @@ void Vio::restart(Held held) {
   held_.push_back(std::move(held));
 }
 
-// Live odometry refines the recent keyframes after they were handed on; the chain does not.
+// Live odometry refines the recent keyframes after they were published; the chain of published
+// keyframes does not change.
 void Vio::locate(const OdometryState& state, const Frame& frame, VioResult& result) {
   if (const WindowFrame* keyframe = smoother_.frame_at(last_keyframe_->stamp))
     T_chain_odom_ = last_keyframe_->T_odom_kf * keyframe->state.T_odom_body.inverse();
@@ -323,19 +329,20 @@ bool Vio::locates_points(const StereoFrame& frame) const {
 }
 
 bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
-  if (!locates_points(frame)) return false;  // no keyframe to close a loop with; a better one comes
+  // A keyframe without points cannot close a loop; wait for a better image.
+  if (!locates_points(frame)) return false;
   const double dt = moved_s(state.stamp);
   const WindowFrame* previous = smoother_.frame_at(last_keyframe_->stamp);
   if (previous == nullptr) return dt >= config_.output_interval_s - 1e-3;
   return is_keyframe_due(config_, dt, previous->state.T_odom_body.inverse() * state.T_odom_body);
 }
 
-// A clock may have been set back since an earlier process.
+// Not negative, even if the clock was set back since an earlier process.
 double Vio::unseen_s(Stamp stamp) const {
   return std::max(seconds_between(last_->stamp, stamp), 0.0);
 }
 
-// Since the last keyframe, without rests.
+// Time in motion since the last keyframe.
 double Vio::moved_s(Stamp stamp) const {
   return seconds_between(last_keyframe_->stamp, stamp) - rested_s_;
 }
@@ -357,7 +364,7 @@ std::optional<StateCovariance> Vio::state_covariance_at(const OdometryState& sta
   return covariance && is_usable(*covariance) ? covariance : std::nullopt;
 }
 
-// Where the first image is the last keyframe's, that one was handed on already.
+// If the first image is that of the last keyframe, the keyframe was published earlier.
 void Vio::take_up_or_hand_on_first(VioResult& result) {
   const OdometryState& first = result.states.front();
   if (!last_keyframe_ || last_keyframe_->stamp != first.stamp) hand_on_first(first, result);
@@ -370,7 +377,7 @@ void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
   keyframe.T_previous_kf = keyframe.T_odom_kf;
   keyframe.id = {robot_, 0};
   keyframe.vertical = vertical_at(state);
-  if (last_keyframe_) {  // a new start
+  if (last_keyframe_) {  // after a restart of the odometry
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
     keyframe.covariance = restart_covariance(

@@ -17,62 +17,64 @@
 
 namespace km {
 
-/// What kept a packet from being used in full. The first that applies.
+/// First reason for which a packet was not used in full.
 enum class VioProblem {
   kNone,
-  kNoImage,         ///< The packet has none that fit the rig: inertial samples are kept.
-  kUnorderedImage,  ///< Not later than the image before: dropped.
-  kBadSamples,      ///< Some inertial samples are implausible or not in order: those are dropped.
-  /// Too long without inertial samples: the images alone tell the motion, or, where they do not, a
-  /// new start from the last pose.
+  kNoImage,         ///< No image that fits the rig; inertial samples are kept.
+  kUnorderedImage,  ///< Not later than the image before; dropped.
+  kBadSamples,      ///< Some inertial samples are implausible or out of order; these are dropped.
+  /// Too long without inertial samples. Images alone determine the motion, or, if they cannot,
+  /// odometry starts again from the last pose.
   kInertialGap,
-  /// The estimate was impossible, or had no place for what is seen: a new start from the last pose.
+  /// The estimate was implausible or contradicted the images. Odometry starts again from the last
+  /// pose.
   kDiverged,
-  kStartTimeout,  ///< Could not start: the oldest images held back are given up, without a pose.
+  kStartTimeout,  ///< No start was possible; the oldest waiting images are dropped without a pose.
 };
 
-/// What came out of one packet.
+/// Result of one packet.
 struct VioResult {
   VioProblem problem = VioProblem::kNone;
   std::vector<OdometryState> states;        ///< In order of time; several at a start.
   std::vector<KeyframeOdometry> keyframes;  ///< New keyframes; several at a start.
   std::vector<LocatedFrame> frames;         ///< One for each state.
   std::optional<StartStatus> start;         ///< Outcome, if a start was attempted.
-  TrackerStatistics tracking;               ///< Of this image.
-  std::vector<Eigen::Vector2d> tracked;     ///< Its features: bearings in the left camera.
-  std::optional<SmootherUpdate> smoother;   ///< Not before the start.
-  std::optional<VisionEvent> vision;        ///< Lost, or back.
+  TrackerStatistics tracking;               ///< Counts of this image.
+  std::vector<Eigen::Vector2d> tracked;    ///< Features of this image: bearings in the left camera.
+  std::optional<SmootherUpdate> smoother;  ///< Absent before the start.
+  std::optional<VisionEvent> vision;       ///< Loss or return of vision.
 };
 
-/// Where an earlier process of the robot left off: at a keyframe, whose image is the first that
-/// comes again.
+/// State in which an earlier process of the robot ended: at a keyframe, whose image is the first
+/// that is processed again.
 struct VioCheckpoint {
   OdometryState state;        ///< At the keyframe's image.
-  KeyframeOdometry keyframe;  ///< The last that was handed on.
+  KeyframeOdometry keyframe;  ///< The last published keyframe.
 };
 
 /// Stereo-inertial or RGB-D-inertial odometry: one call per image, a pose for every image.
 ///
-/// Images of the first VioConfig::start_s are held back; then all their poses come at once, and
-/// from there one pose per image. No keyframes come of a body that stands still (RestDetector), and
-/// the next one is measured from the one before the rest. Bad input is refused and reported, an
-/// estimate that diverges starts anew from the last pose; neither throws. Deterministic; not
-/// thread-safe.
+/// Images of the first VioConfig::start_s are held back. Then all their poses are published at
+/// once, and from there one pose per image. A body that stands still makes no keyframes
+/// (RestDetector); the next one is measured from the one before the rest. Bad input is refused and
+/// reported. An estimate that diverges is replaced by a new start from the last pose. Neither
+/// throws. Deterministic; not thread-safe.
 class Vio {
  public:
   /// Throws ConfigError, and std::invalid_argument for an unusable rig.
   Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, const VioConfig& config);
 
-  /// Goes on from there: the next keyframe follows that one, measured from it like any other where
-  /// odometry starts on its image. Where that comes first and the covariance of the state is
-  /// known, odometry starts on it at once, from that state; else like any start, with the images
-  /// of VioConfig::start_s. What was known of the calibration stays known. Call before the first
-  /// process().
+  /// Continues from the checkpoint. The next keyframe follows the checkpoint's keyframe, and is
+  /// measured from it if odometry starts on its image. If this image comes first and the covariance
+  /// of the state is known, odometry starts at once from that state. Otherwise it starts as usual,
+  /// with the images of VioConfig::start_s. The estimated calibration is kept. Call before the
+  /// first process().
   void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] VioResult process(const SensorPacket& packet);
 
-  /// How the cameras stand to the inertial sensor, as known by now; see VioConfig::calibrate.
+  /// Current estimate of time offset and mounting of the cameras relative to the inertial sensor;
+  /// see VioConfig::calibrate.
   [[nodiscard]] UncertainCalibration calibration() const { return smoother_.calibration(); }
 
   [[nodiscard]] const VioStatistics& statistics() const { return statistics_; }
@@ -120,18 +122,19 @@ class Vio {
   FixedLagSmoother smoother_;
   RestDetector rest_detector_;
   VisionWatch vision_;
-  std::optional<Stamp> back_since_;  // Vision; until what came before is forgotten.
+  // Return of vision; until the prior from the dark is discarded.
+  std::optional<Stamp> back_since_;
   VioStatistics statistics_;
-  std::vector<ImuSample> samples_;  // From the last one not after the last image on.
+  std::vector<ImuSample> samples_;  // From the last sample not after the last image.
   std::optional<Stamp> last_image_;
-  std::vector<Held> held_;  // Not empty: starting.
+  std::vector<Held> held_;  // Images held back; not empty while starting.
   bool running_ = false;
-  bool in_gap_ = false;                // of the inertial samples
-  int unlocated_images_ = 0;           // In a row: with many features and hardly a landmark.
-  std::optional<OdometryState> last_;  // Last state that was given out.
+  bool in_gap_ = false;       // The inertial samples have a gap.
+  int unlocated_images_ = 0;  // Images in a row with many features and few located landmarks.
+  std::optional<OdometryState> last_;  // Last published state.
   std::optional<KeyframeOdometry> last_keyframe_;
-  double rested_s_ = 0.0;               // Since then.
-  SE3 T_chain_odom_ = SE3::Identity();  // From live odometry to the chain of keyframes.
+  double rested_s_ = 0.0;               // Rest since the last keyframe [s].
+  SE3 T_chain_odom_ = SE3::Identity();  // From live odometry to the chain of published keyframes.
 };
 
 }  // namespace km

@@ -45,86 +45,100 @@ struct VioConfig {
   double max_accel_bias_mps2 = 3.0;
 
   void visit_fields(auto& visitor) {
-    visitor.field("window_keyframes", window_keyframes, {3, 50},
-                  "that the smoother keeps; more: smoother and slower");
+    visitor.field(
+        "window_keyframes", window_keyframes, {3, 50},
+        "number of keyframes in the window of the smoother; more: more accurate and slower");
     visitor.field("window_recent", window_recent, {1, 20},
-                  "most recent images kept besides; fewer: faster");
-    visitor.field("iterations", iterations, {1, 50}, "steps of the optimisation for every image");
+                  "number of most recent images in the window in addition; fewer: faster");
+    visitor.field("iterations", iterations, {1, 50},
+                  "largest number of optimisation steps per image");
     visitor.field("noise_px", noise_px, {0.01, 20.0},
                   "[px] standard deviation of a tracked image point");
     visitor.field("loss_scale", loss_scale, {0.1, 1e3},
-                  "[standard deviations] of the Cauchy loss on reprojection errors");
+                  "[standard deviations] scale of the Cauchy loss on reprojection errors");
     visitor.field("outlier_px", outlier_px, {0.1, 100.0},
-                  "[px] observations farther from their landmark are dropped");
-    visitor.field("gyro_noise_factor", gyro_noise_factor, {0.1, 1e3},
-                  "on the sensor's noise density: vibration, imperfect time stamps and calibration "
-                  "add to it; where images contradict it, up to four times as much");
-    visitor.field("accel_noise_factor", accel_noise_factor, {0.1, 1e3}, "the same");
-    visitor.field("gravity_mps2", gravity_mps2, {9.7, 9.9}, "[m/s^2] where the robots are");
+                  "[px] observations farther from the projection of their landmark are dropped");
+    visitor.field(
+        "gyro_noise_factor", gyro_noise_factor, {0.1, 1e3},
+        "factor on the noise density of the gyroscope, to cover vibration, time stamps "
+        "and calibration; when images contradict the gyroscope, the factor rises up to four "
+        "times this value");
+    visitor.field("accel_noise_factor", accel_noise_factor, {0.1, 1e3},
+                  "factor on the noise density of the accelerometer");
+    visitor.field("gravity_mps2", gravity_mps2, {9.7, 9.9}, "[m/s^2] gravity at the site");
     visitor.field("accel_bias_sigma", accel_bias_sigma, {1e-4, 5.0},
-                  "[m/s^2] standard deviation before anything is known of the bias");
+                  "[m/s^2] standard deviation of the accelerometer bias at the start");
     visitor.field("keyframe_parallax_px", keyframe_parallax_px, {0.5, 200.0},
-                  "[px] a new keyframe of the smoother: when the image has moved by this much, "
-                  "rotation taken out");
-    visitor.field("keyframe_tracked_share", keyframe_tracked_share, {0.0, 1.0},
-                  "or this share of the last one's features, or less, is still tracked");
+                  "[px] a keyframe of the smoother is made when the image has moved this far, "
+                  "rotation removed");
+    visitor.field(
+        "keyframe_tracked_share", keyframe_tracked_share, {0.0, 1.0},
+        "or when at most this share of the features of the last keyframe is still tracked");
     visitor.field("keyframe_interval_s", keyframe_interval_s, {0.05, 5.0},
-                  "[s] or after this long");
+                  "[s] or when this time has passed");
     visitor.field("calibrate", calibrate,
-                  "estimates how the cameras' stamps and mounting differ from what the rig says, "
-                  "both cameras in common");
+                  "estimates corrections to the stamps and to the mounting of the cameras, common "
+                  "to both cameras");
     visitor.field("calibration_offset_s", calibration_offset_s, {1e-9, 1.0},
-                  "[s] standard deviation of the stamps before anything is known of them; small: "
-                  "they are right");
-    visitor.field("calibration_rotation_rad", calibration_rotation_rad, {1e-9, 1.0},
-                  "[rad] of the mounting, each axis");
-    visitor.field("calibration_translation_m", calibration_translation_m, {1e-9, 1.0},
-                  "[m] likewise");
-    visitor.field("start_s", start_s, {0.2, 5.0},
-                  "[s] of images held back to start from; all their poses come when it is over");
-    visitor.field("start_timeout_s", start_timeout_s, {0.5, 60.0},
-                  "[s] still unable to start, odometry starts again with newer images");
+                  "[s] standard deviation of the correction to the stamps at the start; small: no "
+                  "correction");
+    visitor.field(
+        "calibration_rotation_rad", calibration_rotation_rad, {1e-9, 1.0},
+        "[rad] standard deviation of the correction to the mounting at the start, each axis");
+    visitor.field(
+        "calibration_translation_m", calibration_translation_m, {1e-9, 1.0},
+        "[m] standard deviation of the correction to the mounting at the start, each axis");
+    visitor.field(
+        "start_s", start_s, {0.2, 5.0},
+        "[s] duration of the images held back for a start; their poses are published after it");
+    visitor.field(
+        "start_timeout_s", start_timeout_s, {0.5, 60.0},
+        "[s] after this time without a successful start, odometry drops the oldest images");
     visitor.field("rest_parallax_px", rest_parallax_px, {0.0, 20.0},
-                  "[px] of image motion over the images held back: a start at rest needs less, and "
-                  "later a rest over rest_s");
+                  "[px] rest requires less image motion: at the start over the images held back, "
+                  "later over rest_s");
     visitor.field("rest_accel_mps2", rest_accel_mps2, {0.0, 10.0},
-                  "[m/s^2] and less change of the mean accelerometer from their first half to the "
-                  "second, later from what the estimate explains");
+                  "[m/s^2] rest requires a smaller change of the mean accelerometer: at the start "
+                  "between the halves of the images held back, later against the estimate");
     visitor.field("rest_gyro_radps", rest_gyro_radps, {0.0, 1.0},
-                  "[rad/s] and of the mean gyroscope");
+                  "[rad/s] rest requires a smaller change of the mean gyroscope, in the same way");
     visitor.field("rest_s", rest_s, {0.1, 1e6},
-                  "[s] a body that has stood still for this long is at rest: no keyframes come "
-                  "of it until it moves");
+                  "[s] after this time without motion the body is at rest and makes no keyframes "
+                  "until it moves");
     visitor.field("output_interval_s", output_interval_s, {0.0, 10.0},
-                  "[s] a keyframe is handed on at least this long after the one before, and then");
-    visitor.field("output_distance_m", output_distance_m, {0.0, 10.0},
-                  "[m] when the body has moved by this much");
+                  "[s] smallest interval between published keyframes");
+    visitor.field(
+        "output_distance_m", output_distance_m, {0.0, 10.0},
+        "[m] after that interval, a keyframe is published when the body has moved this far");
     visitor.field("output_rotation_rad", output_rotation_rad, {0.0, 3.2},
-                  "[rad] or turned by this much");
+                  "[rad] or when it has turned this far");
     visitor.field("output_rest_interval_s", output_rest_interval_s, {0.1, 1e3},
-                  "[s] or, even if it hardly moves, after this long; rests do not count");
+                  "[s] or when this time has passed, even with little motion; rests do not count");
     visitor.field(
         "drift_rotation", drift_rotation, {0.0, 0.1},
-        "[rad/sqrt(s)] random walk per axis added to the covariance between keyframes: "
-        "calibration, drifting tracks, synchronisation, of which the smoother cannot know");
-    visitor.field("drift_translation", drift_translation, {0.0, 1.0}, "[m/sqrt(s)] the same");
+        "[rad/sqrt(s)] random walk per axis, added to the covariance between keyframes for errors "
+        "that the smoother does not model: calibration, drifting tracks, synchronisation");
+    visitor.field("drift_translation", drift_translation, {0.0, 1.0},
+                  "[m/sqrt(s)] random walk per axis, added to the covariance between keyframes");
     visitor.field("tilt_sigma", tilt_sigma, {0.0, 1.5},
-                  "[rad] of the verticals handed on with keyframes, each horizontal axis; below "
-                  "1e-4: none are");
+                  "[rad] standard deviation of the published verticals, each horizontal axis; "
+                  "below 1e-4: no verticals");
     visitor.field(
         "tilt_keyframes", tilt_keyframes, {1, 100000},
-        "in a row have one error of the vertical in common, from biases that hardly change; who "
-        "uses them takes errors for independent: each gets sqrt(tilt_keyframes) times tilt_sigma, "
-        "and beyond 1.5 rad none are handed on");
-    visitor.field(
-        "max_imu_gap_s", max_imu_gap_s, {1e-3, 1.0},
-        "[s] longest between two inertial samples that is interpolated; longer: images alone tell "
-        "the motion, or, where they do not, a new start");
+        "number of keyframes in a row whose verticals share one error, because biases change "
+        "slowly; the optimiser treats the errors as independent, so each vertical gets "
+        "sqrt(tilt_keyframes) times tilt_sigma, and beyond 1.5 rad none is published");
+    visitor.field("max_imu_gap_s", max_imu_gap_s, {1e-3, 1.0},
+                  "[s] longest gap between inertial samples that is interpolated; over a longer "
+                  "one images determine the motion, or odometry starts again");
     visitor.field("max_speed_mps", max_speed_mps, {0.1, 1e3},
-                  "[m/s] a faster body means that the estimate has diverged");
-    visitor.field("max_gyro_bias_radps", max_gyro_bias_radps, {1e-3, 10.0},
-                  "[rad/s] so do larger biases");
-    visitor.field("max_accel_bias_mps2", max_accel_bias_mps2, {1e-2, 50.0}, "[m/s^2] likewise");
+                  "[m/s] a higher estimated speed shows that the estimate has diverged");
+    visitor.field(
+        "max_gyro_bias_radps", max_gyro_bias_radps, {1e-3, 10.0},
+        "[rad/s] a larger estimated bias of the gyroscope shows that the estimate has diverged");
+    visitor.field("max_accel_bias_mps2", max_accel_bias_mps2, {1e-2, 50.0},
+                  "[m/s^2] a larger estimated bias of the accelerometer shows that the estimate "
+                  "has diverged");
   }
 };
 

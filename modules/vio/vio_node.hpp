@@ -15,16 +15,16 @@ namespace km {
 
 /// Channels of the odometry node; they must outlive it.
 struct VioTopics {
-  In<SensorPacket> packets;               ///< In order of time.
-  Out<OdometryState> odometry;            ///< One per image, in order of time.
-  Out<KeyframeOdometry> keyframes;        ///< Indices without gaps.
-  Out<LocatedFrame> frames;               ///< One per image, after its keyframe.
-  Out<VioStatistics> statistics;          ///< When something has happened, and while blind.
-  Out<TrackedImage> images;               ///< All that are accepted.
-  Out<ProcessedFrame> processed;          ///< For each packet, when its step is over.
+  In<SensorPacket> packets;         ///< In order of time.
+  Out<OdometryState> odometry;      ///< One per image, in order of time.
+  Out<KeyframeOdometry> keyframes;  ///< Indices without gaps.
+  Out<LocatedFrame> frames;         ///< One per image, after its keyframe.
+  Out<VioStatistics> statistics;    ///< After events, and while blind.
+  Out<TrackedImage> images;         ///< All accepted images.
+  Out<ProcessedFrame> processed;    ///< For each packet, at the end of its step.
 };
 
-/// Stereo-inertial odometry as a thread: one Vio. A full queue holds the sensors up.
+/// Stereo-inertial odometry as a thread, with one Vio. A full queue delays the sensors.
 class VioNode final : public Node {
  public:
   /// Throws ConfigError if a config is out of bounds, std::invalid_argument for an unusable rig.
@@ -37,13 +37,14 @@ class VioNode final : public Node {
 
   std::string_view name() const override { return VioConfig::kSection; }
   void start() override { worker_.start(); }
-  /// Finishes queued packets and says in the log what odometry met with.
+  /// Finishes queued packets and logs a summary.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handles one packet synchronously. The thread calls only this; so can tests and replay.
+  /// Handles one packet synchronously. The thread calls only this function; tests and replay can
+  /// call it too.
   void step(const SensorPacket& packet);
 
  private:

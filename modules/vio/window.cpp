@@ -14,7 +14,7 @@ namespace {
 constexpr int kRefinements = 3;
 constexpr double kMaxRelativeSigma = 1.0 / 3.0;
 
-// Least squares of the distances to all rays.
+// Minimises the sum of squared distances to all rays.
 std::optional<Eigen::Vector3d> nearest_to_rays(const Window& window, std::span<const SE3> images,
                                                const WindowLandmark& landmark) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
@@ -107,7 +107,8 @@ std::vector<SE3> image_poses(const Window& window) {
 void observe(Window& window, const TrackedFrame& tracked) {
   std::vector<WindowLandmark> added;
   auto at = window.landmarks.begin();
-  for (const TrackedFeature& feature : tracked.features) {  // both lists ascend: one pass
+  for (const TrackedFeature& feature :
+       tracked.features) {  // both lists ascend, so one pass suffices
     const WindowObservation observation{window.frames.size() - 1, {feature.left, feature.right}};
     while (at != window.landmarks.end() && at->id < feature.id) ++at;
     if (at != window.landmarks.end() && at->id == feature.id)

@@ -21,15 +21,16 @@ struct WindowFrame {
   std::uint64_t id = 0;  ///< Ascending along the window.
   OdometryState state;
   bool keyframe = false;
-  bool rests = false;  ///< The body stands still here.
-  /// Cover the time since the frame before, where it was not spent at rest; those of the first only
-  /// those after it need.
+  bool rests = false;  ///< The body stands still in this image.
+  /// Samples over the time since the frame before, except for rests. Those of the first frame are
+  /// needed only by the following frames.
   std::vector<ImuSample> samples;
-  bool is_bridged = false;       ///< With a gap in them: see InertialFrame.
-  std::optional<ImuFactor> imu;  ///< From the frame before; none for the first.
-  /// The state is that of the inertial sensor's instant state.stamp + offset_s.
+  bool is_bridged = false;       ///< `samples` have a gap: see InertialFrame.
+  std::optional<ImuFactor> imu;  ///< Factor from the frame before; none for the first.
+  /// The state belongs to the instant state.stamp + offset_s of the inertial sensor.
   double offset_s = 0.0;
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< Measured there [rad/s].
+  /// Angular rate measured at that instant [rad/s].
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
 
   [[nodiscard]] Stamp instant() const { return state.stamp + nanoseconds(offset_s); }
 };
@@ -43,18 +44,19 @@ struct WindowObservation {
 struct WindowLandmark {
   std::uint64_t id = 0;
   Eigen::Vector3d p_odom = Eigen::Vector3d::Zero();
-  bool located = false;                         ///< p_odom is known: the landmark takes part.
+  bool located = false;                         ///< p_odom is known, and the landmark takes part.
   std::vector<WindowObservation> observations;  ///< Ascending frames.
 };
 
-/// Everything that the optimisation works on.
+/// All variables and data of the optimisation.
 struct Window {
-  std::array<ViewModel, 2> rig_views;  ///< As the rig says.
-  std::array<ViewModel, 2> views;      ///< As the calibration says.
+  std::array<ViewModel, 2> rig_views;  ///< Cameras as the rig states them.
+  std::array<ViewModel, 2> views;      ///< Cameras with the estimated calibration.
   CameraCalibration calibration;
   bool calibrates = false;  ///< The calibration is one of the unknowns.
   double gravity_mps2 = 9.81;
-  double loss_scale = 1.5;  ///< Of the Cauchy loss on reprojection errors [standard deviations].
+  /// Scale of the Cauchy loss on reprojection errors [standard deviations].
+  double loss_scale = 1.5;
   std::vector<WindowFrame> frames;        ///< In order of time.
   std::vector<WindowLandmark> landmarks;  ///< Ascending ids.
   StatePrior prior;
@@ -63,30 +65,31 @@ struct Window {
 /// Index of the frame with `id`; frames.size() if there is none.
 [[nodiscard]] std::size_t frame_index(const Window& window, std::uint64_t id);
 
-/// For each frame what the prior holds of it.
+/// For each frame, the first estimates that the prior holds.
 [[nodiscard]] std::vector<FirstEstimate> first_estimates(const Window& window);
 
-/// Sets the calibration, and the views by it.
+/// Sets the calibration and updates the views.
 void calibrate(Window& window, const CameraCalibration& calibration);
 
-/// Where the body was when the image of `frame` was taken, if `state` was its state.
+/// Pose of the body when the image of `frame` was taken, for its state `state`.
 [[nodiscard]] ImagePose image_pose(const Window& window, const WindowFrame& frame,
                                    const OdometryState& state);
 
-/// The same for all frames by their states, without derivatives.
+/// image_pose() of all frames with their own states, without derivatives.
 [[nodiscard]] std::vector<SE3> image_poses(const Window& window);
 
-/// Enters what was seen in the window's last frame: known landmarks gain an observation, new ones
-/// are added, not located yet.
+/// Adds the observations of the window's last frame. Known landmarks gain an observation; new ones
+/// are added without a position.
 void observe(Window& window, const TrackedFrame& tracked);
 
 /// True if the landmark was seen in the last frame.
 [[nodiscard]] bool tracked_now(const Window& window, const WindowLandmark& landmark);
 
-/// Sets landmark.p_odom and `located` from its observations and image_poses(window): the point
-/// nearest to all rays, refined on the reprojection errors (Gauss-Newton). It stays unlocated if
-/// it comes to lie behind a camera, if an error exceeds `max_error` [standard deviations, root mean
-/// square], or if its distance along the last ray is uncertain by more than a third.
+/// Sets landmark.p_odom and `located` from its observations and image_poses(window). The position
+/// is the point nearest to all rays, refined on the reprojection errors (Gauss-Newton). The
+/// landmark stays unlocated if it lies behind a camera or if an error exceeds `max_error` [standard
+/// deviations, root mean square]. It also stays unlocated if its distance along the last ray is
+/// uncertain by more than a third.
 void locate(const Window& window, std::span<const SE3> images, double max_error,
             WindowLandmark& landmark);
 

@@ -29,9 +29,9 @@ std::vector<const OdometryState*> prior_states(const Window& window) {
 
 constexpr double kInitialDamping = 1e-6;
 constexpr double kMaxDamping = 1e3;
-constexpr double kSmallStep = 1e-6;  // largest of rad, m, m/s: far below what images resolve
+constexpr double kSmallStep = 1e-6;  // largest of rad, m, m/s: far below the resolution of images
 
-// What an iteration changes, to take it back.
+// Variables that an iteration changes, saved so that it can be undone.
 struct Snapshot {
   CameraCalibration calibration;
   std::vector<OdometryState> states;
@@ -52,7 +52,7 @@ bool seen_by_oldest(const WindowLandmark& landmark) {
   return landmark.located && landmark.observations.front().frame == 0;
 }
 
-// The frames that the marginalisation of the oldest concerns, it included.
+// Frames that the marginalisation of the oldest frame involves, including that frame.
 std::vector<std::size_t> concerned_frames(const Window& window) {
   std::vector<bool> concerned(window.frames.size(), false);
   concerned[0] = concerned[1] = true;
@@ -68,7 +68,7 @@ std::vector<std::size_t> concerned_frames(const Window& window) {
   return frames;
 }
 
-// The prior that the oldest frame leaves.
+// Prior that replaces the oldest frame.
 StatePrior prior_after_oldest(const Window& window) {
   WindowEquations equations(window, 0.0);
   equations.add_prior();
@@ -98,7 +98,7 @@ StatePrior prior_after_oldest(const Window& window) {
   const SquareRootPrior root =
       marginalize(full(variables, variables), equations.g()(variables), 15);
   prior.J = root.J;
-  // The gradient was taken at the current states; the prior counts from the first estimates.
+  // The gradient was taken at the current states; the prior is relative to the first estimates.
   prior.r = root.r - root.J * prior_offset(prior, states, window.calibration);
   return prior;
 }
@@ -357,11 +357,11 @@ void forget_frame(Window& window, std::size_t frame) {
 }
 
 void marginalize_oldest(Window& window) {
-  window.frames[1].keyframe = true;  // in the prior: it can only leave by marginalisation
+  window.frames[1].keyframe = true;  // part of the prior, so it can leave only by marginalisation
   window.prior = prior_after_oldest(window);
   for (WindowLandmark& landmark : window.landmarks) {
     if (!seen_by_oldest(landmark)) continue;
-    std::erase_if(landmark.observations,  // what the prior has used must not count again
+    std::erase_if(landmark.observations,  // observations in the prior must not count twice
                   [&](const auto& o) { return window.frames[o.frame].keyframe; });
     landmark.located = false;
   }

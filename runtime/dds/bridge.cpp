@@ -14,9 +14,10 @@ namespace {
 constexpr std::chrono::seconds kAcknowledgementTime{2};
 constexpr double kTellKeys_s = 30.0;  // a robot that was short of memory may have lost one
 constexpr std::size_t kMaxKeyMessageBytes = 512;
-constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // for what only time tells
+constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // interval for changes that only the clock
+                                                    // causes
 
-// What one peer may have waiting on a topic of this kind.
+// Bound on the waiting messages of one peer on a topic of this kind.
 QueueQuota quota_of(TopicKind kind, Pace pace) {
   QueueQuota quota{.per_second = pace.per_second, .burst = pace.burst};
   quota.newest_wins = kind == TopicKind::kStatus || kind == TopicKind::kState;
@@ -31,7 +32,7 @@ TopicSpec key_topic() {
           .carries_keys = true};
 }
 
-// Null where the team has no keys.
+// Null without keys.
 std::unique_ptr<OutgoingTopic> make_key_topic(const DdsParticipant& participant,
                                               const Peers& peers) {
   if (participant.seal() == nullptr) return nullptr;
@@ -165,7 +166,7 @@ void DdsBridge::receive_until_stopped() try {
                   "cannot wait for messages");
     const Heartbeat::Step step(receiving_);
     dds_read_guardcondition(stop_request_.handle(), &stop);
-    // Who is there comes before what they say.
+    // Peers are updated before their messages are read.
     const double now_s = steady_now_s();
     peers_.poll();
     for (const TeamPeer& peer : peers_.take_admitted()) key_teller_.post(peer);

@@ -37,8 +37,8 @@ struct Addressed {
   std::uint64_t boot = 0;  ///< See Addressee.
 };
 
-/// A channel between robots: what is published here on `to_peers` comes out of `from_peers` there.
-/// One end can only be written and the other only read, so that no node takes one for the other.
+/// A channel between robots: a message published on `to_peers` here arrives on `from_peers` there.
+/// One end can only be written and the other only read, so that no node confuses them.
 template <typename T, typename Sent = T>
 class Crossing {
  public:
@@ -51,24 +51,24 @@ class Crossing {
   Topic<T> peers_;
 };
 
-/// Likewise, from one robot to one other.
+/// Crossing of messages from one robot to one other.
 template <typename T>
 using AddressedCrossing = Crossing<T, Addressed<T>>;
 
-/// Which ends of a crossing a robot uses: it is not sent what it does not receive.
+/// Ends of a crossing that a robot uses: messages that it does not receive are not sent to it.
 struct CrossingEnds {
   bool send = true;
   bool receive = true;
 };
 
-/// How many messages of each peer are handed on per second; more wait. For what is cheap to send
-/// and costly to answer.
+/// How many messages of each peer are delivered per second; more wait. For messages that are cheap
+/// to send and costly to answer.
 struct Pace {
   double per_second = std::numeric_limits<double>::infinity();
-  double burst = 1.0;  ///< At once, after a silence.
+  double burst = 1.0;  ///< Number of messages delivered at once after a silence.
 };
 
-/// What else is done with the messages of a crossing. `content` is what is sealed of a message:
+/// Additional processing of the messages of a crossing. `content` is the sealed part of a message:
 /// its serialised form, and its tail.
 template <typename T>
 struct ContentGuard {
@@ -77,43 +77,46 @@ struct ContentGuard {
   /// Octets that `tail` puts behind every message; they are taken off before it is read.
   std::size_t tail_bytes = 0;
   std::function<std::vector<std::uint8_t>(const T& message, Content serialized)> tail = {};
-  /// Sees what arrives before others do: null, or why it is refused (a string literal).
+  /// Checks each received message before it is published: null, or the reason of a refusal (a
+  /// string literal).
   std::function<const char*(const TeamPeer& sender, const T& message, Content content)> check = {};
 };
 
 /// Carries topics between robots: in-process Topic<T> <-> DDS topic, through Codec<T>.
 ///
-/// Wire it (exchange) before start(). What is published to the peers is encoded and written on the
-/// bridge's sending thread: DDS never blocks here for want of a receiver (all kinds keep the last
-/// sample per key), but a thin link can hold up the socket, and no algorithm should wait for that.
-/// What is most important is written first, and with a budget the rest waits for that (see Sender).
-/// What is received is filed on the bridge's receive thread, which waits for nothing else, and
-/// published on a thread of each topic, in turn between the peers (see IncomingTopic): a node that
-/// is busy holds up what is for it, and a peer that sends much holds up itself.
+/// Wire it (exchange) before start(). Messages to peers are encoded and written on the bridge's
+/// sending thread. DDS never blocks here because a receiver is missing (all kinds keep the last
+/// sample per key). But a slow link can block the socket, and no algorithm should wait for that.
+/// The most important messages are written first, and with a budget the others wait for them (see
+/// Sender).
+/// Received messages are filed on the bridge's receive thread, which waits for nothing else. A
+/// thread of each topic publishes them, in rotation between the peers (see IncomingTopic). So a
+/// busy node delays only its own messages, and a peer that sends much delays only itself.
 ///
-/// Where the team has keys (DdsParticipant::seal()), all of it is sealed, and only robots of the
-/// team are heard.
+/// In a team with keys (DdsParticipant::seal()), all messages are sealed, and only robots of the
+/// team are received.
 ///
-/// The bridge is the last of the nodes to stop: it then sends what is queued, with a budget as much
-/// as that lets go in two seconds, and waits as long until the peers have acknowledged it.
+/// The bridge is the last of the nodes to stop. It then sends the queued messages, with a budget as
+/// much as the budget permits in two seconds. It waits equally long until the peers have
+/// acknowledged them.
 class DdsBridge final : public Node {
  public:
-  /// How many messages may wait to be encoded; who publishes one more waits.
+  /// Number of messages that may wait to be encoded; then publishers wait.
   static constexpr std::size_t kSendQueue = Sender::kQueue;
 
   /// `participant` outlives the bridge. Throws ConfigError if `budget` is out of bounds.
   explicit DdsBridge(const DdsParticipant& participant, const BudgetConfig& budget = {});
   ~DdsBridge() override;
 
-  /// Joins `crossing`, which outlives the bridge, to those of the other robots: with all of them,
-  /// or, if it is addressed, each message with the robot it is for and no other. `guard` is called
-  /// by the threads of the bridge.
+  /// Connects `crossing`, which outlives the bridge, to those of the other robots. Each message
+  /// goes to all robots or, if the crossing is addressed, to its addressee only. The threads of the
+  /// bridge call `guard`.
   template <typename T, typename Sent>
   void exchange(Crossing<T, Sent>& crossing, TopicKind kind, TrafficCategory category,
                 CrossingEnds ends = {}, Pace pace = {}, ContentGuard<T> guard = {});
 
-  /// Sends this process's key for messages to all to every robot there is, where the team has
-  /// keys. The bridge does so itself when a robot appears, and now and then. Thread-safe.
+  /// In a team with keys, sends this process's key for messages to all to every present robot. The
+  /// bridge also does so when a robot appears, and at intervals. Thread-safe.
   void tell_keys();
 
   /// Needs a crossing of kind kStatus: presence is its liveliness.
@@ -147,7 +150,7 @@ class DdsBridge final : public Node {
   Peers peers_;
   std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;  // the sender's
   std::vector<std::unique_ptr<IncomingTopic>> incoming_;
-  const std::unique_ptr<OutgoingTopic> keys_;  // where the team has keys; key_teller_'s
+  const std::unique_ptr<OutgoingTopic> keys_;  // null without keys; used by key_teller_
   double told_keys_s_ = 0.0;                   // receive thread only
   DdsEntity waitset_;
   DdsEntity stop_request_;  // guard condition
@@ -156,7 +159,8 @@ class DdsBridge final : public Node {
   std::exception_ptr receive_error_;
   std::atomic<bool> receive_failed_ = false;
   std::thread receiver_;
-  // Apart from the sender: the receive thread has keys told, and must not wait for room there.
+  // A thread apart from the sender's: the receive thread requests keys to be sent, and must not
+  // wait for room there.
   Worker<TeamPeer> key_teller_;
   Sender sender_;  // last members: stop first
 };
@@ -186,7 +190,7 @@ Outgoing outgoing(OutgoingTopic& topic, const GuardPtr<T>& guard,
   return outgoing(topic, guard, message->message, Addressee{message->to, message->boot});
 }
 
-// Publishes what `content` holds, or says why not.
+// Publishes the message in `content`, or returns the reason of a refusal.
 template <typename T>
 const char* publish_decoded(const Out<T>& to, const TeamPeer& sender,
                             std::span<const std::uint8_t> content, std::shared_ptr<void> token,

@@ -4,8 +4,8 @@
 
 namespace km {
 
-/// What a robot may send. Counted are the bytes of messages as in traffic.csv: once per robot that
-/// they go to, and once more where they are sent again. 0: no limit. See SendBudget.
+/// Limits on the bytes that a robot sends. Counted are the bytes of messages as in traffic.csv:
+/// once per addressee, and once more for each retransmission. 0: no limit. See SendBudget.
 struct BudgetConfig {
   static constexpr const char* kSection = "budget";
 
@@ -24,21 +24,23 @@ struct BudgetConfig {
   }
 
   void visit_fields(auto& visitor) {
-    visitor.field("bytes_per_s", bytes_per_s, {0.0, 1e12},
-                  "[B/s] that this robot sends, each receiver and what is sent again counted; more "
-                  "waits: closures go first, then verification, poses, new words, older words, "
-                  "the mesh; statuses are counted but never wait; 0, here and below: no limit");
+    visitor.field(
+        "bytes_per_s", bytes_per_s, {0.0, 1e12},
+        "[B/s] that this robot sends, including each receiver and retransmissions; further "
+        "messages wait, in this order of priority: closures, verification, poses, new words, older "
+        "words, mesh; statuses are counted but never wait; 0, here and below: no limit");
     visitor.field("bytes_per_run", bytes_per_run, {0.0, 1e15},
-                  "[B] in the whole run: the mesh is sent up to 60 % of them, words up to 80 %, "
-                  "verification up to 90 %, poses up to 95 %, closures up to all");
+                  "[B] in the whole run: the mesh may use the first 60 %, words 80 %, verification "
+                  "90 %, poses 95 %, closures all of them");
     visitor.field("verification_bytes_per_s", verification_bytes_per_s, {0.0, 1e12},
-                  "[B/s] of bytes_per_s for requested keyframes");
+                  "[B/s] part of bytes_per_s for requested keyframes");
     visitor.field("poses_bytes_per_s", poses_bytes_per_s, {0.0, 1e12}, "[B/s] for the pose graph");
     visitor.field("words_bytes_per_s", words_bytes_per_s, {0.0, 1e12},
                   "[B/s] for bags of words, new and older ones together");
     visitor.field("mesh_bytes_per_s", mesh_bytes_per_s, {0.0, 1e12}, "[B/s] for the mesh");
-    visitor.field("peer_bytes_per_s", peer_bytes_per_s, {0.0, 1e12},
-                  "[B/s] to any one robot; what is for all goes when it may go to each");
+    visitor.field(
+        "peer_bytes_per_s", peer_bytes_per_s, {0.0, 1e12},
+        "[B/s] to any one robot; a message to all is sent when the limit of each robot permits it");
   }
 };
 

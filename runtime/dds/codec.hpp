@@ -15,8 +15,8 @@
 
 namespace km {
 
-/// What tells a message apart from those that must not replace it: a hash. Only what its own
-/// sender keeps depends on it.
+/// Hash that identifies a message: only a message with the same key replaces it. Only the storage
+/// at its own sender depends on it.
 using MessageKey = std::uint64_t;
 
 /// The key of a message that these numbers name.

@@ -7,8 +7,8 @@
 
 namespace km {
 
-/// Above it lie the ports that Linux hands out to any program (net.ipv4.ip_local_port_range, 32768
-/// to 60999): a domain there cannot be entered while one of its own is among them.
+/// Above it lie the ports that Linux assigns to any program (net.ipv4.ip_local_port_range, 32768 to
+/// 60999). A robot cannot join such a domain while a program uses one of the domain's ports.
 inline constexpr unsigned kLastQuietDomain = 100;
 
 /// How robots find each other: by multicast on the link, or by a list of addresses.
@@ -53,12 +53,13 @@ struct DdsConfig {
     visitor.field("robots_per_peer", robots_per_peer, {1, 111},
                   "robots looked for at each peer; each costs 0.25 kB per 2 s on the air");
     visitor.field("lease_s", lease_s, {3.0, 3600.0},
-                  "[s] of silence after which a robot is forgotten: longer than ordinary outages; "
-                  "requests live as long");
+                  "[s] silence after which a robot is removed: longer than ordinary outages; "
+                  "requests are kept equally long");
     visitor.field("spdp_interval_s", spdp_interval_s, {0.1, 60.0}, "[s] between announcements");
-    visitor.field("liveliness_s", liveliness_s, {0.2, 60.0}, "[s] of silence: lost");
+    visitor.field("liveliness_s", liveliness_s, {0.2, 60.0},
+                  "[s] silence after which a peer counts as lost");
     visitor.field("max_message_bytes", max_message_bytes, {1200, 65500},
-                  "[B] of one UDP datagram; 1400 on radio");
+                  "[B] maximum size of a UDP datagram; 1400 on radio");
     visitor.field("fragment_bytes", fragment_bytes, {1000, 65000},
                   "[B] larger samples are sent in fragments of this; below max_message_bytes");
     visitor.field("max_rexmit_bytes", max_rexmit_bytes, {1024, 1 << 26},

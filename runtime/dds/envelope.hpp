@@ -22,7 +22,7 @@ inline constexpr std::size_t kEnvelopeBytes = 32;
 [[nodiscard]] std::vector<std::uint8_t> serialize(const dds_topic_descriptor_t& type,
                                                   const void* wire);
 
-/// A sample of a generated type, read from bytes that anybody may have sent.
+/// A sample of a generated type, read from untrusted bytes.
 class WireSample {
  public:
   /// `type` outlives this. The sample is zero.
@@ -31,8 +31,8 @@ class WireSample {
   WireSample(const WireSample&) = delete;
   WireSample& operator=(const WireSample&) = delete;
 
-  /// False if `bytes` are not one sample of the type, with what later versions append to it; then
-  /// the sample is as it was. Call once.
+  /// False if `bytes` are not one sample of the type, possibly with fields that later versions
+  /// append; then the sample is unchanged. Call once.
   [[nodiscard]] bool read(std::span<const std::uint8_t> bytes);
 
   [[nodiscard]] const void* get() const { return sample_.data(); }

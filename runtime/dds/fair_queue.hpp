@@ -14,17 +14,20 @@
 
 namespace km {
 
-/// What one peer may have waiting on one topic, and how fast it is served.
+/// Bound on the waiting messages of one peer on one topic, and the rate at which they are
+/// processed.
 struct QueueQuota {
   std::size_t messages = 20000;
   std::size_t bytes = 8U << 20U;
-  bool newest_wins = false;  ///< Full: the oldest makes room; else the newest is not taken.
+  bool newest_wins = false;  ///< When the queue is full, drop the oldest message; otherwise refuse
+                             ///< the newest.
   double per_second = std::numeric_limits<double>::infinity();
-  double burst = 1.0;  ///< Served at once after a silence; with a finite per_second.
+  double burst = 1.0;  ///< Number of messages served at once after a silence; with a finite
+                       ///< per_second.
 };
 
-/// Queues of messages, one per peer, served in turn: a peer that sends much waits for itself and
-/// not the others. Time comes in [s], any origin, and does not go backwards. Not thread-safe.
+/// Queues of messages, one per peer, served in rotation: a peer that sends much delays only its own
+/// messages. Time comes in [s], with any origin, and does not decrease. Not thread-safe.
 template <typename Message>
 class FairQueue {
  public:
@@ -60,7 +63,7 @@ class FairQueue {
     return std::nullopt;
   }
 
-  /// How long after `now_s` pop() will give something if nothing is pushed; nullopt: never.
+  /// Time after `now_s` until pop() returns a message if nothing is pushed; nullopt: never.
   [[nodiscard]] std::optional<double> wait_s(double now_s) {
     std::optional<double> least;
     for (auto& [peer, line] : peers_) {
@@ -86,7 +89,7 @@ class FairQueue {
 
     std::deque<Waiting> waiting;
     std::size_t bytes = 0;
-    TokenBucket tokens;  // a message takes one
+    TokenBucket tokens;  // each message takes one
   };
 
   [[nodiscard]] bool has_room(const Line& line, std::size_t bytes) const {

@@ -18,15 +18,15 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMaxStreams = 4096;  // boots of robots remembered per topic
-// For a writer to become known: DDS may tell of its messages before its robot is heard, and a
-// robot that is killed and started again waits for its former self to be missed.
+// Time to wait until a writer becomes known. DDS may deliver messages before it announces their
+// robot. A robot that is killed and started again waits until its former process counts as lost.
 constexpr double kPatience_s = 8.0;
 constexpr double kRetry_s = 0.1;
 constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};
-constexpr std::size_t kFilingBytes = 256;  // that a message takes beside its own
+constexpr std::size_t kFilingBytes = 256;  // bytes of bookkeeping per message
 
-// An envelope as DDS reads it: one count and what it counts.
+// An envelope in the form in which DDS reads it, with a count and its elements.
 class ReceivedEnvelope {
  public:
   explicit ReceivedEnvelope(const ddsi_serdata& serialized)
@@ -43,7 +43,7 @@ class ReceivedEnvelope {
   bool usable_;
 };
 
-// What a message takes while it is kept.
+// Bytes that a stored message takes.
 std::size_t kept_bytes(const ddsi_serdata& serialized) {
   return ddsi_serdata_size(&serialized) + kFilingBytes;
 }
@@ -126,7 +126,7 @@ void IncomingTopic::arrive(Serdata serialized, dds_instance_handle_t writer, dou
     return refuse("larger than its topic allows");
   const auto guid = writers_.participant_of(writer);
   if (!guid) return refuse("from no known writer");
-  // What waits comes first.
+  // Messages of a writer stay in order behind its waiting messages.
   const Peers::Claim claim = peers_.claim_of(*guid);
   if (!waiting_.contains(*guid) && is_settled(claim.standing))
     return admit(std::move(serialized), *guid, claim, now_s);
@@ -152,11 +152,11 @@ void IncomingTopic::recall(double now_s) {
   }
 }
 
-// Whether it is known what is to be done with the messages of a participant.
+// True if the handling of a participant's messages is decided.
 bool IncomingTopic::is_settled(Standing standing) const {
   const bool is_open = standing == Standing::kUnknown || standing == Standing::kRival ||
                        standing == Standing::kArriving;
-  // Keys come before anything can show who sends them; each is sealed by itself.
+  // Key messages arrive before any seal can prove their sender; each is sealed individually.
   return !is_open || (spec_.carries_keys && standing != Standing::kUnknown);
 }
 
@@ -182,8 +182,8 @@ void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid&
   if (!fits) refuse("for want of room");
 }
 
-// A status of a participant that is not the robot it says it is, or not yet. Of a twin, its number
-// tells how long it has been running; where the team has keys, its seal tells who it is.
+// Handles a status of a participant that is not (yet) the robot it claims to be. The status of a
+// twin states how long that has been running; in a team with keys the seal identifies its sender.
 void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& writer,
                                const Peers::Claim& claim, double now_s) {
   if (spec_.kind != TopicKind::kStatus) return;
@@ -211,7 +211,7 @@ IncomingTopic::Readable IncomingTopic::open(const km_wire_Envelope& envelope,
   const auto addressee = addressed_ ? std::optional(TeamPeer{self.robot, self.boot}) : std::nullopt;
   const SealedEnvelope way(spec_.name, writer, envelope, addressee);
   Readable result{seal->with([&](TeamSeal& team) { return team.open(way.context(), *bytes); }), {}};
-  result.content = result.how.content;  // a vector's octets stay where they are when it is moved
+  result.content = result.how.content;  // moving a vector keeps its elements in place
   return result;
 }
 
@@ -264,7 +264,8 @@ void IncomingTopic::await_key(Filed filed, double now_s) {
     refuse("one too many under a key that is not known yet");
 }
 
-// Of each robot the oldest that could not be opened for want of a key. False if none opens yet.
+// For each robot, delivers the oldest message that could not be opened because its key is missing.
+// False if none opens yet.
 bool IncomingTopic::deliver_again(double now_s) {
   return sealed_.serve(now_s, [this](RobotId /*from*/, const Filed& filed, double waited_s) {
     if (deliver(filed) == Verdict::kTaken) return true;
@@ -292,10 +293,11 @@ IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, c
   return Verdict::kTaken;
 }
 
-// Null, or why the message is refused. A duplicate is neither.
+// Returns the reason of a refusal, otherwise null. A duplicate is dropped without a reason.
 const char* IncomingTopic::hand_on(const km_wire_Envelope& envelope, const Filed& filed,
                                    std::span<const std::uint8_t> content) {
-  std::shared_ptr<void> token = in_flight_->enter();  // before asking who is current: it may wait
+  std::shared_ptr<void> token = in_flight_->enter();  // before the check who is current, because it
+                                                      // may wait
   if (TeamPeer{envelope.robot, envelope.boot} != filed.sender) return "claims another robot's id";
   if (!spec_.carries_keys && !peers_.is_current(filed.sender))
     return "from a former process of its robot";

@@ -23,38 +23,38 @@
 
 namespace km {
 
-/// How many messages are with their subscribers, so that the next waits with those of its peer
-/// instead of before those of others in a node's queue. Thread-safe.
+/// Number of messages that subscribers hold. It is bounded, so that the next message waits with
+/// those of its peer and not before other peers' messages in a node's queue. Thread-safe.
 class InFlight : public std::enable_shared_from_this<InFlight> {
  public:
-  /// Waits until there is room, at most for a while: what a subscriber keeps must not stop the
-  /// rest. The one it counts is in flight until the token is gone.
+  /// Waits until there is room, for a bounded time, because one subscriber must not stop the
+  /// others. The message counts until the token is released.
   [[nodiscard]] std::shared_ptr<void> enter();
 
  private:
   void leave();
 
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the members below
   std::condition_variable left_;
   int count_ = 0;
 };
 
-/// The receiving end of a topic, in two steps. The gate, on the receive thread, knows of a message
-/// who wrote it and how long it is, and nothing else: it files what comes from a robot of the team,
-/// apart by robot, lets wait shortly what comes from one that is not known yet, and refuses all
-/// else. It never waits itself. Delivery, on the topic's own thread, reads what was filed, in turn
-/// between the robots, drops duplicates, and hands it to its subscribers.
+/// The receiving end of a topic, in two steps. The gate runs on the receive thread and knows only
+/// the writer and the length of a message. It files messages of robots of the team, separately for
+/// each robot, lets messages of unknown writers wait for a short time, and refuses all others. It
+/// never waits. Delivery runs on the topic's own thread. It reads the filed messages, in rotation
+/// between the robots, drops duplicates, and calls the subscribers.
 ///
-/// Everything that arrives is untrusted: what is refused, and for want of room dropped, is counted
-/// by reason, logged at a limited rate, and goes no further.
+/// All received bytes are untrusted. Messages that are refused, or dropped because there is no
+/// room, are counted by reason and logged at a limited rate.
 class IncomingTopic {
  public:
-  /// Gets what a message carries; publishes it, or returns why not (a string literal). `token` is
-  /// to be held as long as subscribers are busy with it.
+  /// Receives the content of a message and publishes it, or returns the reason of a refusal (a
+  /// string literal). Subscribers hold `token` as long as they process the message.
   using Handler = std::function<const char*(
       const TeamPeer& sender, std::span<const std::uint8_t> content, std::shared_ptr<void> token)>;
 
-  /// `addressed`: takes only what is sent to this robot alone, else only what is sent to all.
+  /// `addressed`: accepts only messages to this robot, otherwise only messages to all.
   IncomingTopic(const DdsParticipant& participant, Peers& peers, TopicSpec spec, bool addressed,
                 const QueueQuota& quota, Handler handler);
   ~IncomingTopic();
@@ -65,13 +65,13 @@ class IncomingTopic {
   [[nodiscard]] dds_entity_t condition() const { return condition_.handle(); }
   /// Files everything there is.
   void take(double now_s);
-  /// Files what has been waiting for its writer to be known. For now and then.
+  /// Files the messages whose writer has become known. Call at intervals.
   void recall(double now_s);
 
   // Delivery.
 
   void start();
-  /// What is still filed is dropped. Idempotent.
+  /// Drops all filed messages. Idempotent.
   void stop() noexcept;
   [[nodiscard]] std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
 
@@ -90,7 +90,8 @@ class IncomingTopic {
     TeamPeer sender;
     Guid writer{};
   };
-  // What a message carries. `content`, if it opened, is the envelope's or that of `how`.
+  // Parts of a message that are ready to read. `content`, if it opened, is the envelope's or that
+  // of `how`.
   struct Readable {
     Opened how;
     std::span<const std::uint8_t> content;
@@ -125,7 +126,7 @@ class IncomingTopic {
   WaitingRooms<RobotId, Filed> sealed_;  // delivery only: for which a key is missing
   double started_s_ = 0.0;
 
-  mutable std::mutex mutex_;  // guards what is filed, and the counts
+  mutable std::mutex mutex_;  // guards the filed messages and the counts
   std::condition_variable filed_changed_;
   FairQueue<Filed> filed_;
   bool stopping_ = false;

@@ -35,7 +35,7 @@ bool OutgoingTopic::is_kept() const {
   return is_sealed() && (spec_.kind == TopicKind::kEvent || spec_.kind == TopicKind::kState);
 }
 
-// nullopt if there is nobody whom it is for.
+// nullopt if the addressee does not exist.
 std::optional<TeamPeer> OutgoingTopic::receiver_of(const Addressee& addressee) const {
   if (spec_.carries_keys) return TeamPeer{addressee.robot, 0};
   const auto current = peers_.current(addressee.robot);
@@ -49,7 +49,7 @@ std::string OutgoingTopic::partition_for(const std::optional<TeamPeer>& receiver
   return spec_.carries_keys ? partition_of(receiver->robot) : partition_of(*receiver, is_sealed());
 }
 
-// Of a robot in another life the counts go on; what was kept for the former is gone.
+// When a robot restarts (new boot id), its counters continue and its stored messages are discarded.
 OutgoingTopic::Writer& OutgoingTopic::writer_to(const std::optional<TeamPeer>& receiver) {
   const std::lock_guard lock(mutex_);
   const auto [entry, fresh] =
@@ -134,7 +134,8 @@ void OutgoingTopic::send(Writer& writer, MessageKey key, Octets content) {
   for (const Guid& reader : writer.readers) writer.sent_to[reader].add(size);
 }
 
-// Of a state the newest. Requests are soon forgotten: they count only for who comes first.
+// Keeps the newest message of a state. Requests soon expire, so they count only for the first
+// reader.
 void OutgoingTopic::add_to_history(Writer& writer, MessageKey key, std::uint64_t bytes) const {
   if (spec_.kind == TopicKind::kStatus) return;
   if (spec_.kind == TopicKind::kRequest && !writer.readers.empty()) return;

@@ -22,35 +22,35 @@
 
 namespace km {
 
-/// A topic between robots: what travels on it are envelopes (idl/envelope.idl).
+/// A topic between robots, which carries envelopes (idl/envelope.idl).
 struct TopicSpec {
   std::string name;
-  std::uint16_t version = 1;  ///< Of the content's type.
-  std::size_t max_bytes = 0;  ///< Of the content.
+  std::uint16_t version = 1;  ///< Version of the content's type.
+  std::size_t max_bytes = 0;  ///< Maximum size of the content.
   TopicKind kind = TopicKind::kEvent;
   TrafficCategory category = TrafficCategory::kOther;
   bool carries_keys = false;  ///< Its messages are sealed by themselves.
 };
 
-/// Whom a message is for.
+/// Receiver of a message.
 struct Addressee {
   RobotId robot = 0;
-  std::uint64_t boot = 0;  ///< Only for the life of this process; 0: whichever it lives.
+  std::uint64_t boot = 0;  ///< Only for the incarnation of this process; 0: for any.
 };
 
-/// DDS partition in which the messages to one robot travel. In clear, those for all processes of
-/// its life: what was kept for a former life does not reach the next. Sealed, those for this
-/// process, since no other can open them.
+/// DDS partition of the messages to one robot. Without a seal it contains all processes of one
+/// incarnation, so messages for a former incarnation do not reach the next. With a seal it contains
+/// only this process, because no other can open the messages.
 [[nodiscard]] std::string partition_of(const TeamPeer& peer, bool is_sealed);
-/// Likewise, of what is sealed for one process by itself.
+/// DDS partition of messages that are sealed individually for one process.
 [[nodiscard]] std::string partition_of(RobotId robot);
 
-/// The sending end of a topic. Messages to all robots go through one writer; each robot addressed
-/// gets a writer of its own, in its own partition, so that nobody else is sent its bytes.
+/// The sending end of a topic. Messages to all robots use one writer. Each addressee has a writer
+/// of its own, in its own partition, so that other robots do not receive its bytes.
 ///
-/// What a robot is sent reaches a process that resumes its life, too. Where the team has keys, that
-/// is not what DDS keeps, sealed as it is for the former process: events and states for one robot
-/// are kept here in clear as well, and sealed anew for the next one.
+/// A resumed process also receives the messages that were sent to its robot before. In a team with
+/// keys, DDS cannot keep them, because they are sealed for the former process. So events and states
+/// for one robot are also kept here without a seal, and sealed again for the next process.
 ///
 /// write(), catch_up(), notice_readers(), take_newcomers(), readers_of() and wait_for_acks() belong
 /// to one thread; the rest is thread-safe.
@@ -59,27 +59,28 @@ class OutgoingTopic {
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
 
   /// Writes to a robot or to all, sealed where the team has keys. Messages are numbered per writer.
-  /// What DDS refuses is counted and logged, as is content that no reader would take. What is for a
-  /// robot that has never been there, or for a life that is over, is dropped. For a robot that has
-  /// shown no keys events and states wait, and the rest is dropped, counted and logged.
+  /// Content that DDS refuses, or that no reader would accept, is counted and logged. Messages for
+  /// a robot that was never present, or for an earlier incarnation, are dropped. For a robot
+  /// without known keys, events and states wait; other messages are dropped, counted and logged.
   void write(std::optional<Addressee> addressee, MessageKey key, Octets content);
 
-  /// The robot is there, perhaps as another process: it gets what waits for it, and what its life
-  /// was sent before.
+  /// The robot is present, perhaps as another process: sends the messages that wait for it, and
+  /// those that its incarnation was sent before.
   void catch_up(RobotId robot);
 
-  /// Robots that a message written now goes to. An addressee counts before its reader is matched.
+  /// Robots that would receive a message written now. An addressee counts before its reader is
+  /// matched.
   [[nodiscard]] std::vector<RobotId> readers_of(std::optional<Addressee> addressee);
 
   [[nodiscard]] const TopicSpec& spec() const { return spec_; }
 
-  /// Counts what DDS sends by itself to robots that have come since: all that it keeps for them.
+  /// Counts the stored messages that DDS has sent to new readers by itself.
   void notice_readers();
 
   /// Whether such have been noticed since the last call, by whatever was done here.
   [[nodiscard]] bool take_newcomers() { return std::exchange(newcomers_, false); }
 
-  /// So far: once per reader, and what was sent again.
+  /// Bytes sent so far, counted once per reader and retransmission.
   [[nodiscard]] std::uint64_t sent_bytes() const;
 
   /// Waits until every matched reader has everything. False on timeout.
@@ -97,12 +98,13 @@ class OutgoingTopic {
     std::unique_ptr<dds_statistics, StatisticsDeleter> statistics;
     std::optional<TeamPeer> receiver;  // none: all
     std::string partition;
-    std::map<std::string, std::uint32_t> next_number;  // by partition: a process may return
-    std::vector<Guid> readers;                         // participants of those matched
-    std::map<MessageKey, Octets> kept;                 // to be sealed for the next process
-    std::set<MessageKey> due;                          // of these, to this one
+    std::map<std::string, std::uint32_t> next_number;  // by partition, because a process may return
+    std::vector<Guid> readers;                         // participants of the matched readers
+    std::map<MessageKey, Octets> kept;                 // messages to be sealed for the next process
+    std::set<MessageKey> due;                          // messages of these that this process still
+                                                       // needs
     TrafficCount written;
-    TrafficCount history;                        // what DDS sends to a reader that comes
+    TrafficCount history;                        // messages that DDS sends to a new reader
     std::map<MessageKey, std::uint64_t> newest;  // bytes of a state in it
     std::uint64_t failures = 0;
     std::map<Guid, TrafficCount> sent_to;

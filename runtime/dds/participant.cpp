@@ -49,21 +49,21 @@ void write_general(std::ostream& xml, const DdsConfig& config, const NetworkInte
   xml << "<General><Interfaces><NetworkInterface name='" << xml_escaped(interface.name) << '\'';
   // Linux does not flag loopback as capable of multicast, yet it is.
   if (multicast && interface.loopback) xml << " multicast='true'";
-  // Data goes by unicast: on radio, multicast runs at the base rate and without acknowledgement.
+  // Data use unicast: on radio, multicast runs at the base rate and without acknowledgement.
   xml << "/></Interfaces><AllowMulticast>" << (multicast ? "spdp" : "false")
       << "</AllowMulticast><MaxMessageSize>" << config.max_message_bytes
       << "B</MaxMessageSize><FragmentSize>" << config.fragment_bytes
       << "B</FragmentSize></General>";
 }
 
-// Where the discovery of the robots 0, 1, ... of a host listens: the port mapping of RTPS with its
-// default parameters.
+// Discovery ports of the robots 0, 1, ... of a host: the port mapping of RTPS with its default
+// parameters.
 int discovery_port(int domain, int index) {
   return 7400 + 250 * domain + 10 + 2 * index;
 }
 
-// Robots on this host cost nothing on the network: the whole range is asked. Elsewhere each port
-// that is asked is a packet on the air.
+// Asks all ports of this host, because that costs nothing on the network. On other hosts each port
+// costs a packet on the air.
 void write_peers(std::ostream& xml, const DdsConfig& config, const std::string& own_address) {
   xml << "<Peers><Peer address='" << own_address << "'/>";
   for (const std::string& peer : config.peers) {
@@ -82,8 +82,8 @@ void write_peers(std::ostream& xml, const DdsConfig& config, const std::string& 
 void write_discovery(std::ostream& xml, const DdsConfig& config,
                      const NetworkInterface& interface) {
   const bool by_address = config.discovery == Discovery::kPeers || !config.peers.empty();
-  // Fixed ports are needed where robots are found by address, and only there: without them any
-  // number of robots fits on one host.
+  // Fixed ports are needed only if robots are found by address. Without them any number of robots
+  // fits on one host.
   xml << "<Discovery><ParticipantIndex>" << (by_address ? "auto" : "none")
       << "</ParticipantIndex><MaxAutoParticipantIndex>" << config.max_participant_index
       << "</MaxAutoParticipantIndex><LeaseDuration>" << milliseconds(config.lease_s)
@@ -110,7 +110,7 @@ void log_line(void* /*argument*/, const dds_log_data_t* data) {
   while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
   const bool severe = (data->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
   const auto level = severe ? log::Level::kError : log::Level::kWarn;
-  // A dead link fails every packet alike: what is limited is the kind of message.
+  // A dead link fails every packet in the same way, so the limit applies to the kind of message.
   log::limited(level, "dds", std::string(text.substr(0, 24))) << text;
 }
 

@@ -19,16 +19,17 @@ struct NetworkInterface {
   bool loopback = false;
 };
 
-/// Those of this host, in the kernel's order.
+/// Network interfaces of this host, in the kernel's order.
 std::vector<NetworkInterface> network_interfaces();
 
-/// The one called `name`. With an empty name: the first that is not loopback, multicast-capable
-/// ones first, or else loopback. Throws ConfigError if there is none, naming those that exist.
+/// The interface called `name`. With an empty name: the first one that is not loopback,
+/// multicast-capable ones first, or otherwise loopback. Throws ConfigError that lists the existing
+/// ones if there is none.
 NetworkInterface select_interface(const std::vector<NetworkInterface>& interfaces,
                                   const std::string& name);
 
-/// Looks up addresses or names of hosts, each with or without ":port". Throws ConfigError naming
-/// all those that are unknown. May ask a name server, and wait for it.
+/// Looks up addresses or names of hosts, each with or without ":port". Throws ConfigError that
+/// names all unknown ones. May query a name server, and wait for it.
 void check_hosts(const std::vector<std::string>& hosts);
 
 /// Configuration document of Cyclone DDS 0.10 for `config` on `interface`.
@@ -65,7 +66,7 @@ class DdsParticipant {
   [[nodiscard]] const NetworkInterface& interface() const { return domain_->interface(); }
   [[nodiscard]] dds_entity_t handle() const { return participant_.handle(); }
   [[nodiscard]] const Guid& guid() const { return guid_; }
-  /// What seals all messages to and from others; null: they go in clear.
+  /// Seal of all messages to and from other robots; null: they are sent unencrypted.
   [[nodiscard]] SharedSeal* seal() const { return seal_.get(); }
 
  private:

@@ -8,7 +8,7 @@ namespace {
 
 // A robot that has been running for longer is not new: it keeps its id.
 constexpr double kNew_s = 10.0;
-// Uptimes nearer to each other than this do not tell who was first: two statuses.
+// Uptimes closer than the interval of two statuses do not show which process was first.
 constexpr double kSameUptime_s = 1.0;
 
 }  // namespace
@@ -193,7 +193,8 @@ void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant&
   emit(PeerEventKind::kRestarted, identity, "restarted");
 }
 
-// The participant is heard no more. Its id goes to who has been claiming it for longest.
+// Removes a participant that is no longer received. Its id passes to the participant that has
+// claimed it for longest.
 void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text) {
   const auto found = participants_.find(guid);
   if (found == participants_.end() || !std::exchange(found->second.alive, false)) return;

@@ -14,10 +14,10 @@
 
 namespace km {
 
-/// kLost: went silent. kLeft: said good-bye. kTold: known through others alone.
+/// kLost: became silent. kLeft: announced its end. kTold: known only through other robots.
 enum class PeerState { kAlive, kLost, kLeft, kTold };
 
-/// Another robot of the team, as last heard of.
+/// Last known state of another robot of the team.
 struct Peer {
   RobotIdentity identity;
   PeerState state = PeerState::kAlive;
@@ -25,72 +25,77 @@ struct Peer {
 };
 
 enum class PeerEventKind {
-  kJoined,     ///< First heard.
-  kTold,       ///< First told of, by others.
+  kJoined,     ///< First received.
+  kTold,       ///< First reported by other robots.
   kLost,       ///< Silent for longer than dds.liveliness_s.
-  kReturned,   ///< Heard again, same boot.
-  kResumed,    ///< Same robot id, other boot of the same life: its keyframes are as before.
-  kLeft,       ///< Ended in order.
-  kRestarted,  ///< Same robot id, another life: its keyframes are others now.
-  kRefused,    ///< Not talked to: another protocol version, unreadable user data, one robot too
-               ///< many, or the id of a robot that is there already.
-  kConflict,   ///< This robot's id is another's, which had it first: this one must not go on.
+  kReturned,   ///< Received again, same boot id.
+  kResumed,    ///< Same robot id, other boot id of the same incarnation: its keyframes are
+               ///< unchanged.
+  kLeft,       ///< Ended regularly.
+  kRestarted,  ///< Same robot id, another incarnation: its keyframe indices now mean other
+               ///< keyframes.
+  kRefused,    ///< Ignored because of another protocol version, unreadable user data, too many
+               ///< robots, or the id of a present robot.
+  kConflict,   ///< This robot's id belongs to a robot that had it first: this one must end.
 };
 
-/// What a participant's messages are worth.
+/// Trust in the messages of a participant.
 enum class Standing {
-  kUnknown,   ///< Nothing is known of it, yet.
-  kStranger,  ///< No robot, or one that is refused.
+  kUnknown,   ///< No data are known yet.
+  kStranger,  ///< Not a robot, or refused.
   kTwin,      ///< Claims this robot's id.
-  kRival,     ///< Claims the id of a robot that is there already, or has not been heard itself.
-  kArriving,  ///< The robot of its id, but not all nodes know yet that its former life is over.
+  kRival,     ///< Claims the id of a present robot, or has not been received itself.
+  kArriving,  ///< The robot of its id, but not all nodes know yet that its former incarnation has
+              ///< ended.
   kAdmitted,  ///< The robot of its id.
 };
 
 struct PeerEvent {
   PeerEventKind kind;
-  RobotIdentity identity;  ///< Of the peer; default where it could not be read.
+  RobotIdentity identity;  ///< Identity of the peer; default if it could not be read.
   std::string text;        ///< One line for people.
-  bool heard = true;       ///< False of what others tell of it.
+  bool heard = true;       ///< False if other robots have reported it.
 };
 
-/// Who is there: turns what DDS reports about participants and the liveliness of their status
-/// writers, in any order, into peers and events. Pure: time comes in [s], any origin. Memory is
-/// bounded, whatever strangers announce.
+/// Determines the present robots: turns DDS reports about participants and the liveliness of their
+/// status writers, in any order, into peers and events. Deterministic: time comes in [s], with any
+/// origin. Memory is bounded, independent of what other participants announce.
 ///
 /// A robot is present while its participant's user data is accepted and its status writer alive;
-/// that the participant expires (dds.lease_s) changes nothing. An id belongs to the first process
-/// that is heard with it, for as long as that is heard; then to the next. Not thread-safe.
+/// the expiry of the participant (dds.lease_s) changes nothing. An id belongs to the first process
+/// that is received with it, as long as that is received; then to the next. Not thread-safe.
 class PeerTable {
  public:
   static constexpr std::size_t kMaxRobots = 64;
   static constexpr std::size_t kMaxParticipants = 1024;
 
-  /// Whether a robot may be talked to, by what it shows beside its identity: null, or why not (a
+  /// Decides by the credentials whether a robot is accepted: null, or the reason of a refusal (a
   /// string literal).
   using Admit =
       std::function<const char*(const RobotIdentity& identity, std::string_view credentials)>;
 
-  /// With `admit`, a robot is there only once prove() is called for it, too: what it shows could be
-  /// a recording.
+  /// With `admit`, a robot is present only after prove() is also called for it, because its
+  /// credentials could be replayed.
   explicit PeerTable(const RobotIdentity& self, Admit admit = {})
       : self_(self), admit_(std::move(admit)) {}
 
-  /// A robot that was met before this process: it is lost, until it is heard.
+  /// A robot that this robot met in a former process: it is lost until it is received.
   void recall(const RobotIdentity& identity);
 
-  /// Others hear this robot, or have heard it. Of one that is not heard here their word counts:
-  /// kTold if it is new, kResumed or kRestarted if it has been known by another process.
+  /// Other robots receive this robot, or have received it. Their report counts if it is not
+  /// received here directly: kTold if it is new, kResumed or kRestarted if another process of it
+  /// was known.
   void tell(const RobotIdentity& identity);
 
   /// A participant announced itself (again) with this user data.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
 
-  /// A message shows that the participant is who it says it is.
+  /// Notes that a message has proven the identity of the participant.
   void prove(const Guid& guid);
 
-  /// All nodes have handled the event of this process: nothing that it sends comes before that.
+  /// Notes that all nodes have handled the event of this process; only then are its messages
+  /// delivered.
   void told(const TeamPeer& restarted);
 
   /// Its status writer is alive, silent, or closed.
@@ -98,9 +103,9 @@ class PeerTable {
   void silent(const Guid& guid);
   void closed(const Guid& guid);
 
-  /// A status of a process with this robot's own id: how long that has been running, and this one,
-  /// both [s]. The younger one yields, if it is new itself; nobody can talk an older robot out of
-  /// its id.
+  /// Handles a status of a process with this robot's own id. The arguments state how long that
+  /// process and this one have been running, both [s]. The younger process yields if it is new
+  /// itself, so no process can take the id of an older one.
   void twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   /// Events since the last call, in order.
@@ -109,7 +114,7 @@ class PeerTable {
   /// Ascending by robot id.
   [[nodiscard]] std::vector<Peer> peers() const;
 
-  /// What it announced, where that could be read and accepted.
+  /// The announced identity, if it could be read and accepted.
   [[nodiscard]] std::optional<RobotIdentity> identity_of(const Guid& guid) const;
 
   [[nodiscard]] Standing standing(const Guid& guid) const;
@@ -118,7 +123,7 @@ class PeerTable {
   [[nodiscard]] std::optional<TeamPeer> current(RobotId robot) const;
   /// True unless another process has taken the id over since.
   [[nodiscard]] bool is_current(const TeamPeer& sender) const;
-  /// True from when it is another life until told().
+  /// True from the report of another incarnation until all nodes know of it.
   [[nodiscard]] bool is_arriving(RobotId robot) const;
 
  private:
@@ -128,13 +133,13 @@ class PeerTable {
     bool announced = false;
     bool proven = false;
     bool alive = false;
-    bool warned = false;        // of a twin or rival, once
-    std::uint64_t arrival = 0;  // counts those that came alive
+    bool warned = false;        // a twin or rival was logged once
+    std::uint64_t arrival = 0;  // order in which participants became alive
   };
   struct KnownPeer {
     Peer peer;
     Guid guid{};
-    bool arriving = false;  // until told()
+    bool arriving = false;  // true until all nodes know of the new incarnation
   };
 
   void appear_if_there(const Guid& guid, Participant& participant);

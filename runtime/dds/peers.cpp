@@ -14,7 +14,8 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kMaxEvents = 1024;  // that wait; strangers can make many
+constexpr std::size_t kMaxEvents = 1024;  // maximum number of waiting events, because any
+                                          // participant can cause them
 
 std::optional<Guid> take_participant(dds_builtintopic_endpoint_t* endpoint) {
   if (endpoint == nullptr) return std::nullopt;
@@ -23,7 +24,7 @@ std::optional<Guid> take_participant(dds_builtintopic_endpoint_t* endpoint) {
   return guid;
 }
 
-// What a stranger announces is shown to people: printable characters only.
+// Keeps only printable characters, because people read the announcements of unknown participants.
 std::string addresses_of(const dds_qos_t* qos) {
   char* value = nullptr;
   if (!dds_qget_prop(qos, "__NetworkAddresses", &value) || value == nullptr) return {};
@@ -78,7 +79,8 @@ void WriterBook::on_matched(dds_entity_t reader, dds_subscription_matched_status
     if (guid) book.participant_of_.emplace(writer, *guid);
     return;
   }
-  constexpr std::size_t kMaxGone = 4096;  // whose last messages may still be waiting
+  constexpr std::size_t kMaxGone = 4096;  // bound on removed writers whose last messages may still
+                                          // be waiting
   const std::lock_guard lock(book.mutex_);
   book.gone_.push_back(writer);
   if (book.gone_.size() <= kMaxGone) return;
@@ -118,7 +120,7 @@ Peers::Peers(const DdsParticipant& participant)
           kMaxEvents, Overflow::kDropOldest, [this](const auto& event) { events_.publish(event); },
           "peer_events") {}
 
-// Called with the mutex held, as all of the table is.
+// The mutex is held, as for all calls of the table.
 const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
   if (credentials.empty()) return "shows no keys";
   const auto now_s = static_cast<std::int64_t>(wall_now_s());

@@ -16,15 +16,15 @@
 
 namespace km {
 
-/// Which participant each writer of a topic belongs to, noted as DDS matches it: what a writer that
-/// is gone has left behind is its robot's still. Thread-safe.
+/// Participant of each writer of a topic, stored when DDS matches the writer. So messages of a
+/// writer that is gone are still attributed to its robot. Thread-safe.
 class WriterBook {
  public:
   WriterBook();
   WriterBook(const WriterBook&) = delete;
   WriterBook& operator=(const WriterBook&) = delete;
 
-  /// To create the topic's reader with, merged into what else that listens for.
+  /// Adds itself to the listener with which the topic's reader is created.
   void listen(dds_listener_t* listener);
 
   /// nullopt for a writer that has never been matched.
@@ -33,7 +33,7 @@ class WriterBook {
  private:
   static void on_matched(dds_entity_t reader, dds_subscription_matched_status_t status, void* self);
 
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::map<dds_instance_handle_t, Guid> participant_of_;
   std::deque<dds_instance_handle_t> gone_;  // oldest first
 };
@@ -41,10 +41,10 @@ class WriterBook {
 /// Knows when all subscribers are done with an event. Thread-safe.
 class EventReceipts : public std::enable_shared_from_this<EventReceipts> {
  public:
-  /// The event, whose process is handed out by take() once nobody holds it any more.
+  /// Returns the event; take() returns its process once all copies of the event are released.
   [[nodiscard]] Topic<PeerEvent>::Message track(PeerEvent event);
 
-  /// Empty thereafter.
+  /// The result is empty afterwards.
   [[nodiscard]] std::vector<TeamPeer> take();
 
  private:
@@ -61,12 +61,12 @@ class Peers {
   Peers(const Peers&) = delete;
   Peers& operator=(const Peers&) = delete;
 
-  /// Published on a thread of their own. Subscribe before start(). While a kRestarted is held, what
-  /// its process sends waits.
+  /// Events are published on a thread of their own. Subscribe before start(). While any copy of a
+  /// kRestarted exists, messages of its process wait.
   [[nodiscard]] In<PeerEvent> events() { return events_; }
 
-  /// A robot that an earlier process of this one has met: it is lost, until it is heard. Call
-  /// before start().
+  /// A robot that this robot met in a former process: it is lost until it is received. Call before
+  /// start().
   void recall(const RobotIdentity& identity);
 
   /// See PeerTable. Thread-safe.
@@ -78,10 +78,10 @@ class Peers {
 
   [[nodiscard]] std::optional<RobotIdentity> identity_of(const Guid& guid) const;
 
-  /// What is to be done with what a participant sends, and whom it says it is.
+  /// Handling of the messages of a participant, and its claimed identity.
   struct Claim {
     Standing standing = Standing::kUnknown;
-    TeamPeer sender;  ///< Of a robot: neither kUnknown nor kStranger.
+    TeamPeer sender;  ///< Set for a robot: neither kUnknown nor kStranger.
   };
   [[nodiscard]] Claim claim_of(const Guid& guid) const;
   [[nodiscard]] bool is_current(const TeamPeer& sender) const;
@@ -127,7 +127,7 @@ class Peers {
   Topic<PeerEvent> events_;
   const Guid self_;
   SharedSeal* const seal_;    // may be null
-  mutable std::mutex mutex_;  // guards what follows, up to changes_
+  mutable std::mutex mutex_;  // guards the members below, up to changes_
   PeerTable table_;
   std::vector<TeamPeer> admitted_;
   std::deque<LivelinessChange> changes_;

@@ -29,7 +29,8 @@ DdsQos make_writer_qos(TopicKind kind, const DdsConfig& config) {
   DdsQos owner = make_dds_qos();
   dds_qos_t* qos = owner.get();
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
-  dds_qset_writer_data_lifecycle(qos, false);  // an orderly exit takes nothing back
+  dds_qset_writer_data_lifecycle(qos, false);  // an orderly exit does not dispose of published
+                                               // samples
   dds_qset_ignorelocal(qos, DDS_IGNORELOCAL_PARTICIPANT);
 
   if (kind == TopicKind::kStatus) {

@@ -5,18 +5,19 @@
 
 namespace km {
 
-/// What a topic between robots is for; decides its quality of service (see make_writer_qos()).
+/// Purpose of a topic between robots; it decides the quality of service (see make_writer_qos()).
 ///
 /// Writers of all kinds keep the last sample of each key, so that none blocks on an unreachable
-/// robot. Readers keep all until it is taken: another's sample with the same key replaces nothing.
+/// robot. Readers keep all samples until they are taken; samples of different writers with one key
+/// do not replace each other.
 enum class TopicKind {
   kEvent,    ///< Every sample arrives, also at robots that join later. One key value per sample.
   kState,    ///< Reliable, newest sample of each key wins, also for robots that join later.
-  kRequest,  ///< As kEvent, but forgotten after dds.lease_s. One key value per sample.
+  kRequest,  ///< As kEvent, but dropped after dds.lease_s. One key value per sample.
   kStatus,   ///< Newest wins, may be lost, and carries the liveliness of the robot.
 };
 
-/// What its bytes are counted under: the split of the Kimera-Multi paper.
+/// Category under which bytes are counted: the split of the Kimera-Multi paper.
 enum class TrafficCategory {
   kPlaceRecognition,
   kGeometricVerification,

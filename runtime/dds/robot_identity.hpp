@@ -12,22 +12,22 @@ namespace km {
 /// "name (id 7)", for messages.
 [[nodiscard]] std::string to_string(const RobotIdentity& identity);
 
-/// The boot of a new life, random, which has not been resumed.
+/// Random boot id of a new incarnation that has not been resumed.
 [[nodiscard]] std::uint64_t random_boot_id();
 
-/// What a robot tells of itself in the USER_DATA of its DDS participant:
-/// "robot=7;name=alpha;proto=1;boot=0123456789abcdef", and where the team has keys
-/// ";keys=CREDENTIALS" (see TeamSeal). Throws std::invalid_argument for a name that cannot be sent.
+/// Announcement of a robot in the USER_DATA of its DDS participant:
+/// "robot=7;name=alpha;proto=1;boot=0123456789abcdef", and in a team with keys ";keys=CREDENTIALS"
+/// (see TeamSeal). Throws std::invalid_argument for a name that cannot be sent.
 [[nodiscard]] std::string to_user_data(const RobotIdentity& identity,
                                        std::string_view credentials = {});
 
-/// What a robot announces.
+/// Data that a robot announces.
 struct Announcement {
   RobotIdentity identity;
   std::string credentials;  ///< Empty: none.
 };
 
-/// Inverse of to_user_data() for bytes that anybody may have sent. Unknown keys are ignored.
+/// Inverse of to_user_data() for untrusted bytes. Unknown keys are ignored.
 [[nodiscard]] Decoded<Announcement> parse_user_data(std::string_view bytes);
 
 /// True if the bytes claim to be a robot's at all; other programs on the domain are not our

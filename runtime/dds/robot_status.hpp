@@ -24,24 +24,24 @@ enum class RobotPhase { kRunning, kFinished, kSettled, kLeaving };
 /// "running", "finished", "settled", "leaving".
 const char* to_string(RobotPhase phase);
 
-/// What a robot tells the others about itself, a few times a second.
+/// State that a robot sends to the others a few times a second.
 struct RobotStatus {
   RobotId robot = 0;
   std::string name;
   RobotPhase phase = RobotPhase::kRunning;
   double dataset_time_s = 0.0;  ///< Since the start of its input.
   std::uint32_t keyframes = 0;
-  /// Robots fewer links away than this have settled; 0: not even this one. It grows by one with
-  /// what each neighbour tells of its own, so that also far ones are waited for.
+  /// Robots fewer links away than this have settled; 0: not even this one. It is one more than the
+  /// smallest number of the neighbours, so that robots wait also for distant ones.
   std::uint8_t settled_links = 0;
-  std::uint64_t boot = 0;  ///< Of the process that told it.
+  std::uint64_t boot = 0;  ///< Boot id of the sending process.
   RelaySummary relay = {};
 };
 
-/// How often a robot tells its status [s].
+/// Interval between statuses [s].
 inline constexpr double kStatusPeriod_s = 0.5;
 
-/// As far as anybody asks.
+/// Upper limit of settled_links.
 inline constexpr std::uint8_t kManyLinks = 255;
 
 template <>
@@ -49,7 +49,7 @@ struct Codec<RobotStatus> {
   using Wire = km_wire_RobotStatus;
   static constexpr const char* kTopic = "robot_status";
   static constexpr std::uint16_t kVersion = 1;
-  /// Whom a status names at most as heard, and as known.
+  /// Maximum number of robots that a status names as received, and as known.
   static constexpr std::size_t kMaxNamed = 64;
   static constexpr std::size_t kMaxBytes = 256 + (2 + 24) * kMaxNamed;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotStatus_desc; }
@@ -77,7 +77,7 @@ class RobotStatusNode final : public Node {
   /// `provider` is called on this node's thread.
   RobotStatusNode(std::function<RobotStatus()> provider, const RobotStatusTopics& topics);
 
-  /// Latest of each robot heard of, ascending by id. Thread-safe.
+  /// Latest status of each known robot, ascending by id. Thread-safe.
   [[nodiscard]] std::vector<RobotStatus> peers() const;
 
   std::string_view name() const override { return "robot_status"; }

@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// Where ROS 2 is.
+/// Connection to ROS 2.
 struct RosConfig {
   static constexpr const char* kSection = "ros";
 
@@ -25,22 +25,21 @@ struct RosConfig {
     visitor.field("domain", domain, {0, 230}, "ROS_DOMAIN_ID of drivers and viewers");
     visitor.field("interface", interface,
                   "network interface of theirs; empty: chosen; lo with ROS_LOCALHOST_ONLY=1");
-    visitor.field("peers", peers, "addresses of their hosts, where multicast does not pass");
-    visitor.field(
-        "publish", publish,
-        "tell viewers where the robot is and how it does: odometry, pose, tf, path, mesh, "
-        "diagnostics; none: with --live");
+    visitor.field("peers", peers, "addresses of their hosts, for networks without multicast");
+    visitor.field("publish", publish,
+                  "publish the robot's state for viewers: odometry, pose, tf, path, mesh, "
+                  "diagnostics; none: with --live");
     visitor.field("mesh_points", mesh_points, {0, 10000000},
-                  "vertices of the mesh that viewers are told at most, each 12 to 16 B, whenever "
-                  "it is corrected; 0: none are");
+                  "maximum number of mesh vertices published for viewers, 12 to 16 B each, "
+                  "whenever the mesh is corrected; 0: none");
     visitor.field("mesh_faces", mesh_faces, {0, 1000000},
-                  "of the mesh that viewers are told at most, made coarser where it has more, each "
-                  "120 B, also kept for those who come later; 0: none are");
+                  "maximum number of mesh faces published for viewers, 120 B each, also kept for "
+                  "late ones; larger meshes are coarsened; 0: none");
     visitor.field("mesh_bytes_per_s", mesh_bytes_per_s, {1e4, 1e9},
-                  "[B/s] of these faces sent, on average");
+                  "[B/s] average rate of these faces");
     visitor.field("receive_buffer_bytes", receive_buffer_bytes, {65536, 1 << 28},
-                  "[B] for images that come faster than they are taken; the kernel may grant less: "
-                  "net.core.rmem_max");
+                  "[B] buffer for images that arrive faster than they are read; the kernel may "
+                  "grant less: net.core.rmem_max");
   }
 };
 

@@ -34,8 +34,8 @@ constexpr std::array<KnownType, 11> kTypes = {{
     {"visualization_msgs", "Marker", &visualization_msgs_msg_dds__Marker__desc},
 }};
 
-// DDS has one configuration per domain number and process. That of ROS gets a number of its own
-// here, beyond those on the network, and its true one there.
+// DDS has one configuration per domain number and process. So ROS' domain gets another number
+// inside this process, beyond those on the network, and its true number on the network.
 constexpr dds_domainid_t kOwnNumbers = 1000;
 
 std::string cyclone_xml(const RosConfig& config, const NetworkInterface& interface) {
@@ -98,7 +98,7 @@ DdsQos ros_qos(RosQos kind, int depth) {
                        DDS_MSECS(100));
   dds_qset_durability(qos.get(), kind == RosQos::kLatched ? DDS_DURABILITY_TRANSIENT_LOCAL
                                                           : DDS_DURABILITY_VOLATILE);
-  if (kind == RosQos::kLatched)  // else DDS keeps one message for those who come later
+  if (kind == RosQos::kLatched)  // otherwise DDS keeps one message for late readers
     dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED,
                                 DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   return qos;

@@ -11,14 +11,14 @@ namespace km {
 
 /// Kinds of quality of service that ROS has for its topics.
 enum class RosQos {
-  kSensorData,  ///< Best effort: what is lost is not sent again.
+  kSensorData,  ///< Best effort: lost samples are not retransmitted.
   kReliable,
-  kLatched,  ///< Reliable, and the last is kept for those who come later.
+  kLatched,  ///< Reliable, and the last message is kept for late readers.
 };
 
-/// A participant among those of ROS 2: as rmw_cyclonedds_cpp and rmw_fastrtps_cpp it names topics
-/// "rt/..." and types "sensor_msgs::msg::dds_::Imu_". It shares nothing with the domain of the
-/// team, which may have the same number.
+/// A participant in the network of ROS 2. Like rmw_cyclonedds_cpp and rmw_fastrtps_cpp it names
+/// topics "rt/..." and types "sensor_msgs::msg::dds_::Imu_". It shares nothing with the domain of
+/// the team, which may have the same number.
 class RosNetwork {
  public:
   /// Throws ConfigError for an unusable `config`, DdsError if DDS refuses it.
@@ -33,7 +33,7 @@ class RosNetwork {
   /// "sensor_msgs/msg/Image". Throws std::invalid_argument for others than known_ros_types().
   [[nodiscard]] static const dds_topic_descriptor_t& descriptor_of(std::string_view type);
 
-  /// A DDS topic for ROS' `topic`. Throws likewise.
+  /// A DDS topic for ROS' `topic`. Throws DdsError and std::invalid_argument for an unknown type.
   [[nodiscard]] DdsEntity create_topic(std::string_view topic, std::string_view type) const;
 
  private:

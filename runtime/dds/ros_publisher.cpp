@@ -10,8 +10,8 @@
 namespace km {
 namespace {
 
-// DDS does not hand out the type that it makes of a descriptor but with a message that was
-// received: one without content goes over a topic that nobody else looks at.
+// DDS gives access to the type that it makes of a descriptor only through a received message. So
+// one without content is sent over a topic that no other participant uses.
 ddsi_serdata* receive_blank(const RosNetwork& network, std::string_view type) {
   const dds_topic_descriptor_t& descriptor = RosNetwork::descriptor_of(type);
   std::string name = "kimera_multi/type/" + std::string(descriptor.m_typename);

@@ -19,21 +19,22 @@ struct SerializedDeleter {
 /// Thread-safe.
 class RosPublisher {
  public:
-  /// `depth`: with RosQos::kLatched, messages kept for those who come later.
+  /// `depth`: number of messages kept for late readers with RosQos::kLatched.
   RosPublisher(std::shared_ptr<const RosNetwork> network, const std::string& topic,
                std::string_view type, RosQos qos, int depth);
 
-  /// Little-endian CDR with its encapsulation header. Throws DdsError for what is none.
+  /// Publishes little-endian CDR with its encapsulation header. Throws DdsError for other bytes.
   void publish(std::span<const std::uint8_t> bytes) const;
 
-  /// Readers that are there.
+  /// Number of matched readers.
   [[nodiscard]] std::size_t reader_count() const;
 
  private:
-  std::shared_ptr<const RosNetwork> network_;  // outlives what follows
+  std::shared_ptr<const RosNetwork> network_;  // outlives the members below
   std::string name_;
   DdsEntity topic_, writer_;
-  std::unique_ptr<ddsi_serdata, SerializedDeleter> blank_;  // has the type by which DDS takes bytes
+  std::unique_ptr<ddsi_serdata, SerializedDeleter> blank_;  // an empty message with the type that
+                                                            // DDS needs for raw bytes
 };
 
 }  // namespace km

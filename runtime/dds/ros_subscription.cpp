@@ -45,7 +45,7 @@ RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
   }
 }
 
-// Who does not listen yet misses nothing.
+// Messages lost before the first next() do not count.
 void RosSubscription::begin() {
   told_s_ = steady_now_s();
   heard_s_.assign(readers_.size(), told_s_);
@@ -53,7 +53,7 @@ void RosSubscription::begin() {
     lost_before_.push_back(lost_ever(topic));
 }
 
-// All there are: DDS tells of those that come, not of those that are left.
+// Takes all messages, because DDS reports new messages only and not those that remain.
 void RosSubscription::take_from(std::size_t topic) {
   constexpr std::size_t kAtOnce = 16;
   std::array<ddsi_serdata*, kAtOnce> samples{};
@@ -76,7 +76,7 @@ void RosSubscription::add(std::size_t topic, const ddsi_serdata& sample) {
   heard_s_[topic] = steady_now_s();
 }
 
-// A driver that died, or a topic by another name, is what people look for first.
+// Reports silent topics, because a dead driver or a wrong topic name is the most frequent error.
 void RosSubscription::tell_silence() {
   const double now_s = steady_now_s();
   if (now_s - told_s_ < kSilence_s) return;

@@ -25,15 +25,15 @@ struct RosTopic {
   int depth = 10;  ///< Messages kept until next() takes them; the oldest go.
 };
 
-/// A message as it is on the wire: CDR with its encapsulation header.
+/// A serialised message: CDR with its encapsulation header.
 struct RosMessage {
   std::size_t topic = 0;  ///< Index into RosSubscription::topics().
   Stamp arrival = 0;      ///< System clock [ns].
   std::vector<std::uint8_t> bytes;
 };
 
-/// Messages of ROS 2 as they come. What is silent for kSilence_s is named in the log, from the
-/// first next() on. Not thread-safe but for stop().
+/// Messages of ROS 2 in the order of arrival. From the first next() on, topics that are silent for
+/// kSilence_s are named in the log. Not thread-safe, except for stop().
 class RosSubscription {
  public:
   static constexpr double kSilence_s = 5.0;
@@ -46,7 +46,7 @@ class RosSubscription {
   /// Messages of a topic that came too fast for DDS or for next(), since that was called first.
   [[nodiscard]] std::uint64_t lost(std::size_t topic) const;
 
-  /// next() gives nothing once so much time has passed from now [s].
+  /// Ends next() when this time [s] has passed from now.
   void give_up_after(double patience_s);
 
   /// Ends next(), now and later. Thread-safe.
@@ -59,14 +59,15 @@ class RosSubscription {
   void tell_silence();
   [[nodiscard]] std::uint64_t lost_ever(std::size_t topic) const;
 
-  std::shared_ptr<const RosNetwork> network_;  // outlives what follows
+  std::shared_ptr<const RosNetwork> network_;  // outlives the members below
   std::vector<RosTopic> topics_;
   std::vector<DdsEntity> dds_topics_, readers_;
   DdsEntity waitset_, guard_;
   std::deque<RosMessage> taken_;
-  std::vector<std::uint64_t> lost_before_;  // of each topic, before the first next()
-  std::vector<double> heard_s_;  // of each topic, when last; steady clock; empty before next()
-  double told_s_ = 0.0;          // when silence was looked for
+  std::vector<std::uint64_t> lost_before_;  // by topic: lost messages before the first next()
+  std::vector<double> heard_s_;  // by topic: time of the last message by the steady clock; empty
+                                 // before next()
+  double told_s_ = 0.0;          // time of the last check for silence
   double end_s_ = std::numeric_limits<double>::infinity();
   std::atomic<bool> stopped_ = false;
 };

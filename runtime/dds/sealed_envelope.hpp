@@ -10,9 +10,9 @@
 
 namespace km {
 
-/// What the seal of an envelope's content covers beside the content: the topic, the participant
-/// that writes it, the envelope's head, and whom it is for. So a recorded envelope opens neither on
-/// another topic nor from another participant.
+/// The seal of an envelope's content also covers the topic, the participant that writes it, the
+/// envelope's head, and the addressee. So a replayed envelope opens neither on another topic nor
+/// from another participant.
 class SealedEnvelope {
  public:
   /// `head` is copied; its content is not looked at. `addressee`: none for a message to all.

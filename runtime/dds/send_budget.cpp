@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-// A little in debt is at the end of it: sums of doubles do not come to zero.
+// A slightly negative balance counts as no debt, because sums of doubles do not reach zero exactly.
 constexpr double kNoDebt_bytes = -1e-3;
 
 // It begins empty: a run's first second is no exception.
@@ -14,7 +14,7 @@ std::optional<TokenBucket> limit(double per_second) {
   return TokenBucket(per_second, SendBudget::kBurst_s * per_second, 0.0);
 }
 
-// Of the run's total, what messages of this priority and those below may take together.
+// Share of the run's total that messages of this priority and lower ones may use together.
 double share_of_run(SendPriority priority) {
   switch (priority) {
     case SendPriority::kPresence:

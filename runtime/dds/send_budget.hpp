@@ -13,29 +13,30 @@
 
 namespace km {
 
-/// How much a robot may still send, see BudgetConfig. A message goes while there is no debt,
-/// however large it is: the next ones wait until it is paid. So in any time of t seconds go
-/// bytes_per_s * (t + kBurst_s) and one message at most.
-/// Pure: time comes in [s], any origin, and does not go backwards. Not thread-safe.
+/// Amount that a robot may still send, see BudgetConfig. A message is sent if there is no debt,
+/// however large the message is: the next ones wait until the debt is paid. So in any time of t
+/// seconds at most bytes_per_s * (t + kBurst_s) and one message are sent. Deterministic: time comes
+/// in [s], with any origin, and does not decrease. Not thread-safe.
 class SendBudget {
  public:
-  /// What may be sent at once after a silence, in seconds of the limit.
+  /// Amount that may be sent at once after a silence, in seconds of the limit.
   static constexpr double kBurst_s = 0.2;
 
   /// Throws ConfigError if `config` is out of bounds.
   explicit SendBudget(const BudgetConfig& config);
 
-  /// How long after `now_s` a message of `bytes` may go to each of `readers`; nullopt: never, for
-  /// what its priority may take of the run's total is used up. Presence may always.
+  /// Time after `now_s` until a message of `bytes` may be sent to each of `readers`. nullopt:
+  /// never, because its priority has used up its share of the run's total. Presence may always be
+  /// sent.
   [[nodiscard]] std::optional<double> wait_s(SendPriority priority, std::uint64_t bytes,
                                              std::span<const RobotId> readers, double now_s);
 
-  /// Such a message goes.
+  /// Charges such a message to the budget.
   void spend(SendPriority priority, std::uint64_t bytes, std::span<const RobotId> readers,
              double now_s);
 
-  /// The sum of all that has gone, as counted elsewhere: what was sent without asking, or again, is
-  /// spent now.
+  /// Updates the sum of all sent bytes, which is counted elsewhere: bytes that DDS has sent by
+  /// itself, or again, are charged now.
   void settle(std::uint64_t sent_bytes, double now_s);
 
  private:

@@ -6,15 +6,15 @@
 
 namespace km {
 
-/// What goes first where not all can go, most important first.
+/// Order of sending when the budget is short, most important first.
 enum class SendPriority {
   kPresence,      ///< Statuses: small, and always sent.
-  kClosures,      ///< Told once, and what joins two robots.
+  kClosures,      ///< Sent once; they join robots.
   kVerification,  ///< Requests for keyframes, and replies.
   kPoses,         ///< All messages of the pose graph.
   kWords,         ///< Bags of words.
   kBacklog,       ///< Bags of words that are not new any more.
-  kMesh           ///< And whatever else there is.
+  kMesh           ///< Chunks of the mesh, and all other messages.
 };
 inline constexpr std::size_t kSendPriorities = 7;
 

@@ -20,21 +20,23 @@
 
 namespace km {
 
-/// Messages that are to be sent, the most important first, each as soon as the budget lets it.
-/// Within a priority they go in order, but for bags of words: those that have waited for kNew_s go
-/// after those that come then.
+/// Messages to be sent, the most important first, each as soon as the budget permits it. Messages
+/// of one priority keep their order, except for bags of words: those that have waited for kNew_s
+/// follow newer ones.
 ///
-/// With a budget nobody waits for room: of each priority so much is kept, then the oldest are
-/// dropped; so are requests that nobody will answer any more. Of a state only the newest with its
-/// key is kept. Without one all go in turn, and nothing is ever dropped or replaced.
+/// With a budget no sender waits for room: each priority has a bound, beyond which the oldest
+/// messages are dropped. Requests that are too old to be answered are dropped, too. For a state,
+/// only the newest message with its key is kept. Without a budget all messages are sent in order,
+/// and none is dropped or replaced.
 ///
-/// Pure: time comes in [s], any origin, and does not go backwards. Not thread-safe.
+/// Deterministic: time comes in [s], with any origin, and does not decrease. Not thread-safe.
 template <typename TopicId, typename Message>
 class SendSchedule {
  public:
-  static constexpr std::size_t kMaxMessages = 8192;       ///< That wait, of one priority.
-  static constexpr std::uint64_t kMaxBytes = 32U << 20U;  ///< Likewise.
-  static constexpr double kNew_s = 5.0;                   ///< So long a bag of words is new.
+  static constexpr std::size_t kMaxMessages = 8192;       ///< Waiting messages of one priority.
+  static constexpr std::uint64_t kMaxBytes = 32U << 20U;  ///< Waiting bytes of one priority.
+  static constexpr double kNew_s = 5.0;                   ///< Age up to which a bag of words is
+                                                          ///< new.
 
   struct Entry {
     TopicId topic = {};
@@ -63,8 +65,8 @@ class SendSchedule {
     drop_surplus(lane);
   }
 
-  /// The next message that may go. `readers_of(entry)` is the robots that it goes to, or nullopt
-  /// while it should wait for some to be there; it is not asked without a budget.
+  /// The next message that may be sent. `readers_of(entry)` returns its receivers, or nullopt while
+  /// the message should wait for a receiver. It is not called without a budget.
   template <typename ReadersOf>
   [[nodiscard]] std::optional<Entry> pop(double now_s, const ReadersOf& readers_of) {
     wait_s_.reset();
@@ -74,14 +76,14 @@ class SendSchedule {
     return std::nullopt;
   }
 
-  /// After a pop() that gave nothing: how long after it the budget lets something go; nullopt if
-  /// nothing waits for that.
+  /// After a pop() without a result: time until the budget permits a message; nullopt if no message
+  /// waits for the budget.
   [[nodiscard]] std::optional<double> wait_s() const { return wait_s_; }
 
   /// See SendBudget.
   void settle(std::uint64_t sent_bytes, double now_s) { budget_.settle(sent_bytes, now_s); }
 
-  /// Nothing more will be sent: what waits is dropped.
+  /// Drops all waiting messages at the end.
   void drop_all() {
     for (Lane& lane : lanes_)
       while (!lane.messages.empty()) drop_front(lane);
@@ -97,8 +99,8 @@ class SendSchedule {
   struct Waiting {
     Entry entry;
     double since_s = 0.0;
-    std::uint64_t stops = 0;                  // of its lane when it came
-    SendPriority lane = SendPriority::kMesh;  // where it waits
+    std::uint64_t stops = 0;                  // stops of its lane at its arrival
+    SendPriority lane = SendPriority::kMesh;  // lane in which it waits
   };
   struct Lane {
     SendPriority priority = SendPriority::kPresence;

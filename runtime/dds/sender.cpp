@@ -11,8 +11,8 @@
 namespace km {
 namespace {
 
-constexpr double kTick_s = 0.25;  // for what nobody announces: readers, and what is sent again
-constexpr double kLast_s = 2.0;   // for what is left at the end
+constexpr double kTick_s = 0.25;  // interval for unannounced changes: readers and retransmissions
+constexpr double kLast_s = 2.0;   // time for the remaining messages at the end
 constexpr std::size_t kHeldForNobody = 4096;
 
 }  // namespace
@@ -73,7 +73,7 @@ void Sender::run() try {
   posted_.close();
 }
 
-// Goes past the budget, which settle() has it count against.
+// Bypasses the budget; settle() charges the bytes afterwards.
 void Sender::catch_up_due() {
   std::set<RobotId> due;
   {
@@ -85,8 +85,8 @@ void Sender::catch_up_due() {
     for (const auto& topic : topics_) topic->catch_up(robot);
 }
 
-// What has been posted so far, but no more than leaves time to send. Without a budget who posts
-// waits for room, with one the schedule makes it.
+// Files the messages posted so far, but no more than leaves time to send. Without a budget, posting
+// threads wait for room; with a budget, the schedule makes room.
 void Sender::file_posted() {
   constexpr int kAtOnce = 64;
   for (int k = 0; k < kAtOnce && (schedule_.is_limited() || schedule_.size() < kQueue); ++k) {
@@ -137,7 +137,7 @@ std::optional<std::vector<RobotId>> Sender::readers_of(const Schedule::Entry& en
   return readers;
 }
 
-// What newcomers are sent at once counts before anything else goes.
+// Messages that DDS sends to new readers are charged first.
 void Sender::settle(double now_s) {
   const bool is_due = now_s - settled_s_ >= kTick_s;
   if (is_due) {

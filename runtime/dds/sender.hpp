@@ -30,16 +30,16 @@ struct Outgoing {
 };
 
 /// Encodes messages and writes them on a thread of its own, in the order of SendSchedule. With a
-/// budget, what is for all robots waits while there is none, within bounds: what DDS is given, it
-/// sends at once to who comes.
+/// budget, messages to all robots wait, within bounds, while there is no receiver: DDS would send
+/// all of them to a new reader at once.
 class Sender {
  public:
   /// How many messages may wait to be encoded; who posts one more waits.
   static constexpr std::size_t kQueue = 8192;
 
-  /// `topics` are all that it may be given messages of, and outlive it; the list may grow until
-  /// start(). What goes over `beside`, which somebody else writes, counts against the budget, too;
-  /// null: there is no such topic. Requests wait no longer than `lease_s`. Throws ConfigError.
+  /// `topics` are all topics of its messages, and outlive it; the list may grow until start().
+  /// Another thread writes `beside`, whose bytes also count against the budget; null: there is no
+  /// such topic. Requests wait no longer than `lease_s`. Throws ConfigError.
   Sender(const BudgetConfig& budget, double lease_s,
          const std::vector<std::unique_ptr<OutgoingTopic>>& topics,
          const OutgoingTopic* beside = nullptr);
@@ -49,7 +49,7 @@ class Sender {
 
   void start() { thread_ = std::thread(&Sender::run, this); }
 
-  /// Sends what is queued, with a budget as much as that lets go within two seconds, and joins.
+  /// Sends the queued messages, with a budget as much as it permits within two seconds, and joins.
   /// Idempotent.
   void stop() noexcept;
 
@@ -68,7 +68,7 @@ class Sender {
   /// The exception that ended the thread, or null. Thread-safe.
   std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
   Heartbeat& heartbeat() { return heartbeat_; }
-  /// Of encoding and of writing each message. Thread-safe.
+  /// Time of encoding and writing each message. Thread-safe.
   DurationHistogram timing() const { return timing_.histogram(); }
 
  private:

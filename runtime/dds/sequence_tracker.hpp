@@ -6,9 +6,9 @@
 
 namespace km {
 
-/// Which numbers of a counted stream have arrived, in whatever order: drops duplicates, counts
-/// gaps. Memory is bounded: of more than kMaxIntervals separate runs, the oldest are joined, and
-/// what lay between them stays missing for good.
+/// Numbers of a counted stream that have arrived, in any order: drops duplicates and counts gaps.
+/// Memory is bounded: beyond kMaxIntervals separate runs the oldest are joined, and the numbers
+/// between them stay missing permanently.
 class SequenceTracker {
  public:
   static constexpr std::size_t kMaxIntervals = 1024;

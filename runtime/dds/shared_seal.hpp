@@ -9,15 +9,15 @@
 
 namespace km {
 
-/// The seal of this process, for all threads of the transport: one at a time, so that each waits
-/// for at most one message per other thread to be sealed or opened. Thread-safe.
+/// The seal of this process for all threads of the transport, one at a time. Each thread waits for
+/// at most one message per other thread to be sealed or opened. Thread-safe.
 class SharedSeal {
  public:
   /// See TeamSeal.
   SharedSeal(RobotKeys keys, const RobotIdentity& own, std::int64_t now_s)
       : seal_(std::move(keys), own, now_s), credentials_(seal_.credentials()) {}
 
-  /// What `use(TeamSeal&)` returns, by value. `use` calls nothing that could wait.
+  /// Returns the result of `use(TeamSeal&)`, by value. `use` must not call anything that waits.
   template <typename Use>
   auto with(const Use& use) {
     const std::lock_guard lock(mutex_);

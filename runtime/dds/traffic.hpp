@@ -33,14 +33,14 @@ struct TrafficCount {
   bool operator==(const TrafficCount&) const = default;
 };
 
-/// What the budget has made of the messages of one topic since the start, see SendSchedule. Bytes
-/// count once per message, however many robots it is for. What is published is the sum of what went
-/// at once and of all of these.
+/// Effect of the budget on the messages of one topic since the start, see SendSchedule. Bytes count
+/// once per message, independent of the number of receivers. The published messages are the sum of
+/// those sent at once and of all of these.
 struct HeldBack {
-  TrafficCount delayed;     ///< Sent later than they could have been.
-  TrafficCount waiting;     ///< To be sent now: for the budget, or for somebody to be there.
-  TrafficCount superseded;  ///< Never sent: a newer state came before their turn.
-  TrafficCount dropped;     ///< Never sent: no budget, or no room, or too late, or the end.
+  TrafficCount delayed;     ///< Sent later than possible.
+  TrafficCount waiting;     ///< Waiting now: for the budget, or for a receiver.
+  TrafficCount superseded;  ///< Never sent: replaced by a newer state.
+  TrafficCount dropped;     ///< Never sent: no budget, no room, too late, or the end of the run.
 
   bool operator==(const HeldBack&) const = default;
 };
@@ -55,7 +55,7 @@ struct PeerTraffic {
   std::uint64_t retransmitted_bytes = 0;  ///< Out only; of a topic to all it has no single peer.
 };
 
-/// What happened on one topic in one direction since the start.
+/// Traffic on one topic in one direction since the start.
 struct TopicTraffic {
   std::string topic;
   TrafficCategory category = TrafficCategory::kOther;
@@ -77,12 +77,12 @@ struct TrafficSnapshot {
 };
 
 /// Writes traffic.csv: counts over time, a row whenever one has changed. Columns: time_s,
-/// direction, topic, category, peer ("*" where it has no single one), messages, bytes,
-/// retransmitted_bytes. Directions are in and out, cumulative, and where there is a budget delayed,
-/// superseded, dropped, likewise, and waiting, as of then: see HeldBack.
+/// direction, topic, category, peer ("*" if there is no single one), messages, bytes,
+/// retransmitted_bytes. Directions are in and out and, with a budget, delayed, superseded, dropped
+/// and waiting: see HeldBack. All are cumulative, except for waiting, which is the present value.
 class TrafficCsv {
  public:
-  /// Writes the header line, or goes on behind the rows of `former` processes, whose counts are
+  /// Writes the header line, or continues after the rows of `former` processes, whose counts are
   /// added. `output` outlives this.
   explicit TrafficCsv(std::ostream& output, std::string_view former = {});
   void append(double time_s, const TrafficSnapshot& snapshot);

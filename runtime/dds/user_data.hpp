@@ -7,7 +7,7 @@
 
 namespace km {
 
-/// The USER_DATA that a participant announces, bytes that anybody may have sent; empty: none.
+/// The USER_DATA that a participant announces, untrusted bytes; empty: none.
 [[nodiscard]] inline std::string user_data_of(const dds_qos_t* qos) {
   void* data = nullptr;
   std::size_t size = 0;

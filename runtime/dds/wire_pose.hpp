@@ -12,8 +12,9 @@
 
 namespace km {
 
-// The parts of idl/common.idl to and from core types, for all codecs. from_wire() trusts nothing:
-// nullopt where a number is not finite or does not have the meaning of its field.
+// Conversions between the parts of idl/common.idl and core types, for all codecs. from_wire()
+// treats its input as untrusted: nullopt if a number is not finite or does not have the meaning of
+// its field.
 
 /// A quaternion from the wire may be this far from unit length; it is normalised.
 inline constexpr double kUnitQuaternionTolerance = 1e-3;

@@ -16,7 +16,7 @@ class BusyNode final : public Node {
   DurationHistogram spent;
 };
 
-TEST_CASE("Sensors that skip or spoil frames are a warning, by kind", "[robot]") {
+TEST_CASE("Sensors that skip or corrupt frames are a warning, by kind", "[robot]") {
   CHECK(sensors_status(10, 0, {}).level == RosDiagnosticStatus::kOk);
   CHECK(sensors_status(10, 1, {}).level == RosDiagnosticStatus::kWarn);
   ReaderReport faults;
@@ -33,7 +33,7 @@ TEST_CASE("A module that hardly rests is a warning that names it", "[robot]") {
   BusyNode node;
   ModuleLoads loads({&node});
   CHECK(loads.status().level == RosDiagnosticStatus::kOk);
-  node.spent.add(1e6);  // more than there can have been
+  node.spent.add(1e6);  // more than the possible time
   const RosDiagnosticStatus busy = loads.status();
   CHECK(busy.level == RosDiagnosticStatus::kWarn);
   CHECK(busy.message == "busy: busy");

@@ -24,7 +24,7 @@ TEST_CASE("Rows are in the file after a flush", "[robot]") {
   CHECK(results.lost().empty());
 }
 
-TEST_CASE("Rows for which there was no room come when there is", "[robot]") {
+TEST_CASE("Rows for which there was no room are written once there is room", "[robot]") {
   const CapturedLog log;
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "a.csv";
@@ -45,7 +45,7 @@ TEST_CASE("Rows for which there was no room come when there is", "[robot]") {
   CHECK(results.lost().empty());
 }
 
-TEST_CASE("A disk that is full for too long costs rows, and the file is told to lack them",
+TEST_CASE("A disk that is full for too long costs rows, and the file is reported as incomplete",
           "[robot]") {
   const CapturedLog log;
   const TemporaryFolder folder;
@@ -63,7 +63,7 @@ TEST_CASE("A disk that is full for too long costs rows, and the file is told to 
   CHECK_THAT(results.lost().at(path.string()), Catch::Contains("rows are missing"));
 }
 
-TEST_CASE("A file that is gone on with loses its torn row and no other", "[robot]") {
+TEST_CASE("A file that is continued loses its incomplete row and no other", "[robot]") {
   const TemporaryFolder folder;
   const fs::path path = folder.write("a.csv", "time\n1\n2\n3.");
   ResultWriter results;
@@ -77,7 +77,8 @@ TEST_CASE("A file that is gone on with loses its torn row and no other", "[robot
   CHECK(results.lost().empty());
 }
 
-TEST_CASE("A file that is not there, or torn in its first row, is begun anew", "[robot]") {
+TEST_CASE("A file that is missing, or incomplete in its first row, begins from scratch",
+          "[robot]") {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "a.csv";
   if (GENERATE(false, true)) folder.write("a.csv", "tim");

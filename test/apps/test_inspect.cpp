@@ -59,7 +59,7 @@ TEST_CASE("The lists of a EuRoC folder are its topics", "[robot]") {
         Words{"cam0", "cam1", "2", "2", "0.000", "0.000", "0", "0"});
 }
 
-TEST_CASE("A EuRoC folder needs no rig file: what to do instead is said", "[robot]") {
+TEST_CASE("A EuRoC folder needs no rig file, and the message names the alternative", "[robot]") {
   const TemporaryFolder folder;
   folder.write("mav0/cam0/data.csv", "1000000000,a\n");
   const auto rig = folder.path() / "rig.yaml";
@@ -70,7 +70,7 @@ TEST_CASE("A EuRoC folder needs no rig file: what to do instead is said", "[robo
   CHECK_FALSE(std::filesystem::exists(rig));
 }
 
-TEST_CASE("What was skipped of a recording is told with its place", "[robot]") {
+TEST_CASE("Skipped parts of a recording are reported with their place", "[robot]") {
   const auto file = shared_data("ros_recordings/mcap/nav2_turtlebot.mcap");
   if (!file) return;
   const TemporaryFolder folder;
@@ -82,7 +82,7 @@ TEST_CASE("What was skipped of a recording is told with its place", "[robot]") {
   CHECK(text.find("\n\n") == text.npos);  // no cameras
 }
 
-TEST_CASE("What is no recording is refused with its name", "[robot]") {
+TEST_CASE("A file that is no recording is refused with its name", "[robot]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(inspect_recording(folder.path()),
                     folder.path().string() + ": neither .db3 or .mcap files nor a EuRoC recording");

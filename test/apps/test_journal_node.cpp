@@ -27,7 +27,7 @@ JournalTopics journal_topics(Topics& topics, Topic<PeerEvent>& peer_events) {
           .restarts = topics.closure_restarts};
 }
 
-// A node that writes a new journal, and what is in it.
+// A node that writes a new journal, and the content of the journal.
 struct Journal {
   explicit Journal(const CameraCalibration& correction = {})
       : node(file, results, JournalStart{1, 1U << kResumeBits, "toy"}, nullptr, correction,
@@ -52,7 +52,7 @@ struct Journal {
   JournalNode node;
 };
 
-TEST_CASE("What is found while the journal stops is written and handed on", "[robot]") {
+TEST_CASE("Closures found while the journal stops are written and published", "[robot]") {
   Journal journal;
   Inbox<Closure> handed_on(journal.topics.own_closures);
   Closure closure;
@@ -67,8 +67,7 @@ TEST_CASE("What is found while the journal stops is written and handed on", "[ro
   CHECK(written[0].id() == closure.id());
 }
 
-TEST_CASE("A keyframe that was handed on is known by the journal as long as that is there",
-          "[robot]") {
+TEST_CASE("The journal knows a published keyframe as long as its file exists", "[robot]") {
   Journal journal;
   Inbox<Keyframe> handed_on(journal.topics.keyframes);
   Keyframe keyframe;
@@ -86,7 +85,7 @@ TEST_CASE("A keyframe that was handed on is known by the journal as long as that
   CHECK(journal.node.recall(0) == nullptr);
 }
 
-TEST_CASE("A journal holds what all corrections of the cameras come to", "[robot]") {
+TEST_CASE("A journal holds the product of all corrections of the cameras", "[robot]") {
   Journal journal({0.02, make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.0, 0.0})});
   KeyframeOdometry keyframe;
   keyframe.id = {1, 0};
@@ -101,7 +100,7 @@ TEST_CASE("A journal holds what all corrections of the cameras come to", "[robot
 }
 
 // Nodes stop in this order.
-TEST_CASE("The journal stops behind all that find closures and before those that use them",
+TEST_CASE("The journal stops after all nodes that find closures and before those that use them",
           "[robot]") {
   const TemporaryFolder folder;
   RobotOptions options;

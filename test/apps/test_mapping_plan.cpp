@@ -10,7 +10,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPalette = "name,red,green,blue,alpha,id\nroad,1,2,3,255,1\n";
 
-// A recording's folders, without content but the palette.
+// A recording's folders, empty except for the palette.
 struct Recording {
   TemporaryFolder folder;
 
@@ -50,14 +50,14 @@ TEST_CASE("Recorded depth and labels are preferred, others computed", "[robot][m
   CHECK(computed->sensor.labels == LabelsFrom::kNetwork);
   network.palette = full.folder.write("own.csv", "name,red,green,blue,alpha,id\nsky,1,2,3,255,9\n");
   CHECK(stereo.plan(config, network)->palette.find(9)->name == "sky");
-  CHECK(full.plan(config, network)->palette.find(1)->name == "road");  // of the recorded labels
+  CHECK(full.plan(config, network)->palette.find(1)->name == "road");  // name of a recorded label
   config.depth = DenseSource::kComputed;
   config.labels = DenseSource::kComputed;
   CHECK(full.plan(config, network)->sensor.depth == DepthFrom::kStereo);
   CHECK(full.plan(config, network)->sensor.labels == LabelsFrom::kNetwork);
 }
 
-TEST_CASE("Depth is used as far as it is good enough", "[robot][mapping]") {
+TEST_CASE("Depth is used up to the range at which it is accurate enough", "[robot][mapping]") {
   Camera camera;
   camera.fx = 500.0;
   const StereoRig rig = rgbd_rig(camera, 0.1);
@@ -82,7 +82,7 @@ TEST_CASE("A bag has the images that its rig file names", "[robot][mapping]") {
                     Catch::Contains("no label images in rig.yaml"));
 }
 
-TEST_CASE("A map that cannot be had is refused with what is missing", "[robot][mapping]") {
+TEST_CASE("A map that is not possible is refused with the missing inputs", "[robot][mapping]") {
   const Recording stereo({"cam0", "cam1"});
   const Recording depth({"cam0", "depth0", "label0"});
   const auto refused = [](const Recording& recording, const MappingConfig& config,

@@ -43,7 +43,7 @@ TEST_CASE("A mesh is written in the odometry frame until the team's is known", "
   CHECK_FALSE(std::filesystem::exists(bench.folder.path() / "mesh_optimized.ply"));
 }
 
-TEST_CASE("A mesh goes to where its first keyframe belongs", "[robot][mapping]") {
+TEST_CASE("A mesh is moved to the optimised pose of its first keyframe", "[robot][mapping]") {
   Bench bench;
   bench.node.start();
   const SE3 T_odom_first = make_pose(so3_exp(Eigen::Vector3d(0.0, 0.0, 0.3)), {1.0, 2.0, 0.5});

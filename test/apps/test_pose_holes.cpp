@@ -20,7 +20,8 @@ std::vector<double> every(double interval_s, int count) {
 
 }  // namespace
 
-TEST_CASE("A hole is where poses are far longer apart than usual", "[robot][findings]") {
+TEST_CASE("A hole is an interval between poses that is far longer than usual",
+          "[robot][findings]") {
   CHECK(pose_holes({}).empty());
   CHECK(pose_holes(poses_at({7.0})).empty());
   CHECK(pose_holes(poses_at(every(0.05, 100))).empty());

@@ -24,7 +24,7 @@ TEST_CASE("Memory that is taken shows, and processor time does", "[robot]") {
   CHECK(taken.back() == 1);
 }
 
-TEST_CASE("The growth of memory is that of the second half of the time", "[robot]") {
+TEST_CASE("The growth of memory is measured in the second half of the time", "[robot]") {
   std::ostringstream text;
   ProcessCsv csv(text);
   CHECK_FALSE(csv.summary().memory_growth_bytes_per_minute);
@@ -55,8 +55,7 @@ TEST_CASE("process.csv has a row for each sample", "[robot]") {
   CHECK_FALSE(csv.summary().memory_growth_bytes_per_minute);  // too short
 }
 
-TEST_CASE("process.csv goes on with the time of the run, and sums up that of processors",
-          "[robot]") {
+TEST_CASE("process.csv continues the time of the run, and sums up the processor time", "[robot]") {
   std::ostringstream text;
   ProcessCsv csv(text,
                  "time_s,cpu_s,resident_bytes,system_s,page_faults\n"
@@ -67,7 +66,7 @@ TEST_CASE("process.csv goes on with the time of the run, and sums up that of pro
   CHECK(csv.summary().cpu_s == 0.25);
 }
 
-TEST_CASE("optimizer.csv has a row for each round, and goes on counting", "[robot]") {
+TEST_CASE("optimizer.csv has a row for each round, and continues the numbers", "[robot]") {
   std::ostringstream text;
   std::vector<OptimizerProgress> rounds{
       {.members = {1, 2}, .round = 1, .cost = 4.0, .seconds = 0.5}};

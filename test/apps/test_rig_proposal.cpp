@@ -56,7 +56,7 @@ TEST_CASE("A rig is proposed by types, rates and names", "[robot]") {
   CHECK(rig.depth.topic == "/camera/depth/image");
 }
 
-TEST_CASE("Topics that tell the cameras are proposed where there are some", "[robot]") {
+TEST_CASE("Topics with the calibration of cameras are proposed if they exist", "[robot]") {
   const auto image = RosImage::kType;
   std::vector<TopicSummary> topics = {topic("/left/image_raw", image, 20.0, "mono8"),
                                       topic("/right/image_raw", image, 20.0, "mono8"),
@@ -80,7 +80,7 @@ TEST_CASE("A rig file is written for a recording, once", "[robot]") {
                        Catch::Contains("topic: \"/Alpha/imu/data\""));
   CHECK_THROWS_WITH(inspect_recording(*bag, file),
                     file.string() + ": is there already: name another file");
-  // What is left to complete is for topics to tell.
+  // Topics have the rest of the calibration.
   const PartialRig rig = read_rig_file(file);
   CHECK(!rig.is_complete());
   CHECK(rig.info_topics[0] == "/Alpha/camera_info");

@@ -20,7 +20,7 @@ struct Anything {
   }
 };
 
-// How many members an aggregate has.
+// Number of members of an aggregate.
 template <typename Config, typename... Members>
 constexpr std::size_t member_count() {
   if constexpr (requires { Config{Members{}..., Anything{}}; })
@@ -75,7 +75,7 @@ TEST_CASE("The effective configuration gives the same configuration again", "[ro
   CHECK(load_robot_config(again).effective == effective);
 }
 
-TEST_CASE("What comes later wins: profile, files, settings, options", "[robot]") {
+TEST_CASE("Later sources have priority: profile, files, settings, options", "[robot]") {
   RobotOptions options;
   options.link = "wifi";
   options.settings = {"dds.domain=7", "dds.lease_s=33", "dds.interface=eth9"};

@@ -54,7 +54,7 @@ TEST_CASE("New work after all had settled starts the wait again", "[departure]")
   CHECK(robot.leaves_at(8.5));
 }
 
-TEST_CASE("A settled robot goes as soon as a peer says that it leaves", "[departure]") {
+TEST_CASE("A settled robot leaves as soon as a peer reports that it leaves", "[departure]") {
   Done robot{.peers = {kSettled, kSettled}};
   CHECK_FALSE(robot.leaves_at(9.0));
   robot.peers[1].phase = RobotPhase::kLeaving;
@@ -73,8 +73,8 @@ TEST_CASE("A robot whose graph never settles leaves at the limit", "[departure]"
   CHECK(robot.departure.reason() != nullptr);
 }
 
-// A chain of robots that all poll ten times a second and hear their neighbours a poll later. Robot
-// `restless` settles at `from_s` only. When each leaves [s].
+// Leaving times [s] of a chain of robots that all poll ten times a second and hear their neighbours
+// a poll later. Robot `restless` settles at `from_s` only.
 std::vector<double> departures(std::size_t count, std::size_t restless, double from_s) {
   std::vector<Departure> robots(count, Departure(kSettle_s, kLimit_s));
   std::vector<Departure::Present> told(count);
@@ -118,14 +118,15 @@ RunEnd usual_end() {
   return end;
 }
 
-TEST_CASE("A run with poses is a success that tells how many", "[run_end]") {
+TEST_CASE("A run with poses is a success and reports their number", "[run_end]") {
   const Verdict verdict = verdict_of(usual_end());
   CHECK(verdict.exit_code == 0);
   CHECK(verdict.reason == "all present robots have settled");
   CHECK(to_string(*usual_end().images) == "88 of 100 images have a pose");
 }
 
-TEST_CASE("A run without a single pose is none, and tells where the images went", "[run_end]") {
+TEST_CASE("A run without a single pose fails and reports the number of images by reason",
+          "[run_end]") {
   RunEnd end = usual_end();
   end.images->with_pose = 0;
   const Verdict verdict = verdict_of(end);
@@ -159,7 +160,7 @@ TEST_CASE("Live sensors that gave no image make a failure of a run, however it e
   CHECK(verdict_of(end).exit_code == 0);
   end = usual_end();
   end.is_live = true;
-  end.id_taken = true;  // a graver reason comes first
+  end.id_taken = true;  // the more severe reason comes first
   end.images = ImageCounts{};
   CHECK(verdict_of(end).exit_code == 3);
 }
@@ -176,7 +177,7 @@ TEST_CASE("A robot that leaves without others has a verdict of its own that name
         "time limit for serving peers without bob (not heard for 31.2 s), carol (heard, but not in "
         "one frame for 7.0 s)");
   end.result.interrupted = true;
-  CHECK(verdict_of(end).reason == "interrupted");  // it did not leave of itself
+  CHECK(verdict_of(end).reason == "interrupted");  // it was interrupted before it could leave
 }
 
 using enum Absentees::Contact;
@@ -216,14 +217,14 @@ TEST_CASE("A member that only others heard is missed once it cannot have left in
   CHECK(told(absentees, 3.0).empty());
   absentees.update(9.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2});
   CHECK(told(absentees, 3.0) == "robot 7 silent 3 ");
-  // Told of by name, as is one that has never been a member.
+  // Robots of which only others know have a name, also if they have never been members.
   absentees.update(10.0, {{2, {"bob", kHeard}}, {7, {"carol", kTold}}, {9, {"dave", kTold}}},
                    std::vector<RobotId>{1, 2});
   CHECK(told(absentees, 3.0) == "carol silent 4 ");
   CHECK(told(absentees, 5.0).empty());
 }
 
-TEST_CASE("Lost results are told with their reasons and have an exit code, the least of all",
+TEST_CASE("Lost results are reported with their reasons and have the least severe exit code",
           "[run_end]") {
   RunEnd end = usual_end();
   end.lost_results = {{"out/a", "out/a: cannot be written: No space left on device"},

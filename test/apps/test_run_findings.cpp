@@ -42,7 +42,7 @@ Finding the_finding_of(const RunFacts& run) {
 
 }  // namespace
 
-TEST_CASE("Nothing stands out of runs of robots that joined", "[robot][findings]") {
+TEST_CASE("Runs of robots that joined have no findings", "[robot][findings]") {
   const std::vector<RunFacts> team = {run_of(0, true, tally_of(400, 30, 10, 10)),
                                       run_of(2, true, tally_of(300, 20, 5, 5))};
   CHECK(findings_of(team).empty());
@@ -63,7 +63,7 @@ TEST_CASE("Why two robots did not join is one sentence with the counts of both",
                     "loop_closures.csv), 2 kept: below pcm.min_inliers 3"));
 }
 
-TEST_CASE("Of robots that shared enough, one that was lost is named for why they are apart",
+TEST_CASE("If robots share enough closures, a lost link is named as the reason why they are apart",
           "[robot][findings]") {
   RunFacts run = run_of(0, false, tally_of(400, 100, 30, 20));
   const auto what = [&run] {
@@ -76,7 +76,7 @@ TEST_CASE("Of robots that shared enough, one that was lost is named for why they
   run.summary.lost_peers = {{"bob", 12.0}};
   CHECK_THAT(what(), Catch::StartsWith("alice and bob are not in one frame in the end: ") &&
                          Catch::Contains("20 kept, but one was not heard any more"));
-  run.closures[2] = tally_of(400, 100, 0, 0);  // with nothing shared, that is why
+  run.closures[2] = tally_of(400, 100, 0, 0);  // without candidates, that is the reason
   CHECK_THAT(what(), Catch::StartsWith("alice and bob did not join: ") &&
                          !Catch::Contains("not heard any more"));
 }
@@ -124,7 +124,7 @@ TEST_CASE("A tally counts the stages that a closure came through, and why it sto
   CHECK(tally.unmatched == std::map<std::string, std::uint64_t>{{"too few inliers", 1}});
 }
 
-TEST_CASE("What stands out of a run is told with its number", "[robot][findings]") {
+TEST_CASE("A finding on a run is reported with its number", "[robot][findings]") {
   RunFacts run = run_of(0, true, tally_of(40, 30, 10, 10));
   RunSummary& summary = run.summary;
   const auto told = [&](const char* id, Severity severity, const char* number) {
@@ -136,7 +136,7 @@ TEST_CASE("What stands out of a run is told with its number", "[robot][findings]
   SECTION("no frame at all") {
     summary.frames = 0;
     told("frames.none", Severity::kError, "0 frames, 0 keyframes");
-    summary.keyframes = 30;  // of a pose graph that is played
+    summary.keyframes = 30;  // a pose graph that is played has no frames
     CHECK(findings_of_one(run).empty());
   }
   SECTION("frames skipped") {
@@ -161,7 +161,7 @@ TEST_CASE("What stands out of a run is told with its number", "[robot][findings]
     summary.paused_s = 3.25;
     told("frames.paused", Severity::kNote, "paused for 3.2 s in all");
   }
-  SECTION("a map that gave way") {
+  SECTION("a map that skipped frames") {
     summary.mapping = MappingSummary{.frames = 75, .gave_way = 25};
     told("map.gave_way", Severity::kWarning, "25 frames were left out of the map, 25 %");
     summary.mapping->gave_way = 1;

@@ -17,7 +17,8 @@ Closure closure_between(const ClosureId& id) {
 
 }  // namespace
 
-TEST_CASE("what the optimiser rejects is no inlier, until it takes it back", "[robot]") {
+TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accepted again",
+          "[robot]") {
   const ClosureId kept{{1, 2}, {2, 3}};
   const ClosureId doubted{{1, 4}, {2, 5}};
   const ClosureId inconsistent{{1, 6}, {2, 7}};
@@ -72,7 +73,8 @@ TEST_CASE("closures to one robot are recorded up to a bound", "[robot]") {
   CHECK_FALSE(record.closures().contains({{1, 0}, {2, kMost}}));
 }
 
-TEST_CASE("of a robot that restarts no closure is kept, of one that is resumed all", "[robot]") {
+TEST_CASE("closures with a robot that restarts are dropped, those with a resumed one are kept",
+          "[robot]") {
   const auto kind = GENERATE(PeerEventKind::kRestarted, PeerEventKind::kResumed);
   const ClosureId with_it{{1, 2}, {2, 3}}, doubted{{1, 4}, {2, 5}}, with_other{{1, 4}, {3, 5}};
   RunRecord record(1);
@@ -93,14 +95,15 @@ TEST_CASE("of a robot that restarts no closure is kept, of one that is resumed a
   CHECK(record.closures().size() == 1);
   CHECK(record.outcomes().size() == 1);
   CHECK(record.closures_per_peer().at(3).inliers == 1);
-  // In the new life the same numbers are of other keyframes, and versions begin again.
+  // In the new incarnation the same indices mean other keyframes, and versions begin again.
   for (const ClosureId& id : {with_it, doubted}) record.add(closure_between(id));
   CHECK(record.inlier_closures().size() == 1);
   record.add(InlierSet{1, 2, 1, {doubted}});
   CHECK(record.inlier_closures().size() == 2);
 }
 
-TEST_CASE("of two measurements of a pair of keyframes the optimiser's is recorded", "[robot]") {
+TEST_CASE("the optimiser's measurement of a pair of keyframes is recorded, not the other end's",
+          "[robot]") {
   const ClosureId id{{1, 4}, {2, 3}};
   Closure precise = closure_between(id), vague = closure_between(id);
   precise.T_from_to.translation().x() = 1.0;

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-// Gives every field, those to come too, a value of its own that is not its default.
+// Gives every field, also future ones, a different value that is not its default.
 struct Filler {
   int next = 1;
 
@@ -47,7 +47,7 @@ RunSummary full_summary() {
 
 }  // namespace
 
-TEST_CASE("A summary with all there can be is read as it was written", "[robot][summary]") {
+TEST_CASE("A summary with all possible values is read as it was written", "[robot][summary]") {
   const TemporaryFolder folder;
   const RunSummary full = full_summary();
   CHECK(read_summary(folder.write("full.json", json_text(full))) == full);
@@ -90,7 +90,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/findings/1/id /findings/1/severity /findings/1/what /findings/1/means "
         "/findings/1/to_do ");
   const Json least = RunSummary{};
-  CHECK_FALSE(least.contains("mapping"));  // what is absent has no key
+  CHECK_FALSE(least.contains("mapping"));  // an absent value has no key
   CHECK_FALSE(least.contains("cameras"));
   CHECK_FALSE(least.contains("held_back"));
   CHECK_FALSE(least["pgo"].contains("anchor"));

@@ -12,7 +12,7 @@ constexpr const char* kCommitPattern = "(unknown|[0-9a-f]{10,40}(-dirty)?)";
 
 }  // namespace
 
-TEST_CASE("Every program says its version, its commit and what it was built with", "[version]") {
+TEST_CASE("Every program prints its version, its commit and its build settings", "[version]") {
   std::istringstream programs(KM_PROGRAMS);  // all of this build
   int count = 0;
   for (std::string name; programs >> name; ++count) {

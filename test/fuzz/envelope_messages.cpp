@@ -15,7 +15,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// DDS's own reader of envelopes, as it reads what the network brings.
+/// DDS's own reader of envelopes, with the input that it gets from the network.
 class EnvelopeReader {
  public:
   EnvelopeReader()
@@ -30,7 +30,7 @@ class EnvelopeReader {
         dds_create_reader(participant_.handle(), topic_.handle(), nullptr, nullptr), "reader");
     const DdsEntity writer(
         dds_create_writer(participant_.handle(), topic_.handle(), nullptr, nullptr), "writer");
-    for (const std::size_t size : {0, 4, 300}) {  // without padding: no octet is free
+    for (const std::size_t size : {0, 4, 300}) {  // without padding: every octet is used
       Bytes content(size, 7);
       km_wire_Envelope envelope{
           .key = 5, .boot = 70, .number = 3, .version = 1, .robot = 2, .content = {}};
@@ -51,7 +51,7 @@ class EnvelopeReader {
   [[nodiscard]] const std::vector<Bytes>& samples() const { return samples_; }
 
   [[nodiscard]] bool accepts(std::span<const std::uint8_t> bytes) const {
-    // What is shorter than the header of its encoding DDS drops before.
+    // DDS drops messages shorter than the header of their encoding before this.
     constexpr std::size_t kHeader = 4;
     if (bytes.size() < kHeader) return false;
     const ddsrt_iovec_t whole{const_cast<std::uint8_t*>(bytes.data()), bytes.size()};
@@ -66,7 +66,7 @@ class EnvelopeReader {
   }
 
  private:
-  // Every octet, for a sanitizer to see where it lies.
+  // Reads every octet, so that a sanitizer sees an invalid one.
   static void read(const km_wire_Envelope& envelope) {
     volatile std::uint32_t sum = 0;
     for (std::uint32_t i = 0; i < envelope.content._length; ++i)

@@ -12,14 +12,14 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-TEST_CASE("What robots send each other is understood as it is sent", "[messages]") {
+TEST_CASE("Every message between robots is decoded as it was sent", "[messages]") {
   for (const MessageReader& reader : all_messages()) {
     CAPTURE(reader.name);
     for (const Bytes& sample : reader.samples) CHECK(feed(reader, sample));
   }
 }
 
-TEST_CASE("No message ends where it does not end", "[messages]") {
+TEST_CASE("A truncated message is refused", "[messages]") {
   for (const MessageReader& reader : all_messages()) {
     CAPTURE(reader.name);
     for (Bytes sample : reader.samples)
@@ -30,14 +30,14 @@ TEST_CASE("No message ends where it does not end", "[messages]") {
   }
 }
 
-// On the C library's heap [bytes]. Sanitizers have another one; theirs finds leaks itself.
+// Bytes in use on the C library's heap. Sanitizers replace it; theirs finds leaks itself.
 std::size_t in_use() {
   const struct mallinfo2 heap = mallinfo2();
   return heap.uordblks + heap.hblkhd;
 }
 
-// KM_MESSAGES sets how many.
-TEST_CASE("Spoilt messages of all topics harm nobody, and nothing of them stays", "[messages]") {
+// KM_MESSAGES sets the number.
+TEST_CASE("Corrupted messages of all topics do no harm and leave no memory behind", "[messages]") {
   const char* wanted = std::getenv("KM_MESSAGES");
   const long count = wanted == nullptr ? 100'000 : std::atol(wanted);
   const auto readers = all_messages();
@@ -49,7 +49,7 @@ TEST_CASE("Spoilt messages of all topics harm nobody, and nothing of them stays"
       accepted += feed(reader, spoiler(reader.samples)) ? 1 : 0;
     }
   };
-  constexpr long kFirst = 1000;  // what is made once is made by then
+  constexpr long kFirst = 1000;  // one-time allocations are made by then
   feed_messages(kFirst);
   const std::size_t before = in_use();
   feed_messages(count / 2 - kFirst);

@@ -111,7 +111,7 @@ TEST_CASE("A file that is not YAML is reported where it breaks", "[config]") {
   CHECK_THROWS_WITH(layers.finish(), Contains("no/such/file.yaml: cannot open"));
 }
 
-TEST_CASE("A spoilt configuration is refused by name, or keeps the bounds", "[config]") {
+TEST_CASE("A corrupted configuration is refused by name or keeps the bounds", "[config]") {
   const TemporaryFolder folder;
   check_spoilt<ConfigError>(
       "# a toy\ntoy:\n  count: 5\n  length_m: 0.75  # [m]\n  flag: true\n  colour: green\n"
@@ -136,7 +136,7 @@ TEST_CASE("YAML that refers to itself or grows without end is refused or ends", 
   CHECK_THAT(complaint(laughs + "toy: {count: *a39}\n"), Contains("toy.count"));
 }
 
-TEST_CASE("A thousand problems are told by the first and a count", "[config]") {
+TEST_CASE("A thousand problems are reported by the first ones and a count", "[config]") {
   std::string yaml = "toy:\n";
   for (int i = 0; i < 1000; ++i) yaml += "  key" + std::to_string(i) + ": 1\n";
   const std::string text = complaint(yaml);
@@ -144,7 +144,7 @@ TEST_CASE("A thousand problems are told by the first and a count", "[config]") {
   CHECK(text.size() < 5000);
 }
 
-TEST_CASE("What is no configuration file is refused by name", "[config]") {
+TEST_CASE("A file that is no configuration is refused by name", "[config]") {
   check_no_files<ConfigError>(".yaml", [](const auto& place) { (void)load_yaml(place); });
 }
 

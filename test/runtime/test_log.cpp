@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("A rate limit passes one message per interval and tells how many it held", "[log]") {
+TEST_CASE("A rate limit passes one message per interval and counts the others", "[log]") {
   RateLimit limit(5.0);
   CHECK(limit.ask("a", 0.0).pass);
   CHECK_FALSE(limit.ask("a", 1.0).pass);
@@ -43,7 +43,7 @@ TEST_CASE("Levels below the limit are not written", "[log]") {
   CHECK_THAT(captured.lines()[0], Catch::Contains("but this"));
 }
 
-TEST_CASE("Who listens to the log hears the lines that are written, until another does", "[log]") {
+TEST_CASE("A listener of the log receives the written lines until another replaces it", "[log]") {
   CapturedLog log;
   std::vector<log::Entry> heard;
   log::set_listener([&heard](const log::Entry& entry) { heard.push_back(entry); });

@@ -129,7 +129,7 @@ class FeedingNode final : public Node {
                       }};
 };
 
-TEST_CASE("A node that hangs is given up, and keeps no other from ending", "[supervisor]") {
+TEST_CASE("A node that hangs is abandoned and keeps no other from ending", "[supervisor]") {
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   auto next = std::make_unique<HangingNode>();

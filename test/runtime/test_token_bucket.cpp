@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-constexpr double kRounding = 1e-9;  // of sums of some hundred terms
+constexpr double kRounding = 1e-9;  // rounding of sums of some hundred terms
 
 TEST_CASE("Tokens flow in at their rate up to the capacity", "[token_bucket]") {
   TokenBucket bucket(10.0, 5.0, 2.0);
@@ -21,7 +21,7 @@ TEST_CASE("Tokens flow in at their rate up to the capacity", "[token_bucket]") {
   CHECK(bucket.wait_s(1.0, 200.0) == Approx(0.1));
 }
 
-TEST_CASE("A debt is paid by what flows in", "[token_bucket]") {
+TEST_CASE("Later tokens pay a debt first", "[token_bucket]") {
   TokenBucket bucket(10.0, 5.0, 0.0);
   bucket.spend(30.0, 0.0);
   CHECK(bucket.wait_s(0.0, 0.0) == Approx(3.0));
@@ -31,7 +31,7 @@ TEST_CASE("A debt is paid by what flows in", "[token_bucket]") {
   CHECK(bucket.wait_s(0.0, 4.0 + kRounding) == 0.0);
 }
 
-TEST_CASE("Who spends whenever there is no debt spends at the rate", "[token_bucket]") {
+TEST_CASE("Spending whenever there is no debt is spending at the rate", "[token_bucket]") {
   const auto seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -46,7 +46,7 @@ TEST_CASE("Who spends whenever there is no debt spends at the rate", "[token_buc
     bucket.spend(last, now_s);
     spent += last;
   }
-  // All but the last debt has been paid, and nothing was lost for want of room.
+  // All except for the last debt has been paid, and no tokens were lost to a full bucket.
   CHECK(spent >= kRate * kSeconds - 1.0);
   CHECK(spent <= kRate * kSeconds + last);
 }

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kPatience_s = std::chrono::duration<double>(kPatience).count();
 
-// A pipe; what is read of it comes line by line.
+// A pipe that is read line by line.
 class Pipe {
  public:
   Pipe() { REQUIRE(pipe2(ends_.data(), O_CLOEXEC) == 0); }
@@ -32,7 +32,7 @@ class Pipe {
     if (ends_[0] >= 0) close(ends_[0]);
     ends_[0] = -1;
   }
-  // Writes lines until not one more fits, so that the next writer waits.
+  // Writes lines until the pipe is full, so that the next writer waits.
   void fill() {
     const int flags = fcntl(ends_[1], F_GETFL);
     REQUIRE(fcntl(ends_[1], F_SETFL, flags | O_NONBLOCK) == 0);
@@ -65,8 +65,8 @@ std::string numbered(int i) {
   return "line " + std::to_string(i);
 }
 
-TEST_CASE("What is queued comes out whole and in order", "[output]") {
-  constexpr int kLines = 20000;  // many times what a pipe holds
+TEST_CASE("Queued text is written completely and in order", "[output]") {
+  constexpr int kLines = 20000;  // more than a pipe can hold
   Pipe pipe;
   std::vector<std::string> lines;
   std::thread reader([&] { lines = pipe.read_to(numbered(kLines - 1)); });
@@ -79,11 +79,11 @@ TEST_CASE("What is queued comes out whole and in order", "[output]") {
   for (int i = 0; i < kLines; ++i) REQUIRE(lines[static_cast<std::size_t>(i)] == numbered(i));
 }
 
-TEST_CASE("A blocked output holds nobody up, and what is lost is counted in its place",
+TEST_CASE("A blocked output delays no caller, and lost lines are counted in their place",
           "[output]") {
   constexpr int kLines = 20000;
   Pipe pipe;
-  pipe.fill();  // nobody reads: a queue that could still write would have room again in between
+  pipe.fill();  // without a reader; a queue that could still write would have room again in between
   OutputQueue queue(pipe.writer(), 50000);
   for (int i = 0; i < kLines; ++i) queue.write(numbered(i) + '\n');
   auto lines = pipe.read_to("lost: output blocked or failed");
@@ -96,7 +96,7 @@ TEST_CASE("A blocked output holds nobody up, and what is lost is counted in its 
   CHECK(pipe.read_to("news") == std::vector<std::string>{"news"});
 }
 
-TEST_CASE("An output that stays blocked does not hold up the end", "[output]") {
+TEST_CASE("An output that stays blocked does not delay the end", "[output]") {
   Pipe pipe;
   {
     OutputQueue queue(pipe.writer());
@@ -118,7 +118,8 @@ TEST_CASE("A closed pipe is an error of a write and not the end of the process",
   std::signal(SIGPIPE, before);
 }
 
-TEST_CASE("A full disk costs the lines that it does not take, and tells so later", "[output]") {
+TEST_CASE("A full disk costs the lines that it refuses, and their number is written later",
+          "[output]") {
   Pipe pipe;
   OutputQueue queue(pipe.writer());
   const int working = dup(pipe.writer());
@@ -136,7 +137,7 @@ TEST_CASE("A full disk costs the lines that it does not take, and tells so later
   close(full);
 }
 
-TEST_CASE("A program's end writes all it said on both streams, in order where they are one",
+TEST_CASE("The end of a program writes all text of both streams, in order if they are one file",
           "[output]") {
   Pipe pipe;
   const pid_t child = fork();

@@ -66,7 +66,7 @@ TEST_CASE("A long step that ends is no fault, and many steps are none", "[watchd
   CHECK_FALSE(bench.watchdog.given_up().has_value());
 }
 
-TEST_CASE("Who waits for another is not blamed, and is again when it goes on", "[watchdog]") {
+TEST_CASE("A node that waits for another is not blamed until it continues", "[watchdog]") {
   Bench bench;
   const Heartbeat::Step step(bench.node.heartbeat);
   {
@@ -85,7 +85,7 @@ TEST_CASE("A node that is to end and makes no steps is given up", "[watchdog]") 
   bench.watchdog.expect_end(bench.node);
   for (int i = 0; i < 5; ++i) {
     bench.pass(15.0);
-    const Heartbeat::Step step(bench.node.heartbeat);  // it works off what is left
+    const Heartbeat::Step step(bench.node.heartbeat);  // it processes its remaining inputs
   }
   CHECK_FALSE(bench.watchdog.given_up().has_value());
   bench.pass(22.0);
@@ -93,7 +93,7 @@ TEST_CASE("A node that is to end and makes no steps is given up", "[watchdog]") 
   CHECK(bench.watchdog.given_up()->why == "has not ended for 20 s");
 }
 
-TEST_CASE("A node that has ended is blamed for nothing more", "[watchdog]") {
+TEST_CASE("A node that has ended is not blamed any more", "[watchdog]") {
   Bench bench;
   bench.watchdog.expect_end(bench.node);
   bench.watchdog.has_ended(bench.node);

@@ -30,7 +30,8 @@ TEST_CASE("A worker handles everything posted, in order, before stop returns", "
   CHECK(worker.error() == nullptr);
 }
 
-TEST_CASE("A worker that throws keeps the exception and lets nobody wait for it", "[worker]") {
+TEST_CASE("A worker that throws keeps the exception and releases the threads that wait for it",
+          "[worker]") {
   Worker<int> worker(1, Overflow::kBlock, [](int) { throw std::runtime_error("no"); });
   worker.start();
   while (worker.post(0)) {
@@ -71,11 +72,12 @@ TEST_CASE("A topic hands one shared message to every subscriber, in order", "[to
   CHECK(heard[0].second == heard[1].second);
 }
 
-// A node cannot write what it is to read, nor take what comes from peers for what goes to them.
+// A node can neither write its inputs nor confuse the channels from peers and to peers.
 static_assert(!std::is_convertible_v<In<int>, Out<int>>);
 static_assert(!std::is_convertible_v<Out<int>, In<int>>);
 
-TEST_CASE("What is published through one handle of a topic is heard through another", "[topic]") {
+TEST_CASE("A message published through one handle of a topic arrives at another handle",
+          "[topic]") {
   Topic<int> topic;
   const In<int> in = topic;
   const Out<int> out = topic;
@@ -86,7 +88,7 @@ TEST_CASE("What is published through one handle of a topic is heard through anot
   CHECK(heard == std::vector<int>{7, 8});
 }
 
-TEST_CASE("A queue hands out what was put in, in order, also after it is closed", "[queue]") {
+TEST_CASE("A queue returns its values in order, also after it is closed", "[queue]") {
   BoundedQueue<int> queue(3, Overflow::kBlock);
   for (int i = 0; i < 3; ++i) CHECK(queue.push(i));
   queue.close();
@@ -123,7 +125,7 @@ TEST_CASE("A full queue that blocks loses nothing between two threads", "[queue]
   CHECK(queue.load().dropped == 0);
 }
 
-TEST_CASE("Closing a queue releases whoever waits on it", "[queue]") {
+TEST_CASE("Closing a queue releases the threads that wait for it", "[queue]") {
   BoundedQueue<int> empty(1, Overflow::kBlock);
   BoundedQueue<int> full(1, Overflow::kBlock);
   full.push(0);
@@ -139,20 +141,20 @@ TEST_CASE("A queue without room is refused", "[queue]") {
   CHECK_THROWS_AS(BoundedQueue<int>(0, Overflow::kBlock), std::invalid_argument);
 }
 
-TEST_CASE("Of what was put the newest is taken, once", "[runtime]") {
+TEST_CASE("The newest value is taken, and only once", "[runtime]") {
   Latest<int> latest;
   CHECK(latest.take() == nullptr);
   const auto old = std::make_shared<const int>(1);
   latest.put(old);
   latest.put(std::make_shared<const int>(2));
-  CHECK(old.use_count() == 1);  // nothing is held that is not wanted any more
+  CHECK(old.use_count() == 1);  // no former value is kept
   const auto taken = latest.take();
   REQUIRE(taken != nullptr);
   CHECK(*taken == 2);
   CHECK(latest.take() == nullptr);
 }
 
-TEST_CASE("After the end nothing is put, and what was there can be taken", "[runtime]") {
+TEST_CASE("After close() values are refused and the last one can still be taken", "[runtime]") {
   Latest<int> latest;
   latest.put(std::make_shared<const int>(1));
   latest.close();
@@ -161,7 +163,8 @@ TEST_CASE("After the end nothing is put, and what was there can be taken", "[run
   CHECK(latest.take() == nullptr);
 }
 
-TEST_CASE("A taker sees ever newer values while others are put, and the last", "[runtime]") {
+TEST_CASE("A taker sees increasingly newer values while others are put, and the last one",
+          "[runtime]") {
   constexpr int kLast = 10000;
   Latest<int> latest;
   std::thread putter([&] {

@@ -2,7 +2,7 @@
 
 #include "runtime/unblocked_output.hpp"
 
-// Says 1000 lines on each of its two streams in turn, and ends.
+// Writes 1000 lines to each of its two streams in turn, and ends.
 int main() {
   for (int i = 0; i < 1000; ++i) {
     km::unblocked_stdout() << "out " << i << std::endl;

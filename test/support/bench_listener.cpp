@@ -4,7 +4,7 @@
 
 #include "test/support/processor_use.hpp"
 
-// Below each benchmark's times: what the kernel took of them. Page faults cost differently on
+// Prints the kernel's share of the times below each benchmark.
 // different machines, so that a time alone does not show them.
 
 namespace km {

@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// Redirects the log while it lives.
+/// Redirects the log during its lifetime.
 class CapturedLog {
  public:
   CapturedLog() : previous_(log::set_output(&text_)) {}

@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// What a program left behind.
+/// Exit code and output of a program.
 struct CommandResult {
   int exit_code = -1;  ///< -1 if it was ended by a signal.
   std::string output;  ///< Standard output and error together.

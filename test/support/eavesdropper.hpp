@@ -17,7 +17,7 @@
 
 namespace km {
 
-/// A member's solver, and who listens to what it sends.
+/// A member's solver whose messages are passed to a listener.
 class OverheardMember final : public MemberSolver {
  public:
   using Listener = std::function<void(const SolverLetter&)>;
@@ -44,7 +44,7 @@ class OverheardMember final : public MemberSolver {
   Listener listener_;
 };
 
-// Poses that are joined by relative poses.
+// Poses that are connected by relative poses.
 class Chains {
  public:
   void join(const KeyframeId& a, const KeyframeId& b) { parent_[root(a)] = root(b); }
@@ -60,7 +60,7 @@ class Chains {
   std::map<KeyframeId, KeyframeId> parent_;
 };
 
-// All that robots tell each other, as one who reads everything understands it.
+// Decodes all messages between robots, as a reader of everything would.
 class Eavesdropper {
  public:
   explicit Eavesdropper(const TeamGraph& graph) : dimension_(graph.dimension) {
@@ -73,7 +73,7 @@ class Eavesdropper {
     }
   }
 
-  // Poses that the others have announced to a robot.
+  // Adds the poses that the others have announced to a robot.
   void announced(const SessionGraph& part) {
     systems_.clear();
     for (const auto& [id, T] : part.told) known_.insert(id);
@@ -100,10 +100,10 @@ class Eavesdropper {
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::size_t told_edges() const { return told_edges_; }
   [[nodiscard]] std::size_t announced_poses() const { return known_.size(); }
-  // Sizes of right-hand sides and steps that are not those of the poses named.
+  // Number of right-hand sides and steps whose size does not match the named poses.
   [[nodiscard]] std::size_t misfits() const { return misfits_; }
 
-  // Private poses that are joined to an announced one, or to any other pose.
+  // Private poses that are connected to an announced one, or to any other pose.
   [[nodiscard]] std::set<KeyframeId> derivable() {
     std::set<KeyframeId> from_known;
     for (const KeyframeId& id : known_) from_known.insert(chains_.root(id));
@@ -135,7 +135,7 @@ class Eavesdropper {
 
   void hear(RobotId child, const DownLetter& down) { check_size(child, down.step.size()); }
 
-  // Numbers are of the poses that the child has told of.
+  // The numbers belong to the poses that the child has named.
   void check_size(RobotId child, Eigen::Index size) {
     const auto told = systems_.find(child);
     const Eigen::Index block = dimension_ == 2 ? 3 : 6;
@@ -155,16 +155,16 @@ class Eavesdropper {
   std::set<KeyframeId> all_;
   std::set<KeyframeId> public_;
   std::set<KeyframeId> known_;  // announced
-  std::set<KeyframeId> named_;  // in letters
+  std::set<KeyframeId> named_;  // named in messages
   Chains chains_;
-  std::map<RobotId, std::size_t> systems_;  // by child: variables that it has told of
+  std::map<RobotId, std::size_t> systems_;  // by child: number of variables that it has named
   std::size_t letters_ = 0;
   std::size_t bytes_ = 0;
   std::size_t told_edges_ = 0;
   std::size_t misfits_ = 0;
 };
 
-// As robots solve by default, but for no more than so many rounds.
+// Runs the default solver for at most `max_rounds` rounds.
 inline Eavesdropper listen_to(const TeamGraph& graph, bool tell_private, int max_rounds) {
   Eavesdropper ear(graph);
   const TreeNewtonOptions options{.dimension = graph.dimension, .tell_private = tell_private};

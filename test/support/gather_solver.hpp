@@ -20,9 +20,9 @@
 
 namespace km {
 
-/// The plainest solver of a session, for tests of what carries it: everything is gathered up the
-/// tree at the root, which makes one Newton step of the whole graph in every round and sends all
-/// poses down; the next round begins when all have told that they have them.
+/// The simplest solver of a session, for tests of the layers below. All parts are gathered up the
+/// tree at the root. In every round the root makes one Newton step of the whole graph and sends all
+/// poses down. The next round begins when all members have confirmed their poses.
 class GatherSolver final : public MemberSolver {
  public:
   struct Options {
@@ -31,9 +31,9 @@ class GatherSolver final : public MemberSolver {
     std::uint32_t gives_up_in_round = 0;  ///< If not 0, and the root.
     /// A closure with a larger residual at the end is called rejected.
     double largest_residual = std::numeric_limits<double>::infinity();
-    std::set<ClosureId> rejects = {};  ///< As well.
+    std::set<ClosureId> rejects = {};  ///< Further closures to reject.
     double barc = 0.0;
-    bool set_aside = false;  ///< What it says of itself, see SolverState.
+    bool set_aside = false;  ///< Fields of the reported SolverState.
     bool held = false;
   };
 
@@ -103,8 +103,8 @@ class GatherSolver final : public MemberSolver {
  private:
   struct Part {
     std::vector<SE3> poses;
-    std::vector<PoseEdge> edges;                      // of a closure between robots one end's
-    std::vector<std::pair<PoseEdge, SE3>> to_absent;  // with the pose there
+    std::vector<PoseEdge> edges;  // for a closure between robots, only one end's edge
+    std::vector<std::pair<PoseEdge, SE3>> to_absent;  // with the pose at the absent robot
     std::map<ClosureId, bool> decided;
   };
 
@@ -297,7 +297,7 @@ class GatherSolver final : public MemberSolver {
   bool failed_ = false;
   double cost_ = 0.0;
   double gradient_ = 0.0;
-  // At the root.
+  // At the root only.
   std::map<RobotId, Part> parts_;
   std::unique_ptr<QuadraticProblem> problem_;
   LiftedPoses X_;

@@ -11,7 +11,7 @@
 
 namespace km {
 
-/// Collects what a topic publishes; one may wait for it. Thread-safe.
+/// Collects the messages of a topic; a caller may wait for them.
 template <typename T>
 class Inbox {
  public:

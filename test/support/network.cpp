@@ -53,7 +53,7 @@ void ip(pid_t network_of, const std::string& arguments) {
     throw std::runtime_error("VirtualNetwork: failed: ip " + arguments);
 }
 
-// Drops what comes from an address that no route leads back to, broadcasts included (RFC 3704).
+// Drops packets from addresses without a route back, broadcasts included (RFC 3704).
 void drop_what_cannot_be_answered(pid_t network_of) {
   const std::string setting = "/proc/sys/net/ipv4/conf/eth0/rp_filter";
   if (Process({"sh", "-c", "echo 1 > " + setting}, network_of).wait() != 0)

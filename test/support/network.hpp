@@ -8,11 +8,11 @@
 
 namespace km {
 
-/// Hosts on one switch, as network namespaces of this machine. They belong to processes that die
-/// with this one, and vanish with them: nothing is left behind, however a test ends.
+/// Hosts on one switch, as network namespaces of this machine. They belong to processes that end
+/// with this one, and vanish with them, however a test ends.
 class VirtualNetwork {
  public:
-  /// True if this process may make namespaces; else says SKIPPED, for ctest.
+  /// True if this process may make namespaces; otherwise prints SKIPPED, for ctest.
   static bool available();
 
   /// Hosts 1 to `count` with addresses 10.77.0.<n> on interface eth0. Throws std::runtime_error.
@@ -25,14 +25,14 @@ class VirtualNetwork {
   [[nodiscard]] pid_t host(int host) const { return hosts_[static_cast<std::size_t>(host) - 1]; }
   [[nodiscard]] static std::string address(int host) { return "10.77.0." + std::to_string(host); }
 
-  /// Pulls the cable of `host`, or plugs it in.
+  /// Disconnects or connects the cable of `host`.
   void set_link(int host, bool up);
 
-  /// Lets `a` and `b` hear each other, as at first, or not, whoever else hears them: robots on one
-  /// radio channel of which some are out of reach.
+  /// Connects `a` and `b`, as at first, or disconnects them; other hosts still hear both. This
+  /// models robots on one radio channel of which some are out of reach.
   void set_link_between(int a, int b, bool up);
 
-  /// Leaves `host` with nothing but loopback.
+  /// Leaves `host` with only the loopback interface.
   void remove_interface(int host);
 
   /// Gives `host` a second interface, "eth1", that leads nowhere.

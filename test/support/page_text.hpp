@@ -7,7 +7,7 @@
 
 namespace km {
 
-// Text that gets out of a script, an attribute or a comment where it is not kept in.
+// Text that leaves a script, an attribute or a comment unless it is escaped.
 inline constexpr const char* kHostileText = "</script><script>alert(1)</script><!-- \" ' & \\ ]]>";
 
 inline std::size_t occurrences(const std::string& text, const std::string& part) {
@@ -16,14 +16,14 @@ inline std::size_t occurrences(const std::string& text, const std::string& part)
   return n;
 }
 
-// What is in the script element of that id, as a browser cuts it out.
+// Content of the script element with that id, as a browser reads it.
 inline Json data_of_page(const std::string& page, const std::string& id) {
   const std::string begin = "<script type=\"application/json\" id=\"" + id + "\">";
   const auto from = page.find(begin) + begin.size();
   return Json::parse(page.substr(from, page.find("</script", from) - from));
 }
 
-// Ways in which the page asks for another file.
+// Number of references of the page to other files.
 inline std::size_t references_of_page(const std::string& page) {
   std::size_t n = 0;
   for (const char* reference : {"src=", "http:", "https:", "@import", "url(", "fetch("})

@@ -23,7 +23,7 @@ std::array<int, 2> make_pipe() {
   return ends;
 }
 
-// Between fork and exec: only what is safe there.
+// Between fork and exec: only async-signal-safe calls.
 [[noreturn]] void become(char* const* arguments, const std::string& network, int input,
                          int output) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -40,7 +40,7 @@ std::array<int, 2> make_pipe() {
 }  // namespace
 
 Process::Process(const std::vector<std::string>& command, pid_t network_of) {
-  std::signal(SIGPIPE, SIG_IGN);  // a child that is gone is found out otherwise
+  std::signal(SIGPIPE, SIG_IGN);  // the end of the child is detected otherwise
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);

@@ -21,7 +21,7 @@ struct TimedLine {
   std::chrono::steady_clock::time_point time;
 };
 
-/// A child process whose output is read line by line and that is killed, if need be, with this.
+/// A child process whose output is read line by line. The destructor kills it if it still runs.
 class Process {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;

@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// What the process has taken of the processors so far, all its threads together.
+/// Processor time of the process so far, over all its threads.
 struct ProcessorUse {
   double user_s = 0.0;
   double system_s = 0.0;  ///< In the kernel.
@@ -24,8 +24,8 @@ inline ProcessorUse processor_use() {
   return {seconds(usage.ru_utime), seconds(usage.ru_stime), usage.ru_minflt};
 }
 
-/// "system 0.12 ms, 3.0 page faults", of each of `runs` since `before`: what the kernel adds to a
-/// time of user code.
+/// "system 0.12 ms, 3.0 page faults", for each of `runs` since `before`: the share of the kernel in
+/// addition to user code.
 inline std::string kernel_share(const ProcessorUse& before, double runs) {
   const ProcessorUse now = processor_use();
   char text[96];

@@ -26,15 +26,15 @@ struct PosedFrame {
   SE3 T_world_cam = SE3::Identity();
 };
 
-/// The red kitchen of Microsoft's 7-Scenes, every fourth frame of a sequence at 30 Hz: colour, read
-/// as grey, and depth [mm], taken as aligned with it, with the poses of a tracker and no inertial
-/// data. The rig is one camera without distortion; the baseline is virtual, see rgbd_rig(). Throws
-/// std::runtime_error or std::bad_optional_access if a file is not as expected.
+/// The red kitchen of Microsoft's 7-Scenes, every fourth frame of a sequence at 30 Hz, without
+/// inertial data. It has colour images, read as grey, depth [mm], assumed to be aligned with them,
+/// and the poses of a tracker. The rig is one camera without distortion; the baseline is virtual,
+/// see rgbd_rig(). Throws std::runtime_error or std::bad_optional_access if a file is not as
+/// expected.
 class RecordedKitchen {
  public:
   explicit RecordedKitchen(const std::filesystem::path& folder) : folder_(folder) {
-    const std::string text =
-        read_file(folder / "poses.txt");  // of all frames: n r00 r01 r02 tx ...
+    const std::string text = read_file(folder / "poses.txt");  // all frames: n r00 r01 r02 tx ...
     for (const TextRow& row : split_rows(text)) {
       const auto number = static_cast<int>(parse_int64(row.fields.at(0)).value());
       if (!std::filesystem::exists(file(number, ".color.jpg"))) continue;
@@ -47,7 +47,7 @@ class RecordedKitchen {
   [[nodiscard]] const StereoRig& rig() const { return rig_; }
   [[nodiscard]] std::size_t frame_count() const { return frames_.size(); }
 
-  /// Leaves out so many frames.
+  /// Skips `count` frames.
   void skip(std::size_t count) { next_frame_ = std::min(next_frame_ + count, frames_.size()); }
 
   /// The next frame in order of time, or nullopt at the end.

@@ -7,11 +7,11 @@
 
 namespace km {
 
-/// A JRL document of two robots, a with three poses and b with two, in the form of COSMO-Bench's
-/// files: a prior each, odometry of 1 m forwards, a closure inside a (entry 2, measurement 1), one
-/// from b1 to a1 that both robots' lists hold (a: entry 3, measurement 0; b: entry 1, measurement
-/// 1), one from b1 to a2 that is labelled false (b: entry 1, measurement 2). The truth is the
-/// odometry, with b 2 m to the left of a.
+/// A JRL document of two robots in the form of COSMO-Bench's files: a has three poses, b has two.
+/// Each has a prior and odometry of 1 m forwards. One closure is inside a (entry 2, measurement 1).
+/// One from b1 to a1 is in the lists of both robots (a: entry 3, measurement 0; b: entry 1,
+/// measurement 1). One from b1 to a2 is labelled false (b: entry 1, measurement 2). The truth is
+/// the odometry, with b 2 m to the left of a.
 class SmallJrl {
  public:
   using Json = nlohmann::json;
@@ -40,7 +40,7 @@ class SmallJrl {
     value["key"] = key;
     return value;
   }
-  /// Standard deviations of 0.01 rad and 0.1 m about and along all axes.
+  /// Standard deviations of 0.01 rad and 0.1 m for all axes.
   static Json covariance() {
     Json rows = std::vector<double>(36, 0.0);
     for (int i = 0; i < 6; ++i) rows[static_cast<std::size_t>(7 * i)] = i < 3 ? 1e-4 : 1e-2;

@@ -25,12 +25,12 @@ namespace km {
 
 using TeamPoses = std::map<RobotId, std::vector<SE3>>;
 
-/// The graph of a team and where its robots are thought to be when a session begins.
+/// The graph of a team, and the initial poses of a session.
 struct TeamProblem {
   TeamPoses start = {};
   std::vector<PoseEdge> edges = {};  ///< Odometry of all robots, then closures, each pair once.
   std::map<RobotId, std::vector<VerticalPrior>> verticals = {};
-  std::set<RobotId> absent = {};  ///< Robots of `start` that have gone.
+  std::set<RobotId> absent = {};  ///< Robots of `start` that have left.
   std::map<ClosureId, bool> decided = {};
 
   [[nodiscard]] std::vector<RobotId> members() const {
@@ -45,7 +45,7 @@ struct TeamProblem {
   return e.from.robot == e.to.robot && e.to.index == e.from.index + 1;
 }
 
-/// Odometry first, as TeamProblem has it; closures that name a pair again are left out.
+/// Sorts edges as in TeamProblem, odometry first; repeated pairs of closures are left out.
 [[nodiscard]] inline std::vector<PoseEdge> in_order(const std::vector<PoseEdge>& edges) {
   std::map<ClosureId, PoseEdge> odometry, closures;
   for (const PoseEdge& e : edges)
@@ -56,7 +56,7 @@ struct TeamProblem {
   return result;
 }
 
-/// Public poses are in single precision before a session: what everyone holds.
+/// Rounds public poses to single precision, because all robots hold them so before a session.
 [[nodiscard]] inline TeamPoses with_public_poses_rounded(TeamPoses poses,
                                                          const std::vector<PoseEdge>& edges) {
   std::set<KeyframeId> ends;
@@ -70,8 +70,8 @@ struct TeamProblem {
   return poses;
 }
 
-/// A g2o file of one robot dealt out to robots 1, 3, 5, ... in runs of equal length. It starts from
-/// chordal initialisation, or from odometry if `chained`.
+/// A g2o file of one robot split among robots 1, 3, 5, ... in blocks of equal length. It starts
+/// from chordal initialisation, or from odometry if `chained`.
 [[nodiscard]] inline TeamProblem deal_file(const std::filesystem::path& file, std::size_t robots,
                                            bool chained = false) {
   const G2oGraph graph = read_g2o(file);
@@ -100,18 +100,18 @@ struct TeamProblem {
   return problem;
 }
 
-/// What random_team_problem() draws.
+/// Parameters of random_team_problem().
 struct RandomTeam {
   std::vector<RobotId> robots = {};
-  std::vector<std::pair<RobotId, RobotId>> pairs = {};  ///< With closures between them.
-  std::uint32_t keyframes = 20;                         ///< Of each robot.
-  int closures = 6;                                     ///< Of each pair, and inside each robot.
-  double sigma = 0.02;                                  ///< Of measurements [rad, m].
-  double start_sigma = 0.1;                             ///< Of the poses at the start [rad, m].
-  double tilt_sigma = 0.0;                              ///< [rad] of verticals; 0: none.
+  std::vector<std::pair<RobotId, RobotId>> pairs = {};  ///< Pairs of robots with closures.
+  std::uint32_t keyframes = 20;                         ///< Number for each robot.
+  int closures = 6;          ///< Number for each pair, and inside each robot.
+  double sigma = 0.02;       ///< Standard deviation of measurements [rad, m].
+  double start_sigma = 0.1;  ///< Standard deviation of the poses at the start [rad, m].
+  double tilt_sigma = 0.0;   ///< Standard deviation of verticals [rad]; 0: none.
 };
 
-/// Robots that walk about in a box, their measurements with the noise that they claim. z is up.
+/// Robots that move in a box. Their measurements have the stated noise. z is up.
 [[nodiscard]] inline TeamProblem random_team_problem(const RandomTeam& team, unsigned seed) {
   std::mt19937 rng(seed);
   const auto noisy = [&](const SE3& T, double sigma) {
@@ -154,7 +154,7 @@ struct RandomTeam {
   return problem;
 }
 
-/// What a session hands to the solver of `robot`.
+/// Input of the solver of `robot` in a session.
 [[nodiscard]] inline SessionGraph session_graph(const TeamProblem& problem, RobotId robot) {
   SessionGraph graph{.self = robot, .start = problem.start.at(robot)};
   std::map<RobotId, std::pair<Precision, double>> steps;
@@ -188,7 +188,7 @@ struct RandomTeam {
   return graph;
 }
 
-/// The whole problem as one block, the members' poses one robot after the other.
+/// The whole problem as one block, with the members' poses robot by robot.
 class CentralProblem {
  public:
   explicit CentralProblem(const TeamProblem& problem) : members_(problem.members()) {
@@ -230,7 +230,7 @@ class CentralProblem {
 
   [[nodiscard]] double cost(const TeamPoses& poses) const { return problem_->cost(block(poses)); }
 
-  /// Least cost that Newton's method finds from `start`.
+  /// Smallest cost that Newton's method finds from `start`.
   [[nodiscard]] double optimum(const TeamPoses& start) const {
     return minimise(*problem_, block(start),
                     {.max_iterations = 300,
@@ -254,7 +254,7 @@ class CentralProblem {
 
 using TeamTree = std::map<RobotId, TreePlace>;
 
-/// From the parent of every member but the root.
+/// Parent of every member except for the root.
 [[nodiscard]] inline TeamTree tree_of(const std::vector<RobotId>& members,
                                       const std::map<RobotId, RobotId>& parents) {
   TeamTree tree;
@@ -290,15 +290,16 @@ using TeamTree = std::map<RobotId, TreePlace>;
   return tree_of(members, parents);
 }
 
-/// What happens to letters, in steps of the clock.
+/// Faults of the transport of messages, in steps of the clock.
 struct LetterPost {
-  int max_delay = 0;        ///< Each is under way for 0 to so many steps: they overtake each other.
-  double duplicated = 0.0;  ///< This part of them comes twice.
+  int max_delay = 0;        ///< Each message is delayed by 0 to this many steps, so that messages
+                            ///< overtake each other.
+  double duplicated = 0.0;  ///< Share of the messages that arrive twice.
   unsigned seed = 1;
 };
 
-/// Members of a session with the letters between them. In a step of the clock letters arrive, then
-/// every member works that has something to do; with delays half of them, drawn at random.
+/// Members of a session with the messages between them. In a step of the clock messages arrive,
+/// then every member works that has something to do. With delays, a random half of them works.
 class SolverTeam {
  public:
   using Members = std::map<RobotId, std::unique_ptr<MemberSolver>>;
@@ -306,7 +307,8 @@ class SolverTeam {
   explicit SolverTeam(Members members, const LetterPost& post = {})
       : members_(std::move(members)), post_(post), rng_(post.seed) {}
 
-  /// Until all are done. False if that takes more steps, or if none has anything left to do.
+  /// Runs until all are done. False if that takes more steps, or if no member has anything left to
+  /// do.
   bool run(std::size_t max_steps = 100000) {
     for (std::size_t n = 0; n < max_steps; ++n) {
       if (done()) return true;
@@ -315,7 +317,7 @@ class SolverTeam {
     return done();
   }
 
-  /// False if nobody has anything to do and no letter is under way.
+  /// False if no member has anything to do and no message is in flight.
   bool step() {
     ++now_;
     deliver();
@@ -330,7 +332,7 @@ class SolverTeam {
     return busy;
   }
 
-  /// The member is heard no more.
+  /// Disconnects the member.
   void remove(RobotId robot) { members_.erase(robot); }
 
   [[nodiscard]] bool done() const {
@@ -343,12 +345,14 @@ class SolverTeam {
     for (const auto& [robot, member] : members_) poses[robot] = member->poses();
     return poses;
   }
-  /// Sent by `robot`, copies not counted.
+  /// Bytes sent by `robot`, without copies.
   [[nodiscard]] std::size_t bytes_of(RobotId robot) const {
     const auto found = bytes_.find(robot);
     return found == bytes_.end() ? 0 : found->second;
   }
-  [[nodiscard]] std::size_t refused() const { return refused_; }  ///< Letters, copies included.
+  [[nodiscard]] std::size_t refused() const {
+    return refused_;
+  }  ///< Refused messages, copies included.
 
   std::function<void(RobotId, const MemberSolver&)> after_advance = {};
 
@@ -388,7 +392,7 @@ class SolverTeam {
   std::size_t now_ = 0;
 };
 
-/// A member for every place of the tree: `make(graph, place)` gives the solver.
+/// A member for every place of the tree: `make(graph, place)` returns the solver.
 template <typename Make>
 [[nodiscard]] SolverTeam solver_team(const TeamProblem& problem, const TeamTree& tree,
                                      const LetterPost& post, Make&& make) {

@@ -11,15 +11,16 @@
 
 namespace km {
 
-/// A pose graph dealt out to robots. Every edge is given once.
+/// A pose graph split among robots. Every edge is given once.
 struct SplitGraph {
   std::map<RobotId, std::uint32_t> keyframes;
   std::vector<RelativePose> odometry;        ///< Keyframe i to i + 1 of one robot, ascending.
-  std::vector<RelativePose> closures;        ///< All others.
-  std::map<RobotId, SE3> T_odom_first = {};  ///< Of keyframe 0; the identity if not given.
-  std::map<RobotId, std::function<Vertical(std::uint32_t)>> up = {};  ///< At its keyframes.
+  std::vector<RelativePose> closures;        ///< All other edges.
+  std::map<RobotId, SE3> T_odom_first = {};  ///< Pose of keyframe 0; the identity if not given.
+  std::map<RobotId, std::function<Vertical(std::uint32_t)>> up =
+      {};  ///< Verticals at the keyframes of a robot.
 
-  /// Poses of all robots one after the other, ascending by id, as one block.
+  /// Poses of all robots as one block, robot by robot, ascending by id.
   [[nodiscard]] WholeGraph whole() const {
     std::map<RobotId, Eigen::Index> first;
     WholeGraph graph;

@@ -17,15 +17,14 @@
 
 namespace km {
 
-/// Spoils input in the ways in which that of people, programs and networks is spoilt. The same
-/// seed, the same faults.
+/// Corrupts input as people, programs and networks do. The same seed gives the same faults.
 class InputSpoiler {
  public:
   using Bytes = std::vector<std::uint8_t>;
 
   explicit InputSpoiler(unsigned seed) : rng_(seed) {}
 
-  /// A text: numbers that none can be, lines lost, repeated, exchanged or cut, garbage, other line
+  /// Corrupts a text: invalid numbers, lines lost, repeated, exchanged or cut, garbage, other line
   /// ends.
   [[nodiscard]] std::string operator()(std::string text) {
     const int faults = below(3) + 1;
@@ -33,8 +32,8 @@ class InputSpoiler {
     return text;
   }
 
-  /// One of several messages: counts and indices that none can be, octets lost, changed or added,
-  /// or part of another one of them.
+  /// Corrupts one of several messages: invalid counts and indices, octets lost, changed or added,
+  /// or a part of another message.
   [[nodiscard]] Bytes operator()(const std::vector<Bytes>& samples) {
     const auto one_of = [&] { return static_cast<std::size_t>(below(samples.size())); };
     Bytes bytes = samples[one_of()];
@@ -62,7 +61,7 @@ class InputSpoiler {
                                           "86400000000000",
                                           "x"};
 
-  // Lengths, counts and indices at which readers go wrong.
+  // Lengths, counts and indices at which readers tend to fail.
   static constexpr std::array<std::uint32_t, 8> kWords = {
       0, 1, 0x7f, 0xff, 0xffff, 0x7fffffff, 0x80000000, 0xffffffff};
 
@@ -150,7 +149,7 @@ class InputSpoiler {
       octets[place_in(octets) % octets.size()] ^= static_cast<Octet>(1 << below(8));
   }
 
-  // Four octets where one may lie, little-endian.
+  // Four octets at a possible position of a number, little-endian.
   void replace_word(Bytes& bytes) {
     const std::size_t at = place_in(bytes) / 4 * 4;
     const std::uint32_t word = kWords[static_cast<std::size_t>(below(kWords.size()))];
@@ -158,7 +157,7 @@ class InputSpoiler {
       bytes[at + k] = static_cast<std::uint8_t>(word >> (8 * k));
   }
 
-  // A run of digits, signs and points becomes another number, or becomes it in addition.
+  // A run of digits, signs and points is replaced by another number, or followed by it.
   void replace_number(std::string& text) {
     constexpr std::string_view kDigits = "0123456789.+-";
     const std::size_t begin = text.find_first_of(kDigits, place_in(text));
@@ -189,14 +188,15 @@ class InputSpoiler {
   std::mt19937 rng_;
 };
 
-/// How many spoilt files of a kind a test reads; KIMERA_MULTI_SPOILT_FILES makes it longer.
+/// Number of corrupted files of a kind that a test reads; KIMERA_MULTI_SPOILT_FILES increases it.
 [[nodiscard]] inline unsigned spoilt_files() {
   const char* const wanted = std::getenv("KIMERA_MULTI_SPOILT_FILES");
   return wanted == nullptr ? 300U : static_cast<unsigned>(std::atoi(wanted));
 }
 
-/// Hands `read` the good text, which it must accept, and many spoilt ones. It may throw an `Error`
-/// of a few lines that names `name`, and no other exception; what it accepts it has to check.
+/// Calls `read` with the valid text, which it must accept, and with many corrupted ones. It may
+/// throw an `Error` of a few lines that names `name`, and no other exception. It must check the
+/// content that it accepts.
 template <typename Error, typename Read>
 void check_spoilt(const std::string& good, const std::string& name, const Read& read) {
   REQUIRE_NOTHROW(read(good));
@@ -214,10 +214,10 @@ void check_spoilt(const std::string& good, const std::string& name, const Read& 
       FAIL_CHECK("not an error of input: " << error.what());
     }
   }
-  CHECK(refused < spoilt_files());  // or nothing that is accepted was looked at
+  CHECK(refused < spoilt_files());  // otherwise no accepted content was examined
 }
 
-/// Places where there is no file to read.
+/// Paths without a readable file.
 [[nodiscard]] inline std::vector<std::filesystem::path> no_files(const TemporaryFolder& folder,
                                                                  const std::string& extension) {
   namespace fs = std::filesystem;
@@ -229,7 +229,7 @@ void check_spoilt(const std::string& good, const std::string& name, const Read& 
           folder.path() / (std::string(300, 'n') + extension)};
 }
 
-/// `read` refuses each of them with an `Error` that names it.
+/// Checks that `read` refuses each of them with an `Error` that names it.
 template <typename Error, typename Read>
 void check_no_files(const std::string& extension, const Read& read) {
   const TemporaryFolder folder;

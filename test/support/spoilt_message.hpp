@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// A message as it arrives, and who wrote it.
+/// A received message and its writer.
 template <typename T>
 struct Arrived : Codec<T>::Encoded {
   TeamPeer writer;
@@ -29,7 +29,7 @@ template <typename T>
   return Codec<T>::decode(message.wire, message.writer);
 }
 
-/// A way to spoil a message, and what it must be refused for.
+/// A way to corrupt a message, and the expected reason for its refusal.
 template <typename T>
 struct Spoilt {
   const char* what;
@@ -37,7 +37,7 @@ struct Spoilt {
   std::function<void(Arrived<T>&)> spoil;
 };
 
-/// Checks each of `ways` on a fresh message by `make`.
+/// Checks each of `ways` on a new message by `make`.
 template <typename T, typename Make>
 void check_refusals(const Make& make, const std::vector<Spoilt<T>>& ways) {
   for (const Spoilt<T>& way : ways) {

@@ -11,9 +11,9 @@
 
 namespace km {
 
-/// A chain of `poses` with edges also to the fifth pose after each and to a far one; exact but for
-/// noise of `sigma` in each component. Every third pose knows which way is up, equally noisy, if
-/// `vertical_weight` is positive.
+/// A chain of `poses` with edges also to the fifth pose after each and to a far one. It is exact
+/// except for noise of `sigma` in each component. Every third pose has a vertical with the same
+/// noise if `vertical_weight` is positive.
 inline TeamGraph noisy_chain(Eigen::Index poses, std::size_t robots, double sigma,
                              std::mt19937& rng, double vertical_weight = 0.0) {
   std::normal_distribution<double> normal(0.0, sigma);
@@ -42,8 +42,8 @@ inline TeamGraph noisy_chain(Eigen::Index poses, std::size_t robots, double sigm
   return graph;
 }
 
-/// A ring of equal rotations at one place, and the wrong answer that turns once on the way round: a
-/// critical point of cost n (4 - 4 cos(2 pi / n)), while the optimum is 0.
+/// A ring of equal rotations at one place, and the wrong solution that rotates once along the ring.
+/// It is a critical point of cost n (4 - 4 cos(2 pi / n)), while the optimum is 0.
 struct WoundRing {
   TeamGraph graph;
   std::vector<SE3> wound;

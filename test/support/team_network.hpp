@@ -21,17 +21,17 @@
 
 namespace km {
 
-/// A link between two robots, the same both ways.
+/// A link between two robots, the same in both directions.
 struct NetworkLink {
   bool up = true;
   double min_delay_s = 1e-3;
   double max_delay_s = 1e-3;  ///< Uniform: reorders if it is above the least.
   double lost = 0.0;          ///< Probability.
-  double duplicated = 0.0;    ///< Probability of a second copy, delayed anew.
+  double duplicated = 0.0;    ///< Probability of a second copy, with a delay of its own.
 };
 
-/// Agents of a team on a network in memory with virtual time: any links, which may come and go. All
-/// messages cross it as bytes.
+/// Agents of a team on a network in memory with virtual time, over any links, which may fail and
+/// return. All messages cross it as bytes.
 class TeamNetwork {
  public:
   struct Robot {
@@ -42,24 +42,25 @@ class TeamNetwork {
     OptimizerProgress progress = {};
     ClosureVerdicts verdicts = {};
     std::vector<std::string> notices = {};
-    std::size_t bytes = 0;  ///< Sent, every reader counted, also what is relayed and what is lost.
-    std::size_t parcels = 0;  ///< The same.
+    std::size_t bytes =
+        0;  ///< Bytes sent, counted for every reader, including relayed and lost ones.
+    std::size_t parcels = 0;  ///< Messages sent, counted in the same way.
     bool steps_now = true;
   };
 
   explicit TeamNetwork(unsigned seed = 1) : rng_(seed) {}
 
-  NetworkLink usual = {};  ///< What links are like that are not set.
-  /// How long a link that has gone is still taken to be there by its ends: short gaps go unnoticed.
+  NetworkLink usual = {};  ///< Properties of links that are not set.
+  /// Time for which the ends of a failed link do not notice the failure: short gaps have no effect.
   double lease_s = 0.2;
   std::map<RobotId, Robot> robots = {};
-  std::size_t undecodable = 0;  ///< Messages that agents have sent.
-  std::size_t lost = 0;         ///< Parcels.
+  std::size_t undecodable = 0;  ///< Invalid messages that agents have sent.
+  std::size_t lost = 0;         ///< Lost messages.
   /// After every step of a robot.
   std::function<void(const Robot&)> on_step = {};
-  /// Sees every parcel before it is sent.
+  /// Called with every message before it is sent.
   std::function<void(RobotId from, const Parcel&)> on_parcel = {};
-  /// Loses the parcels for which it is true.
+  /// Loses the messages for which it returns true.
   std::function<bool(RobotId from, const Parcel&)> loses = {};
 
   TeamAgent& add(TeamPeer peer, const PoseGraphConfig& config, const MemberSolverFactory& factory) {
@@ -71,7 +72,7 @@ class TeamNetwork {
     return *robot.agent;
   }
 
-  /// Sets a link; nullptr-like defaults come from `usual`.
+  /// Sets a link; by default it is `usual`.
   void set_link(RobotId a, RobotId b, const NetworkLink& link) {
     links_[std::minmax(a, b)] = link;
     renew(a, b);
@@ -99,8 +100,8 @@ class TeamNetwork {
       }
   }
 
-  /// The process ends; what is in flight to it is lost. add() starts another one, revive() goes on
-  /// with the same.
+  /// Ends the process; messages in flight to it are lost. add() starts another process, revive()
+  /// continues the same one.
   void kill(RobotId robot) {
     robots.at(robot).dead = true;
     std::erase_if(in_flight_, [&](const auto& entry) { return entry.second.to == robot; });
@@ -145,13 +146,13 @@ class TeamNetwork {
     return false;
   }
 
-  /// Hands `from`'s message to `to` as if it had come over a link.
+  /// Delivers `from`'s message to `to` as if it had come over a link.
   bool inject(RobotId from, RobotId to, const TeamMessage& message) {
     robots.at(to).steps_now = busy_ = true;
     return robots.at(to).agent->receive(from, std::make_shared<const TeamMessage>(message));
   }
 
-  /// True if all robots that live are members of one settled session.
+  /// True if all running robots are members of one settled session.
   [[nodiscard]] bool all_settled() const {
     std::size_t alive = 0;
     for (const auto& [id, robot] : robots) alive += robot.dead ? 0 : 1;
@@ -161,7 +162,7 @@ class TeamNetwork {
     });
   }
 
-  /// What everyone is at, for messages of failed tests.
+  /// State of all agents, for messages of failed tests.
   [[nodiscard]] std::string describe() const {
     std::ostringstream text;
     text << "at " << now_s_ << " s\n";
@@ -186,14 +187,14 @@ class TeamNetwork {
     return text.str();
   }
 
-  /// What has been published; poses in one frame if all have the same anchor.
+  /// Published poses; they are in one frame if all have the same anchor.
   [[nodiscard]] TeamPoses trajectories() const {
     TeamPoses poses;
     for (const auto& [id, robot] : robots)
       if (robot.trajectory) poses[id] = robot.trajectory->T_world_kf;
     return poses;
   }
-  /// Where the agents are at present, each in its own frame().
+  /// Present poses of the agents, each in its own frame().
   [[nodiscard]] TeamPoses poses() const {
     TeamPoses poses;
     for (const auto& [id, robot] : robots) poses[id] = robot.agent->poses();
@@ -214,8 +215,7 @@ class TeamNetwork {
            !at_b->second.dead && link(a, b).up;
   }
 
-  // The ends of a link notice what has become of it: at once if it is there, after the lease if
-  // not.
+  // The ends of a link notice a change: at once if it returns, after the lease if it fails.
   void renew(RobotId a, RobotId b) {
     if (connected(a, b)) {
       tell_alive(a, b);
@@ -278,7 +278,7 @@ class TeamNetwork {
     }
   }
 
-  // What arrives of a message, and how many bytes it takes.
+  // The message after encoding and decoding, and its number of bytes.
   const std::pair<std::size_t, TeamMessagePtr>& across(const TeamMessagePtr& message) {
     if (last_sent_ == message) return last_across_;
     const std::vector<std::uint8_t> bytes = encode(*message);
@@ -340,7 +340,7 @@ inline Closure closure_of(const PoseEdge& e) {
   return closure;
 }
 
-/// Of all closures between a and b that `problem` has.
+/// All closures between a and b in `problem`.
 inline InlierSet inlier_set(const TeamProblem& problem, RobotId a, RobotId b,
                             std::uint32_t version = 1) {
   InlierSet set{std::min(a, b), std::max(a, b), version, {}};
@@ -368,7 +368,7 @@ inline void feed(TeamAgent& agent, RobotId robot, const TeamProblem& problem) {
   feed_closures(agent, robot, problem);
 }
 
-/// Runs until all that live are members of one settled session. False if that takes longer.
+/// Runs until all running robots are members of one settled session. False if that takes longer.
 inline bool settle(TeamNetwork& network, double within_s = 300.0) {
   const bool settled = network.run(within_s, [&] { return network.all_settled(); });
   if (!settled) UNSCOPED_INFO(network.describe());

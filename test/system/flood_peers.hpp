@@ -17,9 +17,9 @@
 
 namespace km {
 
-/// The other end of all that a robot says and hears (Robot::add_network), with nothing behind it.
+/// The counterpart of all topics of a robot (Robot::add_network), with no modules behind it.
 struct FloodPeer {
-  /// `make_seal` may be empty: then it speaks in clear.
+  /// If `make_seal` is empty, messages are not encrypted.
   FloodPeer(const std::shared_ptr<const DdsDomain>& domain, const RobotIdentity& identity,
             const TestRobot::MakeSeal& make_seal)
       : participant(domain, identity, make_seal ? make_seal(identity) : nullptr),
@@ -77,7 +77,7 @@ struct FloodPeer {
     return sum;
   }
 
-  // Room for the signature that goes behind messages where the team has keys, and none in it.
+  // Room for the signature behind messages if the team has keys, without a signature in it.
   template <typename T>
   static ContentGuard<T> unsigned_guard(bool has_keys) {
     if (!has_keys) return {};
@@ -99,7 +99,7 @@ struct FloodPeer {
   Inbox<PeerEvent> peer_events;
 };
 
-/// When numbered questions were asked, and how long their answers took. Thread-safe.
+/// Measures the time from numbered questions to their answers. Thread-safe.
 class AnswerTimes {
  public:
   using Clock = std::chrono::steady_clock;
@@ -108,7 +108,7 @@ class AnswerTimes {
     const std::lock_guard lock(mutex_);
     open_.emplace(number, Clock::now());
   }
-  /// Of this question, and of those before it.
+  /// Call for the answer to this question, which also answers those before it.
   void answered(std::uint32_t number) {
     const std::lock_guard lock(mutex_);
     while (!open_.empty() && open_.begin()->first <= number) {
@@ -121,7 +121,7 @@ class AnswerTimes {
     const std::lock_guard lock(mutex_);
     return open_.empty();
   }
-  /// Those since the last call [s], ascending.
+  /// Times of the answers since the last call [s], ascending.
   [[nodiscard]] std::vector<double> take() {
     const std::lock_guard lock(mutex_);
     std::ranges::sort(taken_s_);
@@ -129,7 +129,7 @@ class AnswerTimes {
   }
 
  private:
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::map<std::uint32_t, Clock::time_point> open_;
   std::vector<double> taken_s_;
 };

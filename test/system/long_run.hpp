@@ -20,7 +20,7 @@
 
 namespace km {
 
-/// A pipe that is full and that nobody reads.
+/// A full pipe without a reader.
 class FullPipe {
  public:
   FullPipe() {
@@ -28,7 +28,7 @@ class FullPipe {
     const std::array<char, 4096> bytes{};
     while (write(ends_[1], bytes.data(), bytes.size()) > 0) {
     }
-    fcntl(ends_[1], F_SETFL, 0);  // whoever writes now waits
+    fcntl(ends_[1], F_SETFL, 0);  // further writes block
   }
   ~FullPipe() {
     close(ends_[0]);

@@ -73,7 +73,7 @@ Spoil move_samples(double by_s) {
   };
 }
 
-// What is lit too much is white.
+// Overexposed pixels become white.
 void jump_exposure(EurocCopy& copy, Stamp begin, Stamp end) {
   for (auto& images : copy.cameras)
     for_each_within(images, begin, end, [&](EurocCopy::Image& image) {
@@ -95,7 +95,7 @@ std::vector<SensorFault> sensor_faults() {
   const std::string lost = "vision lost since", gap = "gaps between inertial samples",
                     unordered = "stamps out of order";
   constexpr double kBlind5_m = 1.0, kBlind15_m = 10.0;  // by inertial sensing alone
-  constexpr double kRestart2_m = 3.0;                   // what it flies meanwhile
+  constexpr double kRestart2_m = 3.0;                   // distance of the flight during the restart
   const auto blind = [&](const std::string& name, double lasts_s, Spoil spoil) {
     return SensorFault{.name = name,
                        .lasts_s = lasts_s,

@@ -12,15 +12,15 @@ namespace km {
 struct SensorFault {
   std::string name;
   double lasts_s = 0.0;
-  /// Spoils what is from `begin` to before `end`.
+  /// Corrupts the data from `begin` to before `end`.
   std::function<void(EurocCopy&, Stamp begin, Stamp end)> spoil;
-  std::string event = {};    ///< In the log of a robot that meets it.
-  double bound_m = 0.1;      ///< Of the position, while it lasts and after it.
+  std::string event = {};    ///< Text in the log of a robot with this fault.
+  double bound_m = 0.1;      ///< Bound on the position error, during the fault and after it.
   bool is_blind = false;     ///< For a while no image holds the pose.
   bool is_at_start = false;  ///< From the first image on.
 };
 
-/// All, in the order in which they are told of.
+/// All faults, in the order of the report.
 [[nodiscard]] std::vector<SensorFault> sensor_faults();
 
 }  // namespace km

@@ -101,10 +101,10 @@ inline std::filesystem::path write_team(const SplitGraph& graph, const Temporary
 struct TeamResult {
   WholeGraph graph;
   std::vector<SE3> poses;
-  std::vector<int> robot_of;  ///< Of each pose.
+  std::vector<int> robot_of;  ///< Robot of each pose.
 };
 
-/// Of robots 0 to `robots` - 1, whose results are in robot0, robot1, ...
+/// Results of robots 0 to `robots` - 1, from robot0, robot1, ...
 inline TeamResult read_team(const std::filesystem::path& folder, int robots) {
   std::vector<G2oGraph> parts;
   std::map<KeyframeId, Eigen::Index> index_of;
@@ -136,7 +136,7 @@ inline double cost_of(const WholeGraph& graph, const std::vector<SE3>& poses) {
   return cost;
 }
 
-/// The cost that kimera_multi_pgo comes to for the edges that robots 0 to `robots` - 1 have kept,
+/// The cost that kimera_multi_pgo reaches for the edges that robots 0 to `robots` - 1 have kept,
 /// whose results are in robot0, robot1, ... of `folder`.
 inline double solved_in_one_process(const std::filesystem::path& folder, int robots) {
   const std::filesystem::path parts = folder / "kept";

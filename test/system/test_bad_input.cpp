@@ -143,7 +143,7 @@ std::vector<Fault> faults() {
 
 }  // namespace
 
-TEST_CASE("A robot loses what is broken in its recording, tells of it, and goes on", "[system]") {
+TEST_CASE("A robot skips broken parts of its recording, reports them, and continues", "[system]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   for (const Fault& fault : faults()) {
@@ -174,7 +174,7 @@ TEST_CASE("Inertial samples that end in the middle do not end the robot", "[syst
   CHECK_THAT(result.output, Catch::Contains("1 gaps between inertial samples"));
 }
 
-TEST_CASE("What is no recording ends --inspect as bad input with one line", "[system]") {
+TEST_CASE("A file that is no recording ends --inspect as bad input with one line", "[system]") {
   const TemporaryFolder folder;
   const fs::path file = folder.write("a.bag", "#ROSBAG V1.2\n");
   const CommandResult result =
@@ -185,7 +185,8 @@ TEST_CASE("What is no recording ends --inspect as bad input with one line", "[sy
   CHECK(std::count(result.output.begin(), result.output.end(), '\n') == 1);
 }
 
-TEST_CASE("Mistakes on a robot's command line are told by value, and what to do", "[system]") {
+TEST_CASE("Mistakes on a robot's command line are reported by value and with a remedy",
+          "[system]") {
   const TemporaryFolder folder;
   const std::string robot = KM_BIN_DIR "/kimera_multi_robot --dataset " + folder.path().string();
   const auto refusal = [&](const std::string& options) {

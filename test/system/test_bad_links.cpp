@@ -21,14 +21,15 @@
 #include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
 
-// Teams whose frames the team's program carries, over links that lose some of them: --links.
+// Teams over links that lose frames: the team program carries the frames (--links).
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
 
-// barc as in test_links.cpp. Outages are shorter than the robots stay on for each other.
+// barc as in test_links.cpp. Outages are shorter than the time for which robots wait for each
+// other.
 constexpr const char* kSettings =
     "arguments: [--set, pose_graph.barc=20, --set, run.settle_s=10]\n";
 
@@ -68,7 +69,7 @@ SplitGraph pair_of_robots() {
   return random_team(22, {0, 1}, 40, {{0, 1}});
 }
 
-// Whether a process runs that `text` is on the command line of.
+// True if a process runs with `text` on its command line.
 bool is_running(const std::string& text) {
   for (const auto& process : fs::directory_iterator("/proc")) {
     std::ifstream file(process.path() / "cmdline");
@@ -188,7 +189,7 @@ void find_closures_between_ends(bool has_keys) {
     const RunSummary summary = read_summary(folder.path() / name / "summary.json");
     CHECK(summary.pgo.members == std::vector<RobotId>{0, 1, 2});
   }
-  // Of the closures between a and b each is in both files, once.
+  // Each closure between a and b is in both files, once.
   std::map<std::pair<KeyframeId, KeyframeId>, int> closures;
   for (const char* name : {"a", "b"})
     for (const RelativePose& edge : read_g2o(folder.path() / name / "pose_graph.g2o").edges)
@@ -214,7 +215,7 @@ TEST_CASE("Robots with keys that never hear each other find closures through one
 
 namespace {
 
-// One way in which links are bad, all through the run but for the outage.
+// Properties of bad links, constant during the run except for the outage.
 struct BadLinks {
   double outage_s = 0.0;  // from kOutage_s on
   double loss = 0.0;
@@ -235,7 +236,7 @@ std::ostream& operator<<(std::ostream& out, const BadLinks& links) {
              << links.delay_s << " s";
 }
 
-// Any two values of two of the three quantities meet in one of nine.
+// Any two values of two of the three quantities occur together in one of nine combinations.
 std::vector<BadLinks> all_pairs() {
   constexpr double kOutages_s[] = {5.0, 20.0, 60.0};
   constexpr double kLosses[] = {0.0, 0.1, 0.3};
@@ -247,7 +248,8 @@ std::vector<BadLinks> all_pairs() {
   return all;
 }
 
-// Two robots of the tunnels that trust all closures: which of them count hangs on no order.
+// Two robots of the tunnels that trust all closures, so that the kept closures do not depend on the
+// order of events.
 class TunnelsRun {
  public:
   TunnelsRun(const fs::path& dataset, const std::string& script, double settle_s) {
@@ -282,7 +284,8 @@ class TunnelsRun {
     return read_summary(folder_.path() / robot_name(robot) / "summary.json");
   }
 
-  // How often each closure stands in the robots' files; of one between two, in both.
+  // Number of occurrences of each closure in the robots' files; a closure between two robots is in
+  // both.
   [[nodiscard]] std::map<std::pair<KeyframeId, KeyframeId>, int> closures() const {
     std::map<std::pair<KeyframeId, KeyframeId>, int> count;
     for (const int robot : {0, 1})
@@ -292,8 +295,8 @@ class TunnelsRun {
     return count;
   }
 
-  // When what the robots say of closures and the optimiser changed last [s since the start], by
-  // their status lines, one a second.
+  // Time of the last change of closures or optimiser state [s since the start], by the status lines
+  // of the robots, one a second.
   [[nodiscard]] double agreed_s() const {
     double last_s = 0.0;
     std::map<std::string, std::string> told;  // by robot

@@ -9,7 +9,7 @@
 #include "test/system/long_run.hpp"
 #include "test/system/team_run.hpp"
 
-// How whole programs end when what surrounds them fails.
+// End of whole programs when a resource around them fails.
 
 namespace km {
 namespace {
@@ -28,7 +28,7 @@ std::vector<std::string> robot_on_walk(const fs::path& walk, const fs::path& out
           std::to_string(random_domain())};
 }
 
-TEST_CASE("A robot whose output nobody reads ends on a signal with its results",
+TEST_CASE("A robot without a reader of its output ends on a signal with its results",
           "[system][endings]") {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out";
@@ -41,7 +41,7 @@ TEST_CASE("A robot whose output nobody reads ends on a signal with its results",
   CHECK(read_summary(output / "summary.json").exit_reason == "interrupted");
 }
 
-// A file system of its own for this thread and what it starts, that holds `size` bytes.
+// A file system of its own for this thread and its processes, that holds `size` bytes.
 class SmallDisk {
  public:
   explicit SmallDisk(fs::path folder, const char* size) : folder_(std::move(folder)) {
@@ -64,7 +64,7 @@ class SmallDisk {
     while (out.write(block.data(), 4096).flush()) {
     }
   }
-  // Waits for the moment at which no file is being written.
+  // Waits until no file is being written.
   [[nodiscard]] bool make_read_only() const {
     constexpr unsigned long kReadOnly = MS_REMOUNT | MS_RDONLY;
     for (int i = 0; i < 1000; ++i) {
@@ -79,7 +79,7 @@ class SmallDisk {
   bool mounted_ = false;
 };
 
-// A robot on a walk whose output is on a small disk, and what it says in a log elsewhere.
+// A robot on a walk whose output is on a small disk, and its log elsewhere.
 struct RobotOnSmallDisk {
   TemporaryFolder folder;
   SmallDisk disk{folder.path() / "disk", "size=256k"};
@@ -101,7 +101,7 @@ struct RobotOnSmallDisk {
   }
 };
 
-TEST_CASE("On a full or read-only disk a robot goes on, names what is lost, and ends with 4",
+TEST_CASE("On a full or read-only disk a robot continues, names lost results, and ends with 4",
           "[system][endings]") {
   const bool full = GENERATE(true, false);
   CAPTURE(full);
@@ -156,7 +156,7 @@ std::vector<std::string> team_on_walks(const TemporaryFolder& folder) {
           folder.path().string()};
 }
 
-TEST_CASE("A team whose output nobody reads ends on a signal with the results of all",
+TEST_CASE("A team without a reader of its output ends on a signal with the results of all",
           "[system][endings]") {
   const TemporaryFolder folder;
   const FullPipe blocked;
@@ -176,7 +176,8 @@ TEST_CASE("A hung-up terminal and a closed pipe end a robot in order", "[system]
   REQUIRE(pipe2(ends.data(), O_CLOEXEC) == 0);
   Child robot(robot_on_walk(long_walk(folder.path(), 0), output), ends[1]);
   close(ends[1]);
-  close(ends[0]);  // whoever read has gone: every line it says is SIGPIPE, or an error
+  close(
+      ends[0]);  // the reader has gone: every line that the robot prints gives SIGPIPE or an error
   REQUIRE(wait_for_lines(output / "process.csv", 4));
   robot.kill(SIGHUP);
   robot.kill(SIGHUP);  // as from the terminal and from its shell

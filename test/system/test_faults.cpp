@@ -18,10 +18,10 @@ namespace {
 namespace fs = std::filesystem;
 
 // With less patience than by default, so that the tests take less time: 9 s, or 36 s. With much
-// less a computer under load would be taken for a module that hangs.
+// less, a module on a loaded computer would count as hung.
 constexpr const char* kLittlePatience = "run.patience=0.3";
 
-// A robot that says all into `folder`/log.
+// A robot with its log in `folder`/log.
 struct FaultyRobot {
   TemporaryFolder folder;
   fs::path output = folder.path() / "out";
@@ -90,7 +90,8 @@ TEST_CASE("A module that throws or hangs is named, and what was recorded is writ
         *dataset);
 }
 
-TEST_CASE("Likewise a module of the map", "[system][faults][slow]") {
+TEST_CASE("A module of the map that throws or hangs is named, and recorded results are written",
+          "[system][faults][slow]") {
   if (const auto dataset = shared_data("euroc/MH_01_easy"))
     check_faults({"semantic_mapping", "mesh_deformation"}, {"dense_sensing"}, *dataset,
                  {"mapping.mode=metric"});
@@ -102,7 +103,7 @@ TEST_CASE("A disk that stands still under the map leaves the other results", "[s
   FaultyRobot robot;
   robot.start("none", "hang", *dataset, {"mapping.mode=metric", "run.patience=0.1"});
   REQUIRE(wait_for_lines(robot.output / "process.csv", 1));
-  // To open a pipe that nobody reads takes for ever.
+  // The opening of a pipe without a reader never returns.
   REQUIRE(mkfifo((robot.output / "mesh.ply.part").c_str(), 0600) == 0);
   CHECK(robot.process->wait(3 * kPatience) == 5);
   CAPTURE(robot.told());
@@ -113,7 +114,7 @@ TEST_CASE("A disk that stands still under the map leaves the other results", "[s
                  Catch::Contains("mesh.ply"));
 }
 
-TEST_CASE("The team goes on without a robot whose module hangs, and sees it leave",
+TEST_CASE("The team continues without a robot whose module hangs, and sees it leave",
           "[system][faults]") {
   FaultyRobot faulty;
   const fs::path output = faulty.folder.path() / "sound";
@@ -130,7 +131,7 @@ TEST_CASE("The team goes on without a robot whose module hangs, and sees it leav
   faulty.start("pose_graph", "hang", long_walk(faulty.folder.path(), 1));
   check_end(faulty, "pose_graph", "hang");
   const auto end = std::chrono::steady_clock::now() + kPatience;
-  // On a machine that is too busy it may be silent for two seconds before it says good-bye.
+  // On an overloaded machine it may be silent for two seconds before its leave message.
   const auto has = [&](const char* words) {
     return faulty.folder.read("sound.log").find(words) != std::string::npos;
   };

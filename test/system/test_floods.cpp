@@ -23,10 +23,10 @@
 #include "test/system/flood_peers.hpp"
 #include "test/system/long_run.hpp"
 
-// One robot of a team sends to a robot process as much of one kind as a fast radio link carries,
-// all of it readable; another asks that robot something twenty times a second. What the flood
-// costs: memory of the process, octets that it sends for each that it gets, and how long the other
-// waits.
+// One robot of a team sends as many valid messages of one kind to a robot process as a fast radio
+// link carries. Another robot sends that process a question twenty times a second. The test
+// measures the cost of the flood: memory of the process, bytes that it sends for each received
+// byte, and the waiting time of the other robot.
 
 namespace km {
 namespace {
@@ -40,7 +40,7 @@ constexpr double kMaxOutPerIn = 10.0;
 constexpr double kMaxP99_s = 0.2;
 constexpr double kMaxLate_s = 2.0;
 
-// Of a link.
+// Capacity of a link.
 constexpr double kMessages_Hz = 2000.0;
 constexpr double kBytes_Hz = 12.5e6;
 constexpr double kStrangers_Hz = 20.0;
@@ -52,7 +52,7 @@ struct Flood {
   bool sealed = false;
 };
 
-/// A process of a robot that made-up messages are said by.
+/// A process of a robot, and robots whose messages the test makes up.
 TeamPeer made_up(std::uint32_t number) {
   return {static_cast<RobotId>(1000 + number % 2000), 1U + number % 2000U};
 }
@@ -183,7 +183,7 @@ std::int64_t now_s() {
   return static_cast<std::int64_t>(wall_now_s());
 }
 
-// A robot process that is flooded, and whom it serves meanwhile.
+// A flooded robot process, and the other robot that it serves meanwhile.
 class Scene {
  public:
   Scene(const Flood& flood, const std::optional<std::filesystem::path>& images)
@@ -205,7 +205,7 @@ class Scene {
     REQUIRE(eventually([&] { return all_answered(); }));
   }
 
-  /// Asks for a keyframe, and for something to be handed on.
+  /// Requests a keyframe, and sends a message to be forwarded.
   void ask() {
     const std::uint32_t number = ++asked_;
     replies.asked(number);
@@ -299,11 +299,11 @@ struct Waits {
 };
 
 struct Costs {
-  std::uint64_t messages = 0;  // of the flood
+  std::uint64_t messages = 0;  // messages of the flood
   std::uint64_t bytes_in = 0, bytes_out = 0;
   double growth_MB = 0.0;
   Waits replies, relayed;
-  double late_s = 0.0;  // the answer to what is asked when the flood is over
+  double late_s = 0.0;  // waiting time for a question asked after the flood
 
   void print(const std::string& name) const {
     std::printf("%-14s %8llu %8.1f %7.1f %8.2f %7.0f %7.0f %7.0f %7.0f %7.2f\n", name.c_str(),
@@ -380,7 +380,8 @@ Costs measure(Scene& scene, const Flood& flood, double seconds) {
   return costs;
 }
 
-// Seconds of the long form; nullopt in the short one, where what depends on the machine only shows.
+// Duration of the long form [s]; nullopt in the short form, where values that depend on the machine
+// are only printed.
 std::optional<double> long_form_s() {
   const char* given = std::getenv("KM_FLOOD_SECONDS");
   return given != nullptr ? std::optional(std::stod(given)) : std::nullopt;

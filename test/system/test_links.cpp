@@ -11,8 +11,8 @@
 #include "test/support/random_team.hpp"
 #include "test/system/team_run.hpp"
 
-// Teams on recorded pose graphs: a process for each robot, in one network, and in networks of their
-// own where some do not hear each other.
+// Teams on recorded pose graphs: a process for each robot, in one network, and in separate networks
+// if some robots do not hear each other.
 
 namespace km {
 namespace {
@@ -28,7 +28,7 @@ Links all_links(int robots) {
   return links;
 }
 
-// A team on hosts of which those in `links` hear each other; robot k is on host k + 1.
+// A team on hosts connected by `links`; robot k is on host k + 1.
 class Team {
  public:
   Team(const SplitGraph& graph, const Links& links, const fs::path& folder, std::string method,
@@ -48,7 +48,7 @@ class Team {
     }
   }
 
-  // True once every robot has said that it solves with all others.
+  // True once every robot reports that it optimises with all others.
   bool is_joint() {
     const std::string with_all = ", with " + std::to_string(robots_.size() - 1);
     return std::all_of(robots_.begin(), robots_.end(), [&](const auto& robot) {
@@ -57,10 +57,10 @@ class Team {
     });
   }
 
-  // Nobody hears robot k any more.
+  // Disconnects robot k from all others.
   void cut_off(int k) { network_.set_link(k + 1, false); }
 
-  // Exit codes of all.
+  // Exit codes of all robots.
   std::vector<int> wait() {
     std::vector<int> codes;
     for (const auto& robot : robots_) codes.push_back(robot->wait());
@@ -74,8 +74,9 @@ class Team {
             robot_name(k), "--graph", (folder_ / ("part" + number + ".g2o")).string(), "--rate",
             "max", "--output", (folder_ / robot_name(k)).string(), "--domain",
             std::to_string(domain), "--interface", "eth0", "--set", "pose_graph.method=" + method_,
-            // One of the random closures has a residual of 5.6 sigma with it and more than the
-            // default limit of 6.2 without: whether it is kept hangs on which session hears of it.
+            // One of the random closures has a residual of 5.6 sigma in one session, and more than
+            // the default limit of 6.2 in another. Which session contains it depends on the order
+            // of messages.
             "--set", "pose_graph.barc=20", "--set", "run.settle_s=" + shortest_text(settle_s_),
             "--log", "warn"};
   }
@@ -89,13 +90,13 @@ class Team {
 
 struct Solved {
   double cost = 0.0;
-  double one = 0.0;  // what one process comes to
+  double one = 0.0;  // cost of one process
   std::size_t edges = 0;
   double slowest_s = 0.0;
 };
 
-// A team at work from its construction on: several of them at a time take no longer than one, as
-// robots mostly wait for each other.
+// A team that runs from its construction on. Several of them at a time take no longer than one,
+// because robots mostly wait for each other.
 class Solution {
  public:
   Solution(const SplitGraph& graph, const Links& links, const std::string& method = "newton",
@@ -103,7 +104,7 @@ class Solution {
       : robots_(static_cast<int>(graph.keyframes.size())),
         team_(graph, links, folder_.path(), method, settle_s) {}
 
-  // Waits for its end.
+  // Waits for the end of all robots.
   Solved get() {
     const auto codes = team_.wait();
     CHECK(codes == std::vector<int>(codes.size(), 0));
@@ -135,7 +136,7 @@ std::ostream& operator<<(std::ostream& out, const Solved& solved) {
              << solved.slowest_s << " s";
 }
 
-constexpr double kSame = 1e-9;  // of the cost
+constexpr double kSame = 1e-9;  // relative difference of costs
 
 void check_alike(const Solved& some, const Solved& all, const char* what) {
   std::cout << what << ": " << some << "; with all links: " << all << '\n';
@@ -192,7 +193,7 @@ TEST_CASE("Robots with a budget come to one frame and send no more than that", "
   }
 }
 
-TEST_CASE("A team that falls in two ends with both sides telling whom they waited for",
+TEST_CASE("A team that splits in two ends, and both sides report the robots they waited for",
           "[system][namespaces]") {
   if (!VirtualNetwork::available()) return;
   const SplitGraph graph = random_team(21, {0, 1, 2}, 40, {{0, 1}, {1, 2}});
@@ -202,7 +203,7 @@ TEST_CASE("A team that falls in two ends with both sides telling whom they waite
   REQUIRE(team.is_joint());
   team.cut_off(2);
   CHECK(team.wait() == std::vector<int>{0, 0, 0});
-  // Robots 0 and 2 know each other from robot 1 alone, which may not have told their names.
+  // Robots 0 and 2 know of each other only through robot 1, which may not have sent their names.
   const std::map<int, std::vector<std::string>> missed{
       {0, {"robot ?2"}}, {1, {"robot2"}}, {2, {"robot ?0", "robot1"}}};
   for (const auto& [robot, names] : missed) {

@@ -44,7 +44,7 @@ std::vector<std::string> robot_command(const fs::path& output,
   return command;
 }
 
-// On topics with EuRoC's names, of a driver in this domain, with the calibration of `dataset`.
+// Topics with EuRoC's names, from a driver in this domain, with the calibration of `dataset`.
 std::vector<std::string> live_command(const TemporaryFolder& folder, const fs::path& dataset,
                                       const std::string& domain) {
   const fs::path rig =
@@ -68,8 +68,8 @@ std::vector<std::string> stamps_of(const std::string& poses) {
   return stamps;
 }
 
-// Poses of a robot on live topics that are played at `rate`; nullopt if it says that messages were
-// lost on the way: a robot's sensors are best effort, and a busy host loses some.
+// Poses of a robot on live topics that are played at `rate`; nullopt if it reports lost messages. A
+// robot's sensors are best effort, and a busy host loses some.
 std::optional<std::string> live_poses(const fs::path& dataset, double rate) {
   const TemporaryFolder folder;
   const std::string domain = std::to_string(random_domain());
@@ -107,7 +107,7 @@ TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are pl
   const std::string expected = first_lines(folder.path() / "folder/odometry.tum", kPoses);
   REQUIRE(std::ranges::count(expected, '\n') == static_cast<std::ptrdiff_t>(kPoses));
 
-  // Slower where the host is too busy: what is asked here is not whether it keeps up.
+  // Plays more slowly if the host is too busy, because this test does not measure the speed.
   std::optional<std::string> poses;
   for (const double rate : {0.7, 0.35, 0.17}) {
     poses = live_poses(*dataset, rate);
@@ -117,7 +117,7 @@ TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are pl
   CHECK(*poses == expected);
 }
 
-TEST_CASE("What a live robot has lost is in its summary", "[system][live]") {
+TEST_CASE("Messages that a live robot has lost are counted in its summary", "[system][live]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -142,7 +142,7 @@ TEST_CASE("What a live robot has lost is in its summary", "[system][live]") {
 
 namespace {
 
-// Cameras that were calibrated without the inertial sensor: /tf_static tells where they are on it.
+// Cameras that were calibrated without the inertial sensor: /tf_static has their mounting.
 const std::string kUnplaced = R"(left: {topic: /cam0/image_raw}
 right: {topic: /cam1/image_raw}
 imu: {topic: /imu0}
@@ -193,7 +193,7 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
       std::make_shared<const RosNetwork>(RosConfig{.domain = domain, .interface = "lo"});
   const RosPublisher description(network, "/tf_static", RosTransforms::kType, RosQos::kLatched, 1);
   description.publish(encode_ros(RosTransforms{{{{0, "imu0"}, "cam0", {}}}}));
-  // It plays once each topic is read, so that the frames of the samples are told.
+  // Playing begins when every topic has a reader, so that the frames of the samples are received.
   Process driver({KM_BIN_DIR "/kimera_multi_publish", recording.root().string(), "--domain",
                   std::to_string(domain), "--interface", "lo", "--wait", "1", "--reliable"});
   const auto is_complete = [](const std::string& line) {
@@ -203,14 +203,14 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
   CHECK(driver.wait() == 0);
   robot.kill(SIGINT);
   const int exit_code = robot.wait();
-  // What is played before the calibration is complete has gone by.
+  // Messages before the calibration is complete are skipped.
   const bool has_poses = fs::file_size(folder.path() / "live/odometry.tum") > 0;
   CHECK(exit_code == (has_poses ? 0 : 1));
 }
 
 TEST_CASE("A live robot whose topics are silent says where it listens, and ends as failed",
           "[system][live]") {
-  const auto dataset = shared_data("euroc/MH_01_easy");  // of which the calibration is used
+  const auto dataset = shared_data("euroc/MH_01_easy");  // only its calibration is used
   if (!dataset) return;
   const TemporaryFolder folder;
   const std::string domain = std::to_string(random_domain());

@@ -11,7 +11,7 @@
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
-// What a robot takes of its computer, and what it leaves out where that is too little.
+// Processor time and memory of a robot, and the frames it skips if the computer is too slow.
 
 namespace km {
 namespace {
@@ -42,14 +42,15 @@ TEST_CASE("A robot keeps the memory of a frame for the next one", "[load]") {
   REQUIRE(run.exit_code == 0);
   const RunSummary summary = read_summary(output / "summary.json");
   REQUIRE(summary.frames == 299);
-  // The start of the program, its vocabulary and what it records take 84 a frame; returning the
-  // memory of each frame to the kernel 3000.
+  // The start of the program, its vocabulary and its records cause 84 page faults a frame. To
+  // return the memory of each frame to the kernel would cause 3000.
   CHECK(static_cast<double>(summary.process.page_faults) <
         300.0 * static_cast<double>(summary.frames));
 #endif
 }
 
-TEST_CASE("On an overloaded computer the map gives way first, then images, evenly", "[load]") {
+TEST_CASE("On an overloaded computer the map skips frames first, then images are skipped evenly",
+          "[load]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;

@@ -48,7 +48,7 @@ std::vector<std::string> record_command(const fs::path& dataset, const fs::path&
           "--record"};
 }
 
-// As fast as it can, with all there is to record; what it printed if it failed.
+// Runs a robot as fast as possible, with all records; returns its output if it failed.
 CommandResult record_all(const fs::path& dataset, const fs::path& output) {
   std::string command;
   for (const std::string& word : record_command(dataset, output, "max")) command += word + ' ';
@@ -87,7 +87,7 @@ void check_equal(const RosPath& path, const std::vector<StampedPose>& poses) {
         (pose.orientation.toRotationMatrix() - poses[k].T.linear()).lpNorm<Eigen::Infinity>());
   }
   CHECK(farthest_m < kDigits);
-  CHECK(most_turned < 10 * kDigits);  // of a quaternion's four
+  CHECK(most_turned < 10 * kDigits);  // error of the four components of quaternions
 }
 
 }  // namespace
@@ -118,7 +118,8 @@ TEST_CASE("A robot's record has the poses of its results", "[system]") {
 }
 
 TEST_CASE(
-    "The record of a robot that is killed has what came before, and the run goes on in another",
+    "The record of a robot that is killed has all earlier messages, and the resumed run writes "
+    "another",
     "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
@@ -193,7 +194,7 @@ TEST_CASE("A team's records become one", "[system]") {
   REQUIRE(run.result.exit_code == 0);
   Record team(folder.path() / "team.mcap");
   CHECK_THAT(to_string(team.reader.report()), Catch::Equals(""));
-  std::size_t messages = 1;  // where `map` is
+  std::size_t messages = 1;  // begins with the message that places `map`
   for (const char* name : {"a", "b"}) {
     const Record own(folder.path() / name / "record.mcap");
     messages += own.messages.size();
@@ -203,7 +204,7 @@ TEST_CASE("A team's records become one", "[system]") {
                 read_trajectory(folder.path() / name / "optimized.tum"));
   }
   CHECK(team.messages.size() == messages);
-  // Of two robots that are joined one's frame hangs in the other's, and that in `map`.
+  // For two joined robots, the frame of one is a child of the other's, which is a child of `map`.
   std::set<std::pair<std::string, std::string>> links;
   for (const ToldMessage& message : team.messages)
     if (message.topic == "/tf" || message.topic == "/tf_static") {
@@ -235,7 +236,7 @@ TEST_CASE("A team's records become one", "[system]") {
   CHECK(both.output.find("team/a") != std::string::npos);
   CHECK(both.output.find("team/b") != std::string::npos);
 
-  // So are closures: the same as from the folders.
+  // The closures are the same as from the folders, too.
   const auto scores = [&](const std::string& results) {
     return run_command(
         std::string(KM_BIN_DIR) + "/kimera_multi_evaluate closures --dataset " + dataset->string() +

@@ -10,7 +10,7 @@
 #include "test/system/team_run.hpp"
 #include "test/system/walk.hpp"
 
-// A robot that is killed and started again with its id, while the other one goes on.
+// A robot that is killed and restarted with its id, while the other one continues.
 
 namespace km {
 namespace {
@@ -19,15 +19,15 @@ namespace fs = std::filesystem;
 
 struct Restart {
   RobotId robot = 0;         // the other one is 1 - robot
-  bool elsewhere = false;    // the new life begins at another place
-  std::uint32_t killed = 0;  // once both have so many keyframes
+  bool elsewhere = false;    // the new incarnation begins at another place
+  std::uint32_t killed = 0;  // once both have this many keyframes
 };
 
 struct Outcome {
-  bool joint = false;         // both ended optimised together, and waited for no time limit
-  double late_s = 0.0;        // of the survivor, behind the restarted robot
+  bool joint = false;         // both ended optimised together, without a time limit
+  double late_s = 0.0;        // delay of the survivor's end after that of the restarted robot
   std::size_t closures = 0;   // used, between the two, by either
-  std::size_t of_former = 0;  // of these, with keyframes of the former life
+  std::size_t of_former = 0;  // number of these with keyframes of the former incarnation
 };
 
 bool has_keyframes(const std::string& status, std::uint32_t least) {
@@ -46,7 +46,7 @@ class Trial {
         next_{restart.robot, restart.elsewhere ? 75U : 30U} {}
 
   Outcome run() {
-    // What the survivor has measured with the former life is no measurement of another one.
+    // Measurements of the survivor with the former incarnation must not be used with the new one.
     const std::uint32_t last = restart_.elsewhere ? restart_.killed / 2 : kLap;
     const auto survivor = start(survivor_, former_, last, "survivor");
     const auto victim = start(former_, survivor_, kLap, "former");
@@ -101,8 +101,9 @@ class Trial {
 };
 
 // Two restarts, more with KM_RESTARTS.
-TEST_CASE("A robot that is killed and started again is in its team again, in its new life alone",
-          "[system][restarts]") {
+TEST_CASE(
+    "A robot that is killed and restarted joins its team again, with its new incarnation only",
+    "[system][restarts]") {
   const char* const asked = std::getenv("KM_RESTARTS");
   const int restarts = asked == nullptr ? 2 : std::atoi(asked);
   REQUIRE(restarts > 0);

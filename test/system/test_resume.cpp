@@ -18,7 +18,7 @@
 #include "test/system/team_run.hpp"
 #include "test/system/walk.hpp"
 
-// Robots that are killed at any moment and taken up; runs of the past that are joined.
+// Robots that are killed at any moment and resumed; finished runs that are joined.
 
 namespace km {
 namespace {
@@ -62,7 +62,7 @@ std::vector<std::string> with(std::vector<std::string> command, const std::strin
   return command;
 }
 
-// How often robots are killed; KM_KILLS makes it more.
+// Number of kills of a robot; KM_KILLS increases it.
 int kills() {
   const char* const wanted = std::getenv("KM_KILLS");
   return wanted == nullptr ? 3 : std::atoi(wanted);
@@ -74,7 +74,7 @@ std::uintmax_t size_of(const fs::path& file) {
   return none ? 0 : size;
 }
 
-// True once the journal has grown by so much; false if the process has ended its input before.
+// True once the journal has grown by `bytes`; false if the process has ended its input before.
 bool grows_by(const fs::path& folder, std::uintmax_t bytes) {
   const fs::path journal = folder / "run.journal";
   const std::uintmax_t goal = size_of(journal) + bytes;
@@ -125,7 +125,7 @@ TEST_CASE("A robot that is killed again and again loses no image", "[system][res
     const fs::path output = folder.path() / ("killed" + std::to_string(run));
     for (bool first = true; killed < kills(); first = false) {
       Process victim(with(command, first ? "--output" : "--resume", output));
-      if (!grows_by(output, first ? 1 : rng() % (journal / 6))) break;  // has come to its end
+      if (!grows_by(output, first ? 1 : rng() % (journal / 6))) break;  // the input has ended
       victim.kill(SIGKILL);
       victim.wait();
       ++killed;
@@ -140,7 +140,7 @@ TEST_CASE("A robot that is killed again and again loses no image", "[system][res
   }
 }
 
-TEST_CASE("A robot that is killed keeps its map, and goes on with it", "[system][resume]") {
+TEST_CASE("A robot that is killed keeps its map, and continues it", "[system][resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -159,7 +159,7 @@ TEST_CASE("A robot that is killed keeps its map, and goes on with it", "[system]
   CHECK(resumed.wait() == 0);
   const MapMesh after = read_map_file(map);
   CHECK(after.mesh.faces.size() > before.mesh.faces.size() + 100);
-  // What is seen again, and better, may go.
+  // Surface that is seen again, and better, may be replaced.
   std::size_t kept = 0;
   for (std::size_t i = 0; i < after.ids.size() && after.ids[i] <= before.ids.back(); ++i) ++kept;
   CHECK(kept > before.ids.size() / 2);
@@ -203,8 +203,8 @@ std::set<ClosureId> shared_closures(const G2oGraph& graph) {
   return closures;
 }
 
-// Two robots with keys, of which one finds all closures and says which count: what the other has of
-// them it was told. They stay until they are interrupted.
+// Two robots with keys. One of them finds all closures and decides which are inliers, so the other
+// one has received all of its closures. They run until they are interrupted.
 class SealedTeam {
  public:
   static constexpr std::size_t kClosures = kLap / 6;
@@ -245,7 +245,7 @@ class SealedTeam {
         "pcm.min_inliers=" + std::to_string(kClosures)});  // all of them, or they are not joined
   }
 
-  // Waits until it says that it optimises with the other one.
+  // Waits until it reports that it optimises with the other one.
   static bool is_joint(Process& robot) {
     return robot
         .wait_until([](const auto& line) { return line.find(", with 1 |") != std::string::npos; })
@@ -327,7 +327,7 @@ TEST_CASE("A robot with keys that is killed and taken up is in its team as befor
     CHECK((T_world.at(id.from).translation() - T_world.at(id.to).translation()).norm() < kSame_m);
 }
 
-TEST_CASE("A robot finds itself in the map of a run of the past", "[system][resume]") {
+TEST_CASE("A robot localises itself in the map of a finished run", "[system][resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -353,7 +353,7 @@ TEST_CASE("A robot finds itself in the map of a run of the past", "[system][resu
         0.015);
 }
 
-TEST_CASE("Journals that cannot be gone on with are refused by name", "[system][resume]") {
+TEST_CASE("Journals that cannot be continued are refused by name", "[system][resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;

@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Alone: no other robot is on this domain but those of tests that are as deaf to it.
+// A robot without peers: only robots of such tests are on this domain, and they also ignore others.
 CommandResult run_robot(const fs::path& dataset, const fs::path& output,
                         const std::string& options = "") {
   return run_command(KM_BIN_DIR
@@ -53,8 +53,8 @@ EurocCopy first_seconds(const fs::path& recording, double length_s) {
 struct Stage {
   std::string name;
   fs::path recording;
-  double length_s = 0.0;  // that is used
-  double begin_s = 0.0;   // of the fault
+  double length_s = 0.0;  // length of the part that is used
+  double begin_s = 0.0;   // begin of the fault
 };
 
 struct Outcome {
@@ -62,7 +62,7 @@ struct Outcome {
   std::string output;
   std::size_t poses = 0;
   RunSummary summary;
-  // Of the position, in the frame that fits what was before the fault.
+  // Position errors, in the frame that fits the poses before the fault.
   double before_m = 0.0, worst_m = 0.0, last_m = 0.0;
   std::optional<double> back_s;  // after the fault
 };
@@ -80,9 +80,9 @@ double rms_m(const std::vector<PosePair>& pairs, const Alignment& alignment, Acc
   return std::sqrt(sum / count);
 }
 
-// From then on it is right: over no second the motion errs by more than this, beyond what it makes
-// good of the position. A smoother that learns from new images how fast the body was in the dark
-// moves it to where that leads.
+// From then on the pose is right: over no second the motion error exceeds this value, beyond
+// corrections of the position. New images show the smoother the true speed during the blind time,
+// and it moves the body accordingly.
 std::optional<double> back_after_s(const std::vector<PosePair>& pairs, const Alignment& alignment,
                                    Stamp end) {
   constexpr double kRight_m = 0.03, kOver_s = 1.0;
@@ -167,7 +167,7 @@ std::vector<Stage> stages() {
   return stages;
 }
 
-// In short, those that differ most.
+// The short form has the faults that differ most.
 bool is_wanted(const SensorFault& fault) {
   static const char* const wanted = std::getenv("KM_SENSOR_FAULTS");
   if (wanted == nullptr)
@@ -184,7 +184,7 @@ TEST_CASE("A robot survives what happens to its sensors", "[faults]") {
                                                  "starts", "blind [s]", "exit"}};
   for (const Stage& stage : stages())
     for (const SensorFault& fault : sensor_faults()) {
-      constexpr double kAfter_s = 4.0;  // that there is to see
+      constexpr double kAfter_s = 4.0;  // length of the part after the fault
       const double begin_s = fault.is_at_start ? 0.0 : stage.begin_s;
       if (!is_wanted(fault) || begin_s + fault.lasts_s + kAfter_s > stage.length_s) continue;
       const Outcome outcome = meet(stage, fault);
@@ -263,12 +263,12 @@ TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") 
   CHECK(std::ranges::count_if(poses, [&](const auto& pose) { return pose.stamp >= again; }) > 20);
   const RunSummary summary = read_summary(folder.path() / "results/summary.json");
   REQUIRE(summary.odometry);
-  // On a busy machine samples of other instants are lost, too.
+  // On a busy machine samples at other times are lost, too.
   CHECK(summary.odometry->starts >= 2);
   CHECK(summary.odometry->inertial_gaps >= 1);
 }
 
-TEST_CASE("What a run finds of its cameras is where the next one starts from", "[faults]") {
+TEST_CASE("The next run starts from the camera calibration that a run has estimated", "[faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   constexpr double kLate_s = 0.02;
@@ -292,7 +292,8 @@ TEST_CASE("What a run finds of its cameras is where the next one starts from", "
   CHECK(std::abs(second.rotation_x_rad) < 0.5 * 0.01);
 }
 
-TEST_CASE("What a run has found of its cameras is known when it is taken up", "[faults]") {
+TEST_CASE("The camera calibration that a run has estimated is known when it is resumed",
+          "[faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   constexpr double kLate_s = 0.02;
@@ -322,7 +323,7 @@ TEST_CASE("What a run has found of its cameras is known when it is taken up", "[
   const CamerasSummary after = resumed("taken_up", "");
   CHECK(after.offset_s == Approx(before.offset_s).margin(1e-3));
   CHECK(after.offset_sigma_s < 1.05 * before.offset_sigma_s);
-  // By a rig that says so already there is nothing more to correct.
+  // A rig that has this correction already needs no further one.
   const CamerasSummary corrected =
       resumed("corrected", "--rig " + (folder.path() / "run/rig_estimated.yaml").string());
   CHECK(std::abs(corrected.offset_s) < 1e-3);

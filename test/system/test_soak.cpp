@@ -42,7 +42,7 @@ std::vector<std::pair<Stamp, std::string>> images_in(const fs::path& folder) {
   return images;
 }
 
-// The rows of the first piece, again and again.
+// The rows of the first piece, repeated.
 void repeat(const std::vector<std::pair<Stamp, std::string>>& rows, int times,
             const fs::path& csv) {
   std::ofstream out(csv);
@@ -52,7 +52,7 @@ void repeat(const std::vector<std::pair<Stamp, std::string>>& rows, int times,
       if (stamp - rows.front().first < kPiece) out << stamp + k * kPiece << rest << '\n';
 }
 
-// The recording's start, for as long as wanted, in `folder`.
+// The start of the recording, repeated for the wanted duration, in `folder`.
 void make_standing(const fs::path& recording, double seconds, const fs::path& folder) {
   const int times = static_cast<int>(seconds / (1e-9 * static_cast<double>(kPiece))) + 1;
   for (const char* camera : {"cam0", "cam1"}) {
@@ -73,7 +73,8 @@ double seconds_of_soak() {
   return text != nullptr ? std::atof(text) : 20.0;
 }
 
-// In short it does not tell growth: that is the slope of the second half, if it takes a minute.
+// The short form does not measure growth: the slope of the second half, if it takes at least a
+// minute.
 TEST_CASE("Robots that stand still keep their place and take no more memory", "[system][soak]") {
   const auto recording = shared_data("euroc/V1_01_easy");
   if (!recording) return;

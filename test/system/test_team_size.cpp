@@ -12,8 +12,8 @@
 #include "test/support/random_team.hpp"
 #include "test/system/team_run.hpp"
 
-// How a team grows: 2, 4, ... robots, a process each, on one host with a network of its own, whose
-// bytes are theirs alone.
+// Cost of a team by its size: 2, 4, ... robots, a process each, on one host with a network of its
+// own that carries only their bytes.
 
 namespace km {
 namespace {
@@ -36,7 +36,7 @@ SplitGraph ring_of(int robots) {
   return random_team(24, ids, 40, pairs);
 }
 
-// Of a line of a log that begins with the time of day [s].
+// Time of day at the begin of a line of a log [s].
 double time_of(const std::string& line) {
   int hours = 0, minutes = 0;
   double seconds = 0.0;
@@ -44,7 +44,7 @@ double time_of(const std::string& line) {
   return 3600.0 * hours + 60.0 * minutes + seconds;
 }
 
-// From a robot's first word about the network to the last of its peers.
+// From a robot's first line about the network to the last of its peers.
 struct Discovery {
   std::set<std::string> peers = {};  // names
   double seconds = 0.0;
@@ -66,7 +66,7 @@ Discovery discovery_in(const fs::path& log) {
   return result;
 }
 
-// What the interfaces of a network have sent, headers included.
+// Bytes sent by the interfaces of a network, headers included.
 double bytes_on_the_wire(pid_t network_of) {
   Process ip({"ip", "-s", "-j", "link"}, network_of);
   const std::optional<TimedLine> links = ip.wait_for_prefix("[");
@@ -79,12 +79,12 @@ double bytes_on_the_wire(pid_t network_of) {
 
 struct Growth {
   int robots = 0;
-  double discovery_s = 0.0;    // of the slowest
-  double wire_bytes = 0.0;     // a robot
-  double counted_bytes = 0.0;  // the same, as traffic.csv has it: without discovery and transport
-  double cpu_s = 0.0;          // a robot
+  double discovery_s = 0.0;    // time of the slowest robot
+  double wire_bytes = 0.0;     // per robot
+  double counted_bytes = 0.0;  // per robot by traffic.csv: without discovery and transport
+  double cpu_s = 0.0;          // per robot
   double peak_memory_bytes = 0.0;
-  double seconds = 0.0;  // of the slowest
+  double seconds = 0.0;  // time of the slowest robot
 };
 
 Growth measure(int robots) {
@@ -118,7 +118,7 @@ Growth measure(int robots) {
   return result;
 }
 
-// KM_ROBOTS=32 goes on up to so many.
+// KM_ROBOTS=32 tests up to 32 robots.
 TEST_CASE("A team grows and all its robots find each other", "[system][namespaces][team_size]") {
   if (!VirtualNetwork::available()) return;
   const char* most = std::getenv("KM_ROBOTS");
@@ -130,7 +130,7 @@ TEST_CASE("A team grows and all its robots find each other", "[system][namespace
   for (int robots = 2; robots <= largest; robots *= 2) {
     const Growth growth = measure(robots);
     CHECK(growth.discovery_s < 5.0);  // measured: 0.01 to 0.07 s with 2 and 4 robots
-    // Discovery, headers and acknowledgements come on top: measured 1.6 to 1.9 times as much.
+    // Discovery, headers and acknowledgements are additional: measured 1.6 to 1.9 times as much.
     CHECK(growth.wire_bytes > growth.counted_bytes);
     CHECK(growth.wire_bytes < 4.0 * growth.counted_bytes);
     std::printf("%d, %.2f, %.0f, %.0f, %.2f, %.0f, %.1f\n", growth.robots, growth.discovery_s,

@@ -42,13 +42,13 @@ int rounds_to(double cost, const std::filesystem::path& optimizer_csv) {
   for (double seconds = 0, members = 0, value = 0, gradient = 0; std::getline(file, line);) {
     REQUIRE(std::sscanf(line.c_str(), "%lf,%d,%lf,%lf,%lf", &seconds, &last, &members, &value,
                         &gradient) == 5);
-    // A part of the graph costs less than the whole: it has not got there either.
+    // A part of the graph costs less than the whole, so the cost alone does not count.
     if (members < kRobots || value > cost || value < 0.98 * cost) reached = last + 1;
   }
   return reached <= last ? reached : std::numeric_limits<int>::max();
 }
 
-/// What the robots have kept of the closures.
+/// Closures that the robots have kept.
 struct KeptClosures {
   std::size_t count = 0;
   std::map<std::pair<int, int>, std::size_t> between = {};  ///< Two robots, the lower one first.
@@ -74,7 +74,7 @@ TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][sl
   const auto dataset = shared_data("multi_robot/tunnels_8robots");
   if (!dataset) return;
   const TemporaryFolder folder;
-  // By default the last session waits for as long as the bytes of the first ones take to pay.
+  // By default the last session waits until the bytes of the first ones are paid.
   const TeamRun run = run_team("config/teams/tunnels.yaml", *dataset, folder, {},
                                "--set pose_graph.exchange_budget_kb_s=200");
   CAPTURE(run.result.output);
@@ -90,9 +90,9 @@ TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][sl
   // Measured: 2655 to 2843. Robust solvers agree on 2669 to 2987.
   CHECK(kept.count >= 2500);
   CHECK(kept.count <= 3000);
-  // One frame: closures between every two robots hold in it. The threshold is 6.2 sigma of the
-  // noise that the robots find, 3.3 to 6.7 times what the graph says, as they meet sooner or later.
-  // The worst false closure is off by 440 sigma if it is kept.
+  // One frame: closures between every two robots fit in it. The threshold is 6.2 sigma of the noise
+  // that the robots estimate, 3.3 to 6.7 times the stated noise, depending on when they meet. If
+  // the worst false closure is kept, its residual is 440 sigma.
   CHECK(kept.between.size() == kRobots * (kRobots - 1) / 2);
   CHECK(kept.largest <= 15.0 * 6.2);
   for (const auto& [pair, count] : kept.between) CHECK(count >= 20);  // measured: 46 or more
@@ -105,8 +105,8 @@ TEST_CASE("Eight processes bring the tunnels graph into one frame", "[system][sl
   std::cout << "tunnels: closures kept " << kept.count << ", largest residual " << kept.largest
             << " sigma, rounds to 1e-2 " << rounds << ", cost " << reached << ", gap " << gap
             << ", RMSE to the optimum " << rmse_m << " m\n";
-  CHECK(rounds <= 254);  // what the authors' own program needs, its start included
-  CHECK(gap < 1e-8);     // solved to convergence, as far as the reference is
+  CHECK(rounds <= 254);  // rounds of the authors' own program, its start included
+  CHECK(gap < 1e-8);     // solved to convergence, within the accuracy of the reference
   CHECK(rmse_m < 1e-2);  // measured: 1.1e-3; paths are 475 to 886 m long
 }
 

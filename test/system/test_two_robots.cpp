@@ -22,7 +22,7 @@ TEST_CASE("Two robots on the halves of a recording localise together", "[system]
   CAPTURE(run.result.output);
   REQUIRE(run.result.exit_code == 0);
 
-  // Bounds of the recording's requirements; what is reached is two to three times better.
+  // Bounds of the recording's requirements; the actual errors are two to three times smaller.
   const double max_odometry_ate_m = 0.010;
   const double max_team_ate_m = 0.015;
   const int min_inter_robot_inliers = 10;
@@ -39,7 +39,7 @@ TEST_CASE("Two robots on the halves of a recording localise together", "[system]
                            "traffic.csv", "timing.csv", "config.yaml", "summary.json"})
     CHECK(fs::file_size(folder.path() / "a" / file) > 0);
 
-  // The same graph solved once more: no keyframe that no closure leads to can be located.
+  // The same graph solved once more: a keyframe without a path to the others could not be located.
   Eavesdropper ear = listen_to(read_team_folder(folder.path()), false, 100);
   CHECK(ear.letters() > 0);
   CHECK(ear.private_poses() > 0);
@@ -64,7 +64,7 @@ std::vector<std::string> robot_command(const std::string& id, const fs::path& da
           std::to_string(domain)};
 }
 
-// A status line from 4 s of the recording on: the first images are through, and there is much to
+// A status line from 4 s of the recording on: the first images are processed, and most are still to
 // come. A machine under load may print none between.
 bool is_past_start(const std::string& line) {
   double seconds = 0.0;
@@ -85,7 +85,7 @@ TEST_CASE("An interrupted robot ends in order with everything written", "[system
   CHECK(read_summary(folder.path() / "summary.json").exit_reason == "interrupted");
 }
 
-TEST_CASE("A robot whose peer is killed goes on, finishes and says whom it lost", "[system]") {
+TEST_CASE("A robot whose peer is killed continues, finishes and names the lost peer", "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -110,7 +110,8 @@ TEST_CASE("A robot whose peer is killed goes on, finishes and says whom it lost"
   CHECK_THAT(summary.exit_reason, Catch::StartsWith("settled without r60000 (not heard for "));
 }
 
-TEST_CASE("A robot whose id is taken says so and ends, and who had it first goes on", "[system]") {
+TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of the id continues",
+          "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -128,7 +129,7 @@ TEST_CASE("A robot whose id is taken says so and ends, and who had it first goes
   command.insert(command.end(), keys.begin(), keys.end());
   auto same_id = robot_command("7", *dataset, folder.path() / "b", domain);
   same_id.insert(same_id.end(), keys.begin(), keys.end());
-  // There as long as it takes the other to start.
+  // It runs as long as the other one needs to start.
   command.insert(command.end(), {"--to", "7.5", "--set", "run.settle_s=600"});
   Process incumbent(command);
   REQUIRE(incumbent.wait_until(is_past_start).has_value());

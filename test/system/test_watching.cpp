@@ -14,7 +14,7 @@
 #include "test/system/team_run.hpp"
 #include "test/system/walk.hpp"
 
-// Robots and one who watches them, over the network.
+// Robots and a viewer, over the network.
 
 namespace km {
 namespace {
@@ -27,7 +27,7 @@ DdsConfig in_domain(int domain) {
   return config;
 }
 
-// Listens on a thread of its own, until finish() and nothing comes any more.
+// Listens on a thread of its own, until finish() and no more messages.
 class Audience {
  public:
   explicit Audience(int domain) : listener_(in_domain(domain)), ear_([this] { listen(); }) {}
@@ -81,7 +81,7 @@ std::vector<std::string> robot_on(const Walk& walk, const Walk& other, const fs:
           "--view"};
 }
 
-// What it was told is what the robot has written.
+// The viewer's state equals the results that the robot has written.
 void check_knowledge(const Watcher& known, const fs::path& results) {
   const G2oGraph graph = read_g2o(results / "pose_graph.g2o");
   CHECK(known.odometry.size() == graph.vertices.size());
@@ -105,7 +105,7 @@ void check_knowledge(const Watcher& known, const fs::path& results) {
   CHECK(known.states.back().keyframes == graph.vertices.size());
 }
 
-TEST_CASE("Who watches a team knows how it ends, and changes nothing", "[system][view]") {
+TEST_CASE("A viewer of a team knows how it ends, and changes nothing", "[system][view]") {
   const TemporaryFolder folder;
   const int domain = random_domain();
   Audience audience(domain);
@@ -138,7 +138,8 @@ TEST_CASE("A robot that is not to be watched sends viewers nothing", "[system][v
   CHECK(audience.finish().empty());
 }
 
-TEST_CASE("Where the team has keys nothing is told, unless it is asked for", "[system][view]") {
+TEST_CASE("If the team has keys, viewers receive nothing unless this is enabled",
+          "[system][view]") {
   const bool in_clear = GENERATE(false, true);
   CAPTURE(in_clear);
   const TemporaryFolder folder;

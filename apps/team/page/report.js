@@ -1,7 +1,7 @@
-// The report of a run: shows the JSON in #run, whose keys report_page.hpp tells. Stands below
-// charts.js in one module. Text of the data enters the page as text alone.
+// The report of a run: shows the JSON in #run, whose keys report_page.hpp documents. Follows
+// charts.js in one module. Text of the data is inserted as text only, never as HTML.
 
-const STAGES = ['proposed', 'asked for', 'compared', 'verified', 'kept'];  // of a ClosureStage
+const STAGES = ['proposed', 'asked for', 'compared', 'verified', 'kept'];  // ClosureStage
 const KEPT = 4, VERIFIED = 3;
 const STAGE_COLORS = ['#8b93a1', '#8b93a1', '#d8746c', '#e8a34c', '#6fdc8c'];
 const SEVERITY_BADGES = {
@@ -23,8 +23,8 @@ function addSection(title, id, remark) {
   return section;
 }
 
-// Columns: {title, text: of a row, long, left, color: of a row}. `sums`: whether the last row is
-// one.
+// Columns: {title, text: function of a row, long, left, color: function of a row}. `sums`: true if
+// the last row has sums.
 function addTable(host, columns, rows, sums = false) {
   const table = element('table', '', element('div', 'scroll', host));
   const head = element('tr', '', element('thead', '', table));
@@ -44,7 +44,7 @@ function addTable(host, columns, rows, sums = false) {
   return table;
 }
 
-// ---- the whole
+// ---- the whole team
 
 function showHead() {
   const main = document.querySelector('main');
@@ -123,7 +123,7 @@ function showRobots() {
         4, 0,
         {title: 'odometry, rmse [m]', text: (r) => decimals(r.odometry_error?.position_m.rmse, 3)},
         {title: 'optimised, rmse [m]', text: (r) => decimals(optimized(r)?.position_m.rmse, 3)});
-  // "odometry" of a robot without a truth tells of its cameras alone.
+  // For a robot without a truth, "odometry" has only the statistics of its cameras.
   const rows = run.team.robots.map((robot) => ({
                                      ...robot,
                                      color: robotColor(robot.robot),
@@ -136,9 +136,9 @@ function showRobots() {
         'Odometry is aligned with the truth robot by robot, the optimised trajectories all by one transform.');
 }
 
-// ---- where they were
+// ---- trajectories
 
-// Kept closures: [robot that found it, row], those between two robots first.
+// Kept closures as [robot that found it, row]; closures between two robots come first.
 const closuresOf = (stage) => run.robots.flatMap(
     (robot) => robot.closures.filter((c) => c[4] === stage).map((c) => [robot, c]));
 
@@ -154,7 +154,7 @@ function closureLines() {
   return lines;
 }
 
-// At a hole, nulls in JSON, the line ends.
+// The line is interrupted at a hole, which is null in JSON.
 const lineOf = (points) => points.map((point) => point.map((n) => n ?? NaN));
 
 function showTrajectories() {
@@ -207,7 +207,7 @@ const perRobot = (pointsOf) =>
         .map((robot) => ({name: robot.name, color: robotColor(robot.id), points: pointsOf(robot)}))
         .filter((series) => series.points.length);
 
-// A chart in a cell of its own; none without points.
+// A chart in a cell of its own, or nothing without points.
 function addLines(host, options, series) {
   if (!series.some((one) => one.points.length)) return;
   lineChart(element('div', '', host), {height: 190, x: duration, ...options}).set(series);
@@ -275,10 +275,10 @@ function showJudged(section) {
       [['proposed', judged.candidates], ['verified', judged.verified], ['kept', judged.inliers]]);
 }
 
-// Both images of closures that have them, those that were rejected first.
+// Both images of each closure that has them; rejected closures come first.
 function showImages(section, all) {
   const imageOf = (robot, keyframe) => run.images[`${robot}:${keyframe}`];
-  const closures = new Map();  // a pair that two robots looked at, by the one it came further with
+  const closures = new Map();  // if two robots have the same candidate, the one that came further
   for (const [, c] of all) {
     const key = c.slice(0, 4).join();
     if (c[4] >= VERIFIED && imageOf(c[0], c[1]) && imageOf(c[2], c[3]) && !closures.has(key))
@@ -311,7 +311,7 @@ function showImages(section, all) {
   more.onclick();
 }
 
-// The list, of one stage and one pair of robots at a time or all.
+// List of closures, filtered by stage and pair of robots or complete.
 function showList(section, all) {
   element('h3', '', section, 'One by one');
   const step = 50;
@@ -394,7 +394,7 @@ function showClosures() {
 
 // ---- bytes, cost, work
 
-// The sum over robots of what each had sent, at every time that one tells of.
+// Sum of the bytes sent by all robots, at every time for which some robot has a row.
 function sentByKind() {
   const kinds = [...new Set(run.robots.flatMap((robot) => Object.keys(robot.sent)))].sort();
   return kinds.map((kind, k) => {
@@ -410,7 +410,7 @@ function sentByKind() {
   });
 }
 
-// All kinds together, of one robot.
+// Total of all kinds for one robot.
 function sentInAll(robot) {
   const at = new Map();
   for (const points of Object.values(robot.sent))
@@ -418,7 +418,7 @@ function sentInAll(robot) {
   return [...at].sort((a, b) => a[0] - b[0]);
 }
 
-// Share of a core between neighbours.
+// Share of a core between consecutive rows [%].
 const busy = (rows) => rows.slice(1).map(
     (row, i) => [row[0], (100 * (row[1] - rows[i][1])) / Math.max(row[0] - rows[i][0], 1e-3)]);
 

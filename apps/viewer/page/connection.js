@@ -1,4 +1,4 @@
-// The page's end of the WebSocket: messages as objects, those with bytes with views of them.
+// The page's end of the WebSocket: converts messages to objects; binary data become typed arrays.
 
 // Layout: see page_message.hpp.
 function parseBinary(buffer) {
@@ -20,10 +20,8 @@ function parseBinary(buffer) {
 }
 
 export class Connection {
-  /**
-   * `handlers`: message(object), opened(), closed(). After a loss it begins anew, with all that
-   * there is.
-   */
+  /** `handlers`: message(object), opened(), closed(). After a lost connection it connects again and
+   * receives all messages again. */
   constructor(handlers) {
     this.handlers = handlers;
     this.open();
@@ -47,7 +45,7 @@ export class Connection {
     };
   }
 
-  /** Asks for a robot's camera images, or no longer. */
+  /** Asks for a robot's camera images, or ends the request. */
   wantImages(robot, on) {
     if (this.socket.readyState === WebSocket.OPEN)
       this.socket.send(JSON.stringify({images: robot, on}));

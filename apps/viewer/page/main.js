@@ -1,4 +1,5 @@
-// Joins the page: messages to the model, the model at the time of the slider to scene and panels.
+// Connects the parts: messages go to the model; the model at the time of the slider goes to the
+// scene and the panels.
 import {Connection} from './connection.js';
 import {Model} from './model.js';
 import {Panels} from './panels.js';
@@ -21,15 +22,15 @@ const timeline = new Timeline(
     });
 
 let changed = true, chartsChanged = true, caughtUp = false;
-let source = 'run';  // live, replay: as if it were; run: one that has ended
-let pointed = null;  // where the pointer is in the scene
+let source = 'run';  // live; replay: a finished run in real time; run: a finished run
+let pointed = null;  // position of the pointer in the scene
 let camera = null;   // robot whose images are shown
-let heardAt = 0;     // when something came [ms since 1970]
-let waiting = [];    // what has come and is not in the scene
-let showing = [];    // what is, and has not been drawn
-const delays = [];   // {kind, ms}: from told to drawn
+let heardAt = 0;     // time of the last message [ms since 1970]
+let waiting = [];    // messages that have arrived and are not in the scene yet
+let showing = [];    // messages that are in the scene and have not been drawn yet
+const delays = [];   // {kind, ms}: from the reception by the viewer to the drawing
 
-// ---- what comes
+// ---- messages
 
 const connection = new Connection({
   opened() {
@@ -71,7 +72,7 @@ function setLink(text, className) {
   $('link').className = `badge ${className}`;
 }
 
-// Live, or since when no longer.
+// Shows whether robots are heard, or since when not.
 function showLink() {
   if (!caughtUp) return;
   if (source === 'run') return setLink('finished run', '');
@@ -87,7 +88,7 @@ function showLink() {
 }
 setInterval(showLink, 1000);
 
-// ---- what is shown
+// ---- display
 
 function countClosures() {
   const counts = {kept: 0, verified: 0, candidate: 0, rejected: 0};
@@ -119,7 +120,7 @@ function tick(now) {
   requestAnimationFrame(tick);
   if (timeline.step((now - lastTick) / 1000)) changed = true;
   lastTick = now;
-  // All of the past comes in one go: it is shown when it is there.
+  // All messages of the past arrive at once: they are shown when they are complete.
   if (changed && now - shownAt >= SHOW_MS && (caughtUp || now - shownAt >= 1000)) {
     changed = false;
     shownAt = now;
@@ -194,7 +195,7 @@ async function drawCamera() {
   c.scale(2, 2);
   c.drawImage(bitmap, 0, 0);
   c.strokeStyle = '#6fdc8c';
-  c.lineWidth = bitmap.width / 260;  // as wide on the screen, however large the image
+  c.lineWidth = bitmap.width / 260;  // constant width on the screen, independent of the size of the image
   for (let i = 0; i < image.pixels.length; i += 2) {
     c.beginPath();
     c.arc(image.pixels[i] + 0.5, image.pixels[i + 1] + 0.5, bitmap.width / 110, 0, 7);
@@ -320,7 +321,7 @@ addEventListener('keydown', (event) => {
   action();
 });
 
-// ---- for tests and for who asks in the console
+// ---- for tests and for the console
 
 window.kimera = {
   get ready() { return caughtUp && !changed && !scene.building && model.robots.size > 0; },

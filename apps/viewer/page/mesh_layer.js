@@ -1,12 +1,12 @@
-// The meshes: chunks of a robot that are near each other are drawn as one.
+// The meshes: neighbouring chunks of a robot are drawn as one object.
 import {robotColor} from './charts.js';
 import * as THREE from './three/build/three.module.js';
 
-const BUILD_MS = 25;      // of a frame, for what is new
-const BATCH_CELLS = 4;    // cells that are drawn as one, along an axis
-const MAX_INDEX = 65535;  // of a vertex and, in steps, of a position
+const BUILD_MS = 25;      // time per frame for building new objects
+const BATCH_CELLS = 4;    // cells per object along an axis
+const MAX_INDEX = 65535;  // largest index of a vertex, and largest position in steps
 
-// Smooth normals, -127 to 127, four bytes a vertex: WebGL likes them aligned.
+// Smooth normals, -127 to 127, in four bytes a vertex: WebGL is faster with aligned data.
 function normalsOf(positions, triangles) {
   const sums = new Float32Array(positions.length);
   for (let i = 0; i < triangles.length; i += 3) {
@@ -32,13 +32,13 @@ function normalsOf(positions, triangles) {
   return normals;
 }
 
-// Colours of labels without a palette: as far apart as hues get.
+// Colours of labels without a palette, with evenly spread hues.
 function anyColor(label) {
   const color = new THREE.Color().setHSL((label * 0.618034) % 1, label ? 0.45 : 0, 0.58);
   return [color.r * 255, color.g * 255, color.b * 255];
 }
 
-// The largest of its coordinates, in steps.
+// Largest coordinate along each axis, in steps.
 function reachOf({positions, origin}) {
   const most = [0, 0, 0];
   for (let i = 0; i < positions.length; ++i)
@@ -52,7 +52,7 @@ export class MeshLayer {
     this.shown = new Map();    // message -> its batch
     this.mode = 'labels';
     this.palette = new Map();  // label -> {name, color}
-    this.labels = new Set();   // that have been seen
+    this.labels = new Set();   // labels seen so far
     const lit = (settings) => new THREE.MeshLambertMaterial(settings);
     this.materials = {
       labels: lit({vertexColors: THREE.VertexColors}),
@@ -69,7 +69,7 @@ export class MeshLayer {
 
   colorOf(label) { return this.colors[label]; }
 
-  /** Faces that are drawn. */
+  /** Number of drawn faces. */
   get faces() {
     let faces = 0;
     for (const batch of this.batches.values()) faces += batch.faces;
@@ -100,7 +100,7 @@ export class MeshLayer {
     if (object.visible) object.material = this.material(of, !!object.geometry.attributes.color);
   }
 
-  // One object of chunks that have at most MAX_INDEX + 1 vertices in all.
+  // One object for chunks with at most MAX_INDEX + 1 vertices together.
   build(messages, of) {
     const sum = (valueOf) => messages.reduce((all, message) => all + valueOf(message), 0);
     const vertices = sum((m) => m.vertices), labelled = messages.some((m) => m.labels);
@@ -171,7 +171,7 @@ export class MeshLayer {
     return this.batches.get(key);
   }
 
-  // Chunks that have come and gone, into their batches.
+  // Adds new chunks to their batches, and removes old ones.
   sort(model) {
     const wanted = new Set();
     for (const robot of model.robots.values())
@@ -192,7 +192,8 @@ export class MeshLayer {
     }
   }
 
-  /** Shows what robots know now, groupOf(anchor, robot) says where; true if more is to be built. */
+  /** Shows the present meshes of the robots, in the groups groupOf(anchor, robot); true if more is
+   * to be built. */
   sync(model, groupOf) {
     this.sort(model);
     const until = performance.now() + BUILD_MS;
@@ -211,7 +212,7 @@ export class MeshLayer {
     return more;
   }
 
-  /** Where the ray first meets a mesh, or null. */
+  /** Nearest intersection of the ray with a mesh, or null. */
   pick(raycaster) {
     const hits = this.mode === 'off' ? [] : raycaster.intersectObjects(this.objects());
     return hits.length ? hits[0].point : null;

@@ -1,6 +1,6 @@
-// What robots told, and what was known at any time of it.
+// Messages of the robots, and the state that follows from them at any time.
 
-// Of a piece of mesh: the newest with a key counts.
+// Key of a mesh chunk: the newest chunk with a key replaces the others.
 const keyOf = ({of, cell, part}) => `${of} ${cell} ${part}`;
 
 const GONE_S = 10;
@@ -8,43 +8,43 @@ const HOLE_S = 1, HOLE_INTERVALS = 5;  // as in pose_holes.hpp
 
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
 
-/** What one robot told: everything in order, and what that comes to at the time last asked for. */
+/** Messages of one robot in order, and the state that follows from them at the requested time. */
 export class Robot {
   constructor(id) {
     this.id = id;
     this.log = [];     // {n, t, ...}, t [s] since the start, ascending
-    this.states = [];  // those in the log, for charts
+    this.states = [];  // status messages of the log, for charts
     this.forget();
   }
 
   forget() {
-    this.applied = 0;  // so many of the log are in what follows
+    this.applied = 0;  // number of log entries applied to the members below
     this.renew(null);
     this.statesShown = 0;
   }
 
-  // A process begins: what another one of this robot told goes.
+  // A process begins: the messages of the robot's earlier process are dropped.
   renew(boot) {
     this.boot = boot;
     this.state = null;
     this.pose = null;
     this.trail = [];        // poses in odom
-    this.trailStamps = [];  // of the images [s]
-    this.intervals = [];    // between the newest of them [s]
-    this.holes = [];        // the middles of times without a pose, far longer than usual [s]
+    this.trailStamps = [];  // stamps of the images [s]
+    this.intervals = [];    // intervals between the newest stamps [s]
+    this.holes = [];        // middles of times without a pose, far longer than usual [s]
     this.odometry = [];     // T_odom_kf by keyframe
     this.keyframeStamps = [];
     this.optimized = [];    // T_world_kf by keyframe
-    this.anchor = this.id;  // whose frame those are in
+    this.anchor = this.id;  // robot whose odometry frame T_world_kf refers to
     this.closures = new Map();
     this.meshes = new Map();
     this.image = null;
-    this.heard = null;  // when it last told something [s]
+    this.heard = null;  // time of its last message [s]
   }
 
   add(message) {
     const last = this.log[this.log.length - 1];
-    if (last && message.t < last.t) message.t = last.t;  // a clock that was set back
+    if (last && message.t < last.t) message.t = last.t;  // the robot's clock was set back
     this.log.push(message);
     if (message.kind === 'state') this.states.push(message);
   }
@@ -77,7 +77,7 @@ export class Robot {
     this.trailStamps.push(stamp_s);
   }
 
-  /** Whether it is not known how the robot went from one instant to another [s]. */
+  /** True if the robot's motion is unknown for a part of the time between two instants [s]. */
   hasHole(from, to) { return this.holes.some((middle) => from < middle && middle < to); }
 
   apply_keyframes({optimized, anchor, first, T_world_kf, stamps_s}) {
@@ -85,7 +85,7 @@ export class Robot {
       this.keyframeStamps[first + i] = stamp;
     });
     if (optimized && anchor !== this.anchor) {
-      this.optimized = [];  // those of another frame
+      this.optimized = [];  // poses in another frame
       this.anchor = anchor;
     }
     const poses = optimized ? this.optimized : this.odometry;
@@ -118,7 +118,7 @@ export class Robot {
   apply_image(message) { this.image = message; }
 }
 
-/** All robots, all of the time. */
+/** All robots, at all times. */
 export class Model {
   constructor() { this.clear(); }
 
@@ -149,7 +149,7 @@ export class Model {
     if (message.bytes || message.kind !== 'closures') this.byNumber.set(message.n, message);
   }
 
-  /** Lets go of messages that the viewer has let go of. */
+  /** Drops messages that the viewer has dropped. */
   forgetNumbers(numbers) {
     for (const n of numbers) {
       const message = this.byNumber.get(n);
@@ -166,13 +166,13 @@ export class Model {
     }
   }
 
-  /** What was known at `time` [s since the start]. */
+  /** Sets the state to that at `time` [s since the start]. */
   seek(time) {
     this.time = time;
     for (const robot of this.robots.values()) robot.seek(time);
   }
 
-  /** Every pair of keyframes once, the newest word on it. */
+  /** Every pair of keyframes once, with its newest verdict. */
   closures() {
     const all = new Map();
     for (const robot of this.robots.values())
@@ -183,7 +183,7 @@ export class Model {
     return all;
   }
 
-  /** The frames that there are: anchor and the robots in it, the largest first. */
+  /** All frames, with the anchor and its robots; the largest come first. */
   frames() {
     const frames = new Map();
     for (const robot of this.robots.values()) {
@@ -197,10 +197,9 @@ export class Model {
         .sort((a, b) => b.robots.length - a.robots.length || a.anchor - b.anchor);
   }
 
-  /**
-   * Of a live team: {ended, at_ms} once all robots have said that they leave, or nothing has come
-   * for GONE_S; `ended`: none was still running. Null before. `silent_s`: since something came.
-   */
+  /** End of a live team: {ended, at_ms} once all robots have sent that they leave, or no message
+   * has arrived for GONE_S. `ended`: none was still running. Null before. `silent_s`: time since
+   * the last message. */
   over(silent_s) {
     const phases = [...this.robots.values()].map(({states}) => states[states.length - 1]?.phase);
     const left = phases.every((phase) => phase === 'leaving');

@@ -1,4 +1,4 @@
-// What robots say of themselves: cards, who hears whom, and charts over time.
+// State of the robots: cards, matrix of links, and charts over time.
 import {barChart, duration, kindColor, lineChart, quantity, robotColor} from './charts.js';
 
 const SILENT_S = [3, 10];  // late, lost
@@ -13,7 +13,7 @@ function make(tag, parent, className = '', text) {
   return element;
 }
 
-// A list of terms and values, whose values alone change.
+// A list of terms and values; only the values change.
 class Facts {
   constructor(list, terms) {
     this.values = new Map(terms.map((term) => {
@@ -29,7 +29,7 @@ class Facts {
   }
 }
 
-// Rate of a sum, per second, between neighbours.
+// Increase of a sum per second, between consecutive states.
 function rates(states, valueOf) {
   const points = [];
   for (let i = 1; i < states.length; ++i) {
@@ -40,7 +40,7 @@ function rates(states, valueOf) {
   return points;
 }
 
-// Of its modules: what they take now, or of a robot whose run has ended took in the mean of it.
+// Loads of the robot's modules: the present ones, or the means of a run that has ended.
 function loads(robot) {
   if (!robot.state || robot.state.phase === 'running') return Object.entries(robot.state?.loads ?? {});
   const running = robot.states.slice(0, robot.statesShown).filter((s) => s.phase === 'running');
@@ -138,7 +138,7 @@ export class Panels {
     for (const robot of model.robots.values()) this.updateCard(robot, model);
   }
 
-  /** Marks what is followed, and whose images are shown. */
+  /** Marks the followed robot, and the one whose images are shown. */
   mark(followed, camera) {
     for (const [id, card] of this.cards) {
       card.follow.classList.toggle('on', id === followed);
@@ -218,7 +218,7 @@ export class Panels {
         })));
   }
 
-  // Sums over robots: at every state of any, the newest of all.
+  // Sums over robots at each time of a state, from the newest state of every robot.
   bytesByKind(robots) {
     const events = robots.flatMap(
         (robot) => robot.states.slice(0, robot.statesShown).map((s) => [s, robot.id]));

@@ -1,4 +1,4 @@
-// The 3D view: maps, trajectories, keyframes, closures, robots, in as many frames as there are.
+// The 3D view: maps, trajectories, keyframes, closures and robots, in one or several frames.
 import {robotColor} from './charts.js';
 import {MeshLayer} from './mesh_layer.js';
 import * as THREE from './three/build/three.module.js';
@@ -16,15 +16,15 @@ export const VERDICTS = {
 
 const FRAME_GAP_M = 4;
 const BUILDING_DRAW_MS = 400;
-const EDGE_PX = 8;     // between a label and the edge
-const LEGEND_PX = 80;  // at the lower edge, with a label above it
+const EDGE_PX = 8;     // distance between a label and the edge
+const LEGEND_PX = 80;  // height of the legend at the lower edge, with a label above it
 
 function matrixOf([x, y, z, qx, qy, qz, qw], matrix = new THREE.Matrix4()) {
   return matrix.compose(
       new THREE.Vector3(x, y, z), new THREE.Quaternion(qx, qy, qz, qw), new THREE.Vector3(1, 1, 1));
 }
 
-// From each pose to the next, but over holes. Poses may be missing.
+// Lines from each pose to the next, except over holes. Poses may be missing.
 function linesOf(robot, poses, stamps_s, matrix) {
   const points = [], a = new THREE.Vector3(), b = new THREE.Vector3();
   let last = -1;
@@ -39,7 +39,7 @@ function linesOf(robot, poses, stamps_s, matrix) {
   return points;
 }
 
-// Lines between pairs of points, wide on every screen; they may change.
+// Lines between pairs of points, with a constant width on the screen; the points may change.
 class WideLine {
   constructor(settings) {
     this.material = new LineMaterial(settings);
@@ -66,7 +66,7 @@ class WideLine {
   }
 }
 
-// What is drawn of one robot.
+// Objects that show one robot.
 class RobotFigure {
   constructor(id, resolution) {
     const color = robotColor(id);
@@ -115,7 +115,7 @@ export class Scene {
     this.meshes = new MeshLayer();
     this.frames = new Map();  // anchor -> {group, grid, offset, label}
     this.figures = new Map();
-    this.lines = {};  // of closures, by verdict
+    this.lines = {};  // lines of closures, by verdict
     for (const verdict of Object.keys(VERDICTS)) {
       const {color} = VERDICTS[verdict];
       this.lines[verdict] = new WideLine({
@@ -131,7 +131,7 @@ export class Scene {
     this.ruler = new WideLine({color: '#ffffff', linewidth: 2, resolution: this.resolution});
     for (const line of [this.hovered, this.ruler]) {
       line.material.depthTest = false;
-      line.material.transparent = true;  // and so drawn behind all that is not
+      line.material.transparent = true;  // transparent: drawn after all opaque objects
       line.object.renderOrder = 1;
     }
     this.scene.add(this.hovered.object, this.ruler.object);
@@ -146,7 +146,7 @@ export class Scene {
     };
     this.measured = null;  // null: not measuring; else up to two points
     this.follows = null;
-    this.drawn = [];  // closures as drawn: {a, b, closure}
+    this.drawn = [];  // drawn closures: {a, b, closure}
     this.frameTimes = [];
     this.drawnAt = 0;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
@@ -170,14 +170,14 @@ export class Scene {
     this.dirty = true;
   }
 
-  // Materials copy the resolution they are given.
+  // Materials copy the resolution that is assigned.
   sizeLines(...lines) {
     for (const line of lines) line.material.resolution.copy(this.resolution);
   }
 
-  // ---- what is known
+  // ---- state of the model
 
-  /** Shows the model as it is now. */
+  /** Shows the present state of the model. */
   update(model) {
     this.model = model;
     this.updateFrames(model);
@@ -193,8 +193,8 @@ export class Scene {
 
   frameOf(robot) { return robot.optimized.length ? robot.anchor : robot.id; }
 
-  // T from the robot's odometry to the frame it is shown in: by its last keyframe that has both
-  // poses.
+  // Transform from the robot's odometry frame to the frame in which it is shown, by its last
+  // keyframe that has both poses.
   correction(robot) {
     for (let k = Math.min(robot.optimized.length, robot.odometry.length) - 1; k >= 0; --k)
       if (robot.optimized[k] && robot.odometry[k])
@@ -203,8 +203,8 @@ export class Scene {
     return new THREE.Matrix4();
   }
 
-  // Where what is in the frame of `anchor`, told of robot `of`, belongs: a robot's own frame moves
-  // with it once it has joined.
+  // Group and transform for objects of robot `of` in the frame of `anchor`. The robot's own frame
+  // moves with the robot once it has joined others.
   place(anchor, of) {
     const frame = this.frames.get(anchor);
     if (frame) return {group: frame.group, T: null};
@@ -217,7 +217,7 @@ export class Scene {
     const frames = model.frames();
     for (const [anchor, frame] of this.frames)
       if (!frames.some((one) => one.anchor === anchor)) {
-        // What is shown in it finds its new place with the next update of each.
+        // Each object in the frame gets its new place with its next update.
         for (const child of [...frame.group.children]) this.scene.add(child);
         this.scene.remove(frame.group, frame.grid);
         frame.label.remove();
@@ -269,7 +269,7 @@ export class Scene {
     return box;
   }
 
-  // A floor of squares of 1 m (or more, where there is much) below all that is in the frame.
+  // A floor with squares of 1 m (larger for a large map), below all objects of the frame.
   drawGrid(frame) {
     const {min, max} = frame.box;
     const size = Math.max(max.x - min.x, max.y - min.y);
@@ -319,7 +319,7 @@ export class Scene {
     const T = this.correction(robot);
     figure.odometry.set(linesOf(robot, robot.trail, robot.trailStamps, T));
     const optimized = linesOf(robot, robot.optimized, robot.keyframeStamps);
-    const newest = robot.optimized.length - 1;  // from there on to where the robot is
+    const newest = robot.optimized.length - 1;  // from there to the present pose of the robot
     if (newest >= 0 && robot.pose &&
         !robot.hasHole(robot.keyframeStamps[newest], robot.trailStamps[robot.trail.length - 1]))
       optimized.push(
@@ -352,7 +352,7 @@ export class Scene {
     this.dirty = true;
   }
 
-  // A keyframe's position in the scene, or null.
+  // Position of a keyframe in the scene, or null.
   keyframeAt([id, index]) {
     const robot = this.model.robots.get(id);
     const frame = robot && this.frames.get(this.frameOf(robot));
@@ -376,7 +376,7 @@ export class Scene {
     }
   }
 
-  // ---- the view
+  // ---- camera of the view
 
   bounds() {
     const all = new THREE.Box3();
@@ -387,14 +387,14 @@ export class Scene {
         all;
   }
 
-  /** Looks at everything, from where the eye is or from above. */
+  /** Moves the camera so that everything is in view, from its present direction or from above. */
   fit(above) {
     const box = this.bounds(), centre = box.getCenter(new THREE.Vector3());
     const away = (above ? new THREE.Vector3(0, -0.001, 1) : new THREE.Vector3(-0.3, -0.75, 0.75))
                      .normalize();
     const right = new THREE.Vector3().crossVectors(this.camera.up, away).normalize();
     const up = new THREE.Vector3().crossVectors(away, right);
-    const high = Math.tan((this.camera.fov / 2) * (Math.PI / 180)) * 0.9;  // room for the tools
+    const high = Math.tan((this.camera.fov / 2) * (Math.PI / 180)) * 0.9;  // leaves room for the tools
     const wide = high * this.camera.aspect;
     let distance = 2;
     for (let i = 0; i < 8; ++i) {
@@ -439,7 +439,7 @@ export class Scene {
       this.building = this.meshes.sync(this.model, (anchor, of) => this.place(anchor, of));
       this.dirty = true;
     }
-    // While much is built, what there is so far is drawn now and then.
+    // During long builds the finished parts are drawn now and then.
     if (!this.dirty || (this.building && now - this.drawnAt < BUILDING_DRAW_MS)) return;
     this.dirty = false;
     this.drawnAt = now;
@@ -453,14 +453,14 @@ export class Scene {
     this.onDrawn?.(now);
   }
 
-  // [x, y] in the overlay, or null behind the eye.
+  // [x, y] in the overlay, or null behind the camera.
   onScreen(point) {
     const p = point.clone().project(this.camera);
     if (p.z > 1) return null;
     return [(p.x * 0.5 + 0.5) * this.resolution.x, (0.5 - p.y * 0.5) * this.resolution.y];
   }
 
-  // A label just beyond the edge, or where the legend stands, is moved into view.
+  // Moves a label into view if it is just beyond the edge or behind the legend.
   keepInView(at, label) {
     const half = label.offsetWidth / 2 + EDGE_PX, lowest = this.resolution.y - LEGEND_PX;
     const isNear = at[0] > -half && at[0] < this.resolution.x + half && at[1] > 0 &&
@@ -492,7 +492,7 @@ export class Scene {
                                         null);
   }
 
-  // ---- the pointer
+  // ---- pointer
 
   /** The closure within a few pixels of a point of the screen, or null. */
   closureAt(x, y) {
@@ -517,10 +517,8 @@ export class Scene {
     this.dirty = true;
   }
 
-  /**
-   * The point of the map under a point of the screen; beside the map, of the floor of the first
-   * frame.
-   */
+  /** The point of the map under a point of the screen. Outside the map, the point on the floor of
+   * the first frame. */
   pick(x, y) {
     const caster = new THREE.Raycaster();
     caster.setFromCamera(
@@ -533,7 +531,7 @@ export class Scene {
         new THREE.Plane(new THREE.Vector3(0, 0, 1), -z), new THREE.Vector3());
   }
 
-  /** Begins or ends to measure. */
+  /** Begins or ends a measurement. */
   measure(on) {
     this.measured = on ? [] : null;
     this.ruler.set([]);

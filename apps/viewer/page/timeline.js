@@ -1,9 +1,9 @@
-// The time slider: where one is, what there is, and when closures came and robots joined.
+// The time slider: present time, range of times, and times at which closures and joins occurred.
 import {duration, robotColor} from './charts.js';
 import {VERDICTS} from './scene.js';
 
 export class Timeline {
-  /** `onSeek(time)` is told where the user goes. */
+  /** Calls `onSeek(time)` when the user moves the slider. */
   constructor({slider, play, live, clock, speed}, onSeek) {
     Object.assign(this, {slider, play, live, clock, speed, onSeek});
     this.canvas = document.createElement('canvas');
@@ -11,7 +11,7 @@ export class Timeline {
     slider.tabIndex = 0;
     slider.setAttribute('role', 'slider');
     slider.setAttribute('aria-label', 'Time');
-    this.follows = true;  // what comes
+    this.follows = true;  // true: the slider follows new messages
     this.playing = false;
     this.time = this.end = 0;
     play.onclick = () => this.togglePlay();
@@ -56,7 +56,7 @@ export class Timeline {
     this.onSeek(this.time);
   }
 
-  /** Moves on by `seconds` of the clock; true if the time is another one now. */
+  /** Advances by `seconds` of the clock; true if the time has changed. */
   step(seconds) {
     if (this.follows) {
       const moved = this.time !== this.end;
@@ -69,7 +69,7 @@ export class Timeline {
     return true;
   }
 
-  /** Counts closures by second, of the whole time, and notes when frames changed. */
+  /** Counts closures per second of the whole time, and finds the times at which frames changed. */
   survey(model) {
     this.counts = new Map();  // [verified, kept] by second
     this.joins = [];
@@ -122,7 +122,7 @@ export class Timeline {
     c.beginPath();
     c.roundRect(0, middle - 2, toX(this.time), 4, 2);
     c.fill();
-    let free = 0;  // robots that join at once stand side by side
+    let free = 0;  // robots that join at the same time are drawn side by side
     for (const {t, robot} of this.joins ?? []) {
       const x = Math.max(free, toX(t));
       free = x + 9;

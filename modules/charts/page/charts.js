@@ -1,6 +1,6 @@
-// Charts as SVG in a page: lines over time, bars, trajectories from above. Stands for itself, needs
-// no other file. A chart fills the width of the element it is given, is drawn anew by set(), and
-// can be saved as a picture.
+// Charts as SVG in a page: lines over time, bars, trajectories from above. Self-contained: needs no
+// other file. A chart fills the width of its element. set() draws it again. It can be saved as a
+// picture.
 //
 //   const chart = lineChart(element, {title: 'Memory', unit: 'MB', x: duration});
 //   chart.set([{name: 'robot0', color: robotColor(0), points: [[0, 80], [1, 82]]}]);
@@ -11,22 +11,22 @@
 const ROBOT_COLORS =
     ['#1f77b4', '#ff7f0e', '#d62728', '#2ca02c', '#9467bd', '#17becf', '#8c564b', '#e377c2'];
 
-/** The colour of a robot, everywhere. */
+/** The colour of a robot in all charts. */
 export const robotColor = (id) => ROBOT_COLORS[id % ROBOT_COLORS.length];
 
 const KIND_COLORS =
     ['#4c9be8', '#e8a34c', '#b07cd8', '#5fb77c', '#d8746c', '#8b93a1', '#d6c25a', '#56b6c2'];
-/** A colour for the n-th thing that is no robot. */
+/** The colour of the n-th series that is not a robot. */
 export const kindColor = (n) => KIND_COLORS[n % KIND_COLORS.length];
 
-/** Of what is there to compare with: the truth, say. */
+/** Colour of a series for comparison, such as the truth. */
 export const GREY = '#98a1ae';
 
 // ---- texts of numbers
 
 const trimmed = (value, digits) => String(Number(value.toPrecision(digits)));
 
-/** "0.012", "1.2 k", "3.4 M"; with a unit behind it. */
+/** "0.012", "1.2 k", "3.4 M", followed by the unit. */
 export function quantity(value, unit = '') {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
@@ -60,7 +60,7 @@ function ticks(low, high, count, steps = [1, 2, 5, 10]) {
   return all;
 }
 
-// Of time: minutes are divided by 60, not by 10.
+// Ticks of a time axis: minutes are divided by 60, not by 10.
 function timeTicks(low, high, count) {
   const rough = (high - low) / Math.max(1, count);
   const step =
@@ -71,7 +71,7 @@ function timeTicks(low, high, count) {
   return all.length ? all : [low];
 }
 
-// Powers of ten, every k-th where they are many.
+// Powers of ten, every k-th one if there are many.
 function powerTicks(low, high, count) {
   const from = Math.ceil(Math.log10(low) - 1e-9), to = Math.floor(Math.log10(high) + 1e-9);
   const every = Math.max(1, Math.ceil((to - from + 1) / count));
@@ -81,7 +81,7 @@ function powerTicks(low, high, count) {
   return all;
 }
 
-// Of a power of ten: "0.01", "1e5".
+// Text of a power of ten: "0.01", "1e5".
 function powerText(value) {
   const plain = value > 0.999e-3 && value < 1.001e3;
   return plain ? trimmed(value, 1) : value.toExponential(0).replace('e+', 'e');
@@ -146,7 +146,7 @@ function ensureStyle() {
   style.id = 'chart-style';
 }
 
-// What all charts share: head with title and legend, a canvas that follows the width, hidden
+// Parts common to all charts: head with title and legend, a canvas that follows the width, hidden
 // series.
 function frame(host, options, draw) {
   ensureStyle();
@@ -207,7 +207,7 @@ function frame(host, options, draw) {
   return chart;
 }
 
-// Of more points than pixels, the lowest and the highest in each column.
+// If there are more points than pixels: the lowest and the highest point in each column.
 function thinned(points, toX) {
   if (points.length < 2000) return points;
   const kept = [];
@@ -244,7 +244,7 @@ function path(points, toX, toY) {
   return d;
 }
 
-// Of a line, or of dots: points without extent, whose ends are round.
+// SVG of a line, or of dots, which are points without extent and with round ends.
 function seriesSvg(one, points, toX, toY) {
   const at = points.map(([x, y]) => [toX(x), toY(y)])
                  .filter((p) => p.every(Number.isFinite))
@@ -263,10 +263,13 @@ function seriesSvg(one, points, toX, toY) {
 }
 
 /**
- * Lines over a common x: set() takes {name, color, points, width, dashed, marks: discs at its
- * points, dots: only faint ones}. Options: title, unit of y, or yLabel; xLabel; height [px]; logY,
- * decades: the most of them below the largest value; x: text of an x (default: as it is), from0 (y
- * begins at 0; default true without logY), cursor: x of a vertical line.
+ * Lines over a common x. set() takes {name, color, points, width, dashed, marks: discs at its
+ * points, dots: only faint points}. Options:
+ * - title; unit of y, or yLabel; xLabel; height [px];
+ * - logY; decades: largest number of them below the largest value;
+ * - x: function for the text of an x (default: the number);
+ * - from0: y begins at 0 (default: true without logY);
+ * - cursor: x of a vertical line.
  */
 export function lineChart(host, options = {}) {
   const {
@@ -284,7 +287,7 @@ export function lineChart(host, options = {}) {
     const positive = (y) => Number.isFinite(y) && (!logY || y > 0);
     const [x0, x1] = options.range ?? extent(series, 0) ?? [0, 1];
     let [y0, y1] = extent(series, 1, positive) ?? [logY ? 1 : 0, logY ? 10 : 1];
-    // What is six powers of ten below the largest is as good as nothing.
+    // Values six powers of ten below the largest are not shown.
     if (logY)
       [y0, y1] = [
         10 ** Math.floor(Math.log10(Math.max(y0, y1 * 10 ** -decades)) + 1e-9),
@@ -341,7 +344,7 @@ function nearest(points, x) {
   return Math.abs(points[low][0] - x) <= Math.abs(points[high][0] - x) ? points[low] : points[high];
 }
 
-// Under the pointer: a line, a dot on each series, and their values.
+// At the pointer: a line, a dot on each series, and their values.
 function hover(chart, scaleOf, textOfX, unit, height) {
   chart.canvas.onpointerleave = () => {
     chart.tip.hidden = true;
@@ -387,10 +390,12 @@ function showTip(chart, at, head, rows) {
 }
 
 /**
- * Groups of horizontal bars, a bar per series in each: set() takes {name, color, values: {group:
- * value}}. Options: title, unit, or yLabel; most: groups shown, the largest first; groups: these,
- * in this order; decimals: each bar has its value, with so many, in place of the largest of its
- * group; full: value of a bar over the whole width.
+ * Groups of horizontal bars, a bar per series in each. set() takes {name, color, values: {group:
+ * value}}. Options:
+ * - title; unit, or yLabel;
+ * - most: number of groups shown, the largest first; groups: only these, in this order;
+ * - decimals: each bar has its value with this number of decimals, instead of one value per group;
+ * - full: value of a bar over the whole width.
  */
 export function barChart(host, options = {}) {
   const {unit = '', most = 8, decimals} = options;
@@ -430,8 +435,8 @@ export function barChart(host, options = {}) {
   });
 }
 
-// What part of a map is shown: the middle [m] and pixels per metre. Dragging moves it, Ctrl and the
-// wheel zoom about the pointer, a double click shows all again; `view` is null until then.
+// Visible part of a map: the middle [m] and pixels per metre. Dragging moves it, Ctrl and the wheel
+// zoom at the pointer, a double click shows everything again. `view` is null until then.
 function navigate(chart, scaleOf) {
   chart.view = null;
   const place = (event) => {
@@ -489,7 +494,7 @@ function navigate(chart, scaleOf) {
   };
 }
 
-// Tells of the point of a map that is nearest to the pointer.
+// Shows the text of the point of a map nearest to the pointer.
 function point(chart, s, x, y) {
   const reach_px = 14;
   let found = null, least = reach_px * reach_px;
@@ -507,9 +512,9 @@ function point(chart, s, x, y) {
 }
 
 /**
- * Trajectories seen from above [m], both axes to one scale: set() takes series as of lines with
- * tell; a point that is no number breaks a line, and tell(point) is said of the one
- * under the pointer. Options: title, height [px].
+ * Trajectories seen from above [m], both axes with one scale. set() takes series of lineChart()
+ * with a function `tell`, which returns the text for the point at the pointer. A point that is not a
+ * number interrupts a line. Options: title, height [px].
  */
 export function mapChart(host, options = {}) {
   const {height = 360} = options;
@@ -538,7 +543,7 @@ export function mapChart(host, options = {}) {
     svg += `<text x="${left + wide / 2}" y="${height - 5}" text-anchor="middle">x [m]</text>` +
         `<text transform="translate(12 ${
                top + high / 2}) rotate(-90)" text-anchor="middle">y [m]</text>`;
-    // Cut off at the axes.
+    // Clips at the axes.
     svg += `<svg x="${left}" y="${top}" width="${wide}" height="${high}" viewBox="${left} ${top} ${
         wide} ${high}">`;
     for (const one of series) svg += seriesSvg(one, one.points, toX, toY);
@@ -549,7 +554,7 @@ export function mapChart(host, options = {}) {
   return chart;
 }
 
-/** A chart of a plot as to_json() of plot.hpp tells it. */
+/** A chart of a plot from to_json() of plot.hpp. */
 export function plotChart(host, plot) {
   const series = plot.series.map((one) => ({
                                    name: one.name,
@@ -576,7 +581,7 @@ export function plotChart(host, plot) {
 
 // ---- pictures
 
-// Of a picture that stands alone: it has no page to take them from.
+// Colours of a saved picture, which has no page to take them from.
 const PICTURE_COLORS = {
   ink: '#15181d',
   muted: '#555d69',
@@ -584,7 +589,7 @@ const PICTURE_COLORS = {
   paper: '#ffffff'
 };
 
-/** The chart as the text of an SVG file: what is shown of it, on white. */
+/** The visible part of the chart as the text of an SVG file, on white. */
 export function chartSvg(chart) {
   const drawn = chart.canvas.firstElementChild.cloneNode(true);
   const make = (parent, tag, attributes, text) => {
@@ -609,7 +614,7 @@ export function chartSvg(chart) {
     'font-size': 11
   });
   make(svg, 'rect', {width: chart.width, height, fill: paper});
-  // The head is where it is in the page.
+  // The head has its position in the page.
   const label = (of, text, x, attributes) => {
     const box = boxOf(of);
     make(

@@ -22,7 +22,7 @@ std::string quantile_label(int percent) {
     case 100:
       return "max";
     default:
-      std::string label = "p";  // not "p" + ...: GCC 12 warns of its own string addition
+      std::string label = "p";  // not "p" + ...: GCC 12 warns about its own string addition
       return label += std::to_string(percent);
   }
 }
@@ -81,7 +81,7 @@ const ImageFigure* find(std::span<const ImageFigure> figures, const ImageFigure&
   return found != figures.end() ? &*found : nullptr;
 }
 
-// How much was looked at, not what it is like.
+// True for amounts of data, which are not properties of the images.
 bool is_amount(const ImageFigure& figure) {
   return figure.section == "sequence" || figure.name.starts_with("frames, ") ||
          figure.name == "pairs of images";
@@ -91,7 +91,7 @@ bool is_at_flow(const ImageFigure& figure) {
   return figure.name.find("flow ") != figure.name.npos;
 }
 
-// other / reference; NaN where either is not to be had.
+// other / reference; NaN if either is missing.
 double ratio_of(const ImageFigure& reference, const ImageFigure& other) {
   return other.value / reference.value;
 }

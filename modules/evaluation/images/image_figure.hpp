@@ -14,16 +14,16 @@ namespace km {
 
 /// One measured property of a sequence of images: a row of the table.
 struct ImageFigure {
-  std::string section;  ///< Heading it stands under.
-  std::string name;     ///< Unique in its section; says what and in which unit.
-  double value = 0.0;   ///< NaN: not to be had from this sequence.
-  int decimals = 3;     ///< Shown to people.
+  std::string section;  ///< Heading of the figure.
+  std::string name;     ///< Unique in its section; contains quantity and unit.
+  double value = 0.0;   ///< NaN: not available for this sequence.
+  int decimals = 3;     ///< Decimals in tables.
 };
 
 /// Collects the figures of one section.
 class FigureList {
  public:
-  /// `figures` outlives this.
+  /// `figures` must outlive this object.
   FigureList(std::vector<ImageFigure>& figures, std::string section)
       : figures_(figures), section_(std::move(section)) {}
 
@@ -41,12 +41,12 @@ class FigureList {
 /// Arithmetic mean; NaN for an empty sample.
 [[nodiscard]] double mean_of(const std::vector<double>& values);
 
-/// Ranges of a frame's median flow [px/frame] by which figures are told apart: tracking depends on
-/// the motion more than on anything else, so sequences are compared at like flow.
+/// Ranges of a frame's median flow [px/frame] by which figures are grouped. Tracking depends on the
+/// motion more than on anything else, so sequences are compared at similar flow.
 inline constexpr std::array kFlowBinEdges_px = {0.0, 3.0, 6.0, 10.0, 15.0, 25.0, 60.0};
 inline constexpr std::size_t kFlowBinCount = kFlowBinEdges_px.size() - 1;
 
-/// Frames below which a bin says nothing.
+/// A bin with fewer frames gives no mean.
 inline constexpr int kMinFramesInBin = 3;
 
 /// The bin of `flow_px`; nullopt beyond the last edge and for NaN.
@@ -71,25 +71,25 @@ class FlowBinMeans {
 /// Rows that differ by more than this share of the reference are marked.
 inline constexpr double kMarkedDifference = 0.25;
 
-/// A table for people: one row per figure under the headings of its section; "-" for what is not to
-/// be had.
+/// A table for people: one row per figure under the heading of its section; "-" for unavailable
+/// figures.
 [[nodiscard]] std::string to_table(std::span<const ImageFigure> figures);
 
-/// The same for two sequences side by side with the ratio other / reference; rows that differ by
-/// more than kMarkedDifference of the reference end with `<--`, counts of frames excepted. Figures
-/// that only one of the two has are left out. The last line counts rows compared and marked, in
-/// all and of those at like flow (one bin of the median flow).
+/// Compares two sequences in a table, with the ratio other / reference. Rows that differ by more
+/// than kMarkedDifference of the reference end with `<--`, except for counts of frames. Figures
+/// that only one of the sequences has are dropped. The last line counts the compared and marked
+/// rows, in total and among those at equal flow (one bin of the median flow).
 [[nodiscard]] std::string to_comparison(std::span<const ImageFigure> reference,
                                         std::span<const ImageFigure> other,
                                         const std::string& reference_name,
                                         const std::string& other_name);
 
-/// One JSON object: {section: {name: value, ...}, ...}; null for what is not to be had.
+/// One JSON object: {section: {name: value, ...}, ...}; null for unavailable figures.
 [[nodiscard]] Json to_json(std::span<const ImageFigure> figures);
 
 /// The comparison as one JSON object: {"rows": [{"section", "name", "reference", "other", "ratio",
-/// "differs"}, ...], "compared", "differing"}; "differs" is null for rows that are not judged:
-/// amounts, and those without a ratio.
+/// "differs"}, ...], "compared", "differing"}. "differs" is null for rows that are not judged:
+/// amounts, and rows without a ratio.
 [[nodiscard]] Json comparison_json(std::span<const ImageFigure> reference,
                                    std::span<const ImageFigure> other);
 

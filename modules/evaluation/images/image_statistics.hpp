@@ -12,26 +12,26 @@
 
 namespace km {
 
-/// How much of a sequence is looked at.
+/// Part of a sequence that is analysed.
 struct ImageStatisticsOptions {
-  /// ORB and left-right figures are taken, and KLT tracks started, at every so many frames.
+  /// Interval in frames of the ORB and left-right figures, and of the starts of KLT tracks.
   int stride = 5;
-  double max_step_s = 0.25;  ///< Frames further apart are no step of a track.
+  double max_step_s = 0.25;  ///< Frames further apart end a track.
 };
 
-/// What a sequence of stereo images is like, as feature trackers and matchers see it: one pass over
-/// the frames, any length. Not thread-safe.
+/// Properties of a sequence of stereo images for feature trackers and matchers: one pass over the
+/// frames, any length. Not thread-safe.
 class ImageStatistics {
  public:
   /// Throws std::invalid_argument unless stride >= 1 and max_step_s > 0.
   explicit ImageStatistics(const StereoRig& rig, const ImageStatisticsOptions& options = {});
 
-  /// The next pair, in order of time and of the rig's resolution. It may end after the call.
-  /// Without a right image (RGB-D) the figures of the right camera are missing.
+  /// Adds the next pair, in order of time and with the rig's resolution. It is copied. Without a
+  /// right image (RGB-D) the figures of the right camera are missing.
   void add(const StereoFrame& frame);
 
-  /// A pair that counts for the figures of standing still only: the rest of a recording in which
-  /// the camera stands still at another time than that looked at.
+  /// Adds a pair that counts only for the figures at standstill, from another part of the recording
+  /// in which the camera stands still.
   void add_still(const StereoFrame& frame);
 
   [[nodiscard]] std::size_t frames() const { return frames_; }

@@ -15,7 +15,7 @@ constexpr double kStrongGradient = 10.0;
 constexpr int kSaturated = 254;  // JPEG leaves 254 of a saturated 255
 constexpr int kDark = 16;
 
-// Level at which a share `p` of the histogram's pixels is passed, as the centre of its bin.
+// Level below which a share `p` of the histogram's pixels is, as the centre of its bin.
 double histogram_quantile(const std::array<std::uint64_t, 4096>& histogram, double p) {
   const auto total = std::accumulate(histogram.begin(), histogram.end(), std::uint64_t{0});
   if (total == 0) return std::numeric_limits<double>::quiet_NaN();

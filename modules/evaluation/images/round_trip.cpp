@@ -10,11 +10,11 @@ namespace km {
 namespace {
 
 const cv::Size kWindow_px(21, 21);
-constexpr int kTopLevel = 3;  // of the levels 0 to 3
+constexpr int kTopLevel = 3;  // levels 0 to 3
 constexpr double kCornerQuality = 0.01;
 constexpr double kCornerDistance_px = 15.0;
 
-// Moves `to`, where the search starts, to where the points went; 0: lost.
+// Tracks points from `from`, starting the search at `to`, and stores the results in `to`; 0: lost.
 std::vector<unsigned char> track(const KltImage& a, const KltImage& b,
                                  const std::vector<cv::Point2f>& from,
                                  std::vector<cv::Point2f>& to) {

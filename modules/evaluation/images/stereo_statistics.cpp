@@ -19,13 +19,13 @@ constexpr double kKltReturns_px = 1.0;
 constexpr int kFastThreshold = 20;
 constexpr double kRansacConfidence = 0.999;
 constexpr double kLagTolerance_s = 0.03;
-constexpr std::size_t kMinMatches = 8;  // for an essential matrix that means something
+constexpr std::size_t kMinMatches = 8;  // enough for a meaningful essential matrix
 
 Eigen::Vector2d vector_of(const cv::Point2f& p) {
   return {static_cast<double>(p.x), static_cast<double>(p.y)};
 }
 
-// Matches of a to b whose best is clearly better than the second.
+// Matches of a to b whose best distance is clearly better than the second.
 std::vector<cv::DMatch> ratio_matches(const cv::Mat& a, const cv::Mat& b) {
   std::vector<cv::DMatch> matches;
   if (a.rows == 0 || b.rows < 2) return matches;
@@ -51,11 +51,11 @@ std::optional<StereoStatistics::StereoMatch> StereoStatistics::judge(
   const Eigen::Vector3d ray_right = b_right->homogeneous();
   const Eigen::Vector3d& t = T_right_left_.translation();
   const Eigen::Vector3d rotated = T_right_left_.linear() * ray_left;
-  const Eigen::Vector3d line = skew(t) * rotated;  // of the right image, on z = 1
+  const Eigen::Vector3d line = skew(t) * rotated;  // epipolar line of the right image, on z = 1
   StereoMatch match;
   match.epipolar_error_px =
       rig_.cameras[1].fx * std::abs(line.dot(ray_right)) / line.head<2>().norm();
-  // z_right * ray_right = z_left * rotated + t, with the least squared distance.
+  // Minimises the squared distance of z_right * ray_right = z_left * rotated + t.
   Eigen::Matrix<double, 3, 2> A;
   A << rotated, -ray_right;
   match.depth_m = A.colPivHouseholderQr().solve(-t).x();

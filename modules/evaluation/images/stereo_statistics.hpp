@@ -12,18 +12,18 @@
 
 namespace km {
 
-/// How well points are found again in the other camera, and some time later.
+/// Shares of points that are found in the other camera, and some time later.
 ///
-/// ORB: OpenCV's, 1000 features, brute force over the whole image, ratio test 0.8. Left to right an
-/// inlier lies within 1.5 px of its epipolar line; left to left, 0.25, 0.5 and 1 s apart, within
-/// 1.5 px of that of the essential matrix that RANSAC finds. KLT from left to right starts where
-/// the point would be at infinite depth, and back from there at the point itself. Depth by
-/// triangulation: z [m] in the left camera.
+/// ORB: OpenCV's, 1000 features, brute force over the whole image, ratio test 0.8. An inlier from
+/// left to right is within 1.5 px of its epipolar line. An inlier from left to left, 0.25, 0.5 and
+/// 1 s apart, is within 1.5 px of the line from the essential matrix of RANSAC. KLT from left to
+/// right starts at the position of the point at infinite depth, and back from there at the point
+/// itself. Depth by triangulation: z [m] in the left camera.
 class StereoStatistics {
  public:
   explicit StereoStatistics(const StereoRig& rig);
 
-  /// A pair and the corners of its left image. `right` may be empty: a rig with one camera.
+  /// Adds a pair and the corners of its left image. `right` may be empty: a rig with one camera.
   void add(Stamp stamp, const KltImage& left, const KltImage& right,
            const std::vector<cv::Point2f>& corners);
 
@@ -39,7 +39,7 @@ class StereoStatistics {
     double lag_s = 0.0;
     std::vector<double> matches, inlier_shares;
   };
-  // What a point in the left and one in the right image say about each other.
+  // Geometry of a match between a point in the left image and one in the right image.
   struct StereoMatch {
     double epipolar_error_px = 0.0;
     double depth_m = 0.0;  // negative: behind the cameras
@@ -47,7 +47,7 @@ class StereoStatistics {
 
   [[nodiscard]] std::optional<StereoMatch> judge(const cv::Point2f& left,
                                                  const cv::Point2f& right) const;
-  // Where the right camera sees a point of the left image that is infinitely far.
+  // Position in the right image of a left point at infinite depth.
   [[nodiscard]] cv::Point2f at_infinity(const cv::Point2f& left) const;
   void add_orb(const OrbImage& left, const cv::Mat& right);
   void add_later_views(const OrbImage& left);

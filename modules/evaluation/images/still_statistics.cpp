@@ -29,7 +29,7 @@ double robust_sigma(std::vector<double> values) {
 
 void StillStatistics::add(Stamp stamp, const KltImage& image,
                           const std::vector<cv::Point2f>& corners) {
-  if (!kept_.empty() && stamp <= kept_.back().stamp) {  // another piece
+  if (!kept_.empty() && stamp <= kept_.back().stamp) {  // another part of the recording
     kept_.clear();
     last_compared_ = 0;
   }
@@ -62,7 +62,7 @@ void StillStatistics::compare(const Kept& before, const KltImage& image) {
 
 void StillStatistics::add_noise(const cv::Mat& before, const cv::Mat& image) {
   const cv::Mat gradient = gradient_magnitude(before);
-  std::vector<std::uint64_t> histogram(256, 0);  // of the size of the difference
+  std::vector<std::uint64_t> histogram(256, 0);  // magnitude of the difference
   double squares = 0.0;
   double count = 0.0;
   for (int y = 1; y + 1 < image.rows; ++y) {

@@ -10,13 +10,13 @@
 
 namespace km {
 
-/// Noise between images of a camera that stands still: pairs of images about a second apart whose
-/// median flow is below 0.1 px. Temporal noise: standard deviation of their difference over
-/// sqrt(2), on flat pixels; robust: 1.4826 times the median magnitude instead. KLT jitter: the same
-/// of the corners' displacement per axis, freed of its median.
+/// Noise between images of a camera at standstill: pairs of images about a second apart with a
+/// median flow below 0.1 px. Temporal noise is the standard deviation of their difference over
+/// sqrt(2), on flat pixels. The robust version uses 1.4826 times the median magnitude instead. KLT
+/// jitter is the same measure of the corners' displacement per axis, after removal of its median.
 class StillStatistics {
  public:
-  /// The next left image and corners_of() it.
+  /// Adds the next left image and corners_of() it.
   void add(Stamp stamp, const KltImage& image, const std::vector<cv::Point2f>& corners);
 
   [[nodiscard]] int pairs() const { return pairs_; }
@@ -39,7 +39,7 @@ class StillStatistics {
   void compare(const Kept& before, const KltImage& image);
   void add_noise(const cv::Mat& before, const cv::Mat& image);
 
-  std::deque<Kept> kept_;  // of the last second
+  std::deque<Kept> kept_;  // images of the last second
   Stamp last_compared_ = 0;
   int pairs_ = 0;
   std::vector<double> deviations_, robust_, within_, jitter_px_;

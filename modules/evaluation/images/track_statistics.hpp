@@ -10,25 +10,26 @@
 
 namespace km {
 
-/// How corners of one camera survive KLT tracking. A corner survives a step if it comes back within
-/// 1 px (for the strict figures 0.5 px) and stays inside the image; one that does not and ends less
-/// than 10 px inside has left the image, any other has failed. Fresh corners of every frame give
-/// the figures of one step; sets of corners that are followed without being refilled, a new set
-/// every `stride` frames, give survival over many. Where a frame is missing, tracks go on, but the
-/// step is none of the figures of one step.
+/// Survival of the corners of one camera under KLT tracking. A corner survives a step if it returns
+/// within 1 px (for the strict figures 0.5 px) and stays inside the image. A corner that does not
+/// return and ends less than 10 px from the rim has left the image; any other has failed.
+///
+/// New corners of every frame give the figures of one step. Sets of corners without replacement, a
+/// new set every `stride` frames, give the survival over many steps. If a frame is missing, tracks
+/// continue, but the step does not count in the figures of one step.
 class TrackStatistics {
  public:
   /// A step of more than `max_step_s` ends all tracks.
   TrackStatistics(int stride, double max_step_s) : stride_(stride), max_step_s_(max_step_s) {}
 
-  /// The next image and corners_of() it. Returns the median flow since the image before [px/frame];
-  /// NaN if there is none.
+  /// Adds the next image and corners_of() it. Returns the median flow since the image before
+  /// [px/frame]; NaN if there is none.
   double add(Stamp stamp, const KltImage& image, const std::vector<cv::Point2f>& corners);
 
   void append_to(std::vector<ImageFigure>& figures) const;
 
  private:
-  // Corners of one frame, followed ever since; those that are lost are taken out.
+  // Corners of one frame that are still tracked.
   struct TrackSet {
     std::size_t start_count = 0;
     std::size_t age = 0;  // steps
@@ -37,10 +38,10 @@ class TrackStatistics {
     std::vector<bool> strict;  // within 0.5 px in every step
   };
 
-  // What became of the corners of the last image.
+  // Results for the corners of the last image.
   struct Step {
     double corners = 0.0, survived = 0.0, left = 0.0;
-    double flow_px = 0.0;  // median of those that survived; NaN without one
+    double flow_px = 0.0;  // median of the surviving corners; NaN without one
   };
 
   [[nodiscard]] Step one_step(const KltImage& image) const;

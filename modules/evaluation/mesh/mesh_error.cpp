@@ -92,20 +92,21 @@ struct SampledMesh {
   }
 };
 
-// What is nearest to each of a mesh's points on another mesh. All arrays are as long as there are
+// The nearest surface of another mesh for each point of a mesh. All arrays are as long as the
 // points.
 struct PointMatches {
-  std::vector<float> point_m;    // To the nearest sample; infinite if none is within reach.
-  std::vector<float> surface_m;  // See NearestSample::surface_m; likewise.
-  std::vector<LabelId> labels;   // Of the nearest face (NearestSample::face); 0 if none.
+  // Distance to the nearest sample; infinite if none is within reach.
+  std::vector<float> point_m;
+  std::vector<float> surface_m;  // See NearestSample::surface_m; infinite if none is within reach.
+  std::vector<LabelId> labels;   // Labels of the nearest face (NearestSample::face); 0 if none.
 
-  // Whether that face is in front of the point's: neither does the mesh end there, nor do the two
-  // face opposite ways. Else the point may lie on what the other mesh never saw: the ground below
-  // a car, the back of a wall.
+  // Whether that face is in front of the point: the mesh does not end there, and the two faces do
+  // not face opposite ways. Otherwise the point may be on surface that the other mesh never saw,
+  // such as the ground below a car or the back of a wall.
   std::vector<bool> in_front;
 
-  // Takes what `other` has where it is nearer; in front of either is in front. Both are of the
-  // same points.
+  // Takes the values of `other` if they are nearer. A point in front of either mesh is in front.
+  // Both matches are of the same points.
   void keep_nearer(const PointMatches& other) {
     for (std::size_t i = 0; i < point_m.size(); ++i) {
       point_m[i] = std::min(point_m[i], other.point_m[i]);
@@ -117,7 +118,7 @@ struct PointMatches {
   }
 };
 
-// Uses OpenCV's threads; the result does not depend on how many. `progress` is told `stage`.
+// Uses OpenCV's threads; the result does not depend on their number. Calls `progress` with `stage`.
 PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
                           const NearestSurface& nearest_to, double reach_m, std::string_view stage,
                           const MeshProgress& progress) {
@@ -194,7 +195,8 @@ class Evaluation {
 
   [[nodiscard]] std::vector<SurfaceSamples> sampled_estimates(double per_m2) const {
     std::vector<SurfaceSamples> samples;
-    // Another seed than the truth's: a mesh compared with itself must not meet its own points.
+    // Another seed than the truth's, because a mesh compared with itself must not meet its own
+    // points.
     for (std::size_t i = 0; i < moved_.size(); ++i) {
       samples.push_back(sample_surface(moved_[i], per_m2, options_.seed + 1));
       if (samples.back().points.empty())
@@ -232,7 +234,7 @@ class Evaluation {
     place(report_.registration.T_truth_estimate);
   }
 
-  // `found` moves the estimates from where they were assumed to be.
+  // `found` moves the estimates from their assumed pose.
   void note_registration(const Registration& found) {
     Eigen::AlignedBox3d box;
     for (const LabelledMesh& mesh : moved_)
@@ -255,7 +257,7 @@ class Evaluation {
                               " of 6 directions open; registration did not move along these");
   }
 
-  // Both sides with the same density, below max_samples.
+  // Samples both sides with the same density, below max_samples.
   void sample() {
     tell("sampling", 0.0);
     for (;;) {
@@ -327,7 +329,8 @@ class Evaluation {
     error.seen_coverage = static_cast<double>(error.seen.point.count) / total;
   }
 
-  // From the true points that have the estimate within reach, and of which `counts` is true.
+  // Comparison from the true points that have the estimate within reach and for which `counts` is
+  // true.
   [[nodiscard]] SurfaceComparison judged(const PointMatches& matches, const auto& counts) const {
     std::vector<float> point_m;
     std::vector<float> surface_m;

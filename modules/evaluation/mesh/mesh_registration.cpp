@@ -14,12 +14,13 @@ namespace km {
 namespace {
 
 constexpr double kStop_m = 1e-5;  // step that ends the iterations
-constexpr double kShrink = 0.7;   // of the gate from one iteration to the next
-constexpr double kOpen = 1e-3;    // share of the pairs' weight below which a direction is open
+constexpr double kShrink = 0.7;   // factor on the gate from one iteration to the next
+// Share of the pairs' weight below which a direction is undetermined
+constexpr double kOpen = 1e-3;
 constexpr std::size_t kMinPairs = 6;
-constexpr double kMinCosine = 0.7071;  // of 45 degrees, between the normals of a pair
+constexpr double kMinCosine = 0.7071;  // cosine of 45 degrees, between the normals of a pair
 
-// An estimated point, moved by the present transform, and the plane of the true face near it.
+// An estimated point, moved by the current transform, and the plane of the nearest true face.
 struct Pair {
   Eigen::Vector3d point;
   Eigen::Vector3d normal;
@@ -40,7 +41,7 @@ class Pairing {
     }
   }
 
-  // The pairs that count, in the order of the points.
+  // The pairs within the gate, in the order of the points.
   [[nodiscard]] std::vector<Pair> pairs(const SE3& T, double gate_m) const {
     std::vector<std::optional<Pair>> found(points_.size());
     cv::parallel_for_(cv::Range(0, static_cast<int>(points_.size())), [&](const cv::Range& range) {
@@ -103,9 +104,9 @@ Eigen::Vector3d centre_of(const std::vector<Pair>& pairs) {
   return sum / static_cast<double>(pairs.size());
 }
 
-// Least squares of n^T (dR (p - c) + c + dt - q) over the pairs, about their centre c and with
-// rotations as the way [m] they move a point at the typical radius: all six unknowns are lengths,
-// so that eigenvalues tell what the surfaces hold.
+// Least squares of n^T (dR (p - c) + c + dt - q) over the pairs, about their centre c. Rotations
+// are expressed as the distance [m] that they move a point at the typical radius. All six unknowns
+// are then lengths, so that eigenvalues show which directions the surfaces determine.
 Step step_of(const std::vector<Pair>& pairs) {
   const Eigen::Vector3d centre = centre_of(pairs);
   double radius2 = 0.0;
@@ -162,7 +163,8 @@ Registration register_mesh(const LabelledMesh& truth, const NearestSurface& near
   const Pairing pairing(truth, nearest_truth, estimate, options);
   Registration result;
   result.T_truth_estimate = T_truth_estimate;
-  // At first all within reach count, so that what is far off in one direction only is drawn in.
+  // At first all pairs within reach count, so that an estimate that errs in only one direction is
+  // moved.
   double gate_m = options.reach_m;
   while (result.iterations < options.max_iterations && !result.converged) {
     const std::vector<Pair> pairs = pairing.pairs(result.T_truth_estimate, gate_m);

@@ -10,40 +10,43 @@
 
 namespace km {
 
-/// How an estimate is brought onto the truth.
+/// Options of the registration of an estimate to the truth.
 struct RegistrationOptions {
-  double reach_m = 1.0;       ///< Further pairs are not looked at.
-  double gate_m = 0.01;       ///< In the end pairs do not count that are further apart than this
-  double gate_medians = 3.0;  ///< and than so many medians.
+  double reach_m = 1.0;  ///< Pairs further apart are ignored.
+  double gate_m = 0.01;  ///< Smallest final bound on the distance of a pair.
+  /// Final bound on the distance of a pair, as a multiple of the median.
+  double gate_medians = 3.0;
   int max_iterations = 50;
-  std::size_t max_points = 50'000;  ///< Of the estimate that are paired, evenly chosen.
+  std::size_t max_points = 50'000;  ///< Number of paired points of the estimate, evenly chosen.
 };
 
-/// Points on an estimate and the unit normals of its faces there.
+/// Points on an estimate, and the unit normals of its faces there.
 struct OrientedPoints {
   std::vector<Eigen::Vector3f> points, normals;
 
-  /// Adds samples of `mesh`; those on faces without area have no normal and are left out.
+  /// Adds samples of `mesh`, except for those on faces without area, which have no normal.
   void add(const LabelledMesh& mesh, const SurfaceSamples& samples);
 };
 
-/// What registration found.
+/// Result of a registration.
 struct [[nodiscard]] Registration {
   SE3 T_truth_estimate = SE3::Identity();
   int iterations = 0;
-  bool converged = false;   ///< Else stopped by max_iterations, or nothing was near.
-  int free_directions = 0;  ///< Of 6, those the surfaces leave open: not moved along.
-  double rms_m = 0.0;       ///< To the planes, of the pairs kept in the last iteration.
-  std::size_t pairs = 0;    ///< Kept in the last iteration.
+  bool converged = false;   ///< False: stopped by max_iterations, or nothing was near.
+  int free_directions = 0;  ///< Undetermined directions, of 6: no motion along them.
+  double rms_m = 0.0;       ///< Rms distance to the planes, over the pairs of the last iteration.
+  std::size_t pairs = 0;    ///< Pairs of the last iteration.
 };
 
-/// Iterative closest points: pairs of an estimated sample and the nearest true face, turned by at
-/// most 45 degrees against it (ground beside a kerb is not the kerb: in streets, wrong pairs of
-/// that kind outnumber the walls that hold the map along the street), within a gate that shrinks
-/// from iteration to iteration, distances to the plane of that face (Chen and
-/// Medioni, "Object modelling by registration of multiple range images", 1992), Gauss-Newton on
-/// [rotation; translation]. Directions in which the surfaces slide along themselves, as a single
-/// plane's three, keep what the guess has. Works from `T_truth_estimate` on; converged when a step
+/// Iterative closest points. A pair is an estimated sample and the nearest true face with a normal
+/// within 45 degrees of the sample's. (Ground beside a kerb is not the kerb. In streets such wrong
+/// pairs outnumber the walls that determine the position along the street.) Pairs must be within a
+/// gate that shrinks from iteration to iteration. Distances are to the plane of the face (Chen and
+/// Medioni, "Object modelling by registration of multiple range images", 1992), minimised by
+/// Gauss-Newton on [rotation; translation].
+///
+/// Along directions in which the surfaces slide along themselves, as for three directions of a
+/// single plane, the initial guess is kept. Starts from `T_truth_estimate`; converged when a step
 /// is below 10 micrometres.
 Registration register_mesh(const LabelledMesh& truth, const NearestSurface& nearest_truth,
                            const OrientedPoints& estimate, const SE3& T_truth_estimate,

@@ -9,14 +9,15 @@
 namespace km {
 
 /// Tables for people: distances and label accuracy per robot and merged, then accuracy per class of
-/// the merged mesh, then registration and notes. Classes are named by the palette, else by number.
+/// the merged mesh, then registration and notes. Classes are named by the palette, or else by
+/// number.
 [[nodiscard]] std::string to_table(const MeshReport& report, const LabelPalette& palette);
 
-/// The same numbers as one JSON object: {registration: {...}, samples_per_m2, robots: [{name,
-/// area_m2, faces, coverage, seen_coverage, beyond, truth_to_estimate: {point: {mean_m, ...},
-/// surface: {...}, labels: {right, ..., classes: [...]}}, seen_truth_to_estimate: {...},
-/// estimate_to_truth: {...}}], merged: {...}, notes}. Labels
-/// are null where they are not judged, numbers of nothing too.
+/// The report as one JSON object: {registration: {...}, samples_per_m2, robots: [{name, area_m2,
+/// faces, coverage, seen_coverage, beyond, truth_to_estimate: {point: {mean_m, ...}, surface:
+/// {...}, labels: {right, ..., classes: [...]}}, seen_truth_to_estimate: {...}, estimate_to_truth:
+/// {...}}], merged: {...}, notes}. Labels that are not judged and numbers of empty samples are
+/// null.
 [[nodiscard]] Json to_json(const MeshReport& report, const LabelPalette& palette);
 
 }  // namespace km

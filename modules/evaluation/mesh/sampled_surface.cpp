@@ -13,8 +13,8 @@
 namespace km {
 namespace {
 
-constexpr int kBits = 21;  // of each coordinate in a key: two million cells along each axis
-constexpr std::int64_t kMaxCells = 64;  // of a box, above which it is not looked into
+constexpr int kBits = 21;  // bits of each coordinate in a key: two million cells along each axis
+constexpr std::int64_t kMaxCells = 64;  // a box with more cells is not searched
 
 std::uint64_t key_of(const std::array<std::int64_t, 3>& cell) {
   std::uint64_t key = 0;
@@ -23,7 +23,7 @@ std::uint64_t key_of(const std::array<std::int64_t, 3>& cell) {
   return key;
 }
 
-// Calls `use` for the cells from `low` to `high` until it returns true; whether it did.
+// Calls `use` for the cells from `low` to `high` until it returns true; returns whether it did.
 template <typename Use>
 bool any_cell(const std::array<std::int64_t, 3>& low, const std::array<std::int64_t, 3>& high,
               const Use& use) {
@@ -126,8 +126,8 @@ SurfaceSamples sample_surface(const LabelledMesh& mesh, double per_m2, std::uint
                               const NearbyCells* only_near, std::size_t max_points) {
   std::mt19937 random(seed);
   SurfaceSamples samples;
-  // Systematic sampling: point k lies on the face where the running area passes (k + offset) /
-  // per_m2. Faces far smaller than a point's share get their due on average.
+  // Systematic sampling: point k lies on the face at which the running area passes (k + offset) /
+  // per_m2. Faces much smaller than the area per point are sampled correctly on average.
   const auto offset = static_cast<double>(uniform(random));
   double reached = 0.0;
   for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
@@ -150,7 +150,7 @@ SurfaceSamples sample_surface(const LabelledMesh& mesh, double per_m2, std::uint
 
 namespace {
 
-// For each vertex the first one at the same place.
+// For each vertex, the first one at the same position.
 std::vector<std::uint32_t> first_at_place(const LabelledMesh& mesh) {
   const auto place = [&](std::uint32_t i) {
     const Eigen::Vector3f& p = mesh.vertices[i];
@@ -202,9 +202,9 @@ MeshRim::MeshRim(const LabelledMesh& mesh) : faces_(mesh.faces.size(), 0) {
 
 namespace {
 
-constexpr std::size_t kNeighbours = 8;  // samples whose faces are measured to
+constexpr std::size_t kNeighbours = 8;  // samples whose faces are measured
 
-// What nanoflann asks of a set of points.
+// Interface that nanoflann requires of a set of points.
 struct Cloud {
   const std::vector<Eigen::Vector3f>& points;
 
@@ -221,7 +221,7 @@ struct Cloud {
 using Index = nanoflann::KDTreeSingleIndexAdaptor<
     nanoflann::L2_Simple_Adaptor<float, Cloud, float, std::uint32_t>, Cloud, 3, std::uint32_t>;
 
-// The nearest samples that are closer than the root of `limit2`.
+// The nearest samples closer than the square root of `limit2`.
 class NearestWithin : public nanoflann::KNNResultSet<float, std::uint32_t> {
  public:
   explicit NearestWithin(float limit2) : KNNResultSet(kNeighbours), limit2_(limit2) {}
@@ -231,7 +231,7 @@ class NearestWithin : public nanoflann::KNNResultSet<float, std::uint32_t> {
   float limit2_;
 };
 
-// On the edge from corner `edge`, at a, to the next, at b.
+// Nearest point on the edge from corner `edge`, at a, to the next corner, at b.
 TrianglePoint nearest_on_edge(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
                               const Eigen::Vector3d& b, int edge) {
   const Eigen::Vector3d along = b - a;

@@ -16,8 +16,9 @@
 
 namespace km {
 
-/// The space near a set of points, in cubic cells: holds all that is within `reach_m` of a point,
-/// and nothing further than 2 sqrt(3) reach_m. Cheap to ask; O(volume / reach^3) memory.
+/// The space near a set of points, in cubic cells. It contains everything within `reach_m` of a
+/// point, and nothing further than 2 sqrt(3) reach_m. Queries are cheap; O(volume / reach^3)
+/// memory.
 class NearbyCells {
  public:
   /// Throws std::invalid_argument unless reach_m is positive and finite.
@@ -27,7 +28,7 @@ class NearbyCells {
 
   [[nodiscard]] bool contains(const Eigen::Vector3f& point) const;
 
-  /// False only if nothing in the box is near. May be true for a large box with nothing near in it.
+  /// False only if nothing in the box is near. May be true for a large box without anything near.
   [[nodiscard]] bool may_touch(const Eigen::AlignedBox3f& box) const;
 
  private:
@@ -36,33 +37,34 @@ class NearbyCells {
   [[nodiscard]] Cell cell_of(const Eigen::Vector3f& point) const;
 
   double per_m_;
-  Eigen::AlignedBox3f bounds_;  // of the points, widened by the reach
+  Eigen::AlignedBox3f bounds_;  // box of the points, enlarged by the reach
   std::unordered_set<std::uint64_t> cells_;
 };
 
 /// Points on a mesh, uniform by area.
 struct SurfaceSamples {
   std::vector<Eigen::Vector3f> points;  ///< [m], in the mesh's frame.
-  std::vector<std::uint32_t> faces;     ///< The face each lies on.
+  std::vector<std::uint32_t> faces;     ///< The face of each point.
 
-  /// Points there were to be, among them those that were not near or above the limit.
+  /// Number of samples of the whole mesh, including those that were not near or above the limit.
   std::size_t total = 0;
-  std::size_t near = 0;  ///< Of `total`, those near; above points.size() if the limit was met.
+  /// Samples of `total` that are near; larger than points.size() if the limit was reached.
+  std::size_t near = 0;
 };
 
 /// Area of all faces [m^2].
 [[nodiscard]] double surface_area(const LabelledMesh& mesh);
 
-/// Samples `per_m2` points per square metre: their number is the area times per_m2, rounded up or
-/// down, and a face of area A has A per_m2 of them, likewise. With `only_near`, those elsewhere are
-/// left out. Beyond max_points they are counted, but not kept. The same arguments give the same
-/// points; moving the mesh moves them along. O(faces + points).
+/// Samples `per_m2` points per square metre. Their number is the area times per_m2, rounded up or
+/// down. A face of area A has A per_m2 of them, also rounded up or down. With `only_near`, points
+/// elsewhere are dropped. Points beyond max_points are counted but dropped. Equal arguments give
+/// equal points; if the mesh moves, they move with it. O(faces + points).
 [[nodiscard]] SurfaceSamples sample_surface(
     const LabelledMesh& mesh, double per_m2, std::uint32_t seed,
     const NearbyCells* only_near = nullptr,
     std::size_t max_points = std::numeric_limits<std::size_t>::max());
 
-/// Where a mesh ends: edges that only one face has. Vertices at the same place count as one.
+/// Rim of a mesh: edges that only one face has. Vertices at the same position count as one.
 class MeshRim {
  public:
   explicit MeshRim(const LabelledMesh& mesh);
@@ -72,7 +74,7 @@ class MeshRim {
     return (faces_[face] >> k & 1U) != 0;
   }
 
-  /// Whether corner k of a face lies on an edge of the rim, be it another face's.
+  /// Whether corner k of a face is on an edge of the rim, possibly of another face.
   [[nodiscard]] bool has_corner(std::size_t face, int k) const {
     return (faces_[face] >> (3 + k) & 1U) != 0;
   }
@@ -81,21 +83,21 @@ class MeshRim {
   std::vector<std::uint8_t> faces_;  // three bits of edges, three of corners
 };
 
-/// What is nearest to a point.
+/// The nearest sample and face for a point.
 struct NearestSample {
   std::uint32_t sample = 0;  ///< The nearest sample.
-  float distance_m = 0.0F;   ///< To it.
+  float distance_m = 0.0F;   ///< Distance to it.
 
-  /// The nearest of the faces that the nearest few samples lie on, and the distance to it: at most
-  /// distance_m, and free of the floor that the spacing of samples sets. Not below the distance to
-  /// the mesh.
+  /// The nearest of the faces of the nearest samples, and the distance to it. The distance is at
+  /// most distance_m, has no lower limit from the spacing of samples, and is at least the distance
+  /// to the mesh.
   std::uint32_t face = 0;
   float surface_m = 0.0F;
-  bool past_rim = false;  ///< The nearest point of that face lies where the mesh ends.
+  bool past_rim = false;  ///< The nearest point of that face is on the rim of the mesh.
 };
 
-/// Finds the nearest of a mesh's samples in a k-d tree. Mesh and samples outlive this. Const calls
-/// may run in parallel. Building is O(n log n).
+/// Finds the nearest of a mesh's samples in a k-d tree. Mesh and samples must outlive this object.
+/// Const calls may run in parallel. Construction is O(n log n).
 class NearestSurface {
  public:
   NearestSurface(const LabelledMesh& mesh, const SurfaceSamples& samples);
@@ -112,14 +114,14 @@ class NearestSurface {
   std::unique_ptr<Tree> tree_;
 };
 
-/// The point of a triangle that is nearest to another.
+/// The point of a triangle nearest to a given point.
 struct TrianglePoint {
   double distance_m = 0.0;
-  int edge = -1;    ///< It lies between corners `edge` and `edge` + 1 (of 3), or
+  int edge = -1;    ///< It is between corners `edge` and `edge` + 1 (of 3), or
   int corner = -1;  ///< on this corner; both -1: inside.
 };
 
-/// Of the triangle a, b, c, which may be degenerate.
+/// Nearest point of the triangle a, b, c, which may be degenerate.
 [[nodiscard]] TrianglePoint nearest_on_triangle(const Eigen::Vector3d& point,
                                                 const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                                 const Eigen::Vector3d& c);

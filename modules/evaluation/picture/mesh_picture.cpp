@@ -93,7 +93,7 @@ cv::Mat3b draw_legend(const std::vector<LegendEntry>& entries, const PictureView
 
 namespace {
 
-constexpr int kFiner = 2;  // drawn so many times larger each way, then averaged
+constexpr int kFiner = 2;  // drawn this many times larger in both directions, then averaged
 constexpr double kInFront_m = 0.05;
 constexpr LabelledMesh::Color kClay = {214, 210, 200};
 constexpr LabelledMesh::Color kUnknown = {150, 150, 150};
@@ -146,7 +146,7 @@ std::vector<LabelledMesh::Color> colors_of(const PictureScene& scene, std::size_
   return colors;
 }
 
-// All meshes as one; their colours are taken apart from it before.
+// All meshes as one. Their colours were stored separately before.
 LabelledMesh merged(const PictureScene& scene) {
   LabelledMesh all;
   for (const LabelledMesh& mesh : scene.meshes) all.append(mesh);
@@ -154,7 +154,7 @@ LabelledMesh merged(const PictureScene& scene) {
   return all;
 }
 
-// The labels in sight, those of most pixels first.
+// The visible labels, by descending number of pixels.
 std::vector<LegendEntry> label_entries(const LabelledMesh& mesh, const SurfaceImage& surface,
                                        const LabelPalette& palette) {
   std::array<std::size_t, 256> pixels{};
@@ -205,7 +205,7 @@ void draw_path(cv::Mat3b& picture, const PictureLine& line, const cv::Vec3b& col
   const auto in_sight = [&](const Eigen::Vector3d& pixel) {
     return !view.perspective || pixel.z() > kInFront_m;
   };
-  // White below, so that the path shows on any colour.
+  // White below, so that the path is visible on any colour.
   for (const auto& [thickness, shade] : {std::pair(5, white), std::pair(2, ink)})
     for (std::size_t i = 1; i < line.points.size(); ++i) {
       const Eigen::Vector3d from = view.project(line.points[i - 1]);

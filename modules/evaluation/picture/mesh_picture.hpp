@@ -19,18 +19,18 @@ struct LegendEntry {
   bool is_line = false;
 };
 
-/// A white strip as wide as the view: a bar of 1, 2 or 5 times a power of ten metres with its
-/// length (not in perspective, where there is no one scale), and the entries, in as many rows as
-/// they need.
+/// A white strip as wide as the view, with a scale bar and the entries in as many rows as
+/// necessary. The bar has a length of 1, 2 or 5 times a power of ten metres and a label. In
+/// perspective there is no bar, because there is no common scale.
 [[nodiscard]] cv::Mat3b draw_legend(const std::vector<LegendEntry>& entries,
                                     const PictureView& view);
 
-/// What colours the surface.
+/// Colours of the surface.
 enum class PictureColor {
   kLabel,  ///< The palette's colour of each label; unknown is grey.
-  kShade,  ///< None: shape only.
-  kOwn,    ///< The vertices' own.
-  kRobot,  ///< One per mesh.
+  kShade,  ///< No colours, only shading.
+  kOwn,    ///< Colours of the vertices.
+  kRobot,  ///< One colour per mesh.
 };
 
 /// A path drawn over the surface, its start marked by a ring and its end by a disc.
@@ -39,10 +39,10 @@ struct PictureLine {
   std::vector<Eigen::Vector3d> points;  ///< In the meshes' frame [m].
 };
 
-/// What is in a picture. All in one frame.
+/// Content of a picture, all in one frame.
 struct PictureScene {
   std::span<const LabelledMesh> meshes;
-  std::vector<std::string> names;  ///< Of the meshes.
+  std::vector<std::string> names;  ///< Names of the meshes.
   std::vector<PictureLine> lines;
   LabelPalette palette;
 };
@@ -50,13 +50,13 @@ struct PictureScene {
 struct PictureOptions {
   PictureColor color = PictureColor::kLabel;
   SurfaceCut cut;
-  double occlusion_m = 0.8;  ///< How far around a point its light is looked for.
+  double occlusion_m = 0.8;  ///< Distance within which surface shades a point.
 };
 
-/// Shaded picture of the meshes from `view` and, below, a scale bar (parallel views only) and a
-/// legend of the labels in sight, the meshes if coloured one by one, and the lines. As wide as the
-/// view; higher by the legend. Throws std::invalid_argument if no mesh has a face, and for colours
-/// that a mesh does not have: labels, its own. Uses OpenCV's threads.
+/// Shaded picture of the meshes from `view`. Below are a scale bar (parallel views only) and a
+/// legend of the visible labels, of the meshes if these are coloured one by one, and of the lines.
+/// The picture is as wide as the view, and higher by the legend. Throws std::invalid_argument if no
+/// mesh has a face, and if a mesh lacks the requested labels or colours. Uses OpenCV's threads.
 [[nodiscard]] cv::Mat3b draw_meshes(const PictureScene& scene, const PictureView& view,
                                     const PictureOptions& options = {});
 

@@ -15,10 +15,10 @@ namespace {
 constexpr double kRadians = std::numbers::pi / 180.0;
 constexpr double kFieldOfView = 80.0 * kRadians;
 constexpr double kOblique = 40.0 * kRadians;  // elevation of the viewer
-constexpr double kMargin = 1.04;              // of the picture to what is in it
-constexpr double kStray = 0.002;              // share of the vertices left out on each side
+constexpr double kMargin = 1.04;              // size of the picture relative to its content
+constexpr double kStray = 0.002;              // share of the vertices ignored on each side
 
-// The rotation of a camera that looks along `forward` with `up` upwards in its picture.
+// The rotation of a camera that looks along `forward`, with `up` upwards in its picture.
 Eigen::Matrix3d looking(const Eigen::Vector3d& forward, const Eigen::Vector3d& up) {
   Eigen::Matrix3d R_cam_world;
   R_cam_world.row(0) = forward.cross(up).normalized();
@@ -27,7 +27,7 @@ Eigen::Matrix3d looking(const Eigen::Vector3d& forward, const Eigen::Vector3d& u
   return R_cam_world;
 }
 
-// Parallel view that the box just fills, all of it in front.
+// Parallel view that the box just fills, with all of it in front.
 PictureView filled(const Eigen::AlignedBox3d& extent, const Eigen::Matrix3d& R_cam_world, int width,
                    int height) {
   Eigen::AlignedBox3d box;
@@ -79,7 +79,7 @@ std::optional<SE3> pose_in(const std::string& text) {
   const double pitch = n[4] * kRadians;
   const Eigen::Vector3d forward(std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch),
                                 std::sin(pitch));
-  // Up is where the camera tilts from, so that straight down has an up as well.
+  // Up is opposite to the tilt, so that a view straight down has an up direction too.
   const Eigen::Vector3d up(-std::cos(yaw) * std::sin(pitch), -std::sin(yaw) * std::sin(pitch),
                            std::cos(pitch));
   return make_pose(looking(forward, up).transpose(), position);

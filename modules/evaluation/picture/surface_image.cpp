@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-constexpr double kNear_m = 0.05;  // nearer parts of a perspective view are cut off
+constexpr double kNear_m = 0.05;  // nearer parts of a perspective view are clipped
 
 using Corners = std::array<Eigen::Vector3d, 3>;
 
@@ -51,7 +51,7 @@ class Rasteriser {
     return normal.dot(towards) >= 0.0;
   }
 
-  // The part of a triangle that is beyond the near plane.
+  // The part of a triangle beyond the near plane.
   [[nodiscard]] std::vector<Eigen::Vector3d> in_front(const Corners& world) const {
     std::vector<Eigen::Vector3d> polygon;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -86,7 +86,7 @@ class Rasteriser {
         const double b = area2(p[2], p[0], pixel) / doubled;
         const double c = 1.0 - a - b;
         if (a < 0.0 || b < 0.0 || c < 0.0) continue;
-        // Depth is linear over the picture in a parallel view, its inverse in perspective.
+        // In a parallel view the depth is linear over the picture, in perspective its inverse is.
         const double depth_m = view_.perspective
                                    ? 1.0 / (a / p[0].z() + b / p[1].z() + c / p[2].z())
                                    : a * p[0].z() + b * p[1].z() + c * p[2].z();
@@ -129,15 +129,16 @@ SurfaceImage rasterise(const LabelledMesh& mesh, const PictureView& view, const 
 
 namespace {
 
-constexpr double kAmbient = 0.62;  // share of the light that comes from everywhere
-constexpr double kDirect = 0.48;   // and from the upper left
+constexpr double kAmbient = 0.62;  // share of ambient light
+constexpr double kDirect = 0.48;   // share of light from the upper left
 constexpr double kOcclusion = 0.95;
-constexpr double kLine = 0.45;  // what a line leaves of the light
-constexpr int kDirections = 8;  // of the look around each pixel
+constexpr double kLine = 0.45;  // factor on the light at a line
+constexpr int kDirections = 8;  // directions of the search around each pixel
 constexpr int kRings = 3;
 constexpr double kMaxReach_px = 60.0;
 constexpr double kMinReach_px = 4.0;
-constexpr double kJump_px = 6.0;  // of depth across one pixel, beyond the plane of the face
+// Jump of depth across one pixel, relative to the plane of the face
+constexpr double kJump_px = 6.0;
 constexpr double kJump_m = 0.08;
 
 Eigen::Vector3d normal_of(const LabelledMesh& mesh, std::uint32_t face) {
@@ -149,7 +150,7 @@ Eigen::Vector3d normal_of(const LabelledMesh& mesh, std::uint32_t face) {
   return length > 0.0 ? Eigen::Vector3d(normal / length) : Eigen::Vector3d::UnitZ();
 }
 
-// Shares of the three corners of a face in a point on it.
+// Barycentric coordinates of a point on a face.
 Eigen::Vector3d shares_of(const LabelledMesh& mesh, std::uint32_t face,
                           const Eigen::Vector3d& point) {
   const auto [i, j, k] = mesh.faces[face];
@@ -188,7 +189,7 @@ class Shader {
     light_ = view.T_cam_world.linear().transpose() * from.normalized();
     for (int ring = 1; ring <= kRings; ++ring)
       for (int i = 0; i < kDirections; ++i) {
-        // Rings are turned against each other, so that no direction is looked into twice.
+        // Rings are rotated against each other, so that no direction is searched twice.
         const double angle =
             2.0 * std::numbers::pi * (i + ring / static_cast<double>(kRings)) / kDirections;
         const double radius = static_cast<double>(ring) / kRings;
@@ -226,8 +227,8 @@ class Shader {
     return static_cast<double>(surface_.depth_m[surface_.at(column, row)]) / view_.scale;
   }
 
-  // How much of the surroundings stands above the face's plane, 0 to 1: the mean, over the points
-  // looked at, of the sine of their height, less with distance.
+  // Share of the surroundings above the face's plane, 0 to 1: the mean, over the searched points,
+  // of the sine of their elevation, decreasing with distance.
   [[nodiscard]] double occlusion(int column, int row, const Eigen::Vector3d& normal) const {
     const Eigen::Vector3d here = point(column, row);
     const double reach_px =
@@ -248,7 +249,7 @@ class Shader {
     return std::min(1.0, sum / static_cast<double>(around_.size()));
   }
 
-  // Whether the surface below or to the right lies off the plane of the face, or there is none.
+  // Whether the neighbouring surface is off the plane of the face, or there is none.
   [[nodiscard]] bool on_line(int column, int row, const Eigen::Vector3d& normal) const {
     const Eigen::Vector3d here = point(column, row);
     const double limit_m = std::max(kJump_m, kJump_px * metres_per_px(column, row));
@@ -258,7 +259,7 @@ class Shader {
       const int y = row + step[1];
       if (x < 0 || y < 0 || x >= surface_.width || y >= surface_.height) return false;
       if (!shown(x, y)) return true;
-      // The further side of a jump carries the line.
+      // The farther side of a jump gets the line.
       if (surface_.depth_m[surface_.at(x, y)] > surface_.depth_m[surface_.at(column, row)])
         return false;
       return std::abs((point(x, y) - here).dot(normal)) > limit_m;
@@ -270,7 +271,7 @@ class Shader {
   const PictureView& view_;
   double occlusion_m_;
   Eigen::Vector3d light_;
-  std::vector<Eigen::Vector3f> points_;  // of the world, of pixels that show a face
+  std::vector<Eigen::Vector3f> points_;  // points in the world, of pixels that show a face
   std::vector<Eigen::Vector2d> around_;  // at most one long
 };
 

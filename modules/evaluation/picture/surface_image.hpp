@@ -11,14 +11,14 @@
 
 namespace km {
 
-/// The nearest face in each pixel's centre, row by row.
+/// The nearest face at each pixel's centre, row by row.
 struct SurfaceImage {
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
   int width = 0;
   int height = 0;
-  std::vector<float> depth_m;        ///< Along the view's z; infinite where there is no face.
-  std::vector<std::uint32_t> faces;  ///< kNone where there is no face.
+  std::vector<float> depth_m;        ///< Along the view's z; infinite without a face.
+  std::vector<std::uint32_t> faces;  ///< kNone without a face.
 
   [[nodiscard]] std::size_t at(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
@@ -26,25 +26,27 @@ struct SurfaceImage {
   }
 };
 
-/// What is not drawn.
+/// Parts that are not drawn.
 struct SurfaceCut {
-  bool back_faces = false;  ///< Faces seen from behind: a room is looked into through its ceiling.
-  double above_m = std::numeric_limits<double>::infinity();  ///< All that has a larger z.
+  /// Faces seen from behind; without them one can look into a room through its ceiling.
+  bool back_faces = false;
+  /// Points with a larger z are not drawn.
+  double above_m = std::numeric_limits<double>::infinity();
 };
 
 /// Draws the faces into a depth buffer. O(faces + pixels covered).
 [[nodiscard]] SurfaceImage rasterise(const LabelledMesh& mesh, const PictureView& view,
                                      const SurfaceCut& cut = {});
 
-/// Colours of the surface before light falls on it: blue, green, red, one per pixel; white where
-/// there is no face. `vertex_colors` is as long as the mesh's vertices. With `blend`, colours go
-/// over from corner to corner, else a pixel has that of the corner it is most of.
+/// Colours of the surface without light: blue, green, red, one per pixel; white without a face.
+/// `vertex_colors` is as long as the mesh's vertices. With `blend`, colours are interpolated
+/// between the corners. Otherwise a pixel has the colour of the nearest corner.
 [[nodiscard]] cv::Mat3b paint(const LabelledMesh& mesh, const SurfaceImage& surface,
                               const PictureView& view,
                               const std::vector<LabelledMesh::Color>& vertex_colors, bool blend);
 
-/// Makes the shape visible: light from the upper left, ambient occlusion over `occlusion_m` (what
-/// is in a corner or close below something is darker), and lines where depth jumps.
+/// Shows the shape by light from the upper left, ambient occlusion over `occlusion_m` (surface in a
+/// corner or close below other surface is darker), and lines at jumps of depth.
 void shade(cv::Mat3b& picture, const LabelledMesh& mesh, const SurfaceImage& surface,
            const PictureView& view, double occlusion_m);
 

@@ -9,8 +9,8 @@ namespace km {
 /// Named values in the order they are shown.
 using ParameterList = std::vector<std::pair<std::string, std::string>>;
 
-/// What simulation.json says of a folder of recordings: everything that its bytes depend on, and
-/// which robots are finished. Holds nothing that differs between two runs of one command.
+/// Content of simulation.json in a folder of recordings: all parameters that its bytes depend on,
+/// and the finished robots. It is the same for two runs of one command.
 struct DatasetRecord {
   std::string generator;  ///< Program and version.
   ParameterList parameters;
@@ -20,8 +20,8 @@ struct DatasetRecord {
 
 [[nodiscard]] std::string to_json(const DatasetRecord& record);
 
-/// What keeps a run that wants `wanted` from going on in a folder made with `found`, one line per
-/// difference: "duration: 30 there, 60 asked for". Empty if nothing does.
+/// Reasons why a run with `wanted` cannot continue in a folder made with `found`, one line per
+/// difference: "duration: 30 there, 60 asked for". Empty if it can.
 [[nodiscard]] std::vector<std::string> differences(const DatasetRecord& found,
                                                    const DatasetRecord& wanted);
 

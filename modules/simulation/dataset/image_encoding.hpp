@@ -9,8 +9,8 @@
 
 namespace km {
 
-/// How camera images are stored. JPEG at quality 92 is how the recorded images at hand are stored:
-/// it makes their noise correlate between pixels, which features and flow feel.
+/// Format of stored camera images. The recorded images used here are JPEG at quality 92. It
+/// correlates the noise of neighbouring pixels, which affects features and optical flow.
 enum class ImageFormat { kJpeg, kPng };
 
 /// ".jpg" or ".png".

@@ -36,7 +36,7 @@ namespace fs = std::filesystem;
   throw RecordingError(file.string() + ": cannot be written: " + std::strerror(error) + help);
 }
 
-// 0, or the errno of what failed.
+// Returns 0, or the errno of the failure.
 int write_all(int descriptor, std::span<const std::uint8_t> bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
@@ -86,7 +86,7 @@ void write_whole_file(const fs::path& file, std::span<const std::uint8_t> bytes)
   }
   if (descriptor < 0) fail(file, errno);
   int error = write_all(descriptor, bytes);
-  if (::close(descriptor) != 0 && error == 0) error = errno;  // network disks report it here
+  if (::close(descriptor) != 0 && error == 0) error = errno;  // network disks report errors here
   if (error == 0 && ::rename(part.c_str(), file.c_str()) != 0) error = errno;
   if (error == 0) return;
   ::unlink(part.c_str());

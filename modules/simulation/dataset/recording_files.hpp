@@ -12,14 +12,14 @@
 
 namespace km {
 
-/// What a robot's recording can hold of one instant.
+/// Images that a robot's recording can have for one instant.
 enum class ImageChannel { kLeft, kRight, kDepth, kLabels, kColor };
 
 inline constexpr std::array<ImageChannel, 5> kImageChannels = {
     ImageChannel::kLeft, ImageChannel::kRight, ImageChannel::kDepth, ImageChannel::kLabels,
     ImageChannel::kColor};
 
-/// Where the parts of one robot's recording lie: the EuRoC/ASL tree, with depth0, label0 and color0
+/// Paths of the parts of one robot's recording: the EuRoC/ASL tree, with depth0, label0 and color0
 /// beside the cameras.
 class RecordingLayout {
  public:
@@ -48,14 +48,14 @@ struct RecordingError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Writes `bytes` under a temporary name beside `file` and renames it: a file that exists is whole,
-/// whenever the program is stopped. Folders are made where missing. Throws RecordingError, after
-/// which neither a new `file` nor the temporary one is there.
+/// Writes `bytes` under a temporary name beside `file` and renames it, so that an existing file is
+/// complete, whenever the program is stopped. Missing folders are made. Throws RecordingError,
+/// after which neither a new `file` nor the temporary one exists.
 void write_whole_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
 void write_whole_file(const std::filesystem::path& file, std::string_view text);
 
-/// True for a PNG or JPEG file that exists and has its end marker: the name alone does not tell
-/// when the machine, not the program, was stopped.
+/// True for a PNG or JPEG file that exists and has its end marker. After a crash of the machine, an
+/// existing file may be incomplete.
 [[nodiscard]] bool is_whole_image(const std::filesystem::path& file);
 
 }  // namespace km

@@ -39,7 +39,7 @@ std::string list_text(std::span<const double> values) {
   return text + ']';
 }
 
-// As Kalibr names a lens: camera_model with what stands before fu in its intrinsics, and
+// Kalibr's description of a lens: camera_model with the parameters before fu in its intrinsics, and
 // distortion_model with its coefficients.
 struct LensTexts {
   const char* camera_model = "pinhole";

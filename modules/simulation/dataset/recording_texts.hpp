@@ -13,7 +13,7 @@
 
 namespace km {
 
-/// What is true of a robot at one instant: a row of state_groundtruth_estimate0.
+/// True state of a robot at one instant: a row of state_groundtruth_estimate0.
 struct TrueState {
   Stamp stamp = 0;
   SE3 T_world_body = SE3::Identity();
@@ -29,17 +29,17 @@ struct TrueState {
 /// Rows `stamp, stamp.extension`.
 [[nodiscard]] std::string image_csv(const std::vector<Stamp>& stamps, const std::string& extension);
 
-/// Texts of sensor.yaml in the EuRoC/ASL format. Numbers keep the digits that tell doubles apart:
-/// the calibration a reader gets is the one that was rendered.
+/// Texts of sensor.yaml in the EuRoC/ASL format. Numbers have enough digits to restore the doubles,
+/// so a reader gets exactly the calibration used for rendering.
 [[nodiscard]] std::string camera_yaml(const Camera& camera, double rate_hz,
                                       const std::string& comment);
 
-/// What a depth camera is told apart by from the camera in whose place it is.
+/// Properties of a depth camera that the camera in its place does not have.
 struct DepthCameraFigures {
   double rate_hz = 20.0;
   double min_range_m = 0.0;
   double max_range_m = 65.0;
-  double baseline_m = 0.1;  ///< Of the stereo camera that would have its errors.
+  double baseline_m = 0.1;  ///< Baseline of a stereo camera with the same errors.
 };
 
 /// A depth camera in the place of `camera`, pixel for pixel, with images in mm.

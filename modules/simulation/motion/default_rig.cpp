@@ -50,8 +50,8 @@ void resize(Camera& camera, int width, int height) {
   camera.height = height;
 }
 
-// Cameras side by side looking along x, in front of the inertial sensor and turned a little off
-// each other, as assembled ones are.
+// Cameras side by side that look along x, in front of the inertial sensor. They are rotated
+// slightly relative to each other, as assembled ones are.
 void mount_on_vehicle(StereoRig& stereo) {
   Eigen::Matrix3d R_body_cam;
   R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;

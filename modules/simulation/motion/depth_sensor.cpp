@@ -15,9 +15,9 @@ namespace km {
 namespace {
 
 constexpr double kLargest_mm = 65535.0;
-constexpr double kBlockTolerance_px = 0.5;  // by which something nearer must cover a pixel
+constexpr double kBlockTolerance_px = 0.5;  // width by which a nearer surface must cover a pixel
 
-// Half away from zero for positive values, which all are; std::round costs a call.
+// Rounds half away from zero, for positive values; std::round costs a call.
 double rounded(double positive) {
   // NOLINTNEXTLINE(bugprone-incorrect-roundings)
   return static_cast<double>(static_cast<std::int64_t>(positive + 0.5));
@@ -29,8 +29,8 @@ std::uint16_t millimetres(double depth_m) {
   return mm <= kLargest_mm ? static_cast<std::uint16_t>(mm) : std::uint16_t{0};
 }
 
-// Standard normal noise over an image, smooth between the nodes of a lattice of `spacing` pixels:
-// a matcher compares windows, so that neighbours err alike. Of variance 1 at every pixel.
+// Standard normal noise over an image, smooth between the nodes of a lattice of `spacing` pixels. A
+// matcher compares windows, so the errors of neighbours are correlated. Variance 1 at every pixel.
 class SmoothNoise {
  public:
   SmoothNoise(std::size_t width, std::size_t height, std::size_t spacing, GaussianRandom& random)
@@ -44,7 +44,7 @@ class SmoothNoise {
     for (std::size_t k = 0; k < nodes; ++k) nodes_.push_back(random.draw());
   }
 
-  // Of the pixels in row `y`; valid until the next call.
+  // Noise of the pixels in row `y`; valid until the next call.
   [[nodiscard]] std::span<const double> row(std::size_t y) {
     const auto [above, below] = weights_[y % spacing_];
     const double* const upper = &nodes_[y / spacing_ * columns_];
@@ -59,7 +59,7 @@ class SmoothNoise {
 
  private:
   std::size_t spacing_, columns_;
-  std::vector<std::pair<double, double>> weights_;  // of the two nodes around a pixel
+  std::vector<std::pair<double, double>> weights_;  // weights of the two nodes around a pixel
   std::vector<double> nodes_;
   std::vector<double> along_, row_;
 };
@@ -72,7 +72,8 @@ std::vector<double> disparities(std::span<const float> depth_m, double focal_bas
   return d;
 }
 
-// Pixels whose match in the right image, at x - d, lies behind that of a pixel farther right.
+// Marks pixels whose match in the right image, at x - d, is occluded by that of a pixel farther
+// right.
 void mark_blocked(std::span<const double> disparity, std::size_t width, std::vector<bool>& lost) {
   for (std::size_t row = 0; row < disparity.size(); row += width) {
     double leftmost = std::numeric_limits<double>::infinity();
@@ -84,7 +85,7 @@ void mark_blocked(std::span<const double> disparity, std::size_t width, std::vec
   }
 }
 
-// Whether a pixel's disparity is more than `jump_px` from that of a neighbour.
+// True if a pixel's disparity differs from that of a neighbour by more than `jump_px`.
 bool at_edge(std::span<const double> disparity, std::size_t width, std::size_t x, std::size_t k,
              double jump_px) {
   const auto jumps = [&](std::size_t other) {

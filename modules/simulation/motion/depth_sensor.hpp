@@ -16,12 +16,13 @@ struct DepthSensorOptions {
   double baseline_m = 0.1;
   double disparity_noise_px = 0.15;     ///< Standard deviation.
   double disparity_step_px = 1.0 / 16;  ///< Sub-pixel steps of the matcher; 0: none.
-  int correlation_px = 4;               ///< Noise is alike over about so many pixels; 1: white.
+  int correlation_px = 4;  ///< Width over which noise is correlated, in pixels; 1: white.
   double min_range_m = 0.4;
   double max_range_m = 20.0;
-  double edge_disparity_px = 1.0;  ///< Jump to a neighbour from which a pixel counts as an edge.
-  double edge_loss = 0.5;          ///< Probability of no depth at an edge.
-  bool ideal = false;              ///< Rounding to mm only.
+  double edge_disparity_px =
+      1.0;                 ///< Difference to a neighbour above which a pixel counts as an edge.
+  double edge_loss = 0.5;  ///< Probability of no depth at an edge.
+  bool ideal = false;      ///< Rounding to mm only.
 
   void visit_fields(auto& visitor) {
     visitor.field("focal_px", focal_px, {1.0, 1e5});
@@ -43,11 +44,11 @@ class DepthSensor {
   /// Throws ConfigError for options out of range.
   explicit DepthSensor(const DepthSensorOptions& options);
 
-  /// Depth in mm of a true depth image (z in the camera's frame [m], row-major, 0: sky); 0 where
-  /// there is none. Disparity d = f b / z gets noise and is rounded to steps, so that the error
-  /// grows with the square of range: sigma_z = z^2 / (f b) * sigma_d. Holes: outside the range,
-  /// where the right camera's view is blocked by something nearer, and at random at edges. `seed`
-  /// is the frame's. Throws std::invalid_argument if depth_m.size() is not width * height.
+  /// Measured depth [mm] for a true depth image (z in the camera's frame [m], row-major, 0: sky); 0
+  /// for no depth. The disparity d = f b / z gets noise and is rounded to steps, so that the error
+  /// grows with the square of range: sigma_z = z^2 / (f b) * sigma_d. There is no depth outside the
+  /// range, where a nearer surface blocks the right camera's view, and at random at edges. `seed`
+  /// is that of the frame. Throws std::invalid_argument if depth_m.size() is not width * height.
   [[nodiscard]] std::vector<std::uint16_t> measure(std::span<const float> depth_m, int width,
                                                    int height, std::uint64_t seed) const;
 

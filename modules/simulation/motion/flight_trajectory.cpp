@@ -16,15 +16,16 @@ namespace {
 
 using Controls = std::vector<Eigen::Vector4d>;  // position [m] and yaw [rad]
 
-constexpr double kPlanInterval_s = 1.0;   // of the flight plan's controls
-constexpr double kGustInterval_s = 0.25;  // of the gusts'
+constexpr double kPlanInterval_s = 1.0;   // interval of the flight plan's controls
+constexpr double kGustInterval_s = 0.25;  // interval of the gusts' controls
 constexpr double kPoseInterval_s = 0.01;
 constexpr double kGravity_mps2 = 9.81;
 constexpr double kRotorDrag_hz = 0.3;  // deceleration by drag per speed
 constexpr double kSmallestVolume_m = 1.0;
 constexpr double kMaxGusts = 2.5;  // standard deviations
 constexpr double kMinLeg_m = 0.8;
-constexpr double kStartYaw = std::numbers::pi / 4.0;  // off the way to the middle, at most
+constexpr double kStartYaw =
+    std::numbers::pi / 4.0;  // largest angle between the start yaw and the direction to the middle
 constexpr int kTries = 20;
 
 [[noreturn]] void refuse(const std::string& problem) {
@@ -48,7 +49,7 @@ Eigen::Vector3d random_point(const Eigen::AlignedBox3d& box, SeededRandom& rando
   return point;
 }
 
-// A point in `box` not too near to `from`: a leg worth flying.
+// A point in `box` that is not too near to `from`.
 Eigen::Vector3d next_waypoint(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from,
                               SeededRandom& random) {
   Eigen::Vector3d point = random_point(box, random);
@@ -69,8 +70,8 @@ void append_leg(const Eigen::Vector3d& end, double turn, double speed_mps, doubl
   for (int k = 1; k <= steps; ++k) controls.push_back(begin + change * k / steps);
 }
 
-// Rest on the floor, up, then from waypoint to waypoint. A spline stays in the hull of its
-// controls, so in the box, and below the speed between them.
+// Rest on the floor, climb, then flight from waypoint to waypoint. A spline stays in the convex
+// hull of its controls, so in the box, and below the speed between them.
 UniformSpline<4> flight_plan(const Eigen::AlignedBox3d& volume, const Eigen::AlignedBox3d& air,
                              const FlightOptions& options) {
   auto random = SeededRandom::stream(options.seed, 31);
@@ -78,7 +79,7 @@ UniformSpline<4> flight_plan(const Eigen::AlignedBox3d& volume, const Eigen::Ali
   Eigen::Vector4d start;
   start.head<3>() = random_point(air, random);
   start.z() = volume.min().z();
-  // It is set down so that it looks into the room, not at a wall before it.
+  // At the start it looks into the room, not at a near wall.
   const Eigen::Vector3d inwards = volume.center() - start.head<3>();
   start[3] = std::atan2(inwards.y(), inwards.x()) + kStartYaw * (2.0 * random.unit() - 1.0);
   Controls controls(5, start);
@@ -106,14 +107,14 @@ UniformSpline<3> gusts(const FlightOptions& options, double first_s) {
   return {first_s, kGustInterval_s, std::move(controls)};
 }
 
-// When the climb of the start passes `height`; it is not below it again.
+// Time at which the first climb passes `height`; the plan does not go below it again.
 double time_above(const UniformSpline<4>& plan, double height) {
   double t = plan.start();
   while (t < plan.end() && plan.at(t).value.z() < height) t += kPoseInterval_s;
   return t;
 }
 
-// The z axis along the thrust, the x axis as near to `yaw` as that leaves it.
+// Rotation with the z axis along the thrust, and the x axis as near to `yaw` as possible.
 Eigen::Matrix3d attitude(const Eigen::Vector3d& thrust, double yaw) {
   const Eigen::Vector3d z = thrust.normalized();
   const Eigen::Vector3d y =
@@ -128,13 +129,14 @@ Eigen::Matrix3d attitude(const Eigen::Vector3d& thrust, double yaw) {
 SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
                                         const FlightOptions& options) {
   check(volume, options);
-  // Gusts push the vehicle out of its plan by at most this, and only once it is in the air.
+  // Gusts displace the vehicle by at most this, and only once it is in the air.
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kMaxGusts * options.gusts_m);
   const Eigen::AlignedBox3d air(volume.min() + margin, volume.max() - margin);
   const UniformSpline<4> plan = flight_plan(volume, air, options);
   const UniformSpline<3> push = gusts(options, time_above(plan, air.min().z()));
 
-  // From two poses before the start, where it is at rest, to a little after the end.
+  // Begins two poses before the start, where the vehicle is at rest, and ends shortly after the
+  // end.
   const auto count = static_cast<std::size_t>(std::ceil(options.duration_s / kPoseInterval_s)) + 6;
   std::vector<SE3> poses;
   for (std::size_t k = 0; k < count; ++k) {

@@ -8,7 +8,8 @@
 
 namespace km {
 
-/// How a multicopter flies. Defaults: like the easy and medium sequences of EuRoC's Vicon room.
+/// Style of a multicopter flight. Defaults: like the easy and medium sequences of EuRoC's Vicon
+/// room.
 struct FlightOptions {
   static constexpr const char* kSection = "flight";
 
@@ -17,7 +18,7 @@ struct FlightOptions {
   double standstill_s = 2.0;    ///< Exactly at rest on the ground at the start.
   double max_speed_mps = 1.0;   ///< Towards the next waypoint.
   double max_yaw_rate = 1.047;  ///< [rad/s]
-  double gusts_m = 0.008;       ///< Standard deviation by which gusts push it off its way [m].
+  double gusts_m = 0.008;       ///< Standard deviation of the displacement by gusts [m].
   /// The body in the vehicle's frame (x forward, y left, z up); see vehicle_from_body().
   Eigen::Matrix3d R_vehicle_body = Eigen::Matrix3d::Identity();
 
@@ -30,12 +31,12 @@ struct FlightOptions {
   }
 };
 
-/// A flight inside `volume` (frame `world`, z up): at rest at its floor, looking inwards, takes
-/// off, then from one random waypoint to the next with changes of yaw. The vehicle's z axis is
-/// along the thrust: acceleration minus gravity plus the rotors' drag, which is linear in velocity.
-/// The whole curve stays in `volume`. Throws ConfigError for options out of range,
-/// std::invalid_argument for a volume that is empty or smaller than 1 m across or an R_vehicle_body
-/// that is no rotation.
+/// A flight inside `volume` (frame `world`, z up). It begins at rest on the floor, looking inwards,
+/// takes off, and flies from one random waypoint to the next with changes of yaw. The vehicle's z
+/// axis is along the thrust: acceleration minus gravity plus the rotors' drag, which is linear in
+/// velocity. The whole curve stays in `volume`. Throws ConfigError for options out of range. Throws
+/// std::invalid_argument for a volume that is empty or smaller than 1 m across, or an
+/// R_vehicle_body that is no rotation.
 [[nodiscard]] SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
                                                       const FlightOptions& options);
 

@@ -13,17 +13,17 @@ namespace {
 constexpr Stamp kGap = 60'000'000;      // ns; recordings at 20 Hz have none
 constexpr Stamp kMargin = 250'000'000;  // ns
 constexpr double kMaxImuStep_s = 0.05;
-// What the recorded poses are taken to be off by, over what biases are: all that weights do is
-// keep biases small that the margins do not show.
+// Assumed errors of the recorded poses, and standard deviations of the biases. The weights only
+// keep biases small that the margins do not determine.
 constexpr double kRotationNoise_rad = 2e-3, kGyroBias_radps = 0.05;
 constexpr double kPositionNoise_m = 1e-3, kAccelBias_mps2 = 0.3;
 
-// The motion since the first inertial sample, and what biases would change of it.
+// Motion since the first inertial sample, and its derivatives by the biases.
 struct Reckoned {
   Stamp stamp = 0;
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d integral = Eigen::Matrix3d::Zero();         // of R
-  Eigen::Matrix3d double_integral = Eigen::Matrix3d::Zero();  // of R
+  Eigen::Matrix3d integral = Eigen::Matrix3d::Zero();         // integral of R
+  Eigen::Matrix3d double_integral = Eigen::Matrix3d::Zero();  // double integral of R
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
 };
@@ -43,7 +43,7 @@ Reckoning rotations(std::span<const ImuSample> imu, const Eigen::Matrix3d& start
   return states;
 }
 
-// With the rotations as they are. A sample's acceleration is the mean of a step's two ends.
+// Uses the present rotations. A sample's acceleration is the mean over the two ends of a step.
 void integrate_positions(Reckoning& states, std::span<const ImuSample> imu, double gravity_mps2) {
   const Eigen::Vector3d g(0.0, 0.0, -gravity_mps2);
   for (std::size_t k = 1; k < states.size(); ++k) {
@@ -58,7 +58,7 @@ void integrate_positions(Reckoning& states, std::span<const ImuSample> imu, doub
   }
 }
 
-// Between two inertial samples; `stamp` lies within the states.
+// Interpolates between two inertial samples; `stamp` is within the states.
 Reckoned at(const Reckoning& states, Stamp stamp) {
   const auto after = std::lower_bound(states.begin() + 1, states.end() - 1, stamp,
                                       [](const Reckoned& s, Stamp t) { return s.stamp < t; });
@@ -73,8 +73,9 @@ Reckoned at(const Reckoning& states, Stamp stamp) {
   return between;
 }
 
-// Unknowns x of which each recorded pose shows `rows(pose)` * x = `value(pose)`, the last three
-// of them near zero: `bias_weight` is the noise of a value over their size.
+// Solves for unknowns x with `rows(pose)` * x = `value(pose)` for each recorded pose. The last
+// three unknowns are near zero: `bias_weight` is the noise of a value over their standard
+// deviation.
 Eigen::VectorXd least_squares(std::span<const StampedPose> poses, Eigen::Index unknowns,
                               double bias_weight, const auto& rows, const auto& value) {
   const auto n = static_cast<Eigen::Index>(poses.size());
@@ -89,7 +90,7 @@ Eigen::VectorXd least_squares(std::span<const StampedPose> poses, Eigen::Index u
   return A.colPivHouseholderQr().solve(b);
 }
 
-// Turns the states so that they meet the poses, each by Exp(d - integral b).
+// Rotates the states so that they fit the poses, each by Exp(d - integral b).
 void fit_rotations(Reckoning& states, std::span<const StampedPose> poses) {
   const Eigen::VectorXd x = least_squares(
       poses, 6, kRotationNoise_rad / kGyroBias_radps,
@@ -105,7 +106,7 @@ void fit_rotations(Reckoning& states, std::span<const StampedPose> poses) {
     state.R = so3_exp(x.head<3>() - state.integral * x.tail<3>()) * state.R;
 }
 
-// Moves the states so that they meet the poses: by a start, a velocity, and biases.
+// Moves the states so that they fit the poses, by a start, a velocity, and biases.
 void fit_positions(Reckoning& states, std::span<const StampedPose> poses) {
   const Stamp first = states.front().stamp;
   const auto rows = [&](const Reckoned& state) {
@@ -133,8 +134,8 @@ std::span<const Row> within(std::span<const Row> all, Stamp from, Stamp to) {
   return {first, last};
 }
 
-// The inertial samples that span the gap and as much of its margins as they can; none if they
-// do not span it.
+// The inertial samples that span the gap and as much of its margins as possible; empty if they do
+// not span it.
 std::span<const ImuSample> samples_over(std::span<const ImuSample> imu, Stamp from, Stamp to) {
   const std::span<const ImuSample> part = within(imu, from - kMargin, to + kMargin);
   if (part.empty() || part.front().stamp > from || part.back().stamp < to) return {};
@@ -143,8 +144,8 @@ std::span<const ImuSample> samples_over(std::span<const ImuSample> imu, Stamp fr
   return part;
 }
 
-// The motion between two recorded poses and a little before and after; empty if the inertial
-// samples do not tell it.
+// The motion between two recorded poses, and shortly before and after. Empty if the inertial
+// samples do not span it.
 Reckoning motion_over(Stamp from, Stamp to, std::span<const StampedPose> poses,
                       std::span<const ImuSample> imu, double gravity_mps2) {
   const std::span<const ImuSample> samples = samples_over(imu, from, to);

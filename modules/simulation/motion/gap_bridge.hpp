@@ -11,20 +11,19 @@ namespace km {
 
 /// Recorded poses with the motion in their gaps.
 struct BridgedPoses {
-  std::vector<StampedPose> poses;  ///< Those given and, in gaps, one at each inertial sample.
-  std::size_t gaps = 0;            ///< Bridged.
-  std::size_t open_gaps = 0;       ///< Left as they are: no inertial samples all the way.
-  double longest_s = 0.0;          ///< Of the bridged ones.
+  std::vector<StampedPose> poses;  ///< Recorded poses; in gaps, also one at each inertial sample.
+  std::size_t gaps = 0;            ///< Number of bridged gaps.
+  std::size_t open_gaps = 0;       ///< Number of other gaps, which lack inertial samples.
+  double longest_s = 0.0;          ///< Longest bridged gap.
   /// Distances between the inertial motion and the recorded poses on either side of the gaps.
   double rms_m = 0.0, max_m = 0.0;
 };
 
 /// Adds poses to gaps of more than 60 ms between `poses`, T_world_body with z up, ascending in
-/// time, as published truths have where markers were lost: a curve drawn through such a gap
-/// contradicts what the inertial sensor at the body's origin felt, and so would images along it.
-/// Per gap, the samples from 0.25 s before it to 0.25 s after are integrated, and start, velocity
-/// and constant biases are those that meet the recorded poses before and after in linear least
-/// squares:
+/// time. Published truths have such gaps where markers were lost. A curve drawn through a gap
+/// contradicts the measurements of the inertial sensor, as would images along it. For each gap, the
+/// samples from 0.25 s before it to 0.25 s after it are integrated. Start, velocity and constant
+/// biases fit the recorded poses before and after in linear least squares:
 ///   R(t) = Exp(d - int R^ b_g) R^(t),   p(t) = p0 + v0 t + iint (R (f - b_a) + g).
 /// O(poses + samples).
 [[nodiscard]] BridgedPoses bridge_gaps(std::span<const StampedPose> poses,

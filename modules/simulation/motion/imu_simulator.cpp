@@ -11,8 +11,8 @@
 namespace km {
 namespace {
 
-// White noise on a bias that walks, for one of the two sensors. Kalibr's IMU noise model in
-// discrete time: n[k] = density / sqrt(dt) w[k], b[k] = b[k-1] + walk * sqrt(dt) w[k].
+// White noise and a bias with a random walk, for one of the two sensors. Kalibr's IMU noise model
+// in discrete time: n[k] = density / sqrt(dt) w[k], b[k] = b[k-1] + walk * sqrt(dt) w[k].
 class SensorError {
  public:
   SensorError(double initial, double density, double walk, double rate_hz, GaussianRandom random)

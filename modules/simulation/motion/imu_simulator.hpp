@@ -12,15 +12,15 @@
 
 namespace km {
 
-/// How inertial samples are made.
+/// Parameters of the simulated inertial samples.
 struct ImuSimulation {
   static constexpr const char* kSection = "imu";
 
   ImuNoise noise;  ///< Its rate_hz is the sampling rate.
   std::uint64_t seed = 1;
   bool ideal = false;                ///< Neither noise nor bias.
-  double initial_gyro_bias = 0.03;   ///< Standard deviation per axis when switched on [rad/s].
-  double initial_accel_bias = 0.05;  ///< The same [m/s^2].
+  double initial_gyro_bias = 0.03;   ///< Standard deviation per axis at the start [rad/s].
+  double initial_accel_bias = 0.05;  ///< Standard deviation per axis at the start [m/s^2].
   double gravity_mps2 = 9.81;        ///< Gravity is [0, 0, -gravity_mps2] in `world`.
 
   void visit_fields(auto& visitor) {
@@ -36,16 +36,16 @@ struct ImuSimulation {
   }
 };
 
-/// A sample and the biases in it: what EuRoC's ground-truth state lists.
+/// A sample and its biases, which EuRoC's ground-truth state lists.
 struct SimulatedImu {
   ImuSample sample;
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< [rad/s]
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< [m/s^2]
 };
 
-/// What an inertial sensor in the body's origin measures on the whole of `trajectory`: samples at
-/// epoch + k / rate for all whole k within the trajectory, stamps rounded
-/// to nanoseconds and the motion taken at the rounded stamp:
+/// Samples of an inertial sensor in the body's origin over the whole of `trajectory`, at epoch + k
+/// / rate for all integers k within the trajectory. Stamps are rounded to nanoseconds, and the
+/// motion is that at the rounded stamp:
 ///   gyro = w + b_g + n_g,   accel = R^T (a - g) + b_a + n_a.
 /// White noise and bias walk in discrete time as in Kalibr's IMU noise model: standard deviations
 /// density / sqrt(dt) and walk * sqrt(dt). Throws ConfigError for options out of range.

@@ -9,15 +9,15 @@
 
 namespace km {
 
-/// How closely a recording is followed.
+/// Parameters of the fit to a recording.
 struct RecordingOptions {
   static constexpr const char* kSection = "recording";
 
-  double interval_s = 0.02;  ///< Of the spline's controls.
-  /// Deviations taken for ordinary noise; larger ones lose weight, as outliers do.
+  double interval_s = 0.02;  ///< Interval of the spline's controls.
+  /// Standard deviations of the poses; larger deviations lose weight as outliers.
   double position_noise_m = 0.0005;
   double rotation_noise_rad = 0.0005;
-  /// Changes of acceleration taken for ordinary, standard deviation of its derivative.
+  /// Standard deviation of the derivative of the acceleration.
   double jerk_mps3 = 100.0;
   double rotation_jerk = 1000.0;  ///< [rad/s^3]
 
@@ -44,12 +44,12 @@ struct RecordedTrajectory {
   FitDeviation deviation;
 };
 
-/// A smooth motion through recorded poses, by penalised and robust linear least squares: it passes
+/// A smooth motion through recorded poses, by penalised and robust linear least squares. It passes
 /// within the noise of them and bridges gaps. Time 0 of the trajectory is `epoch`, so that stamps
 /// of images and inertial data convert by seconds_between(epoch, stamp). `poses` ascend strictly in
 /// time; the curve covers the first to the last. Throws ConfigError for options out of range,
-/// std::invalid_argument for fewer than two poses and stamps that do not ascend.
-/// O(poses + controls).
+/// std::invalid_argument for fewer than two poses and stamps that do not ascend. O(poses +
+/// controls).
 [[nodiscard]] RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch,
                                                const RecordingOptions& options = {});
 

@@ -18,10 +18,11 @@ namespace {
 using Points = std::vector<Eigen::Vector2d>;
 
 constexpr double kSpacing_m = 0.25;
-constexpr double kEasing_m = 0.8;  // standard deviation of the smoothing: steering takes its time
+constexpr double kEasing_m =
+    0.8;  // standard deviation of the smoothing, for the time that steering takes
 constexpr double kShortest_m = 20.0;
 constexpr double kSamePoint_m = 1e-3;
-constexpr double kStraight = 1e-4;  // [rad] of a corner
+constexpr double kStraight = 1e-4;  // smallest angle of a corner [rad]
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
@@ -43,8 +44,7 @@ Points without_repeats(const Points& points) {
   return kept;
 }
 
-// The arc that rounds the corner at `corner`, as points; the corner itself if the way goes
-// straight.
+// Points of the arc that rounds the corner at `corner`; the corner itself if the path is straight.
 void append_corner(const Eigen::Vector2d& before, const Eigen::Vector2d& corner,
                    const Eigen::Vector2d& after, double radius_m, Points& out) {
   const Eigen::Vector2d in = (corner - before).normalized();
@@ -72,8 +72,8 @@ Points rounded(const Points& points, double radius_m) {
   Points out;
   for (std::size_t k = 0; k < n; ++k)
     append_corner(points[(k + n - 1) % n], points[k], points[(k + 1) % n], radius_m, out);
-  // The first corner's arc begins before the first point: the way shall start at the point nearest
-  // to it, which is the middle of that arc. Rotating the list by whole points is exact enough.
+  // The first corner's arc begins before the first point. The path starts at the point nearest to
+  // it, the middle of that arc; rotating the list by whole points is exact enough.
   const auto nearest = std::min_element(out.begin(), out.end(), [&](const auto& a, const auto& b) {
     return (a - points[0]).squaredNorm() < (b - points[0]).squaredNorm();
   });
@@ -88,7 +88,7 @@ double closed_length(const Points& points) {
   return length;
 }
 
-// `count` points at equal ways along the closed polyline.
+// `count` points at equal distances along the closed polyline.
 Points resampled(const Points& points, std::size_t count) {
   const double step = closed_length(points) / static_cast<double>(count);
   Points out;
@@ -152,11 +152,11 @@ double checked_radius(double radius_m) {
 constexpr double kInterval_m = 0.1;
 constexpr double kDensity_m3 = 16e-6;        // at kReferenceFrequency: geometric mean of class A
 constexpr double kReferenceFrequency = 0.1;  // [cycles/m]
-constexpr double kMemory_m = 15.0;           // after which heights are forgotten
+constexpr double kMemory_m = 15.0;           // distance after which a height has no influence
 
-// A density falling with the square of the frequency is that of a random walk: its slope is white,
-// with the one-sided density (2 pi n)^2 G(n), half of which is the variance of the increments per
-// metre. The walk leaks, which keeps it near 0.
+// A density that falls with the square of the frequency is that of a random walk. Its slope is
+// white, with the one-sided density (2 pi n)^2 G(n); half of that is the variance of the increments
+// per metre. The walk leaks, which keeps it near 0.
 UniformSpline<1> random_walk(double begin_m, double end_m, double roughness, std::uint64_t seed) {
   const double turn = 2.0 * std::numbers::pi * kReferenceFrequency;
   const double step = roughness * std::sqrt(0.5 * turn * turn * kDensity_m3 * kInterval_m);
@@ -172,8 +172,8 @@ UniformSpline<1> random_walk(double begin_m, double end_m, double roughness, std
   return {begin_m, kInterval_m, std::move(heights)};
 }
 
-// A passenger car's: eigenfrequencies, damping, and how far it tilts per acceleration (about 4 and
-// 5 degrees per g).
+// Values of a passenger car: eigenfrequencies, damping, and tilt per acceleration (about 4 and 5
+// degrees per g).
 constexpr double kHeave_hz = 1.5;
 constexpr double kPitch_hz = 1.6;
 constexpr double kRoll_hz = 1.4;

@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// A route as a wheel rolls along it: corners rounded to arcs, curvature continuous. Closed; its
-/// parameter is the way along it [m].
+/// The path of a wheel along a route: corners rounded to arcs, continuous curvature. It is closed;
+/// its parameter is the distance along it [m].
 class RoutePath {
  public:
   struct Point {
@@ -18,14 +18,14 @@ class RoutePath {
     double curvature = 0.0;                              ///< Left turns are positive [1/m].
   };
 
-  /// Arcs of `corner_radius_m`, smaller where the pieces beside a corner are too short. Throws
+  /// Arcs of `corner_radius_m`, smaller at corners between short segments. Throws
   /// std::invalid_argument for fewer than three different points, points that are not finite, or a
-  /// way shorter than 20 m.
+  /// path shorter than 20 m.
   RoutePath(const Route& route, double corner_radius_m);
 
   [[nodiscard]] double length_m() const { return curve_.end(); }
 
-  /// At `way_m` from where the route begins; beyond the end it goes round again.
+  /// Point at `way_m` from the begin of the route; periodic beyond the end.
   [[nodiscard]] Point at(double way_m) const;
 
  private:
@@ -35,10 +35,11 @@ class RoutePath {
 /// Unevenness of the road under one wheel track by the way along it, frozen in space.
 class RoadProfile {
  public:
-  /// Covers ways from `begin_m` to `end_m`. `roughness` scales heights; 1 is a street of ISO 8608
-  /// class A: its displacement has the one-sided density 16e-6 m^3 at 0.1 cycles per metre, falling
-  /// with the square of the frequency. Below one cycle in about 100 m it is flat (the world's own
-  /// ground takes over), above one in about 0.3 m a tyre bridges it.
+  /// Covers distances from `begin_m` to `end_m`. `roughness` scales heights: 1 is a street of ISO
+  /// 8608 class A. That class has the one-sided displacement density 16e-6 m^3 at 0.1 cycles per
+  /// metre. The density falls with the square of the frequency. Below one cycle in about 100 m it
+  /// is zero, because the world's own ground has these frequencies. Above one in about 0.3 m a tyre
+  /// averages it.
   RoadProfile(double begin_m, double end_m, double roughness, std::uint64_t seed);
 
   [[nodiscard]] double height_m(double way_m) const { return curve_.at(way_m).value[0]; }
@@ -58,15 +59,15 @@ struct SprungBody {
 /// ground u, the body on its springs follows the wheels w,
 ///   w'' = -2 zeta_t a w' - a^2 (w - u),
 ///   x'' = -2 zeta b (x' - w') - b^2 (x - w).
-/// For pitch and roll u has, beside the ground's slope, what the vehicle's acceleration adds: nose
+/// For pitch and roll, u is the ground's slope plus the effect of the vehicle's acceleration: nose
 /// down under braking, leaning outwards in curves.
 class Suspension {
  public:
   /// At rest on `ground`.
   explicit Suspension(const SprungBody& ground);
 
-  /// The body after `dt_s` in which the ground moves evenly to `ground`, at the vehicle's
-  /// acceleration forward and to the left [m/s^2]. Exactly at rest while nothing changes.
+  /// State of the body after `dt_s`, in which the ground moves linearly to `ground`, at the
+  /// vehicle's acceleration forward and to the left [m/s^2]. Exactly at rest while nothing changes.
   SprungBody step(const SprungBody& ground, double forward_mps2, double left_mps2, double dt_s);
 
  private:

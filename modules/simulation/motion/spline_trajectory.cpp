@@ -61,16 +61,17 @@ SparseMatrix third_differences(std::size_t controls) {
 
 using Control = SplineTrajectory::Control;
 
-constexpr double kMinLength = 0.5;  // of a control's quaternion
+constexpr double kMinLength = 0.5;  // shortest quaternion of a control
 constexpr double kMaxLength = 2.0;
-constexpr double kMinCosine = 0.70710678118;  // of half the angle between neighbours
+constexpr double kMinCosine =
+    0.70710678118;  // smallest cosine of half the angle between neighbours
 
 [[noreturn]] void refuse(const std::string& problem) {
   throw std::invalid_argument("spline trajectory: " + problem);
 }
 
-// The controls with quaternions on one side of R^4: q and -q are the same rotation, but not the
-// same control.
+// Controls with the signs of quaternions aligned. q and -q are the same rotation, but not the same
+// control.
 std::vector<Control> aligned(std::vector<Control> controls, double start_s, double interval_s) {
   if (!std::isfinite(start_s)) refuse("start " + std::to_string(start_s) + " s");
   if (!(interval_s > 0.0) || !std::isfinite(interval_s))

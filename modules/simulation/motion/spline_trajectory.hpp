@@ -81,7 +81,7 @@ struct SplineFitOptions {
 
 /// Controls (one row each) of the curve through `values` (one row per position) that minimises
 ///   sum rho(|values - curve|^2 / noise^2) + sum |third differences of controls|^2 / roughness^2,
-/// where rho is Cauchy's, by reweighted least squares: outliers lose weight. Positions ascend
+/// with Cauchy's rho, by reweighted least squares, so that outliers lose weight. Positions ascend
 /// within the curve. The band of the normal equations has width 6: O(values + controls).
 [[nodiscard]] Eigen::MatrixXd fit_spline(std::span<const double> positions,
                                          const Eigen::MatrixXd& values,
@@ -112,9 +112,9 @@ class BodyTrajectory {
 ///
 /// Chosen over the cumulative B-spline on SO(3) (Sommer et al., "Efficient Derivative Computation
 /// for Cumulative B-Splines on Lie Groups", CVPR 2020) because it is linear in its controls: curves
-/// are fitted by linear least squares. Turning the world or the body turns the curve alike, since
-/// both act on R^4 as rotations. The rate between controls is less even than there when they are
-/// far apart, which at the few degrees met here is nothing.
+/// are fitted by linear least squares. A rotation of the world or the body rotates the curve in the
+/// same way, since both act on R^4 as rotations. Between controls that are far apart the rate is
+/// less even than there. At the few degrees used here the difference is negligible.
 class SplineTrajectory final : public BodyTrajectory {
  public:
   /// Position [m] and a quaternion (x, y, z, w) of about unit length and any sign.
@@ -138,7 +138,7 @@ class SplineTrajectory final : public BodyTrajectory {
 [[nodiscard]] SplineTrajectory::Control spline_control(const SE3& T);
 
 /// The trajectory whose controls are `poses`, one every `interval_s`: at its start near poses[2],
-/// at its end near the last but two. It smooths what is faster than two or three intervals.
+/// at its end near the last but two. Motion faster than two or three intervals is smoothed.
 [[nodiscard]] SplineTrajectory spline_along(double start_s, double interval_s,
                                             std::span<const SE3> poses);
 

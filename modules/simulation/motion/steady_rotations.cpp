@@ -13,7 +13,7 @@ namespace {
 using SparseMatrix = Eigen::SparseMatrix<double>;
 using Excess = std::vector<std::optional<Eigen::Vector3d>>;
 
-// How the body has turned since the first inertial sample, by a gyroscope without bias.
+// Rotation of the body since the first inertial sample, by a gyroscope without bias.
 class Turns {
  public:
   Turns(std::span<const ImuSample> imu, const Eigen::Vector3d& bias) {
@@ -29,7 +29,7 @@ class Turns {
     }
   }
 
-  // From one instant to another; nullopt if the samples do not span it.
+  // Rotation from one instant to another; nullopt if the samples do not span it.
   [[nodiscard]] std::optional<Eigen::Matrix3d> between(Stamp from, Stamp to) const {
     if (states_.size() < 2 || from < states_.front().stamp || to > states_.back().stamp)
       return std::nullopt;
@@ -44,7 +44,7 @@ class Turns {
   struct State {
     Stamp stamp = 0;
     Eigen::Matrix3d R;
-    int gaps = 0;  // of the samples up to here
+    int gaps = 0;  // number of gaps in the samples before this one
   };
 
   // Nullopt within a gap of the samples.
@@ -61,7 +61,7 @@ class Turns {
   std::vector<State> states_;
 };
 
-// w_k; nullopt where the gyroscope does not tell.
+// w_k; nullopt in gaps of the gyroscope.
 Excess excess_turns(std::span<const StampedPose> poses, std::span<const ImuSample> imu,
                     const Eigen::Vector3d& bias) {
   const Turns turns(imu, bias);
@@ -74,7 +74,8 @@ Excess excess_turns(std::span<const StampedPose> poses, std::span<const ImuSampl
   return excess;
 }
 
-// The mean, in the body, of what poses turn beyond the gyroscope, which feels its bias less.
+// Mean difference between the turns of the poses and those of the gyroscope, in the body frame:
+// minus the bias.
 Eigen::Vector3d mean_bias(std::span<const StampedPose> poses, std::span<const ImuSample> imu) {
   const auto excess = excess_turns(poses, imu, Eigen::Vector3d::Zero());
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -87,7 +88,7 @@ Eigen::Vector3d mean_bias(std::span<const StampedPose> poses, std::span<const Im
   return span_s > 0.0 ? Eigen::Vector3d(sum / span_s) : Eigen::Vector3d::Zero();
 }
 
-// Of the second sum of steady_rotations(), which reweighting leaves as it is.
+// Normal equations of the second sum of steady_rotations(), which do not change with the weights.
 struct NormalEquations {
   SparseMatrix matrix;
   Eigen::MatrixX3d right;

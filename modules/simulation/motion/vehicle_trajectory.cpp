@@ -16,9 +16,10 @@ namespace km {
 namespace {
 
 constexpr double kInterval_s = 0.01;
-constexpr std::size_t kBeyondEnd = 4;  // ways at or after the end
+constexpr std::size_t kBeyondEnd = 4;  // points at or after the end
 constexpr double kStep_m = 0.25;
-// Of the limits. Smoothing in time averages accelerations, but carries speed into curves.
+// Shares of the limits that are used. Smoothing in time averages accelerations, but carries speed
+// into curves.
 constexpr double kLateralShare = 0.92;
 constexpr double kLongitudinalShare = 0.97;
 constexpr double kFirstStop_m = 20.0;
@@ -26,17 +27,17 @@ constexpr double kPedalTime_s = 0.3;    // standard deviation of the smoothing: 
 constexpr std::size_t kLookAround = 6;  // steps before and after a curve that share its limit
 constexpr double kSmoothReach = 4.0;    // standard deviations
 
-// A vehicle's plan over equidistant points of its way.
+// A vehicle's plan over equidistant points of its path.
 struct SpeedPlan {
   std::vector<double> limit_mps;
-  std::map<std::size_t, double> dwell_s;  // at points where it stands
+  std::map<std::size_t, double> dwell_s;  // at points where the vehicle stops
 };
 
 double curve_limit(double curvature, const VehicleOptions& options) {
   return std::sqrt(kLateralShare * options.max_lateral_mps2 / std::max(std::abs(curvature), 1e-6));
 }
 
-// Limits from the road and its curves, each over the points around it as well.
+// Limits from the road and its curves; each also holds for the points around it.
 std::vector<double> road_limits(const RoutePath& path, double speed_mps, std::size_t count,
                                 const VehicleOptions& options) {
   std::vector<double> own(count), limits(count);
@@ -53,7 +54,7 @@ std::vector<double> road_limits(const RoutePath& path, double speed_mps, std::si
   return limits;
 }
 
-// Stretches driven slower than allowed, as traffic has it, and stops.
+// Adds stretches slower than allowed, as in traffic, and stops.
 SpeedPlan plan_speeds(std::vector<double> limits, double speed_mps, const VehicleOptions& options) {
   SpeedPlan plan{std::move(limits), {}};
   const std::size_t count = plan.limit_mps.size();
@@ -87,7 +88,8 @@ std::vector<double> fastest(const std::vector<double>& limits, double accelerati
   return speeds;
 }
 
-// Way since the start at equidistant times, constant acceleration between the points of the plan.
+// Distance since the start at equidistant times, with constant acceleration between points of the
+// plan.
 std::vector<double> ways_in_time(const std::vector<double>& speeds, const SpeedPlan& plan,
                                  double wait_s, std::size_t count) {
   std::vector<double> ways;
@@ -127,10 +129,10 @@ std::vector<double> smoothed(const std::vector<double>& values, int reach) {
 }
 
 // Drives along `path` from `options.start_m`: a standstill, then at most `speed_mps`, slower in
-// curves, with seeded changes of speed and stops. Accelerations change smoothly. The limits of
-// `options` hold; the fastest profile within them is taken (forward and backward pass over v^2).
-// Returns the way driven until each instant [m], one every kInterval_s from time 0 to a little
-// after the end.
+// curves, with seeded changes of speed and stops. Accelerations change smoothly. The result is the
+// fastest profile within the limits of `options` (forward and backward pass over v^2). Returns the
+// distance driven until each instant [m], one every kInterval_s from time 0 until shortly after the
+// end.
 std::vector<double> drive(const RoutePath& path, double speed_mps, const VehicleOptions& options) {
   const int reach = static_cast<int>(std::ceil(kSmoothReach * kPedalTime_s / kInterval_s));
   const double reach_s = (reach + 3) * kInterval_s;  // 3: the spline of the poses
@@ -154,7 +156,7 @@ std::vector<double> drive(const RoutePath& path, double speed_mps, const Vehicle
 
 using GroundHeight = std::function<double(double, double)>;
 
-constexpr double kSlowest_mps = 0.1;  // of a route
+constexpr double kSlowest_mps = 0.1;  // slowest speed of a route
 constexpr double kFastest_mps = 60.0;
 constexpr double kWheelbase_m = 2.7;
 constexpr double kTrack_m = 1.6;
@@ -162,9 +164,10 @@ constexpr double kTyreStep_m = 0.15;
 constexpr std::array<double, 5> kTyreWeights = {0.0625, 0.25, 0.375, 0.25, 0.0625};
 constexpr double kWander_m = 0.08;          // standard deviation of the driver's aim
 constexpr double kWanderInterval_m = 12.0;  // way over which it changes
-constexpr double kQuinticShrink = 0.63;     // of white noise by the spline through it
+constexpr double kQuinticShrink =
+    0.63;  // factor on the standard deviation of white noise by the spline through it
 
-// How far to the left of the path the driver keeps, by way.
+// Lateral offset of the driver to the left of the path, by distance.
 UniformSpline<1> wander(double begin_m, double end_m, std::uint64_t seed) {
   GaussianRandom random(SeededRandom::stream(seed, 21));
   std::vector<UniformSpline<1>::Vector> controls;
@@ -174,7 +177,7 @@ UniformSpline<1> wander(double begin_m, double end_m, std::uint64_t seed) {
   return {begin_m, kWanderInterval_m, std::move(controls)};
 }
 
-// Where the vehicle's reference point, in the middle between its wheels, is on the ground.
+// Position on the ground of the vehicle's reference point, midway between its wheels.
 struct GroundPoint {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   Eigen::Vector2d heading = Eigen::Vector2d::UnitX();  // unit vector
@@ -225,7 +228,7 @@ class Road {
            profile.height_m(way_m + 0.5 * kWheelbase_m * forward);
   }
 
-  // A tyre bridges what is shorter than itself: binomial weights along it.
+  // A tyre averages structures shorter than itself: binomial weights along it.
   [[nodiscard]] double ground_under(const Eigen::Vector2d& contact,
                                     const Eigen::Vector2d& heading) const {
     if (!ground_) return 0.0;

@@ -6,7 +6,7 @@
 
 namespace km {
 
-/// Rays travel in packets of sixteen, side by side in memory.
+/// Rays are traced in packets of sixteen, which are stored side by side.
 inline constexpr int kLanes = 16;
 using LaneMask = std::uint32_t;  ///< Bit i stands for lane i.
 inline constexpr LaneMask kAllLanes = 0xFFFFU;

@@ -73,10 +73,10 @@ class LightBake {
   struct Sample {
     std::array<float, kAxisDirections> ambient{};  ///< Irradiance of a surface facing there.
     std::vector<float> lamps;                      ///< Visible share of each.
-    bool inside = false;                           ///< Of a solid: it must not light what is near.
+    bool inside = false;  ///< true inside a solid: the sample must not light its neighbours
   };
 
-  /// At most kLanes points near each other: rays of the same direction run side by side.
+  /// At most kLanes points near each other, because rays of the same direction are traced together.
   [[nodiscard]] std::vector<Sample> at(std::span<const Eigen::Vector3f> points) const {
     std::vector<Sample> samples(points.size());
     add_surroundings(points, samples);
@@ -120,7 +120,7 @@ class LightBake {
       samples[lane].inside = 3 * backs[lane] > kDirections;
   }
 
-  // Which of the points that the rays have hit the sun shines on, from the side they are seen from.
+  // Lanes among `hits` that the sun lights, on the side from which they are seen.
   [[nodiscard]] LaneMask sunlit(LaneMask hits, const RayPacket& rays) const {
     RayPacket shadow;
     LaneMask facing = 0;
@@ -139,9 +139,9 @@ class LightBake {
     return facing & ~tracer_.occluded(facing, shadow);
   }
 
-  // What a surface throws back: its mean albedo under the sun, if that shines there, and under a
-  // part of the sky. Indoors the surroundings count as lit like the room, but close ones are dark:
-  // they see little light themselves.
+  // Light that a surface reflects: its mean albedo under the sun, if that shines there, and under a
+  // part of the sky. Indoors the surroundings count as lit like the room, except that near ones are
+  // dark, because they receive little light themselves.
   [[nodiscard]] float reflected(const SurfaceRecord& surface, float distance_m, bool sunlit) const {
     if (indoors_) {
       constexpr float kReach_m = 0.8F;
@@ -165,8 +165,8 @@ class LightBake {
         const Eigen::Vector3f light =
             lamp.position +
             Eigen::Vector3f(radius * std::cos(azimuth), radius * std::sin(azimuth), 0.0F);
-        // From the lamp to the points: rays that start together run together. The lamp's own body
-        // is left behind.
+        // Rays go from the lamp to the points, because rays with a common origin are faster. They
+        // begin outside the lamp's own body.
         constexpr float kFirst = 0.05F;
         for (std::size_t lane = 0; lane < points.size(); ++lane)
           set_ray(rays, static_cast<int>(lane), light, points[lane] - light, kFirst, 0.999F);
@@ -184,7 +184,7 @@ class LightBake {
   bool indoors_;
 };
 
-// The finest lattice that keeps the number of samples near this.
+// The spacing of the lattice is the finest that keeps the number of samples near this.
 constexpr float kSampleBudget = 700'000.0F;
 constexpr float kFinestIndoors_m = 0.06F;
 constexpr float kFinestOutdoors_m = 0.3F;
@@ -234,8 +234,8 @@ float byte_of(std::uint32_t word, std::uint32_t shift) {
   return static_cast<float>(static_cast<std::int32_t>(word >> shift & 0xFFU));
 }
 
-// Squares of the normals' components, and which of each axis's two directions they lean to: the
-// shift of its byte.
+// Squares of the normals' components, and for each axis the direction that the normal is nearer to,
+// as the shift of its byte.
 struct Leaning {
   Lanes3 weight;
   BitLanes x, y, z;
@@ -276,7 +276,7 @@ void add_lamp(const BitLanes& word, std::uint32_t shift, const Lanes& weight, La
   for (std::size_t i = 0; i < kLanes; ++i) sum[i] += weight[i] * byte_of(word[i], shift);
 }
 
-// Of corner `index` of a cell: bit 0 is x, bit 1 y, bit 2 z.
+// Weights of corner `index` of a cell: bit 0 is x, bit 1 y, bit 2 z.
 void corner_weights(std::size_t index, const Lanes3& share, Lanes& weights) {
   const bool x = (index & 1U) != 0U;
   const bool y = (index & 2U) != 0U;
@@ -321,7 +321,8 @@ void LightVolume::lay_out(const World& world) {
   brick_index_.assign(static_cast<std::size_t>(bricks_.prod()), -1);
 }
 
-// Which samples lookups on the surfaces will need: all corners of the cells they fall into.
+// Marks the samples that lookups on the surfaces need: all corners of the cells that contain a
+// point.
 std::vector<std::uint8_t> LightVolume::mark(const SurfaceMesh& mesh, const SurfaceTable& surfaces) {
   std::vector<std::uint8_t> wanted;
   const auto mark_cell = [&](const Eigen::Vector3f& point) {
@@ -384,7 +385,7 @@ void LightVolume::bake(const World& world, const RayTracer& tracer, const Surfac
       }
     }
   });
-  // Samples inside of solids and behind surfaces take the light of their neighbours.
+  // Samples inside solids and behind surfaces take the light of their neighbours.
   constexpr int kFillSteps = 3;
   for (int step = 0; step < kFillSteps; ++step) fill_from_neighbours(known);
 }
@@ -455,7 +456,7 @@ void LightVolume::find_cells(const Lanes3& points, const Lanes3& normals, Cells&
     const std::int32_t bx = ix / kBrick;
     const std::int32_t by = iy / kBrick;
     const std::int32_t bz = iz / kBrick;
-    // Free of branches, so that lanes run side by side.
+    // Without branches, so that the compiler vectorises the loop over lanes.
     const float least = std::min(x, std::min(y, z));
     const std::int32_t spare =
         std::min(bricks.x() - bx, std::min(bricks.y() - by, bricks.z() - bz));
@@ -469,8 +470,8 @@ void LightVolume::find_cells(const Lanes3& points, const Lanes3& normals, Cells&
   }
 }
 
-// Trilinear in the lattice. In direction: the squares of the normal's components weigh the three
-// axes it leans to (the ambient cube).
+// Trilinear in the lattice. In direction, the squares of the normal's components weight the three
+// axis directions that are nearest to it (the ambient cube).
 template <std::size_t kWords>
 void LightVolume::interpolate(const Cells& cells, const Lanes3& normals, Light& light) const {
   const auto lamps = static_cast<std::size_t>(lamps_);

@@ -16,30 +16,31 @@ namespace km {
 /// The six axis directions: +x, -x, +y, -y, +z, -z.
 inline constexpr int kAxisDirections = 6;
 
-/// Light that comes from all around, baked once: on a lattice near the surfaces, for each of the
-/// six axis directions, what the sky and the lit surroundings give a surface that faces there, and
-/// how much of each lamp is seen. In between it is interpolated. Corners and contacts are dark
-/// because little of the surroundings is bright there. Immutable.
+/// Ambient light, computed once on a lattice near the surfaces. For each of the six axis directions
+/// it has the irradiance of a surface facing there, from the sky and the lit surroundings, and the
+/// visible share of each lamp. Between lattice points it is interpolated. Corners and contacts are
+/// dark because their surroundings reflect little light. Immutable.
 class LightVolume {
  public:
   static constexpr int kMaxLamps = 10;
 
   struct Light {
     Lanes ambient;                                 ///< Irradiance.
-    std::array<Lanes, kMaxLamps> lamp_visibility;  ///< 0 to 1; only those of the world are set.
+    std::array<Lanes, kMaxLamps> lamp_visibility;  ///< 0 to 1; only the lamps of the world are set.
   };
 
   /// Throws std::invalid_argument for more than kMaxLamps lamps.
   LightVolume(const World& world, const RayTracer& tracer, const SurfaceTable& surfaces,
               const Sky& sky);
 
-  /// Light at points of surfaces, `normals` towards the sides that are lit; unit length.
+  /// Light at points of surfaces; `normals` point to the lit sides and have unit length.
   void look_up(const Lanes3& points, const Lanes3& normals, Light& light) const;
 
  private:
-  static constexpr float kLift = 0.5F;  // light is looked up this far before the surface [cells]
-  // A brick holds kBrick^3 cells, so (kBrick + 1)^3 samples: the last ones are those of the next
-  // brick again, and a lookup stays within one brick.
+  static constexpr float kLift =
+      0.5F;  // distance before the surface at which light is looked up [cells]
+  // A brick holds kBrick^3 cells, so (kBrick + 1)^3 samples: the last ones repeat those of the next
+  // brick, so that a lookup stays within one brick.
   static constexpr int kBrick = 8;
   static constexpr int kSide = kBrick + 1;
   static constexpr std::size_t kBrickSamples = std::size_t{kSide} * kSide * kSide;
@@ -53,9 +54,9 @@ class LightVolume {
   [[nodiscard]] Eigen::Vector3f position(const std::vector<Eigen::Vector3f>& corners,
                                          std::size_t sample) const;
   void fill_from_neighbours(std::vector<std::uint8_t>& known);
-  /// Where lookups fall: the lowest corner of a cell, and how far they are beyond it.
+  /// Cells of lookups: the lowest corner of a cell, and the position relative to it.
   struct Cells {
-    IntLanes brick;   ///< Place in brick_index_; -1: outside of it.
+    IntLanes brick;   ///< Index in brick_index_; -1: outside of it.
     IntLanes corner;  ///< Sample within the brick.
     Lanes3 share;
   };
@@ -76,7 +77,7 @@ class LightVolume {
   std::vector<std::uint8_t> samples_;
   int lamps_ = 0;
   float ambient_scale_ = 1.0F;  ///< Irradiance of one step of 8 bit.
-  float open_ambient_ = 0.0F;   ///< Where nothing was baked.
+  float open_ambient_ = 0.0F;   ///< Ambient light outside all bricks.
 };
 
 }  // namespace km

@@ -51,7 +51,7 @@ void find_occluded(const ValidLanes& valid, RTCScene scene, RTCRay16& rays) {
 }
 #endif
 
-// Embree's checks look at lanes that are not active, too: they get a ray of no length.
+// Embree's checks read inactive lanes, too: they get a ray of length zero.
 void prepare(LaneMask active, RTCRay16& rays) {
   for (int i = 0; i < kLanes; ++i) {
     if (has_lane(active, static_cast<std::size_t>(i))) continue;
@@ -101,7 +101,7 @@ RayTracer::RayTracer(const SurfaceMesh& mesh, const std::string& instruction_set
     : device_(rtcNewDevice(device_config(instruction_set).c_str())) {
   require_no_error(device_.get());
   scene_.reset(rtcNewScene(device_.get()));
-  // Without it, rays slip through between triangles that share an edge.
+  // Without it, rays pass between triangles that share an edge.
   rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
   attach_mesh(device_.get(), scene_.get(), mesh);
   rtcCommitScene(scene_.get());

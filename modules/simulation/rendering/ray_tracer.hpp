@@ -18,11 +18,11 @@ namespace km {
 /// Triangle of a ray that hit nothing.
 inline constexpr std::uint32_t kNoTriangle = RTC_INVALID_GEOMETRY_ID;
 
-/// A packet of rays with what they hit. Embree's layout.
+/// A packet of rays and their hits, in Embree's layout.
 using RayPacket = RTCRayHit16;
 
-/// Embree's acceleration structure over a mesh. Immutable, safe to use from several threads. Rays
-/// of a packet are taken for neighbours that run side by side: any others are slower, not wrong.
+/// Embree's acceleration structure over a mesh. Immutable, safe to use from several threads. It is
+/// fastest if the rays of a packet are neighbours; other rays give correct results, too.
 class RayTracer {
  public:
   /// Copies `mesh`. `instruction_set` is one of Embree's ("sse2", "avx2", ...), for tests of its
@@ -30,11 +30,12 @@ class RayTracer {
   /// code.
   explicit RayTracer(const SurfaceMesh& mesh, const std::string& instruction_set = {});
 
-  /// Nearest hits of the rays in `active` between tnear and tfar: primID, u, v, and tfar shrinks to
-  /// the hit. The other lanes get kNoTriangle and a ray of no length: they need not be set.
+  /// Nearest hits of the rays in `active` between tnear and tfar: primID, u, v; tfar becomes the
+  /// distance of the hit. The other lanes get kNoTriangle and a ray of length zero; they need not
+  /// be set.
   void intersect(LaneMask active, RayPacket& rays) const;
 
-  /// Which of the rays in `active` hit anything. The other lanes need not be set.
+  /// Mask of the rays in `active` that hit any surface. The other lanes need not be set.
   [[nodiscard]] LaneMask occluded(LaneMask active, RayPacket& rays) const;
 
  private:

@@ -24,13 +24,14 @@ int usable_samples(int wanted) {
   return std::min(rounded, kLanes);
 }
 
-// Sample i of n lies in column i of an n x n grid, in the row given here: of all such sets, those
-// whose count on one side of a straight edge follows the area best, over all edges (by search).
+// Sample i of n is in column i of an n x n grid, in the row given here. Among all such sets, these
+// were found by search: the count on one side of a straight edge follows the area best, over all
+// edges.
 constexpr std::array<int, 4> kRows4 = {1, 3, 0, 2};
 constexpr std::array<int, 8> kRows8 = {7, 2, 4, 1, 6, 3, 5, 0};
 constexpr std::array<int, 16> kRows16 = {4, 13, 8, 0, 5, 11, 14, 2, 9, 6, 12, 1, 7, 15, 3, 10};
 
-// From the pixel's centre; n is 2, 4, 8 or 16.
+// Offset from the pixel's centre; n is 2, 4, 8 or 16.
 Eigen::Vector2f sample_offset(std::size_t i, std::size_t n) {
   const int row = n == 16  ? kRows16[i]
                   : n == 8 ? kRows8[i]
@@ -70,8 +71,7 @@ void copy_lane(const SurfaceHits& from, std::size_t lane, SurfaceHits& to, std::
   if (has_lane(from.surface, lane)) to.surface |= bit;
 }
 
-// One call of Renderer::render(): a ray and a shade per pixel, then more rays where the picture has
-// edges.
+// One call of Renderer::render(): a ray and a shade per pixel, then more rays in pixels with edges.
 class ViewPass {
  public:
   ViewPass(const RenderScene& scene, const RenderOptions& options, const PixelRays& rays,
@@ -113,7 +113,7 @@ class ViewPass {
   }
 
  private:
-  /// What the second half needs to know of a pixel's centre.
+  /// Data on a pixel's centre that the second pass needs.
   struct Pixel {
     std::uint32_t triangle = kNoTriangle;
     float depth_m = 0.0F;
@@ -122,7 +122,7 @@ class ViewPass {
     bool dark = false;  ///< The sun is hidden.
   };
   static constexpr std::uint16_t kSkyMaterial = 0xFFFF;
-  /// Pixel of each lane, and where in the pixel its ray goes, from the centre [px].
+  /// Pixel of each lane, and the offset of its ray from the pixel's centre [px].
   struct Aim {
     LaneMask active = 0;
     std::array<int, kLanes> x{}, y{};
@@ -136,8 +136,8 @@ class ViewPass {
       dy[lane] = offset.y();
     }
   };
-  /// Where in a pixel there is an edge: on the way to a neighbour, or anywhere; and whether it may
-  /// be one of a shadow.
+  /// Position of an edge in a pixel: towards a neighbour, or anywhere; and whether it may be that
+  /// of a shadow.
   enum Edge : std::uint8_t {
     kNoEdge = 0,
     kLeft = 1,
@@ -151,18 +151,18 @@ class ViewPass {
     int x = 0, y = 0;
     Eigen::Vector2f offset = Eigen::Vector2f::Zero();  ///< From the pixel's centre [px].
   };
-  /// Samples whose light must be found out: they wait until there are enough for a packet.
+  /// Samples without a shade: they wait until there are enough for a packet.
   struct Deferred {
     SurfaceHits hits{};
     std::size_t count = 0;
-    std::array<std::size_t, kLanes> pixel{};   ///< That the sample belongs to.
-    std::array<std::size_t, kLanes> source{};  ///< Pixel whose shade it takes,
-    LaneMask fresh = 0;                        ///< unless it must be shaded itself.
+    std::array<std::size_t, kLanes> pixel{};   ///< Pixel of the sample.
+    std::array<std::size_t, kLanes> source{};  ///< Pixel whose shade the sample takes,
+    LaneMask fresh = 0;  ///< unless it is in this mask and must be shaded itself.
   };
 
   void trace(const Aim& aim, SurfaceHits& hits) const {
-    // Bearing of each pixel, and its change to the right and down. Lanes that are not active repeat
-    // some pixel: without branches the loops run several lanes at a time.
+    // Bearing of each pixel, and its change to the right and down. Inactive lanes repeat some
+    // pixel, so that the loops have no branches and are vectorised.
     Lanes x, y, right_x, right_y, down_x, down_y;
     const Eigen::Vector2f* bearings = rays_.bearings().data();
     const std::ptrdiff_t stride = rays_.stride();
@@ -264,7 +264,7 @@ class ViewPass {
     return origin_ + pixels_[pixel].depth_m * (R_world_cam_ * bearing.homogeneous());
   }
 
-  // The same material, nearly one plane.
+  // True for the same material and nearly one plane.
   [[nodiscard]] bool same_surface(std::size_t pixel, std::uint32_t triangle,
                                   const Eigen::Vector3f& point) const {
     const Pixel& at = pixels_[pixel];
@@ -275,12 +275,12 @@ class ViewPass {
     const SurfaceRecord& surface = scene_.surfaces.record(at.triangle);
     constexpr float kLeastCosine = 0.95F;  // 18 degrees
     if (std::abs(surface.normal.dot(other.normal)) < kLeastCosine) return false;
-    // Off the plane by less than about what a pixel covers.
+    // The distance from the plane is less than about the size of a pixel.
     const float pixel_m = at.depth_m / static_cast<float>(rays_.camera().fx);
     return std::abs(surface.normal.dot(point - position(pixel))) < pixel_m;
   }
 
-  // Whether the radiances of two pixels differ by so much that a mean of them is seen as such.
+  // True if the radiances of two pixels differ enough for their mean to be visible.
   [[nodiscard]] bool contrast(std::size_t a, std::size_t b) const {
     constexpr float kVisible = 0.05F;  // steps of some grey levels; the lens blurs them away
     const float at_a = request_.radiance ? view_.radiance[a] : luminance_of(view_.rgb[a]);
@@ -288,7 +288,7 @@ class ViewPass {
     return std::abs(at_a - at_b) > kVisible * std::max(at_a, at_b);
   }
 
-  // Edges towards each other of two neighbouring pixels.
+  // Marks the edges of two neighbouring pixels towards each other.
   void compare(std::size_t a, Edge towards_b, std::size_t b, Edge towards_a) {
     if (!rays_.is_lit(a) || !rays_.is_lit(b)) return;
     const bool one_triangle = pixels_[a].triangle == pixels_[b].triangle;
@@ -311,10 +311,10 @@ class ViewPass {
   }
 
   // Poles and wires narrower than a pixel can pass between all centres of a row or column. One more
-  // ray in every other pixel of 8 x 4, elsewhere in each, finds most of them. Where an edge is
-  // known already there is no need.
+  // ray in every other pixel of 8 x 4, and in every pixel of the other rows, finds most of them.
+  // Pixels with a known edge need none.
   void find_thin_things(int x0, int y0) {
-    // In front of what is nearer than this, nothing is narrower than a pixel.
+    // Nothing in front of surfaces nearer than this is narrower than a pixel.
     constexpr float kThinnest_m = 0.02F;
     const float nearest_m = kThinnest_m * static_cast<float>(rays_.camera().fx);
     Aim aim;
@@ -344,9 +344,9 @@ class ViewPass {
     }
   }
 
-  // A hit beside a pixel's centre that is another surface: an edge runs through the pixel. If no
-  // neighbour shows that surface either, it is thin, and likely runs on unseen beside the pixel;
-  // leaves do not.
+  // A hit beside a pixel's centre on another surface shows that an edge runs through the pixel. If
+  // no neighbour shows that surface either, it is thin, and likely continues beside the pixel
+  // without being seen. Leaves do not continue.
   void flag_unlike(int x, int y, std::uint32_t triangle, const Eigen::Vector3f& hit) {
     const auto like = [&](int px, int py) { return same_surface(index(px, py), triangle, hit); };
     if (like(x, y)) return;
@@ -363,15 +363,15 @@ class ViewPass {
     }
   }
 
-  // Whether a sample on this side of a pixel's centre may see what the pixel's edges are with.
+  // True if a sample on this side of a pixel's centre may see the surface beyond the pixel's edge.
   [[nodiscard]] static bool beyond_edge(std::uint8_t edge, const Eigen::Vector2f& offset) {
     const int across = offset.x() < 0.0F ? kLeft : kRight;
     const int along = offset.y() < 0.0F ? kUp : kDown;
     return (edge & (kInside | across | along)) != 0;
   }
 
-  // Makes each pixel with an edge the mean of its centre and its samples; those that lie away from
-  // the edge look like the centre.
+  // Sets each pixel with an edge to the mean of its centre and its samples. Samples away from the
+  // edge have the value of the centre.
   void refine_edges() {
     std::vector<Sample> batch;
     batch.reserve(kLanes);
@@ -388,7 +388,7 @@ class ViewPass {
         batch.clear();
       }
     };
-    // Tile by tile: samples that are traced together lie together.
+    // Goes tile by tile, so that samples traced together are near each other.
     constexpr int kTile = 4;
     for (int y0 = 0; y0 < height_; y0 += kTile)
       for (int x0 = 0; x0 < width_; x0 += kTile)
@@ -398,8 +398,8 @@ class ViewPass {
     light_deferred();
   }
 
-  // Whether the centre of a pixel shows a surface that looks like one at `depth_m`: the same
-  // material at about the same distance and slope. Leaves count as alike whatever their slope.
+  // True if the centre of a pixel shows a surface similar to one at `depth_m`: the same material at
+  // about the same distance and slope. For leaves the slope does not matter.
   [[nodiscard]] bool alike(const Pixel& pixel, const SurfaceRecord& surface, float depth_m) const {
     if (pixel.material != surface.material) return false;
     constexpr float kDepthShare = 0.03F;
@@ -409,8 +409,8 @@ class ViewPass {
            scene_.surfaces.record(pixel.triangle).normal.dot(surface.normal) > kLeastCosine;
   }
 
-  // A pixel whose shade serves for a sample that hit `triangle`: its own or the neighbours on that
-  // side, if one shows the same triangle or at least looks alike.
+  // A pixel whose shade can be used for a sample that hit `triangle`. Candidates are the sample's
+  // own pixel and its neighbours on that side, if they show the same triangle or a similar surface.
   [[nodiscard]] std::optional<std::size_t> shaded_nearby(const Sample& sample,
                                                          std::uint32_t triangle,
                                                          float depth_m) const {
@@ -430,8 +430,8 @@ class ViewPass {
     return std::nullopt;
   }
 
-  // A sample takes the shade of a pixel nearby, or is shaded itself, later, together with others;
-  // at shadows' edges each sample asks for the sun itself.
+  // A sample takes the shade of a pixel nearby, or is deferred to be shaded together with others.
+  // At the edges of shadows a ray to the sun is traced for each sample.
   void refine(std::span<const Sample> batch) {
     Aim aim;
     for (std::size_t lane = 0; lane < batch.size(); ++lane)
@@ -453,7 +453,7 @@ class ViewPass {
     }
   }
 
-  // Puts a sample whose light is not known yet into the packet of those that are lit together.
+  // Adds a sample without known light to the packet of those that are shaded together.
   void defer(const SurfaceHits& hits, std::size_t lane, std::size_t pixel,
              std::optional<std::size_t> source) {
     const std::size_t to = deferred_.count++;
@@ -489,7 +489,7 @@ class ViewPass {
     }
   }
 
-  // In the mean of a pixel's centre and samples, those not added count as the centre.
+  // In the mean of a pixel's centre and samples, missing samples count as the centre.
   template <typename Value>
   void add_sample(std::size_t pixel, const Value& radiance, const std::vector<Shade<Value>>& shaded,
                   std::vector<Value>& image) const {
@@ -514,7 +514,7 @@ class ViewPass {
 
   RenderedView view_;
   std::vector<Pixel> pixels_;
-  std::vector<std::uint8_t> edge_;  ///< Of Edge.
+  std::vector<std::uint8_t> edge_;  ///< flags of Edge
   std::vector<Shade<float>> gray_;
   std::vector<Shade<Eigen::Vector3f>> color_;
   Deferred deferred_;
@@ -556,7 +556,7 @@ Camera shrunk(const Camera& camera, int factor) {
   small.height = (camera.height + factor - 1) / factor;
   small.fx /= factor;
   small.fy /= factor;
-  // The corner of the image, half a pixel before the first centre, stays where it is.
+  // The corner of the image, half a pixel before the first centre, does not move.
   small.cx = (camera.cx + 0.5) / factor - 0.5;
   small.cy = (camera.cy + 0.5) / factor - 0.5;
   return small;

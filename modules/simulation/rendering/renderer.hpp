@@ -12,8 +12,8 @@
 
 namespace km {
 
-/// Viewing rays of every pixel of a camera, distortion undone: computed once per camera (some 20 ms
-/// at 752x480), then shared by all its views. Immutable.
+/// Viewing rays of every pixel of a camera, without distortion. They are computed once per camera
+/// (some 20 ms at 752x480), and shared by all its views. Immutable.
 class PixelRays {
  public:
   /// Throws std::invalid_argument for an empty image or a focal length that is not positive.
@@ -21,14 +21,14 @@ class PixelRays {
 
   [[nodiscard]] const Camera& camera() const { return camera_; }
 
-  /// Bearings of the pixels' centres on the plane z = 1 of the camera frame, row-major, with one
-  /// column and one row more than the image, so that differences give each pixel's extent. 0 where
-  /// the lens has no bearing.
+  /// Bearings of the pixels' centres on the plane z = 1 of the camera frame, row-major. There is
+  /// one column and one row more than in the image, so that differences give each pixel's extent. 0
+  /// where the lens has no bearing.
   [[nodiscard]] const std::vector<Eigen::Vector2f>& bearings() const { return bearings_; }
   [[nodiscard]] int stride() const { return camera_.width + 1; }
 
-  /// False for a pixel, of width * height row by row, for which the lens has no bearing, or none
-  /// for that to its right or below: it stays black.
+  /// False for a pixel (index in width * height, row-major) for which the lens has no bearing, or
+  /// none for the pixel to its right or below. Such a pixel is black.
   [[nodiscard]] bool is_lit(std::size_t pixel) const { return lit_[pixel] != 0; }
 
  private:
@@ -41,16 +41,16 @@ class PixelRays {
 /// For metering, previews and tests. Sizes round up.
 [[nodiscard]] Camera shrunk(const Camera& camera, int factor);
 
-/// What the lens throws on the sensor, before exposure, noise and quantisation; row-major,
-/// width * height each. Vectors not asked for are empty.
+/// Light on the sensor, before exposure, noise and quantisation; row-major, width * height each.
+/// Vectors that were not requested are empty.
 struct RenderedView {
   int width = 0;
   int height = 0;
   std::vector<float> radiance;       ///< Linear grey, anti-aliased; a white wall in the sun is 1.
   std::vector<Eigen::Vector3f> rgb;  ///< Linear colour, anti-aliased.
   std::vector<float> depth_m;        ///< z in the camera frame at the pixel's centre [m]; 0: sky.
-  std::vector<LabelId> labels;       ///< At the pixel's centre; sky is SurfaceClass::kSky, and
-                                     ///< what the lens does not see SurfaceClass::kUnknown.
+  std::vector<LabelId> labels;       ///< At the pixel's centre; sky is SurfaceClass::kSky, pixels
+                                     ///< without a bearing SurfaceClass::kUnknown.
 };
 
 struct RenderRequest {
@@ -61,13 +61,13 @@ struct RenderRequest {
 };
 
 struct RenderOptions {
-  /// Visibility samples, beside its centre, of a pixel in which surfaces or shadows meet: 1 (none),
+  /// Visibility samples, beside the centre, of a pixel with edges of surfaces or shadows: 1 (none),
   /// 2, 4, 8 or 16; others are rounded up.
   int samples_per_pixel = 4;
   bool shadows = true;
 };
 
-/// Ray caster over one world. Immutable after construction; render() may be called from several
+/// Ray caster over one world. Immutable after construction. render() may be called from several
 /// threads at once and gives the same bytes whatever their number.
 class Renderer {
  public:
@@ -78,7 +78,7 @@ class Renderer {
   /// One view through a camera (distortion included), its body at T_world_body.
   [[nodiscard]] RenderedView render(const PixelRays& rays, const SE3& T_world_body,
                                     const RenderRequest& request) const;
-  /// The same for a single view: computes the camera's rays first.
+  /// Renders a single view: computes the camera's rays first.
   [[nodiscard]] RenderedView render(const Camera& camera, const SE3& T_world_body,
                                     const RenderRequest& request) const;
 

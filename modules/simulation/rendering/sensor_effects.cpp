@@ -18,11 +18,11 @@ double mean_level(const std::vector<float>& radiance, double gain, double gamma)
   return sum / static_cast<double>(radiance.size());
 }
 
-// A camera in a cellar, or one that looks at nothing, stops somewhere.
+// Bounds for a camera in the dark, or one that sees nothing.
 constexpr double kLeastGain = 1e-3;
 constexpr double kMostGain = 1e3;
 
-// The gain that gives the target; the mean level grows with it.
+// The gain for the target level; the mean level grows with the gain.
 double solve_gain(const std::vector<float>& radiance, const SensorEffectsConfig& config) {
   double low = std::log(kLeastGain);
   double high = std::log(kMostGain);
@@ -108,7 +108,7 @@ std::vector<float> smoothed_transposed(const std::vector<float>& field, double s
 
 // Gaussian noise of unit variance that repeats, neighbours correlated over `sigma_px`.
 std::vector<float> make_noise_tile(double sigma_px) {
-  std::mt19937 random(20240229);  // any: each image takes the tile from elsewhere
+  std::mt19937 random(20240229);  // any seed: each image takes another part of the tile
   std::normal_distribution<float> normal;
   std::vector<float> tile(static_cast<std::size_t>(kTile) * kTile);
   for (float& value : tile) value = normal(random);
@@ -122,14 +122,14 @@ std::vector<float> make_noise_tile(double sigma_px) {
   return tile;
 }
 
-// What one shot has in common for all its pixels.
+// Noise levels common to all pixels of one shot.
 struct NoiseLevels {
   float read_variance = 0.0F;    // in shares of saturation
   float photon_variance = 0.0F;  // at saturation
 };
 
 NoiseLevels noise_levels(const SensorEffectsConfig& config, const Exposure& exposure) {
-  // Beyond the longest shutter time the signal is amplified, and what noise it has.
+  // Beyond the longest shutter time the signal is amplified together with its noise.
   const double opened = exposure.time_s / config.unit_exposure_s;
   const double amplified = opened > 0.0 ? std::max(1.0, exposure.gain / opened) : 1.0;
   const double read = amplified * config.read_noise / 255.0;
@@ -137,7 +137,7 @@ NoiseLevels noise_levels(const SensorEffectsConfig& config, const Exposure& expo
   return {static_cast<float>(read * read), static_cast<float>(amplified * photon * photon)};
 }
 
-// Where in the noise tile an image begins; two places are added.
+// Begin of an image in the noise tile; the noise at two places is added.
 struct TileOffsets {
   std::array<std::uint32_t, 2> x;
   std::array<std::uint32_t, 2> y;
@@ -189,7 +189,7 @@ Exposure ExposureControl::next(const RenderedView& scene) {
 template <typename Value>
 std::vector<Value> lens_blurred(const std::vector<Value>& image, int width, int height,
                                 double sigma_px) {
-  constexpr double kSharp_px = 0.1;  // the neighbours' weights round to zero
+  constexpr double kSharp_px = 0.1;  // below this the neighbours' weights round to zero
   if (!(sigma_px > kSharp_px) || image.empty()) return image;
   std::vector<float> kernel = gaussian_kernel(sigma_px);
   const float sum = std::accumulate(kernel.begin(), kernel.end(), 0.0F);
@@ -241,7 +241,7 @@ std::vector<Eigen::Vector2f> image_motion(const PixelRays& rays, const std::vect
       const float pz = -(omega.x() * b.y() - omega.y() * b.x() + v.z() * inverse_depth);
       const float bx = px - b.x() * pz;
       const float by = py - b.y() * pz;
-      // Pixels per bearing: the inverse of how the bearing changes from pixel to pixel.
+      // Pixels per bearing: the inverse of the change of the bearing from pixel to pixel.
       const Eigen::Vector2f right = bearing[1] - b;
       const Eigen::Vector2f down = bearing[rays.stride()] - b;
       const float scale = time / (right.x() * down.y() - right.y() * down.x());
@@ -259,7 +259,7 @@ std::vector<Value> blurred(const std::vector<Value>& image, int width, int heigh
   std::size_t i = 0;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x, ++i) {
-      constexpr float kStill_px = 0.2F;  // blurs less than the pixel itself does
+      constexpr float kStill_px = 0.2F;  // below this the blur is smaller than a pixel
       constexpr float kMostTaps = 64.0F;
       const float length = motion[i].norm();
       if (!(length > kStill_px)) {
@@ -291,7 +291,7 @@ SensorEffects::SensorEffects(const PixelRays& rays, const SensorEffectsConfig& c
       rays_(rays),
       noise_tile_(make_noise_tile(config.noise_correlation_px)) {
   const Camera& camera = rays.camera();
-  // The light falls as the fourth power of a cosine does: 1 / (1 + k r^2)^2.
+  // The light falls with the fourth power of a cosine: 1 / (1 + k r^2)^2.
   const Eigen::Vector2d half(0.5 * (camera.width - 1), 0.5 * (camera.height - 1));
   const double k =
       (1.0 / std::sqrt(1.0 - config_.vignetting) - 1.0) / std::max(half.squaredNorm(), 1.0);
@@ -303,7 +303,8 @@ SensorEffects::SensorEffects(const PixelRays& rays, const SensorEffectsConfig& c
       relative_light_.push_back(static_cast<float>(1.0 / (fall * fall)));
     }
   }
-  // The response, over the square root of the signal: fine steps in the dark, where it is steep.
+  // The response as a function of the square root of the signal: fine steps in the dark, where it
+  // is steep.
   for (int i = 0; i <= kResponseSteps; ++i)
     response_.push_back(static_cast<float>(
         255.0 * std::pow(static_cast<double>(i) / kResponseSteps, 2.0 / config_.gamma)));

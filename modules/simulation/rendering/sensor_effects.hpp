@@ -12,17 +12,17 @@
 
 namespace km {
 
-/// What a lens and a sensor do to light; visit_fields() describes the fields, which are the keys
+/// Effects of a lens and a sensor on light; visit_fields() describes the fields, which are the keys
 /// below `sensor:`.
 struct SensorEffectsConfig {
   static constexpr const char* kSection = "sensor";
 
   double vignetting = 0.2;
-  double lens_blur_px =
-      0.6;  ///< So the Vicon room has the Laplacian's variance of recorded images.
+  double lens_blur_px = 0.6;  ///< With this value the Vicon room has the same variance of the
+                              ///< Laplacian as recorded images.
   double read_noise = 1.0;
   double photon_noise = 2.0;
-  double noise_correlation_px = 1.2;  ///< A demosaic, a filter or JPEG leave little fine noise.
+  double noise_correlation_px = 1.2;  ///< Demosaicing, filters and JPEG leave little fine noise.
   double gamma = 1.0;
   double target_level = 0.55;
   double adaptation = 0.02;
@@ -56,9 +56,9 @@ struct Exposure {
   double time_s = 0.0;  ///< Shutter time, centred on the frame's stamp.
 };
 
-/// Auto-exposure as recorded cameras have it: it steers the mean grey level to a target, and lags.
+/// Auto-exposure as in recorded cameras: it controls the mean grey level, with a delay.
 ///
-/// Frames may be developed in any order and on any thread: a cheap sequential pass beforehand gives
+/// Frames may be developed in any order and on any thread. A fast sequential pass beforehand gives
 /// the exposure of every frame, from views of the left camera shrunk() by kMeterShrink:
 ///
 ///     const PixelRays meter(shrunk(left, ExposureControl::kMeterShrink));
@@ -66,7 +66,7 @@ struct Exposure {
 ///     for (each frame) exposures.push_back(control.next(renderer.render(meter, T_world_body,
 ///     {})));
 ///
-/// Deterministic; a resumed run repeats the pass and gets the same numbers.
+/// Deterministic: a resumed run repeats the pass and gets the same numbers.
 class ExposureControl {
  public:
   static constexpr int kMeterShrink = 8;
@@ -74,8 +74,8 @@ class ExposureControl {
   /// `rate_hz` of the frames. Throws ConfigError, std::invalid_argument for a rate not positive.
   ExposureControl(const SensorEffectsConfig& config, double rate_hz);
 
-  /// Exposure of the frame that sees `scene` (its `radiance` is used). The first frame is exposed
-  /// to its target at once. Throws std::invalid_argument without radiance.
+  /// Exposure of the frame that sees `scene` (its `radiance` is used). The first frame is at the
+  /// target at once. Throws std::invalid_argument without radiance.
   [[nodiscard]] Exposure next(const RenderedView& scene);
 
  private:
@@ -85,18 +85,18 @@ class ExposureControl {
   bool started_ = false;
 };
 
-/// What a lens makes of a sharp image: each pixel's light spread as a Gaussian of `sigma_px`; the
-/// borders continue outwards. Row-major, width * height. Value: float, Eigen::Vector3f.
+/// Blur of a sharp image by the lens: a Gaussian of `sigma_px`. Border values continue outwards.
+/// Row-major, width * height. Value: float, Eigen::Vector3f.
 template <typename Value>
 [[nodiscard]] std::vector<Value> lens_blurred(const std::vector<Value>& image, int width,
                                               int height, double sigma_px);
 
-/// How far each pixel's content moves in the image while the shutter is open [px].
+/// Motion of each pixel's content in the image while the shutter is open [px].
 ///
-/// The camera turns and moves with the body: a static point at depth z and bearing b = (x, y, 1)
-/// has the image motion -(omega x b + v / z) less its part along b, on the plane z = 1; the
-/// camera's own bearings take it to pixels, distortion included.
-/// `depth_m`: 0 is infinitely far. `body_velocity` = [rad/s; m/s] in the body frame.
+/// The camera rotates and moves with the body. A static point at depth z has bearing b = (x, y, 1).
+/// On the plane z = 1 its image motion is -(omega x b + v / z) less its part along b. The camera's
+/// own bearings convert it to pixels, distortion included. `depth_m`: 0 is infinitely far.
+/// `body_velocity` = [rad/s; m/s] in the body frame.
 [[nodiscard]] std::vector<Eigen::Vector2f> image_motion(const PixelRays& rays,
                                                         const std::vector<float>& depth_m,
                                                         const Vector6& body_velocity,
@@ -114,22 +114,22 @@ struct ColorImage {
   std::vector<std::uint8_t> pixels;
 };
 
-/// How one frame was taken.
+/// Conditions under which one frame was taken.
 struct Shot {
   Exposure exposure;
   Vector6 body_velocity = Vector6::Zero();  ///< [rad/s; m/s] in the body frame, at the stamp.
   std::uint64_t noise_seed = 0;             ///< One per image: left and right differ.
 };
 
-/// From what the lens throws on the sensor to grey levels: blur of lens and motion, vignetting,
-/// exposure, noise, response, quantisation. Immutable; one per camera, shared by threads.
+/// Converts light on the sensor to grey levels: blur of lens and motion, vignetting, exposure,
+/// noise, response, quantisation. Immutable; one per camera, shared by threads.
 class SensorEffects {
  public:
   /// Throws ConfigError.
   SensorEffects(const PixelRays& rays, const SensorEffectsConfig& config);
 
-  /// What to ask of the renderer for gray() or color(): the radiance or rgb, and the depth if there
-  /// is motion blur.
+  /// Request to the renderer for gray() or color(): the radiance or rgb, and the depth if there is
+  /// motion blur.
   [[nodiscard]] RenderRequest request(bool color) const;
 
   /// Throws std::invalid_argument if `view` lacks what request() names or is of another size.

@@ -38,7 +38,7 @@ float cloud_noise(float x, float y) {
   for (int octave = 0; octave < 5; ++octave) {
     sum += amplitude * value_noise(x, y);
     amplitude *= 0.5F;
-    // Turned a little, so that the lattices of the octaves do not line up.
+    // Rotated a little, so that the lattices of the octaves do not coincide.
     const float turned = 1.7F * x - 1.1F * y + 17.3F;
     y = 1.1F * x + 1.7F * y + 9.1F;
     x = turned;
@@ -70,7 +70,7 @@ Eigen::Vector3f sky_color(const Eigen::Vector3f& d, const Lighting& lighting) {
   const Eigen::Vector3f horizon(1.35F, 1.48F, 1.62F);
   const float fade = std::pow(1.0F - height, 4.0F);
   Eigen::Vector3f sky = zenith + fade * (horizon - zenith);
-  if (!(lighting.sun > 0.0F)) return sky;  // indoors there is none to look at
+  if (!(lighting.sun > 0.0F)) return sky;  // indoors there is no sky
   const float toward_sun = std::max(0.0F, d.dot(lighting.to_sun));
   const float glow = 0.7F * std::pow(toward_sun, 8.0F) + 4.0F * std::pow(toward_sun, 350.0F);
   sky += glow * Eigen::Vector3f(1.0F, 0.93F, 0.8F);
@@ -116,7 +116,8 @@ void Sky::measure_and_scale(float ambient) {
   for (int row = 0; row < kSize; row += kStep) {
     for (int column = 0; column < kSize; column += kStep) {
       const Eigen::Vector3f d = direction_of(column, row);
-      const float solid_angle = (1.0F + d.z()) * (1.0F + d.z());  // of a texel, to a factor
+      const float solid_angle =
+          (1.0F + d.z()) * (1.0F + d.z());  // solid angle of a texel, up to a factor
       const Eigen::Vector3f& color = color_[static_cast<std::size_t>(row * kSize + column)];
       irradiance += solid_angle * d.z() * luminance_of(color);
       weight += solid_angle * d.z();

@@ -9,9 +9,9 @@
 
 namespace km {
 
-/// Radiance of a sky with clouds, brighter towards the horizon and around the sun, tabulated.
-/// Scaled so that an unshaded roof gets Lighting::ambient from it. Below the horizon it continues
-/// as the horizon. Immutable.
+/// Radiance of a sky with clouds, brighter towards the horizon and around the sun, tabulated. It is
+/// scaled so that an unshaded roof receives Lighting::ambient from it. Below the horizon it has the
+/// radiance of the horizon. Immutable.
 class Sky {
  public:
   explicit Sky(const Lighting& lighting);
@@ -19,10 +19,10 @@ class Sky {
   /// `direction` need not have unit length.
   [[nodiscard]] float luminance(const Eigen::Vector3f& direction) const;
   [[nodiscard]] Eigen::Vector3f color(const Eigen::Vector3f& direction) const;
-  /// Sixteen at once.
+  /// Luminance for sixteen directions.
   [[nodiscard]] Lanes luminance(const Lanes3& directions) const;
 
-  /// Mean radiance at the horizon: what distance fades to.
+  /// Mean radiance at the horizon: distant surfaces fade to it.
   [[nodiscard]] float haze_luminance() const { return haze_luminance_; }
   [[nodiscard]] const Eigen::Vector3f& haze_color() const { return haze_color_; }
 

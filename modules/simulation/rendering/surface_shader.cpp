@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// What a point's radiance is made of, as factors that hold for grey and for colour:
+// Terms of a point's radiance, as factors for grey and for colour:
 // albedo * (sky + lamps) + mirrored_sky * sky(mirrored) + mirrored_rest + haze, and albedo * sun.
 struct Mixture {
   Lanes sun, sky, lamps;
@@ -18,7 +18,7 @@ struct Mixture {
   bool any_mirror = false;
 };
 
-// exp(-x) for x >= 0, to 2e-7 of it. Of the library's, each processor has its own.
+// exp(-x) for x >= 0, with relative error 2e-7. The library's result depends on the processor.
 float exp_negative(float x) {
   constexpr float kLog2e = 1.44269504F;
   constexpr float kLn2 = 0.693147181F;
@@ -64,7 +64,7 @@ void add_lamps(const Lighting& lighting, const LightVolume::Light& light,
   }
 }
 
-// The sun on each side, before shadows; light comes through leaves and cloth from behind.
+// Sunlight on each side, before shadows; light passes through leaves and cloth from behind.
 void set_sunlight(const Lighting& lighting, const SurfacePoints& points, const Lanes& transmission,
                   Lanes& sun) {
   const Eigen::Vector3f to_sun = lighting.to_sun;
@@ -78,7 +78,7 @@ void set_sunlight(const Lighting& lighting, const SurfacePoints& points, const L
   }
 }
 
-// A glossy surface mirrors the sky, as far as the surroundings leave it open that way.
+// A glossy surface mirrors the part of the sky that the surroundings leave open in that direction.
 void add_mirror(const RenderScene& scene, const SurfacePoints& points, const Lanes& specular,
                 Mixture& mixture) {
   run_wide([&] {
@@ -170,7 +170,7 @@ void shade_surfaces(const RenderScene& scene, const SurfacePoints& points, const
 Eigen::Vector3f color_albedo(const ShadingMaterial& material, const Taps& taps, std::size_t lane) {
   Eigen::Vector3f base = Eigen::Vector3f::Zero();
   Eigen::Vector3f detail = Eigen::Vector3f::Zero();
-  // Where a sample covers a whole tile of the detail, nothing of it is left.
+  // A sample as large as a tile of the detail averages it completely.
   const float base_width = taps.width_m[lane] * material.base.per_m;
   const float detail_width = taps.width_m[lane] * material.detail.per_m;
   const bool detailed = detail_width < 1.0F;

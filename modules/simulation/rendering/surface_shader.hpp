@@ -21,16 +21,16 @@ struct RenderScene {
   const LightVolume light;
 };
 
-/// Radiance along one ray, split by what a shadow would take away. Value is float (grey) or
-/// Eigen::Vector3f (colour).
+/// Radiance along one ray, split into two parts, of which a shadow removes one. Value is float
+/// (grey) or Eigen::Vector3f (colour).
 template <typename Value>
 struct Shade {
-  Value ambient;  ///< All but the sun.
-  Value sun;      ///< What the sun adds where it is not hidden.
+  Value ambient;  ///< All light except for the sun.
+  Value sun;      ///< Light of the sun if it is not hidden.
 };
 
-/// Lanes of `wanted` whose points the sun does not reach: shadowed, or turned away. All of `wanted`
-/// must have been located.
+/// Lanes of `wanted` that the sun does not reach: shadowed, or turned away. All of `wanted` must
+/// have been located.
 [[nodiscard]] LaneMask shadowed(const RenderScene& scene, LaneMask wanted,
                                 const SurfacePoints& points);
 

@@ -79,7 +79,7 @@ SurfaceRecord surface_record(const SurfaceMesh& mesh, std::size_t index) {
   return record;
 }
 
-// What locate() computes from, side by side.
+// Inputs of locate(), as lanes.
 struct Gathered {
   Lanes3 origin, direction, right, down;
   Lanes t;
@@ -94,7 +94,7 @@ Lanes lanes_of(const float* values) {
   return lanes;
 }
 
-// Lanes without a surface take all from the first that has one.
+// Lanes without a surface copy the first lane that has one.
 Gathered gather(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePoints& points) {
   const RTCRay16& ray = hits.rays.ray;
   const RTCHit16& hit = hits.rays.hit;
@@ -186,10 +186,10 @@ void set_footprints(const Gathered& g, SurfacePoints& points) {
   }
 }
 
-// Coordinates on a tile in units of 2^-30: what is beyond wraps.
+// Coordinates on a tile in units of 2^-30; higher bits wrap.
 constexpr int kTileBits = 30;
 constexpr std::uint32_t kTileMask = (1U << kTileBits) - 1U;
-constexpr int kWeightBits = 16;  // of the way from a texel to the next
+constexpr int kWeightBits = 16;  // bits of the weight from a texel to the next
 
 // One texture per lane.
 struct TextureLanes {
@@ -201,7 +201,7 @@ struct TextureLanes {
 
 struct LevelBlend {
   IntLanes fine, coarse;
-  Lanes share;  // of the coarse one
+  Lanes share;  // share of the coarser level
 };
 
 TextureLanes textures_of(const SurfacePoints& points, TextureLayer ShadingMaterial::*layer) {
@@ -216,7 +216,7 @@ TextureLanes textures_of(const SurfacePoints& points, TextureLayer ShadingMateri
   return textures;
 }
 
-// As Texture does it: between two levels the blend is linear in the footprint.
+// As in Texture: between two levels the blend is linear in the footprint.
 void blend_levels(const TextureLanes& textures, const Taps& taps, LevelBlend& blend) {
   for (std::size_t i = 0; i < kLanes; ++i) {
     const auto size = std::bit_cast<float>((127 + textures.log_size[i]) << 23);
@@ -350,7 +350,7 @@ Lanes gray_albedo(const SurfacePoints& points, const Taps& taps) {
   run_wide([&] {
     mean_of_taps(bases, taps, most, albedo);
     for (std::size_t i = 0; i < kLanes; ++i) albedo[i] *= tint[i];
-    // Where a sample covers a whole tile of the detail, nothing of it is left.
+    // A sample as large as a tile of the detail averages it completely.
     float narrowest = 1.0F;
     for (std::size_t i = 0; i < kLanes; ++i)
       narrowest = std::min(narrowest, taps.width_m[i] * details.per_m[i]);

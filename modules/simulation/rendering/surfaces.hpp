@@ -10,14 +10,15 @@
 
 namespace km {
 
-/// What a grey camera sees of linear colour: the weights of ITU-R BT.709.
+/// Luminance of a linear colour for a grey camera: the weights of ITU-R BT.709.
 inline float luminance_of(const Eigen::Vector3f& rgb) {
   return 0.2126F * rgb.x() + 0.7152F * rgb.y() + 0.0722F * rgb.z();
 }
 
-/// What shading needs of one triangle, in one cache line.
+/// Data of one triangle for shading, in one cache line.
 struct alignas(64) SurfaceRecord {
-  Eigen::Vector3f normal;      ///< Of the plane, unit length, outwards; zero without area.
+  Eigen::Vector3f
+      normal;  ///< Normal of the plane, unit length, outwards; zero for a triangle without area.
   Eigen::Vector3f u_gradient;  ///< Texture coordinates [m] of a point p of the plane:
   Eigen::Vector3f v_gradient;  ///< gradient * p + offset.
   float u_offset = 0.0F;
@@ -32,7 +33,7 @@ struct TextureLayer {
   float per_m = 1.0F;  ///< Tiles per metre.
 };
 
-/// Materials with what does not depend on the point.
+/// Materials with values that do not depend on the point.
 struct ShadingMaterial {
   TextureLayer base;
   TextureLayer detail;
@@ -40,10 +41,10 @@ struct ShadingMaterial {
   float tint_luminance = 1.0F;
   float specular = 0.0F;
   float glow = 0.0F;
-  float transmission = 0.0F;    ///< Share of light that comes through from behind: leaves, cloth.
-  float mean_luminance = 0.0F;  ///< Of the albedo.
+  float transmission = 0.0F;    ///< Share of light transmitted from behind: leaves, cloth.
+  float mean_luminance = 0.0F;  ///< Mean luminance of the albedo.
   LabelId label = 0;
-  bool foliage = false;  ///< Many small leaves, alike.
+  bool foliage = false;  ///< Many small, similar leaves.
 };
 
 /// All triangles and materials of a world, laid out for shading. Immutable.
@@ -73,16 +74,15 @@ class SurfaceTable {
   std::vector<ShadingMaterial> materials_;
 };
 
-/// Up to sixteen rays that hit something, and what is needed to shade and to shadow their ends.
+/// Up to sixteen rays that hit something, and the data to shade and shadow the hit points.
 struct SurfaceHits {
   RayPacket rays;        ///< Traced; directions have z = 1 in the camera frame, so tfar is depth.
   LaneMask active = 0;   ///< Lanes that belong to the image.
-  LaneMask surface = 0;  ///< Of these, lanes that hit a surface; the others see the sky.
+  LaneMask surface = 0;  ///< Active lanes that hit a surface; the others see the sky.
   Lanes3 right, down;    ///< Change of the direction per pixel to the right and down.
 };
 
-/// Geometry of the points that were hit, lane by lane. Lanes that hit nothing hold the geometry of
-/// one that did, seen along another ray: finite, of no meaning.
+/// Geometry of the hit points, lane by lane. Lanes without a hit have finite, meaningless values.
 struct SurfacePoints {
   Lanes3 view;          ///< Unit vector along the ray.
   Lanes distance_m;     ///< Along the ray.

@@ -102,7 +102,7 @@ void add_shutters(Scene& scene, const Opening& o, const FacadeStyle& style) {
   }
 }
 
-/// What a shop shows: goods on two shelves and a print, flat before the pane at y, which is opaque.
+/// Display of a shop: goods on two shelves and a print, flat before the pane at y, which is opaque.
 void add_display(Scene& scene, const Opening& o, float y, SeededRandom& random) {
   const float shelf = o.z0 + 0.42F * o.height();
   const auto board = scene.plain(kLabel, {0.16F, 0.13F, 0.1F});
@@ -235,7 +235,7 @@ void add_shop_front(Scene& scene, const Opening& o, const FacadeStyle& style, bo
   add_display(scene, {x0 + 0.1F, o.x1 - 0.1F, plinth + 0.07F, o.z1 - 0.07F}, y, random);
 }
 
-/// How the width is cut into bays.
+/// Division of the width into bays.
 struct Bays {
   int count = 0;
   float width_m = 0.0F;
@@ -410,7 +410,7 @@ void add_facade(Scene& scene, const FacadeStyle& style, float width_m) {
   if (style.downpipe) add_downpipe(scene, style);
 }
 
-/// The side of a house that few see: a wall with a few small windows, or none if `blind`.
+/// The rear of a house: a wall with a few small windows, or none if `blind`.
 void add_plain_facade(Scene& scene, const FacadeStyle& style, float width_m, bool blind) {
   SeededRandom random = SeededRandom::stream(style.seed, 2);
   FacadeStyle plain = style;

@@ -7,7 +7,7 @@
 
 namespace km {
 
-/// Everything that decides how a facade looks: equal styles give equal facades.
+/// All parameters of a facade: equal styles give equal facades.
 struct FacadeStyle {
   enum class Window : std::uint8_t {
     kCasement,
@@ -17,15 +17,15 @@ struct FacadeStyle {
       ///< sash above the other; one pane.
   enum class GroundFloor : std::uint8_t { kWindows, kShops, kGarages };
 
-  std::uint64_t seed = 0;  ///< Of blinds, doors, signs.
+  std::uint64_t seed = 0;  ///< Seed of blinds, doors and signs.
   int floors = 4;          ///< Ground floor included.
   float ground_floor_m = 3.8F;
   float floor_m = 3.0F;
-  float bay_m = 2.8F;  ///< From window to window, about: bays divide the width evenly.
+  float bay_m = 2.8F;  ///< Approximate distance between windows: bays divide the width evenly.
   float window_width_m = 1.15F;
   float window_height_m = 1.65F;
   float sill_m = 0.85F;    ///< Height of the window above its floor.
-  float recess_m = 0.16F;  ///< Of the glass behind the wall.
+  float recess_m = 0.16F;  ///< Depth of the glass behind the wall.
   Window window = Window::kCasement;
   GroundFloor ground_floor = GroundFloor::kWindows;
   bool surrounds = false;  ///< Raised frames of stone around windows.
@@ -41,7 +41,7 @@ struct FacadeStyle {
   MaterialId shutter = 0;  ///< Also doors.
 };
 
-/// How one of the four walls is made: a facade, a few small windows, none, no wall.
+/// Kind of one of the four walls: a facade, a few small windows, none, no wall.
 enum class WallKind : std::uint8_t { kRich, kPlain, kBlind, kNone };
 
 /// A house on a rectangle: walls of x from 0 to width, of y from 0 to depth, front at y = 0.

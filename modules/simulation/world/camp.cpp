@@ -25,13 +25,13 @@ constexpr float kPi = std::numbers::pi_v<float>;
 /// Adds an object to a scene.
 using Add = void (*)(Scene&, SeededRandom&);
 
-/// Where things may stand in a camp: off the tracks and not in each other.
+/// Keeps objects of a camp off the tracks and apart from each other.
 class CampSite {
  public:
   CampSite(Scene& scene, const CampPlan& plan) : scene_(scene), plan_(plan) {}
 
-  /// Calls `add` in a frame on the ground at `p`, upright, unless something is within `radius_m`.
-  /// Returns whether it did.
+  /// Calls `add` in an upright frame on the ground at `p`, unless an object is within `radius_m`.
+  /// Returns true if it did.
   bool stand(const Vector2f& p, float yaw_rad, float radius_m,
              const std::function<void(Scene&, SeededRandom&)>& add, SeededRandom& random) {
     if (!claim(p, radius_m)) return false;
@@ -43,7 +43,7 @@ class CampSite {
     return true;
   }
 
-  /// The same, tilted like the ground below a footprint of 2 `radius_m`.
+  /// Like stand(), with the frame tilted like the ground below a footprint of 2 `radius_m`.
   bool lie(const Vector2f& p, float yaw_rad, float radius_m,
            const std::function<void(Scene&, SeededRandom&)>& add, SeededRandom& random) {
     const Vector3f forward(std::cos(yaw_rad), std::sin(yaw_rad), 0.0F);
@@ -90,12 +90,12 @@ const Vector3f kOlive(0.2F, 0.22F, 0.12F);  ///< Colours of canvas.
 const Vector3f kSand(0.55F, 0.46F, 0.32F);
 const Vector3f kWhite(0.72F, 0.71F, 0.68F);
 
-/// Equal tents in rank and file.
+/// Rows of equal tents.
 void add_tent_rows(CampSite& site, const Vector2f& center, std::uint64_t seed) {
   const Add tent = [](Scene& s, SeededRandom& r) { add_ridge_tent(s, kOlive, r); };
   for (float row = 0; row < 3; ++row) {
     for (float column = 0; column < 5; ++column) {
-      SeededRandom same = SeededRandom::stream(seed, 60);  // every tent alike
+      SeededRandom same = SeededRandom::stream(seed, 60);  // every tent is the same
       const Vector2f p = center + Vector2f(6.6F * (column - 2.0F), 9.0F * (row - 1.0F));
       site.stand(p + Vector2f(0.0F, -2.0F), 0.0F, 2.9F, tent, same);
     }
@@ -155,7 +155,7 @@ void add_motor_pool(CampSite& site, const Vector2f& center, SeededRandom& random
   }
 }
 
-/// What stands between the tracks: tents in rows (two yards of equal ones), headquarters, domes,
+/// Objects between the tracks: tents in rows (two yards of equal ones), headquarters, domes,
 /// containers, vehicles.
 void add_yards(CampSite& site, const CampPlan& plan, std::uint64_t seed) {
   SeededRandom random = SeededRandom::stream(seed, 62);
@@ -164,12 +164,13 @@ void add_yards(CampSite& site, const CampPlan& plan, std::uint64_t seed) {
   add_motor_pool(site, plan.yard_center(2, 1), random);
   add_headquarters(site, plan.yard_center(0, 0), random);
   add_domes(site, plan.yard_center(1, 0), random);
-  add_tent_rows(site, plan.yard_center(2, 0), seed);  // like the first
+  add_tent_rows(site, plan.yard_center(2, 0), seed);  // equal to the first
 }
 
-constexpr float kSharpBorders_m = 10.0F;  // from a track; beyond, cells have one cover each
+constexpr float kSharpBorders_m =
+    10.0F;  // distance from a track; cells farther away have one cover each
 
-/// What covers the ground at a point: track, trodden earth or grass, with frayed borders.
+/// Cover of the ground at a point: track, trodden earth or grass, with irregular borders.
 class GroundPaint {
  public:
   GroundPaint(Scene& scene, const CampPlan& plan, std::uint64_t seed)
@@ -318,7 +319,7 @@ void add_one_supply(Scene& scene, SeededRandom& random) {
   random.pick(kSupplies)(scene, random);
 }
 
-/// Draws places in the camp until `count` objects have found one.
+/// Draws places in the camp until `count` objects have a place.
 void scatter(CampSite& site, int count, float radius_m, bool tilted, SeededRandom& random,
              Add add) {
   for (int tries = 0; count > 0 && tries < 6000; ++tries) {
@@ -331,7 +332,7 @@ void scatter(CampSite& site, int count, float radius_m, bool tilted, SeededRando
   }
 }
 
-/// What may be beside a track, all as likely.
+/// Kinds of objects beside a track, with equal probability.
 enum class Facing : std::uint8_t { kTrack, kAlong, kAnywhere };
 struct TrackThing {
   float from_middle_m;

@@ -247,7 +247,7 @@ void add_barrier(Scene& scene) {
   const auto concrete = scene.paint(kLabel, kConcrete, Vector3f::Ones(), 0.6F);
   const Vector2f outline[] = {{-0.3F, -0.2F}, {0.3F, -0.2F},   {0.3F, 0.1F},   {0.1F, 0.35F},
                               {0.08F, 0.82F}, {-0.08F, 0.82F}, {-0.1F, 0.35F}, {-0.3F, 0.1F}};
-  // The section stands in (y, z): the extrusion's axis turns to x.
+  // The section is in the plane (y, z): the extrusion's axis becomes x.
   Eigen::Isometry3f turned = Eigen::Isometry3f::Identity();
   turned.linear() << 0, 0, 1, 1, 0, 0, 0, 1, 0;
   const auto frame = scene.at(turned);

@@ -18,7 +18,7 @@ constexpr int kColumns = 4;
 constexpr int kRows = 3;
 constexpr float kPitchX_m = 50.0F;
 constexpr float kPitchY_m = 46.0F;
-constexpr int kPieces = 6;  // of a track
+constexpr int kPieces = 6;  // pieces of a track
 constexpr double kCruise_mps = 7.5;
 
 constexpr float kNearCell_m = 0.5F;
@@ -41,7 +41,7 @@ CampPlan::CampPlan(std::uint64_t seed)
   const auto sample = [&](float x, float y) { return height(x, y, seed); };
   far_ = Heightfield(kFarOrigin, kFarCell_m, 90, 78, sample);
   near_ = Heightfield(kNearOrigin, kNearCell_m, 400, 304, sample);
-  // No gap where the grids meet: the border of the fine one lies on the coarse one.
+  // The border of the fine grid is set to the coarse one, so that there is no gap.
   const auto settle = [&](int row, int column) {
     const Eigen::Vector3f p = near_.point(row, column);
     near_.set_height(row, column, static_cast<float>(far_.at(p.x(), p.y())));

@@ -11,7 +11,8 @@
 
 namespace km {
 
-inline constexpr float kTrackLane_m = 1.7F;   ///< Of a lane's middle from the track's.
+inline constexpr float kTrackLane_m =
+    1.7F;  ///< Distance between the middles of a lane and its track.
 inline constexpr float kTrackHalf_m = 3.4F;   ///< Half of the worn width.
 inline constexpr float kTrackClear_m = 4.2F;  ///< Nothing stands nearer to a track's middle.
 inline constexpr float kCampHalfX_m = 92.0F;  ///< The fence.
@@ -20,8 +21,8 @@ inline constexpr float kCampHalfY_m = 66.0F;
 /// A dirt track between two crossings, its middle line [m].
 using Track = std::vector<Eigen::Vector2f>;
 
-/// Tracks of a camp and the ground they lie on: crossings in 4 columns and 3 rows, winding tracks
-/// between neighbours, six yards in between.
+/// Tracks of a camp and their ground: crossings in 4 columns and 3 rows, winding tracks between
+/// neighbours, six yards in between.
 class CampPlan {
  public:
   explicit CampPlan(std::uint64_t seed);
@@ -36,7 +37,7 @@ class CampPlan {
   /// Height of the ground [m].
   [[nodiscard]] double ground(double x, double y) const;
 
-  /// 0.5 m cells within the camp and around, 4 m cells beyond, hills that close the view.
+  /// 0.5 m cells in and around the camp, 4 m cells beyond, with hills that close the view.
   [[nodiscard]] const Heightfield& near_ground() const { return near_; }
   [[nodiscard]] const Heightfield& far_ground() const { return far_; }
 

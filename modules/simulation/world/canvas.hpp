@@ -10,8 +10,8 @@
 
 namespace km {
 
-/// A square tile to paint on that repeats without a seam: what leaves it on one side comes in on
-/// the other. Lengths and positions are in tiles, u to the right and v up.
+/// A square tile to paint on that repeats without a seam: a shape that leaves it on one side enters
+/// on the other. Lengths and positions are in tiles, u to the right and v up.
 class Canvas {
  public:
   explicit Canvas(int size, const Eigen::Vector3f& color = Eigen::Vector3f::Ones())
@@ -37,17 +37,17 @@ class Canvas {
   /// Texels whose centre lies within half_size of `center` after turning by `angle` [rad].
   void rectangle(const Eigen::Vector2f& center, const Eigen::Vector2f& half_size, float angle,
                  const Eigen::Vector3f& color);
-  /// The same of an ellipse with these half axes.
+  /// Texels within an ellipse with these half axes.
   void ellipse(const Eigen::Vector2f& center, const Eigen::Vector2f& half_size, float angle,
                const Eigen::Vector3f& color);
   /// A line with round ends.
   void line(const Eigen::Vector2f& from, const Eigen::Vector2f& to, float width,
             const Eigen::Vector3f& color);
-  /// Rows of words in letters that no language has, from the top left corner down.
+  /// Rows of words in an invented alphabet, from the top left corner down.
   void text(const Eigen::Vector2f& top_left, const Eigen::Vector2f& extent, float row_height,
             const Eigen::Vector3f& color, SeededRandom& random);
 
-  /// What was painted, clamped to [0, 1]. The canvas is empty afterwards.
+  /// The painted texels, clamped to [0, 1]. The canvas is empty afterwards.
   [[nodiscard]] std::vector<Eigen::Vector3f> take();
 
  private:
@@ -92,9 +92,9 @@ class NoiseField {
 /// Sum of octaves of random values on ever finer grids, each smoothly interpolated.
 struct FractalNoise {
   int cells_u = 4;    ///< Grid cells along u in the first octave: a power of two.
-  int cells_v = 4;    ///< The same along v; fewer than along u gives streaks along v.
-  float gain = 0.8F;  ///< Standard deviation of an octave by that of the one before; images of
-                      ///< nature have about 1.
+  int cells_v = 4;    ///< Grid cells along v; fewer than along u gives streaks along v.
+  float gain = 0.8F;  ///< Ratio of the standard deviations of an octave and the one before; images
+                      ///< of nature have about 1.
   int finest = 0;     ///< No octave has more cells than this; 0: up to one cell a texel.
 };
 
@@ -105,11 +105,11 @@ struct FractalNoise {
 struct CellNoise {
   NoiseField nearest;             ///< Distance to the nearest point, in cells.
   NoiseField edge;                ///< Distance to the second nearest less that to the nearest.
-  std::vector<std::uint32_t> id;  ///< Which point is nearest, 0 to cells^2 - 1.
+  std::vector<std::uint32_t> id;  ///< Index of the nearest point, 0 to cells^2 - 1.
 };
 [[nodiscard]] CellNoise cell_noise(int size, int cells, SeededRandom& random);
 
-/// How a surface of this height looks lit along +u +v: the slope, mean 0, standard deviation 1.
+/// Shading of a surface of this height lit along +u +v: the slope, mean 0, standard deviation 1.
 [[nodiscard]] NoiseField relief(const NoiseField& height);
 
 /// 0 below `low`, 1 above `high`, smooth between.

@@ -108,11 +108,11 @@ void add_park(Scene& scene, const Eigen::AlignedBox2f& kerb, SeededRandom& rando
   }
 }
 
-constexpr float kDepth_m = 11.0F;  // of the houses on the long sides
+constexpr float kDepth_m = 11.0F;  // depth of the houses on the long sides
 constexpr int kParkColumn = 1;
 constexpr int kParkRow = 1;
 
-/// Widths of lots that fill `length`, 9 to 14 m each, or all alike.
+/// Widths of lots that fill `length`, 9 to 14 m each, or all equal.
 std::vector<float> lots(float length, bool alike, SeededRandom& random) {
   std::vector<float> widths;
   if (alike) {
@@ -129,7 +129,7 @@ std::vector<float> lots(float length, bool alike, SeededRandom& random) {
   return widths;
 }
 
-/// The houses along one side; those at its ends show a second street their side.
+/// The houses along one side; those at its ends have a facade to a second street.
 void add_row(Scene& scene, const StreetSide& side, bool open_ends, bool terrace,
              std::uint64_t seed) {
   SeededRandom random = SeededRandom::stream(seed, 20);
@@ -235,7 +235,7 @@ void add_blocks(Scene& scene, const CityPlan& plan, std::uint64_t seed) {
 }
 
 constexpr float kParking_m = -kSidewalk_m - 1.05F;  // middle of the parking lane, y of a side
-constexpr float kAtKerb_m = -kSidewalk_m + 0.65F;   // where poles and trees stand
+constexpr float kAtKerb_m = -kSidewalk_m + 0.65F;   // position of poles and trees
 constexpr float kAtWall_m = -0.45F;
 constexpr float kBay_m = 5.4F;
 constexpr float kClearOfCorner_m = 4.6F;
@@ -328,7 +328,7 @@ void add_sidewalk_objects(Scene& scene, const StreetSide& side, SeededRandom& ra
   add_at_corner(scene, random);
 }
 
-/// Bends everything along with the ground: up and down only, walls stay upright.
+/// Moves everything vertically with the ground, so that walls stay upright.
 void follow_ground(SurfaceMesh& mesh, const CityPlan& plan) {
   for (Eigen::Vector3f& p : mesh.vertices) p.z() += static_cast<float>(plan.ground(p.x(), p.y()));
 }

@@ -7,7 +7,7 @@
 
 namespace km {
 
-// What can be put into a world; the conventions are Scene's.
+// Objects of a world; the conventions are those of Scene.
 
 /// A lamp post, 5.5 m tall, its arm towards -y.
 void add_street_lamp(Scene& scene, SeededRandom& random);
@@ -23,7 +23,7 @@ void add_mail_box(Scene& scene, SeededRandom& random);
 /// A round pillar with prints all around.
 void add_advertising_column(Scene& scene, SeededRandom& random);
 void add_planter(Scene& scene, SeededRandom& random);
-/// A board with raised letters on the wall y = 0, its lower left corner at (x, z).
+/// A board with raised characters on the wall y = 0, its lower left corner at (x, z).
 void add_sign_board(Scene& scene, float x, float z, float width_m, float height_m,
                     SurfaceClass label, SeededRandom& random);
 

@@ -4,7 +4,7 @@
 
 namespace km {
 
-/// The recipes (see procedural_texture.hpp) of what people print: signs, pictures, lines of text.
+/// The recipes (see procedural_texture.hpp) of printed objects: signs, pictures, lines of text.
 /// `size` is the edge in texels.
 [[nodiscard]] Canvas play_mat(int size, SeededRandom& random);
 [[nodiscard]] Canvas marker_tape(int size, SeededRandom& random);

@@ -203,7 +203,7 @@ Canvas stone_blocks(int size, SeededRandom& random) {
   constexpr int kCourses = 8;
   constexpr int kMaxBlocks = 6;
   struct Course {
-    std::array<float, kMaxBlocks> end{};  // of each block, in tiles; the last is 1
+    std::array<float, kMaxBlocks> end{};  // end of each block, in tiles; the last is 1
     std::array<float, kMaxBlocks> shade{};
     float shift = 0.0F;
   };
@@ -470,7 +470,7 @@ using Make = Canvas (*)(int size, SeededRandom& random);
 
 struct Entry {
   RecipeTraits traits;
-  std::uint64_t stream;  // of random draws: what other recipes there are changes no picture
+  std::uint64_t stream;  // stream of random draws: independent of the number of other recipes
   Make make;
 };
 
@@ -479,7 +479,7 @@ constexpr Recipe kGrain = Recipe::kDetailGrain;
 constexpr Recipe kStains = Recipe::kDetailStains;
 
 // Recipe, name, size, period, detail, period of the detail. The two periods have no common multiple
-// below some dozens of either.
+// below several dozens of either.
 constexpr Entry kEntries[] = {
     {{Recipe::kPlain, "plain", 256, 2.0F, kFlat, 1.0F}, 0, plain},
     {{Recipe::kAsphalt, "asphalt", 1024, 4.0F, kStains, 9.31F}, 1, asphalt},

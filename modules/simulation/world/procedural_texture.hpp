@@ -6,9 +6,9 @@
 
 namespace km {
 
-/// What textures can be made. Colours are the material's own linear albedo, so that a tint of one
-/// looks natural; recipes that are painted or dyed in life are near white and take any tint. Those
-/// marked (painted) are of that kind. In brackets: edge of one tile at the natural scale.
+/// Available textures. Colours are the material's own linear albedo, so that a tint of one looks
+/// natural. Recipes of painted or dyed materials are near white and take any tint; they are marked
+/// (painted). In brackets: edge of one tile at the natural scale.
 enum class Recipe : std::uint8_t {
   kPlain,            ///< (painted) Smooth paint: no structure of its own [2 m].
   kAsphalt,          ///< Grey with grains, stains, cracks and patches [4 m].
@@ -49,7 +49,7 @@ struct RecipeTraits {
   const char* name = "";
   int size = 512;                        ///< Texels on an edge.
   float period_m = 1.0F;                 ///< Natural edge of one tile [m].
-  Recipe detail = Recipe::kDetailGrain;  ///< What goes on top.
+  Recipe detail = Recipe::kDetailGrain;  ///< Recipe of the detail on top.
   float detail_period_m = 1.0F;          ///< Incommensurate with period_m [m].
 };
 [[nodiscard]] const RecipeTraits& traits_of(Recipe recipe);

@@ -31,7 +31,7 @@ std::vector<Vector2d> right_hand_lane(std::span<const Vector2d> nodes, double ri
       throw std::invalid_argument("right_hand_lane: the way stands or turns back at node " +
                                   std::to_string(i));
     }
-    // Where the two shifted lines meet: along the bisector of their normals.
+    // Intersection of the two shifted lines, along the bisector of their normals.
     lane.emplace_back(nodes[i] + right_m / (1.0 + cosine) * (right_of(in) + right_of(out)));
   }
   return lane;

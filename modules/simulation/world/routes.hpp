@@ -13,14 +13,14 @@ namespace km {
 [[nodiscard]] std::vector<Eigen::Vector2d> right_hand_lane(std::span<const Eigen::Vector2d> nodes,
                                                            double right_m);
 
-/// A crossing in a grid of ways: its column and row.
+/// A crossing in a grid of streets: its column and row.
 using Crossing = std::array<int, 2>;
 
-/// Four closed ways over a grid of at least 4 columns and 3 rows of crossings, to be begun between
-/// the first crossing and the second. The second follows the first from one street behind over
-/// three streets; the third meets both first and follows them on the street both begin with; the
-/// fourth follows the second and the third. Each comes back to a street of its own, in the same
-/// direction, after one block.
+/// Four closed routes over a grid of at least 4 columns and 3 rows of crossings, which begin
+/// between the first crossing and the second. The second route follows the first from one street
+/// behind over three streets. The third meets both in the opposite direction first, and follows
+/// them on the street on which both begin. The fourth follows the second and the third. Each
+/// returns to a street of its own, in the same direction, after one block.
 [[nodiscard]] const std::array<std::vector<Crossing>, 4>& crossing_routes();
 
 }  // namespace km

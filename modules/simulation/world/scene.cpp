@@ -17,7 +17,8 @@ using Eigen::Vector3f;
 
 constexpr float kTwoPi = 2.0F * std::numbers::pi_v<float>;
 
-constexpr float kLeastHeight_m = 1e-4F;  // of a triangle; at 300 m a float resolves 3e-5 m
+constexpr float kLeastHeight_m =
+    1e-4F;  // smallest height of a triangle; at 300 m a float resolves 3e-5 m
 
 bool has_area(const Vector3f& ab, const Vector3f& ac) {
   const float longest = std::max({ab.norm(), ac.norm(), (ac - ab).norm()});

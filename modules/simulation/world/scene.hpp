@@ -27,9 +27,9 @@ enum BoxSides : unsigned {
   kSideBottom = 16U,  ///< -z
   kSideTop = 32U,     ///< +z
   kSidesAll = 63U,
-  kSidesNoBottom = 47U,  ///< What stands on something.
+  kSidesNoBottom = 47U,  ///< For objects that stand on a surface.
   kSidesAround = 15U,    ///< The four walls.
-  kSidesNoBack = 55U,    ///< What is fixed to a wall at its +y side.
+  kSidesNoBack = 55U,    ///< For objects fixed to a wall at their +y side.
 };
 
 /// Pose of a child that stands at `position`, turned about z [rad].
@@ -41,9 +41,9 @@ enum BoxSides : unsigned {
 /// runs on over neighbouring pieces of one plane. Triangles without area are left out. Not
 /// thread-safe.
 ///
-/// The functions that add an object to a scene share one convention: it stands on the plane z = 0
-/// at the origin of the current frame, faces -y (vehicles: drive along +x), and looks the same for
-/// equal arguments and an equal state of `random`.
+/// The functions that add an object to a scene share one convention. The object stands on the plane
+/// z = 0 at the origin of the current frame, and faces -y (vehicles: drive along +x). It is the
+/// same for equal arguments and an equal state of `random`.
 class Scene {
  public:
   /// Different seeds give different textures of the same kinds.
@@ -61,7 +61,7 @@ class Scene {
     return paint(label, Recipe::kPlain, rgb, 1.0F, specular);
   }
 
-  /// While it lives, the current frame is a child of the former one.
+  /// During its lifetime, the current frame is a child of the former one.
   class Frame {
    public:
     Frame(Scene& scene, const Eigen::Isometry3f& T_parent_child)
@@ -88,7 +88,7 @@ class Scene {
     return {*this, standing_at(position, yaw_rad)};
   }
 
-  /// Shift of the texture of what follows [m]: likes do not look the same to the grain.
+  /// Shift of the texture of the following shapes [m], so that equal objects differ in their grain.
   void set_uv_offset(const Eigen::Vector2f& offset_m) { uv_offset_ = offset_m; }
 
   /// Corners counter-clockwise seen from outside.
@@ -132,7 +132,7 @@ class Scene {
 
   struct GridPoint {
     Eigen::Vector3f position;
-    Eigen::Vector3f normal;  ///< Of any length.
+    Eigen::Vector3f normal;  ///< Any length.
     Eigen::Vector2f uv;      ///< [m]
   };
   /// A sheet whose normals and texture coordinates are known.
@@ -162,7 +162,7 @@ class Scene {
   std::uint64_t seed_;
   std::vector<Material> materials_;
   std::vector<Texture> textures_;
-  std::vector<Recipe> made_;  // of textures_, by index
+  std::vector<Recipe> made_;  // recipes of textures_, by index
 };
 
 }  // namespace km

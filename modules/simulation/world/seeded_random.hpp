@@ -9,20 +9,20 @@
 
 namespace km {
 
-/// Finaliser of SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): neighbours become unrelated.
+/// Finaliser of SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): makes neighbouring values unrelated.
 [[nodiscard]] inline std::uint64_t scrambled(std::uint64_t x) {
   x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9U;
   x = (x ^ (x >> 27U)) * 0x94D049BB133111EBU;
   return x ^ (x >> 31U);
 }
 
-/// Random draws that are equal on every platform: std::mt19937_64 is specified bit by bit, the
-/// distributions of the standard library are not. Values are drawn in call order.
+/// Random draws that are equal on every platform, because std::mt19937_64 is specified bit by bit.
+/// The distributions of the standard library are not. Values are drawn in call order.
 class SeededRandom {
  public:
   explicit SeededRandom(std::uint64_t seed) : engine_(mixed(seed)) {}
 
-  /// A stream of its own for a named part: what one part draws does not shift the others.
+  /// An independent stream for part `part`: draws of one part do not change the others.
   [[nodiscard]] static SeededRandom stream(std::uint64_t seed, std::uint64_t part) {
     return SeededRandom(mixed(seed) ^ mixed(~part));
   }

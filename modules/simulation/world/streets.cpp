@@ -268,8 +268,7 @@ void add_arrow(Scene& scene, float x, float y, bool forward, MaterialId paint) {
   scene.polygon(outline, kMarking_m, paint);
 }
 
-/// Stripes across and the line to stop at, for those who come along +x (or -x) to the crossing at
-/// x.
+/// Stripes across the street and the stop line, for traffic along +x (or -x) to the crossing at x.
 void add_crosswalk(Scene& scene, float x, float stop_x, float stop_y, MaterialId paint) {
   for (float y = -kHalfRoad_m + 0.35F; y < kHalfRoad_m - 0.5F; y += 1.0F)
     add_line(scene, x, x + 3.0F, y + 0.25F, 0.5F, paint);

@@ -12,11 +12,11 @@ namespace km {
 
 /// Cross-section of every street, from its centre line outwards [m].
 inline constexpr float kLaneOffset_m = 1.6F;
-inline constexpr float kLaneEdge_m = 3.1F;      ///< Where the parking lane begins.
+inline constexpr float kLaneEdge_m = 3.1F;      ///< Begin of the parking lane.
 inline constexpr float kHalfRoad_m = 5.2F;      ///< The kerb.
 inline constexpr float kSidewalk_m = 2.8F;      ///< Width with the kerb stone.
 inline constexpr float kKerb_m = 0.12F;         ///< Height of the sidewalk above the road.
-inline constexpr float kCornerRadius_m = 4.0F;  ///< Of the kerb.
+inline constexpr float kCornerRadius_m = 4.0F;  ///< Radius of the kerb at corners.
 
 /// One side of a street between two crossings. Frame: x along the building line, left to right seen
 /// from the street, which lies at negative y; z = 0 is the sidewalk.
@@ -32,7 +32,7 @@ struct CityPlan {
 
   std::array<float, 4> x{};       ///< Centre lines of the streets along y [m].
   std::array<float, 4> y{};       ///< Centre lines of the streets along x [m].
-  std::array<float, 4> phases{};  ///< Of the ground's waves [rad].
+  std::array<float, 4> phases{};  ///< Phases of the ground's waves [rad].
 
   /// Kerb line of a block; column and row 0 .. 2.
   [[nodiscard]] Eigen::AlignedBox2f block(int column, int row) const;
@@ -40,7 +40,7 @@ struct CityPlan {
   [[nodiscard]] static std::array<StreetSide, 4> sides(const Eigen::AlignedBox2f& kerb);
   /// South, east, north, west side of the houses outside the grid, which face inwards.
   [[nodiscard]] std::array<StreetSide, 4> outer_sides() const;
-  /// The same, cut at the crossings like the sides of blocks.
+  /// The outer sides, cut at the crossings like the sides of blocks.
   [[nodiscard]] std::vector<StreetSide> outer_pieces() const;
   /// Gentle waves under the whole city [m], slopes below 3 %.
   [[nodiscard]] double ground(double px, double py) const;

@@ -7,11 +7,11 @@
 
 namespace km {
 
-/// Smooth noise in [-1, 1] with features of about `feature_m`. A function of its arguments alone.
+/// Smooth noise in [-1, 1] with features of about `feature_m`. It depends only on its arguments.
 [[nodiscard]] float ground_noise(float x, float y, float feature_m, std::uint64_t seed);
 
-/// Heights over a regular grid. Between grid points the surface is that of two triangles per cell,
-/// cut from the lower left to the upper right corner, which is how MeshBuilder::sheet() makes them.
+/// Heights over a regular grid. Between grid points the surface consists of two triangles per cell,
+/// cut from the lower left to the upper right corner, as in MeshBuilder::sheet().
 class Heightfield {
  public:
   /// Samples `height` at the corners of columns x rows cells of `cell_m` from `origin` on. Throws

@@ -25,10 +25,9 @@ class Texture {
   /// levels the blend is linear in the footprint.
   [[nodiscard]] Eigen::Vector3f color(const Eigen::Vector2f& uv, float footprint) const;
 
-  /// The luminance alone (Rec. 709 weights), what a grey camera sees, as it is stored for lookups
-  /// of many points side by side: all levels one after the other, rows of `quads`, each a texel and
-  /// its neighbours at +u, +v, +uv (lowest byte first) in steps of `scale`. Valid as long as the
-  /// texture is.
+  /// The luminance (Rec. 709 weights) for grey cameras, stored for lookups of many points side by
+  /// side. All levels follow each other in rows of `quads`. A quad has a texel and its neighbours
+  /// at +u, +v, +uv (lowest byte first) in steps of `scale`. Valid as long as the texture exists.
   struct GrayTexels {
     const std::uint32_t* quads = nullptr;
     int log_size = 0;
@@ -51,7 +50,7 @@ class Texture {
   struct TilePoint {
     std::uint32_t u = 0, v = 0;
   };
-  /// Where a point falls in a level: its texel, and how far it is to the next one to the right and
+  /// Position of a point in a level: its texel, and the distance to the next one to the right and
   /// above, in units of 2^-16.
   struct Cell {
     std::uint32_t column = 0, row = 0;
@@ -65,11 +64,11 @@ class Texture {
   void append_level(int n, const std::vector<Eigen::Vector3f>& rgb);
 
   int log_size_ = 0;
-  float luminance_scale_ = 1.0F;  // of one step of 8 bit: dark textures keep 255 shades
+  float luminance_scale_ = 1.0F;  // luminance of one step of 8 bit: dark textures keep 255 shades
   float color_scale_ = 1.0F;
   std::array<std::uint32_t, kMaxLogSize + 1> level_begin_{};
-  // All levels in one piece. A luminance entry holds its texel and the neighbours at +u, +v, +uv
-  // (lowest byte first): a bilinear lookup is one load. A colour is red, green, blue, 0.
+  // All levels in one array. A luminance entry has its texel and the neighbours at +u, +v, +uv
+  // (lowest byte first), so that a bilinear lookup is one load. A colour is red, green, blue, 0.
   std::vector<std::uint32_t> luminance_;
   std::vector<std::uint32_t> color_;
 };

@@ -23,7 +23,7 @@ struct BodyStation {
   float belt = 0.9F;        // height of the windows' lower edge [m]
   float top = 1.4F;         // height of the roof or bonnet [m]
   float half_width = 0.9F;  // at the widest [m]
-  float half_roof = 0.6F;   // of the roof or bonnet [m]
+  float half_roof = 0.6F;   // half width of the roof or bonnet [m]
   bool side_glass = false;  // from here to the next station, belt to roof
   bool top_glass = false;   // from here to the next station: a screen across
 };
@@ -144,7 +144,7 @@ void add_seam(Scene& scene, std::span<const BodyStation> stations, float x,
   }
 }
 
-/// A wheel that touches the ground at x, its outer face at y (its sign tells the side).
+/// A wheel that touches the ground at x, its outer face at y (the sign of y is the side).
 void add_wheel(Scene& scene, float x, float y, float radius, float width,
                const VehiclePaints& paints) {
   const float out = y > 0.0F ? 1.0F : -1.0F;

@@ -117,7 +117,7 @@ void add_room_floor(Scene& scene, float width_m, float depth_m, SeededRandom& ra
   add_scraps(scene, width_m, depth_m, random);
 }
 
-// Walls of a room and what hangs on them. A wall lies in the plane y = 0 of the builder's current
+// Walls of a room and the objects on them. A wall lies in the plane y = 0 of the builder's current
 // frame, x along it from -length / 2 to length / 2, and is seen from -y.
 
 struct WallWindow {
@@ -362,7 +362,7 @@ constexpr float kHeight_m = 4.0F;
 const Vector3f kCorner(-4.6F, -3.5F, 0.0F);
 constexpr float kHalf_m = 0.5F * kEdge_m;
 
-/// The stretch of a wall whose middle is at x, to put things before it.
+/// The part of a wall whose middle is at x, as a frame for objects in front of it.
 Isometry3f at_wall(float x) {
   return standing_at({x, 0.0F, 0.0F}, 0.0F);
 }
@@ -431,7 +431,7 @@ void furnish_desk_wall(Scene& scene, SeededRandom& random) {
   scene.at({3.6F, -0.3F, 0.0F}).add(add_bucket, random);
 }
 
-/// What stands free, lower than any flight.
+/// Free-standing objects, lower than any flight.
 void furnish_middle(Scene& scene, SeededRandom& random) {
   const float x = kHalf_m + random.uniform(0.6F, 1.2F);
   const float y = kHalf_m + random.uniform(0.9F, 1.4F);

@@ -63,7 +63,7 @@ struct Material {
                                  ///< more (lamps, screens, curtains before a window).
 };
 
-/// Lights of a world. Outdoors the sun and the sky, indoors lamps and a constant ambient term.
+/// Lights of a world: the sun and the sky outdoors, lamps and a constant ambient term indoors.
 struct Lighting {
   struct Lamp {
     Eigen::Vector3f position = Eigen::Vector3f::Zero();  ///< [m]
@@ -94,10 +94,10 @@ struct World {
 
   /// Height of drivable ground below (x, y) [m]. Null indoors.
   std::function<double(double, double)> ground_height;
-  /// Where robot r drives: routes[r % routes.size()]. They overlap in part, some in the same and
+  /// Robot r drives along routes[r % routes.size()]. Routes overlap in part, some in the same and
   /// some in the opposite direction, and each has loops of its own. Empty indoors.
   std::vector<Route> routes;
-  /// Where a flying robot may be, free of obstacles [m]. Empty outdoors.
+  /// Volume for flying robots, free of obstacles [m]. Empty outdoors.
   Eigen::AlignedBox3d flight_volume;
 };
 

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 const std::string kDoctor = KM_BIN_DIR "/kimera_multi_doctor";
 
-// The first seconds of MH_01 with files of their own, the images but links.
+// The first seconds of MH_01 with files of their own, except for the images, which are links.
 class SmallHall {
  public:
   explicit SmallHall(const fs::path& recording) : mav0_(folder.path() / "mav0") {
@@ -36,7 +36,7 @@ class SmallHall {
         fs::create_directory_symlink(source / sensor / "data", mav0_ / sensor / "data");
     }
   }
-  // The doctor on it; "id id " in the order of its JSON.
+  // Runs the doctor on it and returns "id id " in the order of its JSON.
   [[nodiscard]] std::string ids(int expected_exit_code) const {
     const CommandResult run =
         run_command(kDoctor + ' ' + folder.path().string() + " --to 5 --json " +
@@ -85,7 +85,7 @@ TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") 
   }
 }
 
-TEST_CASE("The doctor says of a file why no robot can play it", "[doctor]") {
+TEST_CASE("The doctor gives the reason why no robot can play a file", "[doctor]") {
   const TemporaryFolder folder;
   const auto told = [&](const std::string& file) {
     const CommandResult run = run_command(kDoctor + ' ' + (folder.path() / file).string());
@@ -100,8 +100,7 @@ TEST_CASE("The doctor says of a file why no robot can play it", "[doctor]") {
   CHECK_THAT(told("record.mcap"), Catch::Contains("no topic of it has images"));
 }
 
-TEST_CASE("The doctor's exit code is 2 for what it cannot use, with a line that says why",
-          "[doctor]") {
+TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that says why", "[doctor]") {
   const TemporaryFolder folder;
   const CommandResult empty = run_command(kDoctor + ' ' + folder.path().string());
   CHECK(empty.exit_code == 2);
@@ -117,7 +116,7 @@ TEST_CASE("The doctor's exit code is 2 for what it cannot use, with a line that 
   CHECK_THAT(domain.output, Catch::Contains("--set ros.domain=N"));
 }
 
-TEST_CASE("The doctor listens to the topics of a rig file, and looks at what they show",
+TEST_CASE("The doctor listens to the topics of a rig file, and examines their messages",
           "[doctor]") {
   const auto data = shared_data("euroc/MH_01_easy");
   if (!data) return;
@@ -141,7 +140,7 @@ TEST_CASE("The doctor listens to the topics of a rig file, and looks at what the
     return found;
   };
   CHECK(ids("/left/image_raw") == "live.similar_name ");
-  // A host that is busy loses images: frames.* and recording.* may be there.
+  // A busy host loses images, so frames.* and recording.* are allowed.
   const std::string sound = ids("/cam0/image_raw");
   for (const char* part : {"live.", "stereo.", "extrinsics.", "imu."}) {
     CAPTURE(sound, part);
@@ -149,7 +148,7 @@ TEST_CASE("The doctor listens to the topics of a rig file, and looks at what the
   }
 }
 
-TEST_CASE("Live topics that nobody publishes are not sound: the doctor's exit code is 2",
+TEST_CASE("Live topics without a publisher are not sound: the doctor's exit code is 2",
           "[doctor]") {
   const EurocFolder recording;
   const TemporaryFolder folder;
@@ -180,7 +179,7 @@ class Look {
     told_ = read_json(out);
   }
   [[nodiscard]] int exit_code() const { return exit_code_; }
-  // Of warnings and errors.
+  // Ids of warnings and errors.
   [[nodiscard]] std::string ids() const {
     std::string found;
     for (const auto& finding : told_["findings"])

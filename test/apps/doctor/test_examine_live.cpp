@@ -24,7 +24,7 @@ TEST_CASE("Live topics that are heard are sound", "[doctor]") {
              Catch::Contains("60 messages of sensor_msgs/msg/Image in 3.0"));
 }
 
-TEST_CASE("Why a live topic is silent is told from who publishes", "[doctor]") {
+TEST_CASE("The reason why a live topic is silent follows from the publishers", "[doctor]") {
   using Catch::Contains;
   const std::vector<ListenedTopic> wanted = {{"/left", kImage, 0}};
   const auto why = [&](const std::vector<TopicPublisher>& publishers) {
@@ -38,13 +38,14 @@ TEST_CASE("Why a live topic is silent is told from who publishes", "[doctor]") {
   const auto begins_most_alike = why({{"/cam/left", kImage, true}, {"/left/image", kImage, true}});
   CHECK_THAT(begins_most_alike.what, Contains("but /left/image is of that type"));
   CHECK_THAT(why({{"/cam/left", kImage, true}}).what, Contains("/cam/left is of that type"));
-  // What is another camera's already is not proposed.
+  // A topic that another camera already uses is not proposed.
   const auto result = examine_topics({{"/cam0", kImage, 60}, {"/cam2", kImage, 0}},
                                      {{"/cam0", kImage, true}, {"/other1", kImage, true}}, 3.0, 0);
   CHECK_THAT(the_finding(result).what, Contains("but /other1 is of that type"));
 }
 
-TEST_CASE("That nobody publishes at all is one finding, whatever topics are missing", "[doctor]") {
+TEST_CASE("If there is no publisher at all, one finding says so, whatever topics are missing",
+          "[doctor]") {
   const auto result = examine_topics({{"/left", kImage, 0}, {"/imu", kImu, 0}}, {}, 3.0, 7);
   REQUIRE(result.findings.size() == 1);
   CHECK(result.figures.size() == 2);

@@ -42,7 +42,7 @@ const char* const kMeasured = "verified,60,39,1,2,3,0,0,0,1,";
 
 }  // namespace
 
-TEST_CASE("The doctor says of results why robots did not join, from all files", "[doctor]") {
+TEST_CASE("The doctor gives the reason why robots did not join, from all files", "[doctor]") {
   const Results results;
   results.folder.write(
       "alice/loop_closures.csv",
@@ -62,14 +62,15 @@ TEST_CASE("The doctor says of results why robots did not join, from all files", 
   CHECK(exit_code_of(result.findings) == 1);
 }
 
-TEST_CASE("Robots that saw different places are said to have no candidate", "[doctor]") {
+TEST_CASE("Robots that saw different places are reported to have no candidate", "[doctor]") {
   const Results results;
   const Examination result = examine_results(results.folder.path());
   REQUIRE(result.findings.size() == 1);
   CHECK_THAT(result.findings[0].what, Catch::Contains("alice and bob did not join: 0 candidates"));
 }
 
-TEST_CASE("The doctor says why candidates came to nothing, commas and all", "[doctor]") {
+TEST_CASE("The doctor gives the reason why candidates were rejected, even if it has commas",
+          "[doctor]") {
   const Results results;
   results.folder.write(
       "alice/loop_closures.csv",
@@ -78,7 +79,7 @@ TEST_CASE("The doctor says why candidates came to nothing, commas and all", "[do
              Catch::Contains("most of them: \"no pose, too few inliers\" (1 of 1)"));
 }
 
-TEST_CASE("Of a robot alone the findings are those of its end", "[doctor]") {
+TEST_CASE("The findings on a single robot are those of its end", "[doctor]") {
   const Results results;
   RunSummary summary = read_summary(results.folder.path() / "alice/summary.json");
   summary.findings = {failed_run("vio: no memory"), {.id = "team.not_joined", .what = "x"}};
@@ -89,7 +90,7 @@ TEST_CASE("Of a robot alone the findings are those of its end", "[doctor]") {
   CHECK(exit_code_of(result.findings) == 2);
 }
 
-TEST_CASE("The folder of a robot that was killed is no recording: how it goes on is named",
+TEST_CASE("The folder of a robot that was killed is no recording, and the message names --resume",
           "[doctor]") {
   const Results results;
   const auto bob = results.folder.path() / "bob";
@@ -106,7 +107,7 @@ TEST_CASE("The folder of a robot that was killed is no recording: how it goes on
   }
 }
 
-TEST_CASE("Results with files that are missing or broken are looked at as far as they go",
+TEST_CASE("Results with files that are missing or broken are examined as far as possible",
           "[doctor]") {
   const Results results;
   std::filesystem::remove(results.folder.path() / "alice/config.yaml");
@@ -120,7 +121,7 @@ TEST_CASE("Results with files that are missing or broken are looked at as far as
   CHECK_FALSE(are_results(results.folder.path() / "nowhere"));
 }
 
-TEST_CASE("Nothing is found wrong with the results of the demo", "[doctor]") {
+TEST_CASE("The results of the demo have no findings", "[doctor]") {
   const std::filesystem::path demo = "results/demo";
   if (!are_results(demo)) {
     std::cout << "SKIPPED: no " << demo << "; apps/demo makes it\n";

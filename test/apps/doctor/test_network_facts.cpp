@@ -24,7 +24,7 @@ Announced robot(RobotId id, const std::string& name, int domain = 42,
           .identity = identity};
 }
 
-// A host where all is well, with another robot of the team in reach.
+// A sound host, with another robot of the team in reach.
 NetworkFacts sound() {
   NetworkFacts facts;
   facts.config.domain = 42;
@@ -46,7 +46,7 @@ std::string ids_of(const NetworkFacts& facts) {
 
 }  // namespace
 
-TEST_CASE("Nothing is found wrong with a sound network", "[doctor]") {
+TEST_CASE("A sound network has no findings", "[doctor]") {
   NetworkFacts facts = sound();
   CHECK(ids_of(facts).empty());
   facts.announced = {robot(7, "alice")};
@@ -57,7 +57,7 @@ TEST_CASE("Nothing is found wrong with a sound network", "[doctor]") {
   CHECK(ids_of(facts).empty());
 }
 
-TEST_CASE("What keeps robots apart on a network is named", "[doctor]") {
+TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]") {
   NetworkFacts facts = sound();
   SECTION("no interface") {
     facts.chosen.reset();
@@ -143,12 +143,12 @@ TEST_CASE("What keeps robots apart on a network is named", "[doctor]") {
     facts.announced.clear();
     CHECK(ids_of(facts) == "warning network.nobody ");
   }
-  SECTION("nobody else") {
+  SECTION("no other robot") {
     facts.announced.clear();
     CHECK(ids_of(facts) == "note network.nobody ");
     CHECK(examine_network(facts).findings[0].what ==
           "nobody else was seen: no robot on any domain in 5.0 s");
-    facts.announced = {robot(7, "alice", 43)};  // that is what is wrong
+    facts.announced = {robot(7, "alice", 43)};  // the other domain is the reason
     CHECK(ids_of(facts) == "warning network.other_domain ");
   }
   SECTION("a clock") {
@@ -174,7 +174,7 @@ TEST_CASE("A robot is heard on its domain and in its team, whichever is looked f
   CHECK_THAT(ids, Catch::Contains("warning network.other_domain"));
 }
 
-TEST_CASE("Packets that announce nothing are passed over", "[doctor]") {
+TEST_CASE("Packets without an announcement are skipped", "[doctor]") {
   CHECK_FALSE(parse_announcement({}, 0, ""));
   CHECK_FALSE(parse_announcement({'R', 'T', 'P', 'X'}, 0, ""));
   std::mt19937 rng(1);
@@ -188,7 +188,8 @@ TEST_CASE("Packets that announce nothing are passed over", "[doctor]") {
       packet[21] = static_cast<std::uint8_t>(4U | (rng() & 3U));
       packet[32] = 0, packet[33] = 1, packet[34] = 0, packet[35] = 0xc2;
     }
-    (void)parse_announcement(packet, 0, "");  // reads nothing beyond: a sanitizer sees it
+    (void)parse_announcement(packet, 0,
+                             "");  // does not read beyond the end, which a sanitizer checks
   }
 }
 

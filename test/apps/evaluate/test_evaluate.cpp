@@ -123,13 +123,13 @@ TEST_CASE("images compares two recordings over one window", "[evaluate]") {
   CHECK(frames(" --to 0.2 --compare-from 0.1") == std::pair(4, 6));
 }
 
-TEST_CASE("images refuses what it cannot read", "[evaluate]") {
+TEST_CASE("images refuses unreadable input", "[evaluate]") {
   const auto missing = run_command(kTool + "images --dataset /none");
   CHECK(missing.exit_code == 1);
   CHECK_THAT(missing.output, Catch::StartsWith("kimera_multi_evaluate: /none"));
   const EurocFolder recording;
   const std::string command = kTool + "images --dataset " + recording.root().string();
-  // Before the first recording is gone through, and this fault of it found.
+  // The error comes before the first recording is read, which would show this fault of it.
   std::filesystem::remove(recording.image("cam1", 3));
   const auto other = run_command(command + " --compare /none");
   CHECK(other.exit_code == 1);

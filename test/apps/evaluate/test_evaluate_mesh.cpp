@@ -57,7 +57,7 @@ TEST_CASE("mesh judges each robot and all together", "[evaluate]") {
   CHECK(run_command(command).output == result.output);
 }
 
-TEST_CASE("mesh starts registration where the trajectories say", "[evaluate]") {
+TEST_CASE("mesh starts registration at the transform of the trajectories", "[evaluate]") {
   const Meshes meshes;
   LabelledMesh far = room();
   far.transform(make_pose(Eigen::Matrix3d::Identity(), {50, 0, 0}));
@@ -81,7 +81,7 @@ TEST_CASE("mesh starts registration where the trajectories say", "[evaluate]") {
              Catch::Contains("give one --trajectory-truth for all --trajectory"));
 }
 
-TEST_CASE("mesh refuses what it cannot compare, by name", "[evaluate]") {
+TEST_CASE("mesh refuses incomparable input by name", "[evaluate]") {
   const Meshes meshes;
   const std::string truth = kMeshTool + "mesh --truth " + meshes.truth.string() + " --estimate ";
   CHECK(run_command(truth + "/none.ply").output ==
@@ -143,13 +143,14 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
       top("--mesh " + meshes.truth.string() + " --trajectory " + upright.string());
   const cv::Mat3b found = top("--mesh " + meshes.a.string() + " --trajectory " + turned.string() +
                               " --reference " + upright.string());
-  CHECK(cv::norm(expected, found, cv::NORM_L1) / (3.0 * 320 * 240) < 0.5);  // of 255
+  CHECK(cv::norm(expected, found, cv::NORM_L1) / (3.0 * 320 * 240) <
+        0.5);  // average grey level, out of 255
   const auto many = run_command(kMeshTool + "render --mesh " + meshes.a.string() + " --output " +
                                 meshes.png.string() + " --reference " + upright.string());
   CHECK_THAT(many.output, Catch::Contains("more --reference than --trajectory"));
 }
 
-TEST_CASE("render refuses what it cannot draw", "[evaluate]") {
+TEST_CASE("render refuses input that it cannot draw", "[evaluate]") {
   const Meshes meshes;
   const std::string command = kMeshTool + "render --mesh " + meshes.truth.string() + " --output ";
   CHECK_THAT(run_command(command + "out.jpg").output, Catch::Contains("out.jpg: pictures are PNG"));

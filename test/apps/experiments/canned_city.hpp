@@ -12,7 +12,8 @@
 
 namespace km {
 
-// Of `all` points with a label some are right; seen from where robots were, errors are half.
+// A mesh error of which `right` points among `all` have the right label. Errors of the surface that
+// robots saw are half as large.
 inline MeshError canned_mesh(const std::string& name, double error_m, int right, int all) {
   MeshError mesh;
   mesh.name = name;
@@ -87,7 +88,7 @@ class CannedCity {
             .euroc = {}};
   }
 
-  // y of robot r at x, so that the three paths are not on one line.
+  // y of robot r at x, not linear in x, so that the three paths are not on one line.
   static double sideways(int robot, int x) { return robot + 0.1 * x * x; }
 
   void write_recordings() const {
@@ -145,8 +146,8 @@ class CannedCity {
     folder_.write("results/team-" + world + ".json", json_text(team));
   }
 
-  // Poses bent off the truth: local PGO the most, RBCD half of it, all others not at all.
-  // The further runs bend less.
+  // Poses with an error that no rigid motion removes: local PGO has the most, RBCD half of it, all
+  // others none. The further runs have less.
   void write_method(const std::string& world, const PgoMethodConfig& method) const {
     const double share = world == "city" ? 1.0 : world == "city-run2" ? 0.9 : 0.8;
     const double bend_m = method.name == "local" ? share : method.name == "rbcd" ? 0.5 : 0.0;
@@ -180,7 +181,7 @@ class CannedCity {
     folder_.write("data/city_alone/odometry.tum", "1 0 0 0 0 0 0 1\n4 3 0 0 0 0 0 1\n");
   }
 
-  // On the first set, of which 1.77 m were published.
+  // On the first set, for which 1.77 m were published.
   void write_cosmo() const {
     const auto counts = [](int false_kept) {
       return Json{{"true_kept", 99},

@@ -10,7 +10,7 @@ namespace {
 using Catch::Contains;
 namespace fs = std::filesystem;
 
-// The shipped configuration, to be spoiled.
+// The shipped configuration, to be corrupted.
 struct SpoiledConfig {
   TemporaryFolder folder;
   SpoiledConfig() { fs::copy("config", folder.path(), fs::copy_options::recursive); }
@@ -42,7 +42,7 @@ TEST_CASE("Quick keys replace those beside them", "[experiments]") {
   CHECK(config.trajectory_worlds.size() == 2);
 }
 
-TEST_CASE("What is wrong with the configuration is named by file, line and key", "[experiments]") {
+TEST_CASE("Errors of the configuration are named by file, line and key", "[experiments]") {
   const SpoiledConfig config;
   REQUIRE(config.problems().empty());
   config.folder.write("experiments/pcm.yaml",

@@ -112,7 +112,7 @@ TEST_CASE("A step is the same wherever its files lie", "[experiments]") {
   CHECK(fingerprint_of(step) != fingerprint);
 }
 
-TEST_CASE("Steps of several experiments are planned once, each after what it needs",
+TEST_CASE("Steps of several experiments are planned once, each after the steps it needs",
           "[experiments]") {
   const Plan plan;
   const auto steps =

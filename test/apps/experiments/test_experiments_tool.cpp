@@ -71,7 +71,7 @@ TEST_CASE("The quick pcm experiment runs, reports, and is not run twice", "[expe
   CHECK_THAT(laboratory.run("run pcm").output, Contains("2 steps made"));
 }
 
-TEST_CASE("What a run was given is kept with its results", "[experiments]") {
+TEST_CASE("The inputs of a run are kept with its results", "[experiments]") {
   const Laboratory laboratory;
   const CommandResult empty = laboratory.bare("report");
   CHECK(empty.exit_code == 1);
@@ -85,7 +85,7 @@ TEST_CASE("What a run was given is kept with its results", "[experiments]") {
   CHECK(laboratory.folder.read("results/numbers.json") == before);
   CHECK_THAT(laboratory.bare("list").output,
              Contains((laboratory.folder.path() / "graphs").string()));
-  // The command line has the last word.
+  // The command line has priority.
   fs::create_directory(laboratory.folder.path() / "none");
   const CommandResult other =
       laboratory.bare("report --graphs " + (laboratory.folder.path() / "none").string());
@@ -93,7 +93,7 @@ TEST_CASE("What a run was given is kept with its results", "[experiments]") {
   CHECK(laboratory.folder.read("results/numbers.json") == before);
 }
 
-TEST_CASE("A run with another folder that makes nothing leaves all as it was", "[experiments]") {
+TEST_CASE("A run with another folder and without new results changes nothing", "[experiments]") {
   const Laboratory laboratory;
   REQUIRE(laboratory.run("run pcm").exit_code == 0);
   const std::string report = laboratory.folder.read("results/report.md");
@@ -108,14 +108,14 @@ TEST_CASE("A run with another folder that makes nothing leaves all as it was", "
   const CommandResult list = laboratory.bare("list");
   CHECK_THAT(list.output, Contains("pcm-1   done") && Contains("pcm-2   done"));
   CHECK(laboratory.folder.read("results/report.md") == report);
-  // What makes something stays.
+  // Inputs of a run that makes results are kept.
   laboratory.folder.write("other/polygon.g2o", polygon_graph() + "\n");
   REQUIRE(laboratory.bare("run pcm --graphs " + (laboratory.folder.path() / "other").string())
               .exit_code == 0);
   CHECK_THAT(laboratory.bare("list").output, Contains("pcm-1   done") && Contains("other"));
 }
 
-TEST_CASE("The tool says what is wrong or missing", "[experiments]") {
+TEST_CASE("The tool names faults and missing inputs", "[experiments]") {
   const Laboratory laboratory;
   const auto fails_with = [&](const std::string& arguments, int code, const std::string& message) {
     const CommandResult result = laboratory.run(arguments);

@@ -50,8 +50,8 @@ TEST_CASE("The report has every table with our values and the paper's", "[experi
                        Contains("Numbers to reach"));
   // Costs 1060 over 1000 in their cells beside the paper's, and the gap between them.
   CHECK_THAT(text, Contains("1060.0 (1113.1)") && Contains("| 6.0 (6.3) |"));
-  // No motion as a whole comes nearer to such a bend: it is the whole error; half of it is less
-  // than the paper's share.
+  // The bend is such that no rigid motion reduces the error. Half of the error is less than the
+  // paper's share.
   CHECK_THAT(text, Contains("1.00 (6.09)") && Contains("0.500 (2.38)"));
   // Published by default and by the paper's pipeline, which is no repetition.
   CHECK_THAT(text,
@@ -106,7 +106,7 @@ TEST_CASE("A robot that never met the others is named", "[experiments]") {
   CHECK_THAT(city.read("report.md"), Contains("City: robot2 never met the others;"));
 }
 
-TEST_CASE("Small versions are judged only by what they can answer", "[experiments]") {
+TEST_CASE("Small versions are judged only by targets that they can decide", "[experiments]") {
   const CannedCity city(true);
   const ReportSummary summary = city.report();
   CHECK(summary.targets == 6);  // a cost, COSMO-Bench, two searches with time and clique
@@ -125,7 +125,7 @@ TEST_CASE("The page stands alone and is well formed", "[experiments]") {
   CHECK(is_balanced(page));
   CHECK(occurrences(page, "http") == 0);
   const Json plots = data_of_page(page, "plots");
-  CHECK(plots.size() == 4);  // of outlier rejection, two trajectories, mesh errors
+  CHECK(plots.size() == 4);  // outlier rejection, two trajectories, mesh errors
   for (const auto& [id, drawn] : plots.items()) CHECK(occurrences(page, " id=\"" + id + '"') == 1);
   CHECK(occurrences(page, "data:image/png;base64,") == 2);
   for (const char* id :
@@ -156,7 +156,7 @@ TEST_CASE("Without results the report says so", "[experiments]") {
                        Contains("Nothing was measured yet."));
 }
 
-TEST_CASE("A spread is median, lowest and highest of what is finite", "[experiments]") {
+TEST_CASE("A spread is median, lowest and highest of the finite values", "[experiments]") {
   const Spread spread = spread_of({3.0, 1.0, std::numeric_limits<double>::quiet_NaN(), 2.0, 10.0});
   CHECK(spread.count == 4);
   CHECK(spread.median == 2.5);
@@ -165,7 +165,7 @@ TEST_CASE("A spread is median, lowest and highest of what is finite", "[experime
   CHECK(spread_of({}).count == 0);
 }
 
-TEST_CASE("A range is shown where there are several values", "[experiments]") {
+TEST_CASE("A range is shown if there are several values", "[experiments]") {
   const ReportCell several = spread_cell(spread_of({1.0, 2.0, 4.0}), 1);
   CHECK(several.text == "2.0");
   CHECK(several.paper == "1.0 to 4.0");

@@ -73,7 +73,8 @@ TEST_CASE("A step is run again if its command or the content of an input changes
   CHECK(workshop.run({step}).made == 1);
 }
 
-TEST_CASE("A failed step says why, and holds up only those that need it", "[experiments]") {
+TEST_CASE("A failed step gives the reason, and prevents only the steps that need it",
+          "[experiments]") {
   Workshop workshop;
   Step needs = workshop.step("needs");
   needs.needs = {"bad"};
@@ -88,7 +89,7 @@ TEST_CASE("A failed step says why, and holds up only those that need it", "[expe
                                       Contains("results/logs/bad.log"));
   CHECK(outcome.problems[1] == "not run, as bad is not done: needs, needs_more");
   CHECK(workshop.runs("free") == 1);
-  CHECK(workshop.run(steps).problems.size() == 2);  // it was not taken for done
+  CHECK(workshop.run(steps).problems.size() == 2);  // the failed step did not count as done
   CHECK(workshop.runs("bad") == 2);
 }
 
@@ -109,7 +110,7 @@ TEST_CASE("A program that complains on standard output is heard", "[experiments]
   CHECK_THAT(outcome.problems[0], Contains("bad: exit code 3\n    robot1 failed"));
 }
 
-TEST_CASE("A program that is missing, or leaves nothing, is a failure", "[experiments]") {
+TEST_CASE("A program that is missing, or makes no output, is a failure", "[experiments]") {
   Workshop workshop;
   Step missing = workshop.step("missing");
   missing.command = {workshop.path("no_program")};
@@ -157,10 +158,12 @@ TEST_CASE("A signal ends the running step and begins no other", "[experiments]")
   CHECK(workshop.runs("later") == 0);
   const auto results = workshop.folder.path() / "results";
   CHECK(state_of(steps[0], results) == StepState::kDone);
-  CHECK(state_of(steps[1], results) == StepState::kOutdated);  // its output is there, but not whole
+  CHECK(state_of(steps[1], results) ==
+        StepState::kOutdated);  // its output exists, but is incomplete
 }
 
-TEST_CASE("What a stopped or failed step did not touch keeps its record", "[experiments]") {
+TEST_CASE("Results that a stopped or failed step did not change keep their record",
+          "[experiments]") {
   Workshop workshop;
   const auto results = workshop.folder.path() / "results";
   const char* const fate = GENERATE("kill -INT $PPID; exec sleep 600", "exit 7");
@@ -225,7 +228,7 @@ TEST_CASE("The display says which step runs and how long all will take", "[exper
   CHECK_THAT(out.str(), !Contains("early") && !Contains("too soon") && Contains("shown") &&
                             Contains("[2/3] team, City: done in 2 min 4 s"));
   display.expect({{"closures", "pgo", 20.0}});
-  display.start(0, 0.0);  // nothing after it: no promise once it takes longer than expected
+  display.start(0, 0.0);  // no step follows: no time is shown once it takes longer than expected
   CHECK(display.text("", 19.0) == "[1/1] closures: 19 s, less than a minute left");
   CHECK(display.text("", 300.0) == "[1/1] closures: 5 min 0 s, longer than expected");
 }

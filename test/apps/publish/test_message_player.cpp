@@ -33,7 +33,7 @@ std::unique_ptr<ListedBag> samples(const std::string& topic = "/imu") {
   return bag;
 }
 
-// The stamps that a reader gets of what is played.
+// Stamps of the received messages.
 std::vector<Stamp> played(std::unique_ptr<BagReader> bag, const std::string& topic,
                           PlayOptions options, PlayedTopic& played) {
   options.reliable = true;
@@ -64,7 +64,7 @@ TEST_CASE("A recording is played in its order and pace", "[publish]") {
   CHECK(std::ranges::is_sorted(stamps));
 }
 
-TEST_CASE("A part of a recording is played, and at once", "[publish]") {
+TEST_CASE("A part of a recording is played without waiting for its start", "[publish]") {
   PlayedTopic topic;
   const auto begin = std::chrono::steady_clock::now();
   const auto stamps =
@@ -87,7 +87,7 @@ TEST_CASE("A bad driver loses and delays messages, the same ones for a seed", "[
   CHECK(played(samples("/b"), "/b", bad, topic) == stamps);
 }
 
-TEST_CASE("What is not known is left out, what is broken counted", "[publish]") {
+TEST_CASE("Unknown topics are left out and broken messages are counted", "[publish]") {
   auto bag = samples("/c");
   bag->add_bytes("/scan", "sensor_msgs/LaserScan", kFirst, {0, 1, 0, 0});
   bag->add_bytes("/c", RosImu::kType, kFirst, {0, 0, 0, 0, 1});  // big-endian, and cut

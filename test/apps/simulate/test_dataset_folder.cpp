@@ -22,7 +22,7 @@ std::string refusal(const fs::path& folder, const DatasetRecord& wanted = kWante
 
 }  // namespace
 
-TEST_CASE("A new folder is made and remembers what is finished", "[simulate]") {
+TEST_CASE("A new folder is made and stores the finished robots", "[simulate]") {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "new/recordings";
   {

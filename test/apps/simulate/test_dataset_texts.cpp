@@ -12,7 +12,7 @@ std::string arguments_of(const SimulationOptions& options) {
   return begin == std::string::npos ? "" : text.substr(begin, text.find('\n', begin) - begin);
 }
 
-TEST_CASE("The team file sets what fits the recordings", "[simulate]") {
+TEST_CASE("The settings of the team file fit the recordings", "[simulate]") {
   SimulationOptions options;
   options.names = {"a", "b"};
   options.depth = false;

@@ -7,7 +7,8 @@
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
 
-// apps/demo from end to end: a world is rendered, and three robots find themselves in it over DDS.
+// apps/demo from end to end: a world is rendered, and three robots localise themselves in it over
+// DDS.
 
 namespace km {
 
@@ -43,13 +44,13 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
     CHECK(std::filesystem::exists(folder.path() / file));
 }
 
-TEST_CASE("The demo says how long its world is", "[demo]") {
+TEST_CASE("The demo prints the duration of its world", "[demo]") {
   const auto help = run_command("apps/demo --help");
   CHECK(help.exit_code == 0);
   CHECK_THAT(help.output, Catch::Contains("The simulated world is 25 s long, with --short 8 s"));
 }
 
-TEST_CASE("The demo says how a bag is played", "[demo]") {
+TEST_CASE("The demo prints the commands to play a bag", "[demo]") {
   const TemporaryFolder folder;
   const auto [file, dataset] = GENERATE(table<std::string, std::string>({
       {"walk.bag", "walk.bag"},
@@ -137,7 +138,7 @@ TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
                               Catch::Contains(" --view\n"));
 }
 
-TEST_CASE("The demo says which map is missing, and lists the other results", "[demo]") {
+TEST_CASE("The demo names the missing map, and lists the other results", "[demo]") {
   const StubbedDemo demo;
   const CommandResult result = demo.run("--map");
   CAPTURE(result.output);
@@ -156,7 +157,7 @@ TEST_CASE("The demo needs the evaluation program for a map", "[demo]") {
   CHECK_THAT(with.output, Catch::StartsWith("demo: --programs: no kimera_multi_evaluate in "));
 }
 
-TEST_CASE("The demo refuses what it cannot use", "[demo]") {
+TEST_CASE("The demo refuses unusable input", "[demo]") {
   const auto refusal = [](const std::string& arguments) {
     const auto result = run_command("apps/demo " + arguments);
     CHECK(result.exit_code != 0);

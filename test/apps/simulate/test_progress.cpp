@@ -40,7 +40,7 @@ TEST_CASE("On a terminal one line is redrawn and fits its width", "[simulate]") 
     CHECK(line.size() < 40 + std::string("\x1b[K\n").size());
 }
 
-TEST_CASE("Durations and sizes are said in units people use", "[simulate]") {
+TEST_CASE("Durations and sizes have units that people use", "[simulate]") {
   CHECK(duration_text(0.2) == "1 s");
   CHECK(duration_text(156.0) == "2 min 36 s");
   CHECK(duration_text(7265.0) == "2 h 1 min");

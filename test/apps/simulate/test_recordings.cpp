@@ -12,7 +12,7 @@
 #include "test/support/process.hpp"
 #include "test/support/temporary_folder.hpp"
 
-// kimera_multi_simulate as a program, on recordings as small as they can be.
+// kimera_multi_simulate as a program, on the smallest possible recordings.
 
 namespace km {
 namespace {
@@ -23,7 +23,7 @@ const std::string kProgram = std::string(KM_BIN_DIR) + "/kimera_multi_simulate";
 const std::string kSmall =
     " --world vicon_room --robots 2 --duration 0.5 --resolution 64x48 --depth --depth-rate 10 "
     "--labels --color";
-constexpr std::size_t kFrames = 10;  // of each robot
+constexpr std::size_t kFrames = 10;  // for each robot
 
 CommandResult simulate(const std::string& arguments, const fs::path& output) {
   return run_command(kProgram + arguments + " --output " + output.string());
@@ -101,7 +101,7 @@ TEST_CASE("The ordinary reader reads a recording, and files that went missing ar
   check_equal(contents(folder, "r"), whole);
 }
 
-TEST_CASE("A full disk leaves nothing that looks whole, and the run goes on later", "[simulate]") {
+TEST_CASE("A full disk leaves no incomplete file, and the run continues later", "[simulate]") {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "full";
   // Files beyond 2 blocks of 512 bytes cannot be written: the calibration can, tables cannot.
@@ -120,7 +120,7 @@ TEST_CASE("A full disk leaves nothing that looks whole, and the run goes on late
   check_equal(contents(folder, "full"), contents(folder, "whole"));
 }
 
-TEST_CASE("A run that is stopped goes on to the same bytes", "[simulate]") {
+TEST_CASE("A run that is stopped continues to the same bytes", "[simulate]") {
   const TemporaryFolder folder;
   const std::string arguments =
       " --world vicon_room --robots 1 --duration 20 --resolution 64x48 --output ";
@@ -139,7 +139,8 @@ TEST_CASE("A run that is stopped goes on to the same bytes", "[simulate]") {
   check_equal(contents(folder, "stopped"), contents(folder, "whole"));
 }
 
-TEST_CASE("A signal ends the preparation, and a second one at once", "[simulate]") {
+TEST_CASE("One signal ends the preparation in order, and a second one ends it at once",
+          "[simulate]") {
   const TemporaryFolder folder;
   Process program({kProgram, "--world", "city", "--robots", "1", "--duration", "60", "--output",
                    (folder.path() / "city").string()});

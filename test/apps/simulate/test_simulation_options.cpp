@@ -88,7 +88,7 @@ TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") 
   CHECK(options.robots == 2);
 }
 
-TEST_CASE("Recorded motion may be that of another rig", "[simulate]") {
+TEST_CASE("Recorded motion may come from another rig", "[simulate]") {
   const TemporaryFolder folder;
   const std::string flight = folder.write("room1.csv", "").string();
   std::string camera =
@@ -132,7 +132,7 @@ TEST_CASE("Options may come from a file, and the command line has the last word"
   CHECK(options.duration_s == 7.0);
 }
 
-TEST_CASE("All that is wrong with a file of options is said by line", "[simulate]") {
+TEST_CASE("All errors of a file of options are reported by line", "[simulate]") {
   const TemporaryFolder folder;
   const std::string file =
       folder.write("bad.yaml", "# a city\nworld: citty\nsped: 3\nrate: fast  # Hz\ndepth: maybe\n")

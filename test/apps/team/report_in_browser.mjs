@@ -1,4 +1,4 @@
-// Opens the report of the run in test_report_page.cpp and looks at what it shows.
+// Opens the report of the run in test_report_page.cpp and examines the page.
 //   node report_in_browser.mjs REPORT [SCREENSHOT]
 import assert from 'node:assert/strict';
 import {pathToFileURL} from 'node:url';

@@ -40,7 +40,7 @@ double grey_of(const std::string& jpeg, int width) {
 }
 
 TEST_CASE("Closures that were verified are shown, others not", "[closure_images]") {
-  constexpr double kJpeg = 1.5;  // grey values it may be off by
+  constexpr double kJpeg = 1.5;  // tolerance in grey levels
   const EurocFolder recording;
   std::vector<RobotResult> robots{robot_on(recording.root(), 0), robot_on(recording.root(), 4)};
   robots[0].closures = {closure({0, 1}, {4, 2}, ClosureStage::kInlier),
@@ -60,13 +60,14 @@ TEST_CASE("Small images are not blown up", "[closure_images]") {
   CHECK(grey_of(closure_images(robots).jpegs.at({0, 1}), 32) > 0.0);
 }
 
-TEST_CASE("Of too many closures the rejected ones come first, and it is said", "[closure_images]") {
+TEST_CASE("If there are too many closures, the rejected ones come first, and a note says so",
+          "[closure_images]") {
   const EurocFolder recording;
   std::vector<RobotResult> robots{robot_on(recording.root(), 0), robot_on(recording.root(), 1)};
   robots[0].closures = {closure({0, 0}, {0, 1}, ClosureStage::kInlier),
                         closure({0, 2}, {1, 2}, ClosureStage::kInlier),
                         closure({0, 3}, {0, 4}, ClosureStage::kVerified)};
-  // Another robot knows more of the same pair: it is one.
+  // Another robot has a later stage of the same pair, which counts once.
   robots[1].closures = {closure({0, 2}, {1, 2}, ClosureStage::kVerified)};
   const ClosureImages images = closure_images(robots, {.max_closures = 2, .width_px = 16});
   REQUIRE(images.jpegs.size() == 4);
@@ -76,7 +77,8 @@ TEST_CASE("Of too many closures the rejected ones come first, and it is said", "
   CHECK(images.notes[0] == "images are shown of 2 of 3 closures that were verified");
 }
 
-TEST_CASE("Of many closures of a kind those shown are spread over them", "[closure_images]") {
+TEST_CASE("If there are many closures of a kind, those shown are spread over them",
+          "[closure_images]") {
   const EurocFolder recording;
   std::vector<RobotResult> robots{robot_on(recording.root(), 0)};
   for (KeyframeIndex k = 0; k < 8; k += 2)
@@ -99,7 +101,7 @@ TEST_CASE("A recording that is gone is a note, a pose graph none", "[closure_ima
              Catch::StartsWith("r1: no images of its closures: ") && Contains("/no/such/place"));
 }
 
-TEST_CASE("A clock that is corrected is that of the keyframes", "[closure_images]") {
+TEST_CASE("A corrected camera clock is the clock of the keyframes", "[closure_images]") {
   const EurocFolder recording;
   const TemporaryFolder folder;
   const auto rig = folder.write("rig.yaml", "camera_time_offset_s: 0.05\n").string();

@@ -58,7 +58,7 @@ TEST_CASE("An empty file of links makes perfect ones", "[links]") {
   CHECK(script.paths.empty());
 }
 
-TEST_CASE("What is said of a pair comes over what is said of all", "[links]") {
+TEST_CASE("Keys of a pair override keys of all links", "[links]") {
   LinkScript script = Team().script(
       "seed: 7\nloss: 0.1\ndelay_s: 0.02\njitter_s: 0.01\nrate_bytes_per_s: 1000\n"
       "queue_bytes: 5000\noutages:\n  - {from_s: 1, to_s: 2}\n"
@@ -127,7 +127,7 @@ TEST_CASE("Range follows the true poses at the rate of the run", "[links]") {
              Catch::Contains("links.yaml: range_m needs the true poses of c"));
 }
 
-TEST_CASE("Every problem of a file of links is told with its line", "[links]") {
+TEST_CASE("Every problem of a file of links is reported with its line", "[links]") {
   const std::string problems = Team().problems(
       "loss: 1.5\n"
       "latency: 3\n"
@@ -154,7 +154,7 @@ TEST_CASE("Every problem of a file of links is told with its line", "[links]") {
   }
 }
 
-TEST_CASE("A spoilt file of links is refused by name, or makes a script", "[links]") {
+TEST_CASE("A corrupted file of links is refused by name, or makes a script", "[links]") {
   const Team team;
   check_spoilt<ConfigError>(
       "seed: 3\nloss: 0.1\nrate_bytes_per_s: 1000\nqueue_bytes: 5000\noutages:\n"

@@ -14,8 +14,8 @@ namespace {
 
 using Catch::Contains;
 
-// SmallRun as team has run it. Robot r0 went 10 m along x, as its truth says; it says itself, in
-// `optimized`, that it was so; r1 is 3 m beside. There is something to say of r0.
+// SmallRun as kimera_multi_team ran it. Robot r0 drove 10 m along x, by its truth and by its
+// `optimized` poses; r1 is 3 m beside it. r0 has a finding.
 struct ReportedRun {
   SmallRun run;
   TeamPlan plan;
@@ -77,7 +77,7 @@ TEST_CASE("The report has the numbers that the robots left", "[report_page]") {
   CHECK(data["team"]["robots"][0]["findings"][0]["id"] == "closures.few");
 }
 
-TEST_CASE("Where there is a truth, the report has it and the error over time", "[report_page]") {
+TEST_CASE("If there is a truth, the report has it and the error over time", "[report_page]") {
   constexpr double kRounded_m = 2e-3, kExact_m = 1e-6;
   ReportedRun reported;
   reported.know_truth();
@@ -98,8 +98,7 @@ TEST_CASE("Where there is a truth, the report has it and the error over time", "
   }
 }
 
-TEST_CASE("Lines are broken where no pose is known, not where keyframes are rare",
-          "[report_page]") {
+TEST_CASE("Lines are interrupted at missing poses, not between rare keyframes", "[report_page]") {
   ReportedRun reported;
   reported.know_truth();
   const auto write = [&](const char* file, const std::vector<double>& times_s) {

@@ -71,7 +71,7 @@ TEST_CASE("A signal reaches the process", "[team]") {
   CHECK(script.process.exit()->ok());
 }
 
-TEST_CASE("A process that a signal ended says which", "[team]") {
+TEST_CASE("A process that a signal ended names the signal", "[team]") {
   Script script("kill -9 $$");
   script.wait();
   CHECK_FALSE(script.process.exit()->ok());
@@ -98,7 +98,7 @@ TEST_CASE("A process does not outlive its owner", "[team]") {
   CHECK(kill(child, 0) != 0);
 }
 
-TEST_CASE("A process whose owner goes ends in order", "[team]") {
+TEST_CASE("A process whose owner is destroyed ends in order", "[team]") {
   const TemporaryFolder folder;
   {
     Script script("trap 'echo ended > " + (folder.path() / "diary").string() +

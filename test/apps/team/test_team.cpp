@@ -27,8 +27,8 @@ RunSummary finished_summary() {
   return summary;
 }
 
-// Finds its name and output folder on its command line, prints a status line and leaves a summary;
-// `end` is what it does then.
+// Finds its name and output folder on its command line, prints a status line and leaves a summary.
+// `end` is its last command.
 std::string robot_script(const std::string& end) {
   return "#!/bin/sh\n"
          "all=\"$*\"\n"
@@ -169,12 +169,13 @@ TEST_CASE("Robots die with a team program that is killed", "[team]") {
   while (!program.exit()) program.read();
 
   std::string pid = team.folder.read("out/bob/pid");
-  pid.pop_back();                 // end of line
-  const auto is_alive = [&pid] {  // where nobody collects orphans, they stay as zombies: (name) Z
-    std::string stat;
-    std::getline(std::ifstream("/proc/" + pid + "/stat"), stat);
-    return !stat.empty() && stat.find(") Z ") == stat.npos;
-  };
+  pid.pop_back();  // end of line
+  const auto is_alive =
+      [&pid] {  // without a process that collects orphans they remain as zombies: (name) Z
+        std::string stat;
+        std::getline(std::ifstream("/proc/" + pid + "/stat"), stat);
+        return !stat.empty() && stat.find(") Z ") == stat.npos;
+      };
   while (is_alive()) std::this_thread::yield();  // fails by the time limit of the test
   SUCCEED("robot ended");
 }
@@ -232,7 +233,7 @@ TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][
   if (!had_own_networks(team.folder.read("log"))) return;
   REQUIRE(fs::exists(network));
   const std::string name = team.folder.read("out/bob/network");
-  const auto is_used = [&name] {  // by any process there is
+  const auto is_used = [&name] {  // by any process
     for (const auto& process : fs::directory_iterator("/proc")) {
       std::error_code error;
       const fs::path used = fs::read_symlink(process.path() / "ns/net", error);
@@ -244,7 +245,7 @@ TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][
   CHECK(fs::exists(team.folder.path() / "out/links.csv") == (signal != SIGKILL));
 }
 
-TEST_CASE("Where networks are not allowed, a team with bad links does not start", "[team]") {
+TEST_CASE("If networks are not allowed, a team with bad links does not start", "[team]") {
   const Team team("echo started");
   const std::string links = team.folder.write("links.yaml", "").string();
   const std::string forbid =
@@ -313,7 +314,7 @@ TEST_CASE("A report starts no robot and fails if one of the run did", "[team]") 
                                !Catch::Contains("status of"));
 }
 
-TEST_CASE("What cannot be run is refused with code 1", "[team]") {
+TEST_CASE("Input that cannot be run is refused with code 1", "[team]") {
   const Team team("exit 0");
   CHECK(run_command(team.command + " --robot-binary /nowhere/robot").exit_code == 1);
   const auto fast = run_command(team.command + " --rate fast");

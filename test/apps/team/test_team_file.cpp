@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A folder with what team files refer to.
+// A folder with the files that team files name.
 struct Inputs {
   TemporaryFolder folder;
   fs::path dataset = folder.path() / "recording";
@@ -36,7 +36,7 @@ std::string problems_of(const fs::path& file, const fs::path& dataset) {
 
 }  // namespace
 
-TEST_CASE("A spoilt team file is refused by name, or plans robots", "[team]") {
+TEST_CASE("A corrupted team file is refused by name, or plans robots", "[team]") {
   const Inputs inputs;
   check_spoilt<ConfigError>(
       "config: common.yaml\ntruth: truth.csv\nrate: max\ndomain: 7\ntime_limit_s: 12.5\nrobots:\n"
@@ -93,7 +93,7 @@ TEST_CASE("A team file gives the robots their inputs", "[team]") {
   CHECK(b.arguments == std::vector<std::string>{"--link", "wifi", "--verbose"});
 }
 
-TEST_CASE("A team file may say when a closure counts as true", "[team]") {
+TEST_CASE("A team file may define when a closure counts as true", "[team]") {
   const Inputs inputs;
   const std::string robots = "robots:\n  - {id: 1, graph: recording/g.csv}\n";
   const auto plan = read_team_file(
@@ -127,7 +127,7 @@ TEST_CASE("A truth may be a folder, and one that is missing is a note", "[team]"
   CHECK(read_team_file(file, {}).robots[1].truth == inputs.folder.path() / "truth/data.csv");
 }
 
-TEST_CASE("The command line of a robot says what its plan says", "[team]") {
+TEST_CASE("The command line of a robot has the options of its plan", "[team]") {
   TeamPlan plan;
   plan.configs = {"/c.yaml", "/d.yaml"};
   plan.domain = 9;
@@ -145,7 +145,7 @@ TEST_CASE("The command line of a robot says what its plan says", "[team]") {
             "1.0",        "--domain", "9",         "--output", "out/x",   "--set",   "a.b=1"});
 }
 
-TEST_CASE("Every problem of a team file is told with its line", "[team]") {
+TEST_CASE("Every problem of a team file is reported with its line", "[team]") {
   const Inputs inputs;
   const std::string problems = problems_of(inputs.team("config: none.yaml\n"
                                                        "speed: 3\n"
@@ -167,7 +167,7 @@ TEST_CASE("Every problem of a team file is told with its line", "[team]") {
   }
 }
 
-TEST_CASE("Misspelt keys come before what they are the cause of", "[team]") {
+TEST_CASE("Misspelt keys are reported before the errors that they cause", "[team]") {
   const Inputs inputs;
   const std::string robot = problems_of(
       inputs.team("robots:\n  - {id: 1, datset: recording}\n  - {id: 1, graph: recording/g.csv}\n"),

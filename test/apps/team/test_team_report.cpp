@@ -52,12 +52,12 @@ LabelledMesh moved(LabelledMesh mesh, const Eigen::Vector3d& by) {
   return mesh;
 }
 
-// Robots a, b, ... with ids from 1 on, what they left, and the truth: a straight line each.
+// Robots a, b, ... with ids from 1 on, their results, and the truth: a straight line each.
 struct Team {
   TemporaryFolder folder;
   TeamPlan plan;
   std::vector<std::string> notes;
-  const Eigen::Vector3d shift = {0.2, -0.1, 0.1};  // of meshes in the team's frame
+  const Eigen::Vector3d shift = {0.2, -0.1, 0.1};  // shift of meshes in the team's frame
 
   explicit Team(int robots = 2) {
     plan.output = folder.path();
@@ -87,7 +87,7 @@ struct Team {
   }
 };
 
-// Robot a has done all that can be done, b failed without a word but its last ones.
+// Robot a has all results, b failed and left only its last words.
 struct HalfTeam : Team {
   RunSummary summary = summary_with(1, {1, 7});
 
@@ -138,7 +138,7 @@ TEST_CASE("The tables show results, failures and last words, in 120 columns", "[
   }
 }
 
-TEST_CASE("A robot that left nothing is told of by its last words only", "[team]") {
+TEST_CASE("A robot without results is reported by its last words only", "[team]") {
   TeamResult team = HalfTeam().collect();
   CHECK_THAT(to_table(team), !Contains("no such file"));
   team.robots[0].summary.reset();
@@ -146,7 +146,7 @@ TEST_CASE("A robot that left nothing is told of by its last words only", "[team]
   CHECK(to_table(team) == "a, b failed, exit code 1; their last words:\n  no such key\n");
 }
 
-TEST_CASE("A robot that skipped many frames is told of", "[team]") {
+TEST_CASE("A robot that skipped many frames is reported", "[team]") {
   TeamResult team = HalfTeam().collect();
   CHECK_THAT(to_table(team), !Contains("of its frames"));
   team.robots[0].summary->frames = 20;
@@ -183,7 +183,7 @@ TEST_CASE("Robots outside the team's frame are found and noted", "[team]") {
   };
   auto robots = ended({summary_with(0, {0}), summary_with(1, {1, 2}), summary_with(1, {1, 2}),
                        summary_with(0, {})});
-  robots.emplace_back();  // without a summary nobody knows
+  robots.emplace_back();  // the frame is unknown without a summary
   find_team_frame(robots);
   CHECK_FALSE(robots[0].in_team_frame);
   CHECK(robots[1].in_team_frame);

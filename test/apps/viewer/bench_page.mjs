@@ -1,4 +1,5 @@
-// What the page takes: opens it on a synthetic run of three robots with as many faces as asked for.
+// Resource use of the page: opens it on a synthetic run of three robots with the given number of
+// faces.
 //   node bench_page.mjs VIEWER [FACES [OPTION of the viewer]...]      default 2000000
 import {mkdirSync, mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
@@ -69,7 +70,7 @@ try {
   const heap = await page.send('Runtime.getHeapUsage');
   console.log(`memory: heap ${(heap.usedSize / 1e6).toFixed(0)} MB, arrays ${
       ((heap.backingStorageSize ?? 0) / 1e6).toFixed(0)} MB`);
-  // From one frame to the next with the eye turning; the pixel that is read waits for the drawing.
+  // Time from one frame to the next while the camera turns; reading a pixel waits for the drawing.
   const times = await page.evaluate(`new Promise((done) => {
     const times = [], pixel = new Uint8Array(4), {scene} = kimera, gl = scene.renderer.getContext();
     let last = 0;
@@ -86,7 +87,7 @@ try {
   })`);
   console.log(`frame: median ${percentile(times, 0.5).toFixed(0)} ms, p95 ${
       percentile(times, 0.95).toFixed(0)} ms (no graphics processor)`);
-  // What the page itself takes of a frame: the calls without the drawing.
+  // Time of the page itself in a frame: the calls without the drawing.
   const own = await page.evaluate(`(() => {
     const times = [], {scene} = kimera, {renderer} = scene, gl = renderer.getContext();
     scene.onDrawn = undefined;

@@ -55,7 +55,7 @@ export class Browser {
     return new Promise((done, failed) => this.waiting.set(id, [done, failed, method]));
   }
 
-  /** A new page of that size, with what it complains of in `errors`. */
+  /** A new page of that size; `errors` has its error messages. */
   async open(url, width = 1440, height = 900) {
     const {targetId} = await this.send('Target.createTarget', {url: 'about:blank'});
     const {sessionId} = await this.send('Target.attachToTarget', {targetId, flatten: true});
@@ -116,7 +116,7 @@ class Page {
     while (Date.now() < end) {
       const value =
           this.evaluate(`(() => { try { return !!(${expression}); } catch { return false; } })()`);
-      if (await value.catch(() => false)) return;  // between two pages nothing can be asked
+      if (await value.catch(() => false)) return;  // between two pages there is no page to query
       await pause(0.1);
     }
     throw new Error(`after ${seconds} s it is not so: ${expression}; the page says: ${

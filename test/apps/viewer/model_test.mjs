@@ -1,4 +1,4 @@
-// What the page makes of what it is told, without a browser.
+// The page's model of received messages, without a browser.
 import assert from 'node:assert/strict';
 import {readFileSync} from 'node:fs';
 

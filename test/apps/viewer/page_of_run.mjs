@@ -1,4 +1,4 @@
-// Opens the page on a finished run and compares what it knows with what the robots left.
+// Opens the page on a finished run and compares its state with the results of the robots.
 //   node page_of_run.mjs VIEWER RESULTS [FOLDER for screenshots]
 import assert from 'node:assert/strict';
 import {mkdirSync} from 'node:fs';
@@ -21,7 +21,7 @@ try {
   const shoot = (name) => shots && page.screenshot(join(shots, `${name}.png`));
   await page.until('kimera.ready');
 
-  // The end: as the files say.
+  // The end: as in the files.
   const robots = await page.evaluate('kimera.robots');
   assert.deepEqual(
       robots.map((r) => [r.id, r.name, r.keyframes]),
@@ -43,7 +43,7 @@ try {
   assert.equal(await page.evaluate('kimera.frames.length'), anchors.size);
   await shoot('finished');
 
-  // The past: apart first, and nothing of the future; then the end again.
+  // The past: separate frames first, and no later messages; then the end again.
   const end = await page.evaluate('kimera.end');
   const joined = await page.evaluate(`Math.min(...[...kimera.model.robots.values()].flatMap((r) =>
     r.log.filter((m) => m.optimized && m.anchor !== r.id).map((m) => m.t)), Infinity)`);

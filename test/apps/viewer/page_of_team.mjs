@@ -1,6 +1,6 @@
-// Opens the page on a team that runs, started by apps/demo --view: apart, joined, in the past while
-// the run goes on, closed and opened again, a camera image, and the end, which is compared with what
-// the robots left.
+// Opens the page on a running team, which apps/demo --view starts. Checks the page before and after
+// robots join, and in the past while the run continues. Then closes and opens it again, and
+// requests a camera image. The end is compared with the results of the robots.
 //   node page_of_team.mjs PROGRAMS RESULTS [FOLDER for screenshots [argument of the demo]...]
 import assert from 'node:assert/strict';
 import {spawn} from 'node:child_process';
@@ -14,7 +14,7 @@ import {facesOfMeshes, readStages} from './run_files.mjs';
 const [programs, results, shots, ...rest] = process.argv.slice(2);
 if (shots) mkdirSync(shots, {recursive: true});
 
-// What it prints goes on to who started this.
+// Passes the output of the demo to the output of this program.
 class Demo {
   constructor() {
     const args = [...rest, '--view', '--programs', programs, '--output', results];
@@ -35,11 +35,11 @@ class Demo {
       throw new Error(`the demo ended with ${code}, and had not said ${pattern}`);
     });
     const first = Promise.race([said, ended]);
-    first.catch(() => {});  // who waits for it is told nevertheless
+    first.catch(() => {});  // every caller that waits for it still gets the error
     return first;
   }
 
-  /** Ends it and what it started, as Ctrl-C does. */
+  /** Ends the demo and its processes, as Ctrl-C does. */
   stop() {
     process.kill(-this.process.pid, 'SIGINT');
     return this.ended;
@@ -60,7 +60,7 @@ try {
   let page = await open();
   const shoot = (name) => shots && page.screenshot(join(shots, `${name}.png`));
 
-  // Each in a frame of its own, and what one of them sees.
+  // Each robot has a frame of its own; the camera image of one of them.
   await page.until(`${all('r.keyframes > 1')} && kimera.frames.every((f) => f.length === 1)`, 120);
   const apart = await page.evaluate(
       '({time: kimera.time, frames: kimera.frames, start: kimera.model.start_ms})');
@@ -70,7 +70,7 @@ try {
   await shoot('apart');
   await page.clickAt('#camera button');
 
-  // Back while it goes on, and to the present again.
+  // Goes back while the run continues, and to the present again.
   await page.until(`kimera.end > ${apart.time + 2}`);
   await page.clickAt('#slider', apart.time / (await page.evaluate('kimera.end')));
   const shown = async () => {
@@ -87,7 +87,7 @@ try {
   await page.clickAt('#live');
   await page.until(`kimera.time > ${end + 1} && kimera.time === kimera.end`);
 
-  // Closed and opened again: it knows the past.
+  // Closed and opened again: the page has the past.
   await page.close();
   page = await open();
   await page.until('kimera.ready');
@@ -98,7 +98,7 @@ try {
   await page.until(`${all('r.keyframes > 1')} && kimera.frames.length === 1 && kimera.ready`, 120);
   await shoot('joined');
 
-  // The end: as the robots left it.
+  // The final state is that of the robots' results.
   await demo.finished;
   await page.until(all(`r.phase === 'leaving'`));
   const team = JSON.parse(readFileSync(join(results, 'team.json')));
@@ -107,7 +107,8 @@ try {
   assert.deepEqual(
       await page.evaluate('kimera.robots.map((r) => [r.id, r.name, r.keyframes])'),
       team.robots.map((r) => [r.robot, r.name, r.keyframes]));
-  // Both ends judge a closure: the page has who spoke last, the files who found it.
+  // Both robots judge a closure: the page has the newest verdict, the files that of the robot that
+  // found it.
   const kept = new Set(
       [...readStages(results, team.robots)].filter(([, stage]) => stage === 'inlier').map(([pair]) => pair));
   const known = await page.evaluate(`[...kimera.model.closures()].filter(
@@ -115,7 +116,7 @@ try {
   const agreed = known.filter((pair) => kept.has(pair)).length;
   console.log(`kept: ${known.length} in the page, ${kept.size} in the files, ${agreed} in both`);
   assert.ok(agreed > 0 && agreed >= 0.9 * Math.max(known.length, kept.size));
-  // The last correction of a large mesh is not told to its end.
+  // The last correction of a large mesh is not sent completely.
   const faces = facesOfMeshes(results, team.robots), told = await page.evaluate('kimera.faces');
   console.log(`faces: ${told} in the page, ${faces} in the files`);
   assert.ok(Math.abs(told - faces) <= 0.01 * faces);

@@ -1,4 +1,4 @@
-// What robots left in a folder of results.
+// Results of robots in a results folder.
 import {existsSync, readdirSync, readFileSync} from 'node:fs';
 import {join} from 'node:path';
 
@@ -22,7 +22,7 @@ export const pairOf = (...ends) => ends.sort((a, b) => {
   return r0 - r1 || k0 - k1;
 }).join(' ');
 
-/** How far each pair of keyframes in any robot's loop_closures.csv came: a stage by pair. */
+/** The largest stage in any robot's loop_closures.csv, by pair of keyframes. */
 export function readStages(folder, robots) {
   const stages = new Map();
   for (const {name} of robots) {
@@ -39,7 +39,7 @@ export function readStages(folder, robots) {
 /** Faces of all robots' meshes. */
 export const facesOf = (robots) => sum(robots.map((robot) => robot.mapping?.faces ?? 0));
 
-/** Of the corrected meshes themselves, by the heads of their files. */
+/** Faces of the corrected meshes, by the heads of their files. */
 export function facesOfMeshes(folder, robots) {
   const files = robots.map(({name}) => join(folder, name, 'mesh_optimized.ply')).filter(existsSync);
   return sum(files.map(

@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// The results of two robots on a line, 10 s long: keyframes at 0, 4 and 8 s; they join by the
-/// closure of keyframes 0:0 and 1:1, half a second after the latter.
+/// The results of two robots on a line, 10 s long: keyframes at 0, 4 and 8 s. The robots join by
+/// the closure of keyframes 0:0 and 1:1, half a second after the latter.
 class SmallRun {
  public:
   SmallRun() {

@@ -24,7 +24,7 @@ DdsConfig loopback(int domain) {
   return config;
 }
 
-TEST_CASE("What robots of a domain tell is shown in the page, and recorded", "[viewer]") {
+TEST_CASE("Messages of the robots of a domain are shown in the page, and recorded", "[viewer]") {
   const TemporaryFolder folder;
   const std::filesystem::path record = folder.path() / "team.mcap";
   const int domain = random_domain();
@@ -58,7 +58,7 @@ TEST_CASE("What robots of a domain tell is shown in the page, and recorded", "[v
   CHECK(to_string(reader.report()) == "");
 }
 
-TEST_CASE("A viewer of a team says how robots are started so that it shows them", "[viewer]") {
+TEST_CASE("A viewer of a team prints how to start robots so that it shows them", "[viewer]") {
   Process viewer({"sh", "-c",
                   "exec " KM_BIN_DIR "/kimera_multi_viewer --interface lo --port 0 --domain " +
                       std::to_string(random_domain()) + " 2>&1"});

@@ -12,7 +12,7 @@ namespace {
 
 const std::string kViewer = KM_BIN_DIR "/kimera_multi_viewer";
 
-TEST_CASE("The page knows what the files of a run say, at any time of it", "[page]") {
+TEST_CASE("The page has the content of the files of a run, at any time of the run", "[page]") {
   if (const std::string why = missing_page_program(); !why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;
@@ -40,7 +40,7 @@ TEST_CASE("The page follows a team that runs, shows its past, and knows how it e
   CHECK(result.exit_code == 0);
 }
 
-TEST_CASE("The page's model keeps all that was told, by its time", "[page]") {
+TEST_CASE("The page's model keeps all messages by their time", "[page]") {
   if (run_command("node --version").exit_code != 0) {
     std::cout << "SKIPPED: no node (apt-get install nodejs)\n";
     return;
@@ -50,7 +50,7 @@ TEST_CASE("The page's model keeps all that was told, by its time", "[page]") {
   CHECK(result.exit_code == 0);
 }
 
-TEST_CASE("The viewer refuses what it cannot use", "[viewer]") {
+TEST_CASE("The viewer refuses unusable input", "[viewer]") {
   const TemporaryFolder empty;
   const auto result = run_command(kViewer + ' ' + empty.path().string());
   CHECK(result.exit_code == 1);

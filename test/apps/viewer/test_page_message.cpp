@@ -16,7 +16,7 @@ json text_of(const ViewUpdate& update) {
   return json::parse(message.bytes);
 }
 
-// The object of a binary message, and what is behind it.
+// The object of a binary message, and the data behind it.
 std::pair<json, std::string> parts_of(const PageMessage& message) {
   REQUIRE(message.binary);
   std::uint32_t length = 0;
@@ -25,7 +25,7 @@ std::pair<json, std::string> parts_of(const PageMessage& message) {
   return {json::parse(message.bytes.substr(4, length)), message.bytes.substr(4 + length)};
 }
 
-TEST_CASE("A state is told under its members' names", "[page_message]") {
+TEST_CASE("A state is sent with its members' names", "[page_message]") {
   ViewState state;
   state.name =
       "ro\xff"
@@ -42,7 +42,7 @@ TEST_CASE("A state is told under its members' names", "[page_message]") {
   CHECK(told["kind"] == "state");
   CHECK(told["name"] ==
         "ro\xEF\xBF\xBD"
-        "bot");  // no UTF-8 is replaced, not fatal
+        "bot");  // invalid UTF-8 is replaced and not fatal
   CHECK(told["keyframes"] == 7);
   CHECK(told["links"] == json::parse("[[3, 1.25]]"));
   CHECK(told["sent_bytes"] == json::parse(R"({"pgo": 1234.0})"));
@@ -58,13 +58,13 @@ TEST_CASE("Poses are position and quaternion, x first", "[page_message]") {
   CHECK(told["T_world_kf"] == json::parse("[[1, 2, -3, 0, 0, 0.6, 0.8]]"));
 }
 
-TEST_CASE("A closure is told with its verdict and why", "[page_message]") {
+TEST_CASE("A closure is sent with its verdict and the reason", "[page_message]") {
   const ViewClosure closure{closure_id({1, 2}, {0, 4}), ViewVerdict::kRejected, 30, 8, "too far"};
   CHECK(text_of({0, 1, 0, ViewClosures{{closure}}})["closures"] ==
         json::parse(R"([[0, 4, 1, 2, "rejected", 30, 8, "too far"]])"));
 }
 
-TEST_CASE("A mesh goes as its arrays, one behind the other", "[page_message]") {
+TEST_CASE("A mesh is sent as its arrays, one after the other", "[page_message]") {
   MeshChunk chunk{.key = {3, {-1, 0, 7}, 2}, .anchor = 1};
   chunk.offsets = {{1, 2, 3}, {4, 5, 6}, {7, 8, 65535}};
   chunk.labels = {9, 8, 7};
@@ -81,7 +81,7 @@ TEST_CASE("A mesh goes as its arrays, one behind the other", "[page_message]") {
   CHECK(data.substr(sizeof(numbers)) == "\x09\x08\x07");
 }
 
-TEST_CASE("An image goes behind its features", "[page_message]") {
+TEST_CASE("An image follows its features", "[page_message]") {
   const ViewImage image{0, {0xff, 0xd8}, {{1.5F, 2.5F}}};
   const auto [object, data] = parts_of(page_message({0, 1, 0, image}, 1));
   CHECK(object["features"] == 1);

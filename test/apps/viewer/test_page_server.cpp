@@ -27,7 +27,7 @@ int port_of(const PageServer& server) {
   return std::stoi(found[1]);
 }
 
-// What is below the address of a server.
+// Path and query of the address of a server.
 std::string path_of(const PageServer& server) {
   return server.url().substr(server.url().find('/', std::string("http://").size()));
 }
@@ -70,7 +70,7 @@ TEST_CASE("The page and all its parts are served from the program", "[page_serve
   CHECK(get(port, "/../apps/viewer/main.cpp").status >= 400);
 }
 
-TEST_CASE("Pages of other sites get nothing", "[page_server]") {
+TEST_CASE("Pages of other sites are refused", "[page_server]") {
   ViewStore store(1'000'000);
   const PageServer server(store, any_port());
   const int port = port_of(server);
@@ -85,7 +85,7 @@ TEST_CASE("Pages of other sites get nothing", "[page_server]") {
   CHECK(get(port, "/updates", upgrade + "Origin: http://evil.example\r\n").status == 0);
 }
 
-TEST_CASE("Beyond this host nothing is served without the token", "[page_server]") {
+TEST_CASE("Other hosts need the token", "[page_server]") {
   ViewStore store(1'000'000);
   PageServerOptions options = any_port();
   options.address = "0.0.0.0";
@@ -107,7 +107,7 @@ ViewUpdate state_of(const std::string& name) {
   return {3, 1, 0, state};
 }
 
-TEST_CASE("A page hears the greeting, the past, and what comes", "[page_server]") {
+TEST_CASE("A page receives the greeting, all past messages, and new ones", "[page_server]") {
   ViewStore store(1'000'000);
   store.add(state_of("early"));
   const PageServer server(store, any_port());
@@ -119,7 +119,7 @@ TEST_CASE("A page hears the greeting, the past, and what comes", "[page_server]"
   CHECK(page.hears(R"("name":"later")"));
 }
 
-TEST_CASE("A robot is asked for images as long as any page wants them", "[page_server]") {
+TEST_CASE("A robot is asked for images as long as any page requests them", "[page_server]") {
   ViewStore store(1'000'000);
   std::mutex mutex;
   std::condition_variable changed;

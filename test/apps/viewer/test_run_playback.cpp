@@ -8,7 +8,7 @@ namespace {
 
 constexpr Stamp kBegin = 1'000'000'000'000;
 
-// The updates of a kind that a robot told, with their time [s].
+// The updates of a kind from a robot, with their time [s].
 template <typename T>
 std::vector<std::pair<double, T>> told(const RunPlayback& run, RobotId robot) {
   std::vector<std::pair<double, T>> found;
@@ -19,7 +19,8 @@ std::vector<std::pair<double, T>> told(const RunPlayback& run, RobotId robot) {
   return found;
 }
 
-TEST_CASE("A run is told in the order of time, and as it ended in the end", "[run_playback]") {
+TEST_CASE("The updates of a run are in the order of time, and the last ones are its end",
+          "[run_playback]") {
   const SmallRun files;
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   CHECK(run.notes.empty());
@@ -37,7 +38,7 @@ TEST_CASE("A run is told in the order of time, and as it ended in the end", "[ru
   REQUIRE(last.links.size() == 1);
   CHECK(last.links[0].silent_s == Approx(6.0F));
   REQUIRE(last.sent_bytes.size() == 1);
-  CHECK(last.sent_bytes[0].value == 255.0);  // of which 55 again
+  CHECK(last.sent_bytes[0].value == 255.0);  // including 55 that were sent again
   REQUIRE(last.loads.size() == 1);
   CHECK(last.loads[0].value == Approx(0.25));
 }
@@ -62,7 +63,7 @@ TEST_CASE("Robots join with the first closure of theirs that was kept", "[run_pl
   CHECK(optimized_s == std::vector<double>{4.5, 8.0});
 }
 
-TEST_CASE("The mesh comes when the robot is near, and is another one once it joins",
+TEST_CASE("The mesh appears when the robot is near, and is replaced once the robot joins",
           "[run_playback]") {
   const SmallRun files;
   const auto chunks = told<MeshChunk>(read_run(files.folder.path(), kBegin), 1);
@@ -77,8 +78,7 @@ TEST_CASE("The mesh comes when the robot is near, and is another one once it joi
   CHECK(chunks[3].first == Approx(9.5).margin(0.11));
 }
 
-TEST_CASE("A closure is told when both keyframes are there, then what became of it",
-          "[run_playback]") {
+TEST_CASE("A closure appears when both keyframes exist, then with its outcome", "[run_playback]") {
   const SmallRun files;
   const auto closures = told<ViewClosures>(read_run(files.folder.path(), kBegin), 0);
   REQUIRE(closures.size() == 4);
@@ -93,7 +93,8 @@ TEST_CASE("A closure is told when both keyframes are there, then what became of 
   CHECK(closures[3].second.closures[0].reason == "no pose");
 }
 
-TEST_CASE("What a run lacks is noted, and what is no run refused", "[run_playback]") {
+TEST_CASE("Missing parts of a run are noted, and a folder without a run is refused",
+          "[run_playback]") {
   const SmallRun files;
   std::filesystem::remove(files.folder.path() / "r0/timing.csv");
   files.folder.write("r1/traffic.csv", "time_s\n1,out\n");

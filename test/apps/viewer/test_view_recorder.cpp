@@ -38,7 +38,7 @@ LabelPalette palette() {
   return LabelPalette({{.id = 5, .name = "wall", .color = {255, 0, 51}}});
 }
 
-// What two robots tell: `alice` goes along x, `bob` 2 m beside her, and both are in her frame.
+// Messages of two robots: `alice` moves along x, `bob` 2 m beside her, and both are in her frame.
 std::vector<ViewUpdate> team() {
   std::vector<ViewUpdate> all;
   for (const RobotId robot : {RobotId{0}, RobotId{1}}) {
@@ -84,7 +84,8 @@ struct Record {
 
 }  // namespace
 
-TEST_CASE("A viewer's record has what robots tell, each as its own record has it", "[viewer]") {
+TEST_CASE("A viewer's record has the messages of each robot as the robot's own record has them",
+          "[viewer]") {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "team.mcap";
   ViewRecorder recorder(file, palette());
@@ -153,7 +154,7 @@ TEST_CASE("A viewer's record is readable while it is written", "[viewer]") {
   CHECK(poses == 4);
 }
 
-TEST_CASE("A robot that was started again begins its path anew", "[viewer]") {
+TEST_CASE("A robot that was started again begins its path from scratch", "[viewer]") {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "team.mcap";
   ViewRecorder recorder(file, {});
@@ -167,7 +168,7 @@ TEST_CASE("A robot that was started again begins its path anew", "[viewer]") {
   CHECK(path.poses[0].pose.position.x() == 7.0);
 }
 
-TEST_CASE("Of a robot that has left or is silent a record says nothing more", "[viewer]") {
+TEST_CASE("After a robot has left or is silent, a record has no more of its messages", "[viewer]") {
   constexpr double kGone_s = 0.3;
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "team.mcap";
@@ -191,10 +192,10 @@ TEST_CASE("Of a robot that has left or is silent a record says nothing more", "[
   CHECK(told["alice"] >= 3);
   CHECK(told["bob"] <= 1);
   CHECK(told["carol"] == 0);
-  CHECK(record.count("/bob/closures") <= 2);  // with the path, and as they were told
+  CHECK(record.count("/bob/closures") <= 2);  // with the path, and as they were received
 }
 
-TEST_CASE("A record that cannot be written says so", "[viewer]") {
+TEST_CASE("A record that cannot be written throws an error", "[viewer]") {
   ViewRecorder recorder("/dev/full", {});
   for (const ViewUpdate& update : team()) recorder.add(update);
   CHECK_THROWS_WITH(recorder.finish(), Catch::Contains("/dev/full"));

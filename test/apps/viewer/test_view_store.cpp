@@ -35,7 +35,7 @@ std::vector<std::uint64_t> numbers(const ViewStore::Batch& batch) {
 
 using Numbers = std::vector<std::uint64_t>;
 
-TEST_CASE("A page is told everything in order, whenever it opens", "[view_store]") {
+TEST_CASE("A page receives everything in order, whenever it opens", "[view_store]") {
   ViewStore store(1'000'000);
   for (RobotId robot = 0; robot < 5; ++robot) store.add(pose(robot));
   ViewStore::Cursor early, late;
@@ -47,7 +47,7 @@ TEST_CASE("A page is told everything in order, whenever it opens", "[view_store]
   CHECK(numbers(store.take(late, 1'000'000, 0.0)) == Numbers{0, 1, 2, 3, 4, 5});
 }
 
-TEST_CASE("What a page is told in one go is bounded", "[view_store]") {
+TEST_CASE("The size of a batch of messages for a page is bounded", "[view_store]") {
   ViewStore store(1'000'000);
   for (int i = 0; i < 4; ++i) store.add(image(0, 1000));
   ViewStore::Cursor cursor;
@@ -66,7 +66,7 @@ TEST_CASE("Beyond the limit images of the past go first, then replaced meshes", 
   store.add(image(0, 3001));  // 3
   CHECK(store.size().forgotten == 0);
   static_cast<void>(store.take(page, 1'000'000, 0.0));
-  store.add(image(1, 2000));  // 4: of another robot, its newest
+  store.add(image(1, 2000));  // newest image of another robot
   const ViewStore::Batch batch = store.take(page, 1'000'000, 0.0);
   CHECK(batch.forgotten == Numbers{1});
   CHECK(numbers(batch) == Numbers{4});
@@ -78,19 +78,19 @@ TEST_CASE("Beyond the limit images of the past go first, then replaced meshes", 
   CHECK(all.forgotten.empty());  // it never had those
 }
 
-TEST_CASE("What counts now stays, and what then has no room is refused", "[view_store]") {
+TEST_CASE("Present states are kept, and new messages without room are refused", "[view_store]") {
   ViewStore store(5000);
   store.add(chunk(0, 300));
   store.add(chunk(1, 300));  // replaces nothing
   store.add(chunk(2, 300));
   CHECK(store.size().refused == 1);
   CHECK(store.size().bytes <= 5000);
-  store.add(chunk(2, 10));  // for the one refused
+  store.add(chunk(2, 10));  // takes the room of the refused one
   ViewStore::Cursor page;
   CHECK(numbers(store.take(page, 1'000'000, 0.0)) == Numbers{0, 1, 3});
 }
 
-TEST_CASE("What an ended process of a robot told counts no more", "[view_store]") {
+TEST_CASE("Messages of an ended process of a robot no longer count", "[view_store]") {
   ViewStore store(5000);
   store.add(chunk(0, 300));
   store.add(chunk(1, 300));
@@ -99,7 +99,7 @@ TEST_CASE("What an ended process of a robot told counts no more", "[view_store]"
   CHECK(store.size().forgotten == 1);
 }
 
-TEST_CASE("What is told again as it was is told to pages once", "[view_store]") {
+TEST_CASE("A message that is repeated without a change reaches pages once", "[view_store]") {
   ViewStore store(1'000'000);
   const auto closures = [](ViewVerdict first, ViewVerdict second) {
     return ViewUpdate{
@@ -123,7 +123,7 @@ TEST_CASE("What is told again as it was is told to pages once", "[view_store]") 
   store.add(chunk(0, 11));                    // 5
   store.add(keyframes(2.0));                  // 6
   store.add(closures(kVerified, kRejected));  // 7: its second
-  store.add(chunk(0, 11, 2));                 // 8: of another process
+  store.add(chunk(0, 11, 2));                 // from another process
   ViewStore::Cursor page;
   const ViewStore::Batch all = store.take(page, 1'000'000, 0.0);
   CHECK(numbers(all) == Numbers{0, 1, 2, 3, 4, 5, 6, 7, 8});
@@ -131,7 +131,7 @@ TEST_CASE("What is told again as it was is told to pages once", "[view_store]") 
   CHECK(all.messages[7]->bytes.find("rejected") != std::string::npos);
 }
 
-TEST_CASE("A page waits for what comes", "[view_store]") {
+TEST_CASE("A page waits for new messages", "[view_store]") {
   ViewStore store(5000);
   std::jthread teller([&] { store.add(pose(3)); });
   ViewStore::Cursor page;

@@ -1,4 +1,4 @@
-// Opens the page of test_chart_page.cpp and looks at what its charts show.
+// Opens the page of test_chart_page.cpp and checks the content of its charts.
 //   node charts_in_browser.mjs PAGE [SCREENSHOT]
 import assert from 'node:assert/strict';
 import {readFileSync} from 'node:fs';
@@ -12,7 +12,7 @@ try {
   const page = await browser.open(pathToFileURL(file).href, 800, 2600);
   await page.until('document.body.dataset.ready');
   if (shot) await page.screenshot(shot);
-  // Of the n-th chart: attributes of its elements, and all its text.
+  // Attributes of the elements of the n-th chart, and all its text.
   const all = (n, where, name) => page.evaluate(`[...document.querySelectorAll('.chart')[${
       n}].querySelectorAll('${where}')].map((e) => e.getAttribute('${name}'))`);
   const texts = (n, where) => page.evaluate(`[...document.querySelectorAll('.chart')[${
@@ -20,11 +20,11 @@ try {
   const points = (d) => d.split(/[MLh]/).filter((p) => p).map((p) => p.split(' ').map(Number));
   const LINES = 'svg path', LABELS = 'svg text', BARS = 'svg rect', MARKS = 'svg circle';
 
-  // Text is text.
+  // Text of plots is shown as text.
   assert.deepEqual(await texts(0, '.chart-title'), ['a < b & <i>m']);
   assert.deepEqual(await texts(0, '.chart-key:not(.chart-save)'), ['</svg>', 'marks']);
 
-  // A point that is not finite parts a line; x is tight, y begins at 0 and has some air above.
+  // A point that is not finite interrupts a line. The x axis is tight; y begins at 0 with a margin.
   const [line] = await all(0, LINES, 'd');
   assert.match(line, /^M[^ML]*L[^ML]*M[^ML]*L[^ML]*$/);
   const [a, b, , d] = points(line);
@@ -34,7 +34,7 @@ try {
       await texts(0, LABELS), ['0', '1', '2', '3', '4', '0', '2', '4', '6', '8', '10', 'rounds']);
   assert.equal((await all(0, MARKS, 'cx')).length, 1);
 
-  // What has no logarithm parts a line, too; all decades are there.
+  // A value without a logarithm interrupts a line too; all decades are there.
   const decades = await all(1, LINES, 'd');
   assert.match(decades[0], /^M[^ML]*M[^ML]*L[^ML]*$/);
   const labels = await texts(1, LABELS);
@@ -42,7 +42,7 @@ try {
   assert.equal(points(decades[1])[0][1], points(decades[1])[1][1]);
   assert.equal((decades[2].match(/h0/g)).length, 2);
 
-  // A name is once in the legend, for its line and its dots.
+  // A name has one entry in the legend for its line and its dots.
   assert.deepEqual(await texts(1, '.chart-key:not(.chart-save)'), ['a', 'b']);
   const pressB = `[...document.querySelectorAll('.chart')[1].querySelectorAll('.chart-key')].find(
       (key) => key.textContent === 'b').click()`;
@@ -50,7 +50,7 @@ try {
   assert.equal((await all(1, LINES, 'd')).length, 1);
   await page.evaluate(pressB);
 
-  // A bar is as long as its value, which stands behind it; what is not known has none.
+  // The length of a bar is its value, shown beside it; an unknown value has no bar.
   const lengths = (await all(2, BARS, 'width')).map(Number);
   assert.equal(lengths.length, 3);
   assert.ok(Math.abs(lengths[1] / lengths[0] - 0.5) < 2e-3);
@@ -62,7 +62,7 @@ try {
   assert.ok(Math.abs((to[0] - from[0]) / (from[1] - to[1]) - 5) < 0.01);
   assert.deepEqual(await texts(3, '.chart-key:not(.chart-zoom, .chart-save)'), []);
 
-  // Charts without anything to draw, and of one point, are charts.
+  // A chart without points, or with one point, is drawn.
   for (const n of [4, 5, 6]) {
     assert.ok((await texts(n, LABELS)).length >= 2);
     const drawn = await page.evaluate(
@@ -71,13 +71,13 @@ try {
   }
   assert.equal((await all(6, MARKS, 'cx')).length, 1);
 
-  // Values under the pointer.
+  // Values are shown at the pointer.
   const box = await page.evaluate(`(() => { const b = document.querySelector('.chart svg')
       .getBoundingClientRect(); return [b.x, b.y, b.width]; })()`);
   await page.hover(box[0] + box[2] - 15, box[1] + 60);
   assert.deepEqual(await texts(0, '.chart-tip'), ['10</svg>4marks–']);
 
-  // Time has marks, wherever it begins.
+  // A time axis has marks at any first time.
   const module = readFileSync('modules/charts/page/charts.js').toString('base64');
   const marks = await page.evaluate(`(async () => {
       const charts = await import('data:text/javascript;base64,${module}');
@@ -88,7 +88,7 @@ try {
       return [...host.querySelectorAll('text')].map((e) => e.textContent).slice(-3); })()`);
   assert.deepEqual(marks, ['0:02', '0:04', '0:06']);
 
-  // As a picture of its own: XML, with names, in colours that need no page.
+  // A saved picture is XML, with names, in colours that need no page.
   await page.evaluate(`URL.createObjectURL = (blob) => { window.saved = blob.text(); return 'x:'; };
       HTMLAnchorElement.prototype.click = function() { window.savedAs = this.download; };
       document.querySelector('.chart-save').click()`);

@@ -23,7 +23,7 @@ Json points_of(const Plot& plot) {
   return Json(plot)["series"][0]["points"];
 }
 
-TEST_CASE("A plot is told with all that it shows", "[charts]") {
+TEST_CASE("A plot is written to JSON with all its properties", "[charts]") {
   const Plot plot{
       .title = "t",
       .x_label = "x",
@@ -43,12 +43,12 @@ TEST_CASE("A plot is told with all that it shows", "[charts]") {
       {"name": "d", "colour": 0, "style": "line", "width": 1.6, "points": []}]})"));
 }
 
-TEST_CASE("Numbers have six digits, what is not finite is null", "[charts]") {
+TEST_CASE("Numbers have six digits and a number that is not finite is null", "[charts]") {
   const Plot plot{.series = {{.points = {{1.0 / 3.0, 123456789.0}, {kNan, 1e-7}, {2, INFINITY}}}}};
   CHECK(points_of(plot).dump() == "[[0.333333,123457000.0],[null,1e-07],[2.0,null]]");
 }
 
-TEST_CASE("Of a map what no screen shows is left out, of lines nothing", "[charts]") {
+TEST_CASE("Points too close for a screen are dropped in maps but not in lines", "[charts]") {
   Plot plot{.series = {{.points = {}}}};
   for (int i = 0; i <= 100000; ++i) plot.series[0].points.push_back({1e-3 * i, 0.0});
   CHECK(points_of(plot).size() == 100001);
@@ -65,7 +65,7 @@ TEST_CASE("A map without extent keeps its points", "[charts]") {
   CHECK(points_of(plot).size() == 3);
 }
 
-TEST_CASE("No text of a plot gets out of its place in the page", "[charts]") {
+TEST_CASE("No text of a plot can leave its place in the page", "[charts]") {
   const std::string page = chart_page(
       kHostileText,
       {{.title = kHostileText, .series = {{.name = kHostileText}, {.name = "no UTF-8: \xff"}}}});
@@ -81,18 +81,18 @@ TEST_CASE("A page of charts needs no other file and no network", "[charts]") {
   CHECK(references_of_page(chart_page("t", {Plot{}})) == 0);
 }
 
-TEST_CASE("Bytes stand in a page as RFC 4648 has them", "[charts]") {
+TEST_CASE("Bytes are encoded in a page as in RFC 4648", "[charts]") {
   const auto [bytes, text] = GENERATE(table<std::string, std::string>(
       {{"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob\xff", "Zm9vYv8="}}));
   CHECK(data_uri("image/png", bytes) == "data:image/png;base64," + text);
 }
 
-TEST_CASE("A file that no page has is asked for by mistake", "[charts]") {
+TEST_CASE("A request for a file that no page has is an error", "[charts]") {
   CHECK_FALSE(page_file(chart_files(), "charts.js").empty());
   CHECK_THROWS_AS(page_file(chart_files(), "carts.js"), std::logic_error);
 }
 
-// What charts_in_browser.mjs looks at, in this order.
+// The plots that charts_in_browser.mjs examines, in this order.
 std::vector<Plot> plots_to_look_at() {
   return {
       {.title = "a < b & <i>",
@@ -122,7 +122,7 @@ std::vector<Plot> plots_to_look_at() {
       {.title = "one point", .series = {{.points = {{0, -3}}, .style = Style::kMarkedLine}}}};
 }
 
-TEST_CASE("Charts show in a browser what their plots say", "[charts]") {
+TEST_CASE("Charts in a browser show the content of their plots", "[charts]") {
   if (const std::string why = missing_page_program(); !why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;

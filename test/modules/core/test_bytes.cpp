@@ -12,7 +12,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-TEST_CASE("Bytes: hashed eight at a time they give FNV-1a, the last ones filled up with zeros",
+TEST_CASE("Bytes: hashing eight at a time gives FNV-1a with the last ones padded by zeros",
           "[core]") {
   const auto hash_of = [](const Bytes& bytes) {
     std::uint64_t hash = kFnv1aBasis;
@@ -29,7 +29,7 @@ TEST_CASE("Bytes: hashed eight at a time they give FNV-1a, the last ones filled 
   CHECK(hash_of(filled) == hash_of(odd));
 }
 
-TEST_CASE("Bytes: every number comes back as it was", "[core]") {
+TEST_CASE("Bytes: every number is read back unchanged", "[core]") {
   ByteWriter out;
   out.u8(0xAB);
   out.u16(0xBEEF);
@@ -64,7 +64,7 @@ TEST_CASE("Bytes: the least significant byte comes first", "[core]") {
   CHECK(out.release() == Bytes{4, 3, 2, 1, 0, 0, 0x80, 0x3F});
 }
 
-TEST_CASE("Bytes: a varint takes as many bytes as it needs and one form only", "[core]") {
+TEST_CASE("Bytes: a varint has as many bytes as necessary and one form only", "[core]") {
   const auto [value, size] = GENERATE(
       table<std::uint64_t, std::size_t>({{0, 1},
                                          {127, 1},
@@ -83,7 +83,7 @@ TEST_CASE("Bytes: a varint takes as many bytes as it needs and one form only", "
   CHECK(in.done());
 
   if (value > 0) CHECK((ByteReader(bytes).varint(value - 1) == 0));
-  bytes.back() |= 0x80U;  // the same number with a zero behind it
+  bytes.back() |= 0x80U;  // the same number followed by a zero
   bytes.push_back(0);
   ByteReader padded(bytes);
   CHECK(padded.varint() == 0);
@@ -114,7 +114,7 @@ TEST_CASE("Bytes: a failed reader gives zeros and stays failed", "[core]") {
   CHECK_FALSE(in.done());
 }
 
-TEST_CASE("Bytes: counts that cannot fit in what is left are refused", "[core]") {
+TEST_CASE("Bytes: counts that exceed the remaining bytes are refused", "[core]") {
   ByteWriter out;
   out.varint(3);
   for (int k = 0; k < 11; ++k) out.u8(0);
@@ -130,7 +130,7 @@ TEST_CASE("Bytes: counts that cannot fit in what is left are refused", "[core]")
   CHECK(in.failed());
 }
 
-// Reads whatever comes by a fixed pattern; with address sanitising, a read past the end ends this.
+// Reads bytes in a fixed pattern; the address sanitiser detects a read past the end.
 std::uint64_t read_all(const Bytes& bytes) {
   ByteReader in(bytes);
   std::uint64_t sum = 0;
@@ -141,7 +141,7 @@ std::uint64_t read_all(const Bytes& bytes) {
   return in.done() ? sum : 0;
 }
 
-TEST_CASE("Bytes: what is cut or changed is read to its end and no further", "[core]") {
+TEST_CASE("Bytes: truncated or changed input is read to its end and no further", "[core]") {
   ByteWriter out;
   out.varint(20);
   for (std::uint16_t k = 0; k < 20; ++k) out.u16(k);

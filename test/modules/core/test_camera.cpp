@@ -35,12 +35,12 @@ TEST_CASE("Without distortion a bearing is linear in the pixel", "[core]") {
   CHECK((*bearing - Eigen::Vector2d(1, 0)).norm() < 1e-12);
 }
 
-TEST_CASE("A pixel that no bearing maps to has no bearing", "[core]") {
+TEST_CASE("A pixel without a bearing has none", "[core]") {
   CHECK_FALSE(euroc_left().unproject({1e6, 1e6}).has_value());
   CHECK_FALSE(euroc_left().unproject({std::nan(""), 100.0}).has_value());
 }
 
-TEST_CASE("What is not in front of a camera has no pixel", "[core]") {
+TEST_CASE("A ray that does not point forward has no pixel", "[core]") {
   const Camera camera = euroc_left();
   CHECK(camera.project_ray({0.2, -0.1, 2.0}) == camera.project({0.1, -0.05}));
   CHECK_FALSE(camera.project_ray({0.1, -0.05, 0.0}).has_value());

@@ -15,7 +15,7 @@ CameraCalibration some_calibration(std::mt19937& rng) {
   return calibration;
 }
 
-TEST_CASE("A calibration has moved by what it was moved by", "[calibration]") {
+TEST_CASE("The offset to a moved calibration is its motion", "[calibration]") {
   std::mt19937 rng(1);
   const CameraCalibration calibration = some_calibration(rng);
   const Vector7 delta = 0.1 * random_vector<7>(rng);
@@ -23,7 +23,7 @@ TEST_CASE("A calibration has moved by what it was moved by", "[calibration]") {
   CHECK(calibration.offset_to(calibration).norm() < 1e-12);
 }
 
-TEST_CASE("What is found on top of a correction moves cameras as both in turn", "[calibration]") {
+TEST_CASE("A calibration on top of a correction moves cameras like both in turn", "[calibration]") {
   std::mt19937 rng(2);
   const CameraCalibration correction = some_calibration(rng), found = some_calibration(rng);
   StereoRig in_turn, at_once;
@@ -37,7 +37,7 @@ TEST_CASE("What is found on top of a correction moves cameras as both in turn", 
     CHECK(in_turn.cameras[c].T_body_cam.isApprox(at_once.cameras[c].T_body_cam));
   CHECK(both.offset_s == Approx(found.offset_s + correction.offset_s));
   CHECK(found.offset_to(both.without(correction)).norm() < 1e-12);
-  // One covariance is that of both.
+  // Both have the same covariance.
   const Vector7 delta = 0.1 * random_vector<7>(rng);
   CHECK((both.offset_to(found.moved(delta).on_top_of(correction)) - delta).norm() < 1e-12);
 }

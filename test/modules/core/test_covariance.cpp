@@ -11,7 +11,7 @@ namespace {
 
 TEST_CASE("The composed covariance is that of sampled products", "[core]") {
   std::mt19937 rng(5);
-  const double sigma = 0.01;  // small: first-order propagation is then exact to a few per cent
+  const double sigma = 0.01;  // small, so that first-order propagation is exact to a few per cent
   const UncertainPose a{random_pose(rng, 2.0), random_covariance(rng, sigma)};
   const UncertainPose b{random_pose(rng, 2.0), random_covariance(rng, sigma)};
   const UncertainPose ab = compose(a, b);
@@ -28,7 +28,8 @@ TEST_CASE("The composed covariance is that of sampled products", "[core]") {
   CHECK((sampled - ab.Sigma).norm() < 0.05 * ab.Sigma.norm());
 }
 
-TEST_CASE("The covariance between two poses of a chain is what was composed between", "[core]") {
+TEST_CASE("The covariance between two poses of a chain is the one composed between them",
+          "[core]") {
   std::mt19937 rng(7);
   const UncertainPose a_b{random_pose(rng), random_covariance(rng, 0.1)};
   const UncertainPose b_c{random_pose(rng), random_covariance(rng, 0.2)};
@@ -37,7 +38,7 @@ TEST_CASE("The covariance between two poses of a chain is what was composed betw
   CHECK((found.T.matrix() - b_c.T.matrix()).norm() < 1e-12);
 }
 
-TEST_CASE("Inverting twice gives the pose and the covariance back", "[core]") {
+TEST_CASE("Inverting twice gives the original pose and covariance", "[core]") {
   std::mt19937 rng(9);
   const UncertainPose a{random_pose(rng), random_covariance(rng, 0.1)};
   const UncertainPose again = inverse(inverse(a));
@@ -45,7 +46,7 @@ TEST_CASE("Inverting twice gives the pose and the covariance back", "[core]") {
   CHECK((again.T.matrix() - a.T.matrix()).norm() < 1e-12);
 }
 
-TEST_CASE("Matrices that are no covariance are told apart", "[core]") {
+TEST_CASE("Matrices that are no covariance are refused", "[core]") {
   CHECK(is_covariance(Matrix6::Identity()));
   CHECK(is_covariance(Matrix6::Zero()));
   Matrix6 bad = Matrix6::Identity();
@@ -57,8 +58,7 @@ TEST_CASE("Matrices that are no covariance are told apart", "[core]") {
   CHECK_FALSE(is_covariance(bad));
 }
 
-TEST_CASE("Covariances of states are usable from the least to the most, and where invertible",
-          "[core]") {
+TEST_CASE("Covariances of states are usable within bounds and if invertible", "[core]") {
   for (const double variance : {1e-16, 1.0, 1e6})
     CHECK(is_usable(variance * StateCovariance::Identity()));
   for (const double variance : {-1.0, 0.0, 1e-17, 1e7, std::nan(""), HUGE_VAL})

@@ -12,17 +12,17 @@
 
 namespace km {
 
-TEST_CASE("The bytes of a file come as they are", "[core]") {
+TEST_CASE("The bytes of a file are read unchanged", "[core]") {
   const TemporaryFolder folder;
   const std::string bytes("a\0\r\n\xFF", 5);
   CHECK(read_input_file(folder.write("some", bytes)) == bytes);
   CHECK(read_input_file(folder.write("none", "")).empty());
   const std::string large(3'000'000, 'x');
   CHECK(read_input_file(folder.write("large", large)) == large);
-  CHECK(read_input_file("/proc/self/stat").size() > 10);  // of no size until it is read
+  CHECK(read_input_file("/proc/self/stat").size() > 10);  // has no size until it is read
 }
 
-TEST_CASE("What is no file is refused with what it is", "[core]") {
+TEST_CASE("A path that is not a file is refused with its kind", "[core]") {
   check_no_files<InputFileError>(".txt", [](const auto& file) { (void)read_input_file(file); });
   const TemporaryFolder folder;
   const auto places = no_files(folder, "");
@@ -44,7 +44,7 @@ TEST_CASE("A file beyond the limit is not read", "[core]") {
   const auto file = folder.write("some", "12345");
   CHECK(read_input_file(file, 5) == "12345");
   CHECK_THROWS_WITH(read_input_file(file, 4), Catch::Contains("some: larger than"));
-  std::filesystem::resize_file(file, std::uintmax_t{1} << 40U);  // a hole: takes no room
+  std::filesystem::resize_file(file, std::uintmax_t{1} << 40U);  // a hole needs no disk space
   CHECK_THROWS_WITH(read_input_file(file), Catch::Contains("larger than 8192 MiB"));
 }
 
@@ -54,14 +54,14 @@ TEST_CASE("Text in messages is printable and short", "[core]") {
   CHECK(readable("0123456789", 8) == "0123 ...");
 }
 
-TEST_CASE("Kind and permissions are those of the file that is read, not of its successor",
+TEST_CASE("Kind and permissions are those of the file that is read and not of its successor",
           "[core]") {
   namespace fs = std::filesystem;
   const TemporaryFolder folder;
   const fs::path name = folder.path() / "name";
   REQUIRE(mkfifo(name.c_str(), 0600) == 0);
   auto reading = std::async(std::launch::async, [&] { return open_input_file(name); });
-  std::ofstream writer(name);  // waits for the reader to have it open
+  std::ofstream writer(name);  // waits until the reader has opened it
   fs::rename(folder.write("successor", "another"), name);
   writer << "some";
   writer.close();

@@ -30,7 +30,7 @@ bool equal(const std::vector<LabelClass>& a, const std::vector<LabelClass>& b) {
 
 }  // namespace
 
-TEST_CASE("A palette finds its classes by id and by colour", "[core][palette]") {
+TEST_CASE("A palette returns its classes by id and by colour", "[core][palette]") {
   const LabelPalette palette({{7, "wall", {1, 2, 3}}, {0, "unknown", {0, 0, 0}}});
   REQUIRE(palette.classes().size() == 2);
   CHECK(palette.classes()[0].name == "unknown");
@@ -44,7 +44,7 @@ TEST_CASE("A palette finds its classes by id and by colour", "[core][palette]") 
   CHECK_FALSE(LabelPalette().id_of({0, 0, 0}));
 }
 
-TEST_CASE("Several colours under one id draw it in the first and mean it in all",
+TEST_CASE("The first of several colours of an id draws it and all of them mean it",
           "[core][palette]") {
   const LabelPalette palette = parse_label_palette(kHeader +
                                                        "furniture,10,20,30,255,4\n"
@@ -58,7 +58,7 @@ TEST_CASE("Several colours under one id draw it in the first and mean it in all"
   CHECK(palette.entries().size() == 2);
 }
 
-TEST_CASE("A palette refuses one colour for two ids and names no table can hold",
+TEST_CASE("A palette refuses one colour for two ids and names that no table can contain",
           "[core][palette]") {
   CHECK_THROWS_WITH(LabelPalette({{1, "wall", {9, 9, 9}}, {2, "floor", {9, 9, 9}}}),
                     Contains("9,9,9") && Contains("'floor'") && Contains("id 1 and id 2"));
@@ -86,7 +86,7 @@ TEST_CASE("A bad table is refused with its file, line and value", "[core][palett
           ":3: the colour 1,2,3 of 'floor' stands for id 5, but for id 4 in line 2");
 }
 
-TEST_CASE("A palette survives its CSV", "[core][palette]") {
+TEST_CASE("A palette is equal after writing and reading CSV", "[core][palette]") {
   const LabelPalette palette({{3, "two words", {0, 128, 255}},
                               {255, "Missing", {255, 255, 255}},
                               {3, "alias", {1, 1, 1}},
@@ -97,7 +97,7 @@ TEST_CASE("A palette survives its CSV", "[core][palette]") {
   CHECK(copy.id_of({1, 1, 1}) == LabelId{3});
 }
 
-TEST_CASE("Kimera-Semantics' tables are read, or refused for a reason", "[core][palette]") {
+TEST_CASE("Kimera-Semantics' tables are read or refused with a reason", "[core][palette]") {
   const auto folder = shared_data("semantics");
   if (!folder) return;
   int read_count = 0;
@@ -105,7 +105,7 @@ TEST_CASE("Kimera-Semantics' tables are read, or refused for a reason", "[core][
     const std::string name = file.path().filename().string();
     CAPTURE(name);
     const std::string text = read(file.path());
-    if (name == "mask_rcnn_mapping.csv") {  // names alone, no colours
+    if (name == "mask_rcnn_mapping.csv") {  // only names, no colours
       CHECK_THROWS_WITH(parse_label_palette(text, name), Contains(":2: 'BG' with 2 fields"));
     } else if (name == "tesse_multiscene_office2_segmentation_mapping.csv") {
       CHECK_THROWS_WITH(parse_label_palette(text, name), Contains("stands for id"));

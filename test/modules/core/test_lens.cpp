@@ -13,13 +13,14 @@
 namespace km {
 namespace {
 
-// As published: cam0 of EuRoC, of TUM-VI at 512 x 512 with Kannala-Brandt and double-sphere lens.
+// Published calibrations: cam0 of EuRoC, and of TUM-VI at 512 x 512 with Kannala-Brandt and
+// double-sphere lens.
 const Lens kEuroc(LensModel::kRadialTangential,
                   {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05});
 const Lens kTumVi(LensModel::kEquidistant, {0.0034823894022493434, 0.0007150348452162257,
                                             -0.0020532361418706202, 0.00020293673591811182});
 const Lens kTumViDoubleSphere(LensModel::kDoubleSphere, {-0.17213086034353243, 0.5931177593944744});
-// Of Kalibr's documentation.
+// From Kalibr's documentation.
 const Lens kOmni(LensModel::kOmnidirectional,
                  {0.80065662, -0.33518750, 0.13211436, 0.00055967, 0.00057686});
 const Lens kRational(LensModel::kRadialTangential,
@@ -56,7 +57,7 @@ std::vector<double> vector_of(std::span<const double> values) {
   return {values.begin(), values.end()};
 }
 
-// The image points that OpenCV gives, for a focal length of 1.
+// The image points from OpenCV, for a focal length of 1.
 std::vector<cv::Point2d> points_of_opencv(const Lens& lens,
                                           const std::vector<Eigen::Vector2d>& bearings) {
   std::vector<cv::Point3d> world;
@@ -78,7 +79,7 @@ std::vector<cv::Point2d> points_of_opencv(const Lens& lens,
   return points;
 }
 
-TEST_CASE("Lenses put bearings where OpenCV does", "[core][lens]") {
+TEST_CASE("Lenses map bearings like OpenCV", "[core][lens]") {
   const auto index = GENERATE(range(0, 8));
   CAPTURE(index);
   const Lens lens = all_lenses()[static_cast<std::size_t>(index)];
@@ -92,7 +93,7 @@ TEST_CASE("Lenses put bearings where OpenCV does", "[core][lens]") {
   }
 }
 
-TEST_CASE("An equidistant lens has the bearings that OpenCV finds", "[core][lens]") {
+TEST_CASE("An equidistant lens has the bearings of OpenCV", "[core][lens]") {
   const auto bearings = bearings_of(kTumVi);
   std::vector<cv::Point2d> points, found;
   for (const Eigen::Vector2d& b : bearings) {
@@ -103,22 +104,22 @@ TEST_CASE("An equidistant lens has the bearings that OpenCV finds", "[core][lens
   for (std::size_t i = 0; i < bearings.size(); ++i) {
     const Eigen::Vector2d mine = kTumVi.undistorted({points[i].x, points[i].y}).value();
     CAPTURE(bearings[i].transpose());
-    // OpenCV stops at 1e-8 rad, which the tangent magnifies 33-fold at 80 degrees.
+    // OpenCV stops at 1e-8 rad, which the tangent magnifies 33 times at 80 degrees.
     CHECK((mine - Eigen::Vector2d(found[i].x, found[i].y)).norm() < 1e-6);
   }
 }
 
-TEST_CASE("A double sphere puts bearings where its paper's equations do", "[core][lens]") {
-  // Computed by hand at (0.6, -0.8, 1) with xi = -0.2, alpha = 0.6: d1 = sqrt(2), xi d1 + z =
-  // 1 - 0.2 sqrt(2), d2 = sqrt(1 + that^2).
+TEST_CASE("A double sphere maps bearings like the equations of its paper", "[core][lens]") {
+  // Computed by hand at (0.6, -0.8, 1) with xi = -0.2, alpha = 0.6: d1 = sqrt(2), xi d1 + z = 1 -
+  // 0.2 sqrt(2), d2 = sqrt(1 + that^2).
   const Lens lens(LensModel::kDoubleSphere, {-0.2, 0.6});
   const double z = 1.0 - 0.2 * std::sqrt(2.0);
   const double below = 0.6 * std::sqrt(1.0 + z * z) + 0.4 * z;
   const Eigen::Vector2d expected = 0.8 * Eigen::Vector2d(0.6, -0.8) / below;
   CHECK((lens.distorted({0.6, -0.8}).value() - expected).norm() < 1e-14);
 
-  // The lens of TUM-VI in two calibrations, each with focal lengths of its own: they were estimated
-  // one without the other, and agree to a pixel.
+  // The lens of TUM-VI in two calibrations with separate focal lengths. They were estimated
+  // independently, and agree to a pixel.
   const double f = 190.97847715128717, f_sphere = 158.28600034966977 / (1.0 - 0.17213086034353243);
   for (const double degrees : {5.0, 20.0, 40.0, 60.0, 75.0}) {
     const Eigen::Vector2d bearing(std::tan(degrees * M_PI / 180.0), 0.0);
@@ -138,12 +139,12 @@ TEST_CASE("Undistorting inverts distorting on the whole disc of a lens", "[core]
     CAPTURE(bearing.transpose(), lens.max_bearing());
     const auto back = lens.undistorted(lens.distorted(bearing).value());
     REQUIRE(back.has_value());
-    // 1e-12 in the image; at the rim a bearing moves much farther than its image.
+    // 1e-12 in the image; at the rim the change of a bearing is much larger than that of its image.
     CHECK((*back - bearing).norm() < 1e-9 * (1.0 + bearing.squaredNorm()));
   }
 }
 
-TEST_CASE("Lenses at random are one-to-one on their discs", "[core][lens]") {
+TEST_CASE("Random lenses are one-to-one on their discs", "[core][lens]") {
   const auto seed = GENERATE(1U, 2U, 3U, 4U, 5U, 6U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -160,7 +161,7 @@ TEST_CASE("Lenses at random are one-to-one on their discs", "[core][lens]") {
     CAPTURE(i, k, lens.max_bearing());
     REQUIRE(lens.max_bearing() > 0.1);
     for (const Eigen::Vector2d& bearing : bearings_of(lens)) {
-      if (bearing.norm() > 0.98 * lens.max_bearing()) continue;  // flat at a fold
+      if (bearing.norm() > 0.98 * lens.max_bearing()) continue;  // no slope at a fold
       CAPTURE(bearing.transpose());
       const auto back = lens.undistorted(lens.distorted(bearing).value());
       REQUIRE(back.has_value());
@@ -184,7 +185,7 @@ TEST_CASE("On the axis every lens magnifies by one", "[core][lens]") {
 }
 
 TEST_CASE("A lens ends where its distortion folds back", "[core][lens]") {
-  // r - 0.3 r^3 and theta - 0.1 theta^3 are largest where their derivatives are 0.
+  // r - 0.3 r^3 and theta - 0.1 theta^3 have their maxima where their derivatives are 0.
   const Lens pinhole(LensModel::kRadialTangential, {-0.3, 0.0, 0.0, 0.0});
   CHECK(pinhole.max_bearing() == Approx(1.0 / std::sqrt(0.9)));
   const Lens fisheye(LensModel::kEquidistant, {-0.25, 0.0, 0.0, 0.0});
@@ -213,12 +214,12 @@ TEST_CASE("Bearings end at 80 degrees", "[core][lens]") {
     CHECK_FALSE(lens.undistorted({0.0, std::nan("")}).has_value());
     CHECK_FALSE(lens.undistorted({std::numeric_limits<double>::infinity(), 0.0}).has_value());
   }
-  // TUM-VI's corners see more than the plane z = 1 holds; the middle of its image's sides do not.
+  // TUM-VI's corners see beyond the disc; the middle of its image's sides does not.
   CHECK_FALSE(kTumVi.undistorted({256.0 / 190.97, 256.0 / 190.97}).has_value());
   CHECK(kTumVi.undistorted({256.0 / 190.97, 0.0}).has_value());
 }
 
-TEST_CASE("A lens keeps its coefficients, and is ideal without any", "[core][lens]") {
+TEST_CASE("A lens keeps its coefficients and is ideal without any", "[core][lens]") {
   CHECK(Lens().is_ideal());
   CHECK(Lens(LensModel::kRadialTangential, {0, 0, 0, 0, 0}) == Lens());
   CHECK_FALSE(kEuroc.is_ideal());
@@ -229,7 +230,7 @@ TEST_CASE("A lens keeps its coefficients, and is ideal without any", "[core][len
   CHECK_FALSE(kEuroc == kTumVi);
 }
 
-TEST_CASE("Coefficients that make no lens are refused", "[core][lens]") {
+TEST_CASE("Invalid coefficients of a lens are refused", "[core][lens]") {
   const auto refuses = [](LensModel model, const std::vector<double>& k) {
     CHECK_THROWS_AS(Lens(model, k), std::invalid_argument);
   };

@@ -24,7 +24,7 @@ TEST_CASE("The rotation logarithm is exact near zero and near pi", "[core]") {
   CHECK((so3_log(so3_exp(phi)) - phi).norm() < 1e-8);
 }
 
-TEST_CASE("A quarter turn about z maps x to y", "[core]") {
+TEST_CASE("A rotation by 90 degrees about z maps x to y", "[core]") {
   const Eigen::Matrix3d R = so3_exp({0, 0, std::numbers::pi / 2});
   CHECK((R * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm() < 1e-15);
 }
@@ -43,14 +43,14 @@ TEST_CASE("The right Jacobian is the derivative of the exponential", "[core]") {
   CHECK((so3_right_jacobian_inverse(phi) * numeric - Eigen::Matrix3d::Identity()).norm() < 1e-8);
 }
 
-TEST_CASE("The adjoint moves a perturbation from the right to the left", "[core]") {
+TEST_CASE("The adjoint moves a perturbation from right to left", "[core]") {
   std::mt19937 rng(3);
   const SE3 T = random_pose(rng);
   const Vector6 xi = random_vector<6>(rng);
   CHECK(((T * se3_exp(xi)).matrix() - (se3_exp(adjoint(T) * xi) * T).matrix()).norm() < 1e-10);
 }
 
-TEST_CASE("Local coordinates undo a retraction, to first order T exp(delta)", "[core]") {
+TEST_CASE("Local coordinates invert a retraction that is T exp(delta) to first order", "[core]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);

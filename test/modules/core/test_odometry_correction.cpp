@@ -14,7 +14,8 @@ SE3 at(double x, double y, double yaw = 0.0) {
 }
 
 TEST_CASE("Odometry beyond the last optimised keyframe follows it rigidly", "[core]") {
-  // The optimised graph says the body turned left while moving to (0, 1); odometry went straight.
+  // In the optimised graph the body turned left while moving to (0, 1); in odometry it went
+  // straight.
   const std::vector<StampedPose> odometry = {{0, at(0, 0)}, {1, at(1, 0)}, {2, at(3, 0)}};
   const std::vector<StampedPose> keyframes = {{0, at(0, 0)}, {1, at(0, 1, std::numbers::pi / 2)}};
   const auto corrected = correct_odometry(odometry, keyframes);

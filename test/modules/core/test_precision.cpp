@@ -18,7 +18,7 @@ TEST_CASE("A covariance gives the weights of its block traces", "[precision]") {
   CHECK(precision.tau == Approx(3.0 / 0.6));
 }
 
-TEST_CASE("Weights survive the way through a covariance", "[precision]") {
+TEST_CASE("Weights are equal after conversion to a covariance and back", "[precision]") {
   const Precision there{10000.0, 100.0};
   const Matrix6 covariance = covariance_of(there);
   CHECK(covariance(0, 0) == Approx(5e-5));  // [rad^2]
@@ -29,7 +29,7 @@ TEST_CASE("Weights survive the way through a covariance", "[precision]") {
   CHECK(back.tau == Approx(there.tau));
 }
 
-TEST_CASE("Weights of nothing are refused", "[precision]") {
+TEST_CASE("Weights that are not positive and finite are refused", "[precision]") {
   const double infinite = std::numeric_limits<double>::infinity();
   CHECK_THROWS_AS(precision_of(Matrix6::Zero()), std::invalid_argument);
   CHECK_THROWS_AS(precision_of(Matrix6::Constant(std::nan(""))), std::invalid_argument);

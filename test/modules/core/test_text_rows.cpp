@@ -17,7 +17,7 @@ TEST_CASE("Rows keep their line numbers past comments and empty lines", "[core]"
   CHECK(rows[1].fields == Fields{"3", "4"});
 }
 
-TEST_CASE("Commas, blanks, CRLF, a byte order mark and trailing comments are understood",
+TEST_CASE("Commas and blanks and CRLF and a byte order mark and trailing comments are accepted",
           "[core]") {
   const auto rows = split_rows("\xEF\xBB\xBF 1 ,\ta b , 3 # note\r\n4  5\t6\r\n7");
   REQUIRE(rows.size() == 3);

@@ -10,7 +10,7 @@ namespace {
 
 using Rooms = WaitingRooms<int, std::string>;
 
-// What is served, in order, of those that `are_known`.
+// Served messages of the known senders, in order.
 std::vector<std::string> serve_all(Rooms& rooms, const std::vector<int>& are_known) {
   std::vector<std::string> served;
   const auto take = [&](int from, const std::string& message, double /*waited_s*/) {
@@ -23,7 +23,7 @@ std::vector<std::string> serve_all(Rooms& rooms, const std::vector<int>& are_kno
   return served;
 }
 
-TEST_CASE("What waits is served oldest first, in turn between the rooms", "[rooms]") {
+TEST_CASE("Waiting messages are served oldest first and in turn between the senders", "[rooms]") {
   Rooms rooms;
   for (const char* message : {"a1", "a2", "a3"}) REQUIRE(rooms.push(1, message, 1, 0.0));
   REQUIRE(rooms.push(2, "b1", 1, 0.0));
@@ -35,12 +35,12 @@ TEST_CASE("What waits is served oldest first, in turn between the rooms", "[room
   CHECK(rooms.empty());
 }
 
-TEST_CASE("A full room refuses what comes, and what has gone makes room", "[rooms]") {
+TEST_CASE("A full queue refuses messages and removed messages make room", "[rooms]") {
   Rooms rooms({.bytes = 15, .bytes_of_one = 10});
   CHECK(rooms.push(1, "a1", 6, 0.0));
   CHECK_FALSE(rooms.push(1, "a2", 6, 0.0));
   CHECK(rooms.push(1, "a3", 4, 0.0));
-  CHECK_FALSE(rooms.push(2, "b1", 6, 0.0));  // all rooms together
+  CHECK_FALSE(rooms.push(2, "b1", 6, 0.0));  // bound on all queues together
   CHECK_FALSE(rooms.contains(2));
   CHECK(rooms.push(2, "b2", 5, 0.0));
   CHECK(serve_all(rooms, {1}) == std::vector<std::string>{"a1", "a3"});
@@ -48,7 +48,7 @@ TEST_CASE("A full room refuses what comes, and what has gone makes room", "[room
   CHECK(serve_all(rooms, {1, 2}) == std::vector<std::string>{"a4", "b2"});
 }
 
-TEST_CASE("It is known for how long a message has waited", "[rooms]") {
+TEST_CASE("The waiting time of a message is known", "[rooms]") {
   Rooms rooms;
   REQUIRE(rooms.push(1, "a", 1, 10.0));
   double waited_s = 0.0;

@@ -10,7 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST_CASE("A file is written anew as a whole and nothing is left beside it", "[files]") {
+TEST_CASE("A file is replaced as a whole and leaves no other file", "[files]") {
   const TemporaryFolder folder;
   folder.write("a", "what was there before is longer");
   write_file(folder.path() / "a", "new");
@@ -18,7 +18,8 @@ TEST_CASE("A file is written anew as a whole and nothing is left beside it", "[f
   CHECK(std::distance(fs::directory_iterator(folder.path()), {}) == 1);
 }
 
-TEST_CASE("What cannot be written is named with the reason, and what was there stays", "[files]") {
+TEST_CASE("A file that cannot be written is reported with the reason and the former file stays",
+          "[files]") {
   const TemporaryFolder folder;
   const fs::path taken = folder.path() / "taken";
   fs::create_directory(taken);
@@ -27,12 +28,12 @@ TEST_CASE("What cannot be written is named with the reason, and what was there s
   CHECK_THROWS_WITH(write_file(nowhere, "x"),
                     nowhere.string() + ": cannot be written: No such file or directory");
   folder.write("a", "old");
-  fs::create_directory(folder.path() / "a.part");  // in the way
+  fs::create_directory(folder.path() / "a.part");  // blocks the name of the partial file
   CHECK_THROWS(write_file(folder.path() / "a", "new"));
   CHECK(folder.read("a") == "old");
 }
 
-TEST_CASE("A device is written in place, and a full one says so", "[files]") {
+TEST_CASE("A device is written in place and a full device is reported", "[files]") {
   CHECK_NOTHROW(write_file("/dev/null", "x"));
   CHECK(fs::is_character_file("/dev/null"));
   CHECK_THROWS_WITH(write_file("/dev/full", "x"),
@@ -43,7 +44,7 @@ TEST_CASE("A device is written in place, and a full one says so", "[files]") {
   CHECK(waiting == "x");
 }
 
-TEST_CASE("A link stays one and its file is written", "[files]") {
+TEST_CASE("A link stays a link and its file is written", "[files]") {
   const TemporaryFolder folder;
   folder.write("file", "old");
   fs::create_symlink("file", folder.path() / "link");
@@ -52,7 +53,7 @@ TEST_CASE("A link stays one and its file is written", "[files]") {
   CHECK(folder.read("file") == "new");
 }
 
-TEST_CASE("A link in place of the partial file leads nowhere", "[files]") {
+TEST_CASE("A link in place of the partial file is not followed", "[files]") {
   const TemporaryFolder folder;
   folder.write("elsewhere", "old");
   fs::create_symlink("elsewhere", folder.path() / "a.part");
@@ -63,21 +64,21 @@ TEST_CASE("A link in place of the partial file leads nowhere", "[files]") {
   CHECK_FALSE(fs::exists(folder.path() / "a.part"));
 }
 
-TEST_CASE("A file for its owner alone is never anyone else's to read", "[files]") {
+TEST_CASE("A file for its owner alone can never be read by other users", "[files]") {
   const TemporaryFolder folder;
   const fs::path secret = folder.path() / "secret";
   const fs::path elsewhere = folder.write("elsewhere", "old");
-  SECTION("where there is nothing") {}
-  SECTION("where a partial one was left, which everyone can read") {
+  SECTION("without an earlier file") {}
+  SECTION("with a partial file that all users can read") {
     fs::permissions(folder.write("secret.part", "old"), fs::perms::all);
   }
-  SECTION("where everyone can read the one before") {
+  SECTION("with an earlier file that all users can read") {
     fs::permissions(folder.write("secret", "old"), fs::perms::all);
   }
-  SECTION("where a link leads to a file that everyone can read") {
+  SECTION("with a link to a file that all users can read") {
     fs::create_symlink("elsewhere", secret);
   }
-  SECTION("where the partial one is such a link") {
+  SECTION("with a link in place of the partial file") {
     fs::create_symlink("elsewhere", folder.path() / "secret.part");
   }
   write_file(secret, "new", {.mode = 0600, .through_links = false, .durable = true});
@@ -89,7 +90,7 @@ TEST_CASE("A file for its owner alone is never anyone else's to read", "[files]"
   CHECK_FALSE(fs::exists(folder.path() / "secret.part"));
 }
 
-TEST_CASE("What is appended follows what is there", "[files]") {
+TEST_CASE("Appended bytes follow the existing ones", "[files]") {
   const TemporaryFolder folder;
   const bool durable = GENERATE(false, true);
   for (std::string line : {"one\n", "two\n"}) {

@@ -7,8 +7,8 @@
 #include "modules/sensors/euroc_rig_codec.hpp"
 #include "test/support/shared_data.hpp"
 
-// Time and accuracy of stereo depth on MH_01's pairs, 752 x 480, on one thread: CPU time, which a
-// loaded machine changes little.
+// Time and accuracy of stereo depth on MH_01's pairs, 752 x 480, on one thread. Times are CPU time,
+// which hardly depends on the load of the machine.
 
 namespace km {
 namespace {

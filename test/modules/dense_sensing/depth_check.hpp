@@ -11,14 +11,14 @@
 
 namespace km {
 
-/// A corner seen by both cameras, triangulated: its place in the left camera.
+/// A corner seen by both cameras, triangulated: its position in the left camera.
 struct TriangulatedCorner {
   Eigen::Vector3d p_left = Eigen::Vector3d::Zero();
 };
 
-/// Corners of a raw stereo pair, found in the other image by optical flow and back, and
-/// triangulated as the nearest point of both rays (OpenCV's functions alone: nothing of what is
-/// tested). Kept are those whose rays pass within `max_gap` [bearing] and whose depth is within [1,
+/// Corners of a raw stereo pair, matched to the other image and back by optical flow, and
+/// triangulated as the nearest point of both rays. Uses only OpenCV's functions and nothing that is
+/// tested. A corner is kept if its rays pass within `max_gap` [bearing] and its depth is within [1,
 /// 10] m.
 inline std::vector<TriangulatedCorner> triangulated_corners(const StereoFrame& frame,
                                                             const StereoRig& rig,
@@ -51,8 +51,8 @@ inline std::vector<TriangulatedCorner> triangulated_corners(const StereoFrame& f
   return result;
 }
 
-/// Differences of dense depth to the corners', where it has a depth: in disparity [px], and in
-/// depth over depth.
+/// Differences between dense depth and the depth of corners, in disparity [px] and relative to the
+/// depth.
 struct DepthDifferences {
   std::vector<double> px, relative;
   std::size_t corners = 0;

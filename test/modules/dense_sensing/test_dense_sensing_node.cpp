@@ -12,7 +12,7 @@ namespace {
 
 constexpr Stamp kPeriod = 50'000'000;  // 20 Hz
 
-// An RGB-D camera half a metre above the body, and a node that keeps 5 frames a second.
+// An RGB-D camera half a metre above the body, and a node with a rate of 5 frames a second.
 struct Bench {
   StereoRig rig;
   StereoFrame seen;
@@ -49,7 +49,7 @@ struct Bench {
   }
 };
 
-TEST_CASE("Frames are handed on at the rate, with the camera's pose", "[dense_sensing_node]") {
+TEST_CASE("Frames are published at the rate with the camera's pose", "[dense_sensing_node]") {
   Bench bench;
   for (int i = 0; i < 41; ++i) bench.node->step(bench.frame(i, true));
   REQUIRE(bench.published.size() == 11);  // 2 s, both ends
@@ -65,7 +65,7 @@ TEST_CASE("Frames are handed on at the rate, with the camera's pose", "[dense_se
   CHECK(bench.last.without_labels == 11);
 }
 
-TEST_CASE("The camera's pose is by the mounting that was found", "[dense_sensing_node]") {
+TEST_CASE("The camera's pose uses the estimated mounting", "[dense_sensing_node]") {
   Bench bench;
   LocatedFrame frame = bench.frame(1, true);
   frame.T_body_rig =
@@ -78,7 +78,7 @@ TEST_CASE("The camera's pose is by the mounting that was found", "[dense_sensing
   CHECK(expected.translation().y() == Approx(0.2 - 0.5 * std::sin(0.1)));
 }
 
-TEST_CASE("A due frame without depth is made up for by the next one", "[dense_sensing_node]") {
+TEST_CASE("The next frame replaces a due frame without depth", "[dense_sensing_node]") {
   Bench bench;
   for (int i = 0; i < 40; ++i) bench.node->step(bench.frame(i, i % 3 == 1));
   REQUIRE(bench.published.size() >= 7);  // every 0.3 s
@@ -87,7 +87,7 @@ TEST_CASE("A due frame without depth is made up for by the next one", "[dense_se
   CHECK(bench.last.frames == bench.published.size());
 }
 
-TEST_CASE("Frames that are due while the map gives way are left out and counted",
+TEST_CASE("Due frames are dropped and counted while odometry needs the processors",
           "[dense_sensing_node]") {
   Bench bench;
   for (int i = 0; i < 41; ++i) {
@@ -100,7 +100,7 @@ TEST_CASE("Frames that are due while the map gives way are left out and counted"
   CHECK(bench.published.size() == 7);
 }
 
-TEST_CASE("The thread handles what was queued before it stops", "[dense_sensing_node]") {
+TEST_CASE("The thread handles queued frames before it stops", "[dense_sensing_node]") {
   Bench bench;
   bench.node->start();
   for (int i = 0; i < 20; ++i) bench.located.publish(bench.frame(i, true));
@@ -110,16 +110,16 @@ TEST_CASE("The thread handles what was queued before it stops", "[dense_sensing_
   CHECK(bench.node->timing().count() == 5);
 }
 
-TEST_CASE("A sensor that is too slow gives up the oldest frames", "[dense_sensing_node]") {
+TEST_CASE("A sensor that is too slow drops the oldest frames", "[dense_sensing_node]") {
   Bench bench(Overflow::kDropOldest);
-  for (int i = 0; i < 400; ++i) bench.located.publish(bench.frame(i, true));  // nobody waits
+  for (int i = 0; i < 400; ++i) bench.located.publish(bench.frame(i, true));  // without waiting
   bench.node->start();
   bench.node->stop();
   REQUIRE(bench.published.size() == 1);  // the four newest lie within one interval
   CHECK(bench.published[0].stamp == 396 * kPeriod);
 }
 
-TEST_CASE("A rate that is none is refused", "[dense_sensing_node]") {
+TEST_CASE("An invalid rate is refused", "[dense_sensing_node]") {
   Bench bench;
   const double rate_hz = GENERATE(0.0, -5.0, std::numeric_limits<double>::infinity());
   CHECK_THROWS_AS(DenseSensingNode(DenseSensor(bench.rig, {}), LabelsFrom::kNone, rate_hz,

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-// Left of the optical axis 1, right of it 2.
+// Label 1 left of the optical axis, label 2 right of it.
 std::shared_ptr<const LabelImage> halves(const Camera& camera) {
   auto labels = std::make_shared<LabelImage>(LabelImage{camera.width, camera.height, {}});
   for (int y = 0; y < camera.height; ++y)
@@ -21,7 +21,7 @@ std::shared_ptr<const LabelImage> halves(const Camera& camera) {
   return labels;
 }
 
-TEST_CASE("Recorded depth and labels are handed on as they are", "[dense_sensor]") {
+TEST_CASE("Recorded depth and labels are not changed", "[dense_sensor]") {
   const StereoRig rig = rgbd_rig(test_rig().cameras[0], 0.1);
   DenseSensor sensor(rig, {.labels = LabelsFrom::kImages});
   CHECK(sensor.camera().lens == rig.cameras[0].lens);
@@ -82,7 +82,7 @@ TEST_CASE("A network labels the left image", "[dense_sensor]") {
   CHECK(images.classes_outside == images.labels->ids.size());
 }
 
-TEST_CASE("Images that are missing or of the wrong size are named", "[dense_sensor]") {
+TEST_CASE("Images that are missing or of the wrong size are reported", "[dense_sensor]") {
   const StereoRig rig = test_rig();
   const StereoRig depth_rig = rgbd_rig(rig.cameras[0], 0.1);
   DenseSensor recorded(depth_rig, {.labels = LabelsFrom::kImages});

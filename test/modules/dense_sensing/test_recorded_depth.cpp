@@ -8,11 +8,11 @@
 namespace km {
 namespace {
 
-// What remains between two ways of matching with the same calibration.
+// Largest difference between two methods of matching with the same calibration.
 constexpr double kMaxMedian_px = 0.35;
-constexpr double kMinShare = 0.75;  // of the corners with dense depth
+constexpr double kMinShare = 0.75;  // least share of the corners with dense depth
 
-// Of every so many-th pair.
+// Checks every `every`-th pair.
 void check(const std::vector<StereoPairFile>& pairs, const StereoRig& rig, std::size_t every,
            const StereoDepthConfig& config) {
   StereoDepth stereo(rig, config);

@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-// Of an input in [0, 1]: class 0 below 0.3, class 1 to 0.7, class 2 above.
+// For an input in [0, 1]: class 0 below 0.3, class 1 to 0.7, class 2 above.
 PointwiseNetwork three_levels() {
   PointwiseNetwork network;
   network.weights = {{0.0F}, {1.0F}, {2.0F}};
@@ -24,12 +24,12 @@ SegmentationConfig config_of(const std::filesystem::path& file) {
   return config;
 }
 
-// Vertical stripes of grey levels 40, 128, 220, as wide as they fit.
+// Vertical stripes of grey levels 40, 128, 220, equally wide.
 GrayImage stripes(int width, int height) {
   GrayImage image{width, height, {}};
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      const int stripe = 4 * x / width;  // the last is as the first
+      const int stripe = 4 * x / width;  // the last is like the first
       image.pixels.push_back(stripe == 1 ? 128 : stripe == 2 ? 220 : 40);
     }
   return image;
@@ -49,7 +49,7 @@ TEST_CASE("A network labels every pixel by the class with the best score", "[seg
     }
 }
 
-TEST_CASE("Labels are as large as the image, whatever the network's size", "[segmentation]") {
+TEST_CASE("Labels have the size of the image for any size of the network", "[segmentation]") {
   const TemporaryFolder folder;
   PointwiseNetwork coarse = three_levels();
   coarse.stride = GENERATE(1, 2);
@@ -78,7 +78,8 @@ TEST_CASE("Mean, scale and channels are applied before the network", "[segmentat
   CHECK(int{result.labels.ids[9]} == 2);
 }
 
-TEST_CASE("Classes become the labels of the map, those beyond it are counted", "[segmentation]") {
+TEST_CASE("Classes become the labels of the map and further classes are counted",
+          "[segmentation]") {
   const TemporaryFolder folder;
   SegmentationConfig config = config_of(folder.write("net.onnx", three_levels().onnx()));
   config.label_map = {"7", "9"};

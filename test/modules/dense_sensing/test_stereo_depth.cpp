@@ -11,15 +11,16 @@
 namespace km {
 namespace {
 
-constexpr double kMaxMedian_px = 0.12;  // of disparity: the matcher's steps are a sixteenth
-constexpr double kMinShare = 0.85;      // of the pixels that can have depth
+constexpr double kMaxMedian_px = 0.12;  // disparity; the matcher's steps are a sixteenth
+constexpr double kMinShare = 0.85;      // share of the pixels that can have depth
 
 struct DepthError {
   double median_px = 0.0;  // in disparity
-  double share = 0.0;      // of pixels with depth, right of those that cannot be matched
+  // Share of pixels with depth, to the right of those that cannot be matched
+  double share = 0.0;
 };
 
-// Against the true distance of `plane` along the axis of the depth camera.
+// Accuracy against the true distance of `plane` along the axis of the depth camera.
 DepthError compare(const DepthImage& depth, const StereoDepth& stereo, const TexturedPlane& plane,
                    const SE3& T_world_body) {
   const Camera& camera = stereo.camera();
@@ -53,7 +54,7 @@ DepthError error_on(const StereoRig& rig, const StereoDepthConfig& config,
   return compare(stereo.compute(frame.left, frame.right), stereo, plane, T_world_body);
 }
 
-TEST_CASE("Planes at any distance and slant come out where they are", "[stereo_depth]") {
+TEST_CASE("Planes at any distance and slant have the right depth", "[stereo_depth]") {
   const double depth_m = GENERATE(1.0, 2.0, 4.0);
   const double slant_rad = GENERATE(0.0, 0.5);
   CAPTURE(depth_m, slant_rad);
@@ -67,7 +68,7 @@ TEST_CASE("Planes at any distance and slant come out where they are", "[stereo_d
   CHECK(error.share > kMinShare);
 }
 
-TEST_CASE("Any lens comes out as a plane of the right depth", "[stereo_depth]") {
+TEST_CASE("With any lens a plane has the right depth", "[stereo_depth]") {
   struct Case {
     double focal_px;
     Lens lens;
@@ -103,7 +104,7 @@ TEST_CASE("A fisheye lens of 190 degrees is rectified to a view of some 120", "[
   CHECK(cv::countNonZero(rectification.seen()) == camera.width * camera.height);
 }
 
-TEST_CASE("Cameras that are turned and unlike each other are rectified", "[stereo_depth]") {
+TEST_CASE("Cameras that are rotated and have different lenses are rectified", "[stereo_depth]") {
   StereoRig rig = test_rig();
   rig.cameras[1].T_body_cam =
       make_pose(so3_exp(Eigen::Vector3d(0.02, -0.03, 0.025)), {0.11, 0.004, -0.003});
@@ -116,7 +117,7 @@ TEST_CASE("Cameras that are turned and unlike each other are rectified", "[stere
   CHECK(error.share > kMinShare);
 }
 
-TEST_CASE("Half the resolution is as good in its own pixels", "[stereo_depth]") {
+TEST_CASE("Half the resolution is as accurate in its own pixels", "[stereo_depth]") {
   StereoDepthConfig config;
   config.downscale = 2;
   TexturedPlane plane;
@@ -127,13 +128,13 @@ TEST_CASE("Half the resolution is as good in its own pixels", "[stereo_depth]") 
   CHECK(error.share > kMinShare);
 }
 
-TEST_CASE("What lies out of range has no depth", "[stereo_depth]") {
+TEST_CASE("Depth out of range is dropped", "[stereo_depth]") {
   StereoDepthConfig config;
   config.max_depth_m = 1.5;
   CHECK(error_on(test_rig(), config, TexturedPlane{}, SE3::Identity()).share < 0.01);
 }
 
-TEST_CASE("Images that do not belong together give little depth", "[stereo_depth]") {
+TEST_CASE("Images of different scenes give little depth", "[stereo_depth]") {
   const StereoRig rig = test_rig();
   TexturedPlane other;
   other.seed = 77;
@@ -144,7 +145,7 @@ TEST_CASE("Images that do not belong together give little depth", "[stereo_depth
   CHECK(static_cast<double>(none) > 0.6 * static_cast<double>(depth.millimetres.size()));
 }
 
-TEST_CASE("Rigs and depths that leave nothing to match are refused", "[stereo_depth]") {
+TEST_CASE("Rigs and depth ranges without disparities to search are refused", "[stereo_depth]") {
   const StereoRig rig = test_rig();
   CHECK_THROWS_AS(StereoDepth(rgbd_rig(rig.cameras[0], 0.1), {}), std::invalid_argument);
   StereoRig swapped = rig;

@@ -43,7 +43,7 @@ TEST_CASE("Rates and gaps of a recording are found", "[diagnosis]") {
     sample.frames.erase(sample.frames.begin() + 50, sample.frames.begin() + 60);
     CHECK(ids_of(examine_streams(sample, {})) == "warning frames.gap ");
   }
-  SECTION("one image that is missing is none") {
+  SECTION("one missing image is no gap") {
     sample.frames.erase(sample.frames.begin() + 50);
     CHECK(ids_of(examine_streams(sample, {})).empty());
   }
@@ -71,7 +71,7 @@ TEST_CASE("Rates and gaps of a recording are found", "[diagnosis]") {
   }
 }
 
-TEST_CASE("What a reader skips is found by its share", "[diagnosis]") {
+TEST_CASE("Faults of a reader become findings by their share", "[diagnosis]") {
   const SensorSample sample = regular();
   const auto with = [&](std::size_t count) {
     ReaderReport report;
@@ -108,7 +108,7 @@ TEST_CASE("Images that are dark, bright, blurred or empty are found", "[diagnosi
   CHECK(ids_of(examine_images({})).empty());
 }
 
-TEST_CASE("Gravity tells the unit of the accelerometer", "[diagnosis]") {
+TEST_CASE("Gravity shows the unit of the accelerometer", "[diagnosis]") {
   const auto with = [](double norm) {
     SensorSample sample = regular();
     for (ImuSample& measured : sample.imu) measured.accel = {0.0, norm, 0.0};
@@ -122,7 +122,7 @@ TEST_CASE("Gravity tells the unit of the accelerometer", "[diagnosis]") {
   CHECK(with(32.2) == "error imu.gravity ");
 }
 
-TEST_CASE("A vocabulary that takes all features for few words is found", "[diagnosis]") {
+TEST_CASE("A vocabulary that maps all features to few words is found", "[diagnosis]") {
   // A word for each of 256 first bytes, in two levels of 16.
   VocabularyData tree{.branching = 16, .depth = 2};
   const auto descriptor = [](int byte) {

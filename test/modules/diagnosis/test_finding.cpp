@@ -13,7 +13,7 @@ Finding finding_of(const char* id, Severity severity) {
 
 }  // namespace
 
-TEST_CASE("The exit code is that of the gravest finding", "[diagnosis]") {
+TEST_CASE("The exit code is that of the most severe finding", "[diagnosis]") {
   std::vector<Finding> findings;
   CHECK(exit_code_of(findings) == 0);
   findings.push_back(finding_of("a", Severity::kNote));
@@ -24,7 +24,7 @@ TEST_CASE("The exit code is that of the gravest finding", "[diagnosis]") {
   CHECK(exit_code_of(std::span(findings).last(1)) == 1);
 }
 
-TEST_CASE("Findings are sorted by how grave they are, and keep their order", "[diagnosis]") {
+TEST_CASE("Findings are sorted by severity and otherwise keep their order", "[diagnosis]") {
   std::vector<Finding> findings = {
       finding_of("a", Severity::kNote), finding_of("b", Severity::kError),
       finding_of("c", Severity::kNote), finding_of("d", Severity::kWarning),
@@ -44,7 +44,7 @@ TEST_CASE("A finding is three lines for people", "[diagnosis]") {
   CHECK(to_text(std::vector<Finding>()).empty());
 }
 
-TEST_CASE("A finding is read from JSON as it was written", "[diagnosis]") {
+TEST_CASE("A finding is equal after writing and reading JSON", "[diagnosis]") {
   const Finding finding = finding_of("a.b", Severity::kError);
   CHECK(Json(finding).get<Finding>() == finding);
   CHECK(Json(finding).dump() ==

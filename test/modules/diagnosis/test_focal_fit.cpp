@@ -17,7 +17,7 @@ constexpr int kDriveSteps = 60, kDrivePoints = 80;
 const Eigen::Matrix3d kDriveMounting = so3_exp(Eigen::Vector3d(1.2, -1.2, 1.2));  // R_cam_body
 const Eigen::Vector3d kDriveBias(0.03, -0.02, 0.01);
 
-// Of a robot that drives and turns, about the camera's axes [rad/s].
+// Rate of a robot that drives and turns, about the camera's axes [rad/s].
 Eigen::Vector3d driving_rate(double t_s) {
   return {0.03 * std::sin(4.0 * t_s), 0.15 * std::sin(1.3 * t_s), 0.02 * std::cos(3.0 * t_s)};
 }
@@ -35,7 +35,7 @@ StereoRig scaled(StereoRig pair, double factor) {
   return pair;
 }
 
-// What `rig` sees of points all around, forward and to the side, with that noise of pixels.
+// Steps that `rig` sees of points all around, with motion forward and sideways and with noise [px].
 std::vector<TrackedStep> driven(double noise_px) {
   const StereoRig pair = driven_rig();
   const SE3 T_right_left = pair.T_left_right().inverse();
@@ -77,7 +77,7 @@ std::vector<ImuSample> driven_samples() {
   return result;
 }
 
-// As the rotations that images show have it: about right.
+// About right, like the rotations from images.
 InertialFit rough_fit() {
   InertialFit fit;
   fit.Q = so3_exp(Eigen::Vector3d(0.01, -0.01, 0.005)) * kDriveMounting;
@@ -87,7 +87,7 @@ InertialFit rough_fit() {
 
 }  // namespace
 
-TEST_CASE("The focal length follows from what the gyroscope turns", "[diagnosis]") {
+TEST_CASE("The focal length follows from the gyroscope's rotation", "[diagnosis]") {
   const double given = GENERATE(0.97, 1.0, 1.03);
   CAPTURE(given);
   const auto exact =
@@ -104,9 +104,9 @@ TEST_CASE("The focal length follows from what the gyroscope turns", "[diagnosis]
   CHECK(noisy->error_px == Approx(0.3).margin(0.15));
 }
 
-TEST_CASE("Without turns a gyroscope says nothing of the focal length", "[diagnosis]") {
+TEST_CASE("Without rotation a gyroscope gives no focal length", "[diagnosis]") {
   std::vector<TrackedStep> steps = driven(0.2);
-  for (TrackedStep& step : steps)  // all see what is far away, and stand still
+  for (TrackedStep& step : steps)  // all points are far away, and the robot stands still
     for (TrackedPoint& point : step.points) point.to = point.from;
   std::vector<ImuSample> still = driven_samples();
   for (ImuSample& sample : still) sample.gyro = kDriveBias;
@@ -114,7 +114,7 @@ TEST_CASE("Without turns a gyroscope says nothing of the focal length", "[diagno
   CHECK((!fit || fit->sigma > 0.05));
 }
 
-TEST_CASE("Few steps, and steps of few points, are not judged", "[diagnosis]") {
+TEST_CASE("Too few steps or points give no focal length", "[diagnosis]") {
   std::vector<TrackedStep> steps = driven(0.2);
   CHECK_FALSE(fit_focal(std::span(steps).first(19), driven_rig(), driven_samples(), rough_fit()));
   for (TrackedStep& step : steps) step.points.resize(20);

@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-constexpr double kSigma = 0.3 / 460.0;  // of a bearing
+constexpr double kSigma = 0.3 / 460.0;  // noise of a bearing
 
 // Points 2 to 8 m away, seen before and after a motion, p_from = R p_to + t, with noise.
 std::vector<BearingStep> seen_points(const Eigen::Vector3d& rotation, const Eigen::Vector3d& t,
@@ -30,7 +30,7 @@ std::vector<BearingStep> seen_points(const Eigen::Vector3d& rotation, const Eige
 
 }  // namespace
 
-TEST_CASE("The rotation between two images is found beside any translation", "[diagnosis]") {
+TEST_CASE("The rotation between two images is found with any translation", "[diagnosis]") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   const Eigen::Vector3d rotation(0.03, -0.05, 0.02);
   const Eigen::Vector3d t = GENERATE(Eigen::Vector3d(0.0, 0.0, 0.0), Eigen::Vector3d(0.1, 0.0, 0.0),
@@ -39,11 +39,11 @@ TEST_CASE("The rotation between two images is found beside any translation", "[d
   const auto found = rotation_between(seen_points(rotation, t, 150, rng), kSigma);
   REQUIRE(found);
   CHECK(found->inlier_share > 0.95);
-  // Across the image it is known ten times less well than a bearing: see the header.
+  // Across the image its error is ten times that of a bearing: see the header.
   CHECK((found->rotation - rotation).norm() < 5.0 * kSigma);
 }
 
-TEST_CASE("Points that moved otherwise do not change the rotation between images", "[diagnosis]") {
+TEST_CASE("Points with other motions do not change the rotation between images", "[diagnosis]") {
   std::mt19937 rng(5);
   const Eigen::Vector3d rotation(0.0, 0.04, 0.0), t(0.02, 0.0, 0.1);
   auto steps = seen_points(rotation, t, 150, rng);
@@ -58,7 +58,7 @@ TEST_CASE("Points that moved otherwise do not change the rotation between images
   CHECK(found->inlier_share == Approx(110.0 / 150.0).margin(0.05));
 }
 
-TEST_CASE("Of too few points, or points at random, no rotation is told", "[diagnosis]") {
+TEST_CASE("Too few or random points give no rotation", "[diagnosis]") {
   std::mt19937 rng(6);
   const Eigen::Vector3d none = Eigen::Vector3d::Zero();
   CHECK_FALSE(rotation_between(seen_points(none, none, 19, rng), kSigma));

@@ -13,12 +13,13 @@ namespace {
 constexpr Stamp kStart = 1'000'000'000;
 constexpr double kNoise_rad = 3e-4;
 
-// A hand that turns a camera about all axes [rad/s].
+// Rate of a camera that a hand turns about all axes [rad/s].
 Eigen::Vector3d rate_at(double t_s) {
   return {0.4 * std::sin(2.1 * t_s), 0.3 * std::sin(3.3 * t_s + 1.0), 0.2 * std::cos(1.7 * t_s)};
 }
 
-// Of a gyroscope with that scale, a bias, and a clock that is `late_s` ahead of the images'.
+// Samples of a gyroscope with that scale, a bias, and a clock that is `late_s` ahead of the
+// images'.
 std::vector<ImuSample> samples(double scale, double late_s) {
   std::vector<ImuSample> result;
   for (int k = 0; k < 2400; ++k) {
@@ -29,7 +30,7 @@ std::vector<ImuSample> samples(double scale, double late_s) {
   return result;
 }
 
-// What a camera mounted with R_cam_body sees, in steps of 0.1 s.
+// Rotations that a camera mounted with R_cam_body sees, in steps of 0.1 s.
 std::vector<SeenRotation> seen(const Eigen::Matrix3d& R_cam_body) {
   std::mt19937 rng(3);
   std::normal_distribution<double> noise(0.0, kNoise_rad);
@@ -53,7 +54,8 @@ double degrees_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 
 }  // namespace
 
-TEST_CASE("Mounting, offset and scale follow from rotations seen and measured", "[diagnosis]") {
+TEST_CASE("Mounting and offset and scale follow from rotations of camera and gyroscope",
+          "[diagnosis]") {
   const double scale = GENERATE(1.0, 57.2958), late_s = GENERATE(0.0, 0.0203, -0.0467);
   CAPTURE(scale, late_s);
   const auto fit = fit_inertial(seen(kMounting), samples(scale, late_s));
@@ -69,7 +71,7 @@ TEST_CASE("Mounting, offset and scale follow from rotations seen and measured", 
   CHECK((fit->constant + kMounting * bias).norm() < 2e-3);
 }
 
-TEST_CASE("A mirrored axis is told from any mounting", "[diagnosis]") {
+TEST_CASE("A mirrored axis is distinguished from any mounting", "[diagnosis]") {
   const Eigen::Matrix3d mirrored = kMounting * Eigen::Vector3d(1.0, -1.0, 1.0).asDiagonal();
   const auto fit = fit_inertial(seen(mirrored), samples(1.0, 0.0));
   REQUIRE(fit);
@@ -79,7 +81,7 @@ TEST_CASE("A mirrored axis is told from any mounting", "[diagnosis]") {
   CHECK(fit_inertial(seen(kMounting), samples(1.0, 0.0))->mirror_gain == 0.0);
 }
 
-TEST_CASE("Rotations that have nothing to do with the gyroscope are not explained", "[diagnosis]") {
+TEST_CASE("Rotations unrelated to the gyroscope are not explained", "[diagnosis]") {
   auto others = samples(1.0, 0.0);
   for (std::size_t k = 0; k < others.size(); ++k) {
     const double t_s = 0.005 * static_cast<double>(k);
@@ -90,7 +92,7 @@ TEST_CASE("Rotations that have nothing to do with the gyroscope are not explaine
   CHECK(fit->explained < 0.3);
 }
 
-TEST_CASE("Steps outside the samples do not count, and a few are none", "[diagnosis]") {
+TEST_CASE("Steps outside the samples do not count and too few steps give no fit", "[diagnosis]") {
   auto steps = seen(kMounting);
   for (SeenRotation& step : steps) step.from += 60'000'000'000, step.to += 60'000'000'000;
   CHECK_FALSE(fit_inertial(steps, samples(1.0, 0.0)));

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a recording shows, and what it says of its sensors: faults are planted in either.
+// Data of a recording and its calibration; faults are inserted in either.
 struct Recorded {
   SensorSample sample;
   SensorRig rig;
@@ -45,7 +45,7 @@ const std::optional<Recorded>& machine_hall() {
   return recorded;
 }
 
-// The ids of what is found, notes too.
+// The ids of all findings, including notes.
 std::set<std::string> found_in(const Recorded& recorded) {
   Examination result = examine_streams(recorded.sample, recorded.report);
   result.add(examine_images(recorded.sample));
@@ -67,7 +67,7 @@ void rotate_gyro(SensorSample& sample, const std::function<void(Eigen::Vector3d&
   for (ImuSample& measured : sample.imu) change(measured.gyro);
 }
 
-// A EuRoC folder of links to images of V1_01 that lie apart from their calibration.
+// A EuRoC folder of links to images of V1_01. In the data they are separate from their calibration.
 void link_v1(const fs::path& recording, const fs::path& folder,
              const std::function<fs::path(int camera)>& images,
              const std::function<bool(int camera, const std::string& file)>& is_of) {
@@ -90,12 +90,12 @@ void link_v1(const fs::path& recording, const fs::path& folder,
 
 }  // namespace
 
-TEST_CASE("Nothing is found wrong with MH_01", "[diagnosis]") {
+TEST_CASE("MH_01 gives no findings", "[diagnosis]") {
   if (!machine_hall()) return;
   CHECK(found_in(*machine_hall()).empty());
 }
 
-TEST_CASE("A fault planted in the calibration of MH_01 is named, and nothing else", "[diagnosis]") {
+TEST_CASE("A fault in the calibration of MH_01 is the only finding", "[diagnosis]") {
   if (!machine_hall()) return;
   Recorded recorded = *machine_hall();
   StereoRig& rig = recorded.rig.stereo;
@@ -106,7 +106,7 @@ TEST_CASE("A fault planted in the calibration of MH_01 is named, and nothing els
     rig = undone(rig, StereoFault::kInvertedPair);
     CHECK(found_in(recorded) == Ids{"stereo.inverted"});
   }
-  SECTION("both T_BS inverted: so is the camera's rotation to the inertial sensor") {
+  SECTION("both T_BS inverted and so the camera's rotation to the inertial sensor") {
     rig = undone(rig, StereoFault::kInvertedCameras);
     CHECK(found_in(recorded) == Ids{"stereo.inverted_cameras", "extrinsics.inverted"});
   }
@@ -114,7 +114,7 @@ TEST_CASE("A fault planted in the calibration of MH_01 is named, and nothing els
     rig = undone(rig, StereoFault::kInvertedRight);
     CHECK(found_in(recorded) == Ids{"stereo.inverted_right"});
   }
-  SECTION("the rotation of both to the body inverted, their pose to each other as it is") {
+  SECTION("the rotation of both to the body inverted without their relative pose") {
     const SE3 T_left_right = rig.T_left_right();
     turn_left(rig.cameras[0].T_body_cam.linear().transpose());
     rig.cameras[1].T_body_cam = rig.cameras[0].T_body_cam * T_left_right;
@@ -131,7 +131,7 @@ TEST_CASE("A fault planted in the calibration of MH_01 is named, and nothing els
     scale_focal(rig, 0.97);
     CHECK(found_in(recorded) == Ids{"camera.focal"});
   }
-  SECTION("or too long") {
+  SECTION("a focal length of both cameras 3 % too long") {
     scale_focal(rig, 1.03);
     CHECK(found_in(recorded) == Ids{"camera.focal"});
   }
@@ -140,25 +140,25 @@ TEST_CASE("A fault planted in the calibration of MH_01 is named, and nothing els
     rig.cameras[1].fy *= 1.03;
     CHECK(found_in(recorded) == Ids{"stereo.focal"});
   }
-  SECTION("millimetres for metres") {
+  SECTION("millimetres instead of metres") {
     for (Camera& camera : rig.cameras) camera.T_body_cam.translation() *= 1000.0;
     CHECK(found_in(recorded) == Ids{"stereo.baseline"});
   }
 }
 
-TEST_CASE("A fault planted in the samples of MH_01 is named, and nothing else", "[diagnosis]") {
+TEST_CASE("A fault in the samples of MH_01 is the only finding", "[diagnosis]") {
   if (!machine_hall()) return;
   Recorded recorded = *machine_hall();
   SensorSample& sample = recorded.sample;
-  SECTION("degrees for radians") {
+  SECTION("degrees instead of radians") {
     rotate_gyro(sample, [](Eigen::Vector3d& gyro) { gyro *= kDegrees; });
     CHECK(found_in(recorded) == Ids{"imu.gyro_in_degrees"});
   }
-  SECTION("a gyroscope with one axis the other way round") {
+  SECTION("a gyroscope with one axis inverted") {
     rotate_gyro(sample, [](Eigen::Vector3d& gyro) { gyro.y() *= -1.0; });
     CHECK(found_in(recorded) == Ids{"imu.mirrored"});
   }
-  SECTION("g for m/s^2") {
+  SECTION("g instead of m/s^2") {
     for (ImuSample& measured : sample.imu) measured.accel /= 9.80665;
     CHECK(found_in(recorded) == Ids{"imu.accel_in_g"});
   }
@@ -182,8 +182,7 @@ TEST_CASE("A fault planted in the samples of MH_01 is named, and nothing else", 
   }
 }
 
-TEST_CASE("V1_01 at rest: nothing is found wrong, and what rest does not tell is not told",
-          "[diagnosis]") {
+TEST_CASE("V1_01 at rest gives no findings and no figures that need motion", "[diagnosis]") {
   const auto data = shared_data("euroc/V1_01_easy");
   if (!data) return;
   const TemporaryFolder folder;
@@ -197,7 +196,7 @@ TEST_CASE("V1_01 at rest: nothing is found wrong, and what rest does not tell is
   CHECK_THAT(to_text(inertial.figures), Catch::Contains("not told: the camera turns by"));
 }
 
-TEST_CASE("V1_01 in flight: of images a second apart only what lies between is found",
+TEST_CASE("V1_01 in flight with images a second apart gives findings only on rate and gaps",
           "[diagnosis]") {
   const auto data = shared_data("euroc/V1_01_easy");
   if (!data) return;
@@ -211,7 +210,7 @@ TEST_CASE("V1_01 in flight: of images a second apart only what lies between is f
   CHECK(found_in(recorded) == Ids{"frames.rate", "frames.gap"});
 }
 
-TEST_CASE("Nothing is found wrong with the world of the demo, and what is planted is named",
+TEST_CASE("The world of the demo gives no findings and an inserted fault is the only one",
           "[diagnosis]") {
   const std::string simulator = KM_BIN_DIR "/kimera_multi_simulate";
   if (!fs::exists(simulator)) {

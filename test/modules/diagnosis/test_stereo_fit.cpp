@@ -9,8 +9,8 @@
 namespace km {
 namespace {
 
-// As EuRoC's: cameras that look along the body's z, turned by 90 degrees and a little to each
-// other, with lenses of their own.
+// Like EuRoC's: cameras that look along the body's z, rotated by 90 degrees and slightly against
+// each other, with different lenses.
 StereoRig rig() {
   StereoRig result;
   for (Camera& camera : result.cameras) camera.width = 752, camera.height = 480;
@@ -24,7 +24,7 @@ StereoRig rig() {
   return result;
 }
 
-// Points 1 to 10 m away as both cameras see them, to half a pixel.
+// Points 1 to 10 m away as seen by both cameras, with noise of half a pixel.
 std::vector<StereoMatches> seen_by(const StereoRig& truth, double wrong_share = 0.1) {
   std::mt19937 rng(11);
   std::uniform_real_distribution<double> u(20.0, 730.0), v(20.0, 460.0), inverse(0.1, 1.0), any;
@@ -62,7 +62,7 @@ TEST_CASE("Points of a pair lie on the lines of its own calibration", "[diagnosi
   CHECK(best.fit.on_line == fit.on_line);
 }
 
-TEST_CASE("A fault of the pair's calibration is named", "[diagnosis]") {
+TEST_CASE("A fault of the pair's calibration is identified", "[diagnosis]") {
   const StereoFault fault = GENERATE(StereoFault::kInvertedPair, StereoFault::kInvertedCameras,
                                      StereoFault::kInvertedLeft, StereoFault::kInvertedRight);
   CAPTURE(static_cast<int>(fault));
@@ -74,13 +74,13 @@ TEST_CASE("A fault of the pair's calibration is named", "[diagnosis]") {
   CHECK(best.fit.on_line == Approx(fit_of(images, rig()).on_line));
 }
 
-TEST_CASE("Images that are the other camera's are named", "[diagnosis]") {
+TEST_CASE("Swapped images of a pair are identified", "[diagnosis]") {
   auto images = seen_by(rig());
   for (PixelPair& pair : images[0].pairs) std::swap(pair.a, pair.b);
   CHECK(best_alternative(images, rig()).fault == StereoFault::kSwappedImages);
 }
 
-TEST_CASE("A focal length of one camera that is 3 % off is named with its number", "[diagnosis]") {
+TEST_CASE("A focal length of one camera that is 3 % off is found with its ratio", "[diagnosis]") {
   const double ratio = GENERATE(0.97, 1.03);
   StereoRig wrong = rig();
   wrong.cameras[1].fx *= ratio;
@@ -90,7 +90,7 @@ TEST_CASE("A focal length of one camera that is 3 % off is named with its number
   CHECK(best.focal_ratio * ratio == Approx(1.0).margin(0.006));
 }
 
-TEST_CASE("Matches at random have no calibration that would fit", "[diagnosis]") {
+TEST_CASE("Random matches fit no calibration", "[diagnosis]") {
   const StereoAlternative best = best_alternative(seen_by(rig(), 1.0), rig());
   CHECK(best.fault == StereoFault::kNone);
   CHECK(best.fit.on_line < 0.1);

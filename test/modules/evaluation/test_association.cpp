@@ -26,7 +26,7 @@ TEST_CASE("Poses between stamps are interpolated", "[evaluation]") {
   CHECK(pose_at(poses, kSecond / 2, 0.0, 0.0)->isApprox(screw(0.5), 1e-12));  // exact stamp
 }
 
-TEST_CASE("Across a gap only the nearest pose counts, and only if it is near", "[evaluation]") {
+TEST_CASE("Across a gap only a near pose counts", "[evaluation]") {
   const auto poses = sample(0.0, 1.0, 3, screw);
   CHECK_FALSE(pose_at(poses, kSecond * 3 / 2, 0.9, 0.1));
   CHECK(pose_at(poses, kSecond * 3 / 2, 1.0, 0.1));
@@ -38,7 +38,7 @@ TEST_CASE("Across a gap only the nearest pose counts, and only if it is near", "
   CHECK(near_third->isApprox(screw(2.0), 1e-12));
 }
 
-TEST_CASE("Outside the trajectory only a pose close in time is given", "[evaluation]") {
+TEST_CASE("Outside the trajectory only a pose close in time is returned", "[evaluation]") {
   const auto poses = sample(1.0, 10.0, 11, screw);
   CHECK(pose_at(poses, kSecond - 1000, 0.1, 0.01));
   CHECK_FALSE(pose_at(poses, kSecond - kSecond / 10, 0.1, 0.01));
@@ -72,7 +72,7 @@ TEST_CASE("Only the window and the time in common are paired", "[evaluation]") {
   CHECK(associate(truth, sample(50.0, 10.0, 5, screw), kAlways, 0.1, 0.0).empty());
 }
 
-TEST_CASE("Covered time is that between neighbours without a gap, inside the window",
+TEST_CASE("Covered time is that between neighbours without a gap inside the window",
           "[evaluation]") {
   auto poses = sample(1.0, 10.0, 11, screw);        // 1 to 2 s
   const auto later = sample(5.0, 10.0, 11, screw);  // 5 to 6 s

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
 
-// 90 by 73.7 degrees; it looks along the body's x axis, as a car's would.
+// 90 by 73.7 degrees, looking along the body's x axis as on a car.
 Camera camera() {
   Camera camera;
   camera.width = 640;
@@ -25,12 +25,12 @@ Camera camera() {
   return camera;
 }
 
-// A body at (x, y), turned to the left by `yaw_deg`.
+// A body at (x, y), rotated to the left by `yaw_deg`.
 SE3 at(double x, double y, double yaw_deg = 0.0) {
   return make_pose(so3_exp({0.0, 0.0, kRadians * yaw_deg}), {x, y, 0.0});
 }
 
-// The camera sideways of another.
+// Pose of a camera to the right of another one.
 SE3 sideways(double metres) {
   return make_pose(Eigen::Matrix3d::Identity(), {metres, 0.0, 0.0});
 }
@@ -40,9 +40,9 @@ ClosureRecord closure(KeyframeId from, KeyframeId to, ClosureStage stage,
   return {{from, to}, stage, T_from_to};
 }
 
-// Robot 0 drives along x, robot 1 beside it with 0.4 m between; both look ahead, the scene 4 m
-// away. Robot 1's last keyframe is far off. Every 3 m a keyframe: only those side by side overlap
-// enough.
+// Robot 0 drives along x, robot 1 in parallel at a distance of 0.4 m. Both look ahead; the scene is
+// 4 m away. There is a keyframe every 3 m, so that only keyframes side by side overlap enough.
+// Robot 1's last keyframe is far away.
 std::vector<TrueKeyframe> two_rows(std::uint32_t count) {
   std::vector<TrueKeyframe> keyframes;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -52,24 +52,25 @@ std::vector<TrueKeyframe> two_rows(std::uint32_t count) {
   return keyframes;
 }
 
-const SE3 kTruth = at(0.0, 0.4);  // of robot 1's keyframe i in robot 0's
+const SE3 kTruth = at(0.0, 0.4);  // pose of robot 1's keyframe i in robot 0's
 
 TEST_CASE("The overlap of two views is the share of the image in both", "[closure_truth]") {
   const double grid = 1.0 / 16;  // half a cell of the grid's eight columns
   CHECK(view_overlap(camera(), SE3::Identity(), 3.0) == 1.0);
-  // The image is 2 * depth wide at any depth: moved sideways by a share of it, the rest is seen.
+  // The image is 2 * depth wide at any depth: after a sideways motion by a share of it, the rest is
+  // in view.
   const double depth_m = GENERATE(1.0, 20.0);
   CHECK(view_overlap(camera(), sideways(0.5 * depth_m), depth_m) == Approx(0.75).margin(grid));
   CHECK(view_overlap(camera(), sideways(1.5 * depth_m), depth_m) == Approx(0.25).margin(grid));
   CHECK(view_overlap(camera(), sideways(2.5 * depth_m), depth_m) == 0.0);
-  // Looking the other way, or at twice the distance and more.
+  // No overlap in the opposite direction, and at twice the distance and more.
   CHECK(view_overlap(camera(), make_pose(so3_exp({0.0, std::numbers::pi, 0.0}), {0, 0, 0}),
                      depth_m) == 0.0);
   const SE3 behind = make_pose(Eigen::Matrix3d::Identity(), {0.0, 0.0, -1.2 * depth_m});
   CHECK(view_overlap(camera(), behind, depth_m) == 0.0);
 }
 
-TEST_CASE("Planted errors are counted, stage by stage", "[closure_truth]") {
+TEST_CASE("Inserted errors are counted at each stage", "[closure_truth]") {
   using enum ClosureStage;
   const auto keyframes = two_rows(6);
   const SE3 off_m = kTruth * at(0.6, 0.0);
@@ -77,7 +78,7 @@ TEST_CASE("Planted errors are counted, stage by stage", "[closure_truth]") {
   const SE3 within = kTruth * at(0.3, 0.3, 4.0);
   const std::vector<ClosureRecord> closures = {
       closure({0, 0}, {1, 0}, kInlier, kTruth),
-      closure({1, 0}, {0, 0}, kInlier, kTruth.inverse()),  // the same pair from the other side
+      closure({1, 0}, {0, 0}, kInlier, kTruth.inverse()),  // the same pair in the other direction
       closure({0, 1}, {1, 1}, kInlier, within),
       closure({0, 2}, {1, 2}, kInlier, off_m),
       closure({0, 3}, {1, 3}, kVerified, off_deg),
@@ -106,7 +107,7 @@ TEST_CASE("Planted errors are counted, stage by stage", "[closure_truth]") {
   CHECK(scores.verified.rotation_error_deg.max == Approx(6.0));
 }
 
-TEST_CASE("Limits decide what is true", "[closure_truth]") {
+TEST_CASE("Limits decide which closures are true", "[closure_truth]") {
   using enum ClosureStage;
   const auto keyframes = two_rows(3);
   const std::vector<ClosureRecord> closures = {
@@ -120,19 +121,20 @@ TEST_CASE("Limits decide what is true", "[closure_truth]") {
   CHECK(correct({.max_translation_m = 0.21, .max_rotation_deg = 2.1}) == 1);
 }
 
-TEST_CASE("Places scale with what the keyframes see", "[closure_truth]") {
-  auto keyframes = two_rows(2);  // side by side 0.4 m apart; the second robot's last is far off
+TEST_CASE("Places scale with the depth of the scene", "[closure_truth]") {
+  // Side by side 0.4 m apart; the second robot's last keyframe is far away
+  auto keyframes = two_rows(2);
   const auto pairs = [&](double depth_m) {
     for (TrueKeyframe& keyframe : keyframes) keyframe.scene_depth_m = depth_m;
     return score_closures(keyframes, {}, camera()).true_pairs;
   };
   CHECK(pairs(0.2) == 0);   // 0.4 m is a whole view at 0.2 m
-  CHECK(pairs(2.0) == 1);   // half a view and more overlaps
+  CHECK(pairs(2.0) == 1);   // overlaps by more than half a view
   CHECK(pairs(40.0) == 2);  // 3 m ahead is still the same place
   CHECK(pairs(0.0) == 1);   // unknown: the default of 5 m
 }
 
-TEST_CASE("Closures inside a robot count for precision, not for recall", "[closure_truth]") {
+TEST_CASE("Closures within a robot count for precision and not for recall", "[closure_truth]") {
   std::vector<TrueKeyframe> keyframes = {{{0, 0}, at(0, 0), 4.0}, {{0, 9}, at(0.1, 0), 4.0}};
   const ClosureScores scores = score_closures(
       keyframes, std::vector{closure({0, 0}, {0, 9}, ClosureStage::kInlier, at(0.1, 0))}, camera());
@@ -143,7 +145,7 @@ TEST_CASE("Closures inside a robot count for precision, not for recall", "[closu
   CHECK(std::isnan(score_closures(keyframes, {}, camera()).inliers.precision()));
 }
 
-TEST_CASE("What cannot be judged is refused", "[closure_truth]") {
+TEST_CASE("Invalid closures and options are refused", "[closure_truth]") {
   const auto keyframes = two_rows(2);
   const std::vector<ClosureRecord> none = {
       closure({0, 0}, {1, 0}, ClosureStage::kVerified, std::nullopt)};
@@ -201,7 +203,7 @@ TEST_CASE("Closures are read with their stages and poses", "[closure_files]") {
   CHECK(closures[1].reason == "too few matches, 3 of 20");
 }
 
-TEST_CASE("Keyframes take their true poses from the time they were made", "[closure_files]") {
+TEST_CASE("Keyframes get their true poses by their stamps", "[closure_files]") {
   const TemporaryFolder folder;
   const auto file = folder.write("keyframes.csv",
                                  "robot,keyframe,stamp_ns,median_depth_m\n"
@@ -213,7 +215,7 @@ TEST_CASE("Keyframes take their true poses from the time they were made", "[clos
   CHECK(keyframes[1].stamp == 1'525'000'000);
   const auto truth = sample(1.0, 20.0, 21, curve);  // to 2 s
   const auto placed = place_keyframes(keyframes, truth);
-  REQUIRE(placed.size() == 2);  // the third lies beyond
+  REQUIRE(placed.size() == 2);  // the third is after the truth
   CHECK(placed[0].id == KeyframeId{7, 0});
   CHECK(placed[0].scene_depth_m == 2.5);
   CHECK(placed[0].T_world_body.isApprox(curve(1.0)));
@@ -221,7 +223,7 @@ TEST_CASE("Keyframes take their true poses from the time they were made", "[clos
   CHECK((placed[1].T_world_body.translation() - curve(1.525).translation()).norm() < between_m);
 }
 
-TEST_CASE("Broken closure files are named with their line", "[closure_files]") {
+TEST_CASE("Errors in closure files are reported with their line", "[closure_files]") {
   const TemporaryFolder folder;
   const auto problem = [&](const std::string& rows) -> std::string {
     try {

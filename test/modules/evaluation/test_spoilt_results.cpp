@@ -30,8 +30,7 @@ std::string euroc() {
 
 }  // namespace
 
-TEST_CASE("A spoilt trajectory is refused with its line, or has errors that are numbers",
-          "[evaluation]") {
+TEST_CASE("A corrupted trajectory is refused with its line or has finite errors", "[evaluation]") {
   const std::string good = GENERATE(tum(), euroc());
   const auto truth = parse_trajectory(tum(), "truth");
   check_spoilt<TrajectoryFileError>(good, "spoilt.tum", [&](const std::string& text) {
@@ -57,7 +56,7 @@ TEST_CASE("A pose beyond the earth is refused with line and value", "[evaluation
                     Catch::Contains("line 1: 9223372036854775807 is not a stamp"));
 }
 
-TEST_CASE("Spoilt tables of a run are refused with file and line", "[evaluation]") {
+TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluation]") {
   const TemporaryFolder folder;
   SECTION("keyframes.csv") {
     check_spoilt<ClosureFileError>(
@@ -96,7 +95,7 @@ TEST_CASE("Spoilt tables of a run are refused with file and line", "[evaluation]
   }
 }
 
-TEST_CASE("What is no file of results is refused by name", "[evaluation]") {
+TEST_CASE("A path that is no file of results is refused by name", "[evaluation]") {
   check_no_files<TrajectoryFileError>(".tum",
                                       [](const auto& place) { (void)read_trajectory(place); });
   check_no_files<ClosureFileError>(".csv", [](const auto& place) { (void)read_keyframes(place); });

@@ -28,8 +28,8 @@ TeamError error_of(const std::vector<StampedPose>& truth, const std::vector<Stam
   return trajectory_error({&input, 1}, options);
 }
 
-// Corners of a square in the plane, visited in turn. Raised by (+d, -d, +d, -d) they neither
-// correlate with x nor y and have mean zero: the best alignment stays the identity.
+// Corners of a square in the plane, visited in turn. Heights of (+d, -d, +d, -d) correlate neither
+// with x nor with y and have mean zero, so that the best alignment is the identity.
 SE3 corner(int i, double raise) {
   const double x = i % 4 == 0 || i % 4 == 3 ? 1.0 : -1.0;
   const double y = i % 4 < 2 ? 1.0 : -1.0;
@@ -75,7 +75,7 @@ TEST_CASE("The absolute error of a saddle is its height", "[evaluation]") {
 }
 
 TEST_CASE("Relative errors are the drift over the delta", "[evaluation]") {
-  // 1 m/s with 2 % too much speed and 0.01 rad/s too much turn.
+  // 1 m/s with 2 % too much speed, and a rotation of 0.01 rad/s too much.
   const auto truth = sample(0.0, 10.0, 101, [](double t_s) {
     return make_pose(Eigen::Matrix3d::Identity(), {t_s, 0.0, 0.0});
   });
@@ -97,7 +97,7 @@ TEST_CASE("Relative errors are the drift over the delta", "[evaluation]") {
         Approx(0.01 * options.rpe_delta_s * 180.0 / std::numbers::pi).epsilon(1e-6));
 }
 
-TEST_CASE("One alignment for a team shows how far its robots are apart", "[evaluation]") {
+TEST_CASE("One alignment for a team shows the distance between its robots", "[evaluation]") {
   // Two perfect estimates, the second 6 cm too high: the best compromise errs by 3 cm everywhere.
   const auto truth = square(0.0);
   const auto lifted =
@@ -123,7 +123,7 @@ TEST_CASE("Completeness is the covered share of the window", "[evaluation]") {
   CHECK(trajectory_error(team).joint.completeness == Approx(10.0 / 15.0));
 }
 
-TEST_CASE("What cannot be compared is refused by name", "[evaluation]") {
+TEST_CASE("Trajectories that cannot be compared are refused by name", "[evaluation]") {
   const auto truth = sample(0.0, 10.0, 100, curve);
   const auto elsewhere = sample(100.0, 10.0, 100, curve);
   CHECK_THROWS_WITH(error_of(truth, elsewhere),
@@ -146,8 +146,8 @@ TEST_CASE("The error of a real estimate agrees with an independent computation",
   if (!folder) return;
   const auto truth = read_trajectory(*folder / "freiburg1_xyz-groundtruth.txt");
   const auto estimate = read_trajectory(*folder / "freiburg1_xyz-rgbdslam.txt");
-  // The same interpolation, aligned by Horn's quaternion method (JOSA A 1987) in a program that
-  // shares no code with this one; it prints 1e-7 m.
+  // The same interpolation, with the alignment by Horn's quaternion method (JOSA A 1987) of an
+  // independent program, which prints 1e-7 m.
   const TeamError rigid = error_of(truth, estimate);
   CHECK(rigid.joint.position_m.count == 785);
   CHECK(rigid.joint.position_m.rmse == Approx(0.0134670).margin(1e-7));
@@ -161,7 +161,7 @@ TEST_CASE("The error of a real estimate agrees with an independent computation",
   CHECK(similar.joint.position_m.rmse == Approx(0.0133902).margin(1e-7));
 }
 
-// `count` pairs of a truth and an estimate of it.
+// `count` pairs of a truth and an estimate.
 template <typename Truth, typename Estimate>
 std::vector<PosePair> pairs_of(int count, const Truth& truth, const Estimate& estimate) {
   std::vector<PosePair> pairs;
@@ -169,14 +169,15 @@ std::vector<PosePair> pairs_of(int count, const Truth& truth, const Estimate& es
   return pairs;
 }
 
-TEST_CASE("Drift lengths are those of 1, 2, 5 that fit half the path", "[segment_error]") {
+TEST_CASE("Drift lengths are the multiples of 1, 2 and 5 up to half the path", "[segment_error]") {
   CHECK(segment_lengths(300.0) == std::vector<double>{10.0, 20.0, 50.0, 100.0});
   CHECK(segment_lengths(5.43) == std::vector<double>{0.2, 0.5, 1.0, 2.0});
   CHECK(segment_lengths(0.05).size() == 2);
   CHECK(segment_lengths(0.0).empty());
 }
 
-TEST_CASE("A straight line of the wrong scale drifts by exactly that", "[segment_error]") {
+TEST_CASE("A straight line of the wrong scale drifts by exactly its scale error",
+          "[segment_error]") {
   const double scale = GENERATE(0.9, 1.0, 1.03);
   const double step_m = 0.3;  // no divisor of the lengths
   const auto line = [=](double by) {
@@ -194,7 +195,7 @@ TEST_CASE("A straight line of the wrong scale drifts by exactly that", "[segment
     CHECK(percent == Approx(0.0).margin(1e-9));
 }
 
-TEST_CASE("A constant turn too much is seen per metre", "[segment_error]") {
+TEST_CASE("A constant error of rotation is measured per metre", "[segment_error]") {
   const double step_m = 0.25;
   const double turn = 0.002;  // [rad] a step
   const auto truth = [=](int i) {
@@ -222,7 +223,8 @@ TEST_CASE("Drift does not depend on the frame of the estimate", "[segment_error]
     CHECK(a.translation_percent[i] == Approx(b.translation_percent[i]).margin(1e-9));
 }
 
-TEST_CASE("Lengths beyond the path give nothing, bad ones are refused", "[segment_error]") {
+TEST_CASE("Lengths beyond the path give no errors and invalid lengths are refused",
+          "[segment_error]") {
   const auto line = [](int i) { return make_pose(Eigen::Matrix3d::Identity(), {0.1 * i, 0, 0}); };
   const auto pairs = pairs_of(11, line, line);
   const double lengths_m[] = {0.5, 2.0};
@@ -235,7 +237,7 @@ TEST_CASE("Lengths beyond the path give nothing, bad ones are refused", "[segmen
 
 constexpr Stamp kStep = 100'000'000;
 
-// Straight ahead along x, 1 m a pose, turning its head as it goes.
+// Straight ahead along x, 1 m per pose, with a rotation.
 std::vector<StampedPose> straight_way(int poses) {
   std::vector<StampedPose> way;
   for (int i = 0; i < poses; ++i)
@@ -243,7 +245,7 @@ std::vector<StampedPose> straight_way(int poses) {
   return way;
 }
 
-TEST_CASE("Surroundings are aligned where the way is straight, or a single pose",
+TEST_CASE("Surroundings are aligned on a straight path and for a single pose",
           "[surroundings_alignment]") {
   const int poses = GENERATE(1, 2, 20);
   const SE3 T_truth_estimate = make_pose(so3_exp({0.4, -0.2, 2.0}), {5, -3, 2});
@@ -254,11 +256,11 @@ TEST_CASE("Surroundings are aligned where the way is straight, or a single pose"
   CHECK((found.matrix() - T_truth_estimate.matrix()).norm() < 1e-9);
 }
 
-TEST_CASE("A heading that is wrong weighs less over a long way than over a short one",
+TEST_CASE("A wrong heading has less effect on a long path than on a short one",
           "[surroundings_alignment]") {
   const auto heading_error = [](int poses) {
     const auto truth = straight_way(poses);
-    auto estimate = truth;  // places are right, but the camera is turned by a tenth
+    auto estimate = truth;  // positions are right, but the camera is rotated by 0.1 rad
     for (StampedPose& pose : estimate) pose.T.linear() = pose.T.linear() * so3_exp({0, 0, 0.1});
     const std::vector<TrajectoryInput> inputs = {{"a", truth, estimate, std::nullopt}};
     return angle_of(align_surroundings(inputs).linear());
@@ -267,7 +269,7 @@ TEST_CASE("A heading that is wrong weighs less over a long way than over a short
   CHECK(heading_error(200) < 0.005);
 }
 
-TEST_CASE("Trajectories that share no time are refused by name", "[surroundings_alignment]") {
+TEST_CASE("Trajectories without common time are refused by name", "[surroundings_alignment]") {
   const auto truth = straight_way(3);
   auto late = truth;
   for (StampedPose& pose : late) pose.stamp += 1000 * kStep;

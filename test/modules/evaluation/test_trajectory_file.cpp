@@ -22,7 +22,7 @@ TEST_CASE("TUM and EuRoC rows give the same pose", "[evaluation]") {
   CHECK(poses[0].T.linear().isApprox(q.toRotationMatrix(), 1e-12));
 }
 
-TEST_CASE("A trajectory that cannot be meant is refused with file and line", "[evaluation]") {
+TEST_CASE("An impossible trajectory is refused with file and line", "[evaluation]") {
   struct Case {
     const char *text, *message;
   };
@@ -43,7 +43,7 @@ TEST_CASE("A trajectory that cannot be meant is refused with file and line", "[e
   CHECK_THROWS_WITH(read_trajectory("/nowhere.txt"), "/nowhere.txt: no such file");
 }
 
-TEST_CASE("Of poses with the same stamp the first counts", "[evaluation]") {
+TEST_CASE("The first of several poses with the same stamp counts", "[evaluation]") {
   const auto poses = parse_trajectory("1 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n", "p");
   REQUIRE(poses.size() == 2);
   CHECK(poses[0].T.translation().x() == 1.0);

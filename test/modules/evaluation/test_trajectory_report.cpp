@@ -32,7 +32,7 @@ TEST_CASE("The JSON holds every robot and the team", "[evaluation]") {
                        Catch::Contains("\"completeness\": 1") && Catch::Contains("\"pairs\": 200"));
 }
 
-TEST_CASE("Relative errors of which there are none are not perfect", "[evaluation]") {
+TEST_CASE("Missing relative errors are not perfect errors", "[evaluation]") {
   TrajectoryErrorOptions options;
   options.rpe_delta_s = 100.0;  // the poses span 20 s
   const TeamError none = trajectory_error(kInputs, options);
@@ -65,7 +65,7 @@ TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]
   }
 }
 
-TEST_CASE("The plot leaves out the truth before and after the estimates", "[evaluation]") {
+TEST_CASE("The plot omits the truth before and after the estimates", "[evaluation]") {
   const std::vector<StampedPose> part(kTruth.begin() + 40, kTruth.begin() + 60);
   const std::vector<TrajectoryInput> inputs = {{"part", kTruth, part, {}}};
   const Plot plot = plot_from_above(inputs, trajectory_error(inputs));

@@ -9,7 +9,7 @@ namespace km {
 
 inline constexpr Stamp kSecond = 1'000'000'000;
 
-/// `count` poses at `rate_hz` from `from_s` on; pose(t_s) gives each.
+/// `count` poses at `rate_hz` from `from_s` on; pose(t_s) returns each.
 template <typename Pose>
 std::vector<StampedPose> sample(double from_s, double rate_hz, int count, const Pose& pose) {
   std::vector<StampedPose> poses;

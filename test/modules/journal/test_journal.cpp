@@ -77,7 +77,7 @@ OdometryState state(Stamp stamp, std::mt19937& rng) {
           random_vector<3>(rng)};
 }
 
-// Five keyframes with an image between each two, a closure with robot 3 from each.
+// Five keyframes with an image between each two and a closure of each with robot 3.
 std::vector<JournalEntry> some_run() {
   std::mt19937 rng(1);
   std::vector<JournalEntry> run{JournalStart{kRobot, 0x123450000, "MH_01_easy"}};
@@ -115,7 +115,7 @@ std::pair<JournalExtent, std::vector<JournalEntry>> read(const std::filesystem::
   return {extent, std::move(entries)};
 }
 
-TEST_CASE("Every entry comes back to the last bit", "[journal]") {
+TEST_CASE("Every journal entry is restored exactly", "[journal]") {
   std::mt19937 rng(2);
   const KeyframeOdometry keyframe = step(4, rng);
   const auto decoded = decode_journal_entry(encode_journal_entry(keyframe));
@@ -150,7 +150,7 @@ TEST_CASE("Every entry comes back to the last bit", "[journal]") {
   }
 }
 
-TEST_CASE("What is no entry is refused", "[journal]") {
+TEST_CASE("Bytes that are no journal entry are refused", "[journal]") {
   std::mt19937 rng(3);
   std::vector<std::uint8_t> bytes = encode_journal_entry(features(0, rng));
   for (std::size_t size = 0; size < bytes.size(); ++size)
@@ -162,12 +162,12 @@ TEST_CASE("What is no entry is refused", "[journal]") {
   CHECK_FALSE(decode_journal_entry(encode_journal_entry(nowhere)).value);
   CHECK_FALSE(decode_journal_entry(std::vector<std::uint8_t>{200}).value);
   bytes = encode_journal_entry(KeyframeOdometry{});
-  REQUIRE(bytes.back() == 0);  // nothing follows the step
+  REQUIRE(bytes.back() == 0);  // no optional part follows the step
   bytes.back() = 8;
   CHECK_FALSE(decode_journal_entry(bytes).value);
 }
 
-TEST_CASE("Covariances of states that odometry cannot go on from are refused", "[journal]") {
+TEST_CASE("Covariances of states that odometry cannot continue from are refused", "[journal]") {
   KeyframeOdometry keyframe;
   const auto taken = [&](const StateCovariance& covariance) {
     keyframe.state_covariance = covariance;
@@ -176,7 +176,7 @@ TEST_CASE("Covariances of states that odometry cannot go on from are refused", "
   CHECK(taken(1e-4 * StateCovariance::Identity()));
   CHECK_FALSE(taken(StateCovariance::Zero()));
   CHECK_FALSE(taken(-StateCovariance::Identity()));
-  CHECK_FALSE(taken(StateCovariance::Ones()));  // of rank one
+  CHECK_FALSE(taken(StateCovariance::Ones()));  // rank one
   CHECK_FALSE(taken(1e300 * StateCovariance::Identity()));
   StateCovariance covariance = StateCovariance::Identity();
   covariance(3, 7) = std::numeric_limits<double>::quiet_NaN();
@@ -185,9 +185,9 @@ TEST_CASE("Covariances of states that odometry cannot go on from are refused", "
   CHECK_FALSE(taken(covariance));
 }
 
-TEST_CASE("A journal from before states had covariances and calibrations is read, without them",
+TEST_CASE("A journal without covariances and calibrations of an earlier format is read",
           "[journal]") {
-  // A step then ended in whether it has a vertical: 0 or 1.
+  // A step then ended with 1 or 0: whether it has a vertical.
   std::mt19937 rng(11);
   for (const KeyframeIndex index : {2U, 3U}) {  // with a vertical, and without
     const KeyframeOdometry keyframe = step(index, rng);
@@ -205,7 +205,7 @@ TEST_CASE("A journal from before states had covariances and calibrations is read
   }
 }
 
-TEST_CASE("A journal cut anywhere is whole up to its last full entry", "[journal]") {
+TEST_CASE("A truncated journal is intact up to its last full entry", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const std::string text = (written(folder, run), folder.read("run.journal"));
@@ -224,7 +224,7 @@ TEST_CASE("A journal cut anywhere is whole up to its last full entry", "[journal
   CHECK(read(folder.write("cut", text)).second.size() == run.size());
 }
 
-TEST_CASE("A flipped bit ends the journal before the entry it is in", "[journal]") {
+TEST_CASE("A flipped bit ends the journal before its entry", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const std::string text = (written(folder, run), folder.read("run.journal"));
@@ -249,7 +249,7 @@ TEST_CASE("Files that are no journals are refused by name", "[journal]") {
   CHECK(restore_run(folder.write("begun", "KMJR")).keyframes.empty());
 }
 
-TEST_CASE("A journal taken up loses its torn end and goes on", "[journal]") {
+TEST_CASE("A continued journal loses its incomplete end and grows", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const std::filesystem::path file = written(folder, run);
@@ -270,7 +270,7 @@ TEST_CASE("A journal taken up loses its torn end and goes on", "[journal]") {
   CHECK(std::get<JournalStart>(all[run.size() - 1]).boot == 0x123450001);
 }
 
-TEST_CASE("An entry is read again from where the journal says that it is", "[journal]") {
+TEST_CASE("An entry can be read at the place that add() returned", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const std::filesystem::path file = written(folder, run);
@@ -294,7 +294,7 @@ TEST_CASE("An entry is read again from where the journal says that it is", "[jou
   CHECK_THROWS_AS(read_journal_entry(folder.path() / "missing", places[1]), InputFileError);
 }
 
-TEST_CASE("A disk that is full for a while costs nothing", "[journal]") {
+TEST_CASE("A disk that is full for a while loses no entry", "[journal]") {
   const TemporaryFolder folder;
   const std::filesystem::path file = folder.path() / "run.journal";
   const auto before = std::signal(SIGXFSZ, SIG_IGN);
@@ -321,17 +321,19 @@ TEST_CASE("A run is restored up to its last full keyframe", "[journal]") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   std::mt19937 rng(6);
-  entries.emplace_back(step(5, rng));  // whose features did not reach the disk
+  entries.emplace_back(step(5, rng));  // a step whose features did not reach the disk
   entries.emplace_back(closure(5, rng));
   entries.emplace_back(outcome({kRobot, 1}, {3, 4}, ClosureStage::kRequested));
   entries.emplace_back(outcome({kRobot, 2}, {3, 4}, ClosureStage::kReceived, "too few matches"));
-  entries.emplace_back(outcome({kRobot, 3}, {3, 4}, ClosureStage::kVerified));  // no closure
+  entries.emplace_back(outcome({kRobot, 3}, {3, 4}, ClosureStage::kVerified));  // an outcome
+                                                                                // without its
+                                                                                // closure
   const RestoredRun run = restore_run(written(folder, entries));
   CHECK(run.robot == kRobot);
   CHECK(run.input == "MH_01_easy");
   REQUIRE(run.odometry.size() == 5);
   CHECK(run.keyframes.size() == 5);
-  CHECK(run.states.size() == 10);  // the image after the last keyframe comes anew, but may not
+  CHECK(run.states.size() == 10);  // the image after the last keyframe may not come again
   CHECK(run.final_states() == 9);
   CHECK(run.states[8].stamp == run.odometry.back().stamp);
   CHECK(run.closures.size() == 5);
@@ -339,13 +341,12 @@ TEST_CASE("A run is restored up to its last full keyframe", "[journal]") {
   CHECK(run.outcomes[2].reason == "too few matches");
 }
 
-TEST_CASE("A run taken up goes on behind its last full keyframe, as often as it is killed",
-          "[journal]") {
+TEST_CASE("A run continues after its last full keyframe each time it is killed", "[journal]") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   std::mt19937 rng(7);
   for (std::uint64_t life = 1; life <= 3; ++life) {
-    entries.emplace_back(step(4 + static_cast<KeyframeIndex>(life), rng));  // torn off
+    entries.emplace_back(step(4 + static_cast<KeyframeIndex>(life), rng));  // incomplete
     entries.emplace_back(JournalStart{kRobot, 0x123450000 + life, "MH_01_easy"});
     const KeyframeOdometry next = step(4 + static_cast<KeyframeIndex>(life), rng);
     entries.emplace_back(state(next.stamp, rng));
@@ -355,17 +356,17 @@ TEST_CASE("A run taken up goes on behind its last full keyframe, as often as it 
     CHECK(run.boot == 0x123450000 + life);
     REQUIRE(run.odometry.size() == 5 + life);
     CHECK(run.odometry.back().T_odom_kf.matrix() == next.T_odom_kf.matrix());
-    CHECK(run.states.size() == 10 + life);  // next.stamp is behind the image that was there
+    CHECK(run.states.size() == 10 + life);  // next.stamp is later than that of the former image
   }
 }
 
-TEST_CASE("What was found with another robot ends with its life", "[journal]") {
+TEST_CASE("Closures with another robot end with its incarnation", "[journal]") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   const std::uint64_t boot = std::uint64_t{5} << kResumeBits;
   entries.insert(entries.begin() + 1, JournalPeer{3, boot, "carol"});
   CHECK(restore_run(written(folder, entries)).closures.size() == 5);
-  entries.emplace_back(JournalPeer{3, boot + 1, "carol"});  // was resumed
+  entries.emplace_back(JournalPeer{3, boot + 1, "carol"});  // resumed
   CHECK(restore_run(written(folder, entries)).closures.size() == 5);
   entries.emplace_back(JournalPeer{3, std::uint64_t{6} << kResumeBits, "carol"});
   std::mt19937 rng(9);
@@ -377,7 +378,7 @@ TEST_CASE("What was found with another robot ends with its life", "[journal]") {
   CHECK(run.keyframes.size() == 5);
 }
 
-TEST_CASE("A run of the past has what is its own alone, under another id", "[journal]") {
+TEST_CASE("A finished run under another id keeps only its own results", "[journal]") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   std::mt19937 rng(10);
@@ -395,7 +396,7 @@ TEST_CASE("A run of the past has what is its own alone, under another id", "[jou
   }
 }
 
-TEST_CASE("Entries that contradict each other are named", "[journal]") {
+TEST_CASE("Contradicting journal entries are named", "[journal]") {
   const TemporaryFolder folder;
   std::mt19937 rng(8);
   const JournalStart start{kRobot, 1, "x"};

@@ -49,7 +49,7 @@ std::uint64_t lost(const LinkEmulator& emulator, LinkLoss why) {
   return emulator.counts(0, 1).lost[static_cast<std::size_t>(why)].frames;
 }
 
-// Whether a frame from 0 to 1 at that time arrives.
+// True if a frame from 0 to 1 at that time arrives.
 bool passes(LinkEmulator& emulator, double time_s) {
   emulator.send(0, time_s, frame_to(1));
   return !emulator.due(time_s).empty();
@@ -57,7 +57,7 @@ bool passes(LinkEmulator& emulator, double time_s) {
 
 }  // namespace
 
-TEST_CASE("A perfect link hands on frames at once and unchanged", "[link_emulation]") {
+TEST_CASE("A perfect link delivers frames at once and unchanged", "[link_emulation]") {
   LinkEmulator emulator(script_of(3));
   const EthernetFrame frame = frame_to(2);
   emulator.send(0, 1.5, frame);
@@ -72,7 +72,7 @@ TEST_CASE("A perfect link hands on frames at once and unchanged", "[link_emulati
   CHECK(emulator.counts(0, 1) == LinkCounts{});
 }
 
-TEST_CASE("A frame for many goes to every other robot", "[link_emulation]") {
+TEST_CASE("A broadcast frame goes to every other robot", "[link_emulation]") {
   const EthernetFrame frame = GENERATE(broadcast(), multicast());
   LinkEmulator emulator(script_of(4));
   emulator.send(2, 0.0, frame);
@@ -81,7 +81,7 @@ TEST_CASE("A frame for many goes to every other robot", "[link_emulation]") {
   CHECK(reached == std::set<std::size_t>{0, 1, 3});
 }
 
-TEST_CASE("A frame for nobody vanishes uncounted", "[link_emulation]") {
+TEST_CASE("A frame to an unknown address is dropped and not counted", "[link_emulation]") {
   LinkEmulator emulator(script_of(2));
   emulator.send(0, 0.0, frame_to(7));
   emulator.send(0, 0.0, frame_to(0));
@@ -113,7 +113,7 @@ TEST_CASE("A delay is exact, and jitter stays within its bounds", "[link_emulati
     sum_s += *due_s - i;
     CHECK(shaken.due(*due_s).size() == 1);
   }
-  // Of a uniform distribution; five standard deviations of the mean.
+  // Mean of a uniform distribution; five standard deviations of the mean.
   CHECK(std::abs(sum_s / kFrames - 0.3) < 5.0 * 0.1 / std::sqrt(12.0 * kFrames));
 }
 
@@ -153,17 +153,17 @@ TEST_CASE("A link carries its rate and no more", "[link_emulation]") {
   REQUIRE(arrived.size() == 50);
   for (std::size_t i = 0; i < arrived.size(); ++i)
     CHECK(arrived[i].due_s == Approx(2.5 + 0.1 * static_cast<double>(i + 1)).epsilon(1e-12));
-  emulator.send(0, 100.0, frame_to(1));  // an idle link saves nothing up
+  emulator.send(0, 100.0, frame_to(1));  // an idle link accumulates no capacity
   CHECK(*emulator.next_s() == Approx(100.6).epsilon(1e-12));
 }
 
-TEST_CASE("A full queue drops what comes last", "[link_emulation]") {
+TEST_CASE("A full queue drops the newest frames", "[link_emulation]") {
   LinkPlan link = limited(10e3);
   link.queue_bytes = 5.0 * kFrame_bytes;
   LinkEmulator emulator(script_of(2, link));
   for (int i = 0; i < 8; ++i) emulator.send(0, 0.0, frame_to(1));
   CHECK(lost(emulator, LinkLoss::kQueue) == 3);
-  emulator.send(0, 0.05, frame_to(1));  // half a frame has gone: there is no room yet
+  emulator.send(0, 0.05, frame_to(1));  // half a frame has been sent: there is no room yet
   CHECK(lost(emulator, LinkLoss::kQueue) == 4);
   emulator.send(0, 0.2, frame_to(1));  // room for two
   emulator.send(0, 0.2, frame_to(1));
@@ -172,7 +172,8 @@ TEST_CASE("A full queue drops what comes last", "[link_emulation]") {
   CHECK(all_of(emulator).size() == 7);
 }
 
-TEST_CASE("A queue waits where a trace falls to zero, and goes on with it", "[link_emulation]") {
+TEST_CASE("A queue waits while the rate of a trace is zero and then continues",
+          "[link_emulation]") {
   LinkPlan link;
   link.course = LinkTrace({{0.0, 1000.0, 0.0},
                            {1.0, 1000.0, 0.0},
@@ -184,11 +185,11 @@ TEST_CASE("A queue waits where a trace falls to zero, and goes on with it", "[li
   const auto arrived = all_of(emulator);
   REQUIRE(arrived.size() == 2);
   CHECK(arrived[0].due_s == Approx(1.0));
-  // 50 bytes on the way down and 50 on the way up, and 900 at the full rate.
+  // 50 bytes each while the rate falls and rises, and 900 at the full rate.
   CHECK(arrived[1].due_s == Approx(5.9));
 }
 
-TEST_CASE("A frame that a trace never sends off stays on its way", "[link_emulation]") {
+TEST_CASE("A frame that a trace never sends stays on its way", "[link_emulation]") {
   LinkPlan link = limited(0.0);
   LinkEmulator emulator(script_of(2, link));
   emulator.send(0, 0.0, frame_to(1));
@@ -197,7 +198,7 @@ TEST_CASE("A frame that a trace never sends off stays on its way", "[link_emulat
   CHECK(emulator.counts(0, 1).in == FrameTally{1, kFrame_bytes});
 }
 
-TEST_CASE("An outage begins and ends as planned, for its direction", "[link_emulation]") {
+TEST_CASE("An outage begins and ends as planned for its direction", "[link_emulation]") {
   LinkScript script = script_of(2);
   script.link(0, 1).outages = {{1.0, 2.0}, {5.0, 6.0}};
   LinkEmulator emulator(script);
@@ -216,7 +217,7 @@ TEST_CASE("An outage begins and ends as planned, for its direction", "[link_emul
   CHECK(lost(emulator, LinkLoss::kOutage) == 3);
 }
 
-TEST_CASE("What is on its way arrives though the link goes out", "[link_emulation]") {
+TEST_CASE("A frame on its way arrives although the link fails", "[link_emulation]") {
   LinkPlan link;
   link.course = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
   link.outages = {{1.0, 2.0}};
@@ -225,7 +226,7 @@ TEST_CASE("What is on its way arrives though the link goes out", "[link_emulatio
   CHECK(emulator.due(1.4).size() == 1);
 }
 
-TEST_CASE("A partition keeps groups apart while it lasts", "[link_emulation]") {
+TEST_CASE("A partition separates groups while it lasts", "[link_emulation]") {
   LinkScript script = script_of(4);
   script.partitions = {{{10.0, 20.0}, {0, 0, 1, 1}}};
   LinkEmulator emulator(script);
@@ -243,7 +244,7 @@ TEST_CASE("A partition keeps groups apart while it lasts", "[link_emulation]") {
   CHECK(emulator.counts(0, 1).lost[kPartition] == FrameTally{});
 }
 
-TEST_CASE("Robots hear each other within range", "[link_emulation]") {
+TEST_CASE("Robots receive each other within range", "[link_emulation]") {
   LinkPlan link;
   link.range_m = 5.0;
   LinkScript script = script_of(2, link);
@@ -259,7 +260,7 @@ TEST_CASE("Robots hear each other within range", "[link_emulation]") {
   CHECK(lost(emulator, LinkLoss::kRange) == 2);
 }
 
-TEST_CASE("The same seed and the same frames give the same run", "[link_emulation]") {
+TEST_CASE("Equal seeds and frames give equal runs", "[link_emulation]") {
   LinkPlan link = limited(50e3, 0.02);
   link.jitter_s = 0.05;
   link.loss = 0.2;
@@ -279,12 +280,12 @@ TEST_CASE("The same seed and the same frames give the same run", "[link_emulatio
   CHECK(run(4) != run(5));
 }
 
-TEST_CASE("The chance of a pair's frames does not hang on other links", "[link_emulation]") {
+TEST_CASE("The loss of a pair's frames is independent of other links", "[link_emulation]") {
   LinkPlan link;
   link.loss = 0.5;
   const auto fates = [&](bool others) {
     LinkScript script = script_of(3, link);
-    script.link(0, 1).outages = {{others ? 0.0 : 40.0, 50.0}};  // of the same frames, other losses
+    script.link(0, 1).outages = {{others ? 0.0 : 40.0, 50.0}};  // other losses for the same frames
     LinkEmulator emulator(script);
     std::string arrived;
     for (int i = 0; i < 100; ++i) {

@@ -40,7 +40,7 @@ TEST_CASE("A link trace is a straight line between its rows", "[link_emulation]"
   CHECK(trace.capacity_until(22.0) == Approx(2600.0));
 }
 
-TEST_CASE("The time of a capacity is where the capacity is reached", "[link_emulation]") {
+TEST_CASE("The time of a capacity is the first time at which it is reached", "[link_emulation]") {
   const LinkTrace trace({{0.0, 50.0, 0.0}, {4.0, 0.0, 0.0}, {6.0, 0.0, 0.0}, {9.0, 80.0, 0.0}});
   std::mt19937 rng(1);
   std::uniform_real_distribution<double> time_s(-5.0, 15.0);
@@ -48,11 +48,11 @@ TEST_CASE("The time of a capacity is where the capacity is reached", "[link_emul
     const double t = time_s(rng);
     CAPTURE(t);
     const double bytes = trace.capacity_until(t);
-    // Times closer than the root of the rounding cannot be told apart where the rate is zero.
+    // If the rate is zero, times closer than the root of the rounding are indistinguishable.
     if (t < 3.99 || t > 6.01) CHECK(trace.time_of(bytes) == Approx(t).margin(1e-9));
     CHECK(trace.capacity_until(trace.time_of(bytes)) == Approx(bytes).margin(1e-9));
   }
-  CHECK(trace.time_of(100.0) == Approx(4.0));  // the first time: nothing more until 6 s
+  CHECK(trace.time_of(100.0) == Approx(4.0));  // the first such time: no more until 6 s
   CHECK(LinkTrace({{0.0, 10.0, 0.0}, {2.0, 0.0, 0.0}}).time_of(10.5) == kInfinite);
 }
 
@@ -63,7 +63,7 @@ TEST_CASE("A link without a limit has no other rows", "[link_emulation]") {
   CHECK_THROWS_AS(LinkTrace(std::vector<LinkTraceRow>()), std::invalid_argument);
 }
 
-TEST_CASE("What is wrong with a link trace is told by line", "[link_emulation]") {
+TEST_CASE("An error in a link trace is reported with its line", "[link_emulation]") {
   CHECK(refusal("") == "trace.csv: holds no row");
   CHECK(refusal("time_s,bytes_per_s,delay_s\n") == "trace.csv: holds no row");
   CHECK(refusal("0,1,0\n1,2\n") == "trace.csv:2: 2 fields, expected time_s, bytes_per_s, delay_s");
@@ -74,11 +74,11 @@ TEST_CASE("What is wrong with a link trace is told by line", "[link_emulation]")
   CHECK(refusal("5,1,0\n5,2,0\n") == "trace.csv:2: time_s is not after that of the row before");
 }
 
-TEST_CASE("A link trace that is no file is refused by name", "[link_emulation]") {
+TEST_CASE("A missing link trace is refused by name", "[link_emulation]") {
   check_no_files<LinkTraceError>(".csv", [](const auto& file) { (void)read_link_trace(file); });
 }
 
-TEST_CASE("A spoilt link trace is refused by name, or carries bytes", "[link_emulation]") {
+TEST_CASE("A corrupted link trace is refused by name or usable", "[link_emulation]") {
   check_spoilt<LinkTraceError>(
       "time_s,bytes_per_s,delay_s\n0,125000,0.02\n1.5,60000,0.05\n3,0,0.2\n4,9000,0.1\n",
       "trace.csv", [](const std::string& text) {

@@ -29,7 +29,7 @@ inline RecordedKeyframe record_of(const StereoPairFile& files, const SensorRig& 
           extractor.extract(pair.frame)};
 }
 
-/// Every so many-th of the 100 stereo keyframes of EuRoC V1_01_easy.
+/// Every n-th of the 100 stereo keyframes of EuRoC V1_01_easy; n is `every`.
 inline std::vector<RecordedKeyframe> load_v1_01(const std::filesystem::path& sequence,
                                                 const KeyframeFeaturesConfig& config,
                                                 std::size_t every = 1) {
@@ -57,7 +57,7 @@ inline std::vector<RecordedKeyframe> load_mh_01(const std::filesystem::path& seq
   for (const StereoPairFile& files : pairs) {
     if (files.stamp < next || seconds_between(pairs.front().stamp, files.stamp) >= 15.0) continue;
     keyframes.push_back(record_of(files, rig, extractor, truth));
-    next = files.stamp + nanoseconds(0.475);  // of a 20 Hz camera every tenth image
+    next = files.stamp + nanoseconds(0.475);  // every tenth image of a 20 Hz camera
   }
   return keyframes;
 }

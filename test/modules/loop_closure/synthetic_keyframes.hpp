@@ -30,7 +30,7 @@ inline Keypoint measured(const SE3& T_world_cam, const Eigen::Vector3d& p_world,
 /// Two keyframes that see the same `count` random points 2 to 6 m ahead, descriptor i of one being
 /// descriptor i of the other. The cameras sit on bodies at T_body_cam.
 struct KeyframePair {
-  SE3 T_from_to = SE3::Identity();  ///< Of the bodies.
+  SE3 T_from_to = SE3::Identity();  ///< Relative pose of the bodies.
   KeyframeFeatures from, to;
 };
 

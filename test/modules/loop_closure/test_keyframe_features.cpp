@@ -101,7 +101,7 @@ TEST_CASE("A reduced keyframe has its first keypoints, those with depth before t
   CHECK(numbers(6) == std::vector<int>{0, 1, 2, 3, 4, 5});
 }
 
-TEST_CASE("depths that are not trusted, or not there, are none", "[loop_closure]") {
+TEST_CASE("keypoints without a trusted depth have none", "[loop_closure]") {
   const StereoRig rig = rgbd_rig(test_camera(), 0.08);
   KeyframeFeaturesConfig config;
   config.min_depth_m = 3.0;
@@ -166,7 +166,7 @@ GrayImage dot_at(const Eigen::Vector2d& bearing, const Camera& camera) {
   return image;
 }
 
-// What the matcher finds of a dot at `left` that has an inverse depth of `truth` [1/m].
+// Inverse depth that the matcher finds for a dot at `left` with an inverse depth of `truth` [1/m].
 float found(const StereoRig& rig, const Eigen::Vector2d& left, double truth) {
   const EpipolarMatcher matcher(rig, {.min_depth_m = 0.5, .max_depth_m = 10.0});
   StereoFrame frame;
@@ -176,7 +176,7 @@ float found(const StereoRig& rig, const Eigen::Vector2d& left, double truth) {
   return matcher.inverse_depths(frame, {&bearing, 1}).front();
 }
 
-TEST_CASE("Folded distortion shows nothing twice to the epipolar matcher", "[loop_closure]") {
+TEST_CASE("The epipolar matcher sees no place twice under folded distortion", "[loop_closure]") {
   const double x = GENERATE(-0.9, -0.8, -0.7);
   CAPTURE(x);
   const StereoRig rig = folding_rig();

@@ -43,7 +43,7 @@ TEST_CASE("a peer that returns is asked at once", "[keyframe_requests]") {
   CHECK(requests.due(10.6) == Ids{{7, 1}});
 }
 
-TEST_CASE("only so many requests are under way to one peer", "[keyframe_requests]") {
+TEST_CASE("the number of unanswered requests to one peer is bounded", "[keyframe_requests]") {
   KeyframeRequests requests(2.0, 2);
   for (std::uint32_t i = 0; i < 5; ++i) requests.want({7, i});
   requests.want({8, 0});
@@ -65,7 +65,7 @@ TEST_CASE("a keyframe that does not exist yet makes room and is tried later",
   CHECK(requests.due(2.1) == Ids{{7, 9}});
 }
 
-TEST_CASE("a late answer counts, one nobody asked for does not", "[keyframe_requests]") {
+TEST_CASE("a late reply counts and a reply without a request does not", "[keyframe_requests]") {
   KeyframeRequests requests(2.0, 1);
   CHECK_FALSE(requests.arrived({7, 1}));
   requests.want({7, 1});
@@ -83,7 +83,7 @@ TEST_CASE("windows and time-outs must be positive", "[keyframe_requests]") {
   CHECK_THROWS_AS(KeyframeRequests(1.0, 0), std::invalid_argument);
 }
 
-TEST_CASE("the cache forgets what was used longest ago", "[keyframe_cache]") {
+TEST_CASE("the cache drops the keyframe used longest ago", "[keyframe_cache]") {
   KeyframeCache cache(2);
   const auto keyframe = [](std::uint32_t index) {
     Keyframe k;
@@ -118,7 +118,7 @@ void succeed(RequestEconomy& economy, KeyframeIndex query, KeyframeIndex own) {
   economy.conclude({kPeer, query}, true);
 }
 
-TEST_CASE("Around a closure nothing is asked for, farther with every success",
+TEST_CASE("No keyframe near a closure is requested and the distance grows with successes",
           "[request_economy]") {
   LoopClosureConfig config;
   config.max_link_separation = 3;
@@ -143,7 +143,7 @@ TEST_CASE("Around a closure nothing is asked for, farther with every success",
   CHECK(economy.judge(candidate(100, 50, 1, kPeer + 1)) == Verdict::kAsk);  // another robot
 }
 
-TEST_CASE("What was asked for is not asked for again beside it", "[request_economy]") {
+TEST_CASE("No keyframe near a requested one is requested", "[request_economy]") {
   LoopClosureConfig config;
   config.attempt_separation = 2;
   RequestEconomy economy(config);
@@ -160,7 +160,8 @@ TEST_CASE("What was asked for is not asked for again beside it", "[request_econo
   CHECK(economy.judge(candidate(0, 0)) == Verdict::kAsk);
 }
 
-TEST_CASE("A kind that fails is asked for ever less, and no other with it", "[request_economy]") {
+TEST_CASE("Candidates of a kind that fails are requested less and less often, others are not",
+          "[request_economy]") {
   LoopClosureConfig config;
   config.attempt_separation = 0;
   config.failure_patience = 1.0;

@@ -12,7 +12,7 @@ namespace {
 constexpr RobotId kSelf = 3;
 constexpr RobotId kPeer = 9;
 
-// A robot's node with its channels; what it sends is kept.
+// A robot's node with its channels; its messages are kept.
 struct Robot {
   explicit Robot(RobotId self, const LoopClosureConfig& config = {},
                  LoopClosureNode::Recall recall = {})
@@ -63,7 +63,7 @@ struct Robot {
   LoopClosureNode node;
 };
 
-// Delivers what both have sent; a reply may produce further requests.
+// Delivers the messages of both robots; a reply may produce further requests.
 void deliver(Robot& a, Robot& b) {
   while (!a.requests.empty() || !b.requests.empty() || !a.replies.empty() || !b.replies.empty())
     for (auto [from, to] : {std::pair(&a, &b), std::pair(&b, &a)}) {
@@ -182,7 +182,7 @@ TEST_CASE("both answers of a repeated request give one closure", "[loop_closure_
   CHECK(robot.closures.size() == 1);
 }
 
-TEST_CASE("of a keyframe those points are sent that the requester's own one has words of",
+TEST_CASE("a reply contains the points whose words the requester's own keyframe has",
           "[loop_closure_node]") {
   const bool told = GENERATE(true, false);
   CAPTURE(told);
@@ -195,7 +195,7 @@ TEST_CASE("of a keyframe those points are sent that the requester's own one has 
   for (std::uint32_t i = 0; i < words; ++i) full.features.descriptors[i] = toy_descriptor(i);
   full.features.keypoints[100].inverse_depth = 0.0F;
   peer.give(full);
-  BagOfWords theirs;  // of the last points, but not of the very last
+  BagOfWords theirs;  // words of the last points except for the very last
   for (std::uint32_t word = words - kSent; word + 1 < words; ++word) theirs.push_back({word, 1});
   const Vocabulary vocabulary = toy_vocabulary(200);
   if (told)
@@ -221,8 +221,7 @@ TEST_CASE("of a keyframe those points are sent that the requester's own one has 
   CHECK(sent.keypoints.size() == expected.size());
 }
 
-TEST_CASE("how many points are sent goes by the words that both images have",
-          "[loop_closure_node]") {
+TEST_CASE("the number of points in a reply depends on the common words", "[loop_closure_node]") {
   constexpr std::uint32_t kSent = 50;
   constexpr std::size_t kFirst = 12;
   struct Case {
@@ -231,7 +230,9 @@ TEST_CASE("how many points are sent goes by the words that both images have",
   };
   const auto [shared, first, later] =
       GENERATE(Case{0, 12, 12}, Case{5, 12, 12}, Case{30, 30, 30}, Case{90, 90, 50},
-               Case{170, 150, 50});  // of 50: a quarter at least, at first three times at most
+               Case{170, 150, 50});  // for 50 keypoints: at least a quarter, at first at most three
+                                     // times as many
+                                     // many
   CAPTURE(shared);
   const Scene scene(13);
   Robot robot(kSelf), peer(kPeer, {.reply_keypoints = kSent});
@@ -255,11 +256,11 @@ TEST_CASE("how many points are sent goes by the words that both images have",
   CHECK(peer.replies[kFirst].message->keyframe.features.keypoints.size() == later);
 }
 
-TEST_CASE("a peer that returns is asked at once for what it owes", "[loop_closure_node]") {
+TEST_CASE("a returned peer is at once asked for its outstanding keyframes", "[loop_closure_node]") {
   Meeting meeting(5);
   auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
-  for (int t = 0; t < 60; ++t) robot.tick(t);  // nobody there
+  for (int t = 0; t < 60; ++t) robot.tick(t);  // no peer replies
   robot.requests.clear();
   PeerEvent event{PeerEventKind::kLost, {}, {}};
   event.identity.robot = kPeer;
@@ -278,7 +279,7 @@ PeerEvent event_of(PeerEventKind kind) {
   return event;
 }
 
-TEST_CASE("with a restarted peer everything begins anew, with a resumed one nothing",
+TEST_CASE("work with a restarted peer begins again and with a resumed one continues",
           "[loop_closure_node]") {
   Meeting meeting(5);
   auto& [scene, robot, peer] = meeting;
@@ -304,7 +305,7 @@ TEST_CASE("with a restarted peer everything begins anew, with a resumed one noth
   }
 }
 
-TEST_CASE("what was under way for a peer is dropped when it restarts, and asked anew when resumed",
+TEST_CASE("work for a peer is dropped when it restarts and requested again when it resumes",
           "[loop_closure_node]") {
   const bool measured = GENERATE(true, false);
   const bool own_is_missing = GENERATE(true, false);
@@ -317,7 +318,7 @@ TEST_CASE("what was under way for a peer is dropped when it restarts, and asked 
     robot.give(RelativePose{.from = scene.own.odometry.id, .to = scene.peer.odometry.id});
   else
     robot.give(scene.candidate());
-  for (int t = 0; t < 60; ++t) robot.tick(t);  // nobody answers
+  for (int t = 0; t < 60; ++t) robot.tick(t);  // no peer replies
   robot.requests.clear();
   SECTION("restarted") {
     robot.give(event_of(PeerEventKind::kRestarted));
@@ -474,7 +475,7 @@ TEST_CASE("closures that start at another robot and misdirected requests are ign
   CHECK(robot.reports.empty());
 }
 
-TEST_CASE("a reply nobody asked for changes nothing", "[loop_closure_node]") {
+TEST_CASE("a reply without a request changes nothing", "[loop_closure_node]") {
   const Scene scene(11);
   Robot robot(kSelf);
   robot.give(scene.own);

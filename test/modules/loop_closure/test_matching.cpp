@@ -78,7 +78,7 @@ TEST_CASE("without a second descriptor there is no ratio and no match", "[matchi
   CHECK(match_descriptors(one, two, {}).size() == 1);
 }
 
-TEST_CASE("guided matching tells equal descriptors apart by their place", "[matching]") {
+TEST_CASE("guided matching distinguishes equal descriptors by their place", "[matching]") {
   std::mt19937 rng(4);
   KeyframePair pair = make_keyframe_pair(rng, 50, {}, 0.0);
   // Descriptors alone cannot match: there is only one.

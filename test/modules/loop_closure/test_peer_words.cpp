@@ -23,7 +23,7 @@ TEST_CASE("A peer that sends words without end loses its own oldest", "[loop_clo
   const std::size_t size = GENERATE(0U, 1000U, 65536U);
   PeerWords words;
   words.put({8, 0}, {1});
-  // Twice what may be kept, most of it told twice.
+  // Twice the words that are kept, most of them added twice.
   const auto count = static_cast<KeyframeIndex>(2 * PeerWords::kMaxWordsPerRobot / (size + 32));
   for (KeyframeIndex i = 0; i < count; ++i)
     for (int k = 0; k < 2; ++k) words.put({7, i}, Words(size, i));

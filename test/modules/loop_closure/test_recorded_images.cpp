@@ -119,9 +119,9 @@ TEST_CASE("closures of V1_01 are many, accurate, and as uncertain as they say", 
   CHECK(squared[n * 95 / 100] < 12.592 * 2.0);
 }
 
-// Two robots in one room: frames before 500, and from 500 on; every sixth of those there are.
-// The data are not registered: colour has no intrinsics of its own (its lens is wider than that of
-// depth) and stands beside it, which is where most of the error comes from.
+// Two robots in one room: frames before 500, and from 500 on; every sixth of the available frames.
+// The images are not registered: colour has no intrinsics of its own (its lens is wider than that
+// of depth), and its camera stands beside the depth camera. Most of the error comes from this.
 TEST_CASE("closures of an RGB-D recording are in the right place", "[verifier]") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
@@ -141,7 +141,7 @@ TEST_CASE("closures of an RGB-D recording are in the right place", "[verifier]")
       metres.push_back((result.T_from_to.translation() - T_true.translation()).norm());
       radians.push_back(angle_of(T_true.linear().transpose() * result.T_from_to.linear()));
     }
-  REQUIRE(metres.size() >= 100);  // of 441 pairs
+  REQUIRE(metres.size() >= 100);  // there are 441 pairs in total
   std::sort(metres.begin(), metres.end());
   std::sort(radians.begin(), radians.end());
   const std::size_t n = metres.size();

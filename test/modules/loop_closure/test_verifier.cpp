@@ -52,7 +52,7 @@ TEST_CASE("keyframes of different places are refused", "[verifier]") {
   CHECK(Verifier({}).verify(here.from, there.to).status == VerificationStatus::kTooFewMatches);
 }
 
-TEST_CASE("alike images of different shape have no consensus", "[verifier]") {
+TEST_CASE("similar images of different shape have no consensus", "[verifier]") {
   std::mt19937 rng(4);
   KeyframePair pair = make_keyframe_pair(rng, 100, kNoise, 1.0);
   std::shuffle(pair.to.keypoints.begin(), pair.to.keypoints.end(), rng);  // descriptors stay
@@ -62,7 +62,7 @@ TEST_CASE("alike images of different shape have no consensus", "[verifier]") {
   CHECK(result.consensus < LoopClosureConfig{}.min_consensus);
 }
 
-TEST_CASE("a closure that hangs on a small far patch is refused", "[verifier]") {
+TEST_CASE("a closure that depends on a small far patch is refused", "[verifier]") {
   std::mt19937 rng(5);
   KeyframePair pair = make_keyframe_pair(rng, 60, kNoise, 0.0);
   for (KeyframeFeatures* features : {&pair.from, &pair.to})

@@ -36,7 +36,7 @@ void check_equal(const MapMesh& a, const MapMesh& b) {
   CHECK(a.voxel_m == b.voxel_m);
 }
 
-TEST_CASE("A map comes back from its file to the last bit", "[map_file]") {
+TEST_CASE("A map is read from its file to the last bit", "[map_file]") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "run.map";
   for (MapMesh map : {strip(7, 0.0F, 5), MapMesh()}) {
@@ -49,7 +49,7 @@ TEST_CASE("A map comes back from its file to the last bit", "[map_file]") {
   }
 }
 
-TEST_CASE("A map file that is cut or spoilt is refused by name", "[map_file]") {
+TEST_CASE("A map file that is truncated or corrupted is refused by name", "[map_file]") {
   const TemporaryFolder folder;
   write_map_file(folder.path() / "run.map", strip(3, 0.0F, 0));
   const std::string bytes = folder.read("run.map");
@@ -67,7 +67,7 @@ TEST_CASE("A map file that is cut or spoilt is refused by name", "[map_file]") {
   CHECK_THROWS_AS(read_map_file(folder.path() / "missing"), InputFileError);
 }
 
-TEST_CASE("A map file with faces of vertices that there are not is refused", "[map_file]") {
+TEST_CASE("A map file with faces of missing vertices is refused", "[map_file]") {
   const TemporaryFolder folder;
   MapMesh map = strip(3, 0.0F, 0);
   map.mesh.faces[1][2] = 5;
@@ -79,15 +79,14 @@ TEST_CASE("A map file with faces of vertices that there are not is refused", "[m
   CHECK_THROWS_AS(read_map_file(folder.path() / "run.map"), InputFileError);
 }
 
-TEST_CASE("What is mapped anew comes behind the former map, under ids that follow",
-          "[continued_map]") {
+TEST_CASE("New surface is appended to the former map under ids that follow", "[continued_map]") {
   const ContinuedMap continued(strip(4, 0.0F, 100), 6);
   const MapMesh now = strip(2, 50.0F, 0);
   const MapMesh both = continued.with(now);
   REQUIRE(both.mesh.vertices.size() == 10);
   CHECK(both.mesh.vertices[6].x() == 50.0F);
   CHECK(both.mesh.faces.back() == LabelledMesh::Face{7, 8, 9});
-  CHECK(both.seen_by[0] == std::array<KeyframeIndex, 2>{2, 5});  // keyframe 9 was not yet kept
+  CHECK(both.seen_by[0] == std::array<KeyframeIndex, 2>{2, 5});  // keyframe 9 was not stored then
   CHECK(both.seen_by[6] == std::array<KeyframeIndex, 2>{2, 9});
   CHECK(both.ids[5] == 115);
   CHECK(both.ids[6] == 116);
@@ -96,12 +95,12 @@ TEST_CASE("What is mapped anew comes behind the former map, under ids that follo
   check_equal(continued.with(MapMesh()), continued.before());
 }
 
-TEST_CASE("Of the former map what is superseded goes, and the mapper learns what is its own",
+TEST_CASE("Superseded surface of the former map is dropped and the mapper gets its own part",
           "[continued_map]") {
   ContinuedMap continued(strip(4, 0.0F, 100), 20);  // ids 100, 103, ... 115; then from 116 on
   const SupersededSurface rest =
       continued.drop({{{100, 119}, {103, 119}, {106, 119}, {119, 122}, {122, 115}, {125, 119}}});
-  REQUIRE(rest.vertices.size() == 2);  // one whose heir is of the former map stays
+  REQUIRE(rest.vertices.size() == 2);  // a vertex with an heir in the former map stays
   CHECK(rest.vertices[0].id == 3);
   CHECK(rest.vertices[0].heir == 6);
   CHECK(rest.vertices[1].id == 9);

@@ -28,7 +28,7 @@ TEST_CASE("A face has the label of most of its vertices") {
   CHECK(mesh.face_label(0) == 0);
 }
 
-TEST_CASE("Appending keeps faces on their vertices and fills up what one mesh lacks") {
+TEST_CASE("Appending keeps faces on their vertices and fills the arrays that one mesh lacks") {
   LabelledMesh mesh = triangle();
   LabelledMesh other = triangle();
   other.labels.clear();
@@ -41,7 +41,7 @@ TEST_CASE("Appending keeps faces on their vertices and fills up what one mesh la
   CHECK(mesh.colors[3] == LabelledMesh::Color{1, 2, 3});
 }
 
-TEST_CASE("A mesh is moved as the transform says") {
+TEST_CASE("A mesh is moved by the transform") {
   LabelledMesh mesh = triangle();
   const Eigen::Matrix3d quarter_turn =
       Eigen::AngleAxisd(std::acos(-1.0) / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -67,7 +67,7 @@ const std::string kAsciiHeader =
     "property double y\nproperty float z\nproperty int label\nelement face 1\n"
     "property list uchar int vertex_indices\nend_header\n";
 
-TEST_CASE("A mesh is read back as it was written") {
+TEST_CASE("A mesh is equal after writing and reading") {
   LabelledMesh mesh;
   mesh.vertices = {{0, 0.1F, -3e-7F}, {1e6F, 0, 0}, {0, 1, 0}, {1, 1, 1}};
   mesh.labels = {0, 255, 7, 1};
@@ -83,7 +83,7 @@ TEST_CASE("A mesh is read back as it was written") {
   CHECK(read.faces == mesh.faces);
 }
 
-TEST_CASE("The three encodings of one recorded mesh read alike") {
+TEST_CASE("The three encodings of one recorded mesh give the same mesh") {
   const auto folder = shared_data("meshes");
   if (!folder) return;
   const LabelledMesh little = read_ply(*folder / "platonic_shelf.ply");
@@ -108,7 +108,7 @@ TEST_CASE("Text with mixed types is read, polygons become fans") {
   CHECK(fan.faces == std::vector<LabelledMesh::Face>{{0, 1, 2}, {0, 2, 3}});
 }
 
-TEST_CASE("What cannot be a mesh is refused with the file and the reason") {
+TEST_CASE("A file that is no mesh is refused with the file and the reason") {
   const TemporaryFolder folder;
   const auto refuses = [&](const std::string& text, const std::string& why) {
     const auto file = write_text(folder, text);
@@ -128,7 +128,7 @@ TEST_CASE("What cannot be a mesh is refused with the file and the reason") {
   CHECK_THROWS_WITH(read_ply(folder.path() / "none.ply"), Contains("cannot be opened"));
 }
 
-TEST_CASE("A mesh that cannot be written leaves nothing behind") {
+TEST_CASE("A mesh that cannot be written leaves no file") {
   const TemporaryFolder folder;
   CHECK_THROWS_AS(write_ply(folder.path() / "none" / "a.ply", {}), MeshFileError);
   std::filesystem::create_directory(folder.path() / "taken.ply");

@@ -19,7 +19,7 @@ namespace {
 using Catch::Contains;
 
 constexpr ChunkGrid kGrid{.cell_m = 2.0, .step_m = 0.001};
-// Half a step, and the rounding of a float below 16 m.
+// Half a step, plus the rounding of a float below 16 m.
 constexpr double kRounding_m = 0.5 * 0.001 + 1e-6;
 
 LabelledMesh assembled(const std::vector<MeshChunk>& chunks) {
@@ -54,7 +54,7 @@ std::string refusal(const LabelledMesh& mesh, const ChunkGrid& grid = kGrid) {
   return {};
 }
 
-TEST_CASE("The chunks of a mesh are the mesh", "[mesh]") {
+TEST_CASE("The chunks of a mesh contain the whole mesh", "[mesh]") {
   const bool labelled = GENERATE(true, false);
   LabelledMesh mesh = wavy_sheet(150, 0.1);
   if (!labelled) mesh.labels.clear();
@@ -68,11 +68,11 @@ TEST_CASE("The chunks of a mesh are the mesh", "[mesh]") {
     CHECK(chunk.labels.size() == (labelled ? chunk.offsets.size() : 0));
   }
   const LabelledMesh again = assembled(pieces.chunks);
-  CHECK(again.vertices.size() == mesh.vertices.size());  // those on borders coincide
+  CHECK(again.vertices.size() == mesh.vertices.size());  // vertices on borders coincide
   CHECK(faces_in_space(again) == faces_in_space(mesh));
 }
 
-TEST_CASE("A position is off by half a step per axis at most", "[mesh]") {
+TEST_CASE("A position errs by at most half a step per axis", "[mesh]") {
   const auto seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -100,7 +100,7 @@ TEST_CASE("A position is off by half a step per axis at most", "[mesh]") {
   CHECK(largest_m < kRounding_m);
 }
 
-TEST_CASE("A cell that is too full is sent in parts that fit", "[mesh]") {
+TEST_CASE("A cell that is too full is sent in several parts", "[mesh]") {
   const LabelledMesh mesh = wavy_sheet(180, 0.01);  // 1.8 m: four cells, 16 000 faces each
   const MeshPieces pieces = split_mesh(mesh, 1, 1, kGrid);
   std::map<std::array<std::int32_t, 3>, std::uint16_t> parts;
@@ -112,7 +112,7 @@ TEST_CASE("A cell that is too full is sent in parts that fit", "[mesh]") {
   CHECK(faces_in_space(assembled(pieces.chunks)) == faces_in_space(mesh));
 }
 
-TEST_CASE("What did not change gives the same chunks", "[mesh]") {
+TEST_CASE("An unchanged mesh gives the same chunks", "[mesh]") {
   const LabelledMesh mesh = wavy_sheet(100, 0.1);
   const MeshPieces before = split_mesh(mesh, 1, 1, kGrid);
   SECTION("in another order of faces and corners") {
@@ -122,7 +122,7 @@ TEST_CASE("What did not change gives the same chunks", "[mesh]") {
     for (auto& face : shuffled.faces) std::ranges::rotate(face, face.begin() + 1);
     CHECK(split_mesh(shuffled, 1, 1, kGrid).chunks == before.chunks);
   }
-  SECTION("elsewhere, with vertices before that are new") {
+  SECTION("elsewhere with new vertices before its own") {
     LabelledMesh changed;
     changed.append(wavy_sheet(1, 0.1));
     for (auto& vertex : changed.vertices) vertex += Eigen::Vector3f(101.0F, 1.0F, 1.0F);
@@ -136,7 +136,7 @@ TEST_CASE("What did not change gives the same chunks", "[mesh]") {
   }
 }
 
-TEST_CASE("Chunks differ by what a viewer would see", "[mesh]") {
+TEST_CASE("Chunks differ by differences that a viewer would show", "[mesh]") {
   const LabelledMesh mesh = wavy_sheet(10, 0.1);
   const auto chunk_of = [](const LabelledMesh& m) { return split_mesh(m, 1, 1, {}).chunks.at(0); };
   const MeshChunk before = chunk_of(mesh);
@@ -179,7 +179,8 @@ TEST_CASE("Faces between negative and positive cells belong to one cell each", "
   CHECK(pieces.chunks[1].key.cell == std::array<std::int32_t, 3>{-1, 0, 0});
 }
 
-TEST_CASE("A mesh that cannot be sent is refused, a face that is too long left out", "[mesh]") {
+TEST_CASE("A mesh that cannot be sent is refused and a face that is too long is dropped",
+          "[mesh]") {
   LabelledMesh mesh = wavy_sheet(2, 0.1);
   CHECK(split_mesh({}, 1, 1, kGrid).chunks.empty());
   SECTION("a face longer than the range of offsets") {
@@ -217,7 +218,7 @@ MeshChunk chunk(std::int32_t cell, std::uint16_t height = 0) {
           .faces = {{0, 1, 2}}};
 }
 
-// Cells in the order in which they are sent, until nothing is left.
+// Cells in the order of sending, until nothing is left.
 std::vector<std::int32_t> sent_cells(ChunkSchedule& schedule) {
   std::vector<std::int32_t> cells;
   while (const auto next = schedule.next()) cells.push_back(next->key.cell[0]);
@@ -226,7 +227,7 @@ std::vector<std::int32_t> sent_cells(ChunkSchedule& schedule) {
 
 using Cells = std::vector<std::int32_t>;
 
-TEST_CASE("Only what changed is sent again", "[mesh]") {
+TEST_CASE("Only changed cells are sent again", "[mesh]") {
   ChunkSchedule schedule(0.0);
   schedule.update({chunk(0), chunk(1), chunk(2)});
   CHECK(schedule.waiting() == 3);
@@ -237,7 +238,7 @@ TEST_CASE("Only what changed is sent again", "[mesh]") {
   CHECK(sent_cells(schedule).empty());
 }
 
-TEST_CASE("Moves below the threshold are sent when they have added up", "[mesh]") {
+TEST_CASE("Moves below the threshold are sent when their sum exceeds it", "[mesh]") {
   ChunkSchedule schedule(0.010);  // chunks have steps of 1 mm
   schedule.update({chunk(0)});
   CHECK(sent_cells(schedule) == Cells{0});
@@ -247,7 +248,7 @@ TEST_CASE("Moves below the threshold are sent when they have added up", "[mesh]"
   CHECK(sent_cells(schedule) == Cells{0});
 }
 
-TEST_CASE("The newest state of a chunk is sent, once", "[mesh]") {
+TEST_CASE("Only the newest state of a chunk is sent and only once", "[mesh]") {
   ChunkSchedule schedule(0.0);
   schedule.update({chunk(0, 1)});
   schedule.update({chunk(0, 2)});
@@ -257,11 +258,11 @@ TEST_CASE("The newest state of a chunk is sent, once", "[mesh]") {
   CHECK(sent->offsets[0][2] == 3);
   CHECK_FALSE(schedule.next());
   schedule.update({chunk(0, 4)});
-  schedule.update({chunk(0, 3)});  // and back before its turn
+  schedule.update({chunk(0, 3)});  // changed and changed back before its turn
   CHECK_FALSE(schedule.next());
 }
 
-TEST_CASE("A cell that vanished is sent empty, once, and may return", "[mesh]") {
+TEST_CASE("A cell that vanished is sent empty once and may return", "[mesh]") {
   ChunkSchedule schedule(0.0);
   schedule.update({chunk(0), chunk(1)});
   CHECK(sent_cells(schedule) == Cells{0, 1});
@@ -284,7 +285,7 @@ TEST_CASE("A cell that vanishes before it was sent is never sent", "[mesh]") {
   CHECK(sent_cells(schedule) == Cells{1});
 }
 
-TEST_CASE("To who comes late all is sent, and to those before what is gone", "[mesh]") {
+TEST_CASE("After a restart everything is sent again and vanished cells are sent empty", "[mesh]") {
   ChunkSchedule schedule(0.0);
   schedule.update({chunk(0), chunk(1), chunk(2)});
   CHECK(sent_cells(schedule) == Cells{0, 1, 2});
@@ -299,7 +300,7 @@ TEST_CASE("To who comes late all is sent, and to those before what is gone", "[m
   CHECK_FALSE(schedule.next());
 }
 
-TEST_CASE("Every chunk has its turn although all change faster than they can be sent", "[mesh]") {
+TEST_CASE("Every chunk is sent although all change faster than they can be sent", "[mesh]") {
   ChunkSchedule schedule(0.0);
   Cells sent;
   for (std::uint16_t version = 1; version <= 10; ++version) {
@@ -339,13 +340,14 @@ TEST_CASE("The team's mesh has the newest chunk of each robot and cell", "[mesh]
   chunk.faces.resize(1);
   CHECK(team.add(chunk) == ChunkVerdict::kTaken);
   CHECK(team.snapshot()[1].mesh.faces.size() == 2 * 60 * 60 - faces + 1);
-  CHECK(team.add(MeshChunk{.key = chunk.key, .boot = 1}) == ChunkVerdict::kTaken);  // no more
+  // Chunk without faces
+  CHECK(team.add(MeshChunk{.key = chunk.key, .boot = 1}) == ChunkVerdict::kTaken);
   snapshot = team.snapshot();
   CHECK(snapshot[1].mesh.faces.size() == 2 * 60 * 60 - faces);
   CHECK(snapshot[1].chunks + 1 == chunks_of(5, 1).size());
 }
 
-TEST_CASE("A robot that restarts begins its mesh anew", "[mesh]") {
+TEST_CASE("A robot that restarts replaces its mesh", "[mesh]") {
   TeamMesh team;
   add_all(team, chunks_of(5, 77));
   const std::vector<MeshChunk> fresh = chunks_of(5, 78, 10);
@@ -355,7 +357,8 @@ TEST_CASE("A robot that restarts begins its mesh anew", "[mesh]") {
   CHECK(team.snapshot()[0].mesh.vertices.size() == 11 * 11);
 }
 
-TEST_CASE("Chunks in the frame of an earlier anchor are left out until they come anew", "[mesh]") {
+TEST_CASE("Chunks in the frame of an earlier anchor are dropped until they are sent again",
+          "[mesh]") {
   TeamMesh team;
   const std::vector<MeshChunk> before = chunks_of(5, 1, 60, 5), after = chunks_of(5, 1, 60, 0);
   add_all(team, before);
@@ -371,7 +374,7 @@ TEST_CASE("Chunks in the frame of an earlier anchor are left out until they come
   CHECK(mesh.mesh.vertices.size() == 61 * 61);
 }
 
-TEST_CASE("A robot cannot send more than there is room for", "[mesh]") {
+TEST_CASE("A robot cannot send more than its bound", "[mesh]") {
   MeshChunk chunk = chunks_of(5, 1, 10).front();
   TeamMesh team(10 * wire_bytes(chunk) + 1);
   for (std::int32_t i = 0; i < 10; ++i) {
@@ -381,7 +384,7 @@ TEST_CASE("A robot cannot send more than there is room for", "[mesh]") {
   chunk.key.cell[0] = -1;
   CHECK(team.add(chunk) == ChunkVerdict::kNoRoom);
   chunk.key.cell[0] = 0;
-  CHECK(team.add(chunk) == ChunkVerdict::kTaken);  // in place of the one before
+  CHECK(team.add(chunk) == ChunkVerdict::kTaken);  // replaces the former chunk
   CHECK(team.add(chunks_of(6, 1, 10).front()) == ChunkVerdict::kTaken);
 }
 

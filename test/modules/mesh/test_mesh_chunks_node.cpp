@@ -38,7 +38,7 @@ MeshChunksConfig slow() {
   return config;
 }
 
-TEST_CASE("Chunks leave no faster than configured", "[node]") {
+TEST_CASE("Chunks are sent no faster than configured", "[node]") {
   Topic<MeshChunk> topic;
   Inbox<MeshChunk> sent(topic);
   MeshChunksNode node(slow(), 7, topic);
@@ -47,7 +47,7 @@ TEST_CASE("Chunks leave no faster than configured", "[node]") {
   node.step({kAnchor, mesh}, 1000.0);
   double now_s = 1000.0;
   const auto within_bounds = [&] {
-    // Half a second's worth saved up, and one chunk of overdraft.
+    // Half a second's budget, and one chunk of overdraft.
     const double most = (now_s - 1000.0 + 0.5) * 20000.0 + static_cast<double>(kMaxChunkBytes);
     return static_cast<double>(bytes_of(sent.messages())) <= most;
   };
@@ -64,7 +64,7 @@ TEST_CASE("Chunks leave no faster than configured", "[node]") {
   CHECK(now_s - 1000.0 < least_s + 3.0);  // and no slower
 }
 
-TEST_CASE("A mesh that changes while it is sent leaves in its newest state", "[node]") {
+TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[node]") {
   Topic<MeshChunk> topic;
   Inbox<MeshChunk> sent(topic);
   MeshChunksNode node(slow(), 7, topic);
@@ -74,7 +74,7 @@ TEST_CASE("A mesh that changes while it is sent leaves in its newest state", "[n
   node.step({kAnchor, raised(*mesh, 0.5F)}, 0.1);
   for (double now_s = 0.2; node.waiting() > 0 && now_s < 1000.0; now_s += 0.1) node.step({}, now_s);
   const std::size_t all = split_mesh(*raised(*mesh, 0.5F), 7, kAnchor, {}).chunks.size();
-  CHECK(sent.messages().size() <= all + 2 * early);  // what had left, again, or as no more
+  CHECK(sent.messages().size() <= all + 2 * early);  // those sent before, again, or as empty
 
   TeamMesh team;
   for (const MeshChunk& chunk : sent.messages()) REQUIRE(team.add(chunk) == ChunkVerdict::kTaken);
@@ -97,7 +97,7 @@ TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
   CHECK_THROWS_AS(MeshChunksNode(config, 7, topic), ConfigError);
 }
 
-// A robot with the mesh's part of the wiring.
+// A robot with the modules that exchange meshes.
 struct MeshRobot {
   MeshRobot(std::shared_ptr<const DdsDomain> domain, RobotId id)
       : basis(std::move(domain), id),
@@ -126,7 +126,7 @@ struct MeshRobot {
       if (row.topic == Codec<MeshChunk>::kTopic && row.direction == direction) return row;
     return {};
   }
-  // Of that robot, until it is whole.
+  // True once the whole mesh of that robot has arrived.
   bool receives(RobotId robot, const LabelledMesh& mesh) {
     return eventually([&] {
       for (const RobotMesh& received : team.snapshot())
@@ -161,7 +161,7 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   CHECK(out.count.messages == chunks.size());
   CHECK(b.traffic(Direction::kIn).count == out.count);
   CHECK(b.traffic(Direction::kIn).refused.empty());
-  CHECK(out.count.bytes <= bytes_of(chunks));  // the bound that pacing and size go by
+  CHECK(out.count.bytes <= bytes_of(chunks));  // the bound for pacing and size
   CHECK(out.count.bytes > bytes_of(chunks) - 40 * chunks.size());
 
   const auto less = sheet(50);
@@ -183,13 +183,13 @@ Arrived<MeshChunk> received(const MeshChunk& chunk) {
   return encoded_by(TeamPeer{chunk.key.robot, 12345}, chunk);
 }
 
-TEST_CASE("A mesh chunk survives the wire", "[codec]") {
+TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
   MeshChunk chunk = some_chunk();
   SECTION("with labels") {}
   SECTION("without labels") {
     chunk.labels.clear();
   }
-  SECTION("empty: no more") {
+  SECTION("empty because the piece has vanished") {
     chunk = {.key = chunk.key};
   }
   SECTION("far away") {
@@ -202,7 +202,7 @@ TEST_CASE("A mesh chunk survives the wire", "[codec]") {
   CHECK(*result.value == chunk);
 }
 
-TEST_CASE("The largest chunk survives the wire", "[codec]") {
+TEST_CASE("The largest chunk is equal after encoding and decoding", "[codec]") {
   const MeshPieces pieces = split_mesh(wavy_sheet(180, 0.01), 1, 1, {});
   std::size_t largest = 0;
   for (const MeshChunk& chunk : pieces.chunks) {
@@ -212,7 +212,7 @@ TEST_CASE("The largest chunk survives the wire", "[codec]") {
   CHECK(largest > kMaxChunkBytes - 50);
 }
 
-TEST_CASE("A mesh chunk that cannot be is refused", "[codec]") {
+TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
   const MeshChunk chunk = some_chunk();
   const char* const missing = "elements are missing or too many";
   const char* const no_triples = "offsets or faces are not triples";

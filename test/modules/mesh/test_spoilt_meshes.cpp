@@ -29,7 +29,7 @@ std::string binary() {
 
 }  // namespace
 
-TEST_CASE("A spoilt PLY file is refused by name, or is a mesh of numbers") {
+TEST_CASE("A corrupted PLY file is refused by name or is a mesh of finite numbers") {
   const TemporaryFolder folder;
   check_spoilt<MeshFileError>(
       GENERATE(values<std::string>({kAscii, binary()})), "spoilt.ply",
@@ -43,7 +43,7 @@ TEST_CASE("A spoilt PLY file is refused by name, or is a mesh of numbers") {
       });
 }
 
-TEST_CASE("A vertex that a float does not hold is refused") {
+TEST_CASE("A vertex beyond the range of float is refused") {
   const TemporaryFolder folder;
   std::string text = kAscii;
   text.replace(text.find("1.5 0 0"), 3, "1e300");
@@ -51,7 +51,7 @@ TEST_CASE("A vertex that a float does not hold is refused") {
                     Catch::EndsWith("a.ply: vertex 1 is beyond 1e+09 m"));
 }
 
-TEST_CASE("What is no mesh file is refused by name") {
+TEST_CASE("A path that is no mesh file is refused by name") {
   check_no_files<MeshFileError>(".ply", [](const auto& place) { (void)read_ply(place); });
 }
 

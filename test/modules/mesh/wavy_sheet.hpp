@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// A hilly square of (side + 1)^2 vertices, `step_m` apart in x and y, around the origin; labels in
-/// stripes.
+/// A hilly square of (side + 1)^2 vertices, `step_m` apart in x and y, around the origin, with
+/// striped labels.
 inline LabelledMesh wavy_sheet(std::uint32_t side, double step_m) {
   LabelledMesh mesh;
   const double middle_m = 0.5 * static_cast<double>(side) * step_m;

@@ -13,18 +13,18 @@
 #include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "test/support/random_pose.hpp"
 
-// A square of 35 m, 500 000 vertices, about 2000 nodes and 500 keyframes; then twice and four times
-// all of it. Drift adds up to about 2 % of the path and some degrees; warm: between two solutions
-// that differ by a fifth of that. Everything is inside the times: checks, simplification, graph,
-// solution, interpolation, copy of the mesh. "Connected" has no time window: neighbouring lanes,
-// which drift apart, pull on each other all along. Run with --benchmark-samples 5.
+// A square of 35 m with 500 000 vertices, about 2000 nodes and 500 keyframes; then twice and four
+// times all of it. Drift accumulates to about 2 % of the path and some degrees. Warm: between two
+// solutions that differ by a fifth of the drift. Times include everything: checks, simplification,
+// graph, solution, interpolation, copy of the mesh. "Connected" has no time window: neighbouring
+// lanes, which drift apart, are connected along their whole length. Run with --benchmark-samples 5.
 
 namespace km {
 namespace {
 
-// A hilly square of side x side vertices, 5 cm apart, mapped on a path to and fro along x in lanes
-// of equal width; keyframes evenly along it. A vertex is seen by the ten keyframes around the one
-// nearest to it in its lane.
+// A hilly square of side x side vertices, 5 cm apart, mapped on a path back and forth along x in
+// lanes of equal width, with evenly spaced keyframes. A vertex is seen by the ten keyframes around
+// the nearest one in its lane.
 struct Field {
   MapMesh map;
   std::vector<SE3> T_odom_kf;
@@ -68,8 +68,8 @@ Field field(std::size_t side, std::size_t keyframes, std::size_t lanes) {
   return field;
 }
 
-// The path with noise on every step from keyframe to keyframe, standard deviations per axis: what
-// drift was to odometry.
+// The path with noise on every step from keyframe to keyframe, standard deviations per axis, like
+// the drift of odometry.
 std::vector<SE3> drifted(const std::vector<SE3>& poses, unsigned seed, double rotation_rad,
                          double translation_m) {
   std::mt19937 rng(seed);

@@ -1,8 +1,9 @@
-// What a map occupies while a recorded flight sees the same places again, without the rest of the
-// robot: mapper and corrector in turns, whatever the load of the machine.
+// Memory of a map while a recorded flight revisits places, without the rest of the robot. Mapper
+// and corrector alternate, independently of the load of the machine.
 //   bench_recorded_revisits DATASET RUN OUTPUT.ply [VOXEL_M [DUPLICATE_VOXELS [stereo]]]
-// DATASET: EuRoC/ASL folder with depth (or, with "stereo", a right camera) and labels; RUN: what a
-// robot left of it (odometry.tum, optimized.tum, keyframes.csv). Prints a row for each correction.
+// DATASET: EuRoC/ASL folder with depth (or, with "stereo", a right camera) and labels. RUN: run
+// folder of a robot on it (odometry.tum, optimized.tum, keyframes.csv). Prints a row for each
+// correction.
 
 #include <cstdio>
 #include <cstdlib>
@@ -39,7 +40,7 @@ double cpu_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-// A finished run: poses of all images, and which of them are keyframes.
+// A finished run: poses of all images, and which images are keyframes.
 struct Run {
   explicit Run(const std::string& folder)
       : odometry(read_trajectory(folder + "/odometry.tum")),
@@ -65,7 +66,7 @@ struct Run {
   std::vector<SE3> T_odom_kf, T_world_kf;
 };
 
-// Mapper and corrector in turns.
+// Runs mapper and corrector alternately.
 class Mapping {
  public:
   Mapping(const Task& task, const Run& run, const Camera& camera, const LabelPalette& palette)

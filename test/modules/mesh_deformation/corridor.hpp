@@ -12,7 +12,7 @@
 namespace km {
 
 /// A flat grid of (columns + 1) x (rows + 1) vertices with this step [m], in the plane of x and y
-/// from the origin, two triangles per cell; ids ascend from 0. Vertices at x are seen by the
+/// from the origin, two triangles per cell. Ids ascend from 0. A vertex at x is seen by the
 /// keyframes within two steps of x / keyframe_step_m.
 struct SheetSize {
   std::size_t columns = 40;
@@ -63,8 +63,8 @@ inline std::vector<SE3> keyframes_above(const SheetSize& size) {
   return keyframes;
 }
 
-/// Bends the line x to a circle of this radius in the plane of x and z (up): what is at (x, y, z)
-/// goes to angle x / radius, z above the circle.
+/// Bends the line x to a circle of this radius in the plane of x and z (up). A point (x, y, z)
+/// moves to angle x / radius, z above the circle.
 inline SE3 bend(const SE3& T, double radius_m) {
   const double angle = T.translation().x() / radius_m;
   const Eigen::Matrix3d R = Eigen::AngleAxisd(-angle, Eigen::Vector3d::UnitY()).toRotationMatrix();
@@ -87,7 +87,7 @@ inline std::vector<SE3> moved(const SE3& T, const std::vector<SE3>& poses) {
   return result;
 }
 
-/// Of the vertices of two meshes that have equally many [m].
+/// Largest distance between the vertices of two meshes of equal size [m].
 inline double largest_distance_m(const LabelledMesh& a, const LabelledMesh& b) {
   if (a.vertices.size() != b.vertices.size()) return std::numeric_limits<double>::infinity();
   double largest = 0.0;

@@ -81,7 +81,8 @@ TEST_CASE("Every node of a connected surface has neighbours", "[mesh_deformation
   CHECK(reached.size() == simplified.nodes.size());
 }
 
-TEST_CASE("Surfaces of distant times have nodes of their own and no edge", "[mesh_deformation]") {
+TEST_CASE("Surfaces of distant times have separate nodes and no common edge",
+          "[mesh_deformation]") {
   MapMesh map = sheet({.columns = 40, .rows = 40, .step_m = 0.1, .keyframe_step_m = 10.0});
   MapMesh again = map;  // the same place on a later visit, 5 cm above, joined along one border
   for (auto& vertex : again.mesh.vertices) vertex.z() += 0.05F;
@@ -103,7 +104,7 @@ TEST_CASE("Surfaces of distant times have nodes of their own and no edge", "[mes
           kScale.window_keyframes);
 }
 
-TEST_CASE("New surface extends the simplified mesh without touching its nodes",
+TEST_CASE("New surface extends the simplified mesh without changing its nodes",
           "[mesh_deformation]") {
   const SheetSize size{.columns = 100, .rows = 20, .step_m = 0.1, .keyframe_step_m = 0.5};
   const MapMesh whole = sheet(size);
@@ -130,7 +131,7 @@ TEST_CASE("New surface extends the simplified mesh without touching its nodes",
   CHECK(simplified.nodes.size() == count);
 }
 
-TEST_CASE("Faces that meet in no manifold are decimated all the same", "[mesh_deformation]") {
+TEST_CASE("Faces that form no manifold are decimated too", "[mesh_deformation]") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);

@@ -56,7 +56,7 @@ std::vector<SE3> disturbed(std::vector<SE3> poses, unsigned seed, double rotatio
   return poses;
 }
 
-constexpr double kExact = 1e-12;  // [m] of numbers of size one
+constexpr double kExact = 1e-12;  // [m] for numbers of about one
 
 const Eigen::Matrix3d kHalfTurn =
     Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -98,7 +98,7 @@ TEST_CASE("A node is tied to keyframes spread over its time of sight", "[mesh_de
   CHECK(keyframes({7, 9}, 4) == List{7, 8, 9});
   CHECK(keyframes({10, 19}, 4) == List{10, 13, 16, 19});
   CHECK(keyframes({10, 19}, 1) == List{10});
-  // Left and seen again: only the ends are known.
+  // Left and seen again: only the ends are known to see the node.
   CHECK(keyframes({10, 100}, 4) == List{10, 100});
 }
 
@@ -113,8 +113,7 @@ TEST_CASE("Without corrections nothing moves", "[mesh_deformation]") {
   }
 }
 
-TEST_CASE("One tied node drags the graph along, whatever the rest is tied to",
-          "[mesh_deformation]") {
+TEST_CASE("One tied node moves a graph whose other nodes are not tied", "[mesh_deformation]") {
   // A triangle whose vertex 1 is held at (1.5, 0, 0): all of it moves by (0.5, 0, 0).
   DeformationGraph graph;
   graph.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
@@ -130,7 +129,8 @@ TEST_CASE("One tied node drags the graph along, whatever the rest is tied to",
             .norm() < kSolved);
 }
 
-TEST_CASE("A cube pulled at one corner moves, pulled at two it stretches", "[mesh_deformation]") {
+TEST_CASE("A cube held at one corner moves and a cube held at two stretches",
+          "[mesh_deformation]") {
   DeformationGraph graph;
   for (int i = 0; i < 8; ++i) graph.nodes.emplace_back(i % 2, i / 2 % 2, i / 4);
   for (std::uint32_t i = 0; i < 8; ++i)
@@ -139,7 +139,7 @@ TEST_CASE("A cube pulled at one corner moves, pulled at two it stretches", "[mes
   graph.T_odom_kf = {make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0})};
   graph.ties = {{0, 0}};
   std::vector<SE3> anchors = {make_pose(Eigen::Matrix3d::Identity(), {-0.5, 0, 0})};
-  // Held stiffly against the edges.
+  // Held stiffly compared with the edges.
   const DeformationNoise noise{.anchor_rotation_rad = 1e-5,
                                .anchor_translation_m = 1e-5,
                                .mesh_edge_m = 0.1,
@@ -161,7 +161,7 @@ TEST_CASE("A cube pulled at one corner moves, pulled at two it stretches", "[mes
     const auto& nodes = solution.poses.T_world_node;
     CHECK(nodes[0].translation().x() == Approx(-0.5).margin(1e-3));
     CHECK(nodes[1].translation().x() == Approx(1.5).margin(1e-3));
-    // The far edge is longer than it was, not as long as the one that is pulled; all symmetric.
+    // The far edge is longer than before, but shorter than the held one; all is symmetric.
     const double far = nodes[7].translation().x() - nodes[6].translation().x();
     CHECK(far > 1.0);
     CHECK(far < 2.0);
@@ -185,7 +185,7 @@ TEST_CASE("Rigid motion of the keyframes is the motion of the nodes", "[mesh_def
   }
 }
 
-TEST_CASE("The solution does not depend on where it starts", "[mesh_deformation]") {
+TEST_CASE("The solution does not depend on the first guess", "[mesh_deformation]") {
   const auto seed = GENERATE(range(0U, 4U));
   CAPTURE(seed);
   const DeformationGraph graph = patch(6);
@@ -201,7 +201,7 @@ TEST_CASE("The solution does not depend on where it starts", "[mesh_deformation]
   CHECK(warm.final_cost < cold.initial_cost);
 }
 
-TEST_CASE("Starting from the solution itself ends at once", "[mesh_deformation]") {
+TEST_CASE("A start from the solution itself ends at once", "[mesh_deformation]") {
   const DeformationGraph graph = patch(6);
   const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, 7, 0.1, 0.3);
   const auto cold = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));
@@ -211,7 +211,7 @@ TEST_CASE("Starting from the solution itself ends at once", "[mesh_deformation]"
   CHECK(distance(cold.poses, again.poses) < kSolved);
 }
 
-TEST_CASE("Pieces without ties to each other are solved side by side", "[mesh_deformation]") {
+TEST_CASE("Parts without ties to each other are solved independently", "[mesh_deformation]") {
   DeformationGraph graph = patch(4);
   const auto count = static_cast<std::uint32_t>(graph.nodes.size());
   const DeformationGraph one = graph;
@@ -233,7 +233,7 @@ TEST_CASE("Pieces without ties to each other are solved side by side", "[mesh_de
   }
 }
 
-TEST_CASE("Keyframes that saw nothing stay at their anchors", "[mesh_deformation]") {
+TEST_CASE("Keyframes without nodes stay at their anchors", "[mesh_deformation]") {
   DeformationGraph graph = patch(3);
   std::mt19937 rng(1);
   graph.T_odom_kf.push_back(random_pose(rng));
@@ -242,17 +242,18 @@ TEST_CASE("Keyframes that saw nothing stay at their anchors", "[mesh_deformation
   CHECK((solution.poses.T_world_kf.back().matrix() - anchors.back().matrix()).norm() < 1e-12);
 }
 
-TEST_CASE("Rigidity is how far a node is from where its neighbour puts it", "[mesh_deformation]") {
+TEST_CASE("Rigidity is the distance of a node from its neighbour's prediction",
+          "[mesh_deformation]") {
   SECTION("a neighbour that stayed and a node that moved") {
     CHECK(rigidity(SE3::Identity(), {1, 1, 1}, SE3::Identity(), {2, 1, 1})
               .isApprox(Eigen::Vector3d(-1, 0, 0), kExact));
   }
-  SECTION("a neighbour turned by 180 degrees") {
+  SECTION("a neighbour rotated by 180 degrees") {
     const SE3 turned = make_pose(kHalfTurn, Eigen::Vector3d::Zero());
     CHECK(rigidity(SE3::Identity(), {1, 1, 1}, turned, {1, 1, 1})
               .isApprox(Eigen::Vector3d(-2, -2, 0), kExact));
   }
-  SECTION("a neighbour that was turned to begin with") {
+  SECTION("a neighbour that was rotated from the start") {
     const SE3 before = make_pose(kHalfTurn, {1, 0, 0});
     CHECK(rigidity(before, {1, 1, 1}, before, {1, 1, 1}).norm() < kExact);
     CHECK(rigidity(before, {1, 1, 1}, at(1, 0, 0), {1, 1, 1})
@@ -260,7 +261,7 @@ TEST_CASE("Rigidity is how far a node is from where its neighbour puts it", "[me
   }
 }
 
-TEST_CASE("The derivatives of rigidity are those of differences", "[mesh_deformation]") {
+TEST_CASE("The derivatives of rigidity agree with differences", "[mesh_deformation]") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -276,7 +277,7 @@ TEST_CASE("The derivatives of rigidity are those of differences", "[mesh_deforma
   CHECK((term.by_b - by_b).cwiseAbs().maxCoeff() < kDerivative);
 }
 
-TEST_CASE("A node that turns with its keyframe has no rotation residual", "[mesh_deformation]") {
+TEST_CASE("A node that rotates with its keyframe has no rotation residual", "[mesh_deformation]") {
   std::mt19937 rng(3);
   const SE3 T_odom_kf = random_pose(rng);
   const SE3 T_world_odom = random_pose(rng);
@@ -284,13 +285,13 @@ TEST_CASE("A node that turns with its keyframe has no rotation residual", "[mesh
   CHECK(rotation_term(T_odom_kf.linear(), T_world_odom * T_odom_kf, node).residual.norm() < kExact);
 }
 
-TEST_CASE("The derivatives of the rotation term are those of differences", "[mesh_deformation]") {
+TEST_CASE("The derivatives of the rotation term agree with differences", "[mesh_deformation]") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
   const Eigen::Matrix3d R_odom_kf = random_pose(rng).linear();
   const SE3 keyframe = random_pose(rng);
-  // Up to 2 rad: the logarithm turns over at pi.
+  // Up to 2 rad: the logarithm is discontinuous at pi.
   const Eigen::Vector3d turn = 2.0 * random_vector<3>(rng).normalized();
   const SE3 node =
       make_pose(keyframe.linear() * R_odom_kf.transpose() * so3_exp(turn), random_vector<3>(rng));

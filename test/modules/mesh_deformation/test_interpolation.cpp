@@ -66,7 +66,7 @@ void check_same(const Interpolation& a, const Interpolation& b) {
 
 }  // namespace
 
-TEST_CASE("Vertices between nodes that move alike move like them", "[mesh_deformation]") {
+TEST_CASE("Vertices between nodes with equal motion move with them", "[mesh_deformation]") {
   const auto k = GENERATE(std::size_t{1}, std::size_t{3}, std::size_t{4});
   CAPTURE(k);
   Scene scene;
@@ -82,7 +82,7 @@ TEST_CASE("Vertices between nodes that move alike move like them", "[mesh_deform
   }
 }
 
-TEST_CASE("Nodes do not move what was seen on another visit", "[mesh_deformation]") {
+TEST_CASE("Nodes do not move surface seen on another visit", "[mesh_deformation]") {
   Scene scene;
   for (int i = 0; i < 100; ++i)
     scene.add_vertex({static_cast<float>(i), 0, 0}, i < 50 ? SeenBy{0, 0} : SeenBy{20, 20});
@@ -115,7 +115,7 @@ TEST_CASE("Weights are (1 - d/d_max)^2, normalised", "[mesh_deformation]") {
     CHECK(interpolation.nodes_of(0)[1] == kNoIndex);
     CHECK(interpolation.weights_of(0)[0] == Approx(1.0));
   }
-  SECTION("nodes equally far count alike") {
+  SECTION("nodes equally far have equal weights") {
     for (auto& node : scene.nodes) node.position = {0, 2, 0};
     interpolation.bind(scene.vertices, scene.seen_by, scene.nodes);
     CHECK(interpolation.weights_of(0)[0] == Approx(0.5));
@@ -123,7 +123,7 @@ TEST_CASE("Weights are (1 - d/d_max)^2, normalised", "[mesh_deformation]") {
   }
 }
 
-TEST_CASE("The nodes of a vertex are those that a search of all finds", "[mesh_deformation]") {
+TEST_CASE("The nodes of a vertex are those of an exhaustive search", "[mesh_deformation]") {
   const auto seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -148,7 +148,7 @@ TEST_CASE("The nodes of a vertex are those that a search of all finds", "[mesh_d
   }
 }
 
-TEST_CASE("A binding brought up to date is the one made anew", "[mesh_deformation]") {
+TEST_CASE("An updated binding equals a new binding", "[mesh_deformation]") {
   const auto seed = GENERATE(range(0U, 4U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -163,7 +163,7 @@ TEST_CASE("A binding brought up to date is the one made anew", "[mesh_deformatio
     if (n % 7 == 0 && n < old_nodes) earlier.nodes[n].seen_by[1] = later.nodes[n].seen_by[0];
     if (n >= old_nodes || earlier.nodes[n].seen_by != later.nodes[n].seen_by) changed.push_back(n);
   }
-  // The earlier mesh lacks some vertices, has others elsewhere and in another order.
+  // The earlier mesh lacks some vertices, and has others at other positions and in another order.
   earlier.vertices.clear();
   earlier.seen_by.clear();
   std::vector<std::uint32_t> before(later.vertices.size(), kNoIndex);

@@ -16,7 +16,7 @@ namespace {
 
 using Catch::Contains;
 
-constexpr double kSame = 1e-6;  // [m]: a few roundings of floats below 10 m
+constexpr double kSame = 1e-6;  // [m]; some roundings of floats below 10 m
 
 std::string refusal(const MapMesh& map, const std::vector<SE3>& odometry,
                     const std::vector<SE3>& optimised) {
@@ -31,7 +31,7 @@ std::string refusal(const MapMesh& map, const std::vector<SE3>& odometry,
 
 }  // namespace
 
-TEST_CASE("Poses that did not change leave the mesh as it is", "[mesh_deformation]") {
+TEST_CASE("Unchanged poses leave the mesh unchanged", "[mesh_deformation]") {
   const MapMesh map = sheet(kSheet);
   const std::vector<SE3> keyframes = keyframes_above(kSheet);
   LocalMeshOptimizer optimizer;
@@ -77,8 +77,8 @@ TEST_CASE("A straight corridor follows bent keyframes and stays locally rigid",
     const Eigen::Vector3d expected = bend(vertex, radius_m).translation();
     largest_m = std::max(largest_m, (result.mesh.vertices[v].cast<double>() - expected).norm());
   }
-  // Keyframes 1 m ahead see the surface bent away from where odometry saw it straight:
-  // 1 m^2 / (2 * 15 m) = 3.3 cm at the most.
+  // Keyframes 1 m ahead see the surface bent, which odometry saw straight: at most 1 m^2 / (2 * 15
+  // m) = 3.3 cm.
   CHECK(largest_m < 0.035);
   double largest_stretch = 0.0;
   for (const auto& [a, b, c] : map.mesh.faces) {
@@ -86,12 +86,13 @@ TEST_CASE("A straight corridor follows bent keyframes and stays locally rigid",
     const double after = (result.mesh.vertices[b] - result.mesh.vertices[a]).norm();
     largest_stretch = std::max(largest_stretch, std::abs(after / before - 1.0));
   }
-  // The surface lies 1.5 m below the keyframes' arc: it is 15 / 15 as long there, itself neutral.
+  // The surface is 1.5 m below the keyframes' arc: it is 15 / 15 as long there, itself neutral.
   CHECK(largest_stretch < 0.1);
 }
 
-TEST_CASE("A warm start ends where a cold one does", "[mesh_deformation]") {
-  // To the shipped tolerance within a millimetre, and to the limit of floats if asked to.
+TEST_CASE("A warm start and a cold start have the same solution", "[mesh_deformation]") {
+  // Within a millimetre at the default tolerance, and within the precision of floats at a small
+  // one.
   const auto [tolerance, same_m] = GENERATE(table<double, double>(
       {{MeshDeformationConfig().energy_tolerance, 1e-3}, {1e-14, 2 * kSame}}));
   CAPTURE(tolerance);
@@ -127,13 +128,13 @@ TEST_CASE("A mesh that grows extends the graph", "[mesh_deformation]") {
     nodes = result.report.nodes;
     LocalMeshOptimizer fresh;
     const DeformedMesh anew = fresh.optimize(map, keyframes, corrected);
-    // Other nodes, the same surface: as near as either is to the truth (see the bent corridor).
+    // Other nodes, the same surface: the difference is at most the error of each (see the bent
+    // corridor).
     CHECK(largest_distance_m(result.mesh, anew.mesh) < 0.035);
   }
 }
 
-TEST_CASE("Vertices that vanish and others that move keep the rest in place",
-          "[mesh_deformation]") {
+TEST_CASE("Removed and moved vertices leave the rest in place", "[mesh_deformation]") {
   MapMesh map = sheet(kSheet);
   const std::vector<SE3> keyframes = keyframes_above(kSheet);
   LocalMeshOptimizer optimizer;
@@ -154,7 +155,7 @@ TEST_CASE("Vertices that vanish and others that move keep the rest in place",
   CHECK(largest_distance_m(result.mesh, map.mesh) < kSame);
 }
 
-TEST_CASE("Keyframes without an optimised pose follow the last that has one",
+TEST_CASE("Keyframes without an optimised pose follow the last keyframe that has one",
           "[mesh_deformation]") {
   std::mt19937 rng(4);
   const SE3 T_world_odom = random_pose(rng, 1.0);
@@ -186,11 +187,11 @@ TEST_CASE("An empty mesh is deformed to an empty mesh", "[mesh_deformation]") {
   CHECK(optimizer.optimize({}, {}, {}).mesh.empty());
   const std::vector<SE3> keyframes = keyframes_above(kSheet);
   CHECK(optimizer.optimize({}, keyframes, keyframes).mesh.empty());
-  // And grows from there.
+  // A mesh can follow.
   CHECK(optimizer.optimize(sheet(kSheet), keyframes, keyframes).report.new_nodes > 0);
 }
 
-TEST_CASE("Input that cannot be used is refused by name", "[mesh_deformation]") {
+TEST_CASE("Invalid input is refused by name", "[mesh_deformation]") {
   struct Call {
     MapMesh map = sheet(kSheet);
     std::vector<SE3> keyframes = keyframes_above(kSheet), optimised = keyframes;
@@ -217,7 +218,7 @@ TEST_CASE("Input that cannot be used is refused by name", "[mesh_deformation]") 
                 [](Call& in) { std::swap(in.map.ids[1], in.map.ids[2]); });
 }
 
-TEST_CASE("A refused call leaves the optimizer as it was", "[mesh_deformation]") {
+TEST_CASE("A refused call leaves the optimizer unchanged", "[mesh_deformation]") {
   const MapMesh map = sheet(kSheet);
   const std::vector<SE3> keyframes = keyframes_above(kSheet);
   LocalMeshOptimizer optimizer;

@@ -14,7 +14,7 @@
 namespace km {
 namespace {
 
-constexpr double kSame_m = 1e-5;  // a few roundings of floats below 20 m
+constexpr double kSame_m = 1e-5;  // some roundings of floats below 20 m
 
 struct Corridor {
   MapMesh map = sheet(kSheet);
@@ -27,7 +27,7 @@ struct Corridor {
   void move(const SE3& T) { T_world_kf = moved(T, T_world_kf); }
 };
 
-TEST_CASE("A mesh is corrected once, then only for a reason", "[mesh_deformation]") {
+TEST_CASE("A mesh is corrected once and again only for a reason", "[mesh_deformation]") {
   Corridor corridor;
   corridor.bend_to(20.0);
   MeshCorrector corrector(MeshDeformationConfig{});
@@ -36,7 +36,7 @@ TEST_CASE("A mesh is corrected once, then only for a reason", "[mesh_deformation
   CHECK(first->deformed);
   CHECK_FALSE(corrector.correct(corridor.input()));
 
-  SECTION("a keyframe that moved by less than the threshold is none") {
+  SECTION("a keyframe that moved by less than the threshold is no reason") {
     corridor.T_world_kf[3].translation().z() += 0.005;
     CHECK_FALSE(corrector.correct(corridor.input()));
   }
@@ -60,13 +60,13 @@ TEST_CASE("A mesh is corrected once, then only for a reason", "[mesh_deformation
     ++corridor.version;
     CHECK(corrector.correct(corridor.input()).value().deformed);
   }
-  SECTION("a new keyframe that the map does not know yet is none") {
+  SECTION("a new keyframe that the map does not have yet is no reason") {
     corridor.T_odom_kf.push_back(corridor.T_odom_kf.back());
     CHECK_FALSE(corrector.correct(corridor.input()));
   }
 }
 
-TEST_CASE("A mesh whose keyframes all move alike is moved as a whole", "[mesh_deformation]") {
+TEST_CASE("A mesh whose keyframes all move equally is moved as a whole", "[mesh_deformation]") {
   const auto seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -75,7 +75,7 @@ TEST_CASE("A mesh whose keyframes all move alike is moved as a whole", "[mesh_de
   MeshCorrector corrector(MeshDeformationConfig{});
   const auto first = corrector.correct(corridor.input());
   REQUIRE(first);
-  for (int i = 0; i < 3; ++i) {  // again and again: from the last optimisation, without drift
+  for (int i = 0; i < 3; ++i) {  // repeatedly from the last optimisation, without drift
     corridor.move(random_pose(rng, 2.0));
     const auto again = corrector.correct(corridor.input());
     REQUIRE(again);
@@ -88,7 +88,7 @@ TEST_CASE("A mesh whose keyframes all move alike is moved as a whole", "[mesh_de
     CHECK(largest_distance_m(again->mesh, anew.mesh) < kSame_m);
     CHECK_FALSE(corrector.correct(corridor.input()));
   }
-  SECTION("then one of them bends: what was optimised before is what counts") {
+  SECTION("then one keyframe moves relative to the last optimisation") {
     corridor.T_world_kf[5].translation() += Eigen::Vector3d(0.0, 0.0, 0.02);
     CHECK(corrector.correct(corridor.input()).value().deformed);
   }
@@ -98,7 +98,7 @@ TEST_CASE("A mesh whose keyframes all move alike is moved as a whole", "[mesh_de
   }
 }
 
-TEST_CASE("A refused correction is as if it had not been asked for", "[mesh_deformation]") {
+TEST_CASE("A refused correction changes nothing", "[mesh_deformation]") {
   Corridor corridor;
   MeshCorrector corrector(MeshDeformationConfig{});
   Corridor without;
@@ -111,7 +111,8 @@ TEST_CASE("A refused correction is as if it had not been asked for", "[mesh_defo
   CHECK_FALSE(corrector.correct(corridor.input()));
 }
 
-TEST_CASE("A mesh corrected afresh does not show what was corrected before", "[mesh_deformation]") {
+TEST_CASE("A mesh corrected from scratch does not depend on earlier corrections",
+          "[mesh_deformation]") {
   Corridor corridor;
   corridor.bend_to(20.0);
   MeshCorrector fresh(MeshDeformationConfig{});
@@ -119,19 +120,19 @@ TEST_CASE("A mesh corrected afresh does not show what was corrected before", "[m
   CHECK(expected.deformed);
 
   MeshCorrector corrector(MeshDeformationConfig{});
-  Corridor half;  // a smaller map first: other nodes
+  Corridor half;  // a smaller map first, with other nodes
   half.map = sheet({.columns = 16, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5});
   half.bend_to(30.0);
   REQUIRE(corrector.correct(half.input()));
   corridor.version = 2;
   const auto on_the_way = corrector.correct(corridor.input());
   REQUIRE(on_the_way);
-  CHECK(on_the_way->mesh.vertices != expected.mesh.vertices);  // else there is nothing to test
+  CHECK(on_the_way->mesh.vertices != expected.mesh.vertices);  // else the test shows nothing
   CHECK(corrector.correct_afresh(corridor.input()).mesh.vertices == expected.mesh.vertices);
   CHECK_FALSE(corrector.correct(corridor.input()));
 }
 
-// A corridor gone along twice; odometry puts the second visit 0.6 m higher.
+// A corridor visited twice; odometry places the second visit 0.6 m higher.
 struct TwoVisits {
   static constexpr float kDrift_m = 0.6F;
 
@@ -163,8 +164,7 @@ struct TwoVisits {
   std::uint64_t version = 1;
 };
 
-TEST_CASE("Of two visits that coincide once they are corrected, the newer stays",
-          "[mesh_deformation]") {
+TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh_deformation]") {
   TwoVisits visits;
   MeshDeformationConfig config;
   config.duplicate_faces = 0;
@@ -189,7 +189,7 @@ TEST_CASE("Of two visits that coincide once they are corrected, the newer stays"
     CHECK(again->mesh.faces == first->mesh.faces);
     CHECK(again->superseded.vertices.empty());
   }
-  SECTION("as odometry has them, both stay") {
+  SECTION("with uncorrected poses both stay") {
     visits.T_world_kf = visits.T_odom_kf;
     const auto result = MeshCorrector(config).correct(visits.input());
     REQUIRE(result);
@@ -200,20 +200,20 @@ TEST_CASE("Of two visits that coincide once they are corrected, the newer stays"
     config.duplicate_voxels = 0.0;
     CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
   }
-  SECTION("as long as there is room, both stay") {
+  SECTION("below the bound on faces both stay") {
     config.duplicate_faces = static_cast<int>(visits.map.mesh.faces.size());
     CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
     --config.duplicate_faces;
     CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == visits.one());
   }
-  SECTION("of voxels of unknown size, both stay") {
+  SECTION("with voxels of unknown size both stay") {
     visits.map.voxel_m = 0.0;
     CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
   }
 }
 
-// Coming again and again: the mapper drops what is superseded, and the graph follows.
-TEST_CASE("The deformation graph does not grow in a place seen again and again",
+// Repeated visits: the mapper drops superseded surface, and the graph follows.
+TEST_CASE("The deformation graph does not grow in a place visited repeatedly",
           "[mesh_deformation]") {
   TwoVisits visits;
   const std::uint64_t count = visits.map.ids.size() / 2;
@@ -227,7 +227,7 @@ TEST_CASE("The deformation graph does not grow in a place seen again and again",
     CHECK(result->mesh.faces.size() == visits.one());
     if (visit == 0) nodes_at_first = result->report.nodes;
     most_nodes = std::max(most_nodes, result->report.nodes);
-    // The older copy is gone, the newer one is the older now, and a third comes.
+    // The older copy was dropped, the newer one becomes the older one, and a third one is added.
     const auto keyframes = static_cast<KeyframeIndex>(keyframe_count(kSheet)) + TwoVisits::kAway;
     for (std::uint64_t& id : visits.map.ids) id += count;
     for (SeenBy& seen : visits.map.seen_by) seen = {seen[0] + keyframes, seen[1] + keyframes};
@@ -255,7 +255,7 @@ std::vector<SE3> random_poses(std::mt19937& rng, std::size_t count) {
   return poses;
 }
 
-TEST_CASE("A motion of all keyframes together is no bending", "[mesh_deformation]") {
+TEST_CASE("A common motion of all keyframes is no bending", "[mesh_deformation]") {
   const auto count = GENERATE(1U, 2U, 30U);
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(count, seed);
@@ -275,7 +275,7 @@ TEST_CASE("One keyframe that moves against many others is found", "[mesh_deforma
   constexpr std::size_t kCount = 1000;
   const std::vector<SE3> before = random_poses(rng, kCount);
   std::vector<SE3> after = moved(random_pose(rng), before);
-  // The others' motion takes on a share of about 1 / kCount of the odd one's.
+  // The common motion contains a share of about 1 / kCount of the odd keyframe's motion.
   SECTION("by three times the scale of translation") {
     after[7].translation() += Eigen::Vector3d(0.0, 0.03, 0.0);
     CHECK(keyframe_motion(before, after, kScale).bending == Approx(3.0).epsilon(0.02));
@@ -286,9 +286,10 @@ TEST_CASE("One keyframe that moves against many others is found", "[mesh_deforma
   }
 }
 
-TEST_CASE("The common motion weighs rotations against translations", "[mesh_deformation]") {
-  // Two keyframes 2 m apart on x. Their positions turn by +a about z, their axes by -a. Per the
-  // sum of squares, (1 m * sin)^2 / translation^2 for each position against sin^2 / rotation^2.
+TEST_CASE("The common motion weights rotations against translations", "[mesh_deformation]") {
+  // Two keyframes 2 m apart on x. Their positions rotate by +a about z, their axes by -a. In the
+  // sum of squares, (1 m * sin)^2 / translation^2 for each position competes with sin^2 /
+  // rotation^2.
   const double a = 0.01;
   const std::vector<SE3> before = {make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0}),
                                    make_pose(Eigen::Matrix3d::Identity(), {-1, 0, 0})};
@@ -311,7 +312,7 @@ TEST_CASE("Solutions are compared over the keyframes both have", "[mesh_deformat
   CHECK(keyframe_motion({}, after, kScale).bending == 0.0);
 }
 
-TEST_CASE("Two motions differ by what they differ at the pose they move apart most",
+TEST_CASE("The difference of two motions is that at the pose where they differ most",
           "[mesh_deformation]") {
   const std::vector<SE3> poses = {SE3::Identity(),
                                   make_pose(Eigen::Matrix3d::Identity(), {20.0, 0.0, 0.0})};

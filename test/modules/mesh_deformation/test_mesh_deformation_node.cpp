@@ -14,7 +14,7 @@ namespace km {
 namespace {
 
 constexpr RobotId kSelf = 4;
-// A robot's mapper, odometry and pose graph, as far as this node sees them.
+// A robot's mapper, odometry and pose graph, as seen by this node.
 struct Robot {
   MeshDeformationTopics topics() {
     return {.maps = maps,
@@ -50,12 +50,12 @@ MeshDeformationConfig every_two_seconds() {
   return config;
 }
 
-// Where the last vertex belongs when the corridor is bent.
+// Position of the last vertex in the bent corridor.
 double last_vertex_x(double radius_m) {
   return bend(make_pose(Eigen::Matrix3d::Identity(), {8.0, 2.0, 0.0}), radius_m).translation().x();
 }
 
-// Hands over the map with all its keyframes.
+// Passes the map with all its keyframes to the node.
 void show_map(const Robot& robot, MeshDeformationNode& node) {
   for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
   node.step(robot.map, 0.0);
@@ -64,7 +64,7 @@ void show_map(const Robot& robot, MeshDeformationNode& node) {
 const MeshDeformationNode::Input kTick = MeshDeformationNode::Tick();
 const MeshDeformationNode::Input kEnd = MeshDeformationNode::End();
 
-// Passing of time, in steps far longer than any correction takes.
+// Time in steps far longer than any correction.
 class Hours {
  public:
   explicit Hours(MeshDeformationNode& node) : node_(node) {}
@@ -75,8 +75,7 @@ class Hours {
   double now_s_ = 1e9;
 };
 
-TEST_CASE("The mesh deformation node publishes what the optimizer makes of map and trajectory",
-          "[node]") {
+TEST_CASE("The mesh deformation node publishes the result of the optimizer", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   Hours hours(node);
@@ -101,7 +100,7 @@ TEST_CASE("The mesh deformation node publishes what the optimizer makes of map a
   hours.tick();
   node.step(robot.solution(20.0), 0.0);
   hours.tick();
-  CHECK(robot.results().size() == 1);  // nothing moved
+  CHECK(robot.results().size() == 1);  // nothing has moved
   node.step(robot.solution(30.0), 0.0);
   node.step(robot.solution(40.0), 0.0);
   hours.tick();
@@ -124,12 +123,12 @@ TEST_CASE("A correction waits until the last one is a period old", "[node]") {
   CHECK(robot.results().size() == 2);
 }
 
-TEST_CASE("A map that overtakes its keyframes waits for them", "[node]") {
+TEST_CASE("A map that arrives before its keyframes waits for them", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   Hours hours(node);
   node.step(robot.map, 0.0);
-  node.step(robot.solution(20.0), 0.0);  // of more keyframes than are known
+  node.step(robot.solution(20.0), 0.0);  // has more keyframes than are known
   for (std::size_t i = 0; i + 1 < robot.T_odom_kf.size(); ++i) node.step(robot.keyframe(i), 0.0);
   hours.tick();
   CHECK(robot.results().empty());
@@ -138,7 +137,7 @@ TEST_CASE("A map that overtakes its keyframes waits for them", "[node]") {
   CHECK(robot.results().size() == 1);
 }
 
-TEST_CASE("A trajectory that is behind is completed by odometry", "[node]") {
+TEST_CASE("An incomplete trajectory is completed by odometry", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   Hours hours(node);
@@ -150,7 +149,7 @@ TEST_CASE("A trajectory that is behind is completed by odometry", "[node]") {
   CHECK(robot.results().size() == 1);
 }
 
-TEST_CASE("At the end the mesh is corrected afresh, and never after", "[node]") {
+TEST_CASE("The last correction is from scratch and no other follows", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   show_map(robot, node);
@@ -158,7 +157,8 @@ TEST_CASE("At the end the mesh is corrected afresh, and never after", "[node]") 
   const double now_s = steady_now_s();
   node.step(kTick, now_s);
   Trajectory last = *robot.solution(20.0);
-  last.T_world_kf[3].translation().z() += 0.001;  // below the threshold, before the time
+  // Below the threshold and before the period is over
+  last.T_world_kf[3].translation().z() += 0.001;
   node.step(std::make_shared<const Trajectory>(last), now_s);
   node.step(kEnd, now_s);
   REQUIRE(robot.results().size() == 2);
@@ -170,7 +170,7 @@ TEST_CASE("At the end the mesh is corrected afresh, and never after", "[node]") 
   CHECK(robot.results().size() == 2);
 }
 
-TEST_CASE("A last map that cannot be corrected is told", "[node]") {
+TEST_CASE("A last map that cannot be corrected is reported", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   node.step(robot.keyframe(0), 0.0);
@@ -204,7 +204,7 @@ TEST_CASE("The mesh deformation node works as a thread", "[node]") {
   robot.trajectory.publish(robot.solution(15.0));  // too late
   node.stop();
   CHECK(node.error() == nullptr);
-  REQUIRE(robot.results().size() >= 2);  // the last, and maybe one in time before
+  REQUIRE(robot.results().size() >= 2);  // the last result, and possibly an earlier one
   CHECK(robot.results().back().mesh.vertices.back().x() ==
         Approx(last_vertex_x(10.0)).margin(0.05));
 }

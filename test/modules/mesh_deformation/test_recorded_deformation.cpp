@@ -18,7 +18,7 @@
 namespace km {
 namespace {
 
-// A robot that maps: every frame is a keyframe.
+// A robot that maps, with every frame as a keyframe.
 struct Robot {
   SemanticMapper mapper;
   std::vector<SE3> T_odom_kf = {};
@@ -37,8 +37,8 @@ struct Robot {
   }
 };
 
-// Odometry that goes wrong along the way: lengths grow by 2 %, and the heading turns by 2 degrees
-// in all, evenly over `steps` frames, about an axis that tilts it too.
+// Odometry with drift: lengths grow by 2 %. The heading drifts by 2 degrees in all, evenly over
+// `steps` frames, about a tilted axis.
 class Drift {
  public:
   explicit Drift(std::size_t steps)
@@ -66,7 +66,7 @@ class Drift {
   SE3 T_odom_cam_ = SE3::Identity();
 };
 
-// Median distance [m] of `a` from `b`, of what is within 20 cm of it: more than half.
+// Median distance [m] from `a` to `b` of the points within 20 cm, which are more than half.
 double median_distance_m(const LabelledMesh& a, const LabelledMesh& b) {
   const MeshInput other{"b", b};
   const MeshError error =
@@ -86,7 +86,7 @@ TEST_CASE("A recorded kitchen mapped with drift is corrected to agree with the f
   Robot first{SemanticMapper(mapping, camera)};
   Robot given{SemanticMapper(mapping, camera)};
   Robot drifted{SemanticMapper(mapping, camera)};
-  const std::size_t half = kitchen.frame_count() / 4;  // of every second frame
+  const std::size_t half = kitchen.frame_count() / 4;  // half of the frames are used
   Drift drift(half);
   for (std::size_t frame = 0; const auto posed = kitchen.next(); ++frame) {
     kitchen.skip(1);
@@ -121,7 +121,7 @@ SemanticMappingConfig window_of_3_m() {
   return config;
 }
 
-// Goes round in a room. Odometry turns by 2.5 degrees a lap too much: less than a voxel while a
+// Circles in a room. Odometry rotates by 2.5 degrees per lap too much: less than a voxel while a
 // wall is in view, 20 cm at the walls from one lap to the next. The mesh is corrected after every
 // `period` frames.
 class Flight {
@@ -168,7 +168,7 @@ class Flight {
   std::vector<SE3> T_odom_kf_, T_world_kf_;
 };
 
-// Quarter metres of the walls that have a vertex.
+// Cells of a quarter metre of the walls that have a vertex.
 std::set<std::tuple<int, int, int>> covered(const LabelledMesh& mesh) {
   std::set<std::tuple<int, int, int>> cells;
   for (const Eigen::Vector3f& p : mesh.vertices) {
@@ -192,7 +192,7 @@ double right_labels(const LabelledMesh& mesh) {
   return static_cast<double>(right) / static_cast<double>(mesh.vertices.size());
 }
 
-TEST_CASE("In a room gone round again and again the map hardly grows, and nothing is lost",
+TEST_CASE("In a room circled repeatedly the map hardly grows and no surface is lost",
           "[mesh_deformation][slow]") {
   Flight flight(1.0, 25), hoarding(0.0, kFramesPerLap);
   for (int lap = 0; lap < 2; ++lap) {
@@ -207,7 +207,7 @@ TEST_CASE("In a room gone round again and again the map hardly grows, and nothin
   }
   CAPTURE(faces, nodes, hoarded, flight.size().faces, hoarding.size().faces,
           flight.corrected().report.nodes, hoarding.corrected().report.nodes);
-  // What is left of it: pieces that only one lap saw, and rims.
+  // The rest are parts that only one lap saw, and rims.
   CHECK(hoarding.size().faces > 2 * hoarded);
   CHECK(flight.size().faces - faces < (hoarding.size().faces - hoarded) / 4);
   CHECK(flight.corrected().report.nodes < hoarding.corrected().report.nodes);
@@ -219,7 +219,7 @@ TEST_CASE("In a room gone round again and again the map hardly grows, and nothin
   std::size_t lost = 0;
   for (const auto& cell : cells_all) lost += cells_clean.contains(cell) ? 0 : 1;
   CAPTURE(lost, cells_all.size());
-  CHECK(lost <= cells_all.size() / 50);  // where only a copy that strayed reached into the next
+  CHECK(lost <= cells_all.size() / 50);  // cells reached only by a displaced copy
   CAPTURE(mean_error_m(clean), mean_error_m(all), right_labels(clean), right_labels(all));
   CHECK(mean_error_m(clean) < 1.1 * mean_error_m(all) + 0.001);
   CHECK(right_labels(clean) > right_labels(all) - 0.005);

@@ -16,7 +16,7 @@ const SheetSize kSheet{.columns = 20, .rows = 8, .step_m = kVoxel_m, .keyframe_s
 const SameSurface kSame{
     .distance_m = kVoxel_m, .longest_edge_m = 2 * kVoxel_m, .window_keyframes = 15};
 
-// Sheets one after the other in one mesh, each seen so much later than the one before.
+// Several sheets in one mesh, each seen `later` keyframes after the one before.
 MapMesh visits(const std::vector<MapMesh>& sheets, KeyframeIndex later = kVisit) {
   MapMesh all;
   KeyframeIndex shift = 0;
@@ -41,7 +41,7 @@ LabelledMesh cleaned(const MapMesh& map) {
   return without_superseded(map.mesh, find_heirs(map.mesh, {map.seen_by, map.certainty}, kSame));
 }
 
-TEST_CASE("Of two copies of a surface the newer stays, whichever comes first in the mesh",
+TEST_CASE("The newer of two copies of a surface stays in any order of the mesh",
           "[mesh_deformation]") {
   const double height_m = GENERATE(0.9, -0.9, 0.0) * kVoxel_m;
   CAPTURE(height_m);
@@ -57,7 +57,7 @@ TEST_CASE("Of two copies of a surface the newer stays, whichever comes first in 
   CHECK(cleaned(other_order).vertices == older.mesh.vertices);
 }
 
-TEST_CASE("Of two copies the more certain stays, where it is", "[mesh_deformation]") {
+TEST_CASE("The more certain of two copies stays", "[mesh_deformation]") {
   const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({0, 0, 0.1});
   MapMesh map = visits({older, newer});
   map.certainty.assign(map.ids.size(), 5);
@@ -66,7 +66,7 @@ TEST_CASE("Of two copies the more certain stays, where it is", "[mesh_deformatio
     std::fill(map.certainty.begin() + std::ssize(older.ids), map.certainty.end(), 4);
     CHECK(cleaned(map).vertices == older.mesh.vertices);
   }
-  SECTION("the older on one side: nothing is lost between them") {
+  SECTION("the older on one side and no surface is lost in between") {
     for (std::size_t v = 0; v < count; ++v)
       if (older.mesh.vertices[v].x() > 2.6F) map.certainty[count + v] = 4;
     const LabelledMesh result = cleaned(map);
@@ -79,7 +79,7 @@ TEST_CASE("Of two copies the more certain stays, where it is", "[mesh_deformatio
   }
 }
 
-TEST_CASE("The heir of a vertex is its copy, by name", "[mesh_deformation]") {
+TEST_CASE("The heir of a vertex is its copy by id", "[mesh_deformation]") {
   const MapMesh map = visits({sheet_at({0, 0, 0}), sheet_at({0.05, 0.03, 0.1})});
   const auto count = static_cast<std::uint32_t>(map.ids.size() / 2);
   const auto heirs = find_heirs(map.mesh, {map.seen_by, map.certainty}, kSame);
@@ -94,7 +94,7 @@ TEST_CASE("The heir of a vertex is its copy, by name", "[mesh_deformation]") {
   CHECK(surface.vertices[7].heir == 10 * (7 + count) + 3);
 }
 
-TEST_CASE("Two surfaces stay two", "[mesh_deformation]") {
+TEST_CASE("Two different surfaces both stay", "[mesh_deformation]") {
   MapMesh second = sheet_at({0, 0, 0});
   KeyframeIndex later = kVisit;
   SECTION("more than the distance apart") {
@@ -115,8 +115,9 @@ TEST_CASE("Two surfaces stay two", "[mesh_deformation]") {
   CHECK(result.vertices == map.mesh.vertices);
 }
 
-TEST_CASE("What the newer visit did not see stays, up to its rim", "[mesh_deformation]") {
-  const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({2.1, 0, 0.1});  // of 5 m
+TEST_CASE("Surface that the newer visit did not see stays up to its rim", "[mesh_deformation]") {
+  // The sheet is 5 m long
+  const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({2.1, 0, 0.1});
   const LabelledMesh result = cleaned(visits({older, newer}));
   const float rim_m = 2.1F - 0.25F * static_cast<float>(kSame.distance_m);
   std::size_t expected = newer.mesh.faces.size();
@@ -129,8 +130,8 @@ TEST_CASE("What the newer visit did not see stays, up to its rim", "[mesh_deform
   CHECK(result.vertices.size() == result.labels.size());
 }
 
-// At the edge the normals of neither wall pass through what lies outside of both.
-TEST_CASE("A copy of a convex edge goes as a whole", "[mesh_deformation]") {
+// At the edge the normals of neither wall pass through points outside both.
+TEST_CASE("A copy of a convex edge is dropped as a whole", "[mesh_deformation]") {
   const auto roof = [](double larger_m) {
     MapMesh result = sheet(kSheet);
     for (Eigen::Vector3f& p : result.mesh.vertices) {
@@ -144,7 +145,7 @@ TEST_CASE("A copy of a convex edge goes as a whole", "[mesh_deformation]") {
   CHECK(cleaned(visits({smaller, larger})).vertices == larger.mesh.vertices);
 }
 
-TEST_CASE("Of many noisy copies about one is left, and all are near it", "[mesh_deformation]") {
+TEST_CASE("About one of many noisy copies stays and all are near it", "[mesh_deformation]") {
   const auto seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -166,7 +167,7 @@ TEST_CASE("Of many noisy copies about one is left, and all are near it", "[mesh_
   }
 }
 
-TEST_CASE("A mesh without faces, and one of a face without area, have no heirs",
+TEST_CASE("A mesh without faces and one with a face without area have no heirs",
           "[mesh_deformation]") {
   CHECK(find_heirs({}, {{}, {}}, kSame).empty());
   LabelledMesh mesh;

@@ -43,7 +43,7 @@ inline Closure closure(const OdometryPose& from, const OdometryPose& to, const S
   return {from, to, T_from_to, variance * Matrix6::Identity(), 20, 0.8};
 }
 
-/// Closed cycles may be off by so much per transform, whatever the covariances.
+/// Closed cycles may have this error per transform, independent of the covariances.
 inline PcmConfig bounds_per_transform(double translation_m, double rotation_rad) {
   PcmConfig config;
   config.criterion = CycleCriterion::kBounds;

@@ -214,7 +214,8 @@ TEST_CASE("Odometry that grows more certain along the way makes no pair consiste
   std::mt19937 rng(4);
   const TwoRobots robots(0, 1, 10, 0.01, rng);
   Closure i = robots.measure(3, 5, 0.1, rng), k = robots.measure(7, 2, 0.1, rng);
-  i.from.covariance = 100.0 * Matrix6::Identity();  // of keyframe 3; keyframe 7 has far less
+  i.from.covariance = 100.0 * Matrix6::Identity();  // covariance of keyframe 3; keyframe 7 has far
+                                                    // less
   const CycleTest test(PcmConfig{});
   CHECK_FALSE(test.consistent(PreparedClosure(test.orient(i)), PreparedClosure(test.orient(k))));
 }

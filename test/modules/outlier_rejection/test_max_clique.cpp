@@ -60,8 +60,7 @@ TEST_CASE("The clique is a maximum after every insertion, by brute force", "[cli
   }
 }
 
-TEST_CASE("Whatever the limit and the method, the bound is one and the clique a clique",
-          "[clique]") {
+TEST_CASE("The bound is valid and the result a clique for all limits and methods", "[clique]") {
   const auto [method, limit] =
       GENERATE(table<CliqueMethod, std::uint64_t>({{CliqueMethod::kExact, 1},
                                                    {CliqueMethod::kExact, 3},
@@ -104,7 +103,7 @@ TEST_CASE("The size of the maximum does not depend on the order of insertion", "
   CHECK(forwards.clique().size() == shuffled.clique().size());
 }
 
-TEST_CASE("Adding one at a time finds what a search from scratch finds", "[clique]") {
+TEST_CASE("Incremental search finds the same size as a search from scratch", "[clique]") {
   const unsigned seed = GENERATE(range(0U, 4U));
   const double density = GENERATE(0.1, 0.5, 0.7);
   CAPTURE(seed, density);
@@ -118,7 +117,7 @@ TEST_CASE("Adding one at a time finds what a search from scratch finds", "[cliqu
   }
 }
 
-TEST_CASE("A planted clique is found, whatever the order of its vertices", "[clique]") {
+TEST_CASE("A planted clique is found in any order of its vertices", "[clique]") {
   const unsigned seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -129,7 +128,7 @@ TEST_CASE("A planted clique is found, whatever the order of its vertices", "[cli
   CHECK(std::vector(clique.clique().begin(), clique.clique().end()) == planted);
 }
 
-TEST_CASE("Of equally large cliques the older one is kept", "[clique]") {
+TEST_CASE("The older of equally large cliques is kept", "[clique]") {
   MaxClique clique(kNoLimit);  // 0-1, then 1-2, then 2-3
   CHECK(clique.add({}));
   for (const std::size_t v : {0U, 1U, 2U}) clique.add(std::vector<std::size_t>{v});
@@ -167,7 +166,7 @@ TEST_CASE("A clique as large as the bound is proven again", "[clique]") {
   CHECK(std::ranges::equal(clique.clique(), planted));
 }
 
-TEST_CASE("Neighbours that cannot be are refused and change nothing", "[clique]") {
+TEST_CASE("Invalid neighbours are refused and change nothing", "[clique]") {
   MaxClique clique(kNoLimit);
   clique.add({});
   CHECK_THROWS_WITH(clique.add(std::vector<std::size_t>{1}), Catch::Contains("1 does not exist"));
@@ -218,7 +217,8 @@ TEST_CASE("The greedy clique follows the degrees", "[clique]") {
   CHECK(greedy_clique(graph) == Vertices{0, 3, 4, 5});
 }
 
-TEST_CASE("What is greedily found is a clique with the vertex, and larger than asked", "[clique]") {
+TEST_CASE("The greedy heuristic finds a clique with the vertex that is larger than required",
+          "[clique]") {
   const unsigned seed = GENERATE(range(0U, 20U));
   const double density = GENERATE(0.2, 0.5, 0.9);
   CAPTURE(seed, density);

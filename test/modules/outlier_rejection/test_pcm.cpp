@@ -93,12 +93,12 @@ TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
   CHECK(pcm.clique().proven());
 }
 
-TEST_CASE("As many closures agree in whatever order they come", "[pcm]") {
+TEST_CASE("The number of agreeing closures is independent of their order", "[pcm]") {
   const unsigned seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
   const TwoRobots robots(0, 1, 40, 0.01, rng);
-  std::vector<Closure> closures;  // of two with the same id the first would count
+  std::vector<Closure> closures;  // unique ids, because only the first closure with an id counts
   std::set<ClosureId> known;
   for (const Closure& closure : mixed_closures(robots, 60, rng))
     if (known.insert(closure.id()).second) closures.push_back(closure);
@@ -143,7 +143,7 @@ TEST_CASE("Two aliased keyframes seen from both sides are no four votes", "[pcm]
   CHECK(pcm.inliers().empty());
 }
 
-TEST_CASE("Fewer closures than min_inliers are not handed out", "[pcm]") {
+TEST_CASE("Fewer closures than min_inliers are not published", "[pcm]") {
   std::mt19937 rng(1);
   const TwoRobots robots(0, 1, 5, 0.001, rng);
   PcmConfig config;

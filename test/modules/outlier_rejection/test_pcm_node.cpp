@@ -181,12 +181,12 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
   CHECK(team.sets.messages()[0].closures.size() == 2);
   CHECK_THAT(log.text(), Catch::Contains("robots 2 5: joined by one place only"));
   node.step(closures[2]);
-  node.publish_changes(1031.0);  // the wait is over for good
+  node.publish_changes(1031.0);  // the wait is over permanently
   REQUIRE(team.sets.messages().size() == 2);
   CHECK(team.sets.messages()[1].closures.size() == 3);
 }
 
-TEST_CASE("At the end of all runs nobody waits for a witness", "[node]") {
+TEST_CASE("At the end of all runs no pair waits for a witness", "[node]") {
   Team team;
   PcmNode node(PcmConfig{}, 2, team.topics());
   const CapturedLog log;
@@ -208,7 +208,7 @@ TEST_CASE("Closures inside the robot need no witness", "[node]") {
   CHECK(team.sets.messages()[0].closures.size() == 1);
 }
 
-TEST_CASE("Of a peer that has restarted the closures are forgotten", "[node]") {
+TEST_CASE("The closures of a restarted peer are removed", "[node]") {
   Team team;
   PcmNode node(PcmConfig{}, 2, team.topics());
   const auto before = team.agreeing(2, 5, 20);

@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-// Two robots that drive along x; closures say where b is in the frame of a.
+// Two robots that drive along x; closures state the position of b in the frame of a.
 struct Aisles {
   Chain a{0}, b{1};
 
@@ -64,7 +64,7 @@ TEST_CASE("Along a common stretch there is a witness every fourth keyframe", "[w
   CHECK(pair.witnesses() == 3);
 }
 
-TEST_CASE("All true and false closures of a witnessed pair are handed on", "[witness]") {
+TEST_CASE("All true and false closures of a witnessed pair are published", "[witness]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);

@@ -11,10 +11,10 @@
 
 namespace km {
 
-/// Descriptors with the structure that makes a vocabulary tree worthwhile: a random tree of
-/// branching 10 whose nodes differ from their parents by 70, 45, 28, 18, 12, 8 bits, level by
-/// level. Its leaves stand for the points of a world, some seen more often than others (log-normal
-/// popularity, sigma 1); a sighting flips a few bits more.
+/// Descriptors with the structure that makes a vocabulary tree worthwhile. They come from a random
+/// tree of branching 10 whose nodes differ from their parents by 70, 45, 28, 18, 12, 8 bits, level
+/// by level. Its leaves are the points of a world, some seen more often than others (log-normal
+/// popularity, sigma 1). Each sighting flips a few bits more.
 class SyntheticOrb {
  public:
   SyntheticOrb(int depth, std::uint32_t seed) : rng_(seed) {

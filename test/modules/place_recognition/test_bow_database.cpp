@@ -69,7 +69,8 @@ TEST_CASE("The score is 1 - half the L1 distance of the unit vectors", "[place_r
   }
 }
 
-TEST_CASE("The inverted index finds what comparing every pair finds", "[place_recognition]") {
+TEST_CASE("The inverted index finds the same images as comparing every pair",
+          "[place_recognition]") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -134,7 +135,7 @@ TEST_CASE("An empty database, range or vector matches nothing", "[place_recognit
   CHECK(database.query(toy_vector({4}), {.first = 1, .last = 2}).best.size() == 1);
 }
 
-TEST_CASE("A vector that is none is refused and changes nothing", "[place_recognition]") {
+TEST_CASE("An invalid vector is refused and changes nothing", "[place_recognition]") {
   BowDatabase database(10);
   const auto check_refused = [&](const BowVector& vector, const char* reason) {
     CHECK_THROWS_WITH(database.add(vector), Contains(reason));
@@ -270,7 +271,7 @@ TEST_CASE("Candidates support each other when they are neighbours", "[place_reco
   CHECK(support == std::map<std::size_t, int>{{1, 1}, {7, 2}, {10, 2}});
 }
 
-TEST_CASE("The filter refuses what it cannot use and stays as it was", "[place_recognition]") {
+TEST_CASE("The filter refuses invalid input and is unchanged", "[place_recognition]") {
   CHECK_THROWS_AS(CandidateFilter({.similarity_threshold = -1.0}, kWords), ConfigError);
   CandidateFilter filter({}, kWords);
   filter.add(toy_vector({1}), at_s(5));

@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-// The vector of keyframe i says so.
+// A vector that contains the number of its keyframe.
 BowVector vector_of(std::uint32_t index) {
   return toy_vector({index});
 }
@@ -64,12 +64,11 @@ TEST_CASE("In any order each keyframe is searched for once, with its predecessor
   for (const auto& [index, vector] : stored) CHECK(vector.expired() == (index != 59));
 }
 
-TEST_CASE("The nearest earlier keyframe stands in for one that does not come",
-          "[place_recognition]") {
+TEST_CASE("The nearest earlier keyframe replaces a missing predecessor", "[place_recognition]") {
   PeerHistory history(2);
   history.add(0, vector_of(0));
   CHECK(history.add(5, vector_of(5)).empty());
-  CHECK(history.add(6, vector_of(6)).size() == 1);  // its predecessor is there
+  CHECK(history.add(6, vector_of(6)).size() == 1);  // its predecessor has arrived
   const auto overdue = history.add(7, vector_of(7));
   REQUIRE(overdue.size() == 2);
   CHECK(overdue[0].index == 5);
@@ -104,7 +103,7 @@ TEST_CASE("A repeated keyframe is ignored", "[place_recognition]") {
   CHECK(history.add(2, vector_of(2)).size() == 1);
 }
 
-TEST_CASE("Of endless gaps only the newest are remembered", "[place_recognition]") {
+TEST_CASE("Only the newest of many gaps are kept", "[place_recognition]") {
   PeerHistory history(0);
   constexpr std::uint32_t kGaps = 3 * PeerHistory::kMaxGaps;
   std::vector<std::weak_ptr<const BowVector>> vectors;
@@ -116,8 +115,8 @@ TEST_CASE("Of endless gaps only the newest are remembered", "[place_recognition]
   CHECK(kept <= static_cast<std::ptrdiff_t>(PeerHistory::kMaxGaps) + 1);
   CHECK(vectors.front().expired());
   CHECK_FALSE(vectors.back().expired());
-  // In a gap that is forgotten a keyframe is searched for by itself, in one that is not beside the
-  // one before it.
+  // In a removed gap a keyframe has no normaliser. In a kept gap the keyframe before it is the
+  // normaliser.
   const auto in_old_gap = history.add(1, vector_of(1));
   const auto in_new_gap = history.add(2 * kGaps - 5, vector_of(2 * kGaps - 5));
   std::map<std::uint32_t, bool> has_previous;

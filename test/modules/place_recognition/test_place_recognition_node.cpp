@@ -95,9 +95,8 @@ TEST_CASE("A peer's view of a known place is a candidate, through the thread",
   CHECK(robot.queries.received.size() == 4);
 }
 
-TEST_CASE(
-    "The keyframes of a peer in another life are searched for, and of a resumed one not again",
-    "[place_recognition][node]") {
+TEST_CASE("The keyframes of a restarted peer are searched again and those of a resumed one are not",
+          "[place_recognition][node]") {
   const auto kind = GENERATE(PeerEventKind::kRestarted, PeerEventKind::kResumed);
   Robot robot(kSelf);
   robot.node.step(keyframe({kSelf, 0}, {1, 2, 3, 4}));
@@ -109,7 +108,7 @@ TEST_CASE(
   event.identity.robot = kPeer;
   robot.node.step(std::make_shared<const PeerEvent>(event));
   const bool restarted = kind == PeerEventKind::kRestarted;
-  CHECK(robot.restarts.received.size() == (restarted ? 1 : 0));  // before what follows
+  CHECK(robot.restarts.received.size() == (restarted ? 1 : 0));  // before the outputs below
   robot.node.step(bow({kPeer, 0}, {11, 12, 13, 14}));
   robot.node.step(bow({kPeer, 1}, {11, 12, 13, 15}));
   REQUIRE(robot.candidates.received.size() == (restarted ? 2 : 1));
@@ -128,7 +127,7 @@ TEST_CASE("A return to a place after the gap is a candidate inside one robot",
   CHECK(robot.candidates.received[0].match == KeyframeId{kSelf, 0});
 }
 
-TEST_CASE("What was seen before the way was lost is a candidate at once",
+TEST_CASE("Keyframes before a loss of odometry are candidates at once",
           "[place_recognition][node]") {
   Robot robot(kSelf, {.min_gap_s = 10.0});
   for (std::uint32_t i = 0; i < 3; ++i) robot.node.step(keyframe({kSelf, i}, {1, 2, 3, 4}));
@@ -164,7 +163,8 @@ TEST_CASE("A history that arrives backwards gives the candidates of one in order
   CHECK(candidates_of(true) == in_order);
 }
 
-TEST_CASE("What cannot be compared is reported and harms nothing", "[place_recognition][node]") {
+TEST_CASE("Keyframes that cannot be compared are reported and change nothing",
+          "[place_recognition][node]") {
   Robot robot(kSelf);
   robot.node.step(keyframe({kSelf, 0}, {1, 2, 3, 4}));
   robot.queries.received.clear();
@@ -184,11 +184,11 @@ TEST_CASE("What cannot be compared is reported and harms nothing", "[place_recog
   CHECK(status_after(bow({kPeer, 0}, {1, 2, 3, 4})) == PlaceQueryStatus::kRepeated);
   CHECK(status_after(bow({kPeer, 1}, {})) == PlaceQueryStatus::kSearched);
   CHECK(robot.candidates.received.empty());
-  robot.node.step(bow({kSelf, 0}, {1, 2, 3, 4}));  // its own, come back
+  robot.node.step(bow({kSelf, 0}, {1, 2, 3, 4}));  // own bag that returns
   CHECK(robot.queries.received.empty());
 }
 
-// What the class comment claims: the pair is found, whichever message is first.
+// Tests the claim of the class comment: the pair is found in either order of the messages.
 TEST_CASE("No pair of keyframes of two robots is missed in any order of delivery",
           "[place_recognition][node]") {
   const auto seed = GENERATE(range(0U, 25U));
@@ -266,8 +266,8 @@ TEST_CASE("Random bags survive packing at about six bits a word", "[place_recogn
   }
   const std::vector<std::uint8_t> bytes = pack(bag);
   CHECK(unpack(bytes) == bag);
-  // A gap has log2(e (1 + mean)) bits of information, or less; the code may add half a bit, and
-  // half a bit is for rounding of the mean. Of ten words nine cost one bit for their count.
+  // A gap has at most log2(e (1 + mean)) bits of information. The code may add half a bit, and half
+  // a bit is for rounding of the mean. Nine of ten words cost one bit for their count.
   const double bits = std::log2(std::exp(1.0) * (1.0 + mean_gap)) + 1.0 + 1.3;
   CHECK(8.0 * static_cast<double>(bytes.size()) < 1000.0 * bits);
 }
@@ -281,7 +281,7 @@ TEST_CASE("Bytes that are no bag are refused", "[place_recognition]") {
     CHECK_FALSE(unpack(std::span(good).first(size)));
   Bytes longer = good;
   longer.push_back(0x00);
-  CHECK_FALSE(unpack(longer));  // goes on after the last word
+  CHECK_FALSE(unpack(longer));  // data after the last word
   Bytes filled = good;
   filled.back() |= 0x01U;
   CHECK_FALSE(unpack(filled));           // other than zeros after the last word

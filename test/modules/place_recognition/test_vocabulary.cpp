@@ -134,14 +134,14 @@ TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1", "[place_r
 
   const std::vector<OrbDescriptor> image = {in_two, everywhere, in_two, in_one};
   const BowVector vector = vocabulary.transform(image);
-  REQUIRE(vector.words.size() == 2);  // the word that is everywhere says nothing
+  REQUIRE(vector.words.size() == 2);  // the word of every image has no weight
   const double total = 2.0 * std::log(1.5) + std::log(3.0);
   const std::size_t at = vector.words[0] == word(in_two) ? 0 : 1;
   CHECK(vector.weights[at] == Approx(2.0 * std::log(1.5) / total).epsilon(kFloatTolerance));
   CHECK(vector.weights[1 - at] == Approx(std::log(3.0) / total).epsilon(kFloatTolerance));
 }
 
-TEST_CASE("Training depends on the seed and on nothing else", "[place_recognition]") {
+TEST_CASE("Training depends only on input and seed", "[place_recognition]") {
   SyntheticOrb world(3, 5);
   const Images images = world.images(10, 200, 5);
   const VocabularyTrainingConfig config{.branching = 6, .depth = 3, .seed = 11};
@@ -151,7 +151,7 @@ TEST_CASE("Training depends on the seed and on nothing else", "[place_recognitio
   CHECK(problem_of(first).empty());
 }
 
-TEST_CASE("Two sightings of one place are more alike than two places", "[place_recognition]") {
+TEST_CASE("Two sightings of one place are more similar than two places", "[place_recognition]") {
   SyntheticOrb world(4, 3);
   const Vocabulary vocabulary(train_vocabulary(world.images(50, 400, 5), {.depth = 4}));
   const auto place = world.image(500, 0);
@@ -164,7 +164,7 @@ TEST_CASE("Two sightings of one place are more alike than two places", "[place_r
   CHECK(same > 2.0 * other);
 }
 
-TEST_CASE("What is no vocabulary is refused with the reason", "[place_recognition]") {
+TEST_CASE("An invalid vocabulary is refused with the reason", "[place_recognition]") {
   CHECK_THROWS_WITH(train_vocabulary(Images{{}, {}}, {}), Contains("no descriptors"));
   CHECK_THROWS_WITH(train_vocabulary(Images{{ladder(3), ladder(3)}}, {}), Contains("are equal"));
   CHECK_THROWS_AS(train_vocabulary(Images{{ladder(3)}}, {.branching = 1}), ConfigError);
@@ -288,7 +288,7 @@ TEST_CASE("A malformed tree is refused although its checksum fits", "[place_reco
                     Contains("offset 40: node 0 has 5 children, branching is 4"));
 }
 
-TEST_CASE("A spoilt vocabulary is refused by name", "[place_recognition]") {
+TEST_CASE("A corrupted vocabulary is refused by name", "[place_recognition]") {
   check_spoilt<std::runtime_error>(
       serialize(small_vocabulary()), "spoilt.kmvoc",
       [](const std::string& bytes) { (void)deserialize(bytes, "spoilt.kmvoc"); });
@@ -296,7 +296,7 @@ TEST_CASE("A spoilt vocabulary is refused by name", "[place_recognition]") {
                                      [](const auto& place) { (void)load_vocabulary(place); });
 }
 
-TEST_CASE("A spoilt tree with a checksum that fits is refused, or finds words",
+TEST_CASE("A corrupted tree with a matching checksum is refused or finds words",
           "[place_recognition]") {
   const VocabularyData good = small_vocabulary();
   unsigned refused = 0;
@@ -321,7 +321,7 @@ TEST_CASE("A spoilt tree with a checksum that fits is refused, or finds words",
   CHECK(refused > 0);
 }
 
-TEST_CASE("A file that is not there is named", "[place_recognition]") {
+TEST_CASE("A missing file is named", "[place_recognition]") {
   CHECK_THROWS_WITH(load_vocabulary("/nowhere/at.all"), Contains("/nowhere/at.all"));
   CHECK_THROWS_WITH(load_vocabulary("config"), Contains("config: a folder, not a file"));
   CHECK_THROWS_WITH(save_vocabulary(small_vocabulary(), "/nowhere/at.all"),
@@ -351,7 +351,8 @@ TEST_CASE("The shipped vocabulary loads, is the documented one, and is small",
 }
 
 // checks.md L5 on real images, through the tool.
-TEST_CASE("The tool trains on real images and tells the two places apart", "[place_recognition]") {
+TEST_CASE("The tool trains on real images and distinguishes the two places",
+          "[place_recognition]") {
   const auto images = shared_data("kimera_vio_lcd");
   if (!images) return;
   const TemporaryFolder folder;
@@ -380,7 +381,7 @@ TEST_CASE("The tool trains on real images and tells the two places apart", "[pla
   CHECK(score_of(2, 3) > score_of(1, 3));
 }
 
-TEST_CASE("The tool names what it cannot use and fails", "[place_recognition]") {
+TEST_CASE("The tool names unusable input and fails", "[place_recognition]") {
   const TemporaryFolder folder;
   const auto check_fails = [&](const std::string& arguments, const char* reason) {
     const CommandResult run = run_tool(arguments);

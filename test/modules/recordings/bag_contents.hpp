@@ -13,7 +13,7 @@ inline std::vector<BagMessage> messages_of(BagReader& reader) {
   return messages;
 }
 
-/// A message with what its channel says of it.
+/// A message with the topic and type of its channel.
 struct ToldMessage {
   std::string topic, type, encoding;
   Stamp log_time = 0;

@@ -21,7 +21,7 @@ class McapFile {
   using Bytes = std::vector<std::uint8_t>;
   struct Options {
     std::string compression;       ///< "", "lz4" or "zstd".
-    bool has_crc = true;           ///< Of chunks, the summary and the data.
+    bool has_crc = true;           ///< Checksums of chunks, of the summary and of the data.
     bool has_summary = true;       ///< Channels, statistics and chunk indexes.
     bool repeats_channels = true;  ///< In the summary.
   };
@@ -128,7 +128,7 @@ class McapFile {
     });
   }
 
-  // Of both channels.
+  // Numbers of messages of both channels.
   static void definitions(ByteWriter& out) {
     put(out, 0x03, [](ByteWriter& content) {
       content.u16(7);

@@ -65,10 +65,10 @@ std::vector<std::string> names_in(const fs::path& folder) {
 
 }  // namespace
 
-TEST_CASE("Bags of ROS 2 give what SQLite's own program gives", "[recordings]") {
+TEST_CASE("Bags of ROS 2 give the same messages as SQLite's own program", "[recordings]") {
   struct Known {
     const char* folder;
-    ListedSum sum;  // of Python's sqlite3
+    ListedSum sum;  // result of Python's sqlite3
     std::size_t topics;
   };
   const Known known = GENERATE(Known{"s3e_playground_2", {20, 0xa422acf5d}, 15},
@@ -198,7 +198,7 @@ TEST_CASE("Several files of a folder are one recording", "[recordings]") {
                      {10, 0}, {10, 0}, {10, 1}, {20, 1}, {25, 0}, {30, 1}});
 }
 
-TEST_CASE("What is no recording is refused by name", "[recordings]") {
+TEST_CASE("A file that is no recording is refused by name", "[recordings]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_bag(folder.write("a.bag", "nothing of the kind")),
                     Catch::Contains("a.bag byte 0: begins as none of"));
@@ -213,7 +213,7 @@ TEST_CASE("What is no recording is refused by name", "[recordings]") {
   CHECK_THROWS_WITH(open_bag(folder.path() / "two"), Catch::Contains("both .db3 and .mcap"));
 }
 
-TEST_CASE("Spoilt databases are refused or read in order", "[recordings]") {
+TEST_CASE("Corrupted databases are refused or read in order", "[recordings]") {
   const TemporaryFolder folder;
   // Long enough that rows, index and overflowing data have pages of their own.
   const fs::path good = database_of(

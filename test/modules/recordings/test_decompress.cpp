@@ -41,7 +41,7 @@ Bytes compressed(const std::string& compression, Bytes plain) {
   return packed;
 }
 
-TEST_CASE("What was compressed comes out as it was", "[recordings]") {
+TEST_CASE("Decompression restores the compressed bytes", "[recordings]") {
   const std::string compression = GENERATE("none", "lz4", "zstd", "bz2");
   const std::size_t size = GENERATE(0U, 1U, 1000U, 1U << 20U, 5'000'001U);
   CAPTURE(compression, size);

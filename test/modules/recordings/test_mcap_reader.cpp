@@ -37,7 +37,7 @@ struct Listed {
   std::size_t channels = 0;
 };
 
-// What the suite says a file has, in order of time.
+// Messages of a file according to the suite, in order of time.
 Listed listed_in(const fs::path& file) {
   Listed listed;
   std::map<std::int64_t, std::string> types;
@@ -120,7 +120,7 @@ TEST_CASE("A recording of rosbag2 with zstd is read whole", "[recordings]") {
   const auto file = shared_data("ros_recordings/mcap/nav2_turtlebot.mcap");
   if (!file) return;
   McapReader summed(*file);
-  // Of the chunk that the program zstd unpacks.
+  // A message in the chunk that the program zstd decompresses.
   CHECK(sum_of(summed) == ListedSum{8197, 0x100de38bbb1b});
   McapReader reader(*file);
   const auto messages = messages_of(reader);
@@ -159,7 +159,7 @@ TEST_CASE("Messages in and outside of chunks come in one order of time", "[recor
   CHECK(to_string(reader.report()) == "");
 }
 
-TEST_CASE("Of a file that is cut what is whole is read", "[recordings]") {
+TEST_CASE("The complete parts of a truncated file are read", "[recordings]") {
   McapFile::Options options;
   options.compression = GENERATE("", "zstd");
   const std::string whole = mixed_file(options).finish();
@@ -205,7 +205,8 @@ TEST_CASE("Messages outside of chunks are checked by the checksum of the data", 
   CHECK(reader.report().count(BagFault::kChecksum) == 1);
 }
 
-TEST_CASE("An index that says too late a time costs the messages that are late", "[recordings]") {
+TEST_CASE("Messages are dropped if the index states too late a time for their chunk",
+          "[recordings]") {
   McapFile file({});
   file.add_chunk(numbered_messages(10, 100), 100);
   file.add_chunk(numbered_messages(10, 95), 105);
@@ -217,7 +218,7 @@ TEST_CASE("An index that says too late a time costs the messages that are late",
   CHECK(messages.size() == 11);
 }
 
-TEST_CASE("Spoilt MCAP files are refused or read in order", "[recordings]") {
+TEST_CASE("Corrupted MCAP files are refused or read in order", "[recordings]") {
   McapFile::Options options;
   options.compression = GENERATE("", "lz4", "zstd");
   options.has_crc = GENERATE(true, false);
@@ -232,7 +233,7 @@ TEST_CASE("Spoilt MCAP files are refused or read in order", "[recordings]") {
                                });
 }
 
-TEST_CASE("What is no MCAP file is refused by name", "[recordings]") {
+TEST_CASE("A file that is no MCAP file is refused by name", "[recordings]") {
   check_no_files<InputFileError>(".mcap", [](const fs::path& path) { McapReader{path}; });
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(McapReader(folder.write("a.mcap", "#ROSBAG V2.0\n")),

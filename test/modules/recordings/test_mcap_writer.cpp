@@ -113,7 +113,7 @@ TEST_CASE("MCAP files are to the byte those of the conformance suite", "[recordi
   CHECK(bytes == read_input_file(*folder / (name + ".mcap")));
 }
 
-TEST_CASE("What is written to an MCAP file is read from it in order of time", "[recordings]") {
+TEST_CASE("Messages written to an MCAP file are read in order of time", "[recordings]") {
   const std::string compression = GENERATE("", "lz4", "zstd");
   CAPTURE(compression);
   const SmallFile file = small_file(compression);

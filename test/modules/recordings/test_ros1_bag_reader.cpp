@@ -159,10 +159,10 @@ void check_bag_order(const std::vector<BagMessage>& messages) {
 
 }  // namespace
 
-TEST_CASE("Bags of ROS 1 give what ROS' own reader gives", "[recordings]") {
+TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader", "[recordings]") {
   struct Known {
     const char* file;
-    ListedSum sum;  // of Debian's python3-rosbag 1.15
+    ListedSum sum;  // result of Debian's python3-rosbag 1.15
     std::size_t topics;
   };
   const Known known = GENERATE(Known{"ROS_example.bag", {26566, 0x33da0a80b6c3}, 3},
@@ -226,7 +226,7 @@ TEST_CASE("A bag is read the same with and without an index", "[recordings]") {
   CHECK(reader.report().count(BagFault::kIndex) == (has_index ? 0 : 1));
 }
 
-TEST_CASE("Of a bag that is cut the whole chunks are read", "[recordings]") {
+TEST_CASE("The complete chunks of a truncated bag are read", "[recordings]") {
   const std::string whole = small_bag(GENERATE(true, false));
   const TemporaryFolder folder;
   std::size_t before = 0;
@@ -243,7 +243,7 @@ TEST_CASE("Of a bag that is cut the whole chunks are read", "[recordings]") {
   CHECK(before >= 8);
 }
 
-TEST_CASE("Spoilt bags are refused or read in order", "[recordings]") {
+TEST_CASE("Corrupted bags are refused or read in order", "[recordings]") {
   const TemporaryFolder folder;
   check_spoilt<InputFileError>(small_bag(GENERATE(true, false)), folder.path().string(),
                                [&](const std::string& bytes) {
@@ -255,7 +255,7 @@ TEST_CASE("Spoilt bags are refused or read in order", "[recordings]") {
                                });
 }
 
-TEST_CASE("Spoilt bags with compression are refused or read in order", "[recordings]") {
+TEST_CASE("Corrupted bags with compression are refused or read in order", "[recordings]") {
   const auto file = shared_data("ros_recordings/rosbag1/" +
                                 GENERATE(std::string("tf_example.bag"), "no-messages.bag"));
   if (!file) return;
@@ -267,7 +267,7 @@ TEST_CASE("Spoilt bags with compression are refused or read in order", "[recordi
                                });
 }
 
-TEST_CASE("What is no bag of version 2 is refused by name", "[recordings]") {
+TEST_CASE("A file that is no bag of version 2 is refused by name", "[recordings]") {
   check_no_files<InputFileError>(".bag", [](const fs::path& path) { Ros1BagReader{path}; });
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(Ros1BagReader(folder.write("a.bag", "#ROSBAG V1.2\n")),

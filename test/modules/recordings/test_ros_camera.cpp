@@ -77,7 +77,7 @@ TEST_CASE("ROS's models of distortion are lenses", "[recordings]") {
   CHECK(lens().is_ideal());
 }
 
-TEST_CASE("The right camera's P tells the baseline", "[recordings]") {
+TEST_CASE("The baseline is computed from P of the right camera", "[recordings]") {
   CHECK(baseline_m(right_of(some_info())).value() == Approx(0.1));
   CHECK(!baseline_m(some_info()));
   RosCameraInfo info = right_of(some_info());

@@ -240,7 +240,7 @@ TEST_CASE("A message that was read is written as it was", "[recordings]") {
   CHECK(decode_ros<RosPoseStamped>("cdr", encode_ros(before_1970)).value->header.stamp == -1);
 }
 
-TEST_CASE("A message that is cut or goes on is refused", "[recordings]") {
+TEST_CASE("A message that is too short or too long is refused", "[recordings]") {
   const Wire wire = GENERATE(Wire::kRos1, Wire::kLittleEndian, Wire::kBigEndian);
   AllTypes::for_each([&]<typename Message>(const Message&) {
     CAPTURE(Message::kType);
@@ -290,7 +290,7 @@ TEST_CASE("Encodings that are not known are refused", "[recordings]") {
   CHECK(decode_ros<RosImu>("cdr", bytes).refusal);
 }
 
-TEST_CASE("Spoilt messages are refused or read", "[recordings]") {
+TEST_CASE("Corrupted messages are refused or read", "[recordings]") {
   const Wire wire = GENERATE(Wire::kRos1, Wire::kLittleEndian, Wire::kBigEndian);
   AllTypes::for_each([&]<typename Message>(const Message&) {
     const std::vector<Bytes> samples = {sample(Message::kType, wire)};

@@ -25,7 +25,7 @@ TEST_CASE("Rate and gaps of stamps are those of their intervals", "[recordings]"
   CHECK(statistics.unordered == 0);
 }
 
-TEST_CASE("Jitter is what 19 of 20 intervals keep", "[recordings]") {
+TEST_CASE("Jitter bounds the deviation of 19 of 20 intervals", "[recordings]") {
   // Deviations from the median of 1, 2, ..., 21 ms are 0, then 1 to 10 twice: of 21 the 20th is 10.
   std::vector<Stamp> stamps = {0};
   for (int i = 1; i <= 21; ++i) stamps.push_back(stamps.back() + i * kMs);

@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("What keys cost the relay", "[!benchmark]") {
+TEST_CASE("Relay with and without keys", "[!benchmark]") {
   const ToyTeam team;
   const ToyMember a(team, kA, "alpha"), b(team, kB, "beta");
   const RelayKeys keys = relay_keys(a.seal);

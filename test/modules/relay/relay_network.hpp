@@ -16,7 +16,7 @@
 
 namespace km {
 
-inline constexpr double kPeriod_s = 0.5;  // of the summaries
+inline constexpr double kPeriod_s = 0.5;  // Period of the summaries.
 inline constexpr RobotId kA = 0, kB = 1, kC = 2, kD = 3;
 
 inline std::vector<std::uint8_t> octets(std::size_t size, std::uint8_t value = 7) {
@@ -28,7 +28,7 @@ inline std::string name_of(RobotId robot) {
   return std::string("r").append(std::to_string(robot));
 }
 
-/// What a process of a toy team is asked by its relay.
+/// Signing and checking functions of one member of a toy team.
 inline RelayKeys relay_keys(const TeamSeal& seal) {
   return {
       .endorse = [&](OctetView statement) { return seal.endorse(statement); },
@@ -42,7 +42,7 @@ inline RelayKeys relay_keys(const TeamSeal& seal) {
   };
 }
 
-/// Robots whose links are cut and mended; parcels arrive at once, or are lost.
+/// Robots with links that can be cut and restored. Messages arrive at once or are lost.
 class Network {
  public:
   explicit Network(RobotId robots, bool has_keys = false) : has_keys_(has_keys) {
@@ -77,7 +77,7 @@ class Network {
     at(b).lost(a, now_s_);
     settle();
   }
-  // A bag as DDS carries it: to those that hear the robot.
+  // Publishes a bag to the robots that receive this one directly, as DDS does.
   void tell_bag(RobotId robot, std::uint32_t index) {
     const auto content = told({.kind = RelayKind::kBag,
                                .origin = {robot, boots_.at(robot)},
@@ -86,7 +86,7 @@ class Network {
     for (const auto& [other, store] : stores_)
       if (linked(robot, other)) (void)at(other).keep_bag(identity(robot), index, content);
   }
-  // Likewise a keyframe, to one that has asked for it.
+  // Sends a keyframe as a reply to the robot that requested it.
   void tell_reply(RobotId robot, RobotId to, std::uint32_t index) {
     const TeamPeer origin{robot, boots_.at(robot)};
     (void)at(to).keep_reply(origin, index,
@@ -104,7 +104,7 @@ class Network {
       settle();
     }
   }
-  // Which messages of a kind a robot was handed to read, in order.
+  // Messages of one kind that a robot received to read, in order.
   [[nodiscard]] std::vector<std::uint32_t> read(RobotId robot, RelayKind kind) {
     std::vector<std::uint32_t> numbers;
     for (const RelayMessagePtr& message : read_[robot])
@@ -118,10 +118,10 @@ class Network {
   [[nodiscard]] std::size_t parcels() const { return parcels_; }
   [[nodiscard]] std::size_t octets_sent() const { return octets_; }
   void lose(double part) { loss_ = part; }
-  /// Of what is told; see ToyTeam.
+  /// Team whose keys the robots use.
   [[nodiscard]] ToyTeam& team() { return team_; }
   [[nodiscard]] ToyMember& member(RobotId robot) { return *members_.at(robot); }
-  /// What a robot hands over is changed on its way.
+  /// Sets a function that changes each message that a robot sends.
   void tamper(std::function<void(RelayMessage&)> change) { change_ = std::move(change); }
   [[nodiscard]] const std::vector<std::string>& refusals(RobotId robot) { return refusals_[robot]; }
 
@@ -148,7 +148,7 @@ class Network {
     if (has_keys_) endorse(message, *keys_of(message.origin.robot));
     return message.content;
   }
-  // Carries what there is until nobody has anything to send.
+  // Delivers messages until no robot has any left to send.
   void settle() {
     for (bool more = true; more;) {
       more = false;

@@ -15,7 +15,7 @@ RelayMessage some_message(RelayKind kind) {
   return {.kind = kind, .origin = kOrigin, .to = kB, .number = 17, .content = octets(40)};
 }
 
-// A robot with keys that hears c, which has introduced a.
+// Robot with keys that receives c directly; c has introduced a.
 struct Hearing {
   Hearing() {
     REQUIRE(b.admit(c) == nullptr);
@@ -41,7 +41,7 @@ struct Hearing {
   RelayStore store{b.peer(), relay_keys(b.seal)};
 };
 
-TEST_CASE("A signature is for one message of one robot", "[relay]") {
+TEST_CASE("A relay signature is valid for one message of one robot only", "[relay]") {
   const ToyTeam team;
   const ToyMember a(team, kA, "alpha"), c(team, kC, "gamma");
   const RelayKind kind = GENERATE(RelayKind::kBag, RelayKind::kClosure, RelayKind::kInlierSet,
@@ -54,7 +54,7 @@ TEST_CASE("A signature is for one message of one robot", "[relay]") {
   const auto holds = [&] { return is_endorsed(message, a.keys.certificate.key); };
   REQUIRE(holds());
   CHECK_FALSE(is_endorsed(message, c.keys.certificate.key));
-  SECTION("every octet counts") {
+  SECTION("each byte of the content") {
     for (std::uint8_t& octet : message.content) {
       octet ^= 1U;
       CHECK_FALSE(holds());
@@ -78,26 +78,26 @@ TEST_CASE("A signature is for one message of one robot", "[relay]") {
     ++message.number;
     CHECK_FALSE(holds());
   }
-  SECTION("the origin's life, and its process but for what lasts as long as that") {
+  SECTION("the incarnation of the origin, and its boot id unless the message is valid longer") {
     message.origin.boot = next_boot(kOrigin.boot);
     CHECK(holds() == lasts);
     message.origin.boot = kOrigin.boot + (std::uint64_t{1} << kResumeBits);
     CHECK_FALSE(holds());
   }
-  SECTION("its addressee but for what goes to all that ask") {
+  SECTION("the addressee unless the message is for any requester") {
     message.to = kD;
     CHECK(holds() == lasts);
     message.to = kB;
     message.to_boot = 5;
     CHECK(holds() == lasts);
   }
-  SECTION("not how far it has come") {
+  SECTION("not the number of hops") {
     message.hops = 9;
     CHECK(holds());
   }
 }
 
-TEST_CASE("An introduction is a name and what its robot shows or nothing else", "[relay]") {
+TEST_CASE("An introduction is a robot name with credentials and nothing else", "[relay]") {
   const ToyTeam team;
   const ToyMember a(team, kA, "alpha");
   const auto text = [](const std::string& content) {
@@ -115,7 +115,7 @@ TEST_CASE("An introduction is a name and what its robot shows or nothing else", 
   CHECK_FALSE(text("alpha;" + a.seal.credentials() + "x"));
 }
 
-TEST_CASE("A robot out of reach is believed by its certificate and no other", "[relay]") {
+TEST_CASE("A robot out of reach is accepted only with a valid certificate of its team", "[relay]") {
   Hearing hearing;
   RelayStore& store = hearing.store;
   const auto is_forged = [&](const ToyMember& robot, const char* why) {
@@ -129,15 +129,15 @@ TEST_CASE("A robot out of reach is believed by its certificate and no other", "[
     REQUIRE(store.take_output().met.size() == 1);
     CHECK(store.origin(kA) == kOrigin);
   }
-  SECTION("of another authority") {
+  SECTION("a member of another team") {
     const ToyTeam others("survey");
     is_forged(ToyMember(others, kA, "alpha"), "credentials of another team");
   }
-  SECTION("that is revoked") {
+  SECTION("a revoked member") {
     (void)hearing.b.seal.update(hearing.team.revoking({hearing.a.keys.certificate}), kToyNow_s);
     is_forged(hearing.a, "certificate is revoked");
   }
-  SECTION("with another name or boot than it has signed, or nothing") {
+  SECTION("a member with a name or boot id that it has not signed, or without credentials") {
     const std::string& shown = hearing.a.seal.credentials();
     for (const auto& [boot, introduction] :
          std::vector<std::pair<std::uint64_t, RelayIntroduction>>{
@@ -152,7 +152,8 @@ TEST_CASE("A robot out of reach is believed by its certificate and no other", "[
   CHECK(store.take_output().delivered.empty());
 }
 
-TEST_CASE("What a neighbour forges or changes is refused before it is kept", "[relay]") {
+TEST_CASE("A message that a neighbour forges or changes is refused before it is stored",
+          "[relay]") {
   Hearing hearing;
   RelayStore& store = hearing.store;
   REQUIRE(hearing.introduce(hearing.a) == RelayArrival::kNew);
@@ -161,7 +162,7 @@ TEST_CASE("What a neighbour forges or changes is refused before it is kept", "[r
                                   RelayKind::kRequest, RelayKind::kReply);
   CAPTURE(static_cast<int>(kind));
   RelayMessage message = Hearing::said_by(hearing.a, kind);
-  SECTION("as it was said") {
+  SECTION("unchanged") {
     CHECK(hearing.receive(message) == RelayArrival::kNew);
     const RelayOutput output = store.take_output();
     REQUIRE(output.delivered.size() == 1);
@@ -185,7 +186,7 @@ TEST_CASE("What a neighbour forges or changes is refused before it is kept", "[r
     message.number = 3;
     CHECK(hearing.receive(message) == RelayArrival::kForged);
   }
-  SECTION("said by a former life") {
+  SECTION("sent by an earlier incarnation") {
     const ToyMember former(hearing.a, std::uint64_t{4} << kResumeBits);
     message = Hearing::said_by(former, kind);
     CHECK(hearing.receive(message) == RelayArrival::kRefused);
@@ -198,7 +199,7 @@ TEST_CASE("What a neighbour forges or changes is refused before it is kept", "[r
   CHECK(output.parcels.empty());
 }
 
-TEST_CASE("A robot that is revoked is not believed any more and forgotten", "[relay]") {
+TEST_CASE("Messages of a revoked robot are refused and the robot is removed", "[relay]") {
   Hearing hearing;
   RelayStore& store = hearing.store;
   REQUIRE(hearing.introduce(hearing.a) == RelayArrival::kNew);
@@ -211,7 +212,8 @@ TEST_CASE("A robot that is revoked is not believed any more and forgotten", "[re
   CHECK(hearing.introduce(hearing.a) == RelayArrival::kForged);
 }
 
-TEST_CASE("What is heard is kept for others only with its own signature", "[relay]") {
+TEST_CASE("A directly received message is stored for other robots only with its signature",
+          "[relay]") {
   Hearing hearing;
   RelayStore& store = hearing.store;
   const auto keep = [&](const RelayMessage& said) {
@@ -229,7 +231,7 @@ TEST_CASE("What is heard is kept for others only with its own signature", "[rela
   CHECK(keep(other) == RelayArrival::kForged);
 }
 
-TEST_CASE("What a robot has said with keys that it has no more is told anew", "[relay]") {
+TEST_CASE("Messages that a robot signed with a former key are sent again", "[relay]") {
   Hearing hearing;
   RelayStore& store = hearing.store;
   CHECK(store.keep_bag(hearing.c.identity, 0,
@@ -244,7 +246,7 @@ TEST_CASE("What a robot has said with keys that it has no more is told anew", "[
         (renewed ? RelayArrival::kNew : RelayArrival::kRepeated));
 }
 
-TEST_CASE("A neighbour that changes what it hands on is not believed and harms nobody else",
+TEST_CASE("A neighbour that changes forwarded messages is refused and blocks no other neighbour",
           "[relay]") {
   Network network(4, true);
   network.link(kA, kC);
@@ -259,7 +261,7 @@ TEST_CASE("A neighbour that changes what it hands on is not believed and harms n
   CHECK(network.refusals(kB).size() > 20);
   for (const std::string& why : network.refusals(kB))
     CHECK(why == "not signed by its origin, or changed on its way");
-  // Another one hands on the same as it is.
+  // Another neighbour forwards the same messages unchanged.
   network.tamper({});
   network.run(20.0);
   CHECK(network.read(kB, RelayKind::kBag).size() == 20);

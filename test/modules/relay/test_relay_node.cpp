@@ -35,7 +35,7 @@ std::unique_ptr<SharedSeal> seal_of(const ToyTeam& team, RobotId robot) {
                                       identity_of(robot), today_s());
 }
 
-// What DDS would carry goes from topic to topic here.
+// Passes messages from topic to topic in place of DDS.
 struct Relaying {
   Relaying(const std::shared_ptr<const DdsDomain>& domain, RobotId robot, double& now_s,
            std::unique_ptr<SharedSeal> keys)
@@ -56,7 +56,7 @@ struct Relaying {
                       RelayedTopics<InlierSet>{told_sets, direct_sets, heard_sets, sets});
   }
 
-  // As the bridge sends and takes a message to all.
+  // Sends and receives a message to all robots as the bridge does.
   [[nodiscard]] Octets said(const KeyframeBow& bow) const {
     const auto encoded = Codec<KeyframeBow>::encode(bow);
     Octets content = serialize(Codec<KeyframeBow>::descriptor(), &encoded.wire);
@@ -92,7 +92,7 @@ struct Relaying {
   ContentGuard<KeyframeBow> bow_guard;
 };
 
-// Robots 0 and 1, which do not hear each other, and 2, which hears both.
+// Robots 0 and 1 do not receive each other directly; robot 2 receives both.
 struct Chain {
   explicit Chain(bool has_keys) {
     for (RobotId robot = 0; robot < 3; ++robot)
@@ -122,7 +122,7 @@ struct Chain {
     });
     REQUIRE(why == nullptr);
   }
-  // Statuses for a while.
+  // Exchanges statuses for a while.
   void run(double seconds) {
     for (const double end_s = now_s + seconds; now_s < end_s; now_s += kStatusPeriod_s)
       for (const RobotId end : {RobotId{0}, RobotId{1}}) {
@@ -137,7 +137,7 @@ struct Chain {
 
   double now_s = 0.0;
   ToyTeam team;
-  std::function<void(RelayMessage&)> change;  // of what is handed over
+  std::function<void(RelayMessage&)> change;  // Changes each forwarded message.
   std::vector<std::string> refusals;
   std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
   std::vector<std::unique_ptr<Relaying>> robots;
@@ -145,12 +145,12 @@ struct Chain {
 
 }  // namespace
 
-TEST_CASE("What robots out of reach tell comes out where it would if they were heard", "[relay]") {
+TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Chain chain(has_keys);
   Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
-  c.peers.tell(identity_of(0));  // as if DDS had discovered it
+  c.peers.tell(identity_of(0));  // Stands for the discovery of robot 0 by DDS.
   const Octets bow = a.said({.id = {0, 0}, .words = {{3, 1}}});
   REQUIRE(c.hear(process_of(0), bow).empty());
   chain.run(20.0);
@@ -176,7 +176,7 @@ TEST_CASE("What robots out of reach tell comes out where it would if they were h
   b.events.publish(PeerEvent{PeerEventKind::kLost, identity_of(2), {}});
   b.own_requests.publish(
       Addressed<KeyframeRequest>{2, std::make_shared<const KeyframeRequest>(request)});
-  CHECK(b.sent_directly.messages().size() == 2);  // which DDS keeps
+  CHECK(b.sent_directly.messages().size() == 2);  // Messages that DDS keeps.
   b.events.publish(PeerEvent{PeerEventKind::kReturned, identity_of(2), {}});
 
   const InlierSet set{.a = 0, .b = 1, .version = 1, .closures = {{{0, 1}, {1, 2}}}};
@@ -187,7 +187,8 @@ TEST_CASE("What robots out of reach tell comes out where it would if they were h
   CHECK(a.told_directly.messages().size() == 1);
 }
 
-TEST_CASE("With keys nothing that its origin has not signed is heard or taken", "[relay]") {
+TEST_CASE("With keys a message without the signature of its origin is neither read nor stored",
+          "[relay]") {
   Chain chain(true);
   Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
   c.peers.tell(identity_of(0));
@@ -209,7 +210,7 @@ TEST_CASE("With keys nothing that its origin has not signed is heard or taken", 
   CHECK(c.got_bows.messages().size() == 1);
 }
 
-TEST_CASE("What a neighbour hands over is checked before anything else", "[relay]") {
+TEST_CASE("Messages from a neighbour are checked before use", "[relay]") {
   const auto refusal_of = [](RelayMessage message) -> std::string {
     const RelayParcel parcel{2, std::make_shared<const RelayMessage>(std::move(message))};
     const auto encoded = Codec<RelayParcel>::encode(parcel);

@@ -18,7 +18,8 @@ std::vector<std::uint32_t> first(std::uint32_t count) {
 
 }  // namespace
 
-TEST_CASE("Robots that all hear each other hand nothing on and hold nothing to tell", "[relay]") {
+TEST_CASE("Robots that all receive each other forward nothing and report no stored messages",
+          "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -38,7 +39,7 @@ TEST_CASE("Robots that all hear each other hand nothing on and hold nothing to t
   }
 }
 
-TEST_CASE("A robot gets each bag of one that only another has heard once and in order", "[relay]") {
+TEST_CASE("A robot gets each bag of a robot out of range once and in order", "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -62,7 +63,7 @@ TEST_CASE("A robot gets each bag of one that only another has heard once and in 
         std::vector<RelayHeld>{{{kA, Network::first_boot(kA)}, 300, 0}});
 }
 
-TEST_CASE("A bag may come before it is known that its robot is heard", "[relay]") {
+TEST_CASE("A bag that arrives before its robot is announced is stored", "[relay]") {
   Network network(3);
   CHECK(network.at(kC).keep_bag(network.identity(kA), 0, octets(600)) == RelayArrival::kNew);
   CHECK_FALSE(network.at(kC).hears(kA));
@@ -72,7 +73,8 @@ TEST_CASE("A bag may come before it is known that its robot is heard", "[relay]"
   CHECK(network.read(kB, RelayKind::kBag) == first(1));
 }
 
-TEST_CASE("Bags go along a chain, and of two robots between only one hands them on", "[relay]") {
+TEST_CASE("Bags pass along a chain and only one of two robots in between forwards them",
+          "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(4, has_keys);
@@ -101,7 +103,7 @@ TEST_CASE("Bags go along a chain, and of two robots between only one hands them 
   CHECK(handed_on == (network.read(kD, RelayKind::kBag).empty() ? 100 : 200));
 }
 
-TEST_CASE("What is lost on the way is handed over again, and taken once", "[relay]") {
+TEST_CASE("A lost message is sent again and delivered once", "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -120,7 +122,7 @@ TEST_CASE("What is lost on the way is handed over again, and taken once", "[rela
   CHECK(letters == first(20));
 }
 
-TEST_CASE("A closure reaches a robot that is met again later, once", "[relay]") {
+TEST_CASE("A closure reaches a robot once when it returns into range", "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -135,22 +137,23 @@ TEST_CASE("A closure reaches a robot that is met again later, once", "[relay]") 
   network.at(kB).wrote(RelayKind::kInlierSet, {kA}, 0, octets(20, 2), 9.0);
   network.at(kB).wrote(RelayKind::kInlierSet, {kA}, 0, octets(30, 3), 9.0);
   network.run(10.0);
-  SECTION("by who carries it, the writer being gone") {
+  SECTION("from a robot that carries it, after its origin has gone") {
     network.cut(kB, kC);
     network.link(kA, kC);
   }
-  SECTION("by both at once") {
+  SECTION("from the origin and a carrier at the same time") {
     network.link(kA, kC);
     network.link(kA, kB);
   }
   network.run(10.0);
   CHECK(network.read(kA, RelayKind::kClosure) == first(1));
-  // The older set is of no use any more.
+  // The newer inlier set replaces the older one.
   CHECK(network.read(kA, RelayKind::kInlierSet) == std::vector<std::uint32_t>{2});
   CHECK(network.read(kC, RelayKind::kClosure).empty());
 }
 
-TEST_CASE("Nothing is handed to robots that soon hear each other", "[relay]") {
+TEST_CASE("The relay sends nothing between robots that soon receive each other directly",
+          "[relay]") {
   Network network(3);
   for (std::uint32_t i = 0; i < 20; ++i)
     network.at(kB).wrote(RelayKind::kClosure, {kA}, i, {1}, 0.0);
@@ -167,7 +170,7 @@ TEST_CASE("Nothing is handed to robots that soon hear each other", "[relay]") {
   CHECK(network.parcels() == 0);
 }
 
-TEST_CASE("What was told just before a link fell silent becomes a letter", "[relay]") {
+TEST_CASE("A message sent just before a link failed becomes a reliable message", "[relay]") {
   Network network(3);
   network.link(kA, kB);
   network.link(kA, kC);
@@ -181,7 +184,7 @@ TEST_CASE("What was told just before a link fell silent becomes a letter", "[rel
   CHECK(network.read(kA, RelayKind::kClosure).size() == 1);
 }
 
-TEST_CASE("What was told to a robot in its former life does not reach the next", "[relay]") {
+TEST_CASE("A message to one incarnation of a robot does not reach the next", "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -195,11 +198,11 @@ TEST_CASE("What was told to a robot in its former life does not reach the next",
   tell(1, former, 1);
   tell(2, former, 1);
   network.cut(kA, kB);
-  SECTION("by its writer") {
+  SECTION("from its origin") {
     network.start(kA, next);
     network.link(kA, kB);
   }
-  SECTION("by who carries it and does not know") {
+  SECTION("from a carrier that does not know of the restart") {
     network.run(8.0);
     network.cut(kB, kC);
     network.start(kA, next);
@@ -218,7 +221,7 @@ TEST_CASE("What was told to a robot in its former life does not reach the next",
   CHECK(read.front()->content.front() == 2);
 }
 
-TEST_CASE("A request goes to its addressee and the answer comes back", "[relay]") {
+TEST_CASE("A request reaches its addressee and the reply returns", "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(4, has_keys);
@@ -237,7 +240,7 @@ TEST_CASE("A request goes to its addressee and the answer comes back", "[relay]"
   CHECK(network.all_read(kB).back()->origin == TeamPeer{kA, Network::first_boot(kA)});
 }
 
-TEST_CASE("What DDS keeps for a robot that was heard is not carried as well", "[relay]") {
+TEST_CASE("A reply that DDS keeps for a known robot is not carried by the relay", "[relay]") {
   Network network(3);
   network.link(kA, kB);
   CHECK(network.at(kA).ways_to(kB) == RelayWays{.direct = true, .relay = false});
@@ -252,7 +255,8 @@ TEST_CASE("What DDS keeps for a robot that was heard is not carried as well", "[
   CHECK(network.at(kA).ways_to(kC) == RelayWays{.direct = false, .relay = true});
 }
 
-TEST_CASE("Who has had a keyframe answers in place of a robot that is gone", "[relay]") {
+TEST_CASE("A robot that has stored a keyframe replies for its owner after the owner has gone",
+          "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -261,19 +265,19 @@ TEST_CASE("Who has had a keyframe answers in place of a robot that is gone", "[r
   network.tell_reply(kA, kC, 17);
   network.link(kC, kB);
   network.run(8.0);
-  SECTION("it is there: it is asked itself") {
+  SECTION("the owner is in range and replies itself") {
     network.at(kB).call(RelayKind::kRequest, kA, 17, octets(20));
     network.run(kPeriod_s);
     CHECK(network.read(kA, RelayKind::kRequest).size() == 1);
     CHECK(network.read(kB, RelayKind::kReply).empty());
   }
-  SECTION("it is gone") {
+  SECTION("the owner is gone") {
     network.cut(kA, kC);
     network.at(kB).call(RelayKind::kRequest, kA, 17, octets(20));
     network.run(kPeriod_s);
     CHECK(network.read(kB, RelayKind::kReply) == std::vector<std::uint32_t>{17});
   }
-  SECTION("it is gone, and nobody has had the keyframe: the request is carried, once") {
+  SECTION("the owner is gone and no robot has the keyframe, so the request is carried once") {
     network.cut(kA, kC);
     for (int i = 0; i < 3; ++i) network.at(kB).call(RelayKind::kRequest, kA, 18, octets(20));
     network.run(kPeriod_s);
@@ -291,7 +295,7 @@ TEST_CASE("Who has had a keyframe answers in place of a robot that is gone", "[r
   }
 }
 
-TEST_CASE("Another life of a robot that is not heard takes the place of the former", "[relay]") {
+TEST_CASE("A new incarnation of a robot out of range replaces the former", "[relay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(4, has_keys);
@@ -302,7 +306,7 @@ TEST_CASE("Another life of a robot that is not heard takes the place of the form
   network.run(20.0);
   REQUIRE(network.read(kD, RelayKind::kBag) == first(10));
   const std::uint64_t other_life = std::uint64_t{99} << 32U;
-  SECTION("and its bags are others") {
+  SECTION("its bags replace the former ones") {
     network.start(kA, other_life);
     network.tell_bag(kA, 0);
     network.run(20.0);
@@ -312,7 +316,7 @@ TEST_CASE("Another life of a robot that is not heard takes the place of the form
       CHECK(network.at(robot).origin(kA)->boot == other_life);
     }
   }
-  SECTION("and does not give way to it again where a robot has missed the change") {
+  SECTION("it stays, although one robot has missed the restart") {
     network.cut(kB, kD);
     network.start(kA, other_life);
     network.tell_bag(kA, 0);
@@ -323,7 +327,7 @@ TEST_CASE("Another life of a robot that is not heard takes the place of the form
     CHECK(network.at(kB).origin(kA)->boot == other_life);
     CHECK(network.at(kD).origin(kA)->boot == other_life);
   }
-  SECTION("but of a life that goes on nothing is told again") {
+  SECTION("a resumed process keeps its bags") {
     network.start(kA, Network::first_boot(kA) + 1);
     for (std::uint32_t i = 0; i < 12; ++i) network.tell_bag(kA, i);
     network.run(20.0);
@@ -331,7 +335,8 @@ TEST_CASE("Another life of a robot that is not heard takes the place of the form
   }
 }
 
-TEST_CASE("A neighbour is believed nothing about this robot or one that is heard", "[relay]") {
+TEST_CASE("A neighbour cannot change the state of this robot or of one received directly",
+          "[relay]") {
   RelayStore store({kB, 2});
   store.heard({.robot = kC, .name = "c", .boot = 3});
   const auto receive = [&](RobotId from, RelayMessage message) {
@@ -344,10 +349,11 @@ TEST_CASE("A neighbour is believed nothing about this robot or one that is heard
   CHECK(receive(kC, introduction(kB, 9)) == RelayArrival::kRefused);
   CHECK(receive(kC, introduction(kC, 9)) == RelayArrival::kRepeated);
   CHECK(store.origin(kC)->boot == 3);
-  CHECK(receive(kD, introduction(kA, 1)) == RelayArrival::kRefused);  // who is not heard
+  CHECK(receive(kD, introduction(kA, 1)) == RelayArrival::kRefused);  // The neighbour is not
+                                                                      // received directly.
   const RelayMessage bag{
       .kind = RelayKind::kBag, .origin = {kA, 1}, .number = 0, .content = octets(9)};
-  CHECK(receive(kC, bag) == RelayArrival::kRefused);  // of a robot that is not known
+  CHECK(receive(kC, bag) == RelayArrival::kRefused);  // The origin is unknown.
   CHECK(receive(kC, introduction(kA, 1)) == RelayArrival::kNew);
   CHECK(receive(kC, bag) == RelayArrival::kNew);
   CHECK(receive(kC, bag) == RelayArrival::kRepeated);
@@ -361,7 +367,7 @@ TEST_CASE("A neighbour is believed nothing about this robot or one that is heard
   CHECK(receive(kC, of_heard) == RelayArrival::kRepeated);
 }
 
-TEST_CASE("Robots that a neighbour invents take no more room than there is for all", "[relay]") {
+TEST_CASE("Robots that a neighbour invents cannot exceed the common storage", "[relay]") {
   RelayStore store({kB, 2});
   store.heard({.robot = kC, .name = "c", .boot = 3});
   constexpr std::size_t kSize = 1U << 20U;
@@ -386,7 +392,7 @@ TEST_CASE("Robots that a neighbour invents take no more room than there is for a
   CHECK(store.summary().holds.front().bags == 1);
 }
 
-TEST_CASE("Full, a store gives up what is newest and says how much", "[relay]") {
+TEST_CASE("A full store refuses the newest messages and counts them", "[relay]") {
   Network network(2);
   network.link(kA, kC - 1);
   RelayStore& store = network.at(kB);

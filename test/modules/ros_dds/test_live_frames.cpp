@@ -23,7 +23,7 @@ KeyframeOdometry keyframe_at(int k, KeyframeIndex index) {
   return keyframe;
 }
 
-TEST_CASE("The newest keyframe is where the pose graph has it", "[ros_dds]") {
+TEST_CASE("The newest keyframe has its pose in the pose graph", "[ros_dds]") {
   LiveFrames frames;
   CHECK(frames.T_map_odom().isApprox(SE3::Identity()));
   for (int k = 0; k <= 20; ++k) {
@@ -41,7 +41,7 @@ TEST_CASE("The newest keyframe is where the pose graph has it", "[ros_dds]") {
   CHECK(frames.angular_rate().isApprox(Eigen::Vector3d(0, 0, 0.4), 1e-9));  // 0.02 rad in 50 ms
 }
 
-TEST_CASE("Keyframes of a former life do not correct odometry", "[ros_dds]") {
+TEST_CASE("Keyframes of an earlier incarnation do not correct odometry", "[ros_dds]") {
   LiveFrames frames;
   frames.add(state_at(0));
   frames.add(keyframe_at(0, 7));

@@ -15,7 +15,7 @@ T value_at(const RosPointCloud& cloud, std::size_t point, std::size_t field) {
   return value;
 }
 
-TEST_CASE("A mesh is told as its vertices and their colours", "[ros_dds]") {
+TEST_CASE("A mesh is published as its vertices with their colours", "[ros_dds]") {
   LabelledMesh mesh;
   mesh.vertices = {{1, 2, 3}, {4, 5, 6.5F}};
   mesh.colors = {{0x12, 0x34, 0x56}, {1, 2, 3}};
@@ -34,7 +34,8 @@ TEST_CASE("A mesh is told as its vertices and their colours", "[ros_dds]") {
   CHECK(cloud_of(mesh, 10, {}).fields.size() == 3);
 }
 
-TEST_CASE("Of a large mesh so many vertices are told at most, from all of it", "[ros_dds]") {
+TEST_CASE("A large mesh is published as a bounded number of vertices from all its parts",
+          "[ros_dds]") {
   LabelledMesh mesh;
   for (int k = 0; k < 1000; ++k) mesh.vertices.emplace_back(static_cast<float>(k), 0.0F, 0.0F);
   for (const std::size_t most : {1U, 7U, 300U, 999U, 1000U, 2000U}) {

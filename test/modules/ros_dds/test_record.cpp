@@ -54,13 +54,13 @@ std::size_t count(const std::vector<ToldMessage>& messages, const std::string& t
 
 }  // namespace
 
-TEST_CASE("Closures are lines by what has become of them", "[ros_dds]") {
+TEST_CASE("Closures are drawn as lines by their stage", "[ros_dds]") {
   const RosMarkers message = closure_lines(closures(), straight(3), {5, "map"});
   REQUIRE(message.markers.size() == 4);
   const auto points = [&](std::size_t kind) { return message.markers[kind].points; };
   using Points = std::vector<Eigen::Vector3d>;
   CHECK(message.markers[0].name_space == "candidates");
-  CHECK(points(0).empty());  // where the other ends are is not known
+  CHECK(points(0).empty());  // the other ends are unknown
   CHECK(points(1).empty());
   CHECK(message.markers[2].name_space == "rejected");
   CHECK(points(2) == Points{{0, 0, 0}, {10, 0, 0}});
@@ -88,7 +88,7 @@ TEST_CASE("The faces of a mesh have the colours of their vertices", "[ros_dds]")
   CHECK(surface_of(mesh, mesh.faces, {}).colors.empty());
 }
 
-TEST_CASE("A definition has those of all types in it, each once", "[ros_dds]") {
+TEST_CASE("A type definition contains each of its nested types once", "[ros_dds]") {
   const std::string path = ros_definition(RosPath::kType);
   CHECK(path.starts_with("std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n====="));
   std::size_t parts = 0;
@@ -99,8 +99,7 @@ TEST_CASE("A definition has those of all types in it, each once", "[ros_dds]") {
   CHECK_THROWS_AS(ros_definition("a/B"), std::invalid_argument);
 }
 
-TEST_CASE("A robot's record holds what viewers are told, and the states it ended with",
-          "[ros_dds]") {
+TEST_CASE("A robot's record holds the published messages and the final states", "[ros_dds]") {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "a.mcap";
   Topic<OdometryState> odometry;
@@ -127,7 +126,7 @@ TEST_CASE("A robot's record holds what viewers are told, and the states it ended
           KeyframeOdometry{.id = {3, static_cast<std::uint32_t>(k / 10)}, .stamp = 1000 + k});
   }
   trajectories.publish(straight(3));
-  trajectories.publish(straight(7));  // too soon after the one before to be told
+  trajectories.publish(straight(7));  // too soon after the one before to be published
   LabelledMesh mesh;
   mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   mesh.faces = {{0, 1, 2}};
@@ -155,7 +154,7 @@ TEST_CASE("A robot's record holds what viewers are told, and the states it ended
   CHECK(path->poses[1].header.stamp == 1001);
   CHECK(path->poses[1].pose.position.x() == 6.0);
   CHECK(path->header.frame == "bob_3/map");
-  // It has joined alice: where its own frame is for the team.
+  // The robot has joined alice, so /tf contains its own frame in the frame of the team.
   const auto transforms = last<RosTransforms>(messages, "/tf");
   REQUIRE(transforms);
   CHECK(transforms->transforms[0].header.frame == "alice/map");
@@ -178,7 +177,7 @@ TEST_CASE("A robot's record holds what viewers are told, and the states it ended
   for (const ToldMessage& message : messages) CHECK(message.log_time >= 1000);
 }
 
-TEST_CASE("The map of a robot that is not joined hangs in no other", "[ros_dds]") {
+TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[ros_dds]") {
   const RobotId anchor = GENERATE(as<RobotId>(), 3, 7);
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "a.mcap";
@@ -210,7 +209,7 @@ TEST_CASE("The map of a robot that is not joined hangs in no other", "[ros_dds]"
   CHECK(links.size() == (anchor == 7 ? 3 : 2));
 }
 
-TEST_CASE("A record ends where the disk is full, and says so once", "[ros_dds]") {
+TEST_CASE("A record ends when the disk is full and reports it once", "[ros_dds]") {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "a.mcap";
   fs::create_symlink("/dev/full", file);
@@ -226,7 +225,7 @@ TEST_CASE("A record ends where the disk is full, and says so once", "[ros_dds]")
   CHECK(fs::is_symlink(file));
 }
 
-TEST_CASE("Of a process that is killed the record is whole up to the last flush", "[ros_dds]") {
+TEST_CASE("The record of a killed process is complete up to the last flush", "[ros_dds]") {
   const TemporaryFolder folder;
   const fs::path file = folder.write("a.mcap", "of an earlier run");
   McapSink sink(file, [](const auto&) {});

@@ -50,7 +50,7 @@ void wait_for_reader(const RosPublisher& publisher) {
   REQUIRE(publisher.reader_count() > 0);
 }
 
-TEST_CASE("What is published on a topic of ROS is what is received", "[ros_dds]") {
+TEST_CASE("A message published on a ROS topic is received unchanged", "[ros_dds]") {
   LiveBag subscription(network(), {{"/a/imu", "sensor_msgs/msg/Imu", RosQos::kSensorData, 100},
                                    {"a/image", "sensor_msgs/Image", RosQos::kSensorData, 10}});
   const RosPublisher images(network(), "/a/image", "sensor_msgs/msg/Image", RosQos::kSensorData,
@@ -73,7 +73,7 @@ TEST_CASE("What is published on a topic of ROS is what is received", "[ros_dds]"
   CHECK(subscription.report().empty());
 }
 
-TEST_CASE("Every known type crosses", "[ros_dds]") {
+TEST_CASE("Every known type can be sent and received", "[ros_dds]") {
   const auto crosses = []<typename Message>(Message message) {
     CAPTURE(Message::kType);
     const std::string type(Message::kType);
@@ -115,7 +115,7 @@ TEST_CASE("Every known type crosses", "[ros_dds]") {
   crosses(marker);
 }
 
-TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
+TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframes;
   Topic<Trajectory> trajectories;
@@ -156,7 +156,7 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   std::optional<RosPointCloud> cloud;
   std::optional<RosDiagnostics> diagnostics;
   std::optional<RosMarker> faces;
-  // States go on until the viewer has all: it may have come later.
+  // Publishes until the viewer has received all messages, because it may have subscribed late.
   while (!(path && pose && told && transforms && cloud && diagnostics && faces)) {
     const auto message = [&] {
       state.stamp += 10;
@@ -187,7 +187,7 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   REQUIRE(path->poses.size() == 1);
   CHECK(path->poses[0].header.stamp == 5);
   CHECK(cloud->header.frame == "map");
-  CHECK(cloud->width == 2);  // of three vertices two at most
+  CHECK(cloud->width == 2);  // at most two of three vertices
   CHECK(faces->header.frame == "map");
   CHECK(faces->points.size() == 3);
   REQUIRE(diagnostics->status.size() == 2);
@@ -199,7 +199,7 @@ TEST_CASE("Viewers are told where the robot is", "[ros_dds]") {
   CHECK(path->poses[0].pose.position == Eigen::Vector3d(10, 2, 3));
 }
 
-TEST_CASE("What is latched reaches those who come later", "[ros_dds]") {
+TEST_CASE("A late subscriber receives a latched message", "[ros_dds]") {
   const RosPublisher publisher(network(), "/tf_static", "tf2_msgs/msg/TFMessage", RosQos::kLatched,
                                1);
   publisher.publish(encode_ros(RosTransforms{{{{7, "map"}, "odom", {}}}}));
@@ -210,7 +210,7 @@ TEST_CASE("What is latched reaches those who come later", "[ros_dds]") {
         "odom");
 }
 
-TEST_CASE("Of what is latched those who come later get as much as is kept", "[ros_dds]") {
+TEST_CASE("A late subscriber receives as many latched messages as the depth", "[ros_dds]") {
   constexpr int kKept = 5;
   const RosPublisher publisher(network(), "/pieces", "visualization_msgs/Marker", RosQos::kLatched,
                                kKept);

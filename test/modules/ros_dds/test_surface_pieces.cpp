@@ -33,7 +33,7 @@ double area_m2(const LabelledMesh& mesh) {
   return area;
 }
 
-// What a viewer shows that is told all there is: points of each piece.
+// Points of each piece, as a viewer shows them that has received all markers.
 void show(SurfacePieces& pieces, std::map<std::int32_t, std::size_t>& shown) {
   while (const auto marker = pieces.next({7, "map"})) {
     CHECK(marker->header.frame == "map");
@@ -52,8 +52,9 @@ std::size_t faces_of(const std::map<std::int32_t, std::size_t>& shown) {
   return points / 3;
 }
 
-TEST_CASE("All faces of a mesh are told in small pieces, and of the next one no others",
-          "[ros_dds]") {
+TEST_CASE(
+    "All faces of a mesh are published in small pieces and pieces of the former mesh are deleted",
+    "[ros_dds]") {
   SurfacePieces pieces;
   CHECK_FALSE(pieces.next({}));
   std::map<std::int32_t, std::size_t> shown;
@@ -66,18 +67,18 @@ TEST_CASE("All faces of a mesh are told in small pieces, and of the next one no 
   }
 }
 
-TEST_CASE("A mesh that comes while another is told waits for its end", "[ros_dds]") {
+TEST_CASE("A new mesh waits until the present one is published", "[ros_dds]") {
   SurfacePieces pieces;
   pieces.offer(std::make_shared<const LabelledMesh>(square(40)));  // 7 pieces
   REQUIRE(pieces.next({}));
   pieces.offer(std::make_shared<const LabelledMesh>(square(10)));
   pieces.offer(std::make_shared<const LabelledMesh>(square(20)));
   for (int k = 1; k < 7; ++k) CHECK(pieces.next({})->id == k);
-  CHECK(pieces.next({})->points.size() == 3 * 500);  // of the newest
+  CHECK(pieces.next({})->points.size() == 3 * 500);  // pieces of the newest mesh
   CHECK(pieces.next({})->points.size() == 3 * 300);
 }
 
-TEST_CASE("A mesh with too many faces is made coarser, and covers what it did", "[ros_dds]") {
+TEST_CASE("A mesh with too many faces is coarsened and covers the same area", "[ros_dds]") {
   const LabelledMesh mesh = square(100);
   CHECK(coarsened(mesh, 20000).faces == mesh.faces);
   for (const std::size_t most : {10000U, 1000U, 100U}) {

@@ -27,7 +27,7 @@ TEST_CASE("Sealing and opening", "[!benchmark]") {
     }
 }
 
-TEST_CASE("What a stranger's message costs", "[!benchmark]") {
+TEST_CASE("Refusing the message of an unknown sender", "[!benchmark]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);

@@ -11,8 +11,8 @@
 
 namespace km {
 
-/// A member of the team with a program of its own: it knows all that a member knows, and keeps to
-/// no rule. It speaks the format of TeamSeal independently.
+/// A misbehaving member of the team: it has all keys of a member and obeys no rule. It implements
+/// the format of TeamSeal independently.
 class RogueMember {
  public:
   RogueMember(const ToyTeam& team, RobotId robot, const std::string& name)
@@ -28,7 +28,7 @@ class RogueMember {
         make_credentials(keys_.certificate, keys_.authority, keys_.secret, identity_, open_));
   }
 
-  /// The newest key for messages to all of `from`, out of its key message to this member.
+  /// Newest key for messages to all of `from`, taken from its key message to this member.
   [[nodiscard]] TeamKey team_key_of(const ToyMember& from, const Octets& message) const {
     const auto shown = parse_credentials(from.seal.credentials());
     SealingKey receive, send;
@@ -53,8 +53,8 @@ class RogueMember {
     return key;
   }
 
-  /// A message to all in the name of context.sender, under `key`, signed by `signer`; the signature
-  /// commits to `signed_key`.
+  /// Message to all that states context.sender as its sender, encrypted under `key` and signed by
+  /// `signer`; the signature commits to `signed_key`.
   [[nodiscard]] static Octets message_to_all(const SealContext& context, const TeamKey& key,
                                              const SealingKey& signed_key, const SigningKey& signer,
                                              const Octets& content) {

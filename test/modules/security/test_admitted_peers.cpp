@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("Of one robot, recordings of former starts do not displace the one that speaks",
+TEST_CASE("Replayed credentials of former starts do not displace the active process of a robot",
           "[security]") {
   AdmittedPeers peers;
   const TeamPeer live{3, 1000};
@@ -16,7 +16,7 @@ TEST_CASE("Of one robot, recordings of former starts do not displace the one tha
   CHECK(peers.size() == kMaxAdmittedPerRobot);
 }
 
-TEST_CASE("Of starts that spoke, the one that has been silent for longest makes room",
+TEST_CASE("Among active starts of a robot the one that has been silent for longest is removed",
           "[security]") {
   AdmittedPeers peers;
   for (std::uint64_t boot = 1; boot <= kMaxAdmittedPerRobot; ++boot) {
@@ -41,7 +41,7 @@ TEST_CASE("The number of admitted processes is bounded", "[security]") {
   CHECK(peers.find({2 * kMaxAdmitted - 1, 1}) != nullptr);
 }
 
-TEST_CASE("One robot's many starts cost other robots nothing", "[security]") {
+TEST_CASE("Many starts of one robot displace no other robot", "[security]") {
   AdmittedPeers peers;
   peers.add({2, 7}, {});
   peers.add({4, 7}, {});

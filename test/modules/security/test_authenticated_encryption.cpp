@@ -29,7 +29,7 @@ struct PublishedExample {
 TEST_CASE("Encryption is the XChaCha20-Poly1305 of the standard's example", "[security]") {
   const PublishedExample example;
   const Octets content(example.content.begin(), example.content.end());
-  Octets encrypted = {0xaa};  // what is there stays
+  Octets encrypted = {0xaa};  // existing bytes stay
   encrypt(example.key, example.nonce, example.associated, content, encrypted);
   CHECK(encrypted.front() == 0xaa);
   encrypted.erase(encrypted.begin());
@@ -39,7 +39,7 @@ TEST_CASE("Encryption is the XChaCha20-Poly1305 of the standard's example", "[se
   CHECK(*decrypted == content);
 }
 
-TEST_CASE("What was encrypted is not decrypted with anything else", "[security]") {
+TEST_CASE("Encrypted bytes are decrypted only with their key and associated data", "[security]") {
   const PublishedExample example;
   REQUIRE(decrypt(example.key, example.associated, example.encrypted));
   SECTION("another key") {
@@ -61,7 +61,7 @@ TEST_CASE("What was encrypted is not decrypted with anything else", "[security]"
   }
 }
 
-TEST_CASE("Nothing can be encrypted, too", "[security]") {
+TEST_CASE("An empty content can be encrypted", "[security]") {
   const SealingKey key = make_sealing_key();
   Octets encrypted;
   encrypt(key, random_nonce(), {}, {}, encrypted);

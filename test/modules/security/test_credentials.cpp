@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("Credentials survive being written and read", "[security]") {
+TEST_CASE("Credentials are unchanged by writing and reading", "[security]") {
   const ToyTeam team;
   const RobotKeys keys = team.keys_of(3, "alpha");
   const RobotIdentity identity = toy_identity(3, "alpha");
@@ -47,7 +47,7 @@ TEST_CASE("Credentials are signed with every field of the identity", "[security]
   CHECK_FALSE(is_signed_by_robot(shown, identity));
 }
 
-TEST_CASE("The most that a robot tells of itself fits into its user data", "[security]") {
+TEST_CASE("The longest announcement of a robot fits into its user data", "[security]") {
   const std::string most =
       "robot=65535;name=" + std::string(64, 'n') + ";proto=65535;boot=ffffffffffffffff;auth=";
   CHECK(most.size() + kCredentialsLength <= 1024);
@@ -62,7 +62,7 @@ TEST_CASE("Texts that are no credentials are refused with the reason", "[securit
   text[17] = '+';
   CHECK(reason_of(parse_credentials(text).refusal) == "credentials are not base 64");
   text = zeros;
-  text.back() = 'B';  // another spelling of the same octets
+  text.back() = 'B';  // other text for the same bytes
   CHECK(reason_of(parse_credentials(text).refusal) == "credentials are not base 64");
 }
 

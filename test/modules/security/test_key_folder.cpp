@@ -43,7 +43,7 @@ struct TeamOnDisk {
   TemporaryFolder folder;
 };
 
-TEST_CASE("A robot's folder gives the keys that were made for it", "[security]") {
+TEST_CASE("A robot's folder contains the keys that were made for it", "[security]") {
   const TeamOnDisk team;
   const RobotKeys keys = load_robot_keys(team.alpha());
   CHECK(keys.certificate.team == "survey");
@@ -55,7 +55,7 @@ TEST_CASE("A robot's folder gives the keys that were made for it", "[security]")
   CHECK(load_revocations(team.alpha()).number == 0);
 }
 
-TEST_CASE("Robots whose keys are on disk understand each other", "[security]") {
+TEST_CASE("Robots whose keys are on disk can open each other's messages", "[security]") {
   const TeamOnDisk team;
   const RobotIdentity alpha = toy_identity(3, "alpha"), beta = toy_identity(65535, "beta");
   TeamSeal a(load_robot_keys(team.alpha()), alpha, kToyNow_s);
@@ -67,7 +67,7 @@ TEST_CASE("Robots whose keys are on disk understand each other", "[security]") {
   CHECK(b.open(context, a.seal(context, toy_content()).value()).content == toy_content());
 }
 
-TEST_CASE("Secrets are for their owner alone", "[security]") {
+TEST_CASE("A secret that other users may read is refused", "[security]") {
   const TeamOnDisk team;
   const auto secret = team.alpha() / "secret_key.txt";
   CHECK(fs::status(secret).permissions() == (fs::perms::owner_read | fs::perms::owner_write));
@@ -82,7 +82,7 @@ TEST_CASE("Secrets are for their owner alone", "[security]") {
   CHECK(team.refusal().empty());
 }
 
-TEST_CASE("A file that was changed is refused by its name and line", "[security]") {
+TEST_CASE("A changed file is refused with its name and line", "[security]") {
   const TeamOnDisk team;
   REQUIRE(team.refusal().empty());
   SECTION("another id") {
@@ -143,7 +143,7 @@ TEST_CASE("A file that was changed is refused by its name and line", "[security]
   }
 }
 
-TEST_CASE("Times survive being written and read", "[security]") {
+TEST_CASE("Times are unchanged by writing and reading", "[security]") {
   CHECK(time_text(0) == "1970-01-01T00:00:00Z");
   CHECK(time_text(951'826'154) == "2000-02-29T12:09:14Z");
   const TemporaryFolder folder;

@@ -20,23 +20,23 @@ TEST_CASE("Signatures are the Ed25519 of the standard's first example", "[securi
   CHECK(verify({}, signature, public_key));
 }
 
-TEST_CASE("A signature holds for its statement and its signer alone", "[security]") {
+TEST_CASE("A signature is valid only for its statement and its signer", "[security]") {
   const SigningKey key = make_signing_key();
   const Octets said = {1, 2, 3};
   const Signature signature = sign(said, key);
   REQUIRE(verify(said, signature, public_key_of(key)));
   CHECK_FALSE(verify(Octets{1, 2, 4}, signature, public_key_of(key)));
   CHECK_FALSE(verify(said, signature, public_key_of(make_signing_key())));
-  CHECK_FALSE(verify(said, signature, PublicKey{}));  // of small order
+  CHECK_FALSE(verify(said, signature, PublicKey{}));  // key of small order
 }
 
-TEST_CASE("A secret that was written and read again signs alike", "[security]") {
+TEST_CASE("A secret that was written and read gives equal signatures", "[security]") {
   const SigningKey key = make_signing_key();
   const SigningKey again = signing_key_from(seed_of(key));
   CHECK(sign(Octets{5}, again) == sign(Octets{5}, key));
 }
 
-TEST_CASE("Statements with other fields have other octets", "[security]") {
+TEST_CASE("Statements with different fields have different bytes", "[security]") {
   const auto of = [](std::string_view kind, std::string_view a, std::string_view b) {
     ByteWriter writer = statement(kind);
     put_text(writer, a);

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kEnd_s = kToyNow_s + 86400;
 
-TEST_CASE("A team that was made can be opened again", "[security]") {
+TEST_CASE("A new team folder can be opened again", "[security]") {
   const TemporaryFolder folder;
   const fs::path survey = folder.path() / "survey";
   TeamFolder::make(survey, {{1, "beta"}, {0, "alpha"}}, kToyNow_s, kEnd_s);
@@ -26,7 +26,7 @@ TEST_CASE("A team that was made can be opened again", "[security]") {
   CHECK(team.issued()[1].key == load_robot_keys(survey / "beta").certificate.key);
 }
 
-TEST_CASE("The authority's secret is on no robot", "[security]") {
+TEST_CASE("The authority's secret is in no robot's folder", "[security]") {
   const TemporaryFolder folder;
   TeamFolder::make(folder.path() / "survey", {{0, "alpha"}}, kToyNow_s, kEnd_s);
   const std::string text = folder.read("survey/authority/secret_key.txt");
@@ -36,7 +36,7 @@ TEST_CASE("The authority's secret is on no robot", "[security]") {
           std::string::npos);
 }
 
-TEST_CASE("Names and ids that clash are refused before anything is written", "[security]") {
+TEST_CASE("Conflicting names and ids are refused before anything is written", "[security]") {
   const TemporaryFolder folder;
   const fs::path survey = folder.path() / "survey";
   using Robots = std::vector<RobotName>;
@@ -47,14 +47,14 @@ TEST_CASE("Names and ids that clash are refused before anything is written", "[s
   CHECK_FALSE(fs::exists(survey));
 }
 
-TEST_CASE("A folder that has something in it is not made a team", "[security]") {
+TEST_CASE("A folder that is not empty is not made a team", "[security]") {
   const TemporaryFolder folder;
   folder.write("survey/notes.txt", "mine");
   CHECK_THROWS_WITH(TeamFolder::make(folder.path() / "survey", {{0, "alpha"}}, kToyNow_s, kEnd_s),
                     Catch::Contains("is there already"));
 }
 
-TEST_CASE("A robot gets new keys once the former do not hold", "[security]") {
+TEST_CASE("A robot gets new keys after the former have lapsed", "[security]") {
   const TemporaryFolder folder;
   const fs::path survey = folder.path() / "survey";
   TeamFolder team = TeamFolder::make(survey, {{0, "alpha"}}, kToyNow_s, kEnd_s);
@@ -79,12 +79,13 @@ TEST_CASE("A robot gets new keys once the former do not hold", "[security]") {
   CHECK(TeamFolder(survey).issued().size() == 2);
 }
 
-TEST_CASE("A revocation reaches the folders that are there, and counts on", "[security]") {
+TEST_CASE("A revocation reaches the existing folders and increases the number of the list",
+          "[security]") {
   const TemporaryFolder folder;
   const fs::path survey = folder.path() / "survey";
   TeamFolder team =
       TeamFolder::make(survey, {{0, "alpha"}, {1, "beta"}, {2, "gamma"}}, kToyNow_s, kEnd_s);
-  fs::remove_all(survey / "beta");  // it is on the robot
+  fs::remove_all(survey / "beta");  // the folder is on the robot
   const auto revoked = team.revoke("1");
   REQUIRE(revoked.size() == 1);
   CHECK(revoked[0].name == "beta");
@@ -98,7 +99,7 @@ TEST_CASE("A revocation reaches the folders that are there, and counts on", "[se
   CHECK(load_revocations(survey / "alpha").revoked.size() == 2);
 }
 
-TEST_CASE("A name goes before an id when a robot is revoked", "[security]") {
+TEST_CASE("A robot to revoke is looked up by name before id", "[security]") {
   const TemporaryFolder folder;
   TeamFolder team =
       TeamFolder::make(folder.path() / "survey", {{0, "7"}, {7, "alpha"}}, kToyNow_s, kEnd_s);

@@ -9,7 +9,7 @@ namespace {
 
 using Status = Opened::Status;
 
-TEST_CASE("A message for one robot arrives there, and only there", "[security]") {
+TEST_CASE("A message for one robot opens there and only there", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -32,7 +32,7 @@ TEST_CASE("A message for one robot arrives there, and only there", "[security]")
   CHECK(c.seal.open(for_c, *sealed).status == Status::kRefused);
 }
 
-TEST_CASE("A message to all arrives at every member", "[security]") {
+TEST_CASE("A message to all opens at every member", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -61,7 +61,7 @@ TEST_CASE("Both directions of a pair have keys of their own", "[security]") {
   CHECK(a.seal.open(toy_context(b, a.peer()), *answer).content == toy_content());
 }
 
-TEST_CASE("Sealed content cannot be read, and equal messages do not look equal", "[security]") {
+TEST_CASE("Sealed content is unreadable and equal messages look different", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);
@@ -99,7 +99,7 @@ TEST_CASE("A message waits for the keys it needs", "[security]") {
   CHECK(b.seal.open(to_all, *sealed_to_all).status == Status::kOpened);
 }
 
-TEST_CASE("A key message is for one process, and known from others' messages", "[security]") {
+TEST_CASE("A key message opens at one process and is no ordinary message", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -114,10 +114,11 @@ TEST_CASE("A key message is for one process, and known from others' messages", "
   CHECK(b.seal.accept_key_message(a.peer(), *message) != nullptr);
   CHECK(b.seal.open(toy_context(a, b.peer()), *key).status == Status::kRefused);
   CHECK(b.seal.accept_key_message(a.peer(), *key) == nullptr);
-  CHECK(b.seal.accept_key_message(a.peer(), *key) == nullptr);  // once more is harmless
+  CHECK(b.seal.accept_key_message(a.peer(), *key) == nullptr);  // repeating it is harmless
 }
 
-TEST_CASE("Nothing is sealed in another's name, for itself, or for a stranger", "[security]") {
+TEST_CASE("Messages in another robot's name, to itself, or to an unknown robot are not sealed",
+          "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   CHECK_THROWS_AS(a.seal.seal(toy_context(b), toy_content()), std::invalid_argument);
@@ -142,7 +143,7 @@ TEST_CASE("Another start of a robot has other keys", "[security]") {
   CHECK(a.seal.open(toy_context(b, a.peer()), *former).status == Status::kOpened);
 }
 
-TEST_CASE("Keys of a process that is gone are forgotten", "[security]") {
+TEST_CASE("Keys of a process that has gone are removed", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);

@@ -14,7 +14,7 @@ std::string admission(ToyMember& to, const RobotKeys& keys, const RobotIdentity&
                       std::int64_t now_s = kToyNow_s) {
   const Credentials shown =
       make_credentials(keys.certificate, keys.authority, keys.secret, identity, {9});
-  // What is passed on by others is believed as what is shown.
+  // Forwarded credentials have the same result as directly received ones.
   const auto certified = to.seal.certified(identity, to_text(shown), now_s);
   const std::string refusal = reason_of(to.seal.admit(identity, to_text(shown), now_s));
   CHECK(reason_of(certified.refusal) == refusal);
@@ -22,7 +22,7 @@ std::string admission(ToyMember& to, const RobotKeys& keys, const RobotIdentity&
   return refusal;
 }
 
-TEST_CASE("A robot is admitted by its certificate, and no other", "[security]") {
+TEST_CASE("A robot is admitted only with a valid certificate of its team", "[security]") {
   const ToyTeam team, others("survey");
   ToyMember a(team, 0, "alpha");
   RobotKeys keys = team.keys_of(1, "beta");
@@ -64,7 +64,7 @@ TEST_CASE("A robot is admitted by its certificate, and no other", "[security]") 
     CHECK(admission(a, keys, identity, keys.certificate.valid_until_s + 1) ==
           "certificate has expired (are clocks right?)");
   }
-  SECTION("its own credentials, shown to it") {
+  SECTION("its own credentials, sent back to it") {
     CHECK(reason_of(a.seal.admit(a.identity, a.seal.credentials(), kToyNow_s)) ==
           "these are this process's own credentials");
   }
@@ -82,7 +82,7 @@ TEST_CASE("An exchange key of small order is refused", "[security]") {
   CHECK_FALSE(a.seal.is_admitted({1, identity.boot}));
 }
 
-TEST_CASE("A start of a robot keeps the keys that it was admitted with", "[security]") {
+TEST_CASE("A process keeps the keys with which it was admitted", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);
@@ -116,7 +116,7 @@ TEST_CASE("A robot without keys of its own does not start", "[security]") {
   CHECK_THROWS_AS(TeamSeal(keys, identity, now_s), std::invalid_argument);
 }
 
-TEST_CASE("A revoked robot is forgotten, refused, and cannot read on", "[security]") {
+TEST_CASE("A revoked robot is removed, refused, and cannot read later messages", "[security]") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -141,7 +141,7 @@ TEST_CASE("A revoked robot is forgotten, refused, and cannot read on", "[securit
   CHECK_FALSE(a.seal.update(list, kToyNow_s).new_key);
 }
 
-TEST_CASE("A robot known by its credentials alone is not admitted, and lapses", "[security]") {
+TEST_CASE("A robot known only by its credentials is not admitted, and lapses", "[security]") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   const auto known = a.seal.certified(b.identity, b.seal.credentials(), kToyNow_s);
@@ -159,7 +159,7 @@ TEST_CASE("A robot known by its credentials alone is not admitted, and lapses", 
   CHECK_FALSE(a.seal.credentials_of(b.peer()));
 }
 
-TEST_CASE("What a robot endorses is its own by its certificate", "[security]") {
+TEST_CASE("An endorsement is verified by the robot's certificate", "[security]") {
   const ToyTeam team;
   const ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   const Octets said = statement("toy 1").release();
@@ -168,7 +168,7 @@ TEST_CASE("What a robot endorses is its own by its certificate", "[security]") {
   CHECK_FALSE(verify(said, signature, b.keys.certificate.key));
 }
 
-TEST_CASE("A new member reads what was sealed to all before a revocation", "[security]") {
+TEST_CASE("A new member reads messages to all that were sealed before a revocation", "[security]") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), late(team, 3, "delta"), c(team, 2, "gamma");
   introduce(a, c);
@@ -180,7 +180,7 @@ TEST_CASE("A new member reads what was sealed to all before a revocation", "[sec
   CHECK(late.seal.open(to_all, *before).status == Status::kOpened);
 }
 
-TEST_CASE("A robot that is revoked after it left cannot read on either", "[security]") {
+TEST_CASE("A robot that is revoked after it left cannot read later messages", "[security]") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), c(team, 2, "gamma");
   introduce(a, c);
@@ -192,7 +192,7 @@ TEST_CASE("A robot that is revoked after it left cannot read on either", "[secur
   CHECK(c.seal.open(toy_context(a), *after).status == Status::kNotYet);
 }
 
-TEST_CASE("A certificate that expires during the run is no longer believed", "[security]") {
+TEST_CASE("A certificate that expires during the run is no longer accepted", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);
@@ -233,7 +233,7 @@ TEST_CASE("After more revocations than keys are kept, old messages are refused",
   CHECK(b.seal.open(to_all, *a.seal.seal(to_all, toy_content())).status == Status::kOpened);
 }
 
-TEST_CASE("A recording of an older key message does not take newer keys away", "[security]") {
+TEST_CASE("A replayed older key message does not remove newer keys", "[security]") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);
@@ -245,7 +245,7 @@ TEST_CASE("A recording of an older key message does not take newer keys away", "
   CHECK(b.seal.open(toy_context(a), *sealed).status == Status::kOpened);
 }
 
-TEST_CASE("A member cannot speak to all in another's name, though it has that one's key",
+TEST_CASE("A member cannot send to all in another member's name although it has that member's key",
           "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
@@ -263,7 +263,7 @@ TEST_CASE("A member cannot speak to all in another's name, though it has that on
   CHECK(reason_of(a.seal.open(as_b, forged).reason) == "message is not signed by its sender");
 }
 
-TEST_CASE("A member cannot pass another's words to all for its own", "[security]") {
+TEST_CASE("A member cannot send another member's message to all as its own", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -272,7 +272,8 @@ TEST_CASE("A member cannot pass another's words to all for its own", "[security]
   CHECK(a.seal.open(toy_context(c), *sealed).status == Status::kRefused);
 }
 
-TEST_CASE("The sender's signature commits to the key, so that all read the same", "[security]") {
+TEST_CASE("The sender's signature commits to the key so that all members read the same content",
+          "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   RogueMember c(team, 2, "gamma");
@@ -284,7 +285,7 @@ TEST_CASE("The sender's signature commits to the key, so that all read the same"
   CHECK(a.seal.open(toy_context(b), other_key).status == Status::kRefused);
 }
 
-TEST_CASE("A process's recorded credentials do not push the living one out", "[security]") {
+TEST_CASE("Replayed credentials of a process do not displace the active one", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   std::vector<std::unique_ptr<ToyMember>> former;

@@ -5,8 +5,7 @@
 #include "test/modules/security/toy_team.hpp"
 #include "test/support/spoilt_input.hpp"
 
-// Everything that a stranger can do to what crosses the network: flip any bit, or anything at
-// random.
+// Changes that an attacker can make to network traffic: flipping any bit, or random changes.
 
 namespace km {
 namespace {
@@ -31,7 +30,7 @@ TEST_CASE("A sealed message with any bit flipped is refused", "[security]") {
     sealed[bit / 8] = static_cast<std::uint8_t>(sealed[bit / 8] ^ (1U << (bit % 8)));
     const Opened opened = pair.b.seal.open(context, sealed);
     CHECK(opened.content.empty());
-    // With another number of the key it may be that a new key is on its way.
+    // With another key number the message waits, because a new key may still arrive.
     const bool in_key_number = !addressed && bit < 32;
     CHECK(opened.status != Status::kOpened);
     CHECK((opened.status == Status::kRefused || in_key_number));
@@ -83,8 +82,8 @@ TEST_CASE("A message with any bit of its context flipped does not open", "[secur
   CHECK(pair.b.seal.open(context, sealed).status == Status::kOpened);
 }
 
-TEST_CASE("A message that is admitted peers' in another context is refused", "[security]") {
-  // All these peers are known: not a missing key but the context refuses.
+TEST_CASE("A message of an admitted peer is refused in another context", "[security]") {
+  // All these peers are known, so the context is the reason for the refusal, not a missing key.
   Pair pair;
   ToyMember restarted(pair.a, 5000);
   ToyMember c(pair.team, 2, "gamma");

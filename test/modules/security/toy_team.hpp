@@ -39,7 +39,7 @@ class ToyTeam {
     return keys;
   }
 
-  /// The next list of revocations, of these certificates alone.
+  /// Next list of revocations, which contains only these certificates.
   [[nodiscard]] Revocations revoking(const std::vector<Certificate>& certificates) {
     Revocations list;
     list.number = next_number_++;
@@ -85,7 +85,7 @@ struct ToyMember {
   TeamSeal seal;
 };
 
-/// Each admits the other and takes its key for messages to all.
+/// Each admits the other and accepts its key for messages to all.
 inline void introduce(ToyMember& a, ToyMember& b) {
   REQUIRE(a.admit(b) == nullptr);
   REQUIRE(b.admit(a) == nullptr);

@@ -1,4 +1,4 @@
-// The map of a recording with its TRUE poses: what the mapper can do where odometry is perfect.
+// The map of a recording with its true poses: the accuracy of the mapper with perfect odometry.
 //   bench_recorded_mapping DATASET TRUTH OUTPUT.ply [VOXEL_M [RATE_HZ [MIN_WEIGHT [stereo]]]]
 // DATASET: EuRoC/ASL folder with depth (or, with "stereo", a right camera) and labels; TRUTH: poses
 // of the body, TUM or EuRoC. Judge OUTPUT.ply by kimera_multi_evaluate mesh.

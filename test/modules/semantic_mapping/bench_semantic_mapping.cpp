@@ -11,17 +11,17 @@
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"
 
-// Speed and accuracy of the mapper in the box room: 40 frames of 640 x 480, as other programs were
-// measured with. Times of one thread are CPU time of the process, of two wall time.
+// Speed and accuracy of the mapper in the box room: 40 frames of 640 x 480, as in the measurements
+// of other programs. Times of one thread are CPU time of the process, those of two are wall time.
 
 namespace km {
 namespace {
 
 constexpr int kFrames = 40;
 
-// How the room lies in the voxel grid. Where walls run through the voxels' own points, their signs
-// are noise: more vertices, and all of them close to these points. Halfway between is what other
-// programs' grids have here; turned is what a robot has.
+// Position of the room in the voxel grid. If walls pass through the sample points of voxels, the
+// signs there are noise: there are more vertices, and all of them are close to these points. The
+// grids of other programs are halfway between. A robot's grid is rotated.
 enum class Placement { kAligned, kHalfway, kTurned };
 
 const char* name_of(Placement placement) {

@@ -11,11 +11,11 @@
 
 namespace km {
 
-/// An edge as one face goes along it.
+/// A directed edge of a face.
 using DirectedEdge = std::pair<std::uint32_t, std::uint32_t>;
 
-/// Edges that some face goes along and no other comes back along: the rim of the surface. None: it
-/// is closed.
+/// Directed edges of faces without the opposite edge of another face: the rim of the surface. A
+/// closed surface has none.
 inline std::vector<DirectedEdge> rim_of(const LabelledMesh& mesh) {
   std::map<DirectedEdge, int> balance;
   for (const auto& face : mesh.faces)

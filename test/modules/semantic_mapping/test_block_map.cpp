@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("The block map holds what a std::map holds", "[semantic_mapping]") {
+TEST_CASE("The block map has the same content as a std::map", "[semantic_mapping]") {
   const unsigned seed = GENERATE(1U, 2U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -39,7 +39,7 @@ TEST_CASE("The block map holds what a std::map holds", "[semantic_mapping]") {
   for (const auto& block : map.blocks()) CHECK(map.find(block->position) == block.get());
 }
 
-TEST_CASE("Blocks beyond the map's reach are not there", "[semantic_mapping]") {
+TEST_CASE("Blocks beyond the map's reach do not exist", "[semantic_mapping]") {
   BlockMap map;
   const int last = BlockMap::kReach - 1;
   map.insert({last, -BlockMap::kReach, 0});
@@ -134,7 +134,7 @@ TEST_CASE("A single class is certain", "[semantic_mapping]") {
   CHECK(labels.probability(1, {1, 0.8}) == 1.0);
 }
 
-TEST_CASE("Votes of two places add up", "[semantic_mapping]") {
+TEST_CASE("Votes of two vertices add up", "[semantic_mapping]") {
   VoxelLabels a, b;
   a.observe(1, 8);
   a.observe(2, 3);
@@ -148,7 +148,7 @@ TEST_CASE("Votes of two places add up", "[semantic_mapping]") {
   a.add(VoxelLabels());
   CHECK(a.weight_of(2) == 10.0 / kOne);
 
-  SECTION("beyond what is counted both sides fade alike") {
+  SECTION("beyond the bound both sides fade equally") {
     VoxelLabels full, other;
     for (int i = 0; i < 25; ++i) full.observe(5, 8);   // 200
     for (int i = 0; i < 20; ++i) other.observe(5, 8);  // 160

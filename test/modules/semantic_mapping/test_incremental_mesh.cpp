@@ -19,7 +19,7 @@ Eigen::Vector3d point_of(const VoxelBlock& block, int x, int y, int z) {
   return kVoxel_m * (kBlockSide * block.position + Eigen::Vector3i(x, y, z)).cast<double>();
 }
 
-// Sets all voxels of a block from a distance function, as observed.
+// Sets all voxels of a block to a distance function, as observed.
 template <typename Distance>
 void fill(VoxelBlock& block, const Distance& distance) {
   for (int z = 0; z < kBlockSide; ++z)
@@ -32,7 +32,7 @@ void fill(VoxelBlock& block, const Distance& distance) {
   block.changed = true;
 }
 
-// Blocks from -n to n - 1 along each axis: many borders run through what is in the middle.
+// Blocks from -n to n - 1 along each axis, so that many borders pass through the middle.
 template <typename Distance>
 void fill(BlockMap& map, int n, const Distance& distance) {
   for (int z = -n; z < n; ++z)
@@ -80,7 +80,8 @@ TEST_CASE("The mesh of a sphere is closed across blocks and near the sphere",
   const Errors errors = errors_of(result, sphere);
   CHECK(errors.mean < 0.1);
   CHECK(errors.largest < 0.1);
-  // A polyhedron with its corners on the sphere lies inside: smaller, by curvature times voxel.
+  // A polyhedron with its corners on the sphere is inside it. It is smaller, by curvature times
+  // voxel.
   const double volume = 4.0 / 3.0 * std::numbers::pi * std::pow(kRadius_m, 3);
   CHECK(volume_of(result) < volume);
   CHECK(volume_of(result) > 0.98 * volume);
@@ -101,12 +102,12 @@ TEST_CASE("The mesh of a box is closed across blocks and near the box", "[semant
   CHECK(rim_of(result).empty());
   CHECK(2 * result.vertices.size() == result.faces.size() + 4);
   const Errors errors = errors_of(result, box);
-  CHECK(errors.mean < 0.05);     // exact on the faces; beside edges and corners, which are cut
-  CHECK(errors.largest < 0.25);  // off, interpolation errs by up to a quarter
+  CHECK(errors.mean < 0.05);     // exact on the faces
+  CHECK(errors.largest < 0.25);  // interpolation at edges and corners
   CHECK(volume_of(result) == Approx(8.0 * half.prod()).epsilon(0.01));
 }
 
-TEST_CASE("Whatever the signs, the surface has no cracks", "[semantic_mapping]") {
+TEST_CASE("The surface has no cracks with any signs", "[semantic_mapping]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -160,7 +161,7 @@ TEST_CASE("Only changed blocks are meshed again, and vertices keep their identit
     CHECK(after.ids == before.ids);
     CHECK(after.mesh.faces == before.mesh.faces);
   }
-  SECTION("the same values again give the same vertices") {
+  SECTION("repeated values give the same vertices") {
     for (const auto& block : map.blocks()) fill(*block, sphere);
     const MeshUpdateReport report = mesh.update(map);
     CHECK(report.vertices_added == 0);
@@ -192,7 +193,7 @@ TEST_CASE("Only changed blocks are meshed again, and vertices keep their identit
   }
 }
 
-TEST_CASE("Final mesh stays when its blocks go, and hangs together with the rest",
+TEST_CASE("Final mesh stays when its blocks are erased and stays connected with the rest",
           "[semantic_mapping]") {
   double radius_m = 1.0;
   const auto sphere = [&](const Eigen::Vector3d& p) { return (p - kCentre).norm() - radius_m; };
@@ -214,14 +215,14 @@ TEST_CASE("Final mesh stays when its blocks go, and hangs together with the rest
   CHECK(same.mesh.faces.size() == before.mesh.faces.size());
   CHECK(rim_of(same.mesh).empty());
 
-  // The rest meshed again: the same surface, the seam closed.
+  // The rest is meshed again: the surface is equal and the seam is closed.
   for (const auto& block : map.blocks()) fill(*block, sphere);
   mesh.update(map);
   const MapMesh again = mesh.snapshot(map, false);
   CHECK(again.ids == before.ids);
   CHECK(rim_of(again.mesh).empty());
 
-  // One of them comes back, seen anew: what it adds are new vertices.
+  // One of the blocks returns and is observed again: this adds new vertices.
   fill(map.insert({0, 0, 0}), sphere);
   mesh.update(map);
   const MapMesh revisited = mesh.snapshot(map, false);
@@ -230,7 +231,7 @@ TEST_CASE("Final mesh stays when its blocks go, and hangs together with the rest
                       before.ids.end()));
 }
 
-TEST_CASE("What a forgotten block showed goes with it", "[semantic_mapping]") {
+TEST_CASE("The faces of an erased empty block are removed", "[semantic_mapping]") {
   const auto sphere = [](const Eigen::Vector3d& p) {
     return (p - Eigen::Vector3d::Constant(0.4)).norm() - 0.25;
   };
@@ -264,7 +265,7 @@ TEST_CASE("Unobserved voxels leave a hole, not a wall", "[semantic_mapping]") {
   }
 }
 
-// A plane seen on two visits, as the blocks of each leave the map.
+// A plane seen on two visits, as the blocks of each visit leave the map.
 struct PlaneTwice {
   static constexpr double kFirst_m = 0.05, kSecond_m = 0.07;
 
@@ -291,7 +292,7 @@ struct PlaneTwice {
     (void)mesh.finalise(blocks, map);
     while (map.size() > 0) map.erase(Eigen::Vector3i(map.blocks().back()->position));
   }
-  // Each vertex of the first visit, with that of the second above it.
+  // Each vertex of the first visit, with the vertex of the second visit above it.
   [[nodiscard]] SupersededSurface superseded() const {
     const MapMesh both = mesh.snapshot(map, false);
     std::map<std::pair<float, float>, std::uint64_t> above;
@@ -312,17 +313,18 @@ struct PlaneTwice {
   MapMesh first;
 };
 
-TEST_CASE("Superseded final surface goes, and its labels vote on", "[semantic_mapping]") {
+TEST_CASE("Superseded final surface is dropped and its votes on labels are kept",
+          "[semantic_mapping]") {
   PlaneTwice plane;
   const std::size_t faces = plane.first.mesh.faces.size(), vertices = plane.first.ids.size();
   REQUIRE(plane.mesh.face_count() == 2 * faces);
   const SupersededSurface superseded = plane.superseded();
 
-  SECTION("not before that which supersedes it is final too") {
+  SECTION("not before the superseding surface is final too") {
     CHECK(plane.mesh.drop(superseded).faces == 0);
     CHECK(plane.mesh.face_count() == 2 * faces);
   }
-  SECTION("once, and never what is not listed") {
+  SECTION("once and only the listed surface") {
     plane.leave();
     const SurfaceDrop dropped = plane.mesh.drop(superseded);
     CHECK(dropped.faces == faces);
@@ -337,7 +339,7 @@ TEST_CASE("Superseded final surface goes, and its labels vote on", "[semantic_ma
     }
     CHECK(plane.mesh.drop(superseded).faces == 0);
   }
-  SECTION("a face goes with its last vertex") {
+  SECTION("a face is dropped with its last vertex") {
     plane.leave();
     SupersededSurface all_but_one = superseded;
     const std::uint64_t left_out = superseded.vertices[vertices / 2].id;
@@ -347,7 +349,7 @@ TEST_CASE("Superseded final surface goes, and its labels vote on", "[semantic_ma
       for (const std::uint32_t v : face) around += plane.first.ids[v] == left_out ? 1 : 0;
     REQUIRE(around >= 4);
     CHECK(plane.mesh.drop(all_but_one).faces == faces - around);
-    // Those that stay have voted nowhere: the heirs next to them know the second visit only.
+    // The remaining vertices got no votes: the heirs next to them know only the second visit.
     const MapMesh left = plane.mesh.snapshot(plane.map, true);
     std::size_t stayed = 0;
     for (std::size_t v = 0; v < left.ids.size(); ++v) {
@@ -359,13 +361,13 @@ TEST_CASE("Superseded final surface goes, and its labels vote on", "[semantic_ma
           static_cast<std::ptrdiff_t>(stayed));
     CHECK(plane.mesh.drop(superseded).faces == around);
   }
-  SECTION("places of what is gone are used again") {
+  SECTION("indices of dropped vertices are reused") {
     plane.leave();
     (void)plane.mesh.drop(superseded);
     plane.see(0.03, 2, 1);
     const MapMesh seen = plane.mesh.snapshot(plane.map, true);
     CHECK(seen.ids.size() == 2 * vertices);
-    CHECK(seen.ids[vertices] > superseded.vertices.back().heir);  // names are not
+    CHECK(seen.ids[vertices] > superseded.vertices.back().heir);  // ids are not reused
   }
 }
 

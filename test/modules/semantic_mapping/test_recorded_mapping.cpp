@@ -32,8 +32,8 @@ TEST_CASE("Two halves of a recorded kitchen agree where they overlap", "[semanti
       mesh_error(a, {&other, 1}, {.icp = false, .registration = {}, .crop_m = 0.2}).merged;
   const DistanceSummary& apart = error.truth.surface;
   CAPTURE(error.coverage, apart.median_m, apart.mean_m, apart.p95_m);
-  // What poses and depths allow: another program's meshes of these halves are 9.7 mm apart (median;
-  // mean 27, nine tenths within 80 mm; 83 % overlap).
+  // Accuracy that poses and depths permit: another program's meshes of these halves are 9.7 mm
+  // apart (median; mean 27, nine tenths within 80 mm; 83 % overlap).
   CHECK(error.coverage > 0.75);
   CHECK(apart.median_m < 0.011);
   CHECK(apart.mean_m < 0.03);

@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("A room is mapped where it is, with its labels", "[semantic_mapping]") {
+TEST_CASE("A room is mapped at its position with its labels", "[semantic_mapping]") {
   const double voxel_m = GENERATE(0.05, 0.1);
   const Lens lens = GENERATE(
       Lens(), Lens(LensModel::kRadialTangential, {-0.28, 0.07, 2e-4, -1e-4}),  // as of EuRoC's
@@ -22,7 +22,7 @@ TEST_CASE("A room is mapped where it is, with its labels", "[semantic_mapping]")
   Camera camera = small_camera();
   camera.lens = lens;
   SemanticMapper mapper(settings(voxel_m), camera, BoxRoom::palette());
-  // Shifted and turned against the grid.
+  // Shifted and rotated against the grid.
   const SE3 T_odom_room = make_pose(
       Eigen::AngleAxisd(0.5, Eigen::Vector3d(0.1, 0.2, 1.0).normalized()).toRotationMatrix(),
       {20.3, -7.1, 0.4});
@@ -43,13 +43,13 @@ TEST_CASE("A room is mapped where it is, with its labels", "[semantic_mapping]")
     CHECK(map.seen_by[i][0] <= map.seen_by[i][1]);
   }
   const auto count = static_cast<double>(map.mesh.vertices.size());
-  // Half a pixel at 5 m is 19 mm of a wall, and so much of depth where it is seen at 45 degrees:
-  // means over many frames are far below that.
+  // Half a pixel at 5 m is 19 mm of a wall, and as much of depth if the wall is seen at 45 degrees.
+  // Means over many frames are far below that.
   CHECK(error_m / count < 0.003);
-  CHECK(static_cast<double>(right) / count > 0.97);  // not where walls meet
+  CHECK(static_cast<double>(right) / count > 0.97);  // wrong where walls meet
 }
 
-TEST_CASE("Of a fisheye image all is viewed that has bearings", "[semantic_mapping]") {
+TEST_CASE("All pixels of a fisheye image with bearings are used", "[semantic_mapping]") {
   Camera camera = small_camera();
   camera.fx = camera.fy = 40.0;  // the borders are more than 80 degrees off the axis
   camera.lens = Lens(LensModel::kEquidistant, {0.0, 0.0, 0.0, 0.0});
@@ -72,7 +72,7 @@ TEST_CASE("Of a fisheye image all is viewed that has bearings", "[semantic_mappi
 }
 
 TEST_CASE("Two depths are averaged by their weights", "[semantic_mapping]") {
-  // Seen from z = 0 as 2.00 m and, with the camera at -2 m, 4.04 m: surface at 2.00 and 2.04 m.
+  // The depth is 2.00 m from z = 0, and 4.04 m from z = -2 m: surface at 2.00 and 2.04 m.
   SemanticMappingConfig config = settings();
   config.depth_sigma_m = 0.01;
   config.depth_sigma_per_m = 0.005;
@@ -112,7 +112,7 @@ TEST_CASE("Pixels without depth change nothing", "[semantic_mapping]") {
   CHECK(mapper.mesh().mesh.empty());
   CHECK(mapper.size().blocks == 0);
 
-  // Half of an image: the other half is mapped.
+  // One half of an image has depth, and only that half is mapped.
   images = wall(2.0);
   for (std::size_t i = 0; i < images.depth.millimetres.size() / 2; ++i)
     images.depth.millimetres[i] = none;
@@ -126,8 +126,7 @@ TEST_CASE("Pixels without depth change nothing", "[semantic_mapping]") {
   }
 }
 
-TEST_CASE("Frames that cannot be used are refused and leave the map as it is",
-          "[semantic_mapping]") {
+TEST_CASE("Unusable frames are refused and leave the map unchanged", "[semantic_mapping]") {
   SemanticMapper mapper(settings(), small_camera(), two_classes());
   const DepthAndLabels good = wall(2.0);
   REQUIRE(integrate(mapper, good, at(0), 3));
@@ -145,7 +144,7 @@ TEST_CASE("Frames that cannot be used are refused and leave the map as it is",
     CHECK(mapper.integrate(depth, nullptr, at(0), 3).status ==
           IntegrationStatus::kDepthSizeDiffers);
   }
-  SECTION("a pose that is none") {
+  SECTION("a pose that is not finite or not rigid") {
     SE3 T = at(0);
     T.translation().x() = std::numeric_limits<double>::quiet_NaN();
     CHECK(mapper.integrate(good.depth, nullptr, T, 3).status == IntegrationStatus::kPoseUnusable);
@@ -164,7 +163,7 @@ TEST_CASE("Frames that cannot be used are refused and leave the map as it is",
   CHECK(mapper.size().blocks == blocks);
 }
 
-TEST_CASE("A pose out of the map's reach maps nothing", "[semantic_mapping]") {
+TEST_CASE("A pose outside the map's reach maps nothing", "[semantic_mapping]") {
   SemanticMapper mapper(settings(), small_camera(), two_classes());
   const double far_m = GENERATE(1e7, -1e12, 1e300);
   CAPTURE(far_m);
@@ -173,7 +172,7 @@ TEST_CASE("A pose out of the map's reach maps nothing", "[semantic_mapping]") {
   CHECK(mapper.size().blocks == 0);
 }
 
-TEST_CASE("Labels of another size or outside the palette are left out and counted",
+TEST_CASE("Labels of another size or outside the palette are dropped and counted",
           "[semantic_mapping]") {
   SemanticMapper mapper(settings(), small_camera(), two_classes());
   DepthAndLabels images = wall(2.0);
@@ -203,7 +202,8 @@ TEST_CASE("Labels of another size or outside the palette are left out and counte
   }
 }
 
-TEST_CASE("The label seen more often wins, and a doubtful one is unknown", "[semantic_mapping]") {
+TEST_CASE("The label seen more often is chosen and an uncertain one is unknown",
+          "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.label_confidence = 0.8;
   config.min_label_probability = GENERATE(0.0, 0.7, 0.85);
@@ -216,7 +216,7 @@ TEST_CASE("The label seen more often wins, and a doubtful one is unknown", "[sem
   REQUIRE(integrate(mapper, wall(2.0), at(0), 0));
   REQUIRE(integrate(mapper, wall(2.0), at(0), 0));
   mapper.update_mesh();
-  // Two against one of two classes: posterior 0.8.
+  // Two of three observations of two classes: posterior 0.8.
   const LabelId expected = config.min_label_probability < 0.8 ? LabelId{1} : LabelId{0};
   const MapMesh map = mapper.mesh();
   REQUIRE(map.mesh.labels.size() > 100);
@@ -230,7 +230,7 @@ TEST_CASE("The label seen more often wins, and a doubtful one is unknown", "[sem
   CHECK(inside > 100);
 }
 
-TEST_CASE("Surface is meshed once its weights are enough", "[semantic_mapping]") {
+TEST_CASE("Surface is meshed once its weights suffice", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.depth_sigma_per_m = 0.0;  // all weights are 1
   config.min_weight = 2.5;
@@ -244,7 +244,7 @@ TEST_CASE("Surface is meshed once its weights are enough", "[semantic_mapping]")
   }
 }
 
-TEST_CASE("Carving removes what went away", "[semantic_mapping]") {
+TEST_CASE("Carving removes an object that has gone", "[semantic_mapping]") {
   SemanticMappingConfig config = settings(0.05);
   config.carving = GENERATE(true, false);
   CAPTURE(config.carving);
@@ -267,14 +267,14 @@ TEST_CASE("Carving removes what went away", "[semantic_mapping]") {
   CHECK(map.mesh.vertices.size() > vertices_before(map, 2.0) + 500);  // the wall
 }
 
-TEST_CASE("Unusable settings and cameras are refused", "[semantic_mapping]") {
+TEST_CASE("Invalid settings and cameras are refused", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.voxel_size_m = 0.0;
   CHECK_THROWS_AS(SemanticMapper(config, small_camera()), ConfigError);
   CHECK_THROWS_AS(SemanticMapper(settings(), Camera{}), std::invalid_argument);
 }
 
-TEST_CASE("A frame seen again keeps every vertex and its first keyframe", "[semantic_mapping]") {
+TEST_CASE("A repeated frame keeps every vertex and its first keyframe", "[semantic_mapping]") {
   SemanticMapper mapper(settings(0.05), small_camera(), two_classes());
   REQUIRE(integrate(mapper, wall(2.51, true), at(0), 4));
   CHECK(mapper.update_mesh().vertices_added > 500);
@@ -288,7 +288,8 @@ TEST_CASE("A frame seen again keeps every vertex and its first keyframe", "[sema
   CHECK(after.ids == before.ids);
   CHECK(after.mesh.labels == before.mesh.labels);
   CHECK(after.mesh.faces.size() == before.mesh.faces.size());
-  const float silhouette = 0.4F / std::sqrt(1.5F * 1.5F - 0.4F * 0.4F);  // of the ball, at z = 1
+  // Radius of the ball's silhouette at z = 1
+  const float silhouette = 0.4F / std::sqrt(1.5F * 1.5F - 0.4F * 0.4F);
   for (std::size_t i = 0; i < after.ids.size(); ++i) {
     CHECK(before.seen_by[i] == std::array<KeyframeIndex, 2>{4, 4});
     CHECK(after.seen_by[i][0] == 4);
@@ -301,7 +302,7 @@ TEST_CASE("A frame seen again keeps every vertex and its first keyframe", "[sema
   }
 }
 
-TEST_CASE("What left the window is final, and a revisit makes vertices of its own",
+TEST_CASE("Surface that left the window is final and a revisit makes new vertices",
           "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.window_m = 5.0;
@@ -335,8 +336,9 @@ TEST_CASE("What left the window is final, and a revisit makes vertices of its ow
   CHECK(anew > 100);
 }
 
-// Along a wall with a window shorter than the way: rim edges away from the wall's own border.
-TEST_CASE("Mesh that became final on the way has no cracks", "[semantic_mapping]") {
+// Along a wall, with a window shorter than the distance travelled: rim edges away from the wall's
+// own border.
+TEST_CASE("Mesh that became final during the motion has no cracks", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.window_m = 0.6;
   const KeyframeIndex meshed_every = GENERATE(1U, 7U, 100U);
@@ -354,13 +356,13 @@ TEST_CASE("Mesh that became final on the way has no cracks", "[semantic_mapping]
   std::size_t cracks = 0;
   for (const auto& [a, b] : rim_of(mesh)) {
     const Eigen::Vector3f p = 0.5F * (mesh.vertices[a] + mesh.vertices[b]);
-    const float middle = p.x() * 0.02F / 0.15F;  // height of the camera when it was there
+    const float middle = p.x() * 0.02F / 0.15F;  // height of the camera at that position
     if (p.x() > -0.8F && p.x() < 9.6F && std::abs(p.y() - middle) < 0.6F) ++cracks;
   }
   CHECK(cracks == 0);
 }
 
-TEST_CASE("Blocks never exceed their bound, and their mesh is not lost", "[semantic_mapping]") {
+TEST_CASE("Blocks never exceed their bound and their mesh is not lost", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.max_blocks = 64;
   SemanticMapper mapper(config, small_camera(), two_classes());
@@ -382,7 +384,7 @@ TEST_CASE("Blocks never exceed their bound, and their mesh is not lost", "[seman
     columns.insert(static_cast<int>(std::floor(p.x() + 0.5F)));
   for (int x = 0; x < 20; ++x) CHECK(columns.contains(x));
 
-  // A frame that alone needs more: counted, within the bound.
+  // A frame that alone needs more blocks: they are counted, and the bound holds.
   config.voxel_size_m = 0.02;
   SemanticMapper full(config, small_camera(), two_classes());
   CHECK(full.integrate(wall(2.03).depth, nullptr, at(0), 0).blocks_refused > 0);

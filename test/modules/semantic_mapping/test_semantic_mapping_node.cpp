@@ -37,7 +37,7 @@ DenseFrame frame(int i) {
   return {i * kPeriod, depth, labels, at(0), static_cast<KeyframeIndex>(i / 2)};
 }
 
-TEST_CASE("A mesh comes every few seconds and at the end, coloured by its labels",
+TEST_CASE("A mesh is published every few seconds and at the end and is coloured by its labels",
           "[semantic_mapping_node]") {
   Bench bench;
   for (int i = 0; i < 35; ++i) bench.node->step(frame(i));
@@ -60,10 +60,10 @@ TEST_CASE("A mesh comes every few seconds and at the end, coloured by its labels
   CHECK(bench.last.unlabelled == 0);
 }
 
-TEST_CASE("The size that is told in the end is that of the last mesh", "[semantic_mapping_node]") {
+TEST_CASE("The last published size is that of the last mesh", "[semantic_mapping_node]") {
   Bench bench;
   bench.node->step(frame(0));
-  DenseFrame elsewhere = frame(1);  // of the same keyframe: not meshed before the end
+  DenseFrame elsewhere = frame(1);  // at the same keyframe, so it is not meshed before the end
   elsewhere.T_odom_cam = at(20.0);
   bench.node->step(elsewhere);
   const std::size_t before = bench.last.size.faces;
@@ -72,7 +72,7 @@ TEST_CASE("The size that is told in the end is that of the last mesh", "[semanti
   CHECK(bench.last.size.faces == bench.meshes.back()->mesh.faces.size());
 }
 
-TEST_CASE("Frames that cannot be used are counted, by reason", "[semantic_mapping_node]") {
+TEST_CASE("Unusable frames are counted by reason", "[semantic_mapping_node]") {
   Bench bench;
   DenseFrame unlabelled = frame(0);
   unlabelled.labels = nullptr;
@@ -94,10 +94,10 @@ TEST_CASE("Frames that cannot be used are counted, by reason", "[semantic_mappin
   CHECK(bench.last.labels_outside == 160 * 120);
 }
 
-TEST_CASE("A mapper that is too slow gives up the oldest frames and counts them",
+TEST_CASE("A mapper that is too slow drops the oldest frames and counts them",
           "[semantic_mapping_node]") {
   Bench bench(Overflow::kDropOldest);
-  for (int i = 0; i < 10; ++i) bench.frames.publish(frame(i));  // nobody waits
+  for (int i = 0; i < 10; ++i) bench.frames.publish(frame(i));  // without waiting
   bench.node->start();
   bench.node->stop();
   CHECK(bench.last.integrated + bench.last.too_late == 10);
@@ -106,8 +106,7 @@ TEST_CASE("A mapper that is too slow gives up the oldest frames and counts them"
   CHECK(bench.meshes.back()->seen_by.front()[0] == 4);  // frames 8 and 9
 }
 
-TEST_CASE("What is told to be superseded is dropped with the next frame",
-          "[semantic_mapping_node]") {
+TEST_CASE("Superseded surface is dropped with the next frame", "[semantic_mapping_node]") {
   Bench bench;
   const auto step = [&](int i, double x) {
     DenseFrame next = frame(i);
@@ -123,7 +122,7 @@ TEST_CASE("What is told to be superseded is dropped with the next frame",
   const MapMesh& twice = *bench.meshes.back();
   const std::size_t faces = bench.last.size.faces;
   REQUIRE(bench.last.size.final_faces >= 2 * first.mesh.faces.size());
-  // Seen from the same place alike: in the same order.
+  // Both visits see it from the same pose, so their vertices are in the same order.
   SupersededSurface superseded;
   std::vector<std::uint64_t> again;
   for (std::size_t v = 0; v < twice.ids.size(); ++v)
@@ -140,7 +139,7 @@ TEST_CASE("What is told to be superseded is dropped with the next frame",
   CHECK(bench.last.size.faces == faces - first.mesh.faces.size());
 }
 
-TEST_CASE("Nothing seen, no mesh", "[semantic_mapping_node]") {
+TEST_CASE("Without frames there is no mesh", "[semantic_mapping_node]") {
   Bench bench;
   bench.node->start();
   bench.node->stop();

@@ -16,7 +16,7 @@
 
 namespace km {
 
-/// A room of 10 x 8 x 3 m, seen from inside by an ideal depth camera that goes in a circle.
+/// A room of 10 x 8 x 3 m, seen from inside by an ideal depth camera that moves in a circle.
 struct BoxRoom {
   static inline const Eigen::Vector3d kLow{-5.0, -4.0, 0.0};
   static inline const Eigen::Vector3d kHigh{5.0, 4.0, 3.0};
@@ -36,8 +36,8 @@ struct BoxRoom {
     return camera;
   }
 
-  /// On a circle of radius 2 m at height 1.5 m, 100 poses a turn; the optical axis is the outward
-  /// normal turned left by 45 degrees.
+  /// On a circle of radius 2 m at height 1.5 m, 100 poses per revolution. The optical axis is the
+  /// outward normal rotated left by 45 degrees.
   static SE3 T_room_cam(int frame) {
     const double angle = 2.0 * std::numbers::pi * frame / 100.0;
     const double heading = angle + std::numbers::pi / 4.0;
@@ -68,7 +68,7 @@ struct BoxRoom {
   }
 };
 
-/// What a camera sees of a scene.
+/// A camera's view of a scene.
 struct DepthAndLabels {
   DepthImage depth;
   LabelImage labels;
@@ -127,13 +127,13 @@ inline Camera small_camera() {
 
 inline SemanticMappingConfig settings(double voxel_m = 0.1) {
   SemanticMappingConfig config;
-  config.min_weight = 0.0;  // one frame is often all there is
+  config.min_weight = 0.0;  // often there is only one frame
   config.voxel_size_m = voxel_m;
   return config;
 }
 
-/// A wall at z = `wall_m`, and before it, if `ball`, a ball of radius 0.4 m at z = 1.5 m. Labels
-/// 1, 2.
+/// A wall at z = `wall_m`, and, if `ball`, a ball of radius 0.4 m at z = 1.5 m before it. Labels 1,
+/// 2.
 inline auto wall_and_ball(double wall_m, bool ball) {
   return [=](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, LabelId& label) {
     const Eigen::Vector3d to_origin = origin - Eigen::Vector3d(0.0, 0.0, 1.5);

@@ -11,8 +11,9 @@
 
 namespace km {
 
-/// A temporary folder with a small, faultless EuRoC recording: 8 stereo pairs at 20 Hz from 10 s
-/// on, 32x24 px, and inertial samples at 200 Hz from 8.5 s to 11 s. Tests spoil it file by file.
+/// A temporary folder with a small EuRoC recording without faults. It has 8 stereo pairs of 32x24
+/// px at 20 Hz from 10 s on, and inertial samples at 200 Hz from 8.5 s to 11 s. Tests corrupt its
+/// files one at a time.
 class EurocFolder {
  public:
   static constexpr std::int64_t kFirstImage = 10'000'000'000;
@@ -138,7 +139,7 @@ class EurocFolder {
   TemporaryFolder folder_;
 };
 
-/// What is left to read.
+/// The remaining packets.
 inline std::vector<SensorPacket> packets_of(EurocReader& reader) {
   std::vector<SensorPacket> packets;
   while (auto packet = reader.next()) packets.push_back(std::move(*packet));

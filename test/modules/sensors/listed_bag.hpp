@@ -14,7 +14,8 @@ namespace km {
 /// A recording of ROS 2 whose messages a test lists in order of log time.
 class ListedBag final : public BagReader {
  public:
-  /// Of a type of ros_messages.hpp; logged at the stamp of its header, `late_s` later.
+  /// `message` is of a type of ros_messages.hpp. Its log time is the stamp of its header plus
+  /// `late_s`.
   template <typename Message>
   void add(const std::string& topic, const Message& message, double late_s = 0.0) {
     add_bytes(topic, Message::kType, message.header.stamp + nanoseconds(late_s),

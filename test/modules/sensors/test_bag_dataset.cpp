@@ -94,8 +94,8 @@ TEST_CASE("Messages of a bag become packets without a hole between them", "[sens
   CHECK(dataset.remarks().empty());
 }
 
-TEST_CASE("Poses of an odometry stand in for inertial samples", "[sensors][bag]") {
-  const bool is_live_late = GENERATE(false, true);  // logged after the frame that they are for
+TEST_CASE("Poses of an odometry replace inertial samples", "[sensors][bag]") {
+  const bool is_live_late = GENERATE(false, true);  // logged after their frame
   CAPTURE(is_live_late);
   Rig rig = small_rig();
   rig.topics.imu.clear();
@@ -115,7 +115,7 @@ TEST_CASE("Poses of an odometry stand in for inertial samples", "[sensors][bag]"
   BagDataset dataset("test.bag", std::move(bag), rig, {});
   CHECK(dataset.gives_poses());
   const auto packets = packets_of(dataset);
-  REQUIRE(packets.size() == 19);  // behind the last image no pose comes
+  REQUIRE(packets.size() == 19);  // no pose follows the last image
   for (std::size_t k = 0; k < packets.size(); ++k) {
     CAPTURE(k);
     CHECK(packets[k].imu.empty());
@@ -132,7 +132,7 @@ TEST_CASE("Poses of an odometry stand in for inertial samples", "[sensors][bag]"
                     Catch::Contains("not of nav_msgs/Odometry"));
 }
 
-TEST_CASE("A camera that is stamped late by a constant is paired, and it is said",
+TEST_CASE("A camera with a constant offset of its stamps is paired and the offset is reported",
           "[sensors][bag]") {
   BagDataset dataset("test.bag", recording({.right_late = 2'000'000}), small_rig(), {});
   CHECK(packets_of(dataset).size() == 40);
@@ -140,12 +140,13 @@ TEST_CASE("A camera that is stamped late by a constant is paired, and it is said
   REQUIRE(dataset.remarks().size() == 1);
   CHECK(dataset.remarks()[0] ==
         "the right image is stamped 2.00 ms after the left one, within 1.00 ms");
-  // As was asked for, it is not.
+  // A tolerance of 1 ms refuses it.
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({.right_late = 2'000'000}), small_rig(), 1e-3),
                     Catch::Contains("left images without a right one"));
 }
 
-TEST_CASE("A frame whose right image is lost is counted, the others stay", "[sensors][bag]") {
+TEST_CASE("A frame without its right image is counted and the other frames stay",
+          "[sensors][bag]") {
   const std::vector<int> lost =
       GENERATE(std::vector{0}, std::vector{7}, std::vector{30, 31}, std::vector{39});
   const Stamp late = GENERATE(0, 2'000'000);
@@ -156,7 +157,7 @@ TEST_CASE("A frame whose right image is lost is counted, the others stay", "[sen
   for (const SensorPacket& packet : packets)
     CHECK(packet.frame->right.pixels[0] == packet.frame->left.pixels[0] + 100);
   CHECK(dataset.report().count(ReaderFault::kLeftWithoutRight) == lost.size());
-  // By their stamps only those are missing that have others after them and enough before them.
+  // A missing image is detected by its stamp only with images after it and enough images before it.
   const bool is_between = lost == std::vector{30, 31};
   CHECK(dataset.report().count(ReaderFault::kMissingBetween) == (is_between ? lost.size() : 0));
   CHECK(dataset.report().entries().size() == (is_between ? 2 : 1));
@@ -176,7 +177,7 @@ TEST_CASE("A window of a bag begins with the second before it", "[sensors][bag]"
                     Catch::StartsWith("test.bag: no frame") && Catch::Contains("from 50 s"));
 }
 
-TEST_CASE("Topics that are not there are refused with those that are", "[sensors][bag]") {
+TEST_CASE("Missing topics are refused and the existing topics are listed", "[sensors][bag]") {
   Rig rig = small_rig();
   rig.topics.right = "/rihgt";
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({}), rig, {}),
@@ -188,7 +189,7 @@ TEST_CASE("Topics that are not there are refused with those that are", "[sensors
                     "test.bag: no topic /imu; topics with inertial samples: none");
 }
 
-// A bag of which pieces could not be read.
+// A bag with parts that cannot be read.
 class DamagedBag final : public BagReader {
  public:
   explicit DamagedBag(std::unique_ptr<ListedBag> rest) : rest_(std::move(rest)) {}
@@ -206,7 +207,7 @@ class DamagedBag final : public BagReader {
   std::unique_ptr<ListedBag> rest_;
 };
 
-TEST_CASE("What of a bag cannot be read is counted with its place", "[sensors][bag]") {
+TEST_CASE("Unreadable parts of a bag are counted with their place", "[sensors][bag]") {
   const auto damaged = [](std::unique_ptr<ListedBag> rest) {
     return std::make_unique<DamagedBag>(std::move(rest));
   };
@@ -215,7 +216,7 @@ TEST_CASE("What of a bag cannot be read is counted with its place", "[sensors][b
   CHECK(dataset.report().count(ReaderFault::kDamagedBag) == 4);
   CHECK_THAT(dataset.report().entries().at(ReaderFault::kDamagedBag).first,
              Catch::Contains("test.bag byte"));
-  // Where nothing is left it may be why.
+  // If nothing is left, the damage may be the cause.
   using Catch::Contains;
   CHECK_THROWS_WITH(BagDataset("test.bag", damaged(std::make_unique<ListedBag>()), small_rig(), {}),
                     Contains("no topic /left; topics with images: none") &&
@@ -229,7 +230,7 @@ TEST_CASE("What of a bag cannot be read is counted with its place", "[sensors][b
                         Contains("damaged pieces"));
 }
 
-TEST_CASE("Bad messages of a bag cost themselves", "[sensors][bag]") {
+TEST_CASE("A bad message of a bag affects no other message", "[sensors][bag]") {
   auto bag = recording({.frames = 0});
   for (int k = 0; k < 30; ++k) {
     const Stamp stamp = kFirst + k * kFramePeriod;
@@ -266,7 +267,7 @@ TEST_CASE("Bad messages of a bag cost themselves", "[sensors][bag]") {
         std::string::npos);
 }
 
-TEST_CASE("Gyroscope and accelerometer with stamps of their own are joined", "[sensors][bag]") {
+TEST_CASE("Gyroscope and accelerometer with their own stamps are joined", "[sensors][bag]") {
   auto bag = std::make_unique<ListedBag>();
   constexpr Stamp kGyroPeriod = 2'500'000, kAccelPeriod = 16'000'000;
   for (Stamp at = 0; at < 3'000'000'000; at += 500'000) {
@@ -288,7 +289,7 @@ TEST_CASE("Gyroscope and accelerometer with stamps of their own are joined", "[s
   rig.topics.accel = "/accel";
   BagDataset dataset("test.bag", std::move(bag), rig, {});
   const auto packets = packets_of(dataset);
-  CHECK(packets.size() == 59);  // the first lies before the first acceleration
+  CHECK(packets.size() == 59);  // the first frame is before the first acceleration
   for (const SensorPacket& packet : packets)
     for (const ImuSample& sample : packet.imu) {
       const double t = seconds_between(kFirst, sample.stamp);
@@ -342,10 +343,10 @@ TEST_CASE("Depth of a bag joins its frame, at a lower rate too", "[sensors][bag]
   CHECK(dataset.remarks().size() == 1);
 }
 
-TEST_CASE("Images of every usual encoding become the same grey", "[sensors][bag]") {
+TEST_CASE("Images of every common encoding become the same grey", "[sensors][bag]") {
   struct Kind {
     const char* encoding;
-    std::vector<std::uint8_t> pixel;  // of one grey, 90
+    std::vector<std::uint8_t> pixel;  // one grey level, 90
   };
   const Kind kind = GENERATE(
       Kind{"mono8", {90}}, Kind{"8UC1", {90}}, Kind{"bgr8", {90, 90, 90}},
@@ -371,8 +372,8 @@ TEST_CASE("Images of every usual encoding become the same grey", "[sensors][bag]
   CHECK(gray.image.pixels == std::vector<std::uint8_t>(kWidth * kHeight, 90));
 }
 
-TEST_CASE("Colours of a Bayer pattern are where its name says", "[sensors][bag]") {
-  // A red scene: red pixels see it, blue and green ones do not.
+TEST_CASE("The name of a Bayer pattern determines the place of its colours", "[sensors][bag]") {
+  // A red scene: only red pixels are bright.
   RosImage message = image(kFirst, 0);
   message.encoding = "bayer_rggb8";
   for (std::size_t y = 0; y < kHeight; y += 2)
@@ -388,7 +389,7 @@ TEST_CASE("Colours of a Bayer pattern are where its name says", "[sensors][bag]"
   CHECK(inner_gray("bayer_bggr8") == Approx(0.114 * 200).margin(1.0));
 }
 
-// The messages that a recorder would have written of a EuRoC folder.
+// The messages that a recorder would have written for a EuRoC folder.
 std::unique_ptr<ListedBag> bag_of(const std::filesystem::path& mav0, std::size_t frames) {
   ReaderReport report;
   const auto pairs = list_euroc_pairs(mav0, {}, report).pairs;

@@ -30,7 +30,8 @@ std::string first_of(const ReaderReport& report, ReaderFault fault) {
   return report.entries().at(fault).first;
 }
 
-// Seven pairs are left and the report holds this one fault, of which the example says `text`.
+// Checks that seven pairs remain and that the report contains only this fault, with `text` in its
+// example.
 void check_one_pair_less(const EurocFolder& folder, ReaderFault fault, const std::string& text) {
   const Outcome outcome = read(folder);
   CHECK(outcome.packets.size() == EurocFolder::kPairs - 1);
@@ -41,7 +42,8 @@ void check_one_pair_less(const EurocFolder& folder, ReaderFault fault, const std
 
 }  // namespace
 
-TEST_CASE("A faultless recording gives every pair and every sample between", "[sensors]") {
+TEST_CASE("A recording without faults gives every pair and every sample between them",
+          "[sensors]") {
   const EurocFolder folder(GENERATE(".png", ".jpg"));
   EurocReader reader = open_euroc(folder.root());
   const auto packets = packets_of(reader);
@@ -64,12 +66,13 @@ TEST_CASE("A faultless recording gives every pair and every sample between", "[s
   CHECK(packets[1].imu[0].accel == Eigen::Vector3d(1.0, 2.0, 9.8));
 }
 
-TEST_CASE("The folder mav0 itself will do", "[sensors]") {
+TEST_CASE("The folder mav0 itself is accepted", "[sensors]") {
   const EurocFolder folder;
   CHECK(open_euroc(folder.mav0()).pair_count() == EurocFolder::kPairs);
 }
 
-TEST_CASE("The first packet leads in by one second, also from before the window", "[sensors]") {
+TEST_CASE("The first packet begins one second before its frame and before the window",
+          "[sensors]") {
   const EurocFolder folder;
   EurocReader reader = open_euroc(folder.root(), {.from_s = 0.1});
   const auto packet = reader.next();
@@ -165,12 +168,12 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("in it are robot0, robot1"));
 }
 
-TEST_CASE("Where there is another odometry, a recording needs no inertial sensor", "[sensors]") {
+TEST_CASE("With another odometry a recording needs no inertial sensor", "[sensors]") {
   const EurocFolder folder;
   const EurocOptions options{.imu = false};
   const SE3 T_imu_left = open_euroc(folder.root()).rig().stereo.cameras[0].T_body_cam;
-  SECTION("one that is there is the body") {}
-  SECTION("without, the body is what all poses of sensors refer to") {
+  SECTION("an existing inertial sensor defines the body") {}
+  SECTION("without an inertial sensor the body is the reference of all poses of sensors") {
     fs::remove_all(folder.mav0() / "imu0");
     CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("imu0/sensor.yaml: no such file"));
     CHECK(open_euroc(folder.mav0(), options).pair_count() == EurocFolder::kPairs);
@@ -221,7 +224,7 @@ TEST_CASE("Lists without a usable row are refused", "[sensors]") {
   }
 }
 
-TEST_CASE("A bad image costs its pair and no inertial sample", "[sensors]") {
+TEST_CASE("A bad image loses its pair and no inertial sample", "[sensors]") {
   const EurocFolder folder;
   const fs::path image = folder.image("cam1", 3);
   ReaderFault fault = ReaderFault::kMissingImage;
@@ -256,7 +259,7 @@ TEST_CASE("A bad image costs its pair and no inertial sample", "[sensors]") {
   CHECK(packets[3].imu.front().stamp == packets[2].imu.back().stamp);
 }
 
-TEST_CASE("A truncated JPEG is not taken for an image", "[sensors]") {
+TEST_CASE("A truncated JPEG is not accepted as an image", "[sensors]") {
   const EurocFolder folder(".jpg");
   fs::path image = folder.image("cam0", 0);
   image.replace_extension(".jpg");
@@ -304,7 +307,7 @@ TEST_CASE("Faulty rows of an image list are skipped and counted with their line"
   }
 }
 
-TEST_CASE("Faulty inertial samples are left out and counted", "[sensors]") {
+TEST_CASE("Faulty inertial samples are skipped and counted", "[sensors]") {
   const EurocFolder folder;
   const std::string at = "10100000000,0.1";  // line 322
   ReaderFault fault = ReaderFault::kNotFinite;
@@ -327,11 +330,11 @@ TEST_CASE("Faulty inertial samples are left out and counted", "[sensors]") {
   CHECK(outcome.report.entries().size() == 1);
   CHECK(outcome.report.count(fault) == 1);
   CHECK_THAT(first_of(outcome.report, fault), Catch::Contains("imu0/data.csv line 322"));
-  // The sample at the third image is gone: the next one covers the interval.
+  // The sample at the third image is missing: the next one covers the interval.
   CHECK(outcome.packets[2].imu.back().stamp == 10'105'000'000);
 }
 
-TEST_CASE("A gap between inertial samples is reported, the pairs are kept", "[sensors]") {
+TEST_CASE("A gap between inertial samples is reported and the pairs are kept", "[sensors]") {
   const EurocFolder folder;
   std::string text = folder.read("imu0/data.csv");
   const auto begin = text.find("10110000000");

@@ -50,7 +50,7 @@ TEST_CASE("A rotation with rounded digits is made exact", "[sensors]") {
   CHECK((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-14);
 }
 
-TEST_CASE("A calibration that cannot be meant is refused with file and line", "[sensors]") {
+TEST_CASE("An impossible calibration is refused with file and line", "[sensors]") {
   struct Case {
     const char *from, *to, *message;
   };
@@ -81,7 +81,7 @@ TEST_CASE("A calibration that cannot be meant is refused with file and line", "[
                     Catch::Contains("cam1/sensor.yaml") && Catch::Contains(c.message));
 }
 
-TEST_CASE("Noise figures and baseline must make sense", "[sensors]") {
+TEST_CASE("Impossible noise figures and baselines are refused", "[sensors]") {
   const EurocFolder folder;
   SECTION("zero noise") {
     folder.replace("imu0/sensor.yaml", "1.6e-04", "0");

@@ -12,16 +12,16 @@ namespace {
 constexpr double kPeriod_s = 0.05;
 constexpr double kMaxLag_s = 0.5;
 
-// One odometry that takes `cost_s` for each image, played in virtual time. Images are due every
-// 50 ms; the reader decides about an image when the queue has room for it.
+// One odometry that needs `cost_s` for each image, simulated in virtual time. Images are due every
+// 50 ms. The reader decides about an image when the queue has room for it.
 struct Playback {
   double cost_s = 0.0;
-  double share_per_s = 0.9;  // of the features that survive a second
-  bool waits = true;         // a recording: its clock waits where nothing else helps
+  double share_per_s = 0.9;  // share of features that survive a second
+  bool waits = true;         // a recording: its clock waits as the last resort
 
   LoadShedding shedding{kMaxLag_s};
   std::vector<FrameUse> uses{};
-  std::vector<int> gaps{};  // images from one that is used to the next
+  std::vector<int> gaps{};  // images from one used image to the next
   std::vector<ShedLoad> loads{};
   double waited_s = 0.0, worst_lag_s = 0.0;
 
@@ -77,14 +77,15 @@ int first_with(const Playback& run, auto&& is) {
 
 }  // namespace
 
-TEST_CASE("A robot that keeps up leaves nothing out", "[sensors]") {
+TEST_CASE("A robot that is fast enough drops no images", "[sensors]") {
   Playback run{.cost_s = 0.045};
   run.play(2000);
   for (const FrameUse use : run.uses) REQUIRE(use == FrameUse::kAll);
   CHECK(run.waited_s == 0.0);
 }
 
-TEST_CASE("The map gives way first, then every second image, and both come back", "[sensors]") {
+TEST_CASE("The map loses its frames first and then odometry every second image and both recover",
+          "[sensors]") {
   Playback run{.cost_s = 0.07};
   run.play(400);
   const int map = first_with(run, [](const ShedLoad& load) { return load.map; });
@@ -93,7 +94,8 @@ TEST_CASE("The map gives way first, then every second image, and both come back"
   REQUIRE(half > map);
   for (int k = 0; k < map; ++k) CHECK(run.uses[static_cast<std::size_t>(k)] == FrameUse::kAll);
   for (const ShedLoad& load : run.loads) CHECK((load.stride == 1 || load.map));
-  for (const int gap : run.gaps) CHECK(gap <= 2);  // a stride of 2 is enough, and used evenly
+  for (const int gap : run.gaps)
+    CHECK(gap <= 2);  // a stride of 2 suffices, and images are used evenly
   CHECK(run.worst_lag_s < 2.0 * kMaxLag_s);
 
   run.cost_s = 0.01;
@@ -103,7 +105,7 @@ TEST_CASE("The map gives way first, then every second image, and both come back"
   CHECK(run.shedding.load() == ShedLoad{});
 }
 
-TEST_CASE("Images that come three times as fast as odometry is are left out evenly", "[sensors]") {
+TEST_CASE("Images at three times the rate of odometry are dropped evenly", "[sensors]") {
   Playback run{.cost_s = 3.0 * kPeriod_s};
   run.play(2000);
   CHECK(run.worst_lag_s <= 2.0 * kMaxLag_s + 4 * run.cost_s);
@@ -114,10 +116,9 @@ TEST_CASE("Images that come three times as fast as odometry is are left out even
   }
 }
 
-TEST_CASE("Odometry keeps the images that it needs to hold on, and the recording waits",
-          "[sensors]") {
-  // A fifth of the features is lost from image to image: of every second image's, 0.64 stay, of
-  // every fourth one's 0.41.
+TEST_CASE("Odometry keeps the images that it needs and the recording waits", "[sensors]") {
+  // A fifth of the features is lost from image to image. 0.64 of them survive to the second image,
+  // 0.41 to the fourth.
   Playback run{.cost_s = 0.25, .share_per_s = std::pow(0.8, 1.0 / kPeriod_s)};
   run.play(1000);
   CHECK(run.shedding.max_stride() == 3);
@@ -125,7 +126,8 @@ TEST_CASE("Odometry keeps the images that it needs to hold on, and the recording
   CHECK(run.worst_lag_s <= 2.0 * kMaxLag_s + run.cost_s);
 }
 
-TEST_CASE("A scene that turns too fast for every second image gets all of them", "[sensors]") {
+TEST_CASE("In a scene that turns too fast for every second image all images are used",
+          "[sensors]") {
   Playback run{.cost_s = 0.1, .share_per_s = std::pow(0.6, 1.0 / kPeriod_s)};
   run.play(500);
   CHECK(run.shedding.max_stride() == 1);
@@ -147,10 +149,10 @@ TEST_CASE("A step that has to be repeated is undone less and less often", "[sens
   for (std::size_t k = 1; k < run.loads.size(); ++k)
     changes += run.loads[k].stride != run.loads[k - 1].stride ? 1 : 0;
   CHECK(changes >= 2);
-  CHECK(changes < 40);  // 200 s; without growing patience about one a second
+  CHECK(changes < 40);  // 200 s; with a constant waiting time about one a second
 }
 
-TEST_CASE("A lag without sense is refused", "[sensors]") {
+TEST_CASE("An impossible lag is refused", "[sensors]") {
   CHECK_THROWS_AS(LoadShedding(-0.1), std::invalid_argument);
   CHECK_THROWS_AS(LoadShedding(std::nan("")), std::invalid_argument);
 }

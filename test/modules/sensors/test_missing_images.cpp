@@ -8,7 +8,7 @@ namespace {
 
 constexpr Stamp kInterval = 50'000'000;
 
-TEST_CASE("Images that are missing are counted, whatever the jitter", "[sensors]") {
+TEST_CASE("Missing images are counted at any jitter", "[sensors]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -27,10 +27,10 @@ TEST_CASE("Images that are missing are counted, whatever the jitter", "[sensors]
   CHECK(counted == lost);
 }
 
-TEST_CASE("What begins, or comes at a new rate, misses nothing for long", "[sensors]") {
+TEST_CASE("A new stream or a new rate reports missing images only briefly", "[sensors]") {
   MissingImages missing;
   CHECK(missing.before(kInterval).missing == 0);
-  CHECK(missing.before(9 * kInterval).missing == 0);  // nothing says how often they come
+  CHECK(missing.before(9 * kInterval).missing == 0);  // the interval is not known yet
   Stamp stamp = 9 * kInterval;
   for (int k = 0; k < 50; ++k) CHECK(missing.before(stamp += kInterval).missing == 0);
   CHECK(missing.before(stamp += 40 * kInterval).missing == 39);

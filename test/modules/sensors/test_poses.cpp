@@ -33,21 +33,21 @@ TEST_CASE("Between poses the body moves at constant velocity", "[sensors][poses]
   }
   CHECK(!poses.reaches(nanoseconds(11.1)));
   CHECK(!poses.at(nanoseconds(11.1)));
-  poses.add(nanoseconds(12.5), {pose_at(12.5)});  // further away than can be bridged
+  poses.add(nanoseconds(12.5), {pose_at(12.5)});  // further away than the longest step
   CHECK(!poses.at(nanoseconds(12.0)));
   CHECK(poses.at(nanoseconds(12.5)));
 }
 
-TEST_CASE("A covariance of ROS is that of the body's perturbation", "[sensors][poses]") {
+TEST_CASE("A covariance of ROS becomes that of the body's perturbation", "[sensors][poses]") {
   const SE3 T_odom_child = pose_at(1.0);
   const SE3 T_child_body = se3_exp((Vector6() << -0.3, 0.5, 0.2, 0.7, -0.4, 0.9).finished());
-  const int axis = GENERATE(0, 1, 2, 3, 4, 5);  // of ROS: x, y, z, and rotations about them
+  const int axis = GENERATE(0, 1, 2, 3, 4, 5);  // axis of ROS: x, y, z, and rotations about them
   CAPTURE(axis);
   Vector6 one = Vector6::Zero();
   one[axis] = 1.0;
   const MeasuredPose pose = measured_pose(T_odom_child, one * one.transpose(), T_child_body);
   CHECK(pose.T_odom_body.isApprox(T_odom_child * T_child_body, 1e-12));
-  // The child moved and turned a little along the axes of odom, about its own origin.
+  // The child moved and rotated a little along the axes of odom, about its own origin.
   constexpr double kStep = 1e-6;
   SE3 moved = T_odom_child;
   moved.translation() += kStep * one.head<3>();
@@ -56,13 +56,13 @@ TEST_CASE("A covariance of ROS is that of the body's perturbation", "[sensors][p
   CHECK(pose.covariance.isApprox(xi * xi.transpose(), 1e-5));
 }
 
-TEST_CASE("An odometry's message that holds no pose is refused", "[sensors][poses]") {
+TEST_CASE("A message of an odometry without a valid pose is refused", "[sensors][poses]") {
   RosOdometry message;
   message.pose.position = {1, 2, 3};
   message.pose_covariance[0] = 0.25;
   REQUIRE(measured_pose(message, SE3::Identity()));
   CHECK(measured_pose(message, SE3::Identity())->covariance(3, 3) == 0.25);
-  message.pose_covariance[0] = -1.0;  // not known
+  message.pose_covariance[0] = -1.0;  // unknown
   CHECK(measured_pose(message, SE3::Identity())->covariance.isZero());
   message.pose.orientation.coeffs().setZero();
   CHECK(!measured_pose(message, SE3::Identity()));
@@ -120,7 +120,7 @@ class Frames final : public DatasetReader {
   int next_ = 0;
 };
 
-TEST_CASE("Packets get the poses of a file, and those without one are counted",
+TEST_CASE("Packets get the poses of a file and frames without one are counted",
           "[sensors][poses]") {
   const TemporaryFolder folder;
   PoseFileReader reader(

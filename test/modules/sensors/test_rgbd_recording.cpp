@@ -13,8 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// All frames are there, that of index 2 without its depth (or labels), the report holds this one
-// fault, of which the example says `text`.
+// Checks that all frames are there, that the frame of index 2 lacks its depth (or labels), and that
+// the report contains only this fault, with `text` in its example.
 void check_image_lost(const EurocFolder& folder, const EurocOptions& options, ReaderFault fault,
                       const std::string& text) {
   const Outcome outcome = read(folder, options);
@@ -33,7 +33,7 @@ constexpr const char* kPalette =
     "name,red,green,blue,alpha,id\nunknown,0,0,0,255,0\nroad,128,64,128,255,3\n"
     "tree,0,200,10,255,7\n";
 
-// Median distance [m] of the depths of frame a, carried into b, from those that b has there.
+// Median difference [m] between the depths of frame a, transformed into b, and the depths of b.
 double depth_disagreement(const PosedFrame& a, const PosedFrame& b, const Camera& camera) {
   const SE3 T_b_a = b.T_world_cam.inverse() * a.T_world_cam;
   std::vector<double> errors;
@@ -67,7 +67,7 @@ TEST_CASE("Without a right camera, depth makes an RGB-D rig", "[sensors]") {
   CHECK(rig.depth->min_m == 0.4);
   CHECK(rig.depth->max_m == 20.0);
   CHECK(rig.stereo.cameras[1].fx == 30.0);
-  // To the right in the camera's frame, which is turned against the body's.
+  // To the right in the camera's frame, which is rotated against the body's.
   CHECK(rig.stereo.T_left_right().translation().isApprox(Eigen::Vector3d(0.08, 0, 0)));
 
   const Outcome outcome = read(folder);
@@ -98,7 +98,7 @@ TEST_CASE("Range, scale and baseline of depth have defaults", "[sensors]") {
   CHECK(read_depth_scale(folder.mav0()) == 0.001);
 }
 
-TEST_CASE("Depth at a lower rate leaves frames without", "[sensors]") {
+TEST_CASE("Depth at a lower rate leaves frames without depth", "[sensors]") {
   const EurocFolder folder;
   folder.make_rgbd(3);
   const Outcome outcome = read(folder);
@@ -108,7 +108,7 @@ TEST_CASE("Depth at a lower rate leaves frames without", "[sensors]") {
     CHECK((outcome.packets[i].frame->depth != nullptr) == (i % 3 == 0));
 }
 
-TEST_CASE("Depth and labels beside stereo are read if asked for", "[sensors]") {
+TEST_CASE("Depth and labels beside stereo are read on request", "[sensors]") {
   const EurocFolder folder;
   folder.add_depth();
   folder.add_labels(2);
@@ -126,7 +126,7 @@ TEST_CASE("Depth and labels beside stereo are read if asked for", "[sensors]") {
   CHECK(second->frame->labels == nullptr);
 }
 
-TEST_CASE("A reader holds to the calibration that it is given", "[sensors]") {
+TEST_CASE("A reader uses the calibration that it is given", "[sensors]") {
   const EurocFolder folder;
   folder.add_depth();  // 2000 units everywhere
   EurocCalibration calibration{.rig = read_euroc_rig(folder.mav0(), true), .depth_scale_m = 0.002};
@@ -141,7 +141,7 @@ TEST_CASE("A reader holds to the calibration that it is given", "[sensors]") {
   CHECK(packet->frame->depth->millimetres[0] == 4000);
 }
 
-TEST_CASE("What is asked for must be there", "[sensors]") {
+TEST_CASE("A recording without requested depth or labels is refused", "[sensors]") {
   const EurocFolder folder;
   CHECK_THROWS_WITH(open_euroc(folder.root(), {.depth = true}),
                     Catch::Contains("depth0/sensor.yaml: no such file: a EuRoC folder has the "
@@ -155,7 +155,7 @@ TEST_CASE("What is asked for must be there", "[sensors]") {
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("depth0/data.csv: no such file"));
 }
 
-TEST_CASE("A depth image that cannot be used costs only itself", "[sensors]") {
+TEST_CASE("A depth image that cannot be used loses only itself", "[sensors]") {
   const EurocFolder folder;
   folder.make_rgbd();
   const std::string name = EurocFolder::side_image("depth0", 2);
@@ -195,7 +195,7 @@ TEST_CASE("A depth image of no frame is counted", "[sensors]") {
                    "depth0/data.csv line 4: 10100000000.png");
 }
 
-TEST_CASE("Depths outside the sensor's range are none", "[sensors]") {
+TEST_CASE("Depths outside the sensor's range are dropped", "[sensors]") {
   const EurocFolder folder;
   folder.make_rgbd();
   cv::Mat pixels(24, 32, CV_16UC1, cv::Scalar(0));
@@ -207,7 +207,7 @@ TEST_CASE("Depths outside the sensor's range are none", "[sensors]") {
     return std::vector<int>(all.begin(), all.begin() + 7);
   };
   CHECK(depths() == std::vector<int>{0, 400, 1000, 20000, 0, 0, 0});
-  // Units of 0.2 mm, as in the TUM RGB-D data; 65535 stays what is not measured.
+  // Units of 0.2 mm, as in the TUM RGB-D data; 65535 still means not measured.
   folder.replace("depth0/sensor.yaml", "depth_scale: 0.001", "depth_scale: 0.0002");
   CHECK(depths() == std::vector<int>{0, 0, 0, 4000, 4000, 0, 0});
   folder.replace("depth0/sensor.yaml", "depth_scale: 0.0002", "depth_scale: 0.01");
@@ -237,7 +237,7 @@ TEST_CASE("Depth that is not aligned with the left camera is refused", "[sensors
                     Catch::Contains("depth0/sensor.yaml") && Catch::Contains(c.message));
 }
 
-TEST_CASE("Labels as colours become ids by the palette", "[sensors]") {
+TEST_CASE("The palette maps labels from colours to ids", "[sensors]") {
   const EurocFolder folder;
   folder.add_labels();
   folder.write("label_palette.csv", kPalette);
@@ -245,7 +245,7 @@ TEST_CASE("Labels as colours become ids by the palette", "[sensors]") {
   CAPTURE(channels);
   cv::Mat bgr(24, 32, CV_8UC3, cv::Scalar(128, 64, 128));
   bgr.at<cv::Vec3b>(0, 1) = {10, 200, 0};
-  bgr.at<cv::Vec3b>(0, 2) = {11, 200, 0};  // of no class
+  bgr.at<cv::Vec3b>(0, 2) = {11, 200, 0};  // a colour of no class
   if (channels == 4) {
     const cv::Mat alpha(24, 32, CV_8UC1, cv::Scalar(7));
     const std::vector<cv::Mat> planes = {bgr, alpha};
@@ -266,7 +266,7 @@ TEST_CASE("Labels as colours become ids by the palette", "[sensors]") {
   CHECK_THAT(outcome.report.entries().begin()->second.first, Catch::EndsWith(".png: 1 pixels"));
 }
 
-TEST_CASE("Labels that cannot be read cost only themselves", "[sensors]") {
+TEST_CASE("A label image that cannot be read loses only itself", "[sensors]") {
   const EurocFolder folder;
   folder.add_labels();
   const std::string name = EurocFolder::side_image("label0", 2);
@@ -282,7 +282,7 @@ TEST_CASE("Labels that cannot be read cost only themselves", "[sensors]") {
   check_image_lost(folder, {.labels = true}, ReaderFault::kWrongImageFormat, text);
 }
 
-TEST_CASE("The palette comes with the reader, a broken one is refused", "[sensors]") {
+TEST_CASE("The reader returns the palette and refuses an invalid one", "[sensors]") {
   const EurocFolder folder;
   folder.add_labels();
   folder.write("label_palette.csv", kPalette);
@@ -296,7 +296,7 @@ TEST_CASE("The palette comes with the reader, a broken one is refused", "[sensor
                     Catch::Contains("label_palette.csv"));
 }
 
-TEST_CASE("7-Scenes red kitchen: depth and poses agree on the room", "[sensors]") {
+TEST_CASE("7-Scenes red kitchen: depth and poses agree", "[sensors]") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
   RecordedKitchen kitchen(*folder);
@@ -309,9 +309,9 @@ TEST_CASE("7-Scenes red kitchen: depth and poses agree on the room", "[sensors]"
     const auto known = static_cast<double>(
         std::count_if(depths.begin(), depths.end(), [](std::uint16_t z) { return z > 0; }));
     CHECK(known > 0.5 * 640 * 480);
-    CHECK(*std::max_element(depths.begin(), depths.end()) < 20'000);  // 65535 is none
+    CHECK(*std::max_element(depths.begin(), depths.end()) < 20'000);  // 65535 is not a depth
   }
-  // Kinect's noise at 2 to 3 m is a centimetre or two.
+  // The noise of a Kinect at 2 to 3 m is one or two centimetres.
   CHECK(depth_disagreement(frames[0], frames[4], kitchen.rig().cameras[0]) < 0.03);
   CHECK(depth_disagreement(frames[0], frames[11], kitchen.rig().cameras[0]) < 0.04);
 }

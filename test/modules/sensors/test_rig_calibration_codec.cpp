@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Two cameras that look along the inertial sensor's x axis, at y = 0.1 and y = -0.1 m: T_cam_imu
-// takes x to z, y to -x and z to -y.
+// maps x to z, y to -x and z to -y.
 const std::string kCamera0 =
     "cam0:\n"
     "  T_cam_imu:\n"
@@ -69,7 +69,7 @@ std::string cut(std::string text, const std::string& from, const std::string& be
   return text.erase(begin, text.find(before, begin) - begin);
 }
 
-// A folder of files of calibration.
+// A folder of calibration files.
 struct Files {
   TemporaryFolder folder;
 
@@ -105,14 +105,14 @@ TEST_CASE("Kalibr's files give the rig that they describe", "[sensors][calibrati
   CHECK(calibration.rig.imu.rate_hz == 400.0);
   CHECK_FALSE(calibration.rig.depth.has_value());
   REQUIRE(calibration.image_time_offset_s.has_value());
-  CHECK(*calibration.image_time_offset_s == Approx(0.0126));  // of both cameras
+  CHECK(*calibration.image_time_offset_s == Approx(0.0126));  // common to both cameras
   CHECK(calibration.image_topics ==
         std::array<std::string, 2>{"/cam0/image_raw", "/cam1/image_raw"});
   CHECK(calibration.imu_topic == "/imu0");
   CHECK(calibration.notes.empty());
 }
 
-TEST_CASE("All ways to say where the cameras are agree", "[sensors][calibration]") {
+TEST_CASE("All formats for the poses of the cameras agree", "[sensors][calibration]") {
   const Files files;
   const RigCalibration plain = files.read_kalibr(kCamera0 + kCamera1);
   const std::string inverse0 =
@@ -179,7 +179,7 @@ TEST_CASE("The published calibration of TUM-VI is read", "[sensors][calibration]
   CHECK(stereo.cameras[0].fx == 190.97847715128717);
   CHECK(stereo.cameras[1].width == 512);
   CHECK(stereo.baseline_m() == Approx(0.101).margin(0.001));
-  // The camera looks along the inertial sensor's -y, as both lie in that device.
+  // The camera looks along the inertial sensor's -y, as they are mounted in that device.
   CHECK(stereo.cameras[0].T_body_cam.linear().col(2).dot(-Eigen::Vector3d::UnitY()) > 0.99);
   CHECK(calibration.rig.imu.gyro_noise_density == 0.00016);
   CHECK(calibration.rig.imu.rate_hz == 200.0);
@@ -189,7 +189,7 @@ TEST_CASE("The published calibration of TUM-VI is read", "[sensors][calibration]
     for (int y = 0; y < 512; y += 16)
       for (int x = 0; x < 512; x += 16) {
         const auto bearing = camera.unproject(Eigen::Vector2d(x, y));
-        if (!bearing) continue;  // the corners
+        if (!bearing) continue;  // corners without a bearing
         CHECK((camera.project(*bearing).value() - Eigen::Vector2d(x, y)).norm() < 1e-8);
       }
 }
@@ -281,7 +281,7 @@ TEST_CASE("Basalt's other models are read", "[sensors][calibration]") {
         Approx(254.9 + 158.0 / (0.6 * std::sqrt(2.0) + 0.4)));
 }
 
-TEST_CASE("What is not used of a calibration is noted with its place", "[sensors][calibration]") {
+TEST_CASE("An unused part of a calibration is noted with its place", "[sensors][calibration]") {
   const Files files;
   const auto notes_of = [](const RigCalibration& calibration) {
     REQUIRE(calibration.notes.size() == 1);
@@ -313,14 +313,15 @@ TEST_CASE("A pair is chosen among more cameras, or one with depth", "[sensors][c
   }
 }
 
-TEST_CASE("A folder of EuRoC is a calibration, too", "[sensors][calibration]") {
+TEST_CASE("A folder of EuRoC is a calibration", "[sensors][calibration]") {
   const EurocFolder folder;
   CHECK(read_rig({folder.root()}).rig.stereo.cameras[0].fx == 30.0);
   CHECK_THROWS_WITH(read_rig({folder.mav0() / "cam0" / "sensor.yaml"}),
                     Catch::Contains("give the folder that holds cam0, cam1 and imu0"));
 }
 
-TEST_CASE("What is no calibration is refused with what was expected", "[sensors][calibration]") {
+TEST_CASE("A file that is no calibration is refused with a list of the expected formats",
+          "[sensors][calibration]") {
   const Files files;
   CHECK_THROWS_WITH(read_rig({}), Catch::Contains("expected a folder"));
   CHECK_THROWS_WITH(files.read("a.yaml", "some: thing\n"),
@@ -332,8 +333,7 @@ TEST_CASE("What is no calibration is refused with what was expected", "[sensors]
   check_no_files<DatasetError>(".yaml", [](const fs::path& file) { (void)read_rig({file}); });
 }
 
-TEST_CASE("A Kalibr chain that cannot be meant is refused with file and line",
-          "[sensors][calibration]") {
+TEST_CASE("An impossible Kalibr chain is refused with file and line", "[sensors][calibration]") {
   struct Case {
     std::string from, to, message;
   };
@@ -359,8 +359,7 @@ TEST_CASE("A Kalibr chain that cannot be meant is refused with file and line",
                     Catch::Contains("camchain.yaml " + c.message));
 }
 
-TEST_CASE("A Basalt file that cannot be meant is refused with file and line",
-          "[sensors][calibration]") {
+TEST_CASE("An impossible Basalt file is refused with file and line", "[sensors][calibration]") {
   struct Case {
     std::string from, to, message;
   };
@@ -391,8 +390,7 @@ void check_calibration(const RigCalibration& calibration) {
   CHECK(std::abs(calibration.image_time_offset_s.value_or(0.0)) <= 10.0);
 }
 
-TEST_CASE("Spoilt calibrations are refused, or give what a reader promises",
-          "[sensors][calibration]") {
+TEST_CASE("A corrupted calibration is refused or gives a valid rig", "[sensors][calibration]") {
   const TemporaryFolder folder;
   SECTION("Kalibr") {
     check_spoilt<DatasetError>(

@@ -39,7 +39,8 @@ void tell(ListedBag& bag, const std::vector<RosTransform>& transforms) {
   bag.add_bytes("/tf_static", RosTransforms::kType, 0, encode_ros(RosTransforms{transforms}));
 }
 
-// The inertial sensor a metre above the base and turned to its left, the left camera in front.
+// The inertial sensor is a metre above the base and rotated to its left; the left camera is in
+// front.
 const Eigen::Vector3d kQuarter(0, 0, std::numbers::pi / 2);
 const RosTransform kImuOnBase = transform("base", "imu", {0, 0, 1}, kQuarter);
 const RosTransform kLeftOnBase = transform("base", "left_optical", {0.2, 0, 0}, {0, 0, 0});
@@ -53,7 +54,7 @@ PartialRig nothing_known() {
   return rig;
 }
 
-TEST_CASE("CameraInfo and static transforms tell a whole rig", "[sensors][calibration]") {
+TEST_CASE("CameraInfo and static transforms complete a rig", "[sensors][calibration]") {
   ListedBag bag;
   bag.add("/left_info", info("left_optical", 0.0));
   tell(bag, {kLeftOnBase});
@@ -72,7 +73,7 @@ TEST_CASE("CameraInfo and static transforms tell a whole rig", "[sensors][calibr
   CHECK(rig.notes.empty());
 }
 
-TEST_CASE("Raw images stand as R turns them from their frame", "[sensors][calibration]") {
+TEST_CASE("Raw images are rotated by R from their frame", "[sensors][calibration]") {
   const Eigen::Matrix3d R_left = so3_exp({0.01, -0.03, 0.02}), R_right = so3_exp({-0.02, 0.01, 0});
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   RosCameraInfo left = info("imu", 0.0), right = info("imu", -43.0);
@@ -88,7 +89,7 @@ TEST_CASE("Raw images stand as R turns them from their frame", "[sensors][calibr
   bag.add("/right_info", right);
   const Rig rig = complete_rig("a.bag", bag, partial);
   const auto& cameras = rig.sensors.stereo.cameras;
-  // A point of the rectified left camera, and where each raw camera has it.
+  // A point of the rectified left camera, and its positions in the raw cameras.
   const Eigen::Vector3d p(0.4, -0.3, 2.0), in_right_rectified = p - Eigen::Vector3d(0.1, 0, 0);
   const Eigen::Vector3d in_left = rectified ? p : R_left.transpose() * p;
   const Eigen::Vector3d in_right =
@@ -99,7 +100,7 @@ TEST_CASE("Raw images stand as R turns them from their frame", "[sensors][calibr
   CHECK(rig.notes.size() == (rectified ? 0U : 2U));
 }
 
-TEST_CASE("Without a stereo calibration the frames say where the right camera is",
+TEST_CASE("Without a stereo calibration the frames give the pose of the right camera",
           "[sensors][calibration]") {
   ListedBag bag;
   bag.add("/left_info", info("left_optical", 0.0));
@@ -112,7 +113,7 @@ TEST_CASE("Without a stereo calibration the frames say where the right camera is
   CHECK(stereo.T_left_right().linear().isApprox(so3_exp({0, 0.01, 0}), 1e-12));
 }
 
-TEST_CASE("One CameraInfo tells an RGB-D rig", "[sensors][calibration]") {
+TEST_CASE("One CameraInfo completes an RGB-D rig", "[sensors][calibration]") {
   PartialRig partial = nothing_known();
   partial.rig.topics.right.clear();
   partial.rig.topics.depth = "/depth";
@@ -146,7 +147,7 @@ TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
   CHECK(stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
 }
 
-TEST_CASE("Calibrated cameras are put where their images' frame is", "[sensors][calibration]") {
+TEST_CASE("Calibrated cameras get the pose of their images' frame", "[sensors][calibration]") {
   PartialRig partial = nothing_known();
   partial.has_cameras = true;
   for (Camera& camera : partial.rig.sensors.stereo.cameras) camera.fx = 300.0;
@@ -164,7 +165,7 @@ TEST_CASE("Calibrated cameras are put where their images' frame is", "[sensors][
   CHECK(stereo.cameras[1].T_body_cam.translation().isApprox(Eigen::Vector3d(0.31, 0, 0)));
 }
 
-TEST_CASE("What is missing of a calibration is named with what would tell it",
+TEST_CASE("A missing part of a calibration is named with the topics that could supply it",
           "[sensors][calibration]") {
   const auto complaint = [](ListedBag& bag) -> std::string {
     try {
@@ -204,13 +205,14 @@ TEST_CASE("What is missing of a calibration is named with what would tell it",
 
 TEST_CASE("A chain of static transforms is followed in both directions", "[sensors]") {
   StaticTransforms transforms;
-  transforms.add({{kImuOnBase, kLeftOnBase, transform("left_optical", "lens", {0, 0, 0.5}, {0, 0, 0})}});
+  transforms.add(
+      {{kImuOnBase, kLeftOnBase, transform("left_optical", "lens", {0, 0, 0.5}, {0, 0, 0})}});
   transforms.add({{transform("x", "y", {1, 0, 0}, {0, 0, 0})}});
   CHECK(transforms.find("imu", "lens")->translation().isApprox(Eigen::Vector3d(0, -0.2, -0.5)));
   CHECK(transforms.find("lens", "imu")->isApprox(transforms.find("imu", "lens")->inverse()));
   CHECK(transforms.find("/lens", "lens")->isApprox(SE3::Identity()));
   CHECK(!transforms.find("imu", "y"));
-  // Loops end; what is no transform is left out.
+  // The search through a loop ends, and a transform that is not rigid is skipped.
   transforms.add({{transform("lens", "imu", {9, 9, 9}, {0, 0, 0})}});
   CHECK(!transforms.find("imu", "z"));
   RosTransform bad = transform("imu", "z", {0, 0, 0}, {0, 0, 0});

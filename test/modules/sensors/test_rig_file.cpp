@@ -23,7 +23,7 @@ std::string complaint(const std::string& text) try {
   return error.what();
 }
 
-TEST_CASE("A rig file names topics, and a calibration beside it", "[sensors]") {
+TEST_CASE("A rig file names topics and a calibration beside it", "[sensors]") {
   const EurocFolder recording;
   const TemporaryFolder folder;
   std::filesystem::create_directory_symlink(recording.root(), folder.path() / "recording");
@@ -52,7 +52,7 @@ PartialRig read(const TemporaryFolder& folder, const std::string& text) {
   return read_rig_file(folder.write("rig.yaml", text));
 }
 
-TEST_CASE("A rig file names Kalibr's files, or has what would be in them", "[sensors]") {
+TEST_CASE("A rig file names the files of Kalibr or contains their keys", "[sensors]") {
   const TemporaryFolder folder;
   folder.write("camchain.yaml", kChain);
   folder.write("imu.yaml",
@@ -64,7 +64,7 @@ TEST_CASE("A rig file names Kalibr's files, or has what would be in them", "[sen
   CHECK(named.rig.sensors.imu.rate_hz == 400.0);
   CHECK(named.rig.sensors.stereo.cameras[1].fx == 310.0);
   CHECK(named.rig.notes.empty());
-  // t_imu = t_cam + timeshift_cam_imu, unless the rig file knows better.
+  // t_imu = t_cam + timeshift_cam_imu, unless the rig file states another value.
   CHECK(named.rig.camera_time_offset_s == 0.02);
   CHECK(read(folder, kTopics + "calibration: camchain.yaml\ncamera_time_offset_s: 0\n")
             .rig.camera_time_offset_s == 0.0);
@@ -80,7 +80,7 @@ TEST_CASE("A rig file names Kalibr's files, or has what would be in them", "[sen
   CHECK(written.rig.sensors.stereo.baseline_m() == Approx(0.2));
   CHECK_THROWS_WITH(read(folder, kTopics + "calibration:\n  cam0: {resolution: 3}\n"),
                     Contains("rig.yaml line 5: resolution is not a list of numbers"));
-  // Calibrated as other topics: it may be that of others.
+  // The calibration names other topics, so it may be that of other cameras.
   const PartialRig other = read(folder,
                                 "left: {topic: /a}\nright: {topic: /cam1}\n"
                                 "imu: {topic: /imu0}\ncalibration: camchain.yaml\n");
@@ -117,7 +117,7 @@ TEST_CASE("A rig file needs no inertial sensor beside an odometry named elsewher
 const CameraCalibration kCorrection{
     0.0123456789, make_pose(so3_exp({0.02, -0.01, 0.03}), {0.004, -0.005, 0.006})};
 
-TEST_CASE("A rig with a correction is the rig file's with it", "[sensors]") {
+TEST_CASE("A corrected rig file gives the rig of the original with the correction", "[sensors]") {
   const EurocFolder recording;
   const TemporaryFolder folder, elsewhere;
   std::filesystem::create_directory_symlink(recording.root(), folder.path() / "recording");
@@ -139,11 +139,11 @@ TEST_CASE("A rig with a correction is the rig file's with it", "[sensors]") {
   CHECK(rig.T_body_rig.isApprox(kCorrection.T_body_rig, 1e-9));
   CHECK(rig.rig.topics.right == "/cam1");
   CHECK(rig.rig.sensors.stereo.cameras[1].width == (is_inline ? 640 : 32));
-  // Once more, from the file that was written.
+  // Once more, from the written file.
   CHECK(corrected_rig_text(elsewhere.path() / "rig_estimated.yaml", kCorrection) == corrected);
 }
 
-TEST_CASE("A recording that tells its rig takes a correction alone", "[sensors]") {
+TEST_CASE("A recording with its own rig accepts a file with only a correction", "[sensors]") {
   const TemporaryFolder folder;
   const auto file = folder.write("rig.yaml", corrected_rig_text("", kCorrection));
   const CameraCalibration read = read_rig_correction(file);
@@ -161,7 +161,7 @@ TEST_CASE("A recording that tells its rig takes a correction alone", "[sensors]"
                     Contains("scaled.yaml: T_body_rig"));
 }
 
-TEST_CASE("What a rig file does not tell is asked of topics", "[sensors]") {
+TEST_CASE("Parts that a rig file lacks come from topics", "[sensors]") {
   const TemporaryFolder folder;
   const PartialRig none =
       read(folder,
@@ -189,7 +189,7 @@ TEST_CASE("What a rig file does not tell is asked of topics", "[sensors]") {
       Eigen::Vector3d(0.2, 0, 0)));
 }
 
-TEST_CASE("A robot without an inertial sensor names the odometry that it has", "[sensors]") {
+TEST_CASE("A robot without an inertial sensor names its odometry", "[sensors]") {
   const TemporaryFolder folder;
   folder.write("camchain.yaml", kChain);
   folder.write("poses.tum", "1 0 0 0 0 0 0 1\n");
@@ -214,7 +214,7 @@ TEST_CASE("A robot without an inertial sensor names the odometry that it has", "
              Contains("odometry.T_child_body is not a rotation"));
 }
 
-TEST_CASE("What a rig file lacks is named by file and line", "[sensors]") {
+TEST_CASE("A missing key of a rig file is named by file and line", "[sensors]") {
   CHECK_THAT(complaint("left: {topic: /a}\nimu: {topic: /i}\ncalibration: /\n"),
              Contains("one camera does not tell how far things are"));
   CHECK_THAT(complaint("left: {topic: /a}\ndepth: {topic: /d, min_range_m: 9, max_range_m: 8}\n"

@@ -91,8 +91,8 @@ TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
   CHECK(node.error() == nullptr);
 }
 
-// Odometry that takes three times as long for an image as there is time.
-TEST_CASE("Images that come too fast are left out evenly, after the map", "[sensors]") {
+// Odometry that takes three times the interval of the images.
+TEST_CASE("Images that come too fast are dropped evenly after the map", "[sensors]") {
   constexpr double kRate = 10.0;  // an image every 5 ms
   constexpr auto kCost = std::chrono::milliseconds(15);
   Run run;
@@ -117,13 +117,13 @@ TEST_CASE("Images that come too fast are left out evenly, after the map", "[sens
   }
 }
 
-TEST_CASE("Where nothing else helps, the clock of a recording pauses", "[sensors]") {
+TEST_CASE("The clock of a recording pauses as the last resort", "[sensors]") {
   Run run;
   run.packets.subscribe(
       [](const auto&) { std::this_thread::sleep_for(std::chrono::milliseconds(5)); });
   SensorsConfig config;
   config.max_lag_s = 0.02;
-  // An image every 0.5 ms: even one of four takes 2.5 times as long as there is time.
+  // An image every 0.5 ms: even one of four takes 2.5 times the available time.
   SensorsNode node(config, 100.0, std::make_unique<FakeReader>(1000), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
@@ -156,7 +156,7 @@ TEST_CASE("A reader that throws ends the node with its exception", "[sensors]") 
   CHECK(run.stamps.size() == 3);
 }
 
-TEST_CASE("Unusable parameters of the node are refused", "[sensors]") {
+TEST_CASE("Invalid parameters of the node are refused", "[sensors]") {
   Run run;
   SensorsConfig config;
   config.read_ahead = 0;

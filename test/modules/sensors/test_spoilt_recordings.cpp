@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kDay_ns = 86'400'000'000'000;
 
-// Bytes of a PNG file whose header says `width` x `height`; what follows it is too little.
+// Bytes of a PNG file whose header says `width` x `height`, with too few bytes after it.
 std::string png_of(std::uint32_t width, std::uint32_t height) {
   std::vector<std::uint8_t> encoded;
   cv::imencode(".png", cv::Mat(24, 32, CV_8UC1, cv::Scalar(7)), encoded);
@@ -38,7 +38,7 @@ void check_rig(const SensorRig& rig) {
   CHECK(std::isnormal(rig.imu.accel_noise_density * rig.imu.accel_noise_density));
 }
 
-// What a reader promises, whatever the files.
+// Invariants of a reader for any files.
 void check_recording(EurocReader& reader) {
   check_rig(reader.rig());
   Stamp last = 0;
@@ -62,13 +62,13 @@ void check_recording(EurocReader& reader) {
 struct Row {
   const char* what;
   const char* file;
-  int line;            // of the list
+  int line;            // line of the list
   std::string values;  // for the row; "+N" and "-N" move its stamp
   ReaderFault fault;
   std::size_t packets;
 };
 
-// Changes one row of a list.
+// Corrupts one row of a list.
 void spoil_row(const EurocFolder& folder, const Row& row) {
   const std::string text = folder.read(row.file);
   std::size_t begin = 0;
@@ -86,7 +86,7 @@ void spoil_row(const EurocFolder& folder, const Row& row) {
 
 }  // namespace
 
-TEST_CASE("A bad row is lost and counted with its line, and no other", "[sensors]") {
+TEST_CASE("A bad row is skipped and counted with its line and no other row is", "[sensors]") {
   const std::string day = std::to_string(kDay_ns);
   const Row row = GENERATE_COPY(
       Row{"gyro 1e300", "imu0/data.csv", 300, "1e300,0,0,0,0,9.8", ReaderFault::kImplausible, 8},
@@ -118,7 +118,7 @@ TEST_CASE("A bad row is lost and counted with its line, and no other", "[sensors
   CHECK(reader.report().count(ReaderFault::kImuGap) == 0);
 }
 
-TEST_CASE("An image that lies or cannot be reached costs its pair", "[sensors]") {
+TEST_CASE("An image with a false header or out of reach loses its pair", "[sensors]") {
   const EurocFolder folder;
   const fs::path image = folder.image("cam1", 3);
   fs::remove(image);
@@ -164,8 +164,7 @@ TEST_CASE("A PNG of 16 bits is read as grey", "[sensors]") {
   CHECK(outcome.packets[2].frame->left.pixels[5] == 0x12);
 }
 
-TEST_CASE("Spoilt lists and calibrations are refused, or give what a reader promises",
-          "[sensors]") {
+TEST_CASE("A corrupted list or calibration is refused or gives valid packets", "[sensors]") {
   const std::string file = GENERATE("imu0/data.csv", "cam0/data.csv", "cam1/data.csv",
                                     "imu0/sensor.yaml", "cam0/sensor.yaml", "cam1/sensor.yaml");
   CAPTURE(file);
@@ -178,7 +177,7 @@ TEST_CASE("Spoilt lists and calibrations are refused, or give what a reader prom
   });
 }
 
-TEST_CASE("Spoilt depth calibrations are refused, or give what a reader promises", "[sensors]") {
+TEST_CASE("A corrupted depth calibration is refused or gives a valid rig", "[sensors]") {
   const EurocFolder folder;
   folder.make_rgbd();
   check_spoilt<DatasetError>(EurocFolder::depth_yaml(), folder.root().string(),
@@ -189,7 +188,7 @@ TEST_CASE("Spoilt depth calibrations are refused, or give what a reader promises
                              });
 }
 
-TEST_CASE("A spoilt image is an image of the right size or none", "[sensors]") {
+TEST_CASE("A corrupted image gives an image of the right size or none", "[sensors]") {
   const std::string extension = GENERATE(".png", ".jpg", ".bmp", ".tiff", ".webp");
   CAPTURE(extension);
   std::vector<std::uint8_t> encoded;
@@ -205,7 +204,7 @@ TEST_CASE("A spoilt image is an image of the right size or none", "[sensors]") {
   });
 }
 
-TEST_CASE("A file of a recording that is none is refused by name", "[sensors]") {
+TEST_CASE("A file of a recording that is not a file is refused by name", "[sensors]") {
   const std::string file = GENERATE("imu0/data.csv", "cam0/data.csv", "imu0/sensor.yaml");
   const EurocFolder folder;
   const fs::path place = folder.mav0() / file;
@@ -225,7 +224,7 @@ TEST_CASE("A folder that is a loop is refused by name", "[sensors]") {
   CHECK_THROWS_WITH(open_euroc(folder.path() / "mav0"), Catch::Contains("no such folder"));
 }
 
-TEST_CASE("Noise and optics that no sensor has are refused with line and value", "[sensors]") {
+TEST_CASE("Impossible noise and optics are refused with line and value", "[sensors]") {
   struct Case {
     std::string file, from, to, message;
   };

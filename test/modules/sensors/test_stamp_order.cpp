@@ -14,7 +14,7 @@ constexpr StampVerdict kGood = StampVerdict::kGood, kRepeated = StampVerdict::kR
 constexpr Stamp kDay = 86'400'000'000'000;
 using Verdicts = std::vector<StampVerdict>;
 
-TEST_CASE("One wrong stamp costs itself, wherever it stands", "[sensors]") {
+TEST_CASE("One wrong stamp at any place affects no other stamp", "[sensors]") {
   const std::size_t place = GENERATE(0U, 1U, 5U, 8U, 9U);
   const Stamp offset = GENERATE(values<Stamp>({kDay, -kDay, 25, -25}));
   std::vector<Stamp> stamps;
@@ -27,12 +27,12 @@ TEST_CASE("One wrong stamp costs itself, wherever it stands", "[sensors]") {
   CHECK((verdicts[place] == kGood) == still_in_order);
 }
 
-TEST_CASE("Of equal stamps the first counts", "[sensors]") {
+TEST_CASE("The first of several equal stamps counts", "[sensors]") {
   CHECK(judge_stamps(std::vector<Stamp>{1, 2, 2, 2, 3}) ==
         Verdicts{kGood, kGood, kRepeated, kRepeated, kGood});
 }
 
-TEST_CASE("A clock that was set leaves the part with the most stamps", "[sensors]") {
+TEST_CASE("After a clock was set the part with the most stamps is kept", "[sensors]") {
   CHECK(judge_stamps(std::vector<Stamp>{1, 2, kDay, kDay + 1, kDay + 2}) ==
         Verdicts{kJump, kJump, kGood, kGood, kGood});
   CHECK(judge_stamps(std::vector<Stamp>{kDay, kDay + 1, 1, 2, 3}) ==
@@ -45,7 +45,7 @@ TEST_CASE("A pause of a minute belongs to a recording", "[sensors]") {
   CHECK(judge_stamps(std::vector<Stamp>{1, 2, minute, minute + 1}) == Verdicts(4, kGood));
 }
 
-TEST_CASE("No choice of stamps in order keeps more", "[sensors]") {
+TEST_CASE("No other choice of stamps in order keeps more of them", "[sensors]") {
   CHECK(judge_stamps({}).empty());
   const unsigned seed = GENERATE(range(0U, 50U));
   CAPTURE(seed);
@@ -80,7 +80,7 @@ Verdicts judged_as_they_come(const std::vector<Stamp>& stamps) {
   return verdicts;
 }
 
-TEST_CASE("Stamps of a stream are judged as they come", "[sensors]") {
+TEST_CASE("Stamps of a stream are judged one by one", "[sensors]") {
   CHECK(judged_as_they_come({10, 20, 20, 15, 30}) ==
         Verdicts{kGood, kGood, kRepeated, kUnordered, kGood});
   CHECK(judged_as_they_come({10, 20, kDay, 30, -kDay, 40}) ==
@@ -89,8 +89,8 @@ TEST_CASE("Stamps of a stream are judged as they come", "[sensors]") {
   CHECK(judged_as_they_come({10, least, most, 20}) == Verdicts{kGood, kJump, kJump, kGood});
 }
 
-TEST_CASE("The clock of a stream may be set, but not back behind what was used", "[sensors]") {
-  // Forward, as by a time server; also where it began with a stamp of no clock at all.
+TEST_CASE("The clock of a stream may be set but not back to times already used", "[sensors]") {
+  // Forward, as by a time server, and also if it began with an invalid stamp.
   CHECK(judged_as_they_come({10, 20, 30, 40, kDay, kDay + 1, kDay + 2, kDay + 3}) ==
         Verdicts{kGood, kGood, kGood, kGood, kJump, kJump, kGood, kGood});
   CHECK(judged_as_they_come({kDay, 10, 20, 30, 40}) == Verdicts{kGood, kJump, kJump, kGood, kGood});

@@ -37,7 +37,7 @@ cv::Mat shown(const ViewImage& image) {
 
 }  // namespace
 
-TEST_CASE("Images are told as they are, or smaller", "[view]") {
+TEST_CASE("Images keep their size or are reduced to the maximum width", "[view]") {
   const ViewImage as_it_is = view_image(image_of(640, 480), camera_of(640, 480));
   CHECK(as_it_is.stamp == 77);
   CHECK(shown(as_it_is).cols == 640);
@@ -49,7 +49,7 @@ TEST_CASE("Images are told as they are, or smaller", "[view]") {
   CHECK_THROWS_AS(view_image(image_of(0, 0), Camera{}), std::invalid_argument);
 }
 
-// A bright square around a feature is where the feature is said to be.
+// The feature must lie at the centre of a bright square that is drawn around it.
 TEST_CASE("Features are where the image shows them", "[view]") {
   TrackedImage image = image_of(1280, 800);
   StereoFrame frame = *image.frame;
@@ -75,7 +75,7 @@ TEST_CASE("Features are where the image shows them", "[view]") {
   CHECK(static_cast<double>(told.features[0][1]) == Approx(sum_y / sum).margin(0.2));
 }
 
-TEST_CASE("Whatever the camera sees fits into an update", "[view]") {
+TEST_CASE("A noisy image fits into an update", "[view]") {
   TrackedImage image = image_of(640, 640);
   StereoFrame frame = *image.frame;
   std::mt19937 rng(1);

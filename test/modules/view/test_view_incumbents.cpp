@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::uint64_t kFirst = 50, kSecond = 60;
 
-// What counted, by boot and keyframe.
+// Updates that counted, by boot id and keyframe.
 struct Page {
   ViewIncumbents incumbents;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> shown;
@@ -34,7 +34,7 @@ using Shown = std::vector<std::pair<std::uint64_t, std::uint32_t>>;
 
 }  // namespace
 
-TEST_CASE("Who tells as a robot that is there is not shown", "[view]") {
+TEST_CASE("A second process with the id of an active robot is not shown", "[view]") {
   Page page;
   for (std::uint32_t second = 0; second < 40; ++second) {
     page.tell(kFirst, second, second);
@@ -45,7 +45,7 @@ TEST_CASE("Who tells as a robot that is there is not shown", "[view]") {
   CHECK(page.incumbents.dropped() == 5);
 }
 
-TEST_CASE("A robot that is taken up is shown from its beginning, once the one before is silent",
+TEST_CASE("A resumed robot is shown from its beginning once the former process is silent",
           "[view]") {
   Page page;
   page.tell(kFirst, 0, 0.0);
@@ -57,11 +57,11 @@ TEST_CASE("A robot that is taken up is shown from its beginning, once the one be
   CHECK(page.shown == Shown{{kFirst, 0}, {kSecond, 0}, {kSecond, 1}, {kSecond, 2}, {kSecond, 3}});
   page.tell(kSecond, 4, 5.5);
   CHECK(page.shown.size() == 6);
-  page.tell(kFirst, 9, 6.0);  // its last word, late
+  page.tell(kFirst, 9, 6.0);  // Its last update, which is late.
   CHECK(page.shown.size() == 6);
 }
 
-TEST_CASE("After a robot has left another process of it counts at once", "[view]") {
+TEST_CASE("After a robot has left another process with its id counts at once", "[view]") {
   Page page;
   page.tell(kFirst, 0, 0.0);
   page.tell(kFirst, ViewContent(ViewState{.name = "alice", .phase = "leaving"}), 1.0);
@@ -69,7 +69,7 @@ TEST_CASE("After a robot has left another process of it counts at once", "[view]
   CHECK(page.shown == Shown{{kFirst, 0}, {kSecond, 0}});
 }
 
-TEST_CASE("What waits has a bound", "[view]") {
+TEST_CASE("The number of waiting updates is bounded", "[view]") {
   Page page;
   for (std::uint32_t k = 0; k < ViewIncumbents::kMostWaiting + 100; ++k) {
     page.tell(kFirst, k, 1e-3 * k);

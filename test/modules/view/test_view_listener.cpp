@@ -22,7 +22,7 @@ namespace {
 constexpr double kPatience_s = static_cast<double>(kPatience.count());
 constexpr std::array kChannels = {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages};
 
-// The telling half of a robot.
+// The sending half of a robot.
 struct Teller {
   Teller(const std::shared_ptr<const DdsDomain>& domain, RobotId robot, std::uint64_t boot = 0)
       : participant(domain,
@@ -59,7 +59,7 @@ struct Watching {
 
 }  // namespace
 
-TEST_CASE("Who watches hears what robots tell, in order", "[view]") {
+TEST_CASE("A viewer receives the updates of robots in order", "[view]") {
   Watching w;
   REQUIRE(w.is_read(ViewChannel::kView));
   REQUIRE(w.is_read(ViewChannel::kMesh));
@@ -74,7 +74,7 @@ TEST_CASE("Who watches hears what robots tell, in order", "[view]") {
     REQUIRE(std::holds_alternative<ViewKeyframes>(update.content));
     CHECK(std::get<ViewKeyframes>(update.content).first == k);
   }
-  // As many cells as there is no room for in a queue of one: each has its own.
+  // More cells than a queue for one reader holds, each with a chunk of its own.
   for (std::int32_t x = 0; x < 100; ++x) w.teller.tell(chunk(x));
   for (std::int32_t x = 0; x < 100; ++x) {
     const ViewUpdate update = w.heard();
@@ -88,7 +88,7 @@ TEST_CASE("Who watches hears what robots tell, in order", "[view]") {
   CHECK(w.listener.refused() == 0);
 }
 
-TEST_CASE("A robot knows who has come to watch", "[view]") {
+TEST_CASE("A robot detects new viewers", "[view]") {
   Watching w;
   REQUIRE(w.is_read(ViewChannel::kView));
   ViewWriter& writer = w.teller.on(ViewChannel::kView);
@@ -103,7 +103,7 @@ TEST_CASE("A robot knows who has come to watch", "[view]") {
   CHECK(writer.newcomers() == 0);
 }
 
-TEST_CASE("Who watches hears nothing of a second robot with a taken id", "[view]") {
+TEST_CASE("A viewer ignores a second robot with a taken id", "[view]") {
   Watching w;
   Teller twin(w.domain, 7, 1000);
   REQUIRE(w.is_read(ViewChannel::kView));
@@ -118,7 +118,7 @@ TEST_CASE("Who watches hears nothing of a second robot with a taken id", "[view]
   CHECK(std::get<ViewKeyframes>(next.content).first == 1);
 }
 
-TEST_CASE("Images come of the robots that are asked", "[view]") {
+TEST_CASE("Images arrive only from the robots that are asked", "[view]") {
   Watching w;
   Teller other(w.domain, 8);
   REQUIRE(w.is_read(ViewChannel::kView));
@@ -136,7 +136,7 @@ TEST_CASE("Images come of the robots that are asked", "[view]") {
   CHECK(eventually([&] { return other.on(ViewChannel::kImages).readers() == 1; }));
 }
 
-TEST_CASE("What robots do not write is counted and not handed on", "[view]") {
+TEST_CASE("Updates that no robot writes are counted and dropped", "[view]") {
   Watching w;
   const DdsEntity topic = create_view_topic(w.teller.participant.handle(), ViewChannel::kView);
   const DdsQos qos = make_dds_qos();
@@ -157,7 +157,7 @@ TEST_CASE("What robots do not write is counted and not handed on", "[view]") {
   };
   write({});
   write({77, 1, 2});
-  write(encode_view(chunk(1)));  // not here
+  write(encode_view(chunk(1)));  // Wrong channel for a chunk.
   write(std::vector<std::uint8_t>(kMaxViewBytes + 1));
   CHECK(eventually([&] {
     CHECK_FALSE(w.listener.next(0.0));

@@ -16,9 +16,9 @@ namespace km {
 namespace {
 
 constexpr RobotId kSelf = 7;
-constexpr double kDt_s = 0.1;  // between two ticks
+constexpr double kDt_s = 0.1;  // Time between two ticks.
 
-// A robot that is watched: time passes as the test says.
+// Robot with viewers; the test sets the time.
 struct Watched {
   explicit Watched(const ViewConfig& config = {})
       : participant(domain, {.robot = kSelf, .name = "alpha", .boot = 9}),
@@ -51,7 +51,7 @@ struct Watched {
     return result;
   }
 
-  // Whoever has just come is noticed with the next tick.
+  // The node detects a new viewer with the next tick.
   void pass(double seconds) {
     for (const double end_s = now_s + seconds; now_s < end_s; now_s += kDt_s) node.tell(now_s);
   }
@@ -98,7 +98,7 @@ struct Watched {
   ViewNode node;
 };
 
-// One who has come to watch, once it hears the robot.
+// Viewer that has discovered the robot.
 struct Visitor {
   explicit Visitor(Watched& robot) : listener(robot.domain) {
     REQUIRE(eventually([&] {
@@ -121,7 +121,7 @@ struct Visitor {
 
 }  // namespace
 
-TEST_CASE("With nobody to watch, nothing is told", "[view]") {
+TEST_CASE("Without viewers nothing is sent", "[view]") {
   Watched robot;
   robot.learn_keyframes(100);
   robot.learn_mesh(20);
@@ -131,10 +131,10 @@ TEST_CASE("With nobody to watch, nothing is told", "[view]") {
     CHECK(robot.told(channel) == 0);
 }
 
-TEST_CASE("The past and the present are told within their budgets", "[view]") {
+TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   const ViewConfig config = {};
   Watched robot(config);
-  constexpr std::size_t kKeyframes = 3000;  // 108 kB, and 84 kB as optimised
+  constexpr std::size_t kKeyframes = 3000;  // 108 kB of odometry, and 84 kB as optimised.
   robot.learn_keyframes(kKeyframes);
   const double begin_s = robot.now_s;
   Visitor visitor(robot);
@@ -154,7 +154,7 @@ TEST_CASE("The past and the present are told within their budgets", "[view]") {
            visitor.watcher.optimized.size() == kKeyframes;
   }));
 
-  // More moves than can be told.
+  // More moves than the budget allows to send.
   robot.pass(5.0);
   const double present_s = robot.now_s;
   const std::size_t present = robot.told();
@@ -168,7 +168,7 @@ TEST_CASE("The past and the present are told within their budgets", "[view]") {
   CHECK(rate > 0.9 * config.bytes_per_s);
 }
 
-TEST_CASE("A state is told once a second", "[view]") {
+TEST_CASE("A state is sent once a second", "[view]") {
   Watched robot;
   Visitor visitor(robot);
   robot.learn(OptimizerProgress{.anchor = 3, .members = {3, kSelf}, .round = 12, .cost = 5.5});
@@ -192,7 +192,7 @@ TEST_CASE("A state is told once a second", "[view]") {
   CHECK(state.sent_bytes[0].value > 0.0);
 }
 
-TEST_CASE("Who comes late is told all there is", "[view]") {
+TEST_CASE("A late viewer receives the full state", "[view]") {
   Watched robot;
   robot.learn_keyframes(50);
   const ClosureId id = closure_id({kSelf, 3}, {4, 9});
@@ -213,7 +213,7 @@ TEST_CASE("Who comes late is told all there is", "[view]") {
   Visitor second(robot);
   CHECK(knows_all(second));
   first.reset();
-  CHECK(eventually([&] {  // and when it is alone
+  CHECK(eventually([&] {  // Also after the other viewer has gone.
     robot.learn_mesh(20);
     robot.pass(1.0);
     second.hear_all();
@@ -221,9 +221,10 @@ TEST_CASE("Who comes late is told all there is", "[view]") {
   }));
 }
 
-TEST_CASE("Pieces that are gone when somebody comes go from those who have them", "[view]") {
+TEST_CASE("Chunks that are removed while a viewer appears are removed for the earlier viewers",
+          "[view]") {
   ViewConfig config = {};
-  config.mesh_bytes_per_s = 1000.0;  // so slow that both happen between two pieces
+  config.mesh_bytes_per_s = 1000.0;  // Slow enough that both events happen between two chunks.
   Watched robot(config);
   robot.learn_mesh(60);
   Visitor first(robot);
@@ -241,7 +242,7 @@ TEST_CASE("Pieces that are gone when somebody comes go from those who have them"
   CHECK(knows(first, 20));
 }
 
-TEST_CASE("Pieces of the mesh leave no faster than configured", "[view]") {
+TEST_CASE("Mesh chunks are sent no faster than configured", "[view]") {
   ViewConfig config = {};
   config.mesh_bytes_per_s = 20000.0;
   Watched robot(config);
@@ -260,7 +261,7 @@ TEST_CASE("Pieces of the mesh leave no faster than configured", "[view]") {
   CHECK(told_since() > 0.8 * config.mesh_bytes_per_s * (robot.now_s - begin_s));
 }
 
-TEST_CASE("At the end all is told", "[view]") {
+TEST_CASE("At the end all remaining updates are sent", "[view]") {
   Watched robot;
   std::optional<Visitor> visitor(std::in_place, robot);
   robot.learn_keyframes(400);
@@ -277,7 +278,7 @@ TEST_CASE("At the end all is told", "[view]") {
   }));
 }
 
-TEST_CASE("Images are told while they are asked for", "[view]") {
+TEST_CASE("Images are sent while they are requested", "[view]") {
   ViewConfig config = {};
   config.images_per_s = 30.0;
   Watched robot(config);

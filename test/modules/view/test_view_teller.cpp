@@ -19,11 +19,11 @@ namespace {
 
 constexpr RobotId kSelf = 3;
 
-// Poses are told as float32: at 100 m.
+// Rounding of float32 poses at 100 m.
 constexpr double kRounding_m = 2e-5;
 constexpr double kRounding_rad = 1e-6;
 
-// As it comes over the network.
+// Content after encoding and decoding.
 void hear(const ViewContent& content, Watcher& watcher) {
   const auto bytes = encode_view(content);
   CHECK(bytes.size() < ViewTeller::kUpdateBytes + 100);
@@ -90,11 +90,11 @@ Closure closure(const ClosureId& id, int inliers) {
 
 }  // namespace
 
-TEST_CASE("The newest pose is told a few times a second", "[view]") {
+TEST_CASE("The newest pose is sent a few times a second", "[view]") {
   ViewTeller teller(kSelf);
   Watcher watcher;
   Stamp last = 0;
-  for (int tick = 0; tick < 200; ++tick) {  // 20 images a second for 10 s
+  for (int tick = 0; tick < 200; ++tick) {  // 20 images a second for 10 s.
     OdometryState state;
     state.stamp = last = 1000 + tick;
     teller.add(state);
@@ -104,16 +104,16 @@ TEST_CASE("The newest pose is told a few times a second", "[view]") {
   hear_all(teller, watcher, 11.0);
   CHECK(watcher.poses.back().stamp == last);
   hear_all(teller, watcher, 12.0);
-  CHECK(watcher.poses.size() == 26);  // once
+  CHECK(watcher.poses.size() == 26);  // Each sent once.
 }
 
-TEST_CASE("Keyframes of odometry are told once, several at a time", "[view]") {
+TEST_CASE("Keyframes of odometry are sent once, several at a time", "[view]") {
   ViewTeller teller(kSelf);
   Watcher watcher;
   std::mt19937 rng(5);
   std::vector<SE3> truth;
   int updates = 0;
-  for (KeyframeIndex k = 0; k < 100; ++k) {  // 4 a second
+  for (KeyframeIndex k = 0; k < 100; ++k) {  // 4 keyframes a second.
     truth.push_back(random_pose(rng, 100.0));
     teller.add(keyframe(k, truth.back()));
     while (const auto content = teller.next(0.25 * k)) {
@@ -130,7 +130,7 @@ TEST_CASE("Keyframes of odometry are told once, several at a time", "[view]") {
   CHECK(watcher.odometry.at(0).anchor == kSelf);
 }
 
-TEST_CASE("Optimised poses are told again where they have moved", "[view]") {
+TEST_CASE("Optimised poses are sent again when they have moved", "[view]") {
   ViewTeller teller(kSelf);
   Watcher watcher;
   std::vector<SE3> poses = line(100);
@@ -144,7 +144,7 @@ TEST_CASE("Optimised poses are told again where they have moved", "[view]") {
     CHECK(watcher.optimized_told == 100);
   }
   SECTION("in small steps, once their sum is beyond the bound") {
-    for (int step = 1; step <= 12; ++step) {  // 4 mm: told after 3, 6, 9, 12 of them
+    for (int step = 1; step <= 12; ++step) {  // 4 mm: sent after 3, 6, 9, 12 of them.
       poses[40] = shifted(poses[40], 0.004);
       teller.add(trajectory(poses));
       hear_all(teller, watcher, 10.0 * step);
@@ -167,7 +167,7 @@ TEST_CASE("Optimised poses are told again where they have moved", "[view]") {
     CHECK(watcher.optimized_told == 200);
     check_within_bounds(watcher, poses, 9);
   }
-  SECTION("not those of others, nor what is not finite") {
+  SECTION("not the poses of other robots, nor poses that are not finite") {
     Trajectory other{9, 9, line(3)};
     other.T_world_kf[0].translation().y() = 50.0;
     teller.add(std::make_shared<const Trajectory>(other));
@@ -179,8 +179,8 @@ TEST_CASE("Optimised poses are told again where they have moved", "[view]") {
   }
 }
 
-// A graph that is optimised faster than it can be told: one update per round.
-TEST_CASE("What was told is within the bound in the end", "[view]") {
+// A graph that changes faster than it can be sent: one update per round.
+TEST_CASE("Sent poses are within the bound in the end", "[view]") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   ViewTeller teller(kSelf);
   Watcher watcher, late;
@@ -210,7 +210,7 @@ TEST_CASE("What was told is within the bound in the end", "[view]") {
   CHECK(late.odometry.size() == 300);
 }
 
-TEST_CASE("What becomes of a pair of keyframes is told as it changes", "[view]") {
+TEST_CASE("The stage of a pair of keyframes is sent when it changes", "[view]") {
   ViewTeller teller(kSelf);
   Watcher watcher;
   const ClosureId id = pair_of(10, 20);
@@ -222,13 +222,13 @@ TEST_CASE("What becomes of a pair of keyframes is told as it changes", "[view]")
   CHECK(verdict() == ViewVerdict::kCandidate);
   teller.add(outcome(id, ClosureStage::kRequested));
   CHECK(verdict() == ViewVerdict::kCandidate);
-  CHECK(watcher.order.size() == 1);  // no news
+  CHECK(watcher.order.size() == 1);  // No second update without a change.
   SECTION("verification stops") {
     teller.add(outcome(id, ClosureStage::kReceived, "too few matches"));
     CHECK(verdict() == ViewVerdict::kRejected);
     CHECK(watcher.closures.at(id).reason == "too few matches");
     CHECK(watcher.closures.at(id).matches == 40);
-    teller.add(closure(id, 33));  // the other robot has verified it
+    teller.add(closure(id, 33));  // The other robot has verified it.
     CHECK(verdict() == ViewVerdict::kVerified);
     CHECK(watcher.closures.at(id).reason.empty());
     CHECK(watcher.closures.at(id).inliers == 33);
@@ -243,7 +243,7 @@ TEST_CASE("What becomes of a pair of keyframes is told as it changes", "[view]")
     CHECK(watcher.closures.at(id).reason == "the other closures contradict it");
     teller.add(ClosureVerdicts{{{id, true}}});
     CHECK(verdict() == ViewVerdict::kKept);
-    teller.add(InlierSet{kSelf, 7, 1, {}});  // an old one
+    teller.add(InlierSet{kSelf, 7, 1, {}});  // An outdated version.
     CHECK(verdict() == ViewVerdict::kKept);
     teller.add(InlierSet{kSelf, 7, 3, {pair_of(11, 21)}});
     CHECK(verdict() == ViewVerdict::kVerified);
@@ -253,18 +253,18 @@ TEST_CASE("What becomes of a pair of keyframes is told as it changes", "[view]")
     CHECK(verdict() == ViewVerdict::kRejected);
     CHECK(watcher.closures.at(id).reason == "its robot was restarted");
   }
-  SECTION("a set that is known before its closure") {
+  SECTION("an inlier set that arrives before its closure") {
     teller.add(InlierSet{kSelf, 7, 2, {pair_of(12, 22)}});
     teller.add(closure(pair_of(12, 22), 50));
     hear_all(teller, watcher, 0.0);
     CHECK(watcher.closures.at(pair_of(12, 22)).verdict == ViewVerdict::kKept);
   }
-  SECTION("of other robots nothing is told") {
+  SECTION("no closures between other robots") {
     teller.add(closure(closure_id({1, 1}, {2, 2}), 50));
     hear_all(teller, watcher, 0.0);
     CHECK(watcher.closures.size() == 1);
   }
-  SECTION("to who comes late, as it is now") {
+  SECTION("the present stage to a late viewer") {
     teller.add(outcome(id, ClosureStage::kVerified));
     hear_all(teller, watcher, 0.0);
     Watcher late;
@@ -275,7 +275,7 @@ TEST_CASE("What becomes of a pair of keyframes is told as it changes", "[view]")
   }
 }
 
-TEST_CASE("Verified closures are told before all else", "[view]") {
+TEST_CASE("Verified closures are sent before all other updates", "[view]") {
   ViewTeller teller(kSelf);
   for (KeyframeIndex k = 0; k < 500; ++k) {
     teller.add(keyframe(k, SE3::Identity()));
@@ -293,8 +293,8 @@ TEST_CASE("Verified closures are told before all else", "[view]") {
   CHECK(watcher.odometry_told > 10);
   hear_all(teller, watcher, 0.0);
   CHECK(watcher.closures.size() == 500);
-  CHECK(watcher.order.size() == 500);        // each once
-  CHECK(watcher.order[1] == pair_of(0, 1));  // in the order in which they were found
+  CHECK(watcher.order.size() == 500);        // Each sent once.
+  CHECK(watcher.order[1] == pair_of(0, 1));  // In the order in which they were found.
 }
 
 }  // namespace km

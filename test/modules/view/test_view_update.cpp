@@ -16,7 +16,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Float32 at 10 m: half a unit in the last place, and as much from the quaternion.
+// Rounding of float32 at 10 m: half a unit in the last place, and as much from the quaternion.
 constexpr double kPoseTolerance = 2e-6;
 
 ViewState some_state() {
@@ -92,7 +92,7 @@ bool is_understood(const ViewContent& content) {
   return decode_view(encode_view(content)).has_value();
 }
 
-TEST_CASE("A state survives the wire", "[view]") {
+TEST_CASE("A state is unchanged by encoding and decoding", "[view]") {
   const ViewState sent = some_state();
   const ViewState got = round_trip(sent);
   CHECK(got.name == sent.name);
@@ -116,7 +116,7 @@ TEST_CASE("A state survives the wire", "[view]") {
   CHECK(got.loads[0].name == "vio");
 }
 
-TEST_CASE("Poses survive the wire as float32", "[view]") {
+TEST_CASE("Poses are encoded as float32", "[view]") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   const ViewPose sent{123, random_pose(rng)};
   const ViewPose got = round_trip(sent);
@@ -139,7 +139,7 @@ TEST_CASE("Poses survive the wire as float32", "[view]") {
   CHECK(round_trip(odometry).stamps == odometry.stamps);
 }
 
-TEST_CASE("Closures survive the wire", "[view]") {
+TEST_CASE("Closures are unchanged by encoding and decoding", "[view]") {
   const auto sent = some_closures().closures;
   const auto got = round_trip(some_closures()).closures;
   REQUIRE(got.size() == sent.size());
@@ -153,7 +153,7 @@ TEST_CASE("Closures survive the wire", "[view]") {
   }
 }
 
-TEST_CASE("Pieces of the mesh and images survive the wire", "[view]") {
+TEST_CASE("Mesh chunks and images are unchanged by encoding and decoding", "[view]") {
   CHECK(round_trip(some_chunk()) == some_chunk());
   const MeshChunk gone{.key = some_chunk().key};
   CHECK(round_trip(gone) == gone);
@@ -163,13 +163,13 @@ TEST_CASE("Pieces of the mesh and images survive the wire", "[view]") {
   CHECK(got.features == some_image().features);
 }
 
-TEST_CASE("Texts are told in printable ASCII", "[view]") {
+TEST_CASE("Texts are encoded in printable ASCII", "[view]") {
   ViewState state;
   state.name = "a\nb\xC3\xA9";
   CHECK(round_trip(state).name == "a?b??");
 }
 
-TEST_CASE("Views end where they end", "[view]") {
+TEST_CASE("Truncated and extended updates are refused", "[view]") {
   for (const Bytes& sample : samples()) {
     CAPTURE(int{sample[0]});
     REQUIRE(decode_view(sample));
@@ -183,7 +183,7 @@ TEST_CASE("Views end where they end", "[view]") {
   CHECK_FALSE(decode_view(Bytes{255, 0, 0}));
 }
 
-TEST_CASE("Views with numbers that cannot be are refused", "[view]") {
+TEST_CASE("Updates with impossible numbers are refused", "[view]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
   ViewState state;
@@ -208,7 +208,7 @@ TEST_CASE("Views with numbers that cannot be are refused", "[view]") {
   }
   SECTION("a rotation") {
     ViewKeyframes keyframes = some_keyframes(2);
-    keyframes.T_world_kf[1].linear() *= 1.1;  // its quaternion is none
+    keyframes.T_world_kf[1].linear() *= 1.1;  // A matrix that is no rotation.
     CHECK_FALSE(is_understood(keyframes));
   }
   SECTION("a feature") {
@@ -233,7 +233,7 @@ TEST_CASE("Views with numbers that cannot be are refused", "[view]") {
   }
 }
 
-TEST_CASE("Views have a bound", "[view]") {
+TEST_CASE("The size of an update is bounded", "[view]") {
   CHECK(is_understood(some_keyframes(2000)));
   CHECK_THROWS_AS(encode_view(some_keyframes(2200)), std::length_error);
   ViewImage image;
@@ -242,12 +242,12 @@ TEST_CASE("Views have a bound", "[view]") {
   image.jpeg.resize(kMaxViewBytes);
   CHECK_THROWS_AS(encode_view(image), std::length_error);
   Bytes bytes = encode_view(ViewKeyframes{});
-  bytes.back() = 0x7F;  // poses that are not there
+  bytes.back() = 0x7F;  // More poses than follow.
   CHECK_FALSE(decode_view(bytes));
 }
 
-// What is accepted can be shown: it is told as it was understood.
-TEST_CASE("Spoilt views harm nobody", "[view]") {
+// Each accepted update equals the result of encoding it again, so it is safe to show.
+TEST_CASE("Corrupted updates are refused or decoded consistently", "[view]") {
   const std::vector<Bytes> good = samples();
   InputSpoiler spoiler(GENERATE(1U, 2U));
   int accepted = 0;

@@ -10,7 +10,7 @@
 
 namespace km {
 
-/// What is known of a robot to one who watches from the beginning, or from when it came.
+/// State of a robot as a viewer knows it, from the beginning or from the time when it appeared.
 struct Watcher {
   void hear(const ViewContent& content) {
     std::visit([this](const auto& c) { take(c); }, content);

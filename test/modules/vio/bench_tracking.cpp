@@ -1,4 +1,4 @@
-// Quality and time of the front end on MH_01_easy, 0 to 15 s: bin/bench_tracking, by hand.
+// Quality and time of the feature tracker on MH_01_easy, 0 to 15 s; run bin/bench_tracking by hand.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <iomanip>

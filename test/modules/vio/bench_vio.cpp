@@ -1,13 +1,14 @@
 // Odometry on EuRoC MH_01_easy as in the table of results: three pieces and 21 starts.
 //   bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS] [flight=SECONDS]
 //             [late=MILLISECONDS] [turned=DEGREES] [KEY=VALUE ...]
-// with keys of the sections vio and tracker.
-// "rgbd" replaces the right images by depth made from both, "starts" adds the 21 starts, "black"
-// runs with one second of black images at each of 12 places, "resume" kills odometry
-// within the first seconds at every keyframe, once or at every n-th, and takes it up there, from
-// its state and anew. "rest" stands still for so long; DATASET is V1_01_easy then. "flight" runs
-// once over the first seconds of a recording. Inertial samples are stamped "late" by so much, and
-// cameras "turned" from where they are taken to be.
+// KEY is a key of the sections vio and tracker.
+//
+// "rgbd" replaces the right images by depth computed from both, and "starts" adds the 21 starts.
+// "black" runs with one second of black images at each of 12 positions. "resume" ends odometry
+// within the first seconds at every keyframe, once or at every n-th, and resumes it there, with the
+// state and without it. "rest" stands still for that time; DATASET is V1_01_easy then. "flight"
+// runs once over the first seconds of a recording. "late" delays the stamps of inertial samples,
+// and "turned" rotates the cameras against the rig's calibration.
 
 #include <algorithm>
 #include <array>
@@ -144,8 +145,8 @@ void run_black(const Recording& recording, const TrackerConfig& tracker, const V
   }
 }
 
-// Of odometry that is killed at the `keyframes`-th new keyframe of each of its first `kills` lives,
-// the first of which is `whole` up to there, and taken up there.
+// Errors of odometry that ends at the `keyframes`-th new keyframe of each of its first `kills`
+// processes and is resumed there. The first process is the beginning of `whole`.
 OdometryErrors killed_errors(const Recording& recording, const OdometryRun& whole,
                              std::size_t keyframes, std::size_t kills, bool from_state,
                              const TrackerConfig& tracker, const VioConfig& config) {

@@ -29,14 +29,14 @@ double thread_cpu_ms() {
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
-// Where a rectified camera sees what lies along the ray of a pixel of the left one, and how much
-// deeper that is along its axis than along the left camera's.
+// The pixel at which a rectified camera sees the ray of a pixel of the left camera, and the ratio
+// of the depths along their axes.
 struct SeenRay {
   Eigen::Vector2d rectified_px;
   double depth_ratio = 0.0;
 };
 
-// Of every pixel of the left camera; nullopt where its lens has no bearing.
+// Rays of all pixels of the left camera; nullopt if its lens has no bearing there.
 std::vector<std::optional<SeenRay>> seen_rays(const Camera& rectified, const Camera& left) {
   const SE3 T_rect_left = rectified.T_body_cam.inverse() * left.T_body_cam;
   std::vector<std::optional<SeenRay>> rays;
@@ -51,8 +51,8 @@ std::vector<std::optional<SeenRay>> seen_rays(const Camera& rectified, const Cam
   return rays;
 }
 
-// Makes `folder` a EuRoC folder of links to the images, which lie apart from their calibration in
-// the data.
+// Makes `folder` a EuRoC folder of links to the images. In the data they are separate from their
+// calibration.
 void link_static_start(const std::filesystem::path& recording,
                        const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder / "mav0");
@@ -72,8 +72,8 @@ void link_static_start(const std::filesystem::path& recording,
   }
 }
 
-// Plays `packets` again and again until they are `count`. Samples that lead up to the second image
-// stand before the first, too.
+// Repeats `packets` until there are `count` of them. The samples before the second image are also
+// used before each first one.
 void repeat(std::vector<SensorPacket>& packets, std::size_t count) {
   const std::size_t turn = packets.size();
   const Stamp step = packets[1].frame->stamp - packets[0].frame->stamp;
@@ -166,7 +166,7 @@ Recording disturbed(const Recording& recording, double late_s, double turned_rad
   std::size_t next = 0;
   for (SensorPacket& packet : result.packets) {
     packet.imu.clear();
-    if (next > 0) --next;  // the border sample of two packets
+    if (next > 0) --next;  // border sample of two packets
     while (next < samples.size() &&
            (packet.imu.empty() || packet.imu.back().stamp < packet.frame->stamp))
       packet.imu.push_back(samples[next++]);
@@ -176,7 +176,7 @@ Recording disturbed(const Recording& recording, double late_s, double turned_rad
 
 Recording as_rgbd(const Recording& recording, std::size_t every, std::size_t first) {
   const StereoRig& rig = recording.rig.stereo;
-  constexpr double kMaxDepth_m = 60.0;  // with some to spare to 16 bits of millimetres
+  constexpr double kMaxDepth_m = 60.0;  // below the range of 16 bits of millimetres
   StereoDepth stereo(rig, {.min_depth_m = 0.4, .max_depth_m = kMaxDepth_m});
   const auto rays = seen_rays(stereo.camera(), rig.cameras[0]);
   const auto through_lens = [&](const DepthImage& depth) {

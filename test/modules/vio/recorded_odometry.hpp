@@ -14,29 +14,29 @@
 
 namespace km {
 
-/// What Vio made of a recording.
+/// Results of Vio on a recording.
 struct OdometryRun {
   std::vector<OdometryState> states;
-  std::vector<SE3> truth;  ///< At the states.
+  std::vector<SE3> truth;  ///< True poses of the states.
   std::vector<KeyframeOdometry> keyframes;
-  std::vector<double> cpu_ms;  ///< Of each process(), this thread.
-  std::string kernel_share;    ///< Of a whole call, see test/support/processor_use.hpp.
+  std::vector<double> cpu_ms;  ///< Processor time of each process() in this thread.
+  std::string kernel_share;    ///< Share of a whole call, see test/support/processor_use.hpp.
   std::vector<VioResult> results;
   VioStatistics statistics;
 };
 
-/// Runs a fresh Vio over packets `first` to `last` (not included) of `recording`, which goes on
-/// from `checkpoint` if there is one.
+/// Runs a new Vio over packets `first` to `last` (not included) of `recording`. With a `checkpoint`
+/// it continues from there.
 OdometryRun run_odometry(const Recording& recording, std::size_t first, std::size_t last,
                          const TrackerConfig& tracker, const VioConfig& config,
                          const std::optional<VioCheckpoint>& checkpoint = {});
 
-/// The start of V1_01_easy in `folder`, 4.6 s at rest with rotors idling and five images a second,
-/// again and again for `duration_s`.
+/// The start of V1_01_easy in `folder`, 4.6 s at rest with idling rotors and five images a second,
+/// repeated for `duration_s`.
 Recording standing_recording(const std::filesystem::path& folder, double duration_s);
 
-/// `recording` with inertial samples that are stamped `late_s` too late and cameras that are taken
-/// to be turned by `turned_rad` about [1, 1, 1] of the body from where they are.
+/// `recording` with the stamps of inertial samples `late_s` too late. The calibration of its
+/// cameras is rotated by `turned_rad` about [1, 1, 1] of the body against the true one.
 Recording disturbed(const Recording& recording, double late_s, double turned_rad);
 
 /// Errors of a trajectory against the true poses of the same instants.
@@ -46,16 +46,17 @@ struct OdometryErrors {
   double rpe_m = 0.0;  ///< Root mean square over pairs 1 s apart.
   double rpe_deg = 0.0;
   double tilt_deg = 0.0;  ///< Root mean square angle between the verticals, no alignment.
-  double scale = 1.0;     ///< That Sim(3) alignment would apply to the estimate.
+  double scale = 1.0;     ///< Scale of a Sim(3) alignment of the estimate.
 };
 
 /// `truth[k]` belongs to `states[k]`; at least three of each.
 [[nodiscard]] OdometryErrors odometry_errors(std::span<const OdometryState> states,
                                              std::span<const SE3> truth);
 
-/// `recording` as an RGB-D camera in place of the stereo pair would have recorded it: its left
-/// images, with depth that StereoDepth makes of both, seen through the left camera's lens. The
-/// baseline stays, now virtual. Only every `every`th image has depth, from index `first` on.
+/// `recording` as an RGB-D camera in place of the stereo pair would have recorded it. It has the
+/// left images, with depth that StereoDepth computes from both, seen through the left camera's
+/// lens. The baseline is the same, but virtual. Only every `every`th image has depth, from index
+/// `first` on.
 [[nodiscard]] Recording as_rgbd(const Recording& recording, std::size_t every = 1,
                                 std::size_t first = 0);
 

@@ -137,7 +137,7 @@ TrackingRun run_tracker(const Recording& recording, const TrackerConfig& config,
       R = integrate_gyro(packet.imu, recording.packets[i - 1].frame->stamp, packet.frame->stamp,
                          bias);
     }
-    const std::clock_t start = std::clock();  // Processor time: others may be running.
+    const std::clock_t start = std::clock();  // Processor time: the processor is shared.
     run.frames.push_back(tracker.track(*packet.frame, R));
     run.milliseconds.push_back(1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
     run.statistics.push_back(tracker.statistics());

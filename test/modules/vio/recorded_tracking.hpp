@@ -19,7 +19,7 @@ struct Recording {
 /// Images of `folder` (EuRoC) from `from_s` to `to_s`, with poses of its groundtruth_tum.txt.
 Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s);
 
-/// What the tracker is told about the rotation between images.
+/// Rotation between images that the tracker receives.
 enum class RotationHint { kNone, kRawGyro, kCalibratedGyro };
 
 struct TrackingRun {

@@ -16,7 +16,7 @@ namespace km {
 inline constexpr double kGravity_mps2 = 9.81;
 
 /// A motion known in closed form: position and rotation vector are sums of a line and a sine per
-/// axis. All of it differentiable, so that the inertial samples are exact.
+/// axis. All of it is differentiable, so that the inertial samples are exact.
 struct SyntheticMotion {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d amplitude_m{0.3, 0.4, 0.2};
@@ -84,7 +84,7 @@ inline SensorRig synthetic_rig() {
   return rig;
 }
 
-/// Landmarks before the cameras and what a tracker without faults would see of them.
+/// Landmarks in front of the cameras, and the output of a tracker without faults.
 class SyntheticWorld {
  public:
   SyntheticWorld(SyntheticMotion motion, unsigned seed, std::size_t landmarks = 80)

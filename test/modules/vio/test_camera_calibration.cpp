@@ -75,7 +75,7 @@ TEST_CASE("Derivatives of a reprojection by the calibration agree with differenc
   }
 }
 
-// A rig whose cameras are taken to be turned and moved from where they are.
+// A rig whose calibration of the cameras is rotated and moved against the true one.
 SensorRig disturbed_rig(const SE3& T_body_rig) {
   SensorRig rig = synthetic_rig();
   for (Camera& camera : rig.stereo.cameras)
@@ -95,7 +95,7 @@ std::vector<InertialFrame> late_frames(SyntheticWorld& world, Stamp late) {
   return frames;
 }
 
-// Of a smoother that has gone through `frames`, started on the first 16 from their true states.
+// Calibration of a smoother after `frames`, started on the first 16 from their true states.
 UncertainCalibration estimated(const std::vector<InertialFrame>& frames,
                                const SyntheticWorld& world, const SensorRig& rig,
                                bool rests = false) {
@@ -109,18 +109,18 @@ UncertainCalibration estimated(const std::vector<InertialFrame>& frames,
   return smoother.calibration();
 }
 
-TEST_CASE("Stamps that are off are found out", "[vio][calibration]") {
+TEST_CASE("A time offset of the stamps is estimated", "[vio][calibration]") {
   const Stamp late = GENERATE(-30'000'000, 0, 10'000'000, 30'000'000);
   CAPTURE(late);
   SyntheticWorld world(SyntheticMotion{}, 21);
   const auto [calibration, covariance] =
       estimated(late_frames(world, late), world, synthetic_rig());
   CHECK(calibration.offset_s == Approx(seconds_between(0, late)).margin(5e-4));
-  CHECK(std::sqrt(covariance(0, 0)) < 1e-3);  // 0.7 ms with noise weighed as it is
+  CHECK(std::sqrt(covariance(0, 0)) < 1e-3);  // 0.7 ms with the modelled noise
   CHECK(angle_of(calibration.T_body_rig.linear()) < 2e-3);
 }
 
-TEST_CASE("Cameras that are turned are found out", "[vio][calibration]") {
+TEST_CASE("A rotation of the cameras is estimated", "[vio][calibration]") {
   const unsigned seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -135,7 +135,7 @@ TEST_CASE("Cameras that are turned are found out", "[vio][calibration]") {
   CHECK(calibration.T_body_rig.translation().norm() < 0.01);
 }
 
-TEST_CASE("A body that does not move keeps the calibration that it had", "[vio][calibration]") {
+TEST_CASE("The calibration of a body without motion does not change", "[vio][calibration]") {
   SyntheticMotion motion;
   motion.amplitude_m.setZero();
   motion.turn_amplitude.setZero();

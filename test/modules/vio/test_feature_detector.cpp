@@ -8,7 +8,7 @@ namespace km {
 namespace {
 
 // White squares of 20 px every 40 px on black from (first, first) on. Their shading varies a
-// little: in equal levels a corner would tie with its neighbours.
+// little, because with equal levels a corner would tie with its neighbours.
 GrayImage squares(int width, int height, int first) {
   GrayImage image{width, height, {}};
   for (int y = 0; y < height; ++y) {
@@ -22,7 +22,7 @@ GrayImage squares(int width, int height, int first) {
   return image;
 }
 
-TEST_CASE("Corners are found where the corners are", "[vio]") {
+TEST_CASE("Detected corners are at the true corners", "[vio]") {
   TrackerConfig config;
   config.max_features = 1000;
   config.min_distance_px = 8;
@@ -63,7 +63,7 @@ TEST_CASE("Corners keep their distance, avoid occupied places and cover the imag
   for (const int count : quadrants) CHECK(count >= 8);
 }
 
-TEST_CASE("No corners are asked for, none are possible", "[vio]") {
+TEST_CASE("No corners are returned if none are requested or possible", "[vio]") {
   TrackerConfig config;
   FeatureDetector detector(config);
   const ImagePyramid image(squares(240, 160, 30), config, true);

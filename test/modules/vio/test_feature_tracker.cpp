@@ -55,7 +55,7 @@ TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a p
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
 
-  std::map<std::uint64_t, Eigen::Vector3d> landmarks;  // Where the feature was first seen.
+  std::map<std::uint64_t, Eigen::Vector3d> landmarks;  // First position of each feature.
   std::vector<double> errors_px;
   constexpr int kFrames = 8;
   for (int i = 0; i < kFrames; ++i) {
@@ -112,7 +112,7 @@ TEST_CASE("Through a fisheye lens features stay on their landmarks, and pairs ha
   REQUIRE(errors_px.size() > 100);
   CHECK(quantile(errors_px, 0.5) < 0.05);
   CHECK(quantile(errors_px, 0.95) < 0.2);
-  REQUIRE(wide_errors_px.size() > 200);  // there the texture is too fine for the pixels
+  REQUIRE(wide_errors_px.size() > 200);  // the texture is too fine for the pixels there
   CHECK(quantile(wide_errors_px, 0.5) < 0.1);
   CHECK(quantile(wide_errors_px, 0.95) < 1.0);
   REQUIRE(depth_errors_px.size() > 4 * 50);
@@ -132,7 +132,7 @@ TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
 
   const double disparity_px = rig.cameras[0].fx * rig.baseline_m() / depth_m;
   std::vector<double> errors_px;
-  int visible = 0;  // To the right camera.
+  int visible = 0;  // Features that the right camera can see.
   for (const TrackedFeature& feature : frame.features) {
     const Eigen::Vector2d expected = feature.left - Eigen::Vector2d(0.11 / depth_m, 0.0);
     visible += rig.cameras[1].project(expected).value().x() > 16.0 ? 1 : 0;
@@ -146,7 +146,7 @@ TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
   CHECK(quantile(errors_px, 0.95) < 0.2);
 }
 
-TEST_CASE("Features that move by themselves are dropped", "[vio]") {
+TEST_CASE("Features with a motion of their own are dropped", "[vio]") {
   const StereoRig rig = test_rig();
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
@@ -224,7 +224,7 @@ TEST_CASE("After a second of darkness features return under new ids", "[vio]") {
   }
 }
 
-TEST_CASE("One dark eye leaves features without a right point", "[vio]") {
+TEST_CASE("A dark right image leaves features without a right point", "[vio]") {
   const StereoRig rig = test_rig();
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
@@ -270,7 +270,7 @@ TEST_CASE("An image of the wrong size or no rotation is refused and changes noth
   }
 }
 
-TEST_CASE("A rig or a configuration without sense is refused", "[vio]") {
+TEST_CASE("An invalid rig or configuration is refused", "[vio]") {
   StereoRig rig = test_rig();
   TrackerConfig config;
   config.window_px = 0;
@@ -294,7 +294,7 @@ std::ptrdiff_t located(const TrackedFrame& frame) {
                        [](const TrackedFeature& f) { return f.right.has_value(); });
 }
 
-TEST_CASE("Depth puts features where a right camera would see them", "[vio]") {
+TEST_CASE("Depth gives features the right points of a virtual camera", "[vio]") {
   const StereoRig rig = test_rgbd_rig();
   const TexturedPlane plane{2.0, 0.06, 3};
   FeatureTracker tracker(rig, small_image_config());
@@ -313,7 +313,7 @@ TEST_CASE("Depth puts features where a right camera would see them", "[vio]") {
   }
 }
 
-TEST_CASE("Features outlive images without depth", "[vio]") {
+TEST_CASE("Features survive images without depth", "[vio]") {
   const StereoRig rig = test_rgbd_rig();
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
@@ -325,7 +325,7 @@ TEST_CASE("Features outlive images without depth", "[vio]") {
     const TrackedFrame result = tracker.track(frame, Eigen::Matrix3d::Identity());
     CHECK(result.features.size() > 40);
     CHECK((located(result) > 0) == with_depth);
-    // The motion carries the depth from one depth image to the next.
+    // The motion propagates the depth from one depth image to the next.
     if (i > 0) CHECK(tracker.statistics().motion_known);
   }
 }
@@ -366,7 +366,7 @@ TEST_CASE("Holes and edges of the depth image give no right observation", "[vio]
   CHECK(beyond > 10);
 }
 
-TEST_CASE("Nearer than the nearest depth is no depth", "[vio]") {
+TEST_CASE("A depth below the smallest one is no depth", "[vio]") {
   const StereoRig rig = test_rgbd_rig();
   TrackerConfig config = small_image_config();
   config.min_depth_m = 2.5;

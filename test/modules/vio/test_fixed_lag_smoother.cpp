@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-// glog, which comes with Ceres, has a CHECK of its own that ends the program.
+// glog, which comes with Ceres, has its own CHECK, which ends the program.
 #pragma push_macro("CHECK")
 #undef CHECK
 #include <ceres/ceres.h>
@@ -20,8 +20,8 @@ namespace {
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// A frame of the window by 15 parameters: the local coordinates of its pose about where it stood at
-// first, then velocity, gyro bias and accelerometer bias.
+// A frame of the window as 15 parameters: local coordinates of its pose about the first one, then
+// velocity, gyro bias and accelerometer bias.
 struct Chart {
   OdometryState origin;
   FirstEstimate held;
@@ -198,8 +198,9 @@ void WindowProblem::add_landmarks(const Window& window) {
   }
 }
 
-// A second opinion on optimize(): the same cost, minimised by trust-region steps of Ceres with the
-// landmarks eliminated (DENSE_SCHUR). Not usable: Ceres failed, and the window is as it was.
+// An independent optimize(): minimises the same cost by trust-region steps of Ceres with the
+// landmarks eliminated (DENSE_SCHUR). If Ceres fails, the solution is not usable and the window is
+// unchanged.
 WindowSolution optimize_by_ceres(Window& window, int max_iterations) {
   WindowProblem problem(window);
   ceres::Solver::Options options;
@@ -258,7 +259,7 @@ double position_error(const OdometryState& state, const SyntheticWorld& world) {
       .norm();
 }
 
-TEST_CASE("Exact data of a constant velocity are recovered exactly", "[vio]") {
+TEST_CASE("The motion at constant velocity is estimated exactly from exact data", "[vio]") {
   SyntheticMotion motion;
   motion.amplitude_m.setZero();
   motion.turn_amplitude.setZero();
@@ -274,7 +275,7 @@ TEST_CASE("Exact data of a constant velocity are recovered exactly", "[vio]") {
   }
 }
 
-TEST_CASE("Biases and a lively motion are recovered from exact data", "[vio]") {
+TEST_CASE("Biases and a varied motion are estimated from exact data", "[vio]") {
   SyntheticMotion motion;
   motion.gyro_bias = {0.01, -0.015, 0.005};
   motion.accel_bias = {0.02, 0.03, -0.02};
@@ -300,8 +301,8 @@ TEST_CASE("The window stays bounded and its prior covers keyframes only", "[vio]
     CHECK(window.frames.at(frame_index(window, id)).keyframe);
 }
 
-// How everything turns about the vertical, and shifts, seen from each state: no measurement
-// changes.
+// Directions of a common rotation about the vertical and a common shift, as each state sees them.
+// They change no measurement.
 Eigen::MatrixXd unobservable_directions(const Window& window) {
   const std::vector<FirstEstimate> held = first_estimates(window);
   Eigen::MatrixXd N(15 * static_cast<Eigen::Index>(window.frames.size()), 4);
@@ -320,8 +321,8 @@ Eigen::MatrixXd unobservable_directions(const Window& window) {
 }
 
 TEST_CASE("Marginalisation gives no information on heading and position", "[vio]") {
-  // Nothing holds the first state here, so the information along these directions is zero, and
-  // first-estimate derivatives keep it so although the estimates move after each marginalisation.
+  // Nothing holds the first state here, so the information along these directions is zero.
+  // First-estimate derivatives keep it zero although the estimates move after each marginalisation.
   SyntheticWorld world(SyntheticMotion{}, 4);
   VioConfig config = gaussian_config();
   config.calibrate = false;
@@ -340,7 +341,7 @@ TEST_CASE("Marginalisation gives no information on heading and position", "[vio]
     const Eigen::MatrixXd H = equations.H().selfadjointView<Eigen::Lower>();
     const Eigen::MatrixXd N = unobservable_directions(window);
     const Eigen::VectorXd information = (N.transpose() * H * N).diagonal();
-    // Against what a single state has: rounding of numbers that cancel.
+    // Relative to the information of a single state, to allow for cancellation.
     const double known = H.topLeftCorner<6, 6>().trace();
     for (const double value : information) CHECK(std::abs(value) < 1e-8 * known);
   }
@@ -371,7 +372,7 @@ struct ModelledRun {
   OdometryState last;
 };
 
-// Noise in images and samples, and biases off their guess, all as modelled.
+// Noise in images and samples, and errors of the guessed biases, all as modelled.
 ModelledRun run_as_modelled(unsigned seed, const VioConfig& config) {
   constexpr double kGyroBiasSigma = 0.02;  // around the guess of a start
   std::mt19937 rng(seed + 300);
@@ -390,7 +391,7 @@ ModelledRun run_as_modelled(unsigned seed, const VioConfig& config) {
   return run;
 }
 
-TEST_CASE("Relative poses err as their covariance says", "[vio]") {
+TEST_CASE("The errors of relative poses agree with their covariance", "[vio]") {
   // Mean of chi-squared with 6 degrees of freedom over the runs: 6 with this standard deviation.
   constexpr int kRuns = 60;
   const double sigma = std::sqrt(12.0 / kRuns);
@@ -413,7 +414,7 @@ TEST_CASE("Relative poses err as their covariance says", "[vio]") {
   CHECK(std::abs(sum - 6.0) < 3 * sigma);
 }
 
-// What a StateCovariance is about, of the difference from `estimate` to `truth`.
+// Components of a StateCovariance, for the difference from `estimate` to `truth`.
 Eigen::Matrix<double, 11, 1> difference(const OdometryState& estimate, const OdometryState& truth) {
   const Eigen::Vector3d turn =
       so3_log(truth.T_odom_body.linear() * estimate.T_odom_body.linear().transpose());
@@ -424,7 +425,7 @@ Eigen::Matrix<double, 11, 1> difference(const OdometryState& estimate, const Odo
   return e;
 }
 
-TEST_CASE("A gyroscope that is noisier than assumed is trusted less", "[vio]") {
+TEST_CASE("A gyroscope that is noisier than assumed has less weight", "[vio]") {
   const auto scale_with = [](double factor) {
     const VioConfig config = gaussian_config();
     VioConfig noisy = config;
@@ -444,7 +445,7 @@ TEST_CASE("A gyroscope that is noisier than assumed is trusted less", "[vio]") {
   CHECK(tenfold <= GyroNoiseScale::kMost);
 }
 
-TEST_CASE("States err as their covariance says", "[vio]") {
+TEST_CASE("The errors of states agree with their covariance", "[vio]") {
   // Mean of chi-squared with 11 degrees of freedom over 20 runs: 11 with a standard deviation of
   // 1.05.
   double sum = 0.0;
@@ -461,7 +462,7 @@ TEST_CASE("States err as their covariance says", "[vio]") {
   CHECK(std::abs(sum - 11.0) < 3 * 1.05);
 }
 
-TEST_CASE("A start from a state with its covariance knows what was known", "[vio]") {
+TEST_CASE("A start from a state with its covariance keeps that covariance", "[vio]") {
   SyntheticMotion motion;
   motion.gyro_bias = {0.005, -0.01, 0.01};
   SyntheticWorld world(motion, 10, 40);
@@ -478,7 +479,7 @@ TEST_CASE("A start from a state with its covariance knows what was known", "[vio
   REQUIRE(kept);
   const Eigen::Matrix<double, 11, 1> scale = known->diagonal().cwiseSqrt().cwiseInverse();
   CHECK((scale.asDiagonal() * (*kept - *known) * scale.asDiagonal()).norm() < 1e-6);
-  // From the next image on there are poses; what the biases were is not learnt anew.
+  // All images from the next one on have poses, and the biases stay known.
   for (std::size_t k = kLast + 1; k < frames.size(); ++k) {
     const SmootherUpdate update = smoother.add(frames[k]);
     REQUIRE(update.solution.usable);
@@ -512,7 +513,7 @@ TEST_CASE("Ceres reaches the same minimum of a window with a prior", "[vio]") {
               .norm() < 1e-4);
 }
 
-TEST_CASE("Wrong observations are dropped and do no harm", "[vio]") {
+TEST_CASE("Wrong observations are dropped and do not increase the error", "[vio]") {
   SyntheticWorld world(SyntheticMotion{}, 6);
   auto frames = world.frames(60, 0.5);
   std::mt19937 rng(6);
@@ -536,15 +537,14 @@ TEST_CASE("A second without features is bridged by the inertial samples", "[vio]
   for (std::size_t k = 50; k < frames.size(); ++k)  // the tracker sees new features afterwards
     for (TrackedFeature& feature : frames[k].tracked.features) feature.id += 1000;
   VioConfig config = gaussian_config();
-  config.calibrate = false;  // seven unknowns more are not known so well after a second and a half
+  config.calibrate = false;  // seven more unknowns are not well known after 1.5 s
   const Run run = run_smoother(frames, world, 0.005, config);
   for (const SmootherUpdate& update : run.updates) CHECK(update.solution.usable);
   CHECK(position_error(run.states[49], world) < 0.05);
   CHECK(position_error(run.states.back(), world) < 0.05);
 }
 
-TEST_CASE("However long a body rests, the window keeps its keyframes and grows by nothing",
-          "[vio][rest]") {
+TEST_CASE("During a long rest the window keeps its keyframes and does not grow", "[vio][rest]") {
   SyntheticMotion motion;
   motion.amplitude_m.setZero();
   motion.turn_amplitude.setZero();
@@ -573,12 +573,12 @@ TEST_CASE("However long a body rests, the window keeps its keyframes and grows b
   for (std::size_t k = before.size(); k < run.smoother.window().frames.size(); ++k)
     samples += run.smoother.window().frames[k].samples.size();
   CHECK(run.smoother.window().frames.size() <= before.size() + 4);
-  CHECK(samples <= std::size_t{4 * 13});  // of 50 ms each, at 200 Hz, and both borders
+  CHECK(samples <= std::size_t{4 * 13});  // samples in 50 ms at 200 Hz, with both borders
   // Ten seconds between two images of one rest.
   const auto T = run.smoother.relative_pose(frames[kRest].tracked.stamp, update.state.stamp);
   REQUIRE(T);
   CHECK(T->T.translation().norm() < 5e-3);
-  // A centimetre is what goes unnoticed at rest.
+  // A centimetre is not noticed at rest.
   CHECK(T->Sigma.diagonal().maxCoeff() < 2e-4);
 }
 

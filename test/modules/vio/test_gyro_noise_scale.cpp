@@ -19,7 +19,7 @@ double scale_after(GyroNoiseScale& noise, double sigmas, double seconds) {
   return noise.scale();
 }
 
-TEST_CASE("The scale of the gyroscope's noise is what images say, within bounds", "[vio]") {
+TEST_CASE("The scale of the gyroscope's noise follows the images within bounds", "[vio]") {
   GyroNoiseScale noise;
   CHECK(noise.scale() == 1.0);
   CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
@@ -28,7 +28,7 @@ TEST_CASE("The scale of the gyroscope's noise is what images say, within bounds"
   CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
 }
 
-TEST_CASE("One image does not make a gyroscope noisy", "[vio]") {
+TEST_CASE("One image does not change the noise of the gyroscope", "[vio]") {
   GyroNoiseScale noise;
   noise.add(1.0, 3.0 * kSigma_rad * kSigma_rad, 0.05);
   CHECK(noise.scale() == 1.0);

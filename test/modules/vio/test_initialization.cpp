@@ -57,7 +57,7 @@ TEST_CASE("A start in motion finds gravity, velocities and the gyro's bias", "[v
   CHECK(start.gravity_mps2 == Approx(kGravity_mps2).epsilon(0.05));
 }
 
-TEST_CASE("A start at rest has no velocity and takes the gyro's mean for its bias", "[vio]") {
+TEST_CASE("A start at rest has no velocity and uses the gyro's mean as its bias", "[vio]") {
   SyntheticMotion motion = at_rest();
   motion.gyro_bias = {0.02, -0.01, 0.03};
   SyntheticWorld world(motion, 1);
@@ -70,7 +70,7 @@ TEST_CASE("A start at rest has no velocity and takes the gyro's mean for its bia
   }
 }
 
-TEST_CASE("Constant velocity is no rest although the inertial data look like it", "[vio]") {
+TEST_CASE("Constant velocity is not detected as rest by a start", "[vio]") {
   SyntheticMotion motion = at_rest();
   motion.velocity = {0.3, 0.2, 0.0};
   SyntheticWorld world(motion, 2);
@@ -79,7 +79,7 @@ TEST_CASE("Constant velocity is no rest although the inertial data look like it"
   CHECK((start.states.back().v_odom.norm()) == Approx(motion.velocity.norm()).epsilon(0.05));
 }
 
-TEST_CASE("Images at rest with lively inertial data are no rest", "[vio]") {
+TEST_CASE("Images at rest with inertial data of a motion are not detected as rest", "[vio]") {
   SyntheticWorld still(at_rest(), 3), moving(SyntheticMotion{}, 3);
   auto frames = still.frames(kImages, 0.1);
   const auto other = moving.frames(kImages);
@@ -87,7 +87,7 @@ TEST_CASE("Images at rest with lively inertial data are no rest", "[vio]") {
   CHECK(guess(frames).status != StartStatus::kAtRest);
 }
 
-TEST_CASE("Inertial data that do not fit the images are found inconsistent", "[vio]") {
+TEST_CASE("Inertial data that contradict the images are inconsistent", "[vio]") {
   SyntheticWorld world(SyntheticMotion{}, 4);
   auto frames = world.frames(kImages, 0.1);
   for (InertialFrame& frame : frames)
@@ -95,7 +95,7 @@ TEST_CASE("Inertial data that do not fit the images are found inconsistent", "[v
   CHECK(guess(frames).status == StartStatus::kInconsistent);
 }
 
-TEST_CASE("Too few features or images are told apart", "[vio]") {
+TEST_CASE("A start distinguishes too few features from too few images", "[vio]") {
   SyntheticWorld world(SyntheticMotion{}, 5);
   auto frames = world.frames(kImages);
   CHECK(guess({frames.begin(), frames.begin() + 3}).status == StartStatus::kTooFewImages);

@@ -6,14 +6,15 @@
 namespace km {
 namespace {
 
-TEST_CASE("A speed lasts for about a second", "[vio]") {
+TEST_CASE("A speed persists for about a second", "[vio]") {
   CHECK(coasting_s(0.0) == 0.0);
-  CHECK(coasting_s(0.1) == Approx(0.05).epsilon(0.05));  // both ends together: all of the time
+  CHECK(coasting_s(0.1) == Approx(0.05).epsilon(0.05));  // both ends together cover all of the time
   CHECK(coasting_s(2.0) < 1.0);
   CHECK(coasting_s(1e9) == Approx(1.0));
 }
 
-TEST_CASE("The longer nobody saw the body, and the faster it was, the less is known", "[vio]") {
+TEST_CASE("The covariance across a new start grows with the time without images and the speed",
+          "[vio]") {
   const Matrix6 at_once = restart_covariance();
   CHECK(at_once.isDiagonal());
   CHECK(at_once(2, 2) == Approx(0.09));

@@ -95,7 +95,7 @@ TEST_CASE("In a pure rotation two-point RANSAC keeps all true matches", "[vio]")
   CHECK(result.inliers == 60);
 }
 
-TEST_CASE("Two-point RANSAC does not judge fewer than three pairs", "[vio]") {
+TEST_CASE("Two-point RANSAC keeps all of fewer than three pairs", "[vio]") {
   std::mt19937 rng(1);
   const auto count = static_cast<std::size_t>(GENERATE(0, 1, 2));
   const std::vector<BearingPair> pairs(count, {Eigen::Vector2d(0.1, 0.2), Eigen::Vector2d(-1, 3)});

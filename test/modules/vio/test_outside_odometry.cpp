@@ -48,7 +48,7 @@ struct Run {
   }
 };
 
-TEST_CASE("Poses from outside are handed on, with keyframes by time and distance",
+TEST_CASE("Poses of an external odometry are published with keyframes by time and distance",
           "[outside_odometry]") {
   Run run;
   for (int k = 0; k < 40; ++k) run.add(packet(k, ahead(0.05 * std::min(k, 20))));
@@ -77,18 +77,17 @@ TEST_CASE("Poses from outside are handed on, with keyframes by time and distance
   CHECK(run.jumps == 0);
 }
 
-TEST_CASE("A body that stands still makes no keyframes, for however long", "[outside_odometry]") {
+TEST_CASE("A body that stands still makes no keyframes for any duration", "[outside_odometry]") {
   Run run;
   for (int k = 0; k <= 600; ++k) run.add(packet(k, ahead(0.0)));
   CHECK(run.keyframes.size() == 1);
   CHECK(run.states.size() == 601);
   for (int k = 601; k < 604; ++k) run.add(packet(k, ahead(0.1 * (k - 600))));
-  REQUIRE(run.keyframes.size() == 2);  // the rest behind it is no drift
+  REQUIRE(run.keyframes.size() == 2);  // the rest before it adds no drift
   CHECK(run.keyframes[1].covariance(3, 3) == Approx(0.3 * 1e-4));
 }
 
-TEST_CASE("A body that trembles in its place stands still, one that creeps away does not",
-          "[outside_odometry]") {
+TEST_CASE("A body that trembles stands still and one that creeps does not", "[outside_odometry]") {
   Run trembling, creeping;
   constexpr double kSpeed_mps = 0.005;
   for (int k = 0; k <= 600; ++k) {
@@ -102,7 +101,7 @@ TEST_CASE("A body that trembles in its place stands still, one that creeps away 
   CHECK(creeping.keyframes[1].covariance(3, 3) == Approx(2.0 * 1e-4));
 }
 
-TEST_CASE("A body that turns about in its place makes keyframes", "[outside_odometry]") {
+TEST_CASE("A body that turns on the spot makes keyframes", "[outside_odometry]") {
   Run run;
   for (int k = 0; k <= 60; ++k)
     run.add(packet(k, make_pose(so3_exp(Eigen::Vector3d(0, 0, k % 2 == 0 ? 0.0 : 0.05)),
@@ -110,7 +109,7 @@ TEST_CASE("A body that turns about in its place makes keyframes", "[outside_odom
   CHECK(run.keyframes.size() == 4);  // each 2 s
 }
 
-TEST_CASE("A keyframe's covariance is what that of the odometry grew by, and drift",
+TEST_CASE("A keyframe's covariance is the growth of the odometry's covariance plus drift",
           "[outside_odometry]") {
   const Matrix6 step = (Vector6() << 1e-6, 2e-6, 3e-6, 4e-4, 5e-4, 6e-4).finished().asDiagonal();
   const SE3 motion = se3_exp((Vector6() << 0.02, -0.01, 0.1, 0.3, 0.02, -0.01).finished());
@@ -131,7 +130,8 @@ TEST_CASE("A keyframe's covariance is what that of the odometry grew by, and dri
   }
   expected.diagonal().head<3>().array() += 0.3 * 1e-6;
   expected.diagonal().tail<3>().array() += 0.3 * 1e-4;
-  // Of one that stays the same in the body's axes rounding is left, and the rotation of its axes.
+  // A covariance that is constant in the body's axes leaves only rounding and the rotation of the
+  // axes.
   if (grows) CHECK(run.keyframes[5].covariance.isApprox(expected, 1e-5));
   CHECK(is_covariance(run.keyframes[5].covariance));
   CHECK(
@@ -139,7 +139,7 @@ TEST_CASE("A keyframe's covariance is what that of the odometry grew by, and dri
           .all());
 }
 
-TEST_CASE("Without a covariance the drift is all that is known", "[outside_odometry]") {
+TEST_CASE("Without a covariance only the drift counts", "[outside_odometry]") {
   Run run;
   for (int k = 0; k < 11; ++k) run.add(packet(k, ahead(0.05 * k)));
   const Matrix6 covariance = run.keyframes.at(1).covariance;
@@ -178,7 +178,7 @@ TEST_CASE("Packets without a pose, and images out of order, give nothing", "[out
   CHECK(run.keyframes.size() == 1);
 }
 
-TEST_CASE("Odometry from outside goes on behind a keyframe", "[outside_odometry]") {
+TEST_CASE("An external odometry continues after a keyframe", "[outside_odometry]") {
   Run whole, first, second;
   const auto at = [](int k) {
     return packet(k, ahead(0.05 * k), 1e-4 * (k + 1) * Matrix6::Identity());
@@ -190,7 +190,7 @@ TEST_CASE("Odometry from outside goes on behind a keyframe", "[outside_odometry]
   for (int k = 10; k < 30; ++k) second.add(at(k));
   REQUIRE(second.keyframes.size() == whole.keyframes.size() - 3);
   CHECK(second.frames.size() == 20);
-  CHECK(second.states.size() == 19);  // that of the keyframe has been given out
+  CHECK(second.states.size() == 19);  // the state of the keyframe has been published
   for (std::size_t k = 0; k < second.keyframes.size(); ++k) {
     const KeyframeOdometry &a = second.keyframes[k], &b = whole.keyframes[k + 3];
     CHECK(a.id.index == b.id.index);

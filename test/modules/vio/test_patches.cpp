@@ -26,7 +26,7 @@ cv::Mat warped_texture(const Eigen::Matrix2f& A, const Eigen::Vector2f& centre, 
   return image;
 }
 
-TEST_CASE("A patch is found again under a known warp and in other light", "[vio]") {
+TEST_CASE("A patch is aligned under a known warp and in other light", "[vio]") {
   const Eigen::Vector2f centre(80.0F, 60.0F);
   const cv::Mat reference = warped_texture(Eigen::Matrix2f::Identity(), centre, 1.0, 0.0);
   Eigen::Matrix2f A = Eigen::Matrix2f::Identity();
@@ -44,7 +44,7 @@ TEST_CASE("A patch is found again under a known warp and in other light", "[vio]
   CHECK(found->correlation > 0.99F);
 }
 
-TEST_CASE("A patch is not found where it is not", "[vio]") {
+TEST_CASE("A patch is not aligned with other texture", "[vio]") {
   const Eigen::Vector2f centre(80.0F, 60.0F);
   const Eigen::Matrix2f I = Eigen::Matrix2f::Identity();
   const cv::Mat image = warped_texture(I, centre, 1.0, 0.0);
@@ -61,7 +61,7 @@ TEST_CASE("A patch is not found where it is not", "[vio]") {
   CHECK_FALSE(AlignmentPatch::cut(image, {80.0F, 119.0F}));
 }
 
-TEST_CASE("An edge is no patch: it can slide", "[vio]") {
+TEST_CASE("An edge gives no patch because it can slide", "[vio]") {
   cv::Mat edge(120, 160, CV_8UC1, cv::Scalar(20));
   edge.colRange(80, 160).setTo(200);
   CHECK_FALSE(AlignmentPatch::cut(edge, {80.0F, 60.0F}));
@@ -87,12 +87,12 @@ TEST_CASE("The local warp is the derivative of the image of a facing surface", "
   CHECK((A.cast<double>() * offset - expected).norm() < 0.02);  // Second order.
   const SE3 behind = make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, -2.0));
   CHECK(local_warp(camera, camera, bearing, 1.0 / 1.5, behind).isIdentity());
-  // Next to a bearing that the lens has not.
+  // Next to bearings outside the field of view of the lens.
   const Eigen::Vector2d rim(camera.lens.max_bearing() - 1e-4, 0.0);
   CHECK(local_warp(camera, camera, rim, 0.0, SE3::Identity()).isIdentity());
 }
 
-TEST_CASE("Patch correlation is blind to gain and offset and nothing else", "[vio]") {
+TEST_CASE("Patch correlation is invariant only to gain and offset", "[vio]") {
   const StereoRig rig = test_rig();
   const cv::Mat picture = view(TexturedPlane{}.render(rig.cameras[0], SE3::Identity())).clone();
   const cv::Mat dimmed = picture / 2 + 30;
@@ -103,7 +103,7 @@ TEST_CASE("Patch correlation is blind to gain and offset and nothing else", "[vi
   CHECK(PatchTemplate(255 - picture, 150, 80).correlation(picture, 150, 80) < -0.999F);
 }
 
-TEST_CASE("A flat patch is like no other", "[vio]") {
+TEST_CASE("A flat patch correlates with no other", "[vio]") {
   const StereoRig rig = test_rig();
   const cv::Mat flat(240, 376, CV_8UC1, cv::Scalar(100));
   const cv::Mat other = view(TexturedPlane{}.render(rig.cameras[0], SE3::Identity())).clone();

@@ -37,7 +37,7 @@ TEST_CASE("MH_01_easy: every image has a pose, within a centimetre", "[vio]") {
 TEST_CASE("MH_01_easy: depth in place of the right image is about as good", "[vio]") {
   const Recording* const stereo = recording();
   if (stereo == nullptr) return;
-  Recording part = *stereo;  // dense stereo takes its time
+  Recording part = *stereo;  // dense stereo is slow
   part.packets.resize(60);
   const Recording data = as_rgbd(part);
   const OdometryRun run = run_odometry(data, 0, data.packets.size(), TrackerConfig{}, {});
@@ -51,13 +51,13 @@ TEST_CASE("MH_01_easy: depth in place of the right image is about as good", "[vi
   CHECK(errors.scale == Approx(1.0).epsilon(0.03));
 }
 
-TEST_CASE("MH_01_easy: depth at a quarter of the rate will do", "[vio]") {
+TEST_CASE("MH_01_easy: depth at a quarter of the rate suffices", "[vio]") {
   const Recording* const stereo = recording();
   if (stereo == nullptr) return;
   const std::size_t first = 2;
   const Recording data = as_rgbd(*stereo, 4, first);
   const OdometryRun run = run_odometry(data, 0, data.packets.size(), TrackerConfig{}, {});
-  // What came before the first depth has no pose: there was nothing to start on.
+  // Images before the first depth have no pose, because no start was possible on them.
   CHECK(run.states.size() == data.packets.size() - first);
   CHECK(run.statistics.images_without_pose == static_cast<int>(first));
   CHECK(run.statistics.starts == 1);
@@ -71,7 +71,7 @@ TEST_CASE("MH_01_easy: depth at a quarter of the rate will do", "[vio]") {
   CHECK(errors.rpe_deg < 0.3);
 }
 
-// From image `first` to image `last`, not included, there is no light.
+// Images `first` to `last`, not included, are black.
 Recording darkened(Recording recording, std::size_t first, std::size_t last) {
   for (std::size_t k = first; k < last; ++k) {
     auto frame = std::make_shared<StereoFrame>(*recording.packets[k].frame);
@@ -82,7 +82,7 @@ Recording darkened(Recording recording, std::size_t first, std::size_t last) {
   return recording;
 }
 
-TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
+TEST_CASE("MH_01_easy: odometry continues over a second of black images", "[vio]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   const Recording black = darkened(*data, 36, 56);
@@ -95,7 +95,7 @@ TEST_CASE("MH_01_easy: a second of black images does not lose it", "[vio]") {
   CHECK(errors.max_m < 0.10);
 }
 
-TEST_CASE("MH_01_easy: half a second without inertial samples does not lose it", "[vio]") {
+TEST_CASE("MH_01_easy: odometry continues over half a second without inertial samples", "[vio]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   Recording gap = *data;
@@ -113,7 +113,8 @@ TEST_CASE("MH_01_easy: half a second without inertial samples does not lose it",
   CHECK(errors.max_m < 0.05);
 }
 
-TEST_CASE("MH_01_easy: over a second that nobody saw the body goes on as it did", "[vio]") {
+TEST_CASE("MH_01_easy: over a second without images and samples the body continues at its speed",
+          "[vio]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   Recording gap = *data;
@@ -137,9 +138,8 @@ TEST_CASE("MH_01_easy: over a second that nobody saw the body goes on as it did"
   CHECK(error_m < 2.0 * std::sqrt(next->covariance(3, 3)));
 }
 
-// The velocity that is left after them fits nothing of what is seen then, if the stamps are
-// believed.
-TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry sees again",
+// The velocity after the dark contradicts the images if the time offset is not estimated.
+TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry continues",
           "[vio]") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
@@ -162,8 +162,9 @@ TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odome
   CHECK(errors.ate_m < 0.01);
 }
 
-// What the dark has left would move the pose for seconds more.
-TEST_CASE("MH_01_easy: a second after five of black images odometry is as good as ever", "[vio]") {
+// The prior from the dark would move the pose for seconds more.
+TEST_CASE("MH_01_easy: one second after five seconds of black images odometry is accurate again",
+          "[vio]") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
   const Recording light = read_recording(*folder, 0.0, 15.0);
@@ -183,7 +184,8 @@ TEST_CASE("MH_01_easy: a second after five of black images odometry is as good a
   CHECK(after.ate_m < 1.2 * undisturbed.ate_m);
 }
 
-TEST_CASE("MH_01_easy: stamps of images that are 20 ms late are found out", "[vio][calibration]") {
+TEST_CASE("MH_01_easy: an offset of 20 ms in the stamps of images is estimated",
+          "[vio][calibration]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   const Recording late = disturbed(*data, -0.02, 0.0);
@@ -193,7 +195,9 @@ TEST_CASE("MH_01_easy: stamps of images that are 20 ms late are found out", "[vi
   CHECK(odometry_errors(run.states, run.truth).ate_m < 0.01);
 }
 
-TEST_CASE("MH_01_easy: what goes on from a keyframe is as good as what never stopped", "[vio]") {
+TEST_CASE(
+    "MH_01_easy: odometry resumed from a keyframe is as accurate as odometry without interruption",
+    "[vio]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   const OdometryRun whole = run_odometry(*data, 0, data->packets.size(), TrackerConfig{}, {});
@@ -207,7 +211,7 @@ TEST_CASE("MH_01_easy: what goes on from a keyframe is as good as what never sto
     const OdometryRun rest = run_odometry(*data, image, data->packets.size(), TrackerConfig{}, {},
                                           VioCheckpoint{whole.states[image], keyframe});
     REQUIRE(rest.states.size() == data->packets.size() - image - 1);
-    // Nothing that was known of the sensors, and of which way is up, is lost.
+    // The biases and the vertical are not lost.
     const OdometryState &next = rest.states.front(), &same = whole.states[image + 1];
     CHECK((next.gyro_bias - same.gyro_bias).norm() < 1e-3);
     CHECK((next.accel_bias - same.accel_bias).norm() < 0.02);
@@ -216,13 +220,13 @@ TEST_CASE("MH_01_easy: what goes on from a keyframe is as good as what never sto
         whole.states.begin(), whole.states.begin() + static_cast<std::ptrdiff_t>(image + 1));
     states.insert(states.end(), rest.states.begin(), rest.states.end());
     ratios.push_back(odometry_errors(states, whole.truth).ate_m / whole_m);
-    CHECK(ratios.back() < 1.15);  // a window that begins anew; measured: 1.09 at most
+    CHECK(ratios.back() < 1.15);  // because of a new window; measured: 1.09 at most
   }
   CHECK(std::accumulate(ratios.begin(), ratios.end(), 0.0) <
         1.05 * static_cast<double>(ratios.size()));
 }
 
-TEST_CASE("MH_01_easy: what goes on from a keyframe knows the stamps as the run before did",
+TEST_CASE("MH_01_easy: odometry resumed from a keyframe knows the time offset of the run before",
           "[vio][calibration]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
@@ -253,7 +257,7 @@ TEST_CASE("MH_01_easy: what goes on from a keyframe knows the stamps as the run 
   CHECK(next.covariance(0, 0) < anew.covariance(0, 0));
 }
 
-// Ground truth: at the start of V1_01_easy.
+// Ground truth at the start of V1_01_easy.
 const Eigen::Vector3d kStaticGyroBias(-0.00225, 0.02154, 0.07703);
 
 TEST_CASE("V1_01_easy: a start at rest, at five images a second", "[vio]") {
@@ -266,7 +270,7 @@ TEST_CASE("V1_01_easy: a start at rest, at five images a second", "[vio]") {
           return result.start == StartStatus::kAtRest;
         }) == 1);
   REQUIRE(run.states.size() == 24);
-  for (const OdometryState& state : run.states) {  // it stands: what moves is the estimate
+  for (const OdometryState& state : run.states) {  // the body stands, so only the estimate moves
     CHECK(state.T_odom_body.translation().norm() < 5e-3);
     CHECK(state.v_odom.norm() < 0.02);
   }
@@ -280,7 +284,7 @@ TEST_CASE("V1_01_easy: two minutes at rest, rotors idling", "[vio][rest]") {
   REQUIRE(data.packets.size() == 601);
   const OdometryRun run = run_odometry(data, 0, data.packets.size(), TrackerConfig{}, {});
   CHECK(run.statistics.rests >= 1);
-  CHECK(run.keyframes.size() <= 2);  // one every two seconds if it were not known to rest
+  CHECK(run.keyframes.size() <= 2);  // without rest one every two seconds
   REQUIRE(run.states.size() == data.packets.size());
   for (const OdometryState& state : run.states) {
     CHECK(state.T_odom_body.translation().norm() < 5e-3);
@@ -290,7 +294,7 @@ TEST_CASE("V1_01_easy: two minutes at rest, rotors idling", "[vio][rest]") {
   }
 }
 
-TEST_CASE("MH_01_easy: a body set down stays there, whatever comes of images", "[vio][rest]") {
+TEST_CASE("MH_01_easy: a body set down stays there whatever the images show", "[vio][rest]") {
   // It moves until 15.5 s. From 16 s on there is an image a second.
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
@@ -304,7 +308,7 @@ TEST_CASE("MH_01_easy: a body set down stays there, whatever comes of images", "
     CHECK((there.inverse() * run.states[k].T_odom_body).translation().norm() < 1e-3);
 }
 
-TEST_CASE("The odometry node publishes what odometry gives, in order of time", "[vio][node]") {
+TEST_CASE("The odometry node publishes the results of odometry in order of time", "[vio][node]") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   Topic<SensorPacket> packets;
@@ -312,7 +316,7 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   Topic<KeyframeOdometry> keyframes;
   Topic<LocatedFrame> frames;
   Topic<VioStatistics> statistics;
-  std::vector<Stamp> stamps;  // of the node's thread, read after it has ended
+  std::vector<Stamp> stamps;  // written by the node's thread, read after it has ended
   std::vector<std::uint32_t> indices;
   std::vector<UncertainCalibration> calibrated;
   std::vector<LocatedFrame> located;
@@ -342,7 +346,7 @@ TEST_CASE("The odometry node publishes what odometry gives, in order of time", "
   CHECK(node.error() == nullptr);
   CHECK(stamps.size() == 40);
   REQUIRE(finished.size() == 40);
-  CHECK_FALSE(finished[0].tracked_share);  // no image before it
+  CHECK_FALSE(finished[0].tracked_share);  // the first image has none before it
   for (std::size_t k = 0; k < finished.size(); ++k) {
     CHECK(finished[k].stamp == data->packets[k].frame->stamp);
     if (k > 0) CHECK(finished[k].tracked_share.value_or(0.0) > 0.6);

@@ -21,7 +21,7 @@ TEST_CASE("Five seconds of MH_01_easy are tracked as well as measured", "[vio]")
     stereo_share += static_cast<double>(matched) / static_cast<double>(frame.features.size());
   }
   stereo_share /= static_cast<double>(run.frames.size());
-  // A tenth or so beyond what was measured on all 15 s; these 5 s are calmer.
+  // About a tenth beyond the measurements on all 15 s; these 5 s are calmer.
   CHECK(stereo_share > 0.5);                               // 0.59
   CHECK(survival(run, 1) > 0.93);                          // 0.942
   CHECK(survival(run, 10) > 0.62);                         // 0.69

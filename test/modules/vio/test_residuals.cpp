@@ -66,7 +66,7 @@ TEST_CASE("A reprojection error is in standard deviations of the image point", "
                                  camera.T_body_cam * Eigen::Vector3d(0, 0, -1), r));
 }
 
-TEST_CASE("With a first estimate only the derivatives are taken there", "[vio]") {
+TEST_CASE("Only the derivatives are taken at a first estimate", "[vio]") {
   std::mt19937 rng(3);
   const ViewModel view = view_model(synthetic_rig().stereo.cameras[0], 1.0);
   const SE3 T = random_pose(rng);
@@ -102,7 +102,7 @@ TEST_CASE("Inertial Jacobians agree with differences", "[vio]") {
                                  [&](const Vector15& d) { return factor.error(i, moved(j, d)); }));
 }
 
-TEST_CASE("The inertial error of the true motion is zero, whatever the frame", "[vio]") {
+TEST_CASE("The inertial error of the true motion is zero in any frame", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -116,7 +116,7 @@ TEST_CASE("The inertial error of the true motion is zero, whatever the frame", "
   OdometryState i = motion.state(0), j = motion.state(to);
   const double standard_deviations = factor.error(i, j).norm();
   CHECK(standard_deviations < 0.01);
-  // Heading and position of odom are free.
+  // Heading and position of odom are not observable.
   const SE3 shift = make_pose(so3_exp(Eigen::Vector3d(0, 0, 1.3)), random_vector<3>(rng));
   for (OdometryState* s : {&i, &j}) {
     s->T_odom_body = shift * s->T_odom_body;
@@ -147,7 +147,7 @@ TEST_CASE("Noise too small for a double makes no factor", "[vio]") {
   CHECK_FALSE(ImuFactor::of(imu, kGravity_mps2));
 }
 
-TEST_CASE("At rest a factor holds the state as it is, whatever gravity and biases", "[vio][rest]") {
+TEST_CASE("A factor at rest holds the state with any gravity and biases", "[vio][rest]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -167,7 +167,7 @@ TEST_CASE("At rest a factor holds the state as it is, whatever gravity and biase
   CHECK(factor.error(i, moved(i, walked)).squaredNorm() == Approx(6.0));
 }
 
-TEST_CASE("At its first estimates a prior's offset moves as its states do", "[vio]") {
+TEST_CASE("At its first estimates a prior's offset has the identity as derivative", "[vio]") {
   std::mt19937 rng(11);
   StatePrior prior;
   std::vector<const OdometryState*> states;
@@ -249,7 +249,7 @@ TEST_CASE("Preintegration refuses an interval that its samples do not cover", "[
   CHECK(imu.dt_s() == 0.0);
 }
 
-TEST_CASE("First-order bias correction agrees with integrating anew", "[vio]") {
+TEST_CASE("First-order bias correction agrees with a new integration", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -279,7 +279,7 @@ TEST_CASE("The covariance of preintegration agrees with Monte Carlo", "[vio]") {
   ImuPreintegration reference(noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   REQUIRE(reference.add(exact, 0, end));
 
-  // Noise is white over the steps, as the model has it: each step sees its own.
+  // Noise is white over the steps, as modelled: each step has its own.
   std::mt19937 rng(7);
   const double dt = seconds_between(0, step);
   Matrix9 sum = Matrix9::Zero();
@@ -322,7 +322,7 @@ Quadratic random_quadratic(unsigned seed, int rows) {
   return {J.transpose() * J, J.transpose() * residual};
 }
 
-TEST_CASE("Marginalisation leaves the batch solution of a linear problem as it is", "[vio]") {
+TEST_CASE("Marginalisation does not change the batch solution of a linear problem", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   const Quadratic q = random_quadratic(seed, 30);
@@ -331,16 +331,16 @@ TEST_CASE("Marginalisation leaves the batch solution of a linear problem as it i
   const Eigen::MatrixXd H = prior.J.transpose() * prior.J;
   const Eigen::VectorXd solution = -H.ldlt().solve(prior.J.transpose() * prior.r);
   CHECK((solution - batch.tail(kSize - kTaken)).norm() < 1e-10);
-  // So is the covariance of what is left.
+  // The covariance of the remaining variables is unchanged too.
   const Eigen::MatrixXd covariance =
       q.H.inverse().bottomRightCorner(kSize - kTaken, kSize - kTaken);
   CHECK((H.inverse() - covariance).norm() < 1e-9 * covariance.norm());
 }
 
-TEST_CASE("Later measurements and a prior give what all measurements give", "[vio]") {
+TEST_CASE("Later measurements and a prior give the solution of all measurements", "[vio]") {
   const Quadratic early = random_quadratic(1, 30);
   Quadratic late = random_quadratic(2, 30);
-  late.H.topRows(kTaken).setZero();  // later ones no longer see what was taken out
+  late.H.topRows(kTaken).setZero();  // later measurements do not involve the eliminated variables
   late.H.leftCols(kTaken).setZero();
   late.g.head(kTaken).setZero();
   const Eigen::VectorXd batch = -(early.H + late.H).ldlt().solve(early.g + late.g);
@@ -351,7 +351,7 @@ TEST_CASE("Later measurements and a prior give what all measurements give", "[vi
   CHECK((-H.ldlt().solve(g) - batch.tail(kLeft)).norm() < 1e-10);
 }
 
-TEST_CASE("Directions without information stay without", "[vio]") {
+TEST_CASE("Directions without information get none by marginalisation", "[vio]") {
   // Six measurements of twelve variables; scales differ by 1e8, as radians and accelerations do.
   Quadratic q = random_quadratic(5, 6);
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(kSize);
@@ -359,12 +359,12 @@ TEST_CASE("Directions without information stay without", "[vio]") {
   q.H = scale.asDiagonal() * q.H * scale.asDiagonal();
   q.g = scale.asDiagonal() * q.g;
   const SquareRootPrior prior = marginalize(q.H, q.g, kTaken);
-  CHECK(prior.J.rows() == 1);  // five of six are used up by what is taken out
+  CHECK(prior.J.rows() == 1);  // the eliminated variables use five of the six
   CHECK(prior.J.allFinite());
   CHECK(prior.r.allFinite());
 }
 
-TEST_CASE("Nothing taken out leaves the quadratic itself", "[vio]") {
+TEST_CASE("Elimination of no variable leaves the quadratic itself", "[vio]") {
   const Quadratic q = random_quadratic(3, 30);
   const SquareRootPrior prior = marginalize(q.H, q.g, 0);
   CHECK((prior.J.transpose() * prior.J - q.H).norm() < 1e-9 * q.H.norm());

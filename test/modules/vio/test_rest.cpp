@@ -13,8 +13,8 @@
 namespace km {
 namespace {
 
-// A ride along a textured wall, x of the body upwards: aside by `distance_m` from `begin_s` on, for
-// `duration_s`, with a smooth acceleration; at rest before and after.
+// A smooth motion along a textured wall, x of the body upwards: sideways by `distance_m` from
+// `begin_s` on, for `duration_s`; at rest before and after.
 struct Glide {
   double begin_s = 0.0;
   double duration_s = 3.0;
@@ -34,7 +34,7 @@ struct Glide {
   }
 };
 
-// What the body's sensors measure, with noise in images and samples.
+// Measurements of the body's sensors, with noise in images and samples.
 class Ride {
  public:
   explicit Ride(const Glide& glide) : glide_(glide) { rig_.stereo = test_rig(); }
@@ -83,7 +83,7 @@ class Ride {
     for (GrayImage* const image : {&frame.left, &frame.right})
       for (std::uint8_t& pixel : image->pixels)
         pixel = static_cast<std::uint8_t>(
-            std::clamp<int>(pixel + static_cast<int>(rng_() % 7U) - 3, 0, 255));  // of 2 levels
+            std::clamp<int>(pixel + static_cast<int>(rng_() % 7U) - 3, 0, 255));  // 2 levels
     return frame;
   }
 
@@ -109,12 +109,13 @@ VioResult feed(Vio& vio, Ride& ride, double seconds) {
   return all;
 }
 
-TEST_CASE("A minute at rest moves nobody, and makes no keyframes", "[vio][rest]") {
+TEST_CASE("During a minute at rest the pose does not move and no keyframes are made",
+          "[vio][rest]") {
   Ride ride(Glide{.begin_s = 1e3});
   Vio vio = ride.vio();
   const VioResult result = feed(vio, ride, 60.0);
   CHECK(vio.statistics().rests == 1);
-  // A second one where the first would leave the window, before the body is known to rest.
+  // There is a second keyframe if the first leaves the window before the rest is detected.
   CHECK(result.keyframes.size() <= 2);
   CHECK(result.keyframes.back().stamp <= 2'000'000'000);
   REQUIRE(result.states.size() == 1200);
@@ -137,7 +138,7 @@ TEST_CASE("After a rest the next keyframe is measured from the one before it", "
   (void)feed(vio, ride, 30.0);
   CHECK(vio.statistics().rests == 1);
   const VioResult result = feed(vio, ride, 4.0);
-  REQUIRE(result.states.size() == 80);  // none without a pose
+  REQUIRE(result.states.size() == 80);  // all images have a pose
   REQUIRE(result.keyframes.size() >= 5);
   Stamp before = 0;  // the start's keyframe
   for (const KeyframeOdometry& keyframe : result.keyframes) {
@@ -152,8 +153,7 @@ TEST_CASE("After a rest the next keyframe is measured from the one before it", "
   CHECK(T.translation().norm() == Approx(glide.distance_m).epsilon(0.02));
 }
 
-TEST_CASE("A body that comes to rest stays where it came to, and the chain with it",
-          "[vio][rest]") {
+TEST_CASE("A body that comes to rest keeps its pose and its chain of keyframes", "[vio][rest]") {
   Ride ride(Glide{.begin_s = 3.0, .duration_s = 2.0, .distance_m = 0.4});
   Vio vio = ride.vio();
   (void)feed(vio, ride, 7.0);
@@ -169,7 +169,7 @@ TEST_CASE("A body that comes to rest stays where it came to, and the chain with 
   }
 }
 
-TEST_CASE("Who hardly moves loses nothing of the way", "[vio][rest]") {
+TEST_CASE("Slow motion does not shorten the trajectory", "[vio][rest]") {
   const double distance_m = GENERATE(0.05, 0.2, 0.5);  // 2.5 to 25 mm/s on average
   CAPTURE(distance_m);
   Ride ride(Glide{.begin_s = 3.0, .duration_s = 20.0, .distance_m = distance_m});

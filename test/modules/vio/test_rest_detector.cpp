@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-constexpr double kNoisePx = 0.1;  // of tracks on one patch
+constexpr double kNoisePx = 0.1;  // noise of tracks on one patch
 
 SyntheticMotion standing() {
   SyntheticMotion motion;
@@ -24,8 +24,8 @@ VioConfig rest_config() {
   return config;
 }
 
-// Number of images before the first at which the body has stood still; all if it never has.
-// `estimate`: what is known of the state, from the true one.
+// Number of images before the first one at rest; all images if there is none. `estimate` changes
+// the true state into the estimated one.
 std::size_t images_before_rest(
     const std::vector<InertialFrame>& frames, const SyntheticMotion& motion,
     const std::function<void(OdometryState&)>& estimate = [](OdometryState&) {}) {
@@ -38,21 +38,21 @@ std::size_t images_before_rest(
   return frames.size();
 }
 
-// Slow enough for a rest.
+// Makes the estimated speed low enough for a rest.
 void thought_slow(OdometryState& state) {
   state.v_odom.setZero();
 }
 
 constexpr int kTenSeconds = 200;  // 10 s
 
-TEST_CASE("Who stands still for a second rests", "[vio][rest]") {
+TEST_CASE("A body that stands still for a second is at rest", "[vio][rest]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, seed);
   CHECK(images_before_rest(world.frames(40, kNoisePx), motion) == 20);
 }
 
-TEST_CASE("Rotors that idle do not disturb a rest", "[vio][rest]") {
+TEST_CASE("Idling rotors do not prevent rest", "[vio][rest]") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 1);
   auto frames = world.frames(40, kNoisePx);
@@ -65,7 +65,7 @@ TEST_CASE("Rotors that idle do not disturb a rest", "[vio][rest]") {
   CHECK(images_before_rest(frames, motion) == 20);
 }
 
-TEST_CASE("A slow ride is no rest although the samples look like it", "[vio][rest]") {
+TEST_CASE("Slow motion is not detected as rest although the samples resemble it", "[vio][rest]") {
   const double speed = GENERATE(0.05, 0.1);
   const int axis = GENERATE(0, 1, 2);
   CAPTURE(speed, axis);
@@ -76,7 +76,7 @@ TEST_CASE("A slow ride is no rest although the samples look like it", "[vio][res
         kTenSeconds);
 }
 
-TEST_CASE("A slow turn is no rest", "[vio][rest]") {
+TEST_CASE("A slow rotation is not detected as rest", "[vio][rest]") {
   SyntheticMotion motion = standing();
   motion.turn_amplitude(2) = 0.1;  // 0.01 rad/s at most, 0.005 at both ends
   motion.turn_frequency(2) = 0.1;
@@ -85,7 +85,8 @@ TEST_CASE("A slow turn is no rest", "[vio][rest]") {
         kTenSeconds);
 }
 
-TEST_CASE("Images that hang are no rest while the body turns or gains speed", "[vio][rest]") {
+TEST_CASE("Frozen images are not detected as rest while the body rotates or accelerates",
+          "[vio][rest]") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 4);
   auto frames = world.frames(kTenSeconds, kNoisePx);
@@ -100,14 +101,14 @@ TEST_CASE("Images that hang are no rest while the body turns or gains speed", "[
   CHECK(images_before_rest(frames, motion) == kTenSeconds);
 }
 
-TEST_CASE("Who is thought to move does not rest, whatever is seen", "[vio][rest]") {
+TEST_CASE("A body with an estimated speed is not at rest whatever the images show", "[vio][rest]") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 5);
   CHECK(images_before_rest(world.frames(kTenSeconds, kNoisePx), motion,
                            [](OdometryState& state) { state.v_odom.x() = 0.1; }) == kTenSeconds);
 }
 
-TEST_CASE("In the dark nobody rests", "[vio][rest]") {
+TEST_CASE("In the dark no rest is detected", "[vio][rest]") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 6);
   auto frames = world.frames(kTenSeconds, kNoisePx);
@@ -115,7 +116,7 @@ TEST_CASE("In the dark nobody rests", "[vio][rest]") {
   CHECK(images_before_rest(frames, motion) == kTenSeconds);
 }
 
-TEST_CASE("A rest ends with the first image that shows a motion, and not with what passes by",
+TEST_CASE("A rest ends with the first image that shows a motion and not with passing objects",
           "[vio][rest]") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 7);

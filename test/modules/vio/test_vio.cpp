@@ -11,7 +11,8 @@
 namespace km {
 namespace {
 
-// A rig at rest before a textured wall, x of the body upwards, and packets as sensors make them.
+// A rig at rest before a textured wall, x of the body upwards, and packets in the form that sensors
+// deliver.
 class Bench {
  public:
   Bench() {
@@ -37,7 +38,7 @@ class Bench {
     config.rest_s = rest_s;
     return Vio(3, rig_, TrackerConfig{}, config);
   }
-  // Goes on as if it moved: with a keyframe every 2 s.
+  // Detects no rest, so that there is a keyframe every 2 s.
   Vio restless() const { return vio(1e6); }
   const SensorRig& rig() const { return rig_; }
 
@@ -50,7 +51,7 @@ class Bench {
   StereoFrame frame_;
 };
 
-// Feeds images `first` to `last`, not included; the results together.
+// Feeds images `first` to `last`, not included; returns all their results together.
 VioResult feed(Vio& vio, const Bench& bench, int first, int last) {
   VioResult all;
   for (int k = first; k < last; ++k) {
@@ -64,7 +65,7 @@ VioResult feed(Vio& vio, const Bench& bench, int first, int last) {
   return all;
 }
 
-TEST_CASE("Every image has a pose, at rest the same", "[vio]") {
+TEST_CASE("Every image has a pose and at rest all are equal", "[vio]") {
   const Bench bench;
   Vio vio = bench.vio();
   const VioResult result = feed(vio, bench, 0, 80);
@@ -85,7 +86,7 @@ TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses
   const VioResult result = feed(vio, bench, 0, 100);
   REQUIRE(result.keyframes.size() >= 3);  // 5 s at rest, one every 2 s
   SE3 T_odom_kf = SE3::Identity();
-  double information = 0.0;  // on a tilt that all verticals have in common
+  double information = 0.0;  // on a tilt error common to all verticals
   for (std::size_t k = 0; k < result.keyframes.size(); ++k) {
     const KeyframeOdometry& keyframe = result.keyframes[k];
     CHECK(keyframe.id == KeyframeId{3, static_cast<std::uint32_t>(k)});
@@ -94,10 +95,10 @@ TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses
     CHECK(is_covariance(keyframe.covariance));
     CHECK((keyframe.covariance.trace() > 0.0) == (k > 0));
     REQUIRE(keyframe.vertical);
-    CHECK(keyframe.vertical->up_body.dot(Eigen::Vector3d::UnitX()) > 1.0 - 1e-8);  // as it lies
+    CHECK(keyframe.vertical->up_body.dot(Eigen::Vector3d::UnitX()) > 1.0 - 1e-8);  // on its side
     information += 1.0 / std::pow(keyframe.vertical->sigma_rad, 2);
   }
-  // However many verticals there are, their common error is that of one.
+  // The common error of any number of verticals is that of one.
   const VioConfig config;
   const double stretches = static_cast<double>(result.keyframes.size()) / config.tilt_keyframes;
   CHECK(std::sqrt(stretches / information) == Approx(config.tilt_sigma));
@@ -143,14 +144,14 @@ TEST_CASE("Packets without a usable image are refused and counted", "[vio]") {
   CHECK(vio.process(bench.packet(19)).problem == VioProblem::kUnorderedImage);
   CHECK(vio.statistics().refused_images == 3);
 
-  // Their inertial samples were kept: the next image goes on without a new start.
+  // Their inertial samples were kept, so the next image continues without a new start.
   const VioResult next = vio.process(bench.packet(22));
   CHECK(next.problem == VioProblem::kNone);
   CHECK(next.states.size() == 1);
   CHECK(vio.statistics().starts == 1);
 }
 
-TEST_CASE("Broken inertial samples are refused, the image still has a pose", "[vio]") {
+TEST_CASE("Invalid inertial samples are refused and the image still has a pose", "[vio]") {
   const Bench bench;
   Vio vio = bench.vio();
   REQUIRE(feed(vio, bench, 0, 20).states.size() == 20);
@@ -199,22 +200,22 @@ TEST_CASE("A long gap in the inertial samples leads to a new start from the last
   const VioResult after = feed(vio, bench, 101, 101 + Bench::kStartImages);
   CHECK(vio.statistics().gaps == 1);
   CHECK(vio.statistics().starts == 2);
-  REQUIRE(after.states.size() == 1 + Bench::kStartImages);  // those held back, too
+  REQUIRE(after.states.size() == 1 + Bench::kStartImages);  // includes the images held back
   CHECK(after.states.front().stamp == gap.frame->stamp);
   const SE3 jump = before.states.back().T_odom_body.inverse() * after.states.front().T_odom_body;
   CHECK(jump.translation().norm() < 5e-3);
   CHECK(angle_of(jump.linear()) < 5e-3);
-  // The chain of keyframes makes the same step as live odometry, from which it has moved away.
+  // The chain of keyframes makes the same step as live odometry, although the two have diverged.
   const SE3 chain_jump =
       before.frames.back().T_odom_body.inverse() * after.frames.front().T_odom_body;
   CHECK((chain_jump.matrix() - jump.matrix()).norm() < 1e-9);
-  // The step across the gap is known to be uncertain.
+  // The step across the gap has a large covariance.
   REQUIRE_FALSE(after.keyframes.empty());
   CHECK(after.keyframes.front().id.index == before.keyframes.back().id.index + 1);
   CHECK(after.keyframes.front().covariance(5, 5) > 0.1);
 }
 
-TEST_CASE("From a keyframe that an earlier process left odometry goes on at once", "[vio]") {
+TEST_CASE("Odometry starts at once from a keyframe of an earlier process", "[vio]") {
   const Bench bench;
   Vio former = bench.restless();
   const VioResult before = feed(former, bench, 0, 60);
@@ -227,7 +228,7 @@ TEST_CASE("From a keyframe that an earlier process left odometry goes on at once
   vio.continue_from({state, last});
   const VioResult first = feed(vio, bench, image, image + 1);
   CHECK(first.start == StartStatus::kGoesOn);
-  CHECK(first.states.empty());  // that one stands
+  CHECK(first.states.empty());  // the state of the keyframe was published before
   REQUIRE(first.frames.size() == 1);
   CHECK((first.frames[0].T_odom_body.matrix() - last.T_odom_kf.matrix()).norm() < 1e-9);
   const VioResult after = feed(vio, bench, image + 1, image + 60);
@@ -241,13 +242,13 @@ TEST_CASE("From a keyframe that an earlier process left odometry goes on at once
   CHECK(after.keyframes.front().covariance(5, 5) < 1e-3);
 }
 
-TEST_CASE("Where the keyframe's image does not come again odometry starts as ever", "[vio]") {
+TEST_CASE("If the keyframe's image is not repeated odometry starts as usual", "[vio]") {
   const Bench bench;
   Vio former = bench.restless();
   const VioResult before = feed(former, bench, 0, 60);
   KeyframeOdometry last = before.keyframes.back();
   const auto image = static_cast<int>(last.stamp / Bench::kFrameStep);
-  last.T_odom_kf.translation().x() += 1.0;  // the chain has moved away from live odometry
+  last.T_odom_kf.translation().x() += 1.0;  // the chain has diverged from live odometry
   Vio vio = bench.restless();
   vio.continue_from({before.states.at(static_cast<std::size_t>(image)), last});
   const VioResult after = feed(vio, bench, image + 20, image + 20 + Bench::kStartImages);
@@ -260,7 +261,7 @@ TEST_CASE("Where the keyframe's image does not come again odometry starts as eve
   CHECK(next.covariance(5, 5) > 0.1);
 }
 
-TEST_CASE("Inertial samples that end before an image hold over it, and over no more", "[vio]") {
+TEST_CASE("The last inertial sample is held up to the image but no longer", "[vio]") {
   const Bench bench;
   Vio vio = bench.vio();
   REQUIRE(feed(vio, bench, 0, 30).states.size() == 30);
@@ -284,7 +285,7 @@ TEST_CASE("Without gravity in the samples there is no start at rest", "[vio]") {
   CHECK(vio.statistics().start_attempts > 0);
 }
 
-TEST_CASE("An impossible motion is found out and odometry starts anew", "[vio]") {
+TEST_CASE("An impossible motion is detected and odometry starts again", "[vio]") {
   const Bench bench;
   Vio vio = bench.vio();
   REQUIRE(feed(vio, bench, 0, 30).states.size() == 30);
@@ -304,7 +305,7 @@ TEST_CASE("An impossible motion is found out and odometry starts anew", "[vio]")
   CHECK(after.states.back().T_odom_body.translation().norm() < 1.0);
 }
 
-TEST_CASE("Whatever the samples, poses are finite and odometry can be weighed", "[vio]") {
+TEST_CASE("Poses are finite and covariances valid with any samples", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 8U));
   CAPTURE(seed);
   std::mt19937 rng(seed);

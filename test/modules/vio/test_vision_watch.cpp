@@ -20,7 +20,7 @@ struct Watched {
   }
 };
 
-TEST_CASE("A loss of vision is told with its first image, and its end", "[vio][vision]") {
+TEST_CASE("A loss of vision is reported with its first image and its end", "[vio][vision]") {
   Watched run;
   run.add(20, 50);
   run.add(100, 3);
@@ -41,7 +41,7 @@ TEST_CASE("A loss of vision is told with its first image, and its end", "[vio][v
   CHECK(run.watch.lost_s() == Approx(5.0 + 39 * 0.05));
 }
 
-TEST_CASE("An image or two without landmarks are no loss, nor is what was never seen",
+TEST_CASE("A few images without landmarks and a start without vision are no loss",
           "[vio][vision]") {
   Watched run;
   run.add(100, 0);

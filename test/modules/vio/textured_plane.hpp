@@ -55,8 +55,8 @@ inline StereoRig fisheye_rig() {
   return rig;
 }
 
-/// Of every pixel, row by row. Kept for the next image of the same lens: undistortion takes most of
-/// the time of an image.
+/// Bearings of all pixels, row by row. They are kept for the next image of the same lens, because
+/// undistortion takes most of the time of an image.
 inline const std::vector<std::optional<Eigen::Vector2d>>& bearings_of(const Camera& camera) {
   static std::vector<std::optional<Eigen::Vector2d>> bearings;
   static Camera last;
@@ -72,8 +72,8 @@ inline const std::vector<std::optional<Eigen::Vector2d>>& bearings_of(const Came
   return bearings;
 }
 
-/// A plane z = depth_m of the world with a random texture whose cells are `cell_m` wide; about
-/// 6 px or more in the image, so that pixels need not be averaged.
+/// A plane z = depth_m of the world with a random texture. Its cells are `cell_m` wide, at least
+/// about 6 px in the image, so that pixels need not be averaged.
 struct TexturedPlane {
   double depth_m = 2.0;
   double cell_m = 0.06;
@@ -92,7 +92,7 @@ struct TexturedPlane {
     return {stamp, render(rig.cameras[0], T_world_body), render(rig.cameras[1], T_world_body)};
   }
 
-  /// What an RGB-D camera sees: `rig` as rgbd_rig() makes it.
+  /// Image of an RGB-D camera, with `rig` from rgbd_rig().
   [[nodiscard]] StereoFrame render_rgbd(const StereoRig& rig, const SE3& T_world_body,
                                         Stamp stamp) const {
     const Camera& camera = rig.cameras[0];
@@ -107,7 +107,7 @@ struct TexturedPlane {
     return frame;
   }
 
-  /// Where the ray of `bearing` meets the plane, in the world.
+  /// Intersection of the ray of `bearing` with the plane, in the world.
   [[nodiscard]] Eigen::Vector3d meet(const SE3& T_world_cam, const Eigen::Vector2d& bearing) const {
     const Eigen::Vector3d ray = T_world_cam.linear() * bearing.homogeneous();
     const Eigen::Vector3d& from = T_world_cam.translation();

@@ -59,7 +59,7 @@ struct Codec<Ping> {
   }
 };
 
-/// Asks until `condition` holds; false if it never does. For counters that nobody announces.
+/// Polls until `condition` holds; false if it never does. For counters without notification.
 inline bool eventually(const std::function<bool()>& condition) {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   while (!condition()) {
@@ -89,7 +89,8 @@ class RawWriter {
     head.key = Codec<Ping>::key_of(ping);
     write_bytes(head, serialize(Codec<Ping>::descriptor(), &encoded.wire));
   }
-  /// True once as many readers are there. What is written before may be lost to those of a status.
+  /// True when this many readers have matched. Statuses that are written before may be lost to a
+  /// reader.
   [[nodiscard]] bool is_read_by(std::uint32_t readers) const {
     return eventually([&] {
       dds_publication_matched_status_t status{};

@@ -19,7 +19,7 @@ struct Codec<MarkedPing> : Codec<Ping> {
 
 namespace {
 
-TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "[dds]") {
+TEST_CASE("A message of one robot arrives at the other unchanged and once", "[dds]") {
   Two two;
   auto& [domain, a, b] = two;
   const std::vector<std::uint8_t> payload(70000, 42);
@@ -30,7 +30,7 @@ TEST_CASE("What one robot publishes arrives at the other, unchanged and once", "
   REQUIRE(large != pings.end());
   CHECK(large->payload == payload);
   CHECK(large->robot == 3);
-  CHECK(a.received.messages().empty());  // nobody hears himself
+  CHECK(a.received.messages().empty());  // a robot does not receive its own messages
 }
 
 TEST_CASE("The status of each robot reaches the others", "[dds]") {
@@ -66,7 +66,7 @@ TEST_CASE("A robot that joins late gets every event, request, and the newest sta
     if (ping.index < 2) CHECK(ping.payload == std::vector<std::uint8_t>{2});
 }
 
-TEST_CASE("A request is forgotten once a robot that long silent would be", "[dds]") {
+TEST_CASE("A request expires after the lease of a silent robot", "[dds]") {
   DdsConfig config = loopback_config();
   config.lease_s = 3.0;  // the shortest accepted
   const auto domain = std::make_shared<const DdsDomain>(config);
@@ -81,7 +81,7 @@ TEST_CASE("A request is forgotten once a robot that long silent would be", "[dds
   CHECK(indices(late.received.wait_for(1)) == std::vector<std::uint32_t>{1});
 }
 
-TEST_CASE("What is sent again is dropped", "[dds]") {
+TEST_CASE("A repeated message is dropped", "[dds]") {
   Two two;
   auto& [domain, a, b] = two;
   for (std::uint32_t i = 0; i < 20; ++i) a.ping(i);
@@ -109,7 +109,8 @@ TEST_CASE("Numbers that do not arrive are counted until they do", "[dds]") {
   CHECK(b.traffic(Direction::kIn).missing == 1);
 }
 
-TEST_CASE("An addressed message reaches its addressee, and nobody else gets a byte", "[dds]") {
+TEST_CASE("An addressed message reaches its addressee and no other robot gets a byte of it",
+          "[dds]") {
   const auto kind = GENERATE(TopicKind::kRequest, TopicKind::kEvent);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind, kind), b(domain, 4, kind, kind), c(domain, 5, kind, kind);
@@ -132,7 +133,7 @@ TEST_CASE("An addressed message reaches its addressee, and nobody else gets a by
   CHECK(a.traffic(Direction::kOut).count.messages == 0);
 }
 
-TEST_CASE("Sender and receiver count the same bytes, whatever the size", "[dds]") {
+TEST_CASE("Sender and receiver count the same bytes for all sizes", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
   for (TestRobot* robot : {&a, &b, &c}) robot->start();
@@ -149,15 +150,15 @@ TEST_CASE("Sender and receiver count the same bytes, whatever the size", "[dds]"
   CHECK(b.traffic_with(3, Direction::kIn) == once);
   CHECK(b.traffic(Direction::kIn).count == once);
   // Encoding header 4, key and boot 8 each, number 4, version and robot 2 each, length of the
-  // content 4; of the content: its length 4, index 4, length of the payload 4, payload; padded
-  // to 4.
+  // content 4.
+  // The content has its length 4, index 4, length of the payload 4, and the payload, padded to 4.
   std::uint64_t expected = 0;
   for (std::uint32_t i = 0; i < kCount; ++i)
     expected += 4 + 8 + 8 + 4 + 2 + 2 + 4 + 4 + 4 + 4 + (i + 3) / 4 * 4;
   CHECK(once.bytes == expected);
 }
 
-TEST_CASE("What a robot that joins late is sent counts once", "[dds]") {
+TEST_CASE("Earlier messages for a robot that joins late are counted once", "[dds]") {
   const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind), b(domain, 4, kind);
@@ -177,7 +178,7 @@ TEST_CASE("What a robot that joins late is sent counts once", "[dds]") {
   for (const PeerTraffic& row : a.bridge.traffic().peers) CHECK(row.retransmitted_bytes == 0);
 }
 
-TEST_CASE("A hostile peer is counted by reason and harms nobody", "[dds]") {
+TEST_CASE("Messages of a hostile peer are counted by reason and change nothing", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), foe(domain, 9);
   for (TestRobot* robot : {&a, &b, &foe}) robot->start();
@@ -207,7 +208,7 @@ TEST_CASE("A hostile peer is counted by reason and harms nobody", "[dds]") {
   CHECK(b.bridge.error() == nullptr);
 }
 
-TEST_CASE("A guard puts a tail behind messages and sees them before anybody else", "[dds]") {
+TEST_CASE("A guard appends a tail to messages and sees them before any node", "[dds]") {
   Crossing<MarkedPing> from_a, at_b;
   Inbox<MarkedPing> got(at_b.from_peers());
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
@@ -237,7 +238,7 @@ TEST_CASE("A guard puts a tail behind messages and sees them before anybody else
   CHECK(eventually([&] { return b.refused(Codec<MarkedPing>::kTopic) == 1; }));
 }
 
-TEST_CASE("Programs without an identity, or with a broken one, are not heard", "[dds]") {
+TEST_CASE("Programs without an identity, or with a broken one, are ignored", "[dds]") {
   const std::string user_data =
       GENERATE(std::string(), std::string("robot=7;name=\033[2J;proto=1;boot=1"),
                std::string("robot=") + std::string(5000, '9'));
@@ -262,7 +263,7 @@ TEST_CASE("Programs without an identity, or with a broken one, are not heard", "
   CHECK(b.bridge.peers().list().size() == 1);
 }
 
-TEST_CASE("Robots of another protocol version are refused and not heard", "[dds]") {
+TEST_CASE("Robots of another protocol version are refused and ignored", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3),
       newer(domain, 4, TopicKind::kEvent, TopicKind::kRequest, kProtocolVersion + 1);
@@ -297,8 +298,7 @@ TEST_CASE("A robot that leaves and starts again is recognised by its boot", "[dd
   CHECK(a.bridge.peers().list()[0].identity == second.participant.identity());
 }
 
-TEST_CASE("What was sent to a robot reaches it when it is resumed, and not in another life",
-          "[dds]") {
+TEST_CASE("Messages to a robot reach its resumed process and not its next incarnation", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, TopicKind::kEvent, TopicKind::kEvent);
   a.start();
@@ -330,14 +330,14 @@ TEST_CASE("What was sent to a robot reaches it when it is resumed, and not in an
   CHECK(a.traffic(Direction::kOut, true).failures == 0);
 }
 
-TEST_CASE("A status names the process that told it", "[dds]") {
+TEST_CASE("A status states the process that sent it", "[dds]") {
   Two two;
   auto& [domain, a, b] = two;
   REQUIRE(eventually([&] { return b.status.peers().size() == 1; }));
   CHECK(b.status.peers()[0].boot == a.participant.identity().boot);
 }
 
-TEST_CASE("What a robot sends in another life waits until all know that it has restarted",
+TEST_CASE("Messages of a new incarnation wait until all nodes know that the robot has restarted",
           "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3);

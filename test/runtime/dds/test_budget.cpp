@@ -8,8 +8,8 @@
 namespace km {
 namespace {
 
-// Robot 3 with a budget and robot 4, who know of each other. What is said to all counts as words,
-// what is said to one as closures.
+// Robot 3 with a budget and robot 4, which have joined. Messages to all count as words, messages to
+// one robot as closures.
 struct Thrifty {
   explicit Thrifty(const BudgetConfig& budget)
       : a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, nullptr,
@@ -37,8 +37,9 @@ struct Thrifty {
   TestRobot b{domain, 4, TopicKind::kEvent, TopicKind::kEvent};
 };
 
-TEST_CASE("A robot that has more to say than its budget lets go says so much and no more",
-          "[dds][budget]") {
+TEST_CASE(
+    "A robot with more messages than its budget permits sends as much as the budget and no more",
+    "[dds][budget]") {
   constexpr double kRate = 100'000.0, kSeconds = 5.0;
   Thrifty team({.bytes_per_s = kRate});
   const double from_s = steady_now_s();
@@ -62,7 +63,7 @@ TEST_CASE("A robot that has more to say than its budget lets go says so much and
   CHECK(held.dropped.messages == 0);
 }
 
-TEST_CASE("A closure arrives before what waits for the budget", "[dds][budget]") {
+TEST_CASE("A closure overtakes messages that wait for the budget", "[dds][budget]") {
   Thrifty team({.bytes_per_s = 20'000.0});
   team.offer(4000, 1000);  // for 200 s
   REQUIRE(eventually([&] { return team.a.bridge.holds_back(); }));
@@ -71,7 +72,8 @@ TEST_CASE("A closure arrives before what waits for the budget", "[dds][budget]")
   CHECK(team.b.received.messages().size() < 4000);
 }
 
-TEST_CASE("What is held back adds up, and a run's total is kept", "[dds][budget]") {
+TEST_CASE("Delayed and dropped messages add up and the total of a run is observed",
+          "[dds][budget]") {
   constexpr double kTotal = 1e6;
   Thrifty team({.bytes_per_run = kTotal});
   constexpr std::uint32_t kOffered = 200;
@@ -89,14 +91,15 @@ TEST_CASE("What is held back adds up, and a run's total is kept", "[dds][budget]
   CHECK(team.b.received_addressed.wait_for(1).size() == 1);
 }
 
-TEST_CASE("What a robot has said while it was alone comes within its budget", "[dds][budget]") {
+TEST_CASE("Messages that a robot published while it was alone are sent within its budget",
+          "[dds][budget]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, nullptr,
               TopicKind::kEvent, TopicKind::kEvent, {.bytes_per_s = 100'000.0});
   a.start();
   for (std::uint32_t k = 0; k < 300; ++k) a.ping(k, std::vector<std::uint8_t>(1000, 1));
   REQUIRE(eventually([&] { return a.traffic(Direction::kOut).held.waiting.messages == 300; }));
-  CHECK_FALSE(a.bridge.holds_back());  // for somebody to come
+  CHECK_FALSE(a.bridge.holds_back());  // messages wait for a receiver
   TestRobot b(domain, 4);
   const double from_s = steady_now_s();
   b.start();
@@ -105,7 +108,8 @@ TEST_CASE("What a robot has said while it was alone comes within its budget", "[
   CHECK(a.traffic(Direction::kOut).held.delayed.messages > 0);
 }
 
-TEST_CASE("What a robot that joins late is sent is paid for by what comes after", "[dds][budget]") {
+TEST_CASE("Earlier messages for a robot that joins late are charged to the budget",
+          "[dds][budget]") {
   constexpr double kRate = 100'000.0;
   Thrifty team({.bytes_per_s = kRate});
   team.offer(300, 1000);

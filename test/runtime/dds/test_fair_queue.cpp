@@ -41,14 +41,14 @@ TEST_CASE("A peer that has no room loses its own newest, or its oldest", "[fair_
   CHECK(queue.push(7, 5, 10, 0.0));
 }
 
-TEST_CASE("A message larger than all there may be is not taken", "[fair_queue]") {
+TEST_CASE("A message larger than the bound is refused", "[fair_queue]") {
   FairQueue<int> queue({.bytes = 100, .newest_wins = GENERATE(false, true)});
   CHECK_FALSE(queue.push(7, 1, 101, 0.0));
   CHECK(queue.size() == 0);
   CHECK(queue.push(7, 2, 100, 0.0));
 }
 
-TEST_CASE("Served are a burst at once and then so many a second, of each peer", "[fair_queue]") {
+TEST_CASE("Each peer's messages are served as a burst and then at the rate", "[fair_queue]") {
   FairQueue<int> queue({.per_second = 10.0, .burst = 5.0});
   for (int i = 0; i < 1000; ++i) {
     queue.push(7, i, 1, 100.0);

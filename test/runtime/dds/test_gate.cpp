@@ -21,7 +21,7 @@ std::uint64_t refusals(TestRobot& robot, const std::string& reason) {
   return robot.traffic(Direction::kIn).refused[reason];
 }
 
-TEST_CASE("Bytes that are no message are refused, and messages after them are heard", "[gate]") {
+TEST_CASE("Bytes that are no message are refused and later messages are received", "[gate]") {
   Two two;
   auto& [domain, a, b] = two;
   RawWriter writer(a.participant.handle(), domain->config(), TopicKind::kEvent);
@@ -55,7 +55,7 @@ TEST_CASE("A message larger than its topic allows is not even read", "[gate]") {
   CHECK(b.received.wait_for(1)[0].index == 2);
 }
 
-TEST_CASE("What a robot said before it left is heard", "[gate]") {
+TEST_CASE("Messages that a robot sent before it left are received", "[gate]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3);
   std::promise<void> leave;
@@ -74,7 +74,8 @@ TEST_CASE("What a robot said before it left is heard", "[gate]") {
   CHECK(a.received.wait_for(50).size() == 50);
 }
 
-TEST_CASE("Nobody speaks for a robot, not even from a writer that is gone", "[gate]") {
+TEST_CASE("No participant can send in a robot's name, not even from a writer that is gone",
+          "[gate]") {
   Two two;
   auto& [domain, a, b] = two;
   const bool shows_the_id = GENERATE(false, true);
@@ -93,7 +94,7 @@ TEST_CASE("Nobody speaks for a robot, not even from a writer that is gone", "[ga
   CHECK(b.received.messages().size() == 1);
 }
 
-TEST_CASE("A peer that sends much waits for itself and not the others", "[gate]") {
+TEST_CASE("A peer that sends much delays only its own messages", "[gate]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
   constexpr std::uint32_t kFlood = 2000;
@@ -117,7 +118,7 @@ TEST_CASE("A peer that sends much waits for itself and not the others", "[gate]"
   node.stop();
 }
 
-TEST_CASE("Nobody but the status of a robot's twin makes it yield", "[gate]") {
+TEST_CASE("Only the status of a robot's twin makes it yield", "[gate]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3);
   a.start();
@@ -159,7 +160,7 @@ class LocalEnvelope {
     ddsi_serdata_to_ser(serialized_, 0, result.size(), result.data());
     return result;
   }
-  // The way that what arrives on the network goes. False if DDS refuses it.
+  // The path of messages that arrive on the network. False if DDS refuses the message.
   [[nodiscard]] bool reads(std::vector<std::uint8_t> bytes) const {
     const ddsrt_iovec_t part{bytes.data(), bytes.size()};
     ddsi_serdata* received =

@@ -63,13 +63,13 @@ TEST_CASE("Found by address a robot takes a fixed port, by multicast any", "[pro
                    "<Peer address='10.0.0.2:7912'/><Peer address='10.0.0.3:9999'/></Peers>"));
 }
 
-TEST_CASE("Loopback is told to carry multicast", "[profiles]") {
+TEST_CASE("The loopback interface is configured to carry multicast", "[profiles]") {
   const DdsConfig config;
   CHECK_THAT(cyclone_xml(config, kLoopback), Contains("name='lo' multicast='true'"));
   CHECK_THAT(cyclone_xml(config, kCable), !Contains("multicast='true'"));
 }
 
-TEST_CASE("What a configuration says cannot break out of the document", "[profiles]") {
+TEST_CASE("Text of a configuration cannot break out of the XML document", "[profiles]") {
   DdsConfig config;
   config.team = "a</Tag><evil b='\"&";
   CHECK_THAT(cyclone_xml(config, kCable),

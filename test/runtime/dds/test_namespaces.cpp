@@ -51,7 +51,7 @@ TEST_CASE("Robots on two hosts discover each other, and an addressed message pas
   CHECK(robots.b->wait_for("one 3 7"));
 }
 
-TEST_CASE("On a host with several interfaces the robot uses the one it is told",
+TEST_CASE("On a host with several interfaces the robot uses the configured one",
           "[dds][namespaces]") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(2);
@@ -61,8 +61,7 @@ TEST_CASE("On a host with several interfaces the robot uses the one it is told",
   CHECK(robots.b->wait_for("joined 3"));
 }
 
-TEST_CASE("On a host with nothing but loopback robots meet without being told to use it",
-          "[dds][namespaces]") {
+TEST_CASE("On a host with only loopback robots meet without configuration", "[dds][namespaces]") {
   if (!VirtualNetwork::available()) return;
   const std::string discovery = GENERATE("multicast", "peers");
   VirtualNetwork network(1);
@@ -74,7 +73,7 @@ TEST_CASE("On a host with nothing but loopback robots meet without being told to
   CHECK(b->wait_for("joined 3"));
 }
 
-TEST_CASE("Two robots that do not hear each other both hear a third", "[dds][namespaces]") {
+TEST_CASE("Two robots without a link both receive a third", "[dds][namespaces]") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(3);
   network.set_link_between(1, 3, false);

@@ -34,8 +34,9 @@ std::vector<PeerEventKind> kinds(PeerTable& table) {
 
 using Kinds = std::vector<PeerEventKind>;
 
-TEST_CASE("A robot of an earlier process is lost until it is heard, and known by its life",
-          "[peers]") {
+TEST_CASE(
+    "A robot of an earlier process is lost until it is received, and its incarnation is known",
+    "[peers]") {
   PeerTable table(kSelf);
   table.recall({7, "peer", kProtocolVersion, std::uint64_t{70} << kResumeBits});
   table.recall({kSelf.robot, "self", kProtocolVersion, 3});
@@ -54,7 +55,8 @@ TEST_CASE("A robot of an earlier process is lost until it is heard, and known by
   CHECK(table.peers()[0].addresses == "udp/10.0.0.7");
 }
 
-TEST_CASE("Of a robot that is not heard the word of others counts, until it is", "[peers]") {
+TEST_CASE("Reports of other robots count for a robot that is not received, until it is",
+          "[peers]") {
   constexpr std::uint64_t kLife = std::uint64_t{70} << kResumeBits;
   constexpr std::uint64_t kOtherLife = std::uint64_t{71} << kResumeBits;
   PeerTable table(kSelf);
@@ -72,19 +74,19 @@ TEST_CASE("Of a robot that is not heard the word of others counts, until it is",
     tell(kLife);
     CHECK(kinds(table).empty());
   }
-  SECTION("another process of its life") {
+  SECTION("another process of its incarnation") {
     tell(kLife + 1);
     CHECK(kinds(table) == Kinds{PeerEventKind::kResumed});
     CHECK_FALSE(table.is_arriving(7));
   }
-  SECTION("another life waits until all nodes know") {
+  SECTION("another incarnation waits until all nodes know") {
     tell(kOtherLife);
     CHECK(kinds(table) == Kinds{PeerEventKind::kRestarted});
     CHECK(table.is_arriving(7));
     table.told({7, kOtherLife});
     CHECK_FALSE(table.is_arriving(7));
   }
-  SECTION("it is heard itself") {
+  SECTION("it is received itself") {
     const bool restarted = GENERATE(false, true);
     CAPTURE(restarted);
     const std::uint64_t boot = restarted ? kOtherLife : kLife;
@@ -126,7 +128,8 @@ TEST_CASE("A robot joins once its identity and its liveliness are known, in eith
   CHECK_FALSE(table.is_current({7, 71}));
 }
 
-TEST_CASE("Silence is a loss, sound a return, whatever happens to the lease", "[peers]") {
+TEST_CASE("A silent robot is lost and returns when it is received again, whatever the lease does",
+          "[peers]") {
   PeerTable table(kSelf);
   table.participant(guid(2), data_of(7, 70), "");
   table.alive(guid(2));
@@ -155,13 +158,13 @@ TEST_CASE("An orderly end is not a loss", "[peers]") {
   table.participant_gone(guid(2));
   CHECK(kinds(table) == Kinds{PeerEventKind::kJoined, PeerEventKind::kLeft});
   CHECK(table.peers()[0].state == PeerState::kLeft);
-  CHECK(table.identity_of(guid(2)).has_value());  // what it sent may still be on its way
+  CHECK(table.identity_of(guid(2)).has_value());  // its messages may still be on their way
 }
 
 constexpr std::uint64_t kBoot = 70U << kResumeBits;
 constexpr std::uint64_t kOtherLife = 71U << kResumeBits;
 
-// Robot 7, heard from guid 2, with kBoot.
+// Robot 7, received from guid 2, with kBoot.
 PeerTable with_robot() {
   PeerTable table(kSelf);
   table.participant(guid(2), data_of(7, kBoot), "udp/10.0.0.7");
@@ -185,13 +188,13 @@ TEST_CASE("A robot that is started again has its id back once its former self is
   SECTION("restarted after it was lost") {
     table.silent(guid(2));
     table.participant(guid(3), data_of(7, boot), "");
-    CHECK(table.standing(guid(3)) == Standing::kRival);  // not heard itself yet
+    CHECK(table.standing(guid(3)) == Standing::kRival);  // not received itself yet
     table.alive(guid(3));
   }
   SECTION("restarted after it left") {
     table.closed(guid(2));
     table.participant_gone(guid(2));
-    CHECK(table.standing(guid(2)) == Standing::kAdmitted);  // what it said may still be coming
+    CHECK(table.standing(guid(2)) == Standing::kAdmitted);  // its messages may still arrive
     CHECK(kinds(table) == Kinds{PeerEventKind::kLeft});
     table.participant(guid(3), data_of(7, boot), "");
     table.alive(guid(3));
@@ -204,7 +207,7 @@ TEST_CASE("A robot that is started again has its id back once its former self is
   CHECK(table.peers()[0].state == PeerState::kAlive);
   if (kind == PeerEventKind::kRestarted) {
     CHECK(table.standing(guid(3)) == Standing::kArriving);
-    table.told({7, kBoot});  // of the former life, late
+    table.told({7, kBoot});  // late, for the former incarnation
     CHECK(table.standing(guid(3)) == Standing::kArriving);
     table.told({7, boot});
   }
@@ -214,7 +217,7 @@ TEST_CASE("A robot that is started again has its id back once its former self is
   CHECK(table.standing(guid(2)) != Standing::kAdmitted);
 }
 
-TEST_CASE("Nobody takes over the id of a robot that is there", "[peers]") {
+TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
   PeerTable table = with_robot();
   // That of the robot itself is no secret.
   const std::uint64_t boot = GENERATE(kBoot, kBoot + 1, kOtherLife);
@@ -238,7 +241,7 @@ TEST_CASE("Nobody takes over the id of a robot that is there", "[peers]") {
   CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
 }
 
-TEST_CASE("An id goes to who has claimed it for longest", "[peers]") {
+TEST_CASE("An id passes to the participant that has claimed it for longest", "[peers]") {
   PeerTable table = with_robot();
   for (const std::uint8_t n : std::vector<std::uint8_t>{5, 4, 3}) {
     table.participant(guid(n), data_of(7, kBoot + n), "");
@@ -251,7 +254,7 @@ TEST_CASE("An id goes to who has claimed it for longest", "[peers]") {
   CHECK(table.standing(guid(3)) == Standing::kAdmitted);
 }
 
-TEST_CASE("Of two processes with this robot's id the newer one yields", "[peers]") {
+TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
   struct Case {
     const char* what;
     double its_s, own_s;
@@ -279,7 +282,7 @@ TEST_CASE("Of two processes with this robot's id the newer one yields", "[peers]
   CHECK(table.peers().empty());
 }
 
-TEST_CASE("Crowds of strangers do not use up the memory", "[peers]") {
+TEST_CASE("Many unknown participants do not exhaust the memory", "[peers]") {
   PeerTable table(kSelf);
   const auto wide_guid = [](std::size_t n) {
     Guid result{};
@@ -295,7 +298,7 @@ TEST_CASE("Crowds of strangers do not use up the memory", "[peers]") {
   CHECK(admitted == PeerTable::kMaxRobots);
   CHECK(table.peers().size() == PeerTable::kMaxRobots);
   CHECK(table.standing(wide_guid(2 * PeerTable::kMaxParticipants)) == Standing::kUnknown);
-  // Who goes makes room.
+  // Participants that leave make room for others.
   for (std::size_t n = 0; n < PeerTable::kMaxParticipants; ++n)
     table.participant_gone(wide_guid(n));
   table.participant(wide_guid(9999), "some tool", "");
@@ -366,7 +369,7 @@ TEST_CASE("User data that is not an identity is refused with the reason", "[iden
         "user data too long");
 }
 
-TEST_CASE("Random bytes are never taken for a robot, nor do any harm", "[identity]") {
+TEST_CASE("Random bytes are never accepted as a robot's user data", "[identity]") {
   const auto seed = GENERATE(range(0U, 20U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -390,7 +393,7 @@ TEST_CASE("A name that cannot be sent is refused at home", "[identity]") {
   CHECK_THROWS_AS(to_user_data({1, "tab\t", 1, 1}), std::invalid_argument);
 }
 
-TEST_CASE("A new life differs from all others and has not been resumed", "[identity]") {
+TEST_CASE("The boot id of a new incarnation is unique and not resumed", "[identity]") {
   std::set<std::uint64_t> lives;
   for (int i = 0; i < 100; ++i) {
     const std::uint64_t boot = random_boot_id();
@@ -401,7 +404,7 @@ TEST_CASE("A new life differs from all others and has not been resumed", "[ident
   CHECK(lives.size() == 100);
 }
 
-TEST_CASE("A life is resumed as often as can be counted, and stays the same", "[identity]") {
+TEST_CASE("An incarnation can be resumed as often as its counter permits", "[identity]") {
   const std::uint64_t first = random_boot_id();
   std::uint64_t boot = first;
   constexpr std::uint32_t kMost = 65535;
@@ -432,7 +435,7 @@ TEST_CASE("Duplicates and gaps agree with a set of all numbers, in any order", "
   }
 }
 
-TEST_CASE("A stream that skips every other number does not use up the memory", "[sequence]") {
+TEST_CASE("A stream that skips every other number does not exhaust the memory", "[sequence]") {
   constexpr std::uint32_t kCount = 10 * SequenceTracker::kMaxIntervals;
   SequenceTracker tracker(true);
   for (std::uint32_t i = 0; i < kCount; ++i) CHECK(tracker.is_new(2 * i + 1));
@@ -443,7 +446,7 @@ TEST_CASE("A stream that skips every other number does not use up the memory", "
   CHECK_FALSE(tracker.is_new(2));  // given up: better lost than twice
 }
 
-TEST_CASE("The last number there is counts like any other", "[sequence]") {
+TEST_CASE("The largest number counts like any other", "[sequence]") {
   SequenceTracker tracker(false);
   CHECK(tracker.is_new(0xFFFFFFFFU));
   CHECK_FALSE(tracker.is_new(0xFFFFFFFFU));
@@ -478,7 +481,7 @@ TEST_CASE("Traffic is written when it changes, cumulatively", "[traffic]") {
         "3.5,out,bow,place_recognition,*,0,0,30\n");
 }
 
-TEST_CASE("Traffic of a run that is taken up is added to what there was", "[traffic]") {
+TEST_CASE("Traffic of a resumed run is added to the former traffic", "[traffic]") {
   const std::string former =
       "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
       "1,out,bow,place_recognition,7,1,100,0\n"
@@ -511,7 +514,8 @@ TEST_CASE("Traffic of a run that is taken up is added to what there was", "[traf
   CHECK(csv.str() == "7,waiting,bow,place_recognition,*,1,10,0\n");
 }
 
-TEST_CASE("What a budget holds back is written beside what is sent", "[traffic]") {
+TEST_CASE("Messages that a budget delays or drops are in the table beside those sent",
+          "[traffic]") {
   std::ostringstream csv;
   TrafficCsv writer(csv);
   const HeldBack held{

@@ -9,7 +9,7 @@
 
 namespace km {
 
-// What holds up the sending thread.
+// A message whose encoding blocks the sending thread.
 struct Stone {
   std::shared_future<void> lifted;
 };
@@ -47,7 +47,7 @@ TEST_CASE("Robots of a team with keys talk, to all and to one", "[sealed]") {
   TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
   a.start();
   b.start();
-  for (std::uint32_t i = 0; i < 100; ++i) a.ping(i, {1, 2, 3});  // before anybody is known
+  for (std::uint32_t i = 0; i < 100; ++i) a.ping(i, {1, 2, 3});  // before any robot is known
   REQUIRE(a.hears(PeerEventKind::kJoined, 4));
   REQUIRE(b.hears(PeerEventKind::kJoined, 3));
   CHECK(b.received.wait_for(100).size() == 100);
@@ -62,7 +62,7 @@ TEST_CASE("Robots of a team with keys talk, to all and to one", "[sealed]") {
   CHECK(late.received_addressed.messages().empty());
 }
 
-TEST_CASE("Who has no keys of the team is not heard and hears nothing", "[sealed]") {
+TEST_CASE("A robot without keys of the team is ignored and receives nothing", "[sealed]") {
   const ToyTeam team, others("survey");
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
@@ -80,8 +80,8 @@ TEST_CASE("Who has no keys of the team is not heard and hears nothing", "[sealed
   CHECK(b.bridge.peers().list().size() == 1);
 }
 
-// Listens to the network as anybody in reach can.
-TEST_CASE("What is sealed is not to be read on the way", "[sealed]") {
+// Reads the network as any participant in reach can.
+TEST_CASE("Sealed messages cannot be read on their way", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
@@ -109,11 +109,11 @@ TEST_CASE("What is sealed is not to be read on the way", "[sealed]") {
   dds_sample_free(&envelope, &km_wire_Envelope_desc, DDS_FREE_CONTENTS);
 }
 
-TEST_CASE("Recorded credentials and recorded messages make nobody a member", "[sealed]") {
+TEST_CASE("Replayed credentials and messages make no participant a member", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   auto b = std::make_unique<TestRobot>(domain, 4, member_of(team));
-  // What robot 3 once showed and said; then it is gone.
+  // Records credentials and messages of robot 3, which then ends.
   std::string shown;
   const RobotIdentity identity{3, "robot3", kProtocolVersion, random_boot_id()};
   {
@@ -157,8 +157,7 @@ TEST_CASE("Recorded credentials and recorded messages make nobody a member", "[s
   CHECK(c.bridge.peers().list().size() == 1);
 }
 
-TEST_CASE("Of two processes with one robot's keys the later one is told, and not heard",
-          "[sealed]") {
+TEST_CASE("The later of two processes with one robot's keys is notified and ignored", "[sealed]") {
   const ToyTeam team;
   const RobotKeys keys = team.keys_of(3, "robot3", today_s() - 3600);
   const auto with_its_keys = [&](const RobotIdentity& own) {
@@ -206,7 +205,7 @@ TEST_CASE("Messages under a new key wait for it, however many they are", "[seale
   CHECK(b.refused() == 0);
 }
 
-TEST_CASE("Robots appear and are heard while nothing can be sent", "[sealed]") {
+TEST_CASE("Robots appear and are received while sending is blocked", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, member_of(team));
@@ -246,14 +245,14 @@ TEST_CASE("A robot with keys that starts again is known by its new process", "[s
   }
 }
 
-// The process that goes on with the life of `former`, or one of another life.
+// A process that continues the incarnation of `former`, or one of another incarnation.
 RobotIdentity successor_of(const RobotIdentity& former, bool resumed) {
   RobotIdentity next = former;
   next.boot = resumed ? next_boot(former.boot) : random_boot_id();
   return next;
 }
 
-TEST_CASE("What was sealed for a robot reaches it when it is resumed, and not in another life",
+TEST_CASE("Messages sealed for a robot reach its resumed process and not its next incarnation",
           "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
@@ -289,7 +288,7 @@ TEST_CASE("What was sealed for a robot reaches it when it is resumed, and not in
   for (const TopicTraffic& topic : second.bridge.traffic().topics) CHECK(topic.missing == 0);
 }
 
-TEST_CASE("What is for a robot of an earlier process waits until that shows its keys", "[sealed]") {
+TEST_CASE("Messages for a robot of an earlier process wait until its keys are known", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   const RobotIdentity met{4, robot_name(4), kProtocolVersion, random_boot_id()};

@@ -13,12 +13,12 @@ using enum SendPriority;
 
 const std::vector<RobotId> kOne{7};
 
-// Of topic "t", 100 bytes.
+// A message of topic "t" with 100 bytes.
 Entry entry(SendPriority priority, int message) {
   return {.topic = "t", .priority = priority, .bytes = 100, .message = message};
 }
 
-// What may go at `now_s`.
+// Messages that the schedule sends at `now_s`.
 std::vector<int> sent(Schedule& schedule, double now_s, std::vector<RobotId> readers = kOne) {
   std::vector<int> messages;
   while (const auto next = schedule.pop(now_s, [&](const auto&) { return std::optional(readers); }))
@@ -26,7 +26,7 @@ std::vector<int> sent(Schedule& schedule, double now_s, std::vector<RobotId> rea
   return messages;
 }
 
-TEST_CASE("The most important go first, and those alike in order", "[budget]") {
+TEST_CASE("Messages are sent by priority and in order within a priority", "[budget]") {
   const bool limited = GENERATE(false, true);
   Schedule schedule({.bytes_per_s = limited ? 1e9 : 0.0});
   int message = 0;
@@ -42,7 +42,7 @@ TEST_CASE("The most important go first, and those alike in order", "[budget]") {
   CHECK(schedule.size() == 0);
 }
 
-TEST_CASE("What is sent is what the budget gives, however large the messages are", "[budget]") {
+TEST_CASE("The bytes sent equal the budget for messages of any size", "[budget]") {
   const std::uint64_t bytes = GENERATE(100U, 1000U, 30'000U);
   const std::size_t readers = GENERATE(1U, 3U);
   CAPTURE(bytes, readers);
@@ -76,7 +76,7 @@ TEST_CASE("After a silence little more than the budget is sent at once", "[budge
   CHECK(*schedule.wait_s() == Approx(0.01).margin(1e-6));
 }
 
-TEST_CASE("A closure goes before all that waits for the budget", "[budget]") {
+TEST_CASE("A closure overtakes all messages that wait for the budget", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   for (int k = 0; k < 100; ++k) schedule.push(entry(kMesh, k), 0.0);
   CHECK(sent(schedule, 0.0) == std::vector<int>{0});
@@ -95,7 +95,7 @@ TEST_CASE("Statuses never wait, and are counted", "[budget]") {
   CHECK(sent(schedule, 1.01) == std::vector<int>{10});
 }
 
-TEST_CASE("Bags of words that have waited go after new ones", "[budget]") {
+TEST_CASE("Bags of words that have waited follow new ones", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   for (int k = 0; k < 60; ++k) schedule.push(entry(kWords, k), 0.0);
   CHECK(sent(schedule, 0.0) == std::vector<int>{0});
@@ -105,7 +105,7 @@ TEST_CASE("Bags of words that have waited go after new ones", "[budget]") {
   CHECK(schedule.held_back().at("t").delayed == TrafficCount{2, 200});
 }
 
-TEST_CASE("Of a state that waits only the newest is kept, in the turn of the first", "[budget]") {
+TEST_CASE("Only the newest of a waiting state is kept, at the position of the first", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   const auto state = [&](std::uint64_t key, int message, std::optional<RobotId> to = {}) {
     Entry next = entry(kPoses, message);
@@ -149,7 +149,7 @@ TEST_CASE("A state that is replaced after it has waited takes no room from other
   CHECK(schedule.held_back().at("t").dropped == TrafficCount{});
 }
 
-TEST_CASE("Requests that nobody will answer any more are dropped", "[budget]") {
+TEST_CASE("Requests that are too old to be answered are dropped", "[budget]") {
   Schedule schedule({.bytes_per_s = 100.0});
   for (int k = 0; k < 10; ++k) {
     Entry request = entry(kVerification, k);
@@ -207,7 +207,8 @@ TEST_CASE("Each kind and each peer has a limit of its own", "[budget]") {
   CHECK(pop_for({8}));
 }
 
-TEST_CASE("What has no room, and what is left at the end, is dropped and counted", "[budget]") {
+TEST_CASE("Messages without room and messages left at the end are dropped and counted",
+          "[budget]") {
   Schedule schedule({.bytes_per_s = 1.0});
   constexpr std::size_t kMany = Schedule::kMaxMessages + 10;
   for (std::size_t k = 0; k < kMany; ++k) schedule.push(entry(kMesh, static_cast<int>(k)), 0.0);
@@ -225,7 +226,7 @@ TEST_CASE("What has no room, and what is left at the end, is dropped and counted
   CHECK(schedule.size() == 1);
 }
 
-TEST_CASE("What was sent without asking is paid for", "[budget]") {
+TEST_CASE("Bytes that DDS sends by itself are charged to the budget", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   schedule.settle(500, 0.0);
   schedule.push(entry(kClosures, 1), 0.0);
@@ -236,7 +237,7 @@ TEST_CASE("What was sent without asking is paid for", "[budget]") {
   CHECK(sent(schedule, 0.62) == std::vector<int>{2});
 }
 
-TEST_CASE("What nobody would hear waits, and keeps nothing else up", "[budget]") {
+TEST_CASE("Messages without a reader wait and delay no others", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   schedule.push(entry(kWords, 1), 0.0);
   schedule.push(entry(kMesh, 2), 0.0);

@@ -30,7 +30,7 @@ struct Member {
   SharedSeal seal;
 };
 
-// What is sealed here opens there.
+// True if a message that `from` seals opens at `to`.
 bool passes(Member& from, Member& to, std::optional<TeamPeer> addressee) {
   const SealContext context{.topic = "pings", .sender = from.peer(), .addressee = addressee};
   const auto sealed =
@@ -40,7 +40,7 @@ bool passes(Member& from, Member& to, std::optional<TeamPeer> addressee) {
   });
 }
 
-TEST_CASE("Threads may seal, open, admit, forget and update at once", "[sealed]") {
+TEST_CASE("Threads may seal, open, admit, remove and update at the same time", "[sealed]") {
   const ToyTeam team;
   Member a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   REQUIRE((a.admits(b) && b.admits(a) && a.takes_key_of(b) && b.takes_key_of(a)));

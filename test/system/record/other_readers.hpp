@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// What readers of npm say of an MCAP file, or nullopt where they cannot be had.
+/// Content of an MCAP file according to readers of npm; nullopt if they are not available.
 inline std::optional<Json> told_by_others(const std::filesystem::path& file,
                                           const TemporaryFolder& folder) {
   const std::filesystem::path work = folder.path() / "npm";

@@ -1,5 +1,5 @@
-// Reads an MCAP file with readers that are not ours, from its index and once more from its
-// beginning, decodes every message by the definition in the file, and prints as JSON what is in it:
+// Reads an MCAP file with readers of other projects, from its index and once more from its
+// beginning. Decodes every message by the definition in the file, and prints the content as JSON:
 //
 //   npm install && node read_record.mjs FILE.mcap      (versions: package.json)
 import assert from "node:assert";
@@ -31,7 +31,7 @@ function decode(channel, schema, data) {
   return decoders.get(schema.name).readMessage(data);
 }
 
-// From the beginning, as far as it goes.
+// From the beginning, up to the end or an incomplete chunk.
 const inOrder = [];
 const schemas = new Map(), channels = new Map();
 const stream = new mcap.McapStreamReader({ decompressHandlers, validateCrcs: true });
@@ -63,7 +63,7 @@ if (told.whole) {
   assert.equal(reader.chunkIndexes.length, reader.statistics.chunkCount);
 }
 
-await file.close();  // else Node may warn of it, beside the JSON
+await file.close();  // otherwise Node may print a warning beside the JSON
 const path = Object.entries(told.last).find(([topic]) => topic.endsWith("/path"))?.[1];
 console.log(JSON.stringify({
   whole: told.whole, messages: told.messages, topics: told.topics,

@@ -21,7 +21,7 @@ inline cv::Mat white_noise(int width, int height, double sigma, std::mt19937& ra
   return noise;
 }
 
-/// A surface with blobs of a few pixels everywhere: corners to find and to follow. 8-bit grey.
+/// A surface with blobs of a few pixels everywhere, with corners to track. 8-bit grey.
 inline cv::Mat texture(int width, int height, unsigned seed) {
   std::mt19937 random(seed);
   cv::Mat blobs;
@@ -45,7 +45,7 @@ inline cv::Mat noisy_wall(int width, int height, double grey, double sigma, std:
   return image;
 }
 
-/// Two cameras side by side that see the same of what is infinitely far.
+/// Two cameras side by side with equal views of points at infinity.
 inline StereoRig aligned_rig(int width, int height, double focal_px) {
   Camera camera;
   camera.width = width;

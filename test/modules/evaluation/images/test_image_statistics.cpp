@@ -9,8 +9,8 @@
 #include "test/modules/evaluation/images/synthetic_images.hpp"
 #include "test/support/shared_data.hpp"
 
-// Figures of MH_01_easy as an independent implementation measured them on all images of 0 to 15 s;
-// here on few, so that chance has a say.
+// Figures of MH_01_easy that an independent implementation measured on all images of 0 to 15 s.
+// Here few images are used, so that the figures vary by chance.
 
 namespace km {
 namespace {
@@ -19,7 +19,7 @@ GrayImage gray(const cv::Mat& image) {
   return {image.cols, image.rows, {image.datastart, image.dataend}};
 }
 
-TEST_CASE("One pass gives every section, the same every time", "[image_statistics]") {
+TEST_CASE("One pass gives every section and always the same figures", "[image_statistics]") {
   const auto [width, height] = GENERATE(table<int, int>({{320, 240}, {376, 241}}));
   const cv::Mat surface = texture(width + 40, height, 2);
   const auto run = [&, w = width, h = height] {
@@ -46,7 +46,7 @@ TEST_CASE("One pass gives every section, the same every time", "[image_statistic
   }
 }
 
-TEST_CASE("Images without a corner leave gaps, not errors", "[image_statistics]") {
+TEST_CASE("Images without a corner give missing figures and no errors", "[image_statistics]") {
   const GrayImage wall{64, 48, std::vector<std::uint8_t>(64 * 48, 90)};
   ImageStatistics statistics(aligned_rig(64, 48, 64));
   for (int i = 0; i < 3; ++i) statistics.add({50'000'000 * (i + 1), wall, wall});
@@ -68,7 +68,7 @@ void check_near(const std::vector<ImageFigure>& figures, const std::string& sect
   CHECK(figure(figures, section, name) == Approx(recorded).epsilon(share));
 }
 
-TEST_CASE("Recorded images give the figures recorded of them", "[image_statistics]") {
+TEST_CASE("Recorded images give their recorded figures", "[image_statistics]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   EurocReader reader = open_euroc(*dataset, {.from_s = 0.0, .to_s = 15.0});
@@ -112,7 +112,7 @@ TEST_CASE("Recorded corners survive as recorded", "[image_statistics]") {
     tracks.add(packet->frame->stamp, image, corners_of(image.image));
   }
   tracks.append_to(figures);
-  check_near(figures, "corners", "mean", 485, 0.005);  // all images were looked at
+  check_near(figures, "corners", "mean", 485, 0.005);  // all images are used
   const double few_starts = 0.06;                      // 5 of 22
   check_near(figures, "KLT survival", "1 frames", 0.943, few_starts);
   check_near(figures, "KLT survival", "10 frames", 0.780, few_starts);
@@ -138,13 +138,13 @@ TEST_CASE("A table has a row for each figure below its heading", "[image_statist
                        Catch::Contains(" -\n"));
 }
 
-TEST_CASE("A comparison marks what differs by more than a quarter", "[image_statistics]") {
+TEST_CASE("A comparison marks figures that differ by more than a quarter", "[image_statistics]") {
   const std::string text = to_comparison(kReference, kOther, "recorded", "rendered");
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
     CAPTURE(line);
     const bool marked = line.ends_with("<--");
-    CHECK(marked == (line.find("  p5 ") != line.npos));  // a quarter itself is not marked
+    CHECK(marked == (line.find("  p5 ") != line.npos));  // exactly a quarter is not marked
     CHECK(line.find("only here") == line.npos);
   }
   CHECK_THAT(text, Catch::Contains("1.20") && Catch::Contains("0.75") &&
@@ -152,7 +152,7 @@ TEST_CASE("A comparison marks what differs by more than a quarter", "[image_stat
                            "1 of 3 rows differ by more than 25 %; of those at like flow 0 of 1\n"));
 }
 
-TEST_CASE("The JSON of a comparison says ratio and verdict, row by row", "[image_statistics]") {
+TEST_CASE("The JSON of a comparison has ratio and verdict in each row", "[image_statistics]") {
   const std::string text = json_text(comparison_json(kReference, kOther));
   std::string flat;
   for (const char c : text)
@@ -164,7 +164,7 @@ TEST_CASE("The JSON of a comparison says ratio and verdict, row by row", "[image
                  !Catch::Contains("onlyhere") && Catch::EndsWith(R"("compared":3,"differing":1})"));
 }
 
-TEST_CASE("The JSON nests figures in their sections, null for what is not had",
+TEST_CASE("The JSON nests figures in their sections with null for a missing figure",
           "[image_statistics]") {
   const std::string text = json_text(to_json(kReference));
   CHECK_THAT(text, Catch::Contains("\"corners\": {") && Catch::Contains("\"p5\": 50") &&

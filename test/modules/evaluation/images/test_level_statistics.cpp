@@ -35,12 +35,12 @@ TEST_CASE("The gradient of a ramp is its slope", "[image_statistics]") {
   CHECK(gradient_magnitude(ramp(64, 48, slope).t()).at<float>(20, 20) == Approx(slope));
 }
 
-TEST_CASE("The noise of one image is recovered, whatever lies below it", "[image_statistics]") {
+TEST_CASE("The noise of one image is estimated at any grey level and slope", "[image_statistics]") {
   const double sigma = GENERATE(0.7, 1.0, 1.5, 2.5, 4.0);
   CAPTURE(sigma);
   std::mt19937 random(3);
-  // Rounding to levels adds 1/12 to the variance. 150000 pixels tell the median to half a percent;
-  // grouping leaves another percent or two at the smallest sigma.
+  // Rounding to levels adds 1/12 to the variance. With 150000 pixels the median is known to half a
+  // percent; grouping adds one or two percent at the smallest sigma.
   const double expected = std::sqrt(sigma * sigma + 1.0 / 12.0);
   const cv::Mat wall = noisy_wall(480, 320, 128.0, sigma, random);
   CHECK(noise_of(wall) == Approx(expected).epsilon(0.03));
@@ -53,7 +53,7 @@ TEST_CASE("The noise of one image is recovered, whatever lies below it", "[image
   CHECK(noise_of(tilted) == Approx(expected).epsilon(0.03));
 }
 
-TEST_CASE("Noise that is correlated between pixels counts less", "[image_statistics]") {
+TEST_CASE("Noise that is correlated between pixels is underestimated", "[image_statistics]") {
   std::mt19937 random(3);
   cv::Mat smooth, image;
   cv::GaussianBlur(white_noise(480, 320, 8.0, random), smooth, cv::Size(), 1.5);
@@ -63,7 +63,7 @@ TEST_CASE("Noise that is correlated between pixels counts less", "[image_statist
   CHECK(noise_of(image) < 0.5 * deviation[0]);
 }
 
-TEST_CASE("An image without a flat pixel has no noise to be had", "[image_statistics]") {
+TEST_CASE("An image without a flat pixel has no noise figure", "[image_statistics]") {
   CHECK(std::isnan(noise_of(ramp(64, 48, 3))));
 }
 
@@ -92,7 +92,8 @@ TEST_CASE("The Laplacian's variance is that of white noise times its squared wei
   CHECK(figure(figures_of(after), "motion blur", "all frames, median") < 0.5 * sharpness);
 }
 
-TEST_CASE("Grey levels, exposure steps and blur by flow are those put in", "[image_statistics]") {
+TEST_CASE("Grey levels and exposure steps and blur by flow have the simulated values",
+          "[image_statistics]") {
   LevelStatistics statistics;
   const auto wall = [](int grey) { return cv::Mat(100, 100, CV_8UC1, cv::Scalar(grey)); };
   cv::Mat first = wall(100);

@@ -26,7 +26,7 @@ TEST_CASE("A wall parallel to the cameras is found at its depth", "[image_statis
   StereoStatistics statistics(kRig);
   statistics.add(kSecond, left, right, corners_of(left.image));
   const auto figures = figures_of(statistics);
-  // All but the corners that the right camera does not see.
+  // All except for the corners outside the right camera's view.
   const double seen = 1.0 - disparity_px / double{kWidth};
   CHECK(figure(figures, "KLT, left to right", "pass, share of corners") > seen - 0.05);
   CHECK(figure(figures, "KLT, left to right", "also within 1.5 px of the epipolar line") >
@@ -47,7 +47,7 @@ TEST_CASE("A right image that is too low misses the epipolar lines", "[image_sta
   const auto figures = figures_of(statistics);
   CHECK(figure(figures, "KLT, left to right", "pass, share of corners") > 0.9);
   CHECK(figure(figures, "KLT, left to right", "also within 1.5 px of the epipolar line") < 0.01);
-  // What is left comes from coarse octaves, whose keypoints are off by pixels.
+  // The remaining matches come from coarse octaves, whose keypoints err by pixels.
   CHECK(figure(figures, "ORB, left to right", "share within 1.5 px of the epipolar line") < 0.2);
 }
 

@@ -11,7 +11,7 @@ constexpr int kWidth = 320;
 constexpr int kHeight = 240;
 constexpr Stamp kSecond = 1'000'000'000;
 
-// Blobs to the left, a plain wall with a little noise of its own to the right.
+// Blobs on the left, a plain wall with a little constant noise on the right.
 cv::Mat scene(int shift_px) {
   const cv::Mat surface = texture(kWidth + 8, kHeight, 5);
   cv::Mat image = view_of(surface, shift_px, 0, kWidth, kHeight);
@@ -30,7 +30,7 @@ void add(StillStatistics& statistics, double t_s, const cv::Mat& scene, double s
 
 }  // namespace
 
-TEST_CASE("Noise over time is recovered where the camera stands still", "[image_statistics]") {
+TEST_CASE("Noise over time is estimated while the camera stands still", "[image_statistics]") {
   const double sigma = GENERATE(1.0, 2.0);
   CAPTURE(sigma);
   std::mt19937 random(9);
@@ -39,7 +39,7 @@ TEST_CASE("Noise over time is recovered where the camera stands still", "[image_
   CHECK(statistics.pairs() == 3);
   const double expected = std::sqrt(sigma * sigma + 1.0 / 12.0);  // and rounding to levels
   const auto figures = figures_of(statistics);
-  // A flat pixel is told by the image that is itself noisy: that takes a little of its noise away.
+  // Flat pixels are selected by the noisy image itself, which reduces its noise a little.
   const double selection = 0.05;
   CHECK(figure(figures, "standing", "temporal noise, flat pixels [levels]") ==
         Approx(expected).epsilon(selection));

@@ -11,7 +11,7 @@ constexpr int kWidth = 320;
 constexpr int kHeight = 240;
 constexpr Stamp kPeriod = 50'000'000;
 
-// A camera that moves over a surface by `step_px` a frame, along x.
+// A camera that moves over a surface along x by `step_px` per frame.
 void pass_over(TrackStatistics& statistics, int frames, int step_px) {
   const cv::Mat surface = texture(kWidth + frames * step_px, kHeight, 7);
   for (int i = 0; i < frames; ++i) {
@@ -29,8 +29,9 @@ TEST_CASE("Corners of a shifted image survive until they leave it", "[image_stat
   TrackStatistics statistics(1, 0.25);
   pass_over(statistics, 12, step_px);
   const auto figures = figures_of(statistics);
-  // Corners lie evenly over the width: step * n / width of them leave in n frames. Two percent are
-  // chance (there are about 250), and some whose window reaches over the rim fail at once.
+  // Corners are evenly distributed over the width: step * n / width of them leave in n frames. Two
+  // percent are random (there are about 250). Some corners whose window extends over the rim fail
+  // at once.
   const double chance = 0.02;
   const double at_rim = 0.03;
   for (const int n : {1, 2, 5, 10}) {
@@ -54,11 +55,11 @@ TEST_CASE("Nothing survives when the scene is replaced", "[image_statistics]") {
     const KltImage image = make_klt_image(texture(kWidth, kHeight, 100 + i));
     statistics.add((i + 1) * kPeriod, image, corners_of(image.image));
   }
-  const double chance = 0.1;  // a corner may find something that looks like it nearby
+  const double chance = 0.1;  // a corner may match something similar nearby
   CHECK(figure(figures_of(statistics), "KLT survival", "1 frames") < chance);
 }
 
-TEST_CASE("A missing frame is no step of one frame, but tracks go on", "[image_statistics]") {
+TEST_CASE("A missing frame is no step of one frame but tracks continue", "[image_statistics]") {
   TrackStatistics statistics(10, 0.25);
   const cv::Mat surface = texture(kWidth + 40, kHeight, 7);
   const int places[] = {0, 4, 8, 16};

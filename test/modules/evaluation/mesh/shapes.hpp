@@ -10,7 +10,7 @@
 namespace km {
 
 /// A rectangle with a corner at `corner` and the given sides, as cells x cells squares of two
-/// triangles; all vertices carry `label`.
+/// triangles; all vertices have `label`.
 inline LabelledMesh rectangle(const Eigen::Vector3f& corner, const Eigen::Vector3f& side_u,
                               const Eigen::Vector3f& side_v, int cells = 8, LabelId label = 1) {
   LabelledMesh mesh;

@@ -25,8 +25,8 @@ MeshReport compare(const LabelledMesh& truth, const LabelledMesh& estimate,
   return mesh_error(truth, inputs, options);
 }
 
-// Mean distance from a point at height h above a plane to the nearest of random points on it,
-// `density` of them per square metre: P(r > x) = exp(-pi density x^2) in the plane.
+// Mean distance from a point at height h above a plane to the nearest of random points on it. There
+// are `density` points per square metre: P(r > x) = exp(-pi density x^2) in the plane.
 double mean_distance(double h, double density) {
   const double a = std::numbers::pi * density;
   return h + std::exp(a * h * h) * std::erfc(h * std::sqrt(a)) / (2.0 * std::sqrt(density));
@@ -38,7 +38,7 @@ std::string json_of(const MeshReport& report) {
 
 }  // namespace
 
-TEST_CASE("Two parallel planes are their distance apart", "[mesh_error]") {
+TEST_CASE("Two parallel planes have the error of their distance", "[mesh_error]") {
   const double h = GENERATE(0.0, 0.01, 0.03, 0.08);
   const double density = GENERATE(250.0, 1000.0);
   CAPTURE(h, density);
@@ -62,17 +62,17 @@ TEST_CASE("Two parallel planes are their distance apart", "[mesh_error]") {
   CHECK(report.samples_per_m2 == density);
 }
 
-TEST_CASE("A sphere too large by 5 cm is 5 cm off", "[mesh_error]") {
+TEST_CASE("A sphere too large by 5 cm has an error of 5 cm", "[mesh_error]") {
   MeshErrorOptions options;
   const MeshReport report = compare(sphere(1.0F), sphere(1.05F), options);
-  // Both are cut short by their chords, 1 - cos(pi / 96) = 0.5 mm at most, alike.
+  // Both are smaller because of their chords, by 1 - cos(pi / 96) = 0.5 mm at most, equally.
   CHECK(report.merged.truth.surface.mean_m == Approx(0.05).margin(6e-4));
   CHECK(report.merged.estimate.surface.mean_m == Approx(0.05).margin(6e-4));
-  CHECK(report.registration.free_directions == 3);  // a sphere turns in itself
+  CHECK(report.registration.free_directions == 3);  // a sphere rotates in itself
   CHECK(report.registration.T_truth_estimate.translation().norm() < 1e-3);
 }
 
-TEST_CASE("Shares of right, wrong and unknown labels are those of the areas", "[mesh_error]") {
+TEST_CASE("Shares of right and wrong and unknown labels are those of the areas", "[mesh_error]") {
   LabelledMesh truth = rectangle({0, 0, 0}, {5, 0, 0}, {0, 4, 0}, 8, 1);
   truth.append(rectangle({5, 0, 0}, {5, 0, 0}, {0, 4, 0}, 8, 7));
   // Class 1: 60 % right, 40 % called 7. Class 7: 50 % right, 30 % called 2, 20 % unknown.
@@ -98,7 +98,7 @@ TEST_CASE("Shares of right, wrong and unknown labels are those of the areas", "[
   CHECK(report.merged.estimate.labels.total().accuracy() == Approx(0.55).margin(kBorder));
 }
 
-TEST_CASE("Labels further than the given distance are not judged", "[mesh_error]") {
+TEST_CASE("Labels beyond the given distance are not judged", "[mesh_error]") {
   MeshErrorOptions options = in_place();
   options.label_distance_m = 0.2;
   const float z = GENERATE(0.15F, 0.25F);
@@ -126,8 +126,9 @@ TEST_CASE("True points far from the estimate are not judged", "[mesh_error]") {
   CHECK(compare(square(10.0F, 0.0F), estimate, all).merged.coverage == 1.0);
 }
 
-TEST_CASE("True points past the rim of the estimate or behind it count apart", "[mesh_error]") {
-  // A wall that is 0.2 m thick, of which one side was seen, and that only in part.
+TEST_CASE("True points beyond the rim of the estimate or behind it count separately",
+          "[mesh_error]") {
+  // A wall with a thickness of 0.2 m, of which a part of one side was seen.
   LabelledMesh truth = rectangle({0, 0, 0}, {4, 0, 0}, {0, 0, 2}, 8, 1);
   truth.append(rectangle({0, 0.2F, 0}, {0, 0, 2}, {4, 0, 0}, 8, 2));
   const LabelledMesh estimate = rectangle({0, -0.03F, 0}, {3, 0, 0}, {0, 0, 2}, 8, 1);
@@ -139,16 +140,16 @@ TEST_CASE("True points past the rim of the estimate or behind it count apart", "
   CHECK(report.merged.seen.labels.total().accuracy() == 1.0);
 }
 
-TEST_CASE("What the truth does not have counts as the crop distance", "[mesh_error]") {
+TEST_CASE("Surface that the truth lacks counts with the crop distance", "[mesh_error]") {
   LabelledMesh estimate = square(2.0F, 0.0F);
-  estimate.append(square(1.0F, 3.0F));  // a fifth of the estimate, in the air
+  estimate.append(square(1.0F, 3.0F));  // a fifth of the estimate, above the truth
   const MeshReport report = compare(square(2.0F, 0.0F), estimate, in_place());
   CHECK(report.merged.beyond == Approx(0.2).margin(1e-3));
   CHECK(report.merged.estimate.surface.mean_m == Approx(0.1).margin(1e-3));
   CHECK(report.merged.truth.surface.mean_m < 1e-4);
 }
 
-TEST_CASE("Several robots are judged each and merged", "[mesh_error]") {
+TEST_CASE("Several robots are judged separately and merged", "[mesh_error]") {
   LabelledMesh left = rectangle({0, 0, 0}, {3, 0, 0}, {0, 4, 0}, 8, 1);
   LabelledMesh right = rectangle({2, 0, 0.04F}, {4, 0, 0}, {0, 4, 0}, 8, 2);
   const std::vector<MeshInput> inputs = {{"left", left}, {"right", right}};
@@ -166,7 +167,7 @@ TEST_CASE("Several robots are judged each and merged", "[mesh_error]") {
   CHECK(report.merged.coverage == 1.0);
   CHECK(report.merged.estimate.point.count == 28'000);
   CHECK(report.merged.estimate.surface.mean_m == Approx(0.04 * 16.0 / 28.0).margin(1e-5));
-  // Where both are, the nearer counts: half of the truth is at 0, half at 4 cm.
+  // In their common part the nearer one counts: half of the truth is at 0, half at 4 cm.
   CHECK(report.merged.truth.surface.mean_m == Approx(0.02).margin(6e-4));
   CHECK(report.merged.truth.labels.total().accuracy() == Approx(0.5).margin(0.02));
 }
@@ -211,7 +212,7 @@ TEST_CASE("Meshes without labels are compared by shape, with a note", "[mesh_err
   CHECK_THAT(to_table(report, {}), !Catch::Contains("True class"));
 }
 
-TEST_CASE("What cannot be compared is refused by name", "[mesh_error]") {
+TEST_CASE("Meshes that cannot be compared are refused by name", "[mesh_error]") {
   const LabelledMesh good = square(1.0F, 0.0F);
   const auto message = [&](const LabelledMesh& truth, const LabelledMesh& estimate,
                            MeshErrorOptions options = {}) -> std::string {

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-// Where mesh_error() puts `estimate`.
+// The report of mesh_error() with registration.
 MeshReport report_of(const LabelledMesh& truth, const LabelledMesh& estimate,
                      const SE3& guess = SE3::Identity()) {
   const std::vector<MeshInput> inputs = {{"estimate", estimate}};
@@ -19,7 +19,7 @@ MeshReport report_of(const LabelledMesh& truth, const LabelledMesh& estimate,
   return mesh_error(truth, inputs, options);
 }
 
-// How far `found` puts points of a room from where `truth` puts them [m], at most.
+// Largest distance [m] between the points of a room moved by `found` and by `truth`.
 double difference(const SE3& found, const SE3& truth) {
   double worst = 0.0;
   for (const Eigen::Vector3f& vertex : room().vertices) {
@@ -33,7 +33,7 @@ constexpr double kError_m = 5e-5;  // a few of the steps at which registration s
 
 }  // namespace
 
-TEST_CASE("Registration finds how a room was moved", "[mesh_error]") {
+TEST_CASE("Registration finds the motion of a room", "[mesh_error]") {
   Vector6 xi;
   xi << GENERATE(-0.04, 0.0, 0.05), 0.02, -0.03, 0.10, GENERATE(-0.08, 0.12), 0.05;
   const SE3 T_truth_estimate = se3_exp(xi);
@@ -45,8 +45,10 @@ TEST_CASE("Registration finds how a room was moved", "[mesh_error]") {
   CHECK(difference(found.T_truth_estimate, T_truth_estimate) < kError_m);
 }
 
-// The registration of 40 points of checks of this kind: a quarter turn about z and (1, 2, 3).
-TEST_CASE("A quarter turn is found by known pairs exactly, by ICP from nearby", "[mesh_error]") {
+// The registration of 40 points in checks of this kind: a rotation by 90 degrees about z and (1, 2,
+// 3).
+TEST_CASE("A rotation by 90 degrees is found exactly from known pairs and by ICP from nearby",
+          "[mesh_error]") {
   const SE3 T = make_pose(so3_exp({0, 0, -M_PI / 2}), {1, 2, 3});
   std::mt19937 random(GENERATE(1U, 2U, 3U));
   std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
@@ -70,12 +72,12 @@ TEST_CASE("A quarter turn is found by known pairs exactly, by ICP from nearby", 
   Vector6 off;
   off << 0.01, -0.01, 0.02, 0.02, 0.01, -0.03;
   const MeshReport report = report_of(truth, estimate, T * se3_exp(off));
-  // Triangles that cross each other pair points wrongly, ever fewer while they draw near.
+  // Triangles that cross each other pair points wrongly, but less while they approach.
   CHECK(difference(report.registration.T_truth_estimate, T) < 3e-4);
   CHECK(report.merged.truth.surface.mean_m < 1e-4);
 }
 
-TEST_CASE("Registration does not move along what the surfaces leave open", "[mesh_error]") {
+TEST_CASE("Registration does not move along undetermined directions", "[mesh_error]") {
   LabelledMesh estimate = square(4.0F, 0.0F);
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.3, 0.0, 0.05}));
   const MeshReport report = report_of(square(4.0F, 0.0F), estimate);
@@ -87,7 +89,7 @@ TEST_CASE("Registration does not move along what the surfaces leave open", "[mes
         "the surfaces leave 3 of 6 directions open; registration did not move along these");
 }
 
-TEST_CASE("Registration is not drawn off by a part that is not in the truth", "[mesh_error]") {
+TEST_CASE("Registration is not biased by a part that the truth lacks", "[mesh_error]") {
   LabelledMesh estimate = room();
   estimate.append(square(1.0F, 0.5F));  // a table of 1 m^2 of 41, half a metre above the floor
   const SE3 T_truth_estimate = make_pose(so3_exp({0.0, 0.0, 0.02}), {0.05, -0.05, 0.03});
@@ -96,8 +98,8 @@ TEST_CASE("Registration is not drawn off by a part that is not in the truth", "[
   CHECK(difference(found.T_truth_estimate, T_truth_estimate) < kError_m);
 }
 
-// Rough ground whose rim hangs over beside a kerb: the kerb is the nearest face of it.
-TEST_CASE("Registration does not take ground beside a kerb for the kerb", "[mesh_error]") {
+// Rough ground whose rim extends beyond a kerb, which is then the nearest face.
+TEST_CASE("Registration does not pair ground beside a kerb with the kerb", "[mesh_error]") {
   const LabelledMesh ground = square(8.0F, 0.0F, 16);
   LabelledMesh upright = rectangle({2, 0, 0}, {0, 8, 0}, {0, 0, 0.3F}, 32);  // the kerb
   upright.append(rectangle({8, 0, 0}, {0, 8, 0}, {0, 0, 1}));

@@ -10,13 +10,13 @@
 namespace km {
 namespace {
 
-TEST_CASE("Samples have the density asked for, on every part", "[mesh_error]") {
+TEST_CASE("Samples have the requested density on every part", "[mesh_error]") {
   const std::uint32_t seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   const LabelledMesh mesh = room();  // 12 + 2 * 6 + 2 * 8 m^2
   CHECK(surface_area(mesh) == Approx(40.0));
   const SurfaceSamples samples = sample_surface(mesh, 1000.0, seed);
-  // The number is the area's, rounded up or down; so is that of every face.
+  // The number is that of the area, rounded up or down, also for every face.
   CHECK(std::abs(static_cast<double>(samples.points.size()) - 40'000.0) <= 1.0);
   std::vector<int> of_face(mesh.faces.size());
   for (const std::uint32_t face : samples.faces) ++of_face[face];
@@ -47,7 +47,8 @@ TEST_CASE("Samples are uniform within a triangle", "[mesh_error]") {
   for (const int count : quarter) CHECK(std::abs(count - 10'000) < 5 * 87);
 }
 
-TEST_CASE("Faces smaller than a sample's share get theirs on average", "[mesh_error]") {
+TEST_CASE("Faces smaller than the area per sample are sampled correctly on average",
+          "[mesh_error]") {
   const SurfaceSamples samples = sample_surface(square(1.0F, 0.0F, 100), 1000.0, 1);  // 20000 faces
   CHECK(std::abs(static_cast<double>(samples.points.size()) - 1000.0) <= 1.0);
   const auto left = std::count_if(samples.points.begin(), samples.points.end(),
@@ -55,7 +56,8 @@ TEST_CASE("Faces smaller than a sample's share get theirs on average", "[mesh_er
   CHECK(std::abs(static_cast<double>(left) - 500.0) <= 11.0);  // a row of cells is 10 samples
 }
 
-TEST_CASE("The same seed gives the same samples, another one others", "[mesh_error]") {
+TEST_CASE("The same seed gives the same samples and another seed gives different ones",
+          "[mesh_error]") {
   const LabelledMesh mesh = room();
   const SurfaceSamples a = sample_surface(mesh, 100.0, 7);
   const SurfaceSamples b = sample_surface(mesh, 100.0, 7);
@@ -65,7 +67,7 @@ TEST_CASE("The same seed gives the same samples, another one others", "[mesh_err
   CHECK(a.points != c.points);
 }
 
-TEST_CASE("Samples elsewhere are left out but counted", "[mesh_error]") {
+TEST_CASE("Samples elsewhere are dropped but counted", "[mesh_error]") {
   const LabelledMesh mesh = square(10.0F, 0.0F, 20);
   NearbyCells nearby(0.5);
   const std::vector<Eigen::Vector3f> at = {{5, 5, 0}};
@@ -78,13 +80,13 @@ TEST_CASE("Samples elsewhere are left out but counted", "[mesh_error]") {
     CHECK((point - at[0]).norm() < 2.0 * std::sqrt(3.0) * 0.5);
     within += (point - at[0]).norm() <= 0.5F ? 1 : 0;
   }
-  CHECK(std::abs(within - 25.0 * M_PI) < 5.0 * std::sqrt(25.0 * M_PI));  // all of the disc's
+  CHECK(std::abs(within - 25.0 * M_PI) < 5.0 * std::sqrt(25.0 * M_PI));  // all samples of the disc
   const SurfaceSamples few = sample_surface(mesh, 100.0, 1, &nearby, 20);
   CHECK(few.points.size() == 20);
   CHECK(few.near == samples.near);
 }
 
-TEST_CASE("Cells near points hold all that is within reach", "[mesh_error]") {
+TEST_CASE("Cells near points contain everything within reach", "[mesh_error]") {
   const float x = GENERATE(-3.0F, -0.01F, 0.49F, 1000.0F);
   NearbyCells nearby(0.5);
   const std::vector<Eigen::Vector3f> at = {{x, 2, 3}};
@@ -101,7 +103,9 @@ TEST_CASE("Cells near points hold all that is within reach", "[mesh_error]") {
   CHECK_THROWS_AS(NearbyCells(0.0), std::invalid_argument);
 }
 
-TEST_CASE("Nearest point of a triangle: inside, edges, corners, degenerate", "[mesh_error]") {
+TEST_CASE(
+    "The nearest point of a triangle is found inside and on edges and corners and if degenerate",
+    "[mesh_error]") {
   const Eigen::Vector3d a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
   const auto expect = [&](const Eigen::Vector3d& point, double distance_m, int edge, int corner) {
     const TrianglePoint found = nearest_on_triangle(point, a, b, c);
@@ -122,7 +126,7 @@ TEST_CASE("Nearest point of a triangle: inside, edges, corners, degenerate", "[m
   CHECK(nearest_on_triangle({0, 3, 4}, a, a, a).distance_m == Approx(5.0));
 }
 
-TEST_CASE("A mesh ends where an edge has one face, whether vertices are shared or not",
+TEST_CASE("A mesh ends at an edge of one face with shared and with separate vertices",
           "[mesh_error]") {
   const bool shared = GENERATE(true, false);
   LabelledMesh mesh = square(3.0F, 0.0F, 3);
@@ -175,7 +179,7 @@ TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {
   }
 }
 
-TEST_CASE("The distance to the surface has no floor from sampling", "[mesh_error]") {
+TEST_CASE("The distance to the surface has no lower limit from sampling", "[mesh_error]") {
   const LabelledMesh mesh = square(2.0F, 0.0F);
   const SurfaceSamples samples = sample_surface(mesh, 1000.0, 1);
   const NearestSurface nearest(mesh, samples);
@@ -189,7 +193,7 @@ TEST_CASE("The distance to the surface has no floor from sampling", "[mesh_error
   }
 }
 
-TEST_CASE("Nothing is near no samples", "[mesh_error]") {
+TEST_CASE("No point is near an empty mesh", "[mesh_error]") {
   const LabelledMesh mesh;
   const SurfaceSamples samples;
   CHECK_FALSE(NearestSurface(mesh, samples).find({0, 0, 0}, 10.0));

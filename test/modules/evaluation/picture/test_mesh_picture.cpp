@@ -44,7 +44,7 @@ TEST_CASE("Surfaces have the colours of their labels", "[mesh_picture]") {
   CHECK(picture(100, 1) == cv::Vec3b(255, 255, 255));
 }
 
-TEST_CASE("Other colours: none, the vertices' own, one per mesh", "[mesh_picture]") {
+TEST_CASE("Other colours are none, those of the vertices, and one per mesh", "[mesh_picture]") {
   CHECK(hue(draw(kHalves, PictureColor::kShade)(100, 50)) == -1);
   auto own = kHalves;
   for (auto& mesh : own) mesh.colors.assign(mesh.vertices.size(), {0, 0, 230});
@@ -60,7 +60,7 @@ TEST_CASE("Unknown labels are grey", "[mesh_picture]") {
   CHECK(pixel[0] > 60);
 }
 
-TEST_CASE("Corners are darker than open ground, and steps have lines", "[mesh_picture]") {
+TEST_CASE("Corners are darker than open ground and steps have lines", "[mesh_picture]") {
   std::vector<LabelledMesh> meshes = {square(4.0F, 0.0F)};
   const auto green = [](const cv::Vec3b& pixel) { return static_cast<int>(pixel[1]); };
   const int open = green(draw(meshes, PictureColor::kShade)(100, 100));
@@ -75,7 +75,7 @@ TEST_CASE("Corners are darker than open ground, and steps have lines", "[mesh_pi
   CHECK(darkest < open / 2 + 20);
 }
 
-TEST_CASE("Trajectories are drawn on top, from a ring to a disc", "[mesh_picture]") {
+TEST_CASE("Trajectories are drawn on top from a ring to a disc", "[mesh_picture]") {
   const std::vector<LabelledMesh> meshes = {square(4.0F, 0.0F, 4, 2)};
   const PictureLine line = {"robot0", {{1, 2, -5}, {3, 2, -5}}};  // below the surface
   const cv::Mat3b picture = draw(meshes, PictureColor::kLabel, {line});
@@ -104,7 +104,7 @@ TEST_CASE("The scale bar has the length it names", "[mesh_picture]") {
   CHECK(draw_legend({}, view).rows == 0);
 }
 
-TEST_CASE("A legend takes as many rows as it needs", "[mesh_picture]") {
+TEST_CASE("A legend has as many rows as necessary", "[mesh_picture]") {
   PictureView view;
   view.width = 300;
   view.perspective = true;
@@ -114,7 +114,7 @@ TEST_CASE("A legend takes as many rows as it needs", "[mesh_picture]") {
   CHECK(draw_legend(many, view).rows > 2 * draw_legend(few, view).rows);
 }
 
-TEST_CASE("Pictures of nothing, and colours there are not, are refused", "[mesh_picture]") {
+TEST_CASE("Pictures without faces and missing colours are refused", "[mesh_picture]") {
   CHECK_THROWS_WITH(draw({}, PictureColor::kShade), "no mesh to draw has a face");
   CHECK_THROWS_WITH(draw(kHalves, PictureColor::kOwn), "mesh 0: its vertices have no colours");
   auto bare = kHalves;
@@ -145,7 +145,7 @@ std::size_t covered(const SurfaceImage& image) {
   return count;
 }
 
-TEST_CASE("A triangle covers the pixels whose centres it holds", "[mesh_picture]") {
+TEST_CASE("A triangle covers the pixels whose centres it contains", "[mesh_picture]") {
   const SurfaceImage image = rasterise(triangle(2.0F), from_above());
   CHECK(image.faces[image.at(60, 29)] == 0);  // its right angle
   CHECK(image.faces[image.at(59, 29)] == SurfaceImage::kNone);
@@ -158,7 +158,7 @@ TEST_CASE("A triangle covers the pixels whose centres it holds", "[mesh_picture]
   CHECK(std::abs(static_cast<double>(covered(image)) - 300.0) <= 20.0);  // half of 30 x 20
 }
 
-TEST_CASE("The nearer face is in front, whatever the order", "[mesh_picture]") {
+TEST_CASE("The nearer face is in front in any order", "[mesh_picture]") {
   const bool high_first = GENERATE(true, false);
   LabelledMesh mesh = triangle(high_first ? 5.0F : 2.0F);
   mesh.append(triangle(high_first ? 2.0F : 5.0F));
@@ -167,7 +167,7 @@ TEST_CASE("The nearer face is in front, whatever the order", "[mesh_picture]") {
   CHECK(image.depth_m[image.at(65, 25)] == Approx(95.0F));
 }
 
-TEST_CASE("Faces that cross are each in front where they are nearer", "[mesh_picture]") {
+TEST_CASE("Two crossing faces are each in front where they are nearer", "[mesh_picture]") {
   LabelledMesh mesh = rectangle({-2, -2, -1}, {4, 0, 2}, {0, 4, 0}, 1);  // rises with x
   mesh.append(rectangle({-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 1));
   const SurfaceImage image = rasterise(mesh, from_above());
@@ -175,9 +175,9 @@ TEST_CASE("Faces that cross are each in front where they are nearer", "[mesh_pic
   CHECK(image.faces[image.at(60, 40)] < 2);
 }
 
-TEST_CASE("Back faces and what is above the cut are not drawn", "[mesh_picture]") {
+TEST_CASE("Back faces and surface above the cut are not drawn", "[mesh_picture]") {
   LabelledMesh ceiling = triangle(5.0F);
-  std::swap(ceiling.faces[0][1], ceiling.faces[0][2]);  // made to be seen from below
+  std::swap(ceiling.faces[0][1], ceiling.faces[0][2]);  // visible from below
   LabelledMesh mesh = triangle(2.0F);
   mesh.append(ceiling);
   const auto drawn = [&](const SurfaceCut& cut) {
@@ -188,14 +188,14 @@ TEST_CASE("Back faces and what is above the cut are not drawn", "[mesh_picture]"
   CHECK(drawn({true, 10.0}) == 0);
   CHECK(drawn({false, 4.0}) == 0);
   CHECK(drawn({false, 1.0}) == SurfaceImage::kNone);
-  // A slope is cut where it crosses the height.
+  // A slope is cut at the height.
   const LabelledMesh slope = rectangle({-2, -2, -2}, {4, 0, 4}, {0, 4, 0}, 1);
   const SurfaceImage image = rasterise(slope, from_above(), {false, 0.0});
   CHECK(image.faces[image.at(48, 40)] != SurfaceImage::kNone);
   CHECK(image.faces[image.at(52, 40)] == SurfaceImage::kNone);
 }
 
-TEST_CASE("Perspective shows depth along z and cuts what is behind", "[mesh_picture]") {
+TEST_CASE("Perspective shows depth along z and clips surface behind the viewer", "[mesh_picture]") {
   PictureView view;
   view.width = view.height = 100;
   view.perspective = true;
@@ -212,7 +212,7 @@ TEST_CASE("Perspective shows depth along z and cuts what is behind", "[mesh_pict
   CHECK(image.faces[image.at(50, 50)] == SurfaceImage::kNone);  // beyond 90 m
 }
 
-TEST_CASE("Neighbouring faces leave no gap between them", "[mesh_picture]") {
+TEST_CASE("Neighbouring faces have no gap between them", "[mesh_picture]") {
   const LabelledMesh mesh = rectangle({-3.07F, -2.91F, 0}, {6.1F, 0, 0}, {0, 5.9F, 0}, 37);
   const SurfaceImage image = rasterise(mesh, from_above());
   for (int row = 12; row < 68; ++row)

@@ -14,7 +14,7 @@ bool in_picture(const PictureView& view, const Eigen::Vector3d& pixel) {
 
 }  // namespace
 
-TEST_CASE("From above x is to the right, y up, and high is near", "[mesh_picture]") {
+TEST_CASE("From above x is to the right and y up and high points are near", "[mesh_picture]") {
   const PictureView view = parse_view("top", kBox, 520, 400);
   CHECK(view.scale == Approx(50.0));  // 10 m and 4 % in 520 px
   CHECK(view.project({5, 2.5, 0}).head<2>().isApprox(Eigen::Vector2d(260, 200)));
@@ -30,7 +30,7 @@ TEST_CASE("From the front x is to the right and z up", "[mesh_picture]") {
   CHECK(view.project({5, 4, 1}).z() - view.project({5, 1, 1}).z() == Approx(3.0));
 }
 
-TEST_CASE("Parallel views hold all of the extent", "[mesh_picture]") {
+TEST_CASE("Parallel views contain all of the extent", "[mesh_picture]") {
   const auto* const name = GENERATE("top", "front", "oblique");
   const int width = GENERATE(100, 400);
   const PictureView view = parse_view(name, kBox, width, 200);
@@ -41,7 +41,7 @@ TEST_CASE("Parallel views hold all of the extent", "[mesh_picture]") {
   }
 }
 
-TEST_CASE("A view from a place looks where yaw and pitch say", "[mesh_picture]") {
+TEST_CASE("A view from a position has the direction of yaw and pitch", "[mesh_picture]") {
   const PictureView view = parse_view("1,2,3,90,0", kBox, 200, 100);
   CHECK(view.project({1, 7, 3}).isApprox(Eigen::Vector3d(100, 50, 5)));
   CHECK(view.project({2, 7, 3}).x() > 100.0);  // looking along y, x is to the right
@@ -50,12 +50,12 @@ TEST_CASE("A view from a place looks where yaw and pitch say", "[mesh_picture]")
   CHECK(down.project({1, 2, 0}).isApprox(Eigen::Vector3d(100, 50, 3)));
   CHECK(down.project({2, 2, 0}).y() < 50.0);  // ahead is up
   CHECK(down.project({1, 3, 0}).x() < 100.0);
-  // A camera's pose, z forward and y down, that looks along y.
+  // A camera's pose, z forward and y down, looking along y.
   const PictureView pose = parse_view("1,2,3,-0.70710678,0,0,0.70710678", kBox, 200, 100);
   CHECK((pose.T_cam_world.matrix() - view.T_cam_world.matrix()).norm() < 1e-6);
 }
 
-TEST_CASE("Pixels and depths go back to the points they came from", "[mesh_picture]") {
+TEST_CASE("Pixels and depths are projected back to their points", "[mesh_picture]") {
   const auto* const name = GENERATE("top", "oblique", "-5,1,2,20,-10");
   const PictureView view = parse_view(name, kBox, 300, 200);
   const Eigen::Vector3d point(4, 3, 1);
@@ -67,7 +67,7 @@ TEST_CASE("Pixels and depths go back to the points they came from", "[mesh_pictu
       Eigen::Vector3d(3 * pixel.x(), 3 * pixel.y(), pixel.z())));
 }
 
-TEST_CASE("Other views are refused by their text", "[mesh_picture]") {
+TEST_CASE("Other views are refused with their text", "[mesh_picture]") {
   for (const char* text : {"", "up", "1,2,3", "1,2,3,4,x", "1,2,3,4,5,6", "1,2,3,0,0,0,2",
                            "1,,3,4,5", "nan,0,0,0,0"}) {
     CAPTURE(text);
@@ -76,7 +76,7 @@ TEST_CASE("Other views are refused by their text", "[mesh_picture]") {
   }
 }
 
-TEST_CASE("A few stray vertices do not count into the extent", "[mesh_picture]") {
+TEST_CASE("A few stray vertices do not affect the extent", "[mesh_picture]") {
   LabelledMesh mesh = square(10.0F, 0.0F, 99);  // 10,000 vertices
   mesh.vertices.emplace_back(500.0F, -300.0F, 80.0F);
   const Eigen::AlignedBox3d box = extent_of(mesh);

@@ -120,10 +120,10 @@ Camera some_camera(double shift_m) {
 }
 
 void check_equal(const Camera& a, const Camera& b) {
-  constexpr double kRounding = 1e-14;  // of the reader's nearest rotation
+  constexpr double kRounding = 1e-14;  // tolerance of the reader's nearest rotation
   CHECK(a.width == b.width);
   CHECK(a.height == b.height);
-  // Those of calibrations with a xi are 1 + xi times as long.
+  // Focal lengths of calibrations with a xi are 1 + xi times as long.
   const bool exact =
       b.lens.model() == LensModel::kRadialTangential || b.lens.model() == LensModel::kEquidistant;
   CHECK(std::abs(a.fx - b.fx) <= (exact ? 0.0 : 1e-13));
@@ -341,14 +341,14 @@ TEST_CASE("The world's mesh is written with classes and their colours", "[simula
 const DatasetRecord kRecord = {
     "simulator 1", {{"world", "city"}, {"duration", "30"}}, {"robot0"}, false};
 
-TEST_CASE("The record names what a run depends on", "[simulation][dataset]") {
+TEST_CASE("The record has all parameters that a run depends on", "[simulation][dataset]") {
   CHECK(to_json(kRecord) ==
         "{\n  \"generator\": \"simulator 1\",\n  \"parameters\": {\n    \"world\": \"city\",\n"
         "    \"duration\": \"30\"\n  },\n  \"finished_robots\": [\n    \"robot0\"\n  ],\n"
         "  \"complete\": false\n}\n");
 }
 
-TEST_CASE("Records differ by parameters and program, not by what is finished",
+TEST_CASE("Records differ by parameters and program, not by the finished robots",
           "[simulation][dataset]") {
   DatasetRecord wanted = kRecord;
   wanted.finished_robots.clear();

@@ -12,9 +12,9 @@ namespace km {
 namespace {
 
 constexpr Stamp kEpoch = 1'520'530'308'000'000'000;
-constexpr double kFrom_s = 12.0, kTo_s = 14.5;  // of the gap
+constexpr double kFrom_s = 12.0, kTo_s = 14.5;  // begin and end of the gap
 
-// A flight with the biases of a cheap inertial sensor, its poses at 120 Hz but for a gap.
+// A flight with the biases of a cheap inertial sensor, its poses at 120 Hz except for a gap.
 struct Flight {
   SplineTrajectory truth = make_flight_trajectory(
       {Eigen::Vector3d(-3, -3, 0), Eigen::Vector3d(3, 3, 3)}, {.duration_s = 30.0});
@@ -41,7 +41,7 @@ struct Flight {
     return truth.motion(seconds_between(kEpoch, stamp)).T_world_body;
   }
 
-  // The largest distance from the truth, within the gap, of poses along a curve through `some`.
+  // The largest distance from the truth, within the gap, of a curve through the poses `some`.
   [[nodiscard]] double error_m(const std::vector<StampedPose>& some) const {
     const RecordedTrajectory curve = fit_recording(some, kEpoch);
     double worst = 0.0;
@@ -53,7 +53,7 @@ struct Flight {
   }
 };
 
-TEST_CASE("A gap in a recording is bridged by what the inertial sensor felt", "[motion]") {
+TEST_CASE("A gap in a recording is bridged by the inertial samples", "[motion]") {
   const Flight flight;
   const BridgedPoses bridged = bridge_gaps(flight.poses, flight.imu);
   CHECK(bridged.gaps == 1);

@@ -37,8 +37,8 @@ TEST_CASE("A path follows its route and rounds its corners", "[motion]") {
     farthest = std::max(farthest, distance_to(kBlock, path.at(s).position));
     sharpest = std::max(sharpest, std::abs(path.at(s).curvature));
   }
-  // Where a right angle is rounded, the arc passes (sqrt(2) - 1) r from the corner, that is
-  // r (1 - 1/sqrt(2)) from the lines.
+  // The arc of a right angle passes the corner at (sqrt(2) - 1) r, that is r (1 - 1/sqrt(2)) from
+  // the lines.
   CHECK(farthest == Approx(radius * (1.0 - std::sqrt(0.5))).margin(0.15));
   CHECK(sharpest <= 1.05 / radius);  // smoothing tightens short arcs a little
   CHECK(sharpest > 0.9 / radius);
@@ -59,7 +59,7 @@ TEST_CASE("A path's parameter is the way, its tangent and curvature its derivati
   }
 }
 
-TEST_CASE("A path closes and goes round again", "[motion]") {
+TEST_CASE("A path is closed and periodic", "[motion]") {
   const RoutePath path(kBlock, 5.0);
   for (const double s : {0.0, 10.0, 77.7}) {
     CHECK((path.at(s).position - path.at(s + path.length_m()).position).norm() < 1e-9);
@@ -72,7 +72,7 @@ TEST_CASE("A path closes and goes round again", "[motion]") {
   CHECK(std::abs(end.curvature - start.curvature) < 1e-4);
 }
 
-TEST_CASE("The way begins where the route begins", "[motion]") {
+TEST_CASE("The path begins at the begin of the route", "[motion]") {
   const Route route{{{40, 0}, {80, 0}, {80, 50}, {0, 50}, {0, 0}}, 6.0};  // starts on a straight
   const RoutePath path(route, 5.0);
   CHECK((path.at(0.0).position - Eigen::Vector2d(40, 0)).norm() < 0.02);
@@ -80,7 +80,7 @@ TEST_CASE("The way begins where the route begins", "[motion]") {
   CHECK(path.at(0.0).tangent.x() == Approx(1.0));
 }
 
-TEST_CASE("Corners closer together than their arcs are rounded as far as there is room",
+TEST_CASE("Corners closer together than their arcs are rounded as far as the room allows",
           "[motion]") {
   // A chicane of 4 m pieces with a radius of 10 m.
   const Route route{{{0, 0}, {20, 0}, {20, 4}, {24, 4}, {24, 0}, {60, 0}, {60, 40}, {0, 40}}, 6.0};

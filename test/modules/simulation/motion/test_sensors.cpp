@@ -262,7 +262,7 @@ TEST_CASE("Preintegrated noise-free samples of a flight reproduce it", "[motion]
   CHECK(at_200.rotation < 2e-5);  // [rad]
   CHECK(at_200.velocity < 2e-4);  // [m/s]
   CHECK(at_200.position < 1e-4);  // [m]
-  // What remains is the integration's: it falls with the square of the sampling period.
+  // The rest is the error of the integration, which falls with the square of the sampling period.
   const PredictionErrors at_1000 = predict_seconds(flight, 1000.0);
   CHECK(at_1000.velocity < at_200.velocity / 15.0);
   CHECK(at_1000.position < at_200.position / 15.0);
@@ -306,7 +306,7 @@ TEST_CASE("Samples lie on the grid of the rate, rounded to nanoseconds", "[motio
   CHECK(samples[600].sample.stamp == kFlightEpoch + 2000000000);
 }
 
-TEST_CASE("White noise has the density that was asked for", "[motion]") {
+TEST_CASE("White noise has the configured density", "[motion]") {
   ImuSimulation options;
   options.seed = GENERATE(1U, 2U);
   CAPTURE(options.seed);

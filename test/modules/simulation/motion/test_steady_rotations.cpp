@@ -13,7 +13,7 @@ namespace {
 
 constexpr Stamp kEpoch = 1'520'530'308'000'000'000;
 
-// A flight with a gyroscope off by a constant, and its poses at 120 Hz.
+// A flight with a constant gyroscope bias, and its poses at 120 Hz.
 struct Flight {
   SplineTrajectory motion = make_flight_trajectory(
       {Eigen::Vector3d(-3, -3, 0), Eigen::Vector3d(3, 3, 3)}, {.duration_s = 20.0});
@@ -38,7 +38,7 @@ struct Flight {
     }
   }
 
-  // Rotations that tremble, and every hundredth far off.
+  // Rotations with noise; every hundredth is an outlier.
   [[nodiscard]] std::vector<StampedPose> trembling(double noise_rad) const {
     std::mt19937 rng(7);
     std::normal_distribution<double> normal(0.0, noise_rad);
@@ -68,7 +68,7 @@ TEST_CASE("Rotations that tremble are steadied by the gyroscope", "[motion]") {
   CHECK((steadied.gyro_bias_radps - bias).norm() < 1e-3);
   CHECK(flight.rms_rad(flight.trembling(1.5e-3)) > 2.5e-3);
   CHECK(flight.rms_rad(steadied.poses) < 1e-3);
-  CHECK(steadied.max_rad > 0.03);  // what was far off is not believed
+  CHECK(steadied.max_rad > 0.03);  // outliers have no influence
   REQUIRE(steadied.poses.size() == flight.truth.size());
   for (std::size_t k = 0; k < flight.truth.size(); ++k) {
     REQUIRE(steadied.poses[k].stamp == flight.truth[k].stamp);
@@ -83,7 +83,7 @@ TEST_CASE("Rotations that are steady stay as they are", "[motion]") {
   CHECK(flight.rms_rad(steadied.poses) == Approx(steadied.rms_rad));
 }
 
-TEST_CASE("Where there are no inertial samples rotations stay", "[motion]") {
+TEST_CASE("Rotations stay as they are without inertial samples", "[motion]") {
   Flight flight(Eigen::Vector3d::Zero());
   const auto is_missing = [](Stamp stamp) {
     const double t_s = seconds_between(kEpoch, stamp);

@@ -55,10 +55,11 @@ DerivativeErrors derivative_errors(const BodyTrajectory& trajectory, int samples
   return worst;
 }
 
-/// The body does not move at all from `from_s` to `to_s`.
+/// Checks that the body does not move from `from_s` to `to_s`.
 void check_at_rest(const BodyTrajectory& trajectory, double from_s, double to_s) {
   const SE3 T_start = trajectory.motion(from_s).T_world_body;
-  constexpr double kRounding = 1e-9;  // of second derivatives: 1e-16 over the interval squared
+  constexpr double kRounding =
+      1e-9;  // rounding of second derivatives: 1e-16 over the interval squared
   for (double t = from_s; t <= to_s; t += 0.01) {
     const BodyMotion motion = trajectory.motion(t);
     CAPTURE(t);
@@ -83,7 +84,7 @@ std::vector<Control> lively_controls(std::uint64_t seed, int count) {
   return controls;
 }
 
-TEST_CASE("The weights of the basis sum to one and their derivatives to nothing", "[motion]") {
+TEST_CASE("The weights of the basis sum to one and their derivatives to zero", "[motion]") {
   for (double u = 0.0; u <= 1.0; u += 0.125) {
     const QuinticBasis basis = QuinticBasis::at(u);
     CAPTURE(u);
@@ -132,7 +133,7 @@ TEST_CASE("A spline is four times continuously differentiable across its interva
   }
 }
 
-TEST_CASE("Turning the world turns the curve alike", "[motion]") {
+TEST_CASE("A rotation of the world rotates the curve in the same way", "[motion]") {
   const std::vector<Control> controls = lively_controls(4, 20);
   const Eigen::Quaterniond turn(so3_exp({0.4, -1.1, 2.0}));
   std::vector<Control> turned;
@@ -186,7 +187,7 @@ TEST_CASE("Equal controls are a body at rest", "[motion]") {
   check_at_rest(trajectory, 1.0, 2.0);
 }
 
-TEST_CASE("A spline refuses what is no motion", "[motion]") {
+TEST_CASE("A spline refuses controls that are no motion", "[motion]") {
   const std::vector<Control> good = lively_controls(1, 10);
   CHECK_THROWS_AS(SplineTrajectory(0.0, 0.1, lively_controls(1, 5)), std::invalid_argument);
   CHECK_THROWS_AS(SplineTrajectory(0.0, 0.0, good), std::invalid_argument);
@@ -259,7 +260,7 @@ TEST_CASE("A flight's thrust is along the vehicle's z axis", "[motion]") {
   const SplineTrajectory flight = make_flight_trajectory(kRoom, options);
   for (double t = 0.0; t <= flight.end_s(); t += 0.05) {
     const BodyMotion m = flight.motion(t);
-    // What is not gravity and not the drag of the rotors.
+    // Acceleration without gravity and without the drag of the rotors.
     const Eigen::Vector3d thrust =
         m.acceleration_world + 0.3 * m.velocity_world + Eigen::Vector3d(0, 0, 9.81);
     // The spline through poses every 10 ms smooths both a little: less than 3 mrad.
@@ -267,7 +268,7 @@ TEST_CASE("A flight's thrust is along the vehicle's z axis", "[motion]") {
   }
 }
 
-TEST_CASE("The body is mounted in the vehicle as it is told", "[motion]") {
+TEST_CASE("The body is mounted in the vehicle as the options say", "[motion]") {
   FlightOptions options;
   options.duration_s = 20.0;
   const SplineTrajectory vehicle = make_flight_trajectory(kRoom, options);
@@ -314,11 +315,11 @@ double hills(double x, double y) {
   return 0.8 * std::sin(x / 12.0) + 0.5 * std::cos(y / 9.0);
 }
 
-// What a drive amounts to, on the ground below the body.
+// Statistics of a drive, on the ground below the body.
 struct DriveSummary {
   double forward_max = 0.0, left_max = 0.0;  // [m/s^2]
   double off_route_max = 0.0;                // [m], from the rounded path
-  double heading_error_max = 0.0;            // [rad], of x from the velocity
+  double heading_error_max = 0.0;            // [rad], between x and the velocity
   double pitch_max = 0.0, roll_max = 0.0;    // [rad]
   double speed_max = 0.0, length_m = 0.0;
   int stops = 0;  // times it came to rest after having driven
@@ -377,10 +378,10 @@ TEST_CASE("A vehicle on level ground keeps to the limits and to its route", "[mo
   CAPTURE(s.forward_max, s.left_max, s.off_route_max, s.heading_error_max, s.pitch_max, s.roll_max);
   CHECK(s.forward_max <= options.max_longitudinal_mps2);
   CHECK(s.left_max <= options.max_lateral_mps2);
-  CHECK(s.left_max > 0.5 * options.max_lateral_mps2);  // it does use its corners
+  CHECK(s.left_max > 0.5 * options.max_lateral_mps2);  // it uses the corners
   CHECK(s.speed_max <= kBlock.speed_mps);
-  CHECK(s.off_route_max < 0.35);      // what a driver wanders
-  CHECK(s.heading_error_max < 0.01);  // a wheel rolls, it does not slip
+  CHECK(s.off_route_max < 0.35);      // wander of a driver
+  CHECK(s.heading_error_max < 0.01);  // a wheel rolls without slip
   CHECK(s.pitch_max < 0.04);
   CHECK(s.roll_max < 0.05);
   CHECK(s.pitch_max > 0.003);
@@ -389,7 +390,7 @@ TEST_CASE("A vehicle on level ground keeps to the limits and to its route", "[mo
   CHECK(s.stops >= 1);
 }
 
-TEST_CASE("A vehicle stands still at the start for as long as it is told", "[motion]") {
+TEST_CASE("A vehicle stands still at the start for as long as the options say", "[motion]") {
   VehicleOptions options;
   options.standstill_s = GENERATE(0.5, 2.0);
   options.duration_s = 10.0;
@@ -407,7 +408,7 @@ TEST_CASE("A vehicle follows the ground", "[motion]") {
     const Eigen::Vector3d ground = T * Eigen::Vector3d(0, 0, -options.rig_height_m);
     CAPTURE(t);
     CHECK(ground.z() == Approx(hills(ground.x(), ground.y())).margin(0.1));
-    // Tilted as the slope under it, give or take what the springs do.
+    // Tilted like the slope below, up to the motion of the springs.
     const Eigen::Vector2d slope(0.8 / 12.0 * std::cos(ground.x() / 12.0),
                                 -0.5 / 9.0 * std::sin(ground.y() / 9.0));
     const Eigen::Vector3d normal = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
@@ -478,7 +479,7 @@ TEST_CASE("Equal options give equal flights and drives, another seed others", "[
         [](const VehicleOptions& o) { return make_vehicle_trajectory(kBlock, hills, o); });
 }
 
-TEST_CASE("The start's way along the route is where the vehicle starts", "[motion]") {
+TEST_CASE("A vehicle starts at the configured distance along the route", "[motion]") {
   VehicleOptions options;
   options.duration_s = 3.0;
   const RoutePath path(kBlock, options.corner_radius_m);

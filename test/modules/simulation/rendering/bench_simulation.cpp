@@ -11,8 +11,8 @@
 #include "modules/simulation/motion/road.hpp"
 #include "modules/simulation/rendering/sensor_effects.hpp"
 
-// Stereo pairs per second of the whole chain but the encoding of files, on two threads, and where
-// the time goes. Poses: along the first route of a city, or turning in the middle of a room.
+// Stereo pairs per second of all stages except for the encoding of files, on two threads, and the
+// time of each stage. Poses: along the first route of a city, or turning in the middle of a room.
 
 namespace km {
 namespace {

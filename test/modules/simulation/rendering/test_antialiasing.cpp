@@ -51,7 +51,8 @@ TEST_CASE("The grey of an edge is the share of the pixel that is covered",
   int partial = 0;
   for (int y = 4; y < 44; ++y) {
     for (int x = 4; x < 44; ++x) {
-      // The light of the screen's rim is baked: grey levels are shares of that beside the edge.
+      // The light of the screen's rim is interpolated: grey levels are shares of that beside the
+      // edge.
       const double expected = share_right_of(x0, slope, x, y);
       const double white_level = static_cast<double>(at(view, 47, y));
       const double share = static_cast<double>(at(view, x, y)) / white_level;
@@ -85,14 +86,14 @@ TEST_CASE("A wire thinner than a pixel neither breaks nor vanishes", "[simulatio
   int faint = 0;
   double total = 0.0;
   for (int row = 2; row < 62; ++row) {
-    double missing = 0.0;  // of the wall's light, in pixels
+    double missing = 0.0;  // missing light of the wall, in pixels
     for (int x = 0; x < 64; ++x)
       missing += 1.0 - static_cast<double>(at(view, x, row) / at(view, 2, row));
     faint += static_cast<int>(missing < 0.15);
     total += missing;
   }
-  CHECK(faint <= 8);                                 // of 60 rows
-  CHECK(total / 60.0 == Approx(0.4).epsilon(0.15));  // its width
+  CHECK(faint <= 8);                                 // out of 60 rows
+  CHECK(total / 60.0 == Approx(0.4).epsilon(0.15));  // width of the wire
 }
 
 // A floor with a random texture, seen at a grazing angle. All lengths are those of a street's a
@@ -177,8 +178,8 @@ Eigen::Vector2d steepest_near(const RenderedView& view, int x, int y) {
 }
 
 // Share of pixels that change by more than their motion explains. A wave of f < 1/2 cycles a pixel
-// has at most pi f / sin(pi f) <= pi / 2 times the slope that neighbours show; what changes faster
-// is finer than the pixels: aliased. `motion_px` holds the motion of each pixel from a to b.
+// has at most pi f / sin(pi f) <= pi / 2 times the slope between neighbours. A faster change is
+// finer than the pixels: aliased. `motion_px` holds the motion of each pixel from a to b.
 double share_that_flickers(const RenderedView& a, const RenderedView& b,
                            const std::vector<Eigen::Vector2d>& motion_px, int first_row) {
   constexpr double kSteepest = 1.5708;
@@ -247,8 +248,8 @@ TEST_CASE("Nothing flickers under a motion of a fraction of a pixel", "[simulati
     const Eigen::Vector3d moved = eye + step;
     const RenderedView b = renderer.render(camera, above_floor(moved.x(), moved.y()), request);
     const std::vector<Eigen::Vector2d> motion = motion_of(a, camera, kScale * step);
-    // Long waves whose crest lies in the 5 x 5 pixels show less slope than they have: of 3 x 3
-    // pixels 0.8 % break the bound, of 5 x 5 up to 0.3 %.
+    // Long waves with a crest in the 5 x 5 pixels show less slope than they have. With 3 x 3 pixels
+    // 0.8 % exceed the bound, with 5 x 5 up to 0.3 %.
     CHECK(share_that_flickers(a, b, motion, kFirstRow) < 0.005);
     // The bound is not idle: without filters most pixels break it.
     const RenderedView raw_a = unfiltered(world, a, camera, eye);

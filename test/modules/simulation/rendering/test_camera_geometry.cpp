@@ -50,7 +50,7 @@ TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][r
   }
 }
 
-TEST_CASE("A fisheye sees a plane as far as its lens goes, and black beyond",
+TEST_CASE("A fisheye sees a plane within its field of view, and black beyond",
           "[simulation][rendering]") {
   const Lens lens = GENERATE(Lens(LensModel::kEquidistant, {0.003, 7e-4, -2e-3, 2e-4}),
                              Lens(LensModel::kOmnidirectional, {1.2, 0.0, 0.0, 0.0, 0.0}),
@@ -88,7 +88,7 @@ TEST_CASE("A fisheye sees a plane as far as its lens goes, and black beyond",
   CHECK(lit < 0.95 * 97 * 93);
 }
 
-TEST_CASE("A box hides what is behind it, and only that", "[simulation][rendering]") {
+TEST_CASE("A box hides only the surfaces behind it", "[simulation][rendering]") {
   const Camera camera = distorted_camera(62, 46, 40.0);
   Builder builder;
   builder.wall(8.0F, 3.0F, builder.material(SurfaceClass::kWall, 0.5F));
@@ -99,7 +99,8 @@ TEST_CASE("A box hides what is behind it, and only that", "[simulation][renderin
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const Eigen::Vector2d bearing = camera.unproject({x, y}).value();
-      // Where the ray meets the planes x = 4 and x = 8 of the world; left is +y, up is +z.
+      // Intersections of the ray with the planes x = 4 and x = 8 of the world; left is +y, up is
+      // +z.
       const Eigen::Vector2d near = -4.0 * bearing;
       const Eigen::Vector2d far = -8.0 * bearing;
       const bool box = std::abs(near.x()) < 0.5 && near.y() > -0.25 && near.y() < 0.75;
@@ -115,7 +116,8 @@ TEST_CASE("A box hides what is behind it, and only that", "[simulation][renderin
   }
 }
 
-TEST_CASE("A known point is seen where the camera model projects it", "[simulation][rendering]") {
+TEST_CASE("A known point appears at its projection by the camera model",
+          "[simulation][rendering]") {
   const int seed = GENERATE(1, 2, 3, 4);
   CAPTURE(seed);
   std::mt19937 random(static_cast<std::mt19937::result_type>(seed));
@@ -179,7 +181,7 @@ TEST_CASE("A camera inside a solid sees its inner sides", "[simulation][renderin
   }
 }
 
-TEST_CASE("Only what is asked for is rendered", "[simulation][rendering]") {
+TEST_CASE("Only the requested images are rendered", "[simulation][rendering]") {
   const World world = Builder().build();
   const Camera camera = forward_camera(16, 16, 16.0);
   const RenderedView view =

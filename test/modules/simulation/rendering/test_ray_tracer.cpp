@@ -19,7 +19,7 @@ SurfaceMesh screen() {
   return builder.build().mesh;
 }
 
-// Every byte of the rays is what stands in memory that was never written.
+// Every byte of the rays has the value of uninitialised memory.
 RayPacket unwritten(int byte) {
   RayPacket rays;
   std::memset(&rays, byte, sizeof(rays));

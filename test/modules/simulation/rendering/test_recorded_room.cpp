@@ -14,13 +14,13 @@
 #include "modules/simulation/rendering/sensor_effects.hpp"
 #include "test/support/shared_data.hpp"
 
-// The Vicon room, seen from where EuRoC's V1_01_easy was recorded: same lens, same poses, same
-// motion, furniture of the same kind in other places.
+// The Vicon room, seen from the poses of EuRoC's V1_01_easy: same lens and same motion, furniture
+// of the same kind in other places.
 
 namespace km {
 namespace {
 
-constexpr std::size_t kEvery = 10;  // of the 100 recorded pairs
+constexpr std::size_t kEvery = 10;  // step through the 100 recorded pairs
 
 std::vector<Stamp> recorded_stamps(const std::filesystem::path& keyframes) {
   std::ifstream file(keyframes / "pairs.csv");
@@ -71,7 +71,7 @@ class RoomCameras {
     return exposure;
   }
 
-  // Through JPEG, as the recorded ones went.
+  // Encoded as JPEG, like the recorded ones.
   GrayImage view(const PixelRays& rays, const SensorEffects& effects, const SE3& T_world_body,
                  Shot shot, std::uint64_t camera) const {
     shot.noise_seed = camera;

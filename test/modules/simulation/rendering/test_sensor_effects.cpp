@@ -76,7 +76,7 @@ TEST_CASE("A dark scene opens the shutter to its limit", "[simulation][exposure]
   CHECK(dim.next(evenly_lit(0.01F)).time_s == config.max_exposure_s);
 }
 
-TEST_CASE("Exposure refuses what it cannot work with", "[simulation][exposure]") {
+TEST_CASE("Exposure refuses unusable options", "[simulation][exposure]") {
   CHECK_THROWS_AS(ExposureControl({}, 0.0), std::invalid_argument);
   SensorEffectsConfig config;
   config.target_level = 2.0;
@@ -115,7 +115,7 @@ TEST_CASE("Grey levels are the response to the exposed light", "[simulation][sen
   for (const std::uint8_t level : image.pixels) CHECK(std::abs(level - expected) <= 0.51);
 }
 
-TEST_CASE("The corners lose the light that vignetting says", "[simulation][sensor]") {
+TEST_CASE("The corners lose the configured share of light", "[simulation][sensor]") {
   SensorEffectsConfig config = clean();
   config.vignetting = 0.3;
   const Camera camera = forward_camera(101, 75, 60.0);
@@ -159,7 +159,7 @@ TEST_CASE("Noise has the strength and the correlation that are configured",
   const SensorEffects effects(PixelRays(camera), config);
   const Statistics s =
       statistics_of(effects.gray(flat_view(camera, static_cast<float>(level)), shot(1.0, 7)));
-  // 1/12 is what rounding to whole levels adds. Correlated samples average more slowly.
+  // 1/12 is the variance that rounding to whole levels adds.
   const double expected = std::sqrt(9.0 + 16.0 * level + 1.0 / 12.0);
   CHECK(s.mean == Approx(255.0 * level).margin(0.2));
   CHECK(s.deviation == Approx(expected).epsilon(0.06));
@@ -177,7 +177,7 @@ TEST_CASE("Noise is a function of the seed", "[simulation][sensor]") {
   CHECK(effects.gray(view, shot(1.0, 1)).pixels != effects.gray(view, shot(1.0, 2)).pixels);
 }
 
-TEST_CASE("Amplification raises the noise where the shutter cannot open longer",
+TEST_CASE("Amplification raises the noise if the shutter cannot open longer",
           "[simulation][sensor]") {
   SensorEffectsConfig config = clean();
   config.read_noise = 2.0;
@@ -201,7 +201,7 @@ TEST_CASE("Colour is developed channel by channel", "[simulation][sensor]") {
   }
 }
 
-// Light of an image, and where it lies about the pixel `center`.
+// Light of an image, and its centre of mass relative to the pixel `center`.
 struct LightMoments {
   double mass = 0.0;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
@@ -242,7 +242,7 @@ TEST_CASE("The lens spreads a point as it is configured and keeps its light",
   CHECK(lens_blurred(point, kWidth, kHeight, 0.0) == point);
 }
 
-TEST_CASE("Image motion is that of projected points", "[simulation][sensor]") {
+TEST_CASE("Image motion equals that of projected points", "[simulation][sensor]") {
   const Camera camera = distorted_camera(188, 120, 115.0);
   const PixelRays rays(camera);
   Vector6 velocity;
@@ -285,7 +285,7 @@ TEST_CASE("A bright point is smeared along its motion, its light kept", "[simula
   CHECK(across.dot(spread * across) < 0.3);
 }
 
-TEST_CASE("Views that lack what an effect needs are refused", "[simulation][sensor]") {
+TEST_CASE("Views without the data that an effect needs are refused", "[simulation][sensor]") {
   const Camera camera = forward_camera(8, 8, 8.0);
   const SensorEffects effects(PixelRays(camera), {});
   RenderedView view = flat_view(camera, 0.5F);

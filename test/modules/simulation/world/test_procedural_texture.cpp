@@ -119,14 +119,15 @@ TEST_CASE("Materials of nature have structure at every scale", "[simulation][tex
   for (int level = 1; texture.size() >> level >= 4; ++level) {
     CAPTURE(level);
     const Moments coarse = moments(texels(texture, level));
-    // What averaging over twice the edge takes away is the power of one octave.
+    // The difference between averages over an edge and over twice the edge is the power of one
+    // octave.
     const double power = fine.variance - coarse.variance;
     CHECK(std::sqrt(std::max(power, 0.0)) > 0.004 * fine.mean);
     fine = coarse;
   }
 }
 
-TEST_CASE("Fractal noise has mean 0, deviation 1 and the octaves it is asked for",
+TEST_CASE("Fractal noise has mean 0, deviation 1 and the configured octaves",
           "[simulation][texture]") {
   constexpr int kSize = 128;
   const auto seed = GENERATE(range(1U, 5U));

@@ -107,10 +107,11 @@ TEST_CASE("Equal requests share a material, and recipes share textures", "[simul
   CHECK(world.textures[material.base].size() == traits_of(Recipe::kCanvas).size);
   CHECK(world.materials[lamp].specular == 0.25F);
   CHECK(world.materials[lamp].glow == 3.0F);
-  CHECK(scene.paint(SurfaceClass::kWall, Recipe::kCanvas) == 0);  // it starts anew
+  CHECK(scene.paint(SurfaceClass::kWall, Recipe::kCanvas) ==
+        0);  // the next scene begins from scratch
 }
 
-TEST_CASE("Frames nest, and end where their scope does", "[simulation]") {
+TEST_CASE("Frames nest, and end with their scope", "[simulation]") {
   Scene scene;
   {
     const auto outer = scene.at({10, 0, 0}, 0.5F * kPi);

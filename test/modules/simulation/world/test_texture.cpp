@@ -78,7 +78,7 @@ TEST_CASE("Each level of a texture averages squares of the tile", "[simulation][
   const std::vector<Vector3f> rgb = random_tile(kSize, brightest, random);
   const Texture texture(kSize, rgb);
   REQUIRE(texture.levels() == 7);
-  const float step = brightest / 255.0F;  // of the storage; rounding errs by half of it
+  const float step = brightest / 255.0F;  // step of the storage; rounding errors are half of it
   for (int level = 0; level < texture.levels(); ++level) {
     CAPTURE(level);
     const int n = kSize >> level;

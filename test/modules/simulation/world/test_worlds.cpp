@@ -95,8 +95,8 @@ Overlap overlap_of(const std::vector<Vector2d>& way, const std::vector<Vector2d>
   return {near / static_cast<double>(way.size()), same / std::max(1.0, near)};
 }
 
-/// Where a vehicle meets the world: its front, 2.4 m wide, from 0.3 to 2.2 m above the ground, is
-/// swept from each point of the way to the next by rays 10 cm apart.
+/// Number of rays with which a vehicle hits the world. Its front, 2.4 m wide, from 0.3 to 2.2 m
+/// above the ground, moves from each point of the way to the next. Rays are 10 cm apart.
 int obstacles_on(const World& world, const RayTracer& tracer, const std::vector<Vector2d>& way) {
   const auto at = [&](const Vector2d& p, double above) -> Vector3f {
     return Eigen::Vector3d(p.x(), p.y(), world.ground_height(p.x(), p.y()) + above).cast<float>();
@@ -137,7 +137,7 @@ double ground_error_m(const World& world, const RayTracer& tracer,
   return static_cast<double>(worst);
 }
 
-/// What holds for the routes of a world to drive in.
+/// Checks the routes of a world with streets.
 void check_routes(const World& world) {
   const RayTracer tracer(world.mesh);
   REQUIRE(world.routes.size() >= 3);
