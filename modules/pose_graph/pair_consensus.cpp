@@ -23,6 +23,8 @@ constexpr double kBetter = 0.5;
 constexpr double kBorneOut = 0.2;
 // Of the radius: closures of a pair that are more apart say nothing together.
 constexpr double kAgreeing = 0.25;
+// So many places of a pair that agree on its motion say more than those that do not.
+constexpr std::size_t kAgreeingPlaces = 3;
 
 // The pairs that have a vote.
 PairMotions agreeing(PairMotions pairs) {
@@ -127,14 +129,17 @@ void hold_most(const PairMotions& pairs, std::map<RobotId, SE3>& placed) {
 std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, RobotId a,
                                          const std::function<SE3(const KeyframeId&)>& pose) {
   if (closures.empty()) return std::nullopt;
-  const std::vector<double> weight_of = find_places(closures).weights();
+  const ClosurePlaces found = find_places(closures);
+  const std::vector<double> weight_of = found.weights();
   const std::size_t stride = (closures.size() + kEnoughCandidates - 1) / kEnoughCandidates;
   PairMotion result;
   std::vector<std::pair<SE3, SE3>> ends;  // of b: where it is placed, where a's has it
   std::vector<double> weights;
+  std::vector<std::size_t> places;
   for (std::size_t k = 0; k < closures.size(); k += stride) {
     const PoseEdge& e = closures[k];
     weights.push_back(weight_of[k]);
+    places.push_back(found.place_of[k]);
     const SE3 T_a_b = e.from.robot == a ? e.T_from_to : e.T_from_to.inverse();
     ends.emplace_back(pose(e.other(a)), pose(e.end_on(a)) * T_a_b);
     result.centre += ends.back().first.translation();
@@ -154,9 +159,16 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
     result.strength.kappa += e.precision.kappa;
     result.strength.tau += e.precision.tau;
   }
+  // Several places do not agree by chance, however many others disagree.
+  std::set<std::size_t> agreeing_places;
+  for (const std::size_t k : alignment->inliers) agreeing_places.insert(places[k]);
+  const bool by_places = agreeing_places.size() >= kAgreeingPlaces;
   std::vector<double> distances;
-  for (const auto& [placed, measured] : ends)
-    distances.push_back((T * placed.translation() - measured.translation()).norm());
+  for (std::size_t k = 0; k < ends.size(); ++k) {
+    const auto& [placed, measured] = ends[k];
+    if (!by_places || std::ranges::binary_search(alignment->inliers, k))
+      distances.push_back((T * placed.translation() - measured.translation()).norm());
+  }
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
   result.spread_m = *middle;

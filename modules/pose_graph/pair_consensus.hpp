@@ -22,7 +22,8 @@ struct PairMotion {
   SinglePose T = {};
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [m] of b's ends.
   double radius_m = 0.0;                             ///< RMS distance of b's ends from there.
-  /// Median distance of b's ends, moved by T, from where closures have them.
+  /// Median distance of b's ends, moved by T, from where closures have them. If closures at three
+  /// places or more agree on T, only the closures that agree count.
   double spread_m = 0.0;
   Precision strength = {.kappa = 0.0, .tau = 0.0};  ///< Weights of the closures, summed.
 };

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -143,6 +144,7 @@ class TeamAgent {
   bool join(const Session& session);
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
   void extend_poses();
+  [[nodiscard]] std::vector<PoseEdge> likely_closures(std::span<const PoseEdge> inside) const;
   void try_chordal(const Session& session);
   void advance(TeamOutput& output);
   void enter_stage(TeamOutput& output);

@@ -3,7 +3,9 @@
 #include <utility>
 
 #include "modules/core/text_table.hpp"
+#include "modules/pose_graph/corroboration.hpp"
 #include "modules/pose_graph/frame_entry.hpp"
+#include "modules/pose_graph/robust_schedule.hpp"
 #include "modules/pose_graph/team_agent.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 #include "modules/pose_graph/tree_front.hpp"
@@ -240,22 +242,48 @@ std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
   return part;
 }
 
-// Alone, nothing ties the poses to their present place: closures may call for a better start. Of
-// closures that are not trusted, those that noisy odometry explains; where odometry is taken at its
-// word, it is the start.
+// Closures inside this robot that are likely true, without any solution: those that noisy odometry
+// explains, or else those that agree with a closure a few keyframes away.
+std::vector<PoseEdge> TeamAgent::likely_closures(std::span<const PoseEdge> inside) const {
+  const std::vector<PoseEdge>& explained = graph_.odometry_noise().likely;
+  if (!explained.empty()) return explained;
+  const std::map<RobotId, Precision> step{{self_.robot, graph_.mean_step_precision()}};
+  const Corroboration::PoseOf pose = [&](const KeyframeId& id) { return poses_[id.index]; };
+  const std::vector<bool> isolated =
+      Corroboration(inside, pose, step, 3).isolated(default_threshold(3));
+  std::vector<PoseEdge> likely;
+  for (std::size_t k = 0; k < inside.size(); ++k)
+    if (!isolated[k]) likely.push_back(inside[k]);
+  return likely;
+}
+
+// A robot that is alone may begin at the chordal initialisation. With closures that may be false it
+// does if the truncated cost of all its closures is lower there.
 void TeamAgent::try_chordal(const Session& session) {
-  if (session.plan.members.size() > 1) return;
-  const bool trusted = !config_.robust || config_.method != PgoMethod::kNewton;
-  std::vector<PoseEdge> own = graph_.own_edges();
-  if (!trusted) {
-    own.resize(graph_.keyframes() - 1);
-    const std::vector<PoseEdge>& likely = graph_.odometry_noise().likely;
-    own.insert(own.end(), likely.begin(), likely.end());
+  const std::vector<PoseEdge>* inside = graph_.newest_edges(self_.robot);
+  if (session.plan.members.size() > 1 || inside == nullptr || inside->size() == chordal_tried_)
+    return;
+  chordal_tried_ = inside->size();
+  const std::vector<PoseEdge> all = graph_.own_edges();
+  const std::size_t steps = graph_.keyframes() - 1;
+  if (!config_.robust || config_.method != PgoMethod::kNewton) {
+    poses_ = better_of_chordal(std::move(poses_), all);
+    return;
   }
-  const std::size_t closures = own.size() + 1 - graph_.keyframes();
-  if (closures == chordal_tried_ || (!trusted && closures < kEnoughForChordal)) return;
-  chordal_tried_ = closures;
-  poses_ = better_of_chordal(std::move(poses_), own);
+  std::vector<PoseEdge> likely(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(steps));
+  for (const PoseEdge& closure : likely_closures(*inside)) likely.push_back(closure);
+  if (likely.size() < steps + kEnoughForChordal) return;
+  std::vector<SE3> chordal = better_of_chordal(poses_, likely);
+  const auto cost = [&](const std::vector<SE3>& poses) {
+    const double barc = default_threshold(3);
+    double sum = 0.0;
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      const double r = residual_of(all[k], poses[all[k].from.index], poses[all[k].to.index]);
+      sum += k < steps ? r * r : std::min(r * r, barc * barc);
+    }
+    return sum;
+  };
+  if (cost(chordal) < cost(poses_)) poses_ = std::move(chordal);
 }
 
 void TeamAgent::judge_odometry() {

@@ -31,7 +31,7 @@ constexpr int kAllInSteps = 8;
 constexpr double kMargin = 8.0;
 // Where so many closures agree with those beside them, one that stands alone has cause to be false.
 constexpr double kMostlyConsistent = 0.75;
-constexpr std::uint32_t kFewOpen = 32;
+constexpr std::uint32_t kFewOpen = 32;  // so few false closures do no harm
 // With fewer closures left per pose, the others are needed from the start.
 constexpr double kClosuresPerPose = 0.25;
 
@@ -112,7 +112,7 @@ DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   if (first_) {  // what stands alone is aside
     const std::uint32_t left = sums.open;
     const bool enough = static_cast<double>(left) >= kClosuresPerPose * sums.poses;
-    const bool aside = sums.isolated > 0 && enough && joined(members_, sums.votes);
+    const bool aside = sums.isolated > kFewOpen && enough && joined(members_, sums.votes);
     return start(aside, aside ? sums : *first_);
   }
   first_ = sums;

@@ -11,7 +11,10 @@
 #include "apps/pgo/scenario.hpp"
 #include "apps/pgo/scenario_study.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/pgo_study/team_graph_file.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
 #include "test/support/command.hpp"
+#include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -338,6 +341,34 @@ TEST_CASE("Robots without a true closure between them have a reference of two fr
   CHECK(results["reference"].max_m < 0.5);
   CHECK(results["trust-all"].frames == 1);
   CHECK(results["trust-all"].false_kept == 1);
+}
+
+// Each scenario that a robust team must stand, on the graph that it is meant for.
+TEST_CASE("The robots' own code stands noise and places that are not as claimed", "[scenario]") {
+  struct Row {
+    std::string scenario;
+    std::string graph;
+    double most_lost;   // share of true closures
+    double most_ratio;  // of the RMS error to that of the reference
+  };
+  const Row row = GENERATE(Row{"noisy-odometry", "sphere2500", 0.02, 1.1},
+                           Row{"clusters", "parking-garage", 0.0, 1.01},
+                           Row{"three-folders", "sphere2500", 0.0, 1.1},
+                           Row{"place-bias", "parking-garage", 0.03, 1.25});
+  const auto file = shared_data("pose_graphs/3d/" + row.graph + ".g2o");
+  if (!file) return;
+  const unsigned seed = GENERATE(2U, 4U);
+  CAPTURE(row.scenario, seed);
+  const ScenarioStudy study = run_scenario_study(
+      deal_contiguously(read_g2o(*file), 1, row.graph),
+      {.scenario = scenario_of(row.scenario), .methods = {"robots", "reference"}, .seeds = {seed}},
+      {});
+  const ScenarioResult& robots = study.results.at(0);
+  CHECK(robots.decided);
+  CHECK(robots.false_kept == 0);
+  CHECK(static_cast<double>(robots.true_lost) <=
+        row.most_lost * static_cast<double>(robots.true_closures));
+  CHECK(robots.rms_m <= row.most_ratio * study.results.at(1).rms_m);
 }
 
 TEST_CASE("outliers runs a scenario that options have changed", "[scenario]") {

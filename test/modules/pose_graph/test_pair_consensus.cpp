@@ -150,4 +150,25 @@ TEST_CASE("the motion of a pair is that of most closures", "[pose_graph][pair_co
   CHECK_FALSE(motion_of_pair({}, 2, [](const KeyframeId&) { return SE3::Identity(); }));
 }
 
+TEST_CASE("three places that agree give a pair a vote among many closures that do not",
+          "[pose_graph][pair_consensus]") {
+  std::mt19937 rng(4);
+  const SE3 T = random_pose(rng, 30.0);
+  std::map<KeyframeId, SE3> poses;
+  std::vector<PoseEdge> closures;
+  const auto add = [&](KeyframeIndex k, const SE3& motion) {
+    const SE3 a = poses[{2, k}] = random_pose(rng);
+    const SE3 b = poses[{5, k}] = random_pose(rng);
+    closures.push_back({{2, k}, {5, k}, a.inverse() * motion * b, {2.0, 3.0}});
+  };
+  for (KeyframeIndex place = 0; place < 3; ++place)
+    for (KeyframeIndex k = 0; k < 4; ++k) add(100 * place + k, T);
+  for (KeyframeIndex k = 0; k < 40; ++k) add(1000 + 50 * k, random_pose(rng, 50.0));
+  const auto motion =
+      motion_of_pair(closures, 2, [&](const KeyframeId& id) { return poses.at(id); });
+  REQUIRE(motion);
+  CHECK(motion->T.pose().isApprox(T, kTolerance));
+  CHECK(motion->spread_m < 1e-9);
+}
+
 }  // namespace km
