@@ -112,8 +112,7 @@ class MemberRbcd final : public MemberSolver {
   std::vector<RobotId> robot_of_edge_;  // [k]: other robot of public edge k of problem_
   LiftedPoses fixed_;
   QuadraticProblem problem_;
-  std::map<std::uint32_t, LiftedPoses>
-      history_;                              // by round, from the last one that the root has sent
+  std::map<std::uint32_t, LiftedPoses> history_;  // by round, since last Progress
   std::map<std::uint32_t, Progress> heard_;  // not adopted yet; by the round of the message before
   bool started_ = false;
   bool done_ = false;

@@ -4,11 +4,11 @@
 
 namespace km {
 
-/// The weight in [0, 1] that minimises w r^2 + mu (1 - w) / (mu + w) c^2: Black-Rangarajan form of
-/// the surrogate for min(r^2, c^2), which is convex for mu -> 0 and truncated for mu -> infinity
-/// (Yang et al., "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020, Eq. (14) and
-/// Sec. III-B, truncated least squares). 1 up to r^2 = mu c^2 / (mu + 1), 0 from (mu + 1) c^2 / mu
-/// on.
+/// The weight in [0, 1] that minimises w r^2 + mu (1 - w) / (mu + w) c^2. This is the
+/// Black-Rangarajan form of the surrogate for min(r^2, c^2), convex for mu -> 0 and truncated for
+/// mu -> infinity (Yang et al., "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020,
+/// Eq. (14) and Sec. III-B, truncated least squares). 1 up to r^2 = mu c^2 / (mu + 1), 0 from (mu +
+/// 1) c^2 / mu on.
 [[nodiscard]] double robust_weight(double squared_residual, double squared_barc, double mu);
 
 /// The initial mu, c^2 / (2 r^2 - c^2) with the largest residual r (ibid., Remark 5). Weights are

@@ -39,8 +39,7 @@ struct SessionGraph {
   bool upright = false;                       ///< All members have verticals: the frame has z up.
   /// Decisions of earlier sessions: kept or rejected. Closures without an entry are undecided.
   std::map<ClosureId, bool> decided = {};
-  std::set<ClosureId> trusted =
-      {};  ///< Closures between robots that are not weighed; equal on both robots.
+  std::set<ClosureId> trusted = {};  ///< Never weighed; equal on both robots.
   /// Cycles through closures that this robot counted in earlier sessions.
   ClosureNoiseRecord noise = {};
 };
@@ -49,9 +48,8 @@ struct SessionGraph {
 struct TreePlace {
   std::optional<RobotId> parent = {};  ///< nullopt: the root.
   std::vector<RobotId> children = {};  ///< Ascending.
-  std::vector<RobotId> members =
-      {};            ///< All members of the session, including this robot; ascending.
-  RobotId root = 0;  ///< The member without a parent.
+  std::vector<RobotId> members = {};   ///< All of the session, ascending.
+  RobotId root = 0;                    ///< The member without a parent.
 };
 
 }  // namespace km

@@ -7,8 +7,8 @@
 
 namespace km {
 
-/// n poses in the rank relaxation of SE-Sync (Rosen et al., IJRR 2019, Sec. 4): an r x 4n matrix
-/// whose columns 4i to 4i+3 are [Y_i p_i], Y_i in St(3, r) (orthonormal columns), p_i in R^r [m].
+/// n poses in the rank relaxation of SE-Sync (Rosen et al., IJRR 2019, Sec. 4), an r x 4n matrix.
+/// Its columns 4i to 4i+3 are [Y_i p_i], Y_i in St(3, r) (orthonormal columns), p_i in R^r [m].
 /// With r = 3 it holds ordinary poses [R_i t_i] (or mirrored ones). Tangent vectors and gradients
 /// have the same shape. A point of (St(3, r) x R^r)^n is called feasible below.
 using LiftedPoses = Eigen::MatrixXd;

@@ -22,10 +22,9 @@ struct [[nodiscard]] TeamOutput {
   std::vector<Parcel> parcels = {};
   std::optional<Trajectory> trajectory = {};
   std::optional<OptimizerProgress> progress = {};
-  std::optional<ClosureVerdicts> verdicts =
-      {};                                 ///< Verdicts on closures of this robot, after a session.
-  std::vector<std::string> notices = {};  ///< Messages for a person.
-  bool more = false;                      ///< The next step has work even without further input.
+  std::optional<ClosureVerdicts> verdicts = {};  ///< After a session.
+  std::vector<std::string> notices = {};         ///< Messages for a person.
+  bool more = false;  ///< The next step has work even without further input.
 };
 
 /// The part of one robot in the pose graph optimisation of the team, as a state machine without
@@ -185,7 +184,7 @@ class TeamAgent {
   std::uint64_t links_seen_ = 0;
   std::set<RobotId> component_;  // robots that links connect to this one
 
-  SessionPlan plan_;  // of the present knowledge
+  SessionPlan plan_;  // from the present knowledge
   bool plan_outdated_ = true;
   double plan_changed_s_ = -1e9;      // time of the last change of its graph
   std::uint64_t closures_known_ = 0;  // by the robots of the plan
@@ -201,7 +200,7 @@ class TeamAgent {
   bool solved_ = false;    // it ended, and all members have its solution
   double started_s_ = 0.0;
   std::uint64_t sent_bytes_ = 0;  // for this session, per receiver, and with forwarded messages
-  std::map<ClosureId, bool> verdicts_;          // of the session of part_
+  std::map<ClosureId, bool> verdicts_;          // results of the session of part_
   double odometry_noticed_ = 0.0;               // largest noise scale of odometry in a notice
   std::map<RobotId, double> closures_noticed_;  // noise factor in the last notice, by peer
   std::optional<World> world_;                  // in frame_

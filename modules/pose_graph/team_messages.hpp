@@ -59,8 +59,8 @@ struct EdgeSetOffer {
 /// directly. It goes to all robots of the team, when it changes and periodically.
 struct TeamStatus {
   TeamPeer sender;
-  std::uint32_t number = 0;  ///< Counts the sender's: the highest is the newest. A repeated one
-                             ///< that says the same keeps it.
+  std::uint32_t number = 0;  ///< Counts statuses of the sender: the highest is the newest. A
+                             ///< repeated one that says the same keeps it.
   std::vector<TeamPeer> hears = {};  ///< Robots that it receives directly at present; ascending.
   TeamFrame frame;                   ///< Frame of its present solution.
   std::uint32_t frame_version = 0;   ///< Counts the changes of its frame.
@@ -153,10 +153,8 @@ struct SessionLetter {
   std::uint32_t number = 0;  ///< Counts the messages of the sender to `to` in this session, from 0.
   RobotId to = 0;
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
-  std::uint32_t copy =
-      0;  ///< Counts the transmissions of the sender to `to`, including repetitions.
-  std::uint32_t received =
-      0;  ///< Number of messages of `to`, from the first on, that have been taken.
+  std::uint32_t copy = 0;      ///< Counts all transmissions from sender to `to`.
+  std::uint32_t received = 0;  ///< Messages of `to` that have all been taken.
 };
 
 using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, SessionLetter>;
