@@ -20,8 +20,7 @@ namespace km {
 namespace {
 
 constexpr std::uint64_t kLetters = 26;
-constexpr double kVerticalTolerance =
-    1e-3;  // deviation of information from (I - up up^T) / sigma^2, relative
+constexpr double kVerticalTolerance = 1e-3;  // information, relative to its size
 
 KeyframeId read_id(TextFields& fields) {
   const std::uint64_t key = fields.integer("vertex id");
@@ -30,9 +29,8 @@ KeyframeId read_id(TextFields& fields) {
   return *id;
 }
 
-constexpr Bounds<double> kAngle_rad{
-    -1e6,
-    1e6};  // some files count full turns; a larger angle has no digits left for a part of a turn
+constexpr Bounds<double> kAngle_rad{-1e6,
+                                    1e6};  // with full turns; larger angles have lost their digits
 
 SE3 read_pose(TextFields& fields, int dimension, const Bounds<double>& bounds_m) {
   Eigen::Vector3d t = Eigen::Vector3d::Zero();

@@ -63,7 +63,7 @@ class JsonPlace {
       members.emplace_back(name, JsonPlace(value, place_ + '/' + readable(name, 40), *file_));
     return members;
   }
-  // The elements of a list of exactly two.
+  // The elements of a list of exactly two elements.
   [[nodiscard]] std::pair<JsonPlace, JsonPlace> pair() const {
     auto elements = list();
     if (elements.size() != 2) fail("is not a pair: " + text());

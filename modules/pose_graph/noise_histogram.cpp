@@ -29,7 +29,7 @@ double middle_of(std::uint16_t bin) {
   return kLeast * std::exp(kBin * (static_cast<double>(bin) + 0.5));
 }
 
-// Density of log |x| for a normal vector x with `dimension` components.
+// Density of log |x| for a normal vector x with this number of components.
 double log_length_density(double length, int components) {
   const double k = components;
   return std::exp(k * std::log(length) - 0.5 * length * length -
