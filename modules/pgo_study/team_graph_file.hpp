@@ -32,8 +32,8 @@ enum class EdgeWeights {
 ///
 /// Vertices may come in any order. Estimates in the file are not used. Parallel edges all count. A
 /// file without any vertices takes them from its edges. Throws std::runtime_error "file: what" if
-/// there are fewer poses than robots, a vertex of an edge or prior is missing, a weight is not
-/// usable, or the graph is not connected.
+/// there are too few poses, a vertex of an edge or prior is missing, a weight is not usable, or the
+/// graph is not connected.
 [[nodiscard]] TeamGraph deal_contiguously(const G2oGraph& graph, std::size_t robots,
                                           const std::string& file);
 
