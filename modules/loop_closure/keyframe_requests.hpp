@@ -50,7 +50,7 @@ class KeyframeRequests {
   /// Notes that the keyframe has arrived. False if it was not requested.
   [[nodiscard]] bool arrived(const KeyframeId& keyframe);
 
-  /// Its owner does not have it at `now_s`.
+  /// Notes that the owner of the keyframe does not have it at `now_s`.
   void absent(const KeyframeId& keyframe, double now_s);
 
   /// Notes that the peer has returned: its unanswered requests are due at once.

@@ -220,12 +220,12 @@ class RelayStore {
   TeamPeer self_;
   std::optional<RelayKeys> keys_;
   std::map<RobotId, Origin> origins_;
-  std::map<RobotId, Neighbour> neighbours_;  // Robots received directly.
+  std::map<RobotId, Neighbour> neighbours_;  // robots with a link to this one
   Stream own_letters_;
   std::map<std::tuple<RelayKind, RobotId, std::uint64_t>, std::uint32_t> own_slots_;
   std::deque<Recent> recent_;  // Oldest first.
   std::deque<Recent> unmet_;   // Messages to unknown robots, oldest first.
-  // By addressee; then by kind, origin and number.
+  // Messages kept for other robots, by addressee, then by kind, origin and number.
   std::map<RobotId, std::map<std::tuple<RelayKind, RobotId, std::uint32_t>, RelayMessage>> carried_;
   std::size_t carried_bytes_ = 0;
   RelayOutput output_;

@@ -24,10 +24,10 @@ namespace km {
 struct TrackerStatistics {
   int tracked = 0;   ///< Features continued from the image before.
   int detected = 0;  ///< New features.
-  int lost = 0;      ///< Failed in KLT or left the image.
-  int backward = 0;  ///< Failed the forward-backward check.
-  int crowded = 0;   ///< Too near to another feature.
-  int motion = 0;    ///< Contradict the motion of the other features.
+  int lost = 0;      ///< Features that KLT failed to track or that left the image.
+  int backward = 0;  ///< Features that failed the forward-backward check.
+  int crowded = 0;   ///< Features too near to another feature.
+  int motion = 0;    ///< Features that contradict the motion of the others.
   StereoStatistics stereo;
   int stereo_motion = 0;  ///< Right image points that contradict the motion; the left points stay.
   bool motion_known = false;  ///< The stereo features agreed on a motion.

@@ -93,7 +93,7 @@ struct WindowSolution {
 WindowSolution optimize(Window& window, int max_iterations);
 
 /// Removes a frame with its observations, and the landmarks that no other frame sees. The caller
-/// replaces the inertial factors on its two sides.
+/// replaces the inertial factors before and after the frame by one.
 void forget_frame(Window& window, std::size_t frame);
 
 /// Replaces the oldest frame by a prior on the frames that it shares information with. The prior

@@ -98,7 +98,7 @@ class PeerTable {
   /// delivered.
   void told(const TeamPeer& restarted);
 
-  /// Its status writer is alive, silent, or closed.
+  /// Notes that the status writer with this GUID is alive, silent, or closed.
   void alive(const Guid& guid);
   void silent(const Guid& guid);
   void closed(const Guid& guid);

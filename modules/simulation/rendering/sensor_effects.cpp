@@ -108,7 +108,8 @@ std::vector<float> smoothed_transposed(const std::vector<float>& field, double s
 
 // Gaussian noise of unit variance that repeats, neighbours correlated over `sigma_px`.
 std::vector<float> make_noise_tile(double sigma_px) {
-  std::mt19937 random(20240229);  // any seed: each image takes another part of the tile
+  // A constant seed is enough, because each image uses another part of the tile.
+  std::mt19937 random(20240229);
   std::normal_distribution<float> normal;
   std::vector<float> tile(static_cast<std::size_t>(kTile) * kTile);
   for (float& value : tile) value = normal(random);
