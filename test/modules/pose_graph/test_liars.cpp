@@ -251,10 +251,8 @@ constexpr double kTooHuge = 1e14;  // refused
 
 }  // namespace
 
-TEST_CASE(
-    "one misbehaving robot of four that others contradict adds at most a fifth of the noise of a "
-    "closure",
-    "[pose_graph][liars]") {
+TEST_CASE("one robot of four that others contradict adds at most a fifth of the noise of a closure",
+          "[pose_graph][liars]") {
   const auto lie = GENERATE(
       Lie{.liar = 1, .offset_m = 0.5, .closures = 100},
       Lie{.liar = 1, .offset_m = 50.0, .closures = 100},
