@@ -47,7 +47,7 @@ std::optional<long> largest_receive_buffer() {
     const std::string text = read_input_file("/proc/sys/net/core/rmem_max");
     const auto bytes = parse_int64(std::string_view(text).substr(0, text.find('\n')));
     return bytes ? std::optional(static_cast<long>(*bytes)) : std::nullopt;
-  } catch (const InputFileError&) {  // not readable in a container
+  } catch (const InputFileError&) {  // containers hide this file
     return std::nullopt;
   }
 }

@@ -152,8 +152,9 @@ class LinkEmulator {
   [[nodiscard]] Eigen::Vector3d position(std::size_t robot, double now_s) const;
 
   LinkScript script_;
-  std::vector<State> states_;                       // as the links of the script
-  std::multimap<double, LinkDelivery> on_the_way_;  // by time; equal ones in the order of insertion
+  std::vector<State> states_;                       // states in the order of the script's links
+  std::multimap<double, LinkDelivery> on_the_way_;  // deliveries by time; those of equal time in
+                                                    // the order of insertion
 };
 
 /// A table of the frames of each ordered pair of robots, with their `names`.

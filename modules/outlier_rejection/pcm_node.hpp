@@ -87,7 +87,8 @@ class PcmNode final : public Node {
   const RobotId self_;
   const std::uint32_t first_version_;
   const Out<InlierSet> inlier_sets_;
-  std::map<RobotId, Pair> pairs_;  // by the other robot; `self_` for closures inside this one
+  std::map<RobotId, Pair> pairs_;  // pairs by the other robot; `self_` for closures inside this
+                                   // robot
   std::map<RobotId, std::uint32_t> version_of_;
   std::atomic<bool> no_more_ = false;
   Worker<Input> worker_;

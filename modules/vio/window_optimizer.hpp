@@ -66,7 +66,8 @@ class WindowEquations {
   std::vector<OdometryState> linearization_;  // per frame, where derivatives are taken
   std::vector<SE3> images_;                   // per frame, pose of the body at the image
   std::vector<ImagePose> image_linearization_;
-  Eigen::MatrixXd images_H_;  // by the pose at each image (6), landmarks eliminated
+  Eigen::MatrixXd images_H_;  // Hessian over the pose of each image (6 rows each), landmarks
+                              // eliminated
   Eigen::VectorXd images_g_;
   Eigen::MatrixXd H_;
   Eigen::VectorXd g_;

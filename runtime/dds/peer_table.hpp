@@ -128,7 +128,7 @@ class PeerTable {
 
  private:
   struct Participant {
-    std::optional<RobotIdentity> identity;  // if accepted
+    std::optional<RobotIdentity> identity;  // identity; nullopt until accepted
     std::string addresses;
     bool announced = false;
     bool proven = false;

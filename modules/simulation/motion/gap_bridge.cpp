@@ -28,7 +28,7 @@ struct Reckoned {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
 };
 
-using Reckoning = std::vector<Reckoned>;  // at each inertial sample
+using Reckoning = std::vector<Reckoned>;  // one entry per inertial sample
 
 Reckoning rotations(std::span<const ImuSample> imu, const Eigen::Matrix3d& start) {
   Reckoning states{{.stamp = imu.front().stamp, .R = start}};

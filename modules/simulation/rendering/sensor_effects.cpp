@@ -125,8 +125,8 @@ std::vector<float> make_noise_tile(double sigma_px) {
 
 // Noise levels common to all pixels of one shot.
 struct NoiseLevels {
-  float read_variance = 0.0F;    // in shares of saturation
-  float photon_variance = 0.0F;  // at saturation
+  float read_variance = 0.0F;    // variance in the dark; saturation is 1
+  float photon_variance = 0.0F;  // additional variance at saturation
 };
 
 NoiseLevels noise_levels(const SensorEffectsConfig& config, const Exposure& exposure) {
