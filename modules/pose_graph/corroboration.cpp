@@ -122,8 +122,8 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
                         log_density_if_false(error, volume, dimension_), dimension_);
 }
 
-// The volume in which a false closure may end: twice the bounding box of the poses, enlarged by the
-// length of the longest closure.
+// The volume in which a false closure may end: twice the bounding box of the poses, enlarged on
+// every side by the length of the longest closure.
 double Corroboration::volume() const {
   Eigen::AlignedBox3d below, above;
   double reach_m = 0.0;

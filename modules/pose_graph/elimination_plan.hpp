@@ -35,8 +35,7 @@ class EliminationPlan {
   [[nodiscard]] std::span<const Front> fronts() const { return fronts_; }
   /// Kept nodes, ascending.
   [[nodiscard]] const std::vector<int>& kept() const { return kept_; }
-  /// Couplings of the Schur complement, as places in kept(); the second one is the row in the lower
-  /// triangle.
+  /// Couplings of the Schur complement, as places in kept(), the smaller place first.
   [[nodiscard]] const std::vector<NodePair>& kept_pairs() const { return kept_pairs_; }
   /// Place of each node in kept(), -1 for the others.
   [[nodiscard]] const std::vector<int>& place_of_kept() const { return place_of_kept_; }

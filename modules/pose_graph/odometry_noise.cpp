@@ -114,7 +114,7 @@ double log_density_if_true(const Cycle& cycle, const Factors& v) {
 }
 
 // The volume [m^3] in which a false closure may end: twice the bounding box of the trajectory,
-// enlarged by the length of the longest closure.
+// enlarged on every side by the length of the longest closure.
 double volume_m3(const Chain& chain, std::span<const PoseEdge> closures) {
   Eigen::AlignedBox3d box;
   for (const SE3& T : chain.T_first_kf) box.extend(T.translation());

@@ -51,9 +51,9 @@ inline constexpr Precision kUnlimited{.kappa = std::numeric_limits<double>::max(
 ///
 /// A pair is confirmed if the loop through some third robot closes. The maximum spanning tree over
 /// the confirmations of the pairs places the robots, and as many robots as possible keep their
-/// place. The result is empty if fewer than one more pair would fit, or if the pairs with a vote do
-/// not connect all of their robots. If these pairs form no loop, only robots whose place rests on
-/// pairs without a vote move. O(pairs * robots).
+/// place. The result is empty if the gain in fitting pairs, each counted in [0, 1], is below 0.5.
+/// It is also empty if the pairs with a vote do not connect all of their robots. If these pairs
+/// form no loop, only robots whose place rests on pairs without a vote move. O(pairs * robots).
 [[nodiscard]] std::map<RobotId, SE3> better_placement(const PairMotions& pairs);
 
 /// Lower medians of kappa and of tau, independently. Precondition: `values` is not empty.

@@ -60,7 +60,7 @@ struct EdgeSetOffer {
 struct TeamStatus {
   TeamPeer sender;
   std::uint32_t number = 0;  ///< Counts statuses of the sender: the highest is the newest. A
-                             ///< repeated one that says the same keeps it.
+                             ///< repetition keeps the number.
   std::vector<TeamPeer> hears = {};  ///< Robots that it receives directly at present; ascending.
   TeamFrame frame;                   ///< Frame of its present solution.
   std::uint32_t frame_version = 0;   ///< Counts the changes of its frame.

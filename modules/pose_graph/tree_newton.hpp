@@ -62,10 +62,10 @@ class TreeNewton final : public MemberSolver {
     bool odometry = false;
     bool own = true;               ///< This robot weighs it.
     double weight = 1.0;           ///< Weight at the accepted poses.
-    double candidate = 1.0;        ///< At those at hand.
+    double candidate = 1.0;        ///< At the present poses.
     double limit = 1.0;            ///< Factor on the weight while its pair is limited.
     double share = 1.0;            ///< Factor on the weight at the accepted poses.
-    double candidate_share = 1.0;  ///< At those at hand.
+    double candidate_share = 1.0;  ///< At the present poses.
   };
 
   void classify();

@@ -66,10 +66,9 @@ class TreeRoot {
   double cost_ = 0.0;
   double decrement_ = 0.0;
   bool free_ = true;
-  TreeVerdict::Weighing weighing_ =
-      TreeVerdict::Weighing::kDecided;  // state of the weights in this round
-  bool at_base_ = true;                 // the present poses are the accepted ones
-  bool full_ = false;                   // the second derivatives are full, where possible
+  TreeVerdict::Weighing weighing_ = TreeVerdict::Weighing::kDecided;  // in this round
+  bool at_base_ = true;   // the present poses are the accepted ones
+  bool full_ = false;     // the second derivatives are full, where possible
   bool convex_ = false;   // full ones were indefinite: no retry until convergence is slow
   bool stale_ = false;    // a step was accepted since the last second derivatives
   bool retried_ = false;  // new second derivatives were tried at these poses

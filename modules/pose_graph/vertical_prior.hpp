@@ -14,9 +14,8 @@ namespace km {
 /// frame of the solution has z up. It is linear in the rotation because ||Y up||^2 is 1.
 struct VerticalPrior {
   Eigen::Index pose = 0;
-  Eigen::Vector3d up =
-      Eigen::Vector3d::UnitZ();  ///< Unit vector against gravity, in the frame of the pose.
-  double weight = 1.0;           ///< [1/rad^2]
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< Unit vector against gravity, in pose frame.
+  double weight = 1.0;                            ///< [1/rad^2]
 };
 
 /// Cost of the prior at the lifted rotation `Y` (r x 3).

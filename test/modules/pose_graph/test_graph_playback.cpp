@@ -143,11 +143,10 @@ TEST_CASE("One robot plays a closure with the keyframe that makes it known", "[p
 
   std::vector<ClosureId> ids;
   for (const RelativePose& closure : played.closures) ids.push_back({closure.from, closure.to});
-  CHECK(ids ==
-        std::vector<ClosureId>{{{6, 0}, {2, 5}},
-                               {{6, 2}, {9, 70}},
-                               {{6, 3}, {6, 0}},
-                               {{6, 1}, {6, 4}}});  // without 2:0 -> 6:1, which robot 2 plays
+  CHECK(ids == std::vector<ClosureId>{{{6, 0}, {2, 5}},
+                                      {{6, 2}, {9, 70}},
+                                      {{6, 3}, {6, 0}},
+                                      {{6, 1}, {6, 4}}});  // robot 2 plays 2:0 -> 6:1
   CHECK(played.keyframes_before_closure == std::vector<std::size_t>{1, 3, 4, 5});
   REQUIRE(played.ends.size() == 1);
   CHECK(played.ends[0].keyframes == 5);

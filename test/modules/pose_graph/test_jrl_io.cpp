@@ -62,8 +62,7 @@ TEST_CASE("Every field of a JRL file is read", "[jrl]") {
         std::vector<Stamp>{SmallJrl::kStart, SmallJrl::kStart + 10, SmallJrl::kStart + 20});
   CHECK(graph.stamps.at(1) == std::vector<Stamp>{SmallJrl::kStart + 5, SmallJrl::kStart + 15});
   REQUIRE(graph.truth.size() == 5);
-  CHECK(graph.truth.at({0, 1}).translation() ==
-        Eigen::Vector3d(1, 0, 0));  // from the list of robot a
+  CHECK(graph.truth.at({0, 1}).translation() == Eigen::Vector3d(1, 0, 0));  // in the list of a
   CHECK(graph.truth.at({1, 1}).translation() == Eigen::Vector3d(1, 2, 0));
   REQUIRE(graph.initial.size() == 2);
   CHECK(graph.initial.at({1, 0}).translation() == Eigen::Vector3d(0, 2.5, 0));

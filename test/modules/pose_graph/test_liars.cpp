@@ -186,8 +186,7 @@ double error_of_team(const Walk& walk, const TeamProblem& problem, RobotId liar,
                     [&](const PoseEdge& e) { return e.from.robot == liar || e.to.robot == liar; });
     feed(agent, robot, known);
   }
-  (void)network.run(
-      200.0, [&] { return network.all_settled(); });  // never if the misbehaving robot is refused
+  (void)network.run(200.0, [&] { return network.all_settled(); });  // a refused robot never settles
   return settled_without(network, liar) ? error_m(network, walk, liar)
                                         : std::numeric_limits<double>::infinity();
 }

@@ -191,8 +191,7 @@ TEST_CASE("Every member passes through every state that the root reports, in ord
       else
         CHECK(to.receive(sender, *letter.bytes));
   };
-  const std::size_t enough =
-      held_back == kShare ? 17 : 3;  // 16 rounds; the root reports every fifth
+  const std::size_t enough = held_back == kShare ? 17 : 3;  // 16 rounds; a report every 5
   for (int n = 0; n < 100 && held.size() < enough; ++n) {
     carry(root, leaf);
     carry(leaf, root);

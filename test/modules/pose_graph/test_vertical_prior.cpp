@@ -103,8 +103,7 @@ TEST_CASE("poses are levelled as a whole, by the vertical of most of their prior
     CHECK(vertical_cost(prior, level[static_cast<std::size_t>(prior.pose)].linear()) < 1e-12);
   for (std::size_t i = 1; i < poses.size(); ++i)
     CHECK((level[0].inverse() * level[i]).isApprox(poses[0].inverse() * poses[i], 1e-12));
-  priors.push_back(
-      {1, -up_at(tilt.inverse() * poses[1]), 0.5});  // contradicted by the other priors
+  priors.push_back({1, -up_at(tilt.inverse() * poses[1]), 0.5});  // in a minority
   CHECK(levelled(poses, priors)[0].isApprox(level[0], 1e-12));
 }
 
