@@ -60,7 +60,7 @@ std::vector<std::uint8_t> own_bytes() {
   return bytes;
 }
 
-// Reason why a datagram to `address` did not come back. Other datagrams may arrive before it.
+// Reason why a datagram to `address` did not come back. Other datagrams may arrive before the echo.
 std::optional<std::string> echo_to(DatagramSocket& socket, const std::string& address) {
   const std::vector<std::uint8_t> bytes = own_bytes();
   if (auto problem = socket.send(address, socket.port(), bytes)) return problem;

@@ -61,8 +61,8 @@ class PcmNode final : public Node {
   /// wait of a pair begins with the first call after its first closure. `now_s`: any origin.
   void publish_changes(double now_s);
 
-  /// The runs of all robots are over, and all their closures have arrived. So no pair waits for a
-  /// witness any more, until a robot restarts. Safe to call from any thread, repeatedly.
+  /// Notes that the runs of all robots are over and all their closures have arrived. No pair waits
+  /// for a witness any more, until a robot restarts. Safe to call from any thread, repeatedly.
   void expect_no_more() { no_more_ = true; }
 
  private:

@@ -106,7 +106,8 @@ class RelayStore {
   void heard(const RobotIdentity& peer);
   void lost(RobotId robot, double now_s);
 
-  /// Stores a bag that its origin has sent directly. It may arrive before the call of heard().
+  /// Stores a bag that its origin has sent directly. The bag may arrive before heard() is called
+  /// for the origin.
   RelayArrival keep_bag(const RobotIdentity& origin, std::uint32_t number,
                         std::vector<std::uint8_t> content);
   /// Stores a keyframe that a known robot has sent directly as a reply.
