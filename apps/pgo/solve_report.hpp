@@ -10,14 +10,15 @@
 namespace km {
 
 /// Text with the result, and the rounds, bytes and seconds after which each gap to the optimum was
-/// reached. For a method that rejects closures it shows how many were kept. If fewer than nine
-/// tenths were kept and the noise of the graph was trusted, it hints at a possible reason.
+/// reached. For a method that rejects closures it shows how many were kept.
 [[nodiscard]] std::string solution_text(const TeamGraph& graph, const Solution& solution);
 
-/// Keys of the object. rounds[0] is the start; bytes and times are sums up to the round:
-///     {"poses", "edges", "verticals", "robots", "method", "rounds": [{"cost", "gradient_norm",
-///     "bytes", "critical_path_s", "total_cpu_s"}], "start_cpu_s", "rounded_cost", "lambda_min",
-///     "certified", "rank", "optimum"}.
+/// Writes one object. rounds[0] is the start; bytes and times are sums up to the round:
+///     {"poses", "edges", "verticals", "indefinite_edges", "robots", "method", "start_cpu_s",
+///     "rounds": [{"cost", "gradient_norm", "bytes", "critical_path_s", "total_cpu_s"}]}.
+/// Keys in addition if the solution has a judgement; "lambda_min" only if it was estimated:
+///     "rounded_cost", "relative_gap", "lambda_bound", "lambda_min", "certified", "rank",
+///     "optimum".
 /// Keys of newton in addition:
 ///     "noise_scale", "barc" [sigma of the graph], "most_sent", "most_received", "decided",
 ///     "kept": [indices of edges].
