@@ -7,9 +7,9 @@
 
 namespace km {
 
-/// Shows a watchdog whether a thread makes progress. A step that waits, for room in the queue of
-/// another worker or for its time, is not stuck: the other worker may be. So a circular wait is not
-/// detected. Thread-safe.
+/// Shows a watchdog whether a thread makes progress. A step that waits for its time, or for room in
+/// the queue of another worker, does not count as stuck, because the other worker may be the cause.
+/// A circular wait is therefore not detected. Thread-safe.
 class Heartbeat {
  public:
   /// `give_up` is called, from another thread, when the step is abandoned: it releases the threads

@@ -117,7 +117,8 @@ void Supervisor::begin_stop(Entry& entry) {
     watchdog_->has_ended(*node);
   });
   entry.stopped = stop.get_future();
-  start_without_signals(std::move(stop)).detach();  // for ever, if the node hangs
+  start_without_signals(std::move(stop)).detach();  // detached, because stop() never returns if the
+                                                    // node hangs
 }
 
 // False if the node was given up and does not end for it.

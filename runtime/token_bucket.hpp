@@ -37,7 +37,7 @@ class TokenBucket {
 
   double per_second_;
   double capacity_;
-  double level_;  // at filled_s_
+  double level_;  // level at the time filled_s_
   std::optional<double> filled_s_;
 };
 

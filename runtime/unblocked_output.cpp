@@ -22,7 +22,7 @@ namespace km {
 struct OutputQueue::State {
   struct Piece {
     std::string text;
-    std::uint64_t lines = 0;  // that are lost if it cannot be written
+    std::uint64_t lines = 0;  // lines of `text`, counted as lost if it cannot be written
   };
 
   State(int descriptor_, std::size_t capacity_) : descriptor(descriptor_), capacity(capacity_) {}

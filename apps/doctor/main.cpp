@@ -59,7 +59,7 @@ struct Options {
 
 void add_network(CLI::App& app, Options& options) {
   RobotOptions& robot = options.robot;
-  app.add_flag("--network", options.network, "Look at the network, and who is on it");
+  app.add_flag("--network", options.network, "Examine the network and the participants on it");
   app.add_option("--domain", robot.domain, "DDS domain of the team")->check(CLI::Range(0, 230));
   app.add_option("--peers", robot.peers, "Addresses of the other hosts: also asked for echoes")
       ->delimiter(',');

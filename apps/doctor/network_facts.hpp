@@ -20,9 +20,9 @@ struct Announced {
   /// GUID prefix of its process; zero if unknown.
   std::array<std::uint8_t, 12> guid_prefix = {};
   int domain = 0;
-  std::string team = {};                       ///< Its domain tag.
+  std::string team = {};                       ///< Domain tag of the team.
   std::string from = {};                       ///< Address.
-  std::string user_data = {};                  ///< As received; empty for other programs.
+  std::string user_data = {};                  ///< User data as received; empty for other programs.
   std::optional<RobotIdentity> identity = {};  ///< For a robot with readable user data.
 };
 
@@ -59,8 +59,10 @@ struct NetworkFacts {
   std::optional<std::string> no_unicast =
       {};  ///< Reason why an own datagram to the own address did not come back.
   std::optional<long> largest_receive_buffer = {};  ///< net.core.rmem_max [B].
-  std::vector<Announced> announced = {};            ///< On any domain up to kLastQuietDomain.
-  std::vector<Announced> heard = {};  ///< Received by DDS itself, as configured: also by address.
+  std::vector<Announced> announced = {};            ///< Participants on all domains up to
+                                                    ///< kLastQuietDomain.
+  std::vector<Announced> heard = {};  ///< Participants that DDS itself receives as configured, also
+                                      ///< by address.
   double listened_s = 0.0;
   std::vector<PeerEcho> echoes = {};
   std::vector<ClockDifference> clocks = {};

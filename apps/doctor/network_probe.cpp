@@ -47,7 +47,7 @@ std::optional<long> largest_receive_buffer() {
     const std::string text = read_input_file("/proc/sys/net/core/rmem_max");
     const auto bytes = parse_int64(std::string_view(text).substr(0, text.find('\n')));
     return bytes ? std::optional(static_cast<long>(*bytes)) : std::nullopt;
-  } catch (const InputFileError&) {  // not readable in a container
+  } catch (const InputFileError&) {  // containers hide this file
     return std::nullopt;
   }
 }
@@ -60,7 +60,7 @@ std::vector<std::uint8_t> own_bytes() {
   return bytes;
 }
 
-// Reason why a datagram to `address` did not come back. Other datagrams may arrive before it.
+// Reason why a datagram to `address` did not come back. Other datagrams may arrive before the echo.
 std::optional<std::string> echo_to(DatagramSocket& socket, const std::string& address) {
   const std::vector<std::uint8_t> bytes = own_bytes();
   if (auto problem = socket.send(address, socket.port(), bytes)) return problem;

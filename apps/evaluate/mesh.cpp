@@ -26,7 +26,7 @@ struct MeshCommand {
   std::vector<std::filesystem::path> trajectories;       // The robots' poses in the meshes' frame,
   std::vector<std::filesystem::path> true_trajectories;  // and in the truth's: place the meshes.
   MeshErrorOptions options;
-  std::filesystem::path palette;  // By default the one beside the truth.
+  std::filesystem::path palette;  // default: the palette beside the truth
   std::filesystem::path json;     // Not written if empty.
 };
 

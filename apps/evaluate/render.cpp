@@ -26,18 +26,19 @@ namespace {
 namespace fs = std::filesystem;
 
 struct RenderCommand {
-  std::vector<std::filesystem::path> meshes;        // PLY.
-  std::vector<std::filesystem::path> trajectories;  // TUM or EuRoC CSV, in the meshes' frame.
+  std::vector<std::filesystem::path> meshes;        // PLY files
+  std::vector<std::filesystem::path> trajectories;  // TUM or EuRoC CSV files, in the frame of the
+                                                    // meshes
   std::vector<std::filesystem::path>
-      references;  // References for the first trajectories, in the frame to draw in; by default
-                   // that of the meshes.
-  std::vector<std::string> views = {"top"};  // See parse_view().
+      references;  // References for the first trajectories. They define the frame of the picture,
+                   // which is by default that of the meshes.
+  std::vector<std::string> views = {"top"};  // syntax: see parse_view()
   std::string color = "auto";                // auto, label, own, shade, robot.
   std::string size = "1600x1200";
   double above_m = std::numeric_limits<double>::infinity();
   bool both_sides = false;
-  std::filesystem::path palette;  // By default the one beside the first mesh.
-  std::filesystem::path output;   // PNG; the file of the second view is NAME_2.png.
+  std::filesystem::path palette;  // default: the palette beside the first mesh
+  std::filesystem::path output;   // PNG file; the file of the second view is NAME_2.png
 };
 
 constexpr int kMinSide_px = 64;
@@ -77,7 +78,7 @@ PictureLine line_of(const fs::path& file, const SE3& T_picture_mesh) {
   return line;
 }
 
-// The transform into the frame to draw in.
+// Transform into the frame of the picture.
 SE3 placed_by(const RenderCommand& command) {
   if (command.references.size() > command.trajectories.size())
     throw std::invalid_argument("more --reference than --trajectory");

@@ -55,7 +55,7 @@ struct WorldFiles {
   std::filesystem::path recordings;  ///< Folder with simulation.json, if the world is simulated.
   std::filesystem::path team_file;
   std::filesystem::path run;        ///< Results of the team, a folder per robot.
-  std::filesystem::path team_json;  ///< Its tables.
+  std::filesystem::path team_json;  ///< JSON file with the tables of the team.
   bool original = false;            ///< EuRoC's own images.
 };
 

@@ -53,7 +53,8 @@ struct Spread {
 [[nodiscard]] std::optional<ReportSection> mesh_section(ReportInput& input);
 [[nodiscard]] std::optional<ReportSection> semantics_section(ReportInput& input);
 
-/// All targets; call after the other sections are made.
+/// Returns the section of all targets. Precondition: the other sections have been made, because
+/// they collect the targets.
 [[nodiscard]] ReportSection targets_section(const ReportInput& input);
 
 /// Files and totals of the report.

@@ -60,7 +60,7 @@ std::string now_text() {
 // Files beside the outputs of a step, with the time of their last change.
 std::map<fs::path, fs::file_time_type> written(const Step& step) {
   std::map<fs::path, fs::file_time_type> times;
-  std::error_code error;  // for missing folders and files
+  std::error_code error;  // missing folders and files must not throw
   for (const fs::path& output : step.outputs)
     for (const auto& file : fs::directory_iterator(fs::absolute(output).parent_path(), error)) {
       if (!file.is_regular_file(error)) continue;  // records are written in a folder beside them
@@ -300,7 +300,7 @@ void StepDisplay::update(const std::string& line, double now_s) {
 void StepDisplay::finish(const std::string& result, double now_s) {
   output_ << (terminal_ ? "\r\x1b[K" : "") << heading() << ": " << result << " in "
           << duration(now_s - start_s_) << std::endl;
-  if (result != "done") return;  // not representative for the next steps
+  if (result != "done") return;  // the duration of an unfinished step predicts nothing
   const auto& [title, program, thought_s] = steps_.at(index_);
   Pace& pace = paces_[program];
   pace.took_s += now_s - start_s_;

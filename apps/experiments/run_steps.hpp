@@ -58,7 +58,7 @@ class StepDisplay {
   bool terminal_;
   int width_;
   std::vector<Thought> steps_;
-  std::map<std::string, Pace> paces_;  // by program, over its steps so far
+  std::map<std::string, Pace> paces_;  // pace of each program over its steps so far
   std::size_t index_ = 0;              // index of the running step
   double start_s_ = 0.0, drawn_s_ = 0.0;
 };

@@ -31,8 +31,9 @@ struct RobotNumbers {
   double distance_m = 0.0;  ///< True length of its path; 0 without a truth.
   std::size_t keyframes = 0;
   bool in_team_frame = true;  ///< False if it never joined the others.
-  std::optional<double> odometry_error_m, optimized_error_m;  ///< Absolute, rmse.
-  std::map<std::string, double> sent_bytes;                   ///< By category.
+  std::optional<double> odometry_error_m, optimized_error_m;  ///< Absolute trajectory errors
+                                                              ///< (RMSE).
+  std::map<std::string, double> sent_bytes;                   ///< Sent bytes by category.
   std::optional<double> keyframe_bytes;                       ///< Mean size with all its keypoints.
   std::optional<double> processor_s;                          ///< CPU time of the whole robot.
   std::optional<double> peak_memory_mb;

@@ -10,8 +10,8 @@
 
 namespace km {
 
-/// Add a subcommand of kimera_multi_pgo to `app`, which runs as soon as the command line names it.
-/// Input that cannot be used throws a std::exception that says why.
+/// Adds a subcommand of kimera_multi_pgo to `app`, which runs as soon as the command line names it.
+/// Throws a std::exception with the reason if the input cannot be used.
 void add_solve(CLI::App& app);
 void add_pcm(CLI::App& app);
 void add_outliers(CLI::App& app);
@@ -23,20 +23,22 @@ struct GraphInput {
   std::string partition = "contiguous";
   bool keep_steps = false;
 
-  /// Defines FILE, --robots, --partition and --keep-steps, which fill this: it outlives `app`.
+  /// Defines FILE, --robots, --partition and --keep-steps, which set the members. This object must
+  /// outlive `app`.
   void define(CLI::App& app);
 
-  /// With what the file says of the truth, and without odometry between robots unless keep_steps.
-  /// Throws std::runtime_error if there is no such graph, if --robots was given to `app` and is not
-  /// their number, and if a g2o graph that is dealt out falls apart.
+  /// Reads the graph with the ground truth of the file, and without odometry between robots unless
+  /// keep_steps. Throws std::runtime_error if there is no such graph, or if it is not connected
+  /// after a g2o graph is divided. Throws it too if --robots was given to `app` and differs from
+  /// the number of robots.
   [[nodiscard]] LabelledTeamGraph read(const CLI::App& app) const;
 };
 
-/// What to say of edges that were weighed by the blocks of their information matrix alone, since it
-/// is not positive definite, as SE-Sync reads them; nothing if there are none.
+/// Notice on edges whose information matrix is not positive definite. They were weighed by its
+/// diagonal blocks alone, as SE-Sync reads them. Empty if there are none.
 [[nodiscard]] std::string indefinite_text(std::size_t edges);
 
-/// Which measurements of the file are not in the graph; nothing if all are.
+/// Notice on measurements of the file that are not in the graph. Empty if all are.
 [[nodiscard]] std::string left_out_text(const LabelledTeamGraph& team);
 
 }  // namespace km

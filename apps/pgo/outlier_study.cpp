@@ -51,7 +51,7 @@ double rmse_m(const std::vector<SE3>& truth, const std::vector<SE3>& estimate) {
   return statistics_of(std::move(errors)).rmse;
 }
 
-// One method on a graph whose edges from `own_edges` on are false.
+// Runs one method on a graph whose edges from index `own_edges` are false closures.
 OutlierResult attempt(const std::string& method, const TeamGraph& graph, std::size_t own_edges,
                       const std::vector<SE3>& truth, const OutlierStudyOptions& options,
                       const TeamMeter& meter) {
@@ -107,7 +107,7 @@ TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m, u
                                  .planar = graph.dimension == 2,
                                  .half_side_m = half_side_m};
   std::uniform_int_distribution<std::size_t> closure(0, closures.size() - 1);
-  // What a graph says twice of a pair of poses has one verdict.
+  // Each pair of poses gets at most one closure, because parallel edges would share one verdict.
   std::set<std::pair<Eigen::Index, Eigen::Index>> taken;
   for (const BlockEdge& e : graph.edges) taken.insert(std::minmax(e.i, e.j));
   const auto poses = static_cast<std::size_t>(graph.poses());

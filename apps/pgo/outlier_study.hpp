@@ -12,38 +12,39 @@
 
 namespace km {
 
-/// Which edges of a graph pairwise consistency maximisation keeps: odometry, and of the closures
-/// between two robots, or inside one, the largest set that agrees pairwise, see Pcm. Closures come
-/// in the order of the edges; a second one from the same pose to the same pose is dropped. Sigmas
-/// of all edges are taken to be `noise_scale` times those of the graph.
-/// Throws std::invalid_argument if a robot's odometry is interrupted, and as Pcm does.
+/// By edge: whether pairwise consistency maximisation keeps it. It keeps odometry. From the
+/// closures between two robots, or inside one, it keeps the largest set that agrees pairwise, see
+/// Pcm. Closures come in the order of the edges. A second closure from the same pose to the same
+/// pose is dropped. The sigmas of all edges are `noise_scale` times those of the graph. Throws
+/// std::invalid_argument if a robot's odometry is interrupted, and as Pcm does.
 [[nodiscard]] std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config,
                                                     double noise_scale = 1.0);
 
-/// How false closures are kept out: not at all; by pairwise consistency; by newton; by newton on
-/// what pairwise consistency leaves. The first two end with newton --trust-all.
+/// Methods against false closures: none; pairwise consistency; newton; newton on the closures that
+/// pairwise consistency keeps. The first two end with newton --trust-all.
 inline const std::vector<std::string> kRejections = {"none", "pcm", "newton", "pcm+newton"};
 
-/// False closures that agree with one another within their noise, as those between aisles that look
-/// alike do: each cluster joins successive poses of one robot to successive ones of another.
+/// False closures that agree with one another within their noise, as between aisles of the same
+/// appearance. Each cluster joins successive poses of one robot to successive poses of another.
 struct Clusters {
-  std::size_t places = 0;  ///< So many of them, all between one pair of robots.
+  std::size_t places = 0;  ///< Number of clusters, all between one pair of robots.
   std::size_t size = 5;    ///< Closures in each.
 };
 
 struct OutlierStudyOptions {
   std::vector<double> shares_percent;  ///< False closures for every 100 true ones.
-  std::vector<std::string> methods;    ///< Of kRejections.
+  std::vector<std::string> methods;    ///< Names from kRejections.
   std::vector<unsigned> seeds = {1};
-  double half_side_m = 0.0;  ///< Of the false ones' translations, see spoil(); 0: as the map's.
+  double half_side_m = 0.0;  ///< Range of the translations of false closures; 0: half the extent of
+                             ///< the map.
   PcmConfig pcm = {};
-  double pcm_sigmas = 1.0;  ///< Sigmas of all edges, in multiples of the graph's.
+  double pcm_sigmas = 1.0;  ///< Sigmas of all edges, as a multiple of the graph's.
   double barc = 0.0;        ///< See SolverOptions.
-  Clusters clusters = {};   ///< Beside the others.
+  Clusters clusters = {};   ///< Clusters in addition to random false closures.
   int max_rounds = 300;
 };
 
-/// What one method made of one spoiled graph.
+/// Result of one method on one graph with false closures.
 struct OutlierResult {
   std::string method;
   double share_percent = 0.0;
@@ -51,24 +52,25 @@ struct OutlierResult {
   std::size_t false_closures = 0;
   std::size_t true_kept = 0;
   std::size_t false_kept = 0;
-  double noise_scale = 1.0;  ///< Of closures, as newton has found it.
-  double rmse_m = 0.0;       ///< Of positions to the optimum of the clean graph, rigidly aligned.
+  double noise_scale = 1.0;  ///< Noise scale of closures, as estimated by newton.
+  double rmse_m = 0.0;       ///< RMSE of positions against the optimum of the clean graph, aligned.
   int rounds = 0;
   bool decided = true;    ///< False: max_rounds did not suffice.
-  std::size_t bytes = 0;  ///< Sent by the solver; closures are known to their two robots anyway.
-  double cpu_s = 0.0;     ///< Of all robots, pairwise consistency included.
+  std::size_t bytes = 0;  ///< Sent by the solver. The two robots of a closure know it without a
+                          ///< message.
+  double cpu_s = 0.0;     ///< CPU time of all robots, pairwise consistency included.
 };
 
 struct OutlierStudy {
   std::size_t robots = 0;
   std::size_t poses = 0;
   std::size_t true_closures = 0;
-  bool certified = false;              ///< The optimum of the clean graph is.
-  double half_side_m = 0.0;            ///< As used.
-  std::vector<OutlierResult> results;  ///< By share, method, seed.
+  bool certified = false;              ///< Whether the optimum of the clean graph is certified.
+  double half_side_m = 0.0;            ///< Range of the false translations that was used.
+  std::vector<OutlierResult> results;  ///< Ordered by share, method, seed.
 };
 
-/// Called with the number of runs done, and that of all.
+/// Called with the number of finished runs and the number of all runs.
 using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
 
 /// Throws std::invalid_argument if graph or options are not usable. The graph has no verticals.
@@ -80,16 +82,17 @@ using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
 /// Half the longest side of the box around all positions.
 [[nodiscard]] double half_extent_m(const std::vector<SE3>& poses);
 
-/// Adds `count` false closures after the graph's own edges: between uniform pairs of poses that do
-/// not follow each other, with uniform rotations and translations uniform within +-half_side_m
-/// along every axis (in the plane: both). Each claims the weights of a true closure drawn at
-/// random. Throws std::invalid_argument if `graph` has no closures to draw from.
+/// Appends `count` false closures to the edges. Each joins a uniformly drawn pair of poses that do
+/// not follow each other. Its rotation is uniform, and its translation is uniform within
+/// +-half_side_m along every axis (both in the plane for planar graphs). It claims the weights of a
+/// true closure drawn at random. Throws std::invalid_argument if `graph` has no closures to draw
+/// from.
 [[nodiscard]] TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m,
                               unsigned seed);
 
-/// Adds clusters of false closures, between the first robot and the last; `poses` say how the
-/// robots moved meanwhile. Otherwise as spoil(). Throws std::invalid_argument if a robot has not as
-/// many poses as a cluster closures.
+/// Appends clusters of false closures between the first robot and the last. `poses` give the motion
+/// of the robots within a cluster. Weights and ranges are as in `spoil`. Throws
+/// std::invalid_argument if a robot has fewer poses than a cluster has closures.
 [[nodiscard]] TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
                                           const std::vector<SE3>& poses, double half_side_m,
                                           unsigned seed);

@@ -23,7 +23,7 @@
 namespace km {
 namespace {
 
-// The seeds of one share and method.
+// Results of all seeds for one share and method.
 struct Cell {
   std::span<const OutlierResult> results;
 
@@ -57,7 +57,7 @@ std::vector<Cell> cells_of(const OutlierStudy& study) {
   return cells;
 }
 
-// Of methods that find out; nothing if none did.
+// Noise scales that newton has estimated. Empty if no method estimated any.
 std::string noise_text(const OutlierStudy& study) {
   if (study.results.empty()) return {};
   const auto [least, most] = std::ranges::minmax(study.results, {}, &OutlierResult::noise_scale);
@@ -68,7 +68,7 @@ std::string noise_text(const OutlierStudy& study) {
          " times as noisy as the file says\n";
 }
 
-// A curve per method.
+// One curve per method.
 Plot panel(const OutlierStudy& study, const std::string& title, const char* unit, bool log,
            const auto& ordinate) {
   Plot plot{
@@ -87,7 +87,8 @@ Plot panel(const OutlierStudy& study, const std::string& title, const char* unit
   return plot;
 }
 
-// A row per share and method. Of several seeds the worst, but medians of what they cost.
+// One row per share and method. It shows the worst result of all seeds, and medians of bytes and
+// CPU time.
 std::string outlier_text(const OutlierStudy& study) {
   std::vector<std::vector<std::string>> rows{
       {"method", "share", "false", "true kept", "false kept", "rmse m", "rounds", "sent", "CPU s"}};
@@ -149,41 +150,53 @@ std::vector<Plot> outlier_plots(const OutlierStudy& study) {
 }
 
 std::string details() {
-  return "How far do the poses of a team of robots lie from those without any false closure?\n\n"
-         "FILE is as in kimera_multi_pgo solve; what it says of which way is up is left out. A\n"
-         "share of 30 adds 30 false closures for every 100 true ones: between uniform pairs of\n"
-         "poses, with uniform rotation and translation, and the weights of a true closure.\n\n"
+  return "How far are the poses of a team of robots from those without any false closure?\n"
+         "\n"
+         "FILE is as in kimera_multi_pgo solve, but its verticals are left out. A share of 30 adds "
+         "30\n"
+         "false closures for every 100 true ones. They join uniformly drawn pairs of poses, with\n"
+         "uniform rotation and translation, and the weights of a true closure.\n"
+         "\n"
          "Methods:\n"
          "  pcm      pairwise consistency: between two robots, and inside one, the largest set of\n"
          "           closures that agree pairwise along the odometry, by exact clique search; "
          "then\n"
-         "           Newton steps of the team, from odometry, on odometry and these\n"
-         "  newton   the members of one session, see solve: they find out which closures are "
-         "false\n"
-         "  pcm+newton  the second on what the first leaves\n"
-         "  none     Newton steps on everything\n\n"
-         "With --clusters there are, beside these, false closures that agree with one another, as\n"
-         "between aisles that look alike: between the first robot and the last, at so many "
-         "places.\n\n"
+         "           Newton steps of the team, from odometry, on odometry and these closures\n"
+         "  newton   the members of one session, see solve: they reject false closures themselves\n"
+         "  pcm+newton  newton on the closures that pcm keeps\n"
+         "  none     Newton steps on all closures\n"
+         "\n"
+         "--clusters adds false closures that agree with one another, as between aisles of the "
+         "same\n"
+         "appearance. They join the first robot and the last, at the given number of places.\n"
+         "\n"
          "The error is the RMSE of positions to the certified optimum of the graph without false\n"
-         "closures, after rigid alignment. Sent is what the robots' solver sends; CPU time is\n"
-         "that of all robots together. With several seeds the worst is shown: fewest true and "
-         "most\n"
-         "false closures kept, largest error, most rounds. Bytes and CPU time are medians.\n\n"
-         "Scenarios: with --scenario, or any option of that group, the optimum of FILE is the\n"
-         "truth, and odometry and closures are drawn anew around it, seed by seed. The others of\n"
-         "these options change the named scenario. Scenarios, and the graph each is meant for:\n" +
+         "closures, after rigid alignment. Sent bytes are those of the robots' solver; CPU time "
+         "is\n"
+         "that of all robots together. With several seeds the worst result is shown: fewest true "
+         "and\n"
+         "most false closures kept, largest error, most rounds. Bytes and CPU time are medians.\n"
+         "\n"
+         "Scenarios: with --scenario, or any option of that group, the optimum of FILE is the "
+         "truth,\n"
+         "and each seed draws odometry and closures around it. The other options of the group "
+         "change\n"
+         "the named scenario. Scenarios, and the graph each is meant for:\n" +
          scenario_list() +
          "Their methods:\n"
          "  robots     the robots' own code, from measurements to published poses (TeamAgent)\n"
          "  trust-all  all closures, on one computer\n"
-         "  pcm        the same on what pairwise consistency keeps\n"
-         "  gnc        graduated non-convexity at the scale claimed, on one computer\n"
+         "  pcm        the closures that pairwise consistency keeps, on one computer\n"
+         "  gnc        graduated non-convexity at the claimed scale, on one computer\n"
          "  reference  only the true closures, weighed by the noise that was drawn\n"
-         "A table has each seed of the first method, another the median and the worst of all\n"
-         "seeds of each method. Errors are of positions to the truth; robots that a method leaves\n"
-         "in several frames are aligned frame by frame. The ratio is of the RMS error to that of\n"
-         "the reference.\n\n"
+         "One table shows each seed of the first method, another the median and the worst of all "
+         "seeds\n"
+         "of each method. Errors are of positions to the truth. If a method leaves robots in "
+         "several\n"
+         "frames, each frame is aligned separately. The ratio is the RMS error divided by that of "
+         "the\n"
+         "reference.\n"
+         "\n"
          "Examples:\n"
          "  kimera_multi_pgo outliers sphere2500.g2o --json out.json --plot out.html\n"
          "  kimera_multi_pgo outliers parking-garage.g2o --shares 30,100,400 --methods newton \\\n"
@@ -198,13 +211,14 @@ struct OutliersCommand {
   OutlierStudyOptions study{.shares_percent = {10, 20, 30, 40, 50, 60, 70, 80},
                             .methods = {"pcm", "newton", "pcm+newton"}};
   std::string scenario = {};
-  std::vector<std::function<void(Scenario&)>> changes = {};  // to it, as the options say
+  std::vector<std::function<void(Scenario&)>> changes = {};  // changes that the options make to the
+                                                             // scenario
   double keyframes_per_s = 0.0;
   std::filesystem::path csv = {};
   ReportFiles files = {};
 };
 
-// "A:B".
+// Parses "A:B".
 std::pair<double, double> two_numbers(const std::string& text) {
   const std::size_t colon = text.find(':');
   double first = 0.0, second = 0.0;
@@ -233,22 +247,23 @@ void define(CLI::App& app, OutliersCommand& command) {
   std::vector<std::string> methods = kRejections;
   methods.insert(methods.end(), kScenarioMethods.begin(), kScenarioMethods.end());
   app.add_option("--shares", study.shares_percent,
-                 "False closures for every 100 true ones [%]; of a scenario one share")
+                 "False closures for every 100 true ones [%]; a scenario takes one share")
       ->check(CLI::Range(0.0, 10000.0))
       ->delimiter(',');
   app.add_option("--methods", study.methods,
-                 "See below; of scenarios: robots,trust-all,pcm,gnc,reference")
+                 "See below. For scenarios: robots,trust-all,pcm,gnc,reference")
       ->check(CLI::IsMember(methods).description(""))
       ->delimiter(',');
   app.add_option("--seeds", study.seeds,
-                 "Seeds of the false closures: a run for each. The default of scenarios is 1 to 10")
+                 "Seeds of the false closures, one run each. Scenarios have the default 1 to 10")
       ->delimiter(',');
   app.add_option("--outlier-range", study.half_side_m,
                  "Translations of false closures are at most this along every axis [m]; 0: half\n"
                  "the longest side of the map")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--barc", study.barc,
-                 "newton: residual [sigma] up to which an edge is kept; 0: the team finds it")
+  app.add_option(
+         "--barc", study.barc,
+         "newton: largest residual [sigma] of an edge that is kept; 0: the team estimates it")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--confidence", study.pcm.confidence,
                  "pcm: share of true cycles that pass the test")
@@ -266,10 +281,11 @@ void define(CLI::App& app, OutliersCommand& command) {
          "N:SIZE: N false places of SIZE successive keyframes (5 without :SIZE) between two\n"
          "robots, whose closures agree with each other")
       ->type_name("N:SIZE");
-  app.add_option("--rounds", study.max_rounds, "At most so many")->check(CLI::Range(1, 1000000));
+  app.add_option("--rounds", study.max_rounds, "Largest number of rounds")
+      ->check(CLI::Range(1, 1000000));
 }
 
-// An option that changes the scenario.
+// Adds an option that changes the scenario.
 template <typename T>
 CLI::Option* change(CLI::App& app, OutliersCommand& command, const std::string& name,
                     std::function<void(Scenario&, const T&)> set, const std::string& says) {
@@ -317,55 +333,58 @@ void define_scenario(CLI::App& app, OutliersCommand& command) {
       ->check(CLI::IsMember(names).description(""));
   change<std::size_t>(
       app, command, "--first", [](Scenario& s, std::size_t n) { s.first_poses = n; },
-      "Only so many poses of the graph, from its first; 0: all");
+      "Number of poses of the graph to use, from its first; 0: all");
   change<double>(
       app, command, "--step-length", [](Scenario& s, double m) { s.step_length_m = m; },
-      "The truth is scaled so that steps of odometry have this mean length [m]; 0: as it is")
+      "Scale the truth so that steps of odometry have this mean length [m]; 0: no scaling")
       ->check(CLI::NonNegativeNumber);
   change_sigma(app, command, "--step-noise", &Scenario::step_sigma,
                "Sigma of a step of odometry on each axis, in place of the file's");
   change_sigma(app, command, "--closure-sigma", &Scenario::closure_sigma,
                "Sigma of a closure on each axis, in place of the file's");
-  change_factors(app, command, "--odometry-noise", &Scenario::odometry_noise,
-                 "Odometry of this robot is K times as noisy as it claims; several: 1:7,2:3");
-  change_factors(app, command, "--odometry-sigma", &Scenario::odometry_sigma,
-                 "Odometry of this robot is K times as noisy as the others', and claims so");
-  change_factors(app, command, "--closure-noise", &Scenario::closure_noise,
-                 "Closures with an end on this robot are K times as noisy as they claim. Below 1\n"
-                 "they claim too much. Between two robots the larger K counts");
+  change_factors(
+      app, command, "--odometry-noise", &Scenario::odometry_noise,
+      "Odometry of this robot is K times as noisy as it claims. For several robots: 1:7,2:3");
+  change_factors(
+      app, command, "--odometry-sigma", &Scenario::odometry_sigma,
+      "Odometry of this robot is K times as noisy as the others', and claims that noise");
+  change_factors(
+      app, command, "--closure-noise", &Scenario::closure_noise,
+      "Closures with an end on this robot are K times as noisy as they claim. With K below\n"
+      "1 they claim too much noise. Between two robots the larger K counts");
   change<double>(
       app, command, "--place-bias", [](Scenario& s, double sigma) { s.place_bias = sigma; },
-      "Closures of one place (both ends within the same ten keyframes) share an error of so\n"
-      "many of their sigmas")
+      "Closures of one place (both ends within the same ten keyframes) share an error with this\n"
+      "multiple of their sigmas")
       ->check(CLI::NonNegativeNumber);
   change<double>(
       app, command, "--closure-share", [](Scenario& s, double share) { s.closure_share = share; },
-      "Each closure of the graph is there with this probability")
+      "Probability with which each closure of the graph is kept")
       ->check(CLI::Range(0.0, 1.0));
   change<double>(
       app, command, "--inside-share", [](Scenario& s, double share) { s.inside_share = share; },
-      "Each of these inside a robot is, again, there with this probability")
+      "Further probability with which a closure inside a robot is kept")
       ->check(CLI::Range(0.0, 1.0));
   change<std::size_t>(
       app, command, "--closures-per-pair",
       [](Scenario& s, std::size_t n) { s.closures_per_pair = n; },
-      "At most so many true closures between two robots, drawn at random");
+      "Largest number of true closures between two robots, drawn at random");
   change<std::string>(
       app, command, "--cluster-robots",
       [](Scenario& s, const std::string& text) {
         const auto [a, b] = two_numbers(text);
         s.cluster_robots = {whole_number(a), whole_number(b)};
       },
-      "Clusters are between these two; without it each cluster draws its two robots")
+      "All clusters are between these two robots. By default each cluster draws its two robots")
       ->type_name("A:B");
   app.add_option("--keyframes-per-s", command.keyframes_per_s,
-                 "robots: keyframes that each robot plays in a second of virtual time; 0: all at\n"
+                 "robots: keyframes that each robot plays per second of virtual time; 0: all at\n"
                  "once")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--csv", command.csv, "Also write every run to this file");
 }
 
-// --clusters is an option of both studies.
+// --clusters belongs to both studies, so it alone does not select a scenario.
 bool is_scenario(const CLI::App& app, const OutliersCommand& command) {
   return command.changes.size() > app.count("--clusters") || app.count("--scenario") > 0;
 }
@@ -423,7 +442,7 @@ void run_scenario(const CLI::App& app, const OutliersCommand& command) {
                       [&] { return scenario_plots(study); });
 }
 
-// Without the closures that the file itself labels as false.
+// The graph without the closures that the file labels as false.
 TeamGraph true_graph(const LabelledTeamGraph& input, const std::string& file) {
   if (input.truth.is_false.empty()) return input.graph;
   std::vector<ConnectedPart> parts = true_parts(input);

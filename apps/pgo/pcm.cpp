@@ -24,25 +24,25 @@ const std::map<std::string, CliqueMethod> kSearches{{"exact", CliqueMethod::kExa
 
 constexpr const char* kPcmDetails =
     "Pairwise consistency maximisation (PCM): the closures are vertices of a consistency graph,\n"
-    "whose maximum clique are those to be trusted.\n\n"
+    "and its maximum clique is the set to be trusted.\n\n"
     "FILE is one of\n"
     "  graph.g2o  one robot's pose graph, 2D or 3D. Its closures are its vertices; --outliers\n"
     "             adds random ones. If there is a file graph.g2o.labels with rows \"i j 1\" "
     "(false)\n"
-    "             or \"i j 0\" (true), the file's own closures are told apart by it\n"
+    "             or \"i j 0\" (true), it labels the file's own closures\n"
     "  *.txt      a consistency graph: the number of vertices, then a line per vertex with its\n"
-    "             earlier neighbours. Only the search is done\n\n"
+    "             earlier neighbours. Only the search runs\n\n"
     "Two closures are consistent if the cycle through them and the odometry between them is the\n"
     "identity up to noise: its squared Mahalanobis distance is within the --confidence quantile "
     "of\n"
-    "chi-squared with 6 degrees of freedom. Before that, closures that contradict odometry alone\n"
-    "are dropped (--keep-contradicting: not).\n\n"
+    "chi-squared with 6 degrees of freedom. Closures that contradict odometry alone are dropped\n"
+    "before, unless --keep-contradicting is given.\n\n"
     "Searches:\n"
-    "  exact        the maximum after every addition, proven: branch and bound among the new\n"
-    "               vertex's neighbours; beyond --max-search-nodes the heuristic's answer stands\n"
+    "  exact        the proven maximum after every addition: branch and bound among the new\n"
+    "               vertex's neighbours; beyond --max-search-nodes the heuristic's result\n"
     "  incremental  greedy from the new vertex only (the heuristic of Kimera-Multi)\n"
     "  batch        greedy from every vertex, from scratch at every addition\n\n"
-    "The table has, at growing sizes of the graph: the clique, its true members of all true\n"
+    "The table shows, at growing sizes of the graph: the clique, its true members of all true\n"
     "closures so far, its false ones, the bound on the maximum that is proven, the median time\n"
     "of the last 50 searches, the worst search and their sum, the median time of the last 50\n"
     "rounds of checks and their sum. Times are CPU times of one thread.\n\n"
@@ -64,12 +64,12 @@ void define_closures(CLI::App& app, ClosureChoice& selection) {
   app.add_option("--outliers", selection.outliers, "Random false closures to add")
       ->check(CLI::Range(0, kMostClosures));
   app.add_option("--closures", selection.keep,
-                 "Use so many of the file's closures, drawn at random; 0: all")
+                 "Number of the file's closures to use, drawn at random; 0: all")
       ->check(CLI::Range(0, kMostClosures));
   app.add_option("--outlier-range", selection.outlier_half_side_m,
                  "Translations of the random closures are at most this along every axis [m]")
       ->check(CLI::PositiveNumber);
-  app.add_option("--seed", selection.seed, "Of all that is random")->capture_default_str();
+  app.add_option("--seed", selection.seed, "Seed of all random draws")->capture_default_str();
   app.add_flag_callback(
       "--file-order", [&] { selection.shuffle = false; },
       "Add the closures in the order of the file, random ones last, not shuffled");
@@ -79,7 +79,7 @@ void define_search(CLI::App& app, PcmCommand& command) {
   app.add_option("--search", command.searches, "exact, incremental or batch; several are compared")
       ->check(CLI::IsMember(kSearches).description(""));
   app.add_option("--max-search-nodes", command.config.max_search_nodes,
-                 "Exact search: nodes of its tree in one addition, at most")
+                 "Exact search: largest number of tree nodes in one addition")
       ->check(CLI::Range(1, 1000000000));
 }
 
@@ -97,7 +97,7 @@ void define_checks(CLI::App& app, PcmConfig& config) {
       "Keep closures that contradict odometry alone");
 }
 
-// What is about closures means nothing to a graph of which nothing else is known.
+// Refuses options on closures if the file is a consistency graph, which has no closures.
 void check(const CLI::App& app, const PcmCommand& command) {
   command.files.check();
   if (command.file.extension() == ".g2o") return;
@@ -124,7 +124,7 @@ KeyframePairs labels_beside(const fs::path& file) {
   return pairs;
 }
 
-// One run per search, each told of as soon as it has ended.
+// Does one run per search, and prints each as soon as it has ended.
 std::vector<PcmRun> run_searches(const auto& vertices, const PcmCommand& command) {
   std::vector<PcmRun> runs;
   PcmConfig config = command.config;

@@ -13,7 +13,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kRows = 10;
-constexpr std::size_t kWindow = 50;  // additions that a median is over
+constexpr std::size_t kWindow = 50;  // number of additions per median
 
 using Additions = std::span<const PcmAddition>;
 
@@ -32,7 +32,7 @@ double median_ms(Additions additions, double PcmAddition::*member) {
   return 1e3 * statistics_of(values(additions, member)).median;
 }
 
-// Sizes at which the table has a row: round numbers, and the last.
+// Sizes of the graph at which the table has a row: round numbers, and the last size.
 std::vector<std::size_t> row_sizes(std::size_t vertices) {
   std::size_t step = 1;
   for (const std::size_t next : {2, 5, 10, 20, 50, 100, 250, 500, 1000, 2000, 5000, 10000})
@@ -87,7 +87,7 @@ std::vector<PlotPoint> points(Additions additions, const auto& ordinate) {
   return result;
 }
 
-// Medians over the additions around every point: single times are noise.
+// Medians over the additions around every point, because single times are noisy.
 std::vector<PlotPoint> running_median_ms(Additions additions, double PcmAddition::*member) {
   std::vector<PlotPoint> result;
   for (std::size_t n = 0; n < additions.size(); n += kWindow / 5) {

@@ -10,11 +10,12 @@
 
 namespace km {
 
-/// A table of the run at about ten sizes of its graph, and its totals, for people.
+/// Table of the run at about ten sizes of its graph, and its totals, as text.
 [[nodiscard]] std::string pcm_text(const PcmRun& run);
 
 /// One object for one run: {"search", "additions": [{"vertices", "check_s", "search_s", "clique",
-/// "true_members", "false_members"}]}, members null without labels; an array of them for several.
+/// "true_members", "false_members"}]}. Members are null without labels. Several runs are an array
+/// of such objects.
 void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs);
 
 /// Time of search and checks, and size of the clique, against vertices.

@@ -21,7 +21,7 @@
 namespace km {
 namespace {
 
-// The clique search of one run and what it is asked to note.
+// The clique search of one run and the record of its additions.
 class RecordedSearch {
  public:
   explicit RecordedSearch(const PcmConfig& config)
@@ -103,7 +103,7 @@ std::string to_string(CliqueMethod method) {
 namespace {
 
 constexpr std::int64_t kMaxIndex = std::numeric_limits<std::uint32_t>::max();
-constexpr std::int64_t kMostVertices = 100000;  // their adjacency is more than a gigabyte of bits
+constexpr std::int64_t kMostVertices = 100000;  // the adjacency of more takes over a gigabyte
 
 std::string text_of(std::istream& in, const std::string& file) {
   std::string text(std::istreambuf_iterator<char>(in), {});
@@ -183,7 +183,8 @@ ClosureInput read_closures(const std::filesystem::path& file, const KeyframePair
 
 ConsistencyRows read_consistency_rows(std::istream& in, const std::string& file) {
   const std::string text = text_of(in, file);
-  const std::vector<TextRow> table = split_rows(text);  // without the empty lines of lone vertices
+  const std::vector<TextRow> table = split_rows(text);  // empty lines of isolated vertices are
+                                                        // dropped
   if (table.empty() || table.front().line != 1)
     throw std::runtime_error(file + ":1: must be the number of vertices");
   TextFields header(table.front(), file);

@@ -16,76 +16,79 @@
 
 namespace km {
 
-/// A closure of whom it is known whether it is true.
+/// A closure with a label: true or false.
 struct LabelledClosure {
   Closure closure;
   bool outlier = false;
 };
 
-/// A graph by the earlier neighbours of each vertex.
+/// Adjacency of a graph: [i] has the neighbours of vertex i that come before it.
 using ConsistencyRows = std::vector<std::vector<std::size_t>>;
 
-/// State after one vertex was added. Times are those of the processor, of one thread.
+/// State after the addition of one vertex. Times are CPU times of one thread.
 struct PcmAddition {
   std::size_t vertices = 0;
-  double check_s = 0.0;   ///< Consistency of the new closure with all others.
-  double search_s = 0.0;  ///< Of the larger clique.
+  double check_s = 0.0;   ///< Consistency checks of the new closure against all others.
+  double search_s = 0.0;  ///< Search for a larger clique.
   std::size_t clique = 0;
-  std::optional<std::size_t> true_members = {};   ///< Of the clique; nullopt without labels.
-  std::optional<std::size_t> true_vertices = {};  ///< Of the graph; likewise.
-  std::size_t bound = 0;                          ///< No clique is larger.
+  std::optional<std::size_t> true_members = {};   ///< True closures in the clique; nullopt without
+                                                  ///< labels.
+  std::optional<std::size_t> true_vertices = {};  ///< True closures in the graph; nullopt without
+                                                  ///< labels.
+  std::size_t bound = 0;                          ///< Proven upper bound of the clique size.
 };
 
 struct PcmRun {
   std::string search;  ///< "exact", "incremental" or "batch".
   std::vector<PcmAddition> additions;
-  std::size_t dropped_true = 0, dropped_false = 0;  ///< By the odometry gate, before the graph.
-  std::size_t edges = 0;                            ///< Of the consistency graph.
+  std::size_t dropped_true = 0, dropped_false = 0;  ///< Closures that the odometry gate dropped.
+  std::size_t edges = 0;                            ///< Edges of the consistency graph.
   std::uint64_t search_nodes = 0;
-  std::size_t searches_ended = 0;  ///< By PcmConfig::max_search_nodes.
+  std::size_t searches_ended = 0;  ///< Searches that reached PcmConfig::max_search_nodes.
 };
 
 /// Called before every addition with the number of closures handled so far.
 using PcmProgress = std::function<void(std::size_t)>;
 
-/// Adds the closures, all inside one robot, one at a time, as Pcm does. Throws
+/// Adds the closures one at a time, as Pcm does. All are inside one robot. Throws
 /// std::invalid_argument for a closure that is not is_usable().
 [[nodiscard]] PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& config,
                              const PcmProgress& progress = {});
 
-/// Adds the vertices of a consistency graph one at a time; nothing is checked.
+/// Adds the vertices of a consistency graph one at a time, without consistency checks.
 [[nodiscard]] PcmRun run_pcm(const ConsistencyRows& rows, const PcmConfig& config,
                              const PcmProgress& progress = {});
 
 /// "exact", "incremental" or "batch".
 [[nodiscard]] std::string to_string(CliqueMethod method);
 
-/// What is done to the closures of a pose graph before they are added.
+/// Selection of the closures of a pose graph, and additional random ones.
 struct ClosureChoice {
-  std::size_t outliers = 0;         ///< Random closures to add.
-  double outlier_half_side_m = 20;  ///< Their translations, see RandomOutlierModel.
-  std::size_t keep = 0;             ///< Of the file's closures, drawn at random; 0: all.
-  bool shuffle = true;              ///< The order of all.
+  std::size_t outliers = 0;         ///< Number of random closures to add.
+  double outlier_half_side_m = 20;  ///< Range of their translations, see RandomOutlierModel.
+  std::size_t keep = 0;             ///< Number of the file's closures to use, drawn at random; 0:
+                                    ///< all.
+  bool shuffle = true;              ///< Whether the order of all closures is random.
   unsigned seed = 1;
 };
 
 /// Pairs of keyframes, the lower index first.
 using KeyframePairs = std::set<std::pair<std::uint32_t, std::uint32_t>>;
 
-/// Reads rows "i j flag" with flag 1 for an outlier and 0 for a true closure: the pairs of the
-/// outliers. Throws std::runtime_error "file:line: what".
+/// Reads rows "i j flag" with flag 1 for an outlier and 0 for a true closure, and returns the pairs
+/// of the outliers. Throws std::runtime_error "file:line: what".
 [[nodiscard]] KeyframePairs read_outlier_labels(std::istream& in, const std::string& file);
 
-/// What read_closures() finds.
+/// Result of read_closures().
 struct [[nodiscard]] ClosureInput {
   std::vector<LabelledClosure> closures;
-  std::size_t indefinite_edges = 0;  ///< Of the file, odometry included, see G2oGraph.
+  std::size_t indefinite_edges = 0;  ///< Number in the file, odometry included, see G2oGraph.
 };
 
-/// The closures of one robot's g2o file (2D or 3D), those of the pairs in `false_pairs` labelled,
-/// and random outliers that claim the covariance of the file's first closure.
-/// Throws std::runtime_error "file[:line]: what" for a file that is not one robot's pose graph with
-/// closures, or has fewer of them than are to be kept.
+/// Reads the closures of one robot's g2o file (2D or 3D). Closures of the pairs in `false_pairs`
+/// are labelled false. Random outliers are added with the covariance of the file's first closure.
+/// Throws std::runtime_error "file[:line]: what" if the file is not one robot's pose graph with
+/// closures, or has fewer closures than `selection` keeps.
 [[nodiscard]] ClosureInput read_closures(const std::filesystem::path& file,
                                          const KeyframePairs& false_pairs,
                                          const ClosureChoice& selection);

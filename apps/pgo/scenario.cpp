@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Index;
 
-// A preset, and what it is for.
+// A predefined scenario, the graph for it, and its description.
 struct Preset {
   Scenario scenario;
   std::string graph;
@@ -132,7 +132,7 @@ void check(const Scenario& scenario, std::size_t robots) {
            std::to_string(pair->second) + " of " + std::to_string(robots));
 }
 
-// The first poses of `whole`, dealt to robots contiguously.
+// The first poses of `whole`, divided among robots contiguously.
 TeamGraph dealt(const TeamGraph& whole, const Scenario& scenario) {
   const bool as_it_is = scenario.robots == 0 || scenario.robots == whole.robots();
   if (!as_it_is && whole.robots() != 1)
@@ -160,7 +160,7 @@ TeamGraph dealt(const TeamGraph& whole, const Scenario& scenario) {
   return scenario.keep_steps ? graph : without_cut_steps(std::move(graph));
 }
 
-// Scaled so that steps of odometry have the mean length asked for.
+// `truth`, scaled so that steps of odometry have the mean length `step_length_m`.
 std::vector<SE3> scaled(std::vector<SE3> truth, const TeamGraph& graph, double step_length_m) {
   if (step_length_m <= 0.0) return truth;
   const std::vector<bool> odometry = odometry_edges(graph);
@@ -178,7 +178,7 @@ std::vector<SE3> scaled(std::vector<SE3> truth, const TeamGraph& graph, double s
   return truth;
 }
 
-// Leaves the share of the closures, and of each pair of robots at most so many, all at random.
+// Removes closures at random, down to the shares of `scenario` and to its limit per robot pair.
 void thin_out(TeamGraph& graph, const Scenario& scenario, std::mt19937& rng) {
   const std::vector<bool> odometry = odometry_edges(graph);
   std::vector<bool> stays(graph.edges.size(), true);
@@ -212,7 +212,7 @@ Precision precision_of(const NoiseSigma& sigma, int dimension) {
           1.0 / (sigma.translation_m * sigma.translation_m)};
 }
 
-// Normal with standard deviation 1 on each axis that the graph has.
+// Normally distributed with standard deviation 1 on each axis that the graph has.
 Vector6 normal_tangent(int dimension, std::mt19937& rng) {
   std::normal_distribution<double> normal;
   Vector6 xi = Vector6::Zero();
@@ -223,13 +223,13 @@ Vector6 normal_tangent(int dimension, std::mt19937& rng) {
   return xi;
 }
 
-// Rotation and translation err apart, as the cost has it.
+// T with errors of rotation and translation that are independent, as in the cost.
 SE3 moved_by(const SE3& T, const Vector6& errors, const NoiseSigma& sigma) {
   return make_pose(T.linear() * so3_exp(sigma.rotation_rad * errors.head<3>()),
                    T.translation() + sigma.translation_m * errors.tail<3>());
 }
 
-// Closures with equal places share an error: robots and runs of keyframes of both ends.
+// Robots and runs of keyframes of both ends. Closures with equal places share an error.
 using Place = std::array<Index, 4>;
 
 Place place_of(const TeamGraph& graph, const BlockEdge& e) {
@@ -238,7 +238,7 @@ Place place_of(const TeamGraph& graph, const BlockEdge& e) {
           (e.j - graph.first[b]) / kPlaceKeyframes};
 }
 
-// Claims of all edges, and measurements around the truth.
+// Sets the claims of all edges, and draws their measurements around the truth.
 void measure(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& rng) {
   TeamGraph& graph = drawn.graph;
   const std::vector<bool> odometry = odometry_edges(graph);
@@ -271,13 +271,13 @@ void measure(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& rng) 
     const Precision claims = precision_of(claimed, graph.dimension);
     e.kappa = claims.kappa;
     e.tau = claims.tau;
-    constexpr double kExact = 1e-12;  // a variance of nothing has no weight
+    constexpr double kExact = 1e-12;  // lower bound, because a variance of 0 has no finite weight
     drawn.honest.push_back(
         {claims.kappa / std::max(variance, kExact), claims.tau / std::max(variance, kExact)});
   }
 }
 
-// Claim of a false closure: the scenario's, or else that of the first true closure.
+// Claim of a false closure: that of the scenario, or else that of the first true closure.
 Precision closure_claims(const TeamGraph& graph, const Scenario& scenario) {
   if (scenario.closure_sigma) return precision_of(*scenario.closure_sigma, graph.dimension);
   const std::vector<bool> odometry = odometry_edges(graph);
@@ -288,7 +288,7 @@ Precision closure_claims(const TeamGraph& graph, const Scenario& scenario) {
   return {e.kappa, e.tau};
 }
 
-// False places: successive poses of one robot are taken for successive ones of another, each with
+// Adds false places: successive poses of one robot are matched to successive poses of another, with
 // the noise that a closure claims.
 void add_clusters(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& rng) {
   TeamGraph& graph = drawn.graph;

@@ -9,16 +9,16 @@
 
 namespace km {
 
-/// A row per seed of the first method beside the reference, then a row per method: median and worst
-/// of all seeds.
+/// Text with one row per seed for the first method beside the reference, then one row per method
+/// with median and worst of all seeds.
 [[nodiscard]] std::string scenario_text(const ScenarioStudy& study);
 
-/// Every run. `ratio` is of the RMS error to that of the reference with the same seed; without a
-/// reference it is null in JSON and empty in CSV.
+/// Every run. `ratio` is the RMS error divided by that of the reference with the same seed. Without
+/// a reference it is null in JSON and empty in CSV.
 void write_scenario_json(std::ostream& out, const ScenarioStudy& study);
 void write_scenario_csv(std::ostream& out, const ScenarioStudy& study);
 
-/// RMS and largest error of each method by seed.
+/// Plots of the RMS and the largest error of each method by seed.
 [[nodiscard]] std::vector<Plot> scenario_plots(const ScenarioStudy& study);
 
 }  // namespace km

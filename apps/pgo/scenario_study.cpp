@@ -33,10 +33,10 @@ struct Minimum {
   bool decided = true;
 };
 
-// Minimum of edges that connect all poses.
+// Minimum of the cost of edges that connect all poses.
 Minimum minimum_near(std::vector<SE3> start, const std::vector<BlockEdge>& edges, int dimension,
                      std::uint32_t most_steps) {
-  constexpr double kPatience = 8.0;  // rounds: second derivatives cost nothing to send
+  constexpr double kPatience = 8.0;  // rounds; generous, because no messages are sent
   SessionGraph graph{.start = std::move(start)};
   for (const BlockEdge& e : edges) graph.own.push_back(own_edge(e));
   TreeNewton newton(std::move(graph), TreePlace{.members = {0}},
@@ -49,9 +49,9 @@ Minimum minimum_near(std::vector<SE3> start, const std::vector<BlockEdge>& edges
   return {newton.poses(), !newton.state().failed && newton.state().round + 1 < most_steps};
 }
 
-// Poses and edges of one connected part, numbered anew.
+// Poses and edges of one connected part, with numbers of its own.
 struct Part {
-  std::vector<Index> poses;  // in the whole
+  std::vector<Index> poses;  // indices in the whole graph
   std::vector<BlockEdge> edges;
 };
 
@@ -73,7 +73,7 @@ std::map<Index, Part> parts_of(const TeamGraph& graph) {
   return parts;
 }
 
-// By chordal initialisation, part by part.
+// Chordal initialisation of each connected part.
 std::vector<SE3> chordal_start(const TeamGraph& graph) {
   std::vector<SE3> start(static_cast<std::size_t>(graph.poses()));
   for (const auto& [lowest, part] : parts_of(graph)) {
@@ -157,9 +157,9 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
 
 PlacedTeam solve_by_gnc(const TeamGraph& graph) {
   constexpr double kConfidence = 0.99;
-  constexpr double kSteeper = 1.4;   // as recommended there
+  constexpr double kSteeper = 1.4;   // as the paper recommends
   constexpr double kFloor = 1e-10;   // keeps the equations regular
-  constexpr int kMostUpdates = 100;  // as there
+  constexpr int kMostUpdates = 100;  // as in the paper
   constexpr std::uint32_t kStepsOfUpdate = 20;
   const double c2 = chi_squared_6_quantile(kConfidence);
   const std::vector<bool> odometry = odometry_edges(graph);

@@ -11,13 +11,13 @@
 
 namespace km {
 
-/// How a scenario is solved:
-///   robots     by the robots' own code at its defaults, see run_agent_team();
-///   trust-all  all closures, at what they claim, by Newton's method on one computer;
-///   pcm        the same on what pairwise consistency keeps;
-///   gnc        graduated non-convexity on one computer, see solve_by_gnc();
-///   reference  only the true closures, all edges weighed by the noise that was drawn, on one
-///              computer, begun at the truth: the best that can be had.
+/// Methods by which a scenario is solved:
+///     robots     by the robots' own code at its defaults, see run_agent_team();
+///     trust-all  all closures, at their claims, by Newton's method on one computer;
+///     pcm        the closures that pairwise consistency keeps, otherwise as trust-all;
+///     gnc        graduated non-convexity on one computer, see solve_by_gnc();
+///     reference  only the true closures, all edges weighed by the noise that was drawn, on one
+///                computer, started at the truth: the best achievable result.
 inline const std::vector<std::string> kScenarioMethods = {"robots", "trust-all", "pcm", "gnc",
                                                           "reference"};
 
@@ -26,7 +26,7 @@ struct ScenarioStudyOptions {
   std::vector<std::string> methods = kScenarioMethods;
   std::vector<unsigned> seeds = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
   PcmConfig pcm = {};
-  double keyframes_per_s = 0.0;  ///< robots: see AgentTeamOptions.
+  double keyframes_per_s = 0.0;  ///< Only for robots: see AgentTeamOptions.
 };
 
 /// Result of one method for one drawn scenario.
@@ -39,11 +39,11 @@ struct ScenarioResult {
   std::size_t between_lost = 0;
   std::size_t false_closures = 0;
   std::size_t false_kept = 0;
-  std::size_t frames = 1;  ///< In which the method leaves the robots.
-  /// Errors of positions; each frame of the method is aligned to the truth by one rigid transform.
+  std::size_t frames = 1;  ///< Number of separate frames in the result.
+  /// Errors of positions. Each frame of the result is aligned to the truth by one rigid transform.
   double rms_m = 0.0;
   double max_m = 0.0;
-  bool decided = true;  ///< False: the method came to no end.
+  bool decided = true;  ///< False: the method did not end.
   double cpu_s = 0.0;
 };
 
@@ -51,8 +51,8 @@ struct ScenarioStudy {
   std::string scenario;
   std::size_t robots = 0;
   std::size_t poses = 0;
-  bool certified = false;               ///< The optimum that is the truth is.
-  std::vector<ScenarioResult> results;  ///< By seed, then method.
+  bool certified = false;               ///< Whether the optimum that is the truth is certified.
+  std::vector<ScenarioResult> results;  ///< Ordered by seed, then method.
 };
 
 /// Throws std::invalid_argument if graph or options are not usable.
@@ -61,7 +61,7 @@ struct ScenarioStudy {
                                                const TeamMeter& meter,
                                                const OutlierProgress& progress = {});
 
-/// The poses that a method has found and the edges that it uses.
+/// Poses estimated by a method, and the edges that it uses.
 struct PlacedTeam {
   std::vector<SE3> T_frame_kf;
   std::vector<Eigen::Index> frame_of;  ///< By pose; poses of one frame have the same number.
@@ -69,20 +69,21 @@ struct PlacedTeam {
   bool decided = true;
 };
 
-/// The minimum near `start` of the edges that are `kept`, by at most so many steps of Newton's
-/// method on one computer. Parts that these edges leave unconnected are solved one by one, each in
-/// a frame of its own.
+/// Returns the minimum of the `kept` edges near `start`, after at most `most_steps` Newton steps on
+/// one computer. Parts that these edges leave unconnected are solved separately, each in a frame of
+/// its own.
 [[nodiscard]] PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept,
                                          std::vector<SE3> start, std::uint32_t most_steps = 300);
 
 /// Graduated non-convexity with truncated least squares at a fixed scale (Yang et al., "Graduated
-/// Non-Convexity for Robust Spatial Perception", RA-L 2020, Algorithm 1): closures whose residual
-/// exceeds the 99 % quantile of chi-squared (6 degrees) at what they claim are rejected. Odometry
-/// is trusted. The start is odometry_start(), or chordal where closures do not join all robots.
-/// Each change of the weights is followed by at most 20 Newton steps.
+/// Non-Convexity for Robust Spatial Perception", RA-L 2020, Algorithm 1). Closures are rejected if
+/// their residual exceeds the 99 % quantile of chi-squared (6 degrees) at their claimed noise.
+/// Odometry is trusted. The start is odometry_start(), or chordal if closures do not join all
+/// robots. Each change of the weights is followed by at most 20 Newton steps.
 [[nodiscard]] PlacedTeam solve_by_gnc(const TeamGraph& graph);
 
-/// Closures lost and kept, and errors of `placed`. Method, seed and time are left open.
+/// Counts closures lost and kept, and computes the errors of `placed`. Method, seed and time are
+/// not set.
 [[nodiscard]] ScenarioResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed);
 
 }  // namespace km

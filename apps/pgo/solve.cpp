@@ -17,50 +17,56 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kSolveDetails =
-    "Every robot has only its part of the graph, and what it hears from the others are the\n"
-    "messages that would cross the network.\n\n"
-    "FILE is a g2o file, 2D or 3D, dealt out to --robots robots, or a folder with one *.csv or\n"
-    "*.g2o per robot, or what a team's run has left behind, or a team's JRL file (COSMO-Bench).\n"
-    "The cost is the chordal one without 1/2, weights as SE-Sync reads them (of a team's results\n"
-    "and JRL files: as the robots weigh them):\n"
+    "Every robot has only its part of the graph, and receives only the messages that would cross\n"
+    "the network.\n"
+    "\n"
+    "FILE is a g2o file, 2D or 3D, divided among --robots robots; or a folder with one *.csv or\n"
+    "*.g2o per robot; or the results of a team's run; or a team's JRL file (COSMO-Bench).\n"
+    "The cost is the chordal one without 1/2. Weights are read as SE-Sync reads them. For the\n"
+    "results of a team and for JRL files they are those of the robots:\n"
     "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
-    "Where a g2o file says which way is up at a pose (EDGE_SE3_PRIOR with information on the tilt\n"
-    "alone, as kimera_multi_robot writes it), |R_i up_i - z|^2 / sigma_i^2 is added; dgs and\n"
-    "rbcd-asynchronous do not know of that. Other priors are refused.\n\n"
+    "A vertical in a g2o file (EDGE_SE3_PRIOR with information on the tilt alone, as\n"
+    "kimera_multi_robot writes it) adds |R_i up_i - z|^2 / sigma_i^2. dgs and rbcd-asynchronous\n"
+    "do not support verticals. Other priors are refused.\n"
+    "\n"
     "Methods:\n"
     "  local             every robot alone; their frames joined by one closure each\n"
     "  dgs               two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)\n"
     "  rbcd              Riemannian block-coordinate descent (Tian et al., TRO 2021) as robots "
     "run\n"
-    "                    it: in a round all update, in turn; over-relaxed, without by\n"
-    "                    --over-relaxation 1; ends when the cost hardly falls any more\n"
-    "  rbcd-asynchronous all robots at once, on poses up to --max-delay rounds old; descends all\n"
-    "                    the same\n"
-    "  centralized       the whole graph on one computer: Newton, certified; else the staircase\n"
-    "                    of SE-Sync\n"
-    "  newton            what the robots run: Newton steps of the whole team up and down a tree "
-    "of\n"
-    "                    robots. Finds out how noisy closures are and which are false (graduated\n"
-    "                    non-convexity: weights, and a step, in turn), and ends with the optimum\n"
-    "                    of those that it keeps; with --trust-all it keeps all\n"
-    "newton starts from odometry; the others, and newton --trust-all, from the chordal\n"
-    "initialisation of the whole graph, timed apart (local: from each robot's own).\n\n"
-    "A round is one exchange of messages, of newton one way up the tree and down again, of rbcd "
-    "an\n"
-    "update by every robot; rbcd has poses to show after every fifth. The table says after how\n"
-    "many rounds each gap to the certified optimum was reached (computed centrally unless given),\n"
-    "what had been sent by then by all robots, and the CPU time: of the slowest robot of each\n"
-    "exchange, summed, and of all. newton and rbcd write the robots' own letters, which have one\n"
-    "reader each; of the others nothing is encoded, and a broadcast counts once. The certificate "
-    "proves how far any poses can lie below at most. Of newton\n"
-    "without --trust-all it says what was kept.\n\n"
-    "If a JRL file labels false closures, a table shows how many of them, and of the true ones,\n"
-    "were kept. If it has true poses, another shows the ATE: the RMSE [m] of the positions of all\n"
-    "robots under one rigid alignment, then of each robot under that alignment and under its own.\n"
-    "With both, the optimum of all closures that are not labelled false is shown for comparison.\n"
-    "Priors are left out. --instants N solves what the stamps of the file say is known at N "
-    "times,\n"
-    "spread evenly; parts that no closure connects yet are solved and aligned by themselves.\n\n"
+    "                    it: in a round all robots update, in turn, over-relaxed unless\n"
+    "                    --over-relaxation is 1; ends when the cost hardly decreases any more\n"
+    "  rbcd-asynchronous all robots at once, on poses up to --max-delay rounds old; the cost\n"
+    "                    still descends\n"
+    "  centralized       the whole graph on one computer: Newton, certified; otherwise the\n"
+    "                    staircase of SE-Sync\n"
+    "  newton            default of the robots: Newton steps of the whole team up and down a tree\n"
+    "                    of robots. It estimates how noisy closures are and rejects false ones\n"
+    "                    (graduated non-convexity: weights and a step, in turn). It ends with the\n"
+    "                    optimum of the closures that it keeps. --trust-all keeps all closures\n"
+    "newton starts from odometry. newton --trust-all and the other methods start from the chordal\n"
+    "initialisation of the whole graph, whose time is shown separately (local: of each robot's\n"
+    "own graph).\n"
+    "\n"
+    "A round is one exchange of messages. For newton it is one pass up the tree and one pass "
+    "down.\n"
+    "For rbcd it is an update by every robot, and poses are available after every fifth round.\n"
+    "The table shows when each gap to the certified optimum was reached (computed centrally "
+    "unless\n"
+    "given): the number of rounds, the bytes sent by all robots so far, and the CPU time, both\n"
+    "summed over the slowest robot of each exchange and over all robots. newton and rbcd encode\n"
+    "the robots' own messages, which have one receiver each. Messages of other methods are not\n"
+    "encoded, and a broadcast counts once. The certificate proves an upper bound of the gap. For\n"
+    "newton without --trust-all the table shows the kept closures instead.\n"
+    "\n"
+    "If a JRL file labels false closures, a table shows how many false and true ones were kept. "
+    "If\n"
+    "it has true poses, a table shows the ATE: the RMSE [m] of the positions of all robots under\n"
+    "one rigid alignment, then of each robot under that alignment and under its own. With both,\n"
+    "the optimum of all closures that are not labelled false is shown for comparison. Priors are\n"
+    "left out. --instants N solves the graph known at N evenly spread times, according to the\n"
+    "stamps of the file. Parts that no closure connects yet are solved and aligned separately.\n"
+    "\n"
     "Examples:\n"
     "  kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json "
     "out.json\n"
@@ -80,7 +86,7 @@ struct SolveCommand {
   fs::path output;
 };
 
-// Options that not every method takes, and who does.
+// An option that not every method takes, and the methods that take it.
 struct Takers {
   const char* option;
   std::vector<std::string> methods;
@@ -110,27 +116,26 @@ void define_method(CLI::App& app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
   app.add_option("--method", solver.method, "See below")
       ->check(CLI::IsMember(kMethods).description(""));
-  app.add_flag("--no-vertical", command.no_vertical,
-               "Leave out what the files say of which way is up");
-  app.add_option("--rounds", solver.run.max_rounds, "At most so many")
+  app.add_flag("--no-vertical", command.no_vertical, "Leave out the verticals of the files");
+  app.add_option("--rounds", solver.run.max_rounds, "Largest number of rounds")
       ->check(CLI::Range(0, 1000000));
   app.add_option("--gradient", solver.run.gradient_tolerance,
                  "Stop once the norm of the Riemannian gradient is at most this")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--rank", solver.rank, "rbcd, rbcd-asynchronous: of the relaxation")
+  app.add_option("--rank", solver.rank, "rbcd, rbcd-asynchronous: rank of the relaxation")
       ->check(CLI::Range(3, 10));
   app.add_option_function<std::string>(
          "--links",
          [&solver](const std::string& shape) {
            solver.shape = shape == "chain" ? TeamShape::kChain : TeamShape::kAll;
          },
-         "newton, rbcd: who hears whom: all, or chain (robot k only k - 1 and k + 1)")
+         "newton, rbcd: links of the robots: all, or chain (robot k to k - 1 and k + 1)")
       ->check(CLI::IsMember({"all", "chain"}))
       ->default_str("all");
   app.add_option("--instants", command.instants,
-                 "JRL: also solve what is known at so many times, each time anew, and show the ATE")
+                 "JRL: number of times at which the graph known so far is solved, with the ATE")
       ->check(CLI::Range(1, 10000));
-  app.add_option("--optimum", command.optimum, "The optimum, if known: it is not computed then")
+  app.add_option("--optimum", command.optimum, "The optimum, if known, so that it is not computed")
       ->check(CLI::PositiveNumber);
 }
 
@@ -138,34 +143,33 @@ void define_descent(CLI::App& app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
   app.option_defaults()->group("Block descent");
   app.add_option("--over-relaxation", solver.over_relaxation,
-                 "How far beyond the minimum of its block a robot may go")
+                 "Largest step of a robot, relative to that to the minimum of its block")
       ->check(CLI::Range(1.0, 1.99));
-  app.add_flag(
-      "--verify", solver.verify,
-      "rbcd: the team verifies its result itself: it looks for a direction that leads down");
-  app.add_option("--max-delay", solver.max_delay,
-                 "rbcd-asynchronous: messages come up to so many rounds late, at random; a robot\n"
-                 "that knows less of a neighbour waits")
+  app.add_flag("--verify", solver.verify,
+               "rbcd: the team verifies its result itself by a search for a direction of descent");
+  app.add_option(
+         "--max-delay", solver.max_delay,
+         "rbcd-asynchronous: largest random delay of messages [rounds]; a robot with older\n"
+         "poses of a neighbour waits")
       ->check(CLI::Range(0, 1000));
-  app.add_option("--loss", solver.loss, "rbcd-asynchronous: this part of the messages is lost")
+  app.add_option("--loss", solver.loss, "rbcd-asynchronous: probability that a message is lost")
       ->check(CLI::Range(0.0, 0.99));
-  app.add_option("--seed", solver.seed, "rbcd-asynchronous: of delays and losses");
+  app.add_option("--seed", solver.seed, "rbcd-asynchronous: seed of delays and losses");
 }
 
 void define_newton(CLI::App& app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
   app.option_defaults()->group("newton");
-  app.add_flag("--trust-all", solver.trust_all, "No closure is false");
+  app.add_flag("--trust-all", solver.trust_all, "Treat all closures as true");
   app.add_option(
          "--barc", solver.barc,
-         "Residual [sigma] up to which a closure is kept, sqrt of its cost; 0: where all but\n"
-         "one in a million Gaussian residuals lie, times the noise scale that the team finds")
+         "Largest residual [sigma] of a closure that is kept, sqrt of its cost; 0: exceeded by\n"
+         "one in a million Gaussian residuals, times the noise scale that the team estimates")
       ->check(CLI::NonNegativeNumber);
-  app.add_flag(
-      "--tell-private", solver.tell_private,
-      "Poses that no closure to another robot ends on are told, too, where that saves bytes");
+  app.add_flag("--tell-private", solver.tell_private,
+               "Also send private poses to other robots if that saves bytes");
   app.add_flag("--reject-odometry", solver.reject_odometry,
-               "Steps of odometry inside a robot can be false, too");
+               "Also reject false steps of odometry inside a robot");
 }
 
 void check(const CLI::App& app, SolveCommand& command) {
@@ -180,7 +184,7 @@ void check(const CLI::App& app, SolveCommand& command) {
   check_output_folder(command.output);
 }
 
-// A row for each pose, its number in place of a time.
+// Writes a row for each pose, with its number in place of a time.
 void write_tum(std::ostream& out, const std::vector<SE3>& T_world_kf) {
   out.precision(std::numeric_limits<double>::max_digits10);
   for (std::size_t i = 0; i < T_world_kf.size(); ++i) {
@@ -192,7 +196,7 @@ void write_tum(std::ostream& out, const std::vector<SE3>& T_world_kf) {
   }
 }
 
-// The graph with these poses and isotropic weights, in 3D also if it is planar.
+// The graph with these poses and isotropic weights, in 3D even if it is planar.
 void write_solved(std::ostream& out, const TeamGraph& graph, const std::vector<SE3>& T_world_kf) {
   const auto id = [&](Eigen::Index pose) { return graph.ids[static_cast<std::size_t>(pose)]; };
   G2oGraph result{.dimension = 3, .vertices = {}, .edges = {}};

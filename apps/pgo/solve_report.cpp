@@ -14,17 +14,18 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kMostMarks = 40;  // rounds beyond which their marks would hide the line
+constexpr std::size_t kMostMarks = 40;  // with more rounds, marks would hide the line
 
-// Relative to the optimum, or to what rounding leaves of it where there is no noise.
+// Gap relative to the optimum. Without noise the optimum is only rounding error, so kNoCost bounds
+// the divisor.
 double gap(const Solution& solution, const TeamRound& round) {
   constexpr double kNoCost = 1e-9;
   const double optimum = solution.judgement->optimum;
   return (round.cost - optimum) / std::max(optimum, kNoCost);
 }
 
-// Bottom of a logarithmic axis of gaps: the decade below the least that is above 0. Once there is
-// no gap left, rounding makes it 0 or less.
+// Bottom of a logarithmic axis of gaps: the decade below the least positive gap. Rounding makes
+// gaps at the optimum 0 or negative.
 double gap_floor(const Solution& solution) {
   double least = 1.0;
   for (const TeamRound& round : solution.run.rounds)
@@ -163,7 +164,7 @@ Json ate_json(const TeamGraph& graph, const TeamAte& ate) {
   return {{"team_m", ate.team_m}, {"parts", ate.parts}, {"robots", std::move(robots)}};
 }
 
-// NaN unless both are known.
+// NaN if either is unknown.
 double ate_ratio(const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum) {
   return ate && optimum ? ate->team_m / optimum->team_m : std::numeric_limits<double>::quiet_NaN();
 }

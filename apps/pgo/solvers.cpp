@@ -21,7 +21,7 @@ namespace {
 
 constexpr Eigen::Index kRigidRank = 3;
 
-// The robots' own block descent, with the end that robots come to.
+// The robots' own block descent, with their own stopping rule.
 std::unique_ptr<TeamSolver> rbcd_team(const TeamGraph& graph, const std::vector<SE3>& start,
                                       const SolverOptions& options) {
   const RbcdOptions rbcd{.rank = options.rank,
@@ -52,10 +52,11 @@ std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<
   throw std::invalid_argument("unknown method " + method);
 }
 
-// The team ends by itself: that there is no gradient says nothing of the weights.
+// No gradient tolerance ends the run: at a gradient of 0 the weights may still change.
 SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const SolverOptions& options,
                      const TeamMeter& meter) {
-  constexpr double kPatience = 8.0;  // rounds: as many as second derivatives are worth here
+  // Rounds. As many as second derivatives save here.
+  constexpr double kPatience = 8.0;
   const TreeNewtonOptions newton{.dimension = graph.dimension,
                                  .absolute_tolerance = 1e-12,
                                  .patience_rounds = kPatience,
@@ -85,7 +86,7 @@ SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const Solve
   return run;
 }
 
-// What knows of nothing but edges says so.
+// Refuses verticals for methods that support only edges.
 void check_verticals(const TeamGraph& graph, const SolverOptions& options) {
   const std::string who = options.verify ? "the team's own verification (--verify)"
                           : options.method == "dgs" || options.method == "rbcd-asynchronous"
@@ -130,7 +131,7 @@ TeamMeter cpu_meter() {
 namespace {
 
 Eigen::Index numerical_rank(const LiftedPoses& X, int dimension) {
-  constexpr double kRelative = 1e-3;  // of singular values
+  constexpr double kRelative = 1e-3;  // relative to the largest singular value
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(X.rows(), X.rows());
   for (Eigen::Index i = 0; i < pose_count(X); ++i)
     gram += X.middleCols<3>(4 * i) * X.middleCols<3>(4 * i).transpose();
@@ -139,7 +140,7 @@ Eigen::Index numerical_rank(const LiftedPoses& X, int dimension) {
   return (values.array() > least).count() - (dimension == 2 ? 1 : 0);
 }
 
-// The frame of the first pose; with verticals, that turned the least so that z is up.
+// The frame of the first pose. With verticals, it is rotated by the smallest angle so that z is up.
 Eigen::MatrixXd world_of(const TeamGraph& graph, const LiftedPoses& X) {
   if (graph.verticals.empty()) return X.leftCols<4>();
   return level(X.leftCols<4>(), Eigen::Vector3d::Zero());

@@ -19,89 +19,91 @@ namespace km {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// A method by its name, and what it takes. kMethods has the names.
+/// A method, by its name in kMethods, and its parameters.
 struct SolverOptions {
   std::string method = "newton";
-  Eigen::Index rank = 5;  ///< rbcd, rbcd-asynchronous: of the relaxation.
+  Eigen::Index rank = 5;  ///< Only for rbcd, rbcd-asynchronous: rank of the relaxation.
   TeamRunOptions run = {.max_rounds = 100};
-  bool verify = false;            ///< rbcd: the team looks for a way down from its poses.
-  double over_relaxation = 1.95;  ///< rbcd, rbcd-asynchronous: at most; 1: as published.
+  bool verify = false;            ///< rbcd: the team searches for a direction of descent.
+  double over_relaxation = 1.95;  ///< rbcd, rbcd-asynchronous: largest value; 1: as published.
   int max_delay = 0;              ///< rbcd-asynchronous, as loss and seed: see AsynchronousOptions.
   double loss = 0.0;
   unsigned seed = 1;
-  bool trust_all = false;        ///< newton: no closure is false.
-  double barc = 0.0;             ///< newton: residual of an inlier [sigma]; 0: the team finds it.
-  bool reject_odometry = false;  ///< newton: odometry can be false, too.
+  bool trust_all = false;        ///< newton: all closures are treated as true.
+  double barc = 0.0;             ///< newton: largest residual of an inlier [sigma]; 0: estimated.
+  bool reject_odometry = false;  ///< newton: false steps of odometry are rejected too.
   bool tell_private = false;     ///< newton: see TreeNewtonOptions.
-  TeamShape shape = TeamShape::kAll;  ///< newton, rbcd: who hears whom.
+  TeamShape shape = TeamShape::kAll;  ///< newton, rbcd: links between the robots.
 
   [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }
-  /// The method in the words of the command line.
+  /// The method as given on the command line.
   [[nodiscard]] std::string name() const { return method + (trust_all ? " --trust-all" : ""); }
 };
 
 inline const std::vector<std::string> kMethods = {
     "local", "dgs", "rbcd", "rbcd-asynchronous", "centralized", "newton"};
 
-/// Which edges a method has kept, and how it came to that.
+/// The edges that a method has kept, and the estimates behind this decision.
 struct Decision {
-  std::vector<bool> kept;     ///< Of the graph's edges.
-  double noise_scale = 1.0;   ///< Noise of closures, in multiples of what the graph says.
-  double threshold = 0.0;     ///< Residual of an inlier [sigma of the graph].
-  std::size_t most_sent = 0;  ///< By one robot [B], and received.
+  std::vector<bool> kept;     ///< By edge of the graph.
+  double noise_scale = 1.0;   ///< Noise of closures, as a multiple of the graph's.
+  double threshold = 0.0;     ///< Largest residual of an inlier [sigma of the graph].
+  std::size_t most_sent = 0;  ///< Bytes that one robot sent; below: received.
   std::size_t most_received = 0;
-  bool decided = false;  ///< Else the rounds did not suffice, or the team could not go on.
+  bool decided = false;  ///< False: the rounds did not suffice, or the team failed.
 };
 
 struct SolverRun {
-  std::vector<TeamRound> rounds;  ///< [0]: the start. Costs are of all edges, unweighted.
+  std::vector<TeamRound> rounds;  ///< [0]: the start. Costs of all edges, at weight 1.
   LiftedPoses X;
-  std::optional<TeamVerification> verification;  ///< By the team, if asked for.
-  std::optional<Decision> decision;              ///< Of newton.
+  std::optional<TeamVerification> verification;  ///< The team's own, if requested.
+  std::optional<Decision> decision;              ///< Only of newton.
 };
 
-/// Solves `graph` from `start`; newton without one begins at odometry. Throws
-/// std::invalid_argument if method, options and graph do not go together.
+/// Solves `graph` from `start`. If `start` is empty, newton begins at odometry. Throws
+/// std::invalid_argument if method, options and graph do not fit together.
 [[nodiscard]] SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                                    const SolverOptions& options, const TeamMeter& meter);
 
-/// The least cost of a graph all of whose edges are trusted, as one computer finds it.
+/// The least known cost of a graph with all edges trusted, computed on one computer.
 struct CentralOptimum {
   LiftedPoses X;
   double cost = 0.0;
   bool certified = false;
 };
 
-/// By CentralSolver from `start`, and from the chordal initialisation.
+/// Computed by CentralSolver, from `start` or from the chordal initialisation.
 [[nodiscard]] CentralOptimum central_optimum(const TeamGraph& graph, const std::vector<SE3>& start);
 [[nodiscard]] CentralOptimum central_optimum(const TeamGraph& graph);
 
-/// Measures CPU time of the calling thread.
+/// Returns a meter of the CPU time of the calling thread.
 [[nodiscard]] TeamMeter cpu_meter();
 
-/// What poses are worth, as one computer that has the whole graph sees it.
+/// Evaluation of poses by one computer that has the whole graph.
 struct Judgement {
   double rounded_cost = 0.0;
-  double optimum = 0.0;  ///< The certified one, or as given; the least cost known if none is.
-  bool optimum_certified = false;  ///< Or given.
+  /// The certified or given optimum; otherwise the least known cost.
+  double optimum = 0.0;
+  bool optimum_certified = false;  ///< Certified, or given.
   Certificate certificate = {};
-  Eigen::Index rank = 0;  ///< Numerical, of the rotations; 3 (2 in the plane): no relaxation left.
+  /// Numerical rank of the rotations; 3 (2 in the plane): the poses are rigid.
+  Eigen::Index rank = 0;
 };
 
-/// What one method did to one graph.
+/// Result of one method on one graph.
 struct Solution {
   std::string method;    ///< SolverOptions::name().
   double start_s = 0.0;  ///< CPU time of the chordal initialisation.
   SolverRun run = {};
-  /// Rounded, in the frame of the first pose; z up with verticals.
+  /// Rounded poses in the frame of the first pose; z up with verticals.
   std::vector<SE3> T_world_kf = {};
-  /// nullopt of a method that rejects: before it has decided there is no optimum to compare with.
+  /// nullopt if the method rejects closures: its optimum depends on its own decision.
   std::optional<Judgement> judgement = {};
 };
 
-/// Runs a method from the chordal initialisation, which is computed centrally and not counted, and
-/// is levelled by verticals as a whole; what rejects starts from odometry. The optimum is computed
-/// if not given. Throws as run_solver() does.
+/// Runs a method from the chordal initialisation, which is computed centrally and not counted. With
+/// verticals, the initialisation is levelled as a whole. A method that rejects closures starts from
+/// odometry. The optimum is computed if not given. Throws as run_solver() does.
 [[nodiscard]] Solution solve(const TeamGraph& graph, const SolverOptions& options,
                              std::optional<double> optimum, const TeamMeter& meter);
 

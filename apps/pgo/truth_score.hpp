@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// What became of closures whose truth a data set knows.
+/// Numbers of closures by label and decision.
 struct ClosureCounts {
   std::size_t true_kept = 0;
   std::size_t true_lost = 0;
@@ -21,8 +21,8 @@ struct ClosureCounts {
 struct TeamAte {
   double team_m = 0.0;            ///< All poses under one rigid alignment.
   std::vector<double> in_team_m;  ///< [k]: poses of robot k under that alignment.
-  std::vector<double> alone_m;    ///< [k]: poses of robot k under an alignment of their own.
-  std::size_t parts = 0;          ///< Connected parts, each aligned by itself; 1: one frame.
+  std::vector<double> alone_m;    ///< [k]: poses of robot k under their own alignment.
+  std::size_t parts = 0;          ///< Connected parts, each aligned separately; 1: one frame.
 };
 
 /// Poses of a connected part of a graph, in a frame of their own.
@@ -31,37 +31,38 @@ struct SolvedPart {
   std::vector<SE3> T_world_kf;
 };
 
-/// Counts of closures by where their ends are.
+/// Counts of closures inside robots and between robots.
 struct LabelCounts {
   ClosureCounts inside;   ///< Both ends on one robot.
   ClosureCounts between;  ///< Ends on two robots.
 };
 
-/// How a solution compares with what the data set says.
+/// Comparison of a solution with the ground truth of the data set.
 struct TruthScore {
   std::optional<LabelCounts> closures = {};  ///< Only with labels.
   std::optional<TeamAte> ate = {};           ///< Only with true poses.
-  /// Of the optimum of all edges that are not labelled false, all trusted. Only with both.
+  /// ATE of the optimum of all edges that are not labelled false, all trusted. Only with labels and
+  /// true poses.
   std::optional<TeamAte> optimum_of_true = {};
-  bool certified = false;  ///< That optimum is the global one, of every part.
+  bool certified = false;  ///< That optimum is certified in every part.
 };
 
-/// The parts that the edges not labelled false connect. Precondition: labels.
+/// Parts of the graph that are connected by edges not labelled false. Precondition: labels.
 [[nodiscard]] std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team);
 
 /// The optimum of edges that are all trusted.
 struct TrueOptimum {
   std::vector<SolvedPart> parts;
-  bool certified = true;  ///< Of every part.
+  bool certified = true;  ///< Every part is certified.
 };
 
-/// That of the edges in `keep_edge` that are not labelled false. Precondition: labels.
+/// Optimum of the edges in `keep_edge` that are not labelled false. Precondition: labels.
 [[nodiscard]] TrueOptimum optimum_of_true(const LabelledTeamGraph& team,
                                           const std::vector<bool>& keep_pose,
                                           const std::vector<bool>& keep_edge);
 
-/// Counts the `known` closures by their labels and by whether they were `kept`, both of the graph's
-/// edges. Steps of odometry do not count. Precondition: labels.
+/// Counts the `known` closures by their labels and by whether they were `kept`. Both vectors are by
+/// edge of the graph. Steps of odometry do not count. Precondition: labels.
 [[nodiscard]] LabelCounts count_closures(const LabelledTeamGraph& team,
                                          const std::vector<bool>& known,
                                          const std::vector<bool>& kept);
@@ -70,8 +71,8 @@ struct TrueOptimum {
 /// Precondition: true poses.
 [[nodiscard]] TeamAte ate_of(const LabelledTeamGraph& team, const std::vector<SolvedPart>& parts);
 
-/// Compares a solution of the whole graph with all that the data set says. `kept`: of the graph's
-/// edges; empty: all were kept.
+/// Compares a solution of the whole graph with the ground truth of the data set. `kept`: by edge of
+/// the graph; empty: all were kept.
 [[nodiscard]] TruthScore score(const LabelledTeamGraph& team, const std::vector<SE3>& T_world_kf,
                                std::vector<bool> kept);
 

@@ -62,12 +62,14 @@ Options parse_options(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--to", options.play.to_s, "End of the part to play [s since the first message]")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--topics", options.play.topics, "Only these")->delimiter(',');
-  app.add_option("--wait", options.wait, "Begin when each topic has so many readers")
+  app.add_option("--topics", options.play.topics, "Topics to play; by default all")->delimiter(',');
+  app.add_option("--wait", options.wait,
+                 "Number of readers of each topic to wait for before playing")
       ->capture_default_str();
-  app.add_option("--answers", options.answers,
-                 "Topic of a robot's nav_msgs/Odometry (/robot0/odometry): how long after an image "
-                 "its pose comes");
+  app.add_option(
+      "--answers", options.answers,
+      "Topic of a robot's nav_msgs/Odometry (/robot0/odometry), to measure the time from an image "
+      "to its pose");
   app.add_flag("--reliable", options.play.reliable,
                "Send lost messages again; otherwise best effort, as drivers of sensors do");
   app.add_option("--delay", options.play.delay_s, "Delay of every message [s]")
@@ -80,9 +82,10 @@ Options parse_options(int argc, char** argv) {
   app.add_option("--seed", options.play.seed, "Seed of the random numbers")->capture_default_str();
   const char* const domain = std::getenv("ROS_DOMAIN_ID");
   options.ros.domain = domain != nullptr ? std::atoi(domain) : 0;
-  app.add_option("--domain", options.ros.domain,
-                 "ROS_DOMAIN_ID, by default that of the environment: a robot hears it with --set "
-                 "ros.domain=N (its --domain is the team's)")
+  app.add_option(
+         "--domain", options.ros.domain,
+         "ROS_DOMAIN_ID, by default that of the environment. A robot receives it with --set "
+         "ros.domain=N (--domain of a robot is the domain of the team)")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
   app.add_option("--interface", options.ros.interface, "Network interface, e.g. lo");

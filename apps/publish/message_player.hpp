@@ -85,7 +85,7 @@ class MessagePlayer {
   ReplayClock clock_;
   std::vector<PlayedTopic> topics_;
   std::vector<std::unique_ptr<RosPublisher>> publishers_;
-  std::vector<std::optional<std::size_t>> topic_of_;  // by channel
+  std::vector<std::optional<std::size_t>> topic_of_;  // topic of each channel; none if not played
   std::vector<std::string> left_out_;
   std::priority_queue<Due, std::vector<Due>, std::greater<>> due_;
   std::optional<Stamp> first_, newest_;

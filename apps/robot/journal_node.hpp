@@ -113,7 +113,7 @@ class JournalNode final : public Node {
   // Number of keyframes in the continued journal: RestoreNode publishes them once more.
   const std::size_t known_keyframes_;
   std::set<std::pair<KeyframeId, KeyframeId>> known_closures_;
-  bool added_ = false;                          // since the last sync
+  bool added_ = false;                          // true if entries were added since the last sync
   std::atomic<std::size_t> new_keyframes_ = 0;  // number of keyframes not yet published
   std::vector<HeldBack> held_back_;
   mutable std::mutex mutex_;  // guards places_

@@ -187,7 +187,8 @@ RobotOptions parse_options(int argc, char** argv) {
   CLI::App app{"One robot of the team: odometry, place recognition, and the team's pose graph."};
   app.set_version_flag("--version", version_text("kimera_multi_robot"));
   app.footer(kFooter);
-  app.add_option("--config", options.configs, "Configuration files; later ones override earlier")
+  app.add_option("--config", options.configs,
+                 "Configuration files; a later file overrides earlier ones")
       ->check(CLI::ExistingFile);
   app.add_option("--set", options.settings, "One setting over all files: section.key=value");
   app.add_option("--robot", options.robot, "Id of this robot, any number, unique in the team")

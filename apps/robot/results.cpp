@@ -77,8 +77,8 @@ Matrix6 judged_covariance(const Matrix6& claimed, const OptimizerProgress& progr
   return scale.asDiagonal() * claimed * scale.asDiagonal();
 }
 
-// The robot's own poses with every edge that touches them: odometry, and the inlier closures found
-// by either robot. Also the verticals. Poses of other robots stay in their files.
+// The robot's own poses, their verticals, and every edge that touches them: odometry, and the
+// inlier closures found by either robot. Poses of other robots stay in their files.
 G2oGraph graph_of(const RunRecord& record) {
   G2oGraph graph;
   const auto& keyframes = record.keyframes();

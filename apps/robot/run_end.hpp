@@ -124,7 +124,7 @@ struct RunEnd {
 /// Exit code and reason, for people and for the process that started the robot.
 struct Verdict {
   int exit_code = 0;
-  std::string reason;  ///< One line.
+  std::string reason;  ///< Reason in one line.
 };
 
 /// 5 if a module hung. 3 if a module failed, or another robot claimed the id: the team may then

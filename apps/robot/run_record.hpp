@@ -50,9 +50,7 @@ class RunRecord {
   void add(const ClosureVerdicts& verdicts);
   void add(const DenseSensingProgress& progress) { dense_sensing_ = progress; }
   void add(const MappingProgress& progress) { mapping_ = progress; }
-  void add(const MapMesh& /* the correction of this mesh follows */) {
-    ++activity_;
-  }  // its correction follows
+  void add(const MapMesh& /* the correction of this mesh follows */) { ++activity_; }
   void add(const OptimizedMesh& mesh);
 
   [[nodiscard]] RobotId robot() const { return robot_; }
@@ -97,7 +95,7 @@ class RunRecord {
 
   /// Number of corrections of the mesh.
   struct MeshCorrections {
-    std::size_t deformed = 0;         ///< By Local Mesh Optimization.
+    std::size_t deformed = 0;         ///< Deformations by Local Mesh Optimization.
     std::size_t moved = 0;            ///< Rigid motions of the whole mesh.
     double seconds = 0.0;             ///< Total time.
     MeshDeformationReport last = {};  ///< Report of the last optimisation.
@@ -143,10 +141,11 @@ class RunRecord {
   std::vector<RecordedKeyframe> keyframes_;
   std::optional<UncertainCalibration> calibration_;
   std::optional<VioStatistics> odometry_statistics_;
-  std::map<std::uint32_t, double> median_depths_m_;  // by keyframe
+  std::map<std::uint32_t, double> median_depths_m_;  // median depth of each keyframe
   std::size_t keypoints_ = 0;
   std::map<ClosureId, RelativePose> closures_;
-  std::map<RobotId, std::size_t> closures_to_;  // by the other robot; sizes within `closures_`
+  std::map<RobotId, std::size_t> closures_to_;  // number of entries in `closures_` by the other
+                                                // robot
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
   std::set<ClosureId> rejected_;  // closures of the inlier sets that the optimiser rejected
   std::map<ClosureId, ClosureOutcome> outcomes_;

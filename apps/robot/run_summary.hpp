@@ -133,8 +133,8 @@ struct ProcessSummary {
   bool operator==(const ProcessSummary&) const = default;
 };
 
-/// Offset of both cameras to the inertial sensor relative to the rig, with standard deviations.
-/// Those of rotation and translation are the largest over all directions.
+/// Offset of both cameras to the inertial sensor relative to the rig, with standard deviations. The
+/// standard deviations of rotation and translation are the largest over all directions.
 struct CamerasSummary {
   double offset_s = 0.0,
          offset_sigma_s = 0.0;  ///< Added to stamps of images, gives those of the sensor.

@@ -196,7 +196,7 @@ class Robot {
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;
   LivesMet lives_;
-  std::vector<Node*> feeding_;  // from the source to the last node that makes keyframes
+  std::vector<Node*> feeding_;  // nodes from the source to the last one that makes keyframes
   std::vector<const Node*> nodes_;
   SensorsNode* sensors_ = nullptr;
   std::size_t restored_images_ = 0;

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxNormError = 0.01;  // for quaternions
+constexpr double kMaxNormError = 0.01;  // largest error of the norm of a quaternion
 
 // Text of a file, decompressed if it is gzipped (zlib passes other files through), and its check
 // sum.

@@ -71,7 +71,7 @@ struct SimulationOptions {
     visitor.field("rate", rate_hz, {0.1, 200.0}, "Images per second");
     visitor.field("depth", depth, "Also depth images of the left camera (16 bit, mm)");
     visitor.field("depth-rate", depth_rate_hz, {0.0, 200.0},
-                  "Depth images per second, the rate divided by a whole number; 0: the rate");
+                  "Depth images per second, --rate divided by a whole number; 0: --rate");
     visitor.field("ideal-depth", ideal_depth, "Depth without noise and holes");
     visitor.field("labels", labels, "Also class ids of the left camera's pixels");
     visitor.field("color", color, "Also colour images of the left camera");

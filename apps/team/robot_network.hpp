@@ -40,7 +40,7 @@ class RobotNetwork {
 
  private:
   Descriptor tap_;
-  Descriptor user_;  // none if made as root
+  Descriptor user_;  // user namespace; none if root made the network
   Descriptor network_;
 };
 

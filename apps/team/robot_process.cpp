@@ -53,7 +53,7 @@ std::array<int, 2> make_pipe() {
   prctl(PR_SET_PDEATHSIG, SIGHUP);
   if (getppid() != parent) _exit(127);  // the parent died before the line above
   setpgid(0, 0);
-  signal(SIGHUP, SIG_DFL);  // also under nohup
+  signal(SIGHUP, SIG_DFL);  // nohup would otherwise make robots ignore SIGHUP
   signal(SIGPIPE, SIG_DFL);
   sigprocmask(SIG_SETMASK, &blocked, nullptr);
   const int nothing = open("/dev/null", O_RDONLY);

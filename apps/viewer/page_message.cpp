@@ -157,7 +157,7 @@ PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
 
 std::string page_greeting(PageSource source, const std::string& title,
                           const LabelPalette& palette) {
-  constexpr std::array kNames = {"live", "replay", "run"};  // as in PageSource
+  constexpr std::array kNames = {"live", "replay", "run"};  // names in the order of PageSource
   Json json = {{"kind", "hello"},
                {"source", kNames.at(static_cast<std::size_t>(source))},
                {"title", title},

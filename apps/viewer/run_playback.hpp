@@ -24,8 +24,8 @@ struct RunPlayback {
 /// others follow, spaced by the bytes sent for them. Before it joins, its data are in its own frame
 /// and as odometry estimated them. Afterwards they are as they were at the end of the run. Loads of
 /// modules are means.
-/// Robots that still run or were killed are noted. Throws std::runtime_error if the folder has no
-/// results of a finished robot.
+/// `notes` lists robots that still run or were killed. Throws std::runtime_error if the folder has
+/// no results of a finished robot.
 [[nodiscard]] RunPlayback read_run(const std::filesystem::path& folder, Stamp begin);
 
 }  // namespace km

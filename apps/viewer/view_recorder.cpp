@@ -244,7 +244,7 @@ class ViewRecorder::Robot {
   std::string camera_;
   std::mutex mutex_;  // guards the members that the node reads
   RosDiagnosticStatus status_;
-  double heard_s_ = 0.0;  // on the steady clock
+  double heard_s_ = 0.0;  // time of the last message, by the steady clock
   bool has_left_ = false;
   std::optional<std::vector<ToldClosure>> closures_now_;
   std::optional<RosOutputNode> node_;  // last member: stops first

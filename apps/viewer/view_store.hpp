@@ -81,7 +81,8 @@ class ViewStore {
   std::map<RobotId, std::uint64_t> boots_;
   std::map<Key, Newest> newest_;
   std::map<RobotId, std::map<ClosureId, ViewClosure>> closures_;  // last received values
-  std::array<std::deque<std::uint64_t>, 5> superseded_;  // in the order in which they are dropped
+  std::array<std::deque<std::uint64_t>, 5> superseded_;  // superseded updates, in the order in
+                                                         // which they are dropped
 };
 
 }  // namespace km

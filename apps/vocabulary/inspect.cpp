@@ -16,7 +16,7 @@ namespace km {
 namespace {
 
 struct InspectCommand : VocabularyCommand {
-  std::vector<std::string> images;  ///< To count words in.
+  std::vector<std::string> images;  ///< Images whose words are counted.
   std::vector<std::string> pair;    ///< Two images to compare, or none.
 };
 

@@ -24,11 +24,11 @@ struct CameraCalibration {
   /// The delta for which moved(delta) is `to`.
   [[nodiscard]] Vector7 offset_to(const CameraCalibration& to) const;
 
-  /// The correction relative to another rig, from which `correction` made this one. The covariance
-  /// by moved() does not change.
+  /// This correction relative to the rig before `correction`, which made the present rig of it. The
+  /// covariance by moved() does not change.
   [[nodiscard]] CameraCalibration on_top_of(const CameraCalibration& correction) const;
 
-  /// Inverse of on_top_of(): relative to the rig that `correction` makes of this one.
+  /// Inverse of on_top_of(): this correction relative to the rig after `correction`.
   [[nodiscard]] CameraCalibration without(const CameraCalibration& correction) const;
 
   /// Moves the cameras of `rig`.

@@ -10,7 +10,7 @@ namespace km {
 inline constexpr double kMaxAngularRate_radps = 100.0;
 inline constexpr double kMaxSpecificForce_mps2 = 1000.0;
 
-/// Also false for NaN.
+/// True if the sample is within both limits. False for NaN.
 [[nodiscard]] inline bool is_plausible(const ImuSample& sample) {
   return sample.gyro.norm() <= kMaxAngularRate_radps &&
          sample.accel.norm() <= kMaxSpecificForce_mps2;

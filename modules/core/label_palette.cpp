@@ -111,7 +111,8 @@ LabelPalette parse_label_palette(std::string_view csv, std::string_view source) 
     throw std::invalid_argument(where + ": the first line is not '" + std::string(kHeader) + "'");
   }
   std::vector<LabelClass> entries;
-  std::map<std::uint32_t, std::pair<LabelId, int>> first_use;  // by colour: id and line
+  std::map<std::uint32_t, std::pair<LabelId, int>> first_use;  // id and line of the first use of
+                                                               // each colour
   for (std::size_t i = 1; i < rows.size(); ++i) {
     const int line = rows[i].line;
     const std::string place = where + ":" + std::to_string(line) + ": ";

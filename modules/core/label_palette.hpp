@@ -32,7 +32,11 @@ class LabelPalette {
   /// could not contain: empty, with surrounding blanks, or with a comma, `#` or line end in it.
   explicit LabelPalette(const std::vector<LabelClass>& entries);
 
-  [[nodiscard]] const std::vector<LabelClass>& classes() const { return classes_; }  ///< By id.
+  [[nodiscard]] const std::vector<LabelClass>& classes() const {
+    return classes_;
+  }  ///< Classes,
+     ///< ascending
+     ///< by id.
 
   /// nullptr if no class has this id.
   [[nodiscard]] const LabelClass* find(LabelId id) const;
@@ -45,7 +49,7 @@ class LabelPalette {
 
  private:
   std::vector<LabelClass> classes_;
-  std::vector<LabelClass> others_;  // further entries of an id, ascending ids
+  std::vector<LabelClass> others_;  // further entries of ids, ascending by id
   std::vector<std::pair<std::uint32_t, LabelId>> id_by_color_;  // sorted by 0xRRGGBB
 };
 

@@ -128,7 +128,8 @@ class RadialTangential {
   }
 
   const double* k_;  // k1, k2, p1, p2, k3, k4, k5, k6; zeros at the end for an omnidirectional lens
-  bool four_;        // the last four are 0, as for most lenses: less to compute
+  // True if the last four are 0, as for most lenses; their terms are then skipped.
+  bool four_;
 };
 
 // Newton's method on the disc of radius `max_radius`.
@@ -195,7 +196,7 @@ Eigen::Vector2d double_sphere(double xi, double alpha, const Eigen::Vector2d& b)
   return b * ((1.0 + xi) / (alpha * std::sqrt(r2 + z * z) + (1.0 - alpha) * z));
 }
 
-// Their unprojection.
+// Inverse of double_sphere(); nullopt outside `max_bearing`.
 std::optional<Eigen::Vector2d> inverse_double_sphere(double xi, double alpha,
                                                      const Eigen::Vector2d& point,
                                                      double max_bearing) {

@@ -17,7 +17,7 @@ struct RelativePose {
   KeyframeId from;
   KeyframeId to;
   SE3 T_from_to = SE3::Identity();
-  Matrix6 covariance = Matrix6::Identity();  ///< At T_from_to, see covariance.hpp.
+  Matrix6 covariance = Matrix6::Identity();  ///< Covariance of T_from_to, see covariance.hpp.
 };
 
 /// Two keyframes that place recognition considers the same place. `match` is always one of this

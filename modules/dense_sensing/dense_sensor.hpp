@@ -45,7 +45,8 @@ struct [[nodiscard]] DenseImages {
   std::shared_ptr<const DepthImage> depth;   ///< Null if there is a problem.
   std::shared_ptr<const LabelImage> labels;  ///< Null if there are none.
   bool wrong_label_size = false;    ///< Labels of another size than the left camera's are dropped.
-  std::size_t classes_outside = 0;  ///< From the network, see Segmentation.
+  std::size_t classes_outside = 0;  ///< Pixels of classes that the label map of the network lacks,
+                                    ///< see Segmentation.
 };
 
 /// Computes depth and labels of every pixel of one camera from a robot's images. Not thread-safe.

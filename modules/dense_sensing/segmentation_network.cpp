@@ -132,7 +132,7 @@ struct SegmentationNetwork::State {
   }
 
   SegmentationConfig config;
-  std::array<std::optional<LabelId>, kClasses> labels;  // by class
+  std::array<std::optional<LabelId>, kClasses> labels;  // label of each class of the network
   cv::dnn::Net net;
 };
 

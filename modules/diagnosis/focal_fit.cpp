@@ -12,7 +12,8 @@
 namespace km {
 namespace {
 
-constexpr double kFactorStep = 1e-4;  // for the derivative; the iteration ends below it
+constexpr double kFactorStep = 1e-4;  // step of the numeric derivative; smaller changes end the
+                                      // iteration
 constexpr double kSystematic_px = 0.01;
 
 using Shared = Eigen::Matrix<double, 7, 1>;  // rotation of the mounting, constant, factor

@@ -124,7 +124,8 @@ void fit_rotation(const Rates& image, const Rates& gyro, InertialFit& fit) {
         (of_all - of_rotation) / (gyro.squaredNorm() * std::max(image.squaredNorm(), 1e-12));
 }
 
-// If nothing rotates about an axis, its sign is undetermined: a rotation is preferred.
+// Without rotation about some axis, the sign of this axis is undetermined. Then the proper rotation
+// is preferred to the mirrored solution.
 void prefer_rotation(InertialFit& fit, const Rates& image, const Rates& gyro) {
   constexpr double kClearMirror = 0.02;
   if (fit.Q.determinant() > 0.0 || fit.mirror_gain > kClearMirror) return;

@@ -215,7 +215,7 @@ constexpr double kMaxTruthGap_s = 0.1;  // as for trajectories: longer gaps are 
 constexpr double kMaxTruthDifference_s = 0.01;
 constexpr double kMaxClosureNormError = 0.01;  // norm of a quaternion
 constexpr std::size_t kPoseColumn = 8;
-// So that differences fit
+// Largest stamp for which differences of stamps cannot overflow.
 constexpr Stamp kMaxKeyframeStamp = std::numeric_limits<Stamp>::max() / 2;
 constexpr double kMaxNumber = 1e9;  // larger than any number in a run's results
 

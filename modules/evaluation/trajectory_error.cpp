@@ -134,7 +134,8 @@ void add_absolute_errors(std::span<const PosePair> pairs, const Alignment& align
 void add_relative_errors(std::span<const PosePair> pairs, const Alignment& alignment,
                          double delta_s, Errors& errors) {
   const double tolerance_s = 0.1 * delta_s;
-  constexpr double kJitter = 0.01;  // share of the delta by which the last stamps may be early
+  // Tolerance at the end of the trajectory, as a share of delta_s.
+  constexpr double kJitter = 0.01;
   std::size_t j = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (seconds_between(pairs[i].stamp, pairs.back().stamp) < (1.0 - kJitter) * delta_s) break;

@@ -87,8 +87,8 @@ PlotPoint from_above(const SE3& T) {
   return {T.translation().x(), T.translation().y()};
 }
 
-// Each truth once, over the time that its estimates cover. The rest of a long recording would make
-// the compared part small.
+// Series of each distinct truth, cropped to the time that its estimates cover. The rest of a long
+// recording would make the compared part small in the plot.
 std::vector<PlotSeries> truth_series(std::span<const TrajectoryInput> inputs) {
   struct Drawn {
     std::span<const StampedPose> truth;

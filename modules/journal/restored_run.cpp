@@ -43,7 +43,8 @@ class RunRestorer {
   bool started_ = false;
   bool first_state_ = true;                                        // the next state is the first of
                                                                    // its process
-  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends as measured
+  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // closures by their ends, in the
+                                                                   // order of measurement
   std::map<ClosureId, ClosureOutcome> outcomes_;
 };
 

@@ -21,7 +21,7 @@ struct RestoredRun {
   std::vector<KeyframeOdometry> odometry;  ///< Index i is keyframe i.
   std::vector<Keyframe> keyframes;         ///< Index i is keyframe i, as in `odometry`.
   std::vector<JournalPlace> places;        ///< Places of the keyframes in the journal.
-  /// States of all images. Those after the last keyframe stay until they are estimated again.
+  /// States of all images. States after the last keyframe stay until they are estimated again.
   std::vector<OdometryState> states;
   std::vector<Closure> closures;  ///< Closures of this robot and of others, each once.
   /// Final outcomes of candidates: those verified whose closures are known, and those refused.

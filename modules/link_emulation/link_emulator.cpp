@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kHeader_bytes = 14;  // both addresses and the type
+constexpr std::size_t kHeader_bytes = 14;  // Ethernet header: both addresses and the type
 constexpr std::size_t kMaxRobots = 65536;  // the address has two bytes for the number
 
 bool is_possible(const LinkPlan& link) {

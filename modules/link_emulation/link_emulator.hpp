@@ -39,7 +39,7 @@ struct LinkPlan {
 /// Interval in which robots of different groups do not receive each other.
 struct LinkPartition {
   RunSpan when;
-  std::vector<std::size_t> group_of;  ///< By robot.
+  std::vector<std::size_t> group_of;  ///< Group of each robot.
 };
 
 /// Position of a robot in the common world frame at an instant of the run.
@@ -101,7 +101,7 @@ struct FrameTally {
 struct LinkCounts {
   FrameTally in;
   FrameTally delivered;
-  std::array<FrameTally, kLinkLosses> lost;  ///< By LinkLoss.
+  std::array<FrameTally, kLinkLosses> lost;  ///< Lost frames, indexed by LinkLoss.
   double delay_sum_s = 0.0;                  ///< Sum over the delivered frames.
   double delay_max_s = 0.0;
 
@@ -152,8 +152,9 @@ class LinkEmulator {
   [[nodiscard]] Eigen::Vector3d position(std::size_t robot, double now_s) const;
 
   LinkScript script_;
-  std::vector<State> states_;                       // as the links of the script
-  std::multimap<double, LinkDelivery> on_the_way_;  // by time; equal ones in the order of insertion
+  std::vector<State> states_;                       // states in the order of the script's links
+  std::multimap<double, LinkDelivery> on_the_way_;  // deliveries by time; those of equal time in
+                                                    // the order of insertion
 };
 
 /// A table of the frames of each ordered pair of robots, with their `names`.

@@ -24,7 +24,7 @@ constexpr int kPatchSize = (2 * kHalf + 1) * (2 * kHalf + 1);
 constexpr double kUniqueness = 1.15;
 constexpr int kNeighbour = 2;               // [px]
 constexpr int kMaxLeftRightDifference = 1;  // [px]
-constexpr double kMaxRefinement_px = 1.5;   // in disparity
+constexpr double kMaxRefinement_px = 1.5;   // largest change of the disparity by the refinement
 constexpr double kMaxRowOffset_px = 1.5;    // remaining violation of the epipolar constraint after
                                             // calibration
 

@@ -50,7 +50,7 @@ class KeyframeRequests {
   /// Notes that the keyframe has arrived. False if it was not requested.
   [[nodiscard]] bool arrived(const KeyframeId& keyframe);
 
-  /// Its owner does not have it at `now_s`.
+  /// Notes that the owner of the keyframe does not have it at `now_s`.
   void absent(const KeyframeId& keyframe, double now_s);
 
   /// Notes that the peer has returned: its unanswered requests are due at once.
@@ -65,12 +65,12 @@ class KeyframeRequests {
  private:
   struct Request {
     bool asked = false;   // under way
-    int attempts = 0;     // without an answer
-    double next_s = 0.0;  // not asked (again) before
+    int attempts = 0;     // requests without an answer so far
+    double next_s = 0.0;  // time before which no (further) request is sent
   };
   struct Peer {
     std::map<std::uint32_t, Request> requests;
-    std::deque<std::uint32_t> waiting;  // not under way, oldest first
+    std::deque<std::uint32_t> waiting;  // keyframes whose request is not sent yet, oldest first
     int outstanding = 0;
   };
 

@@ -30,27 +30,29 @@ namespace km {
 
 /// Channels of the loop closure node; they must outlive it.
 struct LoopClosureTopics {
-  In<Keyframe> keyframes;              ///< Own.
-  In<LoopCandidate> candidates;        ///< Pairs that look like the same place.
-  In<RelativePose> measured_closures;  ///< Known ones, from own keyframes.
-  In<KeyframeRequest> peer_requests;   ///< For own keyframes.
-  In<KeyframeReply> peer_replies;      ///< To this robot's requests.
-  In<PeerEvent> peer_events;           ///< Links to peers that begin and end.
+  In<Keyframe> keyframes;              ///< Keyframes of this robot.
+  In<LoopCandidate> candidates;        ///< Pairs that may show the same place.
+  In<RelativePose> measured_closures;  ///< Closures of a recorded graph from keyframes of this
+                                       ///< robot.
+  In<KeyframeRequest> peer_requests;   ///< Requests of peers for keyframes of this robot.
+  In<KeyframeReply> peer_replies;      ///< Replies of peers to requests of this robot.
+  In<PeerEvent> peer_events;           ///< Beginning and end of links to peers.
   In<PeerEvent> restarts;              ///< kRestarted, before the first candidate of the new
                                        ///< incarnation.
   In<KeyframeBow> peer_bows;           ///< Words of the peers' keyframes.
-  In<ClosureOutcome> restored;         ///< Outcomes of candidates in a former process.
+  In<ClosureOutcome> restored;         ///< Outcomes of candidates from a former process of this
+                                       ///< robot.
   Out<Addressed<KeyframeRequest>> own_requests;
   Out<Addressed<KeyframeReply>> own_replies;
-  Out<Closure> own_closures;     ///< Verified.
+  Out<Closure> own_closures;     ///< Verified closures of this robot.
   Out<PeerEvent> own_restarts;   ///< kRestarted, after the last closure with a former keyframe.
   Out<ClosureOutcome> outcomes;  ///< Published whenever a candidate reaches a further stage or
                                  ///< stops.
 };
 
-/// A clock tick: due requests are sent.
+/// Clock tick at which due requests are sent.
 struct LoopClosureTick {
-  double now_s = 0.0;  ///< From any origin, not decreasing.
+  double now_s = 0.0;  ///< Clock with any origin, not decreasing.
 };
 
 /// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A): requests the
@@ -106,9 +108,11 @@ class LoopClosureNode final : public Node {
   struct Work {
     ClosureId id;
     double similarity = 0.0;
-    int support = 1;                            ///< See LoopCandidate.
-    std::optional<RelativePose> measured = {};  ///< Empty: to be verified.
-    bool requested = false;                     ///< The other end has been asked for.
+    int support = 1;                            ///< Support as in LoopCandidate.
+    std::optional<RelativePose> measured = {};  ///< Measured closure; empty if the candidate has to
+                                                ///< be verified.
+    bool requested = false;                     ///< True once the keyframe of the other robot has
+                                                ///< been requested.
   };
 
   void put_away_before(KeyframeIndex newest);

@@ -185,8 +185,9 @@ struct PoseFit {
                                                  int max_iterations);
 
 /// `fit.information` without the `share` of the pairs that determine the pose the most, at least
-/// two. Those are the pairs whose information has the largest trace in units of the whole. If a few
-/// pairs decide a pose, which may be wrong pairs that fit by chance, little information remains.
+/// two. A pair determines the pose the more, the larger the trace of its information is in units of
+/// the whole. If a few pairs decide a pose, which may be wrong pairs that fit by chance, little
+/// information remains.
 [[nodiscard]] Matrix6 information_without_strongest(const PoseFit& fit,
                                                     std::span<const ImagePair> pairs,
                                                     std::span<const std::size_t> indices,

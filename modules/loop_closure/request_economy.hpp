@@ -56,13 +56,15 @@ class RequestEconomy {
   /// Candidates of one peer with about equal support.
   struct Kind {
     int failures = 0;
-    int passed_over = 0;  ///< Queries since one was asked for.
+    int passed_over = 0;  ///< Queries since a candidate of this kind was requested.
   };
   struct Peer {
-    std::set<std::pair<KeyframeIndex, KeyframeIndex>> links;  ///< (the peer's, own).
+    std::set<std::pair<KeyframeIndex, KeyframeIndex>> links;  ///< Pairs (keyframe of the peer, own
+                                                              ///< keyframe).
     std::set<std::pair<KeyframeIndex, KeyframeIndex>> tried;
     int successes = 0;
-    std::array<Kind, 6> kinds;                     ///< By support; 5 and more share a kind.
+    std::array<Kind, 6> kinds;                     ///< Indexed by support; supports of 5 and more
+                                                   ///< share a kind.
     std::map<KeyframeIndex, std::size_t> kind_of;  ///< Kinds of the requested keyframes.
     std::optional<KeyframeIndex> in_vain;          ///< The last candidate that was skipped as
                                                    ///< kVain.

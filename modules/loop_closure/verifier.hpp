@@ -10,7 +10,7 @@ namespace km {
 enum class VerificationStatus {
   kAccepted,
   kTooFewMatches,  ///< The images do not look alike.
-  kNoConsensus,    ///< No pose that enough of the matches agree with.
+  kNoConsensus,    ///< Too few matches agree on any pose.
   kDegenerate,     ///< The matches leave the pose undetermined (few points, on a line).
   kTooFewInliers,  ///< Too few correspondences support the refined pose.
   kPoorlyHeld,     ///< Without its strongest inliers the pose would be too uncertain.
@@ -25,11 +25,12 @@ struct Verification {
   VerificationStatus status = VerificationStatus::kTooFewMatches;
   SE3 T_from_to = SE3::Identity();           ///< Relative pose of the bodies; set if accepted, like
                                              ///< covariance.
-  Matrix6 covariance = Matrix6::Identity();  ///< At T_from_to, see modules/core/covariance.hpp.
+  Matrix6 covariance = Matrix6::Identity();  ///< Covariance of T_from_to, see
+                                             ///< modules/core/covariance.hpp.
   int matches = 0;                  ///< Pairs of similar descriptors, at least one of them with
                                     ///< depth.
   int consensus = 0;                ///< Matches that agree with the best sampled pose.
-  int iterations = 0;               ///< Samples drawn.
+  int iterations = 0;               ///< Number of samples drawn.
   int inliers = 0;                  ///< Correspondences found with the known pose that support it.
   double position_sigma_m = 0.0;    ///< Without the strongest inliers; all three axes together.
   double rotation_sigma_rad = 0.0;  ///< Without the strongest inliers; all three axes together.

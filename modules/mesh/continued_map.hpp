@@ -16,7 +16,7 @@ class ContinuedMap {
 
   [[nodiscard]] const MapMesh& before() const { return before_; }
 
-  /// Both maps in one.
+  /// Returns the former map and `now` as one map.
   [[nodiscard]] MapMesh with(const MapMesh& now) const;
 
   /// Drops faces of the former map whose vertices are all listed. Returns the rest for the mapper,

@@ -37,7 +37,7 @@ struct SupersededVertex {
 };
 
 /// Surface that a map contains twice: its mapper may drop the faces whose vertices are all listed.
-/// Each heir has a face that stays.
+/// Each heir belongs to a face that is not dropped.
 struct SupersededSurface {
   std::vector<SupersededVertex> vertices;  ///< Ascending ids, each once.
 };

@@ -197,7 +197,7 @@ struct SharedVertexHash {
   }
 };
 
-// The step is positive, and the position is one where a robot may be.
+// True if the step of the grid is positive, and the origin lies within the reach of a robot.
 bool are_positions_usable(const MeshChunk& chunk) {
   if (!(chunk.step_m > 0.0F)) return false;
   return std::ranges::all_of(chunk.origin, [&](std::int32_t c) {

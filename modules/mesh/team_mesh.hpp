@@ -14,8 +14,8 @@ namespace km {
 /// Result for one chunk.
 enum class ChunkVerdict {
   kTaken,
-  kEarlierBoot,  ///< From a process of a robot that has restarted since; ignored.
-  kNoRoom,       ///< Its robot's mesh would become too large; ignored.
+  kEarlierBoot,  ///< Ignored, because the robot has restarted since.
+  kNoRoom,       ///< Ignored, because the mesh of the robot would become too large.
 };
 
 /// "taken", "of an earlier boot", "no room"

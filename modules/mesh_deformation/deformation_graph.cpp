@@ -184,8 +184,8 @@ class AnchorCost final : public ceres::SizedCostFunction<6, 7> {
 // half a metre away within 2 cm hold a node's rotation to 2 degrees each, this term to 30.
 constexpr double kRotationNoise_rad = 0.5;
 
-// The solver stops when a step changes the poses by less than this share of their size. That is far
-// below the resolution of a mesh in floats.
+// The solver stops when a step changes the poses by less than this share of their size. The share
+// is far below the resolution of a mesh in floats.
 constexpr double kParameterTolerance = 1e-10;
 
 // The problem with its poses and costs, to which Ceres only refers.

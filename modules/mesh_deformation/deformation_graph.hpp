@@ -28,7 +28,8 @@ struct DeformationGraph {
   std::vector<std::array<std::uint32_t, 2>> edges;  ///< Neighbouring nodes, each pair once.
   std::vector<KeyframeTie> ties;                    ///< Ascending nodes.
 
-  /// Both directions of every mesh edge; position and rotation of every tie.
+  /// Number of terms in the cost: one per direction of every edge, and position and rotation of
+  /// every tie.
   [[nodiscard]] std::size_t term_count() const { return 2 * edges.size() + 2 * ties.size(); }
 };
 
@@ -118,7 +119,7 @@ struct [[nodiscard]] DeformationSolution {
 
 /// First guess from the solution `last` for the anchors `T_world_kf_last`: every vertex of the
 /// graph moves like the anchor of its (first) keyframe since then. Vertices that `last` lacks are
-/// as in initial_poses(). Those that `last` has must be the first ones of the graph.
+/// as in initial_poses(). Precondition: the vertices of `last` are the first ones of the graph.
 [[nodiscard]] DeformationPoses carried_over_poses(const DeformationGraph& graph,
                                                   const DeformationPoses& last,
                                                   std::span<const SE3> T_world_kf_last,

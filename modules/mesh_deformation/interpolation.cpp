@@ -143,7 +143,7 @@ Binding weigh(std::span<const NearNode> nearest, bool all_found) {
     binding.weights[j] = root * root;
     sum += root * root;
   }
-  for (std::size_t j = 0; j < used; ++j)  // all equally far, so equal weights
+  for (std::size_t j = 0; j < used; ++j)  // equal weights, because all nodes are equally far
     binding.weights[j] =
         sum > kNoWeight ? binding.weights[j] / sum : 1.0 / static_cast<double>(used);
   if (all_found)

@@ -256,7 +256,8 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
       solve(graph, anchors, state.noise(),
             {state.config.max_iterations, state.config.energy_tolerance}, std::move(initial));
 
-  std::vector<SE3> T_world_odom;  // for each keyframe; moves vertices without a node
+  std::vector<SE3> T_world_odom;  // correction at each keyframe, which moves vertices without a
+                                  // node
   for (std::size_t i = 0; i < anchors.size(); ++i)
     T_world_odom.push_back(anchors[i] * T_odom_kf[i].inverse());
   result.mesh = map.mesh;

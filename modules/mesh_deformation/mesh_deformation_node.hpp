@@ -88,7 +88,7 @@ class MeshDeformationNode final : public Node {
   double next_s_ = 0.0;
   bool ended_ = false;
   Timing timing_;
-  Latest<MapMesh> latest_map_;  // not yet handled
+  Latest<MapMesh> latest_map_;  // newest map, until it is handled
   Latest<Trajectory> latest_trajectory_;
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to

@@ -70,8 +70,8 @@ struct OrientedClosure {
 /// Quantities of a closure that all cycles through it use, computed once.
 ///
 /// Expressed in odom_a, where robot a began, covariances do not depend on the rest of the cycle.
-/// That of the closure is one matrix. That of the odometry between two keyframes is the difference
-/// of the covariances accumulated at each.
+/// The covariance of the closure is one matrix. The covariance of the odometry between two
+/// keyframes is the difference of the covariances accumulated at each.
 struct PreparedClosure {
   explicit PreparedClosure(const OrientedClosure& closure);
 

@@ -9,8 +9,9 @@ namespace km {
 
 /// How a cycle of two closures and the odometry between them is judged.
 enum class CycleCriterion {
-  kMahalanobis,  ///< Its distance from the identity, weighed by the covariance along the cycle.
-  kBounds,       ///< Its translation and its rotation against fixed bounds.
+  kMahalanobis,  ///< Mahalanobis distance of the cycle from the identity, with the covariance along
+                 ///< the cycle.
+  kBounds,       ///< Fixed bounds on translation and rotation of the cycle.
 };
 
 /// Which closures of a robot pair are handed to the optimiser.

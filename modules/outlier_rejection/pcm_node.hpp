@@ -61,8 +61,8 @@ class PcmNode final : public Node {
   /// wait of a pair begins with the first call after its first closure. `now_s`: any origin.
   void publish_changes(double now_s);
 
-  /// The runs of all robots are over, and all their closures have arrived. So no pair waits for a
-  /// witness any more, until a robot restarts. Safe to call from any thread, repeatedly.
+  /// Notes that the runs of all robots are over and all their closures have arrived. No pair waits
+  /// for a witness any more, until a robot restarts. Safe to call from any thread, repeatedly.
   void expect_no_more() { no_more_ = true; }
 
  private:
@@ -87,7 +87,8 @@ class PcmNode final : public Node {
   const RobotId self_;
   const std::uint32_t first_version_;
   const Out<InlierSet> inlier_sets_;
-  std::map<RobotId, Pair> pairs_;  // by the other robot; `self_` for closures inside this one
+  std::map<RobotId, Pair> pairs_;  // pairs by the other robot; `self_` for closures inside this
+                                   // robot
   std::map<RobotId, std::uint32_t> version_of_;
   std::atomic<bool> no_more_ = false;
   Worker<Input> worker_;

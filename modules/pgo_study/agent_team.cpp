@@ -17,14 +17,15 @@
 namespace km {
 namespace {
 
-constexpr double kTick_s = 0.05;  // as TeamNode
+constexpr double kTick_s = 0.05;  // period of TeamNode
 constexpr double kDelay_s = 1e-3;
-// The next session waits no longer than PoseGraphConfig::session_wait_s. Nothing comes thereafter.
+// Longest wait for the next session, beyond PoseGraphConfig::session_wait_s. A team without a
+// change for that long is finished.
 constexpr double kMargin_s = 5.0;
 
 using RobotPair = std::pair<RobotId, RobotId>;
 
-// A closure, and when both of its ends have been played.
+// A closure, and the time at which both of its ends have been played.
 struct PlayedClosure {
   double at_s = 0.0;
   Closure closure;
@@ -41,7 +42,7 @@ class PlayedPair {
     changed_ |= verdict == PcmVerdict::kAdded || verdict == PcmVerdict::kGrew;
     if (!since_s_) since_s_ = now_s;
   }
-  // The set, if it is new and counts.
+  // The inlier set, if it has changed and its closures count.
   std::optional<InlierSet> take(double now_s) {
     const bool inside = pair_.first == pair_.second;
     if (!changed_ || !(inside || closures_.is_witnessed() || now_s - *since_s_ >= wait_s_))
@@ -117,7 +118,7 @@ class AgentTeam {
     return options_.keyframes_per_s > 0.0 ? keyframe / options_.keyframes_per_s : 0.0;
   }
 
-  // Hands the robots what they measure by now. True if there was anything.
+  // Gives the robots their measurements up to now. True if there were any.
   bool play() {
     bool any = false;
     for (std::size_t k = 0; k < members_.size(); ++k) {
@@ -160,8 +161,8 @@ class AgentTeam {
            std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.waits(); });
   }
 
-  // Delivers what was sent before and lets everybody work who has something to do. True if nothing
-  // is left to do now.
+  // Delivers the messages in flight and steps each robot that is due. True if no robot is due and
+  // no message is in flight afterwards.
   bool exchange() {
     for (const Delivery& delivery : std::exchange(in_flight_, {})) {
       (void)members_[delivery.to].agent->receive(delivery.from, delivery.message);

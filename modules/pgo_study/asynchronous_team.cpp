@@ -9,7 +9,8 @@
 namespace km {
 namespace {
 
-// Of updates whose missed and concurrent changes are made up for; see the class comment.
+// Proximal weight that outweighs missed and concurrent changes of neighbours; see the class
+// comment.
 double weight_for(int max_delay) {
   constexpr double kSurplus = 1.01;
   return kSurplus * (1.0 + 2.0 * max_delay);
@@ -53,7 +54,7 @@ int AsynchronousTeam::step(RoundMeter& meter) {
   return 1;
 }
 
-// Poses that were overtaken by newer ones are dropped.
+// Poses that arrive after newer ones of the same neighbour are dropped.
 void AsynchronousTeam::deliver(RoundMeter& meter) {
   for (const Letter& letter : letters_) {
     if (letter.due > round_) continue;
@@ -67,14 +68,15 @@ void AsynchronousTeam::deliver(RoundMeter& meter) {
   std::erase_if(letters_, [&](const Letter& letter) { return letter.due <= round_; });
 }
 
-// Poses told in the round before lack nothing. In round 1 nobody moves, alone or not.
+// Poses sent in the previous round miss no update. No robot moves in round 1, even one without
+// neighbours.
 bool AsynchronousTeam::may_move(const Robot& robot) const {
   return round_ > 1 && std::all_of(robot.heard.begin(), robot.heard.end(), [&](const auto& entry) {
            return entry.second > 0 && round_ - 1 - entry.second <= options_.max_delay;
          });
 }
 
-// Also by a robot that has not moved: what it told before may be lost.
+// A robot that has not moved sends its poses too, because its last message may be lost.
 void AsynchronousTeam::send(std::size_t k, RoundMeter& meter) {
   Robot& robot = robots_[k];
   const ToldBlock poses = meter.run(k, [&] { return robot.block.round_public_poses(); });

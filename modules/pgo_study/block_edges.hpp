@@ -10,15 +10,15 @@
 
 namespace km {
 
-/// A robot's own edges as those of a block of its poses.
+/// Edges of a robot between its own poses, as edges of the block of these poses.
 [[nodiscard]] std::vector<BlockEdge> block_edges(std::span<const PoseEdge> own);
 
-/// Edges between a robot and others as those of its block, with the poses at their other ends as
-/// the fixed ones.
+/// Edges between a robot and others, as public edges of its block. The poses at their other ends
+/// are fixed.
 struct BlockBorder {
-  std::map<KeyframeId, Eigen::Index> fixed_of = {};  ///< Numbered from 0.
-  std::vector<PublicEdge> edges = {};                ///< As SessionGraph::between.
-  std::vector<RobotId> robot_of_edge = {};           ///< At the other end.
+  std::map<KeyframeId, Eigen::Index> fixed_of = {};  ///< Index of each fixed pose, from 0.
+  std::vector<PublicEdge> edges = {};                ///< In the order of SessionGraph::between.
+  std::vector<RobotId> robot_of_edge = {};           ///< By edge: the robot at the other end.
   std::vector<KeyframeIndex> own = {};               ///< The robot's own ends, ascending.
 };
 

@@ -7,7 +7,8 @@ namespace km {
 namespace {
 
 constexpr std::uint32_t kMaxRounds = 300;
-constexpr double kPatience = 8.0;  // rounds: second derivatives need not be told
+// Rounds. Generous, because second derivatives cost no messages on one computer.
+constexpr double kPatience = 8.0;
 
 bool rigid(const LiftedPoses& X) {
   if (X.rows() != 3) return false;
@@ -41,7 +42,7 @@ CentralSolver::CentralSolver(const std::vector<BlockEdge>& edges, LiftedPoses st
 
 bool CentralSolver::step() {
   if (!newton_) return staircase_.step();
-  (void)newton_->advance();  // there is nobody to write to
+  (void)newton_->advance();  // a team of one sends no messages
   X_ = lift(newton_->poses(), 3);
   if (newton_->done()) {
     staircase_.restart_at_minimum(std::move(X_));

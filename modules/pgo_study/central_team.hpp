@@ -7,9 +7,9 @@
 
 namespace km {
 
-/// The reference: the whole graph on one computer, see CentralSolver. A round is one of its steps,
-/// all work is robot 0's; what bringing the measurements together would cost in bytes is not
-/// counted.
+/// Reference method: the whole graph on one computer, see CentralSolver. A round is one step of
+/// CentralSolver, and all work counts for robot 0. The bytes for collecting the measurements are
+/// not counted.
 class CentralTeam : public TeamSolver {
  public:
   /// `start`: r x 4n, z up if the graph has verticals.

@@ -16,15 +16,17 @@ using Eigen::Index;
 
 constexpr double kCertifiedGap = 1e-4;
 constexpr double kTightGap = 1e-8;
-constexpr double kRounding = 1e-12;    // of the precisions that meet in a pose
-constexpr double kLeastShift = 1e-14;  // likewise: below, a singular S has no Cholesky factor
+constexpr double kRounding = 1e-12;  // relative to the largest sum of kappa at a pose
+// Relative to the largest sum of kappa at a pose. With a smaller shift the Cholesky factorisation
+// of a singular S fails.
+constexpr double kLeastShift = 1e-14;
 constexpr double kShiftGrowth = 30.0;
 constexpr int kMaxProducts = 60;
 constexpr double kEigenTolerance = 1e-6;
 constexpr double kUnitRoundoff = 0.5 * std::numeric_limits<double>::epsilon();
 
-// 1 on the columns that are of unit length in every solution, the rotations' and the vertical's; 0
-// on translations and on what is only there to fill the vertical's block.
+// 1 for the columns that have unit length in every solution: those of rotations, and the vertical.
+// 0 for translations and for the padding of the block of the vertical.
 Eigen::VectorXd unit_columns(const QuadraticProblem& problem) {
   const Eigen::Index poses = problem.poses();
   Eigen::VectorXd units = Eigen::Vector4d(1.0, 1.0, 1.0, 0.0).replicate(poses, 1);
@@ -34,7 +36,8 @@ Eigen::VectorXd unit_columns(const QuadraticProblem& problem) {
   return units;
 }
 
-// `S` with what no cost depends on held: one translation, and the filling of the vertical's block.
+// `S` with `held` added to diagonal entries on which no cost depends: those of one translation and
+// of the padding of the block of the vertical.
 Eigen::SparseMatrix<double> hold(Eigen::SparseMatrix<double> S, const QuadraticProblem& problem,
                                  Index pose, double held) {
   S.coeffRef(4 * pose + 3, 4 * pose + 3) += held;
@@ -46,7 +49,7 @@ Eigen::SparseMatrix<double> hold(Eigen::SparseMatrix<double> S, const QuadraticP
   return S;
 }
 
-// S + shift * units, factorised for one shift after the other.
+// Factorises S + shift * units for several shifts with one elimination plan.
 class ShiftedCholesky {
  public:
   explicit ShiftedCholesky(const Eigen::SparseMatrix<double>& S) : cholesky_(make_plan(S)) {
@@ -54,7 +57,7 @@ class ShiftedCholesky {
     const auto nodes = static_cast<std::size_t>(cholesky_.plan().nodes());
     S_ = BlockMatrix::zero(4, nodes, pairs.size());
     int pair = 0;
-    for (int j = 0; j < cholesky_.plan().nodes(); ++j) {  // the order of make_plan()
+    for (int j = 0; j < cholesky_.plan().nodes(); ++j) {  // in the order of make_plan()
       for (Index c = 0; c < 4; ++c)
         for (Eigen::SparseMatrix<double>::InnerIterator s(S, 4 * j + c); s; ++s)
           if (s.row() / 4 == j) S_.at(j)(s.row() % 4, c) = s.value();
@@ -72,7 +75,7 @@ class ShiftedCholesky {
     }
   }
 
-  // False: S + shift * units is not positive definite, but for rounding.
+  // False: up to rounding, S + shift * units is not positive definite.
   [[nodiscard]] bool factorise(const Eigen::VectorXd& units, double shift) {
     A_ = S_;
     for (Index i = 0; i < units.size(); ++i) A_.diagonal(i % 4, i) += shift * units(i);
@@ -86,10 +89,10 @@ class ShiftedCholesky {
     return x;
   }
 
-  // The last factors are exact for a matrix A + E with |E_ij| <= c u (|L| |L|^T)_ij but for u^2, c
-  // being the terms of the sum (Higham, "Accuracy and Stability of Numerical Algorithms", 10.1.1).
-  // If no |Z_ij| is above reach_i reach_j, tr(E Z) is at most this; c is at most the geometric mean
-  // of the numbers of entries of L's rows i and j.
+  // Upper bound of tr(E Z) if |Z_ij| <= reach_i reach_j for all entries. The last factors are exact
+  // for a matrix A + E. Here |E_ij| <= c u (|L| |L|^T)_ij to first order in u (Higham, "Accuracy
+  // and Stability of Numerical Algorithms", 10.1.1). c is the number of terms of the sum, at most
+  // the geometric mean of the numbers of entries of rows i and j of L.
   [[nodiscard]] double rounding(const Eigen::VectorXd& reach) const {
     constexpr double kMoreTerms = 3.0;  // reciprocal, product or square root, second order
     const EliminationPlan& plan = cholesky_.plan();
@@ -129,7 +132,7 @@ class ShiftedCholesky {
   BlockMatrix A_;
 };
 
-// Shortest paths over the edges from pose `from`: their lengths [m], and the sums of 1 / tau.
+// Shortest paths over the edges from pose `from`: their lengths [m], and their sums of 1 / tau.
 struct Paths {
   Eigen::VectorXd length_m;
   Eigen::VectorXd variance;
@@ -167,7 +170,7 @@ Paths shortest_paths(const QuadraticProblem& problem, Index from) {
   return paths;
 }
 
-// A pose from which the others are not far.
+// A pose with a small largest distance to all others.
 Index middle_pose(const QuadraticProblem& problem) {
   const auto farthest = [](const Eigen::VectorXd& lengths) {
     Index pose = 0;
@@ -182,9 +185,10 @@ Index middle_pose(const QuadraticProblem& problem) {
   return middle;
 }
 
-// How large the columns of poses that cost at most `cost` can be if `held` stands at the origin: 1
-// on rotations; a translation is at most the sum of those measured on the way there and of their
-// residuals e, and sum |e| <= sqrt(sum 1 / tau) sqrt(sum tau |e|^2).
+// Upper bounds of the norms of the columns of all poses that cost at most `cost`, with `held` at
+// the origin. The bound is 1 for rotations. A translation is at most the sum of the measured
+// translations on its path and of their residuals e, and sum |e| <= sqrt(sum 1 / tau) sqrt(sum tau
+// |e|^2).
 Eigen::VectorXd reach_of(const QuadraticProblem& problem, const Eigen::VectorXd& units, Index held,
                          double cost) {
   const Paths paths = shortest_paths(problem, held);
@@ -194,7 +198,7 @@ Eigen::VectorXd reach_of(const QuadraticProblem& problem, const Eigen::VectorXd&
   return reach;
 }
 
-// How many other edges each has between the same two poses.
+// For each edge, the number of other edges between the same two poses.
 std::vector<int> parallel_edges(const std::vector<BlockEdge>& edges) {
   const auto pair_of = [](const BlockEdge& e) { return std::minmax(e.i, e.j); };
   std::map<std::pair<Index, Index>, int> count;
@@ -205,13 +209,15 @@ std::vector<int> parallel_edges(const std::vector<BlockEdge>& edges) {
   return others;
 }
 
-// tr(E Z) at most for what rounding, E, has made of S on the way from edges and multipliers to its
-// entries. Those of an edge are -kappa R, kappa R R^T + tau t t^T, tau t and tau; on the diagonal
-// as many are summed as the pose has edges. tau is not rounded but in sums.
+// Upper bound of tr(E Z), where E is the rounding error of S as it is assembled from edges and
+// multipliers. An edge contributes the entries -kappa R, kappa R R^T + tau t t^T, tau t and tau. A
+// diagonal block sums one contribution per edge of its pose. Rounding affects the entries tau only
+// in sums.
 double assembly_rounding(const QuadraticProblem& problem, const Eigen::VectorXd& multipliers,
                          const Eigen::VectorXd& reach) {
-  constexpr double kTerms = 12.0;  // of an entry of T Omega T^T, and its subtractions
-  const double rotation = std::pow(1.0 + std::sqrt(3.0), 2);  // column sums of |R|: up to sqrt(3)
+  constexpr double kTerms = 12.0;  // terms of an entry of T Omega T^T, and its subtractions
+  const double rotation = std::pow(1.0 + std::sqrt(3.0), 2);  // column sums of |R| are at most
+                                                              // sqrt(3)
   Eigen::VectorXd degree = Eigen::VectorXd::Zero(problem.poses());
   for (const BlockEdge& e : problem.edges())
     for (const Index i : {e.i, e.j}) degree(i) += 1.0;
@@ -220,7 +226,7 @@ double assembly_rounding(const QuadraticProblem& problem, const Eigen::VectorXd&
   for (std::size_t k = 0; k < problem.edges().size(); ++k) {
     const BlockEdge& e = problem.edges()[k];
     const double d = std::max(degree(e.i), degree(e.j));
-    const double t = std::sqrt(3.0) * e.T_i_j.translation().norm();  // sum of |t_c|, at most
+    const double t = std::sqrt(3.0) * e.T_i_j.translation().norm();  // upper bound of sum |t_c|
     const double p_i = reach(4 * e.i + 3);
     const double p_j = reach(4 * e.j + 3);
     sum += (kTerms + d) * (3.0 * e.kappa * rotation + e.tau * t * (t + 2.0 * (p_i + p_j))) +
@@ -232,8 +238,8 @@ double assembly_rounding(const QuadraticProblem& problem, const Eigen::VectorXd&
   return kUnitRoundoff * (sum + (kTerms + n) * multipliers.cwiseAbs().sum());
 }
 
-// The best translations for the rotations of X: with others, which over long chains differ by much
-// at next to no cost, the bound would be loose.
+// X with the best translations for its rotations. Along long chains, translations can differ by
+// much from the best ones at nearly the same cost, and the bound would be loose.
 LiftedPoses with_best_translations(const QuadraticProblem& problem, LiftedPoses X, Index pose,
                                    double held) {
   const LiftedPoses XQ = 0.5 * problem.euclidean_gradient(X);
@@ -254,14 +260,16 @@ LiftedPoses with_best_translations(const QuadraticProblem& problem, LiftedPoses 
   return X;
 }
 
-// Turned as a whole, the least, to where the priors do not pull it any further: a common tilt costs
-// its square, but loosens the bound in proportion, microradians by more than the cost.
+// X after the smallest common rotation that minimises the cost of the priors. The cost of a common
+// tilt is quadratic in its angle, but it loosens the bound linearly. Microradians of tilt can
+// loosen the bound by more than the cost.
 LiftedPoses with_best_tilt(const QuadraticProblem& problem, const LiftedPoses& X) {
   Eigen::VectorXd up = Eigen::VectorXd::Zero(X.rows());
   for (const VerticalPrior& v : problem.verticals())
     up += v.weight * (X.middleCols<3>(4 * v.pose) * v.up);
   const Eigen::VectorXd z = lifting_matrix(X.rows()).col(2);
-  constexpr double kOverhead = -0.5;  // cosine; from beyond there is no least turn to speak of
+  constexpr double kOverhead = -0.5;  // cosine; at larger angles the smallest rotation is
+                                      // ill-conditioned
   const double norm = up.norm();
   if (!(up.dot(z) > kOverhead * norm)) return X;
   up /= norm;
@@ -269,8 +277,8 @@ LiftedPoses with_best_tilt(const QuadraticProblem& problem, const LiftedPoses& X
   return X - middle * (middle.transpose() * X) / (1.0 + up.dot(z)) + 2.0 * z * (up.transpose() * X);
 }
 
-// The vertical's rows and columns of S. On the rotations the priors are linear, |Y up| being 1:
-// what they add to Q and to Lambda there is the same.
+// Appends the rows and columns of the vertical to S. On the rotations the priors are linear,
+// because |Y up| is 1. They contribute equally to Q and to Lambda there.
 void append_vertical(const QuadraticProblem& problem, const LiftedPoses& X,
                      std::vector<Eigen::Triplet<double>>& entries) {
   const Eigen::VectorXd z = lifting_matrix(X.rows()).col(2);
@@ -285,14 +293,15 @@ void append_vertical(const QuadraticProblem& problem, const LiftedPoses& X,
   }
 }
 
-// A multiple of [X z]'s row along z, to which S is blind, puts the vertical back in its place.
+// Changes `direction` so that the vertical stays constant, by a multiple of the row of [X z] along
+// z. This row is in the kernel of S.
 Eigen::VectorXd with_vertical_held(const Eigen::VectorXd& direction, const LiftedPoses& X) {
   const double moved = direction.size() > X.cols() ? direction(X.cols() + 2) : 0.0;
   return direction.head(X.cols()) - moved * X.row(2).transpose();
 }
 
-// sym(Y_i^T (X Q)_Y,i) of every pose, side by side. Whatever X is, S and tr(Lambda) belong
-// together.
+// sym(Y_i^T (X Q)_Y,i) of every pose, side by side. The bound of certify() holds for every X,
+// because S and tr(Lambda) use the same multipliers.
 Eigen::Matrix3Xd multipliers(const QuadraticProblem& problem, const LiftedPoses& X) {
   const LiftedPoses XQ = 0.5 * problem.euclidean_gradient(X);
   Eigen::Matrix3Xd Lambda(3, 3 * problem.poses());
@@ -303,7 +312,7 @@ Eigen::Matrix3Xd multipliers(const QuadraticProblem& problem, const LiftedPoses&
   return Lambda;
 }
 
-// tr(Lambda) with the vertical's multiplier and what the priors hold whatever X is.
+// tr(Lambda) plus the multiplier of the vertical and the constant terms of the priors.
 double dual_value(const QuadraticProblem& problem, const LiftedPoses& X,
                   const Eigen::Matrix3Xd& Lambda) {
   double sum = 0.0;
@@ -314,7 +323,7 @@ double dual_value(const QuadraticProblem& problem, const LiftedPoses& X,
   return sum;
 }
 
-// What is left once one pose stands at the origin: the eigenvalue problem of certify().
+// Eigenvalue problem of certify(), with one pose held at the origin.
 class ProofOf {
  public:
   ProofOf(const QuadraticProblem& problem, const LiftedPoses& X)
@@ -333,14 +342,16 @@ class ProofOf {
 
   [[nodiscard]] bool definite(double shift) { return cholesky_->factorise(units_, shift); }
 
-  // After definite(shift): what costs at most as much as X costs at least this.
+  // Lower bound of the cost of all points that cost at most as much as X. Precondition:
+  // definite(shift) was called last and returned true.
   [[nodiscard]] double bound(double shift, double rounding) const {
     return std::max(0.0, dual_ - shift * units_.sum() - rounding);
   }
   [[nodiscard]] double rounding() const { return assembly_rounding_ + cholesky_->rounding(reach_); }
 
-  // After definite(shift): the smallest eigenvalue, from above, and its direction. Rotations of (S
-  // + shift)^-1 applied to rotations: the inverse of the shifted Schur complement.
+  // The smallest eigenvalue, from above, and its direction. The iterated operator is the block of
+  // (S + shift)^-1 on the rotations: the inverse of the shifted Schur complement. Precondition:
+  // definite(shift) was called last and returned true.
   [[nodiscard]] LanczosResult smallest_eigenpair(double shift, unsigned seed) const {
     const auto inverse = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
       return units_.cwiseProduct(cholesky_->solve(units_.cwiseProduct(v)));
@@ -364,8 +375,9 @@ class ProofOf {
   double assembly_rounding_ = 0.0;
 };
 
-// Where no factorisation up to `refused` was definite the smallest eigenvalue is below -refused. A
-// Ritz value above that has not seen its eigenvector: the next start does, or the one after.
+// If no factorisation up to the shift `refused` was definite, the smallest eigenvalue is below
+// -refused. A larger Ritz value then shows that the start was nearly orthogonal to the eigenvector,
+// so other starts are tried.
 LanczosResult eigenpair_below(const ProofOf& proof, double shift, double refused, unsigned seed) {
   constexpr unsigned kStarts = 4;
   constexpr unsigned kBetweenSeeds = 1000;
@@ -439,7 +451,8 @@ Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X) {
     }
     static_cast<void>(prove(shift));
   }
-  // Another start at every rank: a direction left in the last escape hides its multiples.
+  // The start differs between ranks. The Krylov space of a start contains only one eigenvector of a
+  // multiple eigenvalue, and the last escape has already used that one.
   const LanczosResult least =
       eigenpair_below(proof, shift, refused, static_cast<unsigned>(X.rows()));
   certificate.lambda_min = least.value;
@@ -454,7 +467,7 @@ LiftedPoses escape(const QuadraticProblem& problem, const LiftedPoses& X,
   LiftedPoses step = LiftedPoses::Zero(lifted.rows(), lifted.cols());
   step.bottomRows(1) = direction.transpose();
   const double cost = problem.cost(lifted);
-  // One pose turns by half a radian at first.
+  // In the first trial the pose that rotates most rotates by half a radian.
   double largest = 0.0;
   for (Eigen::Index i = 0; i < problem.poses(); ++i)
     largest = std::max(largest, direction.segment<3>(4 * i).norm());

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Of the preconditioner, relative to the sums of kappa and tau at a pose.
+// Shifts of the preconditioner, relative to the largest sums of kappa and tau at a pose.
 constexpr double kRotationShift = 1e-4;
 constexpr double kTranslationShift = 1e-10;
 
@@ -159,7 +159,7 @@ CertificateState CertificateAgent::iterate(const Eigen::MatrixXd& sums) {
   Eigen::Matrix3d B = sums.leftCols<3>();
   B(2, 2) -= c.squaredNorm();
   Eigen::Matrix3d A = 0.5 * (sums.middleCols<3>(3) + sums.middleCols<3>(3).transpose());
-  // A vector that is not there yet, or not independent, is left out.
+  // Vectors that are still zero or linearly dependent are left out.
   Eigen::Vector3d scale;
   for (int i = 0; i < 3; ++i) scale(i) = B(i, i) > 0.0 ? 1.0 / std::sqrt(B(i, i)) : 0.0;
   B = (scale.asDiagonal() * B * scale.asDiagonal()).eval();

@@ -6,7 +6,7 @@
 namespace km {
 namespace {
 
-// Sets of poses that edges join.
+// Union-find over poses.
 class JoinedPoses {
  public:
   explicit JoinedPoses(Eigen::Index poses) : parent_(static_cast<std::size_t>(poses)) {
@@ -39,7 +39,7 @@ std::vector<ConnectedPart> connected_parts(const TeamGraph& graph,
                   static_cast<std::size_t>(graph.edges[k].j));
   std::vector<ConnectedPart> parts;
   std::map<std::size_t, std::size_t> part_of_root;
-  std::vector<std::size_t> last_robot;  // of each part
+  std::vector<std::size_t> last_robot;  // last robot of each part so far
   std::vector<Eigen::Index> number(static_cast<std::size_t>(graph.poses()), -1);
   for (std::size_t i = 0; i < number.size(); ++i) {
     if (!keep_pose[i]) continue;

@@ -7,15 +7,15 @@
 
 namespace km {
 
-/// A connected part of a team's graph, with robots, poses and edges in the order of the whole.
+/// A connected part of a team's graph. Robots, poses and edges keep the order of the whole graph.
 struct ConnectedPart {
-  TeamGraph graph;                 ///< Of the robots that have a pose in it.
+  TeamGraph graph;                 ///< Graph of the robots that have a pose in the part.
   std::vector<std::size_t> poses;  ///< [i]: number of pose i in the whole graph.
   std::vector<std::size_t> edges;  ///< [k]: number of edge k in the whole graph.
 };
 
-/// The connected parts of what is left of `graph` with the poses and edges that are kept, ascending
-/// by their first pose. An edge whose end is not kept is left out. Preconditions: `keep_pose` and
+/// Returns the connected parts of the subgraph of the kept poses and edges, ascending by their
+/// first pose. An edge whose end is not kept is left out. Preconditions: `keep_pose` and
 /// `keep_edge` have an element for each pose and each edge.
 [[nodiscard]] std::vector<ConnectedPart> connected_parts(const TeamGraph& graph,
                                                          const std::vector<bool>& keep_pose,

@@ -130,7 +130,8 @@ void GaussSeidelTeam::update_poses(Robot& robot) const {
   }
 }
 
-// First stage: the matrices of the relaxation, not yet rotations. Second: poses.
+// The first stage sends the matrices of the relaxation, which are not rotations yet. The second
+// stage sends poses.
 void GaussSeidelTeam::tell(std::size_t k, RoundMeter& meter) {
   const Robot& robot = robots_[k];
   ToldBlock told{robot.separators,

@@ -11,27 +11,28 @@
 namespace km {
 
 struct GaussSeidelOptions {
-  int max_sweeps = 200;     ///< In each of the two stages.
-  double tolerance = 1e-4;  ///< A stage ends when no robot changes more in a sweep: rms of the
-                            ///< entries of rotations; of rotation vectors [rad], positions [m].
+  int max_sweeps = 200;  ///< Limit for each of the two stages.
+  /// A stage ends when no robot changes by more in a sweep (RMS). The first stage compares the
+  /// entries of rotations, the second rotation vectors [rad] and positions [m].
+  double tolerance = 1e-4;
 };
 
 /// Two-stage distributed Gauss-Seidel (Choudhary et al., "Distributed Mapping with Privacy and
-/// Communication Constraints", IJRR 2017): first the rotations of the chordal relaxation, then one
-/// Gauss-Newton step of the whole poses from there, both linear and solved by block Gauss-Seidel
-/// sweeps over the robots. In the first sweep of a stage robots follow a tree from robot 0, whose
-/// first pose is held, and leave out the edges to robots that have not solved yet (flagged
-/// initialisation); afterwards robots of one colour solve together. The answer is the chordal
-/// initialisation improved once, not a minimum. Rank 3.
+/// Communication Constraints", IJRR 2017). The first stage solves for the rotations of the chordal
+/// relaxation. The second stage is one Gauss-Newton step of the whole poses from there. Both are
+/// linear and are solved by block Gauss-Seidel sweeps over the robots. In the first sweep of a
+/// stage robots follow a tree from robot 0, whose first pose is held. They leave out the edges to
+/// robots that have not solved yet (flagged initialisation). In later sweeps robots of one colour
+/// solve together. The result is the chordal initialisation improved once, not a minimum. Rank 3.
 class GaussSeidelTeam : public TeamSolver {
  public:
-  /// Poses of `start`, of the whole graph, stand in block() for translations that are not known
-  /// yet.
+  /// `start`: poses of the whole graph. block() uses their translations until the second stage has
+  /// computed translations.
   GaussSeidelTeam(const TeamGraph& graph, const std::vector<SE3>& start,
                   const GaussSeidelOptions& options = {});
 
   /// Throws std::invalid_argument, naming the robot, if its own edges and those to the robots
-  /// before it do not fix its poses.
+  /// before it do not determine its poses.
   int step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
     return robots_[robot].X;

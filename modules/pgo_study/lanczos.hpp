@@ -8,14 +8,15 @@ namespace km {
 
 struct [[nodiscard]] LanczosResult {
   double value = 0.0;
-  Eigen::VectorXd vector = {};  ///< Of unit length.
+  Eigen::VectorXd vector = {};  ///< Unit eigenvector.
   int products = 0;             ///< Applications of the operator.
   bool converged = false;
 };
 
-/// Largest eigenvalue, with its vector, of a symmetric operator `apply` of size n, by the Lanczos
-/// method with full reorthogonalisation (Golub and Van Loan, "Matrix Computations"): the residual
-/// is at most `tolerance` times the value once converged. The start is random.
+/// Computes the largest eigenvalue and its eigenvector of a symmetric operator `apply` of size n.
+/// The method is Lanczos' with full reorthogonalisation (Golub and Van Loan, "Matrix
+/// Computations"). Once converged, the residual is at most `tolerance` times the value. The start
+/// is random.
 template <typename Operator>
 LanczosResult largest_eigenpair(const Operator& apply, Eigen::Index n, int max_products,
                                 double tolerance, unsigned seed) {

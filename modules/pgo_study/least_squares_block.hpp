@@ -14,22 +14,24 @@ struct EdgeForm {
   Eigen::MatrixXd g_i, g_j;          ///< w x c
 };
 
-/// One robot's part of a linear least squares problem over a pose graph: unknowns of w rows and c
-/// columns for each of its poses, those of its neighbours given. Used for block Gauss-Seidel
-/// sweeps: each solve is exact, the factorisation is kept.
+/// One robot's part of a linear least squares problem over a pose graph. The unknowns are w rows
+/// and c columns for each of its poses; the values of its neighbours are given. Used for block
+/// Gauss-Seidel sweeps: each solve is exact, and the factorisation is reused.
 class LeastSquaresBlock {
  public:
-  /// Pose 0 stays what it is if `hold_first`: the anchor of the team.
+  /// `hold_first`: pose 0, the anchor of the team, is constant.
   LeastSquaresBlock(Eigen::Index poses, Eigen::Index width, Eigen::MatrixXd x, bool hold_first);
 
   void add_own(Eigen::Index i, Eigen::Index j, const EdgeForm& form);
-  /// An edge whose other end is pose `other` of robot `peer`. `form` is that of (own, other).
+  /// Adds an edge whose other end is pose `other` of robot `peer`. `form` has the ends (own,
+  /// other).
   void add_other(Eigen::Index own, std::size_t peer, Eigen::Index other, const EdgeForm& form);
 
-  /// What a neighbour's poses are; until then edges to it are left out ("flagged").
+  /// Sets the values of a neighbour's pose. Edges to poses without values are left out ("flagged").
   void set_other(std::size_t peer, Eigen::Index other, const Eigen::MatrixXd& x);
 
-  /// Solves for the own unknowns. Throws std::invalid_argument if what is known does not fix them.
+  /// Solves for the own unknowns. Throws std::invalid_argument if the known values do not determine
+  /// them.
   void solve();
 
   [[nodiscard]] Eigen::MatrixXd at(Eigen::Index pose) const {
@@ -55,7 +57,7 @@ class LeastSquaresBlock {
 
   Eigen::Index poses_;
   Eigen::Index width_;
-  Eigen::Index held_;  // poses at the front that are not unknown
+  Eigen::Index held_;  // number of constant poses at the beginning: 0 or 1
   Eigen::MatrixXd x_;  // (w n) x c
   std::vector<Own> own_;
   std::vector<Other> others_;

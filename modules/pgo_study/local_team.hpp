@@ -7,13 +7,13 @@
 
 namespace km {
 
-/// What cooperation is measured against: every robot solves its own graph alone (round 1); then the
-/// frames are joined along a tree of robots, each to its parent's by one closure between them, the
-/// first by id (one round for each level of the tree), level if all robots know which way is
-/// up. Rank 3.
+/// Baseline without cooperation. Every robot solves its own graph alone (round 1). Then the frames
+/// are joined along a tree of robots, one round per level of the tree. Each robot's frame is joined
+/// to its parent's by one closure, the first by id. The joined frames are level if all robots have
+/// verticals. Rank 3.
 class LocalTeam : public TeamSolver {
  public:
-  /// Throws std::invalid_argument, naming the robot, if the own edges of one do not connect its
+  /// Throws std::invalid_argument, naming the robot, if the own edges of a robot do not connect its
   /// poses.
   explicit LocalTeam(const TeamGraph& graph);
 

@@ -17,8 +17,8 @@ using Eigen::Index;
 
 namespace {
 
-// What robots do with what they know before a session: odometry that is noisier than it claims is
-// weighed accordingly, all know it, and no robot is much more precise than the others.
+// Corrects weights as robots do before a session. Odometry that is noisier than stated gets a lower
+// weight, and all robots know that weight. No robot remains much more precise than the others.
 void weigh_as_robots(std::vector<SessionGraph>& parts) {
   std::map<RobotId, OdometryNoise> noise;
   for (SessionGraph& part : parts) {
@@ -55,7 +55,7 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
   take_poses();
 }
 
-// As robots plan it for each other.
+// Places in the tree that the robots' own plan_session() computes.
 std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
   std::map<RobotId, TeamStatus> statuses;
   TeamLinks links;
@@ -81,7 +81,7 @@ std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
   return places;
 }
 
-// Public poses in single precision, each to everyone: what MemberPoses takes.
+// Sends all public poses to all robots in single precision, as MemberPoses does.
 void MemberTeam::tell_starts(std::vector<SE3> start, RoundMeter* meter) {
   std::set<KeyframeId> ends;
   for (const SessionGraph& part : parts_)
@@ -142,7 +142,7 @@ int MemberTeam::step(RoundMeter& meter) {
     if (!pass_on(round, meter))
       throw std::runtime_error("MemberTeam: the members wait for each other");
   take_poses();
-  // A solver may let its members know of every few rounds only.
+  // A solver may publish its state every few rounds only.
   rounds_ = rounds_before_ + std::max(round, state_.round);
   return static_cast<int>(rounds_ - before);
 }
@@ -151,7 +151,7 @@ bool MemberTeam::done() const {
   return std::all_of(members_.begin(), members_.end(), [](const auto& m) { return m->done(); });
 }
 
-// Every member works that has something to do, but for those that are a round ahead.
+// Every member that is ready advances, except for members that have completed `round` already.
 bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
   bool worked = !post_.empty();
   for (const Delivery& delivery : std::exchange(post_, {})) {

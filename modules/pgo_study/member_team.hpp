@@ -12,23 +12,23 @@
 
 namespace km {
 
-/// Which robots hear each other.
+/// Links between the robots.
 enum class TeamShape {
-  kAll,    ///< Everybody everybody.
-  kChain,  ///< Robot k only k - 1 and k + 1.
+  kAll,    ///< Every pair of robots has a link.
+  kChain,  ///< Robot k has links to k - 1 and k + 1 only.
 };
 
-/// A recorded graph solved by the members of a session as they are in the robots, with the letters
-/// between them: one session after the other, until no closure that was rejected fits any more. The
-/// tree is the robots' own. A step is over when every member has come a round further, or several
-/// if the solver lets its members know of every few rounds only.
+/// Solves a recorded graph by the members of a session, the same code as in the robots, and their
+/// messages. Sessions follow each other until no rejected closure fits any more. The tree is
+/// planned by the robots' own code. A step is over when every member has advanced by a round. It
+/// covers several rounds if the solver publishes its state every few rounds only.
 class MemberTeam final : public TeamSolver {
  public:
   using Factory = std::function<std::unique_ptr<MemberSolver>(SessionGraph, TreePlace)>;
 
-  /// `start`: a pose for each of the graph's. `as_robots`: weights are what robots make of them
+  /// `start`: one pose for each pose of the graph. `as_robots`: weights are corrected as robots do
   /// that expect false closures, see estimate_odometry_noise() and limit_precisions(). Throws
-  /// std::invalid_argument if there is another number of poses, and what `make` throws.
+  /// std::invalid_argument if the number of poses differs, and what `make` throws.
   MemberTeam(const TeamGraph& graph, Eigen::Index rank, std::vector<SE3> start, Factory make,
              TeamShape shape = TeamShape::kAll, bool as_robots = false);
 
@@ -37,14 +37,14 @@ class MemberTeam final : public TeamSolver {
     return blocks_[robot];
   }
 
-  /// Of the graph's edges, whether they are used as things stand; odometry is.
+  /// By edge of the graph: whether the current solution uses it. Odometry is always used.
   [[nodiscard]] std::vector<bool> kept() const;
-  /// True if the members of the last session have come to its end.
+  /// True if all members of the last session are done.
   [[nodiscard]] bool done() const;
   [[nodiscard]] const SolverState& state() const { return state_; }
-  /// Rounds in all, those of sessions before included.
+  /// Rounds of all sessions.
   [[nodiscard]] std::uint32_t rounds() const { return rounds_; }
-  /// Bytes that `robot` has sent and received.
+  /// Bytes that `robot` has sent.
   [[nodiscard]] std::size_t sent_by(std::size_t robot) const { return sent_[robot]; }
   [[nodiscard]] std::size_t received_by(std::size_t robot) const { return received_[robot]; }
 
@@ -73,10 +73,10 @@ class MemberTeam final : public TeamSolver {
   std::map<ClosureId, int> chances_;
   std::vector<std::size_t> sent_;
   std::vector<std::size_t> received_;
-  std::size_t to_announce_ = 0;  // bytes of public poses
+  std::size_t to_announce_ = 0;  // bytes of the public poses still to be counted
   SolverState state_;
   std::uint32_t rounds_ = 0;
-  std::uint32_t rounds_before_ = 0;  // this session
+  std::uint32_t rounds_before_ = 0;  // rounds before this session
 };
 
 }  // namespace km

@@ -13,7 +13,8 @@ namespace {
 
 using Eigen::Index;
 
-// The vote is quadratic in its candidates; of more, every so many-th is heard.
+// Maximum number of candidates, because the vote is quadratic in them. A larger set is subsampled
+// evenly.
 constexpr std::size_t kMaxVotes = 300;
 
 // Poses of `robot` in the frame of its first one.
@@ -42,7 +43,7 @@ std::vector<SE3> chained(const TeamGraph& graph, const std::vector<bool>& odomet
       else
         i = *j * e.T_i_j.inverse();
       any = true;
-      if (!step) break;  // odometry goes first
+      if (!step) break;  // odometry is preferred
     }
     return any;
   };
@@ -57,10 +58,11 @@ std::vector<SE3> chained(const TeamGraph& graph, const std::vector<bool>& odomet
   return poses;
 }
 
-// Where an edge between two robots puts the one that has no place yet.
+// Placement of a robot without a place by one edge to a robot with a place. "End" is the pose of
+// the former on which the edge ends.
 struct Vote {
-  SE3 T_world_end;  // of the end that is placed by the edge
-  SE3 T_own_end;    // where that robot has it
+  SE3 T_world_end;  // placed end in the common frame
+  SE3 T_own_end;    // same pose in the frame of its own robot
   bool odometry = false;
 };
 

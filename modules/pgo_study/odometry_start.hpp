@@ -7,12 +7,12 @@
 
 namespace km {
 
-/// Where robots begin that know nothing but their odometry: each robot's poses chained along it
-/// (where it is interrupted, along closures inside the robot), and the robots placed one beside the
-/// other by the vote of the closures between them, best connected first, as robots enter a common
-/// frame (see align_frames()). Edges from the last pose of a robot to the first of the next are
-/// odometry that was cut, and decide alone. False closures bend nothing here. Throws
-/// std::invalid_argument if a robot's own edges do not reach all its poses.
+/// Start of robots that know only their odometry. The poses of each robot are chained along its
+/// odometry; where that is interrupted, along closures inside the robot. Then the robots are placed
+/// one after another, best connected first, by the vote of the closures between them. Robots enter
+/// a common frame in the same way (see align_frames()). An edge from the last pose of a robot to
+/// the first of the next is odometry that was cut, and decides alone. False closures do not distort
+/// a robot's poses. Throws std::invalid_argument if a robot's own edges do not reach all its poses.
 [[nodiscard]] std::vector<SE3> odometry_start(const TeamGraph& graph);
 
 }  // namespace km

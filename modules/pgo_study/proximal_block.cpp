@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Every inter-robot edge `1 + weight` times as precise, and a fixed pose of its own for each.
+// Every inter-robot edge with `1 + weight` times its precision and a fixed pose of its own.
 std::vector<PublicEdge> weighted(std::vector<PublicEdge> edges, double weight) {
   for (std::size_t k = 0; k < edges.size(); ++k) {
     edges[k].fixed = static_cast<Eigen::Index>(k);

@@ -6,32 +6,32 @@
 
 namespace km {
 
-/// One robot's block of variables: its own poses, the edges that touch them, and the poses of its
-/// neighbours as last heard. The block may move at the same time as its neighbours, and on poses of
-/// theirs that are out of date. An update minimises, from the present poses X',
+/// One robot's block of variables: its own poses, the edges that touch them, and the newest
+/// received poses of its neighbours. The block may move at the same time as its neighbours, and on
+/// outdated poses of them. An update minimises, from the current poses X',
 ///     f(X; neighbours as heard) + weight * sum_e ||E_e (X - X')||^2 ,
-/// where E_e (X - X') is by how much the residual of inter-robot edge e changes, times the roots of
-/// its precisions. Both terms of an edge are squares of residuals that are linear in the poses at
-/// its two ends, so they are one: that of the edge with 1 + weight times its precision, and for a
-/// neighbour the mean of what was heard and where this block's own poses would put it. Thus the
-/// step is limited where the block meets others, in the metric of the edges there, and nowhere
-/// else; and Q stays constant. Not thread-safe.
+/// and E_e (X - X') is the change of the residual of inter-robot edge e, times the roots of its
+/// precisions. Both terms of an edge are squares of residuals that are linear in the poses at its
+/// two ends. Their sum is therefore one such term, with 1 + weight times the precision of the edge.
+/// Its target is the weighted mean of the received pose and the pose that follows from X' through
+/// the edge. The step is thus limited only at the inter-robot edges, in their metric, and Q stays
+/// constant. Not thread-safe.
 class ProximalBlock {
  public:
-  /// `part` as part_of() gives it, without verticals; `X` r x 4n feasible. Throws
+  /// `part`: result of part_of(), without verticals. `X`: r x 4n, feasible. Throws
   /// std::invalid_argument if `weight` is negative or not finite.
   ProximalBlock(const SessionGraph& part, LiftedPoses X, double weight);
 
-  /// Takes a neighbour's poses, feasible. False, and no change, if a keyframe is missing that an
-  /// edge ends on. Robots that are not neighbours are accepted without effect.
+  /// Stores the feasible poses of a neighbour. False, without a change, if a keyframe is missing on
+  /// which an edge ends. Poses of robots that are not neighbours have no effect.
   bool set_neighbour(RobotId robot, const ToldBlock& told);
 
-  /// Lowers the sum above by minimise_beyond(): it never rises.
-  /// Precondition: all neighbours were set.
+  /// Minimises the sum above by minimise_beyond(). The sum never rises. Precondition: poses of all
+  /// neighbours are set.
   TruncatedNewtonResult update(const TruncatedNewtonOptions& options, double relaxation);
 
-  /// Rounds the public poses to single precision, makes them feasible again, and returns them so:
-  /// the poses that neighbours hear are those that stay here.
+  /// Rounds the public poses to single precision, makes them feasible again, stores and returns
+  /// them. Neighbours thus receive exactly the poses that this block uses.
   [[nodiscard]] ToldBlock round_public_poses();
 
   [[nodiscard]] const LiftedPoses& X() const { return X_; }

@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// What the work of a team is measured with: modules read no clocks.
+/// Clock by which the work of a team is measured. Modules read no clocks themselves.
 struct TeamMeter {
   std::function<double()> cpu_s = [] { return 0.0; };  ///< CPU time of this thread [s].
 };
@@ -16,8 +16,8 @@ struct TeamMeter {
 /// Work of one round, or sums of it.
 struct TeamWork {
   std::size_t bytes = 0;
-  double critical_path_s = 0.0;  ///< Of the slowest robot of each exchange.
-  double total_cpu_s = 0.0;      ///< Of all robots.
+  double critical_path_s = 0.0;  ///< CPU time of the slowest robot, summed over exchanges.
+  double total_cpu_s = 0.0;      ///< CPU time, summed over robots.
 
   TeamWork& operator+=(const TeamWork& other) {
     bytes += other.bytes;
@@ -32,7 +32,8 @@ class RoundMeter {
  public:
   RoundMeter(std::size_t robots, TeamMeter meter) : meter_(std::move(meter)), cpu_s_(robots, 0.0) {}
 
-  /// Calls `work()`, at the expense of `robot`, and returns its result. Calls must not nest.
+  /// Calls `work()`, adds its CPU time to that of `robot`, and returns its result. Calls must not
+  /// nest.
   template <typename F>
   decltype(auto) run(std::size_t robot, F&& work) {
     struct Stopwatch {
@@ -45,12 +46,12 @@ class RoundMeter {
     return work();
   }
 
-  /// Counts a message of so many bytes, see message_sizes.hpp. One to all peers alike is a
-  /// broadcast and counts once.
+  /// Counts a message of `bytes` bytes, see message_sizes.hpp. A message with the same content for
+  /// all peers is a broadcast and counts once.
   void sent(std::size_t bytes) { round_.bytes += bytes; }
 
-  /// What robots do from here on needs what they were sent before. A round is one exchange unless
-  /// it is divided by this.
+  /// Marks that later work of the robots depends on messages sent before. Without a call a round is
+  /// one exchange.
   void finish_exchange() {
     round_.critical_path_s += *std::max_element(cpu_s_.begin(), cpu_s_.end());
     for (double& s : cpu_s_) round_.total_cpu_s += std::exchange(s, 0.0);

@@ -7,10 +7,11 @@
 namespace km {
 namespace {
 
-// From a good start the preconditioner need not stay clear of the constraints as far as from any.
+// Smaller than the default of QuadraticProblem: near a minimum a small shift converges faster.
 constexpr double kShiftFromStart = 1e-4;
-// Convergence is superlinear: after a step that gains less than the first the poses are certified;
-// if that fails, further steps are tried, down to the second, before the rank is blamed.
+// Convergence is superlinear. When a step decreases the cost by less than the first value, the
+// poses are certified. If that fails, further steps follow, until one gains less than the second
+// value. Only then is the rank increased.
 constexpr double kRelativeDecrease = 3e-6;
 constexpr double kLeastRelativeDecrease = 1e-10;
 constexpr double kCgTolerance = 0.1;
@@ -57,12 +58,12 @@ bool Staircase::step() {
   return true;
 }
 
-// What a verification leaves to be done.
+// Prepares the next steps after a verification. False: nothing is left to do.
 bool Staircase::resume() {
   if (certificate_->certified || certificate_->hidden_by_rounding) return false;
   if (last_decrease_ > kLeastRelativeDecrease) {
     last_decrease_ = std::numeric_limits<double>::infinity();
-    sufficient_decrease_ = 1.0;  // whatever one more step gains
+    sufficient_decrease_ = 1.0;  // one more step, whatever its gain
   } else if (X_.rows() < options_.max_rank) {
     climb();
   } else {

@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-// An edge in the robots' own numbering of their poses.
+// An edge in the robots' own numbering of poses.
 RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e, double noise_scale) {
   const auto id = [&](Eigen::Index pose) {
     const std::size_t robot = graph.robot_of(pose);

@@ -9,18 +9,19 @@
 
 namespace km {
 
-/// A pose graph dealt out to robots 0 to N - 1. Poses are numbered robot by robot, so that robot k
-/// owns the contiguous block [first[k], first[k + 1]); within a block they are in the order in
-/// which the robot drove. Solutions of the team are r x 4n in this numbering.
+/// A pose graph divided among robots 0 to N - 1. Poses are numbered robot by robot, so that robot k
+/// owns the contiguous block [first[k], first[k + 1]). Within a block they are in the order of the
+/// robot's trajectory. Solutions of the team are r x 4n in this numbering.
 struct TeamGraph {
-  int dimension = 3;                     ///< 2: planar, lifted to z = 0; cost and weights are 2D's.
+  int dimension = 3;                     ///< 2: planar, lifted to z = 0, with the cost and weights
+                                         ///< of 2D.
   std::vector<Eigen::Index> first = {};  ///< N + 1 entries, ascending, from 0.
-  std::vector<BlockEdge> edges = {};     ///< Each once; parallel ones all count.
-  std::vector<KeyframeId> ids = {};      ///< Of the poses, as in the file.
-  /// Of poses that know which way is up, ascending. If there are any, solutions have z up.
-  /// GaussSeidelTeam, AsynchronousTeam and verify_team() do without.
+  std::vector<BlockEdge> edges = {};     ///< Each edge once. Parallel edges all count.
+  std::vector<KeyframeId> ids = {};      ///< Ids of the poses in the file.
+  /// Vertical priors, ascending by pose. If there are any, solutions have z up. GaussSeidelTeam,
+  /// AsynchronousTeam and verify_team() do not support them.
   std::vector<VerticalPrior> verticals = {};
-  std::size_t indefinite_edges = 0;  ///< Of the files, see G2oGraph.
+  std::size_t indefinite_edges = 0;  ///< Number in the files, see G2oGraph.
 
   [[nodiscard]] std::size_t robots() const { return first.size() - 1; }
   [[nodiscard]] Eigen::Index poses() const { return first.back(); }
@@ -30,25 +31,27 @@ struct TeamGraph {
   [[nodiscard]] std::size_t robot_of(Eigen::Index pose) const;
 };
 
-/// Which edges are odometry: the first one from a pose to the next of the same robot of the file.
+/// By edge: whether it is odometry, that is the first edge from a pose to the next of the same
+/// robot of the file.
 [[nodiscard]] std::vector<bool> odometry_edges(const TeamGraph& graph);
 
-/// The graph with those of its edges that are `kept`.
+/// The graph with only those edges that are `kept`.
 [[nodiscard]] TeamGraph with_edges(TeamGraph graph, const std::vector<bool>& kept);
 
-/// The graph without the odometry that a cut has left between two robots: closures alone join
-/// robots, as in the field. The graph need not be connected any more.
+/// The graph without steps of odometry between two robots, which remain where one trajectory was
+/// cut. Afterwards only closures join robots, as in the field, and the graph may be disconnected.
 [[nodiscard]] TeamGraph without_cut_steps(TeamGraph graph);
 
-/// The connected part that each pose is in, by the lowest pose of that part.
+/// By pose: the lowest pose of its connected part.
 [[nodiscard]] std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph);
 
-/// What one robot of the team knows of the graph, without any poses: `start` and `told` are empty.
-/// Robot k has id k, and its keyframes are its poses, from 0. Odometry that was cut between two
-/// robots is trusted. `step_precision` is that of all robots.
+/// The edges and priors that one robot of the team knows, without any poses: `start` and `told` are
+/// empty. Robot k has id k, and its keyframes are its poses, numbered from 0. Odometry that was cut
+/// between two robots is trusted. `step_precision` has the values of all robots.
 [[nodiscard]] SessionGraph part_of(const TeamGraph& graph, std::size_t robot);
 
-/// The cost of the whole graph at rank r. Throws std::invalid_argument as QuadraticProblem does.
+/// Cost function of the whole graph at rank r. Throws std::invalid_argument as QuadraticProblem
+/// does.
 [[nodiscard]] QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank);
 
 }  // namespace km

@@ -71,7 +71,7 @@ struct PartFiles {
   EdgeWeights weights;
 };
 
-// What a team's run has left behind, or else files in the folder itself.
+// Files of the pose graphs of a team's run. Without a run: the files in the folder itself.
 PartFiles part_files(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> results, files;
   for (const auto& entry : std::filesystem::directory_iterator(nonempty_folder(folder))) {

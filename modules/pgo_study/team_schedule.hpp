@@ -7,19 +7,19 @@
 
 namespace km {
 
-/// Robots that share edges with each robot, ascending.
+/// By robot: the robots with which it shares edges, ascending.
 using TeamNeighbours = std::vector<std::vector<std::size_t>>;
 
 [[nodiscard]] TeamNeighbours neighbours_in(const TeamGraph& graph);
 
-/// Groups of robots without common edges, which may move at the same time: greedily, the robot with
-/// the most neighbours first.
+/// Groups of robots without edges between them, which may move at the same time. The greedy
+/// colouring begins with the robot with the most neighbours.
 [[nodiscard]] std::vector<std::vector<std::size_t>> colours_of(const TeamNeighbours& neighbours);
 
-/// Robot 0, then always the neighbours of those before: parent[k] comes before k in `order`.
+/// Breadth-first tree from robot 0. parent[k] comes before k in `order`.
 struct TeamTree {
   std::vector<std::size_t> order;
-  std::vector<std::size_t> parent;  ///< Of robot 0: itself.
+  std::vector<std::size_t> parent;  ///< By robot; the parent of robot 0 is 0.
 };
 
 /// Throws std::invalid_argument if robot 0 is not connected with all others.

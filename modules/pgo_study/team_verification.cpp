@@ -22,7 +22,7 @@ class Verifiers {
     }
   }
 
-  // Every robot tells the columns that `columns_of(agent)` gives, and hears those of all others.
+  // Every robot sends the result of `columns_of(agent)` to all others.
   template <typename F>
   void exchange_columns(const F& columns_of) {
     for (std::size_t k = 0; k < agents_.size(); ++k) {
@@ -37,7 +37,7 @@ class Verifiers {
     }
   }
 
-  // The sum over the team, in the order of the robots, of what `part_of(agent)` gives.
+  // Sums the results of `part_of(agent)` over the team, in the order of the robots.
   template <typename F>
   Eigen::MatrixXd sum(const F& part_of) {
     Eigen::MatrixXd total;
@@ -103,7 +103,7 @@ TeamVerification verify_team(const TeamGraph& graph, const LiftedPoses& X,
     result.negative = state.lambda < -negligible;
     result.converged =
         gain_over(kWindow) <= options.tolerance * std::abs(state.lambda) + 0.1 * negligible;
-    // A direction down need not be the steepest.
+    // A negative quotient suffices; it need not be the smallest.
     ended = result.converged || (result.negative && gain_over(2) < -0.1 * state.lambda);
   }
   result.direction.resize(1, X.cols());

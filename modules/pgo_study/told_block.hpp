@@ -7,7 +7,7 @@
 
 namespace km {
 
-/// Poses of one robot that it tells the others.
+/// Poses that one robot sends to the others.
 struct ToldBlock {
   std::vector<KeyframeIndex> keyframes = {};  ///< Ascending.
   LiftedPoses X = {};                         ///< r x 4 per keyframe.

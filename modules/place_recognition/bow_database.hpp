@@ -62,7 +62,7 @@ class BowDatabase {
   // Scores of images [first, last) against `vector`.
   std::vector<float> accumulate(const BowVector& vector, std::size_t first, std::size_t last) const;
 
-  std::vector<std::vector<Posting>> postings_;  // by word, images ascending
+  std::vector<std::vector<Posting>> postings_;  // postings of each word, ascending by image
   std::size_t size_ = 0;
 };
 

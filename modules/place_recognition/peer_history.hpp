@@ -15,7 +15,8 @@ namespace km {
 struct PeerQuery {
   std::uint32_t index = 0;
   std::shared_ptr<const BowVector> vector;
-  std::shared_ptr<const BowVector> previous;  ///< Its normaliser; null if there is none.
+  std::shared_ptr<const BowVector> previous;  ///< Vector of the keyframe before it, which
+                                              ///< normalises the score; null if there is none.
 };
 
 /// The keyframes of one peer in a form for searching.

@@ -80,7 +80,7 @@ class PlaceRecognitionNode final : public Node {
   const PlaceRecognitionTopics topics_;
   CandidateFilter own_;
   std::optional<UncertainPose> chain_;  // up to the keyframe before
-  std::vector<KeyframeId> own_ids_;     // by index in own_
+  std::vector<KeyframeId> own_ids_;     // keyframe ids in the order of own_
   std::map<RobotId, PeerHistory> peers_;
   Worker<Input> worker_;  // last member: stops first
 };

@@ -100,7 +100,8 @@ Clustering cluster(std::span<const Bits256> points, int k, std::mt19937& rng) {
     for (std::size_t c = 0; c < counters.size(); ++c)
       if (!counters[c].empty()) result.centers[c] = counters[c].majority();
   }
-  result.of_point = nearest_of_each(points, result.centers);  // also if the rounds ran out
+  result.of_point = nearest_of_each(points, result.centers);  // assignment to the final centres,
+                                                              // also after the last allowed round
   return result;
 }
 

@@ -9,11 +9,11 @@ namespace {
 
 using Factor = Eigen::SparseMatrix<double>;
 
-constexpr int kWidth = 4;  // of panels, or 1
+constexpr int kWidth = 4;  // columns of a panel; other panels have 1
 
-// Whether columns `first` to `first` + kWidth - 1 have the same rows from the last of them on. The
-// rows below the diagonal of a column are all among those of the column that the first of them
-// names (elimination tree), so it is enough to count.
+// True if columns `first` to `first` + kWidth - 1 have equal rows from the last of these columns
+// on. The rows below the diagonal of a column are a subset of the rows of its parent in the
+// elimination tree, so it suffices to count them.
 bool is_panel(const Factor& L, int first) {
   if (first + kWidth > L.cols()) return false;
   const int* begin = L.outerIndexPtr() + first;
@@ -46,7 +46,7 @@ BlockCholesky::BlockCholesky(const Eigen::SimplicialLLT<Factor>& llt) : P_(llt.p
   }
 }
 
-// B L^-T in place, as far as these columns go.
+// The part of these columns in B L^-T, in place.
 template <int kRank, int kCols>
 void BlockCholesky::forward(const Panel& panel, Eigen::MatrixXd& B) const {
   const double* entry = values_.data() + panel.entries;
@@ -61,7 +61,7 @@ void BlockCholesky::forward(const Panel& panel, Eigen::MatrixXd& B) const {
         solved * Eigen::Map<const Eigen::Matrix<double, kCols, 1>>(entry);
 }
 
-// B L^-1 in place, as far as these columns go.
+// The part of these columns in B L^-1, in place.
 template <int kRank, int kCols>
 void BlockCholesky::backward(const Panel& panel, Eigen::MatrixXd& B) const {
   constexpr int kTriangle = kCols * (kCols + 1) / 2;

@@ -7,13 +7,13 @@
 namespace km {
 
 /// Sparse Cholesky factorisation of a symmetric positive definite matrix, for many right-hand sides
-/// of a few rows each: rows of the right-hand side are kept side by side in memory, so that one
-/// pass over the factor serves all of them. Columns of the factor with the same rows below them,
-/// as the four of a pose mostly have, are kept and used together.
+/// of a few rows each. The rows of a right-hand side are adjacent in memory, so that one pass over
+/// the factor serves all of them. Columns of the factor with equal rows below them, usually the
+/// four of a pose, are stored and used together.
 class BlockCholesky {
  public:
-  /// Factorises `A`, of which the lower triangle is read.
-  /// Throws std::runtime_error if it is not positive definite.
+  /// Factorises `A`; only its lower triangle is read. Throws std::runtime_error if it is not
+  /// positive definite.
   explicit BlockCholesky(const Eigen::SparseMatrix<double>& A);
 
   /// nullopt if `A` is not positive definite.
@@ -29,9 +29,9 @@ class BlockCholesky {
   struct Panel {
     int first = 0;
     int width = 0;
-    std::size_t rows = 0;     // first of those below in rows_
-    std::size_t below = 0;    // their number
-    std::size_t entries = 0;  // in values_: the triangle column by column, then row by row below
+    std::size_t rows = 0;     // place in rows_ of the first row below
+    std::size_t below = 0;    // number of rows below
+    std::size_t entries = 0;  // place in values_: the triangle by columns, then the rest by rows
   };
 
   explicit BlockCholesky(const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>& llt);

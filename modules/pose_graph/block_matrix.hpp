@@ -10,9 +10,9 @@ namespace km {
 /// Two nodes of a graph whose unknowns are coupled, the first one above the second.
 using NodePair = std::array<int, 2>;
 
-/// A symmetric matrix of square blocks, one block row per node of a graph: the diagonal blocks side
-/// by side, B x (B nodes), and one block A(i, j) for each of a list of pairs {i, j}, B x (B pairs).
-/// The list is kept elsewhere, for it is the same for many matrices.
+/// A symmetric matrix of square blocks, one block row per node of a graph. The diagonal blocks are
+/// side by side, B x (B nodes). So are the blocks A(i, j), one for each of a list of pairs {i, j},
+/// B x (B pairs). The list is stored elsewhere, because many matrices share it.
 struct BlockMatrix {
   Eigen::MatrixXd diagonal = {};
   Eigen::MatrixXd coupling = {};

@@ -12,7 +12,7 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using Entries = std::vector<Eigen::Triplet<double>>;
 
-// B X = C solved for X; B is definite exactly if every pose hangs together with pose 0.
+// Solves B X = C for X; B is definite exactly if every pose is connected to pose 0.
 Eigen::MatrixXd solve(const Entries& entries, const Eigen::MatrixXd& C) {
   Sparse B(C.rows(), C.rows());
   B.setFromTriplets(entries.begin(), entries.end());

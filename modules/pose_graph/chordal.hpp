@@ -9,14 +9,14 @@ namespace km {
 
 /// Chordal initialisation of one block (Carlone et al., "Initialization Techniques for 3D SLAM",
 /// ICRA 2015, Sec. III-B): rotations minimise sum kappa ||R_j - R_i R_ij||_F^2 over all matrices,
-/// then projected to SO(3); translations minimise sum tau ||t_j - t_i - R_i t_ij||^2 given those.
-/// Pose 0 is the identity. Two sparse factorisations.
-/// Throws std::invalid_argument if the edges do not connect all poses.
+/// and are then projected to SO(3). Translations minimise sum tau ||t_j - t_i - R_i t_ij||^2 given
+/// these rotations. Pose 0 is the identity. Two sparse factorisations. Throws std::invalid_argument
+/// if the edges do not connect all poses.
 [[nodiscard]] std::vector<SE3> chordal_initialisation(Eigen::Index poses,
                                                       std::span<const BlockEdge> edges);
 
-/// Poses chained along the edges i -> i + 1, pose 0 being the identity.
-/// Throws std::invalid_argument if one of these edges is missing.
+/// Poses chained along the edges i -> i + 1, from pose 0, the identity. Throws
+/// std::invalid_argument if one of these edges is missing.
 [[nodiscard]] std::vector<SE3> odometry_initialisation(Eigen::Index poses,
                                                        std::span<const BlockEdge> edges);
 

@@ -9,7 +9,7 @@ namespace {
 
 using Neighbours = std::vector<std::vector<int>>;
 
-// The poses of all closures, ascending, and who is linked to whom, each pair once.
+// The ends of all closures, ascending, and the pairs of ends that closures connect, each pair once.
 std::pair<std::vector<KeyframeId>, Neighbours> public_graph(std::span<const ClosureId> closures) {
   std::vector<KeyframeId> poses;
   for (const ClosureId& closure : closures) poses.insert(poses.end(), {closure.from, closure.to});
@@ -36,7 +36,7 @@ std::pair<std::vector<KeyframeId>, Neighbours> public_graph(std::span<const Clos
 
 std::vector<KeyframeId> cover_closures(std::span<const ClosureId> closures) {
   const auto [poses, neighbours] = public_graph(closures);
-  std::vector<int> left(poses.size());  // closures not covered yet
+  std::vector<int> left(poses.size());  // number of uncovered closures
   std::priority_queue<std::pair<int, int>> queue;
   const auto offer = [&](int v) { queue.emplace(left[static_cast<std::size_t>(v)], -v); };
   for (std::size_t v = 0; v < poses.size(); ++v) {

@@ -7,10 +7,10 @@
 
 namespace km {
 
-/// Keyframes such that each closure has one of them at an end. Ascending, and the same for the same
-/// closures in whatever order. Greedy vertex cover: the keyframe with most closures left comes
-/// next, the smaller one among equals; in the end those are left out that turned out to be
-/// superfluous. O(closures log closures).
+/// Keyframes such that each closure ends on at least one of them. Ascending, and independent of the
+/// order of the closures. Greedy vertex cover: the keyframe with the most uncovered closures is
+/// taken next, and the smallest id decides a tie. At the end, superfluous keyframes are removed.
+/// O(closures log closures).
 [[nodiscard]] std::vector<KeyframeId> cover_closures(std::span<const ClosureId> closures);
 
 }  // namespace km

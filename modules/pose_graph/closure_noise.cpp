@@ -11,28 +11,29 @@
 namespace km {
 namespace {
 
-constexpr double kFactorSigma = 1.0986;    // log 3, of log s
+constexpr double kFactorSigma = 1.0986;    // log 3, prior of log s
 constexpr double kOddsAgainstUsual = 6.9;  // log of odds of 1000 to 1
-constexpr double kOneSigma = 0.5;          // of the log density: one standard deviation of log s
-// Closures that are noisier than claimed and so many times noisier than the team's say nothing.
+constexpr double kOneSigma = 0.5;          // loss of log density at one standard deviation of log s
+// Upper end of the grid, relative to the team: closures with more noise carry no information.
 constexpr double kLargestFactor = 10.0;
 constexpr double kGridStep = 1.1;  // a tenth of the standard deviation is precise enough
-// A team that is so much noisier than it claims says nothing about single pairs by its claims.
+// Noise factor of the team beyond which its claimed noise says nothing about single pairs.
 constexpr double kClaimsFail = 1.5;
-// Fewer places, some of them false, say nothing about the noise of the others.
+// With fewer places, some of them false, the noise of the true ones cannot be estimated.
 constexpr double kFewPlaces = 5.0;
-// A pair most of whose cycles agree with the noise of the team has that noise, and false closures.
+// If more cycles of a pair than this share agree with the noise of the team, the pair has that
+// noise. Its other cycles then contain false closures.
 constexpr double kMostAgree = 0.8;
 constexpr double kAgreeingCycle = 16.8;  // 99 % quantile of chi-squared, 6 degrees of freedom
 // Smaller differences are within the errors of the model: claims are isotropic, and the noise of
 // odometry is that of its mean step.
 constexpr double kNotable = 1.3;
-// A cycle of the estimated noise is this much likelier than a false one (log, mean of all cycles).
-// Closures that are all false are as likely true by a very large noise.
+// Least mean log density ratio of a cycle with the estimated noise to a false cycle. It rejects
+// very large noise, with which closures that are all false would be as likely true.
 constexpr double kDistinct = 3.0;
 
 struct Posterior {
-  double log_density = 0.0;  // of the factor s, up to a constant
+  double log_density = 0.0;  // log posterior density of the factor s, up to a constant
   double distinct = 0.0;     // mean log density ratio of a cycle to a false one
 };
 

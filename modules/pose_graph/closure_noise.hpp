@@ -15,8 +15,8 @@ namespace km {
 /// error of the cycle is written in coordinates in which the covariance of the odometry is the
 /// identity and the claimed covariance of the two closures is diagonal.
 struct NoiseCycle {
-  std::array<float, 6> error = {};     ///< [sigma of the odometry]; planar cycles use three.
-  std::array<float, 6> variance = {};  ///< Claimed by the two closures, in that of the odometry.
+  std::array<float, 6> error = {};  ///< [sigma of the odometry]; planar cycles use three entries.
+  std::array<float, 6> variance = {};  ///< Claimed by the two closures, relative to the odometry.
   float log_if_false = 0.0F;           ///< Log density if a closure is false, in these coordinates.
 
   /// Splits the covariance of the error `e` into odometry `Sigma_o` and closures `Sigma_c`, both
@@ -30,12 +30,12 @@ struct PairCycles {
   std::vector<NoiseCycle> inside = {};   ///< Both closures belong to one place.
   std::vector<NoiseCycle> between = {};  ///< The closures belong to two places.
   double places = 0.0;                   ///< Number of places, the independent observations.
-  double factor = 1.0;  ///< On the claimed standard deviations, beside that of the whole team.
+  double factor = 1.0;                   ///< Noise of this pair over the noise of the team [ratio].
 };
 
-/// What a robot knows about the noise of closures. It carries over from session to session.
+/// The knowledge of a robot about the noise of closures. It carries over from session to session.
 struct ClosureNoiseRecord {
-  NoiseHistogram lengths = {};               ///< Of all pairs that this robot speaks for.
+  NoiseHistogram lengths = {};               ///< Cycle lengths of the pairs that this robot counts.
   std::map<RobotId, PairCycles> pairs = {};  ///< By the other robot of the pair.
 };
 
@@ -43,12 +43,11 @@ struct ClosureNoiseRecord {
 /// of robots are. `usual` is the factor of the whole team.
 ///
 /// Model: the error of a cycle is normal with covariance Sigma_o + s^2 Sigma_c, or one of its
-/// closures is false (see cycle_mixture.hpp). The estimate is
-/// the s with the highest posterior density for the prior log s ~ N(log usual, log 3), a variance
-/// component (Foerstner 1979). The two kinds of cycles are fitted apart, because an error that all
-/// closures of a place share shows only between places; the larger estimate counts. The result is
-/// `usual`, unless the odds against it are 1000 to 1 and the estimate is at least 1.3 times as
-/// large. O(cycles).
+/// closures is false (see cycle_mixture.hpp). The estimate is the s with the highest posterior
+/// density for the prior log s ~ N(log usual, log 3), a variance component (Foerstner 1979). The
+/// two kinds of cycles are fitted separately, because an error that all closures of a place share
+/// shows only between places; the larger estimate counts. The result is `usual`, unless the odds
+/// against it are 1000 to 1 and the estimate is at least 1.3 times as large. O(cycles).
 [[nodiscard]] double estimate_closure_noise(const PairCycles& cycles, double usual);
 
 }  // namespace km

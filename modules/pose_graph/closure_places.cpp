@@ -26,9 +26,9 @@ ClosurePlaces find_places(std::span<const PoseEdge> closures) {
   for (std::size_t k = 0; k < closures.size(); ++k) order.emplace_back(closures[k].id(), k);
   std::ranges::sort(order);
   ClosurePlaces places{.place_of = std::vector<std::size_t>(closures.size())};
-  std::vector<ClosureId> first_of;  // of each place
+  std::vector<ClosureId> first_of;  // first closure of each place
   for (const auto& [id, k] : order) {
-    // Only the places that begin a little before it can hold it.
+    // Only places that begin a little before this closure can contain it.
     std::size_t place = first_of.size();
     for (std::size_t p = first_of.size(); p-- > 0 && are_near(first_of[p].from, id.from);)
       if (are_near(first_of[p].to, id.to)) place = p;

@@ -8,19 +8,19 @@
 
 namespace km {
 
-/// Closures of a place are between the same robots, and their ends are within 10 keyframes of those
-/// of its first closure, on both robots. Where one of them is false because two places look alike,
-/// so are the others: they are one piece of evidence.
+/// The closures of a place are between the same robots, and their ends are within 10 keyframes of
+/// the ends of its first closure, on both robots. If one closure is false because two places look
+/// alike, the other closures of its place are false, too. They are therefore one piece of evidence.
 struct ClosurePlaces {
-  std::vector<std::size_t> place_of = {};  ///< By closure; numbers begin at 0.
-  std::vector<std::size_t> sizes = {};     ///< By place, its closures.
+  std::vector<std::size_t> place_of = {};  ///< Number of the place of each closure, from 0.
+  std::vector<std::size_t> sizes = {};     ///< Number of closures of each place.
 
-  /// By closure, what it counts if each place counts 1.
+  /// Weight of each closure such that the weights in each place sum to 1.
   [[nodiscard]] std::vector<double> weights() const;
 };
 
-/// In any order; the first closure of a place is the one with the lowest id. O(n log n) for n
-/// closures of which few are beside each other.
+/// Closures may have any order; the first closure of a place is the one with the lowest id. O(n log
+/// n) for n closures if few are near each other.
 [[nodiscard]] ClosurePlaces find_places(std::span<const PoseEdge> closures);
 
 }  // namespace km

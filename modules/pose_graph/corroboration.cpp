@@ -15,13 +15,13 @@
 namespace km {
 namespace {
 
-constexpr std::uint32_t kSteps = 10;  // of odometry in a cycle, at most
-constexpr std::uint32_t kBeside = 5;  // keyframes, at both ends
+constexpr std::uint32_t kSteps = 10;  // largest number of steps of odometry in a cycle
+constexpr std::uint32_t kBeside = 5;  // largest distance of near closures, at both ends [keyframes]
 constexpr double kLargestTurn = 0.25 * std::numbers::pi;
-// Steps of odometry in a cycle between two places, at most: their noise grows, and beside it the
-// noise of closures no longer shows.
+// Largest number of steps of odometry in a cycle between two places. The noise of more steps would
+// hide the noise of the closures.
 constexpr std::uint32_t kStepsBetweenPlaces = 60;
-constexpr double kLeastBoxSide_m = 1.0;  // of the volume in which a false closure may end
+constexpr double kLeastBoxSide_m = 1.0;  // least side of the volume for false closures
 
 std::uint32_t steps_between(const KeyframeId& a, const KeyframeId& b) {
   return std::max(a.index, b.index) - std::min(a.index, b.index);
@@ -122,8 +122,8 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
                         log_density_if_false(error, volume, dimension_), dimension_);
 }
 
-// A false closure may end anywhere in twice the box of the poses, and as far beyond as closures
-// reach.
+// The volume in which a false closure may end: twice the bounding box of the poses, enlarged on
+// every side by the length of the longest closure.
 double Corroboration::volume() const {
   Eigen::AlignedBox3d below, above;
   double reach_m = 0.0;
@@ -145,7 +145,7 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
     std::size_t b;
   };
   const ClosurePlaces places = find_places(edges_);
-  std::vector<bool> is_first;  // of its place
+  std::vector<bool> is_first;  // the closure is the first one of its place
   std::vector<bool> seen(places.sizes.size(), false);
   for (const Upward& c : closures_) {
     const std::size_t place = places.place_of[c.place];
@@ -186,7 +186,7 @@ bool Corroboration::agree(const Upward& one, const Upward& other, double barc) c
   const auto& [kappa, tau] = one.precision;
   const double turned = kappa * (T.linear() - measured.linear()).squaredNorm();
   const double moved = tau * (T.translation() - measured.translation()).squaredNorm();
-  // Both closures' noise and that of every step; a rotation also moves the far end of a closure.
+  // Noise of both closures and of every step; a rotation also moves the far end of a closure.
   const double variances =
       2.0 + steps_between(one.lower, other.lower) + steps_between(one.upper, other.upper);
   const double lever = 1.0 + tau / kappa * measured.translation().squaredNorm();
@@ -198,7 +198,7 @@ std::vector<bool> Corroboration::isolated(double barc) const {
   for (std::size_t a = 0; a < closures_.size(); ++a)
     for (std::size_t b = a + 1; b < closures_.size(); ++b) {
       if (steps_between(closures_[a].lower, closures_[b].lower) > kBeside) break;
-      // From either side: so close to each other, one lever may be shorter.
+      // Either direction suffices, because the lever arms of near closures may differ.
       if (!agree(closures_[a], closures_[b], barc) && !agree(closures_[b], closures_[a], barc))
         continue;
       isolated[closures_[a].place] = isolated[closures_[b].place] = false;

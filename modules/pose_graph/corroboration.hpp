@@ -12,40 +12,41 @@
 
 namespace km {
 
-/// The covariance that the weights of an edge stand for, tangent [rotation; translation]. In the
-/// plane (`dimension` 2) kappa is that of the angle (see precision_of_blocks()), and other
-/// directions have none.
+/// The covariance that corresponds to the weights of an edge, tangent [rotation; translation]. In
+/// the plane (`dimension` 2) kappa is the precision of the angle (see precision_of_blocks()), and
+/// the other directions have variance zero.
 [[nodiscard]] Matrix6 covariance_in(const Precision& precision, int dimension);
 
-/// What the closures of one pair of robots (or inside one robot) say of each other, before anything
-/// is optimised. Robots that meet do so for a while, so that a true closure mostly has others
-/// beside it that agree with it along the odometry between; a false one rarely has. From poses and
-/// weights that both robots were told, so that both come to the same.
+/// Agreement between the closures of one pair of robots (or inside one robot), before any
+/// optimisation. Robots usually meet for some time. A true closure therefore has other closures
+/// near it that agree with it along the odometry between them; a false one rarely has. The inputs
+/// are poses and weights that both robots of the pair know, so that both compute the same result.
 class Corroboration {
  public:
   using PoseOf = std::function<SE3(const KeyframeId&)>;
 
-  /// `closures` of one pair of robots; `pose` where their ends are by odometry or by what was
-  /// optimised before; `step` the mean weights of a step of either robot's odometry (of robots that
-  /// are not in it: 1). `dimension` 2: poses are planar. All must outlive it.
+  /// `closures`: of one pair of robots. `pose`: where their ends are, by odometry or by an earlier
+  /// optimisation. `step`: mean weights of an odometry step of each robot; 1 for a robot without an
+  /// entry. `dimension` 2: poses are planar. All arguments must outlive this object.
   Corroboration(std::span<const PoseEdge> closures, const PoseOf& pose,
                 const std::map<RobotId, Precision>& step, int dimension);
 
-  /// Counts the Mahalanobis lengths of cycles through two closures a few keyframes apart at both
-  /// ends and the odometry between; those with least odometry first, and not more than
-  /// `most`. Cycles that turn by more than 45 degrees, as most with a false closure do, are left
-  /// out. What two closures beside each other have in common does not show.
+  /// Counts the Mahalanobis lengths of cycles through two closures whose ends are a few keyframes
+  /// apart on both robots, and the odometry between them. It counts at most `most` cycles, those
+  /// with the least odometry first. Cycles that turn by more than 45 degrees are left out; most of
+  /// these contain a false closure. An error that both closures share does not show in a cycle.
   void count_lengths(NoiseHistogram& histogram, std::size_t most) const;
 
   /// Adds the cycles that estimate_closure_noise() needs: at most kMostNoiseCycles through two
   /// closures of one place, and as many through the first closures of two places (see
-  /// find_places()), those with the fewest steps of odometry first. The covariance of n steps over
-  /// a distance L has the lever arm of their rotation noise: n (sigma_t^2 + sigma_R^2 L^2 / 3).
+  /// find_places()). Cycles with the fewest steps of odometry come first. The translation variance
+  /// of n steps over a distance L includes the lever arm of their rotation noise: n (sigma_t^2 +
+  /// sigma_R^2 L^2 / 3).
   void count_cycles(PairCycles& cycles) const;
   static constexpr std::size_t kMostNoiseCycles = 150;
 
-  /// Which closures stand alone: none beside them agrees up to `barc` [sigma], allowing for the
-  /// noise of both and of the steps between.
+  /// Marks the closures that stand alone: no closure near them agrees with them up to `barc`
+  /// [sigma], given the noise of both closures and of the odometry between them.
   [[nodiscard]] std::vector<bool> isolated(double barc) const;
 
  private:

@@ -14,9 +14,9 @@ Eigen::Matrix3d symmetric(const Eigen::Matrix3d& M) {
   return 0.5 * (M + M.transpose());
 }
 
-// With Z = R_i^T R_j, M = Z R^T, N = R^T Z and u = R_i^T (t_j - t_i) - t the cost is
-// 2 kappa (3 - tr M) + tau |u|^2; along w it becomes tr(exp(-[w_i]) Z exp([w_j]) R^T) and
-// u + Z v_j - v_i - (exp([w_i]) - I) t.
+// With Z = R_i^T R_j, M = Z R^T, N = R^T Z and u = R_i^T (t_j - t_i) - t the cost is 2 kappa (3 -
+// tr M) + tau |u|^2. Along w, these terms become tr(exp(-[w_i]) Z exp([w_j]) R^T) and u + Z v_j -
+// v_i - (exp([w_i]) - I) t.
 struct Relative {
   Eigen::Matrix3d Z;
   Eigen::Matrix3d M;
@@ -36,7 +36,7 @@ Relative relative(const BlockEdge& edge, const SE3& T_i, const SE3& T_j) {
 
 void set_slope(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, const Relative& r,
                EdgeModel& model) {
-  // From residuals, not from 3 - tr M: no cancellation when they are small.
+  // Computed from residuals, not from 3 - tr M, to avoid cancellation if they are small.
   model.cost = edge.kappa * (T_j.linear() - T_i.linear() * edge.T_i_j.linear()).squaredNorm() +
                edge.tau * r.u.squaredNorm();
   model.g_i.head<3>() =
@@ -58,8 +58,8 @@ EdgeModel model_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, Curv
   set_slope(edge, T_i, T_j, r, model);
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
   const Eigen::Vector3d t = edge.T_i_j.translation();
-  // du = S w_i - v_i + Z v_j. Gauss-Newton takes the residual in the moving frame of pose i, where
-  // a rigid motion of both poses leaves it unchanged.
+  // du = S w_i - v_i + Z v_j. Gauss-Newton uses the residual in the moving frame of pose i, in
+  // which a rigid motion of both poses leaves it unchanged.
   const Eigen::Matrix3d S = skew(curvature == Curvature::kFull ? t : Eigen::Vector3d(t + r.u));
   model.H_ii.setZero();
   model.H_ij.setZero();
@@ -90,13 +90,12 @@ EdgeModel model_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, Curv
 VerticalModel model_vertical(const VerticalPrior& prior, const Eigen::Matrix3d& R,
                              Curvature curvature) {
   const Eigen::Vector3d& u = prior.up;
-  const Eigen::Vector3d z = R.row(2).transpose();  // the vertical in the pose's frame
+  const Eigen::Vector3d z = R.row(2).transpose();  // the vertical in the frame of the pose
   VerticalModel model;
   model.cost = prior.weight * (u - z).squaredNorm();
   model.g = 2.0 * prior.weight * z.cross(u);
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  if (curvature ==
-      Curvature::kGaussNewton)  // a turn of everything about the vertical costs nothing
+  if (curvature == Curvature::kGaussNewton)  // a common rotation about the vertical costs nothing
     model.H = 2.0 * prior.weight * (I - z * z.transpose());
   else
     model.H = prior.weight * (2.0 * u.dot(z) * I - u * z.transpose() - z * u.transpose());

@@ -6,16 +6,17 @@
 
 namespace km {
 
-/// Second derivatives of which part of the cost.
+/// The kind of second derivatives.
 enum class Curvature {
-  kGaussNewton,  ///< Residuals taken as linear: never indefinite, zero along rigid motions.
+  kGaussNewton,  ///< Linearised residuals: never indefinite, zero along rigid motions.
   kFull,         ///< The Riemannian Hessian.
 };
 
 /// Cost of one edge, f = kappa ||R_j - R_i R||_F^2 + tau ||t_j - t_i - R_i t||^2, to second order
-/// in the tangent vectors xi = [w; v] of its poses, moved as R exp(w), t + R v: geodesics of SO(3)
-/// x R^3, so that the second derivatives are those of the Riemannian Hessian. All depends on T_i^-1
-/// T_j alone: a team that moves as one, or bends smoothly, keeps its second derivatives.
+/// in the tangent vectors xi = [w; v] of its poses. They move as R exp(w), t + R v, along geodesics
+/// of SO(3) x R^3, so that the second derivatives are those of the Riemannian Hessian. The model
+/// depends only on T_i^-1 T_j. A rigid motion of the whole team does not change it, and a smooth
+/// deformation hardly does.
 struct EdgeModel {
   double cost = 0.0;
   Vector6 g_i;
@@ -28,10 +29,10 @@ struct EdgeModel {
 [[nodiscard]] EdgeModel model_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j,
                                    Curvature curvature);
 
-/// The same without second derivatives; those are left as they are.
+/// Sets cost and gradient of `model` and does not touch its second derivatives.
 void slope_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, EdgeModel& model);
 
-/// Cost of a vertical prior to second order in the tangent vector w of its pose's rotation.
+/// Cost of a vertical prior, to second order in the tangent vector w of the rotation of its pose.
 struct VerticalModel {
   double cost = 0.0;
   Eigen::Vector3d g;

@@ -9,8 +9,9 @@
 namespace km {
 namespace {
 
-// A front takes in its last child if that stores at most this share of zeros, or if both are small:
-// dense kernels on a few columns cost less than the bookkeeping of two fronts.
+// Largest share of stored zeros with which a front is merged with its last child. Two small fronts
+// are always merged, because dense kernels on a few columns cost less than the bookkeeping of two
+// fronts.
 constexpr double kToleratedZeros = 0.15;
 constexpr int kSmallFront = 4;
 
@@ -25,7 +26,7 @@ Neighbours neighbours_of(int nodes, const std::vector<NodePair>& pairs) {
   return neighbours;
 }
 
-// The nodes in the order of approximate minimum degree, those to keep left out.
+// The nodes without the kept ones, in the order of approximate minimum degree.
 std::vector<int> fill_reducing_order(const std::vector<bool>& keep,
                                      const std::vector<NodePair>& pairs) {
   std::vector<int> number(keep.size(), -1);
@@ -57,7 +58,7 @@ std::vector<int> fill_reducing_order(const std::vector<bool>& keep,
 }
 
 // Columns of the factor by place in the order; kept nodes come after all others. The parent of a
-// column is the first place in it, -1 if that is a kept node.
+// column is its first place below the diagonal, or -1 if that is a kept node.
 struct Columns {
   Neighbours below = {};  // ascending places
   std::vector<int> parent = {};
@@ -88,8 +89,8 @@ Columns fill(const std::vector<int>& place, std::size_t eliminated, const Neighb
   return columns;
 }
 
-// Reorders so that every column comes right after its subtree: then a front's last child is the run
-// of columns just before its own.
+// Reorders so that every column follows its subtree directly. The last child of a front is then the
+// run of columns just before its own.
 std::vector<int> postorder(const std::vector<int>& parent) {
   Neighbours children(parent.size());
   std::vector<int> roots;

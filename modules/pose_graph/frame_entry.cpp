@@ -9,8 +9,8 @@ namespace km {
 namespace {
 
 constexpr int kBendingSteps = 10;
-constexpr int kBendingProducts = 50;  // with the Hessian, in each
-constexpr Eigen::Index kRank = 3;     // ordinary poses
+constexpr int kBendingProducts = 50;  // Hessian products in each Newton step
+constexpr Eigen::Index kRank = 3;     // rigid poses, not lifted
 
 std::vector<BlockEdge> block_edges(std::span<const PoseEdge> own) {
   std::vector<BlockEdge> edges;

@@ -12,24 +12,26 @@
 
 namespace km {
 
-/// `poses` of robot `self`, in a frame of its own, moved as a whole into the frame of the poses
-/// `told` by others: the transform that most of `closures` to those agree on, see align_frames().
-/// Candidates are compared at the centre of the closures' own ends. nullopt if no closure ends on a
-/// told pose.
+/// Moves `poses` of robot `self` as a whole from its own frame into the frame of the poses `told`,
+/// received from other robots. The transform is the one on which most of the `closures` to these
+/// poses agree, see align_frames(). Candidates are compared at the centre of the closure ends on
+/// `self`. nullopt if no closure ends on a received pose.
 [[nodiscard]] std::optional<std::vector<SE3>> moved_into_frame(
     const std::vector<SE3>& poses, RobotId self, std::span<const PoseEdge> closures,
     const std::map<KeyframeId, SE3>& told, const AlignmentTolerance& tolerance);
 
-/// `poses`, in the frame of those `told`, bent by some Newton steps on their own edges and on the
-/// closures to told ones, which stay fixed: over a long odometry no rigid transform fits. False
-/// closures would bend it wrongly.
+/// Deforms `poses`, in the frame of the received poses `told`, by a few Newton steps on the own
+/// edges and on the closures to received poses, which stay fixed. A long odometry drifts so far
+/// that no rigid transform fits. The closures must be true, because false ones would deform the
+/// trajectory.
 [[nodiscard]] std::vector<SE3> bent_to_told(const std::vector<SE3>& poses, RobotId self,
                                             std::span<const PoseEdge> own,
                                             std::span<const PoseEdge> closures,
                                             const std::map<KeyframeId, SE3>& told);
 
-/// Of `poses` and chordal initialisation from the robot's own edges, begun at the first of `poses`,
-/// what costs less. Throws std::invalid_argument if `own` does not connect all poses.
+/// The one with the lower cost: `poses`, or the chordal initialisation from the own edges of the
+/// robot, which begins at the first of `poses`. Throws std::invalid_argument if `own` does not
+/// connect all poses.
 [[nodiscard]] std::vector<SE3> better_of_chordal(std::vector<SE3> poses,
                                                  std::span<const PoseEdge> own);
 

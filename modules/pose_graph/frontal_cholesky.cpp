@@ -9,8 +9,9 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Lower triangle of the dense `front`, its first `pivots` scalar columns eliminated in place:
-// those columns become L, the rest the Schur complement. False if a pivot is not positive.
+// Eliminates the first `pivots` scalar columns of the dense `front` (lower triangle) in place.
+// These columns become L, and the rest becomes the Schur complement. False if a pivot is not
+// positive.
 bool eliminate(MatrixXd& front, Index pivots) {
   const Index rest = front.rows() - pivots;
   auto pivot_block = front.topLeftCorner(pivots, pivots);
@@ -176,7 +177,7 @@ double FrontalCholesky::magnitude(const Eigen::VectorXd& b) const {
     for (std::size_t k = 0; k < front.nodes.size(); ++k)
       rows.segment(block_ * static_cast<Index>(k), block_) =
           b.segment(block_ * front.nodes[k], block_);
-    // The upper triangle of the pivots' block is not part of the factor.
+    // The upper triangle of the pivot block is not part of the factor.
     for (Index c = 0; c < factors_[f].cols(); ++c) {
       const Index below = factors_[f].rows() - c;
       const double column = factors_[f].col(c).tail(below).cwiseAbs().dot(rows.tail(below));

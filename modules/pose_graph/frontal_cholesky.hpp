@@ -8,9 +8,10 @@
 namespace km {
 
 /// Cholesky factorisation of a symmetric block matrix A by its elimination plan, and the Schur
-/// complement onto the nodes that are kept. With nothing but the factor, forward() reduces a
-/// right-hand side to the kept nodes and backward() goes from their solution to all nodes', so that
-/// A X = C is solved by parties who each hold some of the nodes. Not thread-safe.
+/// complement onto the kept nodes. forward() reduces a right-hand side to the kept nodes.
+/// backward() computes the solution of all nodes from the solution of the kept ones. Both need only
+/// the factor, so that robots can solve A X = C together, each with some of the nodes. Not
+/// thread-safe. Not thread-safe.
 class FrontalCholesky {
  public:
   explicit FrontalCholesky(std::shared_ptr<const EliminationPlan> plan) : plan_(std::move(plan)) {}
@@ -23,14 +24,16 @@ class FrontalCholesky {
   /// kept_pairs().
   [[nodiscard]] const BlockMatrix& schur() const { return schur_; }
 
-  /// Right-hand side C, (B nodes) x k, in place: of the eliminated nodes to what backward() needs,
-  /// of the kept ones to that of the Schur complement's system.
+  /// Forward substitution of the right-hand side C, (B nodes) x k, in place. Rows of eliminated
+  /// nodes become the input of backward(); rows of kept nodes become the right-hand side of the
+  /// Schur complement.
   void forward(Eigen::MatrixXd& C) const;
-  /// From forward()'s output with the kept nodes' rows replaced by their solution, to the solution.
+  /// Back substitution in place: `X` is the output of forward() with the solution in the rows of
+  /// the kept nodes, and becomes the full solution.
   void backward(Eigen::MatrixXd& X) const;
 
-  /// | |L|^T b |^2 for b >= 0 of B nodes entries, L being the factor's columns of the eliminated
-  /// nodes: what its rounding errors are bounded by.
+  /// | |L|^T b |^2 for b >= 0 of B nodes entries, which bounds the rounding errors of the
+  /// factorisation. L has the columns of the eliminated nodes.
   [[nodiscard]] double magnitude(const Eigen::VectorXd& b) const;
 
   [[nodiscard]] const EliminationPlan& plan() const { return *plan_; }
@@ -43,9 +46,9 @@ class FrontalCholesky {
 
   std::shared_ptr<const EliminationPlan> plan_;
   Eigen::Index block_ = 0;
-  std::vector<Eigen::MatrixXd> factors_;  // per front: its pivots' columns of L
-  std::vector<Eigen::MatrixXd> rests_;    // per front, until its parent has taken it in
-  std::vector<int> local_;                // of each node in the front at hand
+  std::vector<Eigen::MatrixXd> factors_;  // per front: columns of L of its pivots
+  std::vector<Eigen::MatrixXd> rests_;    // per front, until its parent has added it
+  std::vector<int> local_;                // place of each node in the present front
   BlockMatrix schur_;
 };
 

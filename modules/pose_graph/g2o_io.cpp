@@ -20,7 +20,7 @@ namespace km {
 namespace {
 
 constexpr std::uint64_t kLetters = 26;
-constexpr double kVerticalTolerance = 1e-3;  // likewise, of information relative to its size
+constexpr double kVerticalTolerance = 1e-3;  // information, relative to its size
 
 KeyframeId read_id(TextFields& fields) {
   const std::uint64_t key = fields.integer("vertex id");
@@ -30,7 +30,7 @@ KeyframeId read_id(TextFields& fields) {
 }
 
 constexpr Bounds<double> kAngle_rad{-1e6,
-                                    1e6};  // some count turns; beyond, no digits of one are left
+                                    1e6};  // with full turns; larger angles have lost their digits
 
 SE3 read_pose(TextFields& fields, int dimension, const Bounds<double>& bounds_m) {
   Eigen::Vector3d t = Eigen::Vector3d::Zero();
@@ -56,7 +56,7 @@ Eigen::Matrix<double, N, N> read_information(TextFields& fields) {
   return information;
 }
 
-// 1 / (mean of the eigenvalues of the inverse): not positive, or NaN, where that makes no weight.
+// 1 / (mean of the eigenvalues of the inverse): not positive, or NaN, if there is no such weight.
 template <typename Block>
 double mean_precision(const Block& information) {
   return static_cast<double>(information.rows()) / information.inverse().trace();
@@ -70,17 +70,17 @@ bool usable(double weight) {
 template <int N>
 struct EdgeCovariance {
   Eigen::Matrix<double, N, N> Sigma;
-  bool definite = true;  // the information is
+  bool definite = true;  // the information matrix is positive definite
 };
 
-// Without cross terms, with the weights that SE-Sync takes from the blocks of `information`.
+// The covariance without cross terms, with the weights of SE-Sync for the blocks of `information`.
 template <int N>
 EdgeCovariance<N> covariance_of_blocks(const Eigen::Matrix<double, N, N>& information,
                                        const TextFields& fields) {
   constexpr int kAxes = N == 6 ? 3 : 2;
   constexpr int kTurns = N - kAxes;
   const double tau = mean_precision(information.template topLeftCorner<kAxes, kAxes>().eval());
-  const double rotation =  // 2 kappa, in the plane kappa
+  const double rotation =  // 2 kappa; in the plane kappa
       mean_precision(information.template bottomRightCorner<kTurns, kTurns>().eval());
   if (!usable(tau) || !usable(rotation))
     fields.fail("information matrix is not positive definite, and its blocks weigh rotation by " +
@@ -106,7 +106,7 @@ EdgeCovariance<N> read_covariance(TextFields& fields) {
   return edge;
 }
 
-// What the prior of a vertical knows, [translation; rotation], in units of 1 / sigma^2.
+// Information of the prior of a vertical, [translation; rotation], in units of 1 / sigma^2.
 Matrix6 tilt_information(const Eigen::Vector3d& up) {
   Matrix6 information = Matrix6::Zero();
   information.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() - up * up.transpose();

@@ -11,9 +11,9 @@ struct GraphPlaybackConfig {
   double poses_per_second = 1.0;
 
   void visit_fields(auto& visitor) {
-    visitor.field(
-        "poses_per_second", poses_per_second, {1e-3, 1e6},
-        "[1/s] in graphs without times (g2o, CSV): keyframe i is stamped i / poses_per_second");
+    visitor.field("poses_per_second", poses_per_second, {1e-3, 1e6},
+                  "[1/s] keyframe rate of graphs without times (g2o, CSV): keyframe i is stamped i "
+                  "/ poses_per_second");
   }
 };
 

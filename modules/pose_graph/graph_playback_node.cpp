@@ -30,7 +30,7 @@ double checked_rate(double rate) {
                               " is not positive");
 }
 
-// A long product of rotations drifts from orthonormality.
+// Restores orthonormality, from which a long product of rotations drifts.
 SE3 orthonormal(const SE3& T) {
   return make_pose(nearest_rotation(T.linear()), T.translation());
 }
@@ -63,14 +63,15 @@ void GraphPlaybackNode::play(std::size_t index) {
   wait_until_due(index);
   if (stop_.stop_requested()) return;
   step(index);
-  if (index + 1 < graph_.poses()) worker_.post(index + 1);  // the queue is empty: room for one
+  if (index + 1 < graph_.poses())
+    worker_.post(index + 1);  // the queue is empty and has room for one
 }
 
 void GraphPlaybackNode::wait_until_due(std::size_t index) {
   if (std::isinf(rate_) || index < known_) return;
   const double due_s = seconds_between(stamp_of(known_), stamp_of(index)) / rate_;
   const Heartbeat::Waiting waiting;
-  std::mutex unshared;  // the stop token is all there is to wait for
+  std::mutex unshared;  // needed by wait_until(), which only the stop token ends
   std::condition_variable_any never;
   std::unique_lock lock(unshared);
   never.wait_until(lock, stop_.get_token(), begin_ + steady_duration(due_s), [] { return false; });

@@ -20,14 +20,14 @@
 
 namespace km {
 
-/// The recorded graph is over; published once, after everything else. Not published by a stop
-/// before.
+/// End of the recorded graph. The node publishes it once, after everything else, and does not
+/// publish it if it is stopped earlier.
 struct GraphPlaybackEnd {
   std::size_t keyframes = 0;
   std::size_t closures = 0;  ///< Published by this robot.
 };
 
-/// Where a played graph goes. All topics must outlive the node.
+/// Outputs of the playback. All topics must outlive the node.
 struct GraphPlaybackTopics {
   Out<KeyframeOdometry> odometry;
   Out<Keyframe> keyframes;  ///< Without features; covariance since keyframe 0.
@@ -35,34 +35,34 @@ struct GraphPlaybackTopics {
   Out<GraphPlaybackEnd> end;
 };
 
-/// Plays one robot's part of a recorded pose graph as if it were being driven: keyframe after
-/// keyframe, each followed by the closures that it makes known. A closure inside the robot appears
-/// with the later of its keyframes. One between two robots is in the records of both: the robot it
-/// starts `from` publishes it, with its own keyframe, be the other robot there yet or not.
-/// Verticals go with their keyframes; with them odometry starts upright, see
-/// RecordedGraph::T_odom_first(). Keyframes have the stamps of the graph; if it has none, keyframe
-/// i is at i / poses_per_second.
+/// Plays the part of one robot of a recorded pose graph as if it were being driven. It publishes
+/// the keyframes in order, each followed by the closures that it makes known. A closure inside the
+/// robot appears with the later of its keyframes. A closure between two robots is in the records of
+/// both. The robot of its end `from` publishes it with its own keyframe, whether or not the other
+/// robot has reached its end. Verticals are published with their keyframes; odometry then starts
+/// upright, see RecordedGraph::T_odom_first(). Keyframes have the stamps of the graph. If it has
+/// none, keyframe i has the stamp i / poses_per_second.
 class GraphPlaybackNode final : public Node {
  public:
-  /// `rate`: recorded seconds per second; infinity: as fast as consumers take it.
+  /// `rate`: recorded seconds per second; infinity: as fast as the consumers accept messages.
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument for a bad rate.
   GraphPlaybackNode(const GraphPlaybackConfig& config, double rate, RecordedGraph graph,
                     const GraphPlaybackTopics& topics);
 
-  /// The first `keyframes` are known: of those only the closures are played, and at once. Call
-  /// before start().
+  /// Declares the first `keyframes` known: the node plays only their closures, without waiting.
+  /// Call before start().
   void continue_after(std::size_t keyframes) { known_ = std::min(keyframes, graph_.poses()); }
   ~GraphPlaybackNode() override { stop(); }
 
   std::string_view name() const override { return GraphPlaybackConfig::kSection; }
   void start() override;
-  /// Ends at once: what is not yet due has not happened.
+  /// Ends at once and publishes nothing that is not yet due.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
 
-  /// Publishes keyframe `index` and what it makes known, without waiting; the end after the last.
-  /// Call with 0, 1, ... in turn. The thread calls only this and waits.
+  /// Publishes keyframe `index` and its closures, without waiting, and after the last keyframe the
+  /// end. Call with 0, 1, ... in turn. The thread only calls this function and waits.
   void step(std::size_t index);
 
  private:
@@ -76,13 +76,13 @@ class GraphPlaybackNode final : public Node {
   const double rate_;
   const RecordedGraph graph_;
   const GraphPlaybackTopics topics_;
-  std::vector<std::vector<RelativePose>> closures_of_;  // those that keyframe i makes known
-  UncertainPose T_odom_kf_;                             // of the last keyframe published
+  std::vector<std::vector<RelativePose>> closures_of_;  // [i]: closures that keyframe i makes known
+  UncertainPose T_odom_kf_;                             // pose of the last published keyframe
   GraphPlaybackEnd published_;
-  std::size_t known_ = 0;  // keyframes
+  std::size_t known_ = 0;  // number of known keyframes
   Clock::time_point begin_;
   std::stop_source stop_;
-  Worker<std::size_t> worker_;  // last member: stops first; posts itself the next keyframe
+  Worker<std::size_t> worker_;  // last member: stops first; posts the next keyframe to itself
 };
 
 }  // namespace km

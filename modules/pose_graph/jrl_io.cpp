@@ -63,7 +63,7 @@ class JsonPlace {
       members.emplace_back(name, JsonPlace(value, place_ + '/' + readable(name, 40), *file_));
     return members;
   }
-  // A list of exactly two.
+  // The elements of a list of exactly two elements.
   [[nodiscard]] std::pair<JsonPlace, JsonPlace> pair() const {
     auto elements = list();
     if (elements.size() != 2) fail("is not a pair: " + text());
@@ -80,7 +80,7 @@ class JsonPlace {
       fail("is not an integer from 0 to " + std::to_string(max) + ": " + text());
     return value_->get<std::uint64_t>();
   }
-  // A list of exactly N finite numbers.
+  // The numbers of a list of exactly N finite numbers.
   template <int N>
   [[nodiscard]] Eigen::Matrix<double, N, 1> numbers(const Bounds<double>& bounds) const {
     if (!value_->is_array() || value_->size() != N)
@@ -101,7 +101,8 @@ class JsonPlace {
   [[nodiscard]] std::string text() const { return text_of(*value_); }
 
  private:
-  // Of a list or an object only what it is: a document of megabytes is no message.
+  // Lists and objects only as their kind and size, because a document of megabytes does not fit
+  // into a message.
   static std::string text_of(const nlohmann::json& value) {
     if (value.is_structured())
       return std::string(value.is_array() ? "a list" : "an object") + " of " +
@@ -168,7 +169,7 @@ Matrix6 read_covariance(const JsonPlace& place) {
   return Sigma;
 }
 
-// Where a measurement stands in the document.
+// Place of a measurement in the document.
 struct FactorPlace {
   RobotId robot = 0;
   std::size_t entry = 0;
@@ -300,9 +301,9 @@ class JrlReader {
     graph_.measurements.push_back(std::move(measured));
   }
 
-  // Poses are those that steps of odometry reach from index 0.
+  // The poses are index 0 and all indices that steps of odometry reach from it.
   void find_chains(const JsonPlace& place) {
-    std::map<KeyframeId, Stamp> known_from;  // by the pose that the step ends on
+    std::map<KeyframeId, Stamp> known_from;  // by the pose at the end of the step
     for (const JrlMeasurement& measured : graph_.measurements) {
       const auto& [from, to] = std::pair(measured.edge.from, measured.edge.to);
       if (from.robot == to.robot && to.index == std::uint64_t{from.index} + 1)

@@ -12,15 +12,15 @@
 
 namespace km {
 
-/// A relative pose of a JRL file, with the covariance as it stands there.
+/// A relative pose of a JRL file, with its unchanged covariance.
 struct JrlMeasurement {
   RelativePose edge;
-  Stamp stamp = 0;            ///< Of its entry; of the earliest one if it is there several times.
+  Stamp stamp = 0;            ///< Time of its earliest entry.
   bool may_be_false = false;  ///< Listed in "potential_outlier_factors".
   bool is_false = false;      ///< Listed in "outlier_factors".
 };
 
-/// A team's pose graph with its truth, as JRL (JSON Robot Log) holds it.
+/// The pose graph of a team with its truth, from a JRL file (JSON Robot Log).
 struct JrlGraph {
   std::string name;
   std::vector<RobotId> robots;               ///< Ascending.
@@ -29,34 +29,35 @@ struct JrlGraph {
   std::map<KeyframeId, SE3> truth;           ///< T_world_kf; empty if the file has none.
   std::map<KeyframeId, SE3> initial;  ///< T_world_kf of "initialization"; empty if there is none.
   std::map<RobotId, std::vector<Stamp>> stamps;  ///< [i]: when keyframe i became known.
-  std::size_t priors = 0;                        ///< Read, checked and not used.
-  std::size_t repeated = 0;                      ///< Exact copies that were left out.
+  std::size_t priors = 0;                        ///< Priors that were read, checked and not used.
+  std::size_t repeated = 0;                      ///< Exact copies of measurements, left out.
 };
 
-/// Reads a JRL file of 3D poses (github.com/DanMcGann/jrl, format/*.md), as COSMO-Bench has them.
+/// Reads a JRL file of 3D poses (github.com/DanMcGann/jrl, format/*.md), as in COSMO-Bench.
 ///
-/// Robots are letters or character codes; robot a is 0, see keyframe_of_key(). A map by robot may
-/// also be a list of pairs [robot, value], a map by key a list of values with a "key" each. Labels
-/// of a file with one robot may be one list. Covariances are those of the tangent [rotation;
-/// translation] at the measurement, as RelativePose has them: nothing is exchanged or dropped.
-/// Quaternions are normalised. A measurement that several lists hold with equal keys, pose and
-/// covariance counts once. Measurements of one pair that differ all count. A robot's list of poses
-/// may hold poses of others; the list of the robot itself says more than those.
+/// Robots are single characters or character codes; robot a is 0, see keyframe_of_key(). A map by
+/// robot may also be a list of pairs [robot, value], and a map by key may be a list of values with
+/// a "key" each. The labels of a file with one robot may be one list. Covariances refer to the
+/// tangent [rotation; translation] at the measurement, as in RelativePose: no entry is reordered or
+/// dropped. Quaternions are normalised. A measurement that several lists contain with equal keys,
+/// pose and covariance counts once. Different measurements of one pair all count. The list of poses
+/// of a robot may contain poses of other robots; the list of the other robot has precedence.
 ///
-/// PriorFactorPose3 is counted and not used: the frame of a team is its own.
+/// PriorFactorPose3 is counted and not used, because a team defines its own frame.
 ///
-/// Throws std::runtime_error "file: /place/in/the/document: what" for everything else: no JSON,
-/// missing members, wrong types, numbers beyond measurement_limits.hpp, quaternions not of unit
-/// length within 1e-3, covariances that are not symmetric and positive definite, other types of
-/// measurements and values, robots that the file does not name, keys that no chain of odometry from
-/// index 0 reaches, labels of no measurement, and poses given twice in one list.
+/// Throws std::runtime_error "file: /place/in/the/document: what" for everything else: invalid
+/// JSON, missing members, wrong types, other types of measurements and values, and robots that the
+/// file does not name. Also for numbers beyond measurement_limits.hpp, quaternions not of unit
+/// length within 1e-3, and covariances that are not symmetric and positive definite. Also for keys
+/// that no chain of odometry from index 0 reaches, labels without a measurement, and poses that
+/// occur twice in one list.
 [[nodiscard]] JrlGraph read_jrl(const std::filesystem::path& file);
 
-/// The same of the document itself; `file` names it in errors.
+/// Parses the text of a JRL file; errors name it `file`.
 [[nodiscard]] JrlGraph parse_jrl(const std::string& text, const std::string& file);
 
-/// What `robot` knows of the graph: its odometry, and the closures that touch it. Throws
-/// std::runtime_error "file: what" if the file has no such robot, or it has no odometry.
+/// The part of the graph that `robot` knows: its odometry, and the closures that end on it. Throws
+/// std::runtime_error "file: what" if the file has no such robot, or if the robot has no odometry.
 [[nodiscard]] RecordedGraph part_of(const JrlGraph& graph, RobotId robot, const std::string& file);
 
 }  // namespace km

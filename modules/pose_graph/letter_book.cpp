@@ -7,17 +7,18 @@
 namespace km {
 namespace {
 
-// A letter is sent again after so many times the mean time of an answer, and then ever more rarely.
+// Timeout of the first repetition, as a multiple of the mean response time. Later timeouts grow.
 constexpr double kPatience = 2.0;
-constexpr double kMeanOver = 8.0;  // letters
-// In periods.
+constexpr double kMeanOver = 8.0;  // number of messages in the mean
+// Bounds of the timeout [periods].
 constexpr double kLeastPatience = 0.2;
 constexpr double kMostPatience = 3.0;
-// The transport loses nothing while it is there, and where it was not reachable_again() helps. What
-// is large also takes its reader long, who does not answer meanwhile.
+// Rate of repetitions of large messages [bytes/s]. An existing transport loses nothing, and
+// reachable_again() covers outages. The receiver of a large message also needs long before it can
+// acknowledge it.
 constexpr double kRepeated_Bps = 50e3;
 
-// A letter that is so far ahead of those that were taken is not one of a solver's.
+// No solver sends messages this far ahead of those that were taken.
 constexpr std::uint32_t kFarAhead = 10000;
 
 }  // namespace

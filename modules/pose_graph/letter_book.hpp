@@ -15,35 +15,37 @@
 
 namespace km {
 
-/// What a letter is to the one it has come to.
+/// Result of the arrival of a message.
 enum class [[nodiscard]] LetterNews{
-    kNew,    ///< It has a content that has not been taken yet.
-    kNone,   ///< Word of what has arrived there, or a repetition.
-    kFalse,  ///< No member's book could have written it.
+    kNew,    ///< Content that has not been taken yet.
+    kNone,   ///< An acknowledgement without content, or a repetition.
+    kFalse,  ///< A message that no correct member sends.
 };
 
-/// One robot's correspondence with the other members of a session: numbers letters, keeps them
-/// until their addressees tell that they have taken them, and sends them again until then. How long
-/// it waits for that follows from how long answers take (as the retransmission timer of TCP does,
-/// RFC 6298, and its rule of Karn: of what was repeated no time is taken). Letters may be taken in
-/// any order, each once; what is not taken comes again. Deterministic; not thread-safe.
+/// Reliable messages of one robot to the other members of a session. It numbers messages, keeps
+/// them until their receivers acknowledge them, and repeats them until then. The timeout follows
+/// from the measured response time, as in the retransmission timer of TCP (RFC 6298). By Karn's
+/// rule, repeated messages do not count for the response time. The receiver may take messages in
+/// any order, each once; a message that it does not take is sent again. Deterministic; not
+/// thread-safe.
 class LetterBook {
  public:
-  /// `period_s`: first guess of the time that an answer takes.
+  /// `period_s`: initial estimate of the response time.
   LetterBook(TeamPeer self, SessionId session, double period_s)
       : self_(self), session_(std::move(session)), period_s_(period_s) {}
 
-  /// What is sent for a solver's letter.
+  /// The message on the network for a message of the solver.
   [[nodiscard]] SessionLetter write(SolverLetter letter, double now_s);
 
-  /// What arrives; the sender's process is not looked at.
+  /// Processes a message that has arrived. It does not check the boot id of the sender.
   LetterNews read(const SessionLetter& letter, double now_s);
-  /// A new one is in good hands: its sender is told.
+  /// Marks a new message as taken: its sender will receive an acknowledgement.
   void take(const SessionLetter& letter);
 
-  /// What has to be sent again by now, and word of what has arrived to those that repeat it.
+  /// The messages that are due for repetition, and acknowledgements for the robots that repeat
+  /// theirs.
   [[nodiscard]] std::vector<SessionLetter> due(double now_s);
-  /// There is a way to `robot` again: what it may have missed is due at once.
+  /// Reports that `robot` is reachable again: messages that it may have missed are due at once.
   void reachable_again(RobotId robot);
 
  private:
@@ -54,10 +56,10 @@ class LetterBook {
   };
   struct Correspondent {
     std::uint32_t written = 0;
-    std::deque<Waiting> waiting = {};          // until they are known to be taken
-    std::uint32_t taken = 0;                   // all below this
-    std::set<std::uint32_t> taken_early = {};  // beyond
-    std::optional<double> answer_s = {};       // mean time until a letter is known to be there
+    std::deque<Waiting> waiting = {};          // until they are acknowledged
+    std::uint32_t taken = 0;                   // all numbers below this are taken
+    std::set<std::uint32_t> taken_early = {};  // taken numbers above `taken`
+    std::optional<double> answer_s = {};       // mean time until an acknowledgement
     bool owes_word = false;
   };
 

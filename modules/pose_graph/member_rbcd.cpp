@@ -18,16 +18,17 @@ namespace {
 
 enum class LetterKind : std::uint8_t { kPoses, kShare, kProgress };
 
-// Of the start, see perturb_rotations(): small beside any measurement, large beside rounding.
+// Perturbation of the start, see perturb_rotations(): small relative to any measurement, large
+// relative to rounding.
 constexpr double kPerturbation = 1e-3;
-// Rounds after which the root tells all how far they are; and how far ahead of that a member goes,
-// which keeps its poses of all these rounds.
+// Rounds between two progress messages of the root, and the largest number of rounds that a member
+// is ahead of the last one. The member keeps its poses of all these rounds.
 constexpr std::uint32_t kProgressPeriod = 5;
 constexpr std::uint32_t kMaxAhead = 20;
-// Poses that are told are off their manifold by rounding alone.
+// Received poses are off their manifold only by rounding.
 constexpr double kMaxStiefelError = 1e-3;
 
-// The same for everyone who knows the start of that keyframe.
+// The perturbed start of a keyframe, equal on all robots that know its start.
 Eigen::MatrixXd perturbed(const SE3& start, const KeyframeId& keyframe, Eigen::Index rank) {
   std::mt19937 rng((std::uint32_t{keyframe.robot} << 16U) ^ keyframe.index);
   return perturb_rotations(lift(lifted_identity(rank), start), kPerturbation, rng);
@@ -170,7 +171,7 @@ void MemberRbcd::update(std::vector<SolverLetter>& letters) {
   report_share(result.initial_gradient_norm * result.initial_gradient_norm, letters);
 }
 
-// What the others make of the numbers they hear is what stays here.
+// This robot keeps the rounded poses, exactly as the other robots decode them.
 std::map<KeyframeIndex, Eigen::MatrixXf> MemberRbcd::round_public_poses() {
   LiftedPoses& X = history_.rbegin()->second;
   std::map<KeyframeIndex, Eigen::MatrixXf> rounded;
@@ -188,7 +189,7 @@ std::map<KeyframeIndex, Eigen::MatrixXf> MemberRbcd::round_public_poses() {
 
 void MemberRbcd::report_share(double squared_gradient, std::vector<SolverLetter>& letters) {
   const auto& [round, X] = *history_.rbegin();
-  // Before the first round the rigid start counts, which a session that finds nothing ends with.
+  // Before the first round, the rigid start counts: a session without an improvement ends with it.
   const LiftedPoses start = round == 0 ? lift(graph_.start, options_.rank) : LiftedPoses();
   const LiftedPoses& at = round == 0 ? start : X;
   if (round == 0) {
@@ -199,7 +200,7 @@ void MemberRbcd::report_share(double squared_gradient, std::vector<SolverLetter>
             lift(lifted_identity(options_.rank), graph_.told.at({robot, keyframe}));
     problem_.set_fixed(std::move(told));
   }
-  // Of two neighbours the one that moves last counts what is between them.
+  // The cost between two neighbours is counted by the one that moves last.
   Share share{problem_.cost(at), squared_gradient, !graph_.to_absent.empty()};
   for (std::size_t k = 0; k < robot_of_edge_.size(); ++k) {
     const Neighbour& neighbour = neighbours_.at(robot_of_edge_[k]);
@@ -216,7 +217,7 @@ void MemberRbcd::report_share(double squared_gradient, std::vector<SolverLetter>
   letters.push_back(addressed(place_.root, std::move(writer)));
 }
 
-// True if the members are told of it.
+// True if the round is reported to the members.
 bool MemberRbcd::close_round(std::vector<SolverLetter>& letters) {
   const auto shares = shares_.extract(shares_.begin());
   const std::uint32_t round = shares.key();
@@ -233,7 +234,7 @@ bool MemberRbcd::close_round(std::vector<SolverLetter>& letters) {
     return false;
   }
   const double decrease = last->total.cost - total.cost;
-  // Moving the start off the rigid poses may cost more than the first round gains.
+  // The perturbation of the rigid start may cost more than the first round gains.
   const bool settled = round > 1 && !(decrease > options_.min_relative_decrease * total.cost);
   const bool stop = settled || (options_.max_rounds > 0 && round >= options_.max_rounds);
   if (!stop && round % kProgressPeriod != 0) return false;
@@ -300,7 +301,7 @@ bool MemberRbcd::take_poses(RobotId from, std::uint32_t round, ByteReader& reade
   for (double& x : X.reshaped()) x = static_cast<double>(reader.f32());
   if (!reader.done() || !X.allFinite() || stiefel_error(X) > kMaxStiefelError) return false;
   if (round <= neighbour.round) return true;  // repeated
-  // It waits for this one's next poses as this one does for its: it cannot be further.
+  // The neighbour waits for the next poses of this robot and therefore cannot be further ahead.
   const std::uint32_t own_round = history_.rbegin()->first;
   if (round > own_round + (neighbour.before ? 1 : 0)) return false;
   X = restore_stiefel(std::move(X));
@@ -337,7 +338,7 @@ bool MemberRbcd::take_progress(RobotId from, std::uint32_t round, ByteReader& re
   if (progress.before < state_.round) return true;  // repeated
   const bool forward =
       progress.stop ? round == 0 || round >= progress.before : round > progress.before;
-  // Nobody is told of rounds that it has had no part in.
+  // The root never reports rounds to a member that has not completed them.
   if (!forward || std::max(round, progress.before) > history_.rbegin()->first) return false;
   heard_.try_emplace(progress.before, std::move(progress));
   return true;

@@ -13,36 +13,37 @@
 
 namespace km {
 
-/// The same on all members of a session.
+/// Parameters of block descent, equal on all members of a session.
 struct RbcdOptions {
-  Eigen::Index rank = 5;                ///< Of the relaxation.
+  Eigen::Index rank = 5;                ///< Rank r of the relaxation.
   std::uint32_t max_rounds = 0;         ///< 0: no limit.
-  double min_relative_decrease = 1e-7;  ///< Of the team's cost in a round: less is convergence.
-  int max_newton_steps = 3;             ///< Of one block update.
-  int max_cg_iterations = 50;           ///< Of one Newton step.
+  double min_relative_decrease = 1e-7;  ///< Per round, of the team cost.
+  int max_newton_steps = 3;             ///< Newton steps per block update.
+  int max_cg_iterations = 50;           ///< CG iterations per Newton step.
   double max_over_relaxation = 1.95;    ///< 1: to the minimum of the block, see minimise_beyond().
 };
 
 /// Riemannian block-coordinate descent on the rank relaxation (Tian et al., "Distributed
-/// Certifiably Correct Pose-Graph Optimization", TRO 2021, Alg. 3), the blocks in turn.
+/// Certifiably Correct Pose-Graph Optimization", TRO 2021, Alg. 3). The blocks take turns.
 ///
-/// In a round every member lowers the cost of its own lifted poses, all others fixed, once those of
-/// its neighbours in the graph of closures that come before it in the order of ids have done so: a
-/// Gauss-Seidel sweep. Of two neighbours only one is free to move at any time, so the team's cost
-/// never rises but by what rounding to single precision costs. A neighbour is told the poses that
-/// closures to it end on; the root of the tree is told every member's share of cost and gradient,
-/// and tells all now and then which round they have got to, at the end which round counts. The
-/// tree is not used otherwise. Every member comes by each of the rounds told, one at a time, so
-/// that all of them can go back to one that all have completed.
+/// In a round every member lowers the cost of its own lifted poses, with all other poses fixed. It
+/// waits for those neighbours in the graph of closures that have a lower id: a Gauss-Seidel sweep.
+/// Only one of two neighbours may move at any time, so the team cost rises by no more than rounding
+/// to single precision. A member sends each neighbour the poses on which closures to it end. It
+/// sends its share of cost and gradient to the root of the tree. From time to time the root sends
+/// the number of the last complete round to all, and at the end the number of the final round. The
+/// tree has no other use. Every member passes through each of these rounds, one at a time, so that
+/// all members can return to one that all have completed.
 ///
-/// The relaxation lives in here alone. It begins at the start lifted and moved off the rigid poses
-/// a little (perturb_rotations()), which everyone knows of everyone's public poses: the first round
-/// needs no exchange before it. Rigid poses are rounded in the frame of the root's first pose,
-/// which stays where it was; where poses of absent robots or verticals hold the frame, in theirs.
+/// Only this class knows the relaxation. It begins at the lifted start, perturbed slightly away
+/// from rigid poses (perturb_rotations()). Every robot computes the same perturbation of the public
+/// poses, so the first round needs no exchange before it. Rigid poses are rounded in the frame of
+/// the first pose of the root, which keeps its place. If poses of absent robots or verticals fix
+/// the frame, they are rounded in that frame.
 class MemberRbcd final : public MemberSolver {
  public:
-  /// Throws std::invalid_argument if the graph is not usable, see QuadraticProblem, if a pose at
-  /// the other end of a closure was not told, or for a rank below 3.
+  /// Throws std::invalid_argument if the graph is not usable, see QuadraticProblem, if the pose at
+  /// the other end of a closure is missing, or for a rank below 3.
   MemberRbcd(SessionGraph graph, const TreePlace& place, const RbcdOptions& options);
 
   bool receive(RobotId from, std::span<const std::uint8_t> bytes) override;
@@ -51,23 +52,23 @@ class MemberRbcd final : public MemberSolver {
   [[nodiscard]] bool done() const override { return done_; }
 
   [[nodiscard]] const std::vector<SE3>& poses() const override { return poses_; }
-  /// Of the relaxation, at the round that poses() are of.
+  /// State of the relaxation at the round of poses().
   [[nodiscard]] SolverState state() const override { return state_; }
   [[nodiscard]] ClosureVerdicts verdicts() const override { return {}; }
 
  private:
-  // Of the robots that closures lead to, absent ones included.
+  // A robot with closures to this one; it may be absent.
   struct Neighbour {
-    std::map<KeyframeIndex, Eigen::Index> slot_of;  // in fixed_
-    std::vector<KeyframeIndex> own;                 // told to it, ascending
+    std::map<KeyframeIndex, Eigen::Index> slot_of;  // places in fixed_
+    std::vector<KeyframeIndex> own;                 // poses sent to it, ascending
     std::uint32_t round = 0;
     bool absent = false;
-    bool before = false;  // in the order of updates
+    bool before = false;  // it updates before this robot
   };
   struct Share {
     double cost = 0.0;
     double squared_gradient = 0.0;
-    bool held = false;  // by absent robots' poses
+    bool held = false;  // by poses of absent robots
   };
   struct Total {
     double cost = 0.0;
@@ -77,12 +78,12 @@ class MemberRbcd final : public MemberSolver {
     std::uint32_t round = 0;
     Total total;
   };
-  // What the root tells all, each upon the one before.
+  // Message of the root to all members; each one refers to the message before it.
   struct Progress {
     RoundTotal at;
-    std::uint32_t before = 0;  // the round told last
+    std::uint32_t before = 0;  // round of the message before
     bool stop = false;
-    Eigen::MatrixXd anchor;  // r x 4: the session's frame, lifted
+    Eigen::MatrixXd anchor;  // r x 4: frame of the session, lifted
   };
 
   [[nodiscard]] QuadraticProblem make_problem();
@@ -108,19 +109,19 @@ class MemberRbcd final : public MemberSolver {
   TreePlace place_;
   RbcdOptions options_;
   std::map<RobotId, Neighbour> neighbours_;
-  std::vector<RobotId> robot_of_edge_;  // of the k-th public edge of problem_
+  std::vector<RobotId> robot_of_edge_;  // [k]: other robot of public edge k of problem_
   LiftedPoses fixed_;
   QuadraticProblem problem_;
-  std::map<std::uint32_t, LiftedPoses> history_;  // by round, from the last one told on
-  std::map<std::uint32_t, Progress> heard_;       // not adopted yet, by the round before
+  std::map<std::uint32_t, LiftedPoses> history_;  // by round, since last Progress
+  std::map<std::uint32_t, Progress> heard_;  // not adopted yet; by the round of the message before
   bool started_ = false;
   bool done_ = false;
   std::vector<SE3> poses_;
   SolverState state_;
 
-  // Of the root.
-  std::map<std::uint32_t, std::map<RobotId, Share>> shares_;  // of rounds that are not complete
-  std::optional<RoundTotal> last_;                            // complete
+  // Members that only the root uses.
+  std::map<std::uint32_t, std::map<RobotId, Share>> shares_;  // shares of incomplete rounds
+  std::optional<RoundTotal> last_;                            // last complete round
   Total start_;
   bool held_ = false;
 };

@@ -10,13 +10,13 @@ namespace km {
 namespace {
 
 constexpr std::size_t kFewLengths = 5;
-constexpr double kBin = 0.05;  // of log d
+constexpr double kBin = 0.05;  // width of a bin in log d
 constexpr double kLeast = 1e-4;
 constexpr double kGreatest = 1e3;
 constexpr double kLeastScale = 1e-3;
 constexpr double kGreatestScale = 100.0;
 constexpr int kIterations = 40;
-// Of the log-likelihood: a scale that loses no more is as good as the best (Wilks: 2 is the 95 %
+// Loss of log-likelihood up to which a scale is as good as the best one (Wilks: 2 is the 95 %
 // interval).
 constexpr double kDoubt = 4.0;
 
@@ -29,7 +29,7 @@ double middle_of(std::uint16_t bin) {
   return kLeast * std::exp(kBin * (static_cast<double>(bin) + 0.5));
 }
 
-// Density of log |x| for a normal vector x with so many components.
+// Density of log |x| for a normal vector x with this number of components.
 double log_length_density(double length, int components) {
   const double k = components;
   return std::exp(k * std::log(length) - 0.5 * length * length -
@@ -41,7 +41,7 @@ struct Fit {
   double log_likelihood = 0.0;
 };
 
-// Share of the lengths that are noise of this scale, the others being of any.
+// Share of the lengths that are noise of this scale; the other lengths may have any value.
 Fit fit(const NoiseHistogram& histogram, double total, double scale, int components) {
   const double any = 1.0 / std::log(kGreatest / kLeast);
   std::map<std::uint16_t, double> noise;
@@ -72,14 +72,14 @@ std::optional<NoiseScale> fit_noise(const NoiseHistogram& histogram, int dimensi
   NoiseScale result;
   for (const auto& [bin, count] : histogram) result.lengths += count;
   if (result.lengths < kFewLengths) return std::nullopt;
-  std::map<double, Fit> fits;  // by the scale
+  std::map<double, Fit> fits;  // by scale
   double best = -std::numeric_limits<double>::infinity();
   for (double scale = kLeastScale; scale <= kGreatestScale; scale *= std::exp(kBin)) {
     fits[scale] =
         fit(histogram, static_cast<double>(result.lengths), scale, dimension == 2 ? 3 : 6);
     best = std::max(best, fits[scale].log_likelihood);
   }
-  // Few lengths say little: what the measurements tell of themselves stands until enough do.
+  // With few lengths, the stated noise stays in use.
   double farthest = std::numeric_limits<double>::infinity();
   for (const auto& [scale, found] : fits) {
     if (found.log_likelihood < best - kDoubt || std::abs(std::log(scale)) >= farthest) continue;

@@ -15,14 +15,14 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMostCycles = 200;
-constexpr double kPriorSigma = 1.0986;  // log 3, of log sqrt(v)
-constexpr double kLeastSide_m = 1.0;    // of the volume of false closures
-constexpr double kRatioSigma = 0.6931;  // log 2, of log sqrt(v_R / v_t)
-// Log of the odds from which on odometry is taken to be noisier than it claims: one in 1000 wrong.
+constexpr double kPriorSigma = 1.0986;  // log 3, prior of log sqrt(v)
+constexpr double kLeastSide_m = 1.0;    // least side of the volume for false closures
+constexpr double kRatioSigma = 0.6931;  // log 2, prior of log sqrt(v_R / v_t)
+// Log of the odds from which on odometry counts as noisier than it claims: 1000 to 1.
 constexpr double kEvidence = 6.9;
 constexpr int kSweeps = 4;
 
-// Variance factors: of steps' rotations and translations, and of closures.
+// Variance factors of the rotations and translations of steps, and of closures.
 enum Component : std::size_t { kRotation, kTranslation, kClosure, kComponents };
 using Factors = std::array<double, kComponents>;
 
@@ -33,8 +33,8 @@ struct Cycle {
   double weight = 1.0;
 };
 
-// What the steps claim up to each keyframe, as perturbations of the first pose: differences are the
-// chains between.
+// Claimed covariance of the steps up to each keyframe, as perturbations of the first pose. The
+// difference of two keyframes is the covariance of the chain between them.
 struct Chain {
   std::vector<SE3> T_first_kf{SE3::Identity()};
   std::array<std::vector<Matrix6>, 2> covariance{std::vector{Matrix6(Matrix6::Zero())},
@@ -64,7 +64,8 @@ struct Chain {
     const Matrix6 Ad = adjoint(T_j_first);
     Cycle cycle;
     cycle.closure = closure;
-    // From the closure's upper pose to the chain's: small, so that both covariances are at j.
+    // From the upper pose by the closure to the upper pose by the chain. It is small, so that both
+    // covariances refer to j.
     cycle.error = se3_log(measured.inverse() * T_first_kf[i].inverse() * T_first_kf[j]);
     for (const Component part : {kRotation, kTranslation})
       cycle.covariance[part] = Ad * (covariance[part][j] - covariance[part][i]) * Ad.transpose();
@@ -85,7 +86,7 @@ std::vector<PoseEdge> in_order(std::span<const PoseEdge> closures, std::size_t k
   return sorted;
 }
 
-// Cycles with the weights by which a place counts once.
+// Cycles, with weights such that each place counts once.
 std::vector<Cycle> cycles_of(const Chain& chain, std::span<const PoseEdge> closures,
                              std::size_t& places) {
   const std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
@@ -112,8 +113,8 @@ double log_density_if_true(const Cycle& cycle, const Factors& v) {
   return -0.5 * squared - log_root - 3.0 * std::log(2.0 * std::numbers::pi);
 }
 
-// The volume [m^3] in which a false closure may put its end: twice the box of the trajectory, and
-// as far beyond as closures reach.
+// The volume [m^3] in which a false closure may end: twice the bounding box of the trajectory,
+// enlarged on every side by the length of the longest closure.
 double volume_m3(const Chain& chain, std::span<const PoseEdge> closures) {
   Eigen::AlignedBox3d box;
   for (const SE3& T : chain.T_first_kf) box.extend(T.translation());
@@ -161,7 +162,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   const double volume = volume_m3(chain, closures);
   for (const Cycle& cycle : cycles) if_false.push_back(log_density_if_false(cycle.error, volume));
 
-  // A pattern search, coarse to fine: along each factor, and along both of odometry's.
+  // A pattern search, coarse to fine: along each factor, and along both factors of odometry.
   constexpr std::array<Factors, 5> kDirections{
       {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, {1.0, 1.0, 0.0}, {1.0, -1.0, 0.0}}};
   Factors best{1.0, 1.0, 1.0};
@@ -173,7 +174,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
     best = v;
     return true;
   };
-  // Odometry that is worse altogether is farther away than one factor at a time can go.
+  // If both factors of odometry are large, steps along one factor at a time do not reach them.
   for (double root = 2.0; root <= 32.0; root *= 2.0)
     (void)try_factors({root * root, root * root, 1.0});
   for (double ratio = 2.0; ratio > 1.05; ratio = std::sqrt(ratio))
@@ -188,7 +189,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
         }
       if (!is_better) break;
     }
-  // What closures alone explain is no evidence against odometry.
+  // Errors that noise of closures alone explains are no evidence against odometry.
   double without = log_posterior(cycles, if_false, {1.0, 1.0, 1.0});
   for (double v = 1.0 / 64.0; v <= 4096.0; v *= 2.0)
     without = std::max(without, log_posterior(cycles, if_false, {1.0, 1.0, v}));

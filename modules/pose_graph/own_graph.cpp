@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::size_t kKeptSets = 4;  // per peer
 
-// Of the measurements used: direction, translation and weights, which cross the network as they
-// are. A rotation does not: as a quaternion it loses its last bit.
+// Hash of the used measurements: direction, translation and weights, which the network preserves
+// exactly. It excludes rotations, because as a quaternion a rotation loses its last bit.
 EdgeSetId identify(std::uint32_t version, const std::vector<PoseEdge>& edges) {
   EdgeSetId id{version, kFnv1aBasis};
   mix_fnv1a(id.hash, version);
@@ -109,7 +109,7 @@ bool OwnGraph::add(const InlierSet& set) {
   newest = set;
   for (ClosureId& id : newest.closures) id = closure_id(id.from, id.to);
   std::ranges::sort(newest.closures);
-  // Not std::ranges::unique(): Clang 14 cannot read what libstdc++ 12 returns.
+  // Not std::ranges::unique(): Clang 14 cannot compile its return type in libstdc++ 12.
   const auto repeated = std::unique(newest.closures.begin(), newest.closures.end());
   newest.closures.erase(repeated, newest.closures.end());
   sets->second.changed = true;

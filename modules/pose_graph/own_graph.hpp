@@ -13,61 +13,64 @@
 
 namespace km {
 
-/// What one robot knows of the pose graph: its odometry, the closures that touch it, and which of
-/// them are to be optimised. Closures and inlier sets may come in any order and repeatedly. An
-/// inlier set counts once all its closures, and the keyframes of this robot they end on, have
-/// arrived; of the edge sets of a robot pair the newest few are kept, so that the two ends can
-/// agree on one. Not thread-safe.
+/// The part of the pose graph that one robot knows: its odometry, the closures that end on it, and
+/// the inlier sets, which name the closures to optimise. Closures and inlier sets may arrive in any
+/// order and repeatedly. An inlier set counts once all its closures, and the keyframes of this
+/// robot on which they end, have arrived. The newest few edge sets of each robot pair are kept, so
+/// that both robots can agree on one. Not thread-safe.
 ///
-/// A closure is a pair of keyframes and counts once, however often and from whichever end it was
-/// measured: of several measurements the one that is_better(). Which one that
-/// is follows from the measurements alone, and the identity of an edge set covers it: two ends
-/// that have not exchanged all of them yet hold different sets.
+/// A pair of keyframes identifies a closure. The closure counts once, however often and from
+/// whichever end it was measured: of several measurements, the best one by is_better() counts. The
+/// measurements alone determine which one is the best, and the id of an edge set covers them. Two
+/// robots that have not yet exchanged all measurements therefore hold different sets.
 class OwnGraph {
  public:
   explicit OwnGraph(RobotId self) : self_(self) {}
 
-  /// Closures to one peer; more are not taken.
+  /// Largest number of closures to one peer.
   static constexpr std::size_t kMaxClosures = 8000;
 
-  /// False, and ignored, unless it is this robot's next keyframe.
-  /// Throws std::invalid_argument if its pose, covariance or vertical is not usable.
+  /// False, without effect, unless it is the next keyframe of this robot. Throws
+  /// std::invalid_argument if its pose, covariance or vertical is not usable.
   bool add(const KeyframeOdometry& keyframe);
-  /// False, and ignored, if it does not touch this robot, has no usable covariance, is no better
-  /// than what is known of its pair of keyframes, or is one too many: see is_full().
+  /// False, without effect, if the closure does not end on this robot or has no usable covariance.
+  /// Also false if it is not better than the known closure of its pair of keyframes, or if
+  /// is_full().
   bool add(const Closure& closure);
-  /// False, and ignored, if it does not concern this robot, is not newer than what is known, or
-  /// names closures that are not between its robots.
+  /// False, without effect, if the set does not concern this robot, is not newer than the known
+  /// one, or names closures that are not between its robots.
   bool add(const InlierSet& set);
-  /// True if there is no room for this closure: it is not known, and kMaxClosures to its peer are.
+  /// True if there is no room for this closure: it is unknown, and kMaxClosures other closures to
+  /// its peer are known.
   [[nodiscard]] bool is_full(const ClosureId& id) const;
-  /// Forgets a robot that has been restarted: its keyframes are others now.
+  /// Discards everything about a restarted robot: its keyframe indices have a new meaning.
   void forget(RobotId peer);
 
   [[nodiscard]] std::uint32_t keyframes() const { return keyframes_; }
-  /// Grows with every change of the own keyframes and of the closures inside this robot.
+  /// Increases with every change of the own keyframes and of the closures inside this robot.
   [[nodiscard]] std::uint32_t revision() const { return revision_; }
 
-  /// Complete, nonempty edge sets, per peer the newest first.
+  /// Complete, nonempty edge sets, the newest first for each peer.
   [[nodiscard]] std::vector<EdgeSetOffer> offers() const;
-  /// Edges of an offered set, ascending by id; nullptr if it is not (or no longer) held.
+  /// Edges of an offered set, ascending by id; nullptr if this robot does not (or no longer) hold
+  /// it.
   [[nodiscard]] const std::vector<PoseEdge>* edges(RobotId peer, const EdgeSetId& id) const;
   /// Edges of the newest complete set with a peer; nullptr if there is none.
   [[nodiscard]] const std::vector<PoseEdge>* newest_edges(RobotId peer) const;
 
-  /// Estimates the noise of odometry anew, from the closures inside this robot. From now on steps
-  /// have the weights that follow.
+  /// Estimates the noise of odometry again, from the closures inside this robot. From now on, steps
+  /// of odometry have the corrected weights.
   void judge_odometry();
-  /// As last estimated; of no more noise than odometry claims before.
+  /// The last estimate; before the first one, odometry is as precise as it claims.
   [[nodiscard]] const OdometryNoise& odometry_noise() const { return odometry_noise_; }
 
   /// Odometry from each keyframe to the next, then closures inside this robot, ascending by id.
   [[nodiscard]] std::vector<PoseEdge> own_edges() const;
   /// Pose of keyframe 0 in the frame of odometry; the identity before there is one.
   [[nodiscard]] const SE3& T_odom_first() const { return T_odom_first_; }
-  /// Of all keyframes that told a vertical.
+  /// Priors of all keyframes with a vertical.
   [[nodiscard]] const std::vector<VerticalPrior>& verticals() const { return verticals_; }
-  /// True if keyframe 0 told a vertical: then odometry's frame has z up.
+  /// True if keyframe 0 has a vertical: the frame of odometry then has z up.
   [[nodiscard]] bool upright() const { return !verticals_.empty() && verticals_[0].pose == 0; }
   /// Odometry step from keyframe i - 1 to i. Precondition: 0 < i < keyframes().
   [[nodiscard]] const SE3& step_to(std::uint32_t i) const { return odometry_[i - 1].T_from_to; }
@@ -79,10 +82,10 @@ class OwnGraph {
     EdgeSetId id;
     std::vector<PoseEdge> edges;
   };
-  // With one peer, or inside this robot.
+  // Edge sets with one peer, or inside this robot.
   struct Sets {
     InlierSet newest;               // closures ascending, each once
-    bool changed = true;            // `newest` is not what `complete` begins with
+    bool changed = true;            // `complete` does not begin with `newest`
     std::vector<EdgeSet> complete;  // newest first
   };
 
@@ -94,11 +97,11 @@ class OwnGraph {
   SE3 T_odom_first_ = SE3::Identity();
   std::uint32_t keyframes_ = 0;
   std::uint32_t revision_ = 0;
-  std::vector<PoseEdge> odometry_;  // with the precision that it claims
+  std::vector<PoseEdge> odometry_;  // with claimed precision
   OdometryNoise odometry_noise_;
   std::vector<VerticalPrior> verticals_;
   std::map<ClosureId, PoseEdge> closures_;
-  std::map<RobotId, std::size_t> closures_to_;  // by peer; of `closures_`
+  std::map<RobotId, std::size_t> closures_to_;  // number of `closures_` by peer
   std::map<RobotId, Sets> sets_;                // by peer; `self_`: inside this robot
 };
 

@@ -13,20 +13,20 @@ namespace km {
 namespace {
 
 constexpr std::size_t kEnoughCandidates = 200;
-// Pairs with less spread than this [m] are no better for it.
+// Lower limit of the spread of a pair [m].
 constexpr double kLeastSpread_m = 1e-3;
-// A pair that is off by so many spreads does not fit.
+// Misfit from which on a pair does not fit [spreads].
 constexpr double kOff = 4.0;
-// Robots are moved for so many more pairs that fit.
+// Least gain in the number of fitting pairs for which robots are moved.
 constexpr double kBetter = 0.5;
-// Support from which on a pair is borne out: round a third robot two spreads are left over.
+// Least support of a confirmed pair: the loop through a third robot closes within two spreads.
 constexpr double kBorneOut = 0.2;
-// Of the radius: closures of a pair that are more apart say nothing together.
+// Largest spread of consistent closures of a pair, relative to the radius.
 constexpr double kAgreeing = 0.25;
 // So many places of a pair that agree on its motion say more than those that do not.
 constexpr std::size_t kAgreeingPlaces = 3;
 
-// The pairs that have a vote.
+// The pairs with a vote.
 PairMotions agreeing(PairMotions pairs) {
   std::erase_if(pairs, [](const auto& entry) {
     return entry.second.spread_m > kAgreeing * entry.second.radius_m;
@@ -45,7 +45,7 @@ const PairMotion* find(const PairMotions& pairs, RobotId a, RobotId b) {
   return found == pairs.end() ? nullptr : &found->second;
 }
 
-// From a to b: the motion of b if a stays.
+// The motion of b if a keeps its place.
 SE3 along(const PairMotions& pairs, RobotId a, RobotId b) {
   const SE3 T = pairs.at(std::minmax(a, b)).T.pose();
   return a < b ? T : T.inverse();
@@ -59,7 +59,8 @@ double spread_m(const PairMotion& pair) {
   return std::max(kLeastSpread_m, pair.spread_m);
 }
 
-// In [0, number of robots]: third robots on the way round which nothing is left over.
+// Support of a pair, in [0, number of robots]: the number of third robots through which the loop
+// closes.
 double support(const PairMotions& pairs, const std::set<RobotId>& robots, RobotId a, RobotId b) {
   const PairMotion& pair = pairs.at({a, b});
   double sum = 0.0;
@@ -81,7 +82,7 @@ std::map<RobotId, SE3> placed_by_tree(const PairMotions& pairs, const std::set<R
     order.emplace_back(-support(pairs, robots, pair.first, pair.second), pair.first, pair.second);
   std::sort(order.begin(), order.end());
   std::map<RobotId, SE3> placed{{*robots.begin(), SE3::Identity()}};
-  for (bool grown = true; grown;) {  // Prim: the best pair that leads to another robot
+  for (bool grown = true; grown;) {  // Prim: the best pair that reaches another robot
     grown = false;
     for (const auto& [less, a, b] : order) {
       if (placed.contains(a) == placed.contains(b)) continue;
@@ -94,7 +95,7 @@ std::map<RobotId, SE3> placed_by_tree(const PairMotions& pairs, const std::set<R
   return placed;
 }
 
-// Pairs that do not fit, each counted up to 1.
+// Sum over the pairs of their misfit, limited to 1 each.
 double misfit(const PairMotions& pairs, const std::map<RobotId, SE3>& placed) {
   double sum = 0.0;
   for (const auto& [robots, pair] : pairs) {
@@ -105,7 +106,7 @@ double misfit(const PairMotions& pairs, const std::map<RobotId, SE3>& placed) {
   return sum;
 }
 
-// As many robots as possible stay.
+// Moves all robots together so that as many as possible keep their place.
 void hold_most(const PairMotions& pairs, std::map<RobotId, SE3>& placed) {
   const auto staying = [&](const SE3& T) {
     std::set<RobotId> moving;
@@ -133,7 +134,7 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
   const std::vector<double> weight_of = found.weights();
   const std::size_t stride = (closures.size() + kEnoughCandidates - 1) / kEnoughCandidates;
   PairMotion result;
-  std::vector<std::pair<SE3, SE3>> ends;  // of b: where it is placed, where a's has it
+  std::vector<std::pair<SE3, SE3>> ends;  // ends on b: present pose, pose by the closure
   std::vector<double> weights;
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < closures.size(); k += stride) {

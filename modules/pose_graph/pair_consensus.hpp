@@ -16,51 +16,56 @@
 
 namespace km {
 
-/// By which motion of robot b most closures of a pair a < b would fit where a is placed. Motions
-/// are from the left, T_world_kf becomes T * T_world_kf; positions in the frame of the placement.
+/// The motion of robot b after which most closures of a pair a < b would fit, with robot a at its
+/// present place. Motions multiply from the left: T_world_kf becomes T * T_world_kf. Positions are
+/// in the frame of the present poses.
 struct PairMotion {
   SinglePose T = {};
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [m] of b's ends.
-  double radius_m = 0.0;                             ///< RMS distance of b's ends from there.
-  /// Median distance of b's ends, moved by T, from where closures have them. If closures at three
-  /// places or more agree on T, only the closures that agree count.
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Mean position of the ends on b [m].
+  double radius_m = 0.0;  ///< RMS distance of the ends on b from `centre`.
+  /// Median distance of the ends on b, moved by T, from their positions by the closures.
+  /// If closures at three places or more agree on T, only those closures count.
   double spread_m = 0.0;
-  Precision strength = {.kappa = 0.0, .tau = 0.0};  ///< Weights of the closures, summed.
+  Precision strength = {.kappa = 0.0, .tau = 0.0};  ///< Sum of the weights of the closures.
 };
 
 using PairMotions = std::map<std::pair<RobotId, RobotId>, PairMotion>;  // a < b
 
-/// From so many robots on the others can outvote one of them.
+/// Smallest number of robots in which the others can outvote one robot.
 inline constexpr std::size_t kEnoughToOutvote = 4;
 
 inline constexpr Precision kUnlimited{.kappa = std::numeric_limits<double>::max(),
                                       .tau = std::numeric_limits<double>::max()};
 
-/// Of the `closures` between `a` and another robot b, a < b; of very many a part is looked at, but
-/// for `strength`. `pose`: where their ends are placed. nullopt if there are none.
+/// The motion of the `closures` between `a` and another robot b, a < b. If there are very many,
+/// only a subset is used, except for `strength`. `pose`: present poses of their ends. nullopt if
+/// there are no closures.
 [[nodiscard]] std::optional<PairMotion> motion_of_pair(
     std::span<const PoseEdge> closures, RobotId a,
     const std::function<SE3(const KeyframeId&)>& pose);
 
-/// Motions of robots after which more pairs fit. Robots that come in one after the other are placed
-/// by the closures of the first ones, true or not; here each pair whose closures agree has one
-/// vote, however many closures it has: their spread is at most a quarter of the radius. Over a long
-/// odometry no single motion fits, and false closures agree on none. A pair is borne out by third
-/// robots on the way round which nothing is left over, robots are placed by the maximum spanning
-/// tree of what bears pairs out, and as many as possible stay where they are. Empty if that is not
-/// better by a pair, or if pairs with a vote do not join all of their robots; where they close no
-/// circle, robots that only pairs without a vote had placed move. O(pairs * robots).
+/// Motions of robots after which more pairs fit. Robots that enter the frame one after the other
+/// are placed by the closures of the first ones, which may be false. Here each pair with consistent
+/// closures has one vote, however many closures it has. Closures of a pair are consistent if their
+/// spread is at most a quarter of the radius. Over a long odometry no single motion fits, and false
+/// closures agree on none.
+///
+/// A pair is confirmed if the loop through some third robot closes. The maximum spanning tree over
+/// the confirmations of the pairs places the robots, and as many robots as possible keep their
+/// place. The result is empty if the gain in fitting pairs, each counted in [0, 1], is below 0.5.
+/// It is also empty if the pairs with a vote do not connect all of their robots. If these pairs
+/// form no loop, only robots whose place rests on pairs without a vote move. O(pairs * robots).
 [[nodiscard]] std::map<RobotId, SE3> better_placement(const PairMotions& pairs);
 
-/// Lower medians of kappa and of tau, each for itself. `values` are not empty.
+/// Lower medians of kappa and of tau, independently. Precondition: `values` is not empty.
 [[nodiscard]] Precision lower_median(std::span<const Precision> values);
 
-/// How strong a pair of robots is as a rule: of each robot its median pair, of all robots the
-/// median one (lower medians), of the pairs that a third robot bears out; votes as above. One robot
-/// of four has a hand in half of the pairs, but only in a third of those of each other robot, so
-/// that what it says of its own makes this no larger and no smaller than what the others say.
-/// kUnlimited of fewer than kEnoughToOutvote robots, and where no pair is borne out. O(pairs *
-/// robots).
+/// The strength of the usual pair of robots: the lower median over all robots of the lower median
+/// over the confirmed pairs of each robot. Pairs are confirmed as in better_placement(). One robot
+/// of four takes part in half of all pairs, but only in a third of the pairs of each other robot.
+/// Its claims about its own pairs can therefore make the result neither larger nor smaller than the
+/// claims of the other robots. kUnlimited with fewer than kEnoughToOutvote robots, and if no pair
+/// is confirmed. O(pairs * robots).
 [[nodiscard]] Precision usual_strength(const PairMotions& pairs);
 
 }  // namespace km

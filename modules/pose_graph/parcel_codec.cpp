@@ -8,15 +8,15 @@
 namespace km {
 namespace {
 
-// Of one origin to one addressee, letters that may be on one link at a time. Solvers wait for
-// answers, so that a few would do. A letter that is sent again takes the place of its former copy.
+// Number of reliable messages of one origin to one receiver that may be on one link at a time. A
+// few would suffice, because solvers wait for answers. A repetition replaces its former copy.
 constexpr std::uint32_t kLetterSlots = 64;
-constexpr std::uint32_t kReceiptSlot = 64;  // for letters without bytes: the newest counts
+constexpr std::uint32_t kReceiptSlot = 64;  // acknowledgements without bytes: the newest counts
 
 }  // namespace
 
-// Tells apart what must not replace each other: of a status, a session or public poses the newest
-// counts, of letters there is a ring for each way from origin to addressee.
+// Distinguishes messages that must not replace each other. The newest status, session or public
+// poses of an origin count; reliable messages have a ring for each pair of origin and receiver.
 MessageKey Codec<TeamParcel>::key_of(const TeamParcel& parcel) {
   const TeamMessage& message = *parcel.message;
   const auto* letter = std::get_if<SessionLetter>(&message);

@@ -12,15 +12,15 @@
 
 namespace km {
 
-/// A message as it comes across a link: a Parcel that says who hands it over.
+/// A message as it arrives over a link, with the robot that forwarded it.
 struct TeamParcel {
   RobotId from = 0;
   std::shared_ptr<const TeamMessage> message;
 };
 
-/// Sent as TopicKind::kRequest: what a link that is down shortly holds up arrives later, the newest
-/// of each key, and what it holds up for dds.lease_s is forgotten: who is heard again is told
-/// afresh.
+/// Sent as TopicKind::kRequest: messages that a short outage of the link delays arrive later, the
+/// newest of each key. After an outage of dds.lease_s they are discarded, and a robot that is
+/// received again gets the state from scratch.
 template <>
 struct Codec<TeamParcel> {
   using Wire = km_wire_TeamParcel;

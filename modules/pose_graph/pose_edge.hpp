@@ -9,15 +9,15 @@
 namespace km {
 
 /// A relative pose between two keyframes with its weights in the cost of pose graphs (see
-/// Precision): the one form in which edges are held, told and solved. Odometry, closures inside a
-/// robot and closures between robots alike.
+/// Precision). The module stores, sends and solves all edges in this form: odometry, closures
+/// inside a robot and closures between robots.
 struct PoseEdge {
   KeyframeId from;
   KeyframeId to;
   SE3 T_from_to = SE3::Identity();
   Precision precision = {};
 
-  /// Unordered: which end the measurement starts at does not matter.
+  /// Independent of the direction of the measurement.
   [[nodiscard]] ClosureId id() const { return closure_id(from, to); }
   /// The end that is not on `robot`. Precondition: exactly one is.
   [[nodiscard]] const KeyframeId& other(RobotId robot) const {
@@ -29,12 +29,12 @@ struct PoseEdge {
   }
 };
 
-/// nullopt for measurements that would spoil the numbers of everyone: beyond
-/// measurement_limits.hpp.
+/// nullopt for measurements beyond measurement_limits.hpp: they would corrupt the solution of the
+/// whole team.
 [[nodiscard]] std::optional<PoseEdge> pose_edge(const RelativePose& measured);
 
-/// Of two measurements of one pair of keyframes, whether `a` is the one that counts: the one with
-/// the least trace of covariance. A total order, the same for all robots.
+/// True if `a` and not `b` counts, for two measurements of one pair of keyframes: the one with the
+/// smaller trace of the covariance. A total order, equal on all robots.
 [[nodiscard]] bool is_better(const PoseEdge& a, const PoseEdge& b);
 
 }  // namespace km

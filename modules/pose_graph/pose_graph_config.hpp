@@ -31,43 +31,48 @@ struct PoseGraphConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("method", method, {{"newton", PgoMethod::kNewton}, {"rbcd", PgoMethod::kRbcd}},
-                  "of a session, the same on all robots; measured in modules/pose_graph/README.md");
-    visitor.field("robust", robust, "newton: rejects closures that the others contradict");
+                  "solver of a session; equal on all robots; measurements are in "
+                  "modules/pose_graph/README.md");
+    visitor.field("robust", robust, "newton: reject closures that other closures contradict");
     visitor.field("barc", barc, {0.0, 1e6},
-                  "[sigma] newton: largest residual of a closure kept, the square root of its "
-                  "cost; the same on all robots; 0: found from the closures");
+                  "[sigma] newton: largest residual (square root of the cost) of a closure that is "
+                  "kept; equal on all robots; 0: the team estimates it from the closures");
     visitor.field("tell_private", tell_private,
-                  "newton: tells relative poses between private poses where that is fewer bytes: "
-                  "others can derive parts of this robot's trajectory");
-    visitor.field("rank", rank, {3, 10}, "rbcd: r of the relaxation, the same on all robots");
+                  "newton: send relative poses between private poses if that saves bytes; other "
+                  "robots can then derive parts of the trajectory of this robot");
+    visitor.field("rank", rank, {3, 10}, "rbcd: rank r of the relaxation; equal on all robots");
     visitor.field("max_rounds", max_rounds, {0, 1000000},
-                  "after which a session ends even if it has not converged; the paper's early "
-                  "stopping is 50; 0: no limit");
-    visitor.field(
-        "exchange_budget_kb_s", exchange_budget_kb_s, {0.1, 1e6},
-        "[kB/s] sent for sessions on average, every reader and what is passed on counted: the next "
-        "session waits until the last is paid for by the member that sent most");
+                  "rounds after which a session ends even if it has not converged; the paper stops "
+                  "early after 50; 0: no limit");
+    visitor.field("exchange_budget_kb_s", exchange_budget_kb_s, {0.1, 1e6},
+                  "[kB/s] mean rate at which a robot may send for sessions, counted per receiver "
+                  "and with forwarded messages; the next session waits until the bytes of the "
+                  "busiest member in the last one fit this rate");
     visitor.field("session_growth", session_growth, {0.0, 100.0},
-                  "it also waits until another robot takes part, closures have grown in number by "
-                  "this part, or nothing new has come for two seconds");
+                  "relative growth of the number of closures for which the next session waits; a "
+                  "new member, or two seconds without new measurements, also end the wait");
     visitor.field("session_wait_s", session_wait_s, {0.0, 3600.0},
-                  "[s] but for neither reason longer than this");
+                  "[s] longest wait for the next session, whatever exchange_budget_kb_s and "
+                  "session_growth demand");
     visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
-                  "rbcd: of the team's cost in a round: less is convergence");
-    visitor.field("max_newton_steps", max_newton_steps, {1, 100}, "rbcd: of one block update");
+                  "rbcd: relative decrease of the team cost in a round below which the session has "
+                  "converged");
+    visitor.field("max_newton_steps", max_newton_steps, {1, 100},
+                  "rbcd: Newton steps in one block update");
     visitor.field("max_cg_iterations", max_cg_iterations, {1, 10000},
-                  "rbcd: products with the Hessian in a Newton step");
+                  "rbcd: products with the Hessian in one Newton step");
     visitor.field("max_over_relaxation", max_over_relaxation, {1.0, 1.99},
-                  "rbcd: how far a block update may go, 1 being the block's minimum; grows from "
-                  "1.5 towards this over the rounds of a session");
+                  "rbcd: largest relaxation of a block update, where 1 ends at the minimum of the "
+                  "block; it grows from 1.5 to this over the rounds of a session");
     visitor.field("alignment_rotation_rad", alignment_rotation_rad, {1e-3, std::numbers::pi},
-                  "[rad] closures that differ by less agree on where a new robot's frame lies: the "
-                  "drift of the odometry between them");
-    visitor.field("alignment_translation_m", alignment_translation_m, {1e-3, 1e4}, "[m] the same");
+                  "[rad] largest difference of two closures that agree on the frame of a new "
+                  "robot; it allows for the drift of odometry between them");
+    visitor.field("alignment_translation_m", alignment_translation_m, {1e-3, 1e4},
+                  "[m] largest difference of two closures that agree on the frame of a new robot");
     visitor.field("publish_period_s", publish_period_s, {0.01, 60.0},
-                  "[s] between trajectories at least, while rounds go on");
+                  "[s] shortest time between published trajectories during a session");
     visitor.field("status_period_s", status_period_s, {0.01, 60.0},
-                  "[s] between the statuses sent to the robots that are heard directly");
+                  "[s] time between statuses to the robots that are received directly");
   }
 };
 

@@ -8,8 +8,8 @@
 namespace km {
 namespace {
 
-// Largest weights, in those of a step of the lower median robot: of closures half the sigma.
-// Odometry adds up, so a robot's own mean is held closer.
+// Largest weights, relative to a step of the lower median robot. A closure may have half its sigma.
+// The errors of odometry add up, so the limit on the mean step of a robot is stricter.
 constexpr double kMostPrecise = 4.0;
 constexpr double kBestOdometry = 1.25;
 constexpr std::size_t kMajority = 3;

@@ -10,9 +10,10 @@
 namespace km {
 namespace {
 
-// Relative to the largest sum of tau over the edges of one pose: keeps the preconditioner definite,
-// no more. Translations are free of constraints, and long chains of them are soft; on rotations
-// much less than the default amplifies directions that only the constraints make stiff.
+// Diagonal on translations, relative to the largest sum of tau over the edges of one pose. It only
+// keeps the preconditioner definite, because translations have no constraints and long chains of
+// them are soft. On rotations, a much smaller value than the default amplifies directions that only
+// the constraints make stiff.
 constexpr double kTranslationShift = 1e-10;
 
 Eigen::Vector4d weights(double kappa, double tau) {
@@ -94,7 +95,7 @@ void QuadraticProblem::build() {
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(64 * edges_.size() + 16 * public_edges_.size());
   for (const BlockEdge& e : edges_) {
-    // The edge's residual is X_j - X_i T: tr(E Omega E^T) expanded.
+    // The residual E of the edge is X_j - X_i T: tr(E Omega E^T) expanded.
     const Eigen::Matrix4d T = e.T_i_j.matrix();
     const Eigen::Matrix4d Omega = weights(e.kappa, e.tau).asDiagonal();
     append_block(entries, e.j, e.j, Omega);
@@ -129,7 +130,8 @@ void QuadraticProblem::set_fixed(LiftedPoses fixed) {
   }
 }
 
-// The part that no fixed pose has to do with: w ||Y u - z||^2 = 2 w - 2 w z^T Y u.
+// The linear part of the verticals, independent of the fixed poses: w ||Y u - z||^2 = 2 w - 2 w z^T
+// Y u.
 void QuadraticProblem::reset_linear_part() {
   G_ = LiftedPoses::Zero(rank_, 4 * poses_);
   if (verticals_.empty()) return;
@@ -147,7 +149,7 @@ double QuadraticProblem::public_edge_cost(std::size_t k, const LiftedPoses& X) c
 }
 
 double QuadraticProblem::cost(const LiftedPoses& X) const {
-  // From residuals, not from tr(X Q X^T): no cancellation far from the origin.
+  // Computed from residuals, not from tr(X Q X^T), to avoid cancellation far from the origin.
   double sum = 0.0;
   for (const BlockEdge& e : edges_)
     sum += edge_cost(X.middleCols<4>(4 * e.i), X.middleCols<4>(4 * e.j), e.T_i_j, e.kappa, e.tau);

@@ -37,12 +37,12 @@ struct PublicEdge {
                                const Eigen::Ref<const Eigen::MatrixXd>& X_j, const SE3& T_i_j,
                                double kappa, double tau);
 
-/// The part of the pose graph cost that one block of poses decides, all others fixed:
+/// The part of the pose graph cost that depends on one block of poses, with all other poses fixed:
 ///     f(X) = sum kappa ||Y_j - Y_i R_ij||_F^2 + tau ||p_j - p_i - Y_i t_ij||^2
-/// over the edges inside the block and those to fixed poses, and the costs of its vertical priors,
-/// without a factor 1/2 (Tian et al., "Distributed Certifiably Correct Pose-Graph Optimization",
-/// TRO 2021, Problem 2 and Eq. (14); = tr(X Q X^T) + 2 tr(X G^T) + const with Q sparse 4n x 4n and
-/// G r x 4n). Not thread-safe.
+/// over the edges inside the block and the edges to fixed poses, plus the costs of its vertical
+/// priors, without a factor 1/2 (Tian et al., "Distributed Certifiably Correct Pose-Graph
+/// Optimization", TRO 2021, Problem 2 and Eq. (14); = tr(X Q X^T) + 2 tr(X G^T) + const with Q
+/// sparse 4n x 4n and G r x 4n). Not thread-safe.
 class QuadraticProblem {
  public:
   /// Throws std::invalid_argument if an edge or a prior names a pose outside [0, poses), if a
@@ -60,7 +60,7 @@ class QuadraticProblem {
   /// 2 (X Q + G).
   [[nodiscard]] LiftedPoses euclidean_gradient(const LiftedPoses& X) const;
   /// Riemannian Hessian at `X` along tangent `V`: the projection of 2 V Q - V_Y sym(Y^T grad_Y),
-  /// `gradient` being the Euclidean one at X (Absil et al., "An Extrinsic Look at the Riemannian
+  /// with the Euclidean `gradient` at X (Absil et al., "An Extrinsic Look at the Riemannian
   /// Hessian", 2013, for the Stiefel manifold).
   [[nodiscard]] LiftedPoses hessian_product(const LiftedPoses& X, const LiftedPoses& gradient,
                                             const LiftedPoses& V) const;
@@ -69,7 +69,7 @@ class QuadraticProblem {
   [[nodiscard]] LiftedPoses precondition(const LiftedPoses& X, const LiftedPoses& V) const;
 
   /// Sets the diagonal that precondition() adds on rotations, relative to the largest sum of kappa
-  /// over the edges of one pose. Small is fast near a minimum, and slow far from it.
+  /// over the edges of one pose. A small value is fast near a minimum and slow far from it.
   void set_rotation_shift(double shift);
 
   [[nodiscard]] Eigen::Index rank() const { return rank_; }

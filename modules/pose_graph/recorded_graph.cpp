@@ -51,12 +51,13 @@ RelativePose read_row(TextFields& fields) {
     fields.fail("kappa " + shortest_text(precision.kappa) + " and tau " +
                 shortest_text(precision.tau) + " mean variances outside " + kVariance.text());
   row.covariance = covariance_of(precision);
-  // Columns after tau, such as weight, are not used; a row that broke there is not to be trusted.
+  // Columns after tau, such as weight, are not used. They are checked because a row that is damaged
+  // there is not trustworthy.
   while (!fields.at_end()) fields.number("column after tau");
   return row;
 }
 
-// The one robot that has edges inside itself.
+// The only robot with edges between its own keyframes.
 RobotId owner(const std::vector<RelativePose>& edges, const std::string& file) {
   std::set<RobotId> owners;
   for (const RelativePose& edge : edges)
@@ -68,7 +69,7 @@ RobotId owner(const std::vector<RelativePose>& edges, const std::string& file) {
                            (owners.empty() ? " none" : list));
 }
 
-// odometry[i] for every i up to the last keyframe that any edge of the robot names.
+// odometry[i] for every i up to the last keyframe of any edge of the robot.
 void check_chain(const std::vector<std::optional<RelativePose>>& odometry, RobotId robot,
                  const std::string& file) {
   const auto gap = std::find(odometry.begin(), odometry.end(), std::nullopt);
@@ -78,8 +79,8 @@ void check_chain(const std::vector<std::optional<RelativePose>>& odometry, Robot
                            to_string({robot, index + 1}));
 }
 
-// Number of odometry steps if every index named were on the chain; bounded by the edges there are,
-// so that a wild index cannot ask for more memory than the file has rows.
+// Number of steps of odometry if every index in the file is on the chain. It is limited by the
+// number of edges, so that a wrong index cannot require more memory than the file has rows.
 std::size_t chain_length(const std::vector<RelativePose>& edges, RobotId robot,
                          const std::string& file) {
   std::size_t last = 0;
@@ -91,7 +92,7 @@ std::size_t chain_length(const std::vector<RelativePose>& edges, RobotId robot,
                            to_string({robot, static_cast<std::uint32_t>(last)}));
 }
 
-// What a robot's optimiser takes is narrower than what a file may hold.
+// The optimiser of a robot accepts narrower limits than a file.
 void check_variances(const std::vector<RelativePose>& edges, const std::string& file) {
   for (const RelativePose& edge : edges)
     for (const double trace : {edge.covariance.topLeftCorner<3, 3>().trace(),

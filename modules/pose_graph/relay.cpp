@@ -9,13 +9,13 @@ namespace {
 
 constexpr std::size_t kStatusKind = 0;
 
-// So many periods at most between two attempts to hand on what a neighbour lacks.
+// Longest time between two attempts to forward messages that a neighbour lacks [periods].
 constexpr double kMaxPatience = 16.0;
 
-// Copies of letters that are remembered per pair of robots: older ones are taken for seen.
+// Number of copies of reliable messages remembered per pair of robots; older copies count as seen.
 constexpr std::size_t kRememberedCopies = 256;
 
-// What a message that is told to all takes in memory.
+// Memory of a flooded message [bytes].
 std::size_t bytes_of(const TeamMessage& message) {
   const auto bytes = [](const auto&... lists) {
     return (sizeof(TeamMessage) + ... +
@@ -29,7 +29,7 @@ std::size_t bytes_of(const TeamMessage& message) {
   return bytes(poses.keyframes, poses.T_frame_kf, poses.verdicts);
 }
 
-// Of what is told to all.
+// Number of a flooded message.
 std::uint32_t number_of(const TeamMessage& message) {
   return std::visit([](const auto& m) { return m.number; }, message);
 }
@@ -210,7 +210,7 @@ Arrival Relay::receive(RobotId from, const TeamMessagePtr& message, double now_s
   return Arrival::kNew;
 }
 
-// False if there is no room for what is newer.
+// False if there is no room for `newer`.
 bool Relay::hold(std::optional<Held>& held, Held newer) {
   std::size_t& bytes = held_from_[newer.from];
   const std::size_t freed = held && held->from == newer.from ? held->bytes : 0;

@@ -17,70 +17,73 @@ namespace km {
 
 using TeamMessagePtr = std::shared_ptr<const TeamMessage>;
 
-/// What became of a message that has arrived.
+/// Result of the arrival of a message.
 enum class [[nodiscard]] Arrival{
-    kNew,       ///< For this robot to read.
-    kRepeated,  ///< Not newer than what is known of its origin.
-    kPassedOn,  ///< A letter to another robot.
-    kLost,      ///< A letter to a robot that no links lead to, or one that has gone in a circle.
-    kRefused,   ///< Of another process of its robot than the one that is known, or one too many.
-    kNoRoom,    ///< The robot that hands it over has made this one hold too much already.
+    kNew,       ///< New message for this robot.
+    kRepeated,  ///< Not newer than the known message of its origin.
+    kPassedOn,  ///< Reliable message to another robot, forwarded.
+    kLost,      ///< Reliable message to an unreachable robot, or one that has passed here before.
+    kRefused,   ///< Wrong boot id of the origin, or too many robots.
+    kNoRoom,    ///< Too many bytes are held from the robot that forwarded it.
 };
 
-/// One robot's part in carrying the team's messages over whatever links there are.
+/// The part of one robot in forwarding the messages of the team over any links.
 ///
-/// Statuses, sessions and poses go to all robots of the team; of those of one origin the newest of
-/// each kind counts. A robot that learns a newer one passes it on to the robots it hears, but not
-/// to those that its origin or the robot that handed it over has told itself, as far as the told
-/// links say: where all hear each other nothing is sent twice. A robot that is (again) heard is
-/// handed what it cannot have from those it hears. What has been lost all the same shows in the
-/// hash of what a robot holds, which its status tells: robots that hear each other compare them, as
-/// in epidemic routing by summary vectors (Vahdat and Becker, "Epidemic Routing for
-/// Partially-Connected Ad Hoc Networks", 2000), here in eight bytes instead of a vector, and hand
-/// on what is older than `period_s`, more and more rarely while that does not help.
+/// Statuses, sessions and poses go to all robots of the team; the newest message of each origin and
+/// kind counts. A robot that receives a newer one forwards it to the robots that it receives
+/// directly. It omits robots to which the origin or the previous robot has already sent it,
+/// according to the reported links: if all robots receive each other, nothing is sent twice. A
+/// robot that is received again gets all messages whose origins it does not receive directly.
 ///
-/// Letters go hop by hop along shortest paths, each copy over each robot once.
+/// Lost messages show in the hash of all messages that a robot holds, which its status contains.
+/// Robots that receive each other compare these hashes, as in epidemic routing by summary vectors
+/// (Vahdat and Becker, "Epidemic Routing for Partially-Connected Ad Hoc Networks", 2000), here with
+/// eight bytes instead of a vector. If they differ, a robot forwards the messages that are older
+/// than `period_s`, and repeats this ever more rarely while the hashes still differ.
+///
+/// Reliable messages go hop by hop along shortest paths; each copy passes each robot once.
 /// Deterministic; not thread-safe.
 class Relay {
  public:
   Relay(TeamPeer self, double period_s) : self_(self), period_s_(period_s) {}
 
-  /// A link that has gone is told for so long as if it were still there [s]: many come back at
-  /// once, and nobody else needs to know.
+  /// Time for which a lost link is still reported [s]: many links return at once, and no other
+  /// robot needs to know.
   static constexpr double kPatience_s = 3.0;
 
-  /// Of all that one robot hands over so much is held [octets in memory]; what is beyond is not
-  /// taken. Statuses, sessions and public poses of a thousand keyframes of a hundred robots fit.
+  /// Limit of the messages held from one robot [bytes in memory]; messages beyond it are refused.
+  /// Statuses, sessions and public poses of a thousand keyframes of a hundred robots fit.
   static constexpr std::size_t kMaxHeldFromOne = 4U << 20U;
 
-  /// `peer` is heard directly from now on, or no more.
+  /// This robot begins or ceases to receive `peer` directly.
   void link_up(TeamPeer peer, double now_s);
   void link_down(RobotId robot, double now_s);
-  /// Time has passed.
+  /// Does the work that is due at `now_s`.
   void step(double now_s);
 
-  /// Sends a message of this robot, under the next number (letters: copy) of its kind, to all that
-  /// are to have it. `hears` and `holds` of a status are filled in. Returns the number of parcels.
+  /// Sends a message of this robot, with the next number of its kind (reliable messages: copy), to
+  /// all its receivers. Fills in `hears` and `holds` of a status. Returns the number of
+  /// transmissions.
   std::size_t say(TeamMessage message, double now_s);
-  /// Sends the last status again to those that hear this robot, with what it holds by now.
+  /// Sends the last status again to the robots that receive this one, with the present hash.
   void repeat_status(double now_s);
 
-  /// A message that `from` has handed over.
+  /// Processes a message that `from` has forwarded.
   Arrival receive(RobotId from, const TeamMessagePtr& message, double now_s);
 
-  /// What is to be sent, in order; empty thereafter.
+  /// The messages to send, in order; empty thereafter.
   [[nodiscard]] std::vector<Parcel> take_parcels() { return std::exchange(parcels_, {}); }
 
-  /// Robots that are heard directly, or were kPatience_s ago; ascending.
+  /// Robots that were received directly within the last kPatience_s; ascending.
   [[nodiscard]] std::vector<TeamPeer> hears() const;
   [[nodiscard]] const TeamLinks& links() const { return links_; }
   /// Grows when links() changes.
   [[nodiscard]] std::uint64_t links_version() const { return links_version_; }
-  /// Where a letter to `to` goes next: to itself if it is heard directly, else to the one that is
-  /// and has the shortest path, other than `from`; of several to the lowest. nullopt if there is
-  /// none.
+  /// The next robot on the way to `to`: `to` itself if it is received directly. Otherwise the
+  /// directly received robot with the shortest path, except for `from`; the lowest id decides a
+  /// tie. nullopt if there is none.
   [[nodiscard]] std::optional<RobotId> next_hop(RobotId to, std::optional<RobotId> from = {}) const;
-  /// Hash of all that is held.
+  /// Hash of all messages held.
   [[nodiscard]] std::uint64_t holds() const;
 
  private:
@@ -89,8 +92,8 @@ class Relay {
     TeamMessagePtr message;
     std::uint32_t number = 0;
     double learned_s = 0.0;
-    RobotId from = 0;       // who has handed it over
-    std::size_t bytes = 0;  // none of this robot's own
+    RobotId from = 0;       // robot that has forwarded it
+    std::size_t bytes = 0;  // 0 for messages of this robot
   };
   struct Origin {
     std::uint64_t boot = 0;
@@ -99,15 +102,15 @@ class Relay {
   struct Served {
     std::uint32_t number = 0;
     double sent_s = 0.0;
-    bool confirmed = false;  // it was the neighbour that has shown it
+    bool confirmed = false;  // the neighbour has shown that it has it
   };
   struct Neighbour {
     std::uint64_t boot = 0;
     std::map<std::pair<RobotId, std::size_t>, Served> served = {};  // by origin and kind
-    double repair_s = 0.0;                                          // not before
+    double repair_s = 0.0;  // earliest time of the next repair
     double patience_s = 0.0;
   };
-  // Copies of letters of one robot to another that have passed.
+  // Copies of reliable messages of one robot to another that have passed here.
   struct Passed {
     std::uint64_t boot = 0;
     std::set<std::uint32_t> copies = {};
@@ -134,12 +137,12 @@ class Relay {
     std::uint64_t boot = 0;
     double since_s = 0.0;
   };
-  std::map<RobotId, std::size_t> held_from_;  // octets, by who has handed them over
+  std::map<RobotId, std::size_t> held_from_;  // bytes, by the robot that has forwarded them
   std::map<RobotId, Neighbour> direct_;
-  std::map<RobotId, Gone> gone_;                          // from there, not longer than kPatience_s
-  std::map<std::pair<RobotId, RobotId>, Passed> passed_;  // by sender and addressee
-  std::map<RobotId, std::uint32_t> copies_;               // of own letters
-  std::array<std::uint32_t, kFlooded> numbers_ = {};      // of own messages
+  std::map<RobotId, Gone> gone_;                          // lost links, for at most kPatience_s
+  std::map<std::pair<RobotId, RobotId>, Passed> passed_;  // by sender and receiver
+  std::map<RobotId, std::uint32_t> copies_;               // number of the next copy, by receiver
+  std::array<std::uint32_t, kFlooded> numbers_ = {};      // last numbers of this robot, by kind
   std::vector<Parcel> parcels_;
 };
 

@@ -11,11 +11,11 @@ namespace {
 
 constexpr double kInlierProbability = 0.999999;
 constexpr double kMuStep = 1.4;
-// While the surrogate is nearly convex it may come closer faster.
+// While the surrogate is nearly convex, mu may increase faster.
 constexpr double kFastMuStep = 2.5;
 constexpr double kNearlyConvex = 0.05;
-constexpr int kMaxUpdates = 100;  // then they are decided as they are
-// A few more updates let the borderline cases come to rest.
+constexpr int kMaxUpdates = 100;  // weights are final afterwards
+// A few more updates let borderline weights settle.
 constexpr int kHardUpdates = 3;
 constexpr int kMaxReopened = 3;
 

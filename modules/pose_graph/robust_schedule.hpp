@@ -4,42 +4,43 @@
 
 namespace km {
 
-/// The weight in [0, 1] that minimises w r^2 + mu (1 - w) / (mu + w) c^2: Black-Rangarajan form of
-/// the surrogate for min(r^2, c^2), which is convex for mu -> 0 and truncated for mu -> infinity
-/// (Yang et al., "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020, Eq. (14) and
-/// Sec. III-B, truncated least squares). 1 up to r^2 = mu c^2 / (mu + 1), 0 from (mu + 1) c^2 / mu
-/// on.
+/// The weight in [0, 1] that minimises w r^2 + mu (1 - w) / (mu + w) c^2. This is the
+/// Black-Rangarajan form of the surrogate for min(r^2, c^2), convex for mu -> 0 and truncated for
+/// mu -> infinity (Yang et al., "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020,
+/// Eq. (14) and Sec. III-B, truncated least squares). 1 up to r^2 = mu c^2 / (mu + 1), 0 from (mu +
+/// 1) c^2 / mu on.
 [[nodiscard]] double robust_weight(double squared_residual, double squared_barc, double mu);
 
-/// The mu to begin with, c^2 / (2 r^2 - c^2) of the largest residual r (ibid., Remark 5): weights
-/// are zero from 2 r^2 on, so that all closures have a say. kLargestMu if r is below c / sqrt(2):
-/// then none is outside.
+/// The initial mu, c^2 / (2 r^2 - c^2) with the largest residual r (ibid., Remark 5). Weights are
+/// zero from 2 r^2 on, so that all closures have an influence. kLargestMu if r is below c /
+/// sqrt(2): then no residual exceeds c.
 [[nodiscard]] double first_mu(double largest_squared_residual, double squared_barc);
 
 inline constexpr double kLargestMu = 1e30;
 
-/// Square root of the 99.9999 % quantile of the chi-squared distribution with as many degrees of
-/// freedom as a pose has, 6 or (dimension 2) 3. In the plane the cost counts rotations twice (see
-/// precision_of_blocks()), so an inlier there is turned a little less.
+/// Square root of the 99.9999 % quantile of the chi-squared distribution with the degrees of
+/// freedom of a pose, 6 or (dimension 2) 3. In the plane the cost counts rotations twice (see
+/// precision_of_blocks()), so that the limit on the rotation of an inlier is slightly stricter.
 [[nodiscard]] double default_threshold(int dimension);
 
-/// When the surrogate gets steeper, and when all is decided: run by the root of the tree alone, on
-/// the team's sums. Between two weighings there is one step of the poses.
+/// Schedule of graduated non-convexity: it decides when mu increases and when the weights are
+/// final. Only the root of the tree runs it, on the sums of the team. There is one step of the
+/// poses between two weighings.
 class RobustSchedule {
  public:
-  /// What the team says of the last weighing.
+  /// Sums of the team over the last weighing.
   struct Tally {
-    std::uint32_t changed = 0;     ///< Weights that have changed.
-    std::uint32_t fractional = 0;  ///< Weights strictly between 0 and 1.
+    std::uint32_t changed = 0;     ///< Number of weights that have changed.
+    std::uint32_t fractional = 0;  ///< Number of weights strictly between 0 and 1.
   };
 
-  /// `largest` residual [sigma] of what may be rejected; none if `open` is zero: all is decided
-  /// then. The first `all_in` steps are made before anything is weighed.
+  /// `largest`: largest residual [sigma] of the edges that may be rejected. `open`: their number;
+  /// if it is zero, all weights are final. The first `all_in` steps precede the first weighing.
   void start(float largest, std::uint32_t open, double barc, int all_in);
   /// To be called once per accepted step of a weighing.
   void next(const Tally& tally);
-  /// After a decision, where the poses that it led to contradict it: hard weights once more. False
-  /// if that has been done often enough.
+  /// Repeats the hard weighing, if the resulting poses contradict the decided weights. False if the
+  /// limit of repetitions is reached.
   [[nodiscard]] bool reopen();
 
   [[nodiscard]] bool all_in() const { return all_in_ > 0; }
@@ -50,13 +51,13 @@ class RobustSchedule {
   double mu_ = 0.0;
   int all_in_ = 0;
   int updates_ = 0;
-  int hard_updates_ = 0;  // since mu is so large that no weight lies between 0 and 1
+  int hard_updates_ = 0;  // updates since mu exceeded kHardMu
   int reopened_ = 0;
   bool decided_ = true;
 };
 
-/// From here on weights are rounded to 0 or 1: one strictly between them needs a residual within
-/// half a percent of barc.
+/// From this mu on, weights are rounded to 0 or 1: a weight strictly between them needs a residual
+/// within half a percent of barc.
 inline constexpr double kHardMu = 100.0;
 
 }  // namespace km

@@ -15,41 +15,40 @@
 
 namespace km {
 
-/// Factor on the weights of a closure that is decided to be rejected where it stays an edge: its
-/// ends stay in the problem, and it moves nothing.
+/// Factor on the weights of a rejected closure that remains an edge. Its poses remain in the
+/// problem, and its influence is negligible.
 inline constexpr double kRejectedWeight = 1e-6;
 
-/// A robot's part of the graph that a session optimises, frozen when the session begins.
+/// The part of one robot of the graph that a session optimises, frozen when the session begins.
 ///
-/// Both ends of a closure between robots hold it, with the same numbers. Public are the keyframes
-/// that closures between robots end on, and keyframe 0; of a public pose everyone has the same
-/// start, to the last bit (see SinglePose).
+/// Both robots of a closure hold it, with equal numbers. The public keyframes are keyframe 0 and
+/// the keyframes on which closures between robots end. All robots have the same start of a public
+/// pose, to the last bit (see SinglePose).
 struct SessionGraph {
   RobotId self = 0;
   std::vector<SE3> start = {};         ///< T_world_kf of the own keyframes, in the session's frame.
   std::vector<PoseEdge> own = {};      ///< Odometry from each keyframe to the next, then closures.
-  std::size_t odometry = 0;            ///< So many edges at the beginning of `own`.
+  std::size_t odometry = 0;            ///< Number of steps of odometry at the beginning of `own`.
   std::vector<PoseEdge> between = {};  ///< Closures to other members, ascending by id.
-  std::vector<PoseEdge> to_absent = {};  ///< Closures to robots that have gone: poses held fixed.
-  /// Start of the others' public poses, those of absent ones included.
+  std::vector<PoseEdge> to_absent = {};  ///< Closures to held poses of robots out of reach.
+  /// Start of the public poses of other robots, including absent robots.
   std::map<KeyframeId, SE3> told = {};
-  /// Mean weights of one step of odometry, as every robot tells its own.
+  /// Mean weights of one step of odometry, as reported by each robot.
   std::map<RobotId, Precision> step_precision = {};
-  std::vector<VerticalPrior> verticals = {};  ///< Of own poses; empty unless `upright`.
+  std::vector<VerticalPrior> verticals = {};  ///< Priors of own poses; empty unless `upright`.
   bool upright = false;                       ///< All members have verticals: the frame has z up.
-  /// Decided in sessions before: kept or rejected. Closures that are not named are undecided.
+  /// Decisions of earlier sessions: kept or rejected. Closures without an entry are undecided.
   std::map<ClosureId, bool> decided = {};
-  std::set<ClosureId> trusted = {};  ///< Between robots, and not to be weighed; the same for both.
+  std::set<ClosureId> trusted = {};  ///< Never weighed; equal on both robots.
   /// Cycles through closures that this robot counted in earlier sessions.
   ClosureNoiseRecord noise = {};
 };
 
-/// A robot's place in the tree of a session, whose edges are links between robots that hear each
-/// other.
+/// The place of a robot in the tree of a session. The edges of the tree are links.
 struct TreePlace {
   std::optional<RobotId> parent = {};  ///< nullopt: the root.
   std::vector<RobotId> children = {};  ///< Ascending.
-  std::vector<RobotId> members = {};   ///< Of the whole session, this one included; ascending.
+  std::vector<RobotId> members = {};   ///< All of the session, ascending.
   RobotId root = 0;                    ///< The member without a parent.
 };
 

@@ -10,10 +10,10 @@
 namespace km {
 namespace {
 
-// Rounds whose poses are kept until it is known that all members have completed them.
+// Number of rounds whose poses are kept until all members are known to have completed them.
 constexpr std::size_t kRememberedRounds = 16;
 
-// Of letters before there is a solver. What there is no room for comes again.
+// Limit of the messages kept before there is a solver. Senders repeat the messages beyond it.
 constexpr std::size_t kMaxEarlyLetters = 1000;
 constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
 
@@ -93,7 +93,7 @@ bool SessionPart::enter(const ToldPoses& told) {
 }
 
 bool SessionPart::align(const ToldPoses& told) {
-  std::map<KeyframeId, SE3> poses = graph_.told;  // of absent robots
+  std::map<KeyframeId, SE3> poses = graph_.told;  // poses of absent robots
   for (const SessionMember& member : session_.plan.members) {
     if (member.peer == self_) break;
     const bool neighbour = std::any_of(
@@ -133,7 +133,8 @@ bool SessionPart::gather(const ToldPoses& told) {
   return true;
 }
 
-// Both ends of a closure come to the same: rejected if either says so, kept if both do.
+// Both robots of a closure compute the same decision: rejected if either has rejected it, kept if
+// both have kept it.
 void SessionPart::combine_decisions(const MemberPoses& told) {
   std::map<ClosureId, bool> theirs;
   for (const WeighedClosure& closure : told.verdicts) theirs[closure.id] = closure.kept;

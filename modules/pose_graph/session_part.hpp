@@ -19,88 +19,89 @@
 
 namespace km {
 
-/// Makes one robot's solver of a session. It also sees to the session's max_rounds.
+/// Creates the solver of one robot for a session, which also enforces max_rounds of the session.
 using MemberSolverFactory = std::function<std::unique_ptr<MemberSolver>(
     const Session& session, SessionGraph graph, TreePlace place)>;
 
-/// The newest poses that each of the other robots has told.
+/// The newest poses received from each of the other robots.
 using ToldPoses = std::map<RobotId, MemberPoses>;
 
-/// What a robot brings to a session, frozen when it joins.
+/// The contribution of a robot to a session, frozen when it joins.
 struct FrozenPart {
-  /// `start` is in the robot's present frame, `told` holds the poses of absent robots, and
-  /// `step_precision` its own: the rest comes from the members.
+  /// `start` is in the present frame of the robot, `told` has the poses of absent robots, and
+  /// `step_precision` has the entry of this robot. The members supply the rest.
   SessionGraph graph = {};
   TreePlace place = {};
-  bool in_frame = false;  ///< `start` is in the frame of the session already.
-  /// False closures are to be expected: they would bend the trajectory.
+  bool in_frame = false;  ///< `start` is already in the frame of the session.
+  /// False closures are likely. The trajectory is then not deformed to fit closures.
   bool suspicious = true;
   std::vector<KeyframeIndex> public_keyframes = {};  ///< Ascending, 0 first.
 };
 
-/// One robot's part in one session, from joining it to its end, in stages.
+/// The part of one robot in one session, from joining it to its end, in stages.
 ///
-/// First the robot enters the frame: if it is in another one it waits for its neighbours before it
-/// in the session's order and is aligned to them. Its public poses are rounded to single precision
-/// and are ready to be told (stage 0). With those of all members its solver begins; letters go both
-/// ways until it is done (stage 1), or fails (stage 2).
+/// First the robot enters the frame of the session. If it is in another frame, it waits for its
+/// neighbours that precede it in the order of the session, and is aligned to them. Its public poses
+/// are then rounded to single precision and ready to be sent (stage 0). Once the public poses of
+/// all members have arrived, its solver begins. Members exchange messages until the solver is done
+/// (stage 1) or fails (stage 2).
 ///
-/// A session may be cut short at any time, and its members are not all in the same round then. So
-/// the poses of the last rounds are kept, and the coordinator tells now and then which round all
-/// have completed: a member goes back to that one. All that have heard it hold poses of one round.
-/// Deterministic; not thread-safe.
+/// A session may end early at any time, and its members are then in different rounds. Each member
+/// therefore keeps the poses of the last rounds. From time to time the coordinator sends the last
+/// round that all members have completed, and each member returns to that round. All members that
+/// have received it hold poses of one round. Deterministic; not thread-safe.
 class SessionPart {
  public:
   SessionPart(Session session, TeamPeer self, FrozenPart part, MemberSolverFactory factory,
               const AlignmentTolerance& tolerance, double period_s, double now_s);
 
-  /// One piece of work if there is any: the letters to be sent.
+  /// Does one piece of work, if there is any, and returns the messages to send.
   [[nodiscard]] std::vector<SessionLetter> advance(const ToldPoses& told, double now_s);
-  /// True if the last advance() has changed anything: there may be more to do.
+  /// True if the last advance() has changed anything; there may then be more to do.
   [[nodiscard]] bool worked() const { return worked_; }
 
-  /// A letter of a member. Its sender is told once the solver has taken it: what comes before there
-  /// is one is kept as far as there is room, and comes again. False if it is from no member, or of
-  /// no use to the solver as things stand.
+  /// Processes a message of a member. It is acknowledged once the solver has taken it. Messages
+  /// that arrive before there is a solver are kept if there is room, and are repeated otherwise.
+  /// False if the sender is not a member, or if the solver cannot use the message at present.
   bool receive(const SessionLetter& letter, double now_s);
-  /// Senders of letters that were kept until there was a solver, and were of no use to it; empty
-  /// thereafter.
+  /// Senders of early messages that the solver then refused; empty thereafter.
   [[nodiscard]] std::vector<RobotId> take_refused() { return std::exchange(refused_, {}); }
   void reachable_again(RobotId robot) { letters_.reachable_again(robot); }
 
-  /// What the coordinator says by now. True if that ends the session.
+  /// Takes the newest message of the coordinator. True if it ends the session.
   bool follow(const Session& session);
-  /// A round that all members have completed.
+  /// Declares a round completed by all members.
   void commit(std::uint32_t round);
 
-  /// nullopt before the robot is in the frame; then 0, 1 with the solution, 2 if it has failed.
+  /// nullopt before the robot has entered the frame, then 0; 1 with the solution; 2 after a
+  /// failure.
   [[nodiscard]] std::optional<std::uint32_t> stage() const { return stage_; }
   [[nodiscard]] const std::string& failure() const { return failure_; }
-  /// Poses that a member of this session has told in it; nullptr if it has not, or not that far.
+  /// Poses that a member has sent in this session at `stage` or later; nullptr if there are none.
   [[nodiscard]] const MemberPoses* told_by(const ToldPoses& told, RobotId robot,
                                            std::uint32_t stage) const;
-  /// True if all members, this one included, have told poses of stage 1.
+  /// True if all members, including this one, have sent poses of stage 1.
   [[nodiscard]] bool all_solved(const ToldPoses& told) const;
-  /// True if that is a closure between this robot and another member.
+  /// True if `closure` is between this robot and another member.
   [[nodiscard]] bool joins_members(const ClosureId& closure) const;
 
   [[nodiscard]] Session& session() { return session_; }
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const std::vector<KeyframeIndex>& public_keyframes() const { return public_; }
   [[nodiscard]] const std::vector<RobotId>& members() const { return place_.members; }
-  /// Of the solver; zeros before there is one.
+  /// State of the solver; zeros before there is one.
   [[nodiscard]] SolverState state() const { return solver_ ? solver_->state() : SolverState(); }
-  /// On closures to other members what the robot knew when it joined, and once there is a solver,
-  /// on all closures that this robot weighs what the solver makes of them.
+  /// Before there is a solver: the known decisions on closures to other members when the robot
+  /// joined. Afterwards: the verdicts of the solver on all closures that this robot weighs.
   [[nodiscard]] ClosureVerdicts verdicts() const;
   [[nodiscard]] ClosureNoiseRecord noise() const {
     return solver_ ? solver_->noise() : graph_.noise;
   }
-  /// The best ones, in the frame of the session once there is a stage.
+  /// The best poses; in the frame of the session once there is a stage.
   [[nodiscard]] const std::vector<SE3>& poses() const;
-  /// Those of the round that all members have completed, as far as is known.
+  /// Poses of the last round that is known to be completed by all members.
   [[nodiscard]] const std::vector<SE3>& committed_poses() const { return committed_; }
-  /// When something of the session was last done here or heard [s].
+  /// Time of the last activity or message of the session [s].
   [[nodiscard]] double moved_s() const { return moved_s_; }
   void moved(double now_s) { moved_s_ = now_s; }
 
@@ -118,7 +119,7 @@ class SessionPart {
 
   Session session_;
   TeamPeer self_;
-  SessionGraph graph_;  // moved to the solver
+  SessionGraph graph_;  // the solver takes it over
   TreePlace place_;
   bool in_frame_;
   bool suspicious_;
@@ -130,12 +131,12 @@ class SessionPart {
   LetterBook letters_;
   std::map<std::pair<RobotId, std::uint32_t>, SessionLetter> early_;  // before there is a solver
   std::size_t early_bytes_ = 0;
-  std::vector<RobotId> refused_;  // senders of those it had no use for
+  std::vector<RobotId> refused_;  // senders of early messages that the solver refused
   std::vector<SessionLetter> to_send_;
   std::unique_ptr<MemberSolver> solver_;
   std::optional<std::uint32_t> stage_;
   std::string failure_;
-  std::deque<std::pair<std::uint32_t, std::vector<SE3>>> rounds_;  // the last ones
+  std::deque<std::pair<std::uint32_t, std::vector<SE3>>> rounds_;  // poses of the last rounds
   std::vector<SE3> committed_;
   bool worked_ = false;
   double moved_s_;

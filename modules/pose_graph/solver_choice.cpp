@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// In a team a round takes longer than a few bytes do.
+// In a team, the latency of a round costs more than the bytes of new second derivatives.
 constexpr double kPatienceRounds = 8.0;
 
 TreeNewtonOptions newton_options(const PoseGraphConfig& config, const Session& session) {

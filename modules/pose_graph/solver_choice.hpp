@@ -5,7 +5,7 @@
 
 namespace km {
 
-/// Makes the solver that a session's method asks for, with the parameters of `config`.
+/// Creates the solver for the method of a session, with the parameters of `config`.
 [[nodiscard]] MemberSolverFactory solver_choice(const PoseGraphConfig& config);
 
 }  // namespace km

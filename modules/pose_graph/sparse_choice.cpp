@@ -19,12 +19,12 @@ class BitGraph {
     }
   }
 
-  // Couplings that eliminating `v` adds, less those it removes.
+  // Number of couplings that eliminating `v` adds, minus those that it removes.
   [[nodiscard]] int growth(int v) const {
     const std::uint64_t* own = row(v);
     int degree = 0;
     for (std::size_t w = 0; w < words_; ++w) degree += std::popcount(own[w]);
-    int coupled = 0;  // pairs among the neighbours, each twice
+    int coupled = 0;  // coupled neighbours, each pair counted twice
     for_neighbours(v, [&](int u) {
       const std::uint64_t* other = row(u);
       for (std::size_t w = 0; w < words_; ++w) coupled += std::popcount(own[w] & other[w]);
@@ -32,7 +32,7 @@ class BitGraph {
     return (degree * (degree - 1) - coupled) / 2 - degree;
   }
 
-  // Removes `v` and couples its neighbours, which are returned.
+  // Removes `v`, couples its neighbours, and returns them.
   std::vector<int> eliminate(int v) {
     std::vector<int> neighbours;
     for_neighbours(v, [&](int u) { neighbours.push_back(u); });
@@ -74,16 +74,16 @@ std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<NodePair
                               const std::vector<bool>& eliminate_first) {
   BitGraph graph(static_cast<int>(keep.size()), pairs);
 
-  // A node whose surroundings have changed is looked at again when its turn comes by its old
-  // growth, or when no other is left whose turn it is: after each elimination would be too often
-  // where everyone is everyone's neighbour.
+  // The growth of a node with a changed neighbourhood is not computed again at once. It is computed
+  // when the node reaches the front of the queue by its old growth, or when the queue is empty. In
+  // a dense graph, an update after each elimination would be too expensive.
   std::vector<State> state(keep.size(), State::kKept);
   std::priority_queue<std::pair<int, int>> queue;  // least growth first, then lowest node
   const auto offer = [&](std::size_t v) {
     state[v] = State::kOffered;
     queue.emplace(-graph.growth(static_cast<int>(v)), -static_cast<int>(v));
   };
-  // What is left does not depend on the order in which these go.
+  // The remaining graph does not depend on the order of these eliminations.
   for (std::size_t v = 0; v < eliminate_first.size(); ++v) {
     if (!eliminate_first[v] || keep[v]) continue;
     state[v] = State::kEliminated;

@@ -6,10 +6,10 @@
 
 namespace km {
 
-/// Which nodes of a graph to keep so that the Schur complement has few couplings: those in `keep`,
-/// none of those in `eliminate` (empty: none is), and of the others all whose elimination would add
-/// more couplings than it removes. Greedy: the node that adds fewest, net, is eliminated first.
-/// O(nodes x couplings of the result / 64).
+/// The nodes of a graph to keep so that the Schur complement has few couplings. All nodes in `keep`
+/// are kept, and all nodes in `eliminate` (empty: none) are eliminated. Other nodes are kept if
+/// their elimination would add more couplings than it removes. Greedy: the node with the smallest
+/// net increase of couplings is eliminated first. O(nodes x couplings of the result / 64).
 [[nodiscard]] std::vector<bool> keep_sparse(std::vector<bool> keep,
                                             const std::vector<NodePair>& pairs,
                                             const std::vector<bool>& eliminate = {});

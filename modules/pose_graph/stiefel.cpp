@@ -23,7 +23,7 @@ double stiefel_error(const LiftedPoses& X) {
 }
 
 LiftedPoses restore_stiefel(LiftedPoses X) {
-  // Newton-Schulz iteration for the polar factor: the error is squared each time.
+  // Newton-Schulz iteration for the polar factor: each step squares the error.
   constexpr int kIterations = 5;
   for (Eigen::Index i = 0; i < pose_count(X); ++i) {
     auto Y = X.middleCols<3>(4 * i);

@@ -7,8 +7,8 @@
 
 namespace km {
 
-/// n poses in the rank relaxation of SE-Sync (Rosen et al., IJRR 2019, Sec. 4): an r x 4n matrix
-/// whose columns 4i to 4i+3 are [Y_i p_i], Y_i in St(3, r) (orthonormal columns), p_i in R^r [m].
+/// n poses in the rank relaxation of SE-Sync (Rosen et al., IJRR 2019, Sec. 4), an r x 4n matrix.
+/// Its columns 4i to 4i+3 are [Y_i p_i], Y_i in St(3, r) (orthonormal columns), p_i in R^r [m].
 /// With r = 3 it holds ordinary poses [R_i t_i] (or mirrored ones). Tangent vectors and gradients
 /// have the same shape. A point of (St(3, r) x R^r)^n is called feasible below.
 using LiftedPoses = Eigen::MatrixXd;
@@ -24,8 +24,9 @@ inline Eigen::Index pose_count(const LiftedPoses& X) {
 /// Largest entry of |Y_i^T Y_i - I| over the poses: 0 if X is feasible.
 [[nodiscard]] double stiefel_error(const LiftedPoses& X);
 
-/// Feasible poses next to nearly feasible ones, stiefel_error(X) at most 0.1: to rounding what
-/// nearest_stiefel() gives for each, at a fraction of its time. The same bits for the same input.
+/// The feasible poses nearest to nearly feasible ones, with stiefel_error(X) at most 0.1. The
+/// result equals that of nearest_stiefel() for each pose up to rounding, at a fraction of its time.
+/// Equal inputs give equal bits.
 [[nodiscard]] LiftedPoses restore_stiefel(LiftedPoses X);
 
 /// Orthogonal projection of `V` onto the tangent space at feasible `X`: V_i - Y_i sym(Y_i^T V_i) on
@@ -37,8 +38,8 @@ inline Eigen::Index pose_count(const LiftedPoses& X) {
 [[nodiscard]] LiftedPoses retract(const LiftedPoses& X, const LiftedPoses& V);
 
 /// `X` moved along a random tangent vector with entries of standard deviation `sigma` on the
-/// rotations. Ordinary poses, lifted, have a gradient without components in the added dimensions:
-/// only beside them does a descent find its way through those.
+/// rotations. The gradient at lifted rigid poses has no components in the added dimensions. A
+/// descent uses these dimensions only if it starts at perturbed poses.
 [[nodiscard]] LiftedPoses perturb_rotations(const LiftedPoses& X, double sigma, std::mt19937& rng);
 
 /// The matrix of St(3, r) by which every robot lifts its frame: the first three unit vectors. Equal

@@ -10,18 +10,18 @@
 #include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 
-// Who is there, what they tell, and what this robot tells; its sessions are in
+// Other robots, their messages and the messages of this robot. The sessions are in
 // team_agent_session.cpp.
 
 namespace km {
 namespace {
 
-// A status that has changed is sent after this part of the period at the earliest; one that hears
-// others than before, sooner.
+// Earliest time of a changed status, and of one with changed links [periods].
 constexpr double kEarlyStatus = 0.5;
 constexpr double kEarlyLinks = 0.05;
 
-// So many reasons of refusals are told apart: they name robots, which may be made up.
+// Largest number of distinct reasons of refusals: they contain robot ids, which a sender can
+// invent.
 constexpr std::size_t kReasons = 1000;
 
 bool same_content(const TeamStatus& a, const TeamStatus& b) {
@@ -32,7 +32,8 @@ bool same_content(const TeamStatus& a, const TeamStatus& b) {
   return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
 }
 
-// What the codec checks, too, and everything else that is relied on: nobody else is trusted.
+// Checks everything that this robot relies on, including the checks of the codec, because no other
+// robot is trusted.
 bool in_order(const MemberPoses& poses) {
   const auto& keyframes = poses.keyframes;
   const auto finite = [](const SinglePose& T) {
@@ -263,7 +264,7 @@ void TeamAgent::send_status(TeamOutput& output) {
   relay_.say(std::move(status), now_s_);
 }
 
-// What is of the session of this robot is charged to it, what is passed on for others, too.
+// Messages of the session of this robot count as its bytes, including forwarded ones.
 void TeamAgent::hand_out(TeamOutput& output) {
   std::map<const TeamMessage*, std::size_t> sizes;
   for (Parcel& parcel : relay_.take_parcels()) {
@@ -278,7 +279,8 @@ void TeamAgent::hand_out(TeamOutput& output) {
 
 std::optional<SE3> TeamAgent::world_of(RobotId anchor) const {
   const bool upright = part_ && part_->session().upright;
-  // Upright, the optimum knows better than keyframe 0 did how that was tilted.
+  // In an upright session, the optimum has a better estimate of the tilt of keyframe 0 than its own
+  // vertical.
   const auto world = [&](const SE3& T_frame_first, const SE3& T_odom_first) {
     const SE3 T_frame_world = T_frame_first * T_odom_first.inverse();
     if (!upright) return T_frame_world;
@@ -286,7 +288,8 @@ std::optional<SE3> TeamAgent::world_of(RobotId anchor) const {
         level(T_frame_world.matrix().topRows<3>(), T_odom_first.translation());
     return make_pose(turned.leftCols<3>(), turned.col(3));
   };
-  // What the others know it as: then all are in one frame to the last digit.
+  // Uses the pose that all other robots have received, so that all have one frame to the last
+  // digit.
   const auto told = told_.find(anchor);
   if (told == told_.end() || told->second.frame != frame_) return std::nullopt;
   const SE3 T_frame_first = told->second.T_frame_kf.front().pose();

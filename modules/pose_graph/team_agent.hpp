@@ -18,97 +18,100 @@
 
 namespace km {
 
-/// What a step of the agent gives to the others and to its own robot.
+/// Outputs of a step of the agent, to other robots and to its own robot.
 struct [[nodiscard]] TeamOutput {
   std::vector<Parcel> parcels = {};
   std::optional<Trajectory> trajectory = {};
   std::optional<OptimizerProgress> progress = {};
-  std::optional<ClosureVerdicts> verdicts = {};  ///< On closures of this robot, after a session.
-  std::vector<std::string> notices = {};         ///< What a person should know.
-  bool more = false;  ///< The next step has work already, without further input.
+  std::optional<ClosureVerdicts> verdicts = {};  ///< After a session.
+  std::vector<std::string> notices = {};         ///< Messages for a person.
+  bool more = false;  ///< The next step has work even without further input.
 };
 
-/// One robot's part of the team's pose graph optimisation, as a state machine without threads and
-/// clocks.
+/// The part of one robot in the pose graph optimisation of the team, as a state machine without
+/// threads and clocks.
 ///
-/// A robot's team is whoever links lead to, over others in between: see Relay. Those of it that
-/// share inlier closures, directly or through others, optimise together in sessions. A session
-/// freezes the graph: its members, and for every pair of them the edge set that both hold. The
-/// member with the lowest id coordinates it: opens it when the graph has changed, and ends it. A
-/// robot without partners coordinates its own. How a member gets through a session is in
-/// SessionPart; the solver of its graph comes from a factory.
+/// The team of a robot is all robots that links connect to it, directly or through other robots:
+/// see Relay. Robots of a team that share inlier closures, directly or through other robots,
+/// optimise together in sessions. A session freezes the graph: its members, and for every pair of
+/// members the edge set that both hold. The member with the lowest id coordinates the session: it
+/// opens the session when the graph has changed, and ends it. A robot without partners coordinates
+/// its own sessions. SessionPart implements a session of one member; a factory supplies the solver
+/// of its graph.
 ///
-/// A session is not left for new measurements: the next one waits until its bytes are paid for and
-/// it is worth its own. It is cut short when no links lead to a member any more: links that come
-/// back at once (see Relay) spoil nothing, since letters are repeated and find other ways. Its
-/// members go back to the last round that all have completed, and the next session begins there.
+/// New measurements do not interrupt a session. The next one waits until the bytes of the last one
+/// are paid for and it is worth its own bytes. A session ends early when links to a member no
+/// longer exist. Links that return at once (see Relay) do no harm, because messages are repeated
+/// and find other ways. The members of the interrupted session return to the last round that all
+/// have completed, and the next session begins there.
 ///
-/// A robot that is out of reach leaves its last public poses behind, to be held fixed by the
-/// others, so that they keep their frame and what it told them. When it comes back it catches up;
-/// of another process what it told is forgotten, of another life also what was measured. What has
-/// been decided about closures carries over from session to session, and so does what they tell of
-/// their noise; both ends of a closure tell each other first. What a robot decides alone holds
-/// until it is in a team, which knows the noise better; what a team decides beside the poses of
-/// robots that have gone, until its next session: it may be those poses that are wrong. Where
-/// closures were set aside unheard, those that fit the solution all the same are taken for
-/// undecided again, and one more session weighs them.
+/// The other robots hold the last public poses of a robot that is out of reach, so that they keep
+/// their frame and its measurements. When this robot returns, it catches up. If it returns as
+/// another process, its poses are discarded; if it returns with another incarnation, closures to it
+/// are discarded, too.
 ///
-/// Where all members know which way is up, that is part of what they minimise, and `world` has z
-/// up.
-/// Deterministic: equal inputs in equal order give equal outputs. Not thread-safe.
+/// Decisions on closures, and the estimate of their noise, carry over from session to session. Both
+/// robots of a closure exchange their decisions first. The decisions of a robot alone hold until it
+/// is in a team, which knows the noise better. Decisions of a team made with held poses hold until
+/// its next session, because the held poses may be wrong. Deferred closures that fit the solution
+/// become undecided again, and one more session weighs them.
+///
+/// If all members have verticals, these are part of the cost, and `world` has z up. Deterministic:
+/// equal inputs in equal order give equal outputs. Not thread-safe.
 class TeamAgent {
  public:
   /// Throws ConfigError if `config` is out of bounds.
   TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory factory);
 
-  /// Own measurements and decisions about them; see OwnGraph for what is ignored. False if nothing
-  /// has changed. What should not have come is counted in refused().
+  /// Adds own measurements and decisions on them; see OwnGraph for the ignored ones. False if
+  /// nothing has changed. refused() counts invalid inputs.
   bool add(const KeyframeOdometry& keyframe);
   bool add(const Closure& closure);
   bool add(const InlierSet& set);
 
-  /// A robot is heard directly from now on, or no more.
+  /// This robot begins or ceases to receive another robot directly.
   void peer_alive(TeamPeer peer);
   void peer_lost(RobotId robot);
 
-  /// The keyframes of `peer` are others from now on: what was measured before counts no more.
+  /// The keyframe indices of `peer` have a new meaning from now on: earlier measurements of it are
+  /// discarded.
   void peer_restarted(const TeamPeer& peer);
 
-  /// A message that `from`, which is heard directly, has handed over; in any order, repeated or
-  /// lost. False if it is refused.
+  /// Processes a message that `from`, which is received directly, has forwarded. Messages may be
+  /// reordered, repeated or lost. False if the message is refused.
   bool receive(RobotId from, const TeamMessagePtr& message);
 
-  /// Does what is due, at most one piece of a solver's work. Call it after every input and, for
-  /// repetitions, several times in a second; `now_s` [s] must not decrease.
+  /// Does the work that is due, at most one piece of work of a solver. Call it after every input
+  /// and, for repetitions, several times per second; `now_s` [s] must not decrease.
   TeamOutput step(double now_s);
 
-  /// Own poses at present, in the frame().
+  /// Present own poses in frame().
   [[nodiscard]] const std::vector<SE3>& poses() const;
   [[nodiscard]] const TeamFrame& frame() const { return frame_; }
-  /// The session that this robot is in, or was in last.
+  /// The present or last session of this robot.
   [[nodiscard]] const SessionPart* part() const { return part_ ? &*part_ : nullptr; }
-  /// False if that session is at its end.
+  /// False if the session of part() has ended.
   [[nodiscard]] bool in_session() const { return part_ && !over_; }
   [[nodiscard]] const std::map<ClosureId, bool>& decided() const { return decided_; }
   [[nodiscard]] const Relay& relay() const { return relay_; }
-  /// What was refused, and how often.
+  /// Number of refusals by reason.
   [[nodiscard]] const std::map<std::string, std::size_t>& refused() const { return refused_; }
 
  private:
   struct Peer {
     std::uint64_t boot = 0;
     std::optional<TeamStatus> status = {};
-    std::optional<Session> session = {};  // the newest that it coordinates
-    std::uint32_t joined = 0;             // number of the last of these that this robot was in
-    std::uint32_t missed = 0;             // of the last one that it could not join
-    bool other_method = false;            // nothing will come of its edges
+    std::optional<Session> session = {};  // the newest one that it coordinates
+    std::uint32_t joined = 0;             // number of its last session that this robot has joined
+    std::uint32_t missed = 0;   // number of its last session that this robot could not join
+    bool other_method = false;  // its edges are not optimised
   };
   struct World {
     RobotId anchor = 0;
     SE3 T_frame_world = SE3::Identity();
   };
 
-  // Who is there.
+  // Other robots and their messages.
   Peer& meet(const TeamPeer& peer);
   void forget_measured(RobotId robot);
   void watch_links();
@@ -123,7 +126,7 @@ class TeamAgent {
   void send_status(TeamOutput& output);
   void hand_out(TeamOutput& output);
 
-  // Who optimises what, and who says so.
+  // Plans and sessions that this robot coordinates.
   void make_plan();
   void coordinate();
   [[nodiscard]] bool all_upright(const SessionPlan& plan) const;
@@ -171,21 +174,21 @@ class TeamAgent {
   OwnGraph graph_;
   Relay relay_;
   std::map<RobotId, Peer> peers_;
-  ToldPoses told_;  // the newest, of this robot, too
+  ToldPoses told_;  // the newest poses, including those of this robot
   std::map<ClosureId, bool> decided_;
-  std::map<ClosureId, int> chances_;  // that rejected closures have had
-  bool reconsider_due_ = false;       // once all have told the solution
-  std::uint32_t reconsidered_ = 0;    // so many times there was something to weigh again
-  ClosureNoiseRecord noise_;          // of the closures that are decided
-  std::set<ClosureId> provisional_;   // decided without robots that are known of
-  ClosureNoiseRecord team_noise_;     // without these
+  std::map<ClosureId, int> chances_;  // used by rejected closures
+  bool reconsider_due_ = false;       // once all members have sent the solution
+  std::uint32_t reconsidered_ = 0;    // number of times that closures became undecided again
+  ClosureNoiseRecord noise_;          // noise of the decided closures
+  std::set<ClosureId> provisional_;   // decided in the absence of known robots
+  ClosureNoiseRecord team_noise_;     // noise without provisional_
 
   std::uint64_t links_seen_ = 0;
-  std::set<RobotId> component_;  // links lead there
+  std::set<RobotId> component_;  // robots that links connect to this one
 
-  SessionPlan plan_;  // of what is known
+  SessionPlan plan_;  // from the present knowledge
   bool plan_outdated_ = true;
-  double plan_changed_s_ = -1e9;      // its graph
+  double plan_changed_s_ = -1e9;      // time of the last change of its graph
   std::uint64_t closures_known_ = 0;  // by the robots of the plan
   std::uint64_t closures_used_ = 0;   // when the last session was opened
   std::uint32_t sessions_opened_ = 0;
@@ -194,23 +197,23 @@ class TeamAgent {
   std::uint32_t frame_version_ = 0;
   std::vector<SE3> poses_;  // T_frame_kf, of the last session and odometry since
   std::optional<SessionPart> part_;
-  bool over_ = true;       // nothing more comes of it
-  bool deserted_ = false;  // a member of it has gone on to another one
-  bool solved_ = false;    // and all members have its solution
+  bool over_ = true;       // the session has ended
+  bool deserted_ = false;  // a member of it has joined another session
+  bool solved_ = false;    // it ended, and all members have its solution
   double started_s_ = 0.0;
-  std::uint64_t sent_bytes_ = 0;                // for it, to every reader, and passed on
-  std::map<ClosureId, bool> verdicts_;          // of that session
+  std::uint64_t sent_bytes_ = 0;  // for this session, per receiver, and with forwarded messages
+  std::map<ClosureId, bool> verdicts_;          // results of the session of part_
   double odometry_noticed_ = 0.0;               // largest noise scale of odometry in a notice
   std::map<RobotId, double> closures_noticed_;  // noise factor in the last notice, by peer
   std::optional<World> world_;                  // in frame_
-  std::size_t chordal_tried_ = 0;               // with so many closures inside this robot
+  std::size_t chordal_tried_ = 0;  // number of closures inside this robot at the last attempt
 
   std::optional<TeamStatus> sent_status_;
   std::map<std::string, std::size_t> refused_;
   std::vector<std::string> notices_;
   std::optional<ClosureVerdicts> verdicts_due_;
   bool publish_due_ = false;
-  std::uint32_t rounds_before_ = 0;  // of earlier sessions
+  std::uint32_t rounds_before_ = 0;  // rounds of earlier sessions
   double optimising_s_ = 0.0;        // in earlier sessions
   double now_s_ = 0.0;
   double status_sent_s_ = -1e9;

@@ -10,26 +10,27 @@
 #include "modules/pose_graph/team_plan.hpp"
 #include "modules/pose_graph/tree_front.hpp"
 
-// Sessions: who opens them, how this robot gets in and out.
+// Sessions: how they are opened, and how this robot joins and leaves them.
 
 namespace km {
 namespace {
 
-// A session in which nothing has happened for so many status periods is replaced.
+// Status periods without progress after which a session is replaced.
 constexpr double kHopelessPeriods = 15.0;
 
-// Odometry this many times noisier than it claims is worth a notice, and another one when it is
-// this much worse.
+// Noise of odometry over the claimed noise that causes a notice, and its increase that causes
+// another one.
 constexpr double kNoisyOdometry = 2.0;
 constexpr double kNoticedAgain = 1.5;
 
-// Closures that make a start by noisy odometry better; a handful bends it at random. In tunnels,
-// with five or six likely ones a robot, the team would decide on 2.6 % of the closures otherwise
-// than in one session, in place of less than 1 %. In sphere2500 with 7 times the noise, two of ten
-// seeds end 8 and 94 times as far off without.
+// Least number of likely closures for a chordal start from noisy odometry; a few closures would
+// deform it at random. In tunnels, with five or six likely closures per robot, the team would
+// decide on 2.6 % of the closures differently than one session does, instead of on less than 1 %.
+// In sphere2500 with 7 times the noise, two of ten seeds have 8 and 94 times the error without the
+// chordal start.
 constexpr std::size_t kEnoughForChordal = 20;
 
-// After so long without anything new [s] the team has come to rest.
+// Time without new measurements after which the team is at rest [s].
 constexpr double kAtRest_s = 2.0;
 
 bool same_members(const SessionPlan& x, const SessionPlan& y) {
@@ -38,14 +39,14 @@ bool same_members(const SessionPlan& x, const SessionPlan& y) {
 
 }  // namespace
 
-// Who optimises what, and who says so.
+// Plans and sessions that this robot coordinates.
 
 void TeamAgent::make_plan() {
   std::map<RobotId, TeamStatus> statuses{{self_.robot, make_status()}};
   for (const auto& [robot, peer] : peers_) {
     if (!peer.status || peer.other_method || !in_reach(peer.status->sender)) continue;
     TeamStatus& status = statuses.emplace(robot, *peer.status).first->second;
-    // Poses are sent at once, status now and then.
+    // Poses are sent at once, but statuses only periodically.
     const auto told = told_.find(robot);
     if (told != told_.end() && told->second.frame_version > status.frame_version)
       status.frame = told->second.frame;
@@ -87,7 +88,8 @@ bool TeamAgent::all_upright(const SessionPlan& plan) const {
   });
 }
 
-// What the member that has sent most has sent for the last session: the budget is every robot's.
+// Bytes of the member that has sent most in the last session, because the budget applies to every
+// robot.
 std::uint64_t TeamAgent::price_bytes() const {
   std::uint64_t most = sent_bytes_;
   for (const RobotId member : part_->members())
@@ -104,8 +106,8 @@ bool TeamAgent::paid_for() const {
 bool TeamAgent::worthwhile() const {
   const bool alone = plan_.members.size() == 1;
   if (alone || !same_members(part_->session().plan, plan_)) return true;
-  // The first closures join the maps; each further one changes them less. Odometry alone changes
-  // nothing: what it adds can wait until the team is at rest.
+  // The first closures connect the maps; each further closure changes them less. Odometry alone
+  // changes nothing, so new odometry can wait until the team is at rest.
   const auto used = static_cast<double>(closures_used_);
   const bool grown = closures_known_ != closures_used_ &&
                      static_cast<double>(closures_known_) >= (1.0 + config_.session_growth) * used;
@@ -137,7 +139,7 @@ void TeamAgent::open_session() {
   session.upright = all_upright(plan_);
   session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);
   session.anchor = coordinator_of(plan_);
-  // `world` stays where it is when its robot has gone.
+  // `world` keeps its place when its robot is no longer a member.
   if (world_ && world_->anchor < session.anchor && frame_ == plan_.frame) {
     session.anchor = world_->anchor;
     session.T_frame_world = world_->T_frame_world;
@@ -147,7 +149,7 @@ void TeamAgent::open_session() {
   announce();
 }
 
-// Also of hostile origin: nothing that joining relies on is taken for granted.
+// The session may come from a hostile robot: checks everything on which join() relies.
 bool TeamAgent::well_formed(const Session& session) const {
   const SessionPlan& plan = session.plan;
   const auto known_pair = [&](const SessionPair& pair) {
@@ -161,7 +163,8 @@ bool TeamAgent::well_formed(const Session& session) const {
 }
 
 bool TeamAgent::accepts(const Session& session) const {
-  // The others would take what this robot says now for what it has said before it left.
+  // A robot joins a session only once: the other members could not distinguish its new messages
+  // from those before it left.
   if (session.id.number <= peers_.at(session.id.coordinator.robot).joined) return false;
   if (!part_) return true;
   const SessionId& running = part_->session().id;
@@ -172,7 +175,8 @@ bool TeamAgent::accepts(const Session& session) const {
 
 void TeamAgent::consider(const Session& session) {
   if (part_ && session.id == part_->session().id) {
-    // If it has been left because a member seemed to be lost, all came to the end nevertheless.
+    // If this robot has left because a member seemed to be lost, all members completed the session
+    // nevertheless.
     if (part_->follow(session) && !solved_) leave(part_->stage() == 1U && !has_failed());
     return;
   }
@@ -182,13 +186,14 @@ void TeamAgent::consider(const Session& session) {
   const bool from_own_coordinator = part_ && !over_ &&
                                     session.id.coordinator == part_->session().id.coordinator &&
                                     part_->session().id.number < session.id.number;
-  // The others go on without this robot.
+  // The other members continue without this robot.
   if (from_own_coordinator && !member) return leave(part_->all_solved(told_));
-  // Its coordinator must be known to be connected to this robot, and all members to be there.
+  // This robot joins only if it knows a connection to the coordinator, and if all members are
+  // present.
   if (!member || session.finished || !accepts(session) || misses_member(session.plan) ||
       !plan_.has_member(session.id.coordinator.robot) || join(session))
     return;
-  // Asked again whenever something becomes known, and counted once.
+  // consider() runs again with every new message, but counts the refusal only once.
   const RobotId coordinator = session.id.coordinator.robot;
   if (std::exchange(peers_.at(coordinator).missed, session.id.number) != session.id.number)
     refuse("a session of robot " + std::to_string(coordinator) +
@@ -242,8 +247,9 @@ std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
   return part;
 }
 
-// Closures inside this robot that are likely true, without any solution: those that noisy odometry
-// explains, or else those that agree with a closure a few keyframes away.
+// Returns the closures inside this robot that are likely true before anything is solved. If
+// odometry is noisy, these are the closures that its noise explains. Otherwise, these are the
+// closures that agree with a closure a few keyframes away.
 std::vector<PoseEdge> TeamAgent::likely_closures(std::span<const PoseEdge> inside) const {
   const std::vector<PoseEdge>& explained = graph_.odometry_noise().likely;
   if (!explained.empty()) return explained;
@@ -257,8 +263,8 @@ std::vector<PoseEdge> TeamAgent::likely_closures(std::span<const PoseEdge> insid
   return likely;
 }
 
-// A robot that is alone may begin at the chordal initialisation. With closures that may be false it
-// does if the truncated cost of all its closures is lower there.
+// A robot alone may start at the chordal initialisation. If closures may be false, it does so only
+// if the truncated cost of all its closures is lower there.
 void TeamAgent::try_chordal(const Session& session) {
   const std::vector<PoseEdge>* inside = graph_.newest_edges(self_.robot);
   if (session.plan.members.size() > 1 || inside == nullptr || inside->size() == chordal_tried_)
@@ -379,7 +385,7 @@ void TeamAgent::enter_stage(TeamOutput& output) {
     notices_.push_back("session " + std::to_string(session.id.number) + " of robot " +
                        std::to_string(session.id.coordinator.robot) +
                        " cannot be solved: " + part_->failure());
-  hand_out(output);  // what is told of them includes these
+  hand_out(output);  // sent_bytes_ of the poses includes these
   tell_poses();
 }
 
@@ -419,7 +425,7 @@ void TeamAgent::decide_anew() {
   noise_ = team_noise_;
 }
 
-// A member's verdicts on a closure hold for both of its ends.
+// The verdicts of a member on a closure are valid for both of its robots.
 void TeamAgent::decide_with(const MemberPoses& poses) {
   if (poses.session != part_->session().id || poses.stage != 1) return;
   std::vector<WeighedClosure> of_both;
@@ -431,8 +437,9 @@ void TeamAgent::decide_with(const MemberPoses& poses) {
   decide(of_both);
 }
 
-// Closures that were set aside have not been heard; those that may fit the solution may be true.
-// Between robots both ends look at the poses that both have told.
+// Deferred closures have not been weighed; a deferred closure that fits the solution may be true.
+// For a closure between robots, both robots use the poses that both have sent, and so decide
+// equally.
 void TeamAgent::reconsider() {
   if (!reconsider_due_ || !part_->all_solved(told_)) return;
   reconsider_due_ = false;
@@ -466,7 +473,7 @@ bool TeamAgent::fits(const PoseEdge& closure) const {
   return from && to && residual_of(closure, *from, *to) <= kSecondChance * part_->state().barc;
 }
 
-// What follows from what the members have told.
+// Ends the session or sets `world`, if the poses received from the members allow it.
 void TeamAgent::conclude() {
   Session& session = part_->session();
   const RobotId anchor = session.anchor;

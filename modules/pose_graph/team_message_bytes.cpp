@@ -10,16 +10,16 @@
 namespace km {
 namespace {
 
-// A quaternion may be this far from unit length; whoever uses it normalises it.
+// Largest deviation of a quaternion from unit length; every user normalises it.
 constexpr double kUnitTolerance = 1e-3;
-// No robot is farther from the origin of a frame [m].
+// Largest distance of a robot from the origin of a frame [m].
 constexpr double kMaxTranslation_m = 1e7;
 // The largest weight of an edge [1/rad^2, 1/m^2], see pose_edge().
 constexpr double kMaxPrecision = 1e13;
-// Of the edge sets with one peer some are offered.
+// Largest number of offered edge sets per peer.
 constexpr std::size_t kMaxOffers = 8 * kMaxTeam;
 
-// The least bytes that an element of each list takes: what may be reserved is bounded by them.
+// Smallest size of an element of each list [bytes]; it limits the memory that decoding reserves.
 constexpr std::size_t kPeerBytes = 1 + 8;
 constexpr std::size_t kOfferBytes = 1 + 1 + 1 + 8;
 constexpr std::size_t kMemberBytes = kPeerBytes + 1 + 1;
@@ -151,7 +151,7 @@ class MessageWriter {
   ByteWriter out_;
 };
 
-// Reads one message; the first thing that is wrong is the reason of the refusal.
+// Reads one message; the first error is the reason of the refusal.
 class MessageReader {
  public:
   explicit MessageReader(std::span<const std::uint8_t> bytes) : in_(bytes) {}
@@ -179,7 +179,7 @@ class MessageReader {
     return Decoded<TeamMessage>::accept(std::move(message));
   }
 
-  // What follows a failed check need not be read: everything is zero and empty from here on.
+  // After a failed check, all further reads return zero or empty values.
   void require(bool condition, const char* refusal) {
     if (condition || in_.failed()) return;
     refusal_ = refusal;
@@ -281,7 +281,8 @@ class MessageReader {
       if (parent == robots.size()) return false;
       parent_of[place_of(member.peer.robot)] = parent;
     }
-    // Up from each one to what an earlier walk has seen; back into the same walk is a cycle.
+    // Walks up from each robot until a robot of an earlier walk; a robot of the same walk means a
+    // cycle.
     std::vector<std::size_t> seen_by(robots.size(), kRoot);
     for (std::size_t start = 0; start < robots.size(); ++start) {
       std::size_t place = start;
@@ -347,7 +348,7 @@ class MessageReader {
 
   RobotId robot() { return in_.varint_as<RobotId>(); }
   std::uint32_t u32() { return in_.varint_as<std::uint32_t>(); }
-  // Braced: read from left to right.
+  // Braces guarantee that the arguments are evaluated from left to right.
   TeamPeer peer() { return TeamPeer{robot(), in_.u64()}; }
   SessionId session_id() { return SessionId{peer(), u32()}; }
   EdgeSetId edge_set() { return EdgeSetId{u32(), in_.u64()}; }

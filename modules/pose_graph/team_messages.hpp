@@ -19,14 +19,14 @@
 
 namespace km {
 
-/// No team has more robots.
+/// Largest number of robots in a team.
 inline constexpr std::size_t kMaxTeam = 1024;
 
-/// The gauge that poses are expressed in: the process whose own frame it was. Robots with equal
-/// frames need no alignment to each other.
+/// The frame of poses, identified by the process whose own frame it was. Robots with equal frames
+/// need no alignment to each other.
 using TeamFrame = TeamPeer;
 
-/// A rigid transform in single precision, as it crosses the network.
+/// A rigid transform in single precision, as in messages.
 struct SinglePose {
   Eigen::Quaternionf q = Eigen::Quaternionf::Identity();
   Eigen::Vector3f t = Eigen::Vector3f::Zero();  ///< [m]
@@ -34,14 +34,14 @@ struct SinglePose {
   [[nodiscard]] static SinglePose of(const SE3& T) {
     return {Eigen::Quaterniond(T.linear()).cast<float>(), T.translation().cast<float>()};
   }
-  /// What everyone makes of it, to the last bit.
+  /// The transform in double precision, equal on all robots to the last bit.
   [[nodiscard]] SE3 pose() const {
     return make_pose(q.cast<double>().normalized().toRotationMatrix(), t.cast<double>());
   }
 };
 
-/// Identity of the edges between two robots: both ends offer what they hold, and optimise what
-/// both hold. `hash` covers the version and the closures' ids.
+/// Identity of the set of edges between two robots. Both robots offer the sets that they hold, and
+/// optimise one that both hold. `hash` covers the version and the ids of the closures.
 struct EdgeSetId {
   std::uint32_t version = 0;
   std::uint64_t hash = 0;
@@ -55,28 +55,28 @@ struct EdgeSetOffer {
   bool operator==(const EdgeSetOffer&) const = default;
 };
 
-/// What one robot brings to distributed optimisation, and whom it hears; to all robots of the
-/// team, also those that it does not hear itself. Sent when it changes and now and then.
+/// The contribution of one robot to distributed optimisation, and the robots that it receives
+/// directly. It goes to all robots of the team, when it changes and periodically.
 struct TeamStatus {
   TeamPeer sender;
-  std::uint32_t number = 0;  ///< Counts the sender's: the highest is the newest. A repeated one
-                             ///< that says the same keeps it.
-  std::vector<TeamPeer> hears = {};  ///< Directly, at present; ascending.
-  TeamFrame frame;                   ///< Of its present solution.
-  std::uint32_t frame_version = 0;   ///< Counts its changes of frame.
+  std::uint32_t number = 0;  ///< Counts statuses of the sender: the highest is the newest. A
+                             ///< repetition keeps the number.
+  std::vector<TeamPeer> hears = {};  ///< Robots that it receives directly at present; ascending.
+  TeamFrame frame;                   ///< Frame of its present solution.
+  std::uint32_t frame_version = 0;   ///< Counts the changes of its frame.
   std::uint32_t keyframes = 0;
-  std::uint32_t revision = 0;  ///< Grows with its own keyframes and intra-robot closures.
+  std::uint32_t revision = 0;  ///< Increases with its keyframes and the closures inside it.
   std::vector<EdgeSetOffer> offers = {};
-  PgoMethod method = PgoMethod::kNewton;  ///< Its configuration's; only equal ones go together.
-  /// Of its keyframe 0. Odometry's frame is upright, keyframe 0 need not be.
+  PgoMethod method = PgoMethod::kNewton;  ///< From its configuration; sessions need equal methods.
+  /// Odometry pose of its keyframe 0. The frame of odometry is upright, keyframe 0 need not be.
   SE3 T_odom_first = SE3::Identity();
-  bool upright = false;  ///< Its keyframes have vertical priors in that frame.
-  /// Hash of the newest statuses, sessions and poses that it holds. For those that hear it
-  /// directly, which hand on what it lacks; no reason for a new number.
+  bool upright = false;  ///< Its keyframes have vertical priors.
+  /// Hash of the newest statuses, sessions and poses that it holds. Robots that receive it directly
+  /// forward the messages that it lacks. A change of the hash does not increase `number`.
   std::uint64_t holds = 0;
 };
 
-/// A session optimises one frozen graph. Its coordinator numbers them.
+/// Identity of a session. The coordinator numbers its sessions.
 struct SessionId {
   TeamPeer coordinator;
   std::uint32_t number = 0;
@@ -85,8 +85,8 @@ struct SessionId {
 
 struct SessionMember {
   TeamPeer peer;
-  std::uint32_t revision = 0;          ///< Of its status when the session was planned.
-  std::optional<RobotId> parent = {};  ///< In the tree of the session; nullopt: its root.
+  std::uint32_t revision = 0;          ///< Revision in its status when the session was planned.
+  std::optional<RobotId> parent = {};  ///< Parent in the tree of the session; nullopt: the root.
   bool operator==(const SessionMember&) const = default;
 };
 
@@ -97,7 +97,7 @@ struct SessionPair {
   bool operator==(const SessionPair&) const = default;
 };
 
-/// Who optimises which edges, and in which order.
+/// Members of a session, the edges that they optimise, and the order of alignment.
 struct SessionPlan {
   TeamFrame frame;                     ///< Members in other frames are aligned to it first.
   std::vector<SessionMember> members;  ///< In order of alignment.
@@ -109,57 +109,57 @@ struct SessionPlan {
   bool operator==(const SessionPlan&) const = default;
 };
 
-/// A new session, its progress, its end: by its coordinator, to all members.
+/// A new session, its progress or its end: from the coordinator to all members.
 struct Session {
   SessionId id;
-  std::uint32_t number = 0;  ///< Counts what its coordinator says: the highest is the newest.
+  std::uint32_t number = 0;  ///< Counts messages of the coordinator: the highest is the newest.
   SessionPlan plan;
   PgoMethod method = PgoMethod::kNewton;
   bool upright = false;          ///< Members use their vertical priors: the solution has z up.
   std::uint32_t max_rounds = 0;  ///< 0: no limit.
-  RobotId anchor = 0;            ///< The frame of its odometry is `world`.
-  /// `world` in the session's frame: if the anchor is no longer a member, and at the end.
+  RobotId anchor = 0;            ///< Robot whose odometry frame is `world`.
+  /// `world` in the frame of the session: if the anchor is no longer a member, and at the end.
   std::optional<SE3> T_frame_world = {};
-  std::uint32_t round = 0;  ///< Rounds that are complete.
+  std::uint32_t round = 0;  ///< Number of complete rounds.
   double cost = 0.0;        ///< Team cost after them.
   double gradient = 0.0;    ///< See SolverState.
   bool finished = false;    ///< Members stop.
 };
 
-/// Poses of one robot that its peers' edges end on, and keyframe 0, before (stage 0) and after
-/// (stage 1) a session; to all robots of the team. Stage 2: after a session that it could not bring
-/// to the end, which is over for all.
+/// Public poses of one robot, before (stage 0) and after (stage 1) a session; to all robots of the
+/// team. Stage 2: the robot could not complete the session, which is then over for all members.
 struct MemberPoses {
   TeamPeer sender;
-  std::uint32_t number = 0;  ///< Counts the sender's: the highest is the newest.
+  std::uint32_t number = 0;  ///< Counts these messages of the sender: the highest is the newest.
   SessionId session = {};
   std::uint32_t stage = 0;
   TeamFrame frame = {};
-  std::uint32_t frame_version = 0;  ///< As in TeamStatus: whichever message has more is newer.
+  std::uint32_t frame_version = 0;  ///< As in TeamStatus: the message with the higher one is newer.
   Precision step_precision = {};    ///< Mean weights of one step of its odometry.
   std::vector<KeyframeIndex> keyframes = {};  ///< Ascending, 0 first.
   std::vector<SinglePose> T_frame_kf = {};
-  /// On closures to others. Stage 0: what sessions before have decided, as far as it knows; stage
-  /// 1: what this session has made of those that it weighs.
+  /// Verdicts on closures to other robots. Stage 0: known decisions of earlier sessions. Stage 1:
+  /// results of this session for the closures that this robot weighs.
   std::vector<WeighedClosure> verdicts = {};
-  /// What it has sent in this session so far, to every reader, and passed on for others.
+  /// Bytes that it has sent in this session so far, per receiver, and with forwarded messages.
   std::uint64_t sent_bytes = 0;
 };
 
-/// A solver's letter to one member of a session, or, without bytes, only word of what was taken.
+/// Reliable message of a solver to one member of a session, or, without bytes, only an
+/// acknowledgement.
 struct SessionLetter {
   TeamPeer sender;
   SessionId session = {};
-  std::uint32_t number = 0;  ///< Counts the sender's letters to `to` in this session, from 0.
+  std::uint32_t number = 0;  ///< Counts the messages of the sender to `to` in this session, from 0.
   RobotId to = 0;
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
-  std::uint32_t copy = 0;      ///< Counts what the sender has sent to `to`, repetitions included.
-  std::uint32_t received = 0;  ///< So many letters of `to`, from the first on, have been taken.
+  std::uint32_t copy = 0;      ///< Counts all transmissions from sender to `to`.
+  std::uint32_t received = 0;  ///< Messages of `to` that have all been taken.
 };
 
 using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, SessionLetter>;
 
-/// Who said it first.
+/// The robot that sent the message first.
 [[nodiscard]] inline const TeamPeer& origin_of(const TeamMessage& message) {
   return std::visit(
       [](const auto& m) -> const TeamPeer& {
@@ -171,7 +171,7 @@ using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, SessionLetter
       message);
 }
 
-/// The session it is about; nullopt for statuses.
+/// The session of the message; nullopt for statuses.
 [[nodiscard]] inline std::optional<SessionId> session_of(const TeamMessage& message) {
   return std::visit(
       [](const auto& m) -> std::optional<SessionId> {
@@ -185,8 +185,8 @@ using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, SessionLetter
       message);
 }
 
-/// A message on its way across one link, to a robot that is heard directly. It may have been said
-/// by another robot than the one that hands it on, and may be meant for yet another.
+/// A message on its way over one link, to a robot that is received directly. Its origin may be
+/// another robot than the one that forwards it, and its receiver yet another.
 struct Parcel {
   RobotId next = 0;  ///< Robot at the other end of the link.
   std::shared_ptr<const TeamMessage> message;

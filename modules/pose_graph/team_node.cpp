@@ -67,7 +67,7 @@ void TeamNode::step(const Input& input, double now_s) {
   }
 }
 
-// What is not taken is either known already, or the agent gives notice of it.
+// Ignores refusals: a refused input is already known, or the agent counts it and gives notice.
 void TeamNode::take(const Input& input) {
   const auto take_in = Overloaded{
       [](const Tick&) {},

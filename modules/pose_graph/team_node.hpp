@@ -18,27 +18,27 @@ namespace km {
 
 /// Channels of the team node; they must outlive it.
 struct TeamTopics {
-  In<KeyframeOdometry> odometry;       ///< Own keyframes, ascending.
-  In<Closure> closures;                ///< Own and received ones.
-  In<InlierSet> inlier_sets;           ///< Decided here.
-  In<InlierSet> peer_inlier_sets;      ///< Decided by other robots.
-  In<PeerEvent> peer_events;           ///< Who is heard directly.
-  In<PeerEvent> restarts;              ///< kRestarted, before the first closure of that life.
-  In<TeamParcel> peer_parcels;         ///< From robots that are heard directly.
-  Out<Addressed<TeamParcel>> parcels;  ///< To robots that are heard directly.
+  In<KeyframeOdometry> odometry;   ///< Own keyframes, ascending.
+  In<Closure> closures;            ///< Own and received ones.
+  In<InlierSet> inlier_sets;       ///< Decided here.
+  In<InlierSet> peer_inlier_sets;  ///< Decided by other robots.
+  In<PeerEvent> peer_events;       ///< Robots that are received directly.
+  In<PeerEvent> restarts;          ///< kRestarted, before the first closure of the new incarnation.
+  In<TeamParcel> peer_parcels;     ///< From robots that are received directly.
+  Out<Addressed<TeamParcel>> parcels;  ///< To robots that are received directly.
   Out<Trajectory> trajectory;
   Out<OptimizerProgress> progress;
   Out<ClosureVerdicts> verdicts;  ///< After sessions that weigh closures.
 };
 
-/// One robot's part of the team's pose graph optimisation: a TeamAgent on its thread.
+/// The part of one robot in the pose graph optimisation of the team: a TeamAgent on its thread.
 ///
-/// Inputs are taken in as they come; optimisation goes on piece by piece while none is waiting, so
-/// that a heavy graph delays a message by one piece at most. What the agent has to say to people is
+/// Inputs are processed as they arrive. Optimisation continues piece by piece while no input is
+/// waiting, so that a large graph delays a message by at most one piece. Notices of the agent are
 /// logged at a limited rate.
 class TeamNode final : public Node {
  public:
-  /// `self` as the participant announces it. Throws ConfigError if `config` is out of bounds.
+  /// `self`: as announced by the participant. Throws ConfigError if `config` is out of bounds.
   TeamNode(const PoseGraphConfig& config, TeamPeer self, const TeamTopics& topics);
   ~TeamNode() override { stop(); }
 
@@ -47,14 +47,14 @@ class TeamNode final : public Node {
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// A round takes the longer the larger the graph is.
+  /// Large, because the time of a round grows with the graph.
   double step_limit_s() const override { return 120.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Time passes. Always null: as a plain struct among pointers it sets off a false alarm of
-  /// GCC 12.
+  /// Input for the passage of time. Always null: a plain struct among pointers causes a false
+  /// warning of GCC 12.
   using Tick = std::shared_ptr<const struct TickTag>;
-  /// The keyframes of this process are others than its robot's former ones.
+  /// A restarted robot: its keyframe indices have a new meaning.
   struct NewLife {
     TeamPeer peer;
   };

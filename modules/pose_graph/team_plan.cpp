@@ -42,7 +42,7 @@ std::set<RobotId> component_of(RobotId self, const Agreements& agreements) {
   return component;
 }
 
-// Edges between `robot` and the robots of `others`.
+// Number of edges between `robot` and the robots of `others`.
 std::uint64_t edges_to(RobotId robot, const std::set<RobotId>& others,
                        const Agreements& agreements) {
   std::uint64_t edges = 0;
@@ -103,7 +103,8 @@ struct TreeEdge {
   }
 };
 
-// Between members that are linked, or also between all others.
+// Candidate edges of the tree between linked members, or also between members without a link; best
+// first.
 std::vector<TreeEdge> possible_tree_edges(const std::set<RobotId>& members,
                                           const Agreements& agreements, const TeamLinks& links,
                                           bool linked_only) {
@@ -132,7 +133,7 @@ std::vector<TreeEdge> possible_tree_edges(const std::set<RobotId>& members,
 
 Tree spanning_tree(const std::set<RobotId>& members, const Agreements& agreements,
                    const TeamLinks& links) {
-  std::map<RobotId, RobotId> part_of;  // a part is named after one of its robots
+  std::map<RobotId, RobotId> part_of;  // a part is identified by one of its robots
   for (const RobotId robot : members) part_of[robot] = robot;
   Tree tree;
   std::size_t parts = members.size();
@@ -152,7 +153,7 @@ Tree spanning_tree(const std::set<RobotId>& members, const Agreements& agreement
   return tree;
 }
 
-// Parents of all that `root` leads to, in order of their depth.
+// Parents of all robots connected to `root`, in order of their depth.
 std::vector<std::pair<RobotId, RobotId>> parents_below(RobotId root, const Tree& tree) {
   std::vector<std::pair<RobotId, RobotId>> parents;
   std::vector<std::pair<RobotId, RobotId>> open{{root, root}};
@@ -228,8 +229,7 @@ std::optional<TreePlace> place_in(const SessionPlan& plan, RobotId robot) {
   const bool twice =
       std::adjacent_find(place.members.begin(), place.members.end()) != place.members.end();
   const bool member = std::binary_search(place.members.begin(), place.members.end(), robot);
-  // With one root and each robot once, those that the root leads to are all of them or there is a
-  // circle.
+  // With one root and each robot once, either the root reaches all robots, or there is a cycle.
   if (roots != 1 || twice || !member ||
       parents_below(place.root, children).size() + 1 != place.members.size())
     return std::nullopt;

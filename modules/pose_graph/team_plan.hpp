@@ -10,42 +10,43 @@
 
 namespace km {
 
-/// The newest edge set of robots a and b that both offer; nullopt if they share none.
+/// The newest edge set that robots a and b both offer; nullopt if there is none.
 [[nodiscard]] std::optional<EdgeSetOffer> agreed_edges(const TeamStatus& a, const TeamStatus& b);
 
-/// The session that robot `self` is part of, given the latest status of every robot within reach
-/// (its own included, keyed by robot) and the links between them: the connected component over
-/// agreed edge sets. Every robot that knows the same comes to the same plan; the member with the
-/// lowest id coordinates it.
+/// Plan of the session of robot `self`, from the latest status of every robot within reach
+/// (including its own, keyed by robot) and the links between them. The members are the connected
+/// component over agreed edge sets. Robots with equal knowledge compute equal plans; the member
+/// with the lowest id coordinates the session.
 ///
-/// The frame is the one that most members are in already (ties: most edges to other members, then
-/// the lowest robot). Its robots come first, then always the robot with the most edges to those
-/// before it: that is the order of alignment, best connected first.
+/// The frame is the present frame of most members (ties: most edges to other members, then the
+/// lowest robot). Its robots come first in the order of alignment. Then always follows the robot
+/// with the most edges to the robots before it.
 ///
-/// The tree spans the members over links, those with the most agreed edges first (a maximum
-/// spanning tree by Kruskal's algorithm; ties: lowest ids). Where links alone do not connect the
-/// members, fewest hops over robots in between do. Its root is its centre, of two the lower one.
-/// Throws std::invalid_argument if there is no status of `self`.
+/// The tree is a maximum spanning tree of the members over links, weighted by agreed edges
+/// (Kruskal's algorithm; ties: lowest ids). If direct links do not connect the members, paths with
+/// the fewest hops over other robots connect them. The root is the centre of the tree, the lower id
+/// if there are two. Throws std::invalid_argument if there is no status of `self`.
 [[nodiscard]] SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses,
                                        const TeamLinks& links, RobotId self);
 
-/// Where `robot` is in the tree of `plan`. nullopt if it is not a member, or if the members'
-/// parents make no tree.
+/// The place of `robot` in the tree of `plan`. nullopt if it is not a member, or if the parents of
+/// the members do not form a tree.
 [[nodiscard]] std::optional<TreePlace> place_in(const SessionPlan& plan, RobotId robot);
 
-/// True if both plans optimise the same edges of the same processes, in whatever order, frame and
+/// True if both plans optimise the same edges of the same processes, regardless of order, frame and
 /// tree.
 [[nodiscard]] bool same_graph(const SessionPlan& x, const SessionPlan& y);
 
 /// True if a process of `session` is not in the plan `now`.
 [[nodiscard]] bool has_lost_member(const SessionPlan& session, const SessionPlan& now);
 
-/// What the session of `plan`, made of `statuses`, knows beside odometry: closures between its
-/// robots and, since these are not told one by one, changes of those inside them.
+/// Number of measurements in the session of `plan`, made from `statuses`, except for odometry:
+/// closures between its robots, and changes of closures inside robots. Statuses do not report the
+/// latter one by one.
 [[nodiscard]] std::uint64_t closures_known(const SessionPlan& plan,
                                            const std::map<RobotId, TeamStatus>& statuses);
 
-/// Lowest robot id of the members. Precondition: there is one.
+/// Lowest robot id of the members. Precondition: there is a member.
 [[nodiscard]] RobotId coordinator_of(const SessionPlan& plan);
 
 }  // namespace km

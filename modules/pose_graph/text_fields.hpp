@@ -13,11 +13,10 @@
 
 namespace km {
 
-/// How far a quaternion or a direction in a file may be from unit length: some are rounded to 6
-/// digits.
+/// Tolerance of the length of a quaternion or a direction in a file: some files round to 6 digits.
 inline constexpr double kUnitTolerance = 1e-3;
 
-/// Takes the fields of one row in turn. Every failure throws std::runtime_error that begins with
+/// Reads the fields of one row in order. Every failure throws std::runtime_error that begins with
 /// "file:line: ". Borrows the row and the name of the file.
 class TextFields {
  public:

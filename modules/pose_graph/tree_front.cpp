@@ -15,12 +15,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Second derivatives mislead a step from here on: an edge is held half as strongly as it should be,
-// or twice. Weights below the second number say nothing beside odometry.
+// Ratio of weights from which on old second derivatives mislead a step: the stiffness of an edge is
+// half or twice its correct value. Weights below kNoWeight are negligible compared to odometry.
 constexpr double kWeightRatio = 2.0;
 constexpr double kNoWeight = 0.02;
-// An edge with less is one that was rejected: it has no cost and no slope, and a stiffness only so
-// that no robot floats.
+// An edge with a weight below this is rejected. It has no cost and no gradient; its stiffness only
+// keeps the system regular.
 constexpr double kRejected = 1e-6;
 
 [[noreturn]] void refuse(RobotId robot, const std::string& what) {
@@ -36,8 +36,8 @@ std::size_t at(int k) {
   return static_cast<std::size_t>(k);
 }
 
-// First row of a planar step among those of a tangent vector of SE(3): rotation about z and
-// translation along x and y stand together.
+// First row of a planar step in a tangent vector of SE(3): rotation about z and translation along x
+// and y are adjacent.
 constexpr Index first_of(Index block) {
   return block == 3 ? 2 : 0;
 }
@@ -152,7 +152,7 @@ void TreeFront::reweigh_child(RobotId name, std::span<const UpLetter::NewWeight>
   }
 }
 
-// Nodes that robots outside of the subtree touch, as far as is known here.
+// Nodes that robots outside the subtree use, as far as this robot knows.
 std::vector<bool> TreeFront::incomplete() const {
   std::vector<std::uint32_t> touched(ids_.size(), 0), of(ids_.size(), 0);
   for (std::size_t v = 0; v < followed_; ++v) touched[v] = 1;
@@ -420,8 +420,9 @@ void TreeFront::reduce(std::span<const SE3> poses, const std::map<RobotId, Vecto
   }
   forwarded_ = std::move(C);
   factor_->forward(forwarded_);
-  // Not the whole norm less that of the kept rows: they are large where only the team's sum is
-  // small, and what rounding left of the difference would be taken for a decrease to come.
+  // Summed over the eliminated rows, not computed as the whole norm minus that of the kept rows.
+  // Kept rows can be large while only their sum over the team is small. The rounding error of the
+  // difference would then appear as a predicted decrease.
   decrement_ = 0.0;
   const std::vector<int>& place = plan_->place_of_kept();
   for (std::size_t v = 0; v < place.size(); ++v)
@@ -438,9 +439,9 @@ VectorXd TreeFront::reduced() const {
   return rows;
 }
 
-// Of the one pose that is left its place is held, and how it is turned but for what verticals say
-// of its tilt: of the turns of the team as a whole, none of them resists the one about the
-// vertical.
+// The position of the one remaining pose is held, and its rotation, except for its tilt if
+// verticals determine that. A common rotation of the team about the vertical costs nothing, so the
+// softest direction is left out.
 TreeFront::RootStep TreeFront::solve_root(bool upright) const {
   RootStep result{VectorXd::Zero(block() * static_cast<Index>(plan_->kept().size()))};
   if (!upright || result.kept.size() != 6) return result;

@@ -129,7 +129,8 @@ TreeSums read_sums(LetterReader& r) {
   return s;
 }
 
-// Blocks that are zero, as those of poses that only told edges reach, are left out.
+// Zero blocks are left out, for instance those of poses on which only edges in TreeSystem::edges
+// end.
 std::vector<bool> present_blocks(const TreeSystem& system) {
   std::vector<bool> present;
   const BlockMatrix& S = system.schur;

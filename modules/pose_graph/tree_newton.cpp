@@ -18,22 +18,25 @@ using Eigen::VectorXd;
 using Next = TreeVerdict::Next;
 using Weighing = TreeVerdict::Weighing;
 
-// A closure that is rejected keeps so much: no robot floats, and nothing bends.
+// Weight of a rejected closure in the equations. Small enough not to bias the solution, positive so
+// that the system stays regular.
 constexpr double kFloor = 1e-10;
-// A step of odometry that is rejected holds the trajectory together.
+// Weight of a rejected step of odometry, so that the trajectory stays connected.
 constexpr double kJoint = 1e-6;
-// Where numbers are not what they should be, for single precision overflows beyond.
+// Largest distance of a pose from the origin; beyond it, single precision overflows.
 constexpr double kOutOfTheWorld_m = 1e15;
-// How strong a pair may be while closures are weighed, in that of the usual one: no pair outvotes
-// others. In the end what is kept has its own weight, but for pairs that the rest contradicts: by
-// so many standard deviations of the mean of its closures, and of a single one.
+// kStrongest: largest strength of a pair while closures are weighed, relative to the usual pair, so
+// that no pair overrules the others. At the end, kept closures have their own weight, except for
+// pairs that the rest contradicts. Such a contradiction is kTorn standard deviations of the mean of
+// the closures of the pair, and kTornOfOne standard deviations of a single closure.
 constexpr double kStrongest = 1.25;
 constexpr double kTorn = 6.0;
 constexpr double kTornOfOne = 1.0;
-// Cycles of a pair that count for the noise; fewer where one robot is not to say it for all.
+// Maximum number of cycles per robot pair in the noise estimate. With four or more robots it is
+// smaller, so that one robot cannot dominate the estimate.
 constexpr std::size_t kEnoughLengths = 300;
 constexpr std::size_t kShareOfLengths = 60;
-// So many closures of a pair that stand alone do no harm: they are weighed from the start.
+// Number of isolated closures of a pair up to which they do no harm and are weighed from the start.
 constexpr std::ptrdiff_t kFewIsolated = 16;
 
 SolverLetter letter_to(RobotId to, std::vector<std::uint8_t> bytes) {
@@ -66,7 +69,7 @@ const SE3& TreeNewton::start_of(const KeyframeId& id) const {
   return told->second;
 }
 
-// Of the closures of each pair of robots, both ends decide alike.
+// Both robots of a pair classify its closures equally.
 void TreeNewton::classify() {
   if (!options_.robust) return;
   for (const auto& [peer, closures] : by_peer()) {
@@ -88,7 +91,8 @@ void TreeNewton::classify() {
       if (k.odometry) k.trust = Trust::kOpen;
 }
 
-// Places of closures, by the other robot of the pair; own ones by this one.
+// Places in known_ of closures, by the other robot of the pair; closures inside this robot by its
+// own id.
 std::map<RobotId, std::vector<std::size_t>> TreeNewton::by_peer() const {
   std::map<RobotId, std::vector<std::size_t>> closures;
   for (std::size_t k = graph_.odometry; k < known_.size(); ++k)
@@ -100,13 +104,14 @@ RobotId TreeNewton::peer_of(const Known& k) const {
   return k.edge.from.robot == graph_.self ? k.edge.to.robot : k.edge.from.robot;
 }
 
-// Of what both robots of a pair know, one speaks.
+// True if this robot reports the closure: of both robots that know it, only the one with the lower
+// id does.
 bool TreeNewton::speaks_for(const Known& k) const {
   return graph_.self <= std::min(k.edge.from.robot, k.edge.to.robot);
 }
 
-// The two robots of a pair know the same closures, poses and claims, so both come to the same
-// noise. A pair that is noisier than the team as a whole is weighed less.
+// The two robots of a pair know the same closures, poses and claimed precisions, so both compute
+// the same noise. A pair with more noise than the team as a whole has less weight.
 void TreeNewton::weigh_by_noise() {
   if (!options_.robust || noise_known_) return;
   noise_known_ = true;
@@ -175,7 +180,7 @@ void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_
   }
 }
 
-// A limited pair has all of its closures weakened alike.
+// All closures of a limited pair have the same factor.
 std::map<RobotId, double> TreeNewton::shares_of_pairs() const {
   std::map<RobotId, Precision> sums;
   for (std::size_t k = graph_.own.size(); k < known_.size(); ++k) {
@@ -263,7 +268,8 @@ void TreeNewton::count_closures(TreeSums& sums) const {
   }
 }
 
-// Public poses are told in single precision: moved, they are again what everyone has.
+// Public poses are sent in single precision. After the motion they are rounded again, so that all
+// robots have equal values.
 void TreeNewton::move_robots(const std::vector<std::pair<RobotId, SinglePose>>& moves) {
   std::set<KeyframeIndex> ends{0};
   for (const PoseEdge& e : graph_.between) ends.insert(e.end_on(graph_.self).index);
@@ -294,7 +300,7 @@ UpLetter TreeNewton::first_letter() {
       if (known_[k].trust == Trust::kOpen && speaks_for(known_[k]) &&
           !graph_.decided.contains(known_[k].edge.id()))
         closures.push_back(known_[k].edge);
-    // Once only: poses that were optimised agree with closures better than odometry does.
+    // Counts a cycle only once: optimised poses agree with closures better than odometry does.
     Corroboration(closures, pose, graph_.step_precision, options_.dimension)
         .count_lengths(graph_.noise.lengths, most);
   }
@@ -306,8 +312,9 @@ const SE3& TreeNewton::pose_at(const KeyframeId& id, const std::vector<SE3>& pos
   return poses[front_->node_of(id)];
 }
 
-// Their weights at the poses at hand. Whether these are accepted is not known yet. Once all is
-// decided weights stay, and those count as changed that would be decided otherwise here.
+// Computes the weights of the closures at the present poses, which the root may still reject. Once
+// all weights are decided they stay, and weights that would be decided differently here count as
+// changed.
 void TreeNewton::weigh_candidates(TreeSums& sums) {
   const double c2 = told_.barc * told_.barc;
   const bool decided = told_.weighing == Weighing::kDecided;
@@ -329,8 +336,9 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
   limit_candidates(decided);
 }
 
-// Once all is decided, a pair is free from the round on in which it is not torn: poses have not
-// come to rest before, and pull at all of them.
+// Once all weights are decided, a pair is released in the first round in which its closures no
+// longer all pull in one direction. Before, the poses have not converged, and even consistent pairs
+// show such a pull.
 void TreeNewton::limit_candidates(bool decided) {
   const std::set<RobotId> torn = decided ? torn_pairs() : std::set<RobotId>{};
   for (const std::size_t k : front_edge_) {
@@ -340,13 +348,13 @@ void TreeNewton::limit_candidates(bool decided) {
   }
 }
 
-// The limited pairs whose closures all pull one way at the poses at hand, further than noise would
-// their mean.
+// The limited pairs whose closures all pull in one direction at the present poses, with a mean that
+// noise does not explain.
 std::set<RobotId> TreeNewton::torn_pairs() const {
   struct Pull {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double weight = 0.0;
-    double closures = 0.0;  // each as much as it counts
+    double closures = 0.0;  // sum of the weights of the closures
   };
   std::map<RobotId, Pull> pulls;
   for (const std::size_t k : front_edge_) {
@@ -408,7 +416,8 @@ bool TreeNewton::receive(RobotId from, std::span<const std::uint8_t> bytes) {
     const bool child = std::binary_search(place_.children.begin(), place_.children.end(), from);
     auto letter = child ? decode_up(bytes) : std::nullopt;
     if (!letter) return false;
-    if (letter->round > round_) return false;  // it waits for the letter down of this round
+    if (letter->round > round_)
+      return false;  // impossible: the child waits for the message down of this round
     if (letter->round == round_ && phase_ == Phase::kUp) ups_.try_emplace(from, std::move(*letter));
     return true;
   }
@@ -422,7 +431,7 @@ bool TreeNewton::receive(RobotId from, std::span<const std::uint8_t> bytes) {
   return true;
 }
 
-// Of what the root may say, what it can say to the letter that went up.
+// True if the decision of the root fits the last message up of this robot.
 bool TreeNewton::can_follow(const DownLetter& letter) const {
   switch (letter.verdict.next) {
     case Next::kCount:
@@ -467,7 +476,7 @@ std::vector<SolverLetter> TreeNewton::go_up() {
       }
       letter = front_ ? equations() : first_letter();
     } catch (const std::exception&) {
-      failed = true;  // a child's letter does not fit
+      failed = true;  // the message of a child does not fit
     }
   }
   for (const auto& [child, up] : ups_) letter.sums.add(up.sums);
@@ -479,7 +488,7 @@ std::vector<SolverLetter> TreeNewton::go_up() {
     phase_ = Phase::kDown;
     return {letter_to(*place_.parent, encode(letter))};
   }
-  // Full second derivatives may be indefinite once those of several robots have met.
+  // Full second derivatives may become indefinite when those of several robots are added.
   if (letter.failed && told_.full) return go_down(root_->retreat(round_));
   state_.failed = letter.failed;
   if (letter.failed) return go_down(root_->stop(round_));
@@ -574,7 +583,8 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
   return letters;
 }
 
-// Factors are most of a robot's memory, and it stays in this session until the next one begins.
+// Releases the factors, which take most of the memory of a robot; this object exists until the next
+// session begins.
 void TreeNewton::finish() {
   phase_ = Phase::kDone;
   front_.reset();

@@ -13,33 +13,33 @@
 
 namespace km {
 
-/// One robot's part in a robust Newton method for the pose graph of a team, up and down a tree of
-/// robots (see TreeFront).
+/// The part of one robot in a robust Newton method for the pose graph of a team, up and down a tree
+/// of robots (see TreeFront).
 ///
-/// A round is one way up and one way down. Up go the equations of the poses at hand, eliminated
-/// onto what concerns others, and the sums of cost and residuals; the root solves, decides, and
-/// down go the steps of the poses told: one round makes one Newton step of the whole team, exact
-/// but for single precision in second derivatives. A step counts once the next way up has brought
-/// the cost there: if it has risen, it is shortened; while weights change, the cost may rise by
-/// half, twice in a row. All decisions are the root's.
+/// A round is one pass up and one pass down. The pass up carries the equations at the present
+/// poses, eliminated onto the poses that other robots use, and the sums of cost and residuals. The
+/// root solves and decides, and the pass down carries the steps of the poses sent. One round is one
+/// Newton step of the whole team, exact except for single precision in second derivatives. A step
+/// counts once the next pass up has brought its cost. If the cost has risen, the step is shortened;
+/// while weights change, the cost may rise by half, twice in a row. Only the root decides.
 ///
-/// Second derivatives hardly change (see edge_model.hpp): they are told anew only when the old ones
-/// slow down convergence (Shamanskii's variant of Newton's method). The first ones are
-/// Gauss-Newton's, which cannot be indefinite.
+/// Second derivatives hardly change (see edge_model.hpp). They are sent again only when the old
+/// ones slow down convergence (Shamanskii's variant of Newton's method). The first ones are those
+/// of Gauss-Newton, which cannot be indefinite.
 ///
 /// Every closure has a weight: graduated non-convexity with truncated least squares (Yang et al.,
-/// RA-L 2020) sets the weights between two steps, and its end is the plain optimum of the closures
-/// that are kept. Which residuals are too large the team finds out itself, from closures beside
-/// each other (see Corroboration); where those agree, closures that stand alone are set aside at
-/// first. Decisions of sessions before are kept; a pair of robots with new closures opens its own
-/// again, but for the rejected ones. Edges to robots that have gone are weighed as they were.
+/// RA-L 2020) sets the weights between two steps. It ends in the plain optimum of the closures that
+/// are kept. The team estimates the largest admissible residual from closures near each other (see
+/// Corroboration). If most of these agree, closures that stand alone are deferred at first.
+/// Decisions of earlier sessions persist. A pair of robots with new closures weighs its closures
+/// again, except for the rejected ones. Edges to held poses keep their earlier weights.
 ///
-/// A closure between two robots is weighed by one of them: an end of each closure is chosen to
-/// stand for it (a vertex cover per pair, the same for both), and the robot of the other end has
-/// the closure among its own edges, with the chosen pose told to it.
+/// Exactly one of two robots weighs a closure between them. One end of each closure is chosen by a
+/// vertex cover per pair, equal on both robots. The robot of the other end has the closure among
+/// its own edges; the system up the tree contains the chosen pose.
 class TreeNewton final : public MemberSolver {
  public:
-  /// Throws std::invalid_argument if an edge cannot be used or a public pose was not told.
+  /// Throws std::invalid_argument if an edge is not usable or a public pose is missing.
   TreeNewton(SessionGraph graph, TreePlace place, const TreeNewtonOptions& options);
 
   bool receive(RobotId from, std::span<const std::uint8_t> bytes) override;
@@ -54,24 +54,24 @@ class TreeNewton final : public MemberSolver {
  private:
   enum class Phase { kUp, kDown, kDone };
   enum class Trust { kIn, kOpen, kOut };
-  /// An edge that this robot knows; between robots it may be the other's to weigh.
+  /// An edge that this robot knows. The other robot of the edge may be the one that weighs it.
   struct Known {
     PoseEdge edge;
     Trust trust = Trust::kIn;
-    bool aside = false;  ///< Stands alone: out for this session.
+    bool aside = false;  ///< Stands alone: deferred in this session.
     bool odometry = false;
-    bool own = true;               ///< Among this robot's edges.
-    double weight = 1.0;           ///< At the accepted poses.
-    double candidate = 1.0;        ///< At those at hand.
-    double limit = 1.0;            ///< Left of the weight while its pair is limited.
-    double share = 1.0;            ///< Left of the weight at the accepted poses.
-    double candidate_share = 1.0;  ///< At those at hand.
+    bool own = true;               ///< This robot weighs it.
+    double weight = 1.0;           ///< Weight at the accepted poses.
+    double candidate = 1.0;        ///< At the present poses.
+    double limit = 1.0;            ///< Factor on the weight while its pair is limited.
+    double share = 1.0;            ///< Factor on the weight at the accepted poses.
+    double candidate_share = 1.0;  ///< At the present poses.
   };
 
   void classify();
   [[nodiscard]] bool takes_part(const Known& k) const { return k.trust != Trust::kOut && !k.aside; }
   [[nodiscard]] bool speaks_for(const Known& k) const;
-  /// The other robot of the edge; itself, of an own one.
+  /// The other robot of the edge; this robot for an edge inside it.
   [[nodiscard]] RobotId peer_of(const Known& k) const;
   [[nodiscard]] const SE3& start_of(const KeyframeId& id) const;
   [[nodiscard]] std::map<RobotId, std::vector<std::size_t>> by_peer() const;
@@ -101,20 +101,20 @@ class TreeNewton final : public MemberSolver {
   SessionGraph graph_;
   TreePlace place_;
   TreeNewtonOptions options_;
-  std::vector<Known> known_;  // as SessionGraph::own, then ::between
+  std::vector<Known> known_;  // SessionGraph::own, then ::between
   std::optional<TreeFront> front_;
-  std::vector<std::size_t> front_edge_;  // which of known_ the front's edges are
+  std::vector<std::size_t> front_edge_;  // place in known_ of each edge of the front
 
   Phase phase_ = Phase::kUp;
   std::uint32_t round_ = 0;
-  std::map<RobotId, UpLetter> ups_;  // of the children, in this round
-  Eigen::Index told_rows_ = 0;       // of the letter up in this round
+  std::map<RobotId, UpLetter> ups_;  // messages of the children in this round
+  Eigen::Index told_rows_ = 0;       // rows of the message up in this round
   std::optional<DownLetter> down_;
   std::vector<SE3> accepted_;  // own poses
-  std::vector<SE3> base_;      // followed poses, accepted
-  std::vector<SE3> at_hand_;   // followed poses
-  Eigen::MatrixXd step_;       // of followed poses
-  TreeVerdict told_;           // the last one
+  std::vector<SE3> base_;      // accepted followed poses
+  std::vector<SE3> at_hand_;   // followed poses after the step
+  Eigen::MatrixXd step_;       // step of the followed poses
+  TreeVerdict told_;           // last decision of the root
   bool refresh_ = true;
   SolverState state_;
   std::optional<TreeRoot> root_;

@@ -16,26 +16,26 @@ using Weighing = TreeVerdict::Weighing;
 
 constexpr double kShorten = 0.25;
 constexpr double kLengthen = 4.0;
-// Over a rise Newton's steps often lead down: while weights change, the cost may rise this often in
-// a row, to so many times what it was.
+// Newton steps that first increase the cost often decrease it afterwards. While weights change, the
+// root therefore accepts kMaxRises increases in a row, each by a factor of up to kMaxRise.
 constexpr int kMaxRises = 2;
 constexpr double kMaxRise = 1.5;
-constexpr double kCostRounding = 1e-13;  // of the cost: a smaller increase is none
+constexpr double kCostRounding = 1e-13;  // relative to the cost: smaller increases are rounding
 constexpr int kMaxBacktracks = 12;
 constexpr int kMaxBacktracksUndecided = 8;
-// At a start by odometry nothing speaks against odometry. If that may be false, all edges are first
-// heard alike.
+// At a start from odometry, no residual contradicts odometry. If its steps may be rejected, the
+// first steps therefore use all edges with full weight.
 constexpr int kAllInSteps = 8;
-// Noise that is smaller than told has longer tails, too: of parking-garage's residuals the largest
-// is 31 times what the scale is.
+// Margin on barc if noise is smaller than stated, because its tails are then longer: the largest
+// residual of parking-garage is 31 times the scale.
 constexpr double kMargin = 8.0;
-// Where so many closures agree with those beside them, one that stands alone has cause to be false.
+// Share of consistent cycles from which on a closure that stands alone is probably false.
 constexpr double kMostlyConsistent = 0.75;
 constexpr std::uint32_t kFewOpen = 32;  // so few false closures do no harm
-// With fewer closures left per pose, the others are needed from the start.
+// Closures per pose below which the deferred closures are needed from the start.
 constexpr double kClosuresPerPose = 0.25;
 
-// Robots hang together by pairs with closures in use.
+// True if pairs with closures in use connect all robots.
 bool joined(const std::vector<RobotId>& robots, const std::vector<PairVote>& votes) {
   std::map<RobotId, RobotId> part;
   for (const RobotId robot : robots) part[robot] = robot;
@@ -63,9 +63,9 @@ std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>
   return moves;
 }
 
-// The rigid motion that leaves `poses` no mean rotation or translation by `steps`. To first order
-// it costs nothing; the step is as short as can be, and which pose was held to find it no longer
-// shows. `upright`: only turns about z cost nothing.
+// The rigid motion that removes the mean rotation and translation of `poses` by `steps`. To first
+// order it costs nothing. The resulting step has minimum length and does not depend on the pose
+// that was held. `upright`: only rotations about z cost nothing.
 std::array<double, 6> drift_against(std::span<const SE3> poses, const Eigen::MatrixXd& steps,
                                     bool upright) {
   const double share = 1.0 / static_cast<double>(poses.size());
@@ -109,7 +109,7 @@ DownLetter TreeRoot::retreat(std::uint32_t round) {
 
 DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   round_ = round;
-  if (first_) {  // what stands alone is aside
+  if (first_) {  // closures that stand alone are deferred
     const std::uint32_t left = sums.open;
     const bool enough = static_cast<double>(left) >= kClosuresPerPose * sums.poses;
     const bool aside = sums.isolated > kFewOpen && enough && joined(members_, sums.votes);
@@ -150,7 +150,8 @@ DownLetter TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const Tre
     retried_ = false;
     stale_ = true;
     rises_ = sums.cost > sums.base_cost ? rises_ + 1 : 0;
-    // While weights change, what is much too long now is too long next time, too.
+    // While weights change, a step length that is much too long now will be too long in the next
+    // round.
     length_ = std::min(1.0, backtracks_ > 0 ? length_ : kLengthen * length_);
     backtracks_ = 0;
   }
@@ -169,11 +170,12 @@ DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const TreeFront::RootStep root = front.solve_root(upright_);
   decrement_ = sums.decrement + root.decrement;
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
-  // Decisions fall before the poses have come to rest: what these contradict is weighed again.
+  // Weights are decided before the poses have converged. If the converged poses contradict them,
+  // closures are weighed again.
   if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
     last_decrement_.reset();
-  // Weights that were decided on before this way up: its equations are those of the end, unless
-  // pairs were still limited.
+  // If the weights were decided before this pass up, its equations are the final ones, unless pairs
+  // were still limited.
   const bool decided = schedule_.decided();
   const bool unlimited = weighing_ == Weighing::kDecided || usual_pair_.tau >= kUnlimited.tau;
   weighing_ = decided              ? Weighing::kDecided

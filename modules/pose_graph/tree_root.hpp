@@ -12,37 +12,37 @@ namespace km {
 
 struct TreeNewtonOptions {
   int dimension = 3;         ///< 2: poses and measurements are planar.
-  double tolerance = 1e-13;  ///< Ends when a step promises less decrease, relative to the cost.
-  double absolute_tolerance =
-      1e-9;  ///< Or less than this: where nothing contradicts the cost is 0.
-  /// Second derivatives are told anew, which costs an elimination and its bytes, when at the rate
-  /// seen with the old ones more rounds than this would still be needed.
+  double tolerance = 1e-13;  ///< Predicted decrease of a step at the end, relative to the cost.
+  double absolute_tolerance = 1e-9;  ///< Predicted decrease at the end, if the cost is near 0.
+  /// Second derivatives are sent again, at the price of an elimination and its bytes, if more
+  /// rounds than this would remain at the convergence rate of the old ones.
   double patience_rounds = 30.0;
-  std::uint32_t max_rounds = 1000;  ///< Then it ends where it is.
-  bool robust = true;               ///< Closures are weighed; else all are trusted.
-  double barc = 0.0;             ///< Largest residual of an inlier [sigma]; 0: the team finds it.
-  bool reject_odometry = false;  ///< Steps of odometry are weighed, too.
-  /// Poses that no closure to another robot ends on may be told as well, where that saves bytes.
+  std::uint32_t max_rounds = 1000;  ///< Largest number of rounds.
+  bool robust = true;               ///< Closures are weighed; otherwise all are trusted.
+  double barc = 0.0;  ///< Largest residual of an inlier [sigma]; 0: the team estimates it.
+  bool reject_odometry = false;  ///< Steps of odometry are weighed as well.
+  /// Private poses may be sent as well, if that saves bytes.
   bool tell_private = false;
 };
 
-/// What the root of a team's tree decides, round by round, from the sums of the team and its own
-/// front, which solves the equations of all. Not thread-safe.
+/// Decisions of the root of the tree in each round, from the sums of the team and from its front,
+/// which solves the equations of the whole team. Not thread-safe.
 class TreeRoot {
  public:
-  /// `members` of the team, ascending.
+  /// `members`: of the session, ascending.
   TreeRoot(std::vector<RobotId> members, const TreeNewtonOptions& options, bool upright)
       : members_(std::move(members)), options_(options), upright_(upright) {}
 
-  /// Before there are equations: when the team starts, and with which closures.
+  /// Decides, before there are equations, when the team starts and with which closures.
   [[nodiscard]] DownLetter decide_start(const TreeSums& sums, std::uint32_t round);
-  /// After the way up of a round: `front` has the equations at `poses` (of what it follows), unless
-  /// they could not be factorised.
+  /// Decides after the pass up of a round. `front` has the equations at `poses` (of its followed
+  /// nodes), unless they could not be factorised.
   [[nodiscard]] DownLetter decide(const TreeSums& sums, std::uint32_t round, const TreeFront& front,
                                   std::span<const SE3> poses, bool factorised);
-  /// A robot could not eliminate with full second derivatives: again with Gauss-Newton's.
+  /// Repeats the round with Gauss-Newton derivatives, because a robot could not eliminate with full
+  /// ones.
   [[nodiscard]] DownLetter retreat(std::uint32_t round);
-  /// The team cannot go on.
+  /// Ends the session, because the team cannot continue.
   [[nodiscard]] DownLetter stop(std::uint32_t round);
 
  private:
@@ -58,7 +58,7 @@ class TreeRoot {
   TreeNewtonOptions options_;
   bool upright_;
   RobustSchedule schedule_;
-  std::optional<TreeSums> first_;  // before anything was set aside
+  std::optional<TreeSums> first_;  // sums before any closure was deferred
   std::uint32_t round_ = 0;
   double barc_ = 0.0;
   double noise_scale_ = 1.0;
@@ -66,16 +66,16 @@ class TreeRoot {
   double cost_ = 0.0;
   double decrement_ = 0.0;
   bool free_ = true;
-  TreeVerdict::Weighing weighing_ = TreeVerdict::Weighing::kDecided;  // of the letters at hand
-  bool at_base_ = true;   // the poses at hand are the accepted ones
-  bool full_ = false;     // second derivatives at hand, where that was possible
-  bool convex_ = false;   // the full ones were indefinite: not again until it is slow
-  bool stale_ = false;    // a step has been accepted since second derivatives were told
-  bool retried_ = false;  // from these poses, with fresh ones
+  TreeVerdict::Weighing weighing_ = TreeVerdict::Weighing::kDecided;  // in this round
+  bool at_base_ = true;   // the present poses are the accepted ones
+  bool full_ = false;     // the second derivatives are full, where possible
+  bool convex_ = false;   // full ones were indefinite: no retry until convergence is slow
+  bool stale_ = false;    // a step was accepted since the last second derivatives
+  bool retried_ = false;  // new second derivatives were tried at these poses
   int backtracks_ = 0;    // in a row
-  int rises_ = 0;         // accepted, in a row
-  double length_ = 1.0;   // of a step, of Newton's; 1 once all is decided
-  std::optional<double> last_decrement_;  // found with the present second derivatives
+  int rises_ = 0;         // accepted increases of the cost, in a row
+  double length_ = 1.0;   // scale of the next Newton step; 1 once all is decided
+  std::optional<double> last_decrement_;  // with the present second derivatives
 };
 
 }  // namespace km

@@ -6,11 +6,11 @@
 namespace km {
 namespace {
 
-constexpr double kAcceptRatio = 0.1;  // of the predicted decrease
+constexpr double kAcceptRatio = 0.1;  // least share of the predicted decrease
 constexpr double kShrinkBelow = 0.25;
 constexpr double kGrowAbove = 0.75;
-constexpr double kLeastDecrease = 1e-15;  // of the cost
-constexpr int kMaxRejections = 20;        // in a row, the radius shrinking fourfold each time
+constexpr double kLeastDecrease = 1e-15;  // relative to the cost
+constexpr int kMaxRejections = 20;        // in a row; each one reduces the radius fourfold
 
 double dot(const LiftedPoses& a, const LiftedPoses& b) {
   return a.cwiseProduct(b).sum();
@@ -18,14 +18,14 @@ double dot(const LiftedPoses& a, const LiftedPoses& b) {
 
 struct Step {
   LiftedPoses V;
-  double norm = 0.0;                // in the preconditioner's norm
-  double predicted_decrease = 0.0;  // of the quadratic model
+  double norm = 0.0;                // in the norm of the preconditioner
+  double predicted_decrease = 0.0;  // by the quadratic model
   int cg_iterations = 0;
   bool on_boundary = false;
 };
 
-// Steihaug-Toint conjugate gradients. All products below are those of the preconditioner's norm:
-// e = V, d = direction, z = preconditioned residual.
+// Steihaug-Toint conjugate gradients. All products below are in the norm of the preconditioner: e =
+// V, d = direction, z = preconditioned residual.
 Step solve_model(const QuadraticProblem& problem, const LiftedPoses& X,
                  const LiftedPoses& euclidean, const LiftedPoses& gradient, double radius,
                  const TruncatedNewtonOptions& options) {
@@ -81,7 +81,7 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
   LiftedPoses euclidean = problem.euclidean_gradient(X);
   LiftedPoses gradient = project_tangent(X, euclidean);
   result.initial_gradient_norm = result.gradient_norm = gradient.norm();
-  // A full Newton step of a least-squares cost has this norm at most when the model is exact.
+  // If the model is exact, a full Newton step of a least-squares cost has at most this norm.
   double radius = options.initial_radius > 0.0 ? options.initial_radius
                                                : 10.0 * std::sqrt(std::max(result.cost, 1e-12));
   bool last = false;
@@ -90,7 +90,7 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
          result.gradient_norm > options.gradient_tolerance) {
     const Step step = solve_model(problem, X, euclidean, gradient, radius, options);
     result.cg_iterations += step.cg_iterations;
-    // A decrease below rounding is no decrease: stop rather than wander.
+    // Stops at a decrease below rounding, because further steps would be random.
     last = !(step.predicted_decrease > kLeastDecrease * result.cost);
     if (last) break;
     LiftedPoses candidate = retract(X, step.V);

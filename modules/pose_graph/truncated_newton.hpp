@@ -12,8 +12,8 @@ struct TruncatedNewtonOptions {
   int max_iterations = 3;            ///< Accepted steps.
   int max_cg_iterations = 50;        ///< Hessian products per step.
   double cg_tolerance = 0.1;         ///< Residual of the Newton system over its right-hand side.
-  double gradient_tolerance = 1e-6;  ///< Riemannian gradient norm at which nothing is left to do.
-  double relative_decrease_tolerance = 0.0;  ///< Of the cost in one step: less is the last one.
+  double gradient_tolerance = 1e-6;  ///< Riemannian gradient norm at convergence.
+  double relative_decrease_tolerance = 0.0;  ///< Relative decrease of the cost in the last step.
   double initial_radius = 0.0;               ///< 0: too large to bind.
 };
 
@@ -25,8 +25,8 @@ struct [[nodiscard]] TruncatedNewtonResult {
   double gradient_norm = 0.0;
   int iterations = 0;
   int cg_iterations = 0;
-  double radius = 0.0;     ///< To go on with.
-  bool converged = false;  ///< By a tolerance, or no step lowers the cost beyond rounding.
+  double radius = 0.0;     ///< Final trust-region radius.
+  bool converged = false;  ///< By a tolerance, or no step decreases the cost beyond rounding.
 };
 
 /// Minimises `problem` from feasible `X` by the Riemannian trust-region method with preconditioned
@@ -36,11 +36,11 @@ struct [[nodiscard]] TruncatedNewtonResult {
 [[nodiscard]] TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
                                              const TruncatedNewtonOptions& options);
 
-/// minimise(), and beyond the minimum by `relaxation` - 1 times the way to it if the cost there is
-/// still below that at the start. For an exact minimum of a quadratic it is for every relaxation in
-/// (0, 2): successive over-relaxation, by which sweeps over blocks get over their slow modes in a
-/// fraction of the rounds (Ostrowski; Young, "Iterative Solution of Large Linear Systems", 1971,
-/// Ch. 4). At most 1: plain minimise().
+/// Runs minimise() and then goes beyond the minimum by `relaxation` - 1 times the way to it, if the
+/// cost there is below the cost at the start. For the exact minimum of a quadratic this holds for
+/// every relaxation in (0, 2). This is successive over-relaxation, with which sweeps over blocks
+/// reduce their slow modes in a fraction of the rounds (Ostrowski; Young, "Iterative Solution of
+/// Large Linear Systems", 1971, Ch. 4). At most 1: plain minimise().
 [[nodiscard]] TruncatedNewtonResult minimise_beyond(const QuadraticProblem& problem,
                                                     const LiftedPoses& X,
                                                     const TruncatedNewtonOptions& options,

@@ -20,15 +20,15 @@ std::vector<SE3> levelled(std::vector<SE3> poses, std::span<const VerticalPrior>
 }
 
 Eigen::MatrixXd level(const Eigen::MatrixXd& world, const Eigen::Vector3d& origin) {
-  // Frames are levelled again and again, each from the last: what rounding has left of Y's
-  // orthonormality must not grow.
+  // Each frame is levelled from the previous one, so rounding errors of the orthonormality of Y
+  // must not accumulate.
   const Eigen::MatrixXd Y = nearest_stiefel(world.leftCols<3>());
   const Eigen::VectorXd z = lifting_matrix(Y.rows()).col(2);
   const Eigen::VectorXd up = Y.col(2);
   Eigen::MatrixXd turned(Y.rows(), 3);
   constexpr double kUpsideDown = 1e-12;
   if (const double bisected = 1.0 + up.dot(z); bisected > kUpsideDown) {
-    // The turn in the plane of the two that takes `up` to z.
+    // The rotation in the plane of `up` and z that maps `up` to z.
     const Eigen::VectorXd sum = up + z;
     turned = Y - sum * (sum.transpose() * Y) / bisected + 2.0 * z * (up.transpose() * Y);
   } else {

@@ -67,7 +67,7 @@ class ChunkMerge {
   Lost lost_;
   std::uint64_t max_held_bytes_;
   std::uint64_t held_bytes_ = 0;
-  std::deque<ChunkPlace> waiting_;  // in order of time, then place
+  std::deque<ChunkPlace> waiting_;  // chunks not opened yet, in order of time, then place
   std::vector<Open> open_;
   std::optional<Stamp> last_;
 };

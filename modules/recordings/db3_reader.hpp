@@ -50,7 +50,7 @@ class Db3Reader final : public BagReader {
   std::uint64_t max_rows_ = 0;
   BagReport report_;
   std::unique_ptr<sqlite3, Close> database_;  // outlives its statements
-  Statement rows_;                            // in order of time
+  Statement rows_;                            // rows of the messages, in order of time
   Statement data_;                            // reads the data of one message
   std::map<std::int64_t, std::size_t> channel_of_;
   std::vector<BagChannel> channels_;

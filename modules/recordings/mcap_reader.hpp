@@ -34,7 +34,7 @@ class McapReader final : public BagReader {
 
  private:
   struct Summary {
-    std::vector<McapChunkIndex> chunks;  // in order of the file
+    std::vector<McapChunkIndex> chunks;  // chunks in the order of the file
     std::optional<McapStatistics> statistics;
   };
 

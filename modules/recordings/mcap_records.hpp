@@ -48,7 +48,7 @@ struct McapRecordHeader {
 struct McapHeader {
   static constexpr McapOpcode kOpcode = McapOpcode::kHeader;
   std::string profile;  ///< "ros2", ...
-  std::string library;  ///< That wrote the file.
+  std::string library;  ///< Library that wrote the file.
 };
 
 struct McapFooter {

@@ -72,7 +72,7 @@ class McapWriter {
   std::vector<McapAttachmentIndex> attachments_;
   McapStatistics statistics_;
   std::map<std::uint16_t, std::uint64_t> counts_;
-  std::vector<std::uint8_t> bytes_;  // to be taken
+  std::vector<std::uint8_t> bytes_;  // bytes that the caller has not taken yet
   std::uint64_t size_ = 0;           // bytes of the file so far
   std::uint32_t crc_ = 0;            // checksum of the file so far
 };

@@ -23,7 +23,7 @@ class MergedReader final : public BagReader {
  private:
   struct Source {
     std::unique_ptr<BagReader> reader;
-    std::vector<std::size_t> channel_of;  // by the reader's
+    std::vector<std::size_t> channel_of;  // merged channel of each channel of `reader`
     std::optional<BagMessage> head;
   };
   void advance(Source& source);

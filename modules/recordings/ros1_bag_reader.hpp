@@ -56,7 +56,7 @@ class Ros1BagReader final : public BagReader {
   RandomAccessFile file_;
   PlacedReport report_{file_};
   ChannelTable channels_;
-  std::map<std::uint32_t, std::size_t> channel_of_;  // by connection
+  std::map<std::uint32_t, std::size_t> channel_of_;  // channel of each connection of the bag
   std::vector<ChunkPlace> places_;
   std::unique_ptr<ChunkMerge> merge_;
 };

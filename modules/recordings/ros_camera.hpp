@@ -22,8 +22,9 @@ enum class RosImages {
 /// calibration_limits.hpp refuses.
 [[nodiscard]] Camera camera_of(const RosCameraInfo& info, RosImages images);
 
-/// The pose of that camera in the message's frame, which is the rectified camera's: P projects its
-/// points. A rotation R of zeros is none. Throws std::invalid_argument if R is no rotation.
+/// Pose of the camera of camera_of() in the frame of the message. That frame is the rectified
+/// camera, because P projects points of it. A matrix R of zeros means no rotation. Throws
+/// std::invalid_argument if R is no rotation.
 [[nodiscard]] SE3 T_frame_camera(const RosCameraInfo& info, RosImages images);
 
 /// Distance of a right camera from the left one by Tx = -fx B, the fourth number of its P [m];

@@ -206,7 +206,9 @@ bool is_of_type(const BagChannel& channel, std::string_view type) {
   const std::string_view package = type.substr(0, slash);
   const std::string_view message = type.substr(slash);
   if (name == type) return true;
-  if (type == RosTransforms::kType && name == "tf/tfMessage") return true;  // its first name
+  if (type == RosTransforms::kType && name == "tf/tfMessage")
+    return true;  // former name of the
+                  // type
   return name.size() == type.size() + 4 && name.starts_with(package) &&
          name.substr(slash, 4) == "/msg" && name.ends_with(message);
 }

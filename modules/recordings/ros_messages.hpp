@@ -34,7 +34,7 @@ struct RosImage {
   std::string encoding;      ///< "mono8", "bgr8", "16UC1", ...
   bool is_bigendian = false;
   std::uint32_t step = 0;          ///< Length of a row [bytes].
-  std::vector<std::uint8_t> data;  ///< At least height * step.
+  std::vector<std::uint8_t> data;  ///< Pixels: at least height * step bytes.
 };
 
 struct RosCompressedImage {
@@ -153,12 +153,14 @@ struct RosDiagnostics {
 /// visualization_msgs/Marker, as of ROS 2 Humble, without textures and mesh files.
 struct RosMarker {
   static constexpr std::string_view kType = "visualization_msgs/Marker";
-  static constexpr std::int32_t kLineList = 5, kTriangleList = 11;  ///< Connect points to pairs and
-                                                                    ///< to triples.
+  static constexpr std::int32_t kLineList = 5, kTriangleList = 11;  ///< Kinds of markers whose
+                                                                    ///< points form line segments
+                                                                    ///< (2 each) and triangles (3
+                                                                    ///< each).
   static constexpr std::int32_t kDelete = 2;  ///< Deletes the marker with this name space and id.
   RosHeader header;
-  std::string name_space;  ///< Together with the id the name of a marker; a new marker replaces one
-                           ///< with its name.
+  std::string name_space;  ///< Identifies a marker together with `id`. A new marker replaces an
+                           ///< equally identified one.
   std::int32_t id = 0;
   std::int32_t type = 0;
   std::int32_t action = 0;                          ///< 0: add or replace, or kDelete.
@@ -168,7 +170,7 @@ struct RosMarker {
   std::array<std::uint32_t, 2> lifetime{};          ///< [s], [ns]; 0: for ever.
   bool frame_locked = false;
   std::vector<Eigen::Vector3d> points;  ///< [m]
-  std::vector<Eigen::Vector4f> colors;  ///< As many as points, or none.
+  std::vector<Eigen::Vector4f> colors;  ///< One colour per point, or empty.
   std::string text;
 };
 
@@ -187,7 +189,8 @@ struct RosLog {
   std::uint32_t line = 0;
 };
 
-/// True if the channel's messages are of `type`, a name of ROS 1; ROS 2 writes "/msg/" in it.
+/// True if the messages of the channel have `type`, a name of ROS 1. Names of ROS 2 also match,
+/// which contain "/msg/".
 [[nodiscard]] bool is_of_type(const BagChannel& channel, std::string_view type);
 
 /// A message of a type above in the encoding of its channel, "ros1" or "cdr". Refuses bytes that

@@ -34,7 +34,8 @@ struct StampAgreement {
   std::size_t only_second = 0;
 };
 
-/// Both sorted. Pairs are stamps that are each other's nearest and at most `tolerance_s` apart.
+/// Agreement of two sorted lists of stamps. Pairs are stamps that are each other's nearest and at
+/// most `tolerance_s` apart.
 [[nodiscard]] StampAgreement stamp_agreement(std::span<const Stamp> first,
                                              std::span<const Stamp> second, double tolerance_s);
 

@@ -414,8 +414,8 @@ void RelayStore::hand_on(RobotId to, const Origin& origin, bool letters, std::ui
 }
 
 // True if another robot has precedence in sending these messages to the neighbour. Candidates
-// exchange messages with the neighbour directly and either receive the origin directly or hold more
-// of its messages. Those that receive the origin come first, then the lower id.
+// exchange messages with the neighbour directly. They also receive the origin directly or hold more
+// of its messages. Candidates that receive the origin come first, then those with the lower id.
 bool RelayStore::another_should(RobotId to, const RelayHeld& held) const {
   const RobotId origin = held.origin.robot;
   const Neighbour& neighbour = neighbours_.at(to);

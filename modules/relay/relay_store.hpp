@@ -106,7 +106,8 @@ class RelayStore {
   void heard(const RobotIdentity& peer);
   void lost(RobotId robot, double now_s);
 
-  /// Stores a bag that its origin has sent directly. It may arrive before the call of heard().
+  /// Stores a bag that its origin has sent directly. The bag may arrive before heard() is called
+  /// for the origin.
   RelayArrival keep_bag(const RobotIdentity& origin, std::uint32_t number,
                         std::vector<std::uint8_t> content);
   /// Stores a keyframe that a known robot has sent directly as a reply.
@@ -220,12 +221,12 @@ class RelayStore {
   TeamPeer self_;
   std::optional<RelayKeys> keys_;
   std::map<RobotId, Origin> origins_;
-  std::map<RobotId, Neighbour> neighbours_;  // Robots received directly.
+  std::map<RobotId, Neighbour> neighbours_;  // robots with a link to this one
   Stream own_letters_;
   std::map<std::tuple<RelayKind, RobotId, std::uint64_t>, std::uint32_t> own_slots_;
   std::deque<Recent> recent_;  // Oldest first.
   std::deque<Recent> unmet_;   // Messages to unknown robots, oldest first.
-  // By addressee; then by kind, origin and number.
+  // Messages kept for other robots, by addressee, then by kind, origin and number.
   std::map<RobotId, std::map<std::tuple<RelayKind, RobotId, std::uint32_t>, RelayMessage>> carried_;
   std::size_t carried_bytes_ = 0;
   RelayOutput output_;

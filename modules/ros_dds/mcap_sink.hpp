@@ -35,7 +35,8 @@ class McapSink final : public RosSink {
   const std::filesystem::path file_;
   const std::function<void(const std::string&)> fail_;
   McapWriter writer_{{}};
-  std::vector<std::uint32_t> sequences_;  // by topic, whose number is that of its channel less one
+  std::vector<std::uint32_t> sequences_;  // sequence number of each topic; the channel of topic k
+                                          // is k + 1
   Stamp newest_ = 0;                      // newest stamp of the messages
   std::uint64_t written_ = 0;             // [bytes]
   bool failed_ = false;

@@ -172,7 +172,7 @@ class RosOutputNode final : public Node {
   std::optional<Stamp> stamp_;   // stamp of the last image or keyframe
   std::optional<Stamp> latest_;  // greatest stamp that was published, because stamps must not
                                  // decrease
-  double speed_mps_ = 0.0;       // at `stamp_`
+  double speed_mps_ = 0.0;       // speed at `stamp_`
   double told_s_ = 0.0;          // time of arrival of `stamp_`, by the steady clock
   Topic<Trajectory>::Message trajectory_ = std::make_shared<const Trajectory>();
   std::shared_ptr<const LabelledMesh> newest_mesh_;

@@ -33,7 +33,7 @@ struct RevokedCertificate {
 struct Revocations {
   std::uint64_t number = 0;  ///< The list with the higher number replaces the other.
   std::vector<RevokedCertificate> revoked;
-  Signature signature{};  ///< By the authority.
+  Signature signature{};  ///< Signature of the authority over the fields above.
 };
 
 /// Signs with the authority's key.

@@ -167,8 +167,8 @@ class TeamSeal {
   Revocations revocations_;
   AdmittedPeers peers_;
   std::vector<TeamKey> team_keys_;  // own keys by number; the last one seals
-  // Time [s since 1970-01-01 UTC] at which the first holder of the newest team key lapses. That
-  // holder may be gone from peers_ by then.
+  // Time [s since 1970-01-01 UTC] at which the first holder of the newest team key lapses. By then
+  // the holder may have been removed from peers_.
   std::int64_t holder_lapses_s_ = std::numeric_limits<std::int64_t>::max();
 };
 

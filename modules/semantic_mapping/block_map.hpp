@@ -98,13 +98,14 @@ class BlockMap {
  private:
   struct Slot {
     std::uint64_t key = kFree;
-    std::uint32_t block = 0;  // in blocks_
+    std::uint32_t block = 0;  // index in blocks_
   };
   static constexpr std::uint64_t kFree = ~std::uint64_t{0};
 
   [[nodiscard]] static std::uint64_t key_of(const Eigen::Vector3i& position);
   [[nodiscard]] std::size_t home_of(std::uint64_t key) const;
-  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const;  // its slot, or a free one
+  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const;  // slot of `key`, or the free slot
+                                                               // for it
   void grow();
 
   std::vector<std::unique_ptr<VoxelBlock>> blocks_;

@@ -298,7 +298,7 @@ void IncrementalMesh::finalise(VoxelBlock& block, BlockMap& map) {
   disown(block);
 }
 
-// By index; kNone for vertices that stay.
+// Returns, by index of the vertex, the index of its heir; kNone for vertices that are kept.
 std::vector<std::uint32_t> IncrementalMesh::final_heirs(const SupersededSurface& superseded) const {
   PlaceOfId places;
   for (std::size_t i = 0; i < vertices_.size(); ++i)

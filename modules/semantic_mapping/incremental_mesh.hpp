@@ -66,7 +66,7 @@ class IncrementalMesh {
   struct Vertex {
     Eigen::Vector3f position = Eigen::Vector3f::Zero();
     std::uint32_t uses = 0;       // number of face corners that use it
-    std::uint64_t id = kRemoved;  // see MapMesh::ids; kRemoved: the entry is free
+    std::uint64_t id = kRemoved;  // id as in MapMesh::ids; kRemoved: the entry is free
     BlockMesh* owner = nullptr;   // null: its block was erased
     VoxelLabels labels;
     KeyframeIndex first = 0, last = 0;

@@ -84,7 +84,7 @@ struct SemanticMapper::State {
   DepthViewMaker views;
   BlockMap map;
   IncrementalMesh mesh;
-  MeshUpdateReport unreported;  // from blocks that became final
+  MeshUpdateReport unreported;  // counts of blocks that became final, until reported
   std::uint64_t frame = 0;
   KeyframeIndex keyframe = 0;
   std::optional<Eigen::Vector3d> camera_at;  // last position

@@ -19,7 +19,8 @@ namespace km {
 /// Channels of the mapping node; they must outlive it.
 struct SemanticMappingTopics {
   In<DenseFrame> frames;             ///< In order of time.
-  In<SupersededSurface> superseded;  ///< From the newest map; the newest message counts.
+  In<SupersededSurface> superseded;  ///< Surface of the newest map that is mapped twice. Only the
+                                     ///< newest message counts.
   Out<MapMesh> maps;                 ///< The whole map.
   Out<MappingProgress> progress;     ///< With every frame.
 };

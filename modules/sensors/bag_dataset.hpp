@@ -90,7 +90,7 @@ class BagDataset final : public DatasetReader {
   std::unique_ptr<BagReader> bag_;
   Rig rig_;
   BagWindow window_;
-  std::vector<Role> role_of_;  // by channel
+  std::vector<Role> role_of_;  // role of each channel
   StampOrder order_[kRoles];
   MissingImages missing_[kRoles];
   std::size_t taken_[kRoles] = {};  // number of messages

@@ -16,8 +16,8 @@ namespace km {
 /// Files of the images of a frame.
 struct StereoPairFile {
   Stamp stamp = 0;               ///< Stamp of the left image.
-  std::filesystem::path left;    ///< Image files.
-  std::filesystem::path right;   ///< Empty with an RGB-D rig.
+  std::filesystem::path left;    ///< File of the left image.
+  std::filesystem::path right;   ///< File of the right image; empty with an RGB-D rig.
   int line = 0;                  ///< Row of the left image in the list.
   std::filesystem::path depth;   ///< Empty if there is none.
   std::filesystem::path labels;  ///< Empty if there is none.

@@ -8,7 +8,8 @@
 namespace km {
 
 ImageGap MissingImages::before(Stamp stamp) {
-  constexpr double kGap = 1.5;  // in usual intervals; the exposure time varies them by less
+  constexpr double kGap = 1.5;  // smallest gap, in usual intervals; exposure times vary them by
+                                // less
   const std::optional<Stamp> last = std::exchange(last_, stamp);
   if (!last) return {};
   const Stamp interval = stamp - *last;

@@ -23,7 +23,7 @@ void append(std::string& list, const std::string& item) {
 
 }  // namespace
 
-// Topic whose messages name the body's frame.
+// Topic whose messages contain the name of the body frame.
 const std::string& RigCompletion::body_topic() const {
   const SensorTopicNames& topics = partial_.rig.topics;
   if (topics.imu.empty() && topics.gyro.empty()) return topics.odometry;

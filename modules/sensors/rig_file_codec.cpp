@@ -63,7 +63,7 @@ void note_topics(const RigFile& file, const std::string& path, RigCalibration& c
       calibration.notes.push_back(path + ": " + used + " is calibrated as " + calibrated);
 }
 
-// From 16 numbers or none.
+// Transform from 16 numbers of a 4x4 matrix, row by row; the identity from none.
 SE3 transform_of(const std::filesystem::path& path, const char* key,
                  const std::vector<double>& numbers) {
   if (numbers.empty()) return SE3::Identity();

@@ -24,7 +24,8 @@ class StaticTransforms {
   [[nodiscard]] std::string frames() const;
 
  private:
-  std::map<std::string, std::map<std::string, SE3>> T_a_b_;  // by a, by b; both directions
+  std::map<std::string, std::map<std::string, SE3>> T_a_b_;  // T_a_b_[a][b], stored in both
+                                                             // directions
 };
 
 }  // namespace km

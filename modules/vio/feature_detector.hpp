@@ -60,9 +60,10 @@ class DistanceGrid {
 /// Finds new corners where an image has no features yet. Not thread-safe, because it reuses
 /// buffers.
 ///
-/// Candidates are FAST corners (Rosten and Drummond, ECCV 2006). The threshold is high at first,
-/// and config.fast_threshold if that finds none. Candidates are ranked by the smaller eigenvalue of
-/// the gradient matrix (Shi and Tomasi, CVPR 1994), computed from the derivatives of the pyramid.
+/// Candidates are FAST corners (Rosten and Drummond, ECCV 2006). The first search uses a high
+/// threshold. If that search finds none, the next one uses config.fast_threshold. Candidates are
+/// ranked by the smaller eigenvalue of the gradient matrix (Shi and Tomasi, CVPR 1994), computed
+/// from the derivatives of the pyramid.
 class FeatureDetector {
  public:
   explicit FeatureDetector(const TrackerConfig& config) : config_(config) {}

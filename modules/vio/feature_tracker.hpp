@@ -24,10 +24,10 @@ namespace km {
 struct TrackerStatistics {
   int tracked = 0;   ///< Features continued from the image before.
   int detected = 0;  ///< New features.
-  int lost = 0;      ///< Failed in KLT or left the image.
-  int backward = 0;  ///< Failed the forward-backward check.
-  int crowded = 0;   ///< Too near to another feature.
-  int motion = 0;    ///< Contradict the motion of the other features.
+  int lost = 0;      ///< Features that KLT failed to track or that left the image.
+  int backward = 0;  ///< Features that failed the forward-backward check.
+  int crowded = 0;   ///< Features too near to another feature.
+  int motion = 0;    ///< Features that contradict the motion of the others.
   StereoStatistics stereo;
   int stereo_motion = 0;  ///< Right image points that contradict the motion; the left points stay.
   bool motion_known = false;  ///< The stereo features agreed on a motion.
@@ -65,14 +65,14 @@ class FeatureTracker {
   struct Track {
     std::uint64_t id = 0;
     int length = 1;
-    Eigen::Vector2f px = Eigen::Vector2f::Zero();    // In the left image.
-    Eigen::Vector2d left = Eigen::Vector2d::Zero();  // Bearings.
+    Eigen::Vector2f px = Eigen::Vector2f::Zero();    // position in the left image
+    Eigen::Vector2d left = Eigen::Vector2d::Zero();  // bearings in the left and right camera
     std::optional<Eigen::Vector2d> right;
     // Measured in this image, or propagated by the motion [1/m].
     std::optional<double> inverse_depth;
     // Patch in which the track began; null at the rim.
     std::unique_ptr<const AlignmentPatch> patch;
-    Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // Warp from the patch to this image.
+    Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // warp from the patch to this image
   };
   // A track in the new image, with its state in the image before.
   struct Step {

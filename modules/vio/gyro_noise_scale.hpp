@@ -27,7 +27,7 @@ class GyroNoiseScale {
   [[nodiscard]] double scale() const { return std::sqrt(std::max(misfit_, 1.0)); }
 
  private:
-  double misfit_ = 0.0;  // mean square
+  double misfit_ = 0.0;  // running mean of the squared ratio of difference to assumed deviation
 };
 
 }  // namespace km

@@ -50,7 +50,7 @@ class OutsideOdometry {
   DepthSource depth_source_;
   VioConfig config_;
   bool goes_on_ = false;               // true until the first pose
-  std::optional<Fix> last_, last_kf_;  // as measured
+  std::optional<Fix> last_, last_kf_;  // fixes as measured
   std::optional<KeyframeOdometry> last_keyframe_;
   double moved_s_ = 0.0;                // time in motion since the last keyframe
   SE3 T_odom_rest_ = SE3::Identity();   // measured pose at the last motion

@@ -57,7 +57,7 @@ struct ImuTerm {
 /// Parts of a state that a prior holds, at the values of their first linearisation.
 struct FirstEstimate {
   std::optional<SE3> pose;
-  std::optional<OdometryState> motion;  ///< Its velocity and biases.
+  std::optional<OdometryState> motion;  ///< Only velocity and biases are used.
 
   /// `state` with these parts replaced.
   [[nodiscard]] OdometryState applied_to(const OdometryState& state) const;

@@ -18,7 +18,7 @@ std::optional<double> image_motion_px(const TrackedFrame& a, const TrackedFrame&
   constexpr std::size_t kMinFeatures = 15;
   std::vector<double> distances;
   auto there = b.features.begin();
-  for (const TrackedFeature& feature : a.features) {  // both ascend
+  for (const TrackedFeature& feature : a.features) {  // both lists ascend by id
     while (there != b.features.end() && there->id < feature.id) ++there;
     if (there == b.features.end()) break;
     if (there->id == feature.id)

@@ -15,7 +15,7 @@ namespace km {
 /// A point of the left image to be found in the right one.
 struct StereoQuery {
   Eigen::Vector2f left_px = Eigen::Vector2f::Zero();
-  Eigen::Vector2d left = Eigen::Vector2d::Zero();  ///< Its bearing, undistorted.
+  Eigen::Vector2d left = Eigen::Vector2d::Zero();  ///< Undistorted bearing of left_px.
   std::optional<double> inverse_depth;             ///< Expected 1/z in the left camera [1/m].
 };
 

@@ -21,7 +21,7 @@ namespace km {
 enum class VioProblem {
   kNone,
   kNoImage,         ///< No image that fits the rig; inertial samples are kept.
-  kUnorderedImage,  ///< Not later than the image before; dropped.
+  kUnorderedImage,  ///< The image is not later than the one before, and is dropped.
   kBadSamples,      ///< Some inertial samples are implausible or out of order; these are dropped.
   /// Too long without inertial samples. Images alone determine the motion, or, if they cannot,
   /// odometry starts again from the last pose.
@@ -37,7 +37,7 @@ struct VioResult {
   VioProblem problem = VioProblem::kNone;
   std::vector<OdometryState> states;        ///< In order of time; several at a start.
   std::vector<KeyframeOdometry> keyframes;  ///< New keyframes; several at a start.
-  std::vector<LocatedFrame> frames;         ///< One for each state.
+  std::vector<LocatedFrame> frames;         ///< Frames of the images, one per state.
   std::optional<StartStatus> start;         ///< Outcome, if a start was attempted.
   TrackerStatistics tracking;               ///< Counts of this image.
   std::vector<Eigen::Vector2d> tracked;    ///< Features of this image: bearings in the left camera.
@@ -48,7 +48,7 @@ struct VioResult {
 /// State in which an earlier process of the robot ended: at a keyframe, whose image is the first
 /// that is processed again.
 struct VioCheckpoint {
-  OdometryState state;        ///< At the keyframe's image.
+  OdometryState state;        ///< State at the image of the keyframe.
   KeyframeOdometry keyframe;  ///< The last published keyframe.
 };
 

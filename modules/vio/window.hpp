@@ -22,8 +22,8 @@ struct WindowFrame {
   OdometryState state;
   bool keyframe = false;
   bool rests = false;  ///< The body stands still in this image.
-  /// Samples over the time since the frame before, except for rests. Those of the first frame are
-  /// needed only by the following frames.
+  /// Samples over the time since the frame before, except for rests. The samples of the first frame
+  /// are needed only by the following frames.
   std::vector<ImuSample> samples;
   bool is_bridged = false;       ///< `samples` have a gap: see InertialFrame.
   std::optional<ImuFactor> imu;  ///< Factor from the frame before; none for the first.

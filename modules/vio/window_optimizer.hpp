@@ -66,7 +66,8 @@ class WindowEquations {
   std::vector<OdometryState> linearization_;  // per frame, where derivatives are taken
   std::vector<SE3> images_;                   // per frame, pose of the body at the image
   std::vector<ImagePose> image_linearization_;
-  Eigen::MatrixXd images_H_;  // by the pose at each image (6), landmarks eliminated
+  Eigen::MatrixXd images_H_;  // Hessian over the pose of each image (6 rows each), landmarks
+                              // eliminated
   Eigen::VectorXd images_g_;
   Eigen::MatrixXd H_;
   Eigen::VectorXd g_;
@@ -93,7 +94,7 @@ struct WindowSolution {
 WindowSolution optimize(Window& window, int max_iterations);
 
 /// Removes a frame with its observations, and the landmarks that no other frame sees. The caller
-/// replaces the inertial factors on its two sides.
+/// replaces the inertial factors before and after the frame by one.
 void forget_frame(Window& window, std::size_t frame);
 
 /// Replaces the oldest frame by a prior on the frames that it shares information with. The prior

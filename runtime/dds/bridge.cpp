@@ -182,7 +182,7 @@ void DdsBridge::receive_until_stopped() try {
   }
 } catch (...) {
   receive_error_ = std::current_exception();
-  receive_failed_ = true;  // after receive_error_: publishes it
+  receive_failed_ = true;  // set after receive_error_, so that readers of the flag see the error
 }
 
 void DdsBridge::await_acknowledgements() noexcept {

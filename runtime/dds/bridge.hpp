@@ -119,7 +119,8 @@ class DdsBridge final : public Node {
   /// bridge also does so when a robot appears, and at intervals. Thread-safe.
   void tell_keys();
 
-  /// Needs a crossing of kind kStatus: presence is its liveliness.
+  /// Peers of this robot. Precondition: a crossing of kind kStatus is connected, because its
+  /// liveliness shows which robots are present.
   [[nodiscard]] Peers& peers() { return peers_; }
 
   /// Counts since the start. Thread-safe.

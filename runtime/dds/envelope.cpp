@@ -35,7 +35,8 @@ bool WireSample::read(std::span<const std::uint8_t> bytes) {
   // DDS checks bounds in place, and turns numbers into the machine's, before it reads: in a copy,
   // which is aligned as it assumes.
   std::vector<std::uint64_t> aligned(bytes.size() / sizeof(std::uint64_t) + 1);
-  std::ranges::copy(bytes, reinterpret_cast<std::uint8_t*>(aligned.data()));  // none may be there
+  std::ranges::copy(bytes, reinterpret_cast<std::uint8_t*>(aligned.data()));  // `bytes` may be
+                                                                              // empty
   const auto size = static_cast<std::uint32_t>(bytes.size());
   const bool swap = std::endian::native == std::endian::big;
   std::uint32_t end = 0;

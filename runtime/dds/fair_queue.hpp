@@ -84,12 +84,12 @@ class FairQueue {
   struct Line {
     Line(const QueueQuota& quota, double now_s)
         : tokens(quota.per_second, quota.burst, quota.burst) {
-      tokens.spend(0.0, now_s);  // they flow from now on
+      tokens.spend(0.0, now_s);  // tokens accumulate from now on
     }
 
     std::deque<Waiting> waiting;
     std::size_t bytes = 0;
-    TokenBucket tokens;  // each message takes one
+    TokenBucket tokens;  // one token is spent per message
   };
 
   [[nodiscard]] bool has_room(const Line& line, std::size_t bytes) const {

@@ -254,7 +254,7 @@ void IncomingTopic::deliver_until_stopped() try {
   }
 } catch (...) {
   error_ = std::current_exception();
-  failed_ = true;  // after error_: publishes it
+  failed_ = true;  // set after error_, so that readers of the flag see the error
 }
 
 void IncomingTopic::await_key(Filed filed, double now_s) {

@@ -29,7 +29,7 @@ struct TopicSpec {
   std::size_t max_bytes = 0;  ///< Maximum size of the content.
   TopicKind kind = TopicKind::kEvent;
   TrafficCategory category = TrafficCategory::kOther;
-  bool carries_keys = false;  ///< Its messages are sealed by themselves.
+  bool carries_keys = false;  ///< Messages of this topic are sealed separately.
 };
 
 /// Receiver of a message.

@@ -158,7 +158,7 @@ void PeerTable::appear_if_there(const Guid& guid, Participant& participant) {
 
 void PeerTable::appear(const Guid& guid, Participant& participant) {
   const RobotIdentity& identity = *participant.identity;
-  if (identity.robot == self_.robot) return;  // its uptime decides: see twin_heard()
+  if (identity.robot == self_.robot) return;  // twin_heard() decides by uptime
   const auto found = peers_.find(identity.robot);
   if (found == peers_.end()) {
     if (peers_.size() >= kMaxRobots)

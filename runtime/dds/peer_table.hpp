@@ -98,7 +98,7 @@ class PeerTable {
   /// delivered.
   void told(const TeamPeer& restarted);
 
-  /// Its status writer is alive, silent, or closed.
+  /// Notes that the status writer with this GUID is alive, silent, or closed.
   void alive(const Guid& guid);
   void silent(const Guid& guid);
   void closed(const Guid& guid);
@@ -128,7 +128,7 @@ class PeerTable {
 
  private:
   struct Participant {
-    std::optional<RobotIdentity> identity;  // if accepted
+    std::optional<RobotIdentity> identity;  // identity; nullopt until accepted
     std::string addresses;
     bool announced = false;
     bool proven = false;

@@ -16,8 +16,8 @@
 
 namespace km {
 
-/// Participant of each writer of a topic, stored when DDS matches the writer. So messages of a
-/// writer that is gone are still attributed to its robot. Thread-safe.
+/// Participant of each writer of a topic, stored when DDS matches the writer. Messages of a writer
+/// that is gone are thus still attributed to its robot. Thread-safe.
 class WriterBook {
  public:
   WriterBook();

@@ -29,7 +29,7 @@ struct RobotStatus {
   RobotId robot = 0;
   std::string name;
   RobotPhase phase = RobotPhase::kRunning;
-  double dataset_time_s = 0.0;  ///< Since the start of its input.
+  double dataset_time_s = 0.0;  ///< Time since the start of the robot's input.
   std::uint32_t keyframes = 0;
   /// Robots fewer links away than this have settled; 0: not even this one. It is one more than the
   /// smallest number of the neighbours, so that robots wait also for distant ones.

@@ -51,7 +51,7 @@ RosPublisher::RosPublisher(std::shared_ptr<const RosNetwork> network, const std:
 
 void RosPublisher::publish(std::span<const std::uint8_t> bytes) const {
   std::vector<std::uint8_t> padded(bytes.begin(), bytes.end());
-  padded.resize((padded.size() + 3) / 4 * 4);  // as DDS has it on the wire
+  padded.resize((padded.size() + 3) / 4 * 4);  // DDS pads to 4 bytes on the wire
   ddsrt_iovec_t vector{.iov_base = padded.data(),
                        .iov_len = static_cast<ddsrt_iov_len_t>(padded.size())};
   ddsi_serdata* const sample =

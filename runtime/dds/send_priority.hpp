@@ -18,7 +18,7 @@ enum class SendPriority {
 };
 inline constexpr std::size_t kSendPriorities = 7;
 
-/// That of a topic: never kBacklog. An event of verification is a closure.
+/// Priority of a topic: never kBacklog. An event of verification is a closure.
 [[nodiscard]] constexpr SendPriority priority_of(TopicKind kind, TrafficCategory category) {
   if (kind == TopicKind::kStatus) return SendPriority::kPresence;
   switch (category) {

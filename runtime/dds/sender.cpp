@@ -33,7 +33,7 @@ void Sender::stop() noexcept {
 }
 
 void Sender::post(Outgoing message) {
-  const Heartbeat::Waiting waiting;  // for room, if there is none
+  const Heartbeat::Waiting waiting;  // push() may wait for room
   posted_.push(std::move(message));
 }
 
@@ -69,7 +69,7 @@ void Sender::run() try {
   tell();
 } catch (...) {
   error_ = std::current_exception();
-  failed_ = true;  // after error_: publishes it
+  failed_ = true;  // set after error_, so that readers of the flag see the error
   posted_.close();
 }
 

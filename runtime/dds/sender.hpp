@@ -97,7 +97,7 @@ class Sender {
   std::atomic<bool> holds_back_ = false;
   mutable std::mutex mutex_;  // guards held_ and due_
   std::map<const OutgoingTopic*, HeldBack> held_;
-  std::set<RobotId> due_;  // to catch up
+  std::set<RobotId> due_;  // robots that have to catch up
   Heartbeat heartbeat_;
   Timing timing_;
   std::exception_ptr error_;

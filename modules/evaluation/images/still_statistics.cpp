@@ -16,7 +16,7 @@ constexpr double kCompareEvery_s = 0.5;
 constexpr double kMaxFlow_px = 0.1;
 constexpr double kReturns_px = 1.0;
 constexpr double kFlatStillGradient = 3.0;   // [levels/px]
-constexpr double kFlatGradientWithin = 2.0;  // as for single images
+constexpr double kFlatGradientWithin = 2.0;  // the limit that single images have, too
 constexpr std::size_t kMinCorners = 20;
 
 double robust_sigma(std::vector<double> values) {
@@ -29,7 +29,8 @@ double robust_sigma(std::vector<double> values) {
 
 void StillStatistics::add(Stamp stamp, const KltImage& image,
                           const std::vector<cv::Point2f>& corners) {
-  if (!kept_.empty() && stamp <= kept_.back().stamp) {  // another part of the recording
+  if (!kept_.empty() && stamp <= kept_.back().stamp) {  // stamps restart: another part of the
+                                                        // recording begins
     kept_.clear();
     last_compared_ = 0;
   }
@@ -62,7 +63,7 @@ void StillStatistics::compare(const Kept& before, const KltImage& image) {
 
 void StillStatistics::add_noise(const cv::Mat& before, const cv::Mat& image) {
   const cv::Mat gradient = gradient_magnitude(before);
-  std::vector<std::uint64_t> histogram(256, 0);  // magnitude of the difference
+  std::vector<std::uint64_t> histogram(256, 0);  // bins: magnitudes of the difference
   double squares = 0.0;
   double count = 0.0;
   for (int y = 1; y + 1 < image.rows; ++y) {

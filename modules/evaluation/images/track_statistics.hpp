@@ -60,7 +60,8 @@ class TrackStatistics {
 
   std::vector<double> corner_counts_, flow_, survived_, left_, failed_;
   FlowBinMeans survived_by_flow_, left_by_flow_, corners_by_flow_;
-  std::map<std::size_t, std::vector<double>> survival_, strict_survival_;  // by age
+  std::map<std::size_t, std::vector<double>> survival_, strict_survival_;  // shares of surviving
+                                                                           // tracks, by age
   FlowBinMeans ten_frames_by_flow_;
 };
 

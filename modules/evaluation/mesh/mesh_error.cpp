@@ -105,8 +105,8 @@ struct PointMatches {
   // such as the ground below a car or the back of a wall.
   std::vector<bool> in_front;
 
-  // Takes the values of `other` if they are nearer. A point in front of either mesh is in front.
-  // Both matches are of the same points.
+  // Takes the values of `other` where its surface is nearer. A point in front of either mesh is in
+  // front. Precondition: both matches have the same points.
   void keep_nearer(const PointMatches& other) {
     for (std::size_t i = 0; i < point_m.size(); ++i) {
       point_m[i] = std::min(point_m[i], other.point_m[i]);

@@ -110,14 +110,14 @@ struct MeshError {
   /// Share of the true surface with the estimate within crop_m and in front.
   double seen_coverage = 0.0;
   double beyond = 0.0;      ///< Share of the estimate further than crop_m from the truth.
-  SurfaceComparison truth;  ///< From true points within crop_m to the estimate.
+  SurfaceComparison truth;  ///< Distances from true points within crop_m to the estimate.
   SurfaceComparison seen;   ///< Part of `truth` with the estimate in front, see mesh_error().
   /// From estimated points to the truth; a distance beyond crop_m counts as crop_m.
   SurfaceComparison estimate;
 };
 
 struct [[nodiscard]] MeshReport {
-  Registration registration;  ///< One transform for all estimates.
+  Registration registration;  ///< Common transform of all estimates.
   double moved_m = 0.0;       ///< Largest motion by ICP of a corner of the estimates' box.
   /// Below the requested density if max_samples would be exceeded.
   double samples_per_m2 = 0.0;

@@ -25,7 +25,7 @@ struct Pair {
   Eigen::Vector3d point;
   Eigen::Vector3d normal;
   double offset_m = 0.0;    // along the normal, from the plane to the point
-  float distance_m = 0.0F;  // to the face
+  float distance_m = 0.0F;  // distance from the point to the face
 };
 
 class Pairing {

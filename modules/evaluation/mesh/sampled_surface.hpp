@@ -117,8 +117,8 @@ class NearestSurface {
 /// The point of a triangle nearest to a given point.
 struct TrianglePoint {
   double distance_m = 0.0;
-  int edge = -1;    ///< It is between corners `edge` and `edge` + 1 (of 3), or
-  int corner = -1;  ///< on this corner; both -1: inside.
+  int edge = -1;    ///< The point is on the edge between corners `edge` and `edge` + 1 (of 3).
+  int corner = -1;  ///< The point is on this corner. If both are -1, it is inside the face.
 };
 
 /// Nearest point of the triangle a, b, c, which may be degenerate.

@@ -79,7 +79,7 @@ std::optional<SE3> pose_in(const std::string& text) {
   const double pitch = n[4] * kRadians;
   const Eigen::Vector3d forward(std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch),
                                 std::sin(pitch));
-  // Up is opposite to the tilt, so that a view straight down has an up direction too.
+  // The up vector is perpendicular to `forward`, so that a view straight down has one too.
   const Eigen::Vector3d up(-std::cos(yaw) * std::sin(pitch), -std::sin(yaw) * std::sin(pitch),
                            std::cos(pitch));
   return make_pose(looking(forward, up).transpose(), position);

@@ -185,7 +185,8 @@ class Shader {
           view.unproject(column + 0.5, row + 0.5, static_cast<double>(surface.depth_m[at]))
               .cast<float>();
     });
-    const Eigen::Vector3d from(-0.45, -0.6, -0.66);  // in the camera: left, above, in front
+    const Eigen::Vector3d from(-0.45, -0.6, -0.66);  // direction to the light in the camera frame:
+                                                     // left, above, in front
     light_ = view.T_cam_world.linear().transpose() * from.normalized();
     for (int ring = 1; ring <= kRings; ++ring)
       for (int i = 0; i < kDirections; ++i) {

@@ -178,7 +178,9 @@ std::vector<std::uint8_t> world_ply(const World& world, const LabelPalette& pale
   std::vector<std::uint8_t> bytes(head.begin(), head.end());
   bytes.reserve(head.size() + kVertexSize * mesh.vertices.size() +
                 kFaceSize * mesh.triangles.size());
-  const auto add = [&bytes](const void* values, std::size_t size) {  // as they lie in memory
+  const auto add = [&bytes](const void* values, std::size_t size) {  // appends the bytes of
+                                                                     // `values` as they are in
+                                                                     // memory
     const auto* const first = static_cast<const std::uint8_t*>(values);
     bytes.insert(bytes.end(), first, first + size);
   };

@@ -8,18 +8,19 @@
 
 namespace km {
 
-/// Style of a multicopter flight. Defaults: like the easy and medium sequences of EuRoC's Vicon
-/// room.
+/// Style of a multicopter flight. The defaults resemble the easy and medium sequences of EuRoC's
+/// Vicon room.
 struct FlightOptions {
   static constexpr const char* kSection = "flight";
 
   std::uint64_t seed = 1;
-  double duration_s = 60.0;     ///< From time 0, standstill included.
-  double standstill_s = 2.0;    ///< Exactly at rest on the ground at the start.
-  double max_speed_mps = 1.0;   ///< Towards the next waypoint.
+  double duration_s = 60.0;     ///< Duration from time 0, standstill included.
+  double standstill_s = 2.0;    ///< Time exactly at rest on the ground at the start.
+  double max_speed_mps = 1.0;   ///< Largest speed towards the next waypoint.
   double max_yaw_rate = 1.047;  ///< [rad/s]
   double gusts_m = 0.008;       ///< Standard deviation of the displacement by gusts [m].
-  /// The body in the vehicle's frame (x forward, y left, z up); see vehicle_from_body().
+  /// Rotation of the body in the vehicle's frame (x forward, y left, z up); see
+  /// vehicle_from_body().
   Eigen::Matrix3d R_vehicle_body = Eigen::Matrix3d::Identity();
 
   void visit_fields(auto& visitor) {

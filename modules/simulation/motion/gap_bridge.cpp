@@ -28,7 +28,7 @@ struct Reckoned {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
 };
 
-using Reckoning = std::vector<Reckoned>;  // at each inertial sample
+using Reckoning = std::vector<Reckoned>;  // one entry per inertial sample
 
 Reckoning rotations(std::span<const ImuSample> imu, const Eigen::Matrix3d& start) {
   Reckoning states{{.stamp = imu.front().stamp, .R = start}};
@@ -43,7 +43,8 @@ Reckoning rotations(std::span<const ImuSample> imu, const Eigen::Matrix3d& start
   return states;
 }
 
-// Uses the present rotations. A sample's acceleration is the mean over the two ends of a step.
+// Integrates velocities and positions with the current rotations. The acceleration of a step is the
+// mean over its two ends.
 void integrate_positions(Reckoning& states, std::span<const ImuSample> imu, double gravity_mps2) {
   const Eigen::Vector3d g(0.0, 0.0, -gravity_mps2);
   for (std::size_t k = 1; k < states.size(); ++k) {
@@ -73,9 +74,9 @@ Reckoned at(const Reckoning& states, Stamp stamp) {
   return between;
 }
 
-// Solves for unknowns x with `rows(pose)` * x = `value(pose)` for each recorded pose. The last
-// three unknowns are near zero: `bias_weight` is the noise of a value over their standard
-// deviation.
+// Solves `rows(pose)` * x = `value(pose)` over all recorded poses for x by least squares. The last
+// three unknowns are biases, with a prior at zero. `bias_weight` is the standard deviation of a
+// value divided by that of a bias.
 Eigen::VectorXd least_squares(std::span<const StampedPose> poses, Eigen::Index unknowns,
                               double bias_weight, const auto& rows, const auto& value) {
   const auto n = static_cast<Eigen::Index>(poses.size());

@@ -57,7 +57,7 @@ void append_corner(const Eigen::Vector2d& before, const Eigen::Vector2d& corner,
   const double room = 0.5 * std::min((corner - before).norm(), (after - corner).norm());
   const double tan_half = std::tan(0.5 * std::abs(turn));
   const double cut =
-      std::min(radius_m * tan_half, room);  // from the corner to where the arc begins
+      std::min(radius_m * tan_half, room);  // distance from the corner to the begin of the arc
   const double radius = cut / tan_half;
   const Eigen::Vector2d begin = corner - cut * in;
   const Eigen::Vector2d left(-in.y(), in.x());

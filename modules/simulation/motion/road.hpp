@@ -63,7 +63,7 @@ struct SprungBody {
 /// down under braking, leaning outwards in curves.
 class Suspension {
  public:
-  /// At rest on `ground`.
+  /// Starts at rest on `ground`.
   explicit Suspension(const SprungBody& ground);
 
   /// State of the body after `dt_s`, in which the ground moves linearly to `ground`, at the

@@ -30,7 +30,7 @@ constexpr double kSmoothReach = 4.0;    // standard deviations
 // A vehicle's plan over equidistant points of its path.
 struct SpeedPlan {
   std::vector<double> limit_mps;
-  std::map<std::size_t, double> dwell_s;  // at points where the vehicle stops
+  std::map<std::size_t, double> dwell_s;  // duration of the stop, by index of the point
 };
 
 double curve_limit(double curvature, const VehicleOptions& options) {
@@ -93,7 +93,7 @@ std::vector<double> fastest(const std::vector<double>& limits, double accelerati
 std::vector<double> ways_in_time(const std::vector<double>& speeds, const SpeedPlan& plan,
                                  double wait_s, std::size_t count) {
   std::vector<double> ways;
-  double arrival = wait_s;  // at point k, after standing there
+  double arrival = wait_s;  // departure from point k, after the stop there
   for (std::size_t k = 0; k + 1 < speeds.size() && ways.size() < count; ++k) {
     const auto dwell = plan.dwell_s.find(k);
     if (dwell != plan.dwell_s.end()) arrival += dwell->second;
@@ -282,7 +282,9 @@ SplineTrajectory make_vehicle_trajectory(const Route& route, const GroundHeight&
       body = suspension.step(road.under_wheels(point, ways[k]), forward,
                              speed * speed * point.curvature, dt);
     poses.push_back(body_pose(point, body, options.rig_height_m));
-    if (k == 0) poses.insert(poses.end(), 2, poses.back());  // at rest before the start
+    if (k == 0)
+      poses.insert(poses.end(), 2, poses.back());  // the vehicle is at rest before the
+                                                   // start
   }
   return spline_along(0.0, dt, poses);
 }

@@ -229,7 +229,7 @@ std::uint8_t quantized(float share) {
   return static_cast<std::uint8_t>(std::min(255.0F, 255.0F * share + 0.5F));
 }
 
-// Byte `shift` / 8 of a word.
+// Value of byte `shift` / 8 of a word.
 float byte_of(std::uint32_t word, std::uint32_t shift) {
   return static_cast<float>(static_cast<std::int32_t>(word >> shift & 0xFFU));
 }

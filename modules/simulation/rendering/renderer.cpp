@@ -310,9 +310,9 @@ class ViewPass {
     }
   }
 
-  // Poles and wires narrower than a pixel can pass between all centres of a row or column. One more
-  // ray in every other pixel of 8 x 4, and in every pixel of the other rows, finds most of them.
-  // Pixels with a known edge need none.
+  // Poles and wires narrower than a pixel can pass between all centres of a row or column.
+  // Additional rays at alternating pixels of each block of 8 x 4 find most of them. Pixels with a
+  // known edge need none.
   void find_thin_things(int x0, int y0) {
     // Nothing in front of surfaces nearer than this is narrower than a pixel.
     constexpr float kThinnest_m = 0.02F;

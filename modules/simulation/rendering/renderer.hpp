@@ -49,8 +49,9 @@ struct RenderedView {
   std::vector<float> radiance;       ///< Linear grey, anti-aliased; a white wall in the sun is 1.
   std::vector<Eigen::Vector3f> rgb;  ///< Linear colour, anti-aliased.
   std::vector<float> depth_m;        ///< z in the camera frame at the pixel's centre [m]; 0: sky.
-  std::vector<LabelId> labels;       ///< At the pixel's centre; sky is SurfaceClass::kSky, pixels
-                                     ///< without a bearing SurfaceClass::kUnknown.
+  std::vector<LabelId> labels;       ///< Labels at the centres of the pixels. Sky is
+                                     ///< SurfaceClass::kSky; pixels without a bearing are
+                                     ///< SurfaceClass::kUnknown.
 };
 
 struct RenderRequest {

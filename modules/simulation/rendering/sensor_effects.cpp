@@ -108,7 +108,8 @@ std::vector<float> smoothed_transposed(const std::vector<float>& field, double s
 
 // Gaussian noise of unit variance that repeats, neighbours correlated over `sigma_px`.
 std::vector<float> make_noise_tile(double sigma_px) {
-  std::mt19937 random(20240229);  // any seed: each image takes another part of the tile
+  // A constant seed is enough, because each image uses another part of the tile.
+  std::mt19937 random(20240229);
   std::normal_distribution<float> normal;
   std::vector<float> tile(static_cast<std::size_t>(kTile) * kTile);
   for (float& value : tile) value = normal(random);
@@ -124,8 +125,8 @@ std::vector<float> make_noise_tile(double sigma_px) {
 
 // Noise levels common to all pixels of one shot.
 struct NoiseLevels {
-  float read_variance = 0.0F;    // in shares of saturation
-  float photon_variance = 0.0F;  // at saturation
+  float read_variance = 0.0F;    // variance in the dark; saturation is 1
+  float photon_variance = 0.0F;  // additional variance at saturation
 };
 
 NoiseLevels noise_levels(const SensorEffectsConfig& config, const Exposure& exposure) {

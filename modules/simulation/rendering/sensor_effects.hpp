@@ -52,7 +52,7 @@ struct SensorEffectsConfig {
 
 /// Setting of the sensor for one frame.
 struct Exposure {
-  double gain = 1.0;    ///< Radiance that saturates is 1 / gain.
+  double gain = 1.0;    ///< Radiance 1 / gain saturates the sensor.
   double time_s = 0.0;  ///< Shutter time, centred on the frame's stamp.
 };
 
@@ -71,11 +71,12 @@ class ExposureControl {
  public:
   static constexpr int kMeterShrink = 8;
 
-  /// `rate_hz` of the frames. Throws ConfigError, std::invalid_argument for a rate not positive.
+  /// `rate_hz`: rate of the frames. Throws ConfigError, and std::invalid_argument if the rate is
+  /// not positive.
   ExposureControl(const SensorEffectsConfig& config, double rate_hz);
 
-  /// Exposure of the frame that sees `scene` (its `radiance` is used). The first frame is at the
-  /// target at once. Throws std::invalid_argument without radiance.
+  /// Returns the exposure of the frame that sees `scene`, from its `radiance`. The first frame gets
+  /// the target level at once. Throws std::invalid_argument without radiance.
   [[nodiscard]] Exposure next(const RenderedView& scene);
 
  private:
@@ -118,7 +119,8 @@ struct ColorImage {
 struct Shot {
   Exposure exposure;
   Vector6 body_velocity = Vector6::Zero();  ///< [rad/s; m/s] in the body frame, at the stamp.
-  std::uint64_t noise_seed = 0;             ///< One per image: left and right differ.
+  std::uint64_t noise_seed = 0;             ///< Seed of the image; different for left and right
+                                            ///< images.
 };
 
 /// Converts light on the sensor to grey levels: blur of lens and motion, vignetting, exposure,

@@ -23,7 +23,7 @@ float exp_negative(float x) {
   constexpr float kLog2e = 1.44269504F;
   constexpr float kLn2 = 0.693147181F;
   constexpr float kHalfRoot = 0.707106781F;
-  constexpr float kSmallest = 100.0F;  // as a power of two
+  constexpr float kSmallest = 100.0F;  // largest negative exponent of two
   const float power = std::min(x * kLog2e, kSmallest);
   const auto whole = static_cast<std::int32_t>(power);
   const float z = (0.5F - (power - static_cast<float>(whole))) * kLn2;  // within 0.35 of zero

@@ -29,13 +29,13 @@ struct Shade {
   Value sun;      ///< Light of the sun if it is not hidden.
 };
 
-/// Lanes of `wanted` that the sun does not reach: shadowed, or turned away. All of `wanted` must
-/// have been located.
+/// Lanes of `wanted` that the sun does not reach: in shadow, or turned away from it. Precondition:
+/// all lanes of `wanted` have been located.
 [[nodiscard]] LaneMask shadowed(const RenderScene& scene, LaneMask wanted,
                                 const SurfacePoints& points);
 
-/// Radiance of each wanted lane, haze included; the others' is undefined. Those of `wanted` that
-/// are in hits.surface must have been located.
+/// Radiance of each wanted lane, haze included; undefined for the other lanes. Precondition: the
+/// lanes of `wanted` that are in hits.surface have been located.
 template <typename Value>
 void shade(const RenderScene& scene, const SurfaceHits& hits, const SurfacePoints& points,
            LaneMask wanted, std::array<Shade<Value>, kLanes>& shades);

@@ -175,7 +175,7 @@ void set_footprints(const Gathered& g, SurfacePoints& points) {
     const float eu = half > 0.0F ? largest - c : b;
     const float ev = half > 0.0F ? b : largest - a;
     const float length = std::sqrt(eu * eu + ev * ev);
-    constexpr float kMost_m = 1e4F;  // at the horizon
+    constexpr float kMost_m = 1e4F;  // limit of the footprint at the horizon
     const float major_m = std::min(std::sqrt(largest), kMost_m);
     const float area = std::abs(u_x * v_y - u_y * v_x);
     points.major_m[i] = major_m;

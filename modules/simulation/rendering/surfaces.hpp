@@ -85,14 +85,14 @@ struct SurfaceHits {
 /// Geometry of the hit points, lane by lane. Lanes without a hit have finite, meaningless values.
 struct SurfacePoints {
   Lanes3 view;          ///< Unit vector along the ray.
-  Lanes distance_m;     ///< Along the ray.
+  Lanes distance_m;     ///< Distance along the ray.
   Lanes3 position;      ///< [m]
-  Lanes3 plane_normal;  ///< Towards the viewer.
-  Lanes3 normal;        ///< For shading, towards the viewer.
+  Lanes3 plane_normal;  ///< Normal of the plane, towards the viewer.
+  Lanes3 normal;        ///< Normal for shading, towards the viewer.
   std::array<const ShadingMaterial*, kLanes> material;
   Lanes u, v;              ///< Texture coordinates [m].
   Lanes major_u, major_v;  ///< Longer axis of a pixel's footprint [m].
-  Lanes major_m, minor_m;  ///< Its axes' lengths [m].
+  Lanes major_m, minor_m;  ///< Lengths of the axes of the footprint [m].
 };
 
 /// Computes positions, normals and texture footprints (exact ray differentials: Igehy, "Tracing Ray

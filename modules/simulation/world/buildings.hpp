@@ -28,9 +28,9 @@ struct FacadeStyle {
   float recess_m = 0.16F;  ///< Depth of the glass behind the wall.
   Window window = Window::kCasement;
   GroundFloor ground_floor = GroundFloor::kWindows;
-  bool surrounds = false;  ///< Raised frames of stone around windows.
+  bool surrounds = false;  ///< Stone frames around windows.
   bool shutters = false;   ///< Open shutters beside windows.
-  bool balconies = false;  ///< In every third bay.
+  bool balconies = false;  ///< Balconies in every third bay.
   bool string_courses = true;
   bool cornice = true;
   bool downpipe = true;
@@ -38,10 +38,10 @@ struct FacadeStyle {
   MaterialId base = 0;     ///< Wall of the ground floor.
   MaterialId trim = 0;     ///< Sills, surrounds, courses, cornice.
   MaterialId frame = 0;    ///< Window frames.
-  MaterialId shutter = 0;  ///< Also doors.
+  MaterialId shutter = 0;  ///< Material of shutters and doors.
 };
 
-/// Kind of one of the four walls: a facade, a few small windows, none, no wall.
+/// Kind of one of the four walls: facade with windows, few small windows, no windows, no wall.
 enum class WallKind : std::uint8_t { kRich, kPlain, kBlind, kNone };
 
 /// A house on a rectangle: walls of x from 0 to width, of y from 0 to depth, front at y = 0.
@@ -49,10 +49,10 @@ struct Building {
   float width_m = 10.0F;
   float depth_m = 10.0F;
   FacadeStyle style;
-  bool ridge =
-      false;  ///< A ridge along x with gables at both ends; else flat, with machines on it.
+  bool ridge = false;  ///< Roof with a ridge along x and gables at both ends; otherwise flat, with
+                       ///< machines on it.
   MaterialId roofing = 0;
-  /// Front (y = 0), right, back, left.
+  /// Walls in the order front (y = 0), right, back, left.
   std::array<WallKind, 4> walls = {WallKind::kRich, WallKind::kBlind, WallKind::kPlain,
                                    WallKind::kBlind};
 };

@@ -380,7 +380,7 @@ void add_beside_track(CampSite& site, const Vector2f& middle, const Vector2f& ou
     site.stand(at, yaw, thing.radius_m, thing.add, random);
 }
 
-/// Both edges of every track, where the robots pass.
+/// Places things along both edges of every track, where the robots pass.
 void add_along_tracks(CampSite& site, const CampPlan& plan, SeededRandom& random) {
   constexpr int kTries = 4;
   for (const Track& track : plan.tracks()) {

@@ -66,7 +66,7 @@ void add_octave(int cells_u, int cells_v, float deviation, SeededRandom& random,
 }
 
 struct CellPoint {
-  float x, y;  // in cells, from the corner of the cell looked at
+  float x, y;  // position relative to the corner of the current cell [cells]
   std::uint32_t id;
 };
 

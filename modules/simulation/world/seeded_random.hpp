@@ -17,7 +17,8 @@ namespace km {
 }
 
 /// Random draws that are equal on every platform, because std::mt19937_64 is specified bit by bit.
-/// The distributions of the standard library are not. Values are drawn in call order.
+/// The distributions of the standard library are not specified and therefore not used. Values are
+/// drawn in call order.
 class SeededRandom {
  public:
   explicit SeededRandom(std::uint64_t seed) : engine_(mixed(seed)) {}

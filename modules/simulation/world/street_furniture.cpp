@@ -35,7 +35,7 @@ void add_plate(Scene& scene, int corners, float radius, float turn, float z, Mat
   Eigen::Isometry3f upright = Eigen::Isometry3f::Identity();
   upright.linear() = Eigen::AngleAxisf(0.5F * kPi, Vector3f::UnitX()).toRotationMatrix();
   upright.translation() = Vector3f(0.0F, -0.04F, z);
-  const auto frame = scene.at(upright);  // its z points to -y
+  const auto frame = scene.at(upright);  // frame whose z axis points to -y
   scene.extrude(regular(corners, radius, turn), 0.0F, 0.02F, rim);
   scene.polygon(regular(corners, 0.78F * radius, turn), 0.024F, field);
 }

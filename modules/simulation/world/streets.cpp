@@ -247,7 +247,7 @@ void add_outer_ground(Scene& scene, const CityPlan& plan, const GroundPaints& pa
 /// crossing it leaves.
 struct StreetRun {
   Eigen::Isometry3f T_world_run;
-  float length_m = 0.0F;  // from crossing to crossing
+  float length_m = 0.0F;  // length from crossing to crossing
 };
 
 void add_line(Scene& scene, float x0, float x1, float y, float width, MaterialId paint) {

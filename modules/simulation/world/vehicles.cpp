@@ -22,10 +22,10 @@ struct BodyStation {
   float bottom = 0.25F;     // height of the sill [m]
   float belt = 0.9F;        // height of the windows' lower edge [m]
   float top = 1.4F;         // height of the roof or bonnet [m]
-  float half_width = 0.9F;  // at the widest [m]
+  float half_width = 0.9F;  // half width at the widest place [m]
   float half_roof = 0.6F;   // half width of the roof or bonnet [m]
-  bool side_glass = false;  // from here to the next station, belt to roof
-  bool top_glass = false;   // from here to the next station: a screen across
+  bool side_glass = false;  // windows from belt to roof, up to the next station
+  bool top_glass = false;   // screen across the vehicle, up to the next station
 };
 
 struct VehiclePaints {

@@ -19,7 +19,7 @@ using enum Recipe;
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-/// Something flat, centred, its sides closed.
+/// Adds a flat plate, centred at the origin, with side faces.
 void add_flat(Scene& scene, const Vector2f& size, float z, MaterialId material) {
   constexpr float kThickness_m = 0.002F;
   const Vector2f half = 0.5F * size;

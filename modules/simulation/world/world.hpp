@@ -73,14 +73,14 @@ struct Lighting {
   float sun = 0.0F;                                   ///< Irradiance of a surface facing it.
   float ambient = 0.3F;                               ///< Irradiance from an open sky or room.
   std::vector<Lamp> lamps;
-  float haze_distance_m = 0.0F;  ///< Contrast falls to 1/e over it; 0: clear air.
+  float haze_distance_m = 0.0F;  ///< Distance at which contrast falls to 1/e; 0: clear air.
 };
 
 /// A closed way along which vehicles drive, centre line of their lane in driving direction, right
 /// hand traffic. The last point joins the first.
 struct Route {
   std::vector<Eigen::Vector2d> points;  ///< In the world's xy plane [m], corners unrounded.
-  double speed_mps = 6.0;               ///< On straights.
+  double speed_mps = 6.0;               ///< Speed on straights.
 };
 
 /// A procedural world. Pure data: equal for equal (name, seed), whatever the machine's thread

@@ -9,7 +9,7 @@ using Catch::Contains;
 
 const std::string kTool = KM_BIN_DIR "/kimera_multi_pgo ";
 
-TEST_CASE("Without a subcommand the program names those there are", "[pgo]") {
+TEST_CASE("Without a subcommand the program lists its subcommands", "[pgo]") {
   const std::string arguments =
       GENERATE("", "graph.g2o", "graph.g2o --method newton", "best a.g2o");
   CAPTURE(arguments);
@@ -19,7 +19,7 @@ TEST_CASE("Without a subcommand the program names those there are", "[pgo]") {
                                 Contains("\n  pcm ") && Contains("\n  outliers "));
 }
 
-TEST_CASE("Every subcommand teaches by examples and has its own options only", "[pgo]") {
+TEST_CASE("The help of every subcommand has examples and only its own options", "[pgo]") {
   const auto [subcommand, own, other] = GENERATE(
       table<std::string, std::string, std::string>({{"solve", "--trust-all", "--search"},
                                                     {"pcm", "--search", "--robots"},

@@ -17,7 +17,7 @@ using Catch::Contains;
 
 const std::string kOutliersTool = KM_BIN_DIR "/kimera_multi_pgo outliers ";
 
-// A square driven round five times in the plane, each lap tied to the one before.
+// A square driven five times in the plane, each lap joined to the one before by closures.
 std::string laps_g2o() {
   std::string text;
   const auto edge = [&](int i, int j, const char* measured) {
@@ -68,7 +68,7 @@ TEST_CASE("Clusters of false closures are added on request", "[outliers]") {
   CHECK_THAT(result.output, Contains("newton    0 %      6"));
 }
 
-TEST_CASE("Of several seeds outliers shows the worst", "[outliers]") {
+TEST_CASE("outliers shows the worst result of several seeds", "[outliers]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
   const auto rmse_of = [&](const std::string& seeds) {
@@ -88,7 +88,7 @@ TEST_CASE("Of several seeds outliers shows the worst", "[outliers]") {
   CHECK(rmse_of("1,2,3") == worst_m);
 }
 
-TEST_CASE("outliers says what is wrong with its input", "[outliers]") {
+TEST_CASE("outliers reports the fault of its input", "[outliers]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
   const auto fails_with = [](const std::string& arguments, const std::string& message) {
@@ -109,7 +109,7 @@ TEST_CASE("outliers says what is wrong with its input", "[outliers]") {
 
 constexpr double kSigma = 0.01;
 
-// Of a few hundred poses, with weights as its noise has them.
+// A graph of 90 poses whose weights agree with its noise.
 TeamGraph clean_graph(unsigned seed) {
   std::mt19937 rng(seed);
   TeamGraph graph = noisy_chain(90, 3, kSigma, rng);
@@ -120,7 +120,7 @@ TeamGraph clean_graph(unsigned seed) {
   return graph;
 }
 
-TEST_CASE("false closures come after a graph's own edges, and from the seed alone", "[outliers]") {
+TEST_CASE("false closures follow a graph's own edges and depend on the seed alone", "[outliers]") {
   TeamGraph graph = clean_graph(1);
   graph.edges[1].kappa = 7.0;
   const TeamGraph spoiled = spoil(graph, 50, 4.0, 3);
@@ -142,7 +142,7 @@ TEST_CASE("false closures come after a graph's own edges, and from the seed alon
   CHECK_THROWS_AS(spoil(graph, 1, 4.0, 3), std::invalid_argument);
 }
 
-TEST_CASE("pairwise consistency keeps what agrees, robot pair by robot pair", "[outliers]") {
+TEST_CASE("pairwise consistency keeps true closures and no false ones", "[outliers]") {
   const unsigned seed = GENERATE(1U, 2U);
   CAPTURE(seed);
   const std::size_t own_edges = clean_graph(seed).edges.size();
@@ -154,12 +154,12 @@ TEST_CASE("pairwise consistency keeps what agrees, robot pair by robot pair", "[
     if (k < own_edges && !kept[k]) ++true_lost;
   }
   CHECK(false_kept == 0);
-  CHECK(true_lost < own_edges / 4);  // a pair of true ones passes at 99 % only
+  CHECK(true_lost < own_edges / 4);  // a pair of true ones passes with a probability of 99 %
 }
 
-TEST_CASE("pairwise consistency counts in sigmas of the scale that it is told", "[outliers]") {
+TEST_CASE("pairwise consistency multiplies all sigmas by the given scale", "[outliers]") {
   TeamGraph modest = clean_graph(1);
-  constexpr double kScale = 0.004;  // the graph says 250 times the noise that there is
+  constexpr double kScale = 0.004;  // the graph claims 250 times the actual noise
   for (BlockEdge& e : modest.edges) {
     e.kappa *= kScale * kScale;
     e.tau *= kScale * kScale;
@@ -170,13 +170,13 @@ TEST_CASE("pairwise consistency counts in sigmas of the scale that it is told", 
   CHECK(pairwise_consistent(spoiled, {}) != kept);
 }
 
-TEST_CASE("a robot without odometry has no pairwise consistency", "[outliers]") {
+TEST_CASE("pairwise consistency refuses a robot with interrupted odometry", "[outliers]") {
   TeamGraph graph = clean_graph(1);
   std::erase_if(graph.edges, [](const BlockEdge& e) { return e.i == 4 && e.j == 5; });
   CHECK_THROWS_WITH(pairwise_consistent(graph, {}), Catch::Contains("0:5"));
 }
 
-TEST_CASE("what is rejected does not bend the map, what is kept does", "[outliers]") {
+TEST_CASE("rejected closures do not distort the map, and kept false ones do", "[outliers]") {
   const OutlierStudyOptions options{
       .shares_percent = {0.0, 30.0}, .methods = kRejections, .barc = 6.0};
   std::vector<std::size_t> told;
@@ -199,7 +199,7 @@ TEST_CASE("what is rejected does not bend the map, what is kept does", "[outlier
     } else {
       CHECK(result.decided);
       CHECK(result.false_kept == 0);
-      CHECK(result.rmse_m < kSigma);  // true ones lost cost less than the noise of one
+      CHECK(result.rmse_m < kSigma);  // lost true closures change poses by less than their noise
     }
     if (result.method == "newton") CHECK(result.true_kept == study.true_closures);
   }

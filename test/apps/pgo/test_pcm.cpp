@@ -21,7 +21,7 @@ using Catch::Contains;
 
 const std::string kPcmTool = std::string(KM_BIN_DIR) + "/kimera_multi_pgo pcm ";
 
-// A triangle, and a vertex on its own.
+// A triangle and an isolated vertex.
 constexpr const char* kGraph = "4\n\n0\n\n0 1\n";
 
 TEST_CASE("pcm prints a table and writes JSON and a plot", "[pcm]") {
@@ -44,7 +44,7 @@ TEST_CASE("pcm prints a table and writes JSON and a plot", "[pcm]") {
   CHECK(plots[1]["series"][1]["points"].back() == Json::parse("[4.0, 3.0]"));
 }
 
-TEST_CASE("pcm says what is wrong with its input", "[pcm]") {
+TEST_CASE("pcm reports the fault of its input", "[pcm]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("graph.txt", kGraph).string();
   const std::string bad = folder.write("bad.txt", "2\n\n7\n").string();
@@ -84,7 +84,7 @@ std::vector<LabelledClosure> mixed(std::size_t count, std::mt19937& rng) {
   return closures;
 }
 
-TEST_CASE("A run ends with the set that Pcm has", "[pcm]") {
+TEST_CASE("A run ends with the same set as Pcm", "[pcm]") {
   const CliqueMethod search =
       GENERATE(CliqueMethod::kExact, CliqueMethod::kIncremental, CliqueMethod::kBatch);
   const bool gate = GENERATE(false, true);
@@ -104,19 +104,20 @@ TEST_CASE("A run ends with the set that Pcm has", "[pcm]") {
   CHECK(run.additions.back().clique == pcm.inliers().size());
   CHECK(run.additions.size() + run.dropped_true + run.dropped_false == closures.size());
   CHECK((run.dropped_false > 0) == gate);
-  // 40 true ones; 1 % of their pairs, about 8, may fail by chance and cost a member each.
+  // There are 40 true closures. About 8 of their pairs (1 %) may fail by chance, and each costs one
+  // member.
   CHECK(run.additions.back().clique >= 32);
   CHECK(run.additions.back().true_members == run.additions.back().clique);
 }
 
-TEST_CASE("Closures that cannot be weighed are named", "[pcm]") {
+TEST_CASE("Closures without a usable covariance are refused by name", "[pcm]") {
   std::mt19937 rng(1);
   std::vector<LabelledClosure> closures = mixed(3, rng);
   closures[1].closure.covariance(0, 0) = -1.0;
   CHECK_THROWS_WITH(run_pcm(closures, PcmConfig{}), Catch::Contains("cannot be weighed"));
 }
 
-TEST_CASE("The JSON of a run has the agreed keys", "[pcm]") {
+TEST_CASE("The JSON of a run has the documented keys", "[pcm]") {
   PcmRun run;
   run.search = "batch";
   run.additions = {{.vertices = 1,
@@ -139,7 +140,7 @@ TEST_CASE("The JSON of a run has the agreed keys", "[pcm]") {
   CHECK_THAT(two.str(), Catch::Contains("\"false_members\": null"));
 }
 
-TEST_CASE("The report of an empty run, and of one vertex, is one", "[pcm]") {
+TEST_CASE("Reports of an empty run and of a run of one vertex are valid", "[pcm]") {
   const auto vertices = GENERATE(std::size_t{0}, std::size_t{1});
   const PcmRun run = run_pcm(ConsistencyRows(vertices), PcmConfig{});
   CHECK_THAT(pcm_text(run), Catch::Contains("a maximum at every step"));
@@ -147,7 +148,7 @@ TEST_CASE("The report of an empty run, and of one vertex, is one", "[pcm]") {
     for (const PlotSeries& series : plot.series) CHECK(series.points.size() == vertices);
 }
 
-TEST_CASE("Manhattan with 1000 outliers: true closures make the clique", "[pcm]") {
+TEST_CASE("With 1000 outliers the clique of Manhattan consists of true closures", "[pcm]") {
   const auto file = shared_data("pose_graphs/2d/manhattan.g2o");
   if (!file) return;
   ClosureChoice selection;
@@ -155,8 +156,8 @@ TEST_CASE("Manhattan with 1000 outliers: true closures make the clique", "[pcm]"
   PcmConfig config;
   config.odometry_gate = true;
   const PcmRun run = run_pcm(read_closures(*file, {}, selection).closures, config);
-  // The gate is lenient where odometry has become uncertain, but never drops more than the 1 % of
-  // true closures that its confidence gives away.
+  // The gate is lenient if odometry is uncertain, but drops no more than the 1 % of true closures
+  // that its confidence allows.
   CHECK(run.dropped_true <= 20);
   CHECK(run.dropped_false >= 500);
   const PcmAddition& last = run.additions.back();
@@ -170,13 +171,13 @@ ConsistencyRows rows_of(const std::string& text) {
   return read_consistency_rows(in, "graph.txt");
 }
 
-TEST_CASE("A consistency graph is read line by line, empty lines are lone vertices", "[pcm]") {
+TEST_CASE("Empty lines of a consistency graph are isolated vertices", "[pcm]") {
   const ConsistencyRows rows = rows_of("5\n\n\n1 0 \n2\r\n\n");
   CHECK(rows == ConsistencyRows{{}, {}, {0, 1}, {2}, {}});
   CHECK(rows_of("0\n").empty());
 }
 
-TEST_CASE("A consistency graph that cannot be one is refused with its line", "[pcm]") {
+TEST_CASE("An invalid consistency graph is refused with its line", "[pcm]") {
   const auto [text, message] = GENERATE(table<std::string, std::string>(
       {{"", "graph.txt:1: must be the number of vertices"},
        {"\n3\n", "graph.txt:1: must be the number of vertices"},
@@ -192,7 +193,7 @@ TEST_CASE("A consistency graph that cannot be one is refused with its line", "[p
   CHECK_THROWS_WITH(rows_of(text), Contains(message));
 }
 
-TEST_CASE("Labels name the false closures, whichever way round", "[pcm]") {
+TEST_CASE("Labels apply to false closures in either order of keyframes", "[pcm]") {
   std::istringstream good("9 3 1\n4 8 0\n1 5 1\n");
   CHECK(read_outlier_labels(good, "labels") == KeyframePairs{{1, 5}, {3, 9}});
   std::istringstream flag("1 5 2\n");
@@ -252,7 +253,7 @@ TEST_CASE("Closures come from the file, labelled, with random ones among them", 
   }
 }
 
-TEST_CASE("A pose graph without what is asked of it is refused", "[pcm]") {
+TEST_CASE("A pose graph without enough closures is refused", "[pcm]") {
   const TemporaryFolder folder;
   ClosureChoice selection;
   const auto none = folder.write("none.g2o", chain_g2o(5, {}));

@@ -36,7 +36,7 @@ struct Whole {
   explicit Whole(Index poses, unsigned seed = 1) {
     std::mt19937 rng(seed);
     graph = noisy_chain(poses, 1, 0.0, rng);
-    std::set<std::pair<Index, Index>> known;  // a pair of poses counts once with robots
+    std::set<std::pair<Index, Index>> known;  // robots use one edge per pair of poses
     std::erase_if(graph.edges,
                   [&](const BlockEdge& e) { return !known.insert(std::minmax(e.i, e.j)).second; });
     truth.push_back(SE3::Identity());
@@ -49,7 +49,7 @@ Scenario two_robots() {
   return {.name = "two", .robots = 2, .step_sigma = kStep, .closure_sigma = kClosure};
 }
 
-// Rotation and translation error of an edge, in what it claims.
+// Errors of the rotation and translation of an edge, as multiples of the claimed sigmas.
 Vector6 error_of(const ScenarioGraph& drawn, const BlockEdge& e) {
   const SE3 T = drawn.truth[static_cast<std::size_t>(e.i)].inverse() *
                 drawn.truth[static_cast<std::size_t>(e.j)];
@@ -68,7 +68,8 @@ struct Spread {
     count += 6.0;
   }
   [[nodiscard]] double scale() const { return std::sqrt(squares / count); }
-  // Relative sigma of the scale: the square of a standard normal has variance 2.
+  // Relative standard deviation of the estimated scale: the square of a standard normal has
+  // variance 2.
   [[nodiscard]] double sigma() const { return std::sqrt(0.5 / count); }
 };
 
@@ -80,7 +81,7 @@ void check_scale(const Spread& spread, double expected) {
   CHECK(std::abs(spread.scale() / expected - 1.0) < kConfidence * spread.sigma());
 }
 
-TEST_CASE("Noise is as many times what is claimed as a scenario says", "[scenario]") {
+TEST_CASE("The ratio of noise to claim is that of the scenario", "[scenario]") {
   const unsigned seed = GENERATE(1U, 2U);
   CAPTURE(seed);
   const Whole whole(600);
@@ -99,15 +100,15 @@ TEST_CASE("Noise is as many times what is claimed as a scenario says", "[scenari
     const double sigma_m = better * (odometry[k] ? kStep : kClosure).translation_m;
     CHECK(e.tau == Approx(1.0 / (sigma_m * sigma_m)));
   }
-  CHECK(steps.size() == 2);  // none between the robots
+  CHECK(steps.size() == 2);  // no steps between the robots
   check_scale(steps[{0, 0}], 1.0);
   check_scale(steps[{1, 1}], 7.0);
   check_scale(closures[{0, 0}], 0.25);
-  check_scale(closures[{0, 1}], 1.0);  // the larger of both robots' factors
+  check_scale(closures[{0, 1}], 1.0);  // larger factor of both robots
   check_scale(closures[{1, 1}], 1.0);
 }
 
-TEST_CASE("Honest weights are those of the noise that was drawn", "[scenario]") {
+TEST_CASE("Honest weights are those of the drawn noise", "[scenario]") {
   const Whole whole(600);
   Scenario scenario = two_robots();
   scenario.odometry_noise = {{1, 7.0}};
@@ -125,10 +126,11 @@ TEST_CASE("Honest weights are those of the noise that was drawn", "[scenario]") 
   }
 }
 
-TEST_CASE("Closures of one place share their bias, those of two places do not", "[scenario]") {
+TEST_CASE("Closures of one place share their bias, and closures of two places do not",
+          "[scenario]") {
   const Whole whole(600);
   Scenario scenario = two_robots();
-  scenario.closure_noise = {{0, 0.0}, {1, 0.0}};  // nothing but the bias
+  scenario.closure_noise = {{0, 0.0}, {1, 0.0}};  // no noise, only the bias
   scenario.place_bias = 3.0;
   const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, 1);
   const std::vector<bool> odometry = odometry_edges(drawn.graph);
@@ -166,7 +168,8 @@ TEST_CASE("Closures of a cluster agree with each other within their noise, not w
   const auto& edges = drawn.graph.edges;
   const std::size_t first = edges.size() - kPlaces * kSize;
   CHECK(std::count(drawn.is_false.begin(), drawn.is_false.end(), true) == kPlaces * kSize);
-  // Rotations alone: R_a_b of each closure, taken to the first one's ends along the truth.
+  // Only rotations: R_a_b of each closure, transported to the ends of the first one along the
+  // truth.
   double squares = 0.0, count = 0.0;
   for (std::size_t place = 0; place < kPlaces; ++place) {
     const BlockEdge& e0 = edges[first + place * kSize];
@@ -188,11 +191,11 @@ TEST_CASE("Closures of a cluster agree with each other within their noise, not w
       count += 3.0;
     }
   }
-  // The first closure of a place is in all of its six differences: as few as half are independent.
+  // All six differences of a place share its first closure, so that as few as half are independent.
   CHECK(std::abs(std::sqrt(squares / count) - 1.0) < kConfidence * std::sqrt(0.5 / (0.3 * count)));
 }
 
-TEST_CASE("A scenario leaves as many closures between two robots as it says", "[scenario]") {
+TEST_CASE("A scenario limits the closures between two robots", "[scenario]") {
   const Whole whole(600);
   Scenario scenario = two_robots();
   scenario.robots = 3;
@@ -224,7 +227,7 @@ TEST_CASE("A scenario scales its truth and takes the first poses", "[scenario]")
   CHECK(drawn.graph.first == std::vector<Index>{0, 45, 90});
   double length_m = 0.0, steps = 0.0;
   for (std::size_t i = 1; i < drawn.truth.size(); ++i) {
-    if (i == 45) continue;  // no robot's odometry
+    if (i == 45) continue;  // edge between two robots
     length_m += (drawn.truth[i].translation() - drawn.truth[i - 1].translation()).norm();
     steps += 1.0;
   }
@@ -232,7 +235,7 @@ TEST_CASE("A scenario scales its truth and takes the first poses", "[scenario]")
   CHECK(drawn.truth[7].linear() == whole.truth[7].linear());
 }
 
-TEST_CASE("A scenario is drawn from its seed alone", "[scenario]") {
+TEST_CASE("A scenario depends on its seed alone", "[scenario]") {
   const Whole whole(90);
   Scenario scenario = two_robots();
   scenario.random_percent = 20.0;
@@ -306,7 +309,7 @@ TEST_CASE("The central solver finds the truth of exact edges from a wrong start"
   CHECK(judge(drawn, {start, placed.frame_of, all}).max_m > 0.05);
 }
 
-TEST_CASE("Honest noise costs the robots nothing against the reference", "[scenario]") {
+TEST_CASE("With honest noise the robots' error is close to the reference", "[scenario]") {
   const Whole whole(90);
   auto results = results_of(whole, two_robots());
   CHECK(results["robots"].decided);
@@ -316,7 +319,7 @@ TEST_CASE("Honest noise costs the robots nothing against the reference", "[scena
   CHECK(results["trust-all"].rms_m == Approx(results["reference"].rms_m).epsilon(1e-6));
 }
 
-TEST_CASE("False closures are counted by what keeps them", "[scenario]") {
+TEST_CASE("Kept false closures are counted by method", "[scenario]") {
   const Whole whole(90);
   Scenario scenario = two_robots();
   scenario.random_percent = 20.0;
@@ -349,7 +352,7 @@ TEST_CASE("The robots' own code stands noise and places that are not as claimed"
     std::string scenario;
     std::string graph;
     double most_lost;   // share of true closures
-    double most_ratio;  // of the RMS error to that of the reference
+    double most_ratio;  // RMS error over that of the reference
   };
   const Row row = GENERATE(Row{"noisy-odometry", "sphere2500", 0.02, 1.1},
                            Row{"clusters", "parking-garage", 0.0, 1.01},
@@ -400,7 +403,7 @@ TEST_CASE("outliers runs a scenario that options have changed", "[scenario]") {
   CHECK_THAT(folder.read("out.json"), Contains("\"between_robots_lost\":"));
 }
 
-TEST_CASE("outliers says which options are for scenarios", "[scenario]") {
+TEST_CASE("outliers refuses options that do not fit the kind of study", "[scenario]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("steps.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string();
   const auto fails_with = [&](const std::string& arguments, const std::string& message) {

@@ -18,7 +18,7 @@ using Catch::Contains;
 
 const std::string kSolveTool = KM_BIN_DIR "/kimera_multi_pgo solve ";
 
-// A square driven twice in the plane, its second lap tied to the first.
+// A square driven twice in the plane, its second lap joined to the first by closures.
 std::string square_g2o() {
   std::string text;
   const auto edge = [&](int i, int j, const char* measured) {
@@ -32,7 +32,7 @@ std::string square_g2o() {
 
 }  // namespace
 
-TEST_CASE("Every method runs from the command line and says what it reached", "[pgo]") {
+TEST_CASE("Every method runs from the command line and prints its result", "[pgo]") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", square_g2o());
   const auto json = folder.path() / "out.json";
@@ -81,7 +81,7 @@ TEST_CASE("Poses and plot are written", "[pgo]") {
   CHECK(data_of_page(folder.read("gap.html"), "plots")["charts"].size() == 3);
 }
 
-TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]") {
+TEST_CASE("A graph without noise is certified and has no gap", "[pgo]") {
   const TemporaryFolder folder;
   const auto graph = folder.write("exact.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
   const auto json = folder.path() / "out.json";
@@ -94,7 +94,7 @@ TEST_CASE("A graph without noise has no gap to report, and is certified", "[pgo]
   CHECK_THAT(folder.read("out.json"), !Contains("nan") && Contains("\"certified\": true"));
 }
 
-TEST_CASE("The plot goes on to the last round where no gap is left", "[pgo]") {
+TEST_CASE("The plot continues to the last round when no gap is left", "[pgo]") {
   Solution solution;
   solution.judgement = Judgement{.optimum = 1.0};
   for (const double gap : {0.02, 3e-5, 0.0, -1e-15}) {
@@ -107,7 +107,7 @@ TEST_CASE("The plot goes on to the last round where no gap is left", "[pgo]") {
   const std::vector<PlotPoint>& points = plots[0].series[0].points;
   REQUIRE(points.size() == 4);
   CHECK(points[1].y == Approx(3e-5));
-  for (const std::size_t k : {2, 3}) {  // the decade below the least gap
+  for (const std::size_t k : {2, 3}) {  // decade below the least gap
     CHECK(points[k].x == 5.0 * static_cast<double>(k));
     CHECK(points[k].y == Approx(1e-5));
   }
@@ -115,7 +115,7 @@ TEST_CASE("The plot goes on to the last round where no gap is left", "[pgo]") {
   CHECK_THAT(gap_plots(solution)[0].title, !Contains("bottom"));
 }
 
-TEST_CASE("A method without rounds has a plot to look at", "[pgo]") {
+TEST_CASE("A method without rounds still has a plot", "[pgo]") {
   Solution solution;
   solution.run.rounds.emplace_back().cost = 1.0;
   solution.judgement = Judgement{.optimum = 1.0};
@@ -124,7 +124,7 @@ TEST_CASE("A method without rounds has a plot to look at", "[pgo]") {
   CHECK(series.style == PlotSeries::Style::kMarkedLine);
 }
 
-TEST_CASE("newton decides, and says how noisy closures are", "[pgo]") {
+TEST_CASE("newton decides on closures and reports their noise", "[pgo]") {
   const TemporaryFolder folder;
   const std::string square = folder.write("square.g2o", square_g2o()).string();
   const std::string step = folder.write("step.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string();
@@ -143,7 +143,7 @@ TEST_CASE("newton decides, and says how noisy closures are", "[pgo]") {
   CHECK_THAT(strict.output, Contains("kept 0 of 4 closures between robots"));
 }
 
-TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
+TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("square.g2o", square_g2o()).string();
   (void)folder.write("lone.g2o", "VERTEX_SE2 0 0 0 0\n");
@@ -185,14 +185,14 @@ TEST_CASE("What cannot be done is told with the reason", "[pgo]") {
   CHECK_THAT(result.output, Contains(message));
 }
 
-TEST_CASE("A planar graph costs what it costs in the plane", "[pgo]") {
+TEST_CASE("The cost of a planar graph is that of the plane", "[pgo]") {
   const auto file = shared_data("pose_graphs/2d/intel.g2o");
   if (!file) return;
   const CommandResult result =
       run_command(kSolveTool + file->string() + " --robots 5 --keep-steps --method centralized");
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
-  // SE-Sync's optimum; the staircase certifies once what is left is below 4e-8 of the cost.
+  // Optimum of SE-Sync. The staircase certifies when the remaining gap is below 4e-8 of the cost.
   std::smatch optimum;
   REQUIRE(std::regex_search(result.output, optimum, std::regex("optimum ([0-9.]+)")));
   CHECK(std::stod(optimum[1]) == Approx(52.3482273).epsilon(4e-8));
@@ -202,7 +202,7 @@ TEST_CASE("A planar graph costs what it costs in the plane", "[pgo]") {
 
 namespace {
 
-// A square in space, twice round; every pose but the first knows which way is up.
+// A square in space, driven twice. Every pose except for the first has a vertical.
 std::string upright_square_g2o() {
   G2oGraph graph;
   const auto edge = [&](std::uint32_t i, std::uint32_t j, double angle, double x) {
@@ -223,7 +223,7 @@ std::string upright_square_g2o() {
 
 }  // namespace
 
-TEST_CASE("Verticals of the file are used, told of, and written again", "[pgo][vertical]") {
+TEST_CASE("Verticals of the file are used, reported and written", "[pgo][vertical]") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", upright_square_g2o());
   const auto json = folder.path() / "out.json";
@@ -255,7 +255,8 @@ TEST_CASE("Verticals of the file are used, told of, and written again", "[pgo][v
   CHECK_THAT(folder.read("out.json"), Contains("\"verticals\": 0"));
 }
 
-TEST_CASE("What does not know verticals says so, and how to leave them out", "[pgo][vertical]") {
+TEST_CASE("Methods without verticals refuse them and name the option that drops them",
+          "[pgo][vertical]") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", upright_square_g2o());
   const auto [options, who] = GENERATE(table<std::string, std::string>(

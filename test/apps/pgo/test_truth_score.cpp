@@ -66,7 +66,7 @@ TEST_CASE("Closures are counted by label, ends and decision", "[truth]") {
   CHECK(unknown.inside.true_kept + unknown.between.true_kept + unknown.between.false_kept == 0);
 }
 
-TEST_CASE("The ATE of positions that are a tenth too far apart is known", "[truth]") {
+TEST_CASE("The ATE of positions scaled by 1.1 equals its closed form", "[truth]") {
   const LabelledTeamGraph team = small_team();
   CHECK(ate_of(team, {scaled_truth(team, 1.0)}).team_m == Approx(0.0).margin(1e-12));
   const TeamAte ate = ate_of(team, {scaled_truth(team, 1.1)});
@@ -80,7 +80,7 @@ TEST_CASE("The ATE of positions that are a tenth too far apart is known", "[trut
   CHECK(ate.parts == 1);
 }
 
-TEST_CASE("Each part is aligned by itself, and poses without truth do not count", "[truth]") {
+TEST_CASE("Each part is aligned separately, and poses without truth do not count", "[truth]") {
   LabelledTeamGraph team = small_team();
   const SolvedPart whole = scaled_truth(team, 1.1);
   const auto slice = [&](std::size_t begin, std::size_t end) {
@@ -116,7 +116,7 @@ TEST_CASE("Without the edges between two robots a team's graph has two parts", "
   CHECK(parts[1].graph.edges[0].j == 1);
 
   edges[3] = true;
-  poses[2] = false;  // and with it the edges that end there
+  poses[2] = false;  // drops the edges that end there too
   parts = connected_parts(team.graph, poses, edges);
   REQUIRE(parts.size() == 1);
   CHECK(parts[0].graph.first == std::vector<Eigen::Index>{0, 2, 4});
@@ -133,23 +133,23 @@ TEST_CASE("The optimum of true closures without noise is the truth", "[truth]") 
   CHECK(ate_of(team, optimum.parts).team_m < 1e-6);  // [m]
 }
 
-TEST_CASE("A team is played by the stamps of its file", "[truth]") {
+TEST_CASE("The stamps of a file decide the graph that is known at each instant", "[truth]") {
   SolverOptions options;
   const std::vector<Instant> instants = play(small_team(), options, 2, cpu_meter());
   REQUIRE(instants.size() == 2);
-  CHECK(instants[0].poses == 3);  // 10 ns after the first: two of a, one of b
+  CHECK(instants[0].poses == 3);  // 10 ns after the first pose: two poses of a, one of b
   CHECK(instants[0].parts == 2);
   CHECK(instants[0].closures == 0);
   CHECK(instants[1].poses == 5);
   CHECK(instants[1].parts == 1);
   CHECK(instants[1].closures == 3);
-  CHECK(instants[1].after_s == Approx(20e-9));  // the copy that comes later says nothing new
+  CHECK(instants[1].after_s == Approx(20e-9));  // a later copy adds nothing
   CHECK(instants[1].ate->parts == 1);
   CHECK(instants[1].decided);
   CHECK(instants[1].optimum_of_true->team_m < 1e-6);  // [m]
 }
 
-TEST_CASE("solve prints what a JRL file knows of the truth", "[pgo][truth]") {
+TEST_CASE("solve compares its result with the ground truth of a JRL file", "[pgo][truth]") {
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
   const CommandResult result =
@@ -178,7 +178,7 @@ TEST_CASE("solve prints what a JRL file knows of the truth", "[pgo][truth]") {
   CHECK_THAT(plain.output, !Contains("ATE") && !Contains("true kept"));
 }
 
-TEST_CASE("What does not go with a JRL file is refused", "[pgo][truth]") {
+TEST_CASE("solve refuses options that do not fit its file", "[pgo][truth]") {
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
   (void)folder.write("step.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
@@ -203,10 +203,10 @@ TEST_CASE("outliers leaves out the closures that a JRL file labels as false", "[
   CHECK_THAT(result.output, Contains("5 poses, 2 true closures, 2 robots"));
 }
 
-TEST_CASE("True closures of COSMO-Bench lead to the errors known for them", "[truth]") {
+TEST_CASE("True closures of COSMO-Bench lead to their known errors", "[truth]") {
   struct Set {
     const char* name;
-    double ate_m;  // of the certified optimum with kappa and tau, rounded to 1 cm
+    double ate_m;  // error of the certified optimum with kappa and tau, rounded to 1 cm
   };
   const Set set = GENERATE(
       Set{"kth_r3_00_d06_d09_d10_wifi", 1.93}, Set{"kth_r3_00_d06_d09_d10_proradio", 1.25},

@@ -21,11 +21,11 @@ namespace {
 
 constexpr double kNoise = 0.01;
 
-// Three robots that closures alone join.
+// Three robots that only closures join.
 TeamGraph team_of_three(unsigned seed) {
   std::mt19937 rng(seed);
   TeamGraph graph = noisy_chain(90, 3, kNoise, rng);
-  std::set<std::pair<Eigen::Index, Eigen::Index>> known;  // a pair of poses counts once
+  std::set<std::pair<Eigen::Index, Eigen::Index>> known;  // one edge per pair of poses
   std::erase_if(graph.edges,
                 [&](const BlockEdge& e) { return !known.insert(std::minmax(e.i, e.j)).second; });
   for (BlockEdge& e : graph.edges) {
@@ -51,7 +51,7 @@ double largest_difference_m(const std::vector<SE3>& a, const std::vector<SE3>& b
   return largest;
 }
 
-TEST_CASE("Robots without steps between them hang together by closures alone", "[agent_team]") {
+TEST_CASE("Without cut steps, only closures connect the robots of a graph", "[agent_team]") {
   TeamGraph graph = team_of_three(1);
   for (const BlockEdge& e : graph.edges) CHECK((e.j != e.i + 1 || !is_between(graph, e)));
   CHECK(std::ranges::count(part_of_poses(graph), 0) == 90);
@@ -60,7 +60,7 @@ TEST_CASE("Robots without steps between them hang together by closures alone", "
   for (Eigen::Index i = 0; i < 90; ++i) CHECK(parts[static_cast<std::size_t>(i)] == i / 30 * 30);
 }
 
-TEST_CASE("Robots' own code publishes the optimum of a graph", "[agent_team]") {
+TEST_CASE("The robots' own code publishes the optimum of a graph", "[agent_team]") {
   const unsigned seed = GENERATE(1U, 2U);
   const double keyframes_per_s = GENERATE(0.0, 5.0);
   CAPTURE(seed, keyframes_per_s);
@@ -92,7 +92,7 @@ std::vector<SE3> solved_by_members(const TeamGraph& graph, bool limited) {
   return round_to_poses(X, X.leftCols<4>());
 }
 
-TEST_CASE("Members of a study weigh odometry that claims too much as robots do", "[agent_team]") {
+TEST_CASE("Members of a study weigh overconfident odometry as robots do", "[agent_team]") {
   TeamGraph graph = team_of_three(1);
   for (BlockEdge& e : graph.edges)
     if (e.j == e.i + 1 && graph.robot_of(e.i) == 1) {
@@ -124,7 +124,7 @@ TEST_CASE("A pair of robots with one closure is joined after the wait for witnes
   CHECK(run.world_of == std::vector<RobotId>{0, 0, 2});
 }
 
-TEST_CASE("Robots' own code refuses planar and interrupted graphs", "[agent_team]") {
+TEST_CASE("The robots' own code refuses planar and interrupted graphs", "[agent_team]") {
   TeamGraph graph = team_of_three(1);
   graph.dimension = 2;
   CHECK_THROWS_AS(run_agent_team(graph, {}), std::invalid_argument);
@@ -133,7 +133,8 @@ TEST_CASE("Robots' own code refuses planar and interrupted graphs", "[agent_team
   CHECK_THROWS_WITH(run_agent_team(graph, {}), Catch::Contains("0:5"));
 }
 
-// Successive poses of robot 0 taken for successive ones of robot 1: all false, and all agree.
+// Adds a false place: closures from successive poses of robot 0 to successive poses of robot 1. All
+// are false, and all agree.
 void mistake_a_place(TeamGraph& graph, Eigen::Index closures) {
   const SE3 off =
       make_pose(so3_exp(Eigen::Vector3d(0.0, 0.0, 2.0)), Eigen::Vector3d(3.0, 4.0, 0.0));
@@ -146,7 +147,7 @@ void mistake_a_place(TeamGraph& graph, Eigen::Index closures) {
                            graph.edges.front().kappa, graph.edges.front().tau});
 }
 
-TEST_CASE("A place that is taken for another has one say, however many closures it has",
+TEST_CASE("Ten false closures of one place do not outweigh five true ones per robot pair",
           "[agent_team]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);

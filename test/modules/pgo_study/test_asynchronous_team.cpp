@@ -19,7 +19,8 @@ double cost_of(const TeamGraph& graph, const LiftedPoses& X) {
   return QuadraticProblem(X.rows(), graph.poses(), graph.edges, {}).cost(X);
 }
 
-// What the changes `D` of all poses do to the residuals of edges between robots, either end alone.
+// Sum over edges between robots of the squared changes of their residuals, where `D` changes the
+// pose of one end at a time.
 double coupling_of(const TeamGraph& graph, const LiftedPoses& D) {
   const Eigen::MatrixXd still = Eigen::MatrixXd::Zero(D.rows(), 4);
   double sum = 0.0;
@@ -31,8 +32,8 @@ double coupling_of(const TeamGraph& graph, const LiftedPoses& D) {
   return sum;
 }
 
-// Two robots with one pose each, of the same rotation and `distance` apart, that are measured to
-// be at one place: cost tau distance^2, and no force turns them.
+// Two robots with one pose each, of equal rotation, `distance` apart. Their closure measures
+// identity, so the cost is tau distance^2, with no gradient on the rotations.
 TeamGraph pair_of_robots() {
   return {
       .first = {0, 1, 2}, .edges = {{0, 1, SE3::Identity(), 1.0, 2.0}}, .ids = {{0, 0}, {1, 0}}};
@@ -45,7 +46,7 @@ LiftedPoses apart(double distance) {
 
 }  // namespace
 
-TEST_CASE("Robots that move at once meet half way, as far as their weight lets them",
+TEST_CASE("Robots that move at once approach each other by the step that their weight allows",
           "[pgo_study]") {
   const TeamGraph graph = pair_of_robots();
   const int max_delay = GENERATE(0, 2);
@@ -53,7 +54,7 @@ TEST_CASE("Robots that move at once meet half way, as far as their weight lets t
   AsynchronousTeam team(graph, apart(1.0), {.max_delay = max_delay, .max_over_relaxation = 1.0});
   RoundMeter meter(2, {});
   while (team.updates() == 0) (void)team.step(meter);
-  // Minimum of (p - other)^2 + weight (p - before)^2, whoever moves seeing the other at its start.
+  // A step minimises (p - other)^2 + weight (p - before)^2, with the other robot at its start.
   const double step = 1.0 / (1.0 + 1.01 * (1.0 + 2.0 * max_delay));
   const double moved_0 = team.block(0)(0, 3);
   const double moved_1 = 1.0 - team.block(1)(0, 3);
@@ -63,7 +64,8 @@ TEST_CASE("Robots that move at once meet half way, as far as their weight lets t
   CHECK(std::max(moved_0, moved_1) == Approx(step).epsilon(kSinglePrecision));
 }
 
-TEST_CASE("Blocks that are not held back change places for ever", "[pgo_study]") {
+TEST_CASE("A block at weight 0 moves all the way to its neighbour, at weight 1 half of it",
+          "[pgo_study]") {
   const TeamGraph graph = pair_of_robots();
   const LiftedPoses X = apart(1.0);
   const SessionGraph part = part_of(graph, 0);
@@ -75,7 +77,7 @@ TEST_CASE("Blocks that are not held back change places for ever", "[pgo_study]")
   }
 }
 
-TEST_CASE("Whatever comes late or never, descent goes on to the optimum", "[pgo_study]") {
+TEST_CASE("Asynchronous descent reaches the optimum despite delays and losses", "[pgo_study]") {
   const auto [max_delay, rounds] = GENERATE(table<int, int>({{0, 300}, {1, 400}, {3, 700}}));
   const double loss = GENERATE(0.0, 0.2);
   const double max_over_relaxation = GENERATE(1.0, 1.95);
@@ -99,7 +101,7 @@ TEST_CASE("Whatever comes late or never, descent goes on to the optimum", "[pgo_
     couplings.insert(couplings.begin(), coupling_of(graph, next - X));
     couplings.resize(static_cast<std::size_t>(max_delay));
     X = next;
-    // V of the class comment.
+    // V as in the comment on AsynchronousTeam.
     double V = cost_of(graph, X);
     for (std::size_t age = 0; age < couplings.size(); ++age)
       V += static_cast<double>(couplings.size() - age) * couplings[age];
@@ -109,7 +111,8 @@ TEST_CASE("Whatever comes late or never, descent goes on to the optimum", "[pgo_
   CHECK(cost_of(graph, X) == Approx(certified_optimum_of(graph)).epsilon(1e-5));
 }
 
-TEST_CASE("A robot that hears too little waits, and moves again when it hears", "[pgo_study]") {
+TEST_CASE("A robot waits while poses of its neighbours are too old, and moves again after",
+          "[pgo_study]") {
   std::mt19937 rng(3);
   const TeamGraph graph = noisy_chain(30, 3, 0.1, rng);
   const auto updates = [&](int max_delay, double loss) {
@@ -117,27 +120,27 @@ TEST_CASE("A robot that hears too little waits, and moves again when it hears", 
     (void)run_team(graph, team, {.max_rounds = 101}, {});
     return team.updates();
   };
-  CHECK(updates(0, 0.0) == 300);  // the first round only tells
-  CHECK(updates(3, 0.0) > 285);   // the first poses take up to three rounds more
+  CHECK(updates(0, 0.0) == 300);  // robots only send in the first round
+  CHECK(updates(3, 0.0) > 285);   // the first poses arrive up to three rounds later
   const std::size_t lossy = updates(0, 0.5);
-  CHECK(lossy > 30);  // both neighbours heard in the round: a quarter of 300
+  CHECK(lossy > 30);  // poses of both neighbours arrive in a quarter of the rounds
   CHECK(lossy < 120);
 }
 
-TEST_CASE("A robot without neighbours waits for nobody", "[pgo_study]") {
+TEST_CASE("A robot without neighbours moves in every round but the first", "[pgo_study]") {
   std::mt19937 rng(6);
   const TeamGraph graph = noisy_chain(30, 1, 0.1, rng);
   AsynchronousTeam team(graph, start_of(graph),
                         {.max_delay = 5, .loss = 0.9, .max_over_relaxation = 1.0});
   (void)run_team(graph, team, {.max_rounds = 5}, {});
-  CHECK(team.updates() == 4);  // the first round only tells
+  CHECK(team.updates() == 4);  // robots only send in the first round
   LiftedPoses X = start_of(graph);
   const QuadraticProblem problem = problem_of(graph, X.rows());
   for (int k = 0; k < 4; ++k) X = minimise(problem, std::move(X), {}).X;
   CHECK(problem.cost(team.block(0)) == Approx(problem.cost(X)).epsilon(1e-9));
 }
 
-TEST_CASE("One seed gives one result", "[pgo_study]") {
+TEST_CASE("Asynchronous results depend on the seed alone", "[pgo_study]") {
   std::mt19937 rng(7);
   const TeamGraph graph = noisy_chain(30, 3, 0.1, rng);
   const auto result = [&](unsigned seed) {
@@ -149,7 +152,7 @@ TEST_CASE("One seed gives one result", "[pgo_study]") {
   CHECK(result(1) != result(2));
 }
 
-TEST_CASE("Delays and losses that cannot be are refused", "[pgo_study]") {
+TEST_CASE("Invalid delays, losses and weights are refused", "[pgo_study]") {
   const TeamGraph graph = pair_of_robots();
   CHECK_THROWS_WITH(AsynchronousTeam(graph, apart(1.0), {.max_delay = -1}),
                     Catch::Contains("max_delay -1"));
@@ -158,7 +161,7 @@ TEST_CASE("Delays and losses that cannot be are refused", "[pgo_study]") {
                     Catch::Contains("weight -1"));
 }
 
-TEST_CASE("Old poses delay the small grid's optimum, and no more", "[pgo_study]") {
+TEST_CASE("With old poses the small grid still reaches its optimum", "[pgo_study]") {
   const auto file = shared_data("pose_graphs/3d/smallGrid3D.g2o");
   if (!file) return;
   const TeamGraph graph = deal_contiguously(read_g2o(*file), 5, "smallGrid3D");

@@ -15,9 +15,10 @@ namespace {
 
 struct Known {
   const char* file;
-  double
-      optimum;  // of SE-Sync, certified; parking-garage: of unit quaternions, Levenberg-Marquardt
-  double tolerance = 2e-7;  // relative: SE-Sync takes quaternions as they are rounded in the file
+  double optimum;  // certified by SE-Sync; parking-garage: by Levenberg-Marquardt with unit
+                   // quaternions
+  double tolerance = 2e-7;  // relative; SE-Sync does not normalise the rounded quaternions of the
+                            // file
 };
 
 double run(Staircase& staircase) {
@@ -77,7 +78,7 @@ TEST_CASE("[X z] S is half the Riemannian gradient of poses and vertical",
   CHECK((product.col(50) - (pull - z * z.dot(pull))).norm() < 1e-12 * pull.norm());
 }
 
-TEST_CASE("The optimum of a graph with verticals is certified, and S is what proves it",
+TEST_CASE("The optimum of a graph with verticals is certified, and its S is semidefinite",
           "[pgo_study][vertical]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
@@ -91,14 +92,15 @@ TEST_CASE("The optimum of a graph with verticals is certified, and S is what pro
   with_z.leftCols(120) = X;
   with_z(2, 122) = 1.0;
   const Eigen::MatrixXd S = certificate_matrix(problem, X);
-  CHECK((with_z * S).norm() < 1e-5);  // of entries up to 100: where the descent has ended
+  CHECK((with_z * S).norm() < 1e-5);  // small against entries of up to 100; limited by the end of
+                                      // the descent
   const double least = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(S).eigenvalues()(0);
   CHECK(least > -1e-6);
   const Certificate certificate = certify(problem, X);
   CHECK(certificate.certified);
   CHECK(certificate.relative_gap < 1e-5);
 
-  // The same poses tilted as a whole cost more, and the bound knows by how much.
+  // The same poses after a common tilt cost more, and the gap of the certificate shows by how much.
   const double tilt = GENERATE(1e-3, 0.05);
   std::vector<SE3> tilted = round_to_poses(X, lifted_identity(3));
   for (SE3& T : tilted) T = make_pose(so3_exp({tilt, 0.0, 0.0}), Eigen::Vector3d::Zero()) * T;
@@ -108,8 +110,7 @@ TEST_CASE("The optimum of a graph with verticals is certified, and S is what pro
   CHECK(certify(problem, X_tilted).relative_gap == Approx(excess).epsilon(0.1).margin(1e-6));
 }
 
-TEST_CASE("Poses that stand on their heads have the negative eigenvalue they must have",
-          "[pgo_study][vertical]") {
+TEST_CASE("Poses upside down have their known negative eigenvalue", "[pgo_study][vertical]") {
   const Eigen::Index n = GENERATE(2, 7, 30);
   CAPTURE(n);
   constexpr double kWeight = 3.0;
@@ -124,7 +125,8 @@ TEST_CASE("Poses that stand on their heads have the negative eigenvalue they mus
   const LiftedPoses X = lift(std::vector<SE3>(static_cast<std::size_t>(n), overhead), 3);
   const QuadraticProblem problem(3, n, edges, {}, verticals);
   CHECK(project_tangent(X, problem.euclidean_gradient(X)).norm() < 1e-12);
-  // All z axes a, the vertical b: S gives -n w (a + b)^2 to n a^2 + b^2.
+  // With all z axes changed by a, and the vertical by b, S gives -n w (a + b)^2, over the norm n
+  // a^2 + b^2.
   const Certificate certificate = certify(problem, X);
   CHECK_FALSE(certificate.certified);
   REQUIRE(certificate.lambda_min);
@@ -135,29 +137,32 @@ TEST_CASE("Poses that stand on their heads have the negative eigenvalue they mus
   CHECK(staircase.certificate()->certified);
 }
 
-TEST_CASE("A ring wound once has the negative eigenvalue it must have", "[pgo_study]") {
+TEST_CASE("A ring wound once has its known negative eigenvalue", "[pgo_study]") {
   const Eigen::Index n = GENERATE(5, 12, 40);
   CAPTURE(n);
   const WoundRing ring(n, 1);
   const QuadraticProblem problem(3, n, ring.graph.edges, {});
   const Certificate certificate = certify(problem, lift(ring.wound, 3));
-  // S is the ring's Laplacian less 2 - 2 cos(2 pi / n) on two axes: constants have that eigenvalue.
+  // S is the Laplacian of the ring minus 2 - 2 cos(2 pi / n) on two axes, so constant vectors have
+  // that eigenvalue.
   const double expected = -2.0 + 2.0 * std::cos(2.0 * std::numbers::pi / static_cast<double>(n));
   CHECK_FALSE(certificate.certified);
   REQUIRE(certificate.lambda_min);
   CHECK(*certificate.lambda_min == Approx(expected).epsilon(1e-6));
   CHECK(certificate.lambda_bound <= *certificate.lambda_min);
-  // Of the cost n (4 - 4 cos) = -2n lambda_min, 3n lambda_min below is less than nothing.
+  // The cost is n (4 - 4 cos) = -2n lambda_min. A bound 3n lambda_min below it is negative and
+  // becomes 0.
   CHECK(certificate.relative_gap == 1.0);
 }
 
-// The wound ring in other frames of its poses: the rows of S that belong to a pose turn with it,
-// and with them the directions down, which turn all poses alike about x or y. Frames in which the
-// start of Lanczos' iterations turns every pose about z hide them.
-TEST_CASE("What Lanczos cannot see is not certified for that", "[pose_graph]") {
+// The wound ring with other body frames. The rows of S that belong to a pose rotate with its frame.
+// So do the directions of descent, which rotate all poses equally about x or y. The frames are
+// chosen so that the start of the Lanczos iterations rotates every pose about z, and is orthogonal
+// to these directions.
+TEST_CASE("A direction that the first Lanczos start misses is not certified", "[pose_graph]") {
   constexpr Eigen::Index kPoses = 12;
   const WoundRing ring(kPoses, 1);
-  std::mt19937 rng(3);  // the rank is the seed, see certify()
+  std::mt19937 rng(3);  // the seed of certify() is the rank
   std::normal_distribution<double> normal;
   Eigen::VectorXd start(4 * kPoses);
   for (double& v : start) v = normal(rng);
@@ -179,23 +184,23 @@ TEST_CASE("What Lanczos cannot see is not certified for that", "[pose_graph]") {
   const Eigen::VectorXd units = Eigen::Vector4d(1.0, 1.0, 1.0, 0.0).replicate(kPoses, 1);
   Eigen::MatrixXd A = certificate_matrix(problem, X);
   A(3, 3) += 1.0;
-  A.diagonal() += units;  // a shift of 1
+  A.diagonal() += units;  // shift of 1
   const Eigen::LDLT<Eigen::MatrixXd> factor(A);
   const auto inverse = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
     return units.cwiseProduct(factor.solve(units.cwiseProduct(v)));
   };
   const LanczosResult seen = largest_eigenpair(inverse, 4 * kPoses, 60, 1e-6, 3);
   CHECK(seen.converged);
-  CHECK(1.0 / seen.value - 1.0 > -1e-6);  // the eigenvalue of a minimum
+  CHECK(1.0 / seen.value - 1.0 > -1e-6);  // as at a minimum
 
   const Certificate certificate = certify(problem, X);
   CHECK_FALSE(certificate.certified);
   CHECK(certificate.lambda_bound <= lambda_min);
   REQUIRE(certificate.lambda_min);
-  CHECK(*certificate.lambda_min == Approx(lambda_min).epsilon(1e-6));  // from another start
+  CHECK(*certificate.lambda_min == Approx(lambda_min).epsilon(1e-6));  // found from another start
 }
 
-TEST_CASE("A certified bound is below every eigenvalue, and the gap below every cost",
+TEST_CASE("The certified bound is below the smallest eigenvalue of the Schur complement",
           "[pose_graph]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
@@ -207,7 +212,8 @@ TEST_CASE("A certified bound is below every eigenvalue, and the gap below every 
   REQUIRE(solver.certificate());
   CHECK(solver.certificate()->certified);
   CHECK(solver.certificate()->relative_gap < 2e-8);
-  // The same with dense matrices: one translation held, the others the best ones, then eliminated.
+  // The Schur complement with dense matrices: one translation is held, the others are set to their
+  // best values and then eliminated.
   const QuadraticProblem problem(3, 25, graph.edges, {});
   std::vector<Eigen::Index> turns, places;
   for (Eigen::Index k = 0; k < 100; ++k)
@@ -252,7 +258,7 @@ TEST_CASE("The staircase leaves the wound ring for the optimum", "[pose_graph]")
   for (const SE3& pose : poses) CHECK(pose.isApprox(SE3::Identity(), 1e-4));
 }
 
-TEST_CASE("No feasible point refutes the bound on the cost", "[pgo_study]") {
+TEST_CASE("The bound from any point is not above the optimal cost", "[pgo_study]") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
   const double vertical_weight = GENERATE(0.0, 4.0);
   CAPTURE(seed, vertical_weight);
@@ -279,7 +285,7 @@ TEST_CASE("The staircase never raises the cost", "[pgo_study]") {
   CHECK(staircase.certificate());
 }
 
-TEST_CASE("Recorded graphs come out certified at their known optima", "[pgo_study]") {
+TEST_CASE("Recorded graphs are certified at their known optima", "[pgo_study]") {
   const Known known = GENERATE(
       Known{"3d/tinyGrid3D.g2o", 18.5193868, 2e-6}, Known{"3d/smallGrid3D.g2o", 1025.39802},
       Known{"3d/parking-garage.g2o", 1.262524, 1e-6}, Known{"3d/sphere2500.g2o", 1687.00567},

@@ -27,7 +27,7 @@ namespace {
 
 using Eigen::Index;
 
-// A team whose members can be asked one by one.
+// A team that gives access to each member.
 class AskedTeam {
  public:
   AskedTeam(const TeamGraph& graph, std::vector<SE3> start, TreeNewtonOptions options,
@@ -58,7 +58,7 @@ class AskedTeam {
   AskedTeam& operator=(const AskedTeam&) = delete;
 
   bool step() { return team_->step(meter_); }
-  // False: it has come to no end.
+  // False: the team has not ended.
   bool run(int max_rounds) {
     for (int round = 0; round <= max_rounds; ++round)
       if (!step()) return true;
@@ -78,7 +78,7 @@ class AskedTeam {
 
  private:
   TeamGraph graph_;
-  std::vector<TreeNewton*> members_;  // of the last session; MemberTeam owns them
+  std::vector<TreeNewton*> members_;  // members of the last session; MemberTeam owns them
   std::vector<std::set<RobotId>> neighbours_;
   RoundMeter meter_;
   std::size_t letter_bytes_ = 0;
@@ -106,7 +106,7 @@ std::vector<SE3> optimum_of(const TeamGraph& graph) {
   return round_to_poses(central.X(), central.X().leftCols<4>());
 }
 
-// Of positions, under the rigid motion that brings them closest.
+// RMSE of positions after rigid alignment.
 double rmse_m(const std::vector<SE3>& truth, const std::vector<SE3>& estimate) {
   Eigen::Matrix3Xd a(3, truth.size()), b(3, truth.size());
   for (std::size_t k = 0; k < truth.size(); ++k) {
@@ -125,8 +125,8 @@ double half_side_m(const std::vector<SE3>& poses) {
   return 0.5 * box.sizes().maxCoeff();
 }
 
-// False closures go between poses that no true edge joins: a robot has one closure between two
-// keyframes, whoever measured it.
+// Adds false closures between poses that no true edge joins, because a robot uses only one closure
+// between two keyframes.
 class Spoiler {
  public:
   Spoiler(TeamGraph graph, const std::vector<SE3>& truth, unsigned seed)
@@ -152,7 +152,7 @@ class Spoiler {
     }
   }
 
-  // Runs of `size` consecutive poses of the first and the last robot that look alike.
+  // Adds clusters between `size` consecutive poses of the first robot and of the last one.
   void add_clusters(std::size_t places, Index size) {
     const RandomOutlierModel model{
         .keyframes = 3, .planar = graph_.dimension == 2, .half_side_m = half_side_m_};
@@ -187,11 +187,11 @@ class Spoiler {
   double half_side_m_;
   std::mt19937 rng_;
   std::set<std::pair<Index, Index>> joined_;
-  std::vector<Precision> claims_;  // of true closures
+  std::vector<Precision> claims_;  // precisions of the true closures
 };
 
-constexpr int kMostRounds = 90;  // measured: up to 81, in 180 runs of the slow tests below
-// To the end of what numbers can tell, and as long as second derivatives are worth here.
+constexpr int kMostRounds = 90;  // measured maximum: 81, in 180 runs of the slow tests below
+// Until rounding limits the cost. As much patience as second derivatives save here.
 const TreeNewtonOptions kExact{.absolute_tolerance = 0.0, .patience_rounds = 8.0};
 const TreeNewtonOptions kTrusting{
     .absolute_tolerance = 0.0, .patience_rounds = 8.0, .robust = false};
@@ -219,9 +219,9 @@ constexpr const char* kSphere = "pose_graphs/3d/sphere2500.g2o";
 constexpr const char* kGarage = "pose_graphs/3d/parking-garage.g2o";
 
 struct Spoilt {
-  double share = 0.0;  // of random false closures, of the true ones
+  double share = 0.0;  // random false closures per true one
   std::size_t places = 0;
-  Index size = 0;  // of the cluster at each
+  Index size = 0;  // closures of the cluster at each place
 };
 
 constexpr std::size_t kPlaces = 5;
@@ -234,14 +234,15 @@ TeamGraph spoilt_graph(const TeamGraph& clean, const std::vector<SE3>& truth, co
   return spoiler.graph();
 }
 
-// To the optimum of the true closures. Measured with up to 100 false closures that agree, three
-// seeds: at most 4.7e-7 m for the sphere, 9.8e-4 m for the garage, whose cost is flatter.
+// Largest accepted RMSE to the optimum of the true closures. Measured with up to 100 false closures
+// that agree, three seeds: at most 4.7e-7 m for the sphere, 9.8e-4 m for the garage, whose cost is
+// flatter.
 double most_rmse_m(const std::string& name) {
   return name == kSphere ? 1e-5 : 5e-3;
 }
 
-// The team with its defaults comes to the optimum of the true closures, and keeps them all. The
-// number of rounds; 0 if there are no data.
+// Checks that a team with default options reaches the optimum of the true closures and keeps them
+// all. Returns the number of rounds; 0 if there are no data.
 std::uint32_t check_spoilt(const std::string& name, std::size_t robots, const Spoilt& spoilt,
                            unsigned seed) {
   const auto clean = dealt(name, robots);
@@ -270,7 +271,7 @@ TEST_CASE("A team rejects false closures that agree with each other", "[pgo_stud
   (void)check_spoilt(kSphere, 3, {.places = kPlaces, .size = 5}, 1);
 }
 
-// Closures between each pair of robots, the lower one first.
+// Number of closures by pair of robots, the lower one first.
 std::map<std::pair<std::size_t, std::size_t>, std::size_t> closures_between(
     const TeamGraph& graph) {
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> count;
@@ -281,11 +282,11 @@ std::map<std::pair<std::size_t, std::size_t>, std::size_t> closures_between(
   return count;
 }
 
-TEST_CASE("Robots are not placed by the pair with most closures", "[pgo_study]") {
+TEST_CASE("False closures of the pair with most closures do not place the robots", "[pgo_study]") {
   const Spoilt spoilt{.share = 0.1, .places = 8, .size = 10};
   const auto clean = dealt(kSphere, 5);
   if (!clean) return;
-  // The most closures are between the first robot and the last, and none of these is true.
+  // Most closures are between the first robot and the last, and all of these are false.
   REQUIRE_FALSE(closures_between(*clean).contains({0, 4}));
   const auto count = closures_between(spoilt_graph(*clean, optimum_of(*clean), spoilt, 1));
   for (const auto& [pair, closures] : count)
@@ -323,10 +324,10 @@ TEST_CASE("A team rejects false closures that agree, few or many", "[.][slow][pg
 struct Certified {
   const char* name;
   double optimum;  // SE-Sync
-  int rounds;      // to 1e-6 of it, at most
+  int rounds;      // largest number of rounds to a gap of 1e-6
 };
 
-TEST_CASE("A team that trusts its closures comes to the certified optimum", "[pgo_study]") {
+TEST_CASE("A team that trusts its closures reaches the certified optimum", "[pgo_study]") {
   const auto [name, optimum, most] =
       GENERATE(values({Certified{"pose_graphs/3d/smallGrid3D.g2o", 1025.398056, 8},
                        Certified{kSphere, 1687.005815, 7}, Certified{kGarage, 1.26252443, 7},
@@ -362,7 +363,7 @@ void check_shapes(const std::string& name, bool robust) {
   CHECK(cost[TeamShape::kChain] == Approx(cost[TeamShape::kAll]).epsilon(1e-9));
 }
 
-TEST_CASE("Robots that hear only their neighbours come to the same cost", "[pgo_study]") {
+TEST_CASE("Robots in a chain of links reach the same cost as with all links", "[pgo_study]") {
   SECTION("small grid") {
     check_shapes("pose_graphs/3d/smallGrid3D.g2o", GENERATE(false, true));
   }
@@ -374,13 +375,13 @@ TEST_CASE("Robots that hear only their neighbours come to the same cost", "[pgo_
   }
 }
 
-// From odometry, far from the optimum, full second derivatives are indefinite where those of
-// several robots meet: Gauss-Newton's have to do.
+// Odometry starts far from the optimum. There the full Hessian is indefinite on the separators, and
+// the team must use Gauss-Newton's.
 TEST_CASE("A team that trusts its closures does not stop far from the optimum", "[pgo_study]") {
   check_shapes(kGarage, false);
 }
 
-TEST_CASE("A letter has one reader, a neighbour in the tree", "[pgo_study]") {
+TEST_CASE("A solver message goes to one neighbour in the tree", "[pgo_study]") {
   const TeamShape shape = GENERATE(TeamShape::kAll, TeamShape::kChain);
   std::mt19937 rng(3);
   const TeamGraph graph = noisy_chain(60, 4, 0.01, rng);
@@ -396,15 +397,15 @@ TEST_CASE("A letter has one reader, a neighbour in the tree", "[pgo_study]") {
   std::set<KeyframeId> announced;
   for (std::size_t k = 0; k < graph.robots(); ++k)
     for (const PoseEdge& e : part_of(graph, k).between) announced.insert({e.from, e.to});
-  // Public poses are told to all others; broadcast, they count once.
+  // Public poses go to all other robots. As a broadcast each counts once.
   const std::size_t poses = announced.size() * (7 * sizeof(float) + 2);
   CHECK(sent == asked.letter_bytes() + (graph.robots() - 1) * poses);
   CHECK(asked.counted_bytes() == asked.letter_bytes() + poses);
 }
 
-// Both ends of a closure agree on who of them decides it, and whether it takes part.
+// Checks that one of the two robots of a closure decides it, and that all verdicts agree.
 void check_decided_once(const AskedTeam& asked, const TeamGraph& graph) {
-  std::map<ClosureId, int> undecided;  // parallel closures are decided one by one
+  std::map<ClosureId, int> undecided;  // parallel closures have separate verdicts
   std::map<ClosureId, std::set<bool>> verdicts;
   for (std::size_t k = 0; k < graph.robots(); ++k) {
     const SessionGraph part = part_of(graph, k);
@@ -429,7 +430,7 @@ void check_decided_once(const AskedTeam& asked, const TeamGraph& graph) {
   CHECK(contradictory == 0);
 }
 
-TEST_CASE("Every closure is decided by one robot of the two", "[pgo_study]") {
+TEST_CASE("Every closure is decided by exactly one of its two robots", "[pgo_study]") {
   const auto clean = dealt("pose_graphs/3d/smallGrid3D.g2o", 4);
   if (!clean) return;
   const std::vector<SE3> truth = optimum_of(*clean);
@@ -440,7 +441,7 @@ TEST_CASE("Every closure is decided by one robot of the two", "[pgo_study]") {
   check_decided_once(asked, spoiler.graph());
 }
 
-// The groups that kept closures join robots to.
+// Number of groups of robots that kept edges connect.
 std::size_t groups_of(const TeamGraph& graph, const std::vector<bool>& kept) {
   std::vector<std::size_t> group(graph.robots());
   for (std::size_t k = 0; k < group.size(); ++k) group[k] = k;
@@ -453,7 +454,7 @@ std::size_t groups_of(const TeamGraph& graph, const std::vector<bool>& kept) {
   return std::set<std::size_t>(group.begin(), group.end()).size();
 }
 
-TEST_CASE("The robots of the tunnels find their noise, and one frame", "[pgo_study]") {
+TEST_CASE("The robots of the tunnels estimate their noise and reach one frame", "[pgo_study]") {
   const TeamShape shape = GENERATE(TeamShape::kAll, TeamShape::kChain);
   const auto folder = shared_data("multi_robot/tunnels_8robots");
   if (!folder) return;
@@ -473,7 +474,8 @@ TEST_CASE("The robots of the tunnels find their noise, and one frame", "[pgo_stu
     if (!kept[k]) continue;
     ++closures;
     const BlockEdge& e = graph.edges[k];
-    // Which of two between the same poses is kept cannot be asked: verdicts go by poses.
+    // Verdicts are by pair of poses, so they do not show which of several parallel closures is
+    // kept.
     if (edges_between.at(std::minmax(e.i, e.j)) > 1) continue;
     const auto [self, peer] = std::minmax({graph.robot_of(e.i), graph.robot_of(e.j)});
     const double factor = asked.member(self).noise().pairs.at(static_cast<RobotId>(peer)).factor;
@@ -496,7 +498,7 @@ TEST_CASE("The robots of the tunnels find their noise, and one frame", "[pgo_stu
   CHECK(state.noise_scale > 3.0);
   CHECK(state.noise_scale < 5.0);
   CHECK(groups_of(graph, kept) == 1);
-  CHECK(largest <= 1.01 * state.barc);  // one frame: all that is kept fits in it
+  CHECK(largest <= 1.01 * state.barc);  // all kept closures fit in one frame
   check_decided_once(asked, graph);
   for (std::size_t k = 0; k < graph.robots(); ++k) {
     CHECK(asked.member(k).state().cost == state.cost);

@@ -19,23 +19,23 @@ std::optional<TeamGraph> recorded(const std::string& name, std::size_t robots) {
 
 struct Recorded {
   const char* name;
-  std::size_t robots;  // 0: a team's own
+  std::size_t robots;  // 0: those of the recording
 };
 
 const auto kGraphs = {
     Recorded{"pose_graphs/3d/sphere2500.g2o", 5}, Recorded{"pose_graphs/3d/torus3D.g2o", 5},
     Recorded{"pose_graphs/2d/city10000.g2o", 5}, Recorded{"multi_robot/tunnels_8robots", 0}};
-// Enough for several weighings; second derivatives are told in the first of them.
+// Enough for several updates of the weights. Second derivatives are sent in the first of them.
 constexpr int kRounds = 12;
 
-TEST_CASE("No private pose can be chained from the poses and edges that robots tell",
+TEST_CASE("No private pose can be derived from the poses and edges that robots send",
           "[pgo_study]") {
   const auto [name, robots] = GENERATE(values(kGraphs));
   CAPTURE(name);
   const auto graph = recorded(name, robots);
   if (!graph) return;
   Eavesdropper ear = listen_to(*graph, false, kRounds);
-  // There was something to hear.
+  // The eavesdropper has received all messages.
   CHECK(ear.letters() >= static_cast<std::size_t>(kRounds) * 2 * (graph->robots() - 1) - 2);
   CHECK(ear.announced_poses() >= graph->robots());
   CHECK(ear.private_poses() > 0);
@@ -47,14 +47,14 @@ TEST_CASE("No private pose can be chained from the poses and edges that robots t
             << " told edges, " << ear.bytes() << " bytes");
 }
 
-TEST_CASE("Telling private poses for fewer bytes gives trajectories away", "[pgo_study]") {
+TEST_CASE("With tell_private, private poses can be derived from the messages", "[pgo_study]") {
   const auto [name, robots] = GENERATE(values(kGraphs));
   CAPTURE(name);
   const auto graph = recorded(name, robots);
   if (!graph) return;
   Eavesdropper ear = listen_to(*graph, true, kRounds);
   CHECK(ear.misfits() == 0);
-  // The test above would see it.
+  // The check of the test above is not vacuous.
   CHECK(ear.derivable().size() <= ear.private_poses());
   if (std::string(name).find("sphere") != std::string::npos) CHECK(!ear.derivable().empty());
   WARN(name << ": of " << ear.private_poses() << " private poses " << ear.derivable().size()

@@ -43,14 +43,14 @@ TEST_CASE("Cross terms are dropped before the information is inverted", "[pgo_st
   CHECK(spatial.tau == Approx(3.0 / 0.6));
 }
 
-TEST_CASE("Weights that are none are refused", "[pgo_study]") {
+TEST_CASE("Covariances that are not positive definite are refused", "[pgo_study]") {
   Matrix6 covariance = Matrix6::Identity();
   covariance(0, 0) = GENERATE(0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
                               std::numeric_limits<double>::infinity());
   CHECK_THROWS_AS(precision_of_blocks(covariance, 3), std::invalid_argument);
 }
 
-TEST_CASE("Poses are dealt out in the order of their ids, the last robot takes the rest",
+TEST_CASE("Poses are divided in the order of their ids, and the last robot gets the rest",
           "[pgo_study]") {
   // Vertices and edges out of order; ids with gaps.
   std::string text = "VERTEX_SE2 7 0 0 0\nVERTEX_SE2 2 0 0 0\nVERTEX_SE2 3 0 0 0\n";
@@ -69,7 +69,8 @@ TEST_CASE("Poses are dealt out in the order of their ids, the last robot takes t
   CHECK(border_of(part_of(graph, 1)).own == std::vector<KeyframeIndex>{0});
 }
 
-TEST_CASE("Every edge belongs to one robot or to two, parallel ones all count", "[pgo_study]") {
+TEST_CASE("Every edge belongs to one robot or to two, and parallel edges all count",
+          "[pgo_study]") {
   const std::string text = planar_edge(0, 1) + planar_edge(0, 1) + planar_edge(1, 2) +
                            planar_edge(2, 1) + planar_edge(2, 3);
   const TeamGraph graph = deal_contiguously(graph_of(text), 2, "graph.g2o");
@@ -99,7 +100,7 @@ TEST_CASE("A robot's own odometry comes before its closures", "[pgo_study]") {
   CHECK(part.between.empty());
 }
 
-TEST_CASE("Graphs that cannot be dealt out are refused with the reason", "[pgo_study]") {
+TEST_CASE("Graphs that cannot be divided are refused with the reason", "[pgo_study]") {
   const auto deal_out = [](const std::string& text, std::size_t robots) {
     return deal_contiguously(graph_of(text), robots, "graph.g2o");
   };
@@ -129,7 +130,7 @@ TEST_CASE("A partition gives every pose its robot", "[pgo_study]") {
   CHECK(graph.edges[0].j == 0);
 }
 
-TEST_CASE("A partition that is none is refused with its line", "[pgo_study]") {
+TEST_CASE("An invalid partition is refused with its line", "[pgo_study]") {
   const TemporaryFolder folder;
   const auto [text, message] =
       GENERATE(table<std::string, std::string>({{"0 1 2\n", ":1: not two fields"},
@@ -153,7 +154,7 @@ TEST_CASE("The tunnels' edges between robots count once", "[pgo_study]") {
   CHECK(graph.edges.size() == 1247 + 96 + 3548);
 }
 
-TEST_CASE("Verticals go to the robots whose poses they are of", "[pgo_study][vertical]") {
+TEST_CASE("Each vertical goes to the robot of its pose", "[pgo_study][vertical]") {
   const std::string level = " 0 0 0 0 0 0 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9 0 0 9 0 0\n";
   const std::string unit = " 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
   std::string text = "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n";
@@ -207,7 +208,7 @@ TEST_CASE("A folder's verticals are those of all its files", "[pgo_study][vertic
   CHECK(graph.verticals[1].up.isApprox(Eigen::Vector3d::UnitX(), 1e-12));
 }
 
-TEST_CASE("What a team's run has left weighs what it weighed there", "[pgo_study]") {
+TEST_CASE("Edges of a team's run keep the weights of the run", "[pgo_study]") {
   Matrix6 covariance = Matrix6::Identity();
   covariance(1, 5) = covariance(5, 1) = 0.8;
   G2oGraph graph;

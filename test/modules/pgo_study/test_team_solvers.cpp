@@ -20,7 +20,7 @@ std::vector<SE3> chordal(const TeamGraph& graph) {
   return chordal_initialisation(graph.poses(), graph.edges);
 }
 
-// A unit of time for every use of the clock.
+// Clock that advances by one unit at every use.
 TeamMeter counting_meter(double& clock) {
   return {.cpu_s = [&clock] { return clock += 1.0; }};
 }
@@ -33,7 +33,8 @@ MemberTeam rbcd_team(const TeamGraph& graph, std::vector<SE3> start, const RbcdO
 
 }  // namespace
 
-TEST_CASE("Work of a round is that of its slowest robot and of all", "[pgo_study]") {
+TEST_CASE("The work of a round has the times of its slowest robot and of all robots",
+          "[pgo_study]") {
   double clock = 0.0;
   RoundMeter meter(3, counting_meter(clock));
   meter.run(0, [] {});
@@ -48,7 +49,7 @@ TEST_CASE("Work of a round is that of its slowest robot and of all", "[pgo_study
   CHECK(meter.finish_round().total_cpu_s == 0.0);
 }
 
-TEST_CASE("Work of exchanges in a row adds up to the critical path of their round", "[pgo_study]") {
+TEST_CASE("The critical path of a round is the sum over its exchanges", "[pgo_study]") {
   double clock = 0.0;
   RoundMeter meter(2, counting_meter(clock));
   meter.run(0, [] {});
@@ -61,7 +62,7 @@ TEST_CASE("Work of exchanges in a row adds up to the critical path of their roun
   CHECK(work.total_cpu_s == 4.0);
 }
 
-TEST_CASE("A round of block descent costs its letters", "[pgo_study][rbcd]") {
+TEST_CASE("A round of block descent counts the bytes of its messages", "[pgo_study][rbcd]") {
   const WoundRing ring(24, 3);  // each robot's first and last pose are public
   const Eigen::Index rank = GENERATE(3, 5);
   MemberTeam team = rbcd_team(ring.graph, ring.wound, {.rank = rank, .max_rounds = 1});
@@ -69,10 +70,11 @@ TEST_CASE("A round of block descent costs its letters", "[pgo_study][rbcd]") {
   REQUIRE(rounds.size() == 2);
   CHECK(rounds[1].round == 1);
   constexpr std::size_t kHeader = 2;                        // kind and round
-  const auto numbers = static_cast<std::size_t>(4 * rank);  // of a pose
+  const auto numbers = static_cast<std::size_t>(4 * rank);  // numbers per pose
   const std::size_t starts = 6 * (7 * sizeof(float) + 2);
   const std::size_t poses = 6 * (kHeader + numbers * sizeof(float));
-  const std::size_t shares = 2 * 2 * (kHeader + 2 * sizeof(double) + 1);  // before and after
+  const std::size_t shares = 2 * 2 * (kHeader + 2 * sizeof(double) + 1);  // before and after the
+                                                                          // round
   const std::size_t progress = 2 * (kHeader + 2 + (2 + numbers) * sizeof(double));
   CHECK(rounds[1].work.bytes == starts + poses + shares + progress);
 }
@@ -88,12 +90,12 @@ TEST_CASE("Robots of one colour share no edges, and all have a colour", "[pgo_st
         CHECK_FALSE(std::binary_search(neighbours[a].begin(), neighbours[a].end(), b));
   }
   CHECK(coloured == 12);
-  CHECK(colours_of(neighbours).size() == 2);  // a ring of robots, of even length
+  CHECK(colours_of(neighbours).size() == 2);  // a ring with an even number of robots
   const TeamTree tree = breadth_first_tree(neighbours);
   CHECK(tree.order.size() == 12);
 }
 
-TEST_CASE("Block descent ends at the optimum of the small grid however it is dealt out",
+TEST_CASE("Block descent ends at the optimum of the small grid for any number of robots",
           "[pgo_study]") {
   const auto file = shared_data("pose_graphs/3d/smallGrid3D.g2o");
   if (!file) return;
@@ -105,7 +107,7 @@ TEST_CASE("Block descent ends at the optimum of the small grid however it is dea
   const auto rounds = run_team(graph, team, {.max_rounds = 300}, {});
   for (std::size_t k = 1; k < rounds.size(); ++k) {
     REQUIRE(rounds[k].cost <= rounds[k - 1].cost * (1.0 + kSinglePrecision));
-    // The root tells the others after every fifth round how far they are, and at the end.
+    // The root publishes the progress after every fifth round and at the end.
     CHECK((rounds[k].round == 5 * static_cast<int>(k) || k + 1 == rounds.size()));
   }
   CHECK(team.done());
@@ -113,7 +115,7 @@ TEST_CASE("Block descent ends at the optimum of the small grid however it is dea
   CHECK(rounds.back().cost == Approx(kSmallGridOptimum).epsilon(1e-5));
 }
 
-TEST_CASE("Gauss-Seidel sweeps of a team come to the answer of one robot", "[pgo_study]") {
+TEST_CASE("Gauss-Seidel sweeps of a team reach the result of one robot", "[pgo_study]") {
   const std::size_t robots = GENERATE(2U, 4U);
   CAPTURE(robots);
   std::mt19937 rng(2);
@@ -126,15 +128,17 @@ TEST_CASE("Gauss-Seidel sweeps of a team come to the answer of one robot", "[pgo
     return run_team(dealt, team, {.max_rounds = 20000}, {}).back().cost;
   };
   const double team_cost = cost_of(graph);
-  // Positions of some 100 m are told in single precision, and slow modes add up what is lost.
+  // Positions of some 100 m are sent in single precision, and slow modes accumulate the rounding
+  // errors.
   CHECK(team_cost == Approx(cost_of(alone)).epsilon(1e-2));
-  // One Gauss-Newton step from the chordal rotations: better than those, no better than the best.
+  // One Gauss-Newton step from the chordal rotations improves on them, and cannot be better than
+  // the optimum.
   const QuadraticProblem problem(3, 40, graph.edges, {});
   CHECK(team_cost < problem.cost(lift(chordal(graph), 3)));
   CHECK(team_cost >= certified_optimum_of(graph) * (1.0 - 1e-9));
 }
 
-TEST_CASE("Alone, robots meet if nothing is noisy", "[pgo_study]") {
+TEST_CASE("Without noise, robots that solve alone and are joined have no cost", "[pgo_study]") {
   std::mt19937 rng(4);
   const TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
   LocalTeam team(graph);
@@ -143,7 +147,7 @@ TEST_CASE("Alone, robots meet if nothing is noisy", "[pgo_study]") {
   CHECK(rounds.back().cost < 1e-9);
 }
 
-TEST_CASE("A robot whose own edges do not connect its poses cannot be alone", "[pgo_study]") {
+TEST_CASE("A robot whose own edges do not connect its poses cannot solve alone", "[pgo_study]") {
   std::mt19937 rng(4);
   TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
   std::erase_if(graph.edges, [&](const BlockEdge& e) {
@@ -161,7 +165,7 @@ TEST_CASE("A distributed verification finds that a wound ring is no minimum", "[
   const TeamVerification found = verify_team(ring.graph, X, {}, {});
   CHECK(found.negative);
   CHECK(found.lambda_min < 0.0);
-  // The direction has that curvature: the way up from the saddle lowers the cost.
+  // The direction has negative curvature: a step along it in an added dimension lowers the cost.
   const QuadraticProblem higher(rank + 1, 24, ring.graph.edges, {});
   const LiftedPoses beyond = escape(higher, X, found.direction.row(0).transpose());
   CHECK(higher.cost(beyond) < 0.999 * QuadraticProblem(rank, 24, ring.graph.edges, {}).cost(X));
@@ -177,7 +181,7 @@ TEST_CASE("A distributed verification finds nothing at an optimum", "[pgo_study]
       verify_team(ring.graph, X, {.max_iterations = 500, .tolerance = 1e-6}, {});
   CHECK_FALSE(found.negative);
   CHECK(found.converged);
-  // Beyond the kernel: the Laplacian of the ring.
+  // Smallest eigenvalue of the ring's Laplacian outside the kernel.
   CHECK(found.lambda_min ==
         Approx(2.0 - 2.0 * std::cos(2.0 * std::numbers::pi / 24)).epsilon(1e-3));
   CHECK(found.work.bytes > robots * static_cast<std::size_t>(found.rounds) * kMessageHeader);
@@ -195,8 +199,7 @@ TEST_CASE("Distributed and central verification agree on a recorded graph", "[pg
   CHECK(found.lambda_min > 0.0);
 }
 
-TEST_CASE("Block descent of rank 5 finds its way from the wound ring to the optimum",
-          "[pgo_study][rbcd]") {
+TEST_CASE("Block descent of rank 5 leaves the wound ring for the optimum", "[pgo_study][rbcd]") {
   const WoundRing ring(24, 3);
   MemberTeam team = rbcd_team(ring.graph, ring.wound, {});
   const auto rounds = run_team(ring.graph, team, {.max_rounds = 1000}, {});

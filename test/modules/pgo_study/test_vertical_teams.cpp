@@ -10,7 +10,7 @@
 #include "modules/pose_graph/tree_newton.hpp"
 #include "test/support/team_graphs.hpp"
 
-// Teams whose graphs know which way is up, solved in one process.
+// Teams with vertical priors, solved in one process.
 
 namespace km {
 namespace {
@@ -29,8 +29,8 @@ std::vector<SE3> start_of(const TeamGraph& graph) {
   return levelled(chordal_initialisation(graph.poses(), graph.edges), graph.verticals);
 }
 
-// Robots drive side by side over level ground, all along tied to the next. Odometry takes each for
-// pitching ever further, and their verticals are off by a few milliradians.
+// Robots drive side by side over level ground, joined by closures all the way. Their odometry
+// drifts in pitch, and their verticals have errors of a few milliradians.
 TeamGraph level_drive(std::mt19937& rng) {
   constexpr Eigen::Index kLength = 25;
   constexpr Eigen::Index kRobots = 3;
@@ -65,7 +65,7 @@ TeamGraph level_drive(std::mt19937& rng) {
 
 }  // namespace
 
-TEST_CASE("Newton's method, block descent and the centralised solver come to one optimum",
+TEST_CASE("Newton's method, block descent and the centralised solver reach one optimum",
           "[newton][vertical]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
@@ -87,14 +87,14 @@ TEST_CASE("Newton's method, block descent and the centralised solver come to one
   CHECK(run_team(graph, descent, {.max_rounds = 400}, {}).back().cost ==
         Approx(optimum).epsilon(1e-6));
 
-  // The ground is level again: odometry alone pitches by 50 mrad.
+  // The estimated ground is level; odometry alone pitches by 50 mrad.
   for (const SE3& T : round_to_poses(team_poses(graph, newton), lifted_identity(5))) {
     CHECK(std::acos(std::min(1.0, T.linear()(2, 2))) < 0.01);
     CHECK(std::abs(T.translation().z() - start[0].translation().z()) < 0.25);
   }
 }
 
-TEST_CASE("A team finds its tilt from any start that is upright on the whole",
+TEST_CASE("A team estimates its tilt from any start that is upright on the whole",
           "[newton][vertical]") {
   std::mt19937 rng(4);
   const TeamGraph graph = level_drive(rng);
@@ -109,14 +109,14 @@ TEST_CASE("A team finds its tilt from any start that is upright on the whole",
   CHECK(costs[1] == Approx(costs[0]).epsilon(1e-9));
 }
 
-TEST_CASE("Alone, robots that know which way is up are joined upright", "[pose_graph][vertical]") {
+TEST_CASE("Robots with verticals that solve alone are joined upright", "[pose_graph][vertical]") {
   std::mt19937 rng(4);
   TeamGraph graph = noisy_chain(30, 3, 0.0, rng, 2.0);
   {
     LocalTeam exact(graph);
     CHECK(run_team(graph, exact, {}, {}).back().cost < 1e-9);
   }
-  // Closures between robots are tilted: what is joined by them is not.
+  // Closures between robots are tilted; the joined robots are not.
   for (BlockEdge& e : graph.edges)
     if (graph.robot_of(e.i) != graph.robot_of(e.j)) e.T_i_j.linear() *= so3_exp({0.1, 0.2, 0.0});
   LocalTeam team(graph);

@@ -6,7 +6,7 @@
 namespace km {
 namespace {
 
-// Definite, and random; entries come in blocks of 4 x 4, as those of poses, or one by one.
+// A random definite matrix; its entries are in blocks of 4 x 4, as for poses, or single.
 Eigen::SparseMatrix<double> random_definite(int size, int block, std::mt19937& rng) {
   std::normal_distribution<double> normal;
   std::uniform_int_distribution<int> place(0, size / block - 1);
@@ -25,7 +25,7 @@ Eigen::SparseMatrix<double> random_definite(int size, int block, std::mt19937& r
 
 }  // namespace
 
-TEST_CASE("Rows are solved for, whatever pattern the factor has", "[pose_graph]") {
+TEST_CASE("The factor solves for rows of the right-hand side with any pattern", "[pose_graph]") {
   const int block = GENERATE(1, 2, 4);
   const int poses = GENERATE(1, 2, 7, 40);
   const Eigen::Index rank = GENERATE(1, 3, 4, 5);
@@ -37,11 +37,11 @@ TEST_CASE("Rows are solved for, whatever pattern the factor has", "[pose_graph]"
   Eigen::MatrixXd B(rank, 4 * poses);
   for (double& x : B.reshaped()) x = normal(rng);
   const Eigen::MatrixXd X = BlockCholesky(A).solve_rows(B);
-  // The least eigenvalue is 0.1 at least, the largest some 100.
+  // The smallest eigenvalue is at least 0.1, the largest about 100.
   CHECK((X * A - B).norm() < 1e-10 * B.norm());
 }
 
-TEST_CASE("What is not definite is not factorised", "[pose_graph]") {
+TEST_CASE("An indefinite matrix is not factorised", "[pose_graph]") {
   Eigen::SparseMatrix<double> A(4, 4);
   A.setIdentity();
   A.coeffRef(2, 2) = -1.0;

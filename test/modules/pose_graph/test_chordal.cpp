@@ -29,8 +29,9 @@ TEST_CASE("initialisation of a graph in two parts is refused", "[pose_graph]") {
   CHECK_THROWS_AS(odometry_initialisation(4, edges), std::invalid_argument);
 }
 
-TEST_CASE("the chordal start of recorded graphs costs what others found", "[pose_graph]") {
-  // dpgo's costs at its chordal start, same method; quaternions are rounded in the files.
+TEST_CASE("the chordal start of recorded graphs has the cost that dpgo reports", "[pose_graph]") {
+  // Costs of dpgo at its chordal start, which uses the same method. The files have rounded
+  // quaternions.
   const auto [file, expected] = GENERATE(
       table<std::string, double>({{"smallGrid3D", 1561.38498}, {"sphere2500", 1971.17499}}));
   CAPTURE(file);

@@ -10,11 +10,11 @@
 namespace km {
 namespace {
 
-constexpr double kOdometrySigma = 0.02;  // of the odometry in a cycle, on each axis [rad], [m]
-constexpr double kClosureSigma = 0.05;   // of both closures together
+constexpr double kOdometrySigma = 0.02;  // odometry in a cycle, on each axis [rad], [m]
+constexpr double kClosureSigma = 0.05;   // both closures together [rad], [m]
 constexpr double kVolume_m3 = 1000.0;
 
-// Cycles whose closures are `scale` times noisier than they claim. A share of them is false.
+// Cycles whose closures are `scale` times noisier than they claim. Some cycles are false.
 std::vector<NoiseCycle> draw_cycles(std::size_t count, double scale, double share_false,
                                     int dimension, std::mt19937& rng) {
   Matrix6 axes = Matrix6::Identity();
@@ -43,7 +43,8 @@ PairCycles pair_of(std::vector<NoiseCycle> inside, std::vector<NoiseCycle> betwe
 
 }  // namespace
 
-TEST_CASE("The noise of a pair's closures is found beside false closures", "[closure_noise]") {
+TEST_CASE("The noise of the closures of a pair is estimated in the presence of false closures",
+          "[closure_noise]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const double scale = GENERATE(3.0, 5.0, 10.0);
   const double share_false = GENERATE(0.0, 0.4);
@@ -52,11 +53,12 @@ TEST_CASE("The noise of a pair's closures is found beside false closures", "[clo
   std::mt19937 rng(seed);
   const PairCycles cycles = pair_of(draw_cycles(100, scale, share_false, dimension, rng), {});
   const double found = estimate_closure_noise(cycles, 1.0);
-  // 60 cycles of 3 axes tell a standard deviation to 5 %; three of these, and the step of the grid.
+  // 60 cycles of 3 axes determine a standard deviation to 5 %. The tolerance is three times this,
+  // and the step of the grid.
   CHECK(found == Approx(scale).epsilon(0.25));
 }
 
-TEST_CASE("Closures that are as noisy as claimed keep the team's factor", "[closure_noise]") {
+TEST_CASE("Closures that are as noisy as claimed keep the factor of the team", "[closure_noise]") {
   const unsigned seed = GENERATE(range(1U, 21U));
   const double usual = GENERATE(0.5, 1.0, 4.0);
   CAPTURE(seed, usual);
@@ -79,12 +81,12 @@ TEST_CASE("Few observations do not make closures noisy", "[closure_noise]") {
   std::mt19937 rng(1);
   PairCycles cycles = pair_of(draw_cycles(40, 2.2, 0.0, 3, rng), {});
   CHECK(estimate_closure_noise(cycles, 1.0) > 1.7);
-  cycles.places = 1.0;  // all cycles are of one observation
+  cycles.places = 1.0;  // all cycles are one observation
   CHECK(estimate_closure_noise(cycles, 1.0) == 1.0);
   CHECK(estimate_closure_noise({}, 2.5) == 2.5);
 }
 
-TEST_CASE("The share of true cycles is that of the draw", "[closure_noise]") {
+TEST_CASE("The estimated share of true cycles equals the share in the data", "[closure_noise]") {
   const double share = GENERATE(0.2, 0.5, 0.9);
   std::vector<double> log_ratio, weight;
   for (int k = 0; k < 100; ++k) {

@@ -10,7 +10,7 @@ PoseEdge closure(KeyframeId from, KeyframeId to) {
   return {.from = from, .to = to};
 }
 
-TEST_CASE("Closures within ten keyframes at both ends are of one place", "[closure_places]") {
+TEST_CASE("Closures within ten keyframes at both ends form one place", "[closure_places]") {
   const std::vector<PoseEdge> closures{closure({0, 100}, {1, 200}), closure({0, 110}, {1, 190}),
                                        closure({0, 111}, {1, 200}), closure({0, 100}, {1, 211}),
                                        closure({0, 105}, {2, 200}), closure({0, 100}, {0, 200})};

@@ -20,10 +20,10 @@ constexpr int kKeyframes = 300;
 constexpr double kSigma = 0.01;  // [rad], [m]
 constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
-// Two robots drive side by side, and each keyframe of the one sees that of the other.
+// Two robots drive side by side, and each keyframe of one robot sees a keyframe of the other.
 class Lanes {
  public:
-  // Noise of odometry is `times` what it claims.
+  // The noise of odometry is `times` its claimed noise.
   Lanes(int dimension, double times, unsigned seed, double step_sigma = kSigma)
       : dimension_(dimension), rng_(seed), precision_(claim(kSigma)) {
     step_ = {{kOne, claim(step_sigma)}, {kOther, claim(step_sigma)}};
@@ -42,7 +42,7 @@ class Lanes {
     closures_.push_back({id(0, k), id(1, l),
                          truth(0, k).inverse() * truth(1, l) * noise(times * kSigma), precision_});
   }
-  // As false as can be, or little turned.
+  // A random relative pose, or one with a small rotation error.
   void add_false(int k, int l, bool turned = true) {
     SE3 T = truth(0, k).inverse() * truth(1, l);
     T = T * se3_exp(flat((turned ? 20.0 : 0.2) * random_vector<6>(rng_)));
@@ -106,7 +106,7 @@ class Lanes {
   static KeyframeId id(int lane, int k) {
     return {lane == 0 ? kOne : kOther, static_cast<KeyframeIndex>(k)};
   }
-  // The other robot looks across.
+  // The other robot looks across the lane.
   [[nodiscard]] static SE3 truth(int lane, int k) {
     const Eigen::AngleAxisd turn(0.02 * k + lane, Eigen::Vector3d::UnitZ());
     return make_pose(turn.toRotationMatrix(), Eigen::Vector3d(k, 2.0 * lane, 0.0));
@@ -128,7 +128,7 @@ class Lanes {
   std::vector<PoseEdge> closures_;
 };
 
-TEST_CASE("The noise of closures is found from pairs of them", "[pose_graph]") {
+TEST_CASE("The noise of closures is estimated from pairs of closures", "[pose_graph]") {
   const int dimension = GENERATE(2, 3);
   const double times = GENERATE(0.1, 1.0, 4.0);
   const double step_sigma = GENERATE(1e-6, kSigma);
@@ -141,21 +141,23 @@ TEST_CASE("The noise of closures is found from pairs of them", "[pose_graph]") {
   lanes.add_random_false(false_closures, turned);
   const auto nearest = lanes.noise_scale();
   REQUIRE(nearest);
-  CHECK(nearest->lengths >= 240);  // of those that are compared, some turn too far
+  CHECK(nearest->lengths >= 240);  // some of the compared cycles turn too far
   CHECK(nearest->lengths <= 300);
-  // Scales are told apart to 5 %. The scale nearest to 1 is taken that loses no more than 4 of the
-  // log-likelihood: sqrt(8) standard deviations, each 1 / sqrt(2 * 3 * 300) or less.
+  // The resolution of scales is 5 %. fit_noise() takes the scale nearest to 1 that loses no more
+  // than 4 of the log-likelihood. These are sqrt(8) standard deviations, each 1 / sqrt(2 * 3 * 300)
+  // or less.
   CHECK(nearest->scale == Approx(times).epsilon(0.12));
   const auto all = lanes.noise_scale(kAll);
   REQUIRE(all);
   CHECK(all->scale == Approx(times).epsilon(0.12));
-  // False closures are never as close as the mixture expects some to be: less seems consistent.
+  // No false closure here is as close as the mixture expects of some, so the consistent share
+  // appears smaller.
   const double share = static_cast<double>(lanes.true_cycles()) / static_cast<double>(all->lengths);
   CHECK(all->consistent <= share + 0.01);
   CHECK(all->consistent >= share - 0.08);  // measured: 0.072
 }
 
-TEST_CASE("Of many cycles so many count as asked for", "[pose_graph]") {
+TEST_CASE("No more cycles count than the given limit", "[pose_graph]") {
   Lanes lanes(3, 1.0, 1U);
   for (int k = 0; k < kKeyframes; ++k) lanes.add_true(k, k, 1.0);
   for (const std::size_t most : {20U, 60U}) {
@@ -165,7 +167,7 @@ TEST_CASE("Of many cycles so many count as asked for", "[pose_graph]") {
   }
 }
 
-TEST_CASE("Few closures do not tell their noise", "[pose_graph]") {
+TEST_CASE("Too few closures give no estimate of their noise", "[pose_graph]") {
   Lanes lanes(GENERATE(2, 3), 1.0, 3);
   CHECK_FALSE(lanes.noise_scale());
   lanes.add_true(0, 0);
@@ -184,7 +186,7 @@ TEST_CASE("Lengths that are not finite are not counted", "[pose_graph]") {
   CHECK(histogram.size() == 2);
 }
 
-TEST_CASE("Closures beside each other that agree do not stand alone", "[pose_graph]") {
+TEST_CASE("Near closures that agree do not stand alone", "[pose_graph]") {
   Lanes lanes(GENERATE(2, 3), 1.0, GENERATE(range(1U, 6U)));
   for (const int k : {10, 12, 15, 100, 101, 200, 205}) lanes.add_true(k, k);
   CHECK(lanes.isolated().empty());
@@ -196,7 +198,7 @@ TEST_CASE("A closure far from all others stands alone", "[pose_graph]") {
   CHECK(lanes.isolated() == lanes.ids());
 }
 
-TEST_CASE("False closures stand alone, also beside true ones", "[pose_graph]") {
+TEST_CASE("False closures stand alone, even near true ones", "[pose_graph]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const int dimension = GENERATE(2, 3);
   CAPTURE(seed, dimension);
@@ -212,7 +214,7 @@ TEST_CASE("False closures stand alone, also beside true ones", "[pose_graph]") {
   CHECK(lanes.isolated() == all_false);
 }
 
-TEST_CASE("Both robots of a pair find that the same closures stand alone", "[pose_graph]") {
+TEST_CASE("Both robots of a pair find equal sets of closures that stand alone", "[pose_graph]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const int dimension = GENERATE(2, 3);
   CAPTURE(seed, dimension);

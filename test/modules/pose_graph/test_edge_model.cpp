@@ -40,7 +40,7 @@ Matrix12 hessian_of(const EdgeModel& model) {
 
 }  // namespace
 
-TEST_CASE("an edge's slope and curvature are those of differences", "[newton]") {
+TEST_CASE("gradient and Hessian of an edge agree with finite differences", "[newton]") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U, 5U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -50,7 +50,8 @@ TEST_CASE("an edge's slope and curvature are those of differences", "[newton]") 
   Vector12 g;
   g << model.g_i, model.g_j;
   CHECK(model.cost == Approx(moved.cost(Vector12::Zero())).epsilon(1e-12));
-  // Central differences along h: errors of order h^2 and, for the second, rounding over h^2.
+  // Central differences with step h: errors of order h^2, and for the second one also rounding over
+  // h^2.
   constexpr double h = 1e-4;
   for (int k = 0; k < 20; ++k) {
     Vector12 d;
@@ -62,7 +63,7 @@ TEST_CASE("an edge's slope and curvature are those of differences", "[newton]") 
   }
 }
 
-TEST_CASE("without its second derivatives an edge has the same slope", "[newton]") {
+TEST_CASE("an edge without second derivatives has the same gradient", "[newton]") {
   std::mt19937 rng(7);
   const Moved moved = random_edge(rng);
   const EdgeModel model = model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kFull);
@@ -73,7 +74,8 @@ TEST_CASE("without its second derivatives an edge has the same slope", "[newton]
   CHECK(slope.g_j == model.g_j);
 }
 
-TEST_CASE("Gauss-Newton's curvature is never negative, and the full one at a fit", "[newton]") {
+TEST_CASE("the Gauss-Newton Hessian is never indefinite, and the full one is not at zero residual",
+          "[newton]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -81,7 +83,7 @@ TEST_CASE("Gauss-Newton's curvature is never negative, and the full one at a fit
   const Matrix12 gauss_newton =
       hessian_of(model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kGaussNewton));
   CHECK(Eigen::SelfAdjointEigenSolver<Matrix12>(gauss_newton).eigenvalues().minCoeff() > -1e-12);
-  // Both poses turned about the world's origin and shifted, to first order.
+  // A rigid motion of both poses about the origin, to first order.
   const Eigen::Vector3d w = random_vector<3>(rng);
   const Eigen::Vector3d u = random_vector<3>(rng);
   Vector12 rigid;

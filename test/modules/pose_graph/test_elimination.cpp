@@ -22,7 +22,7 @@ MatrixXd random_matrix(std::mt19937& rng, Index rows, Index cols) {
   return M;
 }
 
-// A chain with random chords, and a definite matrix of its pattern.
+// A chain with random chords, and a definite matrix with its pattern.
 struct Problem {
   std::vector<NodePair> pairs;
   std::vector<bool> keep;
@@ -48,8 +48,8 @@ Problem random_problem(std::mt19937& rng, int nodes, int chords, Index block, do
   problem.dense = MatrixXd::Zero(block * nodes, block * nodes);
   for (std::size_t p = 0; p < problem.pairs.size(); ++p) {
     auto& [i, j] = problem.pairs[p];
-    if (p % 2 == 1) std::swap(i, j);  // couplings may be given either way round
-    // A sum of squares of two blocks: definite with the diagonal below.
+    if (p % 2 == 1) std::swap(i, j);  // couplings may have either order
+    // A sum of squares of two blocks, so that the matrix is definite with the diagonal below.
     const MatrixXd J_i = random_matrix(rng, block, block);
     const MatrixXd J_j = random_matrix(rng, block, block);
     problem.A.at(i) += J_i.transpose() * J_i;
@@ -84,7 +84,7 @@ MatrixXd dense_schur(const Problem& problem) {
 
 }  // namespace
 
-TEST_CASE("a Schur complement is that of the dense matrix", "[newton]") {
+TEST_CASE("the Schur complement equals that of the dense matrix", "[newton]") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U, 5U, 6U);
   const Index block = GENERATE(1, 3, 6);
   CAPTURE(seed, block);
@@ -130,7 +130,7 @@ TEST_CASE("forward and backward solve the dense system", "[newton]") {
   CHECK((X - expected).norm() < 1e-9 * expected.norm());
 }
 
-TEST_CASE("a matrix that is not definite is told", "[newton]") {
+TEST_CASE("factorising an indefinite matrix fails", "[newton]") {
   std::mt19937 rng(1);
   Problem problem = random_problem(rng, 20, 10, 3, 0.2);
   const auto node = std::find(problem.keep.begin(), problem.keep.end(), false);
@@ -144,7 +144,7 @@ TEST_CASE("a pair outside the graph is refused", "[newton]") {
   CHECK_THROWS_AS(EliminationPlan({false, false}, {{1, 1}}), std::invalid_argument);
 }
 
-TEST_CASE("a cover has an end of every closure, whatever their order", "[newton]") {
+TEST_CASE("a cover contains an end of every closure, for any order of closures", "[newton]") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -162,7 +162,7 @@ TEST_CASE("a cover has an end of every closure, whatever their order", "[newton]
     return std::binary_search(cover.begin(), cover.end(), id);
   };
   for (const ClosureId& closure : closures) CHECK((covered(closure.from) || covered(closure.to)));
-  // No pose could be left out.
+  // Every pose of the cover is necessary.
   for (const KeyframeId& id : cover)
     CHECK(std::any_of(closures.begin(), closures.end(), [&](const ClosureId& closure) {
       return (closure.from == id && !covered(closure.to)) ||
@@ -172,15 +172,15 @@ TEST_CASE("a cover has an end of every closure, whatever their order", "[newton]
   CHECK(cover_closures(closures) == cover);
 }
 
-TEST_CASE("a star is covered by its centre", "[newton]") {
+TEST_CASE("the centre of a star is its cover", "[newton]") {
   std::vector<ClosureId> closures;
   for (KeyframeIndex k = 0; k < 5; ++k) closures.push_back({{0, k}, {1, 7}});
   CHECK(cover_closures(closures) == std::vector<KeyframeId>{{1, 7}});
 }
 
-TEST_CASE("poses are kept where eliminating them couples many others", "[newton]") {
-  // Node 0 has six neighbours that are not coupled: 15 couplings would replace 6. Node 7 is between
-  // two nodes: one replaces two.
+TEST_CASE("a pose is kept if eliminating it would couple many others", "[newton]") {
+  // Node 0 has six neighbours without couplings: its elimination would replace 6 couplings by 15.
+  // Node 7 is between two nodes: its elimination replaces two couplings by one.
   std::vector<NodePair> pairs;
   for (int k = 1; k <= 6; ++k) pairs.push_back({0, k});
   pairs.push_back({1, 7});

@@ -34,7 +34,7 @@ TEST_CASE("ten equal candidates win over forty random ones", "[pose_graph]") {
   CHECK(alignment->inliers == std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
 }
 
-TEST_CASE("candidates have the say of their weights", "[pose_graph]") {
+TEST_CASE("candidates count by their weights", "[pose_graph]") {
   std::mt19937 rng(1);
   const SE3 few = random_pose(rng);
   const SE3 many = few * make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(100.0, 0.0, 0.0));
@@ -65,7 +65,8 @@ TEST_CASE("noise of the agreeing candidates averages out", "[pose_graph]") {
   const auto alignment = align_frames(candidates, {.rotation_rad = 0.3, .translation_m = 2.0});
   REQUIRE(alignment);
   CHECK(alignment->inliers.size() == 400);
-  // Five standard deviations of a mean of 400: 0.05 sqrt(3) rad, 0.2 sqrt(3) m, over 20.
+  // Five standard deviations of the mean of 400 candidates: 0.05 sqrt(3) rad, 0.2 sqrt(3) m, over
+  // 20.
   CHECK(angle_between(alignment->L, truth) < 0.022);
   CHECK((alignment->L.col(3) - truth.translation()).norm() < 0.087);
 }
@@ -95,7 +96,8 @@ TEST_CASE("alignment does not depend on the frame, lifted or not", "[pose_graph]
   CHECK((lift(frame, T) - in_frame->L).norm() < 1e-9);
 }
 
-TEST_CASE("alignment without candidates has no answer, and bad ones are refused", "[pose_graph]") {
+TEST_CASE("alignment without candidates has no result, and invalid candidates are refused",
+          "[pose_graph]") {
   CHECK_FALSE(align_frames({}, {}).has_value());
   std::vector<Eigen::MatrixXd> mixed{Eigen::MatrixXd::Identity(3, 4),
                                      Eigen::MatrixXd::Identity(5, 4)};

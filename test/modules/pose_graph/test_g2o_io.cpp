@@ -57,7 +57,7 @@ TEST_CASE("A key is a gtsam symbol, a plain number, or robot and index", "[g2o]"
     }
 }
 
-TEST_CASE("A graph survives being written and read", "[g2o]") {
+TEST_CASE("A graph is unchanged after writing and reading it", "[g2o]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -80,12 +80,13 @@ TEST_CASE("A graph survives being written and read", "[g2o]") {
     CHECK(back.edges[i].from == graph.edges[i].from);
     CHECK(back.edges[i].to == graph.edges[i].to);
     CHECK(back.edges[i].T_from_to.isApprox(graph.edges[i].T_from_to, 1e-14));
-    // Inverted twice: the condition number (below 1e4) times the rounding of a double.
+    // The matrix is inverted twice: error of the condition number (below 1e4) times the rounding of
+    // a double.
     CHECK(back.edges[i].covariance.isApprox(graph.edges[i].covariance, 1e-11));
   }
 }
 
-TEST_CASE("Verticals survive being written and read", "[g2o][vertical]") {
+TEST_CASE("Verticals are unchanged after writing and reading them", "[g2o][vertical]") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -109,9 +110,9 @@ TEST_CASE("Verticals survive being written and read", "[g2o][vertical]") {
 
 const std::string kOffset = "PARAMS_SE3OFFSET 4 0 0 0 0 0 0 1\n";
 
-TEST_CASE("A prior on the tilt of a pose is its vertical, wherever else it looks",
-          "[g2o][vertical]") {
-  // Turned by 90 degrees about x: z of the world is y of the pose. Heading and place say nothing.
+TEST_CASE("A prior on the tilt of a pose is its vertical, for any heading", "[g2o][vertical]") {
+  // Rotated by 90 degrees about x: z of the world is y of the pose. Heading and position are
+  // arbitrary.
   const std::string information = " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 25 0 0 0 0 25";
   const auto graph = read_graph(kVertex + kOffset + "EDGE_SE3_PRIOR 0 4 7 8 9 " +
                                 "0.70710678 0 0 0.70710678" + information + '\n');
@@ -153,7 +154,7 @@ TEST_CASE("Other priors than verticals are refused with the line and the reason"
                     "test.g2o:2: 2D and 3D in one file");
 }
 
-TEST_CASE("A vertical that is no direction is not written", "[g2o][vertical]") {
+TEST_CASE("A vertical that is not a unit vector is not written", "[g2o][vertical]") {
   const auto [up, sigma] = GENERATE(table<Eigen::Vector3d, double>({{{0, 0, 2}, 0.1},
                                                                     {{0, 0, 0}, 0.1},
                                                                     {{0, 0, 1}, 0.0},
@@ -213,8 +214,8 @@ TEST_CASE("A bad g2o file is refused with its line and the reason", "[g2o]") {
                     Catch::StartsWith("test.g2o:5: ") && Catch::Contains(reason));
 }
 
-TEST_CASE("An edge with indefinite information weighs what its blocks say", "[g2o]") {
-  // As in cubicle.g2o: cross terms that no covariance has, beside definite blocks.
+TEST_CASE("An edge with indefinite information has the weights of its blocks", "[g2o]") {
+  // As in cubicle.g2o: definite blocks with cross terms that are impossible in a covariance.
   const G2oGraph graph = read_graph("EDGE_SE3:QUAT 1 2" + kPose +
                                     " 4 2 0 0 0 0 4 0 0 0 0 10 70 100 0 10 0 0 10 0 5\n" +
                                     "EDGE_SE3:QUAT 2 3" + kPose + kUnit + '\n');
@@ -232,7 +233,7 @@ TEST_CASE("An edge with indefinite information weighs what its blocks say", "[g2
   CHECK(planar.edges[0].covariance.isApprox(Matrix6(variances.asDiagonal()), 1e-14));
 }
 
-TEST_CASE("A g2o file without content or that is not there is refused", "[g2o]") {
+TEST_CASE("An empty or missing g2o file is refused", "[g2o]") {
   CHECK_THROWS_WITH(read_graph("# nothing\n"), "test.g2o: no vertex and no edge");
   CHECK_THROWS_WITH(read_g2o(std::filesystem::path("no/such.g2o")), "no/such.g2o: no such file");
 }
@@ -244,7 +245,7 @@ TEST_CASE("A message about a broken line is short and printable", "[g2o]") {
                     Catch::Contains("VERTEX?[2Jxxx") && Catch::EndsWith("xx ..."));
 }
 
-TEST_CASE("A covariance without inverse is not written", "[g2o]") {
+TEST_CASE("A singular covariance is not written", "[g2o]") {
   G2oGraph graph;
   graph.edges.push_back({{0, 0}, {0, 1}, SE3::Identity(), Matrix6::Zero()});
   std::ostringstream out;
@@ -271,7 +272,7 @@ TEST_CASE("The public benchmark graphs have the sizes their sources state", "[g2
   CHECK(graph.edges.size() == edges);
 }
 
-TEST_CASE("The weights of an edge are those SE-Sync takes from its information blocks", "[g2o]") {
+TEST_CASE("The weights of an edge equal those of SE-Sync for its information blocks", "[g2o]") {
   const auto graph =
       read_graph("EDGE_SE3:QUAT 0 1" + kPose + " 2 0 0 0 0 0 4 0 0 0 0 4 0 0 0 10 0 0 20 0 20\n");
   const Precision precision = precision_of(graph.edges.at(0).covariance);

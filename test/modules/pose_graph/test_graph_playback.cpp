@@ -92,7 +92,7 @@ TEST_CASE("A played graph chains its odometry with the covariance of the chain",
   CHECK(played.odometry[0].covariance.isZero());
 }
 
-TEST_CASE("Keyframes of a graph with times have its times", "[playback]") {
+TEST_CASE("Keyframes of a graph with times have these times", "[playback]") {
   std::mt19937 rng(1);
   RecordedGraph graph = recording(rng);
   graph.stamps = {100, 250, 251, 1'000'000, 2'000'000};
@@ -134,7 +134,7 @@ TEST_CASE("Verticals are played with their keyframes, and odometry starts uprigh
     CHECK(played.keyframes[i].odometry.T_odom_kf.isApprox(poses[i].T_odom_kf, 1e-12));
 }
 
-TEST_CASE("A closure is played with the keyframe that makes it known, by one robot", "[playback]") {
+TEST_CASE("One robot plays a closure with the keyframe that makes it known", "[playback]") {
   std::mt19937 rng(1);
   const RecordedGraph graph = recording(rng);
   Played played;
@@ -146,7 +146,7 @@ TEST_CASE("A closure is played with the keyframe that makes it known, by one rob
   CHECK(ids == std::vector<ClosureId>{{{6, 0}, {2, 5}},
                                       {{6, 2}, {9, 70}},
                                       {{6, 3}, {6, 0}},
-                                      {{6, 1}, {6, 4}}});  // not 2:0 -> 6:1: robot 2 plays it
+                                      {{6, 1}, {6, 4}}});  // robot 2 plays 2:0 -> 6:1
   CHECK(played.keyframes_before_closure == std::vector<std::size_t>{1, 3, 4, 5});
   REQUIRE(played.ends.size() == 1);
   CHECK(played.ends[0].keyframes == 5);
@@ -169,7 +169,7 @@ TEST_CASE("The playback thread plays to the end at any rate", "[playback]") {
   CHECK(played.ends.size() == 1);
 }
 
-TEST_CASE("A playback that is stopped does not claim to be over", "[playback]") {
+TEST_CASE("A stopped playback does not publish its end", "[playback]") {
   std::mt19937 rng(1);
   Played played;
   std::promise<void> first;

@@ -43,7 +43,7 @@ TEST_CASE("Every field of a JRL file is read", "[jrl]") {
       {{0, 0}, {0, 1}, 1, 0, 10, false, false},
       {{0, 1}, {0, 2}, 1, 0, 20, false, false},
       {{0, 0}, {0, 2}, 2, 0, 20, true, false},
-      {{1, 1}, {0, 1}, 0, -2, 15, true, false},  // the earlier copy's stamp
+      {{1, 1}, {0, 1}, 0, -2, 15, true, false},  // stamp of the earlier copy
       {{1, 0}, {1, 1}, 1, 0, 15, false, false},
       {{1, 1}, {0, 2}, 7, 7, 15, true, true}};
   REQUIRE(graph.measurements.size() == std::size(expected));
@@ -62,7 +62,7 @@ TEST_CASE("Every field of a JRL file is read", "[jrl]") {
         std::vector<Stamp>{SmallJrl::kStart, SmallJrl::kStart + 10, SmallJrl::kStart + 20});
   CHECK(graph.stamps.at(1) == std::vector<Stamp>{SmallJrl::kStart + 5, SmallJrl::kStart + 15});
   REQUIRE(graph.truth.size() == 5);
-  CHECK(graph.truth.at({0, 1}).translation() == Eigen::Vector3d(1, 0, 0));  // of a's own list
+  CHECK(graph.truth.at({0, 1}).translation() == Eigen::Vector3d(1, 0, 0));  // in the list of a
   CHECK(graph.truth.at({1, 1}).translation() == Eigen::Vector3d(1, 2, 0));
   REQUIRE(graph.initial.size() == 2);
   CHECK(graph.initial.at({1, 0}).translation() == Eigen::Vector3d(0, 2.5, 0));
@@ -85,7 +85,7 @@ TEST_CASE("Rotations are w x y z, and covariances have the rotation first", "[jr
   CHECK(turn.angle() == Approx(2.0 * std::atan2(0.6, 0.8)));
   CHECK(turn.axis().z() == Approx(1.0));
 
-  // g2o has the translation first: the same edge there, written by hand, is the same here.
+  // g2o has the translation first. The edge, written by hand as g2o, gives an equal edge.
   const Matrix6 information = Sigma.inverse();
   std::ostringstream g2o;
   g2o.precision(17);
@@ -99,7 +99,7 @@ TEST_CASE("Rotations are w x y z, and covariances have the rotation first", "[jr
   CHECK(same.T_from_to.isApprox(edge.T_from_to, 1e-12));
 }
 
-TEST_CASE("Letters, and lists in place of maps, say the same", "[jrl]") {
+TEST_CASE("Robots as characters, and lists instead of maps, give an equal graph", "[jrl]") {
   const JrlGraph expected = parse_jrl(SmallJrl().text(), "team.jrl");
   SmallJrl small;
   json& document = small.document;
@@ -147,7 +147,7 @@ TEST_CASE("Labels of a single robot may be one list", "[jrl]") {
   CHECK(parsed(document).truth.empty());
 }
 
-TEST_CASE("Measurements of one pair that differ all count", "[jrl]") {
+TEST_CASE("Different measurements of one pair all count", "[jrl]") {
   SmallJrl small;
   json& copy = small.document["measurements"]["a"][3]["measurements"][0];
   SECTION("in the pose") {
@@ -164,7 +164,7 @@ TEST_CASE("Measurements of one pair that differ all count", "[jrl]") {
   CHECK(graph.measurements.size() == 7);
 }
 
-TEST_CASE("A label of either copy of a measurement counts", "[jrl]") {
+TEST_CASE("A label on either copy of a measurement counts", "[jrl]") {
   SmallJrl small;
   const auto [robot, label] =
       GENERATE(table<std::string, json>({{"a", json::array({3, 0})}, {"b", json::array({1, 1})}}));
@@ -172,7 +172,7 @@ TEST_CASE("A label of either copy of a measurement counts", "[jrl]") {
   CHECK(parsed(small.document).measurements[3].is_false);
 }
 
-TEST_CASE("A robot's part of a JRL file has its odometry, closures and times", "[jrl]") {
+TEST_CASE("The part of a robot of a JRL file has its odometry, closures and times", "[jrl]") {
   const TemporaryFolder folder;
   const auto file = folder.write("team.jrl", SmallJrl().text());
   const RecordedGraph a = read_recorded_graph(file, RobotId{0});
@@ -188,7 +188,7 @@ TEST_CASE("A robot's part of a JRL file has its odometry, closures and times", "
   CHECK_THROWS_WITH(read_recorded_graph(file), Contains("team.jrl: holds several robots"));
 }
 
-TEST_CASE("What a JRL file must not have is refused with its place and value", "[jrl]") {
+TEST_CASE("Invalid content of a JRL file is refused with its place and value", "[jrl]") {
   using Edit = std::function<void(json&)>;
   struct Fault {
     const char* message;
@@ -250,7 +250,7 @@ TEST_CASE("What a JRL file must not have is refused with its place and value", "
       {"/key1: 5 is not a letter and an index below 2^32",
        [&](json& d) { factor(d, "a", 1, 0)["key1"] = 5; }},
       {"/key1: 6989586625973977087",
-       [&](json& d) {  // the largest index there is
+       [&](json& d) {  // the largest possible index
          factor(d, "a", 2, 1)["key1"] = SmallJrl::kA + 0xffffffffU;
        }},
       {"/key2: is the pose of key1: 6989586621679009792",
@@ -284,7 +284,7 @@ TEST_CASE("What a JRL file must not have is refused with its place and value", "
   CHECK_THROWS_WITH(parsed(small.document), Contains(at));
 }
 
-TEST_CASE("What is no JSON is refused by name", "[jrl]") {
+TEST_CASE("A file that is not JSON is refused with its name", "[jrl]") {
   const std::string good = SmallJrl().text();
   const auto [text, message] = GENERATE_REF(
       table<std::string, const char*>({{good.substr(0, good.size() / 2), "parse error"},
@@ -295,8 +295,7 @@ TEST_CASE("What is no JSON is refused by name", "[jrl]") {
   CHECK_THROWS_WITH(parse_jrl(text, "team.jrl"), Contains("team.jrl: ") && Contains(message));
 }
 
-TEST_CASE("A spoilt JRL file is refused with its place, or holds numbers that can be solved",
-          "[jrl]") {
+TEST_CASE("A corrupted JRL file is refused with its place, or contains a solvable graph", "[jrl]") {
   check_spoilt<std::runtime_error>(SmallJrl().text(), "team.jrl", [](const std::string& text) {
     const JrlGraph graph = parse_jrl(text, "team.jrl");
     for (const JrlMeasurement& measured : graph.measurements) {
@@ -309,7 +308,7 @@ TEST_CASE("A spoilt JRL file is refused with its place, or holds numbers that ca
   });
 }
 
-TEST_CASE("What is no file of a team's graph is refused by name", "[jrl]") {
+TEST_CASE("A path that is not a JRL file is refused with its name", "[jrl]") {
   check_no_files<std::runtime_error>(".jrl", [](const auto& place) { (void)read_jrl(place); });
 }
 
@@ -317,7 +316,7 @@ TEST_CASE("COSMO-Bench files have the published numbers of poses and closures", 
   struct Set {
     const char* name;
     std::size_t poses;
-    std::size_t inside, false_inside;  // of the factors that may be outliers
+    std::size_t inside, false_inside;  // factors that may be outliers
     std::size_t between, false_between;
   };
   const Set set = GENERATE(Set{"kth_r3_00_d06_d09_d10_wifi", 1604, 432, 52, 231, 20},

@@ -7,20 +7,20 @@
 #include "modules/pose_graph/solver_choice.hpp"
 #include "test/support/team_network.hpp"
 
-// One robot of four runs the stock program on a graph that it has made up. What the three others
-// come to is compared with what they come to without it.
+// One robot of four runs the stock program on an invented graph. The result of the three other
+// robots is compared with their result without it.
 
 namespace km {
 namespace {
 
 const std::vector<RobotId> kTeam{1, 2, 3, 4};
 constexpr std::uint32_t kKeyframes = 80;
-constexpr int kTrueClosures = 30;  // of each pair
-constexpr double kNoise_m = 0.1;   // of closures; of a step of odometry half of it
+constexpr int kTrueClosures = 30;  // per pair of robots
+constexpr double kNoise_m = 0.1;   // closures; half of it for a step of odometry
 constexpr double kNoise_rad = 0.01;
 
-// What a liar may cost the others. Measured with eight seeds: up to 0.014 m if robots contradict
-// it, 0.098 m if no closure to it is true, 0.19 m if its odometry is too long.
+// Limits of the damage by a misbehaving robot. Measured with eight seeds: up to 0.014 m if robots
+// contradict it, 0.098 m if no closure to it is true, 0.19 m if its odometry is too long.
 constexpr double kContradicted_m = 0.2 * kNoise_m;
 constexpr double kOnlyLies_m = kNoise_m;
 constexpr double kWrongOdometry_m = 2.0 * kNoise_m;
@@ -29,23 +29,23 @@ struct Lie {
   RobotId liar = 1;
   double offset_m = 0.0;
   int closures = 0;
-  bool consistent = true;          ///< All that it says of one robot agrees.
-  double variance = 0.0;           ///< That it claims on every axis; 0: an honest one.
-  bool only_lies = false;          ///< No closure between it and others is true.
-  double stretched = 1.0;          ///< Its odometry, in length.
-  double odometry_variance = 0.0;  ///< As `variance`.
+  bool consistent = true;          ///< Its closures to one robot agree.
+  double variance = 0.0;           ///< Claimed on every axis; 0: the true one.
+  bool only_lies = false;          ///< No closure to another robot is true.
+  double stretched = 1.0;          ///< Factor on the length of its odometry.
+  double odometry_variance = 0.0;  ///< Claimed variance of its odometry, as `variance`.
 };
 
 Precision precision_with(double noise_m, double noise_rad) {
   return {0.5 / (noise_rad * noise_rad), 1.0 / (noise_m * noise_m)};
 }
 
-// With axes of the same variance.
+// Precision of an edge with equal variance on all axes.
 Precision precision_of_variance(double variance) {
   return {0.5 / variance, 1.0 / variance};
 }
 
-// Four robots on rounds of a block of 20 m, each begun at another corner and a little further out.
+// Four robots drive around a block of 20 m. Each begins at another corner and a little further out.
 struct Walk {
   TeamPoses truth = {};
   TeamProblem problem = {};
@@ -102,7 +102,7 @@ Eigen::Vector3d direction(std::mt19937& rng) {
   return random_vector<3>(rng).normalized();
 }
 
-// The team's graph with what the liar makes of its own.
+// The graph of the team with the falsified part of the misbehaving robot.
 TeamProblem with_lie(const Walk& walk, const Lie& lie, unsigned seed) {
   std::mt19937 rng(seed);
   TeamProblem problem = walk.problem;
@@ -140,8 +140,8 @@ TeamProblem with_lie(const Walk& walk, const Lie& lie, unsigned seed) {
   return problem;
 }
 
-// RMS distance of the honest robots' positions from the truth, after one alignment of all; infinite
-// if they are not in one frame.
+// RMS distance of the positions of the honest robots from the truth, after one common alignment;
+// infinite if they are not in one frame.
 double error_m(const TeamNetwork& network, const Walk& walk, RobotId liar) {
   Eigen::Matrix3Xd estimate(3, 0), truth(3, 0);
   std::optional<TeamFrame> frame;
@@ -164,7 +164,8 @@ double error_m(const TeamNetwork& network, const Walk& walk, RobotId liar) {
   return std::sqrt((aligned - truth).colwise().squaredNorm().mean());
 }
 
-// True if the honest robots are members of one settled session, the liar may be another.
+// True if the honest robots are members of one settled session. The misbehaving robot may be a
+// member.
 bool settled_without(const TeamNetwork& network, RobotId liar) {
   return std::all_of(network.robots.begin(), network.robots.end(), [&](const auto& entry) {
     const auto& [id, robot] = entry;
@@ -173,7 +174,7 @@ bool settled_without(const TeamNetwork& network, RobotId liar) {
   });
 }
 
-// error_m(); infinite, too, if the honest robots have no settled session.
+// error_m(), or infinite if the honest robots have no settled session.
 double error_of_team(const Walk& walk, const TeamProblem& problem, RobotId liar, bool with_liar) {
   TeamNetwork network;
   for (const RobotId robot : kTeam) {
@@ -185,7 +186,7 @@ double error_of_team(const Walk& walk, const TeamProblem& problem, RobotId liar,
                     [&](const PoseEdge& e) { return e.from.robot == liar || e.to.robot == liar; });
     feed(agent, robot, known);
   }
-  (void)network.run(200.0, [&] { return network.all_settled(); });  // not with a refused liar
+  (void)network.run(200.0, [&] { return network.all_settled(); });  // a refused robot never settles
   return settled_without(network, liar) ? error_m(network, walk, liar)
                                         : std::numeric_limits<double>::infinity();
 }
@@ -202,7 +203,7 @@ std::ostream& operator<<(std::ostream& out, const Lie& lie) {
 class Team {
  public:
   explicit Team(unsigned seed = 1) : seed_(seed), walk_(seed) {}
-  /// Errors of the others [m]: without the liar, with it.
+  /// Errors of the honest robots [m]: without and with the misbehaving robot.
   [[nodiscard]] double alone(RobotId liar) const {
     return error_of_team(walk_, walk_.problem, liar, false);
   }
@@ -224,7 +225,7 @@ void check_cost(const Lie& lie, double most_m) {
   CHECK(team.with(lie) - alone_m <= most_m);
 }
 
-// Says what each lie costs.
+// Prints and checks the damage of each attack.
 void check_table(const std::vector<Lie>& lies) {
   const Team team;
   std::map<RobotId, double> alone;
@@ -244,12 +245,12 @@ void check_table(const std::vector<Lie>& lies) {
 
 constexpr double kHonest = 0.0;
 constexpr double kTiny = 1e-12;
-constexpr double kHuge = 1e11;     // in bounds
+constexpr double kHuge = 1e11;     // within the limits
 constexpr double kTooHuge = 1e14;  // refused
 
 }  // namespace
 
-TEST_CASE("one liar of four whom others contradict costs them next to nothing",
+TEST_CASE("one robot of four that others contradict adds at most a fifth of the noise of a closure",
           "[pose_graph][liars]") {
   const auto lie = GENERATE(
       Lie{.liar = 1, .offset_m = 0.5, .closures = 100},
@@ -265,12 +266,13 @@ TEST_CASE("one liar of four whom others contradict costs them next to nothing",
 }
 
 // Up to 16 closures of a pair that stand alone are weighed like all others; more are deferred.
-TEST_CASE("a few random false closures of one liar of four cost the others half a closure's noise",
-          "[pose_graph][liars]") {
+TEST_CASE(
+    "a few random false closures of one robot of four add at most half the noise of a closure",
+    "[pose_graph][liars]") {
   check_cost({.liar = 4, .offset_m = 5.0, .closures = 100, .consistent = false}, 0.5 * kNoise_m);
 }
 
-TEST_CASE("one liar of four without a true closure costs the others less than a closure's noise",
+TEST_CASE("one robot of four without a true closure adds at most the noise of a closure",
           "[pose_graph][liars]") {
   const auto lie = GENERATE(Lie{.liar = 4, .offset_m = 5.0, .closures = 1000, .only_lies = true},
                             Lie{.liar = 1, .offset_m = 0.5, .closures = 1000, .only_lies = true},
@@ -278,12 +280,12 @@ TEST_CASE("one liar of four without a true closure costs the others less than a 
   check_cost(lie, kOnlyLies_m);
 }
 
-TEST_CASE("odometry of one liar of four costs the others less than twice a closure's noise",
+TEST_CASE("wrong odometry of one robot of four adds at most twice the noise of a closure",
           "[pose_graph][liars]") {
   check_cost({.liar = 1, .stretched = 1.1, .odometry_variance = kTiny}, kWrongOdometry_m);
 }
 
-TEST_CASE("table: closures of a liar", "[.][liars_long]") {
+TEST_CASE("table: false closures of one robot", "[.][liars_long]") {
   std::vector<Lie> lies;
   for (const RobotId liar : {RobotId{1}, RobotId{4}})
     for (const double variance : {kHonest, kTiny, kHuge, kTooHuge})
@@ -298,7 +300,7 @@ TEST_CASE("table: closures of a liar", "[.][liars_long]") {
   check_table(lies);
 }
 
-TEST_CASE("table: a liar of whom nothing is true", "[.][liars_long]") {
+TEST_CASE("table: one robot without true closures", "[.][liars_long]") {
   std::vector<Lie> lies;
   for (const RobotId liar : {RobotId{1}, RobotId{4}})
     for (const double offset_m : {0.5, 5.0, 50.0, 1000.0})
@@ -308,7 +310,7 @@ TEST_CASE("table: a liar of whom nothing is true", "[.][liars_long]") {
   check_table(lies);
 }
 
-TEST_CASE("table: odometry of a liar", "[.][liars_long]") {
+TEST_CASE("table: wrong odometry of one robot", "[.][liars_long]") {
   std::vector<Lie> lies;
   for (const RobotId liar : {RobotId{1}, RobotId{4}})
     for (const double variance : {kHonest, kTiny, kHuge})

@@ -20,7 +20,7 @@ SolverTeam rbcd_team(const TeamProblem& problem, const TeamTree& tree,
 
 constexpr LetterPost kRoughPost{.max_delay = 7, .duplicated = 0.3, .seed = 3};
 
-// Above what single precision on the wire leaves, below any error of method.
+// Above the error of single precision in messages, below any error of the method.
 constexpr double kGap = 2e-6;
 
 TeamProblem three_robots(double tilt_sigma = 0.0) {
@@ -60,7 +60,7 @@ TEST_CASE("Block descent of a team ends at the optimum of the whole graph", "[rb
   CHECK(state.round < 200);
 }
 
-TEST_CASE("The result does not depend on how letters travel, nor on the tree", "[rbcd]") {
+TEST_CASE("The result depends neither on the order of messages nor on the tree", "[rbcd]") {
   const TeamProblem problem = three_robots();
   SolverTeam calm = rbcd_team(problem, star(problem.members(), 1));
   SolverTeam rough = rbcd_team(problem, chain(problem.members()), {}, kRoughPost);
@@ -96,23 +96,23 @@ TEST_CASE("Cost falls from one state of the team to the next", "[rbcd]") {
   CHECK(complete >= 2);
 }
 
-TEST_CASE("Block descent ends upright where robots know which way is up", "[rbcd]") {
+TEST_CASE("Block descent ends upright if the robots have verticals", "[rbcd]") {
   const TeamProblem problem = three_robots(0.01);
   SolverTeam team = rbcd_team(problem, star(problem.members()));
   REQUIRE(team.run());
   CHECK(gap_of(problem, team.poses()) < kGap);
 }
 
-TEST_CASE("Poses of an absent robot hold the frame and stay where they are", "[rbcd]") {
+TEST_CASE("Poses of an absent robot hold the frame and do not move", "[rbcd]") {
   TeamProblem problem = three_robots();
   problem.absent = {2};
-  // The root has no edge to it. What is held does not fit well: the way is long.
+  // The root has no edge to the absent robot. The held poses fit badly, so that descent takes long.
   SolverTeam team = rbcd_team(problem, star(problem.members(), 1), {.min_relative_decrease = 1e-9});
   REQUIRE(team.run());
   CHECK(gap_of(problem, team.poses()) < kGap);
 }
 
-TEST_CASE("A closure that is decided to be false moves nothing", "[rbcd]") {
+TEST_CASE("A rejected closure has no influence", "[rbcd]") {
   TeamProblem problem = three_robots();
   const double optimum = CentralProblem(problem).optimum(problem.start);
   for (const KeyframeId& to : {KeyframeId{5, 14}, KeyframeId{2, 11}}) {
@@ -157,21 +157,21 @@ TEST_CASE("A team that starts at the optimum ends no worse", "[rbcd]") {
   CHECK(central.cost(again.poses()) <= central.cost(problem.start) * (1.0 + 1e-9));
 }
 
-TEST_CASE("A member that vanishes leaves the others what they last agreed on", "[rbcd]") {
+TEST_CASE("When a member disappears, the others keep the last common state", "[rbcd]") {
   const TeamProblem problem = three_robots();
   SolverTeam team = rbcd_team(problem, star(problem.members()), {.min_relative_decrease = 0.0});
   TeamPoses held = problem.start;
   for (int n = 0; n < 60; ++n) REQUIRE(team.step());
   held = team.poses();
   team.remove(7);
-  CHECK_FALSE(team.run(1000));  // nobody has anything left to do
+  CHECK_FALSE(team.run(1000));  // no robot has work left
   for (const RobotId robot : {RobotId{2}, RobotId{5}}) held[robot] = team.member(robot).poses();
   const CentralProblem central(problem);
   CHECK(central.cost(held) < 0.1 * central.cost(problem.start));
 }
 
-TEST_CASE("Every member comes by every state that the root tells, in order", "[rbcd]") {
-  constexpr int kShare = 1, kProgress = 2;  // first bytes of letters
+TEST_CASE("Every member passes through every state that the root reports, in order", "[rbcd]") {
+  constexpr int kShare = 1, kProgress = 2;  // first bytes of messages
   const int held_back = GENERATE_COPY(kShare, kProgress);
   CAPTURE(held_back);
   const TeamProblem problem =
@@ -179,7 +179,7 @@ TEST_CASE("Every member comes by every state that the root tells, in order", "[r
   const TeamTree tree = star(problem.members());
   MemberRbcd root(session_graph(problem, 2), tree.at(2), {.min_relative_decrease = 0.0});
   MemberRbcd leaf(session_graph(problem, 5), tree.at(5), {.min_relative_decrease = 0.0});
-  std::vector<std::uint32_t> rounds{0};  // of the one whose letters are held back
+  std::vector<std::uint32_t> rounds{0};  // rounds of the member whose messages are delayed
   MemberRbcd& late = held_back == kShare ? root : leaf;
   const RobotId from = held_back == kShare ? 5 : 2;
   std::vector<SolverLetter> held;
@@ -191,7 +191,7 @@ TEST_CASE("Every member comes by every state that the root tells, in order", "[r
       else
         CHECK(to.receive(sender, *letter.bytes));
   };
-  const std::size_t enough = held_back == kShare ? 17 : 3;  // 16 rounds; told after each fifth
+  const std::size_t enough = held_back == kShare ? 17 : 3;  // 16 rounds; a report every 5
   for (int n = 0; n < 100 && held.size() < enough; ++n) {
     carry(root, leaf);
     carry(leaf, root);
@@ -214,7 +214,7 @@ TEST_CASE("Every member comes by every state that the root tells, in order", "[r
   CHECK(rounds == std::vector<std::uint32_t>{0, 5, 10, 15});
 }
 
-TEST_CASE("Letters that cannot be are refused", "[rbcd]") {
+TEST_CASE("Impossible messages are refused", "[rbcd]") {
   const TeamProblem problem = three_robots();
   const TeamTree tree = star(problem.members(), 1);
   MemberRbcd root(session_graph(problem, 5), tree.at(5), {});
@@ -225,7 +225,7 @@ TEST_CASE("Letters that cannot be are refused", "[rbcd]") {
   for (const SolverLetter& letter : letters) {
     CHECK(letter.to == 5);
     std::vector<std::uint8_t> bytes = *letter.bytes;
-    CHECK_FALSE(root.receive(4, bytes));  // no member
+    CHECK_FALSE(root.receive(4, bytes));  // not a member
     CHECK_FALSE(root.receive(5, bytes));  // itself
     CHECK_FALSE(leaf.receive(7, bytes));  // neither root nor neighbour
     for (std::size_t size = 0; size < bytes.size(); ++size)
@@ -236,9 +236,9 @@ TEST_CASE("Letters that cannot be are refused", "[rbcd]") {
     bytes[0] = 9;
     CHECK_FALSE(root.receive(2, bytes));
     bytes[0] = letter.bytes->front();
-    bytes[1] = 100;  // a round that cannot have been reached
+    bytes[1] = 100;  // a round beyond the present one
     CHECK_FALSE(root.receive(2, bytes));
-    std::fill(bytes.begin() + 2, bytes.end(), std::uint8_t{0xff});  // no numbers
+    std::fill(bytes.begin() + 2, bytes.end(), std::uint8_t{0xff});  // not numbers
     bytes[1] = 1;
     CHECK_FALSE(root.receive(2, bytes));
     CHECK(root.receive(2, *letter.bytes));

@@ -11,8 +11,8 @@
 namespace km {
 namespace {
 
-// One robot on a helix that passes over itself every 50 keyframes, with claimed noise of 0.01 rad
-// and 5 cm a step and a closure.
+// One robot on a helix that passes over itself every 50 keyframes. The claimed noise of a step and
+// of a closure is 0.01 rad and 5 cm.
 struct Walk {
   static constexpr std::uint32_t kKeyframes = 300, kTurn = 50;
   static constexpr double kRotation = 0.01, kTranslation = 0.05;
@@ -64,14 +64,14 @@ struct Walk {
   [[nodiscard]] OdometryNoise noise() const { return estimate_odometry_noise(steps, closures); }
 };
 
-// The larger over the smaller.
+// Ratio of the larger to the smaller number.
 double factor(double a, double b) {
   return std::max(a / b, b / a);
 }
 
 }  // namespace
 
-TEST_CASE("The noise of odometry is that of its cycles", "[odometry_noise]") {
+TEST_CASE("The noise of odometry is estimated from cycles", "[odometry_noise]") {
   const unsigned seed = GENERATE(range(1U, 11U));
   const double scale = GENERATE(1.0, 2.0, 7.0, 20.0);
   CAPTURE(seed, scale);
@@ -79,15 +79,16 @@ TEST_CASE("The noise of odometry is that of its cycles", "[odometry_noise]") {
   walk.walk(scale, scale);
   walk.close(2);
   const OdometryNoise noise = walk.noise();
-  // Five chains of the walk share no step, of three components each: the standard deviation of the
-  // log of a scale is 1 / sqrt(2 * 15) = 0.18, and three of them a factor of 1.7. Rotation noise
-  // times lever arms is as large as translation noise, so that the latter is known less well.
+  // Five chains of the walk, with three components each, share no step. The standard deviation of
+  // the log of a scale is therefore 1 / sqrt(2 * 15) = 0.18, and three of these are a factor of
+  // 1.7. Rotation noise times lever arms is as large as translation noise, so the estimate of
+  // translation noise is worse.
   CHECK(noise.places >= 20);
   CHECK(factor(noise.rotation, scale) < 1.7);
   CHECK(factor(noise.translation, scale) < 2.2);
 }
 
-TEST_CASE("Rotation and translation are told apart", "[odometry_noise]") {
+TEST_CASE("Noise of rotation and of translation are distinguished", "[odometry_noise]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   Walk walk(seed);
   walk.walk(1.0, 10.0);
@@ -97,7 +98,8 @@ TEST_CASE("Rotation and translation are told apart", "[odometry_noise]") {
   CHECK(factor(noise.translation, 10.0) < 1.7);
 }
 
-TEST_CASE("False closures do not make odometry noisy, nor hide that it is", "[odometry_noise]") {
+TEST_CASE("False closures neither increase the estimated noise of odometry nor hide it",
+          "[odometry_noise]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const double scale = GENERATE(1.0, 7.0);
   CAPTURE(seed, scale);
@@ -106,7 +108,8 @@ TEST_CASE("False closures do not make odometry noisy, nor hide that it is", "[od
   walk.close(2);
   walk.add_false(walk.closures.size() / 2);
   const OdometryNoise noise = walk.noise();
-  // At 7 times the noise the ends of long chains are as far off as false closures are.
+  // At 7 times the noise, the error at the ends of long chains is as large as that of false
+  // closures.
   CHECK(factor(noise.rotation, scale) < (scale > 1.0 ? 2.0 : 1.7));
   CHECK(factor(noise.translation, scale) < (scale > 1.0 ? 3.0 : 2.2));
 }
@@ -126,20 +129,21 @@ TEST_CASE("A wrong place counts once, however many closures it has", "[odometry_
   CHECK(noise.translation < 2.0);
 }
 
-TEST_CASE("Closures that are noisier than they claim are not taken for odometry",
+TEST_CASE("Closures that are noisier than they claim do not count as noise of odometry",
           "[odometry_noise]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   Walk walk(seed);
   walk.walk(1.0, 1.0);
   walk.close(2, 5.0);
-  for (std::uint32_t k = 0; k + 3 < Walk::kKeyframes; k += 10)  // short cycles: closures alone
+  for (std::uint32_t k = 0; k + 3 < Walk::kKeyframes;
+       k += 10)  // short cycles: noise of closures only
     walk.closures.push_back(walk.edge(k, k + 3, 5.0, 5.0));
   const OdometryNoise noise = walk.noise();
   CHECK(noise.rotation < 2.0);
   CHECK(noise.translation < 2.0);
 }
 
-TEST_CASE("Without closures, or with a single one, odometry is taken at its word",
+TEST_CASE("Without closures, or with a single one, the noise of odometry is the claimed one",
           "[odometry_noise]") {
   Walk walk(1);
   walk.walk(1.0, 1.0);
@@ -153,7 +157,7 @@ TEST_CASE("Without closures, or with a single one, odometry is taken at its word
   CHECK(walk.noise().places == 0);
 }
 
-TEST_CASE("A corrected precision has the variance that was found", "[odometry_noise]") {
+TEST_CASE("A corrected precision has the estimated variance", "[odometry_noise]") {
   const OdometryNoise noise{.rotation = 2.0, .translation = 5.0, .places = 1};
   const Precision corrected = noise.corrected({8.0, 50.0});
   CHECK(corrected.kappa == 2.0);

@@ -32,13 +32,13 @@ OwnGraph graph_of(RobotId robot, std::uint32_t keyframes) {
   return graph;
 }
 
-// Between robots 5 and 9.
+// Closures between robots 5 and 9.
 constexpr ClosureId kFirst{{5, 1}, {9, 4}};
 constexpr ClosureId kSecond{{5, 2}, {9, 2}};
 
 }  // namespace
 
-TEST_CASE("an edge set is offered once all of it is known", "[own_graph]") {
+TEST_CASE("an edge set is offered once all its closures are known", "[own_graph]") {
   OwnGraph graph = graph_of(5, 2);
   REQUIRE(graph.add(InlierSet{5, 9, 3, {kFirst, kSecond}}));
   CHECK(graph.offers().empty());
@@ -61,7 +61,7 @@ TEST_CASE("an edge set is offered once all of it is known", "[own_graph]") {
   CHECK(graph.edges(9, {3, offer.id.hash + 1}) == nullptr);
 }
 
-TEST_CASE("both ends name an edge set alike, in whatever order it came", "[own_graph]") {
+TEST_CASE("both robots compute equal ids of an edge set, for any order of arrival", "[own_graph]") {
   OwnGraph graph = graph_of(5, 3);
   OwnGraph other = graph_of(9, 5);
   for (OwnGraph* end : {&graph, &other})
@@ -86,7 +86,7 @@ TEST_CASE("a closure measured from both ends counts once, the better one", "[own
   REQUIRE(other.add(set));
   REQUIRE(graph.add(coarse));
   REQUIRE(other.add(fine));
-  // Each holds the measurement of its own: they must not take their sets for the same.
+  // Each robot holds its own measurement, so their sets must have different ids.
   CHECK(graph.offers().front().edges == other.offers().front().edges);
   CHECK(graph.offers().front().id != other.offers().front().id);
   CHECK(graph.add(fine));
@@ -101,7 +101,7 @@ TEST_CASE("a closure measured from both ends counts once, the better one", "[own
   }
 }
 
-TEST_CASE("both ends take the same of two equally good measurements", "[own_graph]") {
+TEST_CASE("both robots choose the same one of two equally good measurements", "[own_graph]") {
   Closure x = measured(kFirst), y = measured(kFirst);
   SECTION("from either side") {
     std::swap(y.from, y.to);
@@ -117,20 +117,21 @@ TEST_CASE("both ends take the same of two equally good measurements", "[own_grap
   CHECK(graph.offers().front().id == other.offers().front().id);
 }
 
-TEST_CASE("a restarted peer is forgotten", "[own_graph]") {
+TEST_CASE("a restarted peer is removed from the graph", "[own_graph]") {
   OwnGraph graph = graph_of(5, 3);
   REQUIRE(graph.add(measured(kFirst)));
   REQUIRE(graph.add(InlierSet{5, 9, 8, {kFirst}}));
   CHECK(graph.offers().size() == 1);
   graph.forget(9);
   CHECK(graph.offers().empty());
-  REQUIRE(graph.add(InlierSet{5, 9, 1, {kFirst}}));  // versions start anew as well
+  REQUIRE(graph.add(InlierSet{5, 9, 1, {kFirst}}));  // versions also start again from 1
   CHECK(graph.offers().empty());
   REQUIRE(graph.add(measured(kFirst)));
   CHECK(graph.offers().size() == 1);
 }
 
-TEST_CASE("what does not concern a robot, or cannot be weighed, is ignored", "[own_graph]") {
+TEST_CASE("measurements of other robots, or without usable covariance, are ignored",
+          "[own_graph]") {
   OwnGraph graph = graph_of(5, 3);
   CHECK_FALSE(graph.add(measured({1, 0}, {2, 0})));
   CHECK_FALSE(graph.add(measured({5, 0}, {5, 0})));
@@ -154,21 +155,21 @@ TEST_CASE("what does not concern a robot, or cannot be weighed, is ignored", "[o
   CHECK(graph.own_edges().size() == 2);
 }
 
-TEST_CASE("of one peer's closures no more are kept than there is room for", "[own_graph]") {
+TEST_CASE("the number of closures to one peer is limited", "[own_graph]") {
   OwnGraph graph = graph_of(5, 1);
   constexpr auto kMost = static_cast<std::uint32_t>(OwnGraph::kMaxClosures);
   for (std::uint32_t i = 0; i < kMost; ++i) REQUIRE(graph.add(measured({9, i}, {5, 0})));
   CHECK(graph.is_full(ClosureId{{5, 0}, {9, kMost}}));
-  CHECK_FALSE(graph.is_full(ClosureId{{5, 0}, {9, 7}}));  // is known
+  CHECK_FALSE(graph.is_full(ClosureId{{5, 0}, {9, 7}}));  // already known
   CHECK_FALSE(graph.add(measured({9, kMost}, {5, 0})));
-  CHECK(graph.add(measured({9, 7}, {5, 0}, 0.5)));  // better than what is known
+  CHECK(graph.add(measured({9, 7}, {5, 0}, 0.5)));  // better than the known one
   CHECK_FALSE(graph.is_full(ClosureId{{5, 0}, {8, kMost}}));
   CHECK(graph.add(measured({8, kMost}, {5, 0})));
   graph.forget(9);
   CHECK(graph.add(measured({9, kMost}, {5, 0})));
 }
 
-TEST_CASE("closures inside the robot join its own edges", "[own_graph]") {
+TEST_CASE("closures inside the robot are among its own edges", "[own_graph]") {
   OwnGraph graph = graph_of(5, 4);
   const std::uint32_t before = graph.revision();
   REQUIRE(graph.add(InlierSet{5, 5, 1, {{{5, 3}, {5, 0}}}}));
@@ -185,7 +186,7 @@ TEST_CASE("closures inside the robot join its own edges", "[own_graph]") {
   CHECK(graph.offers().empty());
 }
 
-TEST_CASE("the mean precision of a step is that of odometry alone", "[own_graph]") {
+TEST_CASE("the mean precision of a step depends only on odometry", "[own_graph]") {
   OwnGraph graph = graph_of(5, 2);
   KeyframeOdometry next = keyframe(5, 2);
   next.covariance *= 0.5;

@@ -8,10 +8,10 @@
 namespace km {
 namespace {
 
-constexpr double kTolerance = 1e-6;  // relative, of single precision
+constexpr double kTolerance = 1e-6;  // relative; single precision
 
-// Robots that are placed where `moved` says, off from where they belong; pairs whose closures know
-// where that is, up to their spread.
+// Pairs of robots that are displaced by `moved` from their true place. The closures of the pairs
+// give the true place, up to their spread.
 PairMotions pairs_of(const std::map<RobotId, SE3>& moved) {
   PairMotions pairs;
   for (const auto& [a, T_a] : moved)
@@ -35,7 +35,8 @@ SE3 shifted(double x_m) {
 
 }  // namespace
 
-TEST_CASE("robots that are placed where their closures say stay", "[pose_graph][pair_consensus]") {
+TEST_CASE("robots at the place given by their closures do not move",
+          "[pose_graph][pair_consensus]") {
   CHECK(better_placement(pairs_of({{1, SE3::Identity()},
                                    {2, SE3::Identity()},
                                    {3, shifted(0.05)},
@@ -43,7 +44,7 @@ TEST_CASE("robots that are placed where their closures say stay", "[pose_graph][
             .empty());
 }
 
-TEST_CASE("robots that one of four has placed wrongly are moved by the other pairs",
+TEST_CASE("pairs of the other robots move robots that one of four has misplaced",
           "[pose_graph][pair_consensus]") {
   const RobotId liar = GENERATE(as<RobotId>(), 1, 2, 3, 4);
   const double lie_m = GENERATE(5.0, 1000.0);
@@ -53,7 +54,7 @@ TEST_CASE("robots that one of four has placed wrongly are moved by the other pai
   for (RobotId robot = 1; robot <= 4; ++robot)
     moved[robot] = robot == liar ? SE3::Identity() : random_pose(rng, lie_m);
   PairMotions pairs = pairs_of(moved);
-  for (auto& [robots, pair] : pairs)  // what the liar says fits where all are placed
+  for (auto& [robots, pair] : pairs)  // closures of the misbehaving robot fit the present places
     if (robots.first == liar || robots.second == liar) pair.T = {};
   const std::map<RobotId, SE3> moves = better_placement(pairs);
   REQUIRE(moves.size() == 4);
@@ -64,7 +65,7 @@ TEST_CASE("robots that one of four has placed wrongly are moved by the other pai
   }
 }
 
-TEST_CASE("pairs whose closures disagree have no vote", "[pose_graph][pair_consensus]") {
+TEST_CASE("pairs with inconsistent closures have no vote", "[pose_graph][pair_consensus]") {
   PairMotions pairs = pairs_of(
       {{1, SE3::Identity()}, {2, shifted(50.0)}, {3, shifted(-50.0)}, {4, SE3::Identity()}});
   for (auto& [robots, pair] : pairs)
@@ -76,7 +77,7 @@ TEST_CASE("pairs whose closures disagree have no vote", "[pose_graph][pair_conse
   CHECK(usual_strength(pairs).tau == kUnlimited.tau);
 }
 
-TEST_CASE("robots that a pair without a vote has placed go where the others have them",
+TEST_CASE("robots placed by a pair without a vote move to the place given by other pairs",
           "[pose_graph][pair_consensus]") {
   PairMotions pairs = pairs_of({{1, SE3::Identity()}, {2, shifted(50.0)}, {3, SE3::Identity()}});
   pairs[{1, 3}].spread_m = pairs[{1, 3}].radius_m;
@@ -87,7 +88,7 @@ TEST_CASE("robots that a pair without a vote has placed go where the others have
   CHECK(moves.at(3).isApprox(SE3::Identity()));
 }
 
-TEST_CASE("how strong pairs are is not for one robot of four to say",
+TEST_CASE("one robot of four cannot change the usual strength of pairs",
           "[pose_graph][pair_consensus]") {
   const RobotId liar = GENERATE(as<RobotId>(), 1, 2, 3, 4);
   const double lie = GENERATE(0.0, 1e-9, 1e9);
@@ -106,28 +107,29 @@ TEST_CASE("how strong pairs are is not for one robot of four to say",
   CHECK(usual.tau <= 10.0);
 }
 
-TEST_CASE("pairs are not limited where nobody could be outvoted", "[pose_graph][pair_consensus]") {
+TEST_CASE("pairs are not limited if no robot can be outvoted", "[pose_graph][pair_consensus]") {
   PairMotions pairs = of_four();
   for (auto& [robots, pair] : pairs) pair.strength = {1.0, 1.0};
   CHECK(usual_strength(pairs).tau == 1.0);
-  SECTION("in a team of three") {
+  SECTION("a team of three") {
     std::erase_if(pairs, [](const auto& entry) { return entry.first.second == 4; });
   }
-  SECTION("where pairs close no circle") {
+  SECTION("pairs form no loop") {
     std::erase_if(pairs, [](const auto& entry) { return entry.first.first != 1; });
   }
-  SECTION("where they contradict each other all round") {
+  SECTION("all pairs contradict each other") {
     std::erase_if(pairs, [](const auto& entry) { return entry.first.first != 1; });
     pairs[{2, 3}] = {.T = SinglePose::of(shifted(50.0)), .spread_m = 0.1, .strength = {1.0, 1.0}};
   }
-  SECTION("in no team") {
+  SECTION("no team") {
     pairs.clear();
   }
   CHECK(usual_strength(pairs).kappa == kUnlimited.kappa);
   CHECK(usual_strength(pairs).tau == kUnlimited.tau);
 }
 
-TEST_CASE("the motion of a pair is that of most closures", "[pose_graph][pair_consensus]") {
+TEST_CASE("the motion of a pair is the one on which most closures agree",
+          "[pose_graph][pair_consensus]") {
   std::mt19937 rng(3);
   const SE3 T = random_pose(rng, 30.0);
   const SE3 off = make_pose(Eigen::Matrix3d::Identity(), {0.0, 60.0, 0.0});

@@ -23,7 +23,7 @@ SessionLetter letter(const TeamPeer& sender, std::uint32_t number, RobotId to) {
           .bytes = std::make_shared<const std::vector<std::uint8_t>>(100, std::uint8_t{5})};
 }
 
-TEST_CASE("A parcel arrives with who said it and who handed it over", "[pose_graph]") {
+TEST_CASE("A message arrives with its origin and the robot that forwarded it", "[pose_graph]") {
   const TeamPeer origin = GENERATE(kSelf, kFar);
   const auto sent = written(letter(origin, 130, 9), kSelf);
   const auto arrived = decoded(sent);
@@ -35,7 +35,8 @@ TEST_CASE("A parcel arrives with who said it and who handed it over", "[pose_gra
   CHECK(heard.bytes->size() == 100);
 }
 
-TEST_CASE("Of what counts with its newest only, all of one origin has one key", "[pose_graph]") {
+TEST_CASE("Messages of which only the newest counts have one key per origin and kind",
+          "[pose_graph]") {
   const auto key = [](const TeamMessage& message) {
     return Codec<TeamParcel>::key_of({7, std::make_shared<const TeamMessage>(message)});
   };
@@ -50,7 +51,8 @@ TEST_CASE("Of what counts with its newest only, all of one origin has one key", 
         key(MemberPoses{.sender = kFar, .stage = 2}));
 }
 
-TEST_CASE("Letters replace each other after a while, and receipts at once", "[pose_graph]") {
+TEST_CASE("Reliable messages replace each other after 64 numbers, and acknowledgements at once",
+          "[pose_graph]") {
   const auto key = [](const SessionLetter& message) {
     return Codec<TeamParcel>::key_of({7, std::make_shared<const TeamMessage>(message)});
   };
@@ -65,22 +67,22 @@ TEST_CASE("Letters replace each other after a while, and receipts at once", "[po
   CHECK(key(receipt) != key(letter(kFar, 64, 9)));
 }
 
-TEST_CASE("A parcel that contradicts itself is refused", "[pose_graph]") {
+TEST_CASE("An inconsistent message is refused", "[pose_graph]") {
   auto sent = written(letter(kSelf, 1, 9), kSelf);
   REQUIRE(decoded(sent).value);
-  SECTION("said by a former process") {
+  SECTION("sent by a former process") {
     sent.writer.boot = 71;
   }
   SECTION("no content") {
     sent.wire.content._length = 0;
   }
-  SECTION("content that is missing") {
+  SECTION("missing content") {
     sent.wire.content._buffer = nullptr;
   }
-  SECTION("content that is cut short") {
+  SECTION("truncated content") {
     sent.wire.content._length = 5;
   }
-  SECTION("content longer than any") {
+  SECTION("content beyond the limit") {
     sent.wire.content._length = kMaxTeamMessageBytes + 1;
   }
   const auto arrived = decoded(sent);

@@ -36,7 +36,7 @@ LiftedPoses random_direction(std::mt19937& rng, const LiftedPoses& X) {
 
 }  // namespace
 
-TEST_CASE("the cost is the sum of squared residuals written out", "[pose_graph]") {
+TEST_CASE("the cost is the sum of squared residuals", "[pose_graph]") {
   std::mt19937 rng(1);
   const QuadraticProblem problem = random_problem(rng, 3);
   const LiftedPoses X = random_lifted_poses(rng, 3, kPoses);
@@ -56,7 +56,7 @@ TEST_CASE("the cost is the sum of squared residuals written out", "[pose_graph]"
   CHECK(problem.cost(X) == Approx(expected).epsilon(1e-12));
 }
 
-TEST_CASE("gradient and Hessian agree with differences along retractions", "[pose_graph]") {
+TEST_CASE("gradient and Hessian agree with finite differences along retractions", "[pose_graph]") {
   const Eigen::Index rank = GENERATE(3, 4, 5);
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(rank, seed);

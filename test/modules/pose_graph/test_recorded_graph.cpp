@@ -36,7 +36,7 @@ TEST_CASE("Measurements are sorted into odometry and closures", "[recorded]") {
   CHECK(graph.inter_closures[1].to == KeyframeId{40, 1000});
 }
 
-TEST_CASE("A graph that is not one robot's part is refused", "[recorded]") {
+TEST_CASE("A graph that is not the part of one robot is refused", "[recorded]") {
   const RelativePose step = edge({0, 0}, {0, 1});
   const auto refusal = [&](std::vector<RelativePose> edges) {
     edges.push_back(step);
@@ -118,7 +118,7 @@ TEST_CASE("The tunnels robots have the poses and edges their source states", "[r
   CHECK(inter == 2 * 3548);  // in the files of both robots
 }
 
-TEST_CASE("One robot's g2o files are read, each in its layout", "[recorded]") {
+TEST_CASE("g2o files of one robot are read in every layout", "[recorded]") {
   const auto [name, robot, poses, intra, inter] =
       GENERATE(table<std::string, int, std::size_t, std::size_t, std::size_t>({
           {"door_slam/argos_simulation/clean/example_2robots/1.g2o", 1, 442, 0, 34},
@@ -136,7 +136,7 @@ TEST_CASE("One robot's g2o files are read, each in its layout", "[recorded]") {
   CHECK(graph.inter_closures.size() == inter);
 }
 
-TEST_CASE("A robot's verticals come with its part of the graph", "[recorded][vertical]") {
+TEST_CASE("The part of a robot contains its verticals", "[recorded][vertical]") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "7.g2o";
   const Vertical second{{0.0, 1.0, 0.0}, 0.01};
@@ -170,7 +170,7 @@ TEST_CASE("A weight that no robot optimises is refused with its edge", "[recorde
                     Catch::Contains("7.g2o: edge 7:0 -> 7:1 has a variance of"));
 }
 
-TEST_CASE("Files that are not one robot's drive are refused by name", "[recorded]") {
+TEST_CASE("Files that are not the part of one robot are refused with their name", "[recorded]") {
   // A block of a grid (poses 0, 1, 16, ...), and a file with a broken line.
   const auto [name, reason] = GENERATE(table<std::string, std::string>({
       {"distributed_mapper/blocks_world/2robots/0.g2o", "0.g2o: no odometry"},

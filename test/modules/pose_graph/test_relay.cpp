@@ -6,7 +6,7 @@
 namespace km {
 namespace {
 
-// Relays whose parcels arrive at once; what is new to a robot is noted.
+// Relays whose messages arrive at once; the class records the messages that are new to a robot.
 struct Relays {
   std::map<RobotId, Relay> of = {};
   std::set<std::pair<RobotId, RobotId>> links = {};
@@ -31,7 +31,7 @@ struct Relays {
     at(a).link_down(b, now_s);
     at(b).link_down(a, now_s);
   }
-  // Statuses, when links may have changed.
+  // All robots send statuses, after a possible change of links.
   void tell_all() {
     for (auto& [robot, relay] : of) {
       relay.step(now_s);
@@ -86,7 +86,7 @@ SessionLetter letter(RobotId from, RobotId to) {
 
 }  // namespace
 
-TEST_CASE("what one says all hear once, over any links", "[pose_graph][relay]") {
+TEST_CASE("all robots receive each message once, over any links", "[pose_graph][relay]") {
   const Pairs pairs = GENERATE(Pairs{{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6}},
                                Pairs{{1, 6}, {2, 6}, {3, 6}, {4, 6}, {5, 6}},
                                Pairs{{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6}, {1, 6}},
@@ -103,7 +103,7 @@ TEST_CASE("what one says all hear once, over any links", "[pose_graph][relay]") 
   }
 }
 
-TEST_CASE("where all hear each other nothing is passed on", "[pose_graph][relay]") {
+TEST_CASE("nothing is forwarded if all robots receive each other", "[pose_graph][relay]") {
   Pairs pairs;
   for (RobotId a = 1; a <= 6; ++a)
     for (RobotId b = 1; b < a; ++b) pairs.emplace_back(a, b);
@@ -116,7 +116,7 @@ TEST_CASE("where all hear each other nothing is passed on", "[pose_graph][relay]
     CHECK(relays.poses_read(robot) == 1);
 }
 
-TEST_CASE("a line passes each message over each link once", "[pose_graph][relay]") {
+TEST_CASE("in a line of robots, each message passes each link once", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}, {3, 4}, {4, 5}});
   relays.forget();
   (void)relays.at(3).say(MemberPoses{.sender = {3, 1}}, 0.0);
@@ -124,8 +124,7 @@ TEST_CASE("a line passes each message over each link once", "[pose_graph][relay]
   CHECK(relays.total_sent() == 4);
 }
 
-TEST_CASE("a robot that is heard for the first time is handed what there is",
-          "[pose_graph][relay]") {
+TEST_CASE("a robot with a new link receives all present messages", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}});
   (void)relays.at(1).say(MemberPoses{.sender = {1, 1}}, 0.0);
   (void)relays.at(3).say(MemberPoses{.sender = {3, 1}}, 0.0);
@@ -135,7 +134,7 @@ TEST_CASE("a robot that is heard for the first time is handed what there is",
   CHECK(relays.poses_read(4) == 2);
 }
 
-TEST_CASE("what was lost is handed on when the hashes show it", "[pose_graph][relay]") {
+TEST_CASE("a lost message is forwarded when the hashes show its loss", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}, {3, 4}});
   relays.losing = true;
   (void)relays.at(1).say(MemberPoses{.sender = {1, 1}}, 0.0);
@@ -152,17 +151,18 @@ TEST_CASE("what was lost is handed on when the hashes show it", "[pose_graph][re
   relays.forget();
   relays.now_s += 1.0;
   relays.repeat_all();
-  CHECK(relays.total_sent() == 6);  // the statuses alone, to those that hear them
+  CHECK(relays.total_sent() == 6);  // only the statuses, to all direct receivers
 }
 
-TEST_CASE("letters take the shortest way, and another one if there is", "[pose_graph][relay]") {
+TEST_CASE("reliable messages take the shortest path, and another one after an outage",
+          "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 1}});
   relays.forget();
   CHECK(relays.at(1).say(letter(1, 3), 0.0) == 1);
   relays.carry();
   CHECK(relays.read[3].size() == 1);
   CHECK(relays.sent[2] == 1);
-  relays.down(1, 2);  // nobody else knows of it yet
+  relays.down(1, 2);  // no other robot knows it yet
   relays.forget();
   CHECK(relays.at(1).say(letter(1, 3), 0.0) == 1);
   relays.carry();
@@ -172,8 +172,7 @@ TEST_CASE("letters take the shortest way, and another one if there is", "[pose_g
   CHECK(relays.at(1).say(letter(1, 3), 0.0) == 0);
 }
 
-TEST_CASE("of several shortest paths the one over the lowest robot is taken",
-          "[pose_graph][relay]") {
+TEST_CASE("the lowest robot id decides between several shortest paths", "[pose_graph][relay]") {
   Relays relays({{1, 8}, {1, 3}, {8, 2}, {3, 2}});
   CHECK(relays.at(1).next_hop(2) == RobotId{3});
   CHECK(relays.at(2).next_hop(1) == RobotId{3});
@@ -181,7 +180,8 @@ TEST_CASE("of several shortest paths the one over the lowest robot is taken",
   CHECK_FALSE(relays.at(1).next_hop(77));
 }
 
-TEST_CASE("a letter does not go in a circle, whatever robots say", "[pose_graph][relay]") {
+TEST_CASE("a reliable message does not circulate, whatever links robots report",
+          "[pose_graph][relay]") {
   Relay relay({2, 1}, 1.0);
   relay.link_up({1, 1}, 0.0);
   relay.link_up({3, 1}, 0.0);
@@ -195,13 +195,13 @@ TEST_CASE("a letter does not go in a circle, whatever robots say", "[pose_graph]
   const auto message = std::make_shared<const TeamMessage>(letter(1, 9));
   CHECK(relay.receive(1, message, 0.0) == Arrival::kPassedOn);
   CHECK(relay.receive(3, message, 0.0) == Arrival::kLost);
-  CHECK(relay.receive(1, message, 0.0) == Arrival::kLost);  // seen
+  CHECK(relay.receive(1, message, 0.0) == Arrival::kLost);  // a repetition
   SessionLetter again = letter(1, 9);
   again.copy = 1;
   CHECK(relay.receive(1, std::make_shared<const TeamMessage>(again), 0.0) == Arrival::kPassedOn);
 }
 
-TEST_CASE("robots that are made up fill no more room than a team takes", "[pose_graph][relay]") {
+TEST_CASE("invented robots take no more memory than a full team", "[pose_graph][relay]") {
   Relay relay({1, 1}, 1.0);
   relay.link_up({2, 1}, 0.0);
   std::size_t taken = 0, refused = 0;
@@ -213,12 +213,12 @@ TEST_CASE("robots that are made up fill no more room than a team takes", "[pose_
   }
   CHECK(taken < 1024);
   CHECK(refused > 1900);
-  relay.link_up({4000, 1}, 0.0);  // one that is heard itself is there
+  relay.link_up({4000, 1}, 0.0);  // a robot with a direct link is accepted
   const TeamStatus status{.sender = {4000, 1}, .number = 1, .frame = {4000, 1}};
   CHECK(relay.receive(4000, std::make_shared<const TeamMessage>(status), 0.0) == Arrival::kNew);
 }
 
-TEST_CASE("what one robot hands over does not use up the room for what others do",
+TEST_CASE("messages forwarded by one robot do not use the memory for those of others",
           "[pose_graph][relay]") {
   Relays team({{1, 2}, {1, 3}});
   Relay& relay = team.at(1);
@@ -232,13 +232,13 @@ TEST_CASE("what one robot hands over does not use up the room for what others do
   CHECK(relay.receive(2, poses_of({101, 1}, 1, kLarge), 0.0) == Arrival::kNew);
   CHECK(relay.receive(2, poses_of({102, 1}, 1, kLarge), 0.0) == Arrival::kNoRoom);
   CHECK(relay.receive(3, poses_of({102, 1}, 1, kLarge), 0.0) == Arrival::kNew);
-  // What is newer takes the place of what was there.
+  // A newer message replaces the old one.
   CHECK(relay.receive(2, poses_of({101, 1}, 2, kLarge), 0.0) == Arrival::kNew);
   CHECK(relay.receive(2, poses_of({101, 1}, 3, 1), 0.0) == Arrival::kNew);
   CHECK(relay.receive(2, poses_of({103, 1}, 1, kLarge), 0.0) == Arrival::kNew);
 }
 
-TEST_CASE("a link that comes back at once has never been gone", "[pose_graph][relay]") {
+TEST_CASE("a link that returns at once counts as uninterrupted", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}});
   const auto version = relays.at(2).links_version();
   relays.down(2, 3);
@@ -256,14 +256,14 @@ TEST_CASE("a link that comes back at once has never been gone", "[pose_graph][re
   CHECK(relays.at(2).links().component(2) == std::set<RobotId>{1, 2});
 }
 
-TEST_CASE("of a restarted robot only the new process counts", "[pose_graph][relay]") {
+TEST_CASE("after a restart of a robot only the new process counts", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}});
   const TeamStatus old{.sender = {3, 1}, .number = 1000, .frame = {3, 1}};
   const TeamStatus fresh{.sender = {3, 2}, .number = 1, .frame = {3, 2}};
   const auto receive = [&](RobotId at, RobotId from, const TeamStatus& status) {
     return relays.at(at).receive(from, std::make_shared<const TeamMessage>(status), 0.0);
   };
-  CHECK(receive(1, 2, fresh) == Arrival::kRefused);  // nobody has met it yet
+  CHECK(receive(1, 2, fresh) == Arrival::kRefused);  // no robot receives it directly yet
   relays.at(2).link_down(3, 0.0);
   relays.at(2).link_up({3, 2}, 0.0);
   relays.tell_all();

@@ -14,7 +14,7 @@ double surrogate(double w, double r2, double c2, double mu) {
   return w * r2 + mu * (1.0 - w) / (mu + w) * c2;
 }
 
-// Weighs residuals that stay as they are until the schedule has decided.
+// Weighs constant residuals until the schedule has decided.
 struct Weighed {
   std::vector<double> residuals;
   double barc;
@@ -53,7 +53,7 @@ TEST_CASE("The weight of a closure minimises the surrogate of the truncated cost
   const double w = robust_weight(r2, c2, mu);
   CHECK(w >= 0.0);
   CHECK(w <= 1.0);
-  CHECK(surrogate(w, r2, c2, mu) <= least + 1e-12 * (r2 + c2));  // the grid contains no better one
+  CHECK(surrogate(w, r2, c2, mu) <= least + 1e-12 * (r2 + c2));  // no better one on the grid
 }
 
 TEST_CASE("Weights are 0 or 1 once the surrogate is steep", "[pose_graph]") {
@@ -67,14 +67,15 @@ TEST_CASE("Weights are 0 or 1 once the surrogate is steep", "[pose_graph]") {
   CHECK(robust_weight(1e12, 9.0, mu) == 0.0);
 }
 
-TEST_CASE("At the first mu the largest residual is not out yet, and pulls with its whole range",
-          "[pose_graph]") {
+TEST_CASE(
+    "At the first mu the largest residual has a positive weight, and the cost increases up to it",
+    "[pose_graph]") {
   const double c2 = 20.0;
   const double largest = GENERATE(10.1, 19.0, 50.0, 1e3, 1e9);
   CAPTURE(largest);
   const double mu = first_mu(largest, c2);
   CHECK(mu == Approx(c2 / (2.0 * largest - c2)));
-  // The cost min_w surrogate has slope 2 w r: it rises all the way up to the largest residual.
+  // The cost min_w surrogate has slope 2 w r: it increases up to the largest residual.
   double before = -1.0;
   for (int k = 0; k <= 1000; ++k) {
     const double r2 = largest * std::pow(1e-3 * k, 2);
@@ -86,14 +87,14 @@ TEST_CASE("At the first mu the largest residual is not out yet, and pulls with i
   }
 }
 
-TEST_CASE("Nothing is truncated where all residuals are small", "[pose_graph]") {
+TEST_CASE("Nothing is truncated if all residuals are small", "[pose_graph]") {
   CHECK(first_mu(9.99, 20.0) == kLargestMu);
   CHECK(first_mu(0.0, 20.0) == kLargestMu);
   CHECK(robust_weight(9.99, 20.0, kLargestMu) == 1.0);
 }
 
 TEST_CASE("The default threshold is a chi-squared quantile", "[pose_graph]") {
-  // 99.9999 %, 6 and 3 degrees of freedom: the closed form of the former, erf in the latter.
+  // 99.9999 %, 6 and 3 degrees of freedom: closed form with 6, with the error function for 3.
   const double c6 = std::pow(default_threshold(3), 2), c3 = std::pow(default_threshold(2), 2);
   CHECK(std::exp(-c6 / 2.0) * (1.0 + c6 / 2.0 + c6 * c6 / 8.0) == Approx(1e-6).epsilon(1e-6));
   CHECK(std::erfc(std::sqrt(c3 / 2.0)) +
@@ -101,12 +102,12 @@ TEST_CASE("The default threshold is a chi-squared quantile", "[pose_graph]") {
         Approx(1e-6).epsilon(1e-6));
 }
 
-TEST_CASE("A decision that the poses contradict is taken up again, but not for ever",
+TEST_CASE("Decided weights that the poses contradict are reopened a bounded number of times",
           "[pose_graph]") {
   Weighed weighing{.residuals = {0.5, 400.0}, .barc = 3.0};
   weighing.run();
   REQUIRE(weighing.weights == std::vector<double>{1.0, 0.0});
-  weighing.residuals[1] = 2.0;  // once the poses have come to rest
+  weighing.residuals[1] = 2.0;  // after the poses have converged
   REQUIRE(weighing.schedule.reopen());
   RobustSchedule& schedule = weighing.schedule;
   CHECK_FALSE(schedule.decided());
@@ -119,7 +120,8 @@ TEST_CASE("A decision that the poses contradict is taken up again, but not for e
   CHECK(times < 10);
 }
 
-TEST_CASE("The schedule ends, and every closure is decided by its residual", "[pose_graph]") {
+TEST_CASE("The schedule ends, and the residual of every closure decides its weight",
+          "[pose_graph]") {
   Weighed weighing{.residuals = {0.5, 2.9, 3.1, 400.0}, .barc = 3.0};
   weighing.run();
   CHECK(weighing.schedule.decided());
@@ -127,7 +129,8 @@ TEST_CASE("The schedule ends, and every closure is decided by its residual", "[p
   CHECK(weighing.updates < 60);
 }
 
-TEST_CASE("Residuals of any size are decided in a bounded number of steps", "[pose_graph]") {
+TEST_CASE("The schedule ends after a bounded number of steps for residuals of any size",
+          "[pose_graph]") {
   const double largest = GENERATE(3.001, 30.0, 1e4, 1e9);
   CAPTURE(largest);
   Weighed weighing{.residuals = {0.0, 2.999, 3.001, largest}, .barc = 3.0};
@@ -135,7 +138,7 @@ TEST_CASE("Residuals of any size are decided in a bounded number of steps", "[po
   CHECK(weighing.weights == std::vector<double>{1.0, 1.0, 0.0, 0.0});
 }
 
-TEST_CASE("Weights that never come to rest are decided all the same", "[pose_graph]") {
+TEST_CASE("Weights that never settle are decided nevertheless", "[pose_graph]") {
   RobustSchedule schedule;
   const RobustSchedule::Tally restless =
       GENERATE(RobustSchedule::Tally{.changed = 1}, RobustSchedule::Tally{.fractional = 1},
@@ -149,7 +152,7 @@ TEST_CASE("Weights that never come to rest are decided all the same", "[pose_gra
   CHECK(schedule.decided());
 }
 
-TEST_CASE("A schedule decides at once where all residuals are small", "[pose_graph]") {
+TEST_CASE("A schedule decides at once if all residuals are small", "[pose_graph]") {
   RobustSchedule schedule;
   schedule.start(2.0F, 3, 3.0, 0);
   CHECK_FALSE(schedule.decided());
@@ -158,7 +161,7 @@ TEST_CASE("A schedule decides at once where all residuals are small", "[pose_gra
   CHECK(schedule.decided());
 }
 
-TEST_CASE("Without closures that may be rejected all is decided", "[pose_graph]") {
+TEST_CASE("Without closures that may be rejected all weights are final", "[pose_graph]") {
   RobustSchedule schedule;
   CHECK(schedule.decided());
   schedule.start(1e3F, 0, 3.0, 4);
@@ -168,7 +171,7 @@ TEST_CASE("Without closures that may be rejected all is decided", "[pose_graph]"
   CHECK(schedule.decided());
 }
 
-TEST_CASE("The first steps are made with all closures in", "[pose_graph]") {
+TEST_CASE("The first steps use all closures with full weight", "[pose_graph]") {
   RobustSchedule schedule;
   schedule.start(50.0F, 3, 3.0, 2);
   const double mu = schedule.mu();

@@ -12,7 +12,8 @@ namespace {
 constexpr TeamPeer kSelf{1, 1};
 constexpr TeamPeer kOther{2, 1};
 
-// Takes letters with one number each, in order. It refuses what comes too early or is no number.
+// A solver that takes messages with one number each, in order. It refuses messages that arrive too
+// early or contain no number.
 class OrderlySolver final : public MemberSolver {
  public:
   explicit OrderlySolver(std::uint32_t& taken) : taken_(taken) {}
@@ -36,9 +37,9 @@ class OrderlySolver final : public MemberSolver {
   std::vector<SE3> poses_{SE3::Identity()};
 };
 
-// A robot's part in a session with another robot, whose letters it is handed.
+// The part of one robot in a session with another robot, whose messages it receives.
 struct Correspondence {
-  std::uint32_t taken = 0;  // by the solver
+  std::uint32_t taken = 0;  // number of messages that the solver has taken
   Session session{.id = {kSelf, 1},
                   .plan = {.frame = kSelf,
                            .members = {{.peer = kSelf}, {.peer = kOther, .parent = kSelf.robot}},
@@ -62,7 +63,7 @@ struct Correspondence {
     (void)part.advance(told, 0.0);
     REQUIRE(part.stage() == 0U);
   }
-  // The solver does.
+  // Lets the solver begin.
   void begin(double now_s) {
     told[kOther.robot] = {.sender = kOther, .session = session.id, .keyframes = {0}};
     told[kOther.robot].T_frame_kf.resize(1);
@@ -89,7 +90,7 @@ struct Correspondence {
 
 }  // namespace
 
-TEST_CASE("a letter that the solver cannot take yet comes again", "[pose_graph][session]") {
+TEST_CASE("a message that the solver cannot take yet is repeated", "[pose_graph][session]") {
   Correspondence c;
   c.begin(0.0);
   const SessionLetter first = c.write_number(0), second = c.write_number(1);
@@ -101,7 +102,7 @@ TEST_CASE("a letter that the solver cannot take yet comes again", "[pose_graph][
   CHECK(c.others.due(1000.0).empty());
 }
 
-TEST_CASE("letters before the solver begins are not lost, however many and in any order",
+TEST_CASE("messages before the solver begins are not lost, in any number and order",
           "[pose_graph][session]") {
   constexpr std::uint32_t kLetters = 1500;
   Correspondence c;
@@ -115,9 +116,9 @@ TEST_CASE("letters before the solver begins are not lost, however many and in an
   CHECK(c.others.due(1000.0).empty());
 }
 
-TEST_CASE("letters that are refused do not keep a session going", "[pose_graph][session]") {
+TEST_CASE("refused messages do not keep a session alive", "[pose_graph][session]") {
   Correspondence c;
-  CHECK(c.part.receive(c.write({1, 2, 3}), 0.0));  // nobody can tell yet
+  CHECK(c.part.receive(c.write({1, 2, 3}), 0.0));  // not detectable before the solver begins
   CHECK(c.part.take_refused().empty());
   c.begin(0.0);
   CHECK(c.part.take_refused() == std::vector<RobotId>{2});
@@ -131,7 +132,7 @@ TEST_CASE("letters that are refused do not keep a session going", "[pose_graph][
   impossible.number = 1'000'000;
   CHECK_FALSE(c.part.receive(impossible, 5.0));
   impossible = c.write_number(0);
-  impossible.received = 7;  // of this robot, which has not written any
+  impossible.received = 7;  // acknowledges messages that this robot has never sent
   CHECK_FALSE(c.part.receive(impossible, 5.0));
   CHECK(c.part.moved_s() == 0.0);
 }

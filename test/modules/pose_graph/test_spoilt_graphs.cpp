@@ -64,8 +64,7 @@ void check_drive(const RecordedGraph& graph) {
 
 }  // namespace
 
-TEST_CASE("A spoilt g2o file is refused with its line, or holds numbers that can be solved",
-          "[g2o]") {
+TEST_CASE("A corrupted g2o file is refused with its line, or contains a solvable graph", "[g2o]") {
   const std::string good = GENERATE(drive_g2o(), planar_g2o());
   check_spoilt<std::runtime_error>(good, "spoilt.g2o", [](const std::string& text) {
     std::istringstream in(text);
@@ -73,7 +72,7 @@ TEST_CASE("A spoilt g2o file is refused with its line, or holds numbers that can
   });
 }
 
-TEST_CASE("A spoilt graph of a robot is refused by name, or can be driven", "[recorded]") {
+TEST_CASE("A corrupted graph of a robot is refused with its name, or can be played", "[recorded]") {
   const TemporaryFolder folder;
   const auto [name, good] =
       GENERATE(table<std::string, std::string>({{"7.g2o", drive_g2o()}, {"7.csv", drive_csv()}}));
@@ -82,7 +81,7 @@ TEST_CASE("A spoilt graph of a robot is refused by name, or can be driven", "[re
   });
 }
 
-TEST_CASE("What is no file of a graph is refused by name", "[recorded]") {
+TEST_CASE("A path that is not a file of a graph is refused with its name", "[recorded]") {
   const std::string extension = GENERATE(".g2o", ".csv");
   check_no_files<std::runtime_error>(extension,
                                      [](const auto& place) { (void)read_recorded_graph(place); });

@@ -55,7 +55,7 @@ TEST_CASE("the retraction is feasible and of second order", "[pose_graph]") {
   const LiftedPoses V = random_tangent(rng, X);
   CHECK(stiefel_error(retract(X, V)) < kRounding);
   CHECK((retract(X, 0.0 * V) - X).norm() < kRounding);
-  // d/dh at 0 is V; the second difference is normal to the manifold, hence its projection vanishes.
+  // d/dh at 0 is V. The second difference is normal to the manifold, so its projection is zero.
   const double h = 1e-4;
   const LiftedPoses plus = retract(X, h * V);
   const LiftedPoses minus = retract(X, -h * V);
@@ -63,7 +63,7 @@ TEST_CASE("the retraction is feasible and of second order", "[pose_graph]") {
   CHECK(project_tangent(X, (plus - 2.0 * X + minus) / (h * h)).norm() < 1e-6);
 }
 
-TEST_CASE("lifting keeps a chain of poses a chain", "[pose_graph]") {
+TEST_CASE("lifting a chain of poses gives a chain", "[pose_graph]") {
   std::mt19937 rng(6);
   const SE3 T_a_b = random_pose(rng);
   const SE3 T_b_c = random_pose(rng);

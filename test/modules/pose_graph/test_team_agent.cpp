@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-constexpr double kTolerance = 1e-6;  // of the cost, relative
+constexpr double kTolerance = 1e-6;  // relative to the cost
 
 const std::vector<RobotId> kIds{7, 33, 50, 1200};
 const std::vector<std::pair<RobotId, RobotId>> kRing{{7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
@@ -25,7 +25,7 @@ TeamProblem ring(unsigned seed) {
   return random_team_problem({.robots = kIds, .pairs = kRing, .keyframes = 12}, seed);
 }
 
-// Everything but what joins 33 to 50: the rest holds all four together.
+// All closures except for those between 33 and 50; the rest connects all four robots.
 TeamProblem without_33_50(TeamProblem problem) {
   std::erase_if(problem.edges,
                 [](const PoseEdge& e) { return e.id().from.robot == 33 && e.id().to.robot == 50; });
@@ -49,7 +49,7 @@ SolverLetter solver_letter(RobotId to, std::uint8_t content) {
 
 }  // namespace
 
-TEST_CASE("a large letter is repeated more rarely than a small one", "[pose_graph][agent]") {
+TEST_CASE("a large message is repeated more rarely than a small one", "[pose_graph][agent]") {
   LetterBook book({1, 1}, {}, 1.0);
   const SolverLetter large{3, std::make_shared<const std::vector<std::uint8_t>>(1'000'000)};
   (void)book.write(solver_letter(2, 10), 0.0);
@@ -70,7 +70,7 @@ TEST_CASE("a large letter is repeated more rarely than a small one", "[pose_grap
   CHECK(std::ranges::any_of(due, [](const SessionLetter& letter) { return letter.to == 3; }));
 }
 
-TEST_CASE("letters are repeated until they are known to have arrived", "[pose_graph][agent]") {
+TEST_CASE("messages are repeated until they are acknowledged", "[pose_graph][agent]") {
   LetterBook a({1, 1}, {}, 1.0), b({2, 1}, {}, 1.0);
   const auto arrives = [](LetterBook& at, const SessionLetter& letter, double now_s) {
     const bool is_new = at.read(letter, now_s) == LetterNews::kNew;
@@ -81,11 +81,11 @@ TEST_CASE("letters are repeated until they are known to have arrived", "[pose_gr
   const SessionLetter second = a.write(solver_letter(2, 11), 0.0);
   CHECK(a.due(0.9).empty());
   CHECK(a.due(1.0).size() == 2);
-  CHECK(a.due(2.5).empty());  // ever more rarely
+  CHECK(a.due(2.5).empty());  // increasing timeout
   CHECK(arrives(b, second, 1.0));
   CHECK_FALSE(arrives(b, second, 1.0));
   CHECK(arrives(b, first, 1.0));
-  const auto word = b.due(1.0);  // the second came twice
+  const auto word = b.due(1.0);  // the second message arrived twice
   REQUIRE(word.size() == 1);
   CHECK(word[0].received == 2);
   CHECK_FALSE(arrives(a, word[0], 1.0));
@@ -100,7 +100,7 @@ TEST_CASE("letters are repeated until they are known to have arrived", "[pose_gr
 TEST_CASE("one robot alone solves its own graph", "[pose_graph][agent]") {
   const TeamProblem problem = random_team_problem({.robots = {4}, .keyframes = 12}, 1);
   PoseGraphConfig config;
-  config.robust = GENERATE(true, false);  // without: from chordal initialisation
+  config.robust = GENERATE(true, false);  // not robust: from chordal initialisation
   TeamNetwork network;
   feed(network.add({4, 1}, config, gather()), 4, problem);
   REQUIRE(settle(network, 5.0));
@@ -108,7 +108,7 @@ TEST_CASE("one robot alone solves its own graph", "[pose_graph][agent]") {
   CHECK(network.robots.at(4).bytes == 0);
 }
 
-TEST_CASE("robots end in the odometry frame of the lowest one", "[pose_graph][agent]") {
+TEST_CASE("the frame at the end is the odometry frame of the lowest robot", "[pose_graph][agent]") {
   const TeamProblem problem = ring(2);
   PoseGraphConfig config;
   config.robust = GENERATE(true, false);
@@ -147,8 +147,7 @@ TEST_CASE("inputs may come in any order and at any time", "[pose_graph][agent]")
   check_optimal(network, problem);
 }
 
-TEST_CASE("a resumed robot is taken in again with the closures that are known",
-          "[pose_graph][agent]") {
+TEST_CASE("a resumed robot takes part again with its known closures", "[pose_graph][agent]") {
   const RobotId resumed = GENERATE(RobotId{7}, RobotId{50});
   const bool chain = GENERATE(true, false);
   CAPTURE(resumed, chain);
@@ -166,7 +165,8 @@ TEST_CASE("a resumed robot is taken in again with the closures that are known",
   check_optimal(network, problem);
 }
 
-TEST_CASE("a restarted robot is forgotten and taken in anew", "[pose_graph][agent]") {
+TEST_CASE("the data of a restarted robot is discarded, and it takes part again",
+          "[pose_graph][agent]") {
   const RobotId restarted = GENERATE(RobotId{7}, RobotId{50});
   const bool chain = GENERATE(true, false);
   CAPTURE(restarted, chain);
@@ -179,7 +179,7 @@ TEST_CASE("a restarted robot is forgotten and taken in anew", "[pose_graph][agen
   (void)network.run(1.0);
   feed(network.add({restarted, 2U << kResumeBits}, {}, gather()), restarted, problem);
   (void)network.run(0.5);
-  for (const RobotId id : kIds)  // closures with the new process are found again
+  for (const RobotId id : kIds)  // closures to the new process are found again
     if (id != restarted) feed_closures(network.agent(id), id, problem, 3);
   feed_closures(network.agent(restarted), restarted, problem, 3);
   (void)network.run(1.0);
@@ -187,8 +187,7 @@ TEST_CASE("a restarted robot is forgotten and taken in anew", "[pose_graph][agen
   check_optimal(network, problem);
 }
 
-TEST_CASE("of a robot that has restarted nothing is optimised that was measured before",
-          "[pose_graph][agent]") {
+TEST_CASE("measurements of a robot before its restart are not optimised", "[pose_graph][agent]") {
   const TeamProblem problem = ring(9);
   TeamNetwork network;
   for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
@@ -199,13 +198,13 @@ TEST_CASE("of a robot that has restarted nothing is optimised that was measured 
         agent.decided(), [](const auto& decision) { return touches(decision.first, RobotId{7}); });
   };
   REQUIRE(with_7() > 0);
-  agent.peer_restarted({7, 1});  // what came after peer_alive() was measured before, too
+  agent.peer_restarted({7, 1});  // measurements after peer_alive() are also from before the restart
   CHECK(with_7() == 0);
   REQUIRE(settle(network));
   CHECK(with_7() == 0);
 }
 
-TEST_CASE("decisions on closures hold for both ends and carry over", "[pose_graph][agent]") {
+TEST_CASE("decisions on closures are valid for both robots and carry over", "[pose_graph][agent]") {
   TeamProblem problem = ring(4);
   PoseEdge wrong = problem.edges.back();
   wrong.from = {7, 3};
@@ -226,7 +225,7 @@ TEST_CASE("decisions on closures hold for both ends and carry over", "[pose_grap
     for (const auto& [closure, kept] : network.agent(id).decided()) problem.decided[closure] = kept;
   }
   CHECK_FALSE(network.agent(50).decided().contains(wrong.id()));
-  // The next session begins with what this one has decided.
+  // The next session begins with the decisions of this one.
   for (const RobotId id : {RobotId{7}, RobotId{33}})
     (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
   (void)network.run(1.0);
@@ -234,7 +233,7 @@ TEST_CASE("decisions on closures hold for both ends and carry over", "[pose_grap
   check_optimal(network, problem);
 }
 
-TEST_CASE("a graph that cannot be solved ends the session for all, and they say so",
+TEST_CASE("a graph that cannot be solved ends the session for all, with a notice",
           "[pose_graph][agent]") {
   const bool throws = GENERATE(true, false);
   CAPTURE(throws);
@@ -252,7 +251,7 @@ TEST_CASE("a graph that cannot be solved ends the session for all, and they say 
     CHECK(network.agent(id).frame() == network.agent(7).frame());
     CHECK(network.robots.at(id).trajectory);
   }
-  CHECK(network.agent(7).part()->session().id.number < 5);  // not again and again
+  CHECK(network.agent(7).part()->session().id.number < 5);  // without endless repetition
 }
 
 TEST_CASE("sessions wait until their bytes are paid for", "[pose_graph][agent]") {
@@ -276,13 +275,14 @@ TEST_CASE("sessions wait until their bytes are paid for", "[pose_graph][agent]")
   REQUIRE(settle(network));
   const double waited_s = network.now_s() - first_s;
   CAPTURE(waited_s);
-  if (budget_kb_s > 1.0) CHECK(waited_s < 5.0);  // two at rest, and the session
+  if (budget_kb_s > 1.0) CHECK(waited_s < 5.0);  // two seconds at rest, and the session
   if (budget_kb_s <= 1.0) CHECK(waited_s > 5.0);
   CHECK(waited_s < 35.0);
   check_optimal(network, problem);
 }
 
-TEST_CASE("a session is paid for by the member that has sent most", "[pose_graph][agent]") {
+TEST_CASE("the member that has sent most determines the wait for the next session",
+          "[pose_graph][agent]") {
   const std::vector<RobotId> ids{7, 33, 50};
   constexpr double kBudget_kb_s = 5.0;
   TeamProblem problem =
@@ -302,7 +302,7 @@ TEST_CASE("a session is paid for by the member that has sent most", "[pose_graph
   const double first_s = network.now_s();
   const SessionId first = network.agent(7).part()->session().id;
   std::map<RobotId, double>& sent = sent_in.at(first);
-  // The one in the middle is the root; the coordinator is a leaf.
+  // The robot in the middle is the root; the coordinator is a leaf.
   REQUIRE(sent.at(33) > 3.0 * sent.at(7));
   const double price_s = sent.at(33) / (1e3 * kBudget_kb_s);
   for (const RobotId id : {RobotId{7}, RobotId{33}})
@@ -314,7 +314,7 @@ TEST_CASE("a session is paid for by the member that has sent most", "[pose_graph
   CHECK(waited_s < 1.1 * price_s + 2.0);
 }
 
-TEST_CASE("early stopping ends a session after its rounds", "[pose_graph][agent]") {
+TEST_CASE("early stopping ends a session after the given rounds", "[pose_graph][agent]") {
   const TeamProblem problem = ring(10);
   PoseGraphConfig config;
   config.max_rounds = 2;
@@ -324,7 +324,8 @@ TEST_CASE("early stopping ends a session after its rounds", "[pose_graph][agent]
   for (const RobotId id : kIds) CHECK(network.agent(id).part()->state().round == 2);
 }
 
-TEST_CASE("robots of different methods go their own ways, and say so", "[pose_graph][agent]") {
+TEST_CASE("robots with different methods optimise separately, with a notice",
+          "[pose_graph][agent]") {
   const TeamProblem problem = ring(13);
   TeamNetwork network;
   for (const RobotId id : kIds) {
@@ -341,7 +342,7 @@ TEST_CASE("robots of different methods go their own ways, and say so", "[pose_gr
   CHECK_THAT(network.robots.at(7).notices.front(), Catch::Contains("another method"));
 }
 
-TEST_CASE("what is refused is counted and told", "[pose_graph][agent]") {
+TEST_CASE("refused inputs are counted, with a notice", "[pose_graph][agent]") {
   TeamAgent agent({}, {7, 1}, gather());
   KeyframeOdometry keyframe;
   keyframe.id = {7, 5};
@@ -352,7 +353,7 @@ TEST_CASE("what is refused is counted and told", "[pose_graph][agent]") {
   closure.covariance.setZero();
   CHECK_FALSE(agent.add(closure));
   closure.from.id = {50, 0};
-  CHECK_FALSE(agent.add(closure));  // of others: no reason to speak of it
+  CHECK_FALSE(agent.add(closure));  // between other robots: no notice
   InlierSet set{7, 33, 1, {closure_id({7, 0}, {50, 0})}};
   CHECK_FALSE(agent.add(set));
   CHECK(agent.refused().size() == 3);
@@ -361,10 +362,10 @@ TEST_CASE("what is refused is counted and told", "[pose_graph][agent]") {
   CHECK_FALSE(agent.add(keyframe));
   CHECK(agent.step(0.1).notices.size() == 1);
   CHECK_FALSE(agent.add(keyframe));
-  CHECK(agent.step(0.2).notices.empty());  // the third time
+  CHECK(agent.step(0.2).notices.empty());  // third refusal
 }
 
-TEST_CASE("closures beyond what is kept of one robot are told, repeated ones are not",
+TEST_CASE("closures beyond the limit for one robot cause a notice, repeated ones do not",
           "[pose_graph][agent]") {
   TeamAgent agent({}, {7, 1}, gather());
   Closure closure;
@@ -382,7 +383,7 @@ TEST_CASE("closures beyond what is kept of one robot are told, repeated ones are
   CHECK_THAT(output.notices.front(), Catch::Contains("closures of robots 7 and 33 beyond"));
 }
 
-TEST_CASE("messages that lie are refused or do no lasting harm", "[pose_graph][agent]") {
+TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agent]") {
   const unsigned seed = GENERATE(range(1U, 7U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -408,7 +409,7 @@ TEST_CASE("messages that lie are refused or do no lasting harm", "[pose_graph][a
     Session session{.id = {peer(), any(rng)},
                     .plan = {.frame = peer(), .members = {}, .pairs = {}}};
     if (session.id.coordinator.robot != 666 && session.id.coordinator.robot != 667)
-      session.id.coordinator = {666, 1};  // else nothing could tell it from the true one
+      session.id.coordinator = {666, 1};  // otherwise it is identical to a true one
     for (std::uint32_t n = any(rng) % 5; n > 0; --n)
       session.plan.members.push_back({.peer = peer(), .parent = robot()});
     session.plan.members.push_back({.peer = {33, 1}});
@@ -440,7 +441,7 @@ TEST_CASE("messages that lie are refused or do no lasting harm", "[pose_graph][a
   check_optimal(network, problem);
 }
 
-TEST_CASE("what is told of closures that nobody has, and by strangers, decides nothing",
+TEST_CASE("verdicts on unknown closures, or from robots outside the session, decide nothing",
           "[pose_graph][agent]") {
   const TeamProblem problem = ring(11);
   TeamNetwork network;
@@ -471,10 +472,10 @@ TEST_CASE("what is told of closures that nobody has, and by strangers, decides n
   }
   CHECK(victim.decided() == decided);
   CHECK(network.robots.at(7).verdicts.closures.size() == verdicts);
-  CHECK(victim.part()->moved_s() == moved_s);  // it is over
+  CHECK(victim.part()->moved_s() == moved_s);  // the session is over
 }
 
-TEST_CASE("a session over closures that are not at hand is refused", "[pose_graph][agent]") {
+TEST_CASE("a session with unknown closures is refused", "[pose_graph][agent]") {
   const TeamProblem problem = ring(11);
   TeamNetwork network;
   for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
@@ -492,7 +493,7 @@ TEST_CASE("a session over closures that are not at hand is refused", "[pose_grap
   CHECK(agent.part()->session().id == running.id);
 }
 
-TEST_CASE("what a session has decided holds in the next one, also for who did not hear its end",
+TEST_CASE("decisions of a session hold in the next one, even for a robot that missed its end",
           "[pose_graph][agent]") {
   const TeamProblem problem = ring(11);
   PoseGraphConfig config;
@@ -502,7 +503,7 @@ TEST_CASE("what a session has decided holds in the next one, also for who did no
     const auto* session = std::get_if<Session>(parcel.message.get());
     return session != nullptr && session->finished && parcel.next == 33;
   };
-  std::size_t known = 0;  // to 33, when its last session of all four began
+  std::size_t known = 0;  // decisions known to 33 at the beginning of its last session of four
   const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
                                           TreePlace place) {
     if (graph.self == 33 && place.members.size() == 4) known = graph.decided.size();
@@ -524,7 +525,7 @@ TEST_CASE("what a session has decided holds in the next one, also for who did no
   CHECK(known > 0);
 }
 
-TEST_CASE("every message may come late, twice and in any order", "[pose_graph][agent]") {
+TEST_CASE("every message may arrive late, twice and in any order", "[pose_graph][agent]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   const TeamProblem problem = ring(seed);
@@ -537,7 +538,7 @@ TEST_CASE("every message may come late, twice and in any order", "[pose_graph][a
   for (int k = 0; k < 200; ++k) {
     (void)network.run(0.01);
     if (seen.empty()) continue;
-    const auto& [from, parcel] = seen[rng() % seen.size()];  // long ago
+    const auto& [from, parcel] = seen[rng() % seen.size()];  // an old message
     (void)network.inject(from, parcel.next, *parcel.message);
   }
   REQUIRE(settle(network));
@@ -552,8 +553,8 @@ TEST_CASE("every message may come late, twice and in any order", "[pose_graph][a
 
 namespace {
 
-// Two robots that drive side by side over level ground, joined at many places. Odometry takes each
-// for pitching ever further, and their first keyframes for tilted otherwise than they are.
+// Two robots drive side by side over level ground, with closures at many places. The pitch of the
+// odometry of each robot drifts, and the estimated tilt of their first keyframes is wrong.
 struct Drive {
   TeamPoses truth = {};
   std::map<RobotId, std::vector<KeyframeOdometry>> odometry = {};
@@ -620,7 +621,7 @@ TeamPoses drive_to_the_end(const Drive& drive, const PoseGraphConfig& config) {
 
 }  // namespace
 
-TEST_CASE("a team that knows which way is up ends level", "[pose_graph][agent][vertical]") {
+TEST_CASE("the solution of a team with verticals is level", "[pose_graph][agent][vertical]") {
   PoseGraphConfig config;
   config.method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
   config.robust = GENERATE(true, false);
@@ -631,15 +632,15 @@ TEST_CASE("a team that knows which way is up ends level", "[pose_graph][agent][v
   for (const auto& [robot, truth] : drive.truth)
     for (std::size_t k = 0; k < truth.size(); ++k)
       worst = std::max(worst, tilt_between(poses.at(robot)[k], truth[k]));
-  // Odometry alone would be pitched by 58 mrad at the end.
+  // Odometry alone would have a pitch of 58 mrad at the end.
   CHECK(worst < 0.012);
-  // Where odometry says that keyframe 0 of the anchor is, there it is; its tilt is the team's.
+  // Keyframe 0 of the anchor has its position from odometry, and its tilt from the team.
   const SE3& first = poses.at(1)[0];
   CHECK(first.translation().norm() < 1e-6);
   CHECK(std::abs(so3_log(first.linear()).z()) < 1e-6);
 }
 
-TEST_CASE("the vertical leads block descent and Newton's method to one optimum",
+TEST_CASE("block descent and Newton's method with verticals have one optimum",
           "[pose_graph][agent][vertical]") {
   const Drive drive = level_drive(0.01);
   PoseGraphConfig config;
@@ -656,7 +657,7 @@ TEST_CASE("the vertical leads block descent and Newton's method to one optimum",
     }
 }
 
-TEST_CASE("one robot that does not know which way is up leaves the team as it was",
+TEST_CASE("one robot without verticals disables them for the team",
           "[pose_graph][agent][vertical]") {
   Drive one = level_drive(0.0), none = level_drive(0.0);
   for (KeyframeOdometry& keyframe : one.odometry.at(2)) keyframe.vertical.reset();

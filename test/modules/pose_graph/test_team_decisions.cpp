@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-constexpr double kTolerance = 1e-6;  // of the cost, relative
+constexpr double kTolerance = 1e-6;  // relative to the cost
 
 using Pairs = std::vector<std::pair<RobotId, RobotId>>;
 
@@ -39,7 +39,8 @@ std::size_t closures_of(const TeamProblem& problem) {
                                                 [](const PoseEdge& e) { return !is_step(e); }));
 }
 
-// So that this part of all closures is false, between the robots of each pair and inside each.
+// Adds false closures up to this share of all closures, between the robots of each pair and inside
+// each robot.
 std::set<ClosureId> add_random_false(TeamProblem& problem, double part, unsigned seed) {
   std::mt19937 rng(seed);
   std::set<ClosureId> known, added;
@@ -65,7 +66,7 @@ TeamProblem without(TeamProblem problem, const std::set<ClosureId>& closures) {
   return problem;
 }
 
-// In a row, all off by the same motion: places that look alike.
+// Consecutive false closures with one common error, as between places that look alike.
 std::set<ClosureId> add_cluster(TeamProblem& problem, std::uint32_t count, unsigned seed) {
   std::mt19937 rng(seed);
   const SE3 off = random_pose(rng, 8.0);
@@ -121,7 +122,7 @@ TEST_CASE("random false closures are rejected and leave the optimum of the true 
   check_cost(network, without(problem, wrong));
 }
 
-TEST_CASE("false closures that agree with each other are rejected where others contradict them",
+TEST_CASE("false closures that agree with each other are rejected if others contradict them",
           "[pose_graph][decisions]") {
   const unsigned seed = GENERATE(range(1U, 5U));
   const std::uint32_t count = GENERATE(2U, 4U, 6U);
@@ -137,13 +138,13 @@ TEST_CASE("false closures that agree with each other are rejected where others c
   check_cost(network, without(problem, wrong));
 }
 
-TEST_CASE("a session after new closures takes few rounds and keeps what was decided",
+TEST_CASE("a session after new closures takes few rounds and keeps earlier decisions",
           "[pose_graph][decisions]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   TeamProblem all = problem_of(seed);
   const std::set<ClosureId> wrong = add_random_false(all, 0.2, seed);
-  std::set<ClosureId> later;  // true ones of one pair
+  std::set<ClosureId> later;  // true closures of one pair
   for (const PoseEdge& e : all.edges)
     if (e.id().from.robot == 3 && e.id().to.robot == 5 && later.size() < 3 &&
         !wrong.contains(e.id()))
@@ -163,7 +164,7 @@ TEST_CASE("a session after new closures takes few rounds and keeps what was deci
   REQUIRE(settle(network));
   const std::uint32_t second = network.agent(2).part()->state().round;
   CAPTURE(first, second);
-  // One pair is weighed again; the rest is convergence to 1e-13 of the cost.
+  // One pair is weighed again; the other rounds are convergence to 1e-13 of the cost.
   CHECK(second < first);
   CHECK(second <= 20);
   CHECK(rejected(network) == wrong);
@@ -180,7 +181,8 @@ TEST_CASE("a closure that both robots have verified counts once", "[pose_graph][
   for (const RobotId robot : kFour) {
     TeamAgent& agent = network.add({robot, 1}, config, solver_choice(config));
     feed_odometry(agent, robot, problem);
-    // Each hears its own verification first; the other one starts at the other end, and is worse.
+    // Each robot receives its own verification first. The one of the other robot starts at the
+    // other end, and is worse.
     const auto verify = [&](const PoseEdge& e) {
       PoseEdge back{e.to, e.from,
                     e.T_from_to.inverse() * make_pose(so3_exp({0.0, 0.0, 0.1}), {0.3, 0.0, 0.0}),
@@ -205,7 +207,7 @@ TEST_CASE("a closure that both robots have verified counts once", "[pose_graph][
   check_cost(network, problem);
 }
 
-TEST_CASE("both ends of a closure enter every session with the same decisions",
+TEST_CASE("both robots of a closure enter every session with equal decisions",
           "[pose_graph][decisions]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
@@ -232,7 +234,7 @@ TEST_CASE("both ends of a closure enter every session with the same decisions",
     }
     return newton(session, std::move(graph), std::move(place));
   });
-  // Links that break sessions off, and a pair that learns of its closures late.
+  // Outages of links interrupt sessions, and one pair receives its closures late.
   std::mt19937 rng(seed);
   for (double at_s = 2.0; at_s < 60.0; at_s += 4.0) {
     const auto [a, b] = kRing[rng() % kRing.size()];
@@ -249,7 +251,8 @@ TEST_CASE("both ends of a closure enter every session with the same decisions",
   CHECK(differ == 0);
 }
 
-TEST_CASE("closures that were set aside and fit get two more chances", "[pose_graph][decisions]") {
+TEST_CASE("deferred closures that fit are weighed in up to two more sessions",
+          "[pose_graph][decisions]") {
   const bool at_last = GENERATE(true, false);
   CAPTURE(at_last);
   const TeamProblem problem = problem_of(3);
@@ -257,7 +260,7 @@ TEST_CASE("closures that were set aside and fit get two more chances", "[pose_gr
     return e.id().from.robot == 5 && e.id().to.robot == 9;
   });
   REQUIRE(closure != problem.edges.end());
-  std::map<SessionId, std::set<std::optional<bool>>> sessions;  // what was decided before each
+  std::map<SessionId, std::set<std::optional<bool>>> sessions;  // decision before each session
   const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
                                           TreePlace place) {
     GatherSolver::Options options{.barc = 100.0, .set_aside = true};
@@ -281,7 +284,7 @@ TEST_CASE("closures that were set aside and fit get two more chances", "[pose_gr
     CHECK(network.agent(robot).decided().at(closure->id()) == at_last);
 }
 
-TEST_CASE("what is decided beside robots that have gone holds until they are back",
+TEST_CASE("decisions made with held poses hold until these robots return",
           "[pose_graph][decisions]") {
   const bool held = GENERATE(true, false);
   CAPTURE(held);
@@ -319,7 +322,7 @@ TEST_CASE("what is decided beside robots that have gone holds until they are bac
 
 namespace {
 
-// Everything that was recorded, each robot in its own frame by odometry.
+// The whole recording, with each robot in its own frame by odometry.
 TeamProblem recorded_team(const std::filesystem::path& folder, int robots) {
   TeamProblem problem;
   for (int k = 0; k < robots; ++k) {
@@ -334,7 +337,8 @@ TeamProblem recorded_team(const std::filesystem::path& folder, int robots) {
   return problem;
 }
 
-// What one session rejects that knows nothing before, with the robots where `frames` has them.
+// The closures that one session without earlier decisions rejects, with the robots at the places of
+// `frames`.
 std::set<ClosureId> rejected_at_once(TeamProblem problem, const TeamPoses& frames) {
   for (auto& [robot, poses] : problem.start) {
     const SE3 T_frame_own = frames.at(robot).front() * poses.front().inverse();
@@ -354,7 +358,7 @@ std::set<ClosureId> rejected_at_once(TeamProblem problem, const TeamPoses& frame
   return closures;
 }
 
-// The problem as robots see it that have judged their odometry by their own closures.
+// The problem with the corrected noise of odometry that each robot estimates from its own closures.
 TeamProblem with_judged_odometry(TeamProblem problem) {
   for (const RobotId robot : problem.members()) {
     std::vector<PoseEdge> steps, closures;
@@ -368,7 +372,7 @@ TeamProblem with_judged_odometry(TeamProblem problem) {
   return problem;
 }
 
-// The problem with closures weighed by the noise that the robots found for each pair.
+// The problem with closures weighted by the noise that the robots have estimated for each pair.
 TeamProblem with_closure_noise(TeamProblem problem, TeamNetwork& network) {
   for (PoseEdge& e : problem.edges) {
     if (is_step(e)) continue;
@@ -381,7 +385,7 @@ TeamProblem with_closure_noise(TeamProblem problem, TeamNetwork& network) {
   return problem;
 }
 
-// Closures fit the trajectories up to `barc` [sigma], except for those that are `out`.
+// Checks that closures fit the trajectories up to `barc` [sigma], except for those in `out`.
 void check_fit(const TeamProblem& problem, const TeamPoses& poses, const std::set<ClosureId>& out,
                double barc) {
   std::size_t misfits_kept = 0, fits_rejected = 0;
@@ -398,8 +402,8 @@ void check_fit(const TeamProblem& problem, const TeamPoses& poses, const std::se
 
 }  // namespace
 
-// Every robot has had a session of its own before, and knows the noise badly from that.
-TEST_CASE("eight robots in tunnels decide nearly as one session that knows nothing before",
+// Every robot has first had a session alone, and has a bad estimate of the noise from it.
+TEST_CASE("eight robots in tunnels decide nearly as one session without earlier decisions",
           "[pose_graph][decisions]") {
   const auto folder = shared_data("multi_robot/tunnels_8robots");
   if (!folder) return;
@@ -418,12 +422,12 @@ TEST_CASE("eight robots in tunnels decide nearly as one session that knows nothi
   const SolverState state = network.agent(0).part()->state();
   CAPTURE(out.size(), at_once.size(), state.noise_scale, state.round);
   const std::size_t kept = closures_of(problem) - at_once.size();
-  // Robust solvers that take all closures for equally noisy keep 2669 to 2987. Pairs that are found
-  // noisier keep closures that are further off.
+  // Robust solvers that assume equal noise of all closures keep 2669 to 2987. Pairs with larger
+  // estimated noise keep closures with larger errors.
   CHECK(kept >= 2600);
   CHECK(kept <= 3150);
   CAPTURE(differ.size());
-  CHECK(differ.size() * 100 < kept);  // Jaccard's index 0.99
+  CHECK(differ.size() * 100 < kept);  // Jaccard index 0.99
   const TeamProblem judged = with_closure_noise(with_judged_odometry(problem), network);
   check_fit(judged, network.trajectories(), out, state.barc);
   TeamProblem rest = without(judged, out);

@@ -16,7 +16,7 @@ void link(TeamLinks& links, const std::vector<std::pair<RobotId, RobotId>>& pair
 
 }  // namespace
 
-TEST_CASE("a link counts if both of its ends say so", "[core]") {
+TEST_CASE("a link counts if both of its robots report it", "[core]") {
   TeamLinks links;
   CHECK(links.tell(1, {2}));
   CHECK_FALSE(links.tell(1, {2}));
@@ -30,9 +30,9 @@ TEST_CASE("a link counts if both of its ends say so", "[core]") {
   CHECK_FALSE(links.linked(1, 2));
 }
 
-TEST_CASE("a team is who links lead to, and paths are the shortest", "[core]") {
+TEST_CASE("a team is the connected component of links, with shortest paths", "[core]") {
   TeamLinks links;
-  // A ring of five, a tail at 3, and two apart.
+  // A ring of five, a tail at 3, and two separate robots.
   link(links, {{1, 2}, {2, 3}, {3, 4}, {4, 5}, {1, 5}, {3, 9}, {20, 21}});
   CHECK(links.component(9) == std::set<RobotId>{1, 2, 3, 4, 5, 9});
   CHECK(links.component(21) == std::set<RobotId>{20, 21});

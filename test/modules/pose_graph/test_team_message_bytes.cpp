@@ -101,9 +101,9 @@ const char* refusal_of(const TeamMessage& message) {
   return result.value ? "" : result.refusal;
 }
 
-constexpr double kRounding = 1e-14;  // of a rotation told as a quaternion
+constexpr double kRounding = 1e-14;  // rotation sent as a quaternion
 
-TEST_CASE("A team's status comes back as it was told", "[pose_graph]") {
+TEST_CASE("Decoding restores an encoded status", "[pose_graph]") {
   const TeamStatus told = some_status();
   const TeamStatus heard = round_trip(told);
   CHECK(heard.sender == told.sender);
@@ -120,7 +120,7 @@ TEST_CASE("A team's status comes back as it was told", "[pose_graph]") {
   CHECK(heard.holds == told.holds);
 }
 
-TEST_CASE("A session comes back as it was told", "[pose_graph]") {
+TEST_CASE("Decoding restores an encoded session", "[pose_graph]") {
   Session told = some_session();
   const Session heard = round_trip(told);
   CHECK(heard.id == told.id);
@@ -140,7 +140,8 @@ TEST_CASE("A session comes back as it was told", "[pose_graph]") {
   CHECK_FALSE(round_trip(told).T_frame_world);
 }
 
-TEST_CASE("Poses of a member come back to the last bit, in 29 bytes each", "[pose_graph]") {
+TEST_CASE("Decoding restores poses of a member to the last bit, from 29 bytes each",
+          "[pose_graph]") {
   const MemberPoses told = some_poses();
   const MemberPoses heard = round_trip(told);
   CHECK(heard.sender == told.sender);
@@ -172,7 +173,7 @@ TEST_CASE("Poses of a member come back to the last bit, in 29 bytes each", "[pos
   CHECK(encode(many).size() < 29 * 1000 + 80);
 }
 
-TEST_CASE("A letter comes back as it was told", "[pose_graph]") {
+TEST_CASE("Decoding restores an encoded reliable message", "[pose_graph]") {
   SessionLetter told = some_letter();
   const SessionLetter heard = round_trip(told);
   CHECK(heard.sender == told.sender);
@@ -187,28 +188,28 @@ TEST_CASE("A letter comes back as it was told", "[pose_graph]") {
   CHECK(round_trip(told).bytes->empty());
 }
 
-TEST_CASE("Messages with nothing in them are messages", "[pose_graph]") {
+TEST_CASE("Empty messages are valid", "[pose_graph]") {
   CHECK(round_trip(TeamStatus{.sender = kPeer2, .frame = kPeer2}).hears.empty());
   CHECK(round_trip(MemberPoses{.sender = kPeer2}).keyframes.empty());
 }
 
-TEST_CASE("What encoding gives is what decoding takes, to the last byte", "[pose_graph]") {
+TEST_CASE("Decoding accepts every encoded message and uses it to the last byte", "[pose_graph]") {
   for (const TeamMessage& message : one_of_each()) {
     CAPTURE(message.index());
     const Bytes bytes = encode(message);
     const auto again = decode_team_message(bytes);
     REQUIRE(again.value);
     CHECK(again.value->index() == message.index());
-    // A rotation may be rounded again: its double comes back to itself from then on.
+    // The first decoding may round a rotation; afterwards its double is unchanged.
     CHECK(encode(*again.value).size() == bytes.size());
   }
 }
 
-TEST_CASE("No message that is cut short is taken", "[pose_graph]") {
+TEST_CASE("No truncated message is accepted", "[pose_graph]") {
   for (const TeamMessage& message : one_of_each()) {
     const bool is_letter = std::holds_alternative<SessionLetter>(message);
     const Bytes bytes = encode(message);
-    // What a letter says may have any length.
+    // The content of a reliable message may have any length.
     const std::size_t end = is_letter ? bytes.size() - some_letter().bytes->size() : bytes.size();
     for (std::size_t size = 0; size < end; ++size) {
       CAPTURE(message.index(), size);
@@ -223,7 +224,7 @@ TEST_CASE("No message that is cut short is taken", "[pose_graph]") {
   }
 }
 
-TEST_CASE("Counts that are not there are refused before memory is asked for", "[pose_graph]") {
+TEST_CASE("Impossible counts are refused before memory is allocated", "[pose_graph]") {
   ByteWriter out;
   out.u8(2);  // poses
   for (int k = 0; k < 2; ++k) {
@@ -243,15 +244,15 @@ TEST_CASE("Counts that are not there are refused before memory is asked for", "[
   CHECK_FALSE(decode_team_message(out.release()).value);
 }
 
-TEST_CASE("A status is refused where it contradicts itself", "[pose_graph]") {
+TEST_CASE("An inconsistent status is refused", "[pose_graph]") {
   TeamStatus m = some_status();
-  SECTION("heard robots out of order") {
+  SECTION("received robots out of order") {
     std::swap(m.hears[0], m.hears[1]);
   }
-  SECTION("a robot heard twice") {
+  SECTION("a duplicate received robot") {
     m.hears[1] = {m.hears[0].robot, 99};
   }
-  SECTION("a robot that hears itself") {
+  SECTION("a robot that receives itself") {
     m.hears[1] = m.sender;
   }
   SECTION("offers out of order") {
@@ -266,13 +267,13 @@ TEST_CASE("A status is refused where it contradicts itself", "[pose_graph]") {
   SECTION("a method that is not known") {
     m.method = static_cast<PgoMethod>(2);
   }
-  SECTION("an origin that is not finite") {
+  SECTION("an odometry origin that is not finite") {
     m.T_odom_first.translation().x() = std::numeric_limits<double>::quiet_NaN();
   }
-  SECTION("an origin out of this world") {
+  SECTION("an odometry origin out of range") {
     m.T_odom_first.translation().x() = 1e9;
   }
-  SECTION("too large a team") {
+  SECTION("a team that is too large") {
     m.hears.clear();
     for (std::size_t k = 0; k <= kMaxTeam; ++k)
       m.hears.push_back({static_cast<RobotId>(k + 10), 1});
@@ -280,28 +281,28 @@ TEST_CASE("A status is refused where it contradicts itself", "[pose_graph]") {
   CHECK(refusal_of(m) != std::string());
 }
 
-TEST_CASE("A session is refused where it contradicts itself", "[pose_graph]") {
+TEST_CASE("An inconsistent session is refused", "[pose_graph]") {
   Session m = some_session();
   SECTION("no members") {
     m.plan.members.clear();
     m.plan.pairs.clear();
   }
-  SECTION("a member twice") {
+  SECTION("a duplicate member") {
     m.plan.members[2].peer.robot = 2;
   }
-  SECTION("a parent that is no member") {
+  SECTION("a parent that is not a member") {
     m.plan.members[0].parent = RobotId{8};
   }
-  SECTION("its own parent") {
+  SECTION("a member that is its own parent") {
     m.plan.members[1].parent = RobotId{2};
   }
-  SECTION("parents in a circle") {
+  SECTION("a cycle of parents") {
     m.plan.members[1].parent = RobotId{60000};
   }
-  SECTION("a pair with a stranger") {
+  SECTION("a pair with a robot that is not a member") {
     m.plan.pairs[2].b = 60001;
   }
-  SECTION("a pair the wrong way round") {
+  SECTION("a pair in the wrong order") {
     std::swap(m.plan.pairs[0].a, m.plan.pairs[0].b);
   }
   SECTION("pairs out of order") {
@@ -310,16 +311,16 @@ TEST_CASE("A session is refused where it contradicts itself", "[pose_graph]") {
   SECTION("a method that is not known") {
     m.method = static_cast<PgoMethod>(2);
   }
-  SECTION("no cost") {
+  SECTION("a cost that is not finite") {
     m.cost = std::numeric_limits<double>::infinity();
   }
-  SECTION("no gradient") {
+  SECTION("an invalid gradient") {
     m.gradient = std::numeric_limits<double>::quiet_NaN();
   }
   CHECK(refusal_of(m) != std::string());
 }
 
-TEST_CASE("Poses are refused where they are none", "[pose_graph]") {
+TEST_CASE("Invalid poses of a member are refused", "[pose_graph]") {
   MemberPoses m = some_poses();
   SECTION("keyframes out of order") {
     std::swap(m.keyframes[1], m.keyframes[2]);
@@ -336,10 +337,10 @@ TEST_CASE("Poses are refused where they are none", "[pose_graph]") {
   SECTION("not finite") {
     m.T_frame_kf[3].t.z() = std::numeric_limits<float>::infinity();
   }
-  SECTION("no rotation") {
+  SECTION("an invalid rotation") {
     m.T_frame_kf[3].q.coeffs() *= 1.01F;
   }
-  SECTION("no weight") {
+  SECTION("zero weight") {
     m.step_precision.tau = 0.0;
   }
   SECTION("too much weight") {
@@ -348,19 +349,19 @@ TEST_CASE("Poses are refused where they are none", "[pose_graph]") {
   SECTION("a closure of a keyframe with itself") {
     m.verdicts[0].id.from = m.verdicts[0].id.to;
   }
-  SECTION("a closure the wrong way round") {
+  SECTION("a closure in the wrong order") {
     std::swap(m.verdicts[0].id.from, m.verdicts[0].id.to);
   }
   CHECK(refusal_of(m) != std::string());
 }
 
-TEST_CASE("A letter to its own robot is refused", "[pose_graph]") {
+TEST_CASE("A reliable message to its own sender is refused", "[pose_graph]") {
   SessionLetter m = some_letter();
   m.to = m.sender.robot;
   CHECK(refusal_of(m) != std::string());
 }
 
-TEST_CASE("Changed bytes give a message or a reason", "[pose_graph]") {
+TEST_CASE("Corrupted bytes give a message or a reason", "[pose_graph]") {
   const auto seed = GENERATE(1U, 2U, 3U, 4U);
   CAPTURE(seed);
   std::mt19937 random(seed);
@@ -386,11 +387,11 @@ TEST_CASE("Changed bytes give a message or a reason", "[pose_graph]") {
     }
     const auto result = decode_team_message(bytes);
     if (result.value.has_value() == (result.refusal != nullptr)) FAIL("neither or both");
-    // What is taken can be told on.
+    // An accepted message can be forwarded.
     if (result.value && !decode_team_message(encode(*result.value)).value) FAIL("not stable");
     taken += result.value ? 1 : 0;
   }
-  CHECK(taken > 1000);  // most of what varies may have any value
+  CHECK(taken > 1000);  // most of the changed bytes may have any value
 }
 
 }  // namespace

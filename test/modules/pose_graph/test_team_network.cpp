@@ -8,7 +8,7 @@ namespace km {
 namespace {
 
 constexpr double kHour_s = 3600.0;
-constexpr double kTolerance = 1e-6;  // of the cost, relative
+constexpr double kTolerance = 1e-6;  // relative to the cost
 
 using Pairs = std::vector<std::pair<RobotId, RobotId>>;
 
@@ -30,7 +30,7 @@ TeamProblem problem_of(const std::vector<RobotId>& ids, const Pairs& closures, u
       {.robots = ids, .pairs = closures, .keyframes = keyframes, .closures = 6}, seed);
 }
 
-// No closure is false here. The threshold that is found would reject one of 10000 all the same.
+// No closure is false here. The estimated threshold would nevertheless reject one of 10000.
 PoseGraphConfig robust(bool on) {
   PoseGraphConfig config;
   config.robust = on;
@@ -51,10 +51,10 @@ PoseGraphConfig rbcd() {
   return config;
 }
 
-// Of the cost, relative: block descent ends where it gets slow.
+// Relative to the cost: block descent ends when it becomes slow.
 constexpr double kRbcdTolerance = 1e-4;
 
-// One session of all that live, in the frame of the lowest, at the least cost there is.
+// Checks that all running robots share one session, the frame of the lowest robot, and the optimum.
 void check_optimal(const TeamNetwork& network, const TeamProblem& problem,
                    double tolerance = kTolerance) {
   const RobotId anchor = problem.start.begin()->first;
@@ -74,7 +74,7 @@ void check_optimal(const TeamNetwork& network, const TeamProblem& problem,
 
 }  // namespace
 
-TEST_CASE("a robot that only one other hears is taken in at the cost of all links",
+TEST_CASE("a robot with a single link takes part as fast as with all links",
           "[pose_graph][network]") {
   const bool all_links = GENERATE(true, false);
   const bool weighed = GENERATE(true, false);
@@ -89,7 +89,7 @@ TEST_CASE("a robot that only one other hears is taken in at the cost of all link
   check_optimal(network, problem);
 }
 
-TEST_CASE("any links that connect the team do", "[pose_graph][network]") {
+TEST_CASE("a team reaches the optimum over any links that connect it", "[pose_graph][network]") {
   struct Wiring {
     const char* name;
     std::size_t robots;
@@ -120,12 +120,12 @@ TEST_CASE("any links that connect the team do", "[pose_graph][network]") {
   network.wire(wiring.links);
   REQUIRE(settle(network, 30.0));
   CAPTURE(network.now_s());
-  // Block descent takes many letters, which have to be paid for before the next session.
+  // Block descent needs many messages, which have to be paid for before the next session.
   CHECK(network.now_s() < (config.method == PgoMethod::kRbcd ? 15.0 : 10.0));
   check_optimal(network, problem, tolerance);
 }
 
-TEST_CASE("robots without closures pass on what the others say", "[pose_graph][network]") {
+TEST_CASE("robots without closures forward messages of other robots", "[pose_graph][network]") {
   TeamProblem problem = problem_of({1, 2, 3, 4}, {{1, 4}}, 3);
   TeamNetwork network;
   add_all(network, problem);
@@ -139,7 +139,7 @@ TEST_CASE("robots without closures pass on what the others say", "[pose_graph][n
   CHECK(network.robots.at(2).progress.members == std::vector<RobotId>{2});
 }
 
-TEST_CASE("links that come and go every two seconds do not keep a team from its optimum",
+TEST_CASE("a team reaches its optimum although links fail every two seconds",
           "[pose_graph][network]") {
   const unsigned seed = GENERATE(range(1U, 9U));
   CAPTURE(seed);
@@ -162,7 +162,8 @@ TEST_CASE("links that come and go every two seconds do not keep a team from its 
   check_optimal(network, problem);
 }
 
-TEST_CASE("a fifth of all messages may be lost", "[pose_graph][network]") {
+TEST_CASE("a team reaches its optimum although a fifth of all messages is lost",
+          "[pose_graph][network]") {
   const unsigned seed = GENERATE(range(1U, 5U));
   const bool chain = GENERATE(true, false);
   const bool descends = GENERATE(false, true);
@@ -179,7 +180,7 @@ TEST_CASE("a fifth of all messages may be lost", "[pose_graph][network]") {
   check_optimal(network, problem, descends ? kRbcdTolerance : kTolerance);
 }
 
-TEST_CASE("delays up to a second cost time alone", "[pose_graph][network]") {
+TEST_CASE("delays up to a second cost only time", "[pose_graph][network]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   const auto ids = numbered(5);
@@ -194,7 +195,7 @@ TEST_CASE("delays up to a second cost time alone", "[pose_graph][network]") {
   check_optimal(network, problem);
 }
 
-TEST_CASE("the others come to an end when a member dies, and it catches up when it is back",
+TEST_CASE("the others complete a session when a member stops, and it catches up when it returns",
           "[pose_graph][network]") {
   const RobotId gone = GENERATE(RobotId{1}, RobotId{2}, RobotId{4});
   const std::size_t after_parcels = GENERATE(range<std::size_t>(0, 320, 20));
@@ -206,7 +207,7 @@ TEST_CASE("the others come to an end when a member dies, and it catches up when 
   add_all(network, problem, robust(weighed));
   REQUIRE(settle(network, 30.0));
   const CentralProblem whole(problem);
-  // More becomes known, and with it a session begins that does not come to its end.
+  // New closures start a session that does not reach its end.
   TeamProblem more = problem;
   const TeamProblem other = problem_of(ids, {{1, 3}, {2, 4}}, 5);
   for (const PoseEdge& e : other.edges)
@@ -233,7 +234,7 @@ TEST_CASE("the others come to an end when a member dies, and it catches up when 
   }));
   CHECK(network.now_s() - gone_s < 20.0);
   for (const auto& [id, robot] : network.robots)
-    if (id != gone) CHECK(robot.trajectory->anchor == 1);  // `world` stays
+    if (id != gone) CHECK(robot.trajectory->anchor == 1);  // `world` keeps its place
   CHECK(CentralProblem(more).cost(network.trajectories()) <= before * (1.0 + 1e-3));
   network.revive(gone);
   const double back_s = network.now_s();
@@ -241,13 +242,13 @@ TEST_CASE("the others come to an end when a member dies, and it catches up when 
   REQUIRE(settle(network, 60.0));
   CHECK(network.now_s() - back_s < 10.0);
   check_optimal(network, more);
-  for (auto& [robot, of_robot] : sessions) {  // nobody can go on where it has left one
+  for (auto& [robot, of_robot] : sessions) {  // no robot can return to a session that it has left
     std::sort(of_robot.begin(), of_robot.end());
     CHECK(std::adjacent_find(of_robot.begin(), of_robot.end()) == of_robot.end());
   }
 }
 
-TEST_CASE("a team that falls apart goes on in two, in one frame, and becomes one again",
+TEST_CASE("a divided team continues as two teams in one frame, and unites again",
           "[pose_graph][network]") {
   const double apart_at_s = GENERATE(0.1, 0.3, 1.0, 5.0, 20.0);
   CAPTURE(apart_at_s);
@@ -274,7 +275,7 @@ TEST_CASE("a team that falls apart goes on in two, in one frame, and becomes one
   check_optimal(network, problem);
 }
 
-TEST_CASE("a session that is cut short leaves an improvement or the start",
+TEST_CASE("an interrupted session results in an improvement or the start",
           "[pose_graph][network]") {
   const int cut_after = GENERATE(range(20, 320, 20));
   const PgoMethod method = GENERATE(PgoMethod::kNewton, PgoMethod::kRbcd);
@@ -299,7 +300,7 @@ TEST_CASE("a session that is cut short leaves an improvement or the start",
   };
   (void)network.run(600.0, [&] { return steps >= cut_after || network.all_settled(); });
   network.wire({});
-  // Before anybody's own session: that is what is left.
+  // The result before any robot begins a session alone.
   (void)network.run(Relay::kPatience_s + network.lease_s - 0.1);
   TeamPoses left;
   for (const auto& [id, robot] : network.robots)
@@ -311,7 +312,7 @@ TEST_CASE("a session that is cut short leaves an improvement or the start",
   CHECK(whole.cost(left) <= whole.cost(start) * (1.0 + 1e-9));
 }
 
-TEST_CASE("fifty robots come to the optimum, in a line and all to all", "[pose_graph][network]") {
+TEST_CASE("fifty robots reach the optimum, in a line and with all links", "[pose_graph][network]") {
   const bool in_line = GENERATE(true, false);
   CAPTURE(in_line);
   const auto ids = numbered(50);
@@ -324,14 +325,13 @@ TEST_CASE("fifty robots come to the optimum, in a line and all to all", "[pose_g
   check_optimal(network, problem);
 }
 
-TEST_CASE("what crosses links names no keyframe that no closure to another robot ends on",
-          "[pose_graph][network]") {
+TEST_CASE("messages contain no private keyframe", "[pose_graph][network]") {
   const bool chain = GENERATE(true, false);
   const bool weighed = GENERATE(true, false);
   CAPTURE(chain, weighed);
   const auto ids = numbered(4);
   TeamProblem problem = problem_of(ids, {{1, 2}, {2, 3}, {3, 4}, {1, 4}}, 9, 40);
-  for (std::uint32_t k = 10; k < 25; k += 3) {  // false ones inside a robot, too
+  for (std::uint32_t k = 10; k < 25; k += 3) {  // false closures inside a robot as well
     PoseEdge wrong = problem.edges.back();
     wrong.from = {2, k};
     wrong.to = {2, k + 9};

@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-// One robot's node with its topics.
+// The node of one robot with its topics.
 struct Robot {
   explicit Robot(TeamPeer peer, PgoMethod method = PgoMethod::kNewton)
       : self(peer), node({.method = method}, peer, topics()) {
@@ -37,7 +37,7 @@ struct Robot {
             .verdicts = verdicts};
   }
 
-  // What `other` sends to this one arrives.
+  // Delivers the messages that `other` sends to this robot.
   void hears(Robot& other) {
     other.parcels.subscribe([this](const auto& parcel) {
       if (parcel->to == self.robot) peer_parcels.publish(parcel->message);
@@ -51,7 +51,7 @@ struct Robot {
     peer_events.publish(event);
   }
 
-  // Odometry, closures, then the decision, which robot 2 makes for the pair.
+  // Odometry, closures, then the inlier set, which robot 2 decides for the pair.
   void publish_measurements(const SplitGraph& graph) {
     KeyframeOdometry first;
     first.id = {self.robot, 0};
@@ -120,7 +120,7 @@ TEST_CASE("Two nodes on their threads end in one frame", "[pose_graph][node]") {
   nine.publish_measurements(graph);
   const auto of_two = two.await_trajectory(2, 5);
   const auto of_nine = nine.await_trajectory(2, 5);
-  // What one publishes may fill the queue of the other: sources are stopped together.
+  // Messages of one node may fill the queue of the other, so both sources are stopped together.
   two.node.stop();
   nine.node.stop();
   CHECK(two.node.error() == nullptr);
@@ -151,7 +151,8 @@ TEST_CASE("A node alone publishes its own trajectory and sends nothing", "[pose_
   CHECK(parcels == 0);
 }
 
-TEST_CASE("Who is heard gets the status, and who is lost gets no more", "[pose_graph][node]") {
+TEST_CASE("A node sends statuses to robots that it receives, until they are lost",
+          "[pose_graph][node]") {
   Robot two({2, 11});
   std::vector<RobotId> to;
   two.parcels.subscribe([&](const auto& parcel) {
@@ -174,7 +175,7 @@ TEST_CASE("Who is heard gets the status, and who is lost gets no more", "[pose_g
   CHECK(to.empty());
 }
 
-TEST_CASE("What the agent refuses is logged, once in a while", "[pose_graph][node]") {
+TEST_CASE("Refusals of the agent are logged at a limited rate", "[pose_graph][node]") {
   const CapturedLog log;
   Robot two({2, 11});
   KeyframeOdometry third;

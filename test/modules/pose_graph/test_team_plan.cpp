@@ -43,7 +43,7 @@ std::map<RobotId, RobotId> parents_of(const SessionPlan& plan) {
   return parents;
 }
 
-// Robots of a chain of agreed edges, so many in each pair.
+// Robots of a chain of agreed edges, with the given numbers for each pair.
 std::map<RobotId, TeamStatus> chain_of(const std::vector<RobotId>& robots,
                                        const std::vector<std::uint32_t>& edges) {
   std::vector<TeamStatus> statuses;
@@ -62,13 +62,13 @@ TEST_CASE("two robots agree on the newest edges that both hold", "[pose_graph][s
   TeamStatus b = status_of(2, {{1, 8, {3, 30}}, {1, 7, {2, 20}}});
   REQUIRE(agreed_edges(a, b));
   CHECK(agreed_edges(a, b)->id == EdgeSetId{3, 30});
-  b.offers.front().id.hash = 31;  // the same version of other closures
+  b.offers.front().id.hash = 31;  // equal version, other closures
   CHECK(agreed_edges(a, b)->id == EdgeSetId{2, 20});
   b.offers.pop_back();
   CHECK_FALSE(agreed_edges(a, b));
 }
 
-TEST_CASE("what a session knows are the closures of its pairs and changes inside its robots",
+TEST_CASE("closures_known() counts the closures of pairs and the changes inside robots",
           "[pose_graph][session]") {
   TeamStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 7, {3, 30}}, {3, 5, {1, 10}}});
   TeamStatus b = status_of(2, {{1, 7, {3, 30}}});
@@ -77,12 +77,13 @@ TEST_CASE("what a session knows are the closures of its pairs and changes inside
   b.revision = b.keyframes + 4;
   CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 1), by_robot({a, b, c})) == 11);
   CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 3), by_robot({a, b, c})) == 0);
-  b.revision = 0;  // no robot says so, but a message can
+  b.revision = 0;  // impossible for a robot, but not for a message
   CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 1), by_robot({a, b, c})) == 7);
 }
 
-TEST_CASE("the plan holds the component, best connected first", "[pose_graph][session]") {
-  // 3 -10- 8 -2- 5 -7- 3, and 20 -4- 21 apart; 30 claims edges to 3 that 3 does not know.
+TEST_CASE("the plan contains the connected component, best connected robots first",
+          "[pose_graph][session]") {
+  // 3 -10- 8 -2- 5 -7- 3, and separately 20 -4- 21; 30 claims edges to 3 that 3 does not know.
   const auto statuses =
       by_robot({status_of(3, {{8, 10, {1, 1}}, {5, 7, {1, 2}}}),
                 status_of(8, {{3, 10, {1, 1}}, {5, 2, {1, 3}}}),
@@ -118,7 +119,7 @@ TEST_CASE("the tree follows links with the most agreed edges, its root in the mi
     const auto plan = plan_session(statuses, links_of({{1, 2}, {2, 3}, {3, 4}, {4, 5}}), 1);
     CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 2}, {2, 3}, {4, 3}, {5, 4}});
   }
-  SECTION("a line of other links than closures") {
+  SECTION("a line of links without closures") {
     const auto plan = plan_session(statuses, links_of({{1, 3}, {3, 5}, {5, 2}, {2, 4}}), 1);
     CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 3}, {3, 5}, {2, 5}, {4, 2}});
   }
@@ -126,18 +127,17 @@ TEST_CASE("the tree follows links with the most agreed edges, its root in the mi
     const auto plan = plan_session(statuses, links_of({{1, 5}, {2, 5}, {3, 5}, {4, 5}}), 1);
     CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 5}, {2, 5}, {3, 5}, {4, 5}});
   }
-  SECTION("a robot in between that is no member") {
+  SECTION("an intermediate robot that is not a member") {
     const auto plan = plan_session(statuses, links_of({{1, 2}, {2, 9}, {9, 3}, {3, 4}, {4, 5}}), 1);
     CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 2}, {2, 3}, {4, 3}, {5, 4}});
   }
-  SECTION("no links are told") {
+  SECTION("unknown links") {
     const auto plan = plan_session(statuses, {}, 1);
     CHECK(parents_of(plan).size() == 4);
   }
 }
 
-TEST_CASE("of a circle of links the one with the fewest edges is not in the tree",
-          "[pose_graph][session]") {
+TEST_CASE("the link with the fewest edges of a cycle is not in the tree", "[pose_graph][session]") {
   auto statuses = chain_of({1, 2, 3}, {4, 9});
   statuses[1].offers.push_back({3, 6, {2, 2}});
   statuses[3].offers.push_back({1, 6, {2, 2}});
@@ -152,14 +152,14 @@ TEST_CASE("of a circle of links the one with the fewest edges is not in the tree
   CHECK(place_in(plan, 1)->root == 3);
 }
 
-TEST_CASE("parents that make no tree give no place", "[pose_graph][session]") {
+TEST_CASE("parents that do not form a tree give no place", "[pose_graph][session]") {
   SessionPlan plan = plan_session(chain_of({1, 2, 3}, {1, 1}), links_of({{1, 2}, {2, 3}}), 1);
   REQUIRE(place_in(plan, 1));
   CHECK_FALSE(place_in(plan, 7));
   const SessionPlan good = plan;
   for (SessionMember& member : plan.members)
     if (!member.parent) member.parent = 1;
-  CHECK_FALSE(place_in(plan, 1));  // a circle
+  CHECK_FALSE(place_in(plan, 1));  // a cycle
   plan = good;
   for (SessionMember& member : plan.members) member.parent.reset();
   CHECK_FALSE(place_in(plan, 1));  // three roots
@@ -171,7 +171,8 @@ TEST_CASE("parents that make no tree give no place", "[pose_graph][session]") {
   CHECK_FALSE(place_in(plan, 1));
 }
 
-TEST_CASE("plans are of the same graph whatever their tree and frame", "[pose_graph][session]") {
+TEST_CASE("plans with different trees and frames can have the same graph",
+          "[pose_graph][session]") {
   const auto statuses = chain_of({1, 2, 3}, {1, 1});
   const SessionPlan x = plan_session(statuses, links_of({{1, 2}, {2, 3}}), 1);
   SessionPlan y = plan_session(statuses, links_of({{1, 3}, {2, 3}}), 1);

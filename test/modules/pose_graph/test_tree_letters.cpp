@@ -48,8 +48,8 @@ Eigen::VectorXd some_numbers(std::mt19937& rng, Index count) {
   return values;
 }
 
-// Four poses of three robots. The last one and one of the couplings are reached by told edges
-// alone, so that their blocks are zero.
+// Four poses of three robots. Only edges in TreeSystem::edges end on the last pose and add to one
+// of the couplings, so that their blocks are zero.
 TreeSystem some_system(std::mt19937& rng, Index block) {
   TreeSystem system;
   system.variables = {{{2, 0}, 1, 1}, {{2, 300}, 1, 2}, {{7, 5}, 2, 0}, {{60000, 1}, 1, 0}};
@@ -172,7 +172,7 @@ void check_same(const TreeSystem& a, const TreeSystem& b) {
   }
 }
 
-TEST_CASE("A letter up the tree comes back as it was told", "[pose_graph]") {
+TEST_CASE("Decoding restores a message up the tree", "[pose_graph]") {
   const Index block = GENERATE(3, 6);
   const bool with_system = GENERATE(true, false);
   const UpLetter told = some_up_letter(block, with_system);
@@ -193,14 +193,14 @@ TEST_CASE("A letter up the tree comes back as it was told", "[pose_graph]") {
   CHECK_FALSE(decode_down(encode(told)));
 }
 
-TEST_CASE("A letter of a robot that cannot go on comes back", "[pose_graph]") {
+TEST_CASE("Decoding restores a message of a robot that cannot continue", "[pose_graph]") {
   const UpLetter heard = up_again({.round = 3, .sums = {}, .failed = true});
   CHECK(heard.failed);
   CHECK_FALSE(heard.system);
   CHECK(heard.reduced.size() == 0);
 }
 
-TEST_CASE("A subtree that leaves no pose to others tells an empty system", "[pose_graph]") {
+TEST_CASE("A subtree that leaves no pose to other robots sends an empty system", "[pose_graph]") {
   UpLetter told{.round = 1, .sums = {}};
   told.system.emplace().schur = BlockMatrix::zero(6, 0, 0);
   const UpLetter heard = up_again(told);
@@ -208,13 +208,13 @@ TEST_CASE("A subtree that leaves no pose to others tells an empty system", "[pos
   CHECK(heard.system->variables.empty());
 }
 
-TEST_CASE("Blocks that are zero cost a bit", "[pose_graph]") {
+TEST_CASE("A zero block costs one bit", "[pose_graph]") {
   UpLetter dense = some_up_letter(6, true), sparse = dense;
   sparse.system->schur = BlockMatrix::zero(6, 4, 3);
   CHECK(encode(dense).size() - encode(sparse).size() == 8 * (3 * 21 + 2 * 36));
 }
 
-TEST_CASE("A letter down the tree comes back as it was told", "[pose_graph]") {
+TEST_CASE("Decoding restores a message down the tree", "[pose_graph]") {
   using Next = TreeVerdict::Next;
   using Weighing = TreeVerdict::Weighing;
   const Next next = GENERATE(Next::kStep, Next::kShorten, Next::kRefresh, Next::kStart,
@@ -257,7 +257,7 @@ std::vector<Bytes> one_of_each() {
           encode(some_down_letter(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh))};
 }
 
-// Bytes that what was read takes in memory.
+// Memory of a decoded message [bytes].
 std::size_t held_by(const UpLetter& letter) {
   std::size_t bytes = sizeof(letter) + 64 * letter.sums.lengths.size() +
                       sizeof(PairVote) * letter.sums.votes.capacity() +
@@ -276,10 +276,11 @@ std::size_t held_by(const DownLetter& letter) {
          sizeof(double) * static_cast<std::size_t>(letter.step.size());
 }
 
-// A coupling of two bytes may stand for a block of 36 numbers.
+// A coupling of two bytes may result in a block of 36 numbers.
 constexpr std::size_t kMostPerByte = 160;
 
-// Nothing is read of it, or what encode() would have written; and no more than there is.
+// Checks that decoding fails, or gives a message that encode() writes as equal bytes, within the
+// memory limit.
 void check_harmless(const Bytes& bytes) {
   std::size_t held = 0;
   bool same = true;
@@ -298,7 +299,7 @@ void check_harmless(const Bytes& bytes) {
   }
 }
 
-TEST_CASE("A letter that was cut off anywhere is refused", "[pose_graph]") {
+TEST_CASE("A message truncated anywhere is refused", "[pose_graph]") {
   for (const Bytes& bytes : one_of_each()) {
     for (std::size_t size = 0; size < bytes.size(); ++size) {
       const std::span<const std::uint8_t> cut(bytes.data(), size);
@@ -319,7 +320,7 @@ std::size_t largest_resident_kb() {
   return static_cast<std::size_t>(usage.ru_maxrss);
 }
 
-TEST_CASE("A letter with a wrong byte is refused, or is another letter", "[pose_graph]") {
+TEST_CASE("A message with a wrong byte is refused, or is another valid message", "[pose_graph]") {
   std::mt19937 rng(7);
   const std::vector<Bytes> letters = one_of_each();
   constexpr int kChanges = 100000;
@@ -331,11 +332,11 @@ TEST_CASE("A letter with a wrong byte is refused, or is another letter", "[pose_
     CAPTURE(n, at);
     check_harmless(bytes);
   }
-  // What a sanitizer keeps back is in it, too.
+  // The limit includes memory that a sanitizer retains.
   CHECK(largest_resident_kb() - before_kb < 512 * 1024);
 }
 
-TEST_CASE("Random bytes are not a letter", "[pose_graph]") {
+TEST_CASE("Random bytes do no harm", "[pose_graph]") {
   std::mt19937 rng(8);
   for (int n = 0; n < 20000; ++n) {
     Bytes bytes(std::uniform_int_distribution<std::size_t>(1, 200)(rng));
@@ -346,7 +347,7 @@ TEST_CASE("Random bytes are not a letter", "[pose_graph]") {
   }
 }
 
-// What a letter up begins with, up to the number of lengths.
+// The beginning of a message up, before the number of lengths.
 ByteWriter up_to_lengths() {
   ByteWriter w;
   w.u8(1);
@@ -359,7 +360,7 @@ ByteWriter up_to_lengths() {
   return w;
 }
 
-// Up to the number of variables.
+// The beginning of a message up, before the number of variables.
 ByteWriter up_to_variables(std::uint8_t block) {
   ByteWriter w = up_to_lengths();
   for (int k = 0; k < 3; ++k) w.varint(0);  // lengths, votes, right-hand side
@@ -380,7 +381,7 @@ Bytes with_zeros(ByteWriter& w) {
   return w.release();
 }
 
-TEST_CASE("Counts that the letter cannot hold are refused", "[pose_graph]") {
+TEST_CASE("Counts beyond the size of the message are refused", "[pose_graph]") {
   const std::uint64_t count =
       GENERATE(std::uint64_t{2000}, std::uint64_t{1} << 24U, std::uint64_t{1} << 32U,
                std::uint64_t{1} << 61U, ~std::uint64_t{0});
@@ -392,7 +393,7 @@ TEST_CASE("Counts that the letter cannot hold are refused", "[pose_graph]") {
     if (field < 3) {
       for (int k = 0; k < field; ++k) w.varint(0);  // lengths, votes, right-hand side
     } else if (field == 4 || field == 5) {
-      variables(w, 2);  // couplings; told edges
+      variables(w, 2);  // couplings; edges
       if (field == 5) {
         w.varint(0);
         w.u8(0);
@@ -412,7 +413,7 @@ TEST_CASE("Counts that the letter cannot hold are refused", "[pose_graph]") {
     for (int k = 0; k < 3; ++k) w.u8(0);
     for (int k = 0; k < 14; ++k) w.f64(1.0);
     for (int k = 0; k < field; ++k) w.varint(0);  // moves
-    w.varint(count);                              // of moves; of the step
+    w.varint(count);                              // number of moves; rows of the step
     CHECK_FALSE(decode_down(with_zeros(w)));
   }
   CHECK(largest_resident_kb() - before_kb < 64 * 1024);
@@ -436,7 +437,7 @@ TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
   CHECK_FALSE(with([](TreeVerdict& v) { v.cost = INFINITY; }));
 }
 
-TEST_CASE("Systems that contradict themselves are refused", "[pose_graph]") {
+TEST_CASE("Inconsistent systems are refused", "[pose_graph]") {
   const auto with = [](auto&& change) {
     UpLetter letter = some_up_letter(6, true);
     change(*letter.system);

@@ -17,7 +17,7 @@ auto newton(TreeNewtonOptions options) {
 
 const TreeNewtonOptions kTrusting{.robust = false};
 
-TEST_CASE("A team finds the optimum of its graph, whatever the tree", "[pose_graph]") {
+TEST_CASE("A team finds the optimum of its graph with any tree", "[pose_graph]") {
   const unsigned seed = GENERATE(1U, 2U);
   CAPTURE(seed);
   const TeamProblem problem = random_team_problem(
@@ -35,7 +35,7 @@ TEST_CASE("A team finds the optimum of its graph, whatever the tree", "[pose_gra
   }
 }
 
-TEST_CASE("Letters that are late, doubled and out of order change nothing", "[pose_graph]") {
+TEST_CASE("Late, duplicate and reordered messages change nothing", "[pose_graph]") {
   const TeamProblem problem =
       random_team_problem({.robots = {0, 2, 5, 7}, .pairs = {{0, 2}, {2, 5}, {5, 7}, {0, 7}}}, 3);
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton({}));
@@ -57,7 +57,7 @@ TEST_CASE("Verticals are part of the cost", "[pose_graph]") {
   CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kRelativeGap));
 }
 
-TEST_CASE("Robots that have gone hold the others where they were", "[pose_graph]") {
+TEST_CASE("Held poses of absent robots fix the frame of the others", "[pose_graph]") {
   TeamProblem problem =
       random_team_problem({.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}, {1, 3}}}, 5);
   problem.absent = {2};
@@ -92,7 +92,7 @@ TEST_CASE("A recorded graph is solved to its certified optimum", "[pose_graph]")
             << 1e-6 * static_cast<double>(bytes) << ", scale " << state.noise_scale);
 }
 
-TEST_CASE("Verdicts that cannot follow are refused, and the true one is taken after all",
+TEST_CASE("Impossible verdicts are refused, and the true one is accepted afterwards",
           "[pose_graph]") {
   using Next = TreeVerdict::Next;
   const TeamProblem problem = random_team_problem({.robots = {1, 2}, .pairs = {{1, 2}}}, 6);
@@ -108,22 +108,22 @@ TEST_CASE("Verdicts that cannot follow are refused, and the true one is taken af
     while (leaf.ready())
       for (const SolverLetter& letter : leaf.advance()) CHECK(root.receive(2, *letter.bytes));
   };
-  CHECK_FALSE(says(0, Next::kStart));  // nobody has asked
+  CHECK_FALSE(says(0, Next::kStart));  // no message up was sent
   carry_up();
   CHECK_FALSE(says(1, Next::kStart));
   for (const Next next : {Next::kStep, Next::kShorten, Next::kRefresh, Next::kDone})
-    CHECK_FALSE(says(0, next));  // nothing has begun
+    CHECK_FALSE(says(0, next));  // the solver has not begun
   CHECK_FALSE(leaf.ready());
   for (std::uint32_t round = 0; round < 100 && !leaf.done(); ++round) {
     for (const SolverLetter& letter : root.advance()) {
       const auto up = encode(UpLetter{.round = round + 2, .sums = {}});
-      if (!root.done()) CHECK_FALSE(root.receive(2, up));  // nobody is so far
+      if (!root.done()) CHECK_FALSE(root.receive(2, up));  // no robot is this far
       CHECK(leaf.receive(1, *letter.bytes));
       CHECK(leaf.receive(1, *letter.bytes));
     }
     carry_up();
     if (leaf.done()) break;
-    CHECK(says(round, Next::kStop));  // an old one
+    CHECK(says(round, Next::kStop));  // an old verdict
     if (round == 0) CHECK_FALSE(says(1, Next::kShorten));
     CHECK_FALSE(says(round + 1, Next::kStart));
     CHECK_FALSE(says(round + 1, Next::kCount));

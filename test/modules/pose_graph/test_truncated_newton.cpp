@@ -23,7 +23,7 @@ struct Known {
 
 }  // namespace
 
-TEST_CASE("a block with exact measurements comes back from any start", "[pose_graph]") {
+TEST_CASE("a block with exact measurements converges from any start", "[pose_graph]") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -38,7 +38,7 @@ TEST_CASE("a block with exact measurements comes back from any start", "[pose_gr
   for (std::size_t i = 0; i < 3; ++i) CHECK(poses[i].isApprox(truth[i], 1e-6));
 }
 
-TEST_CASE("steps never raise the cost and keep the poses feasible", "[pose_graph]") {
+TEST_CASE("steps never increase the cost and keep the poses feasible", "[pose_graph]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -60,9 +60,9 @@ TEST_CASE("steps never raise the cost and keep the poses feasible", "[pose_graph
   }
 }
 
-TEST_CASE("the relaxation unwinds a ring that rigid poses cannot", "[pose_graph]") {
-  // Equal poses on a ring, started with one full turn: a closed geodesic of SO(3) that cannot be
-  // contracted there, while St(3, 5) is simply connected.
+TEST_CASE("the relaxation unwinds a ring that rigid poses cannot unwind", "[pose_graph]") {
+  // Equal poses on a ring, with one full turn at the start. This closed geodesic cannot be
+  // contracted in SO(3), but St(3, 5) is simply connected.
   constexpr Eigen::Index kPoses = 24;
   WholeGraph ring{.poses = kPoses, .edges = {}};
   std::vector<SE3> wound;
@@ -87,7 +87,8 @@ TEST_CASE("the relaxation unwinds a ring that rigid poses cannot", "[pose_graph]
 }
 
 TEST_CASE("whole graphs reach their certified optima", "[pose_graph]") {
-  // Relative tolerance: quaternions are rounded in the files and normalised here, not there.
+  // Relative tolerance: quaternions in the files are rounded; this code normalises them, SE-Sync
+  // does not.
   const Known known = GENERATE(Known{"tinyGrid3D", 18.5193868}, Known{"smallGrid3D", 1025.39802},
                                Known{"sphere2500", 1687.00567});
   const Eigen::Index rank = GENERATE(3, 5);

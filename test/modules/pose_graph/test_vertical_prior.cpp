@@ -7,7 +7,7 @@
 #include "modules/pose_graph/vertical_prior.hpp"
 #include "test/support/pose_graph_problems.hpp"
 
-// Which way is up, as part of pose graph optimisation.
+// Verticals in pose graph optimisation.
 
 namespace km {
 namespace {
@@ -20,7 +20,7 @@ Eigen::Vector3d up_at(const SE3& T_world_kf) {
 
 }  // namespace
 
-TEST_CASE("a vertical prior costs the squared tilt over sigma, and turns about z cost nothing",
+TEST_CASE("a vertical prior costs the squared tilt over sigma, and rotations about z cost nothing",
           "[pose_graph][vertical]") {
   const double tilt = GENERATE(0.0, 1e-3, 2e-2);
   const double heading = GENERATE(0.0, 1.0, -3.0);
@@ -32,7 +32,7 @@ TEST_CASE("a vertical prior costs the squared tilt over sigma, and turns about z
   CHECK(vertical_cost(prior, lifted) == Approx(vertical_cost(prior, R)).margin(1e-9));
 }
 
-TEST_CASE("slope and curvature of a vertical prior are those of differences",
+TEST_CASE("gradient and Hessian of a vertical prior agree with finite differences",
           "[newton][vertical]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
@@ -52,10 +52,11 @@ TEST_CASE("slope and curvature of a vertical prior are those of differences",
   }
   const VerticalModel convex = model_vertical(prior, R, Curvature::kGaussNewton);
   CHECK(convex.g == model.g);
-  CHECK((convex.H * R.row(2).transpose()).norm() < 1e-12);  // no turn about the vertical resists
+  CHECK((convex.H * R.row(2).transpose()).norm() <
+        1e-12);  // rotations about the vertical cost nothing
 }
 
-TEST_CASE("a block's vertical priors are part of its cost, gradient and Hessian",
+TEST_CASE("vertical priors of a block are part of its cost, gradient and Hessian",
           "[pose_graph][vertical]") {
   const Eigen::Index rank = GENERATE(3, 5);
   std::mt19937 rng(2);
@@ -85,7 +86,7 @@ TEST_CASE("a block's vertical priors are part of its cost, gradient and Hessian"
   CHECK_THROWS_AS(make({0, Eigen::Vector3d::Constant(NAN), 1.0}), std::invalid_argument);
 }
 
-TEST_CASE("poses are levelled as a whole, by what most of their priors hold for up",
+TEST_CASE("poses are levelled as a whole, by the vertical of most of their priors",
           "[pose_graph][vertical]") {
   std::mt19937 rng(3);
   const SE3 tilt = make_pose(so3_exp({1.0, 0.4, 0.0}), Eigen::Vector3d::Zero());
@@ -102,23 +103,23 @@ TEST_CASE("poses are levelled as a whole, by what most of their priors hold for 
     CHECK(vertical_cost(prior, level[static_cast<std::size_t>(prior.pose)].linear()) < 1e-12);
   for (std::size_t i = 1; i < poses.size(); ++i)
     CHECK((level[0].inverse() * level[i]).isApprox(poses[0].inverse() * poses[i], 1e-12));
-  priors.push_back({1, -up_at(tilt.inverse() * poses[1]), 0.5});  // outvoted
+  priors.push_back({1, -up_at(tilt.inverse() * poses[1]), 0.5});  // in a minority
   CHECK(levelled(poses, priors)[0].isApprox(level[0], 1e-12));
 }
 
-TEST_CASE("levelling keeps the origin's place and the heading", "[pose_graph][vertical]") {
+TEST_CASE("levelling keeps the position of the origin and the heading", "[pose_graph][vertical]") {
   const Eigen::Vector3d origin(1.0, 2.0, 3.0);
   const SE3 truth = make_pose(so3_exp({0.0, 0.0, 0.7}), {4.0, -1.0, 0.5});
   SE3 tilted = truth;
   tilted.linear() = so3_exp({0.02, -0.01, 0.0}) * truth.linear();
   tilted.translation() += (truth.linear() - tilted.linear()) * origin;
   const Eigen::MatrixXd L = level(lift(lifted_identity(5), tilted), origin);
-  CHECK(L.isApprox(lift(lifted_identity(5), truth), 1e-4));  // to second order in the tilt
+  CHECK(L.isApprox(lift(lifted_identity(5), truth), 1e-4));  // error of second order in the tilt
   CHECK(stiefel_error(L) < 1e-12);
   CHECK((L.col(2) - lifting_matrix(5).col(2)).norm() < 1e-15);
 }
 
-TEST_CASE("frames that are levelled from each other stay orthonormal", "[pose_graph][vertical]") {
+TEST_CASE("frames that are levelled repeatedly stay orthonormal", "[pose_graph][vertical]") {
   std::mt19937 rng(4);
   Eigen::MatrixXd L = lift(lifted_identity(5), random_pose(rng));
   for (int session = 0; session < 200; ++session) {
@@ -128,14 +129,14 @@ TEST_CASE("frames that are levelled from each other stay orthonormal", "[pose_gr
   }
 }
 
-TEST_CASE("levelling turns a frame that lies on its side, and one upside down",
+TEST_CASE("levelling rotates a frame that lies on its side, and one upside down",
           "[pose_graph][vertical]") {
   const auto roll = GENERATE(0.3, 1.6, 3.0, M_PI);
   CAPTURE(roll);
   const SE3 tilted =
       make_pose(so3_exp({0.0, 0.0, 0.7}) * so3_exp({roll, 0.0, 0.0}), {1.0, 2.0, 3.0});
   const Eigen::MatrixXd L = level(tilted.matrix().topRows<3>(), Eigen::Vector3d::Zero());
-  // About the x axis, which is level.
+  // Rotation about the x axis, which is level.
   const SE3 expected = make_pose(so3_exp({0.0, 0.0, 0.7}), {1.0, 2.0, 3.0});
   CHECK(L.isApprox(expected.matrix().topRows<3>(), 1e-9));
 }
