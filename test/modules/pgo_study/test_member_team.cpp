@@ -494,7 +494,7 @@ TEST_CASE("The robots of the tunnels estimate their noise and reach one frame", 
   CHECK(ended);
   CHECK(asked.team().rounds() <= 100);
   CHECK(closures >= 2500);
-  CHECK(closures <= 3150);  // see the test of eight robots in tunnels
+  CHECK(closures <= 3000);
   CHECK(state.noise_scale > 3.0);
   CHECK(state.noise_scale < 5.0);
   CHECK(groups_of(graph, kept) == 1);

@@ -422,12 +422,11 @@ TEST_CASE("eight robots in tunnels decide nearly as one session without earlier 
   const SolverState state = network.agent(0).part()->state();
   CAPTURE(out.size(), at_once.size(), state.noise_scale, state.round);
   const std::size_t kept = closures_of(problem) - at_once.size();
-  // Robust solvers that assume equal noise of all closures keep 2669 to 2987. Pairs with larger
-  // estimated noise keep closures with larger errors.
+  // Other robust solvers keep 2669 to 2987.
   CHECK(kept >= 2600);
-  CHECK(kept <= 3150);
+  CHECK(kept <= 3000);
   CAPTURE(differ.size());
-  CHECK(differ.size() * 100 < kept);  // Jaccard index 0.99
+  CHECK(differ.size() * 100 < kept);  // Jaccard index 0.99; measured: 20 of 2774
   const TeamProblem judged = with_closure_noise(with_judged_odometry(problem), network);
   check_fit(judged, network.trajectories(), out, state.barc);
   TeamProblem rest = without(judged, out);
