@@ -13,6 +13,9 @@ namespace {
 
 constexpr double kFactorSigma = 1.0986;    // log 3, prior of log s
 constexpr double kOddsAgainstUsual = 6.9;  // log of odds of 1000 to 1
+// Odometry may be this many times noisier than it claims before its errors count as evidence
+// against closures. Sensitivity: METHOD.md.
+constexpr double kNoisyOdometry = 1.5;
 constexpr double kOneSigma = 0.5;          // loss of log density at one standard deviation of log s
 // Upper end of the grid, relative to the team: closures with more noise carry no information.
 constexpr double kLargestFactor = 10.0;
@@ -37,13 +40,14 @@ struct Posterior {
   double distinct = 0.0;     // mean log density ratio of a cycle to a false one
 };
 
+// The odometry is `odometry` times noisier than it claims.
 Posterior posterior_of(std::span<const NoiseCycle> cycles, std::span<const double> weights,
-                       double s, double usual) {
+                       double s, double usual, double odometry = 1.0) {
   std::vector<double> log_ratio;
   for (const NoiseCycle& cycle : cycles) {
     double log_if_true = 0.0;
     for (std::size_t k = 0; k < cycle.error.size(); ++k) {
-      const double variance = 1.0 + s * s * static_cast<double>(cycle.variance[k]);
+      const double variance = odometry * odometry + s * s * static_cast<double>(cycle.variance[k]);
       const double error = cycle.error[k];
       log_if_true -= 0.5 * (error * error / variance + std::log(variance));
     }
@@ -75,13 +79,15 @@ double estimate(std::span<const NoiseCycle> cycles, double observations, double 
   if (agreeing(cycles, usual) > kMostAgree) return usual;
   double most = posterior_of(cycles, weights, usual, usual).log_density;
   densities.emplace_back(usual, most);
+  const double noisy_odometry =
+      posterior_of(cycles, weights, usual, usual, kNoisyOdometry).log_density;
   for (double s = usual * kGridStep; s <= std::max(1.0, kLargestFactor * usual); s *= kGridStep) {
     const Posterior found = posterior_of(cycles, weights, s, usual);
     if (!(found.distinct > kDistinct)) continue;
     densities.emplace_back(s, found.log_density);
     most = std::max(most, found.log_density);
   }
-  if (most - densities.front().second < kOddsAgainstUsual) return usual;
+  if (most - std::max(densities.front().second, noisy_odometry) < kOddsAgainstUsual) return usual;
   const auto credible = [&](const auto& entry) { return entry.second >= most - kOneSigma; };
   return std::ranges::find_if(densities, credible)->first;
 }
