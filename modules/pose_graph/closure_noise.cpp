@@ -16,7 +16,7 @@ constexpr double kOddsAgainstUsual = 6.9;  // log of odds of 1000 to 1
 // Odometry may be this many times noisier than it claims before its errors count as evidence
 // against closures. Sensitivity: METHOD.md.
 constexpr double kNoisyOdometry = 1.5;
-constexpr double kOneSigma = 0.5;          // loss of log density at one standard deviation of log s
+constexpr double kOneSigma = 0.5;  // loss of log density at one standard deviation of log s
 // Upper end of the grid, relative to the team: closures with more noise carry no information.
 constexpr double kLargestFactor = 10.0;
 constexpr double kGridStep = 1.1;  // a tenth of the standard deviation is precise enough
