@@ -45,28 +45,28 @@ std::string both(std::vector<double> values, int digits) {
 std::string seeds_text(const ScenarioStudy& study) {
   const std::string method = study.results.front().method;
   std::vector<std::vector<std::string>> rows{{"seed", "true lost", "between robots", "false kept",
-                                              "frames", "max m", "rms m", "reference max m",
-                                              "rms m", "ratio"}};
+                                              "frames", "tentative", "max m", "rms m",
+                                              "reference max m", "rms m", "ratio"}};
   for (const ScenarioResult& r : study.results) {
     if (r.method != method) continue;
     const ScenarioResult* reference = reference_of(study, r.seed);
     const auto ratio = ratio_of(study, r);
-    rows.push_back({std::to_string(r.seed), part_text(r.true_lost, r.true_closures),
-                    part_text(r.between_lost, r.between), part_text(r.false_kept, r.false_closures),
-                    std::to_string(r.frames) + (r.decided ? "" : "+"), rounded(r.max_m, 3),
-                    rounded(r.rms_m, 3), reference ? rounded(reference->max_m, 3) : "-",
-                    reference ? rounded(reference->rms_m, 3) : "-",
-                    ratio ? rounded(*ratio, 3) : "-"});
+    rows.push_back(
+        {std::to_string(r.seed), part_text(r.true_lost, r.true_closures),
+         part_text(r.between_lost, r.between), part_text(r.false_kept, r.false_closures),
+         std::to_string(r.frames) + (r.decided ? "" : "+"), std::to_string(r.tentative),
+         rounded(r.max_m, 3), rounded(r.rms_m, 3), reference ? rounded(reference->max_m, 3) : "-",
+         reference ? rounded(reference->rms_m, 3) : "-", ratio ? rounded(*ratio, 3) : "-"});
   }
   return method + ":\n" + align_columns(rows);
 }
 
 std::string methods_text(const ScenarioStudy& study) {
   std::vector<std::vector<std::string>> rows{{"median / worst", "true lost", "between robots",
-                                              "false kept", "frames", "max m", "rms m", "ratio",
-                                              "CPU s"}};
+                                              "false kept", "frames", "tentative", "max m", "rms m",
+                                              "ratio", "CPU s"}};
   for (const std::string& method : methods_of(study)) {
-    std::vector<double> lost, between, kept, frames, max_m, rms_m, ratios, cpu_s;
+    std::vector<double> lost, between, kept, frames, tentative, max_m, rms_m, ratios, cpu_s;
     bool decided = true;
     for (const ScenarioResult& r : study.results) {
       if (r.method != method) continue;
@@ -74,6 +74,7 @@ std::string methods_text(const ScenarioStudy& study) {
       between.push_back(static_cast<double>(r.between_lost));
       kept.push_back(static_cast<double>(r.false_kept));
       frames.push_back(static_cast<double>(r.frames));
+      tentative.push_back(static_cast<double>(r.tentative));
       max_m.push_back(r.max_m);
       rms_m.push_back(r.rms_m);
       cpu_s.push_back(r.cpu_s);
@@ -81,7 +82,7 @@ std::string methods_text(const ScenarioStudy& study) {
       decided = decided && r.decided;
     }
     rows.push_back({method + (decided ? "" : "+"), both(lost, 5), both(between, 5), both(kept, 5),
-                    both(frames, 5), both(max_m, 3), both(rms_m, 3),
+                    both(frames, 5), both(tentative, 5), both(max_m, 3), both(rms_m, 3),
                     ratios.empty() ? "-" : both(ratios, 3), both(cpu_s, 2)});
   }
   return align_columns(rows);
@@ -127,6 +128,7 @@ void write_scenario_json(std::ostream& out, const ScenarioStudy& study) {
                        {"false_closures", r.false_closures},
                        {"false_kept", r.false_kept},
                        {"frames", r.frames},
+                       {"tentative", r.tentative},
                        {"max_m", r.max_m},
                        {"rms_m", r.rms_m},
                        {"ratio", ratio ? Json(*ratio) : Json()},
@@ -142,12 +144,13 @@ void write_scenario_json(std::ostream& out, const ScenarioStudy& study) {
 
 void write_scenario_csv(std::ostream& out, const ScenarioStudy& study) {
   out << "scenario,method,seed,true_closures,true_lost,between_robots,between_robots_lost,"
-         "false_closures,false_kept,frames,max_m,rms_m,ratio,decided,cpu_s\n";
+         "false_closures,false_kept,frames,tentative,max_m,rms_m,ratio,decided,cpu_s\n";
   for (const ScenarioResult& r : study.results) {
     const auto ratio = ratio_of(study, r);
     out << study.scenario << ',' << r.method << ',' << r.seed << ',' << r.true_closures << ','
         << r.true_lost << ',' << r.between << ',' << r.between_lost << ',' << r.false_closures
-        << ',' << r.false_kept << ',' << r.frames << ',' << r.max_m << ',' << r.rms_m << ',';
+        << ',' << r.false_kept << ',' << r.frames << ',' << r.tentative << ',' << r.max_m << ','
+        << r.rms_m << ',';
     if (ratio) out << *ratio;
     out << ',' << r.decided << ',' << r.cpu_s << '\n';
   }

@@ -103,7 +103,8 @@ PlacedTeam solve_by_robots(const TeamGraph& graph, double keyframes_per_s) {
   PlacedTeam placed{.T_frame_kf = std::move(run.T_world_kf),
                     .frame_of = {},
                     .kept = std::move(run.kept),
-                    .decided = run.settled};
+                    .decided = run.settled,
+                    .tentative = static_cast<std::size_t>(std::ranges::count(run.tentative, true))};
   for (std::size_t robot = 0; robot < graph.robots(); ++robot)
     placed.frame_of.insert(placed.frame_of.end(), static_cast<std::size_t>(graph.poses_of(robot)),
                            run.world_of[robot]);
@@ -224,6 +225,7 @@ ScenarioResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed) {
   }
   const Statistics statistics = statistics_of(std::move(errors));
   result.frames = frames.size();
+  result.tentative = placed.tentative;
   result.rms_m = statistics.rmse;
   result.max_m = statistics.max;
   return result;

@@ -39,7 +39,8 @@ struct ScenarioResult {
   std::size_t between_lost = 0;
   std::size_t false_closures = 0;
   std::size_t false_kept = 0;
-  std::size_t frames = 1;  ///< Number of separate frames in the result.
+  std::size_t frames = 1;     ///< Number of separate frames in the result.
+  std::size_t tentative = 0;  ///< Number of robots whose place hangs on one place; see FrameTies.
   /// Errors of positions. Each frame of the result is aligned to the truth by one rigid transform.
   double rms_m = 0.0;
   double max_m = 0.0;
@@ -67,6 +68,7 @@ struct PlacedTeam {
   std::vector<Eigen::Index> frame_of;  ///< By pose; poses of one frame have the same number.
   std::vector<bool> kept;              ///< By edge.
   bool decided = true;
+  std::size_t tentative = 0;  ///< See ScenarioResult.
 };
 
 /// Returns the minimum of the `kept` edges near `start`, after at most `most_steps` Newton steps on

@@ -25,6 +25,30 @@ RosDiagnosticStatus sensors_status(std::size_t published, std::size_t skipped,
   return status;
 }
 
+RosDiagnosticStatus team_status(const OptimizerProgress& progress) {
+  const auto list = [](const std::vector<RobotId>& robots) {
+    if (robots.empty()) return std::string("none");
+    std::string text;
+    for (const RobotId robot : robots) {
+      if (!text.empty()) text += ' ';
+      text += std::to_string(robot);
+    }
+    return text;
+  };
+  RosDiagnosticStatus status;
+  status.name = "team";
+  status.values = {{"frame of robot", std::to_string(progress.anchor)},
+                   {"optimises with robots", list(progress.members)},
+                   {"tentative robots", list(progress.tentative)},
+                   {"robots in another frame", list(progress.untied)}};
+  const bool is_certain = progress.tentative.empty() && progress.untied.empty();
+  status.level = is_certain ? RosDiagnosticStatus::kOk : RosDiagnosticStatus::kWarn;
+  status.message = is_certain                ? "ok"
+                   : progress.untied.empty() ? "a single place ties robots to this one"
+                                             : "no accepted closure ties robots to this one";
+  return status;
+}
+
 ModuleLoads::ModuleLoads(std::vector<const Node*> nodes)
     : nodes_(std::move(nodes)), asked_s_(steady_now_s()) {}
 

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/pose_graph.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "runtime/node.hpp"
@@ -15,6 +16,9 @@ namespace km {
 /// Status of the sensors: a warning if frames were skipped or a fault occurred.
 [[nodiscard]] RosDiagnosticStatus sensors_status(std::size_t published, std::size_t skipped,
                                                  const ReaderReport& faults);
+
+/// Status of the pose graph optimisation: a warning if the relative place of a member is uncertain.
+[[nodiscard]] RosDiagnosticStatus team_status(const OptimizerProgress& progress);
 
 /// Load of the modules' threads. Not thread-safe.
 class ModuleLoads {

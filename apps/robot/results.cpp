@@ -221,6 +221,8 @@ RunSummary summary_of(const RunRecord& record) {
                  .anchor = progress.anchor,
                  .settled = progress.settled,
                  .members = progress.members,
+                 .tentative = progress.tentative,
+                 .untied = progress.untied,
                  .odometry_rotation_noise = progress.odometry_rotation_noise,
                  .odometry_translation_noise = progress.odometry_translation_noise};
   if (record.odometry_statistics()) summary.odometry = odometry_of(*record.odometry_statistics());

@@ -117,7 +117,10 @@ std::string closures_text(const RunRecord& record, const std::vector<Peer>& peer
 
 std::string optimizer_text(const OptimizerProgress& progress) {
   return "pgo: cost " + rounded(progress.cost, 4) + ", round " + std::to_string(progress.round) +
-         ", with " + std::to_string(progress.members.empty() ? 0 : progress.members.size() - 1);
+         ", with " + std::to_string(progress.members.empty() ? 0 : progress.members.size() - 1) +
+         (progress.tentative.empty()
+              ? ""
+              : " (" + std::to_string(progress.tentative.size()) + " tentatively)");
 }
 
 std::string count_text(std::size_t count) {

@@ -100,9 +100,13 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
   std::set<std::pair<RobotId, RobotId>> told;
   for (const RunFacts& run : runs) {
     const RobotId self = run.summary.robot;
-    const std::vector<RobotId>& members = run.summary.pgo.members;
+    const OptimizerSummary& pgo = run.summary.pgo;
+    const auto is_joined = [&](RobotId robot) {
+      return std::ranges::find(pgo.members, robot) != pgo.members.end() &&
+             std::ranges::find(pgo.untied, robot) == pgo.untied.end();
+    };
     for (const auto& [other, name] : names) {
-      if (other == self || std::ranges::find(members, other) != members.end()) continue;
+      if (other == self || is_joined(other)) continue;
       const auto pair = std::minmax(self, other);
       if (!told.insert(pair).second) continue;
       const auto tally = tallies.find(pair);
@@ -114,6 +118,23 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
       findings.push_back(std::move(finding));
     }
   }
+}
+
+void add_tentative(std::span<const RunFacts> runs, const Names& names,
+                   std::vector<Finding>& findings) {
+  std::set<std::pair<RobotId, RobotId>> told;
+  for (const RunFacts& run : runs)
+    for (const RobotId other : run.summary.pgo.tentative) {
+      const auto pair = std::minmax(run.summary.robot, other);
+      if (!told.insert(pair).second) continue;
+      findings.push_back(
+          {.id = "team.tentative",
+           .severity = Severity::kWarning,
+           .what = name_of(names, pair.first) + " and " + name_of(names, pair.second) +
+                   " are in one frame tentatively: closures at a single place tie them",
+           .means = "if that place only looks like another, their relative place is wrong",
+           .to_do = "let them meet at a second place"});
+    }
 }
 
 void add_unseen(const RunSummary& run, std::vector<Finding>& findings) {
@@ -383,6 +404,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
   for (const RunFacts& run : runs) names[run.summary.robot] = run.summary.name;
   std::vector<Finding> findings;
   add_apart(runs, names, findings);
+  add_tentative(runs, names, findings);
   for (const RunFacts& run : runs) {
     add_vocabularies(run.summary, findings);
     add_lost(run.summary, findings);

@@ -299,6 +299,7 @@ void Robot::add_back_end(const RobotConfig& config) {
   forward<Closure>(topics_.peer_closures, topics_.closures);
   pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot,
                        PcmTopics{.closures = topics_.closures,
+                                 .keyframes = topics_.keyframe_odometry,
                                  .restarts = topics_.closure_restarts,
                                  .inlier_sets = topics_.own_inlier_sets},
                        resume_count(identity_.boot) << kResumeBits);
@@ -406,6 +407,10 @@ void Robot::add_records() {
   recorder_->record(topics_.optimized_meshes);
   topics_.packets.subscribe(
       [this](const auto& packet) { input_time_.reach(packet->frame->stamp); });
+  topics_.progress.subscribe([this](const auto& progress) {
+    const std::lock_guard lock(progress_mutex_);
+    progress_ = progress;
+  });
   topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
     input_time_.reach(keyframe->stamp);  // a pose graph and a former process have no packets
     ++keyframes_;
@@ -426,6 +431,8 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
         if (sensors_ != nullptr)
           all.push_back(
               sensors_status(sensors_->published(), sensors_->skipped(), sensors_->faults()));
+        if (const std::lock_guard lock(progress_mutex_); progress_ != nullptr)
+          all.push_back(team_status(*progress_));
         return all;
       },
       [this, activity = std::optional<std::uint64_t>()]() mutable {

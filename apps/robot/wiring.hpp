@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -192,6 +193,8 @@ class Robot {
   std::atomic<bool> source_ended_ = false;
   std::atomic<bool> id_taken_ = false;
   InputTime input_time_;
+  mutable std::mutex progress_mutex_;
+  Topic<OptimizerProgress>::Message progress_;  // the newest, guarded by progress_mutex_
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;

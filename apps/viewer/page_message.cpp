@@ -62,6 +62,7 @@ struct Writer {
     json["keyframes"] = state.keyframes;
     json["skipped_frames"] = state.skipped_frames;
     json["anchor"] = state.anchor;
+    json["tentative"] = state.tentative;
     json["round"] = state.round;
     json["cost"] = state.cost;
     json["gradient_norm"] = state.gradient_norm;

@@ -179,6 +179,7 @@ class RobotPlayback {
                          .dataset_time_s = times_.dataset_s(time_s),
                          .keyframes = keyframes_until(time_s),
                          .anchor = anchor_at(time_s),
+                         .tentative = time_s >= joined_s_ && is_tentative(),
                          .cpu_s = process[1],
                          .resident_MB = process[2] * 1e-6,
                          .links = links_of(traffic),
@@ -319,6 +320,11 @@ class RobotPlayback {
 
   std::optional<SE3> pose_at_keyframe(const std::vector<StampedPose>& poses, std::size_t i) const {
     return pose_at(poses, robot_.keyframes[i].stamp, kMaxPoseGap_s, kMaxPoseGap_s);
+  }
+
+  bool is_tentative() const {
+    const OptimizerSummary& pgo = robot_.summary.pgo;
+    return pgo.anchor && std::ranges::binary_search(pgo.tentative, *pgo.anchor);
   }
 
   RobotId anchor_at(double time_s) const {

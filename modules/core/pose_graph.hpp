@@ -95,8 +95,13 @@ struct Trajectory {
 struct OptimizerProgress {
   RobotId anchor = 0;
   std::vector<RobotId> members;  ///< Robots that optimise together, ascending.
-  std::uint32_t round = 0;       ///< Number of rounds; in a round every member sends once.
-  double cost = 0.0;             ///< Team cost, chordal without 1/2.
+  /// Members whose place in the frame is not certain: closures at a single place tie them to this
+  /// robot. Ascending.
+  std::vector<RobotId> tentative = {};
+  /// Members that no accepted closure ties to this robot. They are in another frame. Ascending.
+  std::vector<RobotId> untied = {};
+  std::uint32_t round = 0;  ///< Number of rounds; in a round every member sends once.
+  double cost = 0.0;        ///< Team cost, chordal without 1/2.
   /// Norm of the team's Riemannian gradient, or (newton) its Newton decrement.
   double gradient_norm = 0.0;
   double seconds = 0.0;  ///< Time spent optimising.

@@ -49,8 +49,8 @@ struct PcmConfig {
                   "witness: number of closures that agree pairwise, share no neighbourhood and so "
                   "join robots");
     visitor.field("witness_wait_s", witness_wait_s, {0.0, 1e6},
-                  "[s since the first closure] witness: time after which a pair is joined without "
-                  "witnesses, with a log line");
+                  "[s of keyframe stamps since the first closure] witness: time after which a pair "
+                  "is joined without witnesses, tentatively");
     visitor.field(
         "criterion", criterion,
         {{"mahalanobis", CycleCriterion::kMahalanobis}, {"bounds", CycleCriterion::kBounds}},

@@ -30,6 +30,7 @@ PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
       ticks_(
           steady_duration(config.publish_period_s), [this] { worker_.post(Tick{}); }, "pcm tick") {
   topics.closures.subscribe([this](const auto& message) { worker_.post(message); });
+  topics.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
   topics.restarts.subscribe([this](const auto& message) { worker_.post(message); });
 }
 
@@ -41,7 +42,7 @@ void PcmNode::start() {
 void PcmNode::stop() noexcept {
   worker_.stop();  // refuses further ticks, so that none waits for room
   ticks_.stop();
-  if (worker_.error() == nullptr) publish_changes(steady_now_s());
+  if (worker_.error() == nullptr) publish_changes();
 }
 
 std::exception_ptr PcmNode::error() const {
@@ -50,8 +51,14 @@ std::exception_ptr PcmNode::error() const {
 
 void PcmNode::handle(const Input& input) {
   if (const auto* closure = std::get_if<Topic<Closure>::Message>(&input)) return step(**closure);
+  if (const auto* keyframe = std::get_if<Topic<KeyframeOdometry>::Message>(&input))
+    return step(**keyframe);
   if (const auto* event = std::get_if<Topic<PeerEvent>::Message>(&input)) return step(**event);
-  publish_changes(steady_now_s());
+  publish_changes();
+}
+
+void PcmNode::step(const KeyframeOdometry& keyframe) {
+  newest_ = std::max(newest_.value_or(keyframe.stamp), keyframe.stamp);
 }
 
 void PcmNode::step(const PeerEvent& event) {
@@ -70,6 +77,7 @@ void PcmNode::step(const Closure& closure) {
     return;
   }
   Pair& pair = pair_with(std::max(from, to));
+  if (!pair.since) pair.since = newest_;
   const PcmVerdict verdict = std::visit([&](auto& set) { return set.add(closure); }, pair.closures);
   const bool takes_all = config_.selection == ClosureSelection::kWitness;
   pair.changed |= verdict == PcmVerdict::kGrew || (takes_all && verdict == PcmVerdict::kAdded);
@@ -101,9 +109,9 @@ void PcmNode::report(const Closure& closure, PcmVerdict verdict, const Pair& pai
       << " may: a search ended at pcm.max_search_nodes and fell back to the heuristic";
 }
 
-void PcmNode::publish_changes(double now_s) {
+void PcmNode::publish_changes() {
   for (auto& [other, pair] : pairs_) {
-    std::vector<ClosureId> closures = selected(other, pair, now_s);
+    std::vector<ClosureId> closures = selected(other, pair);
     if (closures.empty()) continue;
     pair.changed = false;
     const auto version = version_of_.try_emplace(other, first_version_).first;
@@ -111,7 +119,7 @@ void PcmNode::publish_changes(double now_s) {
   }
 }
 
-std::vector<ClosureId> PcmNode::selected(RobotId other, Pair& pair, double now_s) const {
+std::vector<ClosureId> PcmNode::selected(RobotId other, Pair& pair) const {
   if (!pair.changed) return {};
   if (const auto* pcm = std::get_if<Pcm>(&pair.closures)) {
     std::vector<ClosureId> inliers = pcm->inliers();
@@ -120,22 +128,22 @@ std::vector<ClosureId> PcmNode::selected(RobotId other, Pair& pair, double now_s
                        << " closures agree";
     return inliers;
   }
-  if (!is_joined(other, pair, now_s)) return {};
+  if (!is_joined(other, pair)) return {};
   return std::get<WitnessedPair>(pair.closures).closures();
 }
 
-bool PcmNode::is_joined(RobotId other, Pair& pair, double now_s) const {
+bool PcmNode::is_joined(RobotId other, Pair& pair) const {
   const auto& closures = std::get<WitnessedPair>(pair.closures);
   if (other == self_ || pair.waited || closures.is_witnessed()) return true;
-  if (!pair.since_s) pair.since_s = now_s;
-  if (!no_more_ && now_s - *pair.since_s < config_.witness_wait_s) return false;
+  if (!pair.since) pair.since = newest_;
+  const double waited_s = pair.since ? seconds_between(*pair.since, *newest_) : 0.0;
+  if (!no_more_ && waited_s < config_.witness_wait_s) return false;
   pair.waited = true;
   const std::size_t places = closures.witnesses();
   log::info(name()) << text_of(self_, other) << "joined by "
                     << (places == 1 ? std::string("one place") : std::to_string(places) + " places")
-                    << " only, none other has agreed in " << now_s - *pair.since_s
-                    << " s: their closures are assumed to be true where the graph does not "
-                       "contradict them";
+                    << " only, no other place has agreed within " << waited_s
+                    << " s of keyframes: the join is tentative";
   return true;
 }
 

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
@@ -23,9 +24,10 @@ namespace km {
 
 /// Channels of the PCM node; they must outlive it.
 struct PcmTopics {
-  In<Closure> closures;        ///< Own and received ones, in any order, repeated or not.
-  In<PeerEvent> restarts;      ///< kRestarted, before the first closure of the new incarnation.
-  Out<InlierSet> inlier_sets;  ///< Versions ascending per pair.
+  In<Closure> closures;            ///< Own and received ones, in any order, repeated or not.
+  In<KeyframeOdometry> keyframes;  ///< Of this robot: the clock of PcmConfig::witness_wait_s.
+  In<PeerEvent> restarts;          ///< kRestarted, before the first closure of the new incarnation.
+  Out<InlierSet> inlier_sets;      ///< Versions ascending per pair.
 };
 
 /// Decides which closures are optimised, for every pair in which this robot has the lower id and
@@ -35,7 +37,9 @@ struct PcmTopics {
 /// PcmConfig::selection states the rule. By default all closures are optimised, because the
 /// optimiser weighs them. Two robots are joined only when independent closures agree
 /// (WitnessedPair), when PcmConfig::witness_wait_s is over, or when no witness can arrive any more.
-/// The latter two are logged. Closures inside the robot join nothing and are published at once.
+/// The latter two are logged. The wait is in sensor time, which the stamps of the robot's keyframes
+/// tell, so results do not depend on the speed of a replay. Closures inside the robot join nothing
+/// and are published at once.
 class PcmNode final : public Node {
  public:
   /// The versions of its sets follow `first_version`: those of a robot that is resumed must be
@@ -52,14 +56,13 @@ class PcmNode final : public Node {
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handles one closure synchronously. The thread calls only this, the other step() and
-  /// publish_changes().
+  /// Handles one message synchronously. The thread calls only these and publish_changes().
   void step(const Closure& closure);
+  void step(const KeyframeOdometry& keyframe);
   void step(const PeerEvent& event);
 
-  /// Publishes the sets that have changed since the last call, and those whose wait is over. The
-  /// wait of a pair begins with the first call after its first closure. `now_s`: any origin.
-  void publish_changes(double now_s);
+  /// Publishes the sets that have changed since the last call, and those whose wait is over.
+  void publish_changes();
 
   /// Notes that the runs of all robots are over and all their closures have arrived. No pair waits
   /// for a witness any more, until a robot restarts. Safe to call from any thread, repeatedly.
@@ -67,20 +70,21 @@ class PcmNode final : public Node {
 
  private:
   struct Tick {};
-  using Input = std::variant<Tick, Topic<Closure>::Message, Topic<PeerEvent>::Message>;
+  using Input = std::variant<Tick, Topic<Closure>::Message, Topic<KeyframeOdometry>::Message,
+                             Topic<PeerEvent>::Message>;
 
   // Closures between this robot and another one, or inside this one.
   struct Pair {
     std::variant<WitnessedPair, Pcm> closures;
-    std::optional<double> since_s = {};  // waiting for a witness
+    std::optional<Stamp> since = {};  // newest keyframe when its first closure came
     bool changed = false;
     bool waited = false;
   };
 
   void handle(const Input& input);
   Pair& pair_with(RobotId other);
-  [[nodiscard]] std::vector<ClosureId> selected(RobotId other, Pair& pair, double now_s) const;
-  [[nodiscard]] bool is_joined(RobotId other, Pair& pair, double now_s) const;
+  [[nodiscard]] std::vector<ClosureId> selected(RobotId other, Pair& pair) const;
+  [[nodiscard]] bool is_joined(RobotId other, Pair& pair) const;
   void report(const Closure& closure, PcmVerdict verdict, const Pair& pair) const;
 
   const PcmConfig config_;
@@ -90,6 +94,7 @@ class PcmNode final : public Node {
   std::map<RobotId, Pair> pairs_;  // pairs by the other robot; `self_` for closures inside this
                                    // robot
   std::map<RobotId, std::uint32_t> version_of_;
+  std::optional<Stamp> newest_;  // keyframe of this robot
   std::atomic<bool> no_more_ = false;
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to

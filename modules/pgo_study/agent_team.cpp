@@ -209,6 +209,7 @@ class AgentTeam {
   [[nodiscard]] AgentTeamRun result(bool settled, double seconds) const {
     AgentTeamRun run{.T_world_kf = {},
                      .world_of = {},
+                     .tentative = {},
                      .kept = odometry_edges(graph_),
                      .settled = settled,
                      .seconds = seconds,
@@ -222,6 +223,8 @@ class AgentTeam {
           published ? member.trajectory->T_world_kf : member.agent->poses();
       run.T_world_kf.insert(run.T_world_kf.end(), own.begin(), own.end());
       run.world_of.push_back(published ? member.trajectory->anchor : static_cast<RobotId>(k));
+      const std::vector<RobotId>& uncertain = members_[run.world_of.back()].progress.tentative;
+      run.tentative.push_back(std::ranges::binary_search(uncertain, static_cast<RobotId>(k)));
       run.rounds = std::max(run.rounds, static_cast<std::size_t>(member.progress.round));
     }
     for (const TeamClosure& measured : team_closures(graph_)) {

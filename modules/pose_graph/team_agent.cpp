@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/stiefel.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/team_plan.hpp"
@@ -142,6 +143,7 @@ void TeamAgent::forget_measured(RobotId robot) {
   std::erase_if(decided_, [&](const auto& decision) { return touches(decision.first, robot); });
   std::erase_if(chances_, [&](const auto& chance) { return touches(chance.first, robot); });
   std::erase_if(verdicts_, [&](const auto& verdict) { return touches(verdict.first, robot); });
+  places_.clear();
   plan_outdated_ = true;
 }
 
@@ -236,14 +238,27 @@ TeamOutput TeamAgent::step(double now_s) {
   return output;
 }
 
-TeamStatus TeamAgent::make_status() const {
+std::uint32_t TeamAgent::places_in(const EdgeSetOffer& offer) {
+  const auto [entry, is_new] = places_.try_emplace({offer.peer, offer.id}, 0);
+  if (!is_new) return entry->second;
+  std::vector<PoseEdge> accepted;
+  for (const PoseEdge& closure : *graph_.edges(offer.peer, offer.id)) {
+    const auto decided = decided_.find(closure.id());
+    if (decided == decided_.end() || decided->second) accepted.push_back(closure);
+  }
+  return entry->second = static_cast<std::uint32_t>(find_places(accepted).sizes.size());
+}
+
+TeamStatus TeamAgent::make_status() {
+  std::vector<EdgeSetOffer> offers = graph_.offers();
+  for (EdgeSetOffer& offer : offers) offer.places = places_in(offer);
   return {.sender = self_,
           .hears = relay_.hears(),
           .frame = frame_,
           .frame_version = frame_version_,
           .keyframes = graph_.keyframes(),
           .revision = revision(),
-          .offers = graph_.offers(),
+          .offers = std::move(offers),
           .method = config_.method,
           .T_odom_first = graph_.T_odom_first(),
           .upright = graph_.upright()};
@@ -299,24 +314,41 @@ std::optional<SE3> TeamAgent::world_of(RobotId anchor) const {
   return world(T_frame_first, peer->second.status->T_odom_first);
 }
 
+// The frame in which this robot publishes. If no closure ties it to the anchor of the session, this
+// is the frame of the lowest robot that closures tie to it.
+std::optional<TeamAgent::World> TeamAgent::tied_world() const {
+  if (!world_ || !part_ || !std::ranges::binary_search(ties_.untied, world_->anchor)) return world_;
+  const auto is_tied = [&](RobotId robot) {
+    return !std::ranges::binary_search(ties_.untied, robot);
+  };
+  const RobotId anchor = *std::ranges::find_if(part_->members(), is_tied);
+  const auto T_frame_world = world_of(anchor);
+  if (!T_frame_world) return std::nullopt;
+  return World{anchor, *T_frame_world};
+}
+
 const std::vector<SE3>& TeamAgent::poses() const {
   return part_ && !over_ && part_->stage() ? part_->poses() : poses_;
 }
 
 void TeamAgent::publish(TeamOutput& output) {
   const bool early = now_s_ - published_s_ < config_.publish_period_s;
-  if (!publish_due_ || !world_ || (in_session() && early)) return;
+  if (!world_ || (in_session() && early)) return;
+  const auto world = tied_world();
+  if (!world || (!publish_due_ && published_anchor_ == world->anchor)) return;
   publish_due_ = false;
   published_s_ = now_s_;
-  Trajectory trajectory{self_.robot, world_->anchor, {}};
-  const SE3 T_world_frame = world_->T_frame_world.inverse();
+  published_anchor_ = world->anchor;
+  Trajectory trajectory{self_.robot, world->anchor, {}};
+  const SE3 T_world_frame = world->T_frame_world.inverse();
   for (const SE3& T_frame_kf : poses()) trajectory.T_world_kf.push_back(T_world_frame * T_frame_kf);
   output.trajectory = std::move(trajectory);
   output.progress = make_progress();
 }
 
 OptimizerProgress TeamAgent::make_progress() const {
-  OptimizerProgress progress{.anchor = world_ ? world_->anchor : self_.robot,
+  const auto world = tied_world();
+  OptimizerProgress progress{.anchor = world ? world->anchor : self_.robot,
                              .members = {self_.robot}};
   progress.odometry_rotation_noise = graph_.odometry_noise().rotation;
   progress.odometry_translation_noise = graph_.odometry_noise().translation;
@@ -324,7 +356,11 @@ OptimizerProgress TeamAgent::make_progress() const {
   progress.seconds = optimising_s_;
   if (!part_) return progress;
   const Session& session = part_->session();
-  if (!over_ || solved_) progress.members = part_->members();
+  if (!over_ || solved_) {
+    progress.members = part_->members();
+    progress.tentative = ties_.tentative;
+    progress.untied = ties_.untied;
+  }
   progress.round += part_->state().round;
   progress.cost = session.finished ? session.cost : part_->state().cost;
   progress.gradient_norm = session.finished ? session.gradient : part_->state().gradient;

@@ -7,9 +7,11 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "modules/core/closure_verdicts.hpp"
+#include "modules/pose_graph/frame_ties.hpp"
 #include "modules/pose_graph/own_graph.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
 #include "modules/pose_graph/relay.hpp"
@@ -55,6 +57,10 @@ struct [[nodiscard]] TeamOutput {
 /// is in a team, which knows the noise better. Decisions of a team made with held poses hold until
 /// its next session, because the held poses may be wrong. Deferred closures that fit the solution
 /// become undecided again, and one more session weighs them.
+///
+/// A robot that closures at a single place tie to the others is joined tentatively; see FrameTies.
+/// If the team rejects all closures that tie some members, the robots on each side publish their
+/// poses in the frame of their lowest robot. Later closures join them again.
 ///
 /// If all members have verticals, these are part of the cost, and `world` has z up. Deterministic:
 /// equal inputs in equal order give equal outputs. Not thread-safe.
@@ -121,7 +127,8 @@ class TeamAgent {
   bool take(const TeamPeer& sender, const MemberPoses& poses);
   bool take(const TeamPeer& sender, const SessionLetter& letter);
   bool refuse(const std::string& what);
-  [[nodiscard]] TeamStatus make_status() const;
+  [[nodiscard]] TeamStatus make_status();
+  [[nodiscard]] std::uint32_t places_in(const EdgeSetOffer& offer);
   [[nodiscard]] std::uint32_t revision() const { return graph_.revision() + reconsidered_; }
   void send_status(TeamOutput& output);
   void hand_out(TeamOutput& output);
@@ -164,6 +171,8 @@ class TeamAgent {
 
   // Results.
   [[nodiscard]] std::optional<SE3> world_of(RobotId anchor) const;
+  [[nodiscard]] std::optional<World> tied_world() const;
+  void notice_ties();
   void publish(TeamOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
   [[nodiscard]] bool holds_all(const SessionPlan& plan) const;
@@ -176,17 +185,20 @@ class TeamAgent {
   std::map<RobotId, Peer> peers_;
   ToldPoses told_;  // the newest poses, including those of this robot
   std::map<ClosureId, bool> decided_;
-  std::map<ClosureId, int> chances_;  // used by rejected closures
-  bool reconsider_due_ = false;       // once all members have sent the solution
-  std::uint32_t reconsidered_ = 0;    // number of times that closures became undecided again
-  ClosureNoiseRecord noise_;          // noise of the decided closures
-  std::set<ClosureId> provisional_;   // decided in the absence of known robots
-  ClosureNoiseRecord team_noise_;     // noise without provisional_
+  std::map<std::pair<RobotId, EdgeSetId>, std::uint32_t> places_;  // see places_in()
+  std::map<ClosureId, int> chances_;                               // used by rejected closures
+  bool reconsider_due_ = false;      // once all members have sent the solution
+  std::uint32_t reconsidered_ = 0;   // number of times that closures became undecided again
+  ClosureNoiseRecord noise_;         // noise of the decided closures
+  std::set<ClosureId> provisional_;  // decided in the absence of known robots
+  ClosureNoiseRecord team_noise_;    // noise without provisional_
 
   std::uint64_t links_seen_ = 0;
   std::set<RobotId> component_;  // robots that links connect to this one
 
-  SessionPlan plan_;  // from the present knowledge
+  SessionPlan plan_;   // from the present knowledge
+  FrameTies ties_;     // of its members
+  FrameTies noticed_;  // in the last notice
   bool plan_outdated_ = true;
   double plan_changed_s_ = -1e9;      // time of the last change of its graph
   std::uint64_t closures_known_ = 0;  // by the robots of the plan
@@ -213,6 +225,7 @@ class TeamAgent {
   std::vector<std::string> notices_;
   std::optional<ClosureVerdicts> verdicts_due_;
   bool publish_due_ = false;
+  std::optional<RobotId> published_anchor_;
   std::uint32_t rounds_before_ = 0;  // rounds of earlier sessions
   double optimising_s_ = 0.0;        // in earlier sessions
   double now_s_ = 0.0;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <exception>
+#include <iterator>
 #include <utility>
 
 #include "modules/core/text_table.hpp"
@@ -55,6 +56,37 @@ void TeamAgent::make_plan() {
   if (!same_graph(plan, plan_)) plan_changed_s_ = now_s_;
   closures_known_ = closures_known(plan, statuses);
   plan_ = std::move(plan);
+  std::vector<RobotId> members;
+  for (const SessionMember& member : plan_.members) members.push_back(member.peer.robot);
+  std::ranges::sort(members);
+  ties_ = frame_ties(self_.robot, members, find_ties(statuses));
+  notice_ties();
+}
+
+// Before the first solution, and while a session decides, the ties are not yet judged.
+void TeamAgent::notice_ties() {
+  if (in_session() || !solved_ || ties_ == noticed_) return;
+  const auto changed = [](const std::vector<RobotId>& now, const std::vector<RobotId>& before) {
+    std::vector<RobotId> added;
+    std::ranges::set_difference(now, before, std::back_inserter(added));
+    std::string names;
+    for (const RobotId robot : added) names += (names.empty() ? "" : ", ") + std::to_string(robot);
+    return names;
+  };
+  if (const auto robots = changed(ties_.tentative, noticed_.tentative); !robots.empty())
+    notices_.push_back("joined tentatively with robots " + robots +
+                       ": closures at a single place tie them to this robot; closures at a second "
+                       "place will confirm or correct it");
+  if (const auto robots = changed(ties_.untied, noticed_.untied); !robots.empty())
+    notices_.push_back("no accepted closure ties robots " + robots +
+                       " to this robot: they are in another frame");
+  std::vector<RobotId> uncertain;
+  std::ranges::set_union(ties_.tentative, ties_.untied, std::back_inserter(uncertain));
+  if (const auto robots = changed(noticed_.tentative, uncertain); !robots.empty())
+    notices_.push_back("robots " + robots +
+                       " are no longer tentative: closures at several places tie them to this "
+                       "robot");
+  noticed_ = ties_;
 }
 
 void TeamAgent::coordinate() {
@@ -416,12 +448,15 @@ void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
     if (is_new && !for_good) provisional_.insert(id);
     decided_[id] = verdicts_[id] = kept;
   }
+  places_.clear();
+  plan_outdated_ = true;
   verdicts_due_.emplace();
   for (const auto& [id, kept] : verdicts_) verdicts_due_->closures.push_back({id, kept});
 }
 
 void TeamAgent::decide_anew() {
   for (const ClosureId& id : std::exchange(provisional_, {})) decided_.erase(id);
+  places_.clear();
   noise_ = team_noise_;
 }
 
@@ -457,6 +492,7 @@ void TeamAgent::reconsider() {
   }
   if (!any) return;
   ++reconsidered_;
+  places_.clear();
   plan_outdated_ = true;
 }
 

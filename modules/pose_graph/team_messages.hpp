@@ -52,6 +52,8 @@ struct EdgeSetOffer {
   RobotId peer = 0;
   std::uint32_t edges = 0;  ///< Number of closures, at least 1.
   EdgeSetId id;
+  /// Number of places (see find_places()) of the closures that the sender has not rejected.
+  std::uint32_t places = 0;
   bool operator==(const EdgeSetOffer&) const = default;
 };
 

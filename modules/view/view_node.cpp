@@ -204,6 +204,7 @@ ViewState ViewNode::state(double now_s) {
   state.anchor = self_;
   if (progress_ != nullptr) {
     state.anchor = progress_->anchor;
+    state.tentative = std::ranges::binary_search(progress_->tentative, progress_->anchor);
     state.round = progress_->round;
     state.cost = finite(progress_->cost);
     state.gradient_norm = finite(progress_->gradient_norm);

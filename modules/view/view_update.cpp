@@ -46,6 +46,7 @@ class ContentWriter {
     out_.varint(s.keyframes);
     out_.varint(s.skipped_frames);
     out_.varint(s.anchor);
+    out_.u8(s.tentative ? 1 : 0);
     out_.varint(s.round);
     for (const double value : {s.cost, s.gradient_norm, s.cpu_s, s.resident_MB}) out_.f64(value);
     put_all(s.links, [this](const ViewLink& link) {
@@ -160,6 +161,12 @@ class ContentReader {
     }
   }
 
+  bool flag() {
+    const std::uint8_t value = in_.u8();
+    require(value <= 1);
+    return value == 1;
+  }
+
   ViewState state() {
     ViewState s;
     s.name = text();
@@ -168,6 +175,7 @@ class ContentReader {
     s.keyframes = in_.varint_as<std::uint32_t>();
     s.skipped_frames = in_.varint_as<std::uint32_t>();
     s.anchor = in_.varint_as<RobotId>();
+    s.tentative = flag();
     s.round = in_.varint_as<std::uint32_t>();
     for (double* value : {&s.cost, &s.gradient_norm, &s.cpu_s, &s.resident_MB}) *value = finite();
     get_all(s.links, kLinkBytes, [this](ViewLink& link) {
@@ -191,9 +199,7 @@ class ContentReader {
 
   ViewKeyframes keyframes() {
     ViewKeyframes result;
-    const std::uint8_t optimized = in_.u8();
-    require(optimized <= 1);
-    result.optimized = optimized == 1;
+    result.optimized = flag();
     result.anchor = in_.varint_as<RobotId>();
     result.first = in_.varint_as<KeyframeIndex>();
     get_all(result.T_world_kf, kPoseBytes, [this](SE3& T) { T = pose(); });

@@ -38,6 +38,7 @@ struct ViewState {
   std::uint32_t keyframes = 0;
   std::uint32_t skipped_frames = 0;
   RobotId anchor = 0;       ///< Robot whose odometry frame its optimised poses are in.
+  bool tentative = false;   ///< Closures at a single place tie it to the anchor.
   std::uint32_t round = 0;  ///< Round of the optimisation.
   double cost = 0.0;        ///< Cost of the team's graph, see OptimizerProgress.
   double gradient_norm = 0.0;

@@ -29,6 +29,18 @@ TEST_CASE("Sensors that skip or corrupt frames are a warning, by kind", "[robot]
   CHECK(status.values[2].value == "3, first: 0.5 s after 7");
 }
 
+TEST_CASE("An uncertain place of a robot is a warning that names the robot", "[robot]") {
+  OptimizerProgress progress{.anchor = 2, .members = {2, 4, 6}};
+  CHECK(team_status(progress).level == RosDiagnosticStatus::kOk);
+  progress.tentative = {4, 6};
+  const RosDiagnosticStatus status = team_status(progress);
+  CHECK(status.level == RosDiagnosticStatus::kWarn);
+  CHECK(status.values.at(2).value == "4 6");
+  progress.tentative.clear();
+  progress.untied = {6};
+  CHECK(team_status(progress).level == RosDiagnosticStatus::kWarn);
+}
+
 TEST_CASE("A module that hardly rests is a warning that names it", "[robot]") {
   BusyNode node;
   ModuleLoads loads({&node});

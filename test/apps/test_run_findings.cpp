@@ -108,6 +108,22 @@ TEST_CASE("Two robots did not join for the first stage that stopped their closur
   CHECK_THAT(why(tally_of(9, 7, 3, 3)), Contains("3 kept: enough"));
 }
 
+TEST_CASE("Robots that one place or no closure ties are reported as such", "[robot][findings]") {
+  std::vector<RunFacts> runs{run_of(0, true, tally_of(9, 7, 3, 3)), run_of(2, true, {})};
+  CHECK(findings_of(runs).empty());
+  runs[0].summary.pgo.tentative = {2};
+  runs[1].summary.pgo.tentative = {0};
+  const auto tentative = findings_of(runs);
+  REQUIRE(tentative.size() == 1);  // once for both robots
+  CHECK(tentative[0].id == "team.tentative");
+  CHECK(tentative[0].severity == Severity::kWarning);
+  runs[0].summary.pgo.tentative.clear();
+  runs[1].summary.pgo.tentative.clear();
+  runs[0].summary.pgo.untied = {2};
+  CHECK(findings_of(runs).size() == 1);
+  CHECK_THAT(findings_of(runs)[0].what, Catch::Contains("did not join"));
+}
+
 TEST_CASE("A tally counts the stages that a closure came through, and why it stopped",
           "[robot][findings]") {
   ClosureTally tally;

@@ -90,7 +90,7 @@ export class Panels {
     card.camera.onclick = () => this.actions.camera(robot.id);
     card.facts = new Facts(
         make('dl', root),
-        ['Last told', 'Keyframes', 'Recording', 'Skipped', 'Processor', 'Memory']);
+        ['Frame', 'Last told', 'Keyframes', 'Recording', 'Skipped', 'Processor', 'Memory']);
     this.cards.set(robot.id, card);
     const ids = [...this.cards.keys()].sort((a, b) => a - b);
     const next = ids[ids.indexOf(robot.id) + 1];
@@ -116,6 +116,11 @@ export class Panels {
             silent > SILENT_S[0] && !over ? 'warn' :
                                             ''}`;
     const lastTold = over ? `at ${duration(robot.heard)}` : `${silent.toFixed(1)} s ago`;
+    card.facts.set(
+        'Frame',
+        !shown || shown.anchor === robot.id ?
+            'its own' :
+            `of ${model.name(shown.anchor)}${shown.tentative ? ', tentatively' : ''}`);
     card.facts.set('Last told', Number.isFinite(silent) ? lastTold : '–');
     card.facts.set('Keyframes', String(shown?.keyframes ?? robot.odometry.length));
     card.facts.set('Recording', shown ? duration(shown.dataset_time_s) : '–');

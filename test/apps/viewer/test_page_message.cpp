@@ -32,6 +32,7 @@ TEST_CASE("A state is sent with its members' names", "[page_message]") {
       "bot";
   state.phase = "running";
   state.keyframes = 7;
+  state.tentative = true;
   state.links = {{3, 1.25F}};
   state.sent_bytes = {{"pgo", 1234.0}};
   const json told = text_of({5, 0xfedcba9876543210U, 1'500'000'000, state});
@@ -44,6 +45,7 @@ TEST_CASE("A state is sent with its members' names", "[page_message]") {
         "ro\xEF\xBF\xBD"
         "bot");  // invalid UTF-8 is replaced and not fatal
   CHECK(told["keyframes"] == 7);
+  CHECK(told["tentative"] == true);
   CHECK(told["links"] == json::parse("[[3, 1.25]]"));
   CHECK(told["sent_bytes"] == json::parse(R"({"pgo": 1234.0})"));
 }

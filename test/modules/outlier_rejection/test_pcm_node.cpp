@@ -17,12 +17,16 @@ namespace {
 struct Team {
   std::mt19937 rng{1};
   Topic<Closure> closures;
+  Topic<KeyframeOdometry> keyframes;
   Topic<PeerEvent> restarts;
   Topic<InlierSet> inlier_sets;
   Inbox<InlierSet> sets{inlier_sets};
 
   PcmTopics topics() {
-    return {.closures = closures, .restarts = restarts, .inlier_sets = inlier_sets};
+    return {.closures = closures,
+            .keyframes = keyframes,
+            .restarts = restarts,
+            .inlier_sets = inlier_sets};
   }
 
   // Exact to a millimetre, weighed as such: all agree.
@@ -45,6 +49,13 @@ struct Team {
   }
 };
 
+// A keyframe of this robot at a time.
+KeyframeOdometry keyframe_at(double at_s) {
+  KeyframeOdometry keyframe;
+  keyframe.stamp = nanoseconds(at_s);
+  return keyframe;
+}
+
 PcmConfig tolerant() {
   PcmConfig config;
   config.selection = ClosureSelection::kPcm;
@@ -60,16 +71,16 @@ TEST_CASE("The PCM node publishes sets that grew, with rising versions", "[node]
 
   node.step(closures[0]);
   node.step(closures[1]);
-  node.publish_changes(0.0);
+  node.publish_changes();
   CHECK(team.sets.messages().empty());  // below min_inliers
   node.step(closures[2]);
-  node.publish_changes(0.0);
-  node.publish_changes(0.0);  // nothing new
-  node.step(closures[2]);     // repeated
-  node.publish_changes(0.0);
+  node.publish_changes();
+  node.publish_changes();  // nothing new
+  node.step(closures[2]);  // repeated
+  node.publish_changes();
   node.step(closures[3]);
   node.step(closures[4]);
-  node.publish_changes(0.0);
+  node.publish_changes();
 
   const auto sets = team.sets.messages();
   REQUIRE(sets.size() == 2);
@@ -89,7 +100,7 @@ TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for 
   for (const Closure& closure : team.agreeing_inside(4, 4)) node.step(closure);
   for (const auto& [a, b] : {std::pair<RobotId, RobotId>{9, 4}, {3, 4}, {5, 6}})
     for (const Closure& closure : team.agreeing(a, b, 4)) node.step(closure);
-  node.publish_changes(0.0);
+  node.publish_changes();
 
   const auto sets = team.sets.messages();
   REQUIRE(sets.size() == 2);
@@ -103,7 +114,7 @@ TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
   auto closures = team.agreeing(0, 1, 4);
   closures[1].T_from_to.translation().x() = std::numeric_limits<double>::quiet_NaN();
   for (const Closure& closure : closures) node.step(closure);
-  node.publish_changes(0.0);
+  node.publish_changes();
   REQUIRE(team.sets.messages().size() == 1);
   CHECK(team.sets.messages()[0].closures.size() == 3);
 }
@@ -148,15 +159,15 @@ TEST_CASE("All closures of two robots are published once independent ones agree"
   node.step(closures[0]);
   node.step(closures[1]);
   node.step(reversed(closures[0]));
-  node.publish_changes(0.0);
+  node.publish_changes();
   CHECK(team.sets.messages().empty());
   node.step(closures[9]);
-  node.publish_changes(1.0);
-  node.publish_changes(100.0);  // nothing new
+  node.publish_changes();
+  node.publish_changes();  // nothing new
   REQUIRE(team.sets.messages().size() == 1);
   CHECK(team.sets.messages()[0].closures.size() == 3);
   node.step(closures[10]);
-  node.publish_changes(100.0);
+  node.publish_changes();
   REQUIRE(team.sets.messages().size() == 2);
   CHECK(team.sets.messages()[1].closures.size() == 4);
   CHECK(std::ranges::is_sorted(team.sets.messages()[1].closures));
@@ -171,17 +182,21 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
   const CapturedLog log;
   const auto closures = team.agreeing(2, 5, 3);  // all neighbours
   node.step(closures[0]);
-  node.publish_changes(1000.0);
+  node.publish_changes();  // without a keyframe there is no time
+  node.step(keyframe_at(1000.0));
+  node.publish_changes();
   node.step(closures[1]);
-  node.publish_changes(1029.9);
+  node.step(keyframe_at(1029.9));
+  node.publish_changes();
   CHECK(team.sets.messages().empty());
   CHECK(log.text().empty());
-  node.publish_changes(1030.0);
+  node.step(keyframe_at(1030.0));
+  node.publish_changes();
   REQUIRE(team.sets.messages().size() == 1);
   CHECK(team.sets.messages()[0].closures.size() == 2);
   CHECK_THAT(log.text(), Catch::Contains("robots 2 5: joined by one place only"));
   node.step(closures[2]);
-  node.publish_changes(1031.0);  // the wait is over permanently
+  node.publish_changes();  // the wait is over permanently
   REQUIRE(team.sets.messages().size() == 2);
   CHECK(team.sets.messages()[1].closures.size() == 3);
 }
@@ -190,20 +205,23 @@ TEST_CASE("At the end of all runs no pair waits for a witness", "[node]") {
   Team team;
   PcmNode node(PcmConfig{}, 2, team.topics());
   const CapturedLog log;
+  node.step(keyframe_at(10.0));
   node.step(team.agreeing(2, 5, 1)[0]);
-  node.publish_changes(10.0);
+  node.publish_changes();
+  node.step(keyframe_at(12.0));
+  node.publish_changes();
   CHECK(team.sets.messages().empty());
   node.expect_no_more();
-  node.publish_changes(12.0);
+  node.publish_changes();
   CHECK(team.sets.messages().size() == 1);
-  CHECK_THAT(log.text(), Catch::Contains("none other has agreed in 2 s"));
+  CHECK_THAT(log.text(), Catch::Contains("no other place has agreed within 2 s"));
 }
 
 TEST_CASE("Closures inside the robot need no witness", "[node]") {
   Team team;
   PcmNode node(PcmConfig{}, 4, team.topics());
   node.step(team.agreeing_inside(4, 4)[0]);
-  node.publish_changes(0.0);
+  node.publish_changes();
   REQUIRE(team.sets.messages().size() == 1);
   CHECK(team.sets.messages()[0].closures.size() == 1);
 }
@@ -214,13 +232,13 @@ TEST_CASE("The closures of a restarted peer are removed", "[node]") {
   const auto before = team.agreeing(2, 5, 20);
   const auto after = team.agreeing(2, 5, 20);
   for (const Closure& closure : before) node.step(closure);
-  node.publish_changes(0.0);
+  node.publish_changes();
   RobotIdentity identity;
   identity.robot = 5;
   node.step(PeerEvent{PeerEventKind::kRestarted, identity, {}});
   node.step(after[3]);
   node.step(after[17]);
-  node.publish_changes(0.5);
+  node.publish_changes();
   const auto sets = team.sets.messages();
   REQUIRE(sets.size() == 2);
   CHECK(sets[0].closures.size() == 20);
@@ -234,7 +252,7 @@ TEST_CASE("The sets of a resumed robot are newer than all before", "[node]") {
   constexpr std::uint32_t kFirst = 3U << 16U;
   PcmNode node(PcmConfig{}, 2, team.topics(), kFirst);
   for (const Closure& closure : closures) node.step(closure);
-  node.publish_changes(0.0);
+  node.publish_changes();
   REQUIRE(team.sets.messages().size() == 1);
   CHECK(team.sets.messages()[0].version == kFirst + 1);
 }
@@ -247,10 +265,10 @@ TEST_CASE("When a robot restarts, its pair waits for a witness again", "[node]")
   identity.robot = 5;
   node.step(PeerEvent{PeerEventKind::kRestarted, identity, {}});
   node.step(team.agreeing(2, 5, 20)[3]);
-  node.publish_changes(0.0);
+  node.publish_changes();
   CHECK(team.sets.messages().empty());
   node.expect_no_more();
-  node.publish_changes(0.5);
+  node.publish_changes();
   CHECK(team.sets.messages().size() == 1);
 }
 

@@ -26,6 +26,7 @@ ViewState some_state() {
           .keyframes = 300,
           .skipped_frames = 2,
           .anchor = 3,
+          .tentative = true,
           .round = 70000,
           .cost = 1234.5,
           .gradient_norm = 1e-3,
@@ -101,6 +102,7 @@ TEST_CASE("A state is unchanged by encoding and decoding", "[view]") {
   CHECK(got.keyframes == sent.keyframes);
   CHECK(got.skipped_frames == sent.skipped_frames);
   CHECK(got.anchor == sent.anchor);
+  CHECK(got.tentative);
   CHECK(got.round == sent.round);
   CHECK(got.cost == sent.cost);
   CHECK(got.gradient_norm == sent.gradient_norm);

@@ -1,3 +1,5 @@
+#include <netdb.h>
+
 #include <catch2/catch.hpp>
 #include <string>
 #include <vector>
@@ -89,7 +91,11 @@ TEST_CASE("The interface is the one named, else the likeliest", "[profiles]") {
 
 TEST_CASE("Hosts that are unknown are all named", "[dds]") {
   CHECK_NOTHROW(check_hosts({}));
-  CHECK_NOTHROW(check_hosts({"10.0.0.2", "127.0.0.1:7410", "localhost"}));
+  CHECK_NOTHROW(check_hosts({"10.0.0.2", "127.0.0.1:7410"}));
+  if (gethostbyname("localhost") == nullptr)
+    WARN("SKIPPED in part: this computer has no name localhost (see /etc/hosts)");
+  else
+    CHECK_NOTHROW(check_hosts({"localhost"}));
   CHECK_THROWS_WITH(check_hosts({"10.0.0.2", "not an address", "10.0.0.300:7", "10.0.0.3:port"}),
                     Catch::Contains("not an address: ") && Catch::Contains("10.0.0.300:7: ") &&
                         Catch::Contains("10.0.0.3:port: ") && !Catch::Contains("10.0.0.2"));

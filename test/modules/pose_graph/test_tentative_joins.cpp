@@ -1,0 +1,166 @@
+#include <catch2/catch.hpp>
+
+#include "modules/pose_graph/solver_choice.hpp"
+#include "test/support/gather_solver.hpp"
+#include "test/support/team_network.hpp"
+
+namespace km {
+namespace {
+
+using Robots = std::vector<RobotId>;
+
+constexpr std::uint32_t kKeyframes = 60;
+constexpr double kTolerance = 1e-6;  // relative to the cost
+
+// Three robots; closures at several places tie robots 4 and 6. The closures of 2 with 4 are
+// `of_pair`, at these keyframes of robot 2.
+TeamProblem team_of_three(unsigned seed, const std::set<std::uint32_t>& at) {
+  TeamProblem problem = random_team_problem({.robots = {2, 4, 6},
+                                             .pairs = {{4, 6}},
+                                             .keyframes = kKeyframes,
+                                             .closures = 8,
+                                             .start_sigma = 0.0},
+                                            seed);
+  std::mt19937 rng(seed);
+  for (const std::uint32_t k : at) {
+    const KeyframeId from{2, k}, to{4, kKeyframes - 1 - k};
+    const SE3 T = problem.start.at(2)[from.index].inverse() * problem.start.at(4)[to.index];
+    const Vector6 noise = 0.02 * random_vector<6>(rng);
+    problem.edges.push_back({from, to, T * se3_exp(noise), problem.edges.front().precision});
+  }
+  return problem;
+}
+
+// Closures of robots 2 and 4 at one place that is taken for another.
+std::set<ClosureId> add_false(TeamProblem& problem, std::uint32_t first, std::uint32_t count) {
+  std::set<ClosureId> added;
+  std::mt19937 rng(first);
+  const SE3 off = random_pose(rng, 20.0);
+  for (std::uint32_t k = first; k < first + count; ++k) {
+    const KeyframeId from{2, k}, to{4, k};
+    const SE3 T = problem.start.at(2)[k].inverse() * off * problem.start.at(4)[k];
+    problem.edges.push_back({from, to, T, problem.edges.front().precision});
+    added.insert(problem.edges.back().id());
+  }
+  return added;
+}
+
+TeamProblem without(TeamProblem problem, const std::set<ClosureId>& closures) {
+  std::erase_if(problem.edges, [&](const PoseEdge& e) { return closures.contains(e.id()); });
+  return problem;
+}
+
+void add_robots(TeamNetwork& network, const TeamProblem& problem,
+                const MemberSolverFactory& factory = solver_choice({})) {
+  for (const auto& [robot, start] : problem.start)
+    feed(network.add({robot, 100U + robot}, {}, factory), robot, problem);
+}
+
+const OptimizerProgress& progress_of(const TeamNetwork& network, RobotId robot) {
+  return network.robots.at(robot).progress;
+}
+
+bool has_notice(const TeamNetwork& network, RobotId robot, const std::string& text) {
+  return std::ranges::any_of(network.robots.at(robot).notices, [&](const std::string& notice) {
+    return notice.find(text) != notice.npos;
+  });
+}
+
+}  // namespace
+
+TEST_CASE("Robots that closures at one place join are tentative, and are told so",
+          "[pose_graph][tentative]") {
+  const std::uint32_t count = GENERATE(1U, 5U);  // closures at this place
+  CAPTURE(count);
+  std::set<std::uint32_t> at;
+  for (std::uint32_t k = 0; k < count; ++k) at.insert(10 + k);
+  const TeamProblem problem = team_of_three(1, at);
+  TeamNetwork network;
+  add_robots(network, problem);
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  CHECK(progress_of(network, 2).tentative == Robots{4, 6});
+  CHECK(progress_of(network, 4).tentative == Robots{2});
+  CHECK(progress_of(network, 6).tentative == Robots{2});
+  for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
+    CHECK(progress_of(network, robot).untied.empty());
+    CHECK(progress_of(network, robot).anchor == 2);
+    CHECK(has_notice(network, robot, "joined tentatively"));
+  }
+}
+
+TEST_CASE("A place that is taken for another joins robots tentatively until two others correct it",
+          "[pose_graph][tentative]") {
+  const unsigned seed = GENERATE(range(1U, 7U));
+  const std::uint32_t count = GENERATE(1U, 3U);
+  CAPTURE(seed, count);
+  TeamProblem all = team_of_three(seed, {8, 9, 30, 31, 50});
+  const std::set<ClosureId> wrong = add_false(all, 20, count);
+  std::set<ClosureId> later;
+  for (const PoseEdge& e : all.edges)
+    if (e.from.robot == 2 && e.to.robot == 4 && !wrong.contains(e.id())) later.insert(e.id());
+  TeamNetwork network(seed);
+  add_robots(network, without(all, later));
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  CHECK(progress_of(network, 2).tentative == Robots{4, 6});
+
+  for (const RobotId robot : {RobotId{2}, RobotId{4}}) {
+    for (const PoseEdge& e : all.edges)
+      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e));
+    (void)network.agent(robot).add(inlier_set(all, 2, 4, 2));
+  }
+  const std::uint32_t sessions = network.agent(2).part()->session().id.number;
+  (void)network.run(1.0);
+  REQUIRE(settle(network));
+  CHECK(network.agent(2).part()->session().id.number == sessions + 1);
+  (void)network.run(5.0);
+  for (const ClosureId& id : wrong) CHECK_FALSE(network.agent(2).decided().at(id));
+  for (const ClosureId& id : later) CHECK(network.agent(2).decided().at(id));
+  for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}})
+    CHECK(progress_of(network, robot).tentative.empty());
+  CHECK(has_notice(network, 2, "no longer tentative"));
+  const CentralProblem whole(without(all, wrong));
+  CHECK(whole.cost(network.trajectories()) == Approx(whole.optimum(all.start)).epsilon(kTolerance));
+}
+
+TEST_CASE("Robots whose closures are all rejected publish in two frames, until others join them",
+          "[pose_graph][tentative]") {
+  const TeamProblem problem = team_of_three(3, {8, 9, 30, 31});
+  bool rejects = true;
+  const MemberSolverFactory factory = [&](const Session&, SessionGraph graph, TreePlace place) {
+    GatherSolver::Options options;
+    if (rejects)
+      for (const PoseEdge& e : graph.between)
+        if (std::min(e.from.robot, e.to.robot) == 2) options.rejects.insert(e.id());
+    return std::make_unique<GatherSolver>(std::move(graph), std::move(place), options);
+  };
+  TeamNetwork network;
+  add_robots(network, problem, factory);
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  CHECK(progress_of(network, 2).untied == Robots{4, 6});
+  CHECK(progress_of(network, 4).untied == Robots{2});
+  CHECK(progress_of(network, 2).anchor == 2);
+  for (const RobotId robot : {RobotId{4}, RobotId{6}}) {
+    CHECK(progress_of(network, robot).anchor == 4);
+    CHECK(network.robots.at(robot).trajectory->anchor == 4);
+    CHECK(has_notice(network, robot, "no accepted closure"));
+  }
+  // The frame of an anchor is that of its odometry.
+  CHECK(network.robots.at(4).trajectory->T_world_kf.front().isApprox(SE3::Identity(), 1e-6));
+
+  rejects = false;
+  for (const RobotId robot : {RobotId{2}, RobotId{4}})
+    (void)network.agent(robot).add(inlier_set(problem, 2, 4, 2));
+  (void)network.run(1.0);
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
+    CHECK(progress_of(network, robot).untied.empty());
+    CHECK(progress_of(network, robot).anchor == 2);
+    CHECK(network.robots.at(robot).trajectory->anchor == 2);
+  }
+}
+
+}  // namespace km
