@@ -40,7 +40,7 @@ struct ScenarioResult {
   std::size_t false_closures = 0;
   std::size_t false_kept = 0;
   std::size_t frames = 1;     ///< Number of separate frames in the result.
-  std::size_t tentative = 0;  ///< Number of robots whose place hangs on one place; see FrameTies.
+  std::size_t tentative = 0;  ///< Number of robots joined tentatively, see FrameTies.
   /// Errors of positions. Each frame of the result is aligned to the truth by one rigid transform.
   double rms_m = 0.0;
   double max_m = 0.0;

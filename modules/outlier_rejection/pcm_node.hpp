@@ -25,7 +25,7 @@ namespace km {
 /// Channels of the PCM node; they must outlive it.
 struct PcmTopics {
   In<Closure> closures;            ///< Own and received ones, in any order, repeated or not.
-  In<KeyframeOdometry> keyframes;  ///< Of this robot: the clock of PcmConfig::witness_wait_s.
+  In<KeyframeOdometry> keyframes;  ///< Keyframes of this robot; clock of witness_wait_s.
   In<PeerEvent> restarts;          ///< kRestarted, before the first closure of the new incarnation.
   Out<InlierSet> inlier_sets;      ///< Versions ascending per pair.
 };
@@ -37,9 +37,9 @@ struct PcmTopics {
 /// PcmConfig::selection states the rule. By default all closures are optimised, because the
 /// optimiser weighs them. Two robots are joined only when independent closures agree
 /// (WitnessedPair), when PcmConfig::witness_wait_s is over, or when no witness can arrive any more.
-/// The latter two are logged. The wait is in sensor time, which the stamps of the robot's keyframes
-/// tell, so results do not depend on the speed of a replay. Closures inside the robot join nothing
-/// and are published at once.
+/// The latter two are logged. The wait is in sensor time, by the stamps of the robot's keyframes,
+/// so results do not depend on the speed of a replay. Closures inside the robot join nothing and
+/// are published at once.
 class PcmNode final : public Node {
  public:
   /// The versions of its sets follow `first_version`: those of a robot that is resumed must be

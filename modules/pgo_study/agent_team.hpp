@@ -23,7 +23,7 @@ struct AgentTeamRun {
   std::vector<SE3> T_world_kf;    ///< Published poses, in the numbering of the graph.
   std::vector<RobotId> world_of;  ///< By robot: id of the robot whose odometry frame is its
                                   ///< `world`.
-  std::vector<bool> tentative;    ///< By robot: its place in `world` hangs on a single place.
+  std::vector<bool> tentative;    ///< By robot: closures at a single place tie it to `world`.
   std::vector<bool> kept;         ///< By edge of the graph: used in the published solution.
   bool settled = false;           ///< False: the run ended at longest_s.
   double seconds = 0.0;           ///< Virtual time of the last change [s].

@@ -40,7 +40,8 @@ std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses) {
       last = offer.peer;
       const EdgeSetOffer* theirs = newest_offer(other->second, a);
       const std::uint32_t places = theirs ? std::min(offer.places, theirs->places) : 0;
-      if (places > 0) ties.push_back({a, offer.peer, places});
+      if (places == 0) continue;
+      ties.push_back({a, offer.peer, places, offer.contested || theirs->contested});
     }
   }
   return ties;
@@ -55,7 +56,8 @@ FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
   std::set<RobotTie> uncertain;
   for (const RobotTie& tie : ties)
     if (tie.places == 1 && is_bridge(tie)) uncertain.insert(tie);
-  const std::set<RobotId> tied = reached(self, ties, [](const RobotTie&) { return true; });
+  const std::set<RobotId> tied = reached(
+      self, ties, [&](const RobotTie& tie) { return !tie.contested || !uncertain.contains(tie); });
   const std::set<RobotId> certain =
       reached(self, ties, [&](const RobotTie& tie) { return !uncertain.contains(tie); });
   FrameTies result;

@@ -16,6 +16,7 @@ struct RobotTie {
   RobotId a = 0;  ///< a < b.
   RobotId b = 0;
   std::uint32_t places = 0;  ///< At least 1.
+  bool contested = false;    ///< One place, and another one that is as likely contradicts it.
   auto operator<=>(const RobotTie&) const = default;
 };
 
@@ -25,9 +26,10 @@ struct RobotTie {
 
 /// Robots whose place relative to one robot is not certain.
 struct FrameTies {
-  /// A single place ties these robots: if two places look alike there, they are elsewhere.
+  /// A single place ties these robots: if it only looks like another place, they are elsewhere.
   std::vector<RobotId> tentative = {};
-  /// No closure ties these robots: nothing is known about their place.
+  /// No closure ties these robots, or closures at two places that contradict each other: nothing is
+  /// known about their place.
   std::vector<RobotId> untied = {};
   bool operator==(const FrameTies&) const = default;
 };

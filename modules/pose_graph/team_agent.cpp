@@ -143,7 +143,7 @@ void TeamAgent::forget_measured(RobotId robot) {
   std::erase_if(decided_, [&](const auto& decision) { return touches(decision.first, robot); });
   std::erase_if(chances_, [&](const auto& chance) { return touches(chance.first, robot); });
   std::erase_if(verdicts_, [&](const auto& verdict) { return touches(verdict.first, robot); });
-  places_.clear();
+  counted_.clear();
   plan_outdated_ = true;
 }
 
@@ -238,20 +238,26 @@ TeamOutput TeamAgent::step(double now_s) {
   return output;
 }
 
-std::uint32_t TeamAgent::places_in(const EdgeSetOffer& offer) {
-  const auto [entry, is_new] = places_.try_emplace({offer.peer, offer.id}, 0);
-  if (!is_new) return entry->second;
-  std::vector<PoseEdge> accepted;
-  for (const PoseEdge& closure : *graph_.edges(offer.peer, offer.id)) {
-    const auto decided = decided_.find(closure.id());
-    if (decided == decided_.end() || decided->second) accepted.push_back(closure);
+void TeamAgent::count_places(EdgeSetOffer& offer) {
+  const auto [entry, is_new] = counted_.try_emplace({offer.peer, offer.id}, offer);
+  if (is_new) {
+    std::vector<PoseEdge> accepted, rejected;
+    for (const PoseEdge& closure : *graph_.edges(offer.peer, offer.id)) {
+      const auto decided = decided_.find(closure.id());
+      const bool is_accepted = decided == decided_.end() || decided->second;
+      (is_accepted ? accepted : rejected).push_back(closure);
+    }
+    const std::vector<std::size_t> rivals = find_places(rejected).sizes;
+    entry->second.places = static_cast<std::uint32_t>(find_places(accepted).sizes.size());
+    entry->second.contested = entry->second.places == 1 && !rivals.empty() &&
+                              *std::ranges::max_element(rivals) >= accepted.size();
   }
-  return entry->second = static_cast<std::uint32_t>(find_places(accepted).sizes.size());
+  offer = entry->second;
 }
 
 TeamStatus TeamAgent::make_status() {
   std::vector<EdgeSetOffer> offers = graph_.offers();
-  for (EdgeSetOffer& offer : offers) offer.places = places_in(offer);
+  for (EdgeSetOffer& offer : offers) count_places(offer);
   return {.sender = self_,
           .hears = relay_.hears(),
           .frame = frame_,

@@ -128,7 +128,7 @@ class TeamAgent {
   bool take(const TeamPeer& sender, const SessionLetter& letter);
   bool refuse(const std::string& what);
   [[nodiscard]] TeamStatus make_status();
-  [[nodiscard]] std::uint32_t places_in(const EdgeSetOffer& offer);
+  void count_places(EdgeSetOffer& offer);
   [[nodiscard]] std::uint32_t revision() const { return graph_.revision() + reconsidered_; }
   void send_status(TeamOutput& output);
   void hand_out(TeamOutput& output);
@@ -185,7 +185,7 @@ class TeamAgent {
   std::map<RobotId, Peer> peers_;
   ToldPoses told_;  // the newest poses, including those of this robot
   std::map<ClosureId, bool> decided_;
-  std::map<std::pair<RobotId, EdgeSetId>, std::uint32_t> places_;  // see places_in()
+  std::map<std::pair<RobotId, EdgeSetId>, EdgeSetOffer> counted_;  // see count_places()
   std::map<ClosureId, int> chances_;                               // used by rejected closures
   bool reconsider_due_ = false;      // once all members have sent the solution
   std::uint32_t reconsidered_ = 0;   // number of times that closures became undecided again
@@ -197,7 +197,7 @@ class TeamAgent {
   std::set<RobotId> component_;  // robots that links connect to this one
 
   SessionPlan plan_;   // from the present knowledge
-  FrameTies ties_;     // of its members
+  FrameTies ties_;     // between its members
   FrameTies noticed_;  // in the last notice
   bool plan_outdated_ = true;
   double plan_changed_s_ = -1e9;      // time of the last change of its graph

@@ -448,7 +448,7 @@ void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
     if (is_new && !for_good) provisional_.insert(id);
     decided_[id] = verdicts_[id] = kept;
   }
-  places_.clear();
+  counted_.clear();
   plan_outdated_ = true;
   verdicts_due_.emplace();
   for (const auto& [id, kept] : verdicts_) verdicts_due_->closures.push_back({id, kept});
@@ -456,7 +456,7 @@ void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
 
 void TeamAgent::decide_anew() {
   for (const ClosureId& id : std::exchange(provisional_, {})) decided_.erase(id);
-  places_.clear();
+  counted_.clear();
   noise_ = team_noise_;
 }
 
@@ -492,7 +492,7 @@ void TeamAgent::reconsider() {
   }
   if (!any) return;
   ++reconsidered_;
-  places_.clear();
+  counted_.clear();
   plan_outdated_ = true;
 }
 

@@ -21,7 +21,7 @@ constexpr std::size_t kMaxOffers = 8 * kMaxTeam;
 
 // Smallest size of an element of each list [bytes]; it limits the memory that decoding reserves.
 constexpr std::size_t kPeerBytes = 1 + 8;
-constexpr std::size_t kOfferBytes = 1 + 1 + 1 + 8 + 1;
+constexpr std::size_t kOfferBytes = 1 + 1 + 1 + 8 + 1 + 1;
 constexpr std::size_t kMemberBytes = kPeerBytes + 1 + 1;
 constexpr std::size_t kPairBytes = 1 + 1 + 1 + 8;
 constexpr std::size_t kPoseBytes = 1 + 7 * 4;
@@ -51,6 +51,7 @@ class MessageWriter {
       out_.varint(offer.edges);
       put(offer.id);
       out_.varint(offer.places);
+      put(offer.contested);
     }
     put(m.method);
     put(m.T_odom_first);
@@ -203,7 +204,7 @@ class MessageReader {
     m.revision = u32();
     m.offers.resize(in_.count(kMaxOffers, kOfferBytes));
     for (std::size_t k = 0; k < m.offers.size(); ++k) {
-      m.offers[k] = {robot(), u32(), edge_set(), u32()};
+      m.offers[k] = {robot(), u32(), edge_set(), u32(), flag()};
       require(k == 0 || m.offers[k - 1].peer <= m.offers[k].peer, "offers do not ascend");
       require(m.offers[k].peer != m.sender.robot, "an offer to its own robot");
       require(m.offers[k].edges > 0, "an offer without edges");

@@ -25,7 +25,7 @@ TeamStatus some_status() {
           .frame_version = 5,
           .keyframes = 1000,
           .revision = 1007,
-          .offers = {{2, 12, {3, 0xABCDEF0123456789}}, {2, 9, {2, 5}}, {60000, 1, {1, 77}}},
+          .offers = {{2, 12, {3, 0xABCDEF0123456789}, 3}, {2, 9, {2, 5}, 1, true}, {60000, 1, {1, 77}}},
           .method = PgoMethod::kRbcd,
           .T_odom_first = random_pose(random, 2.0),
           .upright = true,

@@ -12,8 +12,8 @@ using Robots = std::vector<RobotId>;
 constexpr std::uint32_t kKeyframes = 60;
 constexpr double kTolerance = 1e-6;  // relative to the cost
 
-// Three robots; closures at several places tie robots 4 and 6. The closures of 2 with 4 are
-// `of_pair`, at these keyframes of robot 2.
+// Three robots; closures at several places tie robots 4 and 6. The closures of 2 with 4
+// are at these keyframes of robot 2.
 TeamProblem team_of_three(unsigned seed, const std::set<std::uint32_t>& at) {
   TeamProblem problem = random_team_problem({.robots = {2, 4, 6},
                                              .pairs = {{4, 6}},
@@ -31,7 +31,7 @@ TeamProblem team_of_three(unsigned seed, const std::set<std::uint32_t>& at) {
   return problem;
 }
 
-// Closures of robots 2 and 4 at one place that is taken for another.
+// Closures of robots 2 and 4 at one place that is mistaken for another.
 std::set<ClosureId> add_false(TeamProblem& problem, std::uint32_t first, std::uint32_t count) {
   std::set<ClosureId> added;
   std::mt19937 rng(first);
@@ -68,7 +68,7 @@ bool has_notice(const TeamNetwork& network, RobotId robot, const std::string& te
 
 }  // namespace
 
-TEST_CASE("Robots that closures at one place join are tentative, and are told so",
+TEST_CASE("Robots that closures at one place join are tentative, and report it",
           "[pose_graph][tentative]") {
   const std::uint32_t count = GENERATE(1U, 5U);  // closures at this place
   CAPTURE(count);
@@ -89,8 +89,9 @@ TEST_CASE("Robots that closures at one place join are tentative, and are told so
   }
 }
 
-TEST_CASE("A place that is taken for another joins robots tentatively until two others correct it",
-          "[pose_graph][tentative]") {
+TEST_CASE(
+    "A place that is mistaken for another joins robots tentatively until two others correct it",
+    "[pose_graph][tentative]") {
   const unsigned seed = GENERATE(range(1U, 7U));
   const std::uint32_t count = GENERATE(1U, 3U);
   CAPTURE(seed, count);
@@ -122,6 +123,22 @@ TEST_CASE("A place that is taken for another joins robots tentatively until two 
   CHECK(has_notice(network, 2, "no longer tentative"));
   const CentralProblem whole(without(all, wrong));
   CHECK(whole.cost(network.trajectories()) == Approx(whole.optimum(all.start)).epsilon(kTolerance));
+}
+
+TEST_CASE("Robots with two single closures that contradict each other are not joined",
+          "[pose_graph][tentative]") {
+  const unsigned seed = GENERATE(range(1U, 7U));
+  CAPTURE(seed);
+  TeamProblem problem = team_of_three(seed, {8});
+  (void)add_false(problem, 40, 1);
+  TeamNetwork network(seed);
+  add_robots(network, problem);
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  CHECK(progress_of(network, 2).untied == Robots{4, 6});
+  CHECK(progress_of(network, 4).untied == Robots{2});
+  CHECK(progress_of(network, 4).anchor == 4);
+  CHECK(progress_of(network, 4).tentative.empty());
 }
 
 TEST_CASE("Robots whose closures are all rejected publish in two frames, until others join them",
