@@ -18,18 +18,19 @@ constexpr TeamPeer kPeer60000{60000, 1};
 
 TeamStatus some_status() {
   std::mt19937 random(1);
-  return {.sender = kPeer7,
-          .number = 300,
-          .hears = {kPeer2, kPeer60000},
-          .frame = kPeer2,
-          .frame_version = 5,
-          .keyframes = 1000,
-          .revision = 1007,
-          .offers = {{2, 12, {3, 0xABCDEF0123456789}, 3}, {2, 9, {2, 5}, 1, true}, {60000, 1, {1, 77}}},
-          .method = PgoMethod::kRbcd,
-          .T_odom_first = random_pose(random, 2.0),
-          .upright = true,
-          .holds = 0xFEDCBA9876543210};
+  return {
+      .sender = kPeer7,
+      .number = 300,
+      .hears = {kPeer2, kPeer60000},
+      .frame = kPeer2,
+      .frame_version = 5,
+      .keyframes = 1000,
+      .revision = 1007,
+      .offers = {{2, 12, {3, 0xABCDEF0123456789}, 3}, {2, 9, {2, 5}, 1, true}, {60000, 1, {1, 77}}},
+      .method = PgoMethod::kRbcd,
+      .T_odom_first = random_pose(random, 2.0),
+      .upright = true,
+      .holds = 0xFEDCBA9876543210};
 }
 
 Session some_session() {
