@@ -44,7 +44,7 @@ SessionPart::SessionPart(Session session, TeamPeer self, FrozenPart part,
 }
 
 const MemberPoses* SessionPart::told_by(const ToldPoses& told, RobotId robot,
-                                        std::uint32_t stage) const {
+                                        MemberStage stage) const {
   const auto member = boot_of_.find(robot);
   const auto poses = told.find(robot);
   const bool has = member != boot_of_.end() && poses != told.end() &&
@@ -54,10 +54,11 @@ const MemberPoses* SessionPart::told_by(const ToldPoses& told, RobotId robot,
 }
 
 bool SessionPart::all_solved(const ToldPoses& told) const {
-  return stage_ == 1U && std::all_of(boot_of_.begin(), boot_of_.end(), [&](const auto& member) {
+  return stage_ == MemberStage::kSolved &&
+         std::all_of(boot_of_.begin(), boot_of_.end(), [&](const auto& member) {
            if (member.first == self_.robot) return true;
-           const MemberPoses* poses = told_by(told, member.first, 1);
-           return poses != nullptr && poses->stage == 1;
+           const MemberPoses* poses = told_by(told, member.first, MemberStage::kSolved);
+           return poses != nullptr && poses->stage == MemberStage::kSolved;
          });
 }
 
@@ -69,10 +70,10 @@ std::vector<SessionLetter> SessionPart::advance(const ToldPoses& told, double no
   worked_ = false;
   if (!stage_) {
     worked_ = enter(told);
-  } else if (*stage_ == 0 && !solver_) {
+  } else if (*stage_ == MemberStage::kEntered && !solver_) {
     worked_ = gather(told);
     if (worked_) start_solver(now_s);
-  } else if (*stage_ == 0 && (solver_->ready() || solver_->done())) {
+  } else if (*stage_ == MemberStage::kEntered && (solver_->ready() || solver_->done())) {
     worked_ = true;
     solve(now_s);
   }
@@ -88,7 +89,7 @@ bool SessionPart::enter(const ToldPoses& told) {
     T = SinglePose::of(T).pose();
   }
   committed_ = graph_.start;
-  stage_ = 0;
+  stage_ = MemberStage::kEntered;
   return true;
 }
 
@@ -100,7 +101,7 @@ bool SessionPart::align(const ToldPoses& told) {
         graph_.between.begin(), graph_.between.end(),
         [&](const PoseEdge& e) { return e.other(self_.robot).robot == member.peer.robot; });
     if (!neighbour) continue;
-    const MemberPoses* of_member = told_by(told, member.peer.robot, 0);
+    const MemberPoses* of_member = told_by(told, member.peer.robot, MemberStage::kEntered);
     if (of_member == nullptr) return false;
     add_told(*of_member, poses);
   }
@@ -121,10 +122,11 @@ bool SessionPart::align(const ToldPoses& told) {
 
 bool SessionPart::gather(const ToldPoses& told) {
   for (const auto& [robot, boot] : boot_of_)
-    if (robot != self_.robot && told_by(told, robot, 0) == nullptr) return false;
+    if (robot != self_.robot && told_by(told, robot, MemberStage::kEntered) == nullptr)
+      return false;
   for (const auto& [robot, boot] : boot_of_) {
     if (robot == self_.robot) continue;
-    const MemberPoses& poses = *told_by(told, robot, 0);
+    const MemberPoses& poses = *told_by(told, robot, MemberStage::kEntered);
     add_told(poses, graph_.told);
     graph_.step_precision[robot] = poses.step_precision;
     combine_decisions(poses);
@@ -179,12 +181,12 @@ void SessionPart::solve(double now_s) {
   remember_round();
   if (!solver_->done()) return;
   if (solver_->state().failed) return fail("the team's equations cannot be solved");
-  stage_ = 1;
+  stage_ = MemberStage::kSolved;
 }
 
 void SessionPart::fail(const std::string& why) {
   failure_ = why;
-  stage_ = 2;
+  stage_ = MemberStage::kFailed;
 }
 
 void SessionPart::remember_round() {
@@ -258,7 +260,7 @@ ClosureVerdicts SessionPart::verdicts() const {
 }
 
 const std::vector<SE3>& SessionPart::poses() const {
-  if (stage_ == 2U) return committed_;
+  if (stage_ == MemberStage::kFailed) return committed_;
   return solver_ ? solver_->poses() : graph_.start;
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "modules/pose_graph/frame_alignment.hpp"
+#include "modules/pose_graph/frozen_part.hpp"
 #include "modules/pose_graph/letter_book.hpp"
 #include "modules/pose_graph/member_solver.hpp"
 #include "modules/pose_graph/session_graph.hpp"
@@ -23,28 +24,12 @@ namespace km {
 using MemberSolverFactory = std::function<std::unique_ptr<MemberSolver>(
     const Session& session, SessionGraph graph, TreePlace place)>;
 
-/// The newest poses received from each of the other robots.
-using ToldPoses = std::map<RobotId, MemberPoses>;
-
-/// The contribution of a robot to a session, frozen when it joins.
-struct FrozenPart {
-  /// `start` is in the present frame of the robot, `told` has the poses of absent robots, and
-  /// `step_precision` has the entry of this robot. The members supply the rest.
-  SessionGraph graph = {};
-  TreePlace place = {};
-  bool in_frame = false;  ///< `start` is already in the frame of the session.
-  /// False closures are likely. The trajectory is then not deformed to fit closures.
-  bool suspicious = true;
-  std::vector<KeyframeIndex> public_keyframes = {};  ///< Ascending, 0 first.
-};
-
 /// The part of one robot in one session, from joining it to its end, in stages.
 ///
 /// First the robot enters the frame of the session. If it is in another frame, it waits for its
 /// neighbours that precede it in the order of the session, and is aligned to them. Its public poses
-/// are then rounded to single precision and ready to be sent (stage 0). Once the public poses of
-/// all members have arrived, its solver begins. Members exchange messages until the solver is done
-/// (stage 1) or fails (stage 2).
+/// are then rounded to single precision and ready to be sent. Once the public poses of all members
+/// have arrived, its solver begins. Members exchange messages until the solver is done or fails.
 ///
 /// A session may end early at any time, and its members are then in different rounds. Each member
 /// therefore keeps the poses of the last rounds. From time to time the coordinator sends the last
@@ -73,14 +58,13 @@ class SessionPart {
   /// Declares a round completed by all members.
   void commit(std::uint32_t round);
 
-  /// nullopt before the robot has entered the frame, then 0; 1 with the solution; 2 after a
-  /// failure.
-  [[nodiscard]] std::optional<std::uint32_t> stage() const { return stage_; }
+  /// nullopt before the robot has entered the frame.
+  [[nodiscard]] std::optional<MemberStage> stage() const { return stage_; }
   [[nodiscard]] const std::string& failure() const { return failure_; }
   /// Poses that a member has sent in this session at `stage` or later; nullptr if there are none.
   [[nodiscard]] const MemberPoses* told_by(const ToldPoses& told, RobotId robot,
-                                           std::uint32_t stage) const;
-  /// True if all members, including this one, have sent poses of stage 1.
+                                           MemberStage stage) const;
+  /// True if all members, including this one, have sent their part of the solution.
   [[nodiscard]] bool all_solved(const ToldPoses& told) const;
   /// True if `closure` is between this robot and another member.
   [[nodiscard]] bool joins_members(const ClosureId& closure) const;
@@ -134,7 +118,7 @@ class SessionPart {
   std::vector<RobotId> refused_;  // senders of early messages that the solver refused
   std::vector<SessionLetter> to_send_;
   std::unique_ptr<MemberSolver> solver_;
-  std::optional<std::uint32_t> stage_;
+  std::optional<MemberStage> stage_;
   std::string failure_;
   std::deque<std::pair<std::uint32_t, std::vector<SE3>>> rounds_;  // poses of the last rounds
   std::vector<SE3> committed_;

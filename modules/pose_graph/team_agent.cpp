@@ -6,7 +6,6 @@
 #include <tuple>
 #include <utility>
 
-#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/stiefel.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/team_plan.hpp"
@@ -20,10 +19,6 @@ namespace {
 // Earliest time of a changed status, and of one with changed links [periods].
 constexpr double kEarlyStatus = 0.5;
 constexpr double kEarlyLinks = 0.05;
-
-// Largest number of distinct reasons of refusals: they contain robot ids, which a sender can
-// invent.
-constexpr std::size_t kReasons = 1000;
 
 bool same_content(const TeamStatus& a, const TeamStatus& b) {
   const auto rest = [](const TeamStatus& s) {
@@ -45,7 +40,7 @@ bool in_order(const MemberPoses& poses) {
   return !keyframes.empty() && keyframes.front() == 0 &&
          std::adjacent_find(keyframes.begin(), keyframes.end(), std::greater_equal<>()) ==
              keyframes.end() &&
-         poses.T_frame_kf.size() == keyframes.size() && poses.stage <= 2 &&
+         poses.T_frame_kf.size() == keyframes.size() &&
          std::all_of(poses.T_frame_kf.begin(), poses.T_frame_kf.end(), finite) &&
          step.kappa > 0.0 && step.tau > 0.0 && std::isfinite(step.kappa + step.tau);
 }
@@ -65,16 +60,9 @@ TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverF
       graph_(self.robot),
       relay_(self, config_.status_period_s),
       component_{self.robot},
-      frame_(self) {}
-
-bool TeamAgent::refuse(const std::string& what) {
-  const bool told_apart = refused_.size() < kReasons || refused_.contains(what);
-  const std::string& reason = told_apart ? what : "for reasons of which there are too many";
-  const std::size_t times = ++refused_[reason];
-  const bool power_of_two = (times & (times - 1)) == 0;
-  if (power_of_two) notices_.push_back("refused (" + std::to_string(times) + " times): " + reason);
-  return false;
-}
+      schedule_(config_),
+      frame_(self),
+      notices_(self.robot) {}
 
 bool TeamAgent::add(const KeyframeOdometry& keyframe) {
   const bool taken = graph_.add(keyframe);
@@ -140,10 +128,7 @@ void TeamAgent::peer_restarted(const TeamPeer& peer) {
 
 void TeamAgent::forget_measured(RobotId robot) {
   graph_.forget(robot);
-  std::erase_if(decided_, [&](const auto& decision) { return touches(decision.first, robot); });
-  std::erase_if(chances_, [&](const auto& chance) { return touches(chance.first, robot); });
-  std::erase_if(verdicts_, [&](const auto& verdict) { return touches(verdict.first, robot); });
-  counted_.clear();
+  decisions_.forget(robot);
   plan_outdated_ = true;
 }
 
@@ -206,17 +191,21 @@ bool TeamAgent::take(const TeamPeer& sender, const MemberPoses& poses) {
   if (!in_order(poses))
     return refuse("poses of robot " + std::to_string(sender.robot) + " that are not in order");
   plan_outdated_ = true;
-  const bool in_it = part_ && part_->told_by(told_, sender.robot, 0) != nullptr;
+  const auto is_member = [&] {
+    return part_ && part_->told_by(told_, sender.robot, MemberStage::kEntered) != nullptr;
+  };
+  const bool was_member = is_member();
   told_[sender.robot] = poses;
-  deserted_ |= in_it && poses.session != part_->session().id;
-  if (!part_ || part_->told_by(told_, sender.robot, 0) == nullptr) return true;
+  if (was_member && poses.session != part_->session().id && state_ == SessionState::kRunning)
+    state_ = SessionState::kDeserted;
+  if (!is_member()) return true;
   if (in_session()) part_->moved(now_s_);
-  if (solved_) decide_with(poses);
+  if (state_ == SessionState::kSolved) decide_with(poses);
   return true;
 }
 
 bool TeamAgent::take(const TeamPeer& sender, const SessionLetter& letter) {
-  if (!part_ || over_ || letter.session != part_->session().id) return true;  // too early or late
+  if (!in_session() || letter.session != part_->session().id) return true;  // too early or late
   return part_->receive(letter, now_s_) ||
          refuse("a letter of robot " + std::to_string(sender.robot) + " that is of no use");
 }
@@ -233,31 +222,15 @@ TeamOutput TeamAgent::step(double now_s) {
   send_status(output);
   if (graph_.keyframes() > 0) publish(output);
   hand_out(output);
-  output.verdicts = std::exchange(verdicts_due_, std::nullopt);
-  output.notices = std::exchange(notices_, {});
+  output.verdicts = decisions_.take_verdicts();
+  output.notices = notices_.take();
   return output;
-}
-
-void TeamAgent::count_places(EdgeSetOffer& offer) {
-  const auto [entry, is_new] = counted_.try_emplace({offer.peer, offer.id}, offer);
-  if (is_new) {
-    std::vector<PoseEdge> accepted, rejected;
-    for (const PoseEdge& closure : *graph_.edges(offer.peer, offer.id)) {
-      const auto decided = decided_.find(closure.id());
-      const bool is_accepted = decided == decided_.end() || decided->second;
-      (is_accepted ? accepted : rejected).push_back(closure);
-    }
-    const std::vector<std::size_t> rivals = find_places(rejected).sizes;
-    entry->second.places = static_cast<std::uint32_t>(find_places(accepted).sizes.size());
-    entry->second.contested = entry->second.places == 1 && !rivals.empty() &&
-                              *std::ranges::max_element(rivals) >= accepted.size();
-  }
-  offer = entry->second;
 }
 
 TeamStatus TeamAgent::make_status() {
   std::vector<EdgeSetOffer> offers = graph_.offers();
-  for (EdgeSetOffer& offer : offers) count_places(offer);
+  for (EdgeSetOffer& offer : offers)
+    decisions_.count_places(offer, *graph_.edges(offer.peer, offer.id));
   return {.sender = self_,
           .hears = relay_.hears(),
           .frame = frame_,
@@ -334,7 +307,7 @@ std::optional<TeamAgent::World> TeamAgent::tied_world() const {
 }
 
 const std::vector<SE3>& TeamAgent::poses() const {
-  return part_ && !over_ && part_->stage() ? part_->poses() : poses_;
+  return in_session() && part_->stage() ? part_->poses() : poses_.T_frame_kf();
 }
 
 void TeamAgent::publish(TeamOutput& output) {
@@ -362,7 +335,7 @@ OptimizerProgress TeamAgent::make_progress() const {
   progress.seconds = optimising_s_;
   if (!part_) return progress;
   const Session& session = part_->session();
-  if (!over_ || solved_) {
+  if (in_session() || state_ == SessionState::kSolved) {
     progress.members = part_->members();
     progress.tentative = ties_.tentative;
     progress.untied = ties_.untied;
@@ -371,7 +344,7 @@ OptimizerProgress TeamAgent::make_progress() const {
   progress.cost = session.finished ? session.cost : part_->state().cost;
   progress.gradient_norm = session.finished ? session.gradient : part_->state().gradient;
   progress.seconds += part_->moved_s() - started_s_;
-  progress.settled = over_ && session.finished && !publish_due_ && holds_all(session.plan);
+  progress.settled = !in_session() && session.finished && !publish_due_ && holds_all(session.plan);
   return progress;
 }
 

@@ -11,12 +11,16 @@
 #include <vector>
 
 #include "modules/core/closure_verdicts.hpp"
+#include "modules/pose_graph/closure_decisions.hpp"
 #include "modules/pose_graph/frame_ties.hpp"
 #include "modules/pose_graph/own_graph.hpp"
+#include "modules/pose_graph/own_poses.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
 #include "modules/pose_graph/relay.hpp"
 #include "modules/pose_graph/session_part.hpp"
+#include "modules/pose_graph/session_schedule.hpp"
 #include "modules/pose_graph/team_messages.hpp"
+#include "modules/pose_graph/team_notices.hpp"
 
 namespace km {
 
@@ -41,22 +45,19 @@ struct [[nodiscard]] TeamOutput {
 /// its own sessions. SessionPart implements a session of one member; a factory supplies the solver
 /// of its graph.
 ///
-/// New measurements do not interrupt a session. The next one waits until the bytes of the last one
-/// are paid for and it is worth its own bytes. A session ends early when links to a member no
-/// longer exist. Links that return at once (see Relay) do no harm, because messages are repeated
-/// and find other ways. The members of the interrupted session return to the last round that all
-/// have completed, and the next session begins there.
+/// New measurements do not interrupt a session; see SessionSchedule for the time of the next one. A
+/// session ends early when links to a member no longer exist. Links that return at once (see Relay)
+/// do no harm, because messages are repeated and find other ways. The members of the interrupted
+/// session return to the last round that all have completed, and the next session begins there.
 ///
 /// The other robots hold the last public poses of a robot that is out of reach, so that they keep
 /// their frame and its measurements. When this robot returns, it catches up. If it returns as
 /// another process, its poses are discarded; if it returns with another incarnation, closures to it
 /// are discarded, too.
 ///
-/// Decisions on closures, and the estimate of their noise, carry over from session to session. Both
-/// robots of a closure exchange their decisions first. The decisions of a robot alone hold until it
-/// is in a team, which knows the noise better. Decisions of a team made with held poses hold until
-/// its next session, because the held poses may be wrong. Deferred closures that fit the solution
-/// become undecided again, and one more session weighs them.
+/// Decisions on closures carry over from session to session; see ClosureDecisions. Both robots of a
+/// closure exchange their decisions first. Deferred closures that fit the solution become undecided
+/// again, and one more session weighs them.
 ///
 /// A robot that closures at a single place tie to the others is joined tentatively; see FrameTies.
 /// If the team rejects all closures that tie some members, the robots on each side publish their
@@ -97,13 +98,24 @@ class TeamAgent {
   /// The present or last session of this robot.
   [[nodiscard]] const SessionPart* part() const { return part_ ? &*part_ : nullptr; }
   /// False if the session of part() has ended.
-  [[nodiscard]] bool in_session() const { return part_ && !over_; }
-  [[nodiscard]] const std::map<ClosureId, bool>& decided() const { return decided_; }
+  [[nodiscard]] bool in_session() const {
+    return state_ == SessionState::kRunning || state_ == SessionState::kDeserted;
+  }
+  [[nodiscard]] const std::map<ClosureId, bool>& decided() const { return decisions_.decided(); }
   [[nodiscard]] const Relay& relay() const { return relay_; }
   /// Number of refusals by reason.
-  [[nodiscard]] const std::map<std::string, std::size_t>& refused() const { return refused_; }
+  [[nodiscard]] const std::map<std::string, std::size_t>& refused() const {
+    return notices_.refused();
+  }
 
  private:
+  enum class SessionState {
+    kNone,  // there has been no session
+    kRunning,
+    kDeserted,   // it runs, and a member has joined another session
+    kAbandoned,  // it ended without a solution of all members
+    kSolved,     // it ended, and all members have its solution
+  };
   struct Peer {
     std::uint64_t boot = 0;
     std::optional<TeamStatus> status = {};
@@ -126,9 +138,8 @@ class TeamAgent {
   bool take(const TeamPeer& sender, const Session& session);
   bool take(const TeamPeer& sender, const MemberPoses& poses);
   bool take(const TeamPeer& sender, const SessionLetter& letter);
-  bool refuse(const std::string& what);
+  bool refuse(const std::string& what) { return notices_.refuse(what); }
   [[nodiscard]] TeamStatus make_status();
-  void count_places(EdgeSetOffer& offer);
   [[nodiscard]] std::uint32_t revision() const { return graph_.revision() + reconsidered_; }
   void send_status(TeamOutput& output);
   void hand_out(TeamOutput& output);
@@ -140,8 +151,7 @@ class TeamAgent {
   [[nodiscard]] bool has_moved_on() const;
   [[nodiscard]] bool should_open() const;
   [[nodiscard]] std::uint64_t price_bytes() const;
-  [[nodiscard]] bool paid_for() const;
-  [[nodiscard]] bool worthwhile() const;
+  [[nodiscard]] bool is_next_due() const;
   void open_session();
   void announce();
   [[nodiscard]] bool well_formed(const Session& session) const;
@@ -149,13 +159,11 @@ class TeamAgent {
   void consider(const Session& session);
 
   // The session that this robot is in.
-  void judge_odometry();
-  void notice_closure_noise();
   bool join(const Session& session);
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
-  void extend_poses();
-  [[nodiscard]] std::vector<PoseEdge> likely_closures(std::span<const PoseEdge> inside) const;
-  void try_chordal(const Session& session);
+  [[nodiscard]] bool expects_false() const {
+    return config_.robust && config_.method == PgoMethod::kNewton;
+  }
   void advance(TeamOutput& output);
   void enter_stage(TeamOutput& output);
   void tell_poses();
@@ -165,14 +173,12 @@ class TeamAgent {
   [[nodiscard]] bool has_failed() const;
   void decide(const std::vector<WeighedClosure>& verdicts);
   void decide_with(const MemberPoses& poses);
-  void decide_anew();
   void reconsider();
   [[nodiscard]] bool fits(const PoseEdge& closure) const;
 
   // Results.
   [[nodiscard]] std::optional<SE3> world_of(RobotId anchor) const;
   [[nodiscard]] std::optional<World> tied_world() const;
-  void notice_ties();
   void publish(TeamOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
   [[nodiscard]] bool holds_all(const SessionPlan& plan) const;
@@ -184,50 +190,33 @@ class TeamAgent {
   Relay relay_;
   std::map<RobotId, Peer> peers_;
   ToldPoses told_;  // the newest poses, including those of this robot
-  std::map<ClosureId, bool> decided_;
-  std::map<std::pair<RobotId, EdgeSetId>, EdgeSetOffer> counted_;  // see count_places()
-  std::map<ClosureId, int> chances_;                               // used by rejected closures
-  bool reconsider_due_ = false;      // once all members have sent the solution
-  std::uint32_t reconsidered_ = 0;   // number of times that closures became undecided again
-  ClosureNoiseRecord noise_;         // noise of the decided closures
-  std::set<ClosureId> provisional_;  // decided in the absence of known robots
-  ClosureNoiseRecord team_noise_;    // noise without provisional_
+  ClosureDecisions decisions_;
+  bool reconsider_due_ = false;     // once all members have sent the solution
+  std::uint32_t reconsidered_ = 0;  // number of times that closures became undecided again
 
   std::uint64_t links_seen_ = 0;
   std::set<RobotId> component_;  // robots that links connect to this one
 
-  SessionPlan plan_;   // from the present knowledge
-  FrameTies ties_;     // between its members
-  FrameTies noticed_;  // in the last notice
+  SessionPlan plan_;  // from the present knowledge
   bool plan_outdated_ = true;
-  double plan_changed_s_ = -1e9;      // time of the last change of its graph
-  std::uint64_t closures_known_ = 0;  // by the robots of the plan
-  std::uint64_t closures_used_ = 0;   // when the last session was opened
-  std::uint32_t sessions_opened_ = 0;
+  SessionSchedule schedule_;
+  FrameTies ties_;  // between the members of the plan
 
   TeamFrame frame_;
   std::uint32_t frame_version_ = 0;
-  std::vector<SE3> poses_;  // T_frame_kf, of the last session and odometry since
+  std::optional<World> world_;  // in frame_
+  OwnPoses poses_;
   std::optional<SessionPart> part_;
-  bool over_ = true;       // the session has ended
-  bool deserted_ = false;  // a member of it has joined another session
-  bool solved_ = false;    // it ended, and all members have its solution
+  SessionState state_ = SessionState::kNone;  // of the session of part_
   double started_s_ = 0.0;
-  std::uint64_t sent_bytes_ = 0;  // for this session, per receiver, and with forwarded messages
-  std::map<ClosureId, bool> verdicts_;          // results of the session of part_
-  double odometry_noticed_ = 0.0;               // largest noise scale of odometry in a notice
-  std::map<RobotId, double> closures_noticed_;  // noise factor in the last notice, by peer
-  std::optional<World> world_;                  // in frame_
-  std::size_t chordal_tried_ = 0;  // number of closures inside this robot at the last attempt
-
-  std::optional<TeamStatus> sent_status_;
-  std::map<std::string, std::size_t> refused_;
-  std::vector<std::string> notices_;
-  std::optional<ClosureVerdicts> verdicts_due_;
-  bool publish_due_ = false;
-  std::optional<RobotId> published_anchor_;
+  std::uint64_t sent_bytes_ = 0;     // for this session, per receiver, and with forwarded messages
   std::uint32_t rounds_before_ = 0;  // rounds of earlier sessions
   double optimising_s_ = 0.0;        // in earlier sessions
+
+  TeamNotices notices_;
+  std::optional<TeamStatus> sent_status_;
+  bool publish_due_ = false;
+  std::optional<RobotId> published_anchor_;
   double now_s_ = 0.0;
   double status_sent_s_ = -1e9;
   double session_sent_s_ = -1e9;

@@ -1,12 +1,6 @@
 #include <algorithm>
-#include <exception>
-#include <iterator>
 #include <utility>
 
-#include "modules/core/text_table.hpp"
-#include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/frame_entry.hpp"
-#include "modules/pose_graph/robust_schedule.hpp"
 #include "modules/pose_graph/team_agent.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 #include "modules/pose_graph/tree_front.hpp"
@@ -18,21 +12,6 @@ namespace {
 
 // Status periods without progress after which a session is replaced.
 constexpr double kHopelessPeriods = 15.0;
-
-// Noise of odometry over the claimed noise that causes a notice, and its increase that causes
-// another one.
-constexpr double kNoisyOdometry = 2.0;
-constexpr double kNoticedAgain = 1.5;
-
-// Least number of likely closures for a chordal start from noisy odometry; a few closures would
-// deform it at random. In tunnels, with five or six likely closures per robot, the team would
-// decide on 2.6 % of the closures differently than one session does, instead of on less than 1 %.
-// In sphere2500 with 7 times the noise, two of ten seeds have 8 and 94 times the error without the
-// chordal start.
-constexpr std::size_t kEnoughForChordal = 20;
-
-// Time without new measurements after which the team is at rest [s].
-constexpr double kAtRest_s = 2.0;
 
 bool same_members(const SessionPlan& x, const SessionPlan& y) {
   return x.members.size() == y.members.size() && !has_lost_member(x, y);
@@ -53,40 +32,14 @@ void TeamAgent::make_plan() {
       status.frame = told->second.frame;
   }
   SessionPlan plan = plan_session(statuses, relay_.links(), self_.robot);
-  if (!same_graph(plan, plan_)) plan_changed_s_ = now_s_;
-  closures_known_ = closures_known(plan, statuses);
+  schedule_.update(!same_graph(plan, plan_), closures_known(plan, statuses), now_s_);
   plan_ = std::move(plan);
   std::vector<RobotId> members;
   for (const SessionMember& member : plan_.members) members.push_back(member.peer.robot);
   std::ranges::sort(members);
   ties_ = frame_ties(self_.robot, members, find_ties(statuses));
-  notice_ties();
-}
-
-// Before the first solution, and while a session decides, the ties are not yet judged.
-void TeamAgent::notice_ties() {
-  if (in_session() || !solved_ || ties_ == noticed_) return;
-  const auto changed = [](const std::vector<RobotId>& now, const std::vector<RobotId>& before) {
-    std::vector<RobotId> added;
-    std::ranges::set_difference(now, before, std::back_inserter(added));
-    std::string names;
-    for (const RobotId robot : added) names += (names.empty() ? "" : ", ") + std::to_string(robot);
-    return names;
-  };
-  if (const auto robots = changed(ties_.tentative, noticed_.tentative); !robots.empty())
-    notices_.push_back("joined tentatively with robots " + robots +
-                       ": closures at a single place tie them to this robot; closures at a second "
-                       "place will confirm or correct it");
-  if (const auto robots = changed(ties_.untied, noticed_.untied); !robots.empty())
-    notices_.push_back("no accepted closure ties robots " + robots +
-                       " to this robot: they are in another frame");
-  std::vector<RobotId> uncertain;
-  std::ranges::set_union(ties_.tentative, ties_.untied, std::back_inserter(uncertain));
-  if (const auto robots = changed(noticed_.tentative, uncertain); !robots.empty())
-    notices_.push_back("robots " + robots +
-                       " are no longer tentative: closures at several places tie them to this "
-                       "robot");
-  noticed_ = ties_;
+  // While a session decides, the ties are not yet judged.
+  if (state_ == SessionState::kSolved) notices_.ties(ties_);
 }
 
 void TeamAgent::coordinate() {
@@ -125,32 +78,21 @@ bool TeamAgent::all_upright(const SessionPlan& plan) const {
 std::uint64_t TeamAgent::price_bytes() const {
   std::uint64_t most = sent_bytes_;
   for (const RobotId member : part_->members())
-    if (const MemberPoses* told = part_->told_by(told_, member, 1))
+    if (const MemberPoses* told = part_->told_by(told_, member, MemberStage::kSolved))
       most = std::max(most, told->sent_bytes);
   return most;
 }
 
-bool TeamAgent::paid_for() const {
-  const double price_s = static_cast<double>(price_bytes()) / (1e3 * config_.exchange_budget_kb_s);
-  return now_s_ - part_->moved_s() >= std::min(price_s, config_.session_wait_s);
-}
-
-bool TeamAgent::worthwhile() const {
-  const bool alone = plan_.members.size() == 1;
-  if (alone || !same_members(part_->session().plan, plan_)) return true;
-  // The first closures connect the maps; each further closure changes them less. Odometry alone
-  // changes nothing, so new odometry can wait until the team is at rest.
-  const auto used = static_cast<double>(closures_used_);
-  const bool grown = closures_known_ != closures_used_ &&
-                     static_cast<double>(closures_known_) >= (1.0 + config_.session_growth) * used;
-  return grown || now_s_ - plan_changed_s_ >= kAtRest_s ||
-         now_s_ - part_->moved_s() >= config_.session_wait_s;
+bool TeamAgent::is_next_due() const {
+  if (!schedule_.is_paid_for(price_bytes(), part_->moved_s(), now_s_)) return false;
+  return plan_.members.size() == 1 || !same_members(part_->session().plan, plan_) ||
+         schedule_.is_worthwhile(part_->moved_s(), now_s_);
 }
 
 // True if a member has been in another session since the last one.
 bool TeamAgent::has_moved_on() const {
   const auto elsewhere = [&](RobotId robot) {
-    return robot != self_.robot && part_->told_by(told_, robot, 0) == nullptr;
+    return robot != self_.robot && part_->told_by(told_, robot, MemberStage::kEntered) == nullptr;
   };
   return std::any_of(part_->members().begin(), part_->members().end(), elsewhere);
 }
@@ -159,14 +101,15 @@ bool TeamAgent::should_open() const {
   if (!part_) return true;
   const Session& session = part_->session();
   const bool hopeless = now_s_ - part_->moved_s() > kHopelessPeriods * config_.status_period_s;
-  const bool stalled = !over_ && (deserted_ || hopeless);
-  if (same_graph(session.plan, plan_)) return session.finished ? has_moved_on() : over_ || stalled;
+  const bool stalled = in_session() && (state_ == SessionState::kDeserted || hopeless);
+  if (same_graph(session.plan, plan_))
+    return session.finished ? has_moved_on() : !in_session() || stalled;
   if (session.id.coordinator != self_ || has_lost_member(session.plan, plan_)) return true;
-  return over_ ? !session.finished || (paid_for() && worthwhile()) : stalled;
+  return in_session() ? stalled : !session.finished || is_next_due();
 }
 
 void TeamAgent::open_session() {
-  Session session{.id = {self_, ++sessions_opened_}, .plan = plan_};
+  Session session{.id = {self_, schedule_.next_number()}, .plan = plan_};
   session.method = config_.method;
   session.upright = all_upright(plan_);
   session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);
@@ -177,7 +120,7 @@ void TeamAgent::open_session() {
     session.T_frame_world = world_->T_frame_world;
   }
   if (!join(session)) return;
-  closures_used_ = closures_known_;
+  schedule_.opened();
   announce();
 }
 
@@ -209,13 +152,14 @@ void TeamAgent::consider(const Session& session) {
   if (part_ && session.id == part_->session().id) {
     // If this robot has left because a member seemed to be lost, all members completed the session
     // nevertheless.
-    if (part_->follow(session) && !solved_) leave(part_->stage() == 1U && !has_failed());
+    if (part_->follow(session) && state_ != SessionState::kSolved)
+      leave(part_->stage() == MemberStage::kSolved && !has_failed());
     return;
   }
   const auto& members = session.plan.members;
   const bool member = std::any_of(members.begin(), members.end(),
                                   [&](const SessionMember& m) { return m.peer == self_; });
-  const bool from_own_coordinator = part_ && !over_ &&
+  const bool from_own_coordinator = in_session() &&
                                     session.id.coordinator == part_->session().id.coordinator &&
                                     part_->session().id.number < session.id.number;
   // The other members continue without this robot.
@@ -234,146 +178,45 @@ void TeamAgent::consider(const Session& session) {
 
 // The session that this robot is in.
 
-void TeamAgent::extend_poses() {
-  if (poses_.empty()) poses_.push_back(graph_.T_odom_first());
-  while (poses_.size() < graph_.keyframes())
-    poses_.push_back(poses_.back() * graph_.step_to(static_cast<std::uint32_t>(poses_.size())));
-}
-
 std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
-  const SessionPlan& plan = session.plan;
-  FrozenPart part;
-  SessionGraph& graph = part.graph;
-  graph.self = self_.robot;
-  for (const SessionPair& pair : plan.pairs) {
-    if (pair.a != self_.robot && pair.b != self_.robot) continue;
-    const auto* edges = graph_.edges(pair.a == self_.robot ? pair.b : pair.a, pair.edges);
-    if (edges == nullptr) return std::nullopt;
-    graph.between.insert(graph.between.end(), edges->begin(), edges->end());
-  }
-  std::set<KeyframeIndex> ends{0};
-  for (const auto& [robot, peer] : peers_) {
-    const auto* edges = graph_.newest_edges(robot);
-    if (edges == nullptr) continue;
-    for (const PoseEdge& e : *edges) ends.insert(e.end_on(self_.robot).index);
-    const auto told = told_.find(robot);
-    if (plan.has_member(robot) || told == told_.end() || told->second.frame != plan.frame) continue;
-    const MemberPoses& poses = told->second;
-    for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
-      graph.told[{robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
-    for (const PoseEdge& e : *edges)
-      if (graph.told.contains(e.other(self_.robot))) graph.to_absent.push_back(e);
-  }
-  for (const PoseEdge& e : graph.between) ends.insert(e.end_on(self_.robot).index);
-  part.public_keyframes.assign(ends.begin(), ends.end());
-  std::sort(graph.between.begin(), graph.between.end(),
-            [](const PoseEdge& a, const PoseEdge& b) { return a.id() < b.id(); });
-  graph.own = graph_.own_edges();
-  graph.odometry = graph_.keyframes() - 1;
-  graph.step_precision[self_.robot] = graph_.mean_step_precision();
-  graph.upright = session.upright;
-  if (session.upright) graph.verticals = graph_.verticals();
-  part.place = *place_in(plan, self_.robot);
-  part.in_frame = frame_ == plan.frame || plan.members.front().peer == self_;
-  part.suspicious = config_.robust && config_.method == PgoMethod::kNewton;
+  std::vector<RobotId> peers;
+  for (const auto& [robot, peer] : peers_) peers.push_back(robot);
+  auto part = freeze_part(session, self_.robot, graph_, peers, told_);
+  if (!part) return std::nullopt;
+  part->in_frame = frame_ == session.plan.frame || session.plan.members.front().peer == self_;
+  part->suspicious = expects_false();
   return part;
-}
-
-// Returns the closures inside this robot that are likely true before anything is solved. If
-// odometry is noisy, these are the closures that its noise explains. Otherwise, these are the
-// closures that agree with a closure a few keyframes away.
-std::vector<PoseEdge> TeamAgent::likely_closures(std::span<const PoseEdge> inside) const {
-  const std::vector<PoseEdge>& explained = graph_.odometry_noise().likely;
-  if (!explained.empty()) return explained;
-  const std::map<RobotId, Precision> step{{self_.robot, graph_.mean_step_precision()}};
-  const Corroboration::PoseOf pose = [&](const KeyframeId& id) { return poses_[id.index]; };
-  const std::vector<bool> isolated =
-      Corroboration(inside, pose, step, 3).isolated(default_threshold(3));
-  std::vector<PoseEdge> likely;
-  for (std::size_t k = 0; k < inside.size(); ++k)
-    if (!isolated[k]) likely.push_back(inside[k]);
-  return likely;
-}
-
-// A robot alone may start at the chordal initialisation. If closures may be false, it does so only
-// if the truncated cost of all its closures is lower there.
-void TeamAgent::try_chordal(const Session& session) {
-  const std::vector<PoseEdge>* inside = graph_.newest_edges(self_.robot);
-  if (session.plan.members.size() > 1 || inside == nullptr || inside->size() == chordal_tried_)
-    return;
-  chordal_tried_ = inside->size();
-  const std::vector<PoseEdge> all = graph_.own_edges();
-  const std::size_t steps = graph_.keyframes() - 1;
-  if (!config_.robust || config_.method != PgoMethod::kNewton) {
-    poses_ = better_of_chordal(std::move(poses_), all);
-    return;
-  }
-  std::vector<PoseEdge> likely(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(steps));
-  for (const PoseEdge& closure : likely_closures(*inside)) likely.push_back(closure);
-  if (likely.size() < steps + kEnoughForChordal) return;
-  std::vector<SE3> chordal = better_of_chordal(poses_, likely);
-  const auto cost = [&](const std::vector<SE3>& poses) {
-    const double barc = default_threshold(3);
-    double sum = 0.0;
-    for (std::size_t k = 0; k < all.size(); ++k) {
-      const double r = residual_of(all[k], poses[all[k].from.index], poses[all[k].to.index]);
-      sum += k < steps ? r * r : std::min(r * r, barc * barc);
-    }
-    return sum;
-  };
-  if (cost(chordal) < cost(poses_)) poses_ = std::move(chordal);
-}
-
-void TeamAgent::judge_odometry() {
-  graph_.judge_odometry();
-  const OdometryNoise& noise = graph_.odometry_noise();
-  const double worst = std::max(noise.rotation, noise.translation);
-  if (worst < kNoisyOdometry || worst < kNoticedAgain * odometry_noticed_) return;
-  odometry_noticed_ = worst;
-  notices_.push_back("odometry is " + fixed(noise.rotation, 1) + " times noisier in rotation and " +
-                     fixed(noise.translation, 1) + " times in translation than it claims, by " +
-                     std::to_string(noise.places) +
-                     " places of loop closures inside this robot; it is weighed accordingly");
-}
-
-void TeamAgent::notice_closure_noise() {
-  for (const auto& [peer, cycles] : noise_.pairs) {
-    double& noticed = closures_noticed_.try_emplace(peer, 1.0).first->second;
-    if (cycles.factor < kNoticedAgain * noticed) continue;
-    noticed = cycles.factor;
-    notices_.push_back((peer == self_.robot ? "closures inside this robot"
-                                            : "closures with robot " + std::to_string(peer)) +
-                       " are " + fixed(cycles.factor, 1) +
-                       " times noisier than closures of the team usually are, by " +
-                       fixed(cycles.places, 0) + " places; they are weighed accordingly");
-  }
 }
 
 bool TeamAgent::join(const Session& session) {
   if (graph_.keyframes() == 0) return false;
-  if (config_.robust) judge_odometry();
+  if (config_.robust) {
+    graph_.judge_odometry();
+    notices_.odometry(graph_.odometry_noise());
+  }
   auto part = freeze(session);
   if (!part) return false;
   if (in_session()) leave(part_->all_solved(told_));
-  if (session.plan.members.size() > 1) decide_anew();
+  const bool alone = session.plan.members.size() == 1;
+  decisions_.begin_session(!alone);
   if (part_) {
     rounds_before_ += part_->state().round;
     optimising_s_ += part_->moved_s() - started_s_;
   }
-  extend_poses();
-  if (part->graph.to_absent.empty()) try_chordal(session);
-  part->graph.start = poses_;
-  part->graph.decided = decided_;
-  part->graph.noise = noise_;
+  poses_.extend(graph_);
+  if (alone && part->graph.to_absent.empty())
+    poses_.improve_alone(graph_, self_.robot, !expects_false());
+  part->graph.start = poses_.T_frame_kf();
+  part->graph.decided = decisions_.decided();
+  part->graph.noise = decisions_.noise();
   part_.emplace(session, self_, std::move(*part), factory_,
                 AlignmentTolerance{config_.alignment_rotation_rad, config_.alignment_translation_m},
                 config_.status_period_s, now_s_);
   if (const auto peer = peers_.find(session.id.coordinator.robot); peer != peers_.end())
     peer->second.joined = session.id.number;
-  over_ = solved_ = deserted_ = false;
+  state_ = SessionState::kRunning;
   started_s_ = now_s_;
   sent_bytes_ = 0;
-  verdicts_.clear();
   reconsider_due_ = false;
   return true;
 }
@@ -385,7 +228,8 @@ bool TeamAgent::misses_member(const SessionPlan& plan) const {
 
 bool TeamAgent::has_failed() const {
   const auto failed = [&](RobotId robot) {
-    return robot == self_.robot ? part_->stage() == 2U : part_->told_by(told_, robot, 2) != nullptr;
+    return robot == self_.robot ? part_->stage() == MemberStage::kFailed
+                                : part_->told_by(told_, robot, MemberStage::kFailed) != nullptr;
   };
   return std::any_of(part_->members().begin(), part_->members().end(), failed);
 }
@@ -397,7 +241,7 @@ void TeamAgent::advance(TeamOutput& output) {
   for (const RobotId sender : part_->take_refused())
     refuse("a letter of robot " + std::to_string(sender) + " that is of no use");
   output.more |= part_->worked();
-  publish_due_ |= part_->worked() && part_->stage() == 0U;
+  publish_due_ |= part_->worked() && part_->stage() == MemberStage::kEntered;
   if (part_->stage() != stage) enter_stage(output);
   if (in_session()) conclude();
 }
@@ -405,7 +249,7 @@ void TeamAgent::advance(TeamOutput& output) {
 void TeamAgent::enter_stage(TeamOutput& output) {
   const Session& session = part_->session();
   output.more = true;
-  if (part_->stage() == 0U) {
+  if (part_->stage() == MemberStage::kEntered) {
     if (frame_ != session.plan.frame) {
       ++frame_version_;
       world_.reset();
@@ -413,10 +257,10 @@ void TeamAgent::enter_stage(TeamOutput& output) {
     frame_ = session.plan.frame;
     plan_outdated_ = true;
   }
-  if (part_->stage() == 2U)
-    notices_.push_back("session " + std::to_string(session.id.number) + " of robot " +
-                       std::to_string(session.id.coordinator.robot) +
-                       " cannot be solved: " + part_->failure());
+  if (part_->stage() == MemberStage::kFailed)
+    notices_.add("session " + std::to_string(session.id.number) + " of robot " +
+                 std::to_string(session.id.coordinator.robot) +
+                 " cannot be solved: " + part_->failure());
   hand_out(output);  // sent_bytes_ of the poses includes these
   tell_poses();
 }
@@ -440,29 +284,13 @@ void TeamAgent::tell_poses() {
 }
 
 void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
-  if (verdicts.empty()) return;
-  const bool for_good = part_->members().size() > 1 && !part_->state().held;
-  for (const auto& [id, kept] : verdicts) {
-    const auto before = decided_.find(id);
-    const bool is_new = before == decided_.end() || before->second != kept;
-    if (is_new && !for_good) provisional_.insert(id);
-    decided_[id] = verdicts_[id] = kept;
-  }
-  counted_.clear();
+  decisions_.decide(verdicts, part_->members().size() == 1 || part_->state().held);
   plan_outdated_ = true;
-  verdicts_due_.emplace();
-  for (const auto& [id, kept] : verdicts_) verdicts_due_->closures.push_back({id, kept});
-}
-
-void TeamAgent::decide_anew() {
-  for (const ClosureId& id : std::exchange(provisional_, {})) decided_.erase(id);
-  counted_.clear();
-  noise_ = team_noise_;
 }
 
 // The verdicts of a member on a closure are valid for both of its robots.
 void TeamAgent::decide_with(const MemberPoses& poses) {
-  if (poses.session != part_->session().id || poses.stage != 1) return;
+  if (poses.session != part_->session().id || poses.stage != MemberStage::kSolved) return;
   std::vector<WeighedClosure> of_both;
   for (const WeighedClosure& verdict : poses.verdicts)
     if (std::minmax(verdict.id.from.robot, verdict.id.to.robot) ==
@@ -484,22 +312,18 @@ void TeamAgent::reconsider() {
       closures.insert(closures.end(), edges->begin(), edges->end());
   bool any = false;
   for (const PoseEdge& e : closures) {
-    const auto decided = decided_.find(e.id());
-    if (decided == decided_.end() || decided->second || !fits(e)) continue;
-    if (++chances_[e.id()] > kChances) continue;
-    decided_.erase(decided);
-    any = true;
+    if (decisions_.is_rejected(e.id()) && fits(e)) any |= decisions_.reopen(e.id());
   }
   if (!any) return;
   ++reconsidered_;
-  counted_.clear();
   plan_outdated_ = true;
 }
 
 bool TeamAgent::fits(const PoseEdge& closure) const {
   const bool inside = closure.from.robot == closure.to.robot;
   const auto pose = [&](const KeyframeId& id) -> std::optional<SE3> {
-    if (inside) return id.index < poses_.size() ? std::optional(poses_[id.index]) : std::nullopt;
+    const std::vector<SE3>& own = poses_.T_frame_kf();
+    if (inside) return id.index < own.size() ? std::optional(own[id.index]) : std::nullopt;
     const MemberPoses& told = told_.at(id.robot);
     const auto at = std::lower_bound(told.keyframes.begin(), told.keyframes.end(), id.index);
     if (at == told.keyframes.end() || *at != id.index) return std::nullopt;
@@ -513,8 +337,9 @@ bool TeamAgent::fits(const PoseEdge& closure) const {
 void TeamAgent::conclude() {
   Session& session = part_->session();
   const RobotId anchor = session.anchor;
-  if (part_->stage() == 0U && (!world_ || world_->anchor != anchor)) {
-    const bool told = anchor == self_.robot || part_->told_by(told_, anchor, 0) != nullptr;
+  if (part_->stage() == MemberStage::kEntered && (!world_ || world_->anchor != anchor)) {
+    const bool told =
+        anchor == self_.robot || part_->told_by(told_, anchor, MemberStage::kEntered) != nullptr;
     const auto world = session.T_frame_world ? session.T_frame_world
                        : told                ? world_of(anchor)
                                              : std::nullopt;
@@ -540,9 +365,8 @@ void TeamAgent::conclude() {
 }
 
 void TeamAgent::leave(bool with_solution) {
-  if (part_->stage()) poses_ = with_solution ? part_->poses() : part_->committed_poses();
-  over_ = true;
-  solved_ = with_solution;
+  if (part_->stage()) poses_.set(with_solution ? part_->poses() : part_->committed_poses());
+  state_ = with_solution ? SessionState::kSolved : SessionState::kAbandoned;
   const Session& session = part_->session();
   if (with_solution && session.finished && session.T_frame_world)
     world_ = World{session.anchor, *session.T_frame_world};
@@ -551,11 +375,11 @@ void TeamAgent::leave(bool with_solution) {
   if (!with_solution) return;
   decide(part_->verdicts().closures);
   for (const RobotId member : part_->members())
-    if (const MemberPoses* told = part_->told_by(told_, member, 1); told && member != self_.robot)
+    if (const MemberPoses* told = part_->told_by(told_, member, MemberStage::kSolved);
+        told && member != self_.robot)
       decide_with(*told);
-  noise_ = part_->noise();
-  notice_closure_noise();
-  if (part_->members().size() > 1) team_noise_ = noise_;
+  decisions_.set_noise(part_->noise(), part_->members().size() > 1);
+  notices_.closures(decisions_.noise());
   reconsider_due_ = part_->state().set_aside;
 }
 

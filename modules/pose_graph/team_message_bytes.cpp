@@ -95,7 +95,7 @@ class MessageWriter {
     put(m.sender);
     out_.varint(m.number);
     put(m.session);
-    out_.varint(m.stage);
+    out_.varint(static_cast<std::uint32_t>(m.stage));
     put(m.frame);
     out_.varint(m.frame_version);
     out_.f64(m.step_precision.kappa);
@@ -302,7 +302,9 @@ class MessageReader {
     m.sender = peer();
     m.number = u32();
     m.session = session_id();
-    m.stage = u32();
+    const std::uint32_t stage = u32();
+    require(stage <= static_cast<std::uint32_t>(MemberStage::kFailed), "an unknown stage");
+    m.stage = static_cast<MemberStage>(stage);
     m.frame = peer();
     m.frame_version = u32();
     m.step_precision = {weight(), weight()};

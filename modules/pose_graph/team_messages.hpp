@@ -130,20 +130,26 @@ struct Session {
   bool finished = false;    ///< Members stop.
 };
 
-/// Public poses of one robot, before (stage 0) and after (stage 1) a session; to all robots of the
-/// team. Stage 2: the robot could not complete the session, which is then over for all members.
+/// How far a member is in a session.
+enum class MemberStage : std::uint8_t {
+  kEntered,  ///< It is in the frame of the session, and its poses are those of the start.
+  kSolved,   ///< Its poses are the solution.
+  kFailed,   ///< It could not complete the session, which is then over for all members.
+};
+
+/// Public poses of one robot, before and after a session; to all robots of the team.
 struct MemberPoses {
   TeamPeer sender;
   std::uint32_t number = 0;  ///< Counts these messages of the sender: the highest is the newest.
   SessionId session = {};
-  std::uint32_t stage = 0;
+  MemberStage stage = MemberStage::kEntered;
   TeamFrame frame = {};
   std::uint32_t frame_version = 0;  ///< As in TeamStatus: the message with the higher one is newer.
   Precision step_precision = {};    ///< Mean weights of one step of its odometry.
   std::vector<KeyframeIndex> keyframes = {};  ///< Ascending, 0 first.
   std::vector<SinglePose> T_frame_kf = {};
-  /// Verdicts on closures to other robots. Stage 0: known decisions of earlier sessions. Stage 1:
-  /// results of this session for the closures that this robot weighs.
+  /// Verdicts on closures to other robots. Before the session: known decisions of earlier sessions.
+  /// After it: results for the closures that this robot weighs.
   std::vector<WeighedClosure> verdicts = {};
   /// Bytes that it has sent in this session so far, per receiver, and with forwarded messages.
   std::uint64_t sent_bytes = 0;

@@ -79,7 +79,7 @@ RelayParcel relayed(RelayMessage message) {
 std::vector<TeamParcel> some_parcels() {
   const TeamPeer self{kWriter.robot, kWriter.boot};
   const TeamPeer far{9, 1};
-  MemberPoses poses{.sender = self, .number = 2, .session = {self, 4}, .stage = 1, .frame = self};
+  MemberPoses poses{.sender = self, .number = 2, .session = {self, 4}, .stage = MemberStage::kSolved, .frame = self};
   poses.keyframes = {0, 3, 200};
   poses.T_frame_kf.resize(3, SinglePose::of(SE3::Identity()));
   return {

@@ -47,8 +47,8 @@ TEST_CASE("Messages of which only the newest counts have one key per origin and 
   CHECK(status(kFar, 1) != status(kSelf, 1));
   CHECK(key(Session{.id = {kFar, 4}, .plan = {}}) == key(Session{.id = {kFar, 5}, .plan = {}}));
   CHECK(key(Session{.id = {kFar, 4}, .plan = {}}) != status(kFar, 1));
-  CHECK(key(MemberPoses{.sender = kFar, .stage = 1}) ==
-        key(MemberPoses{.sender = kFar, .stage = 2}));
+  CHECK(key(MemberPoses{.sender = kFar, .stage = MemberStage::kSolved}) ==
+        key(MemberPoses{.sender = kFar, .stage = MemberStage::kFailed}));
 }
 
 TEST_CASE("Reliable messages replace each other after 64 numbers, and acknowledgements at once",

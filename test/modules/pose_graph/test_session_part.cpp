@@ -61,7 +61,7 @@ struct Correspondence {
 
   Correspondence() {
     (void)part.advance(told, 0.0);
-    REQUIRE(part.stage() == 0U);
+    REQUIRE(part.stage() == MemberStage::kEntered);
   }
   // Lets the solver begin.
   void begin(double now_s) {

@@ -419,7 +419,7 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
     (void)network.inject(666, 33, session);
 
     MemberPoses poses{.sender = {666, 1}, .number = any(rng), .session = session.id};
-    poses.stage = any(rng) % 4;
+    poses.stage = static_cast<MemberStage>(any(rng) % 3);
     poses.keyframes = {any(rng) % 2, any(rng)};
     poses.T_frame_kf.resize(any(rng) % 3);
     poses.verdicts = {{closure_id({7, 1}, {33, 2}), false}};
@@ -460,7 +460,7 @@ TEST_CASE("verdicts on unknown closures, or from robots outside the session, dec
     MemberPoses poses{.sender = {666, 1},
                       .number = 1000 + k,
                       .session = victim.part()->session().id,
-                      .stage = 1,
+                      .stage = MemberStage::kSolved,
                       .keyframes = {0}};
     poses.T_frame_kf.resize(1);
     poses.verdicts = {{closure_id({7, k}, {666, k}), false}};
@@ -513,14 +513,14 @@ TEST_CASE("decisions of a session hold in the next one, even for a robot that mi
   const TeamAgent& agent = network.agent(33);
   const auto solved = [&] {
     return agent.part() != nullptr && agent.part()->members().size() == 4 &&
-           agent.part()->stage() == 1U && !network.agent(7).in_session();
+           agent.part()->stage() == MemberStage::kSolved && !network.agent(7).in_session();
   };
   REQUIRE(network.run(60.0, solved));
   CHECK(agent.in_session());
   CHECK(known == 0);
   for (const RobotId id : {RobotId{7}, RobotId{33}})
     (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
-  REQUIRE(network.run(60.0, [&] { return agent.part()->stage() != 1U; }));
+  REQUIRE(network.run(60.0, [&] { return agent.part()->stage() != MemberStage::kSolved; }));
   REQUIRE(network.run(60.0, solved));
   CHECK(known > 0);
 }

@@ -58,7 +58,7 @@ MemberPoses some_poses() {
   MemberPoses poses{.sender = kPeer7,
                     .number = 12,
                     .session = {kPeer2, 9},
-                    .stage = 1,
+                    .stage = MemberStage::kSolved,
                     .frame = kPeer2,
                     .frame_version = 8,
                     .step_precision = {123.456, 7.0},

@@ -1,0 +1,80 @@
+#include "modules/pose_graph/closure_decisions.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "modules/pose_graph/closure_places.hpp"
+
+namespace km {
+
+bool ClosureDecisions::is_rejected(const ClosureId& id) const {
+  const auto decided = decided_.find(id);
+  return decided != decided_.end() && !decided->second;
+}
+
+void ClosureDecisions::begin_session(bool with_team) {
+  verdicts_.clear();
+  if (!with_team) return;
+  for (const ClosureId& id : std::exchange(provisional_, {})) decided_.erase(id);
+  noise_ = team_noise_;
+  counted_.clear();
+}
+
+void ClosureDecisions::decide(std::span<const WeighedClosure> verdicts, bool provisional) {
+  if (verdicts.empty()) return;
+  for (const auto& [id, kept] : verdicts) {
+    const auto before = decided_.find(id);
+    const bool is_new = before == decided_.end() || before->second != kept;
+    if (is_new && provisional) provisional_.insert(id);
+    decided_[id] = verdicts_[id] = kept;
+  }
+  verdicts_due_ = true;
+  counted_.clear();
+}
+
+void ClosureDecisions::set_noise(ClosureNoiseRecord noise, bool with_team) {
+  noise_ = std::move(noise);
+  if (with_team) team_noise_ = noise_;
+}
+
+bool ClosureDecisions::reopen(const ClosureId& id) {
+  if (!is_rejected(id) || reopened_[id] >= kChances) return false;
+  ++reopened_[id];
+  decided_.erase(id);
+  counted_.clear();
+  return true;
+}
+
+void ClosureDecisions::forget(RobotId robot) {
+  const auto concerns = [&](const auto& entry) { return touches(entry.first, robot); };
+  std::erase_if(decided_, concerns);
+  std::erase_if(reopened_, concerns);
+  std::erase_if(verdicts_, concerns);
+  counted_.clear();
+}
+
+std::optional<ClosureVerdicts> ClosureDecisions::take_verdicts() {
+  if (!std::exchange(verdicts_due_, false)) return std::nullopt;
+  ClosureVerdicts result;
+  for (const auto& [id, kept] : verdicts_) result.closures.push_back({id, kept});
+  return result;
+}
+
+void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdge> closures) {
+  const auto [entry, is_new] = counted_.try_emplace({offer.peer, offer.id}, offer);
+  if (is_new) {
+    std::vector<PoseEdge> accepted, rejected;
+    for (const PoseEdge& closure : closures)
+      (is_rejected(closure.id()) ? rejected : accepted).push_back(closure);
+    const std::vector<std::size_t> rivals = find_places(rejected).sizes;
+    EdgeSetOffer& counted = entry->second;
+    counted.places = static_cast<std::uint32_t>(find_places(accepted).sizes.size());
+    counted.contested = counted.places == 1 && !rivals.empty() &&
+                        *std::ranges::max_element(rivals) >= accepted.size();
+  }
+  offer = entry->second;
+}
+
+}  // namespace km

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <utility>
+
+#include "modules/core/closure_verdicts.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/pose_graph/closure_noise.hpp"
+#include "modules/pose_graph/pose_edge.hpp"
+#include "modules/pose_graph/team_messages.hpp"
+
+namespace km {
+
+/// The decisions of sessions on the closures of one robot, and the noise of these closures. Both
+/// carry over from session to session. Not thread-safe.
+///
+/// Some decisions are provisional: a later session of the team drops them. These are the decisions
+/// of a robot alone, because the team knows the noise better, and decisions of a team with held
+/// poses, because these poses may be wrong.
+class ClosureDecisions {
+ public:
+  /// Largest number of times that a rejected closure becomes undecided again.
+  static constexpr int kChances = 2;
+
+  /// True if the closure is kept, false if it is rejected. Undecided closures have no entry.
+  [[nodiscard]] const std::map<ClosureId, bool>& decided() const { return decided_; }
+  [[nodiscard]] bool is_rejected(const ClosureId& id) const;
+  [[nodiscard]] const ClosureNoiseRecord& noise() const { return noise_; }
+
+  /// A session begins, alone or with other robots.
+  void begin_session(bool with_team);
+  /// Adopts verdicts of the present session.
+  void decide(std::span<const WeighedClosure> verdicts, bool provisional);
+  /// Adopts the noise at the end of a session, which was one of a team or of a robot alone.
+  void set_noise(ClosureNoiseRecord noise, bool with_team);
+  /// Makes a rejected closure undecided. False if it is not rejected, or has had its chances.
+  [[nodiscard]] bool reopen(const ClosureId& id);
+  /// Discards all decisions on closures with a robot whose keyframe indices have a new meaning.
+  void forget(RobotId robot);
+
+  /// All verdicts of the present session, if there are new ones since the last call.
+  [[nodiscard]] std::optional<ClosureVerdicts> take_verdicts();
+
+  /// Sets `places` and `contested` of an offer of these closures.
+  void count_places(EdgeSetOffer& offer, std::span<const PoseEdge> closures);
+
+ private:
+  std::map<ClosureId, bool> decided_;
+  std::set<ClosureId> provisional_;
+  std::map<ClosureId, int> reopened_;  // number of times
+  ClosureNoiseRecord noise_;
+  ClosureNoiseRecord team_noise_;  // noise without the sessions of this robot alone
+  std::map<ClosureId, bool> verdicts_;
+  bool verdicts_due_ = false;
+  std::map<std::pair<RobotId, EdgeSetId>, EdgeSetOffer> counted_;  // under the present decisions
+};
+
+}  // namespace km

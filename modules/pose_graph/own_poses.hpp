@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
+#include "modules/pose_graph/own_graph.hpp"
+
+namespace km {
+
+/// The poses of the keyframes of one robot between sessions: those of the last session, and
+/// odometry since. Not thread-safe.
+class OwnPoses {
+ public:
+  /// In the frame of the last session.
+  [[nodiscard]] const std::vector<SE3>& T_frame_kf() const { return T_frame_kf_; }
+  void set(std::vector<SE3> T_frame_kf) { T_frame_kf_ = std::move(T_frame_kf); }
+
+  /// Adds new keyframes, by odometry. The first keyframe has its odometry pose.
+  void extend(const OwnGraph& graph);
+
+  /// Improves the start of a session of this robot alone: the chordal initialisation replaces the
+  /// poses if its cost is lower. If closures are `trusted`, all of them count. Otherwise, the
+  /// initialisation contains closures that are likely true, and the cost of a closure is truncated.
+  /// Precondition: extend(). Does nothing if the number of closures is that of the last call.
+  void improve_alone(const OwnGraph& graph, RobotId self, bool trusted);
+
+ private:
+  [[nodiscard]] std::vector<PoseEdge> likely_closures(const OwnGraph& graph, RobotId self,
+                                                      std::span<const PoseEdge> inside) const;
+
+  std::vector<SE3> T_frame_kf_;
+  std::size_t improved_with_ = 0;  // number of closures
+};
+
+}  // namespace km

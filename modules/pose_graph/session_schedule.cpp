@@ -1,0 +1,27 @@
+#include "modules/pose_graph/session_schedule.hpp"
+
+#include <algorithm>
+
+namespace km {
+namespace {
+
+// Time without new measurements after which the team is at rest [s].
+constexpr double kAtRest_s = 2.0;
+
+}  // namespace
+
+bool SessionSchedule::is_paid_for(std::uint64_t bytes, double ended_s, double now_s) const {
+  const double price_s = static_cast<double>(bytes) / (1e3 * config_.exchange_budget_kb_s);
+  return now_s - ended_s >= std::min(price_s, config_.session_wait_s);
+}
+
+// The first closures connect the maps; each further closure changes them less. Odometry alone
+// changes nothing, so new odometry can wait until the team is at rest.
+bool SessionSchedule::is_worthwhile(double ended_s, double now_s) const {
+  const bool grown =
+      closures_ != used_ &&
+      static_cast<double>(closures_) >= (1.0 + config_.session_growth) * static_cast<double>(used_);
+  return grown || now_s - changed_s_ >= kAtRest_s || now_s - ended_s >= config_.session_wait_s;
+}
+
+}  // namespace km

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+
+#include "modules/pose_graph/pose_graph_config.hpp"
+
+namespace km {
+
+/// When the coordinator of a team opens the next session. New measurements do not interrupt a
+/// session. The next one waits until the bytes of the last one are paid for and it is worth its own
+/// bytes. Not thread-safe.
+class SessionSchedule {
+ public:
+  explicit SessionSchedule(const PoseGraphConfig& config) : config_(config) {}
+
+  /// Takes the present plan: whether its graph has changed, and the number of its closures.
+  void update(bool graph_changed, std::uint64_t closures, double now_s) {
+    if (graph_changed) changed_s_ = now_s;
+    closures_ = closures;
+  }
+  /// Number of the next session.
+  [[nodiscard]] std::uint32_t next_number() { return ++opened_; }
+  /// The next session has begun, with all present closures.
+  void opened() { used_ = closures_; }
+
+  /// True if the busiest member may send again after `bytes` in the session that ended at
+  /// `ended_s`. The budget applies to every robot.
+  [[nodiscard]] bool is_paid_for(std::uint64_t bytes, double ended_s, double now_s) const;
+  /// True if the graph of the members has changed enough since the session that ended at `ended_s`.
+  [[nodiscard]] bool is_worthwhile(double ended_s, double now_s) const;
+
+ private:
+  PoseGraphConfig config_;
+  double changed_s_ = -1e9;     // time of the last change of the graph
+  std::uint64_t closures_ = 0;  // of the present plan
+  std::uint64_t used_ = 0;      // in the last session
+  std::uint32_t opened_ = 0;
+};
+
+}  // namespace km

@@ -1,0 +1,82 @@
+#include "modules/pose_graph/team_notices.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "modules/core/text_table.hpp"
+
+namespace km {
+namespace {
+
+// Noise of odometry over the claimed noise that causes a notice, and its increase that causes
+// another one.
+constexpr double kNoisyOdometry = 2.0;
+constexpr double kNoticedAgain = 1.5;
+
+// Largest number of distinct reasons of refusals: they contain robot ids, which a sender can
+// invent.
+constexpr std::size_t kReasons = 1000;
+
+// The robots of `now` that `before` lacks; both ascending.
+std::string added(const std::vector<RobotId>& now, const std::vector<RobotId>& before) {
+  std::vector<RobotId> robots;
+  std::ranges::set_difference(now, before, std::back_inserter(robots));
+  std::string text;
+  for (const RobotId robot : robots) {
+    if (!text.empty()) text += ", ";
+    text += std::to_string(robot);
+  }
+  return text;
+}
+
+}  // namespace
+
+bool TeamNotices::refuse(const std::string& reason) {
+  const bool counted = refused_.size() < kReasons || refused_.contains(reason);
+  const std::string& known = counted ? reason : "for reasons of which there are too many";
+  const std::size_t times = ++refused_[known];
+  const bool power_of_two = (times & (times - 1)) == 0;
+  if (power_of_two) add("refused (" + std::to_string(times) + " times): " + known);
+  return false;
+}
+
+void TeamNotices::odometry(const OdometryNoise& noise) {
+  const double worst = std::max(noise.rotation, noise.translation);
+  if (worst < kNoisyOdometry || worst < kNoticedAgain * odometry_noise_) return;
+  odometry_noise_ = worst;
+  add("odometry is " + fixed(noise.rotation, 1) + " times noisier in rotation and " +
+      fixed(noise.translation, 1) + " times in translation than it claims, by " +
+      std::to_string(noise.places) +
+      " places of loop closures inside this robot; it is weighed accordingly");
+}
+
+void TeamNotices::closures(const ClosureNoiseRecord& noise) {
+  for (const auto& [peer, cycles] : noise.pairs) {
+    double& last = closure_factors_.try_emplace(peer, 1.0).first->second;
+    if (cycles.factor < kNoticedAgain * last) continue;
+    last = cycles.factor;
+    add((peer == self_ ? "closures inside this robot"
+                       : "closures with robot " + std::to_string(peer)) +
+        " are " + fixed(cycles.factor, 1) +
+        " times noisier than closures of the team usually are, by " + fixed(cycles.places, 0) +
+        " places; they are weighed accordingly");
+  }
+}
+
+void TeamNotices::ties(const FrameTies& ties) {
+  if (ties == ties_) return;
+  if (const std::string robots = added(ties.tentative, ties_.tentative); !robots.empty())
+    add("joined tentatively with robots " + robots +
+        ": closures at a single place tie them to this robot; closures at a second place will "
+        "confirm or correct it");
+  if (const std::string robots = added(ties.untied, ties_.untied); !robots.empty())
+    add("no accepted closure ties robots " + robots + " to this robot: they are in another frame");
+  std::vector<RobotId> uncertain;
+  std::ranges::set_union(ties.tentative, ties.untied, std::back_inserter(uncertain));
+  if (const std::string robots = added(ties_.tentative, uncertain); !robots.empty())
+    add("robots " + robots +
+        " are no longer tentative: closures at several places tie them to this robot");
+  ties_ = ties;
+}
+
+}  // namespace km

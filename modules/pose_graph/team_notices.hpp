@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "modules/pose_graph/closure_noise.hpp"
+#include "modules/pose_graph/frame_ties.hpp"
+#include "modules/pose_graph/odometry_noise.hpp"
+
+namespace km {
+
+/// Messages for a person on the state of the team. A state is reported once, and again only if it
+/// has changed notably. Not thread-safe.
+class TeamNotices {
+ public:
+  explicit TeamNotices(RobotId self) : self_(self) {}
+
+  void add(std::string notice) { notices_.push_back(std::move(notice)); }
+  /// Counts a refused input, and reports the first, second, fourth, ... of equal reason. False.
+  bool refuse(const std::string& reason);
+  /// Odometry of this robot that is noisier than it claims.
+  void odometry(const OdometryNoise& noise);
+  /// Closures of pairs of robots that are noisier than those of the team.
+  void closures(const ClosureNoiseRecord& noise);
+  /// Robots whose place in the frame is uncertain, or certain again.
+  void ties(const FrameTies& ties);
+
+  [[nodiscard]] std::vector<std::string> take() { return std::exchange(notices_, {}); }
+  /// Number of refusals by reason.
+  [[nodiscard]] const std::map<std::string, std::size_t>& refused() const { return refused_; }
+
+ private:
+  RobotId self_;
+  std::vector<std::string> notices_;
+  std::map<std::string, std::size_t> refused_;
+  double odometry_noise_ = 0.0;                // in the last notice
+  std::map<RobotId, double> closure_factors_;  // in the last notice, by peer
+  FrameTies ties_;                             // in the last notice
+};
+
+}  // namespace km
