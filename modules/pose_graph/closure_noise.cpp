@@ -42,7 +42,7 @@ struct Posterior {
 
 // The odometry is `odometry` times noisier than it claims.
 Posterior posterior_of(std::span<const NoiseCycle> cycles, std::span<const double> weights,
-                       double s, double usual, double odometry = 1.0) {
+                       double s, double usual, double odometry) {
   std::vector<double> log_ratio;
   for (const NoiseCycle& cycle : cycles) {
     double log_if_true = 0.0;
@@ -71,25 +71,42 @@ double agreeing(std::span<const NoiseCycle> cycles, double s) {
          static_cast<double>(cycles.size());
 }
 
-double estimate(std::span<const NoiseCycle> cycles, double observations, double usual) {
-  if (cycles.empty() || observations < kFewPlaces || usual > kClaimsFail) return usual;
+struct Estimate {
+  double factor = 1.0;
+  double log_odds = 0.0;  // odds of the most likely factor against the usual one
+};
+
+// The odometry is `odometry` times noisier than it claims. Factors with which true cycles are less
+// than `distinct` from false ones do not count, see Posterior.
+Estimate estimate(std::span<const NoiseCycle> cycles, double observations, double usual,
+                  double odometry, double distinct) {
   const double weight = std::min(1.0, observations / static_cast<double>(cycles.size()));
   const std::vector<double> weights(cycles.size(), weight);
-  std::vector<std::pair<double, double>> densities;  // factor, log posterior density
-  if (agreeing(cycles, usual) > kMostAgree) return usual;
-  double most = posterior_of(cycles, weights, usual, usual).log_density;
-  densities.emplace_back(usual, most);
-  const double noisy_odometry =
-      posterior_of(cycles, weights, usual, usual, kNoisyOdometry).log_density;
-  for (double s = usual * kGridStep; s <= std::max(1.0, kLargestFactor * usual); s *= kGridStep) {
-    const Posterior found = posterior_of(cycles, weights, s, usual);
-    if (!(found.distinct > kDistinct)) continue;
+  const double log_usual = posterior_of(cycles, weights, usual, usual, odometry).log_density;
+  std::vector<std::pair<double, double>> densities{{usual, log_usual}};  // by factor
+  double most = log_usual;
+  const double largest = std::max(1.0, kLargestFactor * usual);
+  for (int k = 1; usual * std::pow(kGridStep, k) <= largest; ++k) {
+    const double s = usual * std::pow(kGridStep, k);
+    const Posterior found = posterior_of(cycles, weights, s, usual, odometry);
+    if (!(found.distinct > distinct)) continue;
     densities.emplace_back(s, found.log_density);
     most = std::max(most, found.log_density);
   }
-  if (most - std::max(densities.front().second, noisy_odometry) < kOddsAgainstUsual) return usual;
   const auto credible = [&](const auto& entry) { return entry.second >= most - kOneSigma; };
-  return std::ranges::find_if(densities, credible)->first;
+  return {std::ranges::find_if(densities, credible)->first, most - log_usual};
+}
+
+// The factor of cycles of one kind.
+double factor_of(std::span<const NoiseCycle> cycles, double observations, double usual) {
+  if (cycles.empty() || observations < kFewPlaces || usual > kClaimsFail ||
+      agreeing(cycles, usual) > kMostAgree)
+    return usual;
+  const Estimate found = estimate(cycles, observations, usual, 1.0, kDistinct);
+  const bool likely =
+      found.log_odds >= kOddsAgainstUsual &&
+      estimate(cycles, observations, usual, kNoisyOdometry, 0.0).log_odds >= kOddsAgainstUsual;
+  return likely ? found.factor : usual;
 }
 
 }  // namespace
@@ -120,8 +137,8 @@ NoiseCycle NoiseCycle::of(const Vector6& e, const Matrix6& Sigma_o, const Matrix
 }
 
 double estimate_closure_noise(const PairCycles& cycles, double usual) {
-  const double noise = std::max(estimate(cycles.inside, cycles.places, usual),
-                                estimate(cycles.between, cycles.places, usual));
+  const double noise = std::max(factor_of(cycles.inside, cycles.places, usual),
+                                factor_of(cycles.between, cycles.places, usual));
   return noise < kNotable * usual ? usual : noise;
 }
 

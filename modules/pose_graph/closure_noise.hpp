@@ -47,8 +47,8 @@ struct ClosureNoiseRecord {
 /// density for the prior log s ~ N(log usual, log 3), a variance component (Foerstner 1979). The
 /// two kinds of cycles are fitted separately, because an error that all closures of a place share
 /// shows only between places; the larger estimate counts. The result is `usual`, unless the odds
-/// against it are 1000 to 1 and the estimate is at least 1.3 times as large. The odds must also
-/// hold against odometry that is 1.5 times noisier than it claims. O(cycles).
+/// against it are 1000 to 1 and the estimate is at least 1.3 times as large. The odds must
+/// also be so if odometry is 1.5 times noisier than it claims. O(cycles).
 [[nodiscard]] double estimate_closure_noise(const PairCycles& cycles, double usual);
 
 }  // namespace km

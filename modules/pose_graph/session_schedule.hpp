@@ -32,8 +32,8 @@ class SessionSchedule {
  private:
   PoseGraphConfig config_;
   double changed_s_ = -1e9;     // time of the last change of the graph
-  std::uint64_t closures_ = 0;  // of the present plan
-  std::uint64_t used_ = 0;      // in the last session
+  std::uint64_t closures_ = 0;  // number in the present plan
+  std::uint64_t used_ = 0;      // number in the last session
   std::uint32_t opened_ = 0;
 };
 

@@ -207,7 +207,7 @@ class TeamAgent {
   std::optional<World> world_;  // in frame_
   OwnPoses poses_;
   std::optional<SessionPart> part_;
-  SessionState state_ = SessionState::kNone;  // of the session of part_
+  SessionState state_ = SessionState::kNone;  // state of the session of part_
   double started_s_ = 0.0;
   std::uint64_t sent_bytes_ = 0;     // for this session, per receiver, and with forwarded messages
   std::uint32_t rounds_before_ = 0;  // rounds of earlier sessions
