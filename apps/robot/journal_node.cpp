@@ -55,7 +55,7 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
   topics.outcomes.subscribe(post);
   topics.peer_events.subscribe([this](const auto& event) {
     using enum PeerEventKind;
-    if (event->kind == kJoined || event->kind == kTold || event->kind == kResumed)
+    if (event->kind == kJoined || event->kind == kReported || event->kind == kResumed)
       worker_.post(event);
   });
 }

@@ -86,7 +86,7 @@ const char* to_word(PeerState state) {
       return "lost";
     case PeerState::kLeft:
       return "left";
-    case PeerState::kTold:
+    case PeerState::kReported:
       return "out of reach";
   }
   return "";
@@ -272,7 +272,7 @@ class Watch {
           return kHeard;
         case PeerState::kLost:
           return kSilent;
-        case PeerState::kTold:
+        case PeerState::kReported:
           return kTold;
         case PeerState::kLeft:
           break;

@@ -336,10 +336,10 @@ void Robot::add_relay() {
       [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
   relay_->join_calls(RelayKind::kReply, around(t.own_replies, t.replies, t.peer_replies),
                      keyframe_of);
-  relay_->join_letters(RelayKind::kClosure,
-                       around(t.told_closures, t.shared_closures, t.peer_closures));
-  relay_->join_letters(RelayKind::kInlierSet,
-                       around(t.told_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
+  relay_->join_reliable(RelayKind::kClosure,
+                        around(t.told_closures, t.shared_closures, t.peer_closures));
+  relay_->join_reliable(RelayKind::kInlierSet,
+                        around(t.told_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
 }
 
 void Robot::add_network(CrossingEnds meshes) {
@@ -378,7 +378,8 @@ void Robot::add_network(CrossingEnds meshes) {
         if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set, lives_.of(set->b)});
       });
   dds.peers().events().subscribe([this, meet](const auto& event) {
-    if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kTold) meet(event);
+    if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kReported)
+      meet(event);
     if (event->kind == PeerEventKind::kConflict && event->identity.robot == identity_.robot)
       id_taken_ = true;
   });

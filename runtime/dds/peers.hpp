@@ -70,7 +70,7 @@ class Peers {
   void recall(const RobotIdentity& identity);
 
   /// See PeerTable. Thread-safe.
-  void tell(const RobotIdentity& identity);
+  void reported(const RobotIdentity& identity);
   [[nodiscard]] bool is_arriving(RobotId robot) const;
 
   /// Robots of the team ever met by this one, ascending by id.
@@ -92,7 +92,7 @@ class Peers {
 
   /// See PeerTable.
   void prove(const Guid& guid);
-  void twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s);
+  void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   // For the bridge.
 

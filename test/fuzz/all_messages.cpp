@@ -129,7 +129,7 @@ std::vector<MessageReader> all_messages() {
       topic<RobotStatus>({{.robot = kWriter.robot,
                            .name = "beta",
                            .settled_links = 3,
-                           .relay = {.hears = {kReader, 9}, .holds = {{{11, 12}, 13, 14}}}}}),
+                           .relay = {.received = {kReader, 9}, .holds = {{{11, 12}, 13, 14}}}}}),
       topic<RelayParcel>(
           {relayed({.kind = RelayKind::kIntroduction, .origin = {9, 1}, .content = {'c'}}),
            relayed({.kind = RelayKind::kIntroduction,

@@ -161,7 +161,7 @@ std::vector<Flood> all_floods() {
              RobotStatus{.robot = kFlooder, .name = "flooder", .keyframes = i});
        }},
       {"identities", [](FloodPeer&, std::uint32_t) {}},  // see strangers_main.cpp
-      {"keys", [](FloodPeer& from, std::uint32_t) { from.bridge.tell_keys(); }, kFlooder, true},
+      {"keys", [](FloodPeer& from, std::uint32_t) { from.bridge.send_keys(); }, kFlooder, true},
       {"mesh chunks",
        [](FloodPeer& from, std::uint32_t i) { from.chunks.to_peers().publish(some_surface(i)); }},
   };
