@@ -193,8 +193,8 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
   write("loop_closures.csv", write_closures, record);
 }
 
-std::vector<ToldClosure> told_closures(const RunRecord& record) {
-  std::vector<ToldClosure> told;
+std::vector<PublishedClosure> published_closures(const RunRecord& record) {
+  std::vector<PublishedClosure> told;
   for (const ClosureOutcome& outcome : record.outcomes())
     told.push_back({.id = outcome.id,
                     .stage = outcome.stage,

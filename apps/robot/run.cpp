@@ -415,7 +415,7 @@ void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRe
   std::map<std::string, std::string> files;
   for (const char* name : {"config.yaml", "keyframes.csv", "loop_closures.csv"})
     if (is_file(options.output / name)) files[name] = read_input_file(options.output / name);
-  node.finish(record.optimized(), told_closures(record), files);
+  node.finish(record.optimized(), published_closures(record), files);
   if (node.left_out() > 0)
     log::warn("record") << node.left_out() << " messages and images are missing in "
                         << options.record->string() << ": they came faster than they were written";

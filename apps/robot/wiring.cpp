@@ -337,7 +337,7 @@ void Robot::add_relay() {
   relay_->join_calls(RelayKind::kReply, around(t.own_replies, t.replies, t.peer_replies),
                      keyframe_of);
   relay_->join_reliable(RelayKind::kClosure,
-                        around(t.told_closures, t.shared_closures, t.peer_closures));
+                        around(t.published_closures, t.shared_closures, t.peer_closures));
   relay_->join_reliable(RelayKind::kInlierSet,
                         around(t.told_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
 }
@@ -364,7 +364,7 @@ void Robot::add_network(CrossingEnds meshes) {
   dds.exchange(t.status, kStatus, kOther);
   // Closures and inlier sets are sent only to the robots that they connect.
   t.own_closures.subscribe(
-      [this, to = Out<Addressed<Closure>>(t.told_closures)](const auto& closure) {
+      [this, to = Out<Addressed<Closure>>(t.published_closures)](const auto& closure) {
         const RobotId other = closure->to.id.robot;
         if (other != closure->from.id.robot)
           to.publish(Addressed<Closure>{other, closure, lives_.of(other)});
@@ -437,10 +437,10 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
         return all;
       },
       [this, activity = std::optional<std::uint64_t>()]() mutable {
-        std::optional<std::vector<ToldClosure>> closures;
+        std::optional<std::vector<PublishedClosure>> closures;
         (void)recorder_->try_with_record([&](const RunRecord& record) {
           if (std::exchange(activity, record.activity()) != record.activity())
-            closures = told_closures(record);
+            closures = published_closures(record);
         });
         return closures;
       },

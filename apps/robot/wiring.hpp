@@ -85,7 +85,7 @@ struct Topics {
   Topic<KeyframeRequest> peer_requests;
   Topic<Addressed<KeyframeReply>> own_replies;
   Topic<KeyframeReply> peer_replies;
-  Topic<Addressed<Closure>> told_closures;
+  Topic<Addressed<Closure>> published_closures;
   Topic<Closure> peer_closures;
   Topic<Addressed<InlierSet>> told_inlier_sets;
   Topic<InlierSet> peer_inlier_sets;

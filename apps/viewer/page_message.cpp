@@ -139,7 +139,7 @@ PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
   std::ostringstream boot;
   boot << std::hex << update.boot;
   Json json = {{"n", number},
-               {"t", static_cast<double>(update.told / 1000) * 1e-3},
+               {"t", static_cast<double>(update.sent / 1000) * 1e-3},
                {"robot", update.robot},
                {"boot", boot.str()}};
   std::string data;

@@ -165,7 +165,7 @@ class PageServer::Impl {
         },
         [](mg_connection* connection, void* self) { static_cast<Impl*>(self)->open(connection); },
         [](mg_connection* connection, int bits, char* data, size_t size, void* self) {
-          static_cast<Impl*>(self)->hear(connection, bits, {data, size});
+          static_cast<Impl*>(self)->receive(connection, bits, {data, size});
           return (bits & 0xf) == MG_WEBSOCKET_OPCODE_CONNECTION_CLOSE ? 0 : 1;
         },
         [](const mg_connection* connection, void* self) {
@@ -219,24 +219,24 @@ class PageServer::Impl {
     const std::lock_guard lock(mutex_);
     const auto page = std::make_shared<Page>();
     pages_[connection] = page;
-    page->sender = std::thread([this, connection, page] { tell(connection, *page); });
+    page->sender = std::thread([this, connection, page] { send_messages(connection, *page); });
   }
 
   // A text frame holds an array of messages, or the greeting.
-  void tell(mg_connection* connection, const Page& page) {
+  void send_messages(mg_connection* connection, const Page& page) {
     if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.greeting + ']')) return;
     ViewStore::Cursor cursor;
     bool caught_up = false;
     while (!page.closed && !stopping_) {
       const ViewStore::Batch batch = store_.take(cursor, kBatchBytes, kWait_s);
-      if (!tell(connection, batch)) return;
+      if (!send_batch(connection, batch)) return;
       if (batch.caught_up && !caught_up)
         send(connection, MG_WEBSOCKET_OPCODE_TEXT, R"([{"kind":"caught_up"}])");
       caught_up = caught_up || batch.caught_up;
     }
   }
 
-  static bool tell(mg_connection* connection, const ViewStore::Batch& batch) {
+  static bool send_batch(mg_connection* connection, const ViewStore::Batch& batch) {
     std::string text;
     const auto flush = [&] {
       const bool ok = text.empty() || send(connection, MG_WEBSOCKET_OPCODE_TEXT, text + ']');
@@ -256,7 +256,7 @@ class PageServer::Impl {
     return flush();
   }
 
-  void hear(mg_connection* connection, int bits, std::string_view text) {
+  void receive(mg_connection* connection, int bits, std::string_view text) {
     if ((bits & 0xf) != MG_WEBSOCKET_OPCODE_TEXT) return;
     const auto wish = parse_wish(text);
     if (!wish) return;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "modules/view/view_listener_node.hpp"
-#include "modules/view/view_teller.hpp"
+#include "modules/view/view_selector.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/support/process.hpp"
 #include "test/system/team_run.hpp"
@@ -49,7 +49,7 @@ class Audience {
       const bool is_over = is_over_;
       const auto update = listener_.next(kSilence_s);
       if (update)
-        robots_[update->robot].hear(update->content);
+        robots_[update->robot].receive(update->content);
       else if (is_over)
         return;
     }
@@ -88,10 +88,10 @@ void check_knowledge(const Watcher& known, const fs::path& results) {
   REQUIRE(known.optimized.size() == graph.vertices.size());
   for (const G2oVertex& vertex : graph.vertices) {
     CAPTURE(to_string(vertex.id));
-    const auto& told = known.optimized.at(vertex.id.index);
-    CHECK(told.anchor == 0);
-    CHECK((told.T.translation() - vertex.T_world_kf.translation()).norm() <
-          ViewTeller::kMaxShift_m + 1e-4);
+    const auto& sent = known.optimized.at(vertex.id.index);
+    CHECK(sent.anchor == 0);
+    CHECK((sent.T.translation() - vertex.T_world_kf.translation()).norm() <
+          ViewSelector::kMaxShift_m + 1e-4);
   }
   std::set<ClosureId> edges, kept;
   for (const RelativePose& edge : graph.edges)

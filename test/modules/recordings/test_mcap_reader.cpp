@@ -33,7 +33,7 @@ struct ListedRecord {
 };
 
 struct Listed {
-  std::vector<ToldMessage> messages;
+  std::vector<TopicMessage> messages;
   std::size_t channels = 0;
 };
 
@@ -50,11 +50,11 @@ Listed listed_in(const fs::path& file) {
     if (record.type == "Channel") channels.emplace(record.number("id"), record);
     if (record.type != "Message") continue;
     const ListedRecord& channel = channels.at(record.number("channel_id"));
-    ToldMessage message{.topic = channel.text("topic"),
-                        .type = types.at(channel.number("schema_id")),
-                        .encoding = channel.text("message_encoding"),
-                        .log_time = record.number("log_time"),
-                        .bytes = {}};
+    TopicMessage message{.topic = channel.text("topic"),
+                         .type = types.at(channel.number("schema_id")),
+                         .encoding = channel.text("message_encoding"),
+                         .log_time = record.number("log_time"),
+                         .bytes = {}};
     for (const Json& byte : record.fields.at("data"))
       message.bytes.push_back(static_cast<std::uint8_t>(std::stoi(byte.get<std::string>())));
     listed.messages.push_back(std::move(message));
@@ -107,10 +107,10 @@ TEST_CASE("Every file of the MCAP conformance suite gives the messages that are 
     std::uint64_t count = 0;
     for (const BagChannel& channel : reader.channels()) count += channel.message_count;
     CHECK(count == listed.messages.size());
-    const auto told = told_by(reader);
-    CHECK(told == listed.messages);
+    const auto read = topic_messages_of(reader);
+    CHECK(read == listed.messages);
     CHECK(to_string(reader.report()) == "");
-    messages += told.size();
+    messages += read.size();
   }
   CHECK(files == 342);
   CHECK(messages == 1694);

@@ -53,7 +53,7 @@ struct Watched {
 
   // The node detects a new viewer with the next tick.
   void pass(double seconds) {
-    for (const double end_s = now_s + seconds; now_s < end_s; now_s += kDt_s) node.tell(now_s);
+    for (const double end_s = now_s + seconds; now_s < end_s; now_s += kDt_s) node.send_due(now_s);
   }
   template <typename T>
   void learn(T message) {
@@ -76,8 +76,8 @@ struct Watched {
     T.translation().x() = x_m;
     learn(Trajectory{kSelf, kSelf, std::vector<SE3>(count, T)});
   }
-  [[nodiscard]] std::size_t told(ViewChannel channel = ViewChannel::kView) const {
-    return node.told_bytes(channel);
+  [[nodiscard]] std::size_t sent(ViewChannel channel = ViewChannel::kView) const {
+    return node.sent_bytes(channel);
   }
 
   std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
@@ -103,12 +103,12 @@ struct Visitor {
   explicit Visitor(Watched& robot) : listener(robot.domain) {
     REQUIRE(eventually([&] {
       robot.pass(kDt_s);
-      hear_all();
+      receive_all();
       return !watcher.states.empty();
     }));
   }
-  void hear_all() {
-    while (auto update = listener.next(0.0)) watcher.hear(update->content);
+  void receive_all() {
+    while (auto update = listener.next(0.0)) watcher.receive(update->content);
   }
   [[nodiscard]] std::size_t faces() const {
     const auto meshes = watcher.mesh.snapshot();
@@ -128,7 +128,7 @@ TEST_CASE("Without viewers nothing is sent", "[view]") {
   robot.pass(60.0);
   CHECK(robot.described == 0);
   for (const auto channel : {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages})
-    CHECK(robot.told(channel) == 0);
+    CHECK(robot.sent(channel) == 0);
 }
 
 TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
@@ -139,17 +139,17 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   const double begin_s = robot.now_s;
   Visitor visitor(robot);
   const double come_s = robot.now_s;
-  const double slack = static_cast<double>(ViewTeller::kUpdateBytes) + 200.0;
-  const auto told = [&] { return static_cast<double>(robot.told()); };
+  const double slack = static_cast<double>(ViewSelector::kUpdateBytes) + 200.0;
+  const auto sent = [&] { return static_cast<double>(robot.sent()); };
   constexpr double kPast_bytes = (36.0 + 28.0) * kKeyframes;
-  while (told() < kPast_bytes) {
+  while (sent() < kPast_bytes) {
     robot.pass(kDt_s);
-    REQUIRE(told() <= config.past_bytes_per_s * (robot.now_s - begin_s + 0.5) + slack);
+    REQUIRE(sent() <= config.past_bytes_per_s * (robot.now_s - begin_s + 0.5) + slack);
     REQUIRE(robot.now_s - come_s < kPast_bytes / config.past_bytes_per_s + 2.0);
   }
   CHECK(eventually([&] {
     robot.pass(kDt_s);
-    visitor.hear_all();
+    visitor.receive_all();
     return visitor.watcher.odometry.size() == kKeyframes &&
            visitor.watcher.optimized.size() == kKeyframes;
   }));
@@ -157,13 +157,13 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   // More moves than the budget allows to send.
   robot.pass(5.0);
   const double present_s = robot.now_s;
-  const std::size_t present = robot.told();
+  const std::size_t present = robot.sent();
   double x_m = 0.0;
   while (robot.now_s < present_s + 60.0) {
     robot.learn_trajectory(kKeyframes, x_m += 1.0);
     robot.pass(1.0);
   }
-  const double rate = static_cast<double>(robot.told() - present) / (robot.now_s - present_s);
+  const double rate = static_cast<double>(robot.sent() - present) / (robot.now_s - present_s);
   CHECK(rate <= config.bytes_per_s + (0.5 * config.bytes_per_s + slack) / 60.0);
   CHECK(rate > 0.9 * config.bytes_per_s);
 }
@@ -176,7 +176,7 @@ TEST_CASE("A state is sent once a second", "[view]") {
   const std::size_t before = visitor.watcher.states.size();
   robot.pass(10.0);
   REQUIRE(eventually([&] {
-    visitor.hear_all();
+    visitor.receive_all();
     return visitor.watcher.states.size() >= before + 10;
   }));
   CHECK(visitor.watcher.states.size() <= before + 11);
@@ -203,7 +203,7 @@ TEST_CASE("A late viewer receives the full state", "[view]") {
   const auto knows_all = [&](Visitor& visitor) {
     return eventually([&] {
       robot.pass(1.0);
-      visitor.hear_all();
+      visitor.receive_all();
       const Watcher& watcher = visitor.watcher;
       return watcher.odometry.size() == 50 && watcher.optimized.size() == 50 &&
              watcher.closures.contains(id) && visitor.faces() == faces;
@@ -216,7 +216,7 @@ TEST_CASE("A late viewer receives the full state", "[view]") {
   CHECK(eventually([&] {  // Also after the other viewer has gone.
     robot.learn_mesh(20);
     robot.pass(1.0);
-    second.hear_all();
+    second.receive_all();
     return second.faces() == wavy_sheet(20, 0.1).faces.size();
   }));
 }
@@ -231,7 +231,7 @@ TEST_CASE("Chunks that are removed while a viewer appears are removed for the ea
   const auto knows = [&](Visitor& visitor, std::uint32_t side) {
     return eventually([&] {
       robot.pass(10.0);
-      visitor.hear_all();
+      visitor.receive_all();
       return visitor.faces() == wavy_sheet(side, 0.1).faces.size();
     });
   };
@@ -249,16 +249,16 @@ TEST_CASE("Mesh chunks are sent no faster than configured", "[view]") {
   robot.learn_mesh(150);
   Visitor visitor(robot);
   const double begin_s = robot.now_s;
-  const std::size_t before = robot.told(ViewChannel::kMesh);
-  const auto told_since = [&] {
-    return static_cast<double>(robot.told(ViewChannel::kMesh) - before);
+  const std::size_t before = robot.sent(ViewChannel::kMesh);
+  const auto sent_since = [&] {
+    return static_cast<double>(robot.sent(ViewChannel::kMesh) - before);
   };
   for (int tick = 0; tick < 100; ++tick) {
     robot.pass(kDt_s);
-    REQUIRE(told_since() <=
+    REQUIRE(sent_since() <=
             config.mesh_bytes_per_s * (robot.now_s - begin_s + 0.5) + kMaxChunkBytes);
   }
-  CHECK(told_since() > 0.8 * config.mesh_bytes_per_s * (robot.now_s - begin_s));
+  CHECK(sent_since() > 0.8 * config.mesh_bytes_per_s * (robot.now_s - begin_s));
 }
 
 TEST_CASE("At the end all remaining updates are sent", "[view]") {
@@ -268,11 +268,11 @@ TEST_CASE("At the end all remaining updates are sent", "[view]") {
   robot.learn_mesh(150);
   robot.node.start();
   robot.node.stop();
-  const std::size_t told = robot.told();
+  const std::size_t sent = robot.sent();
   robot.node.stop();
-  CHECK(robot.told() == told);
+  CHECK(robot.sent() == sent);
   CHECK(eventually([&] {
-    visitor->hear_all();
+    visitor->receive_all();
     return visitor->watcher.optimized.size() == 400 &&
            visitor->faces() == wavy_sheet(150, 0.1).faces.size();
   }));
@@ -288,11 +288,11 @@ TEST_CASE("Images are sent while they are requested", "[view]") {
   Visitor visitor(robot);
   robot.node.start();
   for (int k = 0; k < 20; ++k) robot.images.publish(TrackedImage{shared, {{0.1, 0.2}}});
-  CHECK(robot.told(ViewChannel::kImages) == 0);
+  CHECK(robot.sent(ViewChannel::kImages) == 0);
   visitor.listener.ask_for_images({kSelf});
   CHECK(eventually([&] {
     robot.images.publish(TrackedImage{shared, {{0.1, 0.2}}});
-    visitor.hear_all();
+    visitor.receive_all();
     return !visitor.watcher.images.empty();
   }));
   REQUIRE_FALSE(visitor.watcher.images.empty());
