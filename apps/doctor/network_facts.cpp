@@ -291,7 +291,8 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
 void examine_echo(const PeerEcho& peer, Examination& result) {
   if (!peer.may_ask) {
     result.figures.push_back(
-        {"peer " + peer.host, "not told: this user may not send ICMP (net.ipv4.ping_group_range)"});
+        {"peer " + peer.host,
+         "not determined: this user may not send ICMP (net.ipv4.ping_group_range)"});
     return;
   }
   const double loss = 1.0 - static_cast<double>(peer.received) /

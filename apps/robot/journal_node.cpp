@@ -108,10 +108,10 @@ void JournalNode::step(Tick /*tick*/) {
                                "goes on from there");
   });
   for (const HeldBack& held : std::exchange(held_back_, {}))
-    std::visit([this](const auto& message) { hand_on(message); }, held);
+    std::visit([this](const auto& message) { pass(message); }, held);
 }
 
-void JournalNode::hand_on(const Message<Keyframe>& keyframe) {
+void JournalNode::pass(const Message<Keyframe>& keyframe) {
   topics_.keyframes.publish(keyframe);
   --new_keyframes_;
 }

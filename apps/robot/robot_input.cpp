@@ -117,14 +117,14 @@ std::optional<Rig> hear_calibration(const PartialRig& rig,
   constexpr int kKept = 100;
   std::vector<RosTopic> wanted;
   std::string names;
-  for (const auto& teller : RigCompletion(rig).tellers()) {
-    wanted.push_back({teller.topic, std::string(teller.type),
-                      teller.type == RosTransforms::kType ? RosQos::kLatched : RosQos::kSensorData,
+  for (const auto& source : RigCompletion(rig).sources()) {
+    wanted.push_back({source.topic, std::string(source.type),
+                      source.type == RosTransforms::kType ? RosQos::kLatched : RosQos::kSensorData,
                       kKept});
-    names += (names.empty() ? "" : ", ") + teller.topic;
+    names += (names.empty() ? "" : ", ") + source.topic;
   }
   LiveBag topics(ros, std::move(wanted));
-  log::info("sensors") << "waiting for what tells the calibration: " << names;
+  log::info("sensors") << "waiting for messages with the calibration: " << names;
   topics.give_up_after(kPatience_s);
   const SignalStop stop(signals, topics);
   try {

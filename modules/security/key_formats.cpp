@@ -83,7 +83,7 @@ void write_secret_key(const std::filesystem::path& file, const SigningKey& key,
 
 void write_certificate(const std::filesystem::path& file, const Certificate& certificate) {
   std::ostringstream out;
-  out << "# The team's authority says that this robot has this key. Everyone may read it.\n"
+  out << "# The team's authority certifies that this robot has this key. Everyone may read it.\n"
       << "format: " << kCertificateFormat << "\nteam: " << certificate.team
       << "\nrobot: " << certificate.robot << "\nname: " << certificate.name
       << "\npublic_key: " << to_hex(certificate.key)

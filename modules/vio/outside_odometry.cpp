@@ -62,7 +62,7 @@ OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
   // Frames refer to a keyframe, so a first keyframe must exist. One that locates points is better.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
-    hand_on(fix, T_odom_body, result.has_jumped, result);
+    add_keyframe(fix, T_odom_body, result.has_jumped, result);
   if (!last_keyframe_) return result;
   if (is_taken_up)  // the state was published earlier; the covariance was not kept
     last_kf_ = fix;
@@ -91,8 +91,8 @@ void OutsideOdometry::count_motion(const Fix& fix) {
   T_odom_rest_ = T_odom_body;
 }
 
-void OutsideOdometry::hand_on(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
-                              OutsideOdometryResult& result) {
+void OutsideOdometry::add_keyframe(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
+                                   OutsideOdometryResult& result) {
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, 0};
   keyframe.stamp = fix.stamp;

@@ -43,8 +43,8 @@ class OutsideOdometry {
 
   [[nodiscard]] bool is_jump(const Fix& fix) const;
   void count_motion(const Fix& fix);
-  void hand_on(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
-               OutsideOdometryResult& result);
+  void add_keyframe(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
+                    OutsideOdometryResult& result);
 
   RobotId robot_;
   DepthSource depth_source_;

@@ -162,7 +162,7 @@ void Vio::go_on(const Held& held, VioResult& result) {
   start_on(held, *last_, *last_keyframe_->state_covariance);
   ++statistics_.start_attempts;
   ++statistics_.starts;
-  result.start = StartStatus::kGoesOn;
+  result.start = StartStatus::kContinues;
   running_ = true;
   locate(*last_, held.frame, result);
 }
@@ -195,11 +195,11 @@ void Vio::try_start(VioResult& result) {
       ++statistics_.starts;
       result.states = *states;
       running_ = true;
-      take_up_or_hand_on_first(result);
+      continue_or_add_first_keyframe(result);
       locate(states->front(), held_.front().frame, result);
       for (std::size_t k = 1; k < held_.size(); ++k) {
         if (smoother_.window().frames[k].keyframe && due((*states)[k], *held_[k].frame))
-          hand_on((*states)[k], result);
+          add_keyframe((*states)[k], result);
         locate((*states)[k], held_[k].frame, result);
       }
       held_.clear();
@@ -264,7 +264,7 @@ void Vio::advance(const Held& held, VioResult& result) {
   const bool mended = has_mended(*held.frame);
   if (mended ||
       (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame))))
-    hand_on(result.smoother->state, result);
+    add_keyframe(result.smoother->state, result);
   if (mended) forget_dark(held, result.smoother->state);
   locate(result.smoother->state, held.frame, result);
 }
@@ -365,12 +365,12 @@ std::optional<StateCovariance> Vio::state_covariance_at(const OdometryState& sta
 }
 
 // If the first image is that of the last keyframe, the keyframe was published earlier.
-void Vio::take_up_or_hand_on_first(VioResult& result) {
+void Vio::continue_or_add_first_keyframe(VioResult& result) {
   const OdometryState& first = result.states.front();
-  if (!last_keyframe_ || last_keyframe_->stamp != first.stamp) hand_on_first(first, result);
+  if (!last_keyframe_ || last_keyframe_->stamp != first.stamp) add_first_keyframe(first, result);
 }
 
-void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
+void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
   KeyframeOdometry keyframe;
   keyframe.stamp = state.stamp;
   keyframe.T_odom_kf = T_chain_odom_ * state.T_odom_body;
@@ -392,7 +392,7 @@ void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
   result.keyframes.push_back(keyframe);
 }
 
-void Vio::hand_on(const OdometryState& state, VioResult& result) {
+void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   const auto relative = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, last_keyframe_->id.index + 1};

@@ -102,11 +102,11 @@ class Vio {
   void watch_vision(Stamp stamp, int features, VioResult& result);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
-  void take_up_or_hand_on_first(VioResult& result);
+  void continue_or_add_first_keyframe(VioResult& result);
   [[nodiscard]] double moved_s(Stamp stamp) const;
   [[nodiscard]] double unseen_s(Stamp stamp) const;
-  void hand_on_first(const OdometryState& state, VioResult& result);
-  void hand_on(const OdometryState& state, VioResult& result);
+  void add_first_keyframe(const OdometryState& state, VioResult& result);
+  void add_keyframe(const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<StateCovariance> state_covariance_at(
       const OdometryState& state) const;
   [[nodiscard]] std::optional<UncertainCalibration> known_calibration() const;

@@ -162,7 +162,7 @@ std::vector<std::string> logged(const std::vector<std::string>& command) {
 }
 
 bool waits_for_calibration(const std::string& line) {
-  return line.find("waiting for what tells the calibration") != line.npos;
+  return line.find("waiting for messages with the calibration") != line.npos;
 }
 
 }  // namespace

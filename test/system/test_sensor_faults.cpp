@@ -108,7 +108,7 @@ Outcome meet(const Stage& stage, const SensorFault& fault) {
   const Stamp first = copy.cameras[0].front().stamp;
   const Stamp begin = first + (fault.is_at_start ? 0 : nanoseconds(stage.begin_s));
   const Stamp end = begin + nanoseconds(fault.lasts_s);
-  fault.spoil(copy, begin, end);
+  fault.corrupt(copy, begin, end);
   copy.write(folder.path() / "recording");
   const CommandResult run = run_robot(folder.path() / "recording", folder.path() / "results");
   Outcome outcome;

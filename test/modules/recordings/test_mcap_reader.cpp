@@ -9,8 +9,8 @@
 #include "modules/recordings/mcap_reader.hpp"
 #include "test/modules/recordings/listed_sum.hpp"
 #include "test/modules/recordings/mcap_file.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -223,14 +223,14 @@ TEST_CASE("Corrupted MCAP files are refused or read in order", "[recordings]") {
   options.compression = GENERATE("", "lz4", "zstd");
   options.has_crc = GENERATE(true, false);
   const TemporaryFolder folder;
-  check_spoilt<InputFileError>(mixed_file(options).finish(), folder.path().string(),
-                               [&](const std::string& bytes) {
-                                 McapReader reader(folder.write("a.mcap", bytes));
-                                 check_order(messages_of(reader));
-                                 const BagReport report = reader.report();
-                                 for (const auto& [fault, entry] : report.entries())
-                                   CHECK(entry.first.find("a.mcap byte ") != entry.first.npos);
-                               });
+  check_corrupted<InputFileError>(mixed_file(options).finish(), folder.path().string(),
+                                  [&](const std::string& bytes) {
+                                    McapReader reader(folder.write("a.mcap", bytes));
+                                    check_order(messages_of(reader));
+                                    const BagReport report = reader.report();
+                                    for (const auto& [fault, entry] : report.entries())
+                                      CHECK(entry.first.find("a.mcap byte ") != entry.first.npos);
+                                  });
 }
 
 TEST_CASE("A file that is no MCAP file is refused by name", "[recordings]") {

@@ -152,8 +152,8 @@ OdometryErrors killed_errors(const Recording& recording, const OdometryRun& whol
                              const TrackerConfig& tracker, const VioConfig& config) {
   OdometryRun joined, run = whole;
   std::size_t first = 0;
-  for (std::size_t life = 0;; ++life) {
-    const bool killed = life < kills && run.keyframes.size() > keyframes;
+  for (std::size_t run_index = 0;; ++run_index) {
+    const bool killed = run_index < kills && run.keyframes.size() > keyframes;
     for (std::size_t k = 0; k < run.states.size(); ++k) {
       if (killed && run.states[k].stamp > run.keyframes[keyframes - 1].stamp) break;
       joined.states.push_back(run.states[k]);
