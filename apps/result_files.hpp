@@ -62,7 +62,7 @@ inline constexpr const char* kRecord = "record.mcap";
 /// Remedy for that error.
 [[nodiscard]] inline std::string way_on(const std::filesystem::path& folder) {
   return "if it was killed: the same command with --resume " + folder.string() +
-         " in place of --output goes on with it";
+         " in place of --output continues it";
 }
 
 /// "record_2.mcap" of "record.mcap".

@@ -104,8 +104,8 @@ void JournalNode::step(Tick /*tick*/) {
     added_ = false;
     if (!journal_.is_whole())
       throw std::runtime_error(file.string() +
-                               ": ends where the disk was full for too long: taken up, the run "
-                               "goes on from there");
+                               ": ends where the disk was full for too long: a resumed run "
+                               "continues from there");
   });
   for (const HeldBack& held : std::exchange(held_back_, {}))
     std::visit([this](const auto& message) { pass(message); }, held);

@@ -119,7 +119,7 @@ void Robot::add_restore() {
   restored_images_ = restored_->final_states();
   for (const auto& [robot, peer] : restored_->peers) {
     bridge_->peers().recall({.robot = robot, .name = peer.name, .boot = peer.boot});
-    lives_.meet({robot, peer.boot});
+    incarnations_.meet({robot, peer.boot});
   }
   restore_ = &add<RestoreNode>(false, RestoreTopics{.states = topics_.restored_odometry,
                                                     .odometry = topics_.keyframe_odometry,
@@ -337,9 +337,9 @@ void Robot::add_relay() {
   relay_->join_calls(RelayKind::kReply, around(t.own_replies, t.replies, t.peer_replies),
                      keyframe_of);
   relay_->join_reliable(RelayKind::kClosure,
-                        around(t.published_closures, t.shared_closures, t.peer_closures));
+                        around(t.addressed_closures, t.shared_closures, t.peer_closures));
   relay_->join_reliable(RelayKind::kInlierSet,
-                        around(t.told_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
+                        around(t.addressed_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
 }
 
 void Robot::add_network(CrossingEnds meshes) {
@@ -364,18 +364,19 @@ void Robot::add_network(CrossingEnds meshes) {
   dds.exchange(t.status, kStatus, kOther);
   // Closures and inlier sets are sent only to the robots that they connect.
   t.own_closures.subscribe(
-      [this, to = Out<Addressed<Closure>>(t.published_closures)](const auto& closure) {
+      [this, to = Out<Addressed<Closure>>(t.addressed_closures)](const auto& closure) {
         const RobotId other = closure->to.id.robot;
         if (other != closure->from.id.robot)
-          to.publish(Addressed<Closure>{other, closure, lives_.of(other)});
+          to.publish(Addressed<Closure>{other, closure, incarnations_.of(other)});
       });
   const auto meet = [this](const auto& event) {
-    lives_.meet({event->identity.robot, event->identity.boot});
+    incarnations_.meet({event->identity.robot, event->identity.boot});
   };
   t.closure_restarts.subscribe(meet);
   t.own_inlier_sets.subscribe(
-      [this, to = Out<Addressed<InlierSet>>(t.told_inlier_sets)](const auto& set) {
-        if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set, lives_.of(set->b)});
+      [this, to = Out<Addressed<InlierSet>>(t.addressed_inlier_sets)](const auto& set) {
+        if (set->a != set->b)
+          to.publish(Addressed<InlierSet>{set->b, set, incarnations_.of(set->b)});
       });
   dds.peers().events().subscribe([this, meet](const auto& event) {
     if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kReported)
@@ -485,8 +486,8 @@ std::string Robot::name_of(RobotId robot) const {
 void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& camera) {
   if (!config.view.on) return;
   if (seal_ != nullptr && !config.view.in_clear) {
-    log::info(ViewConfig::kSection)
-        << "off: the team has keys, and who watches would be told in clear (view.in_clear)";
+    log::info(ViewConfig::kSection) << "off: the team has keys, and viewers would receive data "
+                                       "without encryption (view.in_clear)";
     return;
   }
   const MeshChunksConfig& mesh = config.mesh_chunks;

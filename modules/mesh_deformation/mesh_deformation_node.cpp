@@ -155,7 +155,7 @@ void MeshDeformationNode::report(const OptimizedMesh& result) const {
   log::debug(name()) << report.vertices << " vertices, " << report.nodes << " nodes ("
                      << report.new_nodes << " new), " << report.keyframes
                      << " keyframes: " << to_string(report.status) << " after " << report.iterations
-                     << " iterations, " << result.superseded_faces << " faces seen anew, "
+                     << " iterations, " << result.superseded_faces << " faces seen again, "
                      << result.seconds << " s";
   if (report.status == DeformationStatus::kFailed)
     log::limited(log::Level::kWarn, name(), "failed")

@@ -197,9 +197,10 @@ TEST_CASE("Mistakes on a robot's command line are reported by value and with a r
   CHECK_THAT(refusal("--output x --robot 70000"),
              Catch::Contains("--robot: Value 70000 not in range") && Catch::Contains("65535"));
   const fs::path mistyped = folder.path() / "alcie";
-  CHECK_THAT(refusal("--robot 1 --resume " + mistyped.string()),
-             Catch::Contains(mistyped.string() + ": there is no such folder, so no run to go on") &&
-                 Catch::Contains("--output"));
+  CHECK_THAT(
+      refusal("--robot 1 --resume " + mistyped.string()),
+      Catch::Contains(mistyped.string() + ": there is no such folder, so no run to continue") &&
+          Catch::Contains("--output"));
   CHECK_FALSE(fs::exists(mistyped));
 }
 

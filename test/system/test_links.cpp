@@ -213,7 +213,7 @@ TEST_CASE("A team that splits in two ends, and both sides report the robots they
     CHECK(summary.lost_peers.size() == names.size());
     CHECK(summary.apart_peers.empty());
     for (const std::string& name : names)
-      CHECK_THAT(summary.exit_reason, Catch::Matches(".*" + name + " \\(not heard for .*"));
+      CHECK_THAT(summary.exit_reason, Catch::Matches(".*" + name + " \\(not received for .*"));
     for (const auto& [name, missed_s] : summary.lost_peers) CHECK(missed_s > 0.0);
   }
 }

@@ -103,7 +103,8 @@ TEST_CASE("Steps that fail for the same reason share a message", "[experiments]"
   CHECK_THAT(outcome.problems[1], Catch::StartsWith("c: exit code 2"));
 }
 
-TEST_CASE("A program that complains on standard output is heard", "[experiments]") {
+TEST_CASE("The report of a failed step contains the standard output of its program",
+          "[experiments]") {
   Workshop workshop;
   const StepsOutcome outcome = workshop.run({workshop.step("bad", "echo robot1 failed; exit 3")});
   REQUIRE(outcome.problems.size() == 1);
