@@ -102,7 +102,7 @@ struct Fault {
   std::string name;
   std::function<void(const Excerpt&)> corrupt;
   std::size_t poses;
-  std::string told;  // with file and line
+  std::string message;  // with file and line
 };
 
 std::vector<Fault> faults() {
@@ -153,7 +153,7 @@ TEST_CASE("A robot skips broken parts of its recording, reports them, and contin
     const CommandResult result = run_robot(excerpt.root(), excerpt.root() / "results");
     CAPTURE(result.output);
     CHECK(result.exit_code == 0);
-    CHECK_THAT(result.output, Catch::Contains(fault.told));
+    CHECK_THAT(result.output, Catch::Contains(fault.message));
     CHECK(lines_of(excerpt.root() / "results/odometry.tum").size() == fault.poses);
   }
 }
@@ -204,8 +204,7 @@ TEST_CASE("Mistakes on a robot's command line are reported by value and with a r
   CHECK_FALSE(fs::exists(mistyped));
 }
 
-TEST_CASE("A folder that results cannot go to is refused before anything else is said",
-          "[system]") {
+TEST_CASE("A folder that results cannot go to is refused before any other output", "[system]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   const TemporaryFolder folder;

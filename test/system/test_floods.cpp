@@ -58,7 +58,7 @@ TeamPeer made_up(std::uint32_t number) {
 }
 
 template <typename Message>
-void hand_over(FloodPeer& from, Message message) {
+void send(FloodPeer& from, Message message) {
   from.parcels.to_peers().publish(
       {kVictim, std::make_shared<const TeamParcel>(TeamParcel{
                     from.self().robot, std::make_shared<const TeamMessage>(std::move(message))})});
@@ -141,19 +141,19 @@ std::vector<Flood> all_floods() {
        [](FloodPeer& from, std::uint32_t i) {
          TeamStatus status{.sender = made_up(i), .number = i + 1, .frame = made_up(i)};
          for (RobotId robot = 1000; robot < 1200; ++robot) status.hears.push_back({robot, i});
-         hand_over(from, std::move(status));
+         send(from, std::move(status));
        }},
-      {"sessions", [](FloodPeer& from, std::uint32_t i) { hand_over(from, large_session(i)); }},
-      {"public poses", [](FloodPeer& from, std::uint32_t i) { hand_over(from, many_poses(i)); }},
-      {"letters",
+      {"sessions", [](FloodPeer& from, std::uint32_t i) { send(from, large_session(i)); }},
+      {"public poses", [](FloodPeer& from, std::uint32_t i) { send(from, many_poses(i)); }},
+      {"session messages",
        [](FloodPeer& from, std::uint32_t i) {
-         hand_over(from, SessionLetter{.sender = made_up(i),
-                                       .session = {made_up(i), 1},
-                                       .number = i,
-                                       .to = i % 2 == 0 ? kVictim : kFar,
-                                       .bytes = std::make_shared<const std::vector<std::uint8_t>>(
-                                           10000, std::uint8_t{1}),
-                                       .copy = i});
+         send(from, SessionLetter{.sender = made_up(i),
+                                  .session = {made_up(i), 1},
+                                  .number = i,
+                                  .to = i % 2 == 0 ? kVictim : kFar,
+                                  .bytes = std::make_shared<const std::vector<std::uint8_t>>(
+                                      10000, std::uint8_t{1}),
+                                  .copy = i});
        }},
       {"statuses",
        [](FloodPeer& from, std::uint32_t i) {
@@ -200,7 +200,7 @@ class Scene {
       if (status != nullptr && status->sender == friend_.self()) relayed.answered(status->number);
     });
     for (FloodPeer* peer : {&flooder, &friend_, &far_}) peer->start();
-    for (FloodPeer* peer : {&flooder, &friend_, &far_}) REQUIRE(peer->hears(kVictim));
+    for (FloodPeer* peer : {&flooder, &friend_, &far_}) REQUIRE(peer->receives(kVictim));
     ask();
     REQUIRE(eventually([&] { return all_answered(); }));
   }

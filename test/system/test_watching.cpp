@@ -30,14 +30,15 @@ DdsConfig in_domain(int domain) {
 // Listens on a thread of its own, until finish() and no more messages.
 class Audience {
  public:
-  explicit Audience(int domain) : listener_(in_domain(domain)), ear_([this] { listen(); }) {}
+  explicit Audience(int domain)
+      : listener_(in_domain(domain)), listening_thread_([this] { listen(); }) {}
   ~Audience() { finish(); }
   Audience(const Audience&) = delete;
   Audience& operator=(const Audience&) = delete;
 
   std::map<RobotId, Watcher>& finish() {
     is_over_ = true;
-    if (ear_.joinable()) ear_.join();
+    if (listening_thread_.joinable()) listening_thread_.join();
     return robots_;
   }
   [[nodiscard]] std::uint64_t refused() const { return listener_.refused(); }
@@ -58,7 +59,7 @@ class Audience {
   ViewListener listener_;
   std::map<RobotId, Watcher> robots_;
   std::atomic<bool> is_over_ = false;
-  std::thread ear_;
+  std::thread listening_thread_;
 };
 
 std::vector<std::string> robot_on(const Walk& walk, const Walk& other, const fs::path& folder,

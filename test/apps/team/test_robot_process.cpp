@@ -63,11 +63,11 @@ TEST_CASE("Its standard input is empty and its process group its own", "[team]")
 }
 
 TEST_CASE("A signal reaches the process", "[team]") {
-  Script script("trap 'echo told; exit 0' INT; echo ready; while :; do sleep 0.02; done");
+  Script script("trap 'echo interrupted; exit 0' INT; echo ready; while :; do sleep 0.02; done");
   while (script.lines.empty()) script.read_once();
   script.process.send(SIGINT);
   script.wait();
-  CHECK(script.lines == std::vector<std::string>{"ready", "told"});
+  CHECK(script.lines == std::vector<std::string>{"ready", "interrupted"});
   CHECK(script.process.exit()->ok());
 }
 

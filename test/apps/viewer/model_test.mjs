@@ -107,7 +107,7 @@ test('a new process of a robot replaces the updates of the former one', (model) 
   assert.equal(model.faces(), 10);
 });
 
-test('of a closure the newest word counts, whoever says it', (model) => {
+test('the newest verdict on a closure counts, of whichever robot', (model) => {
   add(model, 0, 0, closures([0, 0, 1, 0, 'candidate', 0, 0, '']));
   add(model, 1, 1, closures([0, 0, 1, 0, 'verified', 30, 20, '']));
   add(model, 0, 2, closures([0, 0, 1, 0, 'rejected', 30, 20, 'too far']));

@@ -22,11 +22,11 @@ class Demo {
     this.ended = new Promise((done) => this.process.on('exit', done));
     this.lines = createInterface({input: this.process.stdout});
     this.lines.on('line', (line) => console.log(line));
-    this.url = this.says(/http:\S+/);
-    this.finished = this.says(/The viewer goes on showing it/);
+    this.url = this.output_line(/http:\S+/);
+    this.finished = this.output_line(/The viewer goes on showing it/);
   }
 
-  says(pattern) {
+  output_line(pattern) {
     const said = new Promise((done) => this.lines.on('line', (line) => {
       const match = pattern.exec(line);
       if (match) done(match[0]);
