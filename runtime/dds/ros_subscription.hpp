@@ -67,7 +67,7 @@ class RosSubscription {
   std::vector<std::uint64_t> lost_before_;  // by topic: lost messages before the first next()
   std::vector<double> last_received_s_;  // by topic: time of the last message by the steady clock;
                                          // empty before next()
-  double silence_checked_s_ = 0.0;  // time of the last check for silence
+  double silence_checked_s_ = 0.0;       // time of the last check for silence
   double end_s_ = std::numeric_limits<double>::infinity();
   std::atomic<bool> stopped_ = false;
 };
