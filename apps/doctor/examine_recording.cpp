@@ -22,13 +22,14 @@ namespace km {
 namespace {
 
 Examination refused(const std::string& why) {
-  return {.figures = {},
-          .findings = {{.id = "recording.refused",
-                        .severity = Severity::kError,
-                        .what = why,
-                        .means = "no robot can play it",
-                        .to_do = "as the line says; kimera_multi_robot --inspect shows what is in "
-                                 "it"}}};
+  return {
+      .figures = {},
+      .findings = {{.id = "recording.refused",
+                    .severity = Severity::kError,
+                    .what = why,
+                    .means = "no robot can play it",
+                    .to_do = "as the line states; kimera_multi_robot --inspect shows what is in "
+                             "it"}}};
 }
 
 // Ends a live reader in time, also while it waits for sensors that are silent.

@@ -97,7 +97,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
                    std::nullopt);
   if (options.record) add_record(options, config.ros, results);
   if (seal_ != nullptr)
-    add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->tell_keys(); });
+    add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->send_keys(); });
   nodes_.push_back(bridge_);
   supervisor_.add(std::move(bridge));
   if (restore_ != nullptr) restore_->set(*std::exchange(restored_, std::nullopt));

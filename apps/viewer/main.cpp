@@ -162,9 +162,8 @@ void show_run(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   RunPlayback run = read_run(options.results, nanoseconds(wall_now_s()));
   for (const std::string& note : run.notes) log::warn("viewer") << note;
   const std::string title = std::filesystem::canonical(options.results).filename().string();
-  options.server.greeting =
-      page_greeting(options.rate ? PageSource::kReplay : PageSource::kRun, title,
-                    options.palette.empty() ? run.palette : palette_of(options));
+  options.server.hello = hello_message(options.rate ? PageSource::kReplay : PageSource::kRun, title,
+                                       options.palette.empty() ? run.palette : palette_of(options));
   const PageServer server(store, options.server);
   print_address(server);
   if (!play(run.updates, options.rate, store, signals)) return;
@@ -201,7 +200,7 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   ViewListener listener(options.dds);
   ImageRequests images(listener);
   const std::string title = "domain " + std::to_string(options.dds.domain);
-  options.server.greeting = page_greeting(PageSource::kTeam, title, palette_of(options));
+  options.server.hello = hello_message(PageSource::kTeam, title, palette_of(options));
   options.server.on_images = [&](const std::set<RobotId>& robots) { images.show(robots); };
   const PageServer server(store, options.server);
   std::optional<ViewRecorder> recorder;

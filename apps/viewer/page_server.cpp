@@ -222,9 +222,9 @@ class PageServer::Impl {
     page->sender = std::thread([this, connection, page] { send_messages(connection, *page); });
   }
 
-  // A text frame holds an array of messages, or the greeting.
+  // A text frame holds an array of messages, or the hello message.
   void send_messages(mg_connection* connection, const Page& page) {
-    if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.greeting + ']')) return;
+    if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.hello + ']')) return;
     ViewStore::Cursor cursor;
     bool caught_up = false;
     while (!page.closed && !stopping_) {

@@ -92,7 +92,7 @@ const char* RelayNode::take(const RelayParcel& parcel) {
   });
   if (arrival == RelayArrival::kRefused)
     log::limited(log::Level::kDebug, kTag, "refused " + std::to_string(parcel.neighbour))
-        << "robot " << parcel.neighbour << " hands over a message of robot "
+        << "robot " << parcel.neighbour << " forwards a message of robot "
         << parcel.message->origin.robot << " that is not taken";
   return forged;
 }

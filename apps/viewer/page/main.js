@@ -43,7 +43,7 @@ const connection = new Connection({
     setLink('viewer gone', 'bad');
   },
   message(message) {
-    if (message.kind === 'hello') return greet(message);
+    if (message.kind === 'hello') return begin(message);
     if (message.kind === 'forgotten') return model.forgetNumbers(message.numbers);
     if (message.kind === 'caught_up') {
       caughtUp = true;
@@ -58,7 +58,7 @@ const connection = new Connection({
   },
 });
 
-function greet({source: shown, title, labels}) {
+function begin({source: shown, title, labels}) {
   source = shown;
   $('title').textContent = title;
   $('live').textContent = {live: 'Live', replay: 'Newest', run: 'End'}[source];

@@ -101,7 +101,8 @@ TEST_CASE("The doctor gives the reason why no robot can play a file", "[doctor]"
   CHECK_THAT(output_of("record.mcap"), Catch::Contains("no topic of it has images"));
 }
 
-TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that says why", "[doctor]") {
+TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that gives the reason",
+          "[doctor]") {
   const TemporaryFolder folder;
   const CommandResult empty = run_command(kDoctor + ' ' + folder.path().string());
   CHECK(empty.exit_code == 2);

@@ -157,7 +157,8 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
   }
 }
 
-TEST_CASE("A robot is heard on its domain and in its team, whichever is looked for", "[doctor]") {
+TEST_CASE("A robot is received on its domain and in its team, whichever is looked for",
+          "[doctor]") {
   std::random_device device;
   const int domain = static_cast<int>(device() % 90);
   const std::string team = "test-" + std::to_string(device());

@@ -212,7 +212,7 @@ TEST_CASE("A record keeps how a result was made", "[experiments]") {
   CHECK_THAT(record->started, Contains("UTC"));
 }
 
-TEST_CASE("The display says which step runs and how long all will take", "[experiments]") {
+TEST_CASE("The display shows which step runs and how long all will take", "[experiments]") {
   std::ostringstream out;
   StepDisplay display(out, false, 80);
   display.expect(

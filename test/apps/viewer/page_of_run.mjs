@@ -96,4 +96,4 @@ try {
   await replay.stop();
   await other.close();
 }
-console.log('as the files say');
+console.log('as in the files');

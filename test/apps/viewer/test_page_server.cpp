@@ -53,7 +53,7 @@ Answer get(int port, const std::string& path, const std::string& headers = {}) {
 PageServerOptions any_port() {
   PageServerOptions options;
   options.port = 0;
-  options.greeting = R"({"kind":"hello"})";
+  options.hello = R"({"kind":"hello"})";
   return options;
 }
 
@@ -107,7 +107,7 @@ ViewUpdate state_of(const std::string& name) {
   return {3, 1, 0, state};
 }
 
-TEST_CASE("A page receives the greeting, all past messages, and new ones", "[page_server]") {
+TEST_CASE("A page receives the hello message, all past messages, and new ones", "[page_server]") {
   ViewStore store(1'000'000);
   store.add(state_of("early"));
   const PageServer server(store, any_port());

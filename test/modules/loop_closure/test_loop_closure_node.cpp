@@ -353,7 +353,7 @@ TEST_CASE("a keyframe its owner does not have yet is asked for again", "[loop_cl
   CHECK(robot.closures.size() == 1);
 }
 
-TEST_CASE("a candidate that fails verification says why", "[loop_closure_node]") {
+TEST_CASE("a candidate that fails verification has a reason", "[loop_closure_node]") {
   Scene views(7);
   for (OrbDescriptor& descriptor : views.peer.features.descriptors) descriptor = {};
   Meeting meeting(views);

@@ -177,7 +177,7 @@ TEST_CASE("The complete parts of a truncated file are read", "[recordings]") {
   CHECK(before == 42);
 }
 
-TEST_CASE("A chunk with another checksum than it says is lost with its place", "[recordings]") {
+TEST_CASE("A chunk with another checksum than it states is lost with its place", "[recordings]") {
   const bool has_summary = GENERATE(true, false);
   McapFile file({.compression = "", .has_summary = has_summary});
   file.add_chunk({{.channel = 1, .log_time = 1, .bytes = {'f', 'i', 'n', 'd'}}}, 1);

@@ -150,7 +150,7 @@ TEST_CASE("A file cut at any byte gives the chunks before the cut", "[recordings
   }
 }
 
-TEST_CASE("Indexes say where messages are", "[recordings]") {
+TEST_CASE("Indexes give the positions of messages", "[recordings]") {
   const SmallFile file = small_file("");
   std::size_t messages = 0;
   McapChunk chunk;

@@ -274,7 +274,7 @@ TEST_CASE("Stamps before 1970 are ROS 2's and those after 2038 ROS 1's", "[recor
   CHECK(decode_ros<RosHeader>("cdr", cdr).value->stamp == -999999995);
 }
 
-TEST_CASE("Images with fewer pixels than they say are refused", "[recordings]") {
+TEST_CASE("Images with fewer pixels than they state are refused", "[recordings]") {
   Bytes bytes = sample(RosImage::kType, Wire::kRos1);
   const std::size_t height = 4 + 8 + 4 + 8;
   REQUIRE(bytes[height] == 2);

@@ -369,7 +369,7 @@ TEST_CASE("Messages of a new incarnation wait until all nodes know that the robo
   CHECK(a.received.wait_for(2).size() == 2);
 }
 
-TEST_CASE("A subscriber that throws does not stop the robot from hearing", "[dds]") {
+TEST_CASE("A subscriber that throws does not stop the robot from receiving", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4);
   b.pings.from_peers().subscribe([](const auto& ping) {

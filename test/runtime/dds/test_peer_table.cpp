@@ -268,7 +268,7 @@ TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
               Case{"it is younger", 2.0, 5.0, 70, PeerEventKind::kRefused},
               Case{"both are new, and its boot is lower", 2.0, 2.5, 70, PeerEventKind::kConflict},
               Case{"both are new, and its boot is higher", 2.0, 2.5, 7000, PeerEventKind::kRefused},
-              Case{"it says it is older, to one that is not new", 1e6, 11.0, 70,
+              Case{"it reports that it is older, to one that is not new", 1e6, 11.0, 70,
                    PeerEventKind::kRefused}}));
   CAPTURE(what);
   PeerTable table(kSelf);
