@@ -229,7 +229,8 @@ class StepsRun {
         if (problem.empty() && !fs::exists(output)) problem = "it made no " + output.string();
     if (problem.empty()) return {};
     // Not every program prints its error to standard error.
-    for (const auto& words : process.last_words().empty() ? last_lines : process.last_words())
+    for (const auto& words :
+         process.last_log_lines().empty() ? last_lines : process.last_log_lines())
       problem += "\n    " + words;
     return problem + kLogHint + log.string() + ')';
   }

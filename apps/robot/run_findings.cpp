@@ -341,7 +341,8 @@ void add_budget(const RunSummary& run, std::vector<Finding>& findings) {
                bytes_text(static_cast<double>(sum(run.held_back->delayed.bytes))) +
                ") and dropped " + std::to_string(dropped) + " (" +
                bytes_text(static_cast<double>(sum(run.held_back->dropped.bytes))) + ')',
-       .means = dropped == 0 ? "the others learned later" : "the others never learned of these",
+       .means = dropped == 0 ? "the other robots received them later"
+                             : "the other robots never received them",
        .to_do = dropped == 0 ? "" : "raise budget.bytes_per_s or budget.bytes_per_run"});
 }
 

@@ -41,8 +41,8 @@ void forward(In<T> from, Out<T> to) {
 
 // A resumed run continues its incarnation.
 std::uint64_t boot_of(const RobotInput& input) {
-  const bool goes_on = input.restored && !std::holds_alternative<PastRun>(input.source);
-  return goes_on ? next_boot(input.restored->boot) : random_boot_id();
+  const bool continues = input.restored && !std::holds_alternative<PastRun>(input.source);
+  return continues ? next_boot(input.restored->boot) : random_boot_id();
 }
 
 std::optional<Camera> left_camera_of(const RobotInput& input) {

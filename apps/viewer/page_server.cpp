@@ -66,17 +66,17 @@ bool send(mg_connection* connection, int kind, std::string_view bytes) {
 }
 
 // Request of a page: {"images": robot, "on": true}. Other text is no request.
-struct Wish {
+struct ImageRequest {
   RobotId robot = 0;
   bool on = false;
 };
-std::optional<Wish> parse_wish(std::string_view text) {
+std::optional<ImageRequest> parse_image_request(std::string_view text) {
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object() || !json.contains("images") || !json.contains("on")) return std::nullopt;
   if (!json["images"].is_number_unsigned() || !json["on"].is_boolean()) return std::nullopt;
   const auto robot = json["images"].get<std::uint64_t>();
   if (robot > std::numeric_limits<RobotId>::max()) return std::nullopt;
-  return Wish{static_cast<RobotId>(robot), json["on"].get<bool>()};
+  return ImageRequest{static_cast<RobotId>(robot), json["on"].get<bool>()};
 }
 
 }  // namespace
@@ -258,17 +258,17 @@ class PageServer::Impl {
 
   void receive(mg_connection* connection, int bits, std::string_view text) {
     if ((bits & 0xf) != MG_WEBSOCKET_OPCODE_TEXT) return;
-    const auto wish = parse_wish(text);
-    if (!wish) return;
+    const auto request = parse_image_request(text);
+    if (!request) return;
     const std::lock_guard lock(mutex_);
     const auto page = pages_.find(connection);
     if (page == pages_.end()) return;
     std::set<RobotId>& images = page->second->images;
     ask([&] {
-      if (wish->on)
-        images.insert(wish->robot);
+      if (request->on)
+        images.insert(request->robot);
       else
-        images.erase(wish->robot);
+        images.erase(request->robot);
     });
   }
 

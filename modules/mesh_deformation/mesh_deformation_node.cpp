@@ -128,7 +128,7 @@ void MeshDeformationNode::correct() {
   }
   const double start_s = steady_now_s();
   std::optional<MeshCorrection> correction =
-      ended_ ? corrector_.correct_afresh(input()) : corrector_.correct(input());
+      ended_ ? corrector_.correct_from_scratch(input()) : corrector_.correct(input());
   if (!correction) return;
   const double end_s = steady_now_s();
   next_s_ = end_s + config_.period_s;

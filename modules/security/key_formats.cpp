@@ -95,7 +95,8 @@ void write_certificate(const std::filesystem::path& file, const Certificate& cer
 
 void write_authority(const std::filesystem::path& file, const Authority& authority) {
   write_key_file(file,
-                 "# Whom the robots of this team believe. Everyone may read it, only the authority "
+                 "# Key of the authority that the robots of this team trust. Everyone may read it, "
+                 "only the authority "
                  "may change it.\nformat: " +
                      std::string(kAuthorityFormat) + "\nteam: " + authority.team +
                      "\npublic_key: " + to_hex(authority.key) + '\n',

@@ -27,7 +27,7 @@ OutsideOdometry::OutsideOdometry(RobotId robot, DepthSource depth_source, const 
     : robot_(robot), depth_source_(depth_source), config_(checked(config)) {}
 
 void OutsideOdometry::continue_from(const VioCheckpoint& checkpoint) {
-  goes_on_ = true;
+  continues_ = true;
   last_keyframe_ = checkpoint.keyframe;
   last_ = last_kf_ = {checkpoint.keyframe.stamp, {checkpoint.state.T_odom_body}};
   T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
@@ -38,7 +38,7 @@ OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
   if (packet.frame == nullptr || !packet.pose || !packet.pose->T_odom_body.matrix().allFinite())
     return result;
   const Fix fix{packet.frame->stamp, *packet.pose};
-  const bool is_taken_up = std::exchange(goes_on_, false) && fix.stamp == last_keyframe_->stamp;
+  const bool is_taken_up = std::exchange(continues_, false) && fix.stamp == last_keyframe_->stamp;
   if (last_ && fix.stamp <= last_->stamp && !is_taken_up) return result;
   result.has_jumped = !is_taken_up && is_jump(fix);
   if (result.has_jumped)

@@ -91,14 +91,14 @@ class Vio {
   [[nodiscard]] bool takes_over(const TrackerStatistics& tracking, double gap_s) const;
   [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,
                                      Stamp to) const;
-  [[nodiscard]] bool goes_on_at(const Held& held) const;
+  [[nodiscard]] bool can_continue_at(const Held& held) const;
   void go_on(const Held& held, VioResult& result);
   void start_on(const Held& held, const OdometryState& state, const StateCovariance& covariance);
   void try_start(VioResult& result);
   void advance(const Held& held, VioResult& result);
   void restart(Held held);
-  [[nodiscard]] bool has_mended(const StereoFrame& frame) const;
-  void forget_dark(const Held& held, const OdometryState& state);
+  [[nodiscard]] bool has_recovered(const StereoFrame& frame) const;
+  void drop_dark(const Held& held, const OdometryState& state);
   void watch_vision(Stamp stamp, int features, VioResult& result);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;

@@ -162,7 +162,7 @@ bool IncomingTopic::is_settled(Standing standing) const {
 
 void IncomingTopic::admit(Serdata serialized, const Guid& writer, const Peers::Claim& claim,
                           double now_s) {
-  if (claim.standing == Standing::kStranger) return refuse("from no known robot");
+  if (claim.standing == Standing::kOutsider) return refuse("from no known robot");
   if (claim.standing == Standing::kTwin && !spec_.carries_keys) {
     receive_claim(*serialized, writer, claim, now_s);
     return refuse("claims this robot's id");

@@ -135,7 +135,7 @@ Standing PeerTable::standing(const Guid& guid) const {
   if (found == participants_.end()) return Standing::kUnknown;
   const Participant& participant = found->second;
   if (!participant.identity)
-    return participant.announced ? Standing::kStranger : Standing::kUnknown;
+    return participant.announced ? Standing::kOutsider : Standing::kUnknown;
   if (participant.identity->robot == self_.robot) return Standing::kTwin;
   const auto known = peers_.find(participant.identity->robot);
   if (known == peers_.end() || known->second.guid != guid) return Standing::kRival;

@@ -42,7 +42,7 @@ enum class PeerEventKind {
 /// Trust in the messages of a participant.
 enum class Standing {
   kUnknown,   ///< No data are known yet.
-  kStranger,  ///< Not a robot, or refused.
+  kOutsider,  ///< Not a robot, or refused.
   kTwin,      ///< Claims this robot's id.
   kRival,     ///< Claims the id of a present robot, or has not been received itself.
   kArriving,  ///< The robot of its id, but not all nodes know yet that its former incarnation has

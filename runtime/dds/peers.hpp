@@ -81,7 +81,7 @@ class Peers {
   /// Handling of the messages of a participant, and its claimed identity.
   struct Claim {
     Standing standing = Standing::kUnknown;
-    TeamPeer sender;  ///< Set for a robot: neither kUnknown nor kStranger.
+    TeamPeer sender;  ///< Set for a robot: neither kUnknown nor kOutsider.
   };
   [[nodiscard]] Claim claim_of(const Guid& guid) const;
   [[nodiscard]] bool is_current(const TeamPeer& sender) const;

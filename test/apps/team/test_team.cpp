@@ -289,11 +289,11 @@ TEST_CASE("How a robot ended elsewhere is read from its folder", "[team]") {
   const auto runs = finished_runs(plan);
   REQUIRE(runs.size() == 4);
   CHECK(runs[0].exit.ok());
-  CHECK(runs[0].last_words.empty());
+  CHECK(runs[0].last_log_lines.empty());
   CHECK(runs[1].exit.code == 3);
-  REQUIRE(runs[1].last_words.size() == 10);
-  CHECK(runs[1].last_words.front() == "line 20");
-  CHECK(runs[1].last_words.back() == "line 29");
+  REQUIRE(runs[1].last_log_lines.size() == 10);
+  CHECK(runs[1].last_log_lines.front() == "line 20");
+  CHECK(runs[1].last_log_lines.back() == "line 29");
   CHECK(runs[2].exit.code == 1);
   CHECK(runs[3].exit.code == 1);
 }

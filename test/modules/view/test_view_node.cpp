@@ -56,25 +56,25 @@ struct Watched {
     for (const double end_s = now_s + seconds; now_s < end_s; now_s += kDt_s) node.send_due(now_s);
   }
   template <typename T>
-  void learn(T message) {
+  void give(T message) {
     node.step(std::make_shared<const T>(std::move(message)));
   }
-  void learn_mesh(std::uint32_t side) {
+  void give_mesh(std::uint32_t side) {
     node.step(
         ViewNode::MeshOffer{kSelf, std::make_shared<const LabelledMesh>(wavy_sheet(side, 0.1))});
   }
-  void learn_keyframes(std::size_t count) {
+  void give_keyframes(std::size_t count) {
     for (std::size_t k = 0; k < count; ++k) {
       KeyframeOdometry keyframe;
       keyframe.id = {kSelf, static_cast<KeyframeIndex>(k)};
-      learn(std::move(keyframe));
+      give(std::move(keyframe));
     }
-    learn_trajectory(count, 0.0);
+    give_trajectory(count, 0.0);
   }
-  void learn_trajectory(std::size_t count, double x_m) {
+  void give_trajectory(std::size_t count, double x_m) {
     SE3 T = SE3::Identity();
     T.translation().x() = x_m;
-    learn(Trajectory{kSelf, kSelf, std::vector<SE3>(count, T)});
+    give(Trajectory{kSelf, kSelf, std::vector<SE3>(count, T)});
   }
   [[nodiscard]] std::size_t sent(ViewChannel channel = ViewChannel::kView) const {
     return node.sent_bytes(channel);
@@ -123,8 +123,8 @@ struct Visitor {
 
 TEST_CASE("Without viewers nothing is sent", "[view]") {
   Watched robot;
-  robot.learn_keyframes(100);
-  robot.learn_mesh(20);
+  robot.give_keyframes(100);
+  robot.give_mesh(20);
   robot.pass(60.0);
   CHECK(robot.described == 0);
   for (const auto channel : {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages})
@@ -135,7 +135,7 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   const ViewConfig config = {};
   Watched robot(config);
   constexpr std::size_t kKeyframes = 3000;  // 108 kB of odometry, and 84 kB as optimised.
-  robot.learn_keyframes(kKeyframes);
+  robot.give_keyframes(kKeyframes);
   const double begin_s = robot.now_s;
   Visitor visitor(robot);
   const double come_s = robot.now_s;
@@ -160,7 +160,7 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   const std::size_t present = robot.sent();
   double x_m = 0.0;
   while (robot.now_s < present_s + 60.0) {
-    robot.learn_trajectory(kKeyframes, x_m += 1.0);
+    robot.give_trajectory(kKeyframes, x_m += 1.0);
     robot.pass(1.0);
   }
   const double rate = static_cast<double>(robot.sent() - present) / (robot.now_s - present_s);
@@ -171,8 +171,8 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
 TEST_CASE("A state is sent once a second", "[view]") {
   Watched robot;
   Visitor visitor(robot);
-  robot.learn(OptimizerProgress{.anchor = 3, .members = {3, kSelf}, .round = 12, .cost = 5.5});
-  robot.learn(RobotStatus{.robot = 4, .name = "beta"});
+  robot.give(OptimizerProgress{.anchor = 3, .members = {3, kSelf}, .round = 12, .cost = 5.5});
+  robot.give(RobotStatus{.robot = 4, .name = "beta"});
   const std::size_t before = visitor.watcher.states.size();
   robot.pass(10.0);
   REQUIRE(eventually([&] {
@@ -194,10 +194,10 @@ TEST_CASE("A state is sent once a second", "[view]") {
 
 TEST_CASE("A late viewer receives the full state", "[view]") {
   Watched robot;
-  robot.learn_keyframes(50);
+  robot.give_keyframes(50);
   const ClosureId id = closure_id({kSelf, 3}, {4, 9});
-  robot.learn(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
-  robot.learn_mesh(60);
+  robot.give(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
+  robot.give_mesh(60);
   const std::size_t faces = wavy_sheet(60, 0.1).faces.size();
   std::optional<Visitor> first(std::in_place, robot);
   const auto knows_all = [&](Visitor& visitor) {
@@ -214,7 +214,7 @@ TEST_CASE("A late viewer receives the full state", "[view]") {
   CHECK(knows_all(second));
   first.reset();
   CHECK(eventually([&] {  // Also after the other viewer has gone.
-    robot.learn_mesh(20);
+    robot.give_mesh(20);
     robot.pass(1.0);
     second.receive_all();
     return second.faces() == wavy_sheet(20, 0.1).faces.size();
@@ -226,7 +226,7 @@ TEST_CASE("Chunks that are removed while a viewer appears are removed for the ea
   ViewConfig config = {};
   config.mesh_bytes_per_s = 1000.0;  // Slow enough that both events happen between two chunks.
   Watched robot(config);
-  robot.learn_mesh(60);
+  robot.give_mesh(60);
   Visitor first(robot);
   const auto knows = [&](Visitor& visitor, std::uint32_t side) {
     return eventually([&] {
@@ -236,7 +236,7 @@ TEST_CASE("Chunks that are removed while a viewer appears are removed for the ea
     });
   };
   REQUIRE(knows(first, 60));
-  robot.learn_mesh(20);
+  robot.give_mesh(20);
   Visitor second(robot);
   CHECK(knows(second, 20));
   CHECK(knows(first, 20));
@@ -246,7 +246,7 @@ TEST_CASE("Mesh chunks are sent no faster than configured", "[view]") {
   ViewConfig config = {};
   config.mesh_bytes_per_s = 20000.0;
   Watched robot(config);
-  robot.learn_mesh(150);
+  robot.give_mesh(150);
   Visitor visitor(robot);
   const double begin_s = robot.now_s;
   const std::size_t before = robot.sent(ViewChannel::kMesh);
@@ -264,8 +264,8 @@ TEST_CASE("Mesh chunks are sent no faster than configured", "[view]") {
 TEST_CASE("At the end all remaining updates are sent", "[view]") {
   Watched robot;
   std::optional<Visitor> visitor(std::in_place, robot);
-  robot.learn_keyframes(400);
-  robot.learn_mesh(150);
+  robot.give_keyframes(400);
+  robot.give_mesh(150);
   robot.node.start();
   robot.node.stop();
   const std::size_t sent = robot.sent();

@@ -304,7 +304,7 @@ TEST_CASE("Many unknown participants do not exhaust the memory", "[peers]") {
   for (std::size_t n = 0; n < PeerTable::kMaxParticipants; ++n)
     table.participant_gone(wide_guid(n));
   table.participant(wide_guid(9999), "some tool", "");
-  CHECK(table.standing(wide_guid(9999)) == Standing::kStranger);
+  CHECK(table.standing(wide_guid(9999)) == Standing::kOutsider);
 }
 
 TEST_CASE("Another protocol version and unreadable user data are refused, once", "[peers]") {
@@ -315,7 +315,7 @@ TEST_CASE("Another protocol version and unreadable user data are refused, once",
   CHECK(kinds(table) == Kinds{PeerEventKind::kRefused});
   CHECK(table.peers().empty());
   CHECK_FALSE(table.identity_of(guid(2)).has_value());
-  CHECK(table.standing(guid(2)) == Standing::kStranger);
+  CHECK(table.standing(guid(2)) == Standing::kOutsider);
 }
 
 TEST_CASE("Programs that are no robots are not our business", "[peers]") {
