@@ -43,7 +43,7 @@ constexpr double kMaxLate_s = 2.0;
 // Capacity of a link.
 constexpr double kMessages_Hz = 2000.0;
 constexpr double kBytes_Hz = 12.5e6;
-constexpr double kStrangers_Hz = 20.0;
+constexpr double kOutsiders_Hz = 20.0;
 
 struct Flood {
   std::string name;
@@ -160,7 +160,7 @@ std::vector<Flood> all_floods() {
          from.statuses.to_peers().publish(
              RobotStatus{.robot = kFlooder, .name = "flooder", .keyframes = i});
        }},
-      {"identities", [](FloodPeer&, std::uint32_t) {}},  // see strangers_main.cpp
+      {"identities", [](FloodPeer&, std::uint32_t) {}},  // see outsiders_main.cpp
       {"keys", [](FloodPeer& from, std::uint32_t) { from.bridge.send_keys(); }, kFlooder, true},
       {"mesh chunks",
        [](FloodPeer& from, std::uint32_t i) { from.chunks.to_peers().publish(some_surface(i)); }},
@@ -348,11 +348,11 @@ Costs measure(Scene& scene, const Flood& flood, double seconds) {
   const std::uint64_t messages_before = scene.flooder.sent().messages;
   (void)waits_of(scene.replies);
   (void)waits_of(scene.relayed);
-  std::optional<Child> strangers;
+  std::optional<Child> outsiders;
   if (flood.name == "identities")
-    strangers.emplace(
-        std::vector<std::string>{KM_BIN_DIR "/test_strangers", std::to_string(scene.dds().domain),
-                                 scene.dds().team, std::to_string(kStrangers_Hz)},
+    outsiders.emplace(
+        std::vector<std::string>{KM_BIN_DIR "/test_outsiders", std::to_string(scene.dds().domain),
+                                 scene.dds().team, std::to_string(kOutsiders_Hz)},
         STDOUT_FILENO);
   Costs costs;
   const auto look = [&] {
@@ -365,7 +365,7 @@ Costs measure(Scene& scene, const Flood& flood, double seconds) {
     scene.ask();
     look();
   }
-  strangers.reset();
+  outsiders.reset();
   const auto over = Clock::now();
   scene.ask();
   CHECK(eventually([&] { return scene.all_answered(); }));

@@ -142,18 +142,18 @@ TEST_CASE("Updates that no robot writes are counted and dropped", "[view]") {
   const DdsQos qos = make_dds_qos();
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
   dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-  const DdsEntity stranger(
+  const DdsEntity outsider(
       dds_create_writer(w.publisher.participant.handle(), topic.handle(), qos.get(), nullptr),
       "writer");
   REQUIRE(eventually([&] {
     dds_publication_matched_status_t status{};
-    dds_get_publication_matched_status(stranger.handle(), &status);
+    dds_get_publication_matched_status(outsider.handle(), &status);
     return status.current_count == 1;
   }));
   const auto write = [&](std::vector<std::uint8_t> bytes) {
     km_wire_ViewUpdate wire{};
     borrow(wire.content, bytes);
-    check_dds(dds_write(stranger.handle(), &wire), "write");
+    check_dds(dds_write(outsider.handle(), &wire), "write");
   };
   write({});
   write({77, 1, 2});

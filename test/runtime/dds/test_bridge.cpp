@@ -246,14 +246,14 @@ TEST_CASE("Programs without an identity, or with a broken one, are ignored", "[d
   TestRobot a(domain, 3), b(domain, 4);
   const DdsQos qos = make_dds_qos();
   dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
-  const DdsEntity stranger(
+  const DdsEntity outsider(
       dds_create_participant(static_cast<dds_domainid_t>(domain->config().domain), qos.get(),
                              nullptr),
       "participant");
   a.start();
   b.start();
   REQUIRE(b.receives(PeerEventKind::kJoined, 3));
-  RawWriter writer(stranger.handle(), domain->config(), TopicKind::kEvent);
+  RawWriter writer(outsider.handle(), domain->config(), TopicKind::kEvent);
   writer.write(header(a.participant.identity(), 0), {3, 0, {}});
   CHECK(eventually([&] { return b.traffic(Direction::kIn).refused["from no known robot"] == 1; }));
   CHECK(b.received.messages().empty());

@@ -80,9 +80,9 @@ TEST_CASE("No participant can send in a robot's name, not even from a writer tha
   auto& [domain, a, b] = two;
   const bool shows_the_id = GENERATE(false, true);
   {
-    const DdsEntity stranger = participant_with(
+    const DdsEntity outsider = participant_with(
         domain->config(), shows_the_id ? to_user_data(a.participant.identity()) : "");
-    RawWriter writer(stranger.handle(), domain->config(), TopicKind::kEvent);
+    RawWriter writer(outsider.handle(), domain->config(), TopicKind::kEvent);
     for (std::uint32_t i = 0; i < 60; ++i)
       writer.write(header(a.participant.identity(), 1000 + i), {3, 1000 + i, {}});
     REQUIRE(writer.is_read_by(2));

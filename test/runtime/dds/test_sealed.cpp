@@ -67,16 +67,16 @@ TEST_CASE("A robot without keys of the team is ignored and receives nothing", "[
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
   const bool has_keys = GENERATE(false, true);
-  TestRobot stranger(domain, 9, has_keys ? member_of(others) : TestRobot::MakeSeal());
-  for (TestRobot* robot : {&a, &b, &stranger}) robot->start();
+  TestRobot outsider(domain, 9, has_keys ? member_of(others) : TestRobot::MakeSeal());
+  for (TestRobot* robot : {&a, &b, &outsider}) robot->start();
   REQUIRE(b.receives(PeerEventKind::kJoined, 3));
   CHECK(b.receives(PeerEventKind::kRefused, 9));
-  stranger.ping(1);
+  outsider.ping(1);
   CHECK(eventually([&] { return b.refused() >= 1; }));
   a.ping(2, {42});
   REQUIRE(b.received.wait_for(1).size() == 1);
   CHECK(b.received.messages()[0].index == 2);
-  CHECK(stranger.received.messages().empty());
+  CHECK(outsider.received.messages().empty());
   CHECK(b.bridge.peers().list().size() == 1);
 }
 
