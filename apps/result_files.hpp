@@ -62,7 +62,7 @@ inline constexpr const char* kRecord = "record.mcap";
 /// Remedy for that error.
 [[nodiscard]] inline std::string way_on(const std::filesystem::path& folder) {
   return "if it was killed: the same command with --resume " + folder.string() +
-         " in place of --output goes on with it";
+         " in place of --output continues it";
 }
 
 /// "record_2.mcap" of "record.mcap".
@@ -75,16 +75,16 @@ inline constexpr const char* kRecord = "record.mcap";
 inline constexpr const char* kPeerMeshes = "peer_meshes";
 
 /// Removes a robot's results from `folder`, except for its journal and map, so that those of an
-/// earlier run are not mistaken for those of one that fails. If the run continues (`goes_on`), its
-/// growing files stay, too. Throws std::filesystem::filesystem_error naming the file.
-inline void remove_results(const std::filesystem::path& folder, bool goes_on = false) {
+/// earlier run are not mistaken for those of one that fails. If the run continues (`continues`),
+/// its growing files stay, too. Throws std::filesystem::filesystem_error naming the file.
+inline void remove_results(const std::filesystem::path& folder, bool continues = false) {
   for (const std::string file : kResultFiles) {
-    if (goes_on && std::ranges::find(kGrowingFiles, file) != kGrowingFiles.end()) continue;
+    if (continues && std::ranges::find(kGrowingFiles, file) != kGrowingFiles.end()) continue;
     for (const char* ending : {"", ".part"})  // file cut short by the end of the process
       std::filesystem::remove(folder / (file + ending));
   }
   std::filesystem::remove_all(folder / kPeerMeshes);
-  if (goes_on) return;
+  if (continues) return;
   std::filesystem::remove(folder / kRecord);
   for (int number = 2; std::filesystem::remove(numbered(folder / kRecord, number));) ++number;
 }

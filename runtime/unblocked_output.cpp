@@ -42,7 +42,7 @@ struct OutputQueue::State {
     waiting.push_back({std::move(text), lines});
     changed.notify_all();
   }
-  void tell_of_losses() {
+  void report_losses() {
     const std::uint64_t lines = std::exchange(lost, 0);
     if (lines > 0)
       push(std::to_string(lines) + (lines == 1 ? " line" : " lines") +
@@ -90,7 +90,7 @@ void OutputQueue::State::run() {
     if (!written)
       lost += piece.lines;
     else if (waiting.empty())
-      tell_of_losses();
+      report_losses();
     changed.notify_all();
   }
 }
@@ -122,7 +122,7 @@ void OutputQueue::write(std::string text) {
     state_->lost += lines;
     return;
   }
-  state_->tell_of_losses();
+  state_->report_losses();
   state_->push(std::move(text), lines);
 }
 

@@ -37,7 +37,7 @@ bool Watchdog::is_stuck(const Watched& watched) {
 void Watchdog::look_at(Watched& w, double dt_s) {
   if (!is_stuck(w)) {
     if (w.named)
-      log::info("supervisor") << w.node->name() << " goes on after " << std::lround(w.stuck_s)
+      log::info("supervisor") << w.node->name() << " continues after " << std::lround(w.stuck_s)
                               << " s";
     w.stuck_s = 0.0;
     w.named = false;

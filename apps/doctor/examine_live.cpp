@@ -139,7 +139,7 @@ Examination examine_topics(const std::vector<ListenedTopic>& topics,
 }
 
 Examination examine_live_topics(const SensorTopicNames& names, const RosConfig& config,
-                                double listen_s, const TellProgress& tell) {
+                                double listen_s, const ReportProgress& report_progress) {
   const auto network = std::make_shared<const RosNetwork>(config);
   PublisherList list(*network);
   RosSubscription subscription(network, topics_of(names));
@@ -148,7 +148,7 @@ Examination examine_live_topics(const SensorTopicNames& names, const RosConfig& 
   const double start_s = steady_now_s();
   subscription.give_up_after(listen_s);
   while (const auto message = subscription.next()) {
-    tell("listening", (steady_now_s() - start_s) / listen_s);
+    report_progress("listening", (steady_now_s() - start_s) / listen_s);
     ++topics[message->topic].messages;
   }
   std::vector<TopicPublisher> publishers;

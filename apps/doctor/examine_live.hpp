@@ -28,6 +28,6 @@ struct ListenedTopic {
 /// publishers.
 [[nodiscard]] Examination examine_live_topics(const SensorTopicNames& names,
                                               const RosConfig& config, double listen_s,
-                                              const TellProgress& tell);
+                                              const ReportProgress& report_progress);
 
 }  // namespace km

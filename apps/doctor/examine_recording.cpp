@@ -22,13 +22,14 @@ namespace km {
 namespace {
 
 Examination refused(const std::string& why) {
-  return {.figures = {},
-          .findings = {{.id = "recording.refused",
-                        .severity = Severity::kError,
-                        .what = why,
-                        .means = "no robot can play it",
-                        .to_do = "as the line says; kimera_multi_robot --inspect shows what is in "
-                                 "it"}}};
+  return {
+      .figures = {},
+      .findings = {{.id = "recording.refused",
+                    .severity = Severity::kError,
+                    .what = why,
+                    .means = "no robot can play it",
+                    .to_do = "as the line states; kimera_multi_robot --inspect shows what is in "
+                             "it"}}};
 }
 
 // Ends a live reader in time, also while it waits for sensors that are silent.
@@ -47,13 +48,14 @@ class Stopper {
   std::jthread thread_;  // last member: stops first
 };
 
-SensorSample sample_of(DatasetReader& reader, double live_s, const TellProgress& tell) {
+SensorSample sample_of(DatasetReader& reader, double live_s,
+                       const ReportProgress& report_progress) {
   std::optional<Stopper> stopper;
   if (live_s > 0.0) stopper.emplace(reader, live_s);
   SensorSampler sampler;
   const auto total = static_cast<double>(reader.pair_count());
   for (double done = 0.0; const auto packet = reader.next(); ++done) {
-    tell("looking at images", total > 0.0 ? done / total : 0.0);
+    report_progress("looking at images", total > 0.0 ? done / total : 0.0);
     sampler.add(*packet);
   }
   return sampler.sample();
@@ -62,9 +64,9 @@ SensorSample sample_of(DatasetReader& reader, double live_s, const TellProgress&
 }  // namespace
 
 Examination examine_packets(DatasetReader& reader, const RobotConfig& config, double live_s,
-                            const TellProgress& tell) {
-  const SensorSample sample = sample_of(reader, live_s, tell);
-  tell("comparing", 0.0);
+                            const ReportProgress& report_progress) {
+  const SensorSample sample = sample_of(reader, live_s, report_progress);
+  report_progress("comparing", 0.0);
   Examination result = examine_streams(sample, reader.report());
   for (const std::string& remark : reader.remarks())
     result.findings.push_back({.id = "recording.remark",
@@ -83,14 +85,14 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
 }
 
 Examination examine_recording(const RobotOptions& options, const RobotConfig& config, double live_s,
-                              const TellProgress& tell) try {
+                              const ReportProgress& report_progress) try {
   const auto input = [&] {
     SignalWatch signals;  // while live topics are to complete the calibration
     return open_robot_input(options, config, std::nullopt, read_rig_input(options), signals);
   }();
   if (!input) return refused("interrupted before the calibration was complete");
   return examine_packets(*std::get<std::unique_ptr<DatasetReader>>(input->source), config,
-                         options.is_live ? live_s : 0.0, tell);
+                         options.is_live ? live_s : 0.0, report_progress);
 } catch (const DatasetError& error) {
   return refused(error.what());
 } catch (const ConfigError& error) {

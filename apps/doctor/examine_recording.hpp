@@ -10,17 +10,17 @@
 namespace km {
 
 /// Called with the finished share of the work, 0 to 1; always 0 if the share is unknown.
-using TellProgress = std::function<void(std::string_view stage, double share)>;
+using ReportProgress = std::function<void(std::string_view stage, double share)>;
 
 /// Findings on a recording, or on the live sensors of a rig file: see examine_sensors.hpp.
 /// `options` names the input as for a robot, with the window. Live sensors are examined for
 /// `live_s`. An input that cannot be opened is a finding, too: recording.refused. The vocabulary of
 /// `config` is compared with the images: vocabulary.coverage.
 [[nodiscard]] Examination examine_recording(const RobotOptions& options, const RobotConfig& config,
-                                            double live_s, const TellProgress& tell);
+                                            double live_s, const ReportProgress& report_progress);
 
 /// Findings on the packets of a reader, up to its end; with `live_s` above 0 for that time.
 [[nodiscard]] Examination examine_packets(DatasetReader& reader, const RobotConfig& config,
-                                          double live_s, const TellProgress& tell);
+                                          double live_s, const ReportProgress& report_progress);
 
 }  // namespace km

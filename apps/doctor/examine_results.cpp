@@ -30,7 +30,7 @@ Finding missing(const char* file, const std::string& why) {
   return {.id = std::string("results.") + file,
           .severity = Severity::kNote,
           .what = why,
-          .means = "what it would tell is not looked at"};
+          .means = "its content is not examined"};
 }
 
 std::map<RobotId, ClosureTally> tallies_in(const fs::path& folder, RobotId self) {

@@ -40,7 +40,7 @@ Examples
     kimera_multi_doctor --live rig.yaml
   Why did two robots not join?
     kimera_multi_doctor results/team
-  Can robots hear each other here? On which domain are the others?
+  Can robots receive each other here? On which domain are the others?
     kimera_multi_doctor --network --domain 42
     kimera_multi_doctor --network --peers 10.0.0.2,10.0.0.3 --interface wlan0 --link wifi
   For programs:
@@ -105,37 +105,38 @@ Options parse_options(int argc, char** argv) {
   return options;
 }
 
-Examination examine_dataset(const Options& options, const TellProgress& tell) {
+Examination examine_dataset(const Options& options, const ReportProgress& report_progress) {
   RobotOptions robot = options.robot;
   robot.dataset = options.path;
   constexpr double kLongest_s = 120.0;
   if (!robot.to_s) robot.to_s = robot.from_s.value_or(0.0) + kLongest_s;
-  return examine_recording(robot, load_robot_config(robot), 0.0, tell);
+  return examine_recording(robot, load_robot_config(robot), 0.0, report_progress);
 }
 
-Examination examine_live(const Options& options, const TellProgress& tell) {
+Examination examine_live(const Options& options, const ReportProgress& report_progress) {
   RobotOptions robot = options.robot;
   robot.rig = options.live;
   robot.is_live = true;
   const RobotConfig config = load_robot_config(robot);
   constexpr double kTopics_s = 3.0, kSensors_s = 10.0;
-  Examination result =
-      examine_live_topics(read_rig_file(robot.rig).rig.topics, config.ros, kTopics_s, tell);
+  Examination result = examine_live_topics(read_rig_file(robot.rig).rig.topics, config.ros,
+                                           kTopics_s, report_progress);
   if (exit_code_of(result.findings) < kUnusable)
-    result.add(examine_recording(robot, config,
-                                 options.seconds > 0.0 ? options.seconds : kSensors_s, tell));
+    result.add(examine_recording(
+        robot, config, options.seconds > 0.0 ? options.seconds : kSensors_s, report_progress));
   sort_by_severity(result.findings);
   return result;
 }
 
-Examination run(const Options& options, const TellProgress& tell) {
-  if (!options.live.empty()) return examine_live(options, tell);
+Examination run(const Options& options, const ReportProgress& report_progress) {
+  if (!options.live.empty()) return examine_live(options, report_progress);
   if (!options.network)
     return are_results(options.path) ? examine_results(options.path)
-                                     : examine_dataset(options, tell);
+                                     : examine_dataset(options, report_progress);
   constexpr double kNetwork_s = 5.0;
   return examine_network(probe_network(load_robot_config(options.robot).dds,
-                                       options.seconds > 0.0 ? options.seconds : kNetwork_s, tell));
+                                       options.seconds > 0.0 ? options.seconds : kNetwork_s,
+                                       report_progress));
 }
 
 std::string conclusion(const std::vector<Finding>& findings) {

@@ -115,7 +115,7 @@ void examine_interface(const NetworkFacts& facts, Examination& result) {
         {.id = "network.several_interfaces",
          .severity = Severity::kNote,
          .what = std::to_string(outward) + " interfaces are up, " + chosen.name + " is used",
-         .means = "robots on another one are not heard",
+         .means = "robots on another one are not received",
          .to_do = "--interface chooses"});
   if (chosen.loopback)
     result.findings.push_back(
@@ -200,7 +200,7 @@ struct Robots {
 Robots sorted(const NetworkFacts& facts) {
   Robots robots;
   std::vector<Announced> all = facts.announced;
-  all.insert(all.end(), facts.heard.begin(), facts.heard.end());
+  all.insert(all.end(), facts.received.begin(), facts.received.end());
   for (const Announced& one : all) {
     const bool is_robot = claims_to_be_a_robot(one.user_data);
     if (!is_robot) {
@@ -239,15 +239,15 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
   const Robots robots = sorted(facts);
   const std::string domain = std::to_string(facts.config.domain);
   result.figures.push_back(
-      {"robots heard", (robots.of_team.empty() ? "none" : names_of(robots.of_team)) + " of team " +
-                           facts.config.team + " on domain " + domain + ", in " +
-                           fixed(facts.listened_s, 1) + " s"});
+      {"robots received", (robots.of_team.empty() ? "none" : names_of(robots.of_team)) +
+                              " of team " + facts.config.team + " on domain " + domain + ", in " +
+                              fixed(facts.listened_s, 1) + " s"});
   if (!robots.on_other_domain.empty())
-    result.findings.push_back(
-        warning("network.other_domain",
-                names_of(robots.on_other_domain) + " on domain " +
-                    std::to_string(robots.on_other_domain.front().domain) + ", not " + domain,
-                "robots of different domains do not hear each other", "the same --domain for all"));
+    result.findings.push_back(warning(
+        "network.other_domain",
+        names_of(robots.on_other_domain) + " on domain " +
+            std::to_string(robots.on_other_domain.front().domain) + ", not " + domain,
+        "robots of different domains do not receive each other", "the same --domain for all"));
   if (!robots.of_other_team.empty())
     result.findings.push_back(
         {.id = "network.other_team",
@@ -260,7 +260,7 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
     result.findings.push_back(
         {.id = "network.protocol",
          .severity = Severity::kError,
-         .what = name_of(robot) + " at " + robot.from + " speaks protocol " +
+         .what = name_of(robot) + " at " + robot.from + " uses protocol " +
                  (robot.identity ? std::to_string(robot.identity->protocol) : "unknown") +
                  ", this is " + std::to_string(kProtocolVersion),
          .means = "it is not talked to",
@@ -274,7 +274,7 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
                                .to_do = "a domain of its own is quieter"});
   examine_ids(robots.of_team, result);
   if (!facts.config.peers.empty() && robots.of_team.empty())
-    result.findings.push_back(warning("network.nobody", "no robot of the team is heard",
+    result.findings.push_back(warning("network.nobody", "no robot of the team is received",
                                       "none runs, or it is kept out by what stands here",
                                       "start it, and see its log for the interface it uses"));
   else if (robots.are_none())
@@ -283,7 +283,7 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
          .severity = Severity::kNote,
          .what =
              "nobody else was seen: no robot on any domain in " + fixed(facts.listened_s, 1) + " s",
-         .means = "this host is ready; whether others reach it is not told",
+         .means = "this host is ready; whether others reach it is not known",
          .to_do =
              "start a robot on another host and look again; of one that runs, --peers ADDRESS"});
 }
@@ -291,7 +291,8 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
 void examine_echo(const PeerEcho& peer, Examination& result) {
   if (!peer.may_ask) {
     result.figures.push_back(
-        {"peer " + peer.host, "not told: this user may not send ICMP (net.ipv4.ping_group_range)"});
+        {"peer " + peer.host,
+         "not determined: this user may not send ICMP (net.ipv4.ping_group_range)"});
     return;
   }
   const double loss = 1.0 - static_cast<double>(peer.received) /

@@ -61,8 +61,8 @@ struct NetworkFacts {
   std::optional<long> largest_receive_buffer = {};  ///< net.core.rmem_max [B].
   std::vector<Announced> announced = {};            ///< Participants on all domains up to
                                                     ///< kLastQuietDomain.
-  std::vector<Announced> heard = {};  ///< Participants that DDS itself receives as configured, also
-                                      ///< by address.
+  std::vector<Announced> received = {};  ///< Participants that DDS itself receives as configured,
+                                         ///< also by address.
   double listened_s = 0.0;
   std::vector<PeerEcho> echoes = {};
   std::vector<ClockDifference> clocks = {};

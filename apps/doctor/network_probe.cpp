@@ -112,7 +112,7 @@ class DiscoveryListener {
   }
 
   // Collects all announcements except for those of `self`.
-  void listen(milliseconds patience, const Guid& self, std::vector<Announced>& heard) {
+  void listen(milliseconds patience, const Guid& self, std::vector<Announced>& received) {
     std::vector<pollfd> waiting;
     for (const DatagramSocket& socket : sockets_)
       waiting.push_back({.fd = socket.handle(), .events = POLLIN, .revents = 0});
@@ -123,7 +123,7 @@ class DiscoveryListener {
       if (!datagram) continue;
       const auto one = parse_announcement(datagram->bytes, domains_[k], datagram->from);
       if (one && !std::ranges::equal(one->guid_prefix, std::span(self).first<12>()))
-        keep(heard, *one);
+        keep(received, *one);
     }
   }
 
@@ -157,7 +157,7 @@ class Bystander {
   }
 
   // Adds the participants that DDS has discovered so far.
-  void take(std::vector<Announced>& heard) {
+  void take(std::vector<Announced>& received) {
     for_each(participants_, [&](const dds_sample_info_t& info, const void* sample) {
       const auto& found = *static_cast<const dds_builtintopic_participant_t*>(sample);
       if (!info.valid_data) return;
@@ -172,7 +172,7 @@ class Bystander {
         one.identity = announcement->identity;
         of_participant_[info.instance_handle] = to_string(*one.identity);
       }
-      keep(heard, one);
+      keep(received, one);
     });
   }
 
@@ -279,15 +279,15 @@ PeerEcho ask(const std::string& host) {
   return echo;
 }
 
-void listen(const DdsConfig& config, double listen_s, const TellProgress& tell,
+void listen(const DdsConfig& config, double listen_s, const ReportProgress& report_progress,
             NetworkFacts& facts) {
   DiscoveryListener listener(config, *facts.chosen);
   Bystander bystander(config);
   const double start_s = steady_now_s();
   while (steady_now_s() - start_s < listen_s) {
-    tell("listening", (steady_now_s() - start_s) / listen_s);
+    report_progress("listening", (steady_now_s() - start_s) / listen_s);
     listener.listen(milliseconds(20), bystander.guid(), facts.announced);
-    bystander.take(facts.heard);
+    bystander.take(facts.received);
     bystander.take_clocks();
   }
   facts.listened_s = listen_s;
@@ -296,7 +296,8 @@ void listen(const DdsConfig& config, double listen_s, const TellProgress& tell,
 
 }  // namespace
 
-NetworkFacts probe_network(const DdsConfig& config, double listen_s, const TellProgress& tell) {
+NetworkFacts probe_network(const DdsConfig& config, double listen_s,
+                           const ReportProgress& report_progress) {
   NetworkFacts facts{.config = checked(config), .interfaces = network_interfaces()};
   try {
     facts.chosen = select_interface(facts.interfaces, config.interface);
@@ -309,10 +310,10 @@ NetworkFacts probe_network(const DdsConfig& config, double listen_s, const TellP
   facts.no_multicast = try_multicast(config, *facts.chosen);
   facts.no_unicast = try_unicast(*facts.chosen);
   for (const std::string& peer : config.peers) {
-    tell("asking " + peer, 0.0);
+    report_progress("asking " + peer, 0.0);
     facts.echoes.push_back(ask(peer));
   }
-  listen(config, listen_s, tell, facts);
+  listen(config, listen_s, report_progress, facts);
   return facts;
 }
 

@@ -10,6 +10,6 @@ namespace km {
 /// domains up to kLastQuietDomain, and on that of `config` also as a participant that is no robot.
 /// It does not take part in a session. Throws DdsError if DDS refuses the configuration.
 [[nodiscard]] NetworkFacts probe_network(const DdsConfig& config, double listen_s,
-                                         const TellProgress& tell);
+                                         const ReportProgress& report_progress);
 
 }  // namespace km

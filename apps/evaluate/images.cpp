@@ -128,7 +128,7 @@ constexpr const char* kImagesDetails =
     "A-B px\",\n"
     "Tracking depends on motion most of all: compare two recordings by the rows \"flow A-B px\",\n"
     "frames of like median flow. Rows that differ by more than 25 % are marked. Noise over time\n"
-    "needs the camera to stand still for a second; --still-from and --still-to say where.\n\n"
+    "needs the camera to stand still for a second; --still-from and --still-to state when.\n\n"
     "Examples:\n"
     "  kimera_multi_evaluate images --dataset MH_01_easy --to 15 --still-from 21 --still-to 25.5\n"
     "  kimera_multi_evaluate images --dataset V1_01_easy --compare simulated --compare-from 5";

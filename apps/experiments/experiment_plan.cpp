@@ -89,7 +89,7 @@ void add_flights(const WorldConfig& world, const ExperimentPaths& paths, Step& s
     if (flight.truth.empty() || flight.imu.empty()) {
       step.missing = "no true poses and inertial data of " + robot +
                      (paths.euroc.empty() ? std::string() : " in " + paths.euroc.string()) +
-                     "; --euroc says where EuRoC's recordings are";
+                     "; --euroc names the folder of the EuRoC recordings";
       return;
     }
     truths.push_back(flight.truth.string());
@@ -257,7 +257,7 @@ std::vector<Step> cosmo_steps(const CosmoExperiment& cosmo, const ExperimentPath
                      .outputs = {json},
                      .expected_s = 1.0});
     if (!fs::exists(graph))
-      steps.back().missing = "no pose graph " + graph.string() + "; --graphs says where it is";
+      steps.back().missing = "no pose graph " + graph.string() + "; --graphs names its folder";
   }
   return steps;
 }
@@ -278,7 +278,7 @@ std::vector<Step> pcm_steps(const PcmExperiment& pcm, const ExperimentPaths& pat
     append(step.command, pcm.searches);
     append(step.command, {"--json", files.json.string(), "--plot", files.plot.string()});
     if (!fs::exists(graph))
-      step.missing = "no pose graph " + graph.string() + "; --graphs says where it is";
+      step.missing = "no pose graph " + graph.string() + "; --graphs names its folder";
     steps.push_back(std::move(step));
   }
   return steps;

@@ -202,7 +202,7 @@ void report(const km::ExperimentConfig& config, const km::ExperimentPaths& paths
     throw std::runtime_error(
         "nothing to report: " + paths.results.string() +
         " has no result of these experiments; `run` makes them, `list` shows what there is, "
-        "--results and --quick say where to look");
+        "--results and --quick select the folder");
   print(km::write_report(config, paths));
 }
 

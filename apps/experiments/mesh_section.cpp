@@ -63,7 +63,7 @@ ReportTable error_table(const std::vector<ReportInput::World>& worlds) {
       "within 0.5 m of it count. The middle leaves out true surface past the mesh's rim or behind "
       "it. The way back: from points of the estimated mesh to the true one. Several copies of a "
       "surface, spread about it, have a nearer one to most true points than copies that agree: of "
-      "a merged mesh only the way back tells the two apart.";
+      "a merged mesh only the way back distinguishes the two.";
   return table;
 }
 
@@ -187,7 +187,7 @@ std::optional<ReportSection> semantics_section(ReportInput& input) {
   ReportSection section{.id = "semantics", .title = "Labels"};
   section.add(ReportParagraph{
       "Labels come from the simulator's images of classes, as in the paper; each vertex of the "
-      "mesh has the most likely one of what all its views said. The paper has no truth for the "
+      "mesh has the most likely one of the labels of all its views. The paper has no truth for the "
       "Vicon rooms; ours are rendered, so there is one."});
   section.add(labels_table(worlds));
   for (const auto& world : worlds) {

@@ -177,7 +177,8 @@ std::optional<ReportSection> pcm_section(ReportInput& input) {
   ReportSection section{.id = "pcm", .title = "Outlier rejection"};
   section.add(ReportParagraph{
       "Closures of the Manhattan graph and random false ones enter the consistency graph one at a "
-      "time; after each the clique of closures that agree is searched anew (batch), improved from "
+      "time; after each the clique of closures that agree is searched again from scratch (batch), "
+      "improved from "
       "the new vertex only (incremental, as in the paper), or found exactly (exact, ours). The "
       "paper shows two plots without numbers: incremental is much faster, and its cliques are of "
       "comparable size."});

@@ -96,7 +96,7 @@ constexpr const char* kLead =
     "Worlds are like the paper's in kind, not the same: compare ratios before values.";
 
 constexpr const char* kQuick =
-    " These are the small versions (--quick), to see that all works: their numbers say little "
+    " These are the small versions (--quick), to see that all works: their numbers mean little "
     "about "
     "the paper's.";
 

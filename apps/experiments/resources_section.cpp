@@ -93,7 +93,7 @@ ReportTable live_table(ReportInput& input, const std::vector<ReportInput::World>
                           {fixed(mb.live_pgo, 2)},
                           {fixed(mb.of_keypoints_percent(mb.whole_run()), 0)}});
   }
-  table.note = "The running team solves anew as closures come; the paper's solves once.";
+  table.note = "The running team solves again as closures come; the paper's solves once.";
   return table;
 }
 

@@ -30,7 +30,7 @@ constexpr double kQuiet_s = 2.0;  // shorter steps show only their end
 constexpr double kRedrawInterval_s = 0.2;
 constexpr int kPoll_ms = 100;
 constexpr std::size_t kLastLines = 12;
-constexpr const char* kLogHint = "\n    (all it said: ";
+constexpr const char* kLogHint = "\n    (complete output: ";
 
 std::string duration(double seconds) {
   const auto s = static_cast<long>(std::lround(seconds));
@@ -220,7 +220,7 @@ class StepsRun {
       }
       display_.update(last_lines.empty() ? "" : last_lines.back(), steady_now_s());
     }
-    if (outcome_.stopped) return "stopped; the same command goes on";
+    if (outcome_.stopped) return "stopped; the same command continues";
     std::string problem;
     if (!process.exit()->ok())
       problem = to_string(*process.exit());
@@ -229,7 +229,8 @@ class StepsRun {
         if (problem.empty() && !fs::exists(output)) problem = "it made no " + output.string();
     if (problem.empty()) return {};
     // Not every program prints its error to standard error.
-    for (const auto& words : process.last_words().empty() ? last_lines : process.last_words())
+    for (const auto& words :
+         process.last_log_lines().empty() ? last_lines : process.last_log_lines())
       problem += "\n    " + words;
     return problem + kLogHint + log.string() + ')';
   }

@@ -77,7 +77,7 @@ void show_robot(const fs::path& folder) {
 void add_show(CLI::App& parent) {
   CLI::App& app = *parent.add_subcommand(
       "show",
-      "Check the keys of a team, or of one robot, and show what they say. Shows no secret.\n"
+      "Check the keys of a team, or of one robot, and show their content. Shows no secret.\n"
       "  kimera_multi_keys show survey\n"
       "  kimera_multi_keys show keys          # on the robot");
   const auto folder = std::make_shared<fs::path>();

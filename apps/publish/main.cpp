@@ -123,13 +123,13 @@ class Progress {
  public:
   [[nodiscard]] bool is_due() {
     constexpr double kInterval_s = 5.0;
-    if (steady_now_s() - told_s_ < kInterval_s) return false;
-    told_s_ = steady_now_s();
+    if (steady_now_s() - reported_s_ < kInterval_s) return false;
+    reported_s_ = steady_now_s();
     return true;
   }
 
  private:
-  double told_s_ = steady_now_s();
+  double reported_s_ = steady_now_s();
 };
 
 // True once there are enough readers and they had time to discover the topics; false after a

@@ -122,12 +122,12 @@ void MessagePlayer::schedule(BagMessage message) {
   due_.push({message.log_time + nanoseconds(late_s), number_++, topic, std::move(*bytes)});
 }
 
-void MessagePlayer::tell_image(const Due& due) const {
+void MessagePlayer::notify_image(const Due& due) const {
   const auto is_image = [](const PlayedTopic& topic) { return topic.type.ends_with("Image"); };
   const auto first = std::ranges::find_if(topics_, is_image);
   if (first == topics_.end() || std::cmp_not_equal(first - topics_.begin(), due.topic)) return;
   const auto header = decode_ros<RosHeader>("cdr", due.bytes);
-  if (header.value) tell_image_(header.value->stamp);
+  if (header.value) on_image_(header.value->stamp);
 }
 
 bool MessagePlayer::step() {
@@ -137,7 +137,7 @@ bool MessagePlayer::step() {
   }
   if (due_.empty() || !clock_.wait_until(due_.top().stamp)) return false;
   const Due& due = due_.top();
-  if (tell_image_) tell_image(due);
+  if (on_image_) notify_image(due);
   publishers_[due.topic]->publish(due.bytes);
   ++topics_[due.topic].published;
   played_s_ = seconds_between(*first_, due.stamp);

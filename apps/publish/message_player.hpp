@@ -53,8 +53,8 @@ class MessagePlayer {
   /// Publishes the next message when it is due; false after the last one, and after stop().
   bool step();
 
-  /// Calls `tell` with the stamp of each image of the first image topic before it is published.
-  void on_image(std::function<void(Stamp)> tell) { tell_image_ = std::move(tell); }
+  /// Calls `notify` with the stamp of each image of the first image topic before it is published.
+  void on_image(std::function<void(Stamp)> notify) { on_image_ = std::move(notify); }
 
   /// Ends step(). Thread-safe.
   void stop() { clock_.stop(); }
@@ -77,7 +77,7 @@ class MessagePlayer {
 
   [[nodiscard]] bool take(BagMessage message);
   void schedule(BagMessage message);
-  void tell_image(const Due& due) const;
+  void notify_image(const Due& due) const;
 
   std::unique_ptr<BagReader> recording_;
   PlayOptions options_;
@@ -92,7 +92,7 @@ class MessagePlayer {
   bool ended_ = false;
   std::uint64_t number_ = 0;
   double played_s_ = 0.0;
-  std::function<void(Stamp)> tell_image_;
+  std::function<void(Stamp)> on_image_;
 };
 
 }  // namespace km

@@ -136,7 +136,8 @@ std::string inspect_recording(const fs::path& path, const fs::path& rig) {
                          (proposal.right.topic.empty() || !proposal.right.info_topic.empty());
   return text_of(topics) + to_string(reader->report()) + "\nwritten: " + rig.string() +
          ": look at its topics, and name the calibration" +
-         (has_infos ? "; without it, topics of CameraInfo and /tf_static tell the cameras\n"
+         (has_infos ? "; without it, the calibration comes from topics of CameraInfo and from "
+                      "/tf_static\n"
                     : "\n");
 }
 

@@ -55,7 +55,7 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
   topics.outcomes.subscribe(post);
   topics.peer_events.subscribe([this](const auto& event) {
     using enum PeerEventKind;
-    if (event->kind == kJoined || event->kind == kTold || event->kind == kResumed)
+    if (event->kind == kJoined || event->kind == kReported || event->kind == kResumed)
       worker_.post(event);
   });
 }
@@ -104,14 +104,14 @@ void JournalNode::step(Tick /*tick*/) {
     added_ = false;
     if (!journal_.is_whole())
       throw std::runtime_error(file.string() +
-                               ": ends where the disk was full for too long: taken up, the run "
-                               "goes on from there");
+                               ": ends where the disk was full for too long: a resumed run "
+                               "continues from there");
   });
   for (const HeldBack& held : std::exchange(held_back_, {}))
-    std::visit([this](const auto& message) { hand_on(message); }, held);
+    std::visit([this](const auto& message) { pass(message); }, held);
 }
 
-void JournalNode::hand_on(const Message<Keyframe>& keyframe) {
+void JournalNode::pass(const Message<Keyframe>& keyframe) {
   topics_.keyframes.publish(keyframe);
   --new_keyframes_;
 }

@@ -101,9 +101,9 @@ class JournalNode final : public Node {
   void step(const Message<ClosureOutcome>& outcome);
   void step(const Message<PeerEvent>& event);
   std::optional<JournalPlace> add(const JournalEntry& entry);
-  void hand_on(const Message<Keyframe>& keyframe);
-  void hand_on(const Message<Closure>& closure) { topics_.closures.publish(closure); }
-  void hand_on(const Message<PeerEvent>& restart) { topics_.restarts.publish(restart); }
+  void pass(const Message<Keyframe>& keyframe);
+  void pass(const Message<Closure>& closure) { topics_.closures.publish(closure); }
+  void pass(const Message<PeerEvent>& restart) { topics_.restarts.publish(restart); }
 
   const std::filesystem::path file_;
   ResultWriter& results_;

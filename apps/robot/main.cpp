@@ -107,7 +107,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
   group->require_option(1);
   app.add_option(
          "--rig", options.rig,
-         "For a bag: file that says which topics are the sensors, and their calibration; for a "
+         "For a bag: file that states which topics are the sensors, and their calibration; for a "
          "EuRoC folder, what its calibration is off by (rig_estimated.yaml of a run)")
       ->check(CLI::ExistingFile);
   app.add_option("--odometry", options.odometry,
@@ -163,12 +163,13 @@ void add_output(CLI::App& app, RobotOptions& options) {
             options.output = folder;
             options.resume = true;
           },
-          "In place of --output: the folder of a run that was killed; goes on where it ended (all "
+          "In place of --output: the folder of a run that was killed; continues where it ended "
+          "(all "
           "other options as before)")
       ->check([](const std::string& folder) {
         return std::filesystem::is_directory(folder)
                    ? ""
-                   : folder + ": there is no such folder, so no run to go on with; --output " +
+                   : folder + ": there is no such folder, so no run to continue; --output " +
                          folder + " begins one there";
       });
   group->require_option(1);

@@ -193,14 +193,14 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
   write("loop_closures.csv", write_closures, record);
 }
 
-std::vector<ToldClosure> told_closures(const RunRecord& record) {
-  std::vector<ToldClosure> told;
+std::vector<PublishedClosure> published_closures(const RunRecord& record) {
+  std::vector<PublishedClosure> published;
   for (const ClosureOutcome& outcome : record.outcomes())
-    told.push_back({.id = outcome.id,
-                    .stage = outcome.stage,
-                    .rejected = !outcome.reason.empty(),
-                    .T_from_to = measured_pose(record, outcome)});
-  return told;
+    published.push_back({.id = outcome.id,
+                         .stage = outcome.stage,
+                         .rejected = !outcome.reason.empty(),
+                         .T_from_to = measured_pose(record, outcome)});
+  return published;
 }
 
 RunSummary summary_of(const RunRecord& record) {

@@ -14,7 +14,7 @@ void write_results(const std::filesystem::path& folder, const RunRecord& record,
                    ResultWriter& results);
 
 /// Every candidate of the robot, in the form in which viewers receive it.
-[[nodiscard]] std::vector<ToldClosure> told_closures(const RunRecord& record);
+[[nodiscard]] std::vector<PublishedClosure> published_closures(const RunRecord& record);
 
 /// Summary of the record; the fields that concern the process and its network keep their defaults.
 [[nodiscard]] RunSummary summary_of(const RunRecord& record);

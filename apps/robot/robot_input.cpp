@@ -37,7 +37,7 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
   const fs::path file = options.output / kJournal;
   if (!options.resume) return std::nullopt;
   if (is_absent(file)) {
-    log::warn("journal") << file.string() << ": there is none: the run begins anew";
+    log::warn("journal") << file.string() << ": there is none: the run starts from the beginning";
     return std::nullopt;
   }
   RestoredRun run = restore_run(file);
@@ -62,7 +62,7 @@ std::optional<ContinuedMap> restore_map(const RobotOptions& options, const Resto
   if (is_absent(file)) return std::nullopt;
   return ContinuedMap(read_map_file(file), static_cast<KeyframeIndex>(run.keyframes.size()));
 } catch (const InputFileError& error) {
-  log::warn("journal") << error.what() << ": the map begins anew";
+  log::warn("journal") << error.what() << ": the map starts from the beginning";
   return std::nullopt;
 }
 
@@ -110,21 +110,21 @@ class SignalStop {
 };
 
 // nullopt: a signal arrived.
-std::optional<Rig> hear_calibration(const PartialRig& rig,
-                                    const std::shared_ptr<const RosNetwork>& ros,
-                                    SignalWatch& signals) {
+std::optional<Rig> receive_calibration(const PartialRig& rig,
+                                       const std::shared_ptr<const RosNetwork>& ros,
+                                       SignalWatch& signals) {
   constexpr double kPatience_s = 30.0;
   constexpr int kKept = 100;
   std::vector<RosTopic> wanted;
   std::string names;
-  for (const auto& teller : RigCompletion(rig).tellers()) {
-    wanted.push_back({teller.topic, std::string(teller.type),
-                      teller.type == RosTransforms::kType ? RosQos::kLatched : RosQos::kSensorData,
+  for (const auto& source : RigCompletion(rig).sources()) {
+    wanted.push_back({source.topic, std::string(source.type),
+                      source.type == RosTransforms::kType ? RosQos::kLatched : RosQos::kSensorData,
                       kKept});
-    names += (names.empty() ? "" : ", ") + teller.topic;
+    names += (names.empty() ? "" : ", ") + source.topic;
   }
   LiveBag topics(ros, std::move(wanted));
-  log::info("sensors") << "waiting for what tells the calibration: " << names;
+  log::info("sensors") << "waiting for messages with the calibration: " << names;
   topics.give_up_after(kPatience_s);
   const SignalStop stop(signals, topics);
   try {
@@ -139,7 +139,7 @@ std::optional<Rig> hear_calibration(const PartialRig& rig,
 std::optional<Rig> complete(const RobotOptions& options, const PartialRig& rig,
                             const std::shared_ptr<const RosNetwork>& ros, SignalWatch& signals) {
   if (rig.is_complete()) return rig.rig;
-  return options.is_live ? hear_calibration(rig, ros, signals)
+  return options.is_live ? receive_calibration(rig, ros, signals)
                          : complete_rig(options.dataset.string(), *open_bag(options.dataset), rig);
 }
 
@@ -188,8 +188,9 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
   if (std::ranges::none_of(reader->channels(), is_image))
     throw std::invalid_argument(bag +
                                 ": no topic of it has images: robots play recordings of "
-                                "sensors, not what a robot has told (--record)");
-  throw std::invalid_argument(bag + ": --rig FILE must tell which of its topics are the sensors; " +
+                                "sensors, not what a robot has published (--record)");
+  throw std::invalid_argument(bag +
+                              ": --rig FILE must state which of its topics are the sensors; " +
                               "--inspect " + bag + " rig.yaml writes one");
 }
 
@@ -223,10 +224,11 @@ std::unique_ptr<DatasetReader> with_poses(const RobotOptions& options, const Rig
       options.odometry.empty() && rig.messages ? rig.messages->pose_file : options.odometry;
   if (file.empty()) return reader;
   if (options.is_live)
-    throw std::invalid_argument(file.string() +
-                                ": a file of poses is of a recording; --live hears an odometry on "
-                                "a topic: odometry: {topic: ...} in " +
-                                options.rig.string());
+    throw std::invalid_argument(
+        file.string() +
+        ": a file of poses is of a recording; --live receives an odometry on "
+        "a topic: odometry: {topic: ...} in " +
+        options.rig.string());
   return std::make_unique<PoseFileReader>(std::move(reader), file);
 }
 

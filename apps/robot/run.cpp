@@ -62,10 +62,10 @@ void make_output(const fs::path& folder) {
 }
 
 // Call when all inputs of the run have been checked, because earlier results are removed.
-void remove_former(const fs::path& folder, bool goes_on, bool resume) {
+void remove_former(const fs::path& folder, bool continues, bool resume) {
   if (!resume && is_file(folder / kSummary))
     log::info("robot") << folder.string() << ": the results of an earlier run are replaced";
-  remove_results(folder, goes_on);
+  remove_results(folder, continues);
   if (resume) return;
   for (const char* file : {kJournal, kMap}) fs::remove(folder / file);
 }
@@ -86,7 +86,7 @@ const char* to_word(PeerState state) {
       return "lost";
     case PeerState::kLeft:
       return "left";
-    case PeerState::kTold:
+    case PeerState::kReported:
       return "out of reach";
   }
   return "";
@@ -171,8 +171,8 @@ std::string status_text(double dataset_time_s, const RunRecord& record,
 // Work beside the modules while they run: phase, status line, traffic and memory over time.
 class Watch {
  public:
-  /// `goes_on`: continues the run whose results are in the folder.
-  Watch(const RobotOptions& options, const RobotConfig& config, bool goes_on, Robot& robot,
+  /// `continues`: continues the run whose results are in the folder.
+  Watch(const RobotOptions& options, const RobotConfig& config, bool continues, Robot& robot,
         ResultWriter& results)
       : robot_(robot),
         is_past_(!options.session.empty()),
@@ -180,45 +180,46 @@ class Watch {
         departure_(config.run.settle_s, options.serve_limit_s),
         start_s_(steady_now_s()),
         traffic_file_(options.output / "traffic.csv", results),
-        traffic_csv_(traffic_file_.rows(), goes_on ? traffic_file_.go_on() : std::string()),
+        traffic_csv_(traffic_file_.rows(), continues ? traffic_file_.go_on() : std::string()),
         process_file_(options.output / "process.csv", results),
-        process_csv_(process_file_.rows(), goes_on ? process_file_.go_on() : std::string()),
+        process_csv_(process_file_.rows(), continues ? process_file_.go_on() : std::string()),
         rounds_file_(options.output / "optimizer.csv", results),
-        rounds_csv_(rounds_file_.rows(), goes_on ? rounds_file_.go_on() : std::string()) {}
+        rounds_csv_(rounds_file_.rows(), continues ? rounds_file_.go_on() : std::string()) {}
 
   /// True when the robot may leave, or must because its id belongs to another. Called ten times a
   /// second.
   bool poll() {
     const double now_s = steady_now_s() - start_s_;
     const TrafficSnapshot traffic = robot_.bridge().traffic();
-    const bool ended = robot_.input_ended() && !waits_for_company(now_s);
+    const bool ended = robot_.input_ended() && !waits_for_peers(now_s);
     // If the recorder is at work, the next call reads it: this thread does not wait.
     (void)robot_.recorder().try_with_record([&](const RunRecord& record) {
-      say(now_s, record, traffic);
+      log_progress(now_s, record, traffic);
       rounds_csv_.append(record.rounds());
       if (leaving_since_s_) return;
       const std::map<RobotId, Departure::Present> peers = present_peers();
       std::vector<Departure::Present> present;
       for (const auto& [robot, peer] : peers) present.push_back(peer);
       const auto& team = record.progress().members;
-      const auto unheard = std::count_if(team.begin(), team.end(), [&](RobotId member) {
+      const auto not_received = std::count_if(team.begin(), team.end(), [&](RobotId member) {
         return member != record.robot() && !peers.contains(member);
       });
       // Messages that wait for the budget may change the graphs of other robots.
       const bool settled = record.settled() && !robot_.bridge().holds_back();
-      const auto told = departure_.update(now_s, {.input_ended = ended,
-                                                  .graph_settled = settled,
-                                                  .activity = record.activity(),
-                                                  .present_peers = present,
-                                                  .unheard = static_cast<std::size_t>(unheard)});
-      robot_.set_settled(told);
+      const auto reported =
+          departure_.update(now_s, {.input_ended = ended,
+                                    .graph_settled = settled,
+                                    .activity = record.activity(),
+                                    .present_peers = present,
+                                    .not_received = static_cast<std::size_t>(not_received)});
+      robot_.set_settled(reported);
       absentees_.update(now_s, known_peers(), team);
       const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
-      if (told.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
+      if (reported.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
         robot_.expect_no_more_closures();
     });
     if (now_s - written_s_ >= kInterval_s) write(now_s, traffic);
-    return robot_.id_taken() || (departure_.reason() != nullptr && said_goodbye(now_s));
+    return robot_.id_taken() || (departure_.reason() != nullptr && leave_notice_sent(now_s));
   }
 
   /// `record` is final.
@@ -229,35 +230,35 @@ class Watch {
   [[nodiscard]] ProcessSummary process() const { return process_csv_.summary(); }
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
-  [[nodiscard]] std::vector<MissedPeer> missed() const { return absentees_.missed(kHearsay_s); }
+  [[nodiscard]] std::vector<MissedPeer> missed() const { return absentees_.missed(kSecondHand_s); }
 
  private:
-  static constexpr double kInterval_s = 1.0;  // between rows of a CSV, and status lines
-  static constexpr double kGoodbye_s = 1.5;   // three times the period of the status
+  static constexpr double kInterval_s = 1.0;     // between rows of a CSV, and status lines
+  static constexpr double kLeaveNotice_s = 1.5;  // three times the period of the status
   // In a chain, robots leave one after the other: the first are gone before the last receives a
   // notice.
-  static constexpr double kHearsay_s = 2.0 * kGoodbye_s;
+  static constexpr double kSecondHand_s = 2.0 * kLeaveNotice_s;
 
   // The robot of a finished run serves others: it stays until another robot has come, or until the
   // limit.
-  bool waits_for_company(double now_s) const {
+  bool waits_for_peers(double now_s) const {
     return is_past_ && now_s < serve_limit_s_ && robot_.bridge().peers().list().empty();
   }
 
   // Sends the leave message before the robot ends, so that all robots end with the same solution.
-  bool said_goodbye(double now_s) {
+  bool leave_notice_sent(double now_s) {
     if (!leaving_since_s_) {
       leaving_since_s_ = now_s;
       robot_.freeze_record();
       robot_.set_settled({RobotPhase::kLeaving, kManyLinks});
     }
-    return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kGoodbye_s;
+    return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kLeaveNotice_s;
   }
 
   // Less often than poll(), because the time to count closures grows with their number.
-  void say(double now_s, const RunRecord& record, const TrafficSnapshot& traffic) {
-    if (now_s - said_s_ < kInterval_s) return;
-    said_s_ = now_s;
+  void log_progress(double now_s, const RunRecord& record, const TrafficSnapshot& traffic) {
+    if (now_s - logged_s_ < kInterval_s) return;
+    logged_s_ = now_s;
     status_line_.update(status_text(robot_.dataset_time_s(), record, robot_.bridge().peers().list(),
                                     traffic, process_usage().resident_bytes));
   }
@@ -269,11 +270,11 @@ class Watch {
     const auto contact_of = [](PeerState state) {
       switch (state) {
         case PeerState::kAlive:
-          return kHeard;
+          return kReceived;
         case PeerState::kLost:
           return kSilent;
-        case PeerState::kTold:
-          return kTold;
+        case PeerState::kReported:
+          return kReported;
         case PeerState::kLeft:
           break;
       }
@@ -293,13 +294,13 @@ class Watch {
   // A peer that is present but has not yet sent a status counts as running, regardless of the last
   // status of its former process.
   std::map<RobotId, Departure::Present> present_peers() const {
-    std::map<TeamPeer, Departure::Present> told;
+    std::map<TeamPeer, Departure::Present> reported;
     for (const RobotStatus& status : robot_.status_node().peers())
-      told[{status.robot, status.boot}] = {status.phase, status.settled_links};
+      reported[{status.robot, status.boot}] = {status.phase, status.settled_links};
     std::map<RobotId, Departure::Present> present;
     for (const auto& [identity, state, addresses] : robot_.bridge().peers().list())
       if (state == PeerState::kAlive)
-        present[identity.robot] = told[{identity.robot, identity.boot}];
+        present[identity.robot] = reported[{identity.robot, identity.boot}];
     return present;
   }
 
@@ -326,7 +327,7 @@ class Watch {
   GrowingFile rounds_file_;
   RoundsCsv rounds_csv_;
   double written_s_ = 0.0;
-  double said_s_ = -kInterval_s;
+  double logged_s_ = -kInterval_s;
   std::optional<double> leaving_since_s_;
   StatusLine status_line_;
 };
@@ -359,7 +360,7 @@ RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& 
 }
 
 // Last line of a run.
-void say(const RobotOptions& options, const RunEnd& end, const Verdict& verdict) {
+void log_end(const RobotOptions& options, const RunEnd& end, const Verdict& verdict) {
   const std::string images = end.images ? ", " + to_string(*end.images) : "";
   if (verdict.exit_code != 0)
     log::error("robot") << verdict.reason;
@@ -415,7 +416,7 @@ void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRe
   std::map<std::string, std::string> files;
   for (const char* name : {"config.yaml", "keyframes.csv", "loop_closures.csv"})
     if (is_file(options.output / name)) files[name] = read_input_file(options.output / name);
-  node.finish(record.optimized(), told_closures(record), files);
+  node.finish(record.optimized(), published_closures(record), files);
   if (node.left_out() > 0)
     log::warn("record") << node.left_out() << " messages and images are missing in "
                         << options.record->string() << ": they came faster than they were written";
@@ -491,7 +492,7 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
       [&summary](const auto& file) { write_summary(file, summary); });
   end.lost_results = results.lost();
   const Verdict verdict = verdict_of(end);
-  say(options, end, verdict);
+  log_end(options, end, verdict);
   return verdict.exit_code;
 }
 
@@ -511,12 +512,12 @@ void write_estimated_rig(const RobotOptions& options, const RigInput& rig, const
 
 // Path of the MCAP record, if one is requested; a resumed run writes a new file. Throws
 // std::runtime_error if the folder of the requested file does not exist.
-std::optional<fs::path> record_file(const RobotOptions& options, bool goes_on) {
+std::optional<fs::path> record_file(const RobotOptions& options, bool continues) {
   if (!options.record) return std::nullopt;
   const bool is_named = !options.record->empty();
   if (is_named) check_output_folder(*options.record);
   const fs::path file = is_named ? *options.record : options.output / kRecord;
-  if (!goes_on || !fs::exists(file)) return file;
+  if (!continues || !fs::exists(file)) return file;
   int number = 2;
   while (fs::exists(numbered(file, number))) ++number;
   return numbered(file, number);
@@ -567,8 +568,8 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   log::info("robot") << "kimera_multi_robot " << built_version() << ", commit " << built_commit();
   const std::optional<double> rate = chosen_rate(options, config, mapping, rig, signals);
   options.rate = rate.value_or(options.rate);
-  const bool goes_on = options.resume && input->restored;
-  options.record = record_file(options, goes_on);
+  const bool continues = options.resume && input->restored;
+  options.record = record_file(options, continues);
   Robot robot(options, config, *std::move(input), mapping, results, signals);
   if (listen) listen(robot.topics());
   log_network(config, robot.interface());
@@ -577,7 +578,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
     log::warn("robot") << "segmentation.palette is not used: labels are recorded, and with them "
                           "their label_palette.csv";
   change_output(options, results,
-                [&](const fs::path& folder) { remove_former(folder, goes_on, options.resume); });
+                [&](const fs::path& folder) { remove_former(folder, continues, options.resume); });
   const auto write = [&](const char* name, const std::string& text) {
     results.write(options.output / name, [&text](const auto& file) { write_file(file, text); });
   };
@@ -586,7 +587,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
     write(kLabelPalette, to_csv(mapping->palette));
 
   std::optional<Watch> watch;
-  watch.emplace(options, config, goes_on, robot, results);
+  watch.emplace(options, config, continues, robot, results);
   const RunResult result = robot.run([&watch] { return watch->poll(); });
   const auto end = [&](const RunRecord& record) {
     write_estimated_rig(options, rig, record, results);

@@ -49,15 +49,15 @@ Departure::Present Departure::update(double now_s, const Inputs& inputs) {
   // The distance in links to a robot that is not heard is at most the number of such robots plus
   // one.
   const bool all_settled =
-      peers_settled && links > std::min(inputs.unheard + 1, std::size_t{kManyLinks} - 1);
+      peers_settled && links > std::min(inputs.not_received + 1, std::size_t{kManyLinks} - 1);
   if (!all_settled) all_settled_s_.reset();
   if (all_settled && !all_settled_s_) all_settled_s_ = now_s;
   // A peer that leaves has waited for all others.
-  const bool told =
+  const bool peer_leaves =
       peers_settled &&
       std::any_of(inputs.present_peers.begin(), inputs.present_peers.end(),
                   [](const Present& peer) { return peer.phase == RobotPhase::kLeaving; });
-  if (told || (all_settled && now_s - *all_settled_s_ >= settle_s_))
+  if (peer_leaves || (all_settled && now_s - *all_settled_s_ >= settle_s_))
     reason_ = kAllSettled;
   else if (now_s - *ended_s_ >= serve_limit_s_)
     reason_ = "time limit for serving peers";
@@ -71,14 +71,14 @@ void Absentees::update(double now_s, const std::map<RobotId, Known>& known,
   for (const auto& [robot, peer] : known) {
     if (peer.contact == Contact::kLeft || std::ranges::find(members, robot) != members.end())
       continue;
-    const bool hearsay = peer.contact == Contact::kTold;
-    if (hearsay && !ever_members_.contains(robot)) continue;
-    const Absence why = peer.contact == Contact::kHeard ? Absence::kApart : Absence::kSilent;
-    miss(robot, {.name = peer.name, .why = why, .hearsay = hearsay}, missed);
+    const bool second_hand = peer.contact == Contact::kReported;
+    if (second_hand && !ever_members_.contains(robot)) continue;
+    const Absence why = peer.contact == Contact::kReceived ? Absence::kApart : Absence::kSilent;
+    miss(robot, {.name = peer.name, .why = why, .second_hand = second_hand}, missed);
   }
   for (const RobotId robot : ever_members_)
     if (!known.contains(robot) && std::ranges::find(members, robot) == members.end())
-      miss(robot, {.name = "robot " + std::to_string(robot), .hearsay = true}, missed);
+      miss(robot, {.name = "robot " + std::to_string(robot), .second_hand = true}, missed);
   missed_ = std::move(missed);
   ever_members_.insert(members.begin(), members.end());
 }
@@ -86,15 +86,15 @@ void Absentees::update(double now_s, const std::map<RobotId, Known>& known,
 // Keeps the time since which the robot is missed, as long as the reason is the same.
 void Absentees::miss(RobotId robot, const Missed& missed, std::map<RobotId, Missed>& now) const {
   const auto before = missed_.find(robot);
-  const bool goes_on = before != missed_.end() && before->second.why == missed.why;
-  now.emplace(robot, missed).first->second.since_s = goes_on ? before->second.since_s : now_s_;
+  const bool continues = before != missed_.end() && before->second.why == missed.why;
+  now.emplace(robot, missed).first->second.since_s = continues ? before->second.since_s : now_s_;
 }
 
-std::vector<MissedPeer> Absentees::missed(double hearsay_s) const {
+std::vector<MissedPeer> Absentees::missed(double second_hand_s) const {
   std::vector<MissedPeer> peers;
   for (const auto& [robot, missed] : missed_) {
     const double missed_s = now_s_ - missed.since_s;
-    if (!missed.hearsay || missed_s >= hearsay_s)
+    if (!missed.second_hand || missed_s >= second_hand_s)
       peers.push_back({missed.name, missed.why, missed_s});
   }
   return peers;
@@ -107,14 +107,14 @@ std::string to_string(const ImageCounts& images) {
 
 namespace {
 
-// "bob (not heard for 31.2 s), carol (heard, but not in one frame for 7.0 s)"
+// "bob (not received for 31.2 s), carol (received, but not in one frame for 7.0 s)"
 std::string names_of(const std::vector<MissedPeer>& missed) {
   std::string text;
   for (const MissedPeer& peer : missed)
-    text +=
-        (text.empty() ? "" : ", ") + peer.name +
-        (peer.why == Absence::kSilent ? " (not heard for " : " (heard, but not in one frame for ") +
-        fixed(peer.missed_s, 1) + " s)";
+    text += (text.empty() ? "" : ", ") + peer.name +
+            (peer.why == Absence::kSilent ? " (not received for "
+                                          : " (received, but not in one frame for ") +
+            fixed(peer.missed_s, 1) + " s)";
   return text;
 }
 
@@ -127,7 +127,7 @@ Verdict verdict_of_run(const RunEnd& end) {
                          ": give every robot its own --robot, and run again"};
   if (end.is_live && end.images && end.images->read + end.images->skipped == 0)
     return {kNothingEstimated,
-            "no image came: kimera_multi_doctor --live RIG tells which topic is silent, and why"};
+            "no image came: kimera_multi_doctor --live RIG shows which topic is silent, and why"};
   if (end.result.interrupted) return {0, "interrupted"};
   if (end.images && end.images->with_pose == 0)
     return {kNothingEstimated, why_no_pose(*end.images)};

@@ -35,7 +35,7 @@ class Departure {
     bool graph_settled = false;  ///< The optimiser has nothing left to do.
     std::uint64_t activity = 0;  ///< Changes whenever a module has done new work.
     std::span<const Present> present_peers = {};
-    std::size_t unheard = 0;  ///< Number of robots of the team that only other robots hear.
+    std::size_t not_received = 0;  ///< Number of robots of the team that only other robots receive.
   };
 
   /// Takes the state at `now_s` and returns the progress to publish.
@@ -69,11 +69,11 @@ struct MissedPeer {
 /// origin.
 class Absentees {
  public:
-  /// kLeft: the robot has sent its leave message. kTold: only other robots hear it.
-  enum class Contact { kHeard, kSilent, kLeft, kTold };
+  /// kLeft: the robot has sent its leave message. kReported: only other robots receive it.
+  enum class Contact { kReceived, kSilent, kLeft, kReported };
   struct Known {
     std::string name;
-    Contact contact = Contact::kHeard;
+    Contact contact = Contact::kReceived;
   };
 
   /// `members`: all robots in one frame with this one, itself included, heard directly or only by
@@ -82,15 +82,15 @@ class Absentees {
               std::span<const RobotId> members);
 
   /// Missed robots as of the last update(), ascending by id. A former member that was never heard
-  /// is listed only after it has been missed for `hearsay_s`. It may have left in order, which only
-  /// other robots know.
-  [[nodiscard]] std::vector<MissedPeer> missed(double hearsay_s) const;
+  /// is listed only after it has been missed for `second_hand_s`. It may have left in order, which
+  /// only other robots know.
+  [[nodiscard]] std::vector<MissedPeer> missed(double second_hand_s) const;
 
  private:
   struct Missed {
     std::string name;
     Absence why = Absence::kSilent;
-    bool hearsay = false;
+    bool second_hand = false;
     double since_s = 0.0;
   };
   void miss(RobotId robot, const Missed& missed, std::map<RobotId, Missed>& now) const;

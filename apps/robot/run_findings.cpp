@@ -43,7 +43,8 @@ Finding not_joined(const ClosureTally& tally, const PcmConfig& pcm, bool has_one
     finding.to_do = "the same run.vocabulary on all robots";
   } else if (tally.candidates == 0) {
     finding.what = "0 candidates: no place of one looks like a place of the other";
-    finding.means = "they were at different places, or the vocabulary does not tell these places";
+    finding.means =
+        "they were at different places, or the vocabulary does not distinguish these places";
     finding.to_do = "let both see one place from about the same side";
   } else if (tally.received == 0) {
     finding.what = candidates + "of which no keyframe came for verification";
@@ -74,9 +75,10 @@ Finding not_joined(const ClosureTally& tally, const PcmConfig& pcm, bool has_one
   } else if (was_lost) {
     outcome = " are not in one frame in the end: ";
     finding.what = verified + std::to_string(tally.inliers) +
-                   " kept, but one was not heard any more when the other ended";
+                   " kept, but one was not received any more when the other ended";
     finding.means = "what joined them, if they were joined before, ended with it";
-    finding.to_do = "see its log; killed, it goes on with --resume; out of reach, bring it back";
+    finding.to_do =
+        "see its log; if it was killed, --resume continues it; out of reach, bring it back";
   } else {
     finding.what = verified + std::to_string(tally.inliers) + " kept: enough";
     finding.means = "the run ended, or the link, before their pose graphs were one";
@@ -97,7 +99,7 @@ Tallies tallies_of(std::span<const RunFacts> runs) {
 
 void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<Finding>& findings) {
   const Tallies tallies = tallies_of(runs);
-  std::set<std::pair<RobotId, RobotId>> told;
+  std::set<std::pair<RobotId, RobotId>> reported;
   for (const RunFacts& run : runs) {
     const RobotId self = run.summary.robot;
     const OptimizerSummary& pgo = run.summary.pgo;
@@ -108,7 +110,7 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
     for (const auto& [other, name] : names) {
       if (other == self || is_joined(other)) continue;
       const auto pair = std::minmax(self, other);
-      if (!told.insert(pair).second) continue;
+      if (!reported.insert(pair).second) continue;
       const auto tally = tallies.find(pair);
       Finding finding = not_joined(tally == tallies.end() ? ClosureTally{} : tally->second, run.pcm,
                                    !run.summary.other_vocabulary.contains(name),
@@ -122,11 +124,11 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
 
 void add_tentative(std::span<const RunFacts> runs, const Names& names,
                    std::vector<Finding>& findings) {
-  std::set<std::pair<RobotId, RobotId>> told;
+  std::set<std::pair<RobotId, RobotId>> reported;
   for (const RunFacts& run : runs)
     for (const RobotId other : run.summary.pgo.tentative) {
       const auto pair = std::minmax(run.summary.robot, other);
-      if (!told.insert(pair).second) continue;
+      if (!reported.insert(pair).second) continue;
       findings.push_back(
           {.id = "team.tentative",
            .severity = Severity::kWarning,
@@ -144,7 +146,7 @@ void add_unseen(const RunSummary& run, std::vector<Finding>& findings) {
                       .what = run.name + ": 0 frames, 0 keyframes",
                       .means = "odometry never began: nothing of this robot is in the results",
                       .to_do = "see sensor_faults in summary.json; of live topics "
-                               "kimera_multi_doctor --live RIG tells which is silent"});
+                               "kimera_multi_doctor --live RIG shows which is silent"});
 }
 
 void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
@@ -255,7 +257,7 @@ void add_holes(const RunSummary& run, std::vector<Finding>& findings) {
                                    ? "frames were skipped: a lower --rate (max waits), or fewer "
                                      "robots on this computer"
                                    : "see sensor_faults in summary.json for images that are "
-                                     "missing, and the log for when odometry began anew"});
+                                     "missing, and the log for when odometry started again"});
 }
 
 void add_rejected(const RunFacts& run, std::vector<Finding>& findings) {
@@ -270,7 +272,7 @@ void add_rejected(const RunFacts& run, std::vector<Finding>& findings) {
                               std::to_string(all.verified) +
                               " verified closures were rejected by the optimiser",
                       .means = "the others contradict them: places that look alike, or odometry "
-                               "worse than its covariances say",
+                               "worse than its covariances state",
                       .to_do = share < kMany ? "" : "check odometry; see loop_closures.csv"});
 }
 
@@ -299,17 +301,17 @@ void add_cameras(const RunSummary& run, std::vector<Finding>& findings) {
                                 fixed(kDegrees * found.rotation_sigma_rad, 2) +
                                 ") against their calibration",
                         .means = "it was estimated and made good, but not for the map",
-                        .to_do = "calibrate cameras and inertial sensor anew"});
+                        .to_do = "calibrate cameras and inertial sensor again"});
 }
 
 void add_lost(const RunSummary& run, std::vector<Finding>& findings) {
   for (const auto& [name, seconds] : run.lost_peers)
     findings.push_back({.id = "link.lost",
                         .severity = Severity::kWarning,
-                        .what = run.name + ": " + name + " had not been heard for " +
+                        .what = run.name + ": " + name + " had not been received for " +
                                 fixed(seconds, 1) + " s at the end",
                         .means = "it went out of reach or died: its last closures are missing",
-                        .to_do = "see its log; kimera_multi_doctor --network tells of the link"});
+                        .to_do = "see its log; kimera_multi_doctor --network examines the link"});
 }
 
 void add_vocabularies(const RunSummary& run, std::vector<Finding>& findings) {
@@ -339,7 +341,8 @@ void add_budget(const RunSummary& run, std::vector<Finding>& findings) {
                bytes_text(static_cast<double>(sum(run.held_back->delayed.bytes))) +
                ") and dropped " + std::to_string(dropped) + " (" +
                bytes_text(static_cast<double>(sum(run.held_back->dropped.bytes))) + ')',
-       .means = dropped == 0 ? "the others learned later" : "the others never learned of these",
+       .means = dropped == 0 ? "the other robots received them later"
+                             : "the other robots never received them",
        .to_do = dropped == 0 ? "" : "raise budget.bytes_per_s or budget.bytes_per_run"});
 }
 
@@ -373,7 +376,7 @@ void add_map(const RunSummary& run, std::vector<Finding>& findings) {
                         .what = run.name + ": " + std::to_string(skipped) +
                                 " frames came too late for the map, " +
                                 std::to_string(run.mapping->frames) + " are in it",
-                        .means = "the map is sparser than mapping.rate_hz says",
+                        .means = "the map is sparser than mapping.rate_hz requests",
                         .to_do = "a lower mapping.rate_hz"});
 }
 

@@ -74,7 +74,7 @@ void TrafficUntil::advance(double time_s) {
     auto& known = sums_[{row.out, row.topic, row.peer}];
     if (row.out) sent_[row.category] += row.bytes - known.bytes;
     if (const auto peer = parse_int64(row.peer); !row.out && peer && row.messages > known.messages)
-      heard_[static_cast<RobotId>(*peer)] = row.time_s;
+      last_received_s_[static_cast<RobotId>(*peer)] = row.time_s;
     known = row;
   }
   time_s_ = time_s;
@@ -87,7 +87,7 @@ double TrafficUntil::sent(const std::string& category) const {
 
 std::map<RobotId, double> TrafficUntil::silent_s() const {
   std::map<RobotId, double> silent_s;
-  for (const auto& [robot, heard_s] : heard_) silent_s[robot] = time_s_ - heard_s;
+  for (const auto& [robot, received_s] : last_received_s_) silent_s[robot] = time_s_ - received_s;
   return silent_s;
 }
 

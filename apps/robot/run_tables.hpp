@@ -59,7 +59,7 @@ class TrafficUntil {
   double time_s_ = 0.0;
   std::map<std::tuple<bool, std::string, std::string>, TrafficRow> sums_;
   std::map<std::string, double> sent_;
-  std::map<RobotId, double> heard_;
+  std::map<RobotId, double> last_received_s_;
 };
 
 }  // namespace km

@@ -26,10 +26,10 @@ std::shared_ptr<SharedSeal> make_team_seal(const std::filesystem::path& folder,
 }
 
 TeamKeysNode::TeamKeysNode(std::filesystem::path folder, SharedSeal& seal,
-                           std::function<void()> tell_keys)
+                           std::function<void()> send_keys)
     : folder_(std::move(folder)),
       seal_(seal),
-      tell_keys_(std::move(tell_keys)),
+      send_keys_(std::move(send_keys)),
       periodic_(
           kPeriod, [this] { step(); }, "team_keys") {}
 
@@ -39,7 +39,7 @@ void TeamKeysNode::step() try {
       seal_.with([&](TeamSeal& seal) { return seal.update(list, now_s()); });
   for (const TeamPeer& peer : change.forgotten)
     log::warn("keys") << "robot " << peer.robot << " is a member no more: revoked or expired";
-  if (change.new_key) tell_keys_();
+  if (change.new_key) send_keys_();
 } catch (const std::exception& error) {
   // A list may be incomplete while it is copied; the old one stays in use.
   log::limited(log::Level::kWarn, "keys", "revocations") << error.what();

@@ -21,8 +21,8 @@ namespace km {
 /// revocations has changed. If so, sends new keys to the members.
 class TeamKeysNode final : public Node {
  public:
-  /// `tell_keys` sends this process's new key to the others. `seal` outlives this.
-  TeamKeysNode(std::filesystem::path folder, SharedSeal& seal, std::function<void()> tell_keys);
+  /// `send_keys` sends this process's new key to the others. `seal` outlives this.
+  TeamKeysNode(std::filesystem::path folder, SharedSeal& seal, std::function<void()> send_keys);
 
   void step();
 
@@ -34,7 +34,7 @@ class TeamKeysNode final : public Node {
  private:
   const std::filesystem::path folder_;
   SharedSeal& seal_;
-  const std::function<void()> tell_keys_;
+  const std::function<void()> send_keys_;
   Periodic periodic_;  // last member: stops first
 };
 

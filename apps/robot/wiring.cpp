@@ -41,8 +41,8 @@ void forward(In<T> from, Out<T> to) {
 
 // A resumed run continues its incarnation.
 std::uint64_t boot_of(const RobotInput& input) {
-  const bool goes_on = input.restored && !std::holds_alternative<PastRun>(input.source);
-  return goes_on ? next_boot(input.restored->boot) : random_boot_id();
+  const bool continues = input.restored && !std::holds_alternative<PastRun>(input.source);
+  return continues ? next_boot(input.restored->boot) : random_boot_id();
 }
 
 std::optional<Camera> left_camera_of(const RobotInput& input) {
@@ -97,7 +97,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
                    std::nullopt);
   if (options.record) add_record(options, config.ros, results);
   if (seal_ != nullptr)
-    add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->tell_keys(); });
+    add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->send_keys(); });
   nodes_.push_back(bridge_);
   supervisor_.add(std::move(bridge));
   if (restore_ != nullptr) restore_->set(*std::exchange(restored_, std::nullopt));
@@ -119,7 +119,7 @@ void Robot::add_restore() {
   restored_images_ = restored_->final_states();
   for (const auto& [robot, peer] : restored_->peers) {
     bridge_->peers().recall({.robot = robot, .name = peer.name, .boot = peer.boot});
-    lives_.meet({robot, peer.boot});
+    incarnations_.meet({robot, peer.boot});
   }
   restore_ = &add<RestoreNode>(false, RestoreTopics{.states = topics_.restored_odometry,
                                                     .odometry = topics_.keyframe_odometry,
@@ -336,10 +336,10 @@ void Robot::add_relay() {
       [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
   relay_->join_calls(RelayKind::kReply, around(t.own_replies, t.replies, t.peer_replies),
                      keyframe_of);
-  relay_->join_letters(RelayKind::kClosure,
-                       around(t.told_closures, t.shared_closures, t.peer_closures));
-  relay_->join_letters(RelayKind::kInlierSet,
-                       around(t.told_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
+  relay_->join_reliable(RelayKind::kClosure,
+                        around(t.addressed_closures, t.shared_closures, t.peer_closures));
+  relay_->join_reliable(RelayKind::kInlierSet,
+                        around(t.addressed_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
 }
 
 void Robot::add_network(CrossingEnds meshes) {
@@ -364,21 +364,23 @@ void Robot::add_network(CrossingEnds meshes) {
   dds.exchange(t.status, kStatus, kOther);
   // Closures and inlier sets are sent only to the robots that they connect.
   t.own_closures.subscribe(
-      [this, to = Out<Addressed<Closure>>(t.told_closures)](const auto& closure) {
+      [this, to = Out<Addressed<Closure>>(t.addressed_closures)](const auto& closure) {
         const RobotId other = closure->to.id.robot;
         if (other != closure->from.id.robot)
-          to.publish(Addressed<Closure>{other, closure, lives_.of(other)});
+          to.publish(Addressed<Closure>{other, closure, incarnations_.of(other)});
       });
   const auto meet = [this](const auto& event) {
-    lives_.meet({event->identity.robot, event->identity.boot});
+    incarnations_.meet({event->identity.robot, event->identity.boot});
   };
   t.closure_restarts.subscribe(meet);
   t.own_inlier_sets.subscribe(
-      [this, to = Out<Addressed<InlierSet>>(t.told_inlier_sets)](const auto& set) {
-        if (set->a != set->b) to.publish(Addressed<InlierSet>{set->b, set, lives_.of(set->b)});
+      [this, to = Out<Addressed<InlierSet>>(t.addressed_inlier_sets)](const auto& set) {
+        if (set->a != set->b)
+          to.publish(Addressed<InlierSet>{set->b, set, incarnations_.of(set->b)});
       });
   dds.peers().events().subscribe([this, meet](const auto& event) {
-    if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kTold) meet(event);
+    if (event->kind == PeerEventKind::kJoined || event->kind == PeerEventKind::kReported)
+      meet(event);
     if (event->kind == PeerEventKind::kConflict && event->identity.robot == identity_.robot)
       id_taken_ = true;
   });
@@ -436,10 +438,10 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
         return all;
       },
       [this, activity = std::optional<std::uint64_t>()]() mutable {
-        std::optional<std::vector<ToldClosure>> closures;
+        std::optional<std::vector<PublishedClosure>> closures;
         (void)recorder_->try_with_record([&](const RunRecord& record) {
           if (std::exchange(activity, record.activity()) != record.activity())
-            closures = told_closures(record);
+            closures = published_closures(record);
         });
         return closures;
       },
@@ -484,8 +486,8 @@ std::string Robot::name_of(RobotId robot) const {
 void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& camera) {
   if (!config.view.on) return;
   if (seal_ != nullptr && !config.view.in_clear) {
-    log::info(ViewConfig::kSection)
-        << "off: the team has keys, and who watches would be told in clear (view.in_clear)";
+    log::info(ViewConfig::kSection) << "off: the team has keys, and viewers would receive data "
+                                       "without encryption (view.in_clear)";
     return;
   }
   const MeshChunksConfig& mesh = config.mesh_chunks;

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "apps/robot/diagnostics.hpp"
+#include "apps/robot/incarnations_met.hpp"
 #include "apps/robot/input_time.hpp"
 #include "apps/robot/journal_node.hpp"
-#include "apps/robot/lives_met.hpp"
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/mesh_files_node.hpp"
 #include "apps/robot/restore_node.hpp"
@@ -85,9 +85,9 @@ struct Topics {
   Topic<KeyframeRequest> peer_requests;
   Topic<Addressed<KeyframeReply>> own_replies;
   Topic<KeyframeReply> peer_replies;
-  Topic<Addressed<Closure>> told_closures;
+  Topic<Addressed<Closure>> addressed_closures;
   Topic<Closure> peer_closures;
-  Topic<Addressed<InlierSet>> told_inlier_sets;
+  Topic<Addressed<InlierSet>> addressed_inlier_sets;
   Topic<InlierSet> peer_inlier_sets;
 
   Crossing<KeyframeBow> bows;
@@ -139,9 +139,9 @@ class Robot {
   /// Null without --record.
   [[nodiscard]] RosOutputNode* record() { return record_; }
   [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
-  void set_settled(const Departure::Present& told) {
-    phase_ = told.phase;
-    settled_links_ = told.settled_links;
+  void set_settled(const Departure::Present& reported) {
+    phase_ = reported.phase;
+    settled_links_ = reported.settled_links;
   }
   /// Reports that no robot will find another closure.
   void expect_no_more_closures() { pcm_->expect_no_more(); }
@@ -198,7 +198,7 @@ class Robot {
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;
-  LivesMet lives_;
+  IncarnationsMet incarnations_;
   std::vector<Node*> feeding_;  // nodes from the source to the last one that makes keyframes
   std::vector<const Node*> nodes_;
   SensorsNode* sensors_ = nullptr;

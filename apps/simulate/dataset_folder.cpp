@@ -78,7 +78,7 @@ void DatasetFolder::open_record(const DatasetRecord& wanted) {
   std::string message = path_.string() + " was made with other parameters:";
   for (const std::string& line : found) message += "\n  " + line;
   throw std::runtime_error(message +
-                           "\nGive the same ones to go on there, choose another --output, or "
+                           "\nGive the same ones to continue there, choose another --output, or "
                            "remove the folder.");
 }
 

@@ -72,7 +72,7 @@ std::string team_yaml(const SimulationOptions& options) {
     settings.push_back("semantic_mapping.voxel_size_m=0.05");
   if (!options.is_recorded()) {
     text +=
-        "# Simulated sensors are as their calibration says: odometry drifts less than the "
+        "# Simulated sensors are as their calibration states: odometry drifts less than the "
         "default.\n";
     settings.insert(settings.end(), {"vio.drift_rotation=2e-4", "vio.drift_translation=0.002"});
   }

@@ -51,7 +51,7 @@ int main(int argc, char** argv) try {
               << " --output results" << std::endl;
     return 0;
   }
-  std::cout << "Stopped; the same command goes on from here." << std::endl;
+  std::cout << "Stopped; the same command continues from here." << std::endl;
   return kInterrupted;
 } catch (const std::exception& error) {
   std::cerr << "kimera_multi_simulate: " << error.what() << '\n';

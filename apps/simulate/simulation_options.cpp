@@ -147,7 +147,7 @@ void complete_names(const SimulationOptions& options) {
       throw std::invalid_argument("robot name '" + name +
                                   "' is not made of letters, digits, _, - and .");
     if (!seen.insert(name).second)
-      throw std::invalid_argument("two robots are named " + name + "; tell them apart by --names");
+      throw std::invalid_argument("two robots are named " + name + "; distinguish them by --names");
   }
 }
 

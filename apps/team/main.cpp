@@ -194,29 +194,29 @@ void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs
   km::merge_records(records, root, file);
 }
 
-// Writes the JSON, the report and the mesh of the whole team. Prints the files to `told`, except
+// Writes the JSON, the report and the mesh of the whole team. Prints the files to `out`, except
 // for the JSON.
 void write_results(const TeamOptions& options, const km::TeamPlan& plan, const km::TeamResult& team,
-                   km::ResultWriter& results, std::ostream& told) {
+                   km::ResultWriter& results, std::ostream& out) {
   if (!options.json.empty())
     results.write(options.json, [&](const fs::path& file) { km::write_json(file, team); });
   if (!std::ranges::all_of(team.robots, &km::RobotResult::left_nothing))
     results.write(plan.output / km::kReportPage, [&](const fs::path& file) {
       km::write_report(file, plan, team);
-      told << "\nThe report, for a browser: " << file.string() << '\n';
+      out << "\nThe report, for a browser: " << file.string() << '\n';
     });
   if (options.record)
     results.write(options.record->empty() ? plan.output / km::kTeamRecord : *options.record,
                   [&](const fs::path& file) {
                     write_record(plan, team, file);
-                    told << "\nThe record of all robots: " << file.string() << '\n';
+                    out << "\nThe record of all robots: " << file.string() << '\n';
                   });
   if (!team.meshes.merged.empty())
     results.write(plan.output / "team_mesh.ply", [&](const fs::path& file) {
       km::write_ply(file, team.meshes.merged);
       copy_palette(plan);
-      told << "The mesh of all robots" << (team.optimized ? ", in the frame of the truth: " : ": ")
-           << file.string() << '\n';
+      out << "The mesh of all robots" << (team.optimized ? ", in the frame of the truth: " : ": ")
+          << file.string() << '\n';
     });
 }
 
@@ -228,9 +228,9 @@ int run(const TeamOptions& options) {
   km::ResultWriter results;
   const km::TeamResult team = km::collect_results(
       plan, options.report ? km::finished_runs(plan) : run_robots(options, plan, results));
-  std::ostream& told = km::unblocked_stdout();
-  told << to_table(team);
-  write_results(options, plan, team, results, told);
+  std::ostream& out = km::unblocked_stdout();
+  out << to_table(team);
+  write_results(options, plan, team, results, out);
   const bool ok = std::all_of(team.robots.begin(), team.robots.end(),
                               [](const km::RobotResult& robot) { return robot.run.exit.ok(); });
   if (!ok) return 3;

@@ -148,7 +148,7 @@ Answer receive_answer(int socket) {
 }
 
 // Runs in a process of its own: makes the network and sends its descriptors.
-[[noreturn]] void make_and_hand_over(int socket, std::size_t robot) {
+[[noreturn]] void make_and_pass(int socket, std::size_t robot) {
   Answer answer;
   try {
     const bool as_root = unshare(CLONE_NEWNET) == 0;
@@ -195,7 +195,7 @@ RobotNetwork::RobotNetwork(std::size_t robot) try {
   Descriptor other(ends[1]);
   const pid_t maker = fork();
   require(maker >= 0, "a process");
-  if (maker == 0) make_and_hand_over(other.get(), robot);
+  if (maker == 0) make_and_pass(other.get(), robot);
   other = Descriptor();
   const Answer answer = receive_answer(own.get());
   waitpid(maker, nullptr, 0);

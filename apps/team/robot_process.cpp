@@ -17,7 +17,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kLastWords = 12;
+constexpr std::size_t kLastLogLines = 12;
 constexpr double kGrace_s = 20.0;
 constexpr int kPoll_ms = 50;
 
@@ -141,8 +141,8 @@ std::vector<std::string> RobotProcess::read() {
   const bool ended = !exit_ && waitpid(pid_, &status, WNOHANG) == pid_;
   std::vector<std::string> lines = drain(out_);
   for (std::string& line : drain(err_)) {
-    last_words_.push_back(std::move(line));
-    if (last_words_.size() > kLastWords) last_words_.pop_front();
+    last_log_lines_.push_back(std::move(line));
+    if (last_log_lines_.size() > kLastLogLines) last_log_lines_.pop_front();
   }
   if (ended)
     exit_ = WIFSIGNALED(status) ? ProcessExit{0, WTERMSIG(status)}

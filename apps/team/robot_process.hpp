@@ -58,7 +58,7 @@ class RobotProcess {
   [[nodiscard]] const std::optional<ProcessExit>& exit() const { return exit_; }
 
   /// The last lines of standard error.
-  [[nodiscard]] const std::deque<std::string>& last_words() const { return last_words_; }
+  [[nodiscard]] const std::deque<std::string>& last_log_lines() const { return last_log_lines_; }
 
  private:
   struct Pipe {
@@ -72,7 +72,7 @@ class RobotProcess {
   Pipe out_;
   Pipe err_;
   std::ofstream log_;
-  std::deque<std::string> last_words_;
+  std::deque<std::string> last_log_lines_;
   std::optional<ProcessExit> exit_;
 };
 

@@ -71,7 +71,8 @@ class RunningTeam {
 
   std::vector<RobotRun> results() const {
     std::vector<RobotRun> runs;
-    for (const auto& robot : robots_) runs.push_back({robot->exit().value(), robot->last_words()});
+    for (const auto& robot : robots_)
+      runs.push_back({robot->exit().value(), robot->last_log_lines()});
     return runs;
   }
 
@@ -79,7 +80,7 @@ class RunningTeam {
   // Reason why a robot failed. It is shown at once, because the other robots may run for long.
   // Indented lines are details of the line above.
   static std::string why(const RobotProcess& robot) {
-    const auto& words = robot.last_words();
+    const auto& words = robot.last_log_lines();
     const auto cause = std::find_if(words.rbegin(), words.rend(), [](const std::string& line) {
       return !line.empty() && line.front() != ' ';
     });
@@ -133,7 +134,7 @@ int exit_code(const fs::path& folder) {
   return fs::is_regular_file(folder / "summary.json") ? 0 : 1;
 }
 
-std::deque<std::string> last_words(const fs::path& log) {
+std::deque<std::string> last_log_lines(const fs::path& log) {
   std::deque<std::string> lines;
   std::ifstream file(log);
   for (std::string line; std::getline(file, line);) {
@@ -183,7 +184,7 @@ std::vector<RobotRun> finished_runs(const TeamPlan& plan) {
   std::vector<RobotRun> runs;
   for (const RobotPlan& robot : plan.robots) {
     const fs::path folder = plan.output / robot.name;
-    runs.push_back({{exit_code(folder), 0}, last_words(folder / "robot.log")});
+    runs.push_back({{exit_code(folder), 0}, last_log_lines(folder / "robot.log")});
   }
   return runs;
 }

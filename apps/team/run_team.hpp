@@ -25,7 +25,7 @@ inline constexpr const char* kReportPage = "report.html";
 /// Exit status of the process of one robot.
 struct RobotRun {
   ProcessExit exit;
-  std::deque<std::string> last_words;
+  std::deque<std::string> last_log_lines;
 };
 
 /// The command line of a robot.

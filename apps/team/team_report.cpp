@@ -214,17 +214,17 @@ std::string notes(const TeamResult& team) {
 // Robots that failed in the same way, for instance by a mistyped option for all, are listed once.
 std::string failures(const TeamResult& team) {
   struct Failure {
-    std::string exit, last_words, names;
+    std::string exit, last_log_lines, names;
     bool of_several = false;
   };
   std::vector<Failure> failures;
   for (const RobotResult& robot : team.robots) {
     if (robot.run.exit.ok()) continue;
     Failure failure{to_string(robot.run.exit), {}, robot.plan.name};
-    for (const std::string& line : robot.run.last_words)
-      if (!line.empty()) failure.last_words.append("  ").append(line).append("\n");
+    for (const std::string& line : robot.run.last_log_lines)
+      if (!line.empty()) failure.last_log_lines.append("  ").append(line).append("\n");
     const auto same = std::find_if(failures.begin(), failures.end(), [&](const Failure& other) {
-      return other.exit == failure.exit && other.last_words == failure.last_words;
+      return other.exit == failure.exit && other.last_log_lines == failure.last_log_lines;
     });
     if (same == failures.end()) {
       failures.push_back(std::move(failure));
@@ -237,7 +237,7 @@ std::string failures(const TeamResult& team) {
   for (const Failure& failure : failures)
     text += failure.names + " failed, " + failure.exit +
             (failure.of_several ? "; their last words:\n" : "; its last words:\n") +
-            failure.last_words;
+            failure.last_log_lines;
   return text;
 }
 

@@ -29,7 +29,8 @@ constexpr int kBadInput = 1, kBadCommandLine = 2;
 constexpr const char* kAbout =
     "Shows a team in a browser, while it runs or afterwards. It prints the address to "
     "open.\\n\\nThe page has the map, trajectories and loop closures in 3D, and the state of the "
-    "robots:\nwho hears whom, cost, bytes, loads, memory. Its time slider goes back to any moment "
+    "robots:\nwhich robots receive each other, cost, bytes, loads, memory. Its time slider goes "
+    "back to any moment "
     "while the run\ncontinues.";
 
 constexpr const char* kFooter = R"(
@@ -133,10 +134,10 @@ bool play(const std::vector<ViewUpdate>& updates, std::optional<double> rate, Vi
   const double start_s = steady_now_s();
   for (ViewUpdate update : updates) {
     if (rate) {
-      const double due_s = start_s + seconds_between(updates.front().told, update.told) / *rate;
+      const double due_s = start_s + seconds_between(updates.front().sent, update.sent) / *rate;
       for (double left_s = 0.0; (left_s = due_s - steady_now_s()) > 0.0;)
         if (signals.wait(std::min(left_s, 0.2))) return false;
-      update.told = nanoseconds(wall_now_s());
+      update.sent = nanoseconds(wall_now_s());
     }
     store.add(std::move(update));
   }
@@ -153,7 +154,7 @@ LabelPalette palette_of(const ViewerOptions& options) {
   return parse_label_palette(read_input_file(options.palette), options.palette.string());
 }
 
-void tell_address(const PageServer& server) {
+void print_address(const PageServer& server) {
   std::cout << "Open " << server.url() << "   (Ctrl-C ends)" << std::endl;
 }
 
@@ -161,11 +162,10 @@ void show_run(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   RunPlayback run = read_run(options.results, nanoseconds(wall_now_s()));
   for (const std::string& note : run.notes) log::warn("viewer") << note;
   const std::string title = std::filesystem::canonical(options.results).filename().string();
-  options.server.greeting =
-      page_greeting(options.rate ? PageSource::kReplay : PageSource::kRun, title,
-                    options.palette.empty() ? run.palette : palette_of(options));
+  options.server.hello = hello_message(options.rate ? PageSource::kReplay : PageSource::kRun, title,
+                                       options.palette.empty() ? run.palette : palette_of(options));
   const PageServer server(store, options.server);
-  tell_address(server);
+  print_address(server);
   if (!play(run.updates, options.rate, store, signals)) return;
   run = {};
   wait_for_end(signals);
@@ -200,12 +200,12 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   ViewListener listener(options.dds);
   ImageRequests images(listener);
   const std::string title = "domain " + std::to_string(options.dds.domain);
-  options.server.greeting = page_greeting(PageSource::kTeam, title, palette_of(options));
+  options.server.hello = hello_message(PageSource::kTeam, title, palette_of(options));
   options.server.on_images = [&](const std::set<RobotId>& robots) { images.show(robots); };
   const PageServer server(store, options.server);
   std::optional<ViewRecorder> recorder;
   if (!options.record.empty()) recorder.emplace(options.record, palette_of(options));
-  std::jthread teller([&](const std::stop_token& stop) {
+  std::jthread receiver([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       auto update = listener.next(1.0);
       if (!update) continue;
@@ -217,11 +217,11 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   log::info("viewer") << title << " on " << listener.interface().name << " ("
                       << listener.interface().address
                       << "): shows robots that run with --view (or view.on: true)";
-  tell_address(server);
+  print_address(server);
   wait_for_end(signals);
-  teller.request_stop();
+  receiver.request_stop();
   listener.stop();
-  teller.join();
+  receiver.join();
   if (recorder) recorder->finish();
 }
 

@@ -139,7 +139,7 @@ PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
   std::ostringstream boot;
   boot << std::hex << update.boot;
   Json json = {{"n", number},
-               {"t", static_cast<double>(update.told / 1000) * 1e-3},
+               {"t", static_cast<double>(update.sent / 1000) * 1e-3},
                {"robot", update.robot},
                {"boot", boot.str()}};
   std::string data;
@@ -156,7 +156,7 @@ PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
   return {true, bytes + text + data};
 }
 
-std::string page_greeting(PageSource source, const std::string& title,
+std::string hello_message(PageSource source, const std::string& title,
                           const LabelPalette& palette) {
   constexpr std::array kNames = {"live", "replay", "run"};  // names in the order of PageSource
   Json json = {{"kind", "hello"},

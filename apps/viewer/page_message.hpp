@@ -31,7 +31,7 @@ enum class PageSource {
 };
 
 /// First message to the page: the source (`source`), its name (`title`), and the colours of labels.
-[[nodiscard]] std::string page_greeting(PageSource source, const std::string& title,
+[[nodiscard]] std::string hello_message(PageSource source, const std::string& title,
                                         const LabelPalette& palette);
 
 }  // namespace km

@@ -66,17 +66,17 @@ bool send(mg_connection* connection, int kind, std::string_view bytes) {
 }
 
 // Request of a page: {"images": robot, "on": true}. Other text is no request.
-struct Wish {
+struct ImageRequest {
   RobotId robot = 0;
   bool on = false;
 };
-std::optional<Wish> parse_wish(std::string_view text) {
+std::optional<ImageRequest> parse_image_request(std::string_view text) {
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object() || !json.contains("images") || !json.contains("on")) return std::nullopt;
   if (!json["images"].is_number_unsigned() || !json["on"].is_boolean()) return std::nullopt;
   const auto robot = json["images"].get<std::uint64_t>();
   if (robot > std::numeric_limits<RobotId>::max()) return std::nullopt;
-  return Wish{static_cast<RobotId>(robot), json["on"].get<bool>()};
+  return ImageRequest{static_cast<RobotId>(robot), json["on"].get<bool>()};
 }
 
 }  // namespace
@@ -165,7 +165,7 @@ class PageServer::Impl {
         },
         [](mg_connection* connection, void* self) { static_cast<Impl*>(self)->open(connection); },
         [](mg_connection* connection, int bits, char* data, size_t size, void* self) {
-          static_cast<Impl*>(self)->hear(connection, bits, {data, size});
+          static_cast<Impl*>(self)->receive(connection, bits, {data, size});
           return (bits & 0xf) == MG_WEBSOCKET_OPCODE_CONNECTION_CLOSE ? 0 : 1;
         },
         [](const mg_connection* connection, void* self) {
@@ -219,24 +219,24 @@ class PageServer::Impl {
     const std::lock_guard lock(mutex_);
     const auto page = std::make_shared<Page>();
     pages_[connection] = page;
-    page->sender = std::thread([this, connection, page] { tell(connection, *page); });
+    page->sender = std::thread([this, connection, page] { send_messages(connection, *page); });
   }
 
-  // A text frame holds an array of messages, or the greeting.
-  void tell(mg_connection* connection, const Page& page) {
-    if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.greeting + ']')) return;
+  // A text frame holds an array of messages, or the hello message.
+  void send_messages(mg_connection* connection, const Page& page) {
+    if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.hello + ']')) return;
     ViewStore::Cursor cursor;
     bool caught_up = false;
     while (!page.closed && !stopping_) {
       const ViewStore::Batch batch = store_.take(cursor, kBatchBytes, kWait_s);
-      if (!tell(connection, batch)) return;
+      if (!send_batch(connection, batch)) return;
       if (batch.caught_up && !caught_up)
         send(connection, MG_WEBSOCKET_OPCODE_TEXT, R"([{"kind":"caught_up"}])");
       caught_up = caught_up || batch.caught_up;
     }
   }
 
-  static bool tell(mg_connection* connection, const ViewStore::Batch& batch) {
+  static bool send_batch(mg_connection* connection, const ViewStore::Batch& batch) {
     std::string text;
     const auto flush = [&] {
       const bool ok = text.empty() || send(connection, MG_WEBSOCKET_OPCODE_TEXT, text + ']');
@@ -256,19 +256,19 @@ class PageServer::Impl {
     return flush();
   }
 
-  void hear(mg_connection* connection, int bits, std::string_view text) {
+  void receive(mg_connection* connection, int bits, std::string_view text) {
     if ((bits & 0xf) != MG_WEBSOCKET_OPCODE_TEXT) return;
-    const auto wish = parse_wish(text);
-    if (!wish) return;
+    const auto request = parse_image_request(text);
+    if (!request) return;
     const std::lock_guard lock(mutex_);
     const auto page = pages_.find(connection);
     if (page == pages_.end()) return;
     std::set<RobotId>& images = page->second->images;
     ask([&] {
-      if (wish->on)
-        images.insert(wish->robot);
+      if (request->on)
+        images.insert(request->robot);
       else
-        images.erase(wish->robot);
+        images.erase(request->robot);
     });
   }
 

@@ -15,7 +15,7 @@ struct PageServerOptions {
       "127.0.0.1";          ///< Address to listen on; if not loopback, URLs need the token.
   int port = 8777;          ///< 0: any free port.
   std::string page_folder;  ///< Files of the page; empty: those embedded in the program.
-  std::string greeting;     ///< See page_greeting().
+  std::string hello;        ///< See hello_message().
   /// Called when the set of robots whose images some page requests has changed; in order, by one
   /// thread at a time.
   std::function<void(const std::set<RobotId>&)> on_images;

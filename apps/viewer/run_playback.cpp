@@ -88,7 +88,7 @@ class RobotTimes {
   }
 
   [[nodiscard]] double run_s(Stamp image) const { return pace_ * seconds_between(first_, image); }
-  [[nodiscard]] Stamp told(double run_s) const { return begin_ + nanoseconds(run_s); }
+  [[nodiscard]] Stamp stamp_at(double run_s) const { return begin_ + nanoseconds(run_s); }
   [[nodiscard]] double dataset_s(double run_s) const {
     return std::min(run_s, end_of_data_s_) / pace_;
   }
@@ -167,7 +167,7 @@ class RobotPlayback {
     return times_.run_s(robot_.keyframes[keyframe].stamp);
   }
 
-  void tell_states() {
+  void add_states() {
     TrafficUntil traffic(robot_.traffic);
     std::size_t round = 0;
     for (const NumberRow& process : robot_.process) {
@@ -192,29 +192,29 @@ class RobotPlayback {
         state.cost = robot_.rounds[round - 1][3];
         state.gradient_norm = robot_.rounds[round - 1][4];
       }
-      tell(time_s, std::move(state));
+      add(time_s, std::move(state));
     }
   }
 
-  void tell_poses() {
+  void add_poses() {
     double next_s = 0.0;
     for (const StampedPose& pose : robot_.odometry) {
       const double time_s = times_.run_s(pose.stamp);
       if (time_s < next_s) continue;
       next_s = time_s + kPoseInterval_s;
-      tell(time_s, ViewPose{pose.stamp, pose.T});
+      add(time_s, ViewPose{pose.stamp, pose.T});
     }
   }
 
-  void tell_keyframes() {
+  void add_keyframes() {
     for (std::size_t i = 0; i < robot_.keyframes.size(); ++i) {
       const auto pose = pose_at_keyframe(robot_.odometry, i);
       if (!pose) break;  // an index stands for all poses before it, so none can be missing
-      tell(*seen_s(static_cast<KeyframeIndex>(i)), ViewKeyframes{false,
-                                                                 robot_.id,
-                                                                 static_cast<std::uint32_t>(i),
-                                                                 {*pose},
-                                                                 {robot_.keyframes[i].stamp}});
+      add(*seen_s(static_cast<KeyframeIndex>(i)), ViewKeyframes{false,
+                                                                robot_.id,
+                                                                static_cast<std::uint32_t>(i),
+                                                                {*pose},
+                                                                {robot_.keyframes[i].stamp}});
     }
     if (joined_s_ == kNever_s) return;
     ViewKeyframes before{true, anchor_at(joined_s_), 0, {}};
@@ -227,14 +227,14 @@ class RobotPlayback {
                                  *seen_s(static_cast<KeyframeIndex>(i + 1)) > joined_s_;
       const bool flush = next_is_later || before.T_world_kf.size() == kMostKeyframes;
       if (!flush) continue;
-      tell(std::max(time_s, joined_s_), before);
+      add(std::max(time_s, joined_s_), before);
       before.first = static_cast<std::uint32_t>(i + 1);
       before.T_world_kf.clear();
     }
   }
 
   // `seen_s`: time of any keyframe of any robot.
-  void tell_closures(const std::function<std::optional<double>(const KeyframeId&)>& seen_s) {
+  void add_closures(const std::function<std::optional<double>(const KeyframeId&)>& seen_s) {
     std::map<double, ViewClosures> at;
     for (const ClosureRecord& record : robot_.closures) {
       const auto from_s = seen_s(record.id.from), to_s = seen_s(record.id.to);
@@ -249,47 +249,47 @@ class RobotPlayback {
       closure.verdict = verdict_of(record);
       at[time_s + kAnswer_s].closures.push_back(std::move(closure));
     }
-    for (auto& [time_s, closures] : at) tell_in_parts(std::min(time_s, end_s_), closures);
+    for (auto& [time_s, closures] : at) add_in_parts(std::min(time_s, end_s_), closures);
   }
 
-  void tell_meshes() {
+  void add_meshes() {
     const std::size_t before = updates_.size();
     if (joined_s_ == kNever_s) {
-      tell_mesh(robot_.optimized_mesh.empty() ? robot_.mesh : robot_.optimized_mesh, robot_.id,
-                robot_.odometry, 0.0);
+      add_mesh(robot_.optimized_mesh.empty() ? robot_.mesh : robot_.optimized_mesh, robot_.id,
+               robot_.odometry, 0.0);
       return;
     }
-    tell_mesh(robot_.mesh, robot_.id, robot_.odometry, 0.0);
+    add_mesh(robot_.mesh, robot_.id, robot_.odometry, 0.0);
     // After its joining nothing is in the robot's own frame.
     std::vector<MeshChunk> ended;
     for (std::size_t i = before; i < updates_.size(); ++i)
-      if (updates_[i].told <= times_.told(joined_s_))
+      if (updates_[i].sent <= times_.stamp_at(joined_s_))
         ended.push_back({.key = std::get<MeshChunk>(updates_[i].content).key});
     updates_.erase(
         std::remove_if(
             updates_.begin() + static_cast<std::ptrdiff_t>(before), updates_.end(),
-            [&](const ViewUpdate& update) { return update.told > times_.told(joined_s_); }),
+            [&](const ViewUpdate& update) { return update.sent > times_.stamp_at(joined_s_); }),
         updates_.end());
-    for (MeshChunk& chunk : ended) tell(joined_s_, std::move(chunk));
-    tell_mesh(robot_.optimized_mesh, anchor_at(joined_s_), robot_.optimized, joined_s_);
+    for (MeshChunk& chunk : ended) add(joined_s_, std::move(chunk));
+    add_mesh(robot_.optimized_mesh, anchor_at(joined_s_), robot_.optimized, joined_s_);
   }
 
  private:
-  void tell(double time_s, ViewContent content) {
-    updates_.push_back({robot_.id, 1, times_.told(time_s), std::move(content)});
+  void add(double time_s, ViewContent content) {
+    updates_.push_back({robot_.id, 1, times_.stamp_at(time_s), std::move(content)});
   }
 
-  void tell_in_parts(double time_s, const ViewClosures& all) {
+  void add_in_parts(double time_s, const ViewClosures& all) {
     for (std::size_t i = 0; i < all.closures.size(); i += kMostClosures) {
       const auto begin = all.closures.begin() + static_cast<std::ptrdiff_t>(i);
       const auto count = std::min(kMostClosures, all.closures.size() - i);
-      tell(time_s, ViewClosures{{begin, begin + static_cast<std::ptrdiff_t>(count)}});
+      add(time_s, ViewClosures{{begin, begin + static_cast<std::ptrdiff_t>(count)}});
     }
   }
 
   // Each chunk appears when the robot is nearest to it, but not before `from_s`.
-  void tell_mesh(const LabelledMesh& mesh, RobotId anchor, const std::vector<StampedPose>& way,
-                 double from_s) {
+  void add_mesh(const LabelledMesh& mesh, RobotId anchor, const std::vector<StampedPose>& way,
+                double from_s) {
     constexpr std::size_t kMostPlaces = 500;
     const std::size_t stride = way.size() / kMostPlaces + 1;
     for (MeshChunk& chunk : split_mesh(mesh, robot_.id, anchor, ChunkGrid{}).chunks) {
@@ -306,7 +306,7 @@ class RobotPlayback {
         nearest_m = distance_m;
         time_s = times_.run_s(way[i].stamp);
       }
-      tell(std::max(time_s, from_s), std::move(chunk));
+      add(std::max(time_s, from_s), std::move(chunk));
     }
   }
 
@@ -414,14 +414,14 @@ RunPlayback read_run(const fs::path& folder, Stamp begin) {
     }
   for (auto& [id, robot] : playbacks) {
     robot.join(kept_s.contains(id) ? kept_s.at(id) : kNever_s);
-    robot.tell_states();
-    robot.tell_poses();
-    robot.tell_keyframes();
-    robot.tell_closures(seen_s);
-    robot.tell_meshes();
+    robot.add_states();
+    robot.add_poses();
+    robot.add_keyframes();
+    robot.add_closures(seen_s);
+    robot.add_meshes();
   }
   std::stable_sort(run.updates.begin(), run.updates.end(),
-                   [](const ViewUpdate& a, const ViewUpdate& b) { return a.told < b.told; });
+                   [](const ViewUpdate& a, const ViewUpdate& b) { return a.sent < b.sent; });
   return run;
 }
 

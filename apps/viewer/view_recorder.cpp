@@ -86,7 +86,7 @@ class ViewRecorder::Sink final : public RosSink {
  public:
   explicit Sink(std::shared_ptr<File> file) : file_(std::move(file)) {}
 
-  std::size_t open(const ToldTopic& topic) override {
+  std::size_t open(const PublishedTopic& topic) override {
     return file_->with_sink([&](McapSink& sink) { return sink.open(topic); });
   }
   void put(std::size_t topic, std::optional<Stamp> time,
@@ -126,7 +126,7 @@ class ViewRecorder::Robot {
                          .queue = kQueue},
         [this, gone_s]() -> std::optional<std::vector<RosDiagnosticStatus>> {
           const std::lock_guard lock(mutex_);
-          if (has_left_ || steady_now_s() - heard_s_ > gone_s) return std::nullopt;
+          if (has_left_ || steady_now_s() - last_received_s_ > gone_s) return std::nullopt;
           return std::vector<RosDiagnosticStatus>{status_};
         },
         [this] {
@@ -141,51 +141,54 @@ class ViewRecorder::Robot {
   [[nodiscard]] bool has_begun() const { return node_.has_value(); }
 
   // Notes that a message of the robot arrived.
-  void hear() {
+  void receive() {
     const std::lock_guard lock(mutex_);
-    heard_s_ = steady_now_s();
+    last_received_s_ = steady_now_s();
   }
 
-  void hear(const ViewState& state) {
+  void receive(const ViewState& state) {
     const std::lock_guard lock(mutex_);
     status_ = status_of(state);
     has_left_ = state.phase == "leaving";
   }
 
-  void hear(const ViewPose& pose) { publish_state(pose.stamp, pose.T_odom_body); }
+  void receive(const ViewPose& pose) { publish_state(pose.stamp, pose.T_odom_body); }
 
-  void hear(const ViewKeyframes& told) {
-    if (told.optimized && told.anchor != std::exchange(trajectory.anchor, told.anchor))
+  void receive(const ViewKeyframes& keyframes) {
+    if (keyframes.optimized &&
+        keyframes.anchor != std::exchange(trajectory.anchor, keyframes.anchor))
       trajectory.T_world_kf.clear();
-    for (std::size_t k = 0; k < told.T_world_kf.size(); ++k) {
-      const std::size_t index = told.first + k;
-      if (told.optimized)
-        put(trajectory.T_world_kf, index, told.T_world_kf[k]);
-      else if (put(odometry, index, StampedPose{told.stamps[k], told.T_world_kf[k]}))
+    for (std::size_t k = 0; k < keyframes.T_world_kf.size(); ++k) {
+      const std::size_t index = keyframes.first + k;
+      if (keyframes.optimized)
+        put(trajectory.T_world_kf, index, keyframes.T_world_kf[k]);
+      else if (put(odometry, index, StampedPose{keyframes.stamps[k], keyframes.T_world_kf[k]}))
         publish_keyframe(index);
     }
-    if (told.optimized) trajectory_topic_.publish(trajectory);
+    if (keyframes.optimized) trajectory_topic_.publish(trajectory);
   }
 
-  void hear(const ViewClosures& told) {
-    for (const ViewClosure& closure : told.closures) closures[closure.id] = closure;
+  void receive(const ViewClosures& update) {
+    for (const ViewClosure& closure : update.closures) closures[closure.id] = closure;
   }
 
-  void hear(const MeshChunk& chunk) { mesh_changed_ |= mesh_.add(chunk) == ChunkVerdict::kTaken; }
+  void receive(const MeshChunk& chunk) {
+    mesh_changed_ |= mesh_.add(chunk) == ChunkVerdict::kTaken;
+  }
 
-  void hear(const ViewImage& image) {
+  void receive(const ViewImage& image) {
     if (!images_) return;
     images_->put(image_topic_, image.stamp,
                  encode_ros(RosCompressedImage{{image.stamp, camera_}, "jpeg", image.jpeg}));
   }
 
-  void tell_closures(std::vector<ToldClosure> now) {
+  void publish_closures(std::vector<PublishedClosure> now) {
     const std::lock_guard lock(mutex_);
     closures_now_ = std::move(now);
   }
 
   // Writes the present mesh if it has changed and is due.
-  void tell_mesh(const LabelPalette& palette, double now_s) {
+  void publish_mesh(const LabelPalette& palette, double now_s) {
     if (!mesh_changed_ || !node_ || now_s < mesh_due_s_) return;
     mesh_changed_ = false;
     mesh_due_s_ = now_s + kMeshPeriod_s;
@@ -200,7 +203,7 @@ class ViewRecorder::Robot {
   std::size_t finish(const LabelPalette& palette) {
     if (!node_) return 0;
     mesh_due_s_ = 0.0;
-    tell_mesh(palette, steady_now_s());
+    publish_mesh(palette, steady_now_s());
     node_->stop();
     node_->finish({}, std::exchange(closures_now_, std::nullopt), {});
     return node_->left_out();
@@ -244,9 +247,9 @@ class ViewRecorder::Robot {
   std::string camera_;
   std::mutex mutex_;  // guards the members that the node reads
   RosDiagnosticStatus status_;
-  double heard_s_ = 0.0;  // time of the last message, by the steady clock
+  double last_received_s_ = 0.0;  // time of the last message, by the steady clock
   bool has_left_ = false;
-  std::optional<std::vector<ToldClosure>> closures_now_;
+  std::optional<std::vector<PublishedClosure>> closures_now_;
   std::optional<RosOutputNode> node_;  // last member: stops first
 };
 
@@ -271,13 +274,13 @@ void ViewRecorder::step(const Input& update) {
   if (!update) {
     const bool changed = std::exchange(closures_changed_, false);
     for (auto& [id, robot] : robots_) {
-      if (changed) robot->tell_closures(closures_of(*robot));
-      robot->tell_mesh(palette_, steady_now_s());
+      if (changed) robot->publish_closures(closures_of(*robot));
+      robot->publish_mesh(palette_, steady_now_s());
     }
     return;
   }
   Robot& robot = robot_of(*update);
-  robot.hear();
+  robot.receive();
   const auto* const state = std::get_if<ViewState>(&update->content);
   if (state != nullptr && !robot.has_begun()) {
     {
@@ -289,7 +292,7 @@ void ViewRecorder::step(const Input& update) {
   const auto* const keyframes = std::get_if<ViewKeyframes>(&update->content);
   closures_changed_ |= std::holds_alternative<ViewClosures>(update->content) ||
                        (keyframes != nullptr && keyframes->optimized);
-  std::visit([&](const auto& content) { robot.hear(content); }, update->content);
+  std::visit([&](const auto& content) { robot.receive(content); }, update->content);
 }
 
 // Replaces the robot if the update comes from a new process of it.
@@ -306,7 +309,7 @@ std::string ViewRecorder::name_of(RobotId robot) const {
   return known != names_.end() ? known->second : "robot" + std::to_string(robot);
 }
 
-std::vector<ToldClosure> ViewRecorder::closures_of(const Robot& robot) const {
+std::vector<PublishedClosure> ViewRecorder::closures_of(const Robot& robot) const {
   const auto pose_of = [&](const KeyframeId& keyframe) -> const SE3* {
     const auto known = robots_.find(keyframe.robot);
     if (known == robots_.end() || known->second == nullptr) return nullptr;
@@ -315,9 +318,9 @@ std::vector<ToldClosure> ViewRecorder::closures_of(const Robot& robot) const {
                           keyframe.index < trajectory.T_world_kf.size();
     return is_there ? &trajectory.T_world_kf[keyframe.index] : nullptr;
   };
-  std::vector<ToldClosure> told;
+  std::vector<PublishedClosure> published;
   for (const auto& [id, closure] : robot.closures) {
-    ToldClosure& one = told.emplace_back();
+    PublishedClosure& one = published.emplace_back();
     one.id = id;
     one.stage = stage_of(closure.verdict);
     one.rejected = closure.verdict == ViewVerdict::kRejected;
@@ -325,11 +328,11 @@ std::vector<ToldClosure> ViewRecorder::closures_of(const Robot& robot) const {
     const SE3* const to = pose_of(id.to);
     if (from != nullptr && to != nullptr) one.T_from_to = from->inverse() * *to;
   }
-  return told;
+  return published;
 }
 
 void ViewRecorder::finish_robot(Robot& robot) {
-  if (closures_changed_) robot.tell_closures(closures_of(robot));
+  if (closures_changed_) robot.publish_closures(closures_of(robot));
   lost_ += robot.finish(palette_);
 }
 

@@ -46,7 +46,7 @@ class ViewRecorder {
   Robot& robot_of(const ViewUpdate& update);
   void finish_robot(Robot& robot);
   [[nodiscard]] std::string name_of(RobotId robot) const;
-  [[nodiscard]] std::vector<ToldClosure> closures_of(const Robot& robot) const;
+  [[nodiscard]] std::vector<PublishedClosure> closures_of(const Robot& robot) const;
 
   const LabelPalette palette_;
   const double gone_s_;

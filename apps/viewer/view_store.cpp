@@ -19,7 +19,7 @@ bool is_state_of_things(const auto& key) {
 
 // Hash of the content, independent of the time of reception.
 std::size_t hash_of(ViewUpdate update) {
-  update.told = 0;
+  update.sent = 0;
   return std::hash<std::string>{}(page_message(update, 0).bytes);
 }
 

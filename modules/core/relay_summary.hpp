@@ -10,8 +10,8 @@ namespace km {
 /// Number of messages of one robot that another robot holds without a gap, from the first on.
 struct RelayHeld {
   TeamPeer origin;
-  std::uint32_t bags = 0;     ///< 0 for an origin that is received directly.
-  std::uint32_t letters = 0;  ///< Other messages, see RelayStore.
+  std::uint32_t bags = 0;      ///< 0 for an origin that is received directly.
+  std::uint32_t reliable = 0;  ///< Number of reliable messages, see RelayStore.
 
   bool operator==(const RelayHeld&) const = default;
 };
@@ -19,7 +19,7 @@ struct RelayHeld {
 /// Part of a robot in the relay, as it publishes it, ascending by robot. If all robots receive each
 /// other directly, `holds` is empty.
 struct RelaySummary {
-  std::vector<RobotId> hears;  ///< Robots that are received directly.
+  std::vector<RobotId> received;  ///< Robots that are received directly.
   /// For each known robot that is not received directly, or whose other messages are held.
   std::vector<RelayHeld> holds = {};
 

@@ -30,8 +30,8 @@ inline constexpr unsigned kResumeBits = 16;
 /// there have been too many.
 [[nodiscard]] inline std::uint64_t next_boot(std::uint64_t boot) {
   if (!is_same_life(boot, boot + 1))
-    throw std::overflow_error("a robot's life was resumed " + std::to_string(resume_count(boot)) +
-                              " times, which is as often as can be told");
+    throw std::overflow_error("an incarnation of a robot was resumed " +
+                              std::to_string(resume_count(boot)) + " times, which is the maximum");
   return boot + 1;
 }
 

@@ -4,22 +4,22 @@
 
 namespace km {
 
-bool TeamLinks::tell(RobotId robot, std::set<RobotId> heard) {
-  const auto [known, is_new] = heard_by_.try_emplace(robot);
-  if (!is_new && known->second == heard) return false;
-  known->second = std::move(heard);
+bool TeamLinks::tell(RobotId robot, std::set<RobotId> received) {
+  const auto [known, is_new] = received_by_.try_emplace(robot);
+  if (!is_new && known->second == received) return false;
+  known->second = std::move(received);
   return true;
 }
 
 bool TeamLinks::hears(RobotId a, RobotId b) const {
-  const auto known = heard_by_.find(a);
-  return known != heard_by_.end() && known->second.contains(b);
+  const auto known = received_by_.find(a);
+  return known != received_by_.end() && known->second.contains(b);
 }
 
 std::vector<RobotId> TeamLinks::neighbours(RobotId robot) const {
   std::vector<RobotId> neighbours;
-  const auto known = heard_by_.find(robot);
-  if (known == heard_by_.end()) return neighbours;
+  const auto known = received_by_.find(robot);
+  if (known == received_by_.end()) return neighbours;
   for (const RobotId other : known->second)
     if (other != robot && hears(other, robot)) neighbours.push_back(other);
   return neighbours;

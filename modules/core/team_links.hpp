@@ -13,10 +13,10 @@ namespace km {
 /// that they receive the other one. Robots with equal reports see the same graph. Not thread-safe.
 class TeamLinks {
  public:
-  /// Reports that `robot` receives the robots `heard` and no others. True if this is a change.
-  bool tell(RobotId robot, std::set<RobotId> heard);
+  /// Reports that `robot` receives the robots `received` and no others. True if this is a change.
+  bool tell(RobotId robot, std::set<RobotId> received);
   /// Removes the report of `robot`.
-  void forget(RobotId robot) { heard_by_.erase(robot); }
+  void forget(RobotId robot) { received_by_.erase(robot); }
 
   /// True if `a` reports that it receives `b`.
   [[nodiscard]] bool hears(RobotId a, RobotId b) const;
@@ -30,7 +30,7 @@ class TeamLinks {
   [[nodiscard]] std::set<RobotId> component(RobotId self) const;
 
  private:
-  std::map<RobotId, std::set<RobotId>> heard_by_;
+  std::map<RobotId, std::set<RobotId>> received_by_;
 };
 
 }  // namespace km

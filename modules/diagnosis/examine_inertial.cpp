@@ -21,7 +21,7 @@ double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 }
 
 // Rotation below which the fit to the gyroscope makes no statement, and bounds for more statements.
-constexpr double kToldRate_radps = 0.02;
+constexpr double kMinRate_radps = 0.02;
 constexpr double kRelated = 0.6, kUnrelated = 0.3;  // share explained
 constexpr double kSecondAxis_radps = 0.02;          // about a second axis, for directions
 
@@ -45,7 +45,7 @@ void examine_scale(const InertialFit& fit, Examination& result) {
   result.findings.push_back(
       {.id = in_degrees ? "imu.gyro_in_degrees" : "imu.gyro_scale",
        .severity = Severity::kError,
-       .what = "images turn " + rounded(fit.scale, 4) + " times as fast as the gyroscope says" +
+       .what = "images turn " + rounded(fit.scale, 4) + " times as fast as the gyroscope measures" +
                (in_degrees ? ", and 1 degree is 0.01745 rad" : ""),
        .means = in_degrees ? "the gyroscope is in degrees/s: odometry takes it for rad/s"
                            : "the gyroscope or the focal length is off by this factor",
@@ -62,7 +62,7 @@ void examine_direction(const InertialFit& fit, const Camera& left, Examination& 
          .severity = Severity::kError,
          .what = "the gyroscope's axes are left-handed: with one of them the other way round, " +
                  percent(fit.mirror_gain) + " more of the rotation of images are explained",
-         .means = "no mounting of the camera makes that good",
+         .means = "no mounting of the camera explains this",
          .to_do = "change the sign of the axis that is mirrored; see the sensor's data sheet"});
     return;
   }
@@ -78,7 +78,7 @@ void examine_direction(const InertialFit& fit, const Camera& left, Examination& 
                                 fixed(kDegrees * angle, 0) + " degrees off, its inverse " +
                                 fixed(kDegrees * angle_between(R_cam_body.transpose(), fit.Q), 1)
                           : "the left camera is turned by " + fixed(kDegrees * angle, 1) +
-                                " degrees against what T_body_cam says",
+                                " degrees against T_body_cam",
        .means = "odometry turns the wrong way, or drifts",
        .to_do = is_inverse ? "write its inverse: T_BS maps the camera's points to the body's"
                            : "calibrate cameras and inertial sensor together (Kalibr); "
@@ -88,8 +88,8 @@ void examine_direction(const InertialFit& fit, const Camera& left, Examination& 
 void examine_offset(const InertialFit& fit, Examination& result) {
   constexpr double kSmall_s = 3e-3, kLarge_s = 5e-3, kSure = 4.0;
   if (fit.offset_at_limit) {
-    result.figures.push_back(
-        {"time offset", "not told: none within " + milliseconds(kMaxOffset_s) + " fits best"});
+    result.figures.push_back({"time offset", "not determined: none within " +
+                                                 milliseconds(kMaxOffset_s) + " fits best"});
     return;
   }
   result.figures.push_back({"time offset", milliseconds(fit.offset_s) + " +- " +
@@ -109,12 +109,12 @@ void examine_offset(const InertialFit& fit, Examination& result) {
 
 void examine_focal(const SensorSample& sample, const StereoRig& rig, const SeenRotations& seen,
                    const InertialFit& inertial, Examination& result) {
-  constexpr double kSlack = 0.015, kSure = 2.0, kToldSigma = 0.01;
+  constexpr double kSlack = 0.015, kSure = 2.0, kMaxSigma = 0.01;
   constexpr const char* kName = "focal length by the gyroscope";
   const bool has_depth = 2 * seen.with_depth > seen.steps.size();
   const auto fit = has_depth ? fit_focal(sample.steps, rig, sample.imu, inertial) : std::nullopt;
-  if (!fit || !(fit->sigma < kToldSigma)) {
-    result.figures.push_back({kName, std::string("not told: ") +
+  if (!fit || !(fit->sigma < kMaxSigma)) {
+    result.figures.push_back({kName, std::string("not determined: ") +
                                          (has_depth ? "too little rotation across the optical axis"
                                                     : "no stereo depth that fits")});
     return;
@@ -128,7 +128,7 @@ void examine_focal(const SensorSample& sample, const StereoRig& rig, const SeenR
        .what = "images move as the gyroscope turns if the focal lengths are " + factor +
                " times the calibration's",
        .means = "distances and turns are off by as much",
-       .to_do = "calibrate the cameras anew, at the resolution of the images; or the gyroscope's "
+       .to_do = "calibrate the cameras again, at the resolution of the images; or the gyroscope's "
                 "scale is off"});
 }
 
@@ -168,11 +168,11 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
       rig.depth_source == DepthSource::kRightImage && is_sound(fit_of(sample.stereo, rig));
   const SeenRotations seen = seen_rotations(sample.steps, rig, use_depth);
   const auto fit = fit_inertial(seen.steps, sample.imu);
-  if (!fit || fit->image_rms < kToldRate_radps) {
+  if (!fit || fit->image_rms < kMinRate_radps) {
     result.figures.push_back({"images against the gyroscope",
-                              fit ? "not told: the camera turns by " +
+                              fit ? "not determined: the camera turns by " +
                                         fixed(kDegrees * fit->image_rms, 2) + " degrees/s only"
-                                  : "not told: " + std::to_string(seen.steps.size()) +
+                                  : "not determined: " + std::to_string(seen.steps.size()) +
                                         " pairs of images close in time"});
     return result;
   }
@@ -187,7 +187,7 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
     examine_direction(*fit, rig.cameras[0], result);
   else
     result.figures.push_back(
-        {"camera to inertial sensor", "not told: the camera turns about one axis only"});
+        {"camera to inertial sensor", "not determined: the camera turns about one axis only"});
   if (std::abs(fit->scale - 1.0) < 0.1) examine_focal(sample, rig, seen, *fit, result);
   return result;
 }

@@ -40,12 +40,12 @@ FaultWords words_of(StereoFault fault) {
               "exchange them"};
     case StereoFault::kFocalLength:
       return {"stereo.focal", "the focal lengths of the two cameras do not go together",
-              "calibrate them anew, at the resolution of the images"};
+              "calibrate them again, at the resolution of the images"};
     case StereoFault::kNone:
       break;
   }
   return {"stereo.epipolar", "points lie far from their epipolar lines",
-          "calibrate the pair anew, at the resolution of the images, with its lens model"};
+          "calibrate the pair again, at the resolution of the images, with its lens model"};
 }
 
 std::string fit_text(const StereoFit& fit) {
@@ -76,8 +76,8 @@ void examine_baseline(const StereoRig& rig, const StereoFit& fit, Examination& r
   const std::string depth = std::isfinite(fit.depth_m)
                                 ? "points at a median of " + fixed(fit.depth_m, 1) + " m by it"
                                 : "no depth by it";
-  result.figures.push_back(
-      {"baseline", fixed(baseline_m, 3) + " m, " + depth + " (images do not tell its length)"});
+  result.figures.push_back({"baseline", fixed(baseline_m, 3) + " m, " + depth +
+                                            " (images do not determine its length)"});
   if (baseline_m < kLeast_m || baseline_m > kMost_m)
     result.findings.push_back({.id = "stereo.baseline",
                                .severity = Severity::kWarning,
@@ -96,7 +96,7 @@ Examination examine_stereo(const SensorSample& sample, const StereoRig& rig) {
   const StereoFit given = fit_of(sample.stereo, rig);
   if (given.points < kLeastStereoPoints) {
     result.figures.push_back(
-        {"stereo", "not told: " + std::to_string(given.points) + " points in both images"});
+        {"stereo", "not determined: " + std::to_string(given.points) + " points in both images"});
     return result;
   }
   result.figures.push_back({"stereo", fit_text(given)});

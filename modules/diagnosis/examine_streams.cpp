@@ -28,7 +28,7 @@ Finding fault_finding(ReaderFault fault, const ReaderReport::Entry& entry, doubl
           .what = std::to_string(entry.count) + ' ' + to_string(fault) + ", " + percent(share) +
                   ", first: " + entry.first,
           .means = "what is concerned is skipped",
-          .to_do = "repair or record it anew, where there are many"};
+          .to_do = "repair or record it again, where there are many"};
 }
 
 // Total number of the items of which a fault counts some. Images missing between others are counted
@@ -71,7 +71,7 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
         {.id = id + ".gap",
          .severity = Severity::kWarning,
          .what = std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s",
-         .means = "odometry may lose track there and start anew",
+         .means = "odometry may lose track there and start again",
          .to_do = "see why the driver or the disk stopped; --from and --to "
                   "choose a part without it"});
 }

@@ -19,22 +19,22 @@ Examination examine_words(std::span<const std::vector<OrbDescriptor>> images,
     }
   constexpr double kEnough = 1000.0;
   if (features < kEnough)
-    return {.figures = {{"vocabulary", "not told: " + fixed(features, 0) + " features"}},
+    return {.figures = {{"vocabulary", "not determined: " + fixed(features, 0) + " features"}},
             .findings = {}};
   double entropy = 0.0;
   for (const auto& [word, count] : counts) entropy -= count / features * std::log(count / features);
   const double words = std::exp(entropy);
   const double most = std::min(features, static_cast<double>(vocabulary.size()));
   Examination result;
-  result.figures.push_back({"vocabulary", fixed(words, 0) + " words tell " + fixed(features, 0) +
-                                              " features apart, of " +
+  result.figures.push_back({"vocabulary", fixed(words, 0) + " words distinguish " +
+                                              fixed(features, 0) + " features, of " +
                                               std::to_string(vocabulary.size())});
   constexpr double kLeastWords = 200.0, kLeastShare = 0.05;
   if (words < kLeastWords || words < kLeastShare * most)
     result.findings.push_back({.id = "vocabulary.coverage",
                                .severity = Severity::kWarning,
-                               .what = "the vocabulary tells " + fixed(features, 0) +
-                                       " features apart by " + fixed(words, 0) + " words only",
+                               .what = "the vocabulary distinguishes " + fixed(features, 0) +
+                                       " features by " + fixed(words, 0) + " words only",
                                .means = "different places look alike: few or false candidates",
                                .to_do = "train one on images like these "
                                         "(kimera_multi_vocabulary train)"});

@@ -51,7 +51,7 @@ class RunRestorer {
 void RunRestorer::take(JournalEntry entry, JournalPlace place) {
   place_ = place;
   if (!started_ && !std::holds_alternative<JournalStart>(entry))
-    throw std::invalid_argument("nothing says whose run it is");
+    throw std::invalid_argument("the first entry does not state the robot of the run");
   std::visit([this](auto& value) { add(std::move(value)); }, entry);
 }
 

@@ -256,8 +256,8 @@ LoopClosureNode::KeyframePtr LoopClosureNode::own(const KeyframeId& id) const {
 
 KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features,
                                                 const KeyframeId& to) {
-  const bool strangers = ++replies_[to.robot] <= kFirstReplies;
-  const std::size_t most = strangers ? kFirstFactor * reply_keypoints_ : reply_keypoints_;
+  const bool is_first = ++replies_[to.robot] <= kFirstReplies;
+  const std::size_t most = is_first ? kFirstFactor * reply_keypoints_ : reply_keypoints_;
   const std::vector<std::uint32_t>* words = words_.find(to);
   if (words == nullptr) return reduced(features, most);
   return chosen_by_words(features, {reply_keypoints_ / kLeastPart, most}, *vocabulary_, *words);

@@ -28,7 +28,7 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   return result;
 }
 
-MeshCorrection MeshCorrector::correct_afresh(const CorrectionInput& input) {
+MeshCorrection MeshCorrector::correct_from_scratch(const CorrectionInput& input) {
   check_trajectories(input.T_odom_kf, input.T_world_kf);
   optimizer_.reset();
   return deform(input, complete(input.T_odom_kf, input.T_world_kf));

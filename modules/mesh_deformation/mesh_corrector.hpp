@@ -51,7 +51,7 @@ class MeshCorrector {
 
   /// Returns the mesh as from a first correction: it depends only on `input`, bit by bit, and not
   /// on earlier corrections. Throws under the conditions of LocalMeshOptimizer::optimize().
-  [[nodiscard]] MeshCorrection correct_afresh(const CorrectionInput& input);
+  [[nodiscard]] MeshCorrection correct_from_scratch(const CorrectionInput& input);
 
  private:
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);

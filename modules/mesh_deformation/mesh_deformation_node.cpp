@@ -128,7 +128,7 @@ void MeshDeformationNode::correct() {
   }
   const double start_s = steady_now_s();
   std::optional<MeshCorrection> correction =
-      ended_ ? corrector_.correct_afresh(input()) : corrector_.correct(input());
+      ended_ ? corrector_.correct_from_scratch(input()) : corrector_.correct(input());
   if (!correction) return;
   const double end_s = steady_now_s();
   next_s_ = end_s + config_.period_s;
@@ -155,7 +155,7 @@ void MeshDeformationNode::report(const OptimizedMesh& result) const {
   log::debug(name()) << report.vertices << " vertices, " << report.nodes << " nodes ("
                      << report.new_nodes << " new), " << report.keyframes
                      << " keyframes: " << to_string(report.status) << " after " << report.iterations
-                     << " iterations, " << result.superseded_faces << " faces seen anew, "
+                     << " iterations, " << result.superseded_faces << " faces seen again, "
                      << result.seconds << " s";
   if (report.status == DeformationStatus::kFailed)
     log::limited(log::Level::kWarn, name(), "failed")

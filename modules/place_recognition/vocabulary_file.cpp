@@ -71,7 +71,7 @@ FileHeader read_header(const std::string& bytes, const Refusal& refuse) {
                    " nodes, and no more words than nodes");
   const std::uint64_t size = file_size(header);
   if (bytes.size() != size)
-    refuse(bytes.size(), "is the end, but the header promises " + std::to_string(size) + " bytes");
+    refuse(bytes.size(), "is the end, but the header states " + std::to_string(size) + " bytes");
   return header;
 }
 

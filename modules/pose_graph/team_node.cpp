@@ -80,7 +80,7 @@ void TeamNode::take(const Input& input) {
 }
 
 void TeamNode::take_peer_event(const PeerEvent& event) {
-  if (!event.heard) return;
+  if (!event.direct) return;
   switch (event.kind) {
     case PeerEventKind::kJoined:
     case PeerEventKind::kReturned:
@@ -92,7 +92,7 @@ void TeamNode::take_peer_event(const PeerEvent& event) {
       return agent_.peer_lost(event.identity.robot);
     case PeerEventKind::kRefused:
     case PeerEventKind::kConflict:
-    case PeerEventKind::kTold:
+    case PeerEventKind::kReported:
       return;
   }
 }

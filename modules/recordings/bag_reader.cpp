@@ -17,7 +17,7 @@ const char* to_string(BagFault fault) {
     case BagFault::kUnknownChannel:
       return "messages of unknown channels";
     case BagFault::kUnordered:
-      return "messages earlier than the index says";
+      return "messages earlier than the index states";
     case BagFault::kLost:
       return "lost messages";
   }

@@ -119,11 +119,11 @@ Output run(Codec codec, std::span<const std::uint8_t> bytes, std::uint64_t size)
       result.resize(std::min<std::uint64_t>(size, 2 * full));
       buffers.out = std::span(result).subspan(full);
     } else if (buffers.in.size() == in_before && out_before == 0) {
-      return Output::refuse("more bytes than their chunk says");
+      return Output::refuse("more bytes than their chunk states");
     }
   }
   if (!buffers.out.empty() || result.size() != size)
-    return Output::refuse("fewer bytes than their chunk says");
+    return Output::refuse("fewer bytes than their chunk states");
   if (!buffers.in.empty()) return Output::refuse("bytes after the compressed ones");
   return Output::accept(std::move(result));
 }
@@ -135,7 +135,7 @@ Output decompress(std::string_view compression, std::span<const std::uint8_t> by
   if (size > kMaxDecompressed_bytes) return Output::refuse("more than 512 MiB in one piece");
   if (compression.empty() || compression == "none") {
     if (bytes.size() != size)
-      return Output::refuse("another number of bytes than their chunk says");
+      return Output::refuse("another number of bytes than their chunk states");
     return Output::accept(Bytes(bytes.begin(), bytes.end()));
   }
   if (compression == "lz4") return run(Lz4(), bytes, size);

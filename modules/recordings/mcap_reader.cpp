@@ -96,7 +96,7 @@ void McapReader::read_summary(std::uint64_t begin, std::uint64_t footer, const M
     return report_.add(BagFault::kIndex, begin, "a summary of more than 512 MiB");
   const Bytes bytes = file_.read(begin, end - begin);
   if (fields.summary_crc != 0 && mcap_crc(bytes) != fields.summary_crc)
-    return report_.add(BagFault::kIndex, begin, "a summary with another checksum than it says");
+    return report_.add(BagFault::kIndex, begin, "a summary with another checksum than it states");
   Summary summary;
   bool is_whole = true;
   is_whole &= for_each_record(std::span(bytes).first(footer - begin), [&](const McapRecord& read) {
@@ -139,7 +139,7 @@ const char* McapReader::misfit_of(Summary& summary, std::uint64_t data_end) cons
   }
   const bool counts_others = summary.statistics && !summary.chunks.empty() &&
                              summary.statistics->chunk_count != summary.chunks.size();
-  return counts_others ? "another number of chunks than it says" : nullptr;
+  return counts_others ? "another number of chunks than it states" : nullptr;
 }
 
 // Channels and schemas need not be repeated in the summary, nor chunks be listed.
@@ -240,7 +240,7 @@ void McapReader::check_data_crc(std::uint64_t end, std::uint32_t crc) {
   for (std::uint64_t at = 0; at < end; at += kPart_bytes)
     actual = mcap_crc(file_.read(at, std::min(kPart_bytes, end - at)), actual);
   if (actual != crc)
-    report_.add(BagFault::kChecksum, end, "the data section has another checksum than it says");
+    report_.add(BagFault::kChecksum, end, "the data section has another checksum than it states");
 }
 
 Chunk McapReader::load(const ChunkPlace& place) {
@@ -281,7 +281,7 @@ Bytes McapReader::records_of(const ChunkPlace& place) {
   if (place.is_bare) return bytes;
   const auto header = parse_mcap_record_header(bytes);
   if (!header || !header->is(McapOpcode::kChunk) || header->size != size - kMcapRecordHeader_bytes)
-    return refuse(BagFault::kIndex, "no chunk where the index says");
+    return refuse(BagFault::kIndex, "no chunk at the position in the index");
   const auto chunk = parse_mcap<McapChunk>(std::span(bytes).subspan(kMcapRecordHeader_bytes));
   if (!chunk) return refuse(BagFault::kMalformed, "a chunk that ends within its fields");
   auto records = decompress(chunk->compression, chunk->records, chunk->uncompressed_size);
@@ -289,7 +289,7 @@ Bytes McapReader::records_of(const ChunkPlace& place) {
     return refuse(BagFault::kCompression,
                   "a chunk (compression '" + chunk->compression + "'): " + records.refusal);
   if (chunk->uncompressed_crc != 0 && mcap_crc(*records.value) != chunk->uncompressed_crc)
-    return refuse(BagFault::kChecksum, "a chunk with another checksum than it says");
+    return refuse(BagFault::kChecksum, "a chunk with another checksum than it states");
   return *std::move(records.value);
 }
 

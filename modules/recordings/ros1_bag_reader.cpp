@@ -90,7 +90,7 @@ const char* Ros1BagReader::read_index(const Place& bag_header) {
     }
   }
   if (found != *connections || infos.size() != *chunks)
-    return "an index with another number of connections or chunks than the bag header says";
+    return "an index with another number of connections or chunks than the bag header states";
   return use_chunk_infos(std::move(infos), data_begin, *begin);
 }
 
@@ -160,7 +160,7 @@ Bytes Ros1BagReader::records_of(const ChunkPlace& place) {
   };
   const auto record = record_at(place.begin, place.end);
   if (!record || !record->fields.is(Ros1Opcode::kChunk))
-    return refuse(BagFault::kIndex, "no chunk where the index says, or one that is cut");
+    return refuse(BagFault::kIndex, "no chunk at the position in the index, or one that is cut");
   const auto compression = record->fields.text("compression");
   const auto size = record->fields.u32("size");
   if (!compression || !size || record->data_size > kMaxDecompressed_bytes)

@@ -34,7 +34,7 @@ Decoded<RelayParcel> Codec<RelayParcel>::decode(const Wire& wire, const TeamPeer
   const auto kind = static_cast<RelayKind>(wire.kind);
   if (wire.boot == 0) return Result::refuse("of no process");
   if (wire.origin == writer.robot && wire.boot != writer.boot)
-    return Result::refuse("told by a former process of the robot that sends it");
+    return Result::refuse("its origin is a former process of its sender");
   const auto content = elements_of(wire.content, kMaxRelayContent);
   if (!content) return Result::refuse("the content is missing or too long");
   if (kind == RelayKind::kIntroduction && !parse_introduction(*content))

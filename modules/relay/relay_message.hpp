@@ -38,7 +38,7 @@ struct RelayMessage {
 
 using RelayMessagePtr = std::shared_ptr<const RelayMessage>;
 
-[[nodiscard]] constexpr bool is_letter(RelayKind kind) {
+[[nodiscard]] constexpr bool is_reliable(RelayKind kind) {
   return kind == RelayKind::kClosure || kind == RelayKind::kInlierSet;
 }
 

@@ -51,23 +51,23 @@ RelayNode::RelayNode(TeamPeer self, SharedSeal* seal, Peers& peers, const RelayT
       store_(self, keys_) {
   topics.peer_events.subscribe([this](const auto& event) { take(*event); });
   topics.statuses.subscribe([this](const auto& status) {
-    act([&](RelayStore& store) { store.told(status->robot, status->relay, now_s_()); });
+    act([&](RelayStore& store) { store.update(status->robot, status->relay, now_s_()); });
   });
 }
 
 void RelayNode::take(const PeerEvent& event) {
-  if (!event.heard) return;
+  if (!event.direct) return;
   act([&](RelayStore& store) {
     switch (event.kind) {
       case PeerEventKind::kJoined:
       case PeerEventKind::kReturned:
       case PeerEventKind::kResumed:
       case PeerEventKind::kRestarted:
-        return store.heard(event.identity);
+        return store.connected(event.identity);
       case PeerEventKind::kLost:
       case PeerEventKind::kLeft:
         return store.lost(event.identity.robot, now_s_());
-      case PeerEventKind::kTold:
+      case PeerEventKind::kReported:
       case PeerEventKind::kRefused:
       case PeerEventKind::kConflict:
         return;
@@ -92,7 +92,7 @@ const char* RelayNode::take(const RelayParcel& parcel) {
   });
   if (arrival == RelayArrival::kRefused)
     log::limited(log::Level::kDebug, kTag, "refused " + std::to_string(parcel.neighbour))
-        << "robot " << parcel.neighbour << " hands over a message of robot "
+        << "robot " << parcel.neighbour << " forwards a message of robot "
         << parcel.message->origin.robot << " that is not taken";
   return forged;
 }
@@ -130,7 +130,7 @@ std::vector<std::uint8_t> RelayNode::signature_of(RelayKind kind, std::uint32_t 
 }
 
 void RelayNode::carry_out(const RelayOutput& output, std::uint64_t given_up) {
-  for (const RobotIdentity& robot : output.met) peers_.tell(robot);
+  for (const RobotIdentity& robot : output.met) peers_.reported(robot);
   for (const RelayParcel& parcel : output.parcels)
     topics_.own_parcels.publish({parcel.neighbour, std::make_shared<const RelayParcel>(parcel)});
   for (const RelayMessagePtr& message : output.delivered) deliver(*message);

@@ -36,7 +36,7 @@ template <typename T>
 struct RelayedTopics {
   In<Addressed<T>> own;      ///< Messages from the nodes of this robot.
   Out<Addressed<T>> direct;  ///< The same messages, unchanged, to the bridge.
-  In<T> heard;               ///< Messages from the bridge.
+  In<T> received;            ///< Messages from the bridge.
   Out<T> all;                ///< Direct and forwarded messages, to the nodes.
 };
 
@@ -61,10 +61,10 @@ class RelayNode {
 
   /// Bags of words, which each robot sends to all others: see RelayKind::kBag.
   template <typename T>
-  void join_bags(In<T> heard, Out<T> to);
+  void join_bags(In<T> received, Out<T> to);
   /// Closures or inlier sets. Messages with equal Codec<T>::key_of() replace each other.
   template <typename T>
-  void join_letters(RelayKind kind, const RelayedTopics<T>& topics);
+  void join_reliable(RelayKind kind, const RelayedTopics<T>& topics);
   /// Requests or replies.
   template <typename T, typename NumberOf>
   void join_calls(RelayKind kind, const RelayedTopics<T>& topics, const NumberOf& number_of);
@@ -130,9 +130,9 @@ class RelayNode {
 };
 
 template <typename T>
-void RelayNode::join_bags(In<T> heard, Out<T> to) {
+void RelayNode::join_bags(In<T> received, Out<T> to) {
   deliver_as<T>(RelayKind::kBag, to);
-  heard.subscribe([to](const auto& message) { to.publish(message); });
+  received.subscribe([to](const auto& message) { to.publish(message); });
 }
 
 template <typename T, typename NumberOf>
@@ -151,15 +151,15 @@ ContentGuard<T> RelayNode::guard(RelayKind kind, const NumberOf& number_of) {
 }
 
 template <typename T>
-void RelayNode::join_letters(RelayKind kind, const RelayedTopics<T>& topics) {
+void RelayNode::join_reliable(RelayKind kind, const RelayedTopics<T>& topics) {
   deliver_as<T>(kind, topics.all);
-  topics.heard.subscribe([to = topics.all](const auto& message) { to.publish(message); });
-  topics.own.subscribe([this, kind, direct = topics.direct](const auto& letter) {
-    direct.publish(letter);
-    const T& message = *letter->message;
+  topics.received.subscribe([to = topics.all](const auto& message) { to.publish(message); });
+  topics.own.subscribe([this, kind, direct = topics.direct](const auto& addressed) {
+    direct.publish(addressed);
+    const T& message = *addressed->message;
     act([&](RelayStore& store) {
-      store.wrote(kind, {letter->to, letter->boot}, Codec<T>::key_of(message), bytes_of(message),
-                  now_s_());
+      store.wrote(kind, {addressed->to, addressed->boot}, Codec<T>::key_of(message),
+                  bytes_of(message), now_s_());
     });
   });
 }
@@ -168,7 +168,7 @@ template <typename T, typename NumberOf>
 void RelayNode::join_calls(RelayKind kind, const RelayedTopics<T>& topics,
                            const NumberOf& number_of) {
   deliver_as<T>(kind, topics.all);
-  topics.heard.subscribe([to = topics.all](const auto& message) { to.publish(message); });
+  topics.received.subscribe([to = topics.all](const auto& message) { to.publish(message); });
   topics.own.subscribe([this, kind, direct = topics.direct, number_of](const auto& call) {
     const std::optional<KeyframeId> keyframe = number_of(*call->message);
     const RelayWays ways = ways_to(call->to);

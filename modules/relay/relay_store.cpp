@@ -73,7 +73,7 @@ bool RelayStore::is_forged(const RelayMessage& message) {
   const Certificate& certificate = *origins_.at(robot).membership.certificate;
   refusal_ = keys_->why_lapsed(certificate);
   if (refusal_ != nullptr) {
-    if (!hears(robot)) origins_.erase(robot);
+    if (!receives(robot)) origins_.erase(robot);
     return true;
   }
   if (is_endorsed(message, certificate.key)) return false;
@@ -87,8 +87,8 @@ void RelayStore::sign(RelayMessage& message) const {
 
 RelayWays RelayStore::ways_to(RobotId robot) const {
   const auto known = origins_.find(robot);
-  if (known == origins_.end() || hears(robot)) return {};
-  return {.direct = known->second.was_heard, .relay = true};
+  if (known == origins_.end() || receives(robot)) return {};
+  return {.direct = known->second.was_direct, .relay = true};
 }
 
 // A resumed process sends all its closures again, so its stored reliable messages are discarded.
@@ -102,30 +102,30 @@ void RelayStore::become(Origin& origin, const RobotIdentity& identity, Membershi
   origin.identity = identity;
   origin.membership = std::move(membership);
   if (former == identity.boot) return;
-  origin.letters = {};
-  const bool other_life = !is_same_life(former, identity.boot);
-  if (other_key || other_life) origin.bags = origin.replies = {};
-  if (other_life) end_letters_to_former_lives({identity.robot, identity.boot});
+  origin.reliable = {};
+  const bool other_incarnation = !is_same_life(former, identity.boot);
+  if (other_key || other_incarnation) origin.bags = origin.replies = {};
+  if (other_incarnation) drop_messages_to_former_incarnations({identity.robot, identity.boot});
 }
 
-void RelayStore::end_letters_to_former_lives(const TeamPeer& peer) {
+void RelayStore::drop_messages_to_former_incarnations(const TeamPeer& peer) {
   const auto is_over = [&](const RelayMessage& message) {
     return message.to == peer.robot && message.to_boot != 0 &&
            !is_same_life(message.to_boot, peer.boot);
   };
   std::erase_if(recent_, [&](const Recent& recent) { return is_over(recent.message); });
   std::erase_if(own_slots_, [&](const auto& slot) {
-    const bool ends = is_over(*own_letters_.find(slot.second));
-    if (ends) empty_letter(slot.second);
+    const bool ends = is_over(*own_reliable_.find(slot.second));
+    if (ends) empty_reliable(slot.second);
     return ends;
   });
 }
 
-void RelayStore::heard(const RobotIdentity& peer) {
+void RelayStore::connected(const RobotIdentity& peer) {
   Origin* origin = peer.robot == self_.robot ? nullptr : know(peer);
   if (origin == nullptr) return;
   origin->via.reset();
-  origin->was_heard = true;
+  origin->was_direct = true;
   neighbours_[peer.robot] = {};
   settle_unmet(peer.robot, true);
   renew_ways();
@@ -136,7 +136,7 @@ void RelayStore::lost(RobotId robot, double now_s) {
   for (Recent& recent : std::exchange(recent_, {})) {
     if (now_s - recent.sent_s > kDoubt_s) continue;
     if (recent.message.to == robot) {
-      write_letter(recent.slot, std::move(recent.message));
+      add_reliable(recent.slot, std::move(recent.message));
     } else {
       recent_.push_back(std::move(recent));
     }
@@ -194,8 +194,8 @@ void RelayStore::wrote(RelayKind kind, const TeamPeer& to, std::uint64_t slot,
                        .to_boot = to.boot,
                        .content = std::move(content)};
   while (!recent_.empty() && now_s - recent_.front().sent_s > kDoubt_s) recent_.pop_front();
-  if (hears(to.robot)) return recent_.push_back({now_s, slot, std::move(message)});
-  if (origins_.contains(to.robot)) return write_letter(slot, std::move(message));
+  if (receives(to.robot)) return recent_.push_back({now_s, slot, std::move(message)});
+  if (origins_.contains(to.robot)) return add_reliable(slot, std::move(message));
   unmet_.push_back({now_s, slot, std::move(message)});
   if (unmet_.size() <= kMaxUnmet) return;
   unmet_.pop_back();
@@ -203,34 +203,34 @@ void RelayStore::wrote(RelayKind kind, const TeamPeer& to, std::uint64_t slot,
 }
 
 // The messages to a robot that is received directly are already stored for it.
-void RelayStore::settle_unmet(RobotId robot, bool heard) {
+void RelayStore::settle_unmet(RobotId robot, bool direct) {
   for (Recent& unmet : std::exchange(unmet_, {})) {
     if (unmet.message.to != robot) {
       unmet_.push_back(std::move(unmet));
-    } else if (!heard) {
-      write_letter(unmet.slot, std::move(unmet.message));
+    } else if (!direct) {
+      add_reliable(unmet.slot, std::move(unmet.message));
     }
   }
 }
 
-void RelayStore::write_letter(std::uint64_t slot, RelayMessage message) {
-  message.number = own_letters_.whole();
+void RelayStore::add_reliable(std::uint64_t slot, RelayMessage message) {
+  message.number = own_reliable_.whole();
   const auto [last, first] =
       own_slots_.try_emplace({message.kind, message.to, slot}, message.number);
-  if (!first) empty_letter(std::exchange(last->second, message.number));
+  if (!first) empty_reliable(std::exchange(last->second, message.number));
   sign(message);
-  if (own_letters_.put(std::move(message), kMaxLetterBytes)) return;
+  if (own_reliable_.put(std::move(message), kMaxReliableBytes)) return;
   ++given_up_;
   own_slots_.erase(last);
 }
 
 // The number of the message stays in use, because messages are sent in the order of their numbers.
-void RelayStore::empty_letter(std::uint32_t number) {
-  RelayMessage emptied = *own_letters_.find(number);
+void RelayStore::empty_reliable(std::uint32_t number) {
+  RelayMessage emptied = *own_reliable_.find(number);
   emptied.content.clear();
   sign(emptied);
-  (void)own_letters_.put(std::move(emptied), kMaxLetterBytes);  // Fits in place of the larger
-                                                                // message.
+  (void)own_reliable_.put(std::move(emptied), kMaxReliableBytes);  // Fits in place of the larger
+                                                                   // message.
 }
 
 void RelayStore::call(RelayKind kind, RobotId to, std::uint32_t number,
@@ -247,12 +247,12 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
   const RelayMessage& message = *parcel.message;
   const RobotId from = parcel.neighbour;
   const RobotId robot = message.origin.robot;
-  if (!hears(from) || robot == self_.robot) return RelayArrival::kRefused;
+  if (!receives(from) || robot == self_.robot) return RelayArrival::kRefused;
   if (message.kind == RelayKind::kIntroduction) return introduce(from, message);
   if (!is_known(message.origin)) return RelayArrival::kRefused;
   if (is_forged(message)) return RelayArrival::kForged;
 
-  const bool is_kept = message.kind == RelayKind::kBag || is_letter(message.kind);
+  const bool is_kept = message.kind == RelayKind::kBag || is_reliable(message.kind);
   if (is_kept && !has_room_for(message)) {
     ++given_up_;
     return RelayArrival::kNoRoom;
@@ -260,21 +260,22 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
   const bool is_mine = message.to == self_.robot;
   RelayArrival arrival = RelayArrival::kNew;
   if (message.kind == RelayKind::kBag) {
-    if (hears(robot)) return RelayArrival::kRepeated;
+    if (receives(robot)) return RelayArrival::kRepeated;
     arrival = keep(&Origin::bags, kMaxBagBytes, message);
     origins_.at(robot).via = from;
-  } else if (is_letter(message.kind)) {
+  } else if (is_reliable(message.kind)) {
     RelayMessage kept = message;
     if (is_mine && !keys_)
       kept.content = {};  // No other robot needs the content, but the
                           // signature covers it.
-    arrival = keep(&Origin::letters, kMaxLetterBytes, std::move(kept));
+    arrival = keep(&Origin::reliable, kMaxReliableBytes, std::move(kept));
   } else {
     if (message.kind == RelayKind::kReply) hold_reply(message);
     if (!is_mine) return route(message, from);
   }
-  const bool is_this_life = message.to_boot == 0 || is_same_life(message.to_boot, self_.boot);
-  const bool is_for_self = message.kind == RelayKind::kBag || (is_mine && is_this_life);
+  const bool is_this_incarnation =
+      message.to_boot == 0 || is_same_life(message.to_boot, self_.boot);
+  const bool is_for_self = message.kind == RelayKind::kBag || (is_mine && is_this_incarnation);
   if (arrival == RelayArrival::kNew && is_for_self) deliver(parcel.message);
   return arrival;
 }
@@ -289,11 +290,11 @@ void RelayStore::deliver(const RelayMessagePtr& message) {
 }
 
 bool RelayStore::has_room_for(const RelayMessage& message) const {
-  if (hears(message.origin.robot)) return true;
+  if (receives(message.origin.robot)) return true;
   std::size_t bytes = bytes_of(message);
   for (const auto& [robot, origin] : origins_)
-    if (!hears(robot))
-      bytes += origin.bags.bytes() + origin.letters.bytes() + origin.replies.bytes();
+    if (!receives(robot))
+      bytes += origin.bags.bytes() + origin.reliable.bytes() + origin.replies.bytes();
   return bytes <= kMaxFarBytes;
 }
 
@@ -302,15 +303,15 @@ RelayArrival RelayStore::introduce(RobotId from, const RelayMessage& message) {
   if (!content || (!keys_ && !content->credentials.empty())) return RelayArrival::kRefused;
   const RobotIdentity identity{
       .robot = message.origin.robot, .name = content->name, .boot = message.origin.boot};
-  if (hears(identity.robot)) return RelayArrival::kRepeated;
+  if (receives(identity.robot)) return RelayArrival::kRepeated;
   const auto known = origins_.find(identity.robot);
   if (known == origins_.end()) {
     if (origins_.size() >= kMaxOrigins) return RelayArrival::kNoRoom;
   } else {
     Origin& origin = known->second;
-    const bool knows_it = neighbours_.at(from).hears.contains(identity.robot);
+    const bool knows_it = neighbours_.at(from).received.contains(identity.robot);
     if (origin.identity.boot == identity.boot) {
-      if (knows_it || !origin.via || !hears(*origin.via)) origin.via = from;
+      if (knows_it || !origin.via || !receives(*origin.via)) origin.via = from;
       renew_ways();
       return RelayArrival::kRepeated;
     }
@@ -339,35 +340,35 @@ RelayArrival RelayStore::meet(const RobotIdentity& identity, const std::string& 
   return RelayArrival::kNew;
 }
 
-void RelayStore::told(RobotId robot, const RelaySummary& summary, double now_s) {
+void RelayStore::update(RobotId robot, const RelaySummary& summary, double now_s) {
   const auto found = neighbours_.find(robot);
   if (found == neighbours_.end()) return;
   Neighbour& neighbour = found->second;
-  neighbour.hears = {summary.hears.begin(), summary.hears.end()};
+  neighbour.received = {summary.received.begin(), summary.received.end()};
   neighbour.holds.clear();
   for (const RelayHeld& held : summary.holds) neighbour.holds[held.origin.robot] = held;
   renew_ways();
-  if (neighbour.hears.contains(self_.robot)) hand_on(robot, now_s);
+  if (neighbour.received.contains(self_.robot)) forward(robot, now_s);
 }
 
-void RelayStore::hand_on(RobotId to, double now_s) {
+void RelayStore::forward(RobotId to, double now_s) {
   Neighbour& neighbour = neighbours_.at(to);
   const auto own = neighbour.holds.find(self_.robot);
   const bool knows_own = own != neighbour.holds.end() && own->second.origin == self_;
   const Origin self{.identity = {.robot = self_.robot, .name = {}, .boot = self_.boot}};
-  hand_on(to, self, true, knows_own ? own->second.letters : 0, now_s);
+  forward(to, self, true, knows_own ? own->second.reliable : 0, now_s);
   for (const auto& [robot, origin] : origins_) {
     if (robot == to) continue;
-    if (neighbour.hears.contains(robot)) {
+    if (neighbour.received.contains(robot)) {
       neighbour.misses_s.erase(robot);
       continue;
     }
     const double since_s = neighbour.misses_s.try_emplace(robot, now_s).first->second;
-    if (now_s - since_s >= kGrace_s) hand_on(to, origin, now_s);
+    if (now_s - since_s >= kGrace_s) forward(to, origin, now_s);
   }
 }
 
-void RelayStore::hand_on(RobotId to, const Origin& origin, double now_s) {
+void RelayStore::forward(RobotId to, const Origin& origin, double now_s) {
   Neighbour& neighbour = neighbours_.at(to);
   const TeamPeer peer{origin.identity.robot, origin.identity.boot};
   const auto held = neighbour.holds.find(peer.robot);
@@ -380,30 +381,31 @@ void RelayStore::hand_on(RobotId to, const Origin& origin, double now_s) {
                      .origin = peer,
                      .content = to_octets({origin.identity.name, origin.membership.credentials})});
   }
-  hand_on(to, origin, false, held->second.bags, now_s);
-  hand_on(to, origin, true, held->second.letters, now_s);
+  forward(to, origin, false, held->second.bags, now_s);
+  forward(to, origin, true, held->second.reliable, now_s);
 }
 
 // Sends the messages from the first one that the neighbour lacks, up to the window.
-void RelayStore::hand_on(RobotId to, const Origin& origin, bool letters, std::uint32_t told,
+void RelayStore::forward(RobotId to, const Origin& origin, bool reliable, std::uint32_t reported,
                          double now_s) {
   Neighbour& neighbour = neighbours_.at(to);
   const TeamPeer peer{origin.identity.robot, origin.identity.boot};
   const bool is_own = peer == self_;
-  const Stream& stream = is_own ? own_letters_ : letters ? origin.letters : origin.bags;
+  const Stream& stream = is_own ? own_reliable_ : reliable ? origin.reliable : origin.bags;
   Progress& progress =
-      neighbour.progress.try_emplace({peer.robot, letters}, Progress{told, told, now_s})
+      neighbour.progress.try_emplace({peer.robot, reliable}, Progress{reported, reported, now_s})
           .first->second;
-  const bool stands_still = told == progress.told && told < stream.whole();
+  const bool stands_still = reported == progress.reported && reported < stream.whole();
   if (!stands_still) progress.since_s = now_s;
   const bool overdue = now_s - progress.since_s >= kPatience_s;
-  progress.sent = overdue || told < progress.told ? told : std::max(told, progress.sent);
-  progress.told = told;
+  progress.sent =
+      overdue || reported < progress.reported ? reported : std::max(reported, progress.sent);
+  progress.reported = reported;
   if (!is_own && !overdue && another_should(to, neighbour.holds.at(peer.robot))) return;
   if (overdue) progress.since_s = now_s;
 
   std::size_t under_way = 0;
-  for (std::uint32_t number = told; number < progress.sent; ++number)
+  for (std::uint32_t number = reported; number < progress.sent; ++number)
     if (const RelayMessage* sent = stream.find(number)) under_way += bytes_of(*sent);
   for (; progress.sent < stream.whole() && under_way < kWindowBytes; ++progress.sent) {
     RelayMessage message = *stream.find(progress.sent);
@@ -419,26 +421,28 @@ void RelayStore::hand_on(RobotId to, const Origin& origin, bool letters, std::ui
 bool RelayStore::another_should(RobotId to, const RelayHeld& held) const {
   const RobotId origin = held.origin.robot;
   const Neighbour& neighbour = neighbours_.at(to);
-  const std::pair own(!hears(origin), self_.robot);
+  const std::pair own(!receives(origin), self_.robot);
   return std::ranges::any_of(neighbours_, [&](const auto& entry) {
     const auto& [robot, other] = entry;
-    if (robot == to || !other.hears.contains(to) || !neighbour.hears.contains(robot)) return false;
-    const bool at_source = other.hears.contains(origin);
+    if (robot == to || !other.received.contains(to) || !neighbour.received.contains(robot))
+      return false;
+    const bool at_source = other.received.contains(origin);
     const auto its = other.holds.find(origin);
     const bool has_more = its != other.holds.end() && its->second.origin == held.origin &&
-                          (its->second.bags > held.bags || its->second.letters > held.letters);
+                          (its->second.bags > held.bags || its->second.reliable > held.reliable);
     return (at_source || has_more) && std::pair(!at_source, robot) < own;
   });
 }
 
 std::optional<RobotId> RelayStore::next_hop(RobotId to, std::optional<RobotId> from) const {
-  if (hears(to)) return to;
+  if (receives(to)) return to;
   for (const auto& [robot, neighbour] : neighbours_)
-    if (robot != from && neighbour.hears.contains(to) && neighbour.hears.contains(self_.robot))
+    if (robot != from && neighbour.received.contains(to) &&
+        neighbour.received.contains(self_.robot))
       return robot;
   const auto known = origins_.find(to);
   if (known == origins_.end() || !known->second.via || known->second.via == from ||
-      !hears(*known->second.via))
+      !receives(*known->second.via))
     return std::nullopt;
   return known->second.via;
 }
@@ -482,7 +486,7 @@ void RelayStore::renew_ways() {
   for (auto& [robot, origin] : origins_) {
     const bool reachable = next_hop(robot, {}).has_value();
     const bool before = std::exchange(origin.reachable, reachable);
-    if (reachable && !before && !hears(robot)) output_.reachable.push_back(robot);
+    if (reachable && !before && !receives(robot)) output_.reachable.push_back(robot);
   }
   for (auto entry = carried_.begin(); entry != carried_.end();) {
     const auto next = next_hop(entry->first, {});
@@ -500,12 +504,12 @@ void RelayStore::renew_ways() {
 
 RelaySummary RelayStore::summary() const {
   RelaySummary summary;
-  for (const auto& [robot, neighbour] : neighbours_) summary.hears.push_back(robot);
+  for (const auto& [robot, neighbour] : neighbours_) summary.received.push_back(robot);
   for (const auto& [robot, origin] : origins_) {
-    const std::uint32_t bags = hears(robot) ? 0 : origin.bags.whole();
-    const std::uint32_t letters = origin.letters.whole();
-    if (!hears(robot) || letters > 0)
-      summary.holds.push_back({{robot, origin.identity.boot}, bags, letters});
+    const std::uint32_t bags = receives(robot) ? 0 : origin.bags.whole();
+    const std::uint32_t reliable = origin.reliable.whole();
+    if (!receives(robot) || reliable > 0)
+      summary.holds.push_back({{robot, origin.identity.boot}, bags, reliable});
   }
   return summary;
 }

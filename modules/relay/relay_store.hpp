@@ -79,7 +79,7 @@ class RelayStore {
   /// Storage for one origin [bytes]: an hour of bags at 4 Hz; thousands of closures; hundreds of
   /// keyframes.
   static constexpr std::size_t kMaxBagBytes = 8U << 20U;
-  static constexpr std::size_t kMaxLetterBytes = 4U << 20U;
+  static constexpr std::size_t kMaxReliableBytes = 4U << 20U;
   static constexpr std::size_t kMaxReplyBytes = 8U << 20U;
   /// Storage for all robots out of range together, because a neighbour could invent any number of
   /// them.
@@ -102,12 +102,12 @@ class RelayStore {
   explicit RelayStore(TeamPeer self, std::optional<RelayKeys> keys = {})
       : self_(self), keys_(std::move(keys)) {}
 
-  /// This robot receives `peer` directly from now on (heard), or no longer (lost).
-  void heard(const RobotIdentity& peer);
+  /// This robot receives `peer` directly from now on (connected), or no longer (lost).
+  void connected(const RobotIdentity& peer);
   void lost(RobotId robot, double now_s);
 
-  /// Stores a bag that its origin has sent directly. The bag may arrive before heard() is called
-  /// for the origin.
+  /// Stores a bag that its origin has sent directly. The bag may arrive before connected() is
+  /// called for the origin.
   RelayArrival keep_bag(const RobotIdentity& origin, std::uint32_t number,
                         std::vector<std::uint8_t> content);
   /// Stores a keyframe that a known robot has sent directly as a reply.
@@ -125,14 +125,14 @@ class RelayStore {
   void call(RelayKind kind, RobotId to, std::uint32_t number, std::vector<std::uint8_t> content);
 
   /// Processes the summary in the status of a neighbour.
-  void told(RobotId neighbour, const RelaySummary& summary, double now_s);
+  void update(RobotId neighbour, const RelaySummary& summary, double now_s);
   /// Processes a message from a neighbour.
   RelayArrival receive(const RelayParcel& parcel);
   /// Reason why the last message was kForged (a string literal).
   [[nodiscard]] const char* refusal() const { return refusal_; }
 
   [[nodiscard]] RelaySummary summary() const;
-  [[nodiscard]] bool hears(RobotId robot) const { return neighbours_.contains(robot); }
+  [[nodiscard]] bool receives(RobotId robot) const { return neighbours_.contains(robot); }
   [[nodiscard]] std::optional<TeamPeer> origin(RobotId robot) const;
   [[nodiscard]] RelayWays ways_to(RobotId robot) const;
   /// Output since the last call.
@@ -167,16 +167,16 @@ class RelayStore {
     Membership membership = {};
     std::optional<RobotId> via = {};  // Neighbour that introduced the origin or sent its last bag.
     bool reachable = false;           // Last reachability that was reported.
-    bool was_heard = false;
-    Stream bags = {}, letters = {}, replies = {};
+    bool was_direct = false;
+    Stream bags = {}, reliable = {}, replies = {};
   };
   struct Progress {
-    std::uint32_t told = 0;  // Number of messages that the neighbour reports.
+    std::uint32_t reported = 0;  // Number of messages that the neighbour reports.
     std::uint32_t sent = 0;
     double since_s = 0.0;  // Start of the time without progress.
   };
   struct Neighbour {
-    std::set<RobotId> hears = {};
+    std::set<RobotId> received = {};
     std::map<RobotId, RelayHeld> holds = {};
     std::map<std::pair<RobotId, bool>, Progress> progress = {};  // By origin; true for reliable
                                                                  // messages, false for bags.
@@ -203,13 +203,14 @@ class RelayStore {
   RelayArrival introduce(RobotId from, const RelayMessage& message);
   RelayArrival meet(const RobotIdentity& identity, const std::string& credentials, RobotId from);
   RelayArrival keep(Stream Origin::*stream, std::size_t max_bytes, RelayMessage message);
-  void settle_unmet(RobotId robot, bool heard);
-  void write_letter(std::uint64_t slot, RelayMessage message);
-  void empty_letter(std::uint32_t number);
-  void end_letters_to_former_lives(const TeamPeer& peer);
-  void hand_on(RobotId to, double now_s);
-  void hand_on(RobotId to, const Origin& origin, double now_s);
-  void hand_on(RobotId to, const Origin& origin, bool letters, std::uint32_t told, double now_s);
+  void settle_unmet(RobotId robot, bool direct);
+  void add_reliable(std::uint64_t slot, RelayMessage message);
+  void empty_reliable(std::uint32_t number);
+  void drop_messages_to_former_incarnations(const TeamPeer& peer);
+  void forward(RobotId to, double now_s);
+  void forward(RobotId to, const Origin& origin, double now_s);
+  void forward(RobotId to, const Origin& origin, bool reliable, std::uint32_t reported,
+               double now_s);
   [[nodiscard]] bool has_room_for(const RelayMessage& message) const;
   [[nodiscard]] bool another_should(RobotId to, const RelayHeld& held) const;
   RelayArrival route(RelayMessage message, std::optional<RobotId> from);
@@ -222,7 +223,7 @@ class RelayStore {
   std::optional<RelayKeys> keys_;
   std::map<RobotId, Origin> origins_;
   std::map<RobotId, Neighbour> neighbours_;  // robots with a link to this one
-  Stream own_letters_;
+  Stream own_reliable_;
   std::map<std::tuple<RelayKind, RobotId, std::uint64_t>, std::uint32_t> own_slots_;
   std::deque<Recent> recent_;  // Oldest first.
   std::deque<Recent> unmet_;   // Messages to unknown robots, oldest first.

@@ -17,7 +17,7 @@ constexpr std::array<Kind, 4> kKinds = {{{"candidates", {0.6F, 0.6F, 0.6F}},
                                          {"rejected", {0.9F, 0.2F, 0.15F}},
                                          {"kept", {0.15F, 0.75F, 0.3F}}}};
 
-std::size_t kind_of(const ToldClosure& closure) {
+std::size_t kind_of(const PublishedClosure& closure) {
   if (closure.stage == ClosureStage::kInlier) return kKept;
   if (closure.stage < ClosureStage::kVerified) return kCandidates;
   return closure.rejected ? kRejected : kVerified;
@@ -31,7 +31,7 @@ std::optional<SE3> pose_of(const KeyframeId& keyframe, const Trajectory& traject
 
 }  // namespace
 
-RosMarkers closure_lines(std::span<const ToldClosure> closures, const Trajectory& trajectory,
+RosMarkers closure_lines(std::span<const PublishedClosure> closures, const Trajectory& trajectory,
                          const RosHeader& header) {
   RosMarkers message;
   for (const Kind& kind : kKinds) {
@@ -42,7 +42,7 @@ RosMarkers closure_lines(std::span<const ToldClosure> closures, const Trajectory
     marker.scale = {kLine_m, 0.0, 0.0};
     marker.color = {kind.color[0], kind.color[1], kind.color[2], 1.0F};
   }
-  for (const ToldClosure& closure : closures) {
+  for (const PublishedClosure& closure : closures) {
     auto from = pose_of(closure.id.from, trajectory);
     auto to = pose_of(closure.id.to, trajectory);
     if (from && !to && closure.T_from_to) to = *from * *closure.T_from_to;

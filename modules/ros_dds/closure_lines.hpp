@@ -9,7 +9,7 @@
 namespace km {
 
 /// Stage of a pair of keyframes.
-struct ToldClosure {
+struct PublishedClosure {
   ClosureId id;
   ClosureStage stage = ClosureStage::kCandidate;
   bool rejected = false;         ///< Verified, but rejected by the optimiser.
@@ -21,7 +21,7 @@ struct ToldClosure {
 /// verified (yellow), rejected (red) and kept (green). It always returns all four markers, so that
 /// viewers remove old lines. A line to a keyframe of another robot ends where the closure places
 /// that keyframe. Lines to keyframes without a known pose are omitted.
-[[nodiscard]] RosMarkers closure_lines(std::span<const ToldClosure> closures,
+[[nodiscard]] RosMarkers closure_lines(std::span<const PublishedClosure> closures,
                                        const Trajectory& trajectory, const RosHeader& header);
 
 }  // namespace km

@@ -2,7 +2,7 @@
 
 namespace km {
 
-std::size_t LiveSink::open(const ToldTopic& topic) {
+std::size_t LiveSink::open(const PublishedTopic& topic) {
   publishers_.push_back(std::make_unique<RosPublisher>(
       network_, topic.name, topic.type, topic.is_state ? RosQos::kLatched : RosQos::kReliable,
       topic.depth));

@@ -14,7 +14,7 @@ class LiveSink final : public RosSink {
   explicit LiveSink(std::shared_ptr<const RosNetwork> network) : network_(std::move(network)) {}
 
   /// Throws DdsError, and std::invalid_argument for a type that RosNetwork does not know.
-  std::size_t open(const ToldTopic& topic) override;
+  std::size_t open(const PublishedTopic& topic) override;
   void put(std::size_t topic, std::optional<Stamp> /*time*/,
            std::span<const std::uint8_t> message) override {
     publishers_.at(topic)->publish(message);

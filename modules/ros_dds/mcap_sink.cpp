@@ -12,7 +12,7 @@ namespace km {
 McapSink::McapSink(std::filesystem::path file, std::function<void(const std::string&)> fail)
     : file_(std::move(file)), fail_(std::move(fail)) {}
 
-std::size_t McapSink::open(const ToldTopic& topic) {
+std::size_t McapSink::open(const PublishedTopic& topic) {
   sequences_.push_back(0);
   return writer_.add_channel({.topic = topic.name, .message_encoding = "cdr"},
                              {.name = ros2_name(topic.type),

@@ -22,7 +22,7 @@ class McapSink final : public RosSink {
   /// early.
   McapSink(std::filesystem::path file, std::function<void(const std::string& why)> fail);
 
-  std::size_t open(const ToldTopic& topic) override;
+  std::size_t open(const PublishedTopic& topic) override;
   void put(std::size_t topic, std::optional<Stamp> time,
            std::span<const std::uint8_t> message) override;
   void flush() override;

@@ -155,12 +155,12 @@ std::string RosOutputNode::map_of(RobotId anchor) const {
 // Time of the sensors. After the last image it advances with the steady clock.
 std::optional<Stamp> RosOutputNode::time() const {
   if (!stamp_) return std::nullopt;
-  return *stamp_ + nanoseconds(steady_now_s() - told_s_);
+  return *stamp_ + nanoseconds(steady_now_s() - stamp_arrived_s_);
 }
 
 // Returns the size of the message [bytes].
 template <typename Message>
-std::size_t RosOutputNode::tell(std::size_t topic, const Message& message) {
+std::size_t RosOutputNode::publish(std::size_t topic, const Message& message) {
   const auto bytes = encode_ros(message);
   if (const auto now = time()) latest_ = std::max(latest_.value_or(*now), *now);
   sink_->put(topic, latest_, bytes);
@@ -172,70 +172,71 @@ void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
   ++poses_;
   stamp_ = state->stamp;
   speed_mps_ = state->v_odom.norm();
-  told_s_ = steady_now_s();
+  stamp_arrived_s_ = steady_now_s();
   RosOdometry odometry;
   odometry.header = {state->stamp, odom_};
   odometry.child_frame = base_link_;
   odometry.pose = message_of(state->T_odom_body);
   odometry.linear_velocity = state->T_odom_body.linear().transpose() * state->v_odom;
   odometry.angular_velocity = frames_.angular_rate();
-  tell(odometry_, odometry);
-  tell(pose_,
-       RosPoseStamped{{state->stamp, map_}, message_of(frames_.T_map_odom() * state->T_odom_body)});
-  tell(tf_, RosTransforms{{{{state->stamp, map_}, odom_, message_of(frames_.T_map_odom())},
-                           {{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)}}});
-  tell_pieces();
+  publish(odometry_, odometry);
+  publish(pose_, RosPoseStamped{{state->stamp, map_},
+                                message_of(frames_.T_map_odom() * state->T_odom_body)});
+  publish(tf_,
+          RosTransforms{{{{state->stamp, map_}, odom_, message_of(frames_.T_map_odom())},
+                         {{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)}}});
+  publish_pieces();
 }
 
 void RosOutputNode::step(const Topic<KeyframeOdometry>::Message& keyframe) {
   frames_.add(*keyframe);
   if (stamp_ && *stamp_ >= keyframe->stamp) return;
   stamp_ = keyframe->stamp;  // the input is a pose graph without images
-  told_s_ = steady_now_s();
+  stamp_arrived_s_ = steady_now_s();
 }
 
 void RosOutputNode::step(const Topic<Trajectory>::Message& trajectory) {
   frames_.add(*trajectory);
   trajectory_ = trajectory;
   path_.changed = closures_.changed = true;
-  tell_states(false);
+  publish_states(false);
 }
 
 void RosOutputNode::step(const std::shared_ptr<const LabelledMesh>& mesh) {
   newest_mesh_ = mesh;
   mesh_.changed = options_.mesh_points > 0 && !mesh->empty();
   if (options_.mesh_faces > 0) encoder_.post(mesh);
-  tell_states(false);
+  publish_states(false);
 }
 
 void RosOutputNode::step(const CoarseMesh& coarse) {
   pieces_.offer(coarse.mesh);
-  tell_pieces();
+  publish_pieces();
 }
 
 void RosOutputNode::step(const std::shared_ptr<const RosLog>& line) {
   RosLog stamped = *line;
   stamped.stamp = time().value_or(0);
-  tell(log_, stamped);
+  publish(log_, stamped);
 }
 
 void RosOutputNode::step(const std::shared_ptr<const RosCompressedImage>& image) {
   sink_->put(image_, image->header.stamp, encode_ros(*image));
 }
 
-void RosOutputNode::tell_states(bool all) {
-  const auto tell_if_due = [&](State& state, const auto& tell_it) {
+void RosOutputNode::publish_states(bool all) {
+  const auto publish_if_due = [&](State& state, const auto& publish_it) {
     const double now_s = steady_now_s();
     if (!state.changed || (!all && now_s < state.due_s)) return;
     state.changed = false;
-    state.due_s = now_s + static_cast<double>(tell_it()) / options_.state_bytes_per_s;
+    state.due_s = now_s + static_cast<double>(publish_it()) / options_.state_bytes_per_s;
   };
-  tell_if_due(path_, [this] { return tell_path(keyframe_poses()); });
-  tell_if_due(mesh_, [this] { return tell_mesh(); });
+  publish_if_due(path_, [this] { return publish_path(keyframe_poses()); });
+  publish_if_due(mesh_, [this] { return publish_mesh(); });
   if (!options_.draws) return;
-  tell_if_due(closures_, [this] {
-    return tell(closures_.topic,
-                closure_lines(newest_closures_, *trajectory_, {stamp_.value_or(0), map_}));
+  publish_if_due(closures_, [this] {
+    return publish(closures_.topic,
+                   closure_lines(newest_closures_, *trajectory_, {stamp_.value_or(0), map_}));
   });
 }
 
@@ -247,44 +248,45 @@ std::vector<StampedPose> RosOutputNode::keyframe_poses() const {
   return poses;
 }
 
-std::size_t RosOutputNode::tell_path(std::span<const StampedPose> poses) {
+std::size_t RosOutputNode::publish_path(std::span<const StampedPose> poses) {
   if (poses.empty()) return 0;
   RosPath path{{stamp_.value_or(poses.back().stamp), map_}, {}};
   for (const StampedPose& pose : poses)
     path.poses.push_back({{pose.stamp, map_}, message_of(pose.T)});
-  return tell(path_.topic, path);
+  return publish(path_.topic, path);
 }
 
-std::size_t RosOutputNode::tell_mesh() {
+std::size_t RosOutputNode::publish_mesh() {
   const RosHeader header{stamp_.value_or(0), map_};
-  std::size_t bytes = tell(
+  std::size_t bytes = publish(
       mesh_.topic, cloud_of(*newest_mesh_, static_cast<std::size_t>(options_.mesh_points), header));
-  if (options_.draws) bytes += tell(faces_, surface_of(*newest_mesh_, newest_mesh_->faces, header));
+  if (options_.draws)
+    bytes += publish(faces_, surface_of(*newest_mesh_, newest_mesh_->faces, header));
   return bytes;
 }
 
 // Sends as many pieces as the budget allows now.
-void RosOutputNode::tell_pieces() {
+void RosOutputNode::publish_pieces() {
   const double now_s = steady_now_s();
   while (piece_bytes_.wait_s(0.0, now_s) <= 0.0) {
     const auto piece = pieces_.next({stamp_.value_or(0), map_});
     if (!piece) return;
-    piece_bytes_.spend(static_cast<double>(tell(faces_, *piece)), now_s);
+    piece_bytes_.spend(static_cast<double>(publish(faces_, *piece)), now_s);
   }
 }
 
 // Before robots have joined a session, no transform between their frames is known.
-void RosOutputNode::tell_link() {
+void RosOutputNode::publish_link() {
   const std::string team = map_of(trajectory_->anchor);
   if (trajectory_->T_world_kf.empty() || team == map_) return;
-  tell(tf_, RosTransforms{{{{stamp_.value_or(0), team}, map_, RosPose{}}}});
+  publish(tf_, RosTransforms{{{{stamp_.value_or(0), team}, map_, RosPose{}}}});
 }
 
 RosDiagnosticStatus RosOutputNode::odometry_status() const {
   RosDiagnosticStatus status;
   status.name = name_ + ": odometry";
   status.hardware_id = name_;
-  const double age_s = steady_now_s() - told_s_;
+  const double age_s = steady_now_s() - stamp_arrived_s_;
   if (poses_ == 0 || age_s > kLate_s) status.level = RosDiagnosticStatus::kWarn;
   status.message = poses_ == 0       ? "no image has a pose yet"
                    : age_s > kLate_s ? "no pose for " + fixed(age_s, 1) + " s"
@@ -296,40 +298,40 @@ RosDiagnosticStatus RosOutputNode::odometry_status() const {
   return status;
 }
 
-void RosOutputNode::tell_diagnostics(std::vector<RosDiagnosticStatus> parts) {
+void RosOutputNode::publish_diagnostics(std::vector<RosDiagnosticStatus> parts) {
   for (RosDiagnosticStatus& status : parts) {
     status.name = name_ + ": " + status.name;
     status.hardware_id = name_;
   }
   parts.insert(parts.begin(), odometry_status());
-  tell(diagnostics_, RosDiagnostics{{stamp_.value_or(0), ""}, std::move(parts)});
+  publish(diagnostics_, RosDiagnostics{{stamp_.value_or(0), ""}, std::move(parts)});
 }
 
 void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
   auto parts = diagnose_();
   const bool is_silent = !parts;
-  if (parts) tell_diagnostics(*std::move(parts));
+  if (parts) publish_diagnostics(*std::move(parts));
   if (auto closures = options_.draws ? closures_of_() : std::nullopt) {
     newest_closures_ = *std::move(closures);
     closures_.changed = true;
   }
-  tell_states(is_silent);
-  tell_pieces();
-  if (!is_silent) tell_link();
+  publish_states(is_silent);
+  publish_pieces();
+  if (!is_silent) publish_link();
   sink_->flush();
 }
 
 void RosOutputNode::finish(std::span<const StampedPose> poses,
-                           std::optional<std::vector<ToldClosure>> closures,
+                           std::optional<std::vector<PublishedClosure>> closures,
                            const std::map<std::string, std::string>& files) {
   if (closures && options_.draws) {
     newest_closures_ = *std::move(closures);
     closures_.changed = true;
   }
   path_.changed = path_.changed && poses.empty();
-  tell_states(true);
-  if (!poses.empty()) tell_path(poses);
-  tell_link();
+  publish_states(true);
+  if (!poses.empty()) publish_path(poses);
+  publish_link();
   for (const auto& [name, text] : files) sink_->attach(name, text);
   sink_->finish();
 }

@@ -87,7 +87,7 @@ class RosOutputNode final : public Node {
   using Diagnose = std::function<std::optional<std::vector<RosDiagnosticStatus>>()>;
   /// Returns all closures of the robot, or nullopt if they are unchanged. Called on the node's
   /// thread.
-  using Closures = std::function<std::optional<std::vector<ToldClosure>>()>;
+  using Closures = std::function<std::optional<std::vector<PublishedClosure>>()>;
 
   RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sink, RosOutputOptions options,
                 Diagnose diagnose, Closures closures, const RosOutputTopics& topics);
@@ -108,7 +108,8 @@ class RosOutputNode final : public Node {
   /// Publishes the final states and files; call it after stop(), as the last call. `closures` is
   /// nullopt if they are unchanged. `poses`, in `map`, are the poses of all images and become the
   /// path unless empty.
-  void finish(std::span<const StampedPose> poses, std::optional<std::vector<ToldClosure>> closures,
+  void finish(std::span<const StampedPose> poses,
+              std::optional<std::vector<PublishedClosure>> closures,
               const std::map<std::string, std::string>& files);
 
   /// Number of inputs and images that were dropped because the node was too slow.
@@ -136,7 +137,7 @@ class RosOutputNode final : public Node {
 
   void open_topics(bool has_images);
   void step(const std::shared_ptr<const Tick>& tick);
-  void tell_diagnostics(std::vector<RosDiagnosticStatus> parts);
+  void publish_diagnostics(std::vector<RosDiagnosticStatus> parts);
   void step(const Topic<OdometryState>::Message& state);
   void step(const Topic<KeyframeOdometry>::Message& keyframe);
   void step(const Topic<Trajectory>::Message& trajectory);
@@ -152,12 +153,12 @@ class RosOutputNode final : public Node {
   [[nodiscard]] RosDiagnosticStatus odometry_status() const;
   [[nodiscard]] std::vector<StampedPose> keyframe_poses() const;
   template <typename Message>
-  std::size_t tell(std::size_t topic, const Message& message);
-  void tell_states(bool all);
-  std::size_t tell_path(std::span<const StampedPose> poses);
-  std::size_t tell_mesh();
-  void tell_pieces();
-  void tell_link();
+  std::size_t publish(std::size_t topic, const Message& message);
+  void publish_states(bool all);
+  std::size_t publish_path(std::span<const StampedPose> poses);
+  std::size_t publish_mesh();
+  void publish_pieces();
+  void publish_link();
 
   const std::string node_name_;
   const std::unique_ptr<RosSink> sink_;
@@ -169,16 +170,16 @@ class RosOutputNode final : public Node {
   State path_, mesh_, closures_;
   LiveFrames frames_;
   std::size_t poses_ = 0;
-  std::optional<Stamp> stamp_;   // stamp of the last image or keyframe
-  std::optional<Stamp> latest_;  // greatest stamp that was published, because stamps must not
-                                 // decrease
-  double speed_mps_ = 0.0;       // speed at `stamp_`
-  double told_s_ = 0.0;          // time of arrival of `stamp_`, by the steady clock
+  std::optional<Stamp> stamp_;    // stamp of the last image or keyframe
+  std::optional<Stamp> latest_;   // greatest stamp that was published, because stamps must not
+                                  // decrease
+  double speed_mps_ = 0.0;        // speed at `stamp_`
+  double stamp_arrived_s_ = 0.0;  // time of arrival of `stamp_`, by the steady clock
   Topic<Trajectory>::Message trajectory_ = std::make_shared<const Trajectory>();
   std::shared_ptr<const LabelledMesh> newest_mesh_;
   SurfacePieces pieces_;
   TokenBucket piece_bytes_;
-  std::vector<ToldClosure> newest_closures_;
+  std::vector<PublishedClosure> newest_closures_;
   Worker<Input> worker_;
   Worker<Encoded> encoder_;
   Periodic clock_;  // last member: stops first

@@ -12,7 +12,7 @@
 namespace km {
 
 /// A topic of a RosSink.
-struct ToldTopic {
+struct PublishedTopic {
   std::string name;
   std::string_view type;  ///< kType of its messages.
   bool is_state = false;  ///< The newest message is the full state: late subscribers receive it.
@@ -25,7 +25,7 @@ class RosSink {
   virtual ~RosSink() = default;
 
   /// Returns the number of the topic.
-  virtual std::size_t open(const ToldTopic& topic) = 0;
+  virtual std::size_t open(const PublishedTopic& topic) = 0;
 
   /// Writes a message encoded by encode_ros(). `time` is the time of the robot's sensors; nullopt
   /// before the first stamp.

@@ -56,16 +56,17 @@ LabelledMesh coarsened(const LabelledMesh& mesh, std::size_t most) {
 }
 
 std::optional<RosMarker> SurfacePieces::next(const RosHeader& header) {
-  const auto pieces = [this] { return told_ ? count(told_->faces.size()) : 0; };
+  const auto pieces = [this] { return published_ ? count(published_->faces.size()) : 0; };
   if (next_ >= std::max(pieces(), shown_) && waiting_) {
     shown_ = pieces();
-    told_ = std::exchange(waiting_, nullptr);
+    published_ = std::exchange(waiting_, nullptr);
     next_ = 0;
   }
   if (next_ >= std::max(pieces(), shown_)) return std::nullopt;
-  const std::size_t begin = std::min(next_ * kFaces, told_->faces.size());
-  const std::size_t size = std::min(kFaces, told_->faces.size() - begin);
-  RosMarker marker = surface_of(*told_, std::span(told_->faces).subspan(begin, size), header);
+  const std::size_t begin = std::min(next_ * kFaces, published_->faces.size());
+  const std::size_t size = std::min(kFaces, published_->faces.size() - begin);
+  RosMarker marker =
+      surface_of(*published_, std::span(published_->faces).subspan(begin, size), header);
   marker.id = static_cast<std::int32_t>(next_++);
   if (size == 0) marker.action = RosMarker::kDelete;
   return marker;

@@ -33,7 +33,7 @@ class SurfacePieces {
   [[nodiscard]] std::optional<RosMarker> next(const RosHeader& header);
 
  private:
-  std::shared_ptr<const LabelledMesh> told_, waiting_;
+  std::shared_ptr<const LabelledMesh> published_, waiting_;
   std::size_t next_ = 0;
   std::size_t shown_ = 0;  // number of pieces that viewers have
 };

@@ -26,18 +26,18 @@ void AdmittedPeers::add(const TeamPeer& peer, AdmittedPeer admitted) {
   peers_[peer] = {.admitted = std::move(admitted), .last_turn = ++turn_};
 }
 
-void AdmittedPeers::heard(const TeamPeer& peer) {
+void AdmittedPeers::received(const TeamPeer& peer) {
   const auto found = peers_.find(peer);
   if (found == peers_.end()) return;
-  found->second.has_spoken = true;
+  found->second.has_sent = true;
   found->second.last_turn = ++turn_;
 }
 
 void AdmittedPeers::make_room(Entries::iterator begin, Entries::iterator end, std::size_t most) {
   if (static_cast<std::size_t>(std::distance(begin, end)) < most) return;
   peers_.erase(std::min_element(begin, end, [](const auto& a, const auto& b) {
-    return std::tie(a.second.has_spoken, a.second.last_turn) <
-           std::tie(b.second.has_spoken, b.second.last_turn);
+    return std::tie(a.second.has_sent, a.second.last_turn) <
+           std::tie(b.second.has_sent, b.second.last_turn);
   }));
 }
 

@@ -45,7 +45,7 @@ class AdmittedPeers {
   void add(const TeamPeer& peer, AdmittedPeer admitted);
 
   /// Notes that a message of the process has been decrypted. Does nothing for an unknown process.
-  void heard(const TeamPeer& peer);
+  void received(const TeamPeer& peer);
 
   void erase(const TeamPeer& peer) { peers_.erase(peer); }
 
@@ -64,7 +64,7 @@ class AdmittedPeers {
  private:
   struct Entry {
     AdmittedPeer admitted;
-    bool has_spoken = false;
+    bool has_sent = false;
     std::uint64_t last_turn = 0;
   };
   using Entries = std::map<TeamPeer, Entry>;

@@ -83,7 +83,7 @@ void write_secret_key(const std::filesystem::path& file, const SigningKey& key,
 
 void write_certificate(const std::filesystem::path& file, const Certificate& certificate) {
   std::ostringstream out;
-  out << "# The team's authority says that this robot has this key. Everyone may read it.\n"
+  out << "# The team's authority certifies that this robot has this key. Everyone may read it.\n"
       << "format: " << kCertificateFormat << "\nteam: " << certificate.team
       << "\nrobot: " << certificate.robot << "\nname: " << certificate.name
       << "\npublic_key: " << to_hex(certificate.key)
@@ -95,7 +95,8 @@ void write_certificate(const std::filesystem::path& file, const Certificate& cer
 
 void write_authority(const std::filesystem::path& file, const Authority& authority) {
   write_key_file(file,
-                 "# Whom the robots of this team believe. Everyone may read it, only the authority "
+                 "# Key of the authority that the robots of this team trust. Everyone may read it, "
+                 "only the authority "
                  "may change it.\nformat: " +
                      std::string(kAuthorityFormat) + "\nteam: " + authority.team +
                      "\npublic_key: " + to_hex(authority.key) + '\n',

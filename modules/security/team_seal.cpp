@@ -220,7 +220,7 @@ const char* TeamSeal::accept_key_message(const TeamPeer& from, OctetView message
   std::vector<TeamKey> keys = team_keys_from(*content);
   sodium_memzero(content->data(), content->size());
   if (keys.empty()) return "key message does not hold keys";
-  peers_.heard(from);
+  peers_.received(from);
   // A replayed older key message must not remove the newer keys.
   if (sender->team_keys.empty() || sender->team_keys.back().number < keys.back().number)
     sender->team_keys = std::move(keys);
@@ -269,7 +269,7 @@ Opened TeamSeal::open_for_self(const SealContext& context, OctetView sealed) {
   if (sender == nullptr) return not_yet("its sender is not admitted");
   auto content = decrypt(sender->from_peer, associated_data(context), sealed);
   if (!content) return refused("message is not its sender's, or was changed on its way");
-  peers_.heard(context.sender);
+  peers_.received(context.sender);
   return opened(std::move(*content));
 }
 
@@ -298,7 +298,7 @@ Opened TeamSeal::open_to_all(const SealContext& context, OctetView sealed) {
   if (!verify(signed_statement(key->key, associated, encrypted), signature,
               sender->certificate.key))
     return refused("message is not signed by its sender");
-  peers_.heard(context.sender);
+  peers_.received(context.sender);
   return opened(std::move(*content));
 }
 

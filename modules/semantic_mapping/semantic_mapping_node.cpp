@@ -41,7 +41,7 @@ void SemanticMappingNode::stop() noexcept {
   const MappingProgress& p = progress_;
   log::info(name()) << p.integrated << " frames, " << p.size.vertices << " vertices, "
                     << p.size.faces << " faces, " << p.size.dropped_faces
-                    << " more seen anew and dropped; too late " << p.too_late;
+                    << " more seen again and dropped; too late " << p.too_late;
   if (p.wrong_size + p.bad_pose + p.labels_outside + p.blocks_refused > 0)
     log::warn(name()) << "skipped " << p.wrong_size << " frames of the wrong size and "
                       << p.bad_pose << " without a usable pose; " << p.labels_outside
@@ -53,7 +53,7 @@ void SemanticMappingNode::drop_superseded() {
   const Topic<SupersededSurface>::Message superseded = superseded_.take();
   if (superseded == nullptr) return;
   const SurfaceDrop dropped = mapper_.drop(before_ ? before_->drop(*superseded) : *superseded);
-  log::debug(name()) << "dropped " << dropped.faces << " faces seen anew";
+  log::debug(name()) << "dropped " << dropped.faces << " faces seen again";
 }
 
 void SemanticMappingNode::step(const DenseFrame& frame) {

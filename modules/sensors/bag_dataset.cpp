@@ -321,11 +321,11 @@ ReaderReport BagDataset::report() const {
 
 std::vector<std::string> BagDataset::remarks() const {
   std::vector<std::string> lines = rig_.notes;
-  const auto say = [&lines](const std::optional<Synchrony>& synchrony, const char* other) {
+  const auto add_line = [&lines](const std::optional<Synchrony>& synchrony, const char* other) {
     if (synchrony && is_remarkable(*synchrony)) lines.push_back(to_string(*synchrony, other));
   };
-  say(joiner_.right_synchrony(), "right");
-  say(joiner_.depth_synchrony(), "depth");
+  add_line(joiner_.right_synchrony(), "right");
+  add_line(joiner_.depth_synchrony(), "depth");
   return lines;
 }
 

@@ -90,7 +90,7 @@ LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,
 LoadedImage<cv::Mat> wrong_size(const std::string& place, const cv::Size& found,
                                 const cv::Size& size) {
   return image_failure(ImageStatus::kWrongSize, place,
-                       text(found) + " px, the calibration says " + text(size));
+                       text(found) + " px, the calibration states " + text(size));
 }
 
 LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,

@@ -30,24 +30,24 @@ const std::string& RigCompletion::body_topic() const {
   return topics.imu.empty() ? topics.gyro : topics.imu;
 }
 
-std::vector<RigCompletion::Teller> RigCompletion::tellers() const {
-  std::vector<Teller> tellers;
+std::vector<RigCompletion::Source> RigCompletion::sources() const {
+  std::vector<Source> sources;
   if (!partial_.has_cameras) {
-    tellers.push_back({partial_.info_topics[0], RosCameraInfo::kType});
-    if (has_right()) tellers.push_back({partial_.info_topics[1], RosCameraInfo::kType});
+    sources.push_back({partial_.info_topics[0], RosCameraInfo::kType});
+    if (has_right()) sources.push_back({partial_.info_topics[1], RosCameraInfo::kType});
   }
   if (!partial_.is_complete())
-    tellers.push_back({kStaticTransforms, RosTransforms::kType,
+    sources.push_back({kStaticTransforms, RosTransforms::kType,
                        !partial_.is_placed && partial_.body_frame.empty()});
   if (!partial_.is_placed) {
     if (partial_.body_frame.empty() && !body_topic().empty())
-      tellers.push_back({body_topic(), body_topic() == partial_.rig.topics.odometry
+      sources.push_back({body_topic(), body_topic() == partial_.rig.topics.odometry
                                            ? RosOdometry::kType
                                            : RosImu::kType});
     if (partial_.has_cameras)
-      tellers.push_back({partial_.rig.topics.left, type_of_images(partial_.rig.topics.left)});
+      sources.push_back({partial_.rig.topics.left, type_of_images(partial_.rig.topics.left)});
   }
-  return tellers;
+  return sources;
 }
 
 bool RigCompletion::take_info(std::size_t camera, const BagChannel& channel,
@@ -193,9 +193,9 @@ Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
                        ": the calibration is not complete; missing: " + completion.missing());
   };
   // If a bag lacks the topics, it need not be searched.
-  for (const auto& teller : completion.tellers())
-    if (!bag.is_live() && teller.is_needed &&
-        std::ranges::count(bag.channels(), teller.topic, &BagChannel::topic) == 0)
+  for (const auto& source : completion.sources())
+    if (!bag.is_live() && source.is_needed &&
+        std::ranges::count(bag.channels(), source.topic, &BagChannel::topic) == 0)
       fail();
   auto complete = completion.rig();
   while (!complete) {

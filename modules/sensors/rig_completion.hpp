@@ -42,12 +42,12 @@ class RigCompletion {
   explicit RigCompletion(PartialRig rig) : partial_(std::move(rig)) {}
 
   /// A topic that can supply missing parts, with the type of its messages.
-  struct Teller {
+  struct Source {
     std::string topic;
     std::string_view type;
     bool is_needed = true;  ///< False: another topic may supply the same part.
   };
-  [[nodiscard]] std::vector<Teller> tellers() const;
+  [[nodiscard]] std::vector<Source> sources() const;
 
   /// True if the message supplies a new part. Throws DatasetError with topic and value for a
   /// CameraInfo that is not a calibration.

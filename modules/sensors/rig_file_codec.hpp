@@ -137,9 +137,10 @@ struct RigFile {
         "is missing: odometry goes by cameras and an inertial sensor; a robot without one "
         "names the odometry that it has: odometry: {topic: ...} or {file: ...}, or --odometry "
         "FILE");
-    visitor.check(!right.topic.empty() || !depth.topic.empty(), "left",
-                  "is alone: a right camera or depth is needed (one camera does not tell how far "
-                  "things are)");
+    visitor.check(
+        !right.topic.empty() || !depth.topic.empty(), "left",
+        "is alone: a right camera or depth is needed (one camera does not measure how far "
+        "things are)");
   }
 };
 

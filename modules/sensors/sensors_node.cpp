@@ -96,8 +96,8 @@ void SensorsNode::take_faults() {
   }
   if (!reader_->is_live()) return;
   const std::string faults = to_string(report);
-  if (faults != told_faults_) log_lines(faults, name());
-  told_faults_ = faults;
+  if (faults != logged_faults_) log_lines(faults, name());
+  logged_faults_ = faults;
 }
 
 FrameUse SensorsNode::choose_use(Stamp stamp, Stamp arrival) {
@@ -122,12 +122,12 @@ FrameUse SensorsNode::choose_use(Stamp stamp, double due_s, double now_s) {
   const FrameUse use = shedding_.use_next(stamp, due_s, now_s);
   const ShedLoad now = shedding_.load();
   lock.unlock();
-  if (now != before) tell(before, now);
+  if (now != before) report_load(before, now);
   if (use == FrameUse::kNone) ++skipped_;
   return use;
 }
 
-void SensorsNode::tell(const ShedLoad& before, const ShedLoad& now) {
+void SensorsNode::report_load(const ShedLoad& before, const ShedLoad& now) {
   topics_.load.publish(now);
   const bool is_more = now.stride > before.stride || (now.map && !before.map);
   auto line = log::limited(is_more ? log::Level::kWarn : log::Level::kInfo, name(),

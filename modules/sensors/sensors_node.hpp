@@ -91,7 +91,7 @@ class SensorsNode final : public Node {
   void take_faults();
   [[nodiscard]] FrameUse choose_use(Stamp stamp, Stamp arrival);
   [[nodiscard]] FrameUse choose_use(Stamp stamp, double due_s, double now_s);
-  void tell(const ShedLoad& before, const ShedLoad& now);
+  void report_load(const ShedLoad& before, const ShedLoad& now);
   void step(const Packet& packet);
   void step(const EndOfData& end);
   void step(const std::exception_ptr& failure) { std::rethrow_exception(failure); }
@@ -110,7 +110,7 @@ class SensorsNode final : public Node {
   std::atomic<bool> stopped_ = false;
   mutable std::mutex faults_mutex_;
   ReaderReport faults_;
-  std::string told_faults_;  // last logged faults of a live source
+  std::string logged_faults_;  // last logged faults of a live source
   double counted_s_ = 0.0;
   Timing reading_;
   Heartbeat decoding_;  // a step reads one packet

@@ -115,8 +115,8 @@ StampVerdict StampOrder::judge(Stamp stamp) {
     good_ = std::min(good_ + 1, kNewTimes);
     return StampVerdict::kGood;
   }
-  const bool goes_on = jumps_ > 0 && stamp > *jump_ && is_near(*jump_, stamp);
-  jumps_ = goes_on ? jumps_ + 1 : 1;
+  const bool continues = jumps_ > 0 && stamp > *jump_ && is_near(*jump_, stamp);
+  jumps_ = continues ? jumps_ + 1 : 1;
   jump_ = stamp;
   if (jumps_ < kNewTimes || (stamp < *last_ && good_ == kNewTimes)) return StampVerdict::kJump;
   last_ = stamp;

@@ -125,7 +125,8 @@ std::size_t ViewWriter::write(const ViewContent& content) {
   wire.boot = self_.boot;
   wire.told = system_now();
   borrow(wire.content, bytes);
-  check_dds(dds_write(writer_.handle(), &wire), std::string("cannot tell ") + name_of(channel_));
+  check_dds(dds_write(writer_.handle(), &wire),
+            std::string("cannot publish on ") + name_of(channel_));
   constexpr std::size_t kHead = 4 + 28;  // Encoding header, and the fields before the content.
   return bytes.size() + kHead;
 }

@@ -39,7 +39,7 @@ class ViewIncumbents {
   void serve(double now_s, const Take& take) {
     const auto one = [&](const Process& from, ViewUpdate& update, double waited_s) {
       Incumbent& incumbent = incumbents_.at(from.first);
-      if (now_s - incumbent.heard_s.value_or(now_s - kSilent_s) >= kSilent_s)
+      if (now_s - incumbent.last_received_s.value_or(now_s - kSilent_s) >= kSilent_s)
         incumbent.boot = from.second;
       if (incumbent.boot == from.second) {
         pass(std::move(update), now_s, take);
@@ -59,14 +59,15 @@ class ViewIncumbents {
   using Process = std::pair<RobotId, std::uint64_t>;  // Robot id and boot id.
   struct Incumbent {
     std::uint64_t boot = 0;
-    std::optional<double> heard_s;  // Time of the last update; none after the process has left.
+    std::optional<double>
+        last_received_s;  // Time of the last update; none after the process has left.
   };
 
   template <typename Take>
   void pass(ViewUpdate update, double now_s, const Take& take) {
     const auto* const state = std::get_if<ViewState>(&update.content);
     const bool leaves = state != nullptr && state->phase == "leaving";
-    incumbents_.at(update.robot).heard_s = leaves ? std::nullopt : std::optional(now_s);
+    incumbents_.at(update.robot).last_received_s = leaves ? std::nullopt : std::optional(now_s);
     take(std::move(update));
   }
 

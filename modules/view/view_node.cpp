@@ -55,7 +55,7 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
                  {writer_on(participant, ViewChannel::kMesh), budget_of(config.mesh_bytes_per_s)},
                  {writer_on(participant, ViewChannel::kImages), budget_of(kUnlimited)}}},
       past_budget_(budget_of(config.past_bytes_per_s)),
-      teller_(self_),
+      selector_(self_),
       schedule_(mesh.min_move_m),
       worker_(
           kQueue, Overflow::kDropOldest, [this](const Input& input) { step(input); },
@@ -96,17 +96,17 @@ void ViewNode::start() {
 void ViewNode::stop() noexcept try {
   worker_.stop();
   ticks_.stop();
-  if (!std::exchange(stopped_, true) && error() == nullptr) tell_rest();
+  if (!std::exchange(stopped_, true) && error() == nullptr) send_rest();
 } catch (const std::exception& error) {
-  log::warn(name()) << "the last was not told: " << error.what();
+  log::warn(name()) << "the final state was not sent: " << error.what();
 }
 
 std::exception_ptr ViewNode::error() const {
   return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
-std::size_t ViewNode::told_bytes(ViewChannel channel) const {
-  return channels_[static_cast<std::size_t>(channel)].told_bytes;
+std::size_t ViewNode::sent_bytes(ViewChannel channel) const {
+  return channels_[static_cast<std::size_t>(channel)].sent_bytes;
 }
 
 void ViewNode::step(const Input& input) {
@@ -114,7 +114,7 @@ void ViewNode::step(const Input& input) {
 }
 
 void ViewNode::take(const Tick& /*tick*/) {
-  tell(steady_now_s());
+  send_due(steady_now_s());
 }
 
 void ViewNode::take(const MeshOffer& offer) {
@@ -123,32 +123,32 @@ void ViewNode::take(const MeshOffer& offer) {
 }
 
 void ViewNode::take(const Topic<PeerEvent>::Message& event) {
-  if (event->kind == PeerEventKind::kRestarted) teller_.restarted(event->identity.robot);
+  if (event->kind == PeerEventKind::kRestarted) selector_.restarted(event->identity.robot);
 }
 
 void ViewNode::take(const Topic<RobotStatus>::Message& status) {
-  heard_s_[status->robot] = steady_now_s();
+  last_received_s_[status->robot] = steady_now_s();
 }
 
 void ViewNode::take(const Topic<TrackedImage>::Message& image) {
   write(on(ViewChannel::kImages), view_image(*image, *camera_));
 }
 
-void ViewNode::tell(double now_s) {
+void ViewNode::send_due(double now_s) {
   are_images_asked_ = on(ViewChannel::kImages).writer.readers() > 0;
-  tell_view(now_s);
-  tell_mesh(now_s);
+  send_view(now_s);
+  send_mesh(now_s);
 }
 
 TokenBucket& ViewNode::view_budget() {
-  return teller_.tells_past() ? past_budget_ : on(ViewChannel::kView).budget;
+  return selector_.sends_past() ? past_budget_ : on(ViewChannel::kView).budget;
 }
 
 // An update is sent while the budget has no debt, and may itself cause a debt.
-void ViewNode::tell_view(double now_s) {
+void ViewNode::send_view(double now_s) {
   Channel& view = on(ViewChannel::kView);
   if (view.writer.newcomers() > 0) {
-    teller_.begin_again();
+    selector_.begin_again();
     state_due_s_ = now_s;
   }
   if (view.writer.readers() == 0) return;
@@ -159,7 +159,7 @@ void ViewNode::tell_view(double now_s) {
       content = state(now_s);
       state_due_s_ = now_s + kStatePeriod_s;
     } else {
-      content = teller_.next(now_s);
+      content = selector_.next(now_s);
     }
     const std::size_t bytes = content ? write(view, *content) : 0;
     if (bytes == 0) return;
@@ -167,16 +167,16 @@ void ViewNode::tell_view(double now_s) {
   }
 }
 
-void ViewNode::tell_mesh(double now_s) {
+void ViewNode::send_mesh(double now_s) {
   Channel& mesh = on(ViewChannel::kMesh);
   const bool has_newcomers = mesh.writer.newcomers() > 0;
-  const bool told_before = std::exchange(tells_mesh_, mesh.writer.readers() > 0);
-  if (has_newcomers || (told_before && !tells_mesh_)) {
+  const bool sent_before = std::exchange(sends_mesh_, mesh.writer.readers() > 0);
+  if (has_newcomers || (sent_before && !sends_mesh_)) {
     schedule_.begin_again();
     is_cut_ = mesh_.mesh == nullptr;
     cut_due_s_ = now_s;
   }
-  if (!tells_mesh_) return;
+  if (!sends_mesh_) return;
   if (!is_cut_ && now_s >= cut_due_s_) cut_mesh(now_s);
   while (mesh.budget.wait_s(0.0, now_s) <= 0.0) {
     const std::optional<MeshChunk> chunk = schedule_.next();
@@ -194,7 +194,7 @@ void ViewNode::cut_mesh(double now_s) {
   try {
     schedule_.update(split_mesh(*mesh_.mesh, self_, mesh_.anchor, mesh_settings_.grid).chunks);
   } catch (const std::invalid_argument& error) {
-    log::limited(log::Level::kWarn, name(), "mesh") << "a mesh is not told: " << error.what();
+    log::limited(log::Level::kWarn, name(), "mesh") << "a mesh is not sent: " << error.what();
   }
   cut_due_s_ = now_s + (steady_now_s() - begin_s) / kCutShare;
 }
@@ -209,18 +209,18 @@ ViewState ViewNode::state(double now_s) {
     state.cost = finite(progress_->cost);
     state.gradient_norm = finite(progress_->gradient_norm);
   }
-  for (const auto& [robot, heard_s] : heard_s_)
-    state.links.push_back({robot, static_cast<float>(std::max(0.0, now_s - heard_s))});
+  for (const auto& [robot, received_s] : last_received_s_)
+    state.links.push_back({robot, static_cast<float>(std::max(0.0, now_s - received_s))});
   constexpr std::array kNames = {"view", "view_mesh", "view_images"};
   for (std::size_t k = 0; k < kNames.size(); ++k)
-    state.sent_bytes.push_back({kNames[k], static_cast<double>(channels_[k].told_bytes)});
+    state.sent_bytes.push_back({kNames[k], static_cast<double>(channels_[k].sent_bytes)});
   return state;
 }
 
 // Returns the bytes sent, or 0 if DDS refused the update.
 std::size_t ViewNode::write(Channel& channel, const ViewContent& content) try {
   const std::size_t bytes = channel.writer.write(content);
-  channel.told_bytes += bytes;
+  channel.sent_bytes += bytes;
   return bytes;
 } catch (const DdsError& error) {
   log::limited(log::Level::kWarn, name(), "dds") << error.what();
@@ -228,21 +228,21 @@ std::size_t ViewNode::write(Channel& channel, const ViewContent& content) try {
 }
 
 // Sends the final state to the viewers that are still present.
-void ViewNode::tell_rest() {
+void ViewNode::send_rest() {
   const double now_s = steady_now_s();
   Channel& view = on(ViewChannel::kView);
   Channel& mesh = on(ViewChannel::kMesh);
   if (view.writer.readers() > 0) {
     auto bytes = static_cast<double>(write(view, state(now_s)));
-    const double late_s = now_s + ViewTeller::kKeyframePeriod_s;  // Time at which all updates are
-                                                                  // due.
+    const double late_s = now_s + ViewSelector::kKeyframePeriod_s;  // Time at which all updates are
+                                                                    // due.
     while (bytes < kRest_s * config_.past_bytes_per_s) {
-      const auto content = teller_.next(late_s);
+      const auto content = selector_.next(late_s);
       if (!content) break;
       bytes += static_cast<double>(write(view, *content));
     }
   }
-  if (tells_mesh_) {
+  if (sends_mesh_) {
     if (!is_cut_) cut_mesh(now_s);
     double bytes = 0.0;
     while (bytes < kMeshRest_s * config_.mesh_bytes_per_s) {
@@ -251,7 +251,7 @@ void ViewNode::tell_rest() {
       bytes += static_cast<double>(write(mesh, *chunk));
     }
     if (schedule_.waiting() > 0)
-      log::info(name()) << schedule_.waiting() << " pieces of the last mesh are not told";
+      log::info(name()) << schedule_.waiting() << " pieces of the last mesh are not sent";
   }
   for (const Channel* channel : {&view, &mesh})
     if (channel->writer.readers() > 0) channel->writer.await_readers(kAcknowledged_s);

@@ -18,7 +18,7 @@
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/view/view_channel_codec.hpp"
 #include "modules/view/view_config.hpp"
-#include "modules/view/view_teller.hpp"
+#include "modules/view/view_selector.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/dds/robot_status.hpp"
@@ -52,7 +52,7 @@ struct ViewMesh {
 };
 
 /// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's
-/// domain. It sends the updates of a ViewTeller, a state once a second, the mesh in chunks, and
+/// domain. It sends the updates of a ViewSelector, a state once a second, the mesh in chunks, and
 /// camera images on request. Each topic has a budget. While a topic has no reader, the node only
 /// keeps the newest inputs. No node waits for a viewer; updates that DDS cannot accept are lost.
 class ViewNode final : public Node {
@@ -97,40 +97,40 @@ class ViewNode final : public Node {
   void step(const Input& input);
 
   /// Sends the updates that are due at `now_s`.
-  void tell(double now_s);
+  void send_due(double now_s);
 
   /// Bytes sent on that channel since the start. Thread-safe.
-  [[nodiscard]] std::size_t told_bytes(ViewChannel channel) const;
+  [[nodiscard]] std::size_t sent_bytes(ViewChannel channel) const;
 
  private:
   /// One channel with its byte budget and the bytes it has sent.
   struct Channel {
     ViewWriter writer;
     TokenBucket budget;
-    std::atomic<std::size_t> told_bytes = 0;
+    std::atomic<std::size_t> sent_bytes = 0;
   };
 
   // Each take() stores an input, except for a Tick, which sends.
   void take(const Tick& tick);
   void take(const MeshOffer& offer);
   void take(const Topic<OptimizerProgress>::Message& progress) { progress_ = progress; }
-  void take(const Topic<Trajectory>::Message& trajectory) { teller_.add(trajectory); }
+  void take(const Topic<Trajectory>::Message& trajectory) { selector_.add(trajectory); }
   void take(const Topic<PeerEvent>::Message& event);
   void take(const Topic<RobotStatus>::Message& status);
   void take(const Topic<TrackedImage>::Message& image);
   template <typename T>
   void take(const std::shared_ptr<const T>& message) {
-    teller_.add(*message);
+    selector_.add(*message);
   }
 
   [[nodiscard]] Channel& on(ViewChannel channel) {
     return channels_[static_cast<std::size_t>(channel)];
   }
   [[nodiscard]] TokenBucket& view_budget();
-  void tell_view(double now_s);
-  void tell_mesh(double now_s);
+  void send_view(double now_s);
+  void send_mesh(double now_s);
   void cut_mesh(double now_s);
-  void tell_rest();
+  void send_rest();
   [[nodiscard]] ViewState state(double now_s);
   std::size_t write(Channel& channel, const ViewContent& content);
 
@@ -141,14 +141,14 @@ class ViewNode final : public Node {
   const Describe describe_;
   std::array<Channel, 3> channels_;
   TokenBucket past_budget_;  // Budget of kView while earlier data are sent.
-  ViewTeller teller_;
+  ViewSelector selector_;
   double state_due_s_ = 0.0;
   Topic<OptimizerProgress>::Message progress_;
-  std::map<RobotId, double> heard_s_;  // By robot: time of the last message.
-  MeshOffer mesh_;                     // The newest mesh.
-  bool is_cut_ = true;                 // True if `mesh_` is in the schedule.
+  std::map<RobotId, double> last_received_s_;  // By robot: time of the last message.
+  MeshOffer mesh_;                             // The newest mesh.
+  bool is_cut_ = true;                         // True if `mesh_` is in the schedule.
   double cut_due_s_ = 0.0;
-  bool tells_mesh_ = false;  // True if the mesh channel has a reader.
+  bool sends_mesh_ = false;  // True if the mesh channel has a reader.
   ChunkSchedule schedule_;
   std::atomic<bool> are_images_asked_ = false;
   bool stopped_ = false;

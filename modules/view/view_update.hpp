@@ -97,7 +97,7 @@ struct ViewUpdate {
   RobotId robot = 0;
   std::uint64_t boot = 0;  ///< Boot id of the process. A viewer discards the state of the robot
                            ///< when it changes.
-  Stamp told = 0;          ///< System clock [ns].
+  Stamp sent = 0;          ///< System clock [ns].
   ViewContent content;
 };
 

@@ -9,9 +9,10 @@
 namespace km {
 
 enum class StartStatus {
-  kAtRest,    ///< Images and inertial data agree that the body stands still.
-  kInMotion,  ///< Motion from stereo, aligned with the inertial data.
-  kGoesOn,  ///< Continues from the last state of an earlier process; not a result of guess_start().
+  kAtRest,          ///< Images and inertial data agree that the body stands still.
+  kInMotion,        ///< Motion from stereo, aligned with the inertial data.
+  kContinues,       ///< Continues from the last state of an earlier process; not a result of
+                    ///< guess_start().
   kTooFewImages,    ///< Fewer than kMinStartImages.
   kTooFewFeatures,  ///< Too few features with depth, or too few tracked, for motion from stereo.
   kInconsistent,    ///< Stereo and inertial data contradict each other.
@@ -19,7 +20,7 @@ enum class StartStatus {
 
 [[nodiscard]] constexpr bool started(StartStatus status) {
   return status == StartStatus::kAtRest || status == StartStatus::kInMotion ||
-         status == StartStatus::kGoesOn;
+         status == StartStatus::kContinues;
 }
 
 /// A guess of the states of the first images, for FixedLagSmoother::start(), or the reason for its

@@ -27,7 +27,7 @@ OutsideOdometry::OutsideOdometry(RobotId robot, DepthSource depth_source, const 
     : robot_(robot), depth_source_(depth_source), config_(checked(config)) {}
 
 void OutsideOdometry::continue_from(const VioCheckpoint& checkpoint) {
-  goes_on_ = true;
+  continues_ = true;
   last_keyframe_ = checkpoint.keyframe;
   last_ = last_kf_ = {checkpoint.keyframe.stamp, {checkpoint.state.T_odom_body}};
   T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
@@ -38,7 +38,7 @@ OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
   if (packet.frame == nullptr || !packet.pose || !packet.pose->T_odom_body.matrix().allFinite())
     return result;
   const Fix fix{packet.frame->stamp, *packet.pose};
-  const bool is_taken_up = std::exchange(goes_on_, false) && fix.stamp == last_keyframe_->stamp;
+  const bool is_taken_up = std::exchange(continues_, false) && fix.stamp == last_keyframe_->stamp;
   if (last_ && fix.stamp <= last_->stamp && !is_taken_up) return result;
   result.has_jumped = !is_taken_up && is_jump(fix);
   if (result.has_jumped)
@@ -62,7 +62,7 @@ OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
   // Frames refer to a keyframe, so a first keyframe must exist. One that locates points is better.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
-    hand_on(fix, T_odom_body, result.has_jumped, result);
+    add_keyframe(fix, T_odom_body, result.has_jumped, result);
   if (!last_keyframe_) return result;
   if (is_taken_up)  // the state was published earlier; the covariance was not kept
     last_kf_ = fix;
@@ -91,8 +91,8 @@ void OutsideOdometry::count_motion(const Fix& fix) {
   T_odom_rest_ = T_odom_body;
 }
 
-void OutsideOdometry::hand_on(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
-                              OutsideOdometryResult& result) {
+void OutsideOdometry::add_keyframe(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
+                                   OutsideOdometryResult& result) {
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, 0};
   keyframe.stamp = fix.stamp;

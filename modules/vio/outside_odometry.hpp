@@ -43,13 +43,13 @@ class OutsideOdometry {
 
   [[nodiscard]] bool is_jump(const Fix& fix) const;
   void count_motion(const Fix& fix);
-  void hand_on(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
-               OutsideOdometryResult& result);
+  void add_keyframe(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
+                    OutsideOdometryResult& result);
 
   RobotId robot_;
   DepthSource depth_source_;
   VioConfig config_;
-  bool goes_on_ = false;               // true until the first pose
+  bool continues_ = false;             // true until the first pose
   std::optional<Fix> last_, last_kf_;  // fixes as measured
   std::optional<KeyframeOdometry> last_keyframe_;
   double moved_s_ = 0.0;                // time in motion since the last keyframe

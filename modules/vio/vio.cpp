@@ -25,9 +25,9 @@ constexpr std::ptrdiff_t kFewOfSeen = 4;  // a quarter
 constexpr int kMostUnlocatedImages = 10;
 
 // After a loss of vision longer than kLongDark_s the smoother discards its prior from the dark,
-// kMended_s after vision is back. By then images have corrected the states of the dark.
+// kRecovered_s after vision is back. By then images have corrected the states of the dark.
 constexpr double kLongDark_s = 3.0;
-constexpr double kMended_s = 0.8;
+constexpr double kRecovered_s = 0.8;
 
 // Least number of features and longest time for which images alone carry the pose over a gap of
 // inertial samples.
@@ -94,7 +94,7 @@ VioResult Vio::process(const SensorPacket& packet) {
   if (in_gap_ && !takes_over(result.tracking, gap_s)) {
     held.data.samples.clear();
     restart(std::move(held));
-  } else if (first && goes_on_at(held)) {
+  } else if (first && can_continue_at(held)) {
     go_on(held, result);
   } else if (running_) {
     advance(held, result);
@@ -151,7 +151,7 @@ Eigen::Matrix3d Vio::turn(const std::vector<ImuSample>& samples, Stamp from, Sta
   return imu.add(samples, from, to) ? imu.motion().dR : Eigen::Matrix3d::Identity();
 }
 
-bool Vio::goes_on_at(const Held& held) const {
+bool Vio::can_continue_at(const Held& held) const {
   const Stamp stamp = held.frame->stamp;
   return last_keyframe_ && last_keyframe_->state_covariance && last_keyframe_->stamp == stamp &&
          last_->stamp == stamp;
@@ -162,7 +162,7 @@ void Vio::go_on(const Held& held, VioResult& result) {
   start_on(held, *last_, *last_keyframe_->state_covariance);
   ++statistics_.start_attempts;
   ++statistics_.starts;
-  result.start = StartStatus::kGoesOn;
+  result.start = StartStatus::kContinues;
   running_ = true;
   locate(*last_, held.frame, result);
 }
@@ -195,11 +195,11 @@ void Vio::try_start(VioResult& result) {
       ++statistics_.starts;
       result.states = *states;
       running_ = true;
-      take_up_or_hand_on_first(result);
+      continue_or_add_first_keyframe(result);
       locate(states->front(), held_.front().frame, result);
       for (std::size_t k = 1; k < held_.size(); ++k) {
         if (smoother_.window().frames[k].keyframe && due((*states)[k], *held_[k].frame))
-          hand_on((*states)[k], result);
+          add_keyframe((*states)[k], result);
         locate((*states)[k], held_[k].frame, result);
       }
       held_.clear();
@@ -261,23 +261,23 @@ void Vio::advance(const Held& held, VioResult& result) {
   }
   result.states.push_back(result.smoother->state);
   const bool last_chance = last_keyframe_ && smoother_.leaving(last_keyframe_->stamp);
-  const bool mended = has_mended(*held.frame);
-  if (mended ||
+  const bool recovered = has_recovered(*held.frame);
+  if (recovered ||
       (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame))))
-    hand_on(result.smoother->state, result);
-  if (mended) forget_dark(held, result.smoother->state);
+    add_keyframe(result.smoother->state, result);
+  if (recovered) drop_dark(held, result.smoother->state);
   locate(result.smoother->state, held.frame, result);
 }
 
-bool Vio::has_mended(const StereoFrame& frame) const {
-  return back_since_ && seconds_between(*back_since_, frame.stamp) >= kMended_s &&
+bool Vio::has_recovered(const StereoFrame& frame) const {
+  return back_since_ && seconds_between(*back_since_, frame.stamp) >= kRecovered_s &&
          locates_points(frame) && !smoother_.window().frames.back().rests;
 }
 
 // States from the dark have large errors, and so have the derivatives of the prior at them. With
 // this prior the smoother would move the pose for seconds; without it, images correct the pose at
 // once.
-void Vio::forget_dark(const Held& held, const OdometryState& state) {
+void Vio::drop_dark(const Held& held, const OdometryState& state) {
   back_since_.reset();
   if (last_keyframe_->state_covariance) start_on(held, state, *last_keyframe_->state_covariance);
 }
@@ -365,12 +365,12 @@ std::optional<StateCovariance> Vio::state_covariance_at(const OdometryState& sta
 }
 
 // If the first image is that of the last keyframe, the keyframe was published earlier.
-void Vio::take_up_or_hand_on_first(VioResult& result) {
+void Vio::continue_or_add_first_keyframe(VioResult& result) {
   const OdometryState& first = result.states.front();
-  if (!last_keyframe_ || last_keyframe_->stamp != first.stamp) hand_on_first(first, result);
+  if (!last_keyframe_ || last_keyframe_->stamp != first.stamp) add_first_keyframe(first, result);
 }
 
-void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
+void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
   KeyframeOdometry keyframe;
   keyframe.stamp = state.stamp;
   keyframe.T_odom_kf = T_chain_odom_ * state.T_odom_body;
@@ -392,7 +392,7 @@ void Vio::hand_on_first(const OdometryState& state, VioResult& result) {
   result.keyframes.push_back(keyframe);
 }
 
-void Vio::hand_on(const OdometryState& state, VioResult& result) {
+void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   const auto relative = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, last_keyframe_->id.index + 1};

@@ -91,22 +91,22 @@ class Vio {
   [[nodiscard]] bool takes_over(const TrackerStatistics& tracking, double gap_s) const;
   [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,
                                      Stamp to) const;
-  [[nodiscard]] bool goes_on_at(const Held& held) const;
+  [[nodiscard]] bool can_continue_at(const Held& held) const;
   void go_on(const Held& held, VioResult& result);
   void start_on(const Held& held, const OdometryState& state, const StateCovariance& covariance);
   void try_start(VioResult& result);
   void advance(const Held& held, VioResult& result);
   void restart(Held held);
-  [[nodiscard]] bool has_mended(const StereoFrame& frame) const;
-  void forget_dark(const Held& held, const OdometryState& state);
+  [[nodiscard]] bool has_recovered(const StereoFrame& frame) const;
+  void drop_dark(const Held& held, const OdometryState& state);
   void watch_vision(Stamp stamp, int features, VioResult& result);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
-  void take_up_or_hand_on_first(VioResult& result);
+  void continue_or_add_first_keyframe(VioResult& result);
   [[nodiscard]] double moved_s(Stamp stamp) const;
   [[nodiscard]] double unseen_s(Stamp stamp) const;
-  void hand_on_first(const OdometryState& state, VioResult& result);
-  void hand_on(const OdometryState& state, VioResult& result);
+  void add_first_keyframe(const OdometryState& state, VioResult& result);
+  void add_keyframe(const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<StateCovariance> state_covariance_at(
       const OdometryState& state) const;
   [[nodiscard]] std::optional<UncertainCalibration> known_calibration() const;

@@ -22,9 +22,10 @@ const char* text(VioProblem problem) {
     case VioProblem::kBadSamples:
       return "inertial samples out of order or beyond what sensors measure, refused";
     case VioProblem::kInertialGap:
-      return "gap in the inertial samples: images alone tell the motion, or a new start";
+      return "gap in the inertial samples: the motion is estimated from images alone, or odometry "
+             "starts again";
     case VioProblem::kDiverged:
-      return "estimate diverged, starting anew from the last pose";
+      return "estimate diverged, starting again from the last pose";
     case VioProblem::kStartTimeout:
       return "cannot start, giving up the oldest images held back";
   }
@@ -37,8 +38,8 @@ const char* text(StartStatus status) {
       return "started at rest";
     case StartStatus::kInMotion:
       return "started in motion";
-    case StartStatus::kGoesOn:
-      return "goes on from the last keyframe";
+    case StartStatus::kContinues:
+      return "continues from the last keyframe";
     case StartStatus::kTooFewImages:
       return "too few images to start";
     case StartStatus::kTooFewFeatures:
@@ -98,7 +99,7 @@ void VioNode::step(const SensorPacket& packet) {
     topics_.processed.publish(ProcessedFrame{packet.frame->stamp, tracked_share(result.tracking)});
 }
 
-void VioNode::tell(const VisionEvent& event) const {
+void VioNode::log_event(const VisionEvent& event) const {
   const std::string since = fixed(1e-9 * static_cast<double>(event.since), 3) + " s";
   if (event.is_lost)
     log::warn(name()) << "vision lost since " << since << ", " << event.features
@@ -112,9 +113,9 @@ void VioNode::report(const VioResult& result, Stamp stamp) const {
   if (result.problem != VioProblem::kNone)
     log::limited(log::Level::kWarn, name(), text(result.problem))
         << "at " << stamp << " ns: " << text(result.problem);
-  if (result.vision) tell(*result.vision);
+  if (result.vision) log_event(*result.vision);
   if (!result.start) return;
-  if (*result.start == StartStatus::kGoesOn)
+  if (*result.start == StartStatus::kContinues)
     log::info(name()) << text(*result.start);
   else if (started(*result.start))
     log::info(name()) << text(*result.start) << " with " << result.states.size() << " images";

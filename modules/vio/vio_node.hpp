@@ -49,7 +49,7 @@ class VioNode final : public Node {
 
  private:
   void report(const VioResult& result, Stamp stamp) const;
-  void tell(const VisionEvent& event) const;
+  void log_event(const VisionEvent& event) const;
 
   Vio vio_;
   const VioTopics topics_;

@@ -12,7 +12,7 @@ namespace km {
 namespace {
 
 constexpr std::chrono::seconds kAcknowledgementTime{2};
-constexpr double kTellKeys_s = 30.0;  // a robot that was short of memory may have lost one
+constexpr double kSendKeys_s = 30.0;  // a robot that was short of memory may have lost one
 constexpr std::size_t kMaxKeyMessageBytes = 512;
 constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // interval for changes that only the clock
                                                     // causes
@@ -51,15 +51,15 @@ DdsBridge::DdsBridge(const DdsParticipant& participant, const BudgetConfig& budg
       keys_(make_key_topic(participant, peers_)),
       waitset_(dds_create_waitset(participant.handle()), "wait set"),
       stop_request_(dds_create_guardcondition(participant.handle()), "guard condition"),
-      key_teller_(
-          kMaxAdmitted, Overflow::kDropOldest, [this](const TeamPeer& peer) { tell_key(peer); },
+      key_sender_(
+          kMaxAdmitted, Overflow::kDropOldest, [this](const TeamPeer& peer) { send_key(peer); },
           "dds_keys"),
       sender_(budget, participant.config().lease_s, outgoing_, keys_.get()) {
   for (const dds_entity_t condition :
        {stop_request_.handle(), peers_.discovery_condition(), peers_.liveliness_condition()})
     check_dds(dds_waitset_attach(waitset_.handle(), condition, kOther), "cannot wait");
   if (keys_ == nullptr) return;
-  hear_keys();
+  receive_keys();
   peers_.events().subscribe([this](const auto& event) { catch_up(*event); });
 }
 
@@ -67,7 +67,7 @@ DdsBridge::~DdsBridge() {
   stop();
 }
 
-void DdsBridge::hear_keys() {
+void DdsBridge::receive_keys() {
   add_incoming(
       key_topic(), true, {},
       [seal = participant_.seal()](const TeamPeer& sender, auto content, const auto&) {
@@ -75,17 +75,17 @@ void DdsBridge::hear_keys() {
       });
 }
 
-void DdsBridge::tell_key(const TeamPeer& peer) {
+void DdsBridge::send_key(const TeamPeer& peer) {
   auto message =
       participant_.seal()->with([&](TeamSeal& team) { return team.key_message_for(peer); });
   if (message) keys_->write(Addressee{peer.robot}, message_key({peer.boot}), *std::move(message));
 }
 
-void DdsBridge::tell_keys() {
+void DdsBridge::send_keys() {
   if (keys_ == nullptr) return;
   for (const Peer& peer : peers_.list())
     if (peer.state == PeerState::kAlive)
-      key_teller_.post({peer.identity.robot, peer.identity.boot});
+      key_sender_.post({peer.identity.robot, peer.identity.boot});
 }
 
 void DdsBridge::catch_up(const PeerEvent& event) {
@@ -123,7 +123,7 @@ TrafficSnapshot DdsBridge::traffic() const {
 
 void DdsBridge::start() {
   sender_.start();
-  if (keys_ != nullptr) key_teller_.start();
+  if (keys_ != nullptr) key_sender_.start();
   peers_.start();
   for (const auto& topic : incoming_) topic->start();
   receiver_ = std::thread(&DdsBridge::receive_until_stopped, this);
@@ -132,7 +132,7 @@ void DdsBridge::start() {
 void DdsBridge::stop() noexcept {
   if (std::exchange(stopped_, true)) return;
   sender_.stop();
-  key_teller_.stop();
+  key_sender_.stop();
   if (!receiver_.joinable()) return;
   await_acknowledgements();
   dds_set_guardcondition(stop_request_.handle(), true);
@@ -144,14 +144,14 @@ void DdsBridge::stop() noexcept {
 std::exception_ptr DdsBridge::error() const {
   if (receive_failed_) return receive_error_;
   if (const auto error = sender_.error()) return error;
-  if (const auto error = key_teller_.error()) return error;
+  if (const auto error = key_sender_.error()) return error;
   for (const auto& topic : incoming_)
     if (const auto error = topic->error()) return error;
   return peers_.error();
 }
 
 std::vector<Heartbeat*> DdsBridge::heartbeats() {
-  std::vector<Heartbeat*> all{&receiving_, &sender_.heartbeat(), &key_teller_.heartbeat()};
+  std::vector<Heartbeat*> all{&receiving_, &sender_.heartbeat(), &key_sender_.heartbeat()};
   for (const auto& topic : incoming_) all.push_back(&topic->heartbeat());
   return all;
 }
@@ -169,10 +169,10 @@ void DdsBridge::receive_until_stopped() try {
     // Peers are updated before their messages are read.
     const double now_s = steady_now_s();
     peers_.poll();
-    for (const TeamPeer& peer : peers_.take_admitted()) key_teller_.post(peer);
-    if (now_s - told_keys_s_ >= kTellKeys_s) {
-      told_keys_s_ = now_s;
-      tell_keys();
+    for (const TeamPeer& peer : peers_.take_admitted()) key_sender_.post(peer);
+    if (now_s - keys_sent_s_ >= kSendKeys_s) {
+      keys_sent_s_ = now_s;
+      send_keys();
     }
     const auto n = std::min(triggered.size(), static_cast<std::size_t>(count));
     for (std::size_t i = 0; i < n; ++i)

@@ -117,7 +117,7 @@ class DdsBridge final : public Node {
 
   /// In a team with keys, sends this process's key for messages to all to every present robot. The
   /// bridge also does so when a robot appears, and at intervals. Thread-safe.
-  void tell_keys();
+  void send_keys();
 
   /// Peers of this robot. Precondition: a crossing of kind kStatus is connected, because its
   /// liveliness shows which robots are present.
@@ -141,8 +141,8 @@ class DdsBridge final : public Node {
  private:
   OutgoingTopic& add_outgoing(TopicSpec spec);
   void add_incoming(TopicSpec spec, bool addressed, Pace pace, IncomingTopic::Handler handler);
-  void hear_keys();
-  void tell_key(const TeamPeer& peer);
+  void receive_keys();
+  void send_key(const TeamPeer& peer);
   void catch_up(const PeerEvent& event);
   void receive_until_stopped();
   void await_acknowledgements() noexcept;
@@ -151,8 +151,8 @@ class DdsBridge final : public Node {
   Peers peers_;
   std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;  // the sender's
   std::vector<std::unique_ptr<IncomingTopic>> incoming_;
-  const std::unique_ptr<OutgoingTopic> keys_;  // null without keys; used by key_teller_
-  double told_keys_s_ = 0.0;                   // receive thread only
+  const std::unique_ptr<OutgoingTopic> keys_;  // null without keys; used by key_sender_
+  double keys_sent_s_ = 0.0;                   // receive thread only
   DdsEntity waitset_;
   DdsEntity stop_request_;  // guard condition
   bool stopped_ = false;
@@ -162,7 +162,7 @@ class DdsBridge final : public Node {
   std::thread receiver_;
   // A thread apart from the sender's: the receive thread requests keys to be sent, and must not
   // wait for room there.
-  Worker<TeamPeer> key_teller_;
+  Worker<TeamPeer> key_sender_;
   Sender sender_;  // last members: stop first
 };
 

@@ -130,7 +130,7 @@ void IncomingTopic::arrive(Serdata serialized, dds_instance_handle_t writer, dou
   const Peers::Claim claim = peers_.claim_of(*guid);
   if (!waiting_.contains(*guid) && is_settled(claim.standing))
     return admit(std::move(serialized), *guid, claim, now_s);
-  hear_claim(*serialized, *guid, claim, now_s);
+  receive_claim(*serialized, *guid, claim, now_s);
   const std::size_t bytes = kept_bytes(*serialized);
   if (!waiting_.push(*guid, std::move(serialized), bytes, now_s))
     refuse("one too many from a robot that is not known yet");
@@ -162,9 +162,9 @@ bool IncomingTopic::is_settled(Standing standing) const {
 
 void IncomingTopic::admit(Serdata serialized, const Guid& writer, const Peers::Claim& claim,
                           double now_s) {
-  if (claim.standing == Standing::kStranger) return refuse("from no known robot");
+  if (claim.standing == Standing::kOutsider) return refuse("from no known robot");
   if (claim.standing == Standing::kTwin && !spec_.carries_keys) {
-    hear_claim(*serialized, writer, claim, now_s);
+    receive_claim(*serialized, writer, claim, now_s);
     return refuse("claims this robot's id");
   }
   file(std::move(serialized), claim.sender, writer, now_s);
@@ -184,8 +184,8 @@ void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid&
 
 // Handles a status of a participant that is not (yet) the robot it claims to be. The status of a
 // twin states how long that has been running; in a team with keys the seal identifies its sender.
-void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& writer,
-                               const Peers::Claim& claim, double now_s) {
+void IncomingTopic::receive_claim(const ddsi_serdata& serialized, const Guid& writer,
+                                  const Peers::Claim& claim, double now_s) {
   if (spec_.kind != TopicKind::kStatus) return;
   if (claim.standing != Standing::kRival && claim.standing != Standing::kTwin) return;
   const ReceivedEnvelope received(serialized);
@@ -194,7 +194,7 @@ void IncomingTopic::hear_claim(const ddsi_serdata& serialized, const Guid& write
   if (TeamPeer{envelope.robot, envelope.boot} != claim.sender) return;
   if (open(envelope, writer).how.status != Opened::Status::kOpened) return;
   if (claim.standing == Standing::kTwin) {
-    peers_.twin_heard(writer, kStatusPeriod_s * envelope.number, now_s - started_s_);
+    peers_.twin_received(writer, kStatusPeriod_s * envelope.number, now_s - started_s_);
   } else {
     peers_.prove(writer);
   }
@@ -287,15 +287,15 @@ IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, c
   const Opened::Status status = readable.how.status;
   if (status == Opened::Status::kNotYet) return Verdict::kNotYet;
   const char* reason = status == Opened::Status::kOpened
-                           ? hand_on(envelope, filed, readable.content)
+                           ? pass_to_handler(envelope, filed, readable.content)
                            : readable.how.reason;
   if (reason != nullptr) refuse(reason);
   return Verdict::kTaken;
 }
 
 // Returns the reason of a refusal, otherwise null. A duplicate is dropped without a reason.
-const char* IncomingTopic::hand_on(const km_wire_Envelope& envelope, const Filed& filed,
-                                   std::span<const std::uint8_t> content) {
+const char* IncomingTopic::pass_to_handler(const km_wire_Envelope& envelope, const Filed& filed,
+                                           std::span<const std::uint8_t> content) {
   std::shared_ptr<void> token = in_flight_->enter();  // before the check who is current, because it
                                                       // may wait
   if (TeamPeer{envelope.robot, envelope.boot} != filed.sender) return "claims another robot's id";

@@ -103,16 +103,16 @@ class IncomingTopic {
   bool is_settled(Standing standing) const;
   void admit(Serdata serialized, const Guid& writer, const Peers::Claim& claim, double now_s);
   void file(Serdata serialized, const TeamPeer& sender, const Guid& writer, double now_s);
-  void hear_claim(const ddsi_serdata& serialized, const Guid& writer, const Peers::Claim& claim,
-                  double now_s);
+  void receive_claim(const ddsi_serdata& serialized, const Guid& writer, const Peers::Claim& claim,
+                     double now_s);
   [[nodiscard]] Readable open(const km_wire_Envelope& envelope, const Guid& writer) const;
   void deliver_until_stopped();
   void await_key(Filed filed, double now_s);
   bool deliver_again(double now_s);
   Verdict deliver(const Filed& filed);
   Verdict accept(const km_wire_Envelope& envelope, const Filed& filed);
-  const char* hand_on(const km_wire_Envelope& envelope, const Filed& filed,
-                      std::span<const std::uint8_t> content);
+  const char* pass_to_handler(const km_wire_Envelope& envelope, const Filed& filed,
+                              std::span<const std::uint8_t> content);
   bool is_new(const TeamPeer& sender, std::uint32_t number);
   void refuse(const char* reason);
 

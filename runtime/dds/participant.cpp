@@ -204,7 +204,7 @@ DdsDomain::DdsDomain(const DdsConfig& config)
       "DDS domain " + std::to_string(config_.domain) + " on interface " + interface_.name +
           (config_.domain > static_cast<int>(kLastQuietDomain)
                ? " (its ports may be in use: up to " + std::to_string(kLastQuietDomain) +
-                     " they are not handed out to other programs)"
+                     " they are not given to other programs)"
                : ""));
 }
 

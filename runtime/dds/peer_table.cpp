@@ -18,21 +18,21 @@ void PeerTable::recall(const RobotIdentity& identity) {
   peers_.try_emplace(identity.robot, KnownPeer{{identity, PeerState::kLost, "unknown"}, Guid{}});
 }
 
-void PeerTable::tell(const RobotIdentity& identity) {
+void PeerTable::reported(const RobotIdentity& identity) {
   if (identity.robot == self_.robot) return;
   const auto found = peers_.find(identity.robot);
   if (found == peers_.end()) {
     if (peers_.size() >= kMaxRobots) return;
-    peers_.emplace(identity.robot, KnownPeer{{identity, PeerState::kTold, "unknown"}, Guid{}});
-    return emit(PeerEventKind::kTold, identity, "told of by others", false);
+    peers_.emplace(identity.robot, KnownPeer{{identity, PeerState::kReported, "unknown"}, Guid{}});
+    return emit(PeerEventKind::kReported, identity, "reported by other robots", false);
   }
   KnownPeer& known = found->second;
   const std::uint64_t former_boot = known.peer.identity.boot;
   if (known.peer.state == PeerState::kAlive || former_boot == identity.boot) return;
   const bool resumed = is_same_life(former_boot, identity.boot);
-  known = {{identity, PeerState::kTold, "unknown"}, Guid{}, known.arriving || !resumed};
+  known = {{identity, PeerState::kReported, "unknown"}, Guid{}, known.arriving || !resumed};
   emit(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, identity,
-       resumed ? "resumed, as others tell" : "restarted, as others tell", false);
+       resumed ? "resumed, as other robots report" : "restarted, as other robots report", false);
 }
 
 bool PeerTable::is_arriving(RobotId robot) const {
@@ -59,7 +59,7 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
   const auto& [identity, credentials] = *decoded.value;
   if (identity.protocol != self_.protocol)
     return emit(PeerEventKind::kRefused, identity,
-                "refused: speaks protocol version " + std::to_string(identity.protocol) +
+                "refused: uses protocol version " + std::to_string(identity.protocol) +
                     ", this robot " + std::to_string(self_.protocol));
   if (const char* reason = admit_ ? admit_(identity, credentials) : nullptr)
     return emit(PeerEventKind::kRefused, identity, std::string("refused: ") + reason);
@@ -74,7 +74,7 @@ void PeerTable::prove(const Guid& guid) {
   appear_if_there(guid, found->second);
 }
 
-void PeerTable::told(const TeamPeer& restarted) {
+void PeerTable::restart_handled(const TeamPeer& restarted) {
   if (is_current(restarted)) peers_.at(restarted.robot).arriving = false;
 }
 
@@ -104,7 +104,7 @@ void PeerTable::closed(const Guid& guid) {
   give_way(guid, PeerState::kLeft, PeerEventKind::kLeft, "left");
 }
 
-void PeerTable::twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s) {
+void PeerTable::twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s) {
   const auto found = participants_.find(guid);
   if (found == participants_.end() || !found->second.identity) return;
   Participant& twin = found->second;
@@ -135,7 +135,7 @@ Standing PeerTable::standing(const Guid& guid) const {
   if (found == participants_.end()) return Standing::kUnknown;
   const Participant& participant = found->second;
   if (!participant.identity)
-    return participant.announced ? Standing::kStranger : Standing::kUnknown;
+    return participant.announced ? Standing::kOutsider : Standing::kUnknown;
   if (participant.identity->robot == self_.robot) return Standing::kTwin;
   const auto known = peers_.find(participant.identity->robot);
   if (known == peers_.end() || known->second.guid != guid) return Standing::kRival;
@@ -158,7 +158,7 @@ void PeerTable::appear_if_there(const Guid& guid, Participant& participant) {
 
 void PeerTable::appear(const Guid& guid, Participant& participant) {
   const RobotIdentity& identity = *participant.identity;
-  if (identity.robot == self_.robot) return;  // twin_heard() decides by uptime
+  if (identity.robot == self_.robot) return;  // twin_received() decides by uptime
   const auto found = peers_.find(identity.robot);
   if (found == peers_.end()) {
     if (peers_.size() >= kMaxRobots)
@@ -173,7 +173,7 @@ void PeerTable::appear(const Guid& guid, Participant& participant) {
     return take_over(known, guid, participant);
   if (!std::exchange(participant.warned, true))
     emit(PeerEventKind::kRefused, identity,
-         "at " + participant.addresses + " not heard: another process, at " + known.peer.addresses +
+         "at " + participant.addresses + " ignored: another process, at " + known.peer.addresses +
              ", has that id, until it falls silent");
 }
 
@@ -228,8 +228,8 @@ PeerTable::Participant* PeerTable::remember(const Guid& guid) {
 }
 
 void PeerTable::emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text,
-                     bool heard) {
-  events_.push_back({kind, identity, to_string(identity) + ' ' + text, heard});
+                     bool direct) {
+  events_.push_back({kind, identity, to_string(identity) + ' ' + text, direct});
 }
 
 }  // namespace km

@@ -14,8 +14,8 @@
 
 namespace km {
 
-/// kLost: became silent. kLeft: announced its end. kTold: known only through other robots.
-enum class PeerState { kAlive, kLost, kLeft, kTold };
+/// kLost: became silent. kLeft: announced its end. kReported: known only through other robots.
+enum class PeerState { kAlive, kLost, kLeft, kReported };
 
 /// Last known state of another robot of the team.
 struct Peer {
@@ -26,7 +26,7 @@ struct Peer {
 
 enum class PeerEventKind {
   kJoined,     ///< First received.
-  kTold,       ///< First reported by other robots.
+  kReported,   ///< First reported by other robots.
   kLost,       ///< Silent for longer than dds.liveliness_s.
   kReturned,   ///< Received again, same boot id.
   kResumed,    ///< Same robot id, other boot id of the same incarnation: its keyframes are
@@ -42,7 +42,7 @@ enum class PeerEventKind {
 /// Trust in the messages of a participant.
 enum class Standing {
   kUnknown,   ///< No data are known yet.
-  kStranger,  ///< Not a robot, or refused.
+  kOutsider,  ///< Not a robot, or refused.
   kTwin,      ///< Claims this robot's id.
   kRival,     ///< Claims the id of a present robot, or has not been received itself.
   kArriving,  ///< The robot of its id, but not all nodes know yet that its former incarnation has
@@ -54,7 +54,7 @@ struct PeerEvent {
   PeerEventKind kind;
   RobotIdentity identity;  ///< Identity of the peer; default if it could not be read.
   std::string text;        ///< One line for people.
-  bool heard = true;       ///< False if other robots have reported it.
+  bool direct = true;      ///< False if other robots have reported it.
 };
 
 /// Determines the present robots: turns DDS reports about participants and the liveliness of their
@@ -83,9 +83,9 @@ class PeerTable {
   void recall(const RobotIdentity& identity);
 
   /// Other robots receive this robot, or have received it. Their report counts if it is not
-  /// received here directly: kTold if it is new, kResumed or kRestarted if another process of it
-  /// was known.
-  void tell(const RobotIdentity& identity);
+  /// received here directly: kReported if it is new, kResumed or kRestarted if another process of
+  /// it was known.
+  void reported(const RobotIdentity& identity);
 
   /// A participant announced itself (again) with this user data.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
@@ -96,7 +96,7 @@ class PeerTable {
 
   /// Notes that all nodes have handled the event of this process; only then are its messages
   /// delivered.
-  void told(const TeamPeer& restarted);
+  void restart_handled(const TeamPeer& restarted);
 
   /// Notes that the status writer with this GUID is alive, silent, or closed.
   void alive(const Guid& guid);
@@ -106,7 +106,7 @@ class PeerTable {
   /// Handles a status of a process with this robot's own id. The arguments state how long that
   /// process and this one have been running, both [s]. The younger process yields if it is new
   /// itself, so no process can take the id of an older one.
-  void twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s);
+  void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   /// Events since the last call, in order.
   [[nodiscard]] std::vector<PeerEvent> take_events() { return std::exchange(events_, {}); }
@@ -148,7 +148,7 @@ class PeerTable {
   void give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text);
   Participant* remember(const Guid& guid);
   void emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text,
-            bool heard = true);
+            bool direct = true);
 
   RobotIdentity self_;
   Admit admit_;

@@ -160,10 +160,10 @@ void Peers::recall(const RobotIdentity& identity) {
   table_.recall(identity);
 }
 
-void Peers::tell(const RobotIdentity& identity) {
+void Peers::reported(const RobotIdentity& identity) {
   {
     const std::lock_guard lock(mutex_);
-    table_.tell(identity);
+    table_.reported(identity);
   }
   publish_events();
 }
@@ -194,10 +194,10 @@ bool Peers::is_current(const TeamPeer& sender) const {
   return table_.is_current(sender);
 }
 
-void Peers::twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s) {
+void Peers::twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s) {
   {
     const std::lock_guard lock(mutex_);
-    table_.twin_heard(guid, its_uptime_s, own_uptime_s);
+    table_.twin_received(guid, its_uptime_s, own_uptime_s);
   }
   publish_events();
 }
@@ -219,7 +219,7 @@ void Peers::poll() {
   take_liveliness();
   {
     const std::lock_guard lock(mutex_);
-    for (const TeamPeer& restarted : receipts_->take()) table_.told(restarted);
+    for (const TeamPeer& restarted : receipts_->take()) table_.restart_handled(restarted);
   }
   publish_events();
 }

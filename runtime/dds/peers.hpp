@@ -70,7 +70,7 @@ class Peers {
   void recall(const RobotIdentity& identity);
 
   /// See PeerTable. Thread-safe.
-  void tell(const RobotIdentity& identity);
+  void reported(const RobotIdentity& identity);
   [[nodiscard]] bool is_arriving(RobotId robot) const;
 
   /// Robots of the team ever met by this one, ascending by id.
@@ -81,7 +81,7 @@ class Peers {
   /// Handling of the messages of a participant, and its claimed identity.
   struct Claim {
     Standing standing = Standing::kUnknown;
-    TeamPeer sender;  ///< Set for a robot: neither kUnknown nor kStranger.
+    TeamPeer sender;  ///< Set for a robot: neither kUnknown nor kOutsider.
   };
   [[nodiscard]] Claim claim_of(const Guid& guid) const;
   [[nodiscard]] bool is_current(const TeamPeer& sender) const;
@@ -92,7 +92,7 @@ class Peers {
 
   /// See PeerTable.
   void prove(const Guid& guid);
-  void twin_heard(const Guid& guid, double its_uptime_s, double own_uptime_s);
+  void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   // For the bridge.
 

@@ -58,12 +58,12 @@ std::string to_string(const RobotIdentity& identity) {
 
 std::uint64_t random_boot_id() {
   std::random_device device;
-  std::uint64_t life = 0;
-  while (life == 0) {
-    life = device();
-    life = ((life << 32U) ^ device()) >> kResumeBits;
+  std::uint64_t incarnation = 0;
+  while (incarnation == 0) {
+    incarnation = device();
+    incarnation = ((incarnation << 32U) ^ device()) >> kResumeBits;
   }
-  return life << kResumeBits;
+  return incarnation << kResumeBits;
 }
 
 std::string to_user_data(const RobotIdentity& identity, std::string_view credentials) {

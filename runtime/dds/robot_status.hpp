@@ -56,7 +56,7 @@ struct Codec<RobotStatus> {
 
   struct Encoded {
     Wire wire{};
-    std::vector<std::uint16_t> hears;
+    std::vector<std::uint16_t> received;
     std::vector<km_wire_RelayHeld> holds;
   };
   static MessageKey key_of(const RobotStatus& status);

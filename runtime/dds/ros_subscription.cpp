@@ -47,8 +47,8 @@ RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
 
 // Messages lost before the first next() do not count.
 void RosSubscription::begin() {
-  told_s_ = steady_now_s();
-  heard_s_.assign(readers_.size(), told_s_);
+  silence_checked_s_ = steady_now_s();
+  last_received_s_.assign(readers_.size(), silence_checked_s_);
   for (std::size_t topic = 0; topic < readers_.size(); ++topic)
     lost_before_.push_back(lost_ever(topic));
 }
@@ -73,20 +73,20 @@ void RosSubscription::add(std::size_t topic, const ddsi_serdata& sample) {
   RosMessage message{topic, wall_now(), std::vector<std::uint8_t>(ddsi_serdata_size(&sample))};
   ddsi_serdata_to_ser(&sample, 0, message.bytes.size(), message.bytes.data());
   taken_.push_back(std::move(message));
-  heard_s_[topic] = steady_now_s();
+  last_received_s_[topic] = steady_now_s();
 }
 
 // Reports silent topics, because a dead driver or a wrong topic name is the most frequent error.
-void RosSubscription::tell_silence() {
+void RosSubscription::report_silence() {
   const double now_s = steady_now_s();
-  if (now_s - told_s_ < kSilence_s) return;
-  told_s_ = now_s;
+  if (now_s - silence_checked_s_ < kSilence_s) return;
+  silence_checked_s_ = now_s;
   for (std::size_t topic = 0; topic < topics_.size(); ++topic) {
-    if (now_s - heard_s_[topic] < kSilence_s) continue;
+    if (now_s - last_received_s_[topic] < kSilence_s) continue;
     dds_subscription_matched_status_t status{};
     dds_get_subscription_matched_status(readers_[topic].handle(), &status);
     log::warn("ros") << "nothing on " << topics_[topic].topic << " (" << topics_[topic].type
-                     << ") for " << std::lround(now_s - heard_s_[topic]) << " s; "
+                     << ") for " << std::lround(now_s - last_received_s_[topic]) << " s; "
                      << status.current_count << " publish it on ROS domain " << network_->domain()
                      << (status.current_count > 0
                              ? ""
@@ -99,10 +99,10 @@ void RosSubscription::give_up_after(double patience_s) {
 }
 
 std::optional<RosMessage> RosSubscription::next() {
-  if (heard_s_.empty()) begin();
+  if (last_received_s_.empty()) begin();
   const auto is_over = [this] { return stopped_ || steady_now_s() >= end_s_; };
   while (taken_.empty() && !is_over()) {
-    tell_silence();
+    report_silence();
     std::array<dds_attach_t, 16> ready{};
     const auto count = [&] {
       const Heartbeat::Waiting waiting;

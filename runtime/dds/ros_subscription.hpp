@@ -56,7 +56,7 @@ class RosSubscription {
   void begin();
   void take_from(std::size_t topic);
   void add(std::size_t topic, const ddsi_serdata& sample);
-  void tell_silence();
+  void report_silence();
   [[nodiscard]] std::uint64_t lost_ever(std::size_t topic) const;
 
   std::shared_ptr<const RosNetwork> network_;  // outlives the members below
@@ -65,9 +65,9 @@ class RosSubscription {
   DdsEntity waitset_, guard_;
   std::deque<RosMessage> taken_;
   std::vector<std::uint64_t> lost_before_;  // by topic: lost messages before the first next()
-  std::vector<double> heard_s_;  // by topic: time of the last message by the steady clock; empty
-                                 // before next()
-  double told_s_ = 0.0;          // time of the last check for silence
+  std::vector<double> last_received_s_;  // by topic: time of the last message by the steady clock;
+                                         // empty before next()
+  double silence_checked_s_ = 0.0;       // time of the last check for silence
   double end_s_ = std::numeric_limits<double>::infinity();
   std::atomic<bool> stopped_ = false;
 };

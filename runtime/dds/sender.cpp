@@ -66,7 +66,7 @@ void Sender::run() try {
       file(*message);
   }
   schedule_.drop_all();
-  tell();
+  report();
 } catch (...) {
   error_ = std::current_exception();
   failed_ = true;  // set after error_, so that readers of the flag see the error
@@ -103,7 +103,7 @@ bool Sender::send_next() {
   auto next = schedule_.pop(now_s, [this](const auto& entry) { return readers_of(entry); });
   if (!next) {
     holds_back_ = schedule_.wait_s().has_value();
-    tell();
+    report();
     return false;
   }
   const Heartbeat::Step step(heartbeat_);
@@ -152,7 +152,7 @@ void Sender::settle(double now_s) {
   schedule_.settle(sent_bytes, now_s);
 }
 
-void Sender::tell() {
+void Sender::report() {
   if (!schedule_.is_limited()) return;
   bool lost = false;
   {
@@ -163,10 +163,10 @@ void Sender::tell() {
       lost |= held.dropped.messages > 0;
     }
   }
-  if (holds_back_ && !std::exchange(told_delay_, true))
+  if (holds_back_ && !std::exchange(delay_reported_, true))
     log::info("dds") << "the budget is used up for now: messages wait, see traffic.csv";
-  if (lost && !std::exchange(told_loss_, true))
-    log::warn("dds") << "messages are not sent for want of budget, see traffic.csv";
+  if (lost && !std::exchange(loss_reported_, true))
+    log::warn("dds") << "messages are not sent because the budget is used up, see traffic.csv";
 }
 
 }  // namespace km

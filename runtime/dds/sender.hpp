@@ -84,7 +84,7 @@ class Sender {
   bool send_next();
   void file(const Outgoing& message);
   void settle(double now_s);
-  void tell();
+  void report();
   [[nodiscard]] std::optional<std::vector<RobotId>> readers_of(const Schedule::Entry& entry) const;
 
   const double lease_s_;
@@ -93,7 +93,7 @@ class Sender {
   BoundedQueue<Outgoing> posted_;
   Schedule schedule_;  // the thread's own, as what follows
   double settled_s_ = 0.0;
-  bool told_delay_ = false, told_loss_ = false;
+  bool delay_reported_ = false, loss_reported_ = false;
   std::atomic<bool> holds_back_ = false;
   mutable std::mutex mutex_;  // guards held_ and due_
   std::map<const OutgoingTopic*, HeldBack> held_;

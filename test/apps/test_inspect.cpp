@@ -6,8 +6,8 @@
 
 #include "apps/robot/inspect.hpp"
 #include "modules/core/input_file.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {

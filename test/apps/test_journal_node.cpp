@@ -54,14 +54,14 @@ struct Journal {
 
 TEST_CASE("Closures found while the journal stops are written and published", "[robot]") {
   Journal journal;
-  Inbox<Closure> handed_on(journal.topics.own_closures);
+  Inbox<Closure> passed(journal.topics.own_closures);
   Closure closure;
   closure.from.id = {1, 2};
   closure.to.id = {3, 4};
   journal.topics.new_closures.publish(closure);
   journal.node.stop();
-  REQUIRE(handed_on.messages().size() == 1);
-  CHECK(handed_on.messages()[0].id() == closure.id());
+  REQUIRE(passed.messages().size() == 1);
+  CHECK(passed.messages()[0].id() == closure.id());
   const auto written = journal.written<Closure>();
   REQUIRE(written.size() == 1);
   CHECK(written[0].id() == closure.id());
@@ -69,14 +69,14 @@ TEST_CASE("Closures found while the journal stops are written and published", "[
 
 TEST_CASE("The journal knows a published keyframe as long as its file exists", "[robot]") {
   Journal journal;
-  Inbox<Keyframe> handed_on(journal.topics.keyframes);
+  Inbox<Keyframe> passed(journal.topics.keyframes);
   Keyframe keyframe;
   keyframe.odometry.id = {1, 0};
   keyframe.stamp = 17;
   CHECK(journal.node.recall(0) == nullptr);
   journal.topics.new_keyframes.publish(keyframe);
   journal.node.stop();
-  REQUIRE(handed_on.messages().size() == 1);
+  REQUIRE(passed.messages().size() == 1);
   const auto recalled = journal.node.recall(0);
   REQUIRE(recalled != nullptr);
   CHECK(recalled->stamp == 17);

@@ -77,24 +77,24 @@ TEST_CASE("A robot whose graph never settles leaves at the limit", "[departure]"
 // a poll later. Robot `restless` settles at `from_s` only.
 std::vector<double> departures(std::size_t count, std::size_t restless, double from_s) {
   std::vector<Departure> robots(count, Departure(kSettle_s, kLimit_s));
-  std::vector<Departure::Present> told(count);
+  std::vector<Departure::Present> reported(count);
   std::vector<double> left_s(count, 0.0);
   for (int poll = 0; poll < 600; ++poll) {
     const double now_s = 0.1 * poll;
-    const auto before = told;
+    const auto before = reported;
     for (std::size_t k = 0; k < count; ++k) {
       if (left_s[k] > 0.0) continue;
-      std::vector<Departure::Present> heard;
+      std::vector<Departure::Present> received;
       for (const std::size_t other : {k - 1, k + 1})
         if (other < count && (left_s[other] == 0.0 || now_s - left_s[other] < 1.0))
-          heard.push_back(before[other]);
-      told[k] = robots[k].update(now_s, {.input_ended = true,
-                                         .graph_settled = k != restless || now_s >= from_s,
-                                         .activity = 0,
-                                         .present_peers = heard,
-                                         .unheard = count - 1 - heard.size()});
+          received.push_back(before[other]);
+      reported[k] = robots[k].update(now_s, {.input_ended = true,
+                                             .graph_settled = k != restless || now_s >= from_s,
+                                             .activity = 0,
+                                             .present_peers = received,
+                                             .not_received = count - 1 - received.size()});
       if (robots[k].reason() == nullptr) continue;
-      told[k].phase = RobotPhase::kLeaving;
+      reported[k].phase = RobotPhase::kLeaving;
       left_s[k] = now_s;
     }
   }
@@ -170,11 +170,12 @@ TEST_CASE("A robot that leaves without others has a verdict of its own that name
   RunEnd end = usual_end();
   end.missed = {{"bob", Absence::kSilent, 31.24}};
   CHECK(verdict_of(end).exit_code == 0);
-  CHECK(verdict_of(end).reason == "settled without bob (not heard for 31.2 s)");
+  CHECK(verdict_of(end).reason == "settled without bob (not received for 31.2 s)");
   end.departure = "time limit for serving peers";
   end.missed.push_back({"carol", Absence::kApart, 7.0});
   CHECK(verdict_of(end).reason ==
-        "time limit for serving peers without bob (not heard for 31.2 s), carol (heard, but not in "
+        "time limit for serving peers without bob (not received for 31.2 s), carol (received, but "
+        "not in "
         "one frame for 7.0 s)");
   end.result.interrupted = true;
   CHECK(verdict_of(end).reason == "interrupted");  // it was interrupted before it could leave
@@ -183,9 +184,9 @@ TEST_CASE("A robot that leaves without others has a verdict of its own that name
 using enum Absentees::Contact;
 
 // "bob silent 10 carol apart 7 "
-std::string told(const Absentees& absentees, double hearsay_s = 0.0) {
+std::string text_of(const Absentees& absentees, double second_hand_s = 0.0) {
   std::string text;
-  for (const MissedPeer& peer : absentees.missed(hearsay_s))
+  for (const MissedPeer& peer : absentees.missed(second_hand_s))
     text += peer.name + (peer.why == Absence::kSilent ? " silent " : " apart ") +
             std::to_string(static_cast<int>(peer.missed_s)) + ' ';
   return text;
@@ -194,34 +195,35 @@ std::string told(const Absentees& absentees, double hearsay_s = 0.0) {
 TEST_CASE("A robot is missed for as long as it has been silent or in another frame", "[run_end]") {
   const std::vector<RobotId> alone{1}, with_bob{1, 2};
   Absentees absentees;
-  CHECK(told(absentees).empty());
-  absentees.update(99.0, {{2, {"bob", kHeard}}, {7, {"carol", kHeard}}}, with_bob);
-  CHECK(told(absentees) == "carol apart 0 ");
-  absentees.update(100.0, {{2, {"bob", kSilent}}, {7, {"carol", kHeard}}}, alone);
+  CHECK(text_of(absentees).empty());
+  absentees.update(99.0, {{2, {"bob", kReceived}}, {7, {"carol", kReceived}}}, with_bob);
+  CHECK(text_of(absentees) == "carol apart 0 ");
+  absentees.update(100.0, {{2, {"bob", kSilent}}, {7, {"carol", kReceived}}}, alone);
   absentees.update(103.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
   absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
-  CHECK(told(absentees) == "bob silent 10 carol silent 7 ");
+  CHECK(text_of(absentees) == "bob silent 10 carol silent 7 ");
   absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, with_bob);
-  CHECK(told(absentees) == "carol silent 7 ");  // others hear bob
-  absentees.update(111.0, {{2, {"bob", kHeard}}, {7, {"carol", kSilent}}}, alone);
-  absentees.update(112.0, {{2, {"bob", kHeard}}, {7, {"carol", kLeft}}}, alone);
-  CHECK(told(absentees) == "bob apart 1 ");
+  CHECK(text_of(absentees) == "carol silent 7 ");  // others hear bob
+  absentees.update(111.0, {{2, {"bob", kReceived}}, {7, {"carol", kSilent}}}, alone);
+  absentees.update(112.0, {{2, {"bob", kReceived}}, {7, {"carol", kLeft}}}, alone);
+  CHECK(text_of(absentees) == "bob apart 1 ");
 }
 
-TEST_CASE("A member that only others heard is missed once it cannot have left in order",
+TEST_CASE("A member that only others received is missed once it cannot have left in order",
           "[run_end]") {
   Absentees absentees;
-  absentees.update(5.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2, 7});
-  absentees.update(6.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2});
-  absentees.update(8.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2});
-  CHECK(told(absentees, 3.0).empty());
-  absentees.update(9.0, {{2, {"bob", kHeard}}}, std::vector<RobotId>{1, 2});
-  CHECK(told(absentees, 3.0) == "robot 7 silent 3 ");
+  absentees.update(5.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2, 7});
+  absentees.update(6.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2});
+  absentees.update(8.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2});
+  CHECK(text_of(absentees, 3.0).empty());
+  absentees.update(9.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2});
+  CHECK(text_of(absentees, 3.0) == "robot 7 silent 3 ");
   // Robots of which only others know have a name, also if they have never been members.
-  absentees.update(10.0, {{2, {"bob", kHeard}}, {7, {"carol", kTold}}, {9, {"dave", kTold}}},
+  absentees.update(10.0,
+                   {{2, {"bob", kReceived}}, {7, {"carol", kReported}}, {9, {"dave", kReported}}},
                    std::vector<RobotId>{1, 2});
-  CHECK(told(absentees, 3.0) == "carol silent 4 ");
-  CHECK(told(absentees, 5.0).empty());
+  CHECK(text_of(absentees, 3.0) == "carol silent 4 ");
+  CHECK(text_of(absentees, 5.0).empty());
 }
 
 TEST_CASE("Lost results are reported with their reasons and have the least severe exit code",

@@ -75,10 +75,10 @@ TEST_CASE("If robots share enough closures, a lost link is named as the reason w
   CHECK_THAT(what(), Catch::StartsWith("alice and bob did not join: "));
   run.summary.lost_peers = {{"bob", 12.0}};
   CHECK_THAT(what(), Catch::StartsWith("alice and bob are not in one frame in the end: ") &&
-                         Catch::Contains("20 kept, but one was not heard any more"));
+                         Catch::Contains("20 kept, but one was not received any more"));
   run.closures[2] = tally_of(400, 100, 0, 0);  // without candidates, that is the reason
   CHECK_THAT(what(), Catch::StartsWith("alice and bob did not join: ") &&
-                         !Catch::Contains("not heard any more"));
+                         !Catch::Contains("not received any more"));
 }
 
 TEST_CASE("Two robots did not join for the first stage that stopped their closures",
@@ -143,7 +143,7 @@ TEST_CASE("A tally counts the stages that a closure came through, and why it sto
 TEST_CASE("A finding on a run is reported with its number", "[robot][findings]") {
   RunFacts run = run_of(0, true, tally_of(40, 30, 10, 10));
   RunSummary& summary = run.summary;
-  const auto told = [&](const char* id, Severity severity, const char* number) {
+  const auto check_finding = [&](const char* id, Severity severity, const char* number) {
     const Finding finding = the_finding_of(run);
     CHECK(finding.id == id);
     CHECK(finding.severity == severity);
@@ -151,53 +151,54 @@ TEST_CASE("A finding on a run is reported with its number", "[robot][findings]")
   };
   SECTION("no frame at all") {
     summary.frames = 0;
-    told("frames.none", Severity::kError, "0 frames, 0 keyframes");
+    check_finding("frames.none", Severity::kError, "0 frames, 0 keyframes");
     summary.keyframes = 30;  // a pose graph that is played has no frames
     CHECK(findings_of_one(run).empty());
   }
   SECTION("frames skipped") {
     summary.frames_skipped = 500;
-    told("frames.skipped", Severity::kWarning, "500 frames skipped, 50 %");
+    check_finding("frames.skipped", Severity::kWarning, "500 frames skipped, 50 %");
     summary.frames_skipped = 1;
-    told("frames.skipped", Severity::kNote, "1 frames skipped, 0.2 %");
+    check_finding("frames.skipped", Severity::kNote, "1 frames skipped, 0.2 %");
   }
   SECTION("a recording that was played more slowly") {
     summary.rate = 1.0;
     CHECK(findings_of_one(run).empty());
     summary.rate = 0.625;
-    told("frames.slowed", Severity::kNote, "played at 0.6");
+    check_finding("frames.slowed", Severity::kNote, "played at 0.6");
   }
   SECTION("odometry that is noisier than it claims") {
     summary.pgo.odometry_translation_noise = 6.75;
-    told("odometry.noisy", Severity::kWarning, "1.0 times noisier in rotation and 6.8 times");
+    check_finding("odometry.noisy", Severity::kWarning,
+                  "1.0 times noisier in rotation and 6.8 times");
     summary.pgo.odometry_translation_noise = 1.5;
     CHECK(findings_of_one(run).empty());
   }
   SECTION("a recording that was paused") {
     summary.paused_s = 3.25;
-    told("frames.paused", Severity::kNote, "paused for 3.2 s in all");
+    check_finding("frames.paused", Severity::kNote, "paused for 3.2 s in all");
   }
   SECTION("a map that skipped frames") {
     summary.mapping = MappingSummary{.frames = 75, .gave_way = 25};
-    told("map.gave_way", Severity::kWarning, "25 frames were left out of the map, 25 %");
+    check_finding("map.gave_way", Severity::kWarning, "25 frames were left out of the map, 25 %");
     summary.mapping->gave_way = 1;
-    told("map.gave_way", Severity::kNote, "1 frames");
+    check_finding("map.gave_way", Severity::kNote, "1 frames");
   }
   SECTION("images that are missing") {
     summary.sensor_faults = {{"images missing between others", 116}, {"pauses of a camera", 1}};
-    told("sensors.faults", Severity::kWarning,
-         "116 images missing between others, 1 pauses of a camera; 500 frames were whole");
+    check_finding("sensors.faults", Severity::kWarning,
+                  "116 images missing between others, 1 pauses of a camera; 500 frames were whole");
     summary.sensor_faults = {{"images missing between others", 5}};
     CHECK(findings_of_one(run).empty());
   }
   SECTION("a hole of the trajectory") {
     summary.holes =
         HolesSummary{.count = 1, .seconds = 6.3, .longest_s = 6.3, .longest_from_s = 12.06};
-    told("trajectory.hole", Severity::kWarning, "no pose for 6.3 s, from 12.1 s on");
+    check_finding("trajectory.hole", Severity::kWarning, "no pose for 6.3 s, from 12.1 s on");
     CHECK_THAT(the_finding_of(run).to_do, Catch::Contains("sensor_faults"));
     summary.holes->count = 3;
     summary.holes->seconds = 9.0;
-    told("trajectory.hole", Severity::kWarning, "the longest of 3 holes of 9.0 s in all");
+    check_finding("trajectory.hole", Severity::kWarning, "the longest of 3 holes of 9.0 s in all");
     summary.frames_skipped = 1;
     const auto findings = findings_of_one(run);
     REQUIRE(findings.size() == 2);
@@ -205,43 +206,43 @@ TEST_CASE("A finding on a run is reported with its number", "[robot][findings]")
   }
   SECTION("closures rejected") {
     run.closures[2].rejected = 2;
-    told("closures.rejected", Severity::kNote, "2 of 10 verified");
+    check_finding("closures.rejected", Severity::kNote, "2 of 10 verified");
     run.closures[2].rejected = 5;
-    told("closures.rejected", Severity::kWarning, "5 of 10 verified");
+    check_finding("closures.rejected", Severity::kWarning, "5 of 10 verified");
   }
   SECTION("offset of the cameras") {
     summary.cameras = CamerasSummary{.offset_s = 0.02, .offset_sigma_s = 0.001};
-    told("cameras.offset", Severity::kWarning, "20.0 ms (+- 1.0)");
+    check_finding("cameras.offset", Severity::kWarning, "20.0 ms (+- 1.0)");
     summary.cameras->offset_s = -0.004;
-    told("cameras.offset", Severity::kNote, "-4.0 ms");
+    check_finding("cameras.offset", Severity::kNote, "-4.0 ms");
     summary.cameras->offset_sigma_s = 0.002;  // it may be none
     CHECK(findings_of_one(run).empty());
   }
   SECTION("cameras turned") {
     summary.cameras = CamerasSummary{.rotation_y_rad = 0.0349, .rotation_sigma_rad = 0.001};
-    told("cameras.turned", Severity::kWarning, "2.00 degrees");
+    check_finding("cameras.turned", Severity::kWarning, "2.00 degrees");
   }
   SECTION("a link lost") {
     summary.lost_peers["bob"] = 31.25;
-    told("link.lost", Severity::kWarning, "bob had not been heard for 31.2 s");
+    check_finding("link.lost", Severity::kWarning, "bob had not been received for 31.2 s");
   }
   SECTION("another vocabulary") {
     summary.other_vocabulary["bob"] = 77;
-    told("vocabulary.other", Severity::kError, "77 keyframes of bob");
+    check_finding("vocabulary.other", Severity::kError, "77 keyframes of bob");
   }
   SECTION("held back") {
     summary.held_back.emplace().delayed.messages["pgo"] = 12;
-    told("budget.held_back", Severity::kNote, "delayed 12 messages");
+    check_finding("budget.held_back", Severity::kNote, "delayed 12 messages");
     summary.held_back->dropped.messages["mesh"] = 3;
-    told("budget.held_back", Severity::kWarning, "dropped 3");
+    check_finding("budget.held_back", Severity::kWarning, "dropped 3");
   }
   SECTION("memory") {
     summary.process.memory_growth_bytes_per_minute = 30e6;
-    told("memory.grows", Severity::kWarning, "30.0 MB a minute");
+    check_finding("memory.grows", Severity::kWarning, "30.0 MB a minute");
   }
   SECTION("the map") {
     summary.mapping.emplace().blocks_refused = 5;
-    told("map.full", Severity::kWarning, "5 blocks");
+    check_finding("map.full", Severity::kWarning, "5 blocks");
   }
 }
 

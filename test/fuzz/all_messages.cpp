@@ -98,16 +98,16 @@ std::vector<TeamParcel> some_parcels() {
   };
 }
 
-UpLetter some_up_letter(Eigen::Index block) {
-  UpLetter letter{
+UpLetter some_up_message(Eigen::Index block) {
+  UpLetter message{
       .round = 3, .sums = {}, .reduced = Eigen::VectorXd::LinSpaced(2 * block, 0.0, 1.0)};
   TreeSystem system;
   system.variables = {{{2, 0}, 1, 1}, {{9, 300}, 1, 1}};
   system.pairs = {{0, 1}};
   system.schur = BlockMatrix::zero(block, 2, 1);
   for (int v = 0; v < 2; ++v) system.schur.at(v).setIdentity();
-  letter.system = std::move(system);
-  return letter;
+  message.system = std::move(system);
+  return message;
 }
 
 }  // namespace
@@ -129,7 +129,7 @@ std::vector<MessageReader> all_messages() {
       topic<RobotStatus>({{.robot = kWriter.robot,
                            .name = "beta",
                            .settled_links = 3,
-                           .relay = {.hears = {kReader, 9}, .holds = {{{11, 12}, 13, 14}}}}}),
+                           .relay = {.received = {kReader, 9}, .holds = {{{11, 12}, 13, 14}}}}}),
       topic<RelayParcel>(
           {relayed({.kind = RelayKind::kIntroduction, .origin = {9, 1}, .content = {'c'}}),
            relayed({.kind = RelayKind::kIntroduction,
@@ -147,13 +147,13 @@ std::vector<MessageReader> all_messages() {
                     .number = 3,
                     .content = {1, 2, 3}})}),
       topic<TeamParcel>(some_parcels())};
-  all.push_back({"letters up",
+  all.push_back({"messages up",
                  [](std::span<const std::uint8_t> bytes) { return decode_up(bytes).has_value(); },
-                 {encode(some_up_letter(3)), encode(some_up_letter(6))}});
+                 {encode(some_up_message(3)), encode(some_up_message(6))}});
   DownLetter down;
   down.verdict.round = 2;
   down.step = Eigen::VectorXd::LinSpaced(6, 0.0, 1.0);
-  all.push_back({"letters down",
+  all.push_back({"messages down",
                  [](std::span<const std::uint8_t> bytes) { return decode_down(bytes).has_value(); },
                  {encode(down)}});
   all.push_back(envelope_messages());

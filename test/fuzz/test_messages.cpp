@@ -5,7 +5,7 @@
 
 #include "runtime/dds/codec.hpp"
 #include "test/fuzz/all_messages.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 namespace {
@@ -41,12 +41,12 @@ TEST_CASE("Corrupted messages of all topics do no harm and leave no memory behin
   const char* wanted = std::getenv("KM_MESSAGES");
   const long count = wanted == nullptr ? 100'000 : std::atol(wanted);
   const auto readers = all_messages();
-  InputSpoiler spoiler(GENERATE(1U, 2U));
+  InputCorrupter corrupter(GENERATE(1U, 2U));
   long accepted = 0;
   const auto feed_messages = [&](long messages) {
     for (long k = 0; k < messages; ++k) {
       const MessageReader& reader = readers[static_cast<std::size_t>(k) % readers.size()];
-      accepted += feed(reader, spoiler(reader.samples)) ? 1 : 0;
+      accepted += feed(reader, corrupter(reader.samples)) ? 1 : 0;
     }
   };
   constexpr long kFirst = 1000;  // one-time allocations are made by then

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "runtime/config_layers.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 using Catch::Contains;
 
@@ -113,12 +113,12 @@ TEST_CASE("A file that is not YAML is reported where it breaks", "[config]") {
 
 TEST_CASE("A corrupted configuration is refused by name or keeps the bounds", "[config]") {
   const TemporaryFolder folder;
-  check_spoilt<ConfigError>(
+  check_corrupted<ConfigError>(
       "# a toy\ntoy:\n  count: 5\n  length_m: 0.75  # [m]\n  flag: true\n  colour: green\n"
       "  hosts: [a, b]\n  name: \"some\"\n",
-      "spoilt.yaml", [&](const std::string& text) {
+      "corrupted.yaml", [&](const std::string& text) {
         ConfigLayers layers;
-        layers.add_file(folder.write("spoilt.yaml", text));
+        layers.add_file(folder.write("corrupted.yaml", text));
         const auto toy = layers.load<ToyConfig>();
         layers.finish();
         CHECK_NOTHROW(checked(toy));

@@ -45,16 +45,16 @@ TEST_CASE("Levels below the limit are not written", "[log]") {
 
 TEST_CASE("A listener of the log receives the written lines until another replaces it", "[log]") {
   CapturedLog log;
-  std::vector<log::Entry> heard;
-  log::set_listener([&heard](const log::Entry& entry) { heard.push_back(entry); });
+  std::vector<log::Entry> received;
+  log::set_listener([&received](const log::Entry& entry) { received.push_back(entry); });
   log::warn("vio") << "slow: " << 3 << " s";
   log::debug("vio") << "below the limit";
   log::set_listener({});
   log::warn("vio") << "to nobody";
-  REQUIRE(heard.size() == 1);
-  CHECK(heard[0].level == log::Level::kWarn);
-  CHECK(heard[0].tag == "vio");
-  CHECK(heard[0].text == "slow: 3 s");
+  REQUIRE(received.size() == 1);
+  CHECK(received[0].level == log::Level::kWarn);
+  CHECK(received[0].tag == "vio");
+  CHECK(received[0].text == "slow: 3 s");
   CHECK(log.lines().size() == 2);
 }
 

@@ -244,9 +244,9 @@ TEST_CASE("A hang-up is not waited for where it was ignored before, as under noh
   Supervisor supervisor(signals);
   supervisor.emplace<Stubborn>(ready);
   const char running = 'r';
-  bool told = false;
+  bool reported = false;
   (void)supervisor.run([&] {
-    if (!std::exchange(told, true) && write(ready, &running, 1) != 1) _exit(9);
+    if (!std::exchange(reported, true) && write(ready, &running, 1) != 1) _exit(9);
     return false;
   });
   _exit(0);
@@ -257,12 +257,12 @@ TEST_CASE("A second signal ends the process at once", "[supervisor]") {
   REQUIRE(pipe(ends) == 0);
   const pid_t child = fork();
   if (child == 0) run_stubborn_robot(ends[1]);
-  char told = 0;
-  REQUIRE(read(ends[0], &told, 1) == 1);
-  REQUIRE(told == 'r');
+  char reported = 0;
+  REQUIRE(read(ends[0], &reported, 1) == 1);
+  REQUIRE(reported == 'r');
   kill(child, SIGINT);
-  REQUIRE(read(ends[0], &told, 1) == 1);
-  REQUIRE(told == 's');
+  REQUIRE(read(ends[0], &reported, 1) == 1);
+  REQUIRE(reported == 's');
   kill(child, SIGHUP);  // a terminal that closes may send several
   kill(child, SIGINT);
   int status = 0;

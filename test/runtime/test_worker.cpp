@@ -62,14 +62,14 @@ TEST_CASE("A worker that never started stops", "[worker]") {
 
 TEST_CASE("A topic hands one shared message to every subscriber, in order", "[topic]") {
   Topic<int> topic;
-  std::vector<std::pair<int, const int*>> heard;
-  topic.subscribe([&](const auto& message) { heard.emplace_back(1, message.get()); });
-  topic.subscribe([&](const auto& message) { heard.emplace_back(2, message.get()); });
+  std::vector<std::pair<int, const int*>> received;
+  topic.subscribe([&](const auto& message) { received.emplace_back(1, message.get()); });
+  topic.subscribe([&](const auto& message) { received.emplace_back(2, message.get()); });
   topic.publish(7);
-  REQUIRE(heard.size() == 2);
-  CHECK(heard[0].first == 1);
-  CHECK(heard[1].first == 2);
-  CHECK(heard[0].second == heard[1].second);
+  REQUIRE(received.size() == 2);
+  CHECK(received[0].first == 1);
+  CHECK(received[1].first == 2);
+  CHECK(received[0].second == received[1].second);
 }
 
 // A node can neither write its inputs nor confuse the channels from peers and to peers.
@@ -81,11 +81,11 @@ TEST_CASE("A message published through one handle of a topic arrives at another 
   Topic<int> topic;
   const In<int> in = topic;
   const Out<int> out = topic;
-  std::vector<int> heard;
-  in.subscribe([&](const auto& message) { heard.push_back(*message); });
+  std::vector<int> received;
+  in.subscribe([&](const auto& message) { received.push_back(*message); });
   out.publish(7);
   out.publish(std::make_shared<const int>(8));
-  CHECK(heard == std::vector<int>{7, 8});
+  CHECK(received == std::vector<int>{7, 8});
 }
 
 TEST_CASE("A queue returns its values in order, also after it is closed", "[queue]") {

@@ -18,11 +18,11 @@
 namespace km {
 
 /// A member's solver whose messages are passed to a listener.
-class OverheardMember final : public MemberSolver {
+class ObservedMember final : public MemberSolver {
  public:
   using Listener = std::function<void(const SolverLetter&)>;
 
-  OverheardMember(std::unique_ptr<MemberSolver> member, Listener listener)
+  ObservedMember(std::unique_ptr<MemberSolver> member, Listener listener)
       : member_(std::move(member)), listener_(std::move(listener)) {}
 
   bool receive(RobotId from, std::span<const std::uint8_t> bytes) override {
@@ -79,26 +79,26 @@ class Eavesdropper {
     for (const auto& [id, T] : part.told) known_.insert(id);
   }
 
-  void hear(RobotId from, const SolverLetter& letter) {
-    ++letters_;
+  void receive(RobotId from, const SolverLetter& letter) {
+    ++messages_;
     bytes_ += letter.bytes->size();
     if (is_up_letter(*letter.bytes)) {
       const auto up = decode_up(*letter.bytes);
       REQUIRE(up);
-      hear(from, *up);
+      receive(from, *up);
     } else {
       const auto down = decode_down(*letter.bytes);
       REQUIRE(down);
-      hear(letter.to, *down);
+      receive(letter.to, *down);
     }
   }
 
   [[nodiscard]] const std::set<KeyframeId>& public_poses() const { return public_; }
   [[nodiscard]] std::set<KeyframeId> named_private() const { return without_public(named_); }
   [[nodiscard]] std::size_t private_poses() const { return all_.size() - public_.size(); }
-  [[nodiscard]] std::size_t letters() const { return letters_; }
+  [[nodiscard]] std::size_t messages() const { return messages_; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
-  [[nodiscard]] std::size_t told_edges() const { return told_edges_; }
+  [[nodiscard]] std::size_t sent_edges() const { return sent_edges_; }
   [[nodiscard]] std::size_t announced_poses() const { return known_.size(); }
   // Number of right-hand sides and steps whose size does not match the named poses.
   [[nodiscard]] std::size_t misfits() const { return misfits_; }
@@ -118,13 +118,13 @@ class Eavesdropper {
   }
 
  private:
-  void hear(RobotId from, const UpLetter& up) {
+  void receive(RobotId from, const UpLetter& up) {
     if (up.system) {
       const TreeSystem& system = *up.system;
       systems_[from] = system.variables.size();
       for (const TreeVariable& v : system.variables) named_.insert(v.id);
       for (const ToldEdge& e : system.edges) {
-        ++told_edges_;
+        ++sent_edges_;
         const auto& [i, j] = system.pairs[static_cast<std::size_t>(e.pair)];
         chains_.join(system.variables[static_cast<std::size_t>(i)].id,
                      system.variables[static_cast<std::size_t>(j)].id);
@@ -133,14 +133,14 @@ class Eavesdropper {
     check_size(from, up.reduced.size());
   }
 
-  void hear(RobotId child, const DownLetter& down) { check_size(child, down.step.size()); }
+  void receive(RobotId child, const DownLetter& down) { check_size(child, down.step.size()); }
 
   // The numbers belong to the poses that the child has named.
   void check_size(RobotId child, Eigen::Index size) {
-    const auto told = systems_.find(child);
+    const auto known = systems_.find(child);
     const Eigen::Index block = dimension_ == 2 ? 3 : 6;
     const Eigen::Index expected =
-        told == systems_.end() ? 0 : block * static_cast<Eigen::Index>(told->second);
+        known == systems_.end() ? 0 : block * static_cast<Eigen::Index>(known->second);
     if (size != 0 && size != expected) ++misfits_;
   }
 
@@ -158,9 +158,9 @@ class Eavesdropper {
   std::set<KeyframeId> named_;  // named in messages
   Chains chains_;
   std::map<RobotId, std::size_t> systems_;  // by child: number of variables that it has named
-  std::size_t letters_ = 0;
+  std::size_t messages_ = 0;
   std::size_t bytes_ = 0;
-  std::size_t told_edges_ = 0;
+  std::size_t sent_edges_ = 0;
   std::size_t misfits_ = 0;
 };
 
@@ -173,8 +173,8 @@ inline Eavesdropper listen_to(const TeamGraph& graph, bool tell_private, int max
     const RobotId self = part.self;
     ear.announced(part);
     auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);
-    return std::make_unique<OverheardMember>(
-        std::move(member), [&ear, self](const SolverLetter& letter) { ear.hear(self, letter); });
+    return std::make_unique<ObservedMember>(
+        std::move(member), [&ear, self](const SolverLetter& letter) { ear.receive(self, letter); });
   });
   RoundMeter meter(graph.robots(), {});
   for (int round = 0; round < max_rounds && team.step(meter); ++round) {

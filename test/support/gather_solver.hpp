@@ -69,7 +69,7 @@ class GatherSolver final : public MemberSolver {
 
   [[nodiscard]] std::vector<SolverLetter> advance() override {
     if (options_.fails_in_round > 0 && round_ >= options_.fails_in_round)
-      throw std::runtime_error("as it was told to");
+      throw std::runtime_error("as requested by the test");
     if (options_.gives_up_in_round > 0 && round_ >= options_.gives_up_in_round) {
       done_ = failed_ = true;
       return {};
@@ -172,7 +172,7 @@ class GatherSolver final : public MemberSolver {
         part.to_absent.emplace_back(e, pose(in));
       }
     }
-    if (!in.done()) throw std::runtime_error("a letter that cannot be read");
+    if (!in.done()) throw std::runtime_error("a message that cannot be read");
   }
 
   SolverLetter letter(RobotId to, const std::vector<std::uint8_t>& rest) const {

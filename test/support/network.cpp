@@ -33,10 +33,10 @@ pid_t hold_namespace() {
     while (true) pause();
   }
   char answer = 'n';
-  const bool heard = read(ready[0], &answer, 1) == 1;
+  const bool received = read(ready[0], &answer, 1) == 1;
   close(ready[0]);
   close(ready[1]);
-  if (heard && answer == 'y') return process;
+  if (received && answer == 'y') return process;
   end(process);
   return 0;
 }

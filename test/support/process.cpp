@@ -69,7 +69,7 @@ Process::~Process() {
   close(output_);
 }
 
-void Process::tell(const std::string& line) {
+void Process::send_line(const std::string& line) {
   const std::string text = line + '\n';
   if (write(input_, text.data(), text.size()) != static_cast<ssize_t>(text.size()))
     throw std::runtime_error("Process: cannot write to its input");

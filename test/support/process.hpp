@@ -36,7 +36,7 @@ class Process {
   [[nodiscard]] TimePoint started() const { return started_; }
 
   /// Writes a line to its standard input.
-  void tell(const std::string& line);
+  void send_line(const std::string& line);
 
   /// Waits until it has printed `line` `times` times; the last of them, or nullopt after
   /// `patience`.

@@ -218,28 +218,28 @@ class TeamNetwork {
   // The ends of a link notice a change: at once if it returns, after the lease if it fails.
   void renew(RobotId a, RobotId b) {
     if (connected(a, b)) {
-      tell_alive(a, b);
-      tell_alive(b, a);
+      report_alive(a, b);
+      report_alive(b, a);
       return;
     }
     at(now_s_ + lease_s, [this, a, b] {
       if (connected(a, b)) return;
-      tell_lost(a, b);
-      tell_lost(b, a);
+      report_lost(a, b);
+      report_lost(b, a);
     });
   }
-  void tell_alive(RobotId to, RobotId of) {
+  void report_alive(RobotId to, RobotId of) {
     const TeamPeer& peer = robots.at(of).peer;
-    std::optional<TeamPeer>& heard = heard_[{to, of}];
-    if (heard == peer) return;
-    heard = peer;
+    std::optional<TeamPeer>& reported = reported_[{to, of}];
+    if (reported == peer) return;
+    reported = peer;
     robots.at(to).agent->peer_alive(peer);
     robots.at(to).steps_now = busy_ = true;
   }
-  void tell_lost(RobotId to, RobotId of) {
-    std::optional<TeamPeer>& heard = heard_[{to, of}];
-    if (!heard) return;
-    heard.reset();
+  void report_lost(RobotId to, RobotId of) {
+    std::optional<TeamPeer>& reported = reported_[{to, of}];
+    if (!reported) return;
+    reported.reset();
     if (robots.contains(to)) robots.at(to).agent->peer_lost(of);
   }
 
@@ -306,7 +306,7 @@ class TeamNetwork {
 
   std::mt19937 rng_;
   std::map<std::pair<RobotId, RobotId>, NetworkLink> links_;
-  std::map<std::pair<RobotId, RobotId>, std::optional<TeamPeer>> heard_;
+  std::map<std::pair<RobotId, RobotId>, std::optional<TeamPeer>> reported_;
   std::multimap<double, Delivery> in_flight_;
   std::multimap<double, std::function<void()>> schedule_;
   TeamMessagePtr last_sent_;

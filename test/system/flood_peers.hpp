@@ -31,15 +31,15 @@ struct FloodPeer {
     using enum TopicKind;
     const bool has_keys = participant.seal() != nullptr;
     constexpr auto kOther = TrafficCategory::kOther;
-    constexpr CrossingEnds kSpeaks{.receive = false};
+    constexpr CrossingEnds kSends{.receive = false};
     bridge.exchange(statuses, kStatus, kOther);
-    bridge.exchange(bows, kEvent, kOther, kSpeaks, {}, unsigned_guard<KeyframeBow>(has_keys));
-    bridge.exchange(requests, kRequest, kOther, kSpeaks);
+    bridge.exchange(bows, kEvent, kOther, kSends, {}, unsigned_guard<KeyframeBow>(has_keys));
+    bridge.exchange(requests, kRequest, kOther, kSends);
     bridge.exchange(replies, kRequest, kOther, {}, {}, unsigned_guard<KeyframeReply>(has_keys));
-    bridge.exchange(closures, kEvent, kOther, kSpeaks);
-    bridge.exchange(inlier_sets, kState, kOther, kSpeaks);
+    bridge.exchange(closures, kEvent, kOther, kSends);
+    bridge.exchange(inlier_sets, kState, kOther, kSends);
     bridge.exchange(parcels, kRequest, kOther);
-    bridge.exchange(chunks, kState, kOther, kSpeaks);
+    bridge.exchange(chunks, kState, kOther, kSends);
   }
   ~FloodPeer() {
     status_node.stop();
@@ -54,7 +54,7 @@ struct FloodPeer {
   [[nodiscard]] TeamPeer self() const {
     return {participant.identity().robot, participant.identity().boot};
   }
-  [[nodiscard]] bool hears(RobotId robot) {
+  [[nodiscard]] bool receives(RobotId robot) {
     return !peer_events
                 .wait_until([&](const auto& events) {
                   return TestRobot::matching(events, PeerEventKind::kJoined, robot) > 0;

@@ -6,7 +6,7 @@
 namespace km {
 namespace {
 
-using Spoil = std::function<void(EurocCopy&, Stamp, Stamp)>;
+using Corruption = std::function<void(EurocCopy&, Stamp, Stamp)>;
 
 template <typename Item, typename Change>
 void for_each_within(std::vector<Item>& items, Stamp begin, Stamp end, Change change) {
@@ -19,7 +19,7 @@ void erase_within(std::vector<Item>& items, Stamp begin, Stamp end) {
   std::erase_if(items, [&](const Item& item) { return item.stamp >= begin && item.stamp < end; });
 }
 
-Spoil uniform(std::vector<std::size_t> cameras, double level) {
+Corruption uniform(std::vector<std::size_t> cameras, double level) {
   return [cameras = std::move(cameras), level](EurocCopy& copy, Stamp begin, Stamp end) {
     for (const std::size_t c : cameras)
       for_each_within(copy.cameras[c], begin, end, [&](EurocCopy::Image& image) {
@@ -30,7 +30,7 @@ Spoil uniform(std::vector<std::size_t> cameras, double level) {
 }
 
 // Frames of both cameras, by number.
-Spoil drop_frames(std::function<bool(std::size_t)> is_lost) {
+Corruption drop_frames(std::function<bool(std::size_t)> is_lost) {
   return [is_lost = std::move(is_lost)](EurocCopy& copy, Stamp begin, Stamp end) {
     std::vector<Stamp> lost;
     for (std::size_t k = 0; k < copy.cameras[0].size(); ++k) {
@@ -43,14 +43,14 @@ Spoil drop_frames(std::function<bool(std::size_t)> is_lost) {
   };
 }
 
-Spoil drop_at_random(double share) {
+Corruption drop_at_random(double share) {
   return drop_frames([share, rng = std::mt19937(3)](std::size_t /*frame*/) mutable {
     return std::uniform_real_distribution<double>()(rng) < share;
   });
 }
 
 // A second of every three.
-Spoil drop_bursts() {
+Corruption drop_bursts() {
   return [](EurocCopy& copy, Stamp begin, Stamp end) {
     for (Stamp at = begin; at < end; at += nanoseconds(3.0))
       for (auto& images : copy.cameras) erase_within(images, at, at + nanoseconds(1.0));
@@ -66,7 +66,7 @@ void drop_everything(EurocCopy& copy, Stamp begin, Stamp end) {
   for (auto& images : copy.cameras) erase_within(images, begin, end);
 }
 
-Spoil move_samples(double by_s) {
+Corruption move_samples(double by_s) {
   return [by_s](EurocCopy& copy, Stamp begin, Stamp end) {
     for_each_within(copy.samples, begin, end,
                     [&](EurocCopy::Sample& sample) { sample.stamp += nanoseconds(by_s); });
@@ -96,10 +96,10 @@ std::vector<SensorFault> sensor_faults() {
                     unordered = "stamps out of order";
   constexpr double kBlind5_m = 1.0, kBlind15_m = 10.0;  // by inertial sensing alone
   constexpr double kRestart2_m = 3.0;                   // distance of the flight during the restart
-  const auto blind = [&](const std::string& name, double lasts_s, Spoil spoil) {
+  const auto blind = [&](const std::string& name, double lasts_s, Corruption corrupt) {
     return SensorFault{.name = name,
                        .lasts_s = lasts_s,
-                       .spoil = std::move(spoil),
+                       .corrupt = std::move(corrupt),
                        .event = lost,
                        .bound_m = lasts_s > 5.0 ? kBlind15_m : kBlind5_m,
                        .is_blind = true};
@@ -120,7 +120,7 @@ std::vector<SensorFault> sensor_faults() {
       {"samples 1 s back", 0.2, move_samples(-1.0), unordered},
       {"right images 2 ms late", 10.0, late_right, "2.00 ms after"},
       {"exposure jumps", 10.0, jump_exposure},
-      {.name = "cameras 10 s late", .lasts_s = 10.0, .spoil = late_cameras, .is_at_start = true},
+      {.name = "cameras 10 s late", .lasts_s = 10.0, .corrupt = late_cameras, .is_at_start = true},
       {"drivers restart", 2.0, drop_everything, gap, kRestart2_m, true},
   };
 }

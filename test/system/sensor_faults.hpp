@@ -13,7 +13,7 @@ struct SensorFault {
   std::string name;
   double lasts_s = 0.0;
   /// Corrupts the data from `begin` to before `end`.
-  std::function<void(EurocCopy&, Stamp begin, Stamp end)> spoil;
+  std::function<void(EurocCopy&, Stamp begin, Stamp end)> corrupt;
   std::string event = {};    ///< Text in the log of a robot with this fault.
   double bound_m = 0.1;      ///< Bound on the position error, during the fault and after it.
   bool is_blind = false;     ///< For a while no image holds the pose.

@@ -60,8 +60,8 @@ class Excerpt {
   fs::path mav0() const { return folder_.path() / "mav0"; }
 
   // Changes row `row` of a list; the header is row 0.
-  void spoil(const std::string& file, std::size_t row,
-             const std::function<std::string(const std::string&)>& change) const {
+  void corrupt(const std::string& file, std::size_t row,
+               const std::function<std::string(const std::string&)>& change) const {
     std::vector<std::string> lines = lines_of(mav0() / file);
     lines.at(row) = change(lines.at(row));
     write_lines(mav0() / file, lines);
@@ -100,9 +100,9 @@ CommandResult run_robot(const fs::path& dataset, const fs::path& output) {
 
 struct Fault {
   std::string name;
-  std::function<void(const Excerpt&)> spoil;
+  std::function<void(const Excerpt&)> corrupt;
   std::size_t poses;
-  std::string told;  // with file and line
+  std::string message;  // with file and line
 };
 
 std::vector<Fault> faults() {
@@ -118,17 +118,17 @@ std::vector<Fault> faults() {
        kImages - 1, "1 images of the wrong size, first: "},
       {"a gyroscope at 1e300",
        [](const Excerpt& excerpt) {
-         excerpt.spoil("imu0/data.csv", 1200,
-                       [](const std::string& line) { return in_fields(line, 1, "1e300"); });
+         excerpt.corrupt("imu0/data.csv", 1200,
+                         [](const std::string& line) { return in_fields(line, 1, "1e300"); });
        },
        kImages, "imu0/data.csv line 1201: 1e+300 rad/s (at most 100)"},
       {"an inertial stamp a day ahead",
-       [](const Excerpt& excerpt) { excerpt.spoil("imu0/data.csv", 1200, day_ahead); }, kImages,
+       [](const Excerpt& excerpt) { excerpt.corrupt("imu0/data.csv", 1200, day_ahead); }, kImages,
        "imu0/data.csv line 1201: "},
       {"an image's stamp a day ahead",
        [](const Excerpt& excerpt) {
-         excerpt.spoil("cam0/data.csv", 25, day_ahead);
-         excerpt.spoil("cam1/data.csv", 25, day_ahead);
+         excerpt.corrupt("cam0/data.csv", 25, day_ahead);
+         excerpt.corrupt("cam1/data.csv", 25, day_ahead);
        },
        kImages - 1, "2 stamps out of order, first: "},
       {"an image that is a link to itself",
@@ -149,11 +149,11 @@ TEST_CASE("A robot skips broken parts of its recording, reports them, and contin
   for (const Fault& fault : faults()) {
     CAPTURE(fault.name);
     const Excerpt excerpt(fs::absolute(*recording));
-    fault.spoil(excerpt);
+    fault.corrupt(excerpt);
     const CommandResult result = run_robot(excerpt.root(), excerpt.root() / "results");
     CAPTURE(result.output);
     CHECK(result.exit_code == 0);
-    CHECK_THAT(result.output, Catch::Contains(fault.told));
+    CHECK_THAT(result.output, Catch::Contains(fault.message));
     CHECK(lines_of(excerpt.root() / "results/odometry.tum").size() == fault.poses);
   }
 }
@@ -197,14 +197,14 @@ TEST_CASE("Mistakes on a robot's command line are reported by value and with a r
   CHECK_THAT(refusal("--output x --robot 70000"),
              Catch::Contains("--robot: Value 70000 not in range") && Catch::Contains("65535"));
   const fs::path mistyped = folder.path() / "alcie";
-  CHECK_THAT(refusal("--robot 1 --resume " + mistyped.string()),
-             Catch::Contains(mistyped.string() + ": there is no such folder, so no run to go on") &&
-                 Catch::Contains("--output"));
+  CHECK_THAT(
+      refusal("--robot 1 --resume " + mistyped.string()),
+      Catch::Contains(mistyped.string() + ": there is no such folder, so no run to continue") &&
+          Catch::Contains("--output"));
   CHECK_FALSE(fs::exists(mistyped));
 }
 
-TEST_CASE("A folder that results cannot go to is refused before anything else is said",
-          "[system]") {
+TEST_CASE("A folder that results cannot go to is refused before any other output", "[system]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   const TemporaryFolder folder;

@@ -89,12 +89,12 @@ TEST_CASE("Robots in networks of their own end when their team is killed", "[sys
                    "exec " KM_BIN_DIR "/kimera_multi_team --config " + team + " --links " +
                        folder.write("links.yaml", "").string() + " --rate max --output " + output +
                        " 2>&1"});
-  const auto is_telling = [](const std::string& line) {
+  const auto is_status = [](const std::string& line) {
     return line.find("peers: robot1 alive") != line.npos || !had_own_networks(line);
   };
-  const auto told = program.wait_until(is_telling);
-  REQUIRE(told.has_value());
-  if (told->text.find("alive") == told->text.npos) return;
+  const auto line = program.wait_until(is_status);
+  REQUIRE(line.has_value());
+  if (line->text.find("alive") == line->text.npos) return;
   program.kill(SIGKILL);
   program.wait();
   while (is_running(output)) std::this_thread::yield();  // fails by the time limit of the test
@@ -134,7 +134,7 @@ TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[system
   CHECK(cost == Approx(best).epsilon(1e-9).margin(0.0));
 }
 
-TEST_CASE("A team in two parts ends in two frames and its table of links says why",
+TEST_CASE("A team in two parts ends in two frames and its table of links gives the reason",
           "[system][namespaces]") {
   const PairRun run(pair_of_robots(), "partitions:\n  - {groups: [[robot0], [robot1]]}\n");
   CAPTURE(run.team.result.output);
@@ -195,7 +195,7 @@ void find_closures_between_ends(bool has_keys) {
     for (const RelativePose& edge : read_g2o(folder.path() / name / "pose_graph.g2o").edges)
       if (edge.from.robot + edge.to.robot == 1 && edge.from.robot != edge.to.robot)
         ++closures[{edge.from, edge.to}];
-  std::cout << closures.size() << " closures between robots that never hear each other"
+  std::cout << closures.size() << " closures between robots that never receive each other"
             << (has_keys ? ", with keys\n" : "\n");
   CHECK(closures.size() >= 3);
   for (const auto& [ends, count] : closures) CHECK(count == 2);
@@ -203,13 +203,14 @@ void find_closures_between_ends(bool has_keys) {
 
 }  // namespace
 
-TEST_CASE("Robots that never hear each other find closures through one that hears both",
+TEST_CASE("Robots that never receive each other find closures through one that receives both",
           "[system][namespaces]") {
   find_closures_between_ends(false);
 }
 
-TEST_CASE("Robots with keys that never hear each other find closures through one that hears both",
-          "[system][namespaces]") {
+TEST_CASE(
+    "Robots with keys that never receive each other find closures through one that receives both",
+    "[system][namespaces]") {
   find_closures_between_ends(true);
 }
 
@@ -299,11 +300,11 @@ class TunnelsRun {
   // of the robots, one a second.
   [[nodiscard]] double agreed_s() const {
     double last_s = 0.0;
-    std::map<std::string, std::string> told;  // by robot
+    std::map<std::string, std::string> last;  // by robot
     for (const auto& [text, time] : lines_) {
       const std::size_t begin = text.find("closures: "), end = text.find(" | out: ");
       if (begin == text.npos || end == text.npos) continue;
-      std::string& before = told[text.substr(0, text.find(' '))];
+      std::string& before = last[text.substr(0, text.find(' '))];
       const std::string now = text.substr(begin, end - begin);
       if (now != before) last_s = std::chrono::duration<double>(time - started_).count();
       before = now;

@@ -95,7 +95,7 @@ struct RobotOnSmallDisk {
     INFO(folder.read("log"));
     REQUIRE(running);
   }
-  [[nodiscard]] bool told(const std::string& file, const std::string& why) const {
+  [[nodiscard]] bool reports(const std::string& file, const std::string& why) const {
     const std::string line = (output / file).string() + ": cannot be written: " + why;
     return folder.read("log").find(line) != std::string::npos;
   }
@@ -119,7 +119,7 @@ TEST_CASE("On a full or read-only disk a robot continues, names lost results, an
   for (const char* file : {"optimized.tum", "pose_graph.g2o", "keyframes.csv", "loop_closures.csv",
                            "timing.csv", "summary.json"}) {
     CAPTURE(file);
-    CHECK(run.told(file, why));
+    CHECK(run.reports(file, why));
     CHECK_FALSE(fs::exists(run.output / file));
   }
   for (const auto& entry : fs::directory_iterator(run.output))

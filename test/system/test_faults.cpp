@@ -43,16 +43,16 @@ struct FaultyRobot {
     command.insert(command.end(), settings.begin(), settings.end());
     process.emplace(command, log);
   }
-  [[nodiscard]] std::string told() const { return folder.read("log"); }
+  [[nodiscard]] std::string log_text() const { return folder.read("log"); }
 };
 
 void check_end(FaultyRobot& robot, const std::string& module, const std::string& how) {
   CAPTURE(module, how);
   const int exit_code = robot.process->wait(3 * kPatience);
-  CAPTURE(robot.told());
+  CAPTURE(robot.log_text());
   CHECK(exit_code == (how == "hang" ? 5 : 3));
-  CHECK_THAT(robot.told(), Catch::Contains(how == "hang" ? "supervisor: " + module + " has not"
-                                                         : module + " failed: injected"));
+  CHECK_THAT(robot.log_text(), Catch::Contains(how == "hang" ? "supervisor: " + module + " has not"
+                                                             : module + " failed: injected"));
   for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "keyframes.csv",
                            "loop_closures.csv", "optimizer.csv", "timing.csv", "process.csv"})
     CHECK(fs::is_regular_file(robot.output / file));
@@ -106,8 +106,8 @@ TEST_CASE("A disk that stands still under the map leaves the other results", "[s
   // The opening of a pipe without a reader never returns.
   REQUIRE(mkfifo((robot.output / "mesh.ply.part").c_str(), 0600) == 0);
   CHECK(robot.process->wait(3 * kPatience) == 5);
-  CAPTURE(robot.told());
-  CHECK_THAT(robot.told(), Catch::Contains("mesh_files has not"));
+  CAPTURE(robot.log_text());
+  CHECK_THAT(robot.log_text(), Catch::Contains("mesh_files has not"));
   CHECK(fs::is_regular_file(robot.output / "pose_graph.g2o"));
   CHECK_THAT(read_summary(robot.output / "summary.json").exit_reason,
              Catch::StartsWith("mesh_files: ") && Catch::Contains("1 result lost") &&

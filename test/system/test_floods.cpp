@@ -43,7 +43,7 @@ constexpr double kMaxLate_s = 2.0;
 // Capacity of a link.
 constexpr double kMessages_Hz = 2000.0;
 constexpr double kBytes_Hz = 12.5e6;
-constexpr double kStrangers_Hz = 20.0;
+constexpr double kOutsiders_Hz = 20.0;
 
 struct Flood {
   std::string name;
@@ -58,7 +58,7 @@ TeamPeer made_up(std::uint32_t number) {
 }
 
 template <typename Message>
-void hand_over(FloodPeer& from, Message message) {
+void send(FloodPeer& from, Message message) {
   from.parcels.to_peers().publish(
       {kVictim, std::make_shared<const TeamParcel>(TeamParcel{
                     from.self().robot, std::make_shared<const TeamMessage>(std::move(message))})});
@@ -141,27 +141,27 @@ std::vector<Flood> all_floods() {
        [](FloodPeer& from, std::uint32_t i) {
          TeamStatus status{.sender = made_up(i), .number = i + 1, .frame = made_up(i)};
          for (RobotId robot = 1000; robot < 1200; ++robot) status.hears.push_back({robot, i});
-         hand_over(from, std::move(status));
+         send(from, std::move(status));
        }},
-      {"sessions", [](FloodPeer& from, std::uint32_t i) { hand_over(from, large_session(i)); }},
-      {"public poses", [](FloodPeer& from, std::uint32_t i) { hand_over(from, many_poses(i)); }},
-      {"letters",
+      {"sessions", [](FloodPeer& from, std::uint32_t i) { send(from, large_session(i)); }},
+      {"public poses", [](FloodPeer& from, std::uint32_t i) { send(from, many_poses(i)); }},
+      {"session messages",
        [](FloodPeer& from, std::uint32_t i) {
-         hand_over(from, SessionLetter{.sender = made_up(i),
-                                       .session = {made_up(i), 1},
-                                       .number = i,
-                                       .to = i % 2 == 0 ? kVictim : kFar,
-                                       .bytes = std::make_shared<const std::vector<std::uint8_t>>(
-                                           10000, std::uint8_t{1}),
-                                       .copy = i});
+         send(from, SessionLetter{.sender = made_up(i),
+                                  .session = {made_up(i), 1},
+                                  .number = i,
+                                  .to = i % 2 == 0 ? kVictim : kFar,
+                                  .bytes = std::make_shared<const std::vector<std::uint8_t>>(
+                                      10000, std::uint8_t{1}),
+                                  .copy = i});
        }},
       {"statuses",
        [](FloodPeer& from, std::uint32_t i) {
          from.statuses.to_peers().publish(
              RobotStatus{.robot = kFlooder, .name = "flooder", .keyframes = i});
        }},
-      {"identities", [](FloodPeer&, std::uint32_t) {}},  // see strangers_main.cpp
-      {"keys", [](FloodPeer& from, std::uint32_t) { from.bridge.tell_keys(); }, kFlooder, true},
+      {"identities", [](FloodPeer&, std::uint32_t) {}},  // see outsiders_main.cpp
+      {"keys", [](FloodPeer& from, std::uint32_t) { from.bridge.send_keys(); }, kFlooder, true},
       {"mesh chunks",
        [](FloodPeer& from, std::uint32_t i) { from.chunks.to_peers().publish(some_surface(i)); }},
   };
@@ -200,7 +200,7 @@ class Scene {
       if (status != nullptr && status->sender == friend_.self()) relayed.answered(status->number);
     });
     for (FloodPeer* peer : {&flooder, &friend_, &far_}) peer->start();
-    for (FloodPeer* peer : {&flooder, &friend_, &far_}) REQUIRE(peer->hears(kVictim));
+    for (FloodPeer* peer : {&flooder, &friend_, &far_}) REQUIRE(peer->receives(kVictim));
     ask();
     REQUIRE(eventually([&] { return all_answered(); }));
   }
@@ -348,11 +348,11 @@ Costs measure(Scene& scene, const Flood& flood, double seconds) {
   const std::uint64_t messages_before = scene.flooder.sent().messages;
   (void)waits_of(scene.replies);
   (void)waits_of(scene.relayed);
-  std::optional<Child> strangers;
+  std::optional<Child> outsiders;
   if (flood.name == "identities")
-    strangers.emplace(
-        std::vector<std::string>{KM_BIN_DIR "/test_strangers", std::to_string(scene.dds().domain),
-                                 scene.dds().team, std::to_string(kStrangers_Hz)},
+    outsiders.emplace(
+        std::vector<std::string>{KM_BIN_DIR "/test_outsiders", std::to_string(scene.dds().domain),
+                                 scene.dds().team, std::to_string(kOutsiders_Hz)},
         STDOUT_FILENO);
   Costs costs;
   const auto look = [&] {
@@ -365,7 +365,7 @@ Costs measure(Scene& scene, const Flood& flood, double seconds) {
     scene.ask();
     look();
   }
-  strangers.reset();
+  outsiders.reset();
   const auto over = Clock::now();
   scene.ask();
   CHECK(eventually([&] { return scene.all_answered(); }));

@@ -146,7 +146,7 @@ void check_alike(const Solved& some, const Solved& all, const char* what) {
   CHECK(all.cost == Approx(all.one).epsilon(kSame).margin(0.0));
 }
 
-TEST_CASE("A chain of five robots comes to what five that all hear each other come to",
+TEST_CASE("A chain of five robots reaches the cost of five that all receive each other",
           "[system][namespaces]") {
   if (!VirtualNetwork::available()) return;
   const Links chain{{0, 1}, {1, 2}, {2, 3}, {3, 4}};
@@ -155,7 +155,7 @@ TEST_CASE("A chain of five robots comes to what five that all hear each other co
   check_alike(some.get(), all.get(), "chain of five");
 }
 
-TEST_CASE("A robot that not everyone hears is taken in", "[system][namespaces]") {
+TEST_CASE("A robot that some robots do not receive joins", "[system][namespaces]") {
   if (!VirtualNetwork::available()) return;
   const std::string method = GENERATE("newton", "rbcd");
   CAPTURE(method);
@@ -213,12 +213,12 @@ TEST_CASE("A team that splits in two ends, and both sides report the robots they
     CHECK(summary.lost_peers.size() == names.size());
     CHECK(summary.apart_peers.empty());
     for (const std::string& name : names)
-      CHECK_THAT(summary.exit_reason, Catch::Matches(".*" + name + " \\(not heard for .*"));
+      CHECK_THAT(summary.exit_reason, Catch::Matches(".*" + name + " \\(not received for .*"));
     for (const auto& [name, missed_s] : summary.lost_peers) CHECK(missed_s > 0.0);
   }
 }
 
-TEST_CASE("Robots that never hear each other share closures through one that hears both",
+TEST_CASE("Robots that never receive each other share closures through one that receives both",
           "[system][namespaces]") {
   if (!VirtualNetwork::available()) return;
   const SplitGraph graph = random_team(23, {0, 1, 2}, 40, {{0, 1}, {1, 2}, {0, 2}});
@@ -227,7 +227,7 @@ TEST_CASE("Robots that never hear each other share closures through one that hea
   check_alike(cut.get(), whole.get(), "closures between the ends of a chain of three");
 }
 
-TEST_CASE("Five processes over DDS come to the cost that one process comes to", "[system]") {
+TEST_CASE("Five processes over DDS reach the cost that one process reaches", "[system]") {
   const SplitGraph graph =
       random_team(20, {0, 1, 2, 3, 4}, 40, {{0, 1}, {1, 2}, {2, 3}, {3, 4}, {0, 4}, {1, 3}});
   constexpr int kRobots = 5;

@@ -162,7 +162,7 @@ std::vector<std::string> logged(const std::vector<std::string>& command) {
 }
 
 bool waits_for_calibration(const std::string& line) {
-  return line.find("waiting for what tells the calibration") != line.npos;
+  return line.find("waiting for messages with the calibration") != line.npos;
 }
 
 }  // namespace
@@ -208,19 +208,19 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
   CHECK(exit_code == (has_poses ? 0 : 1));
 }
 
-TEST_CASE("A live robot whose topics are silent says where it listens, and ends as failed",
+TEST_CASE("A live robot whose topics are silent reports where it listens, and ends as failed",
           "[system][live]") {
   const auto dataset = shared_data("euroc/MH_01_easy");  // only its calibration is used
   if (!dataset) return;
   const TemporaryFolder folder;
   const std::string domain = std::to_string(random_domain());
   Process robot(logged(live_command(folder, *dataset, domain)));
-  const auto says_where = [&domain](const std::string& line) {
+  const auto states_place = [&domain](const std::string& line) {
     return line.find("nothing on /cam0/image_raw") != line.npos &&
            line.find("0 publish it on ROS domain " + domain + " (ROS_DOMAIN_ID") != line.npos &&
            line.find("--set ros.domain=") != line.npos;
   };
-  REQUIRE(robot.wait_until(says_where).has_value());
+  REQUIRE(robot.wait_until(states_place).has_value());
   robot.kill(SIGINT);
   CHECK(robot.wait() == 1);
   const RunSummary summary = read_summary(folder.path() / "live/summary.json");

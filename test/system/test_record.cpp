@@ -56,8 +56,8 @@ CommandResult record_all(const fs::path& dataset, const fs::path& output) {
 }
 
 struct Record {
-  explicit Record(const fs::path& file) : reader(file), messages(told_by(reader)) {
-    for (const ToldMessage& message : messages) ++counts[message.topic];
+  explicit Record(const fs::path& file) : reader(file), messages(topic_messages_of(reader)) {
+    for (const TopicMessage& message : messages) ++counts[message.topic];
   }
   template <typename Message>
   [[nodiscard]] Message last(const std::string& topic) const {
@@ -68,7 +68,7 @@ struct Record {
   }
 
   McapReader reader;
-  std::vector<ToldMessage> messages;
+  std::vector<TopicMessage> messages;
   std::map<std::string, std::size_t> counts;
 };
 
@@ -160,25 +160,25 @@ TEST_CASE("Readers that are not ours read a record, whole and cut", "[system]") 
   CAPTURE(run.output);
   REQUIRE(run.exit_code == 0);
   const fs::path file = folder.path() / "record.mcap";
-  const auto told = told_by_others(file, folder);
-  if (!told) {
+  const auto read = read_by_others(file, folder);
+  if (!read) {
     WARN("SKIPPED: npm cannot install the readers of test/system/record");
     return;
   }
   const Record record(file);
-  CHECK(told->at("whole") == true);
-  CHECK(told->at("messages") == record.messages.size());
+  CHECK(read->at("whole") == true);
+  CHECK(read->at("messages") == record.messages.size());
   for (const auto& [topic, count] : record.counts)
-    CHECK(told->at("topics").at(topic).at("count") == count);
+    CHECK(read->at("topics").at(topic).at("count") == count);
   const RosPath path = record.last<RosPath>("/alice/path");
-  REQUIRE(told->at("path").size() == path.poses.size());
+  REQUIRE(read->at("path").size() == path.poses.size());
   for (std::size_t k = 0; k < path.poses.size(); ++k)
     for (int axis = 0; axis < 3; ++axis)  // behind seconds and nanoseconds
-      REQUIRE(told->at("path")[k][static_cast<std::size_t>(2 + axis)] ==
+      REQUIRE(read->at("path")[k][static_cast<std::size_t>(2 + axis)] ==
               path.poses[k].pose.position[axis]);
 
   fs::resize_file(file, fs::file_size(file) / 2);
-  const auto cut = told_by_others(file, folder);
+  const auto cut = read_by_others(file, folder);
   REQUIRE(cut);
   CHECK(cut->at("whole") == false);
   CHECK(cut->at("messages") > 0);
@@ -206,7 +206,7 @@ TEST_CASE("A team's records become one", "[system]") {
   CHECK(team.messages.size() == messages);
   // For two joined robots, the frame of one is a child of the other's, which is a child of `map`.
   std::set<std::pair<std::string, std::string>> links;
-  for (const ToldMessage& message : team.messages)
+  for (const TopicMessage& message : team.messages)
     if (message.topic == "/tf" || message.topic == "/tf_static") {
       const auto transforms = decode_ros<RosTransforms>("cdr", message.bytes);
       REQUIRE(transforms.value);

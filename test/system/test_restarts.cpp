@@ -107,7 +107,8 @@ TEST_CASE(
   const char* const asked = std::getenv("KM_RESTARTS");
   const int restarts = asked == nullptr ? 2 : std::atoi(asked);
   REQUIRE(restarts > 0);
-  std::printf("restart  robot  place    killed_at  joint  late_s  closures  of_former_life\n");
+  std::printf(
+      "restart  robot  place    killed_at  joint  late_s  closures  of_former_incarnation\n");
   for (int k = 0; k < restarts; ++k) {
     const Restart restart{.robot = static_cast<RobotId>((k + 1) % 2),
                           .elsewhere = (k + k / 2) % 2 == 1,

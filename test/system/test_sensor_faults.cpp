@@ -93,8 +93,8 @@ std::optional<double> back_after_s(const std::vector<PosePair>& pairs, const Ali
     if (j == pairs.size()) break;
     const SE3 truth = pairs[i].T_truth_body.inverse() * pairs[j].T_truth_body;
     const SE3 estimate = pairs[i].T_estimate_body.inverse() * pairs[j].T_estimate_body;
-    const double mended_m = error_m(pairs[i], alignment) - error_m(pairs[j], alignment);
-    if ((truth.inverse() * estimate).translation().norm() - std::max(mended_m, 0.0) > kRight_m)
+    const double corrected_m = error_m(pairs[i], alignment) - error_m(pairs[j], alignment);
+    if ((truth.inverse() * estimate).translation().norm() - std::max(corrected_m, 0.0) > kRight_m)
       back.reset();
     else if (!back)
       back = pairs[i].stamp;
@@ -108,7 +108,7 @@ Outcome meet(const Stage& stage, const SensorFault& fault) {
   const Stamp first = copy.cameras[0].front().stamp;
   const Stamp begin = first + (fault.is_at_start ? 0 : nanoseconds(stage.begin_s));
   const Stamp end = begin + nanoseconds(fault.lasts_s);
-  fault.spoil(copy, begin, end);
+  fault.corrupt(copy, begin, end);
   copy.write(folder.path() / "recording");
   const CommandResult run = run_robot(folder.path() / "recording", folder.path() / "results");
   Outcome outcome;
@@ -250,12 +250,12 @@ TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") 
                     "--interface", "lo", "--wait", "1", "--reliable", "--rate", "0.7"});
     CHECK(driver.wait() == 0);
   }
-  const auto goes_on = [](const std::string& line) {  // "10.6 s, 164 images, ..."
+  const auto continues = [](const std::string& line) {  // "10.6 s, 164 images, ..."
     double seconds = 0.0;
     int images = 0;
     return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && seconds > 7.5;
   };
-  CHECK(robot.wait_until(goes_on));
+  CHECK(robot.wait_until(continues));
   robot.kill(SIGINT);
   CHECK(robot.wait() == 0);
   const auto poses = read_trajectory(folder.path() / "results/odometry.tum");

@@ -41,7 +41,7 @@ TEST_CASE("Two robots on the halves of a recording localise together", "[system]
 
   // The same graph solved once more: a keyframe without a path to the others could not be located.
   Eavesdropper ear = listen_to(read_team_folder(folder.path()), false, 100);
-  CHECK(ear.letters() > 0);
+  CHECK(ear.messages() > 0);
   CHECK(ear.private_poses() > 0);
   CHECK(ear.misfits() == 0);
   CHECK(ear.derivable().empty());
@@ -107,7 +107,7 @@ TEST_CASE("A robot whose peer is killed continues, finishes and names the lost p
   CHECK(summary.pgo.settled);
   REQUIRE(summary.lost_peers.size() == 1);
   CHECK(summary.lost_peers.at("r60000") > 0.0);
-  CHECK_THAT(summary.exit_reason, Catch::StartsWith("settled without r60000 (not heard for "));
+  CHECK_THAT(summary.exit_reason, Catch::StartsWith("settled without r60000 (not received for "));
 }
 
 TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of the id continues",

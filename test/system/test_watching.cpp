@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "modules/view/view_listener_node.hpp"
-#include "modules/view/view_teller.hpp"
+#include "modules/view/view_selector.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/support/process.hpp"
 #include "test/system/team_run.hpp"
@@ -30,14 +30,15 @@ DdsConfig in_domain(int domain) {
 // Listens on a thread of its own, until finish() and no more messages.
 class Audience {
  public:
-  explicit Audience(int domain) : listener_(in_domain(domain)), ear_([this] { listen(); }) {}
+  explicit Audience(int domain)
+      : listener_(in_domain(domain)), listening_thread_([this] { listen(); }) {}
   ~Audience() { finish(); }
   Audience(const Audience&) = delete;
   Audience& operator=(const Audience&) = delete;
 
   std::map<RobotId, Watcher>& finish() {
     is_over_ = true;
-    if (ear_.joinable()) ear_.join();
+    if (listening_thread_.joinable()) listening_thread_.join();
     return robots_;
   }
   [[nodiscard]] std::uint64_t refused() const { return listener_.refused(); }
@@ -49,7 +50,7 @@ class Audience {
       const bool is_over = is_over_;
       const auto update = listener_.next(kSilence_s);
       if (update)
-        robots_[update->robot].hear(update->content);
+        robots_[update->robot].receive(update->content);
       else if (is_over)
         return;
     }
@@ -58,7 +59,7 @@ class Audience {
   ViewListener listener_;
   std::map<RobotId, Watcher> robots_;
   std::atomic<bool> is_over_ = false;
-  std::thread ear_;
+  std::thread listening_thread_;
 };
 
 std::vector<std::string> robot_on(const Walk& walk, const Walk& other, const fs::path& folder,
@@ -88,10 +89,10 @@ void check_knowledge(const Watcher& known, const fs::path& results) {
   REQUIRE(known.optimized.size() == graph.vertices.size());
   for (const G2oVertex& vertex : graph.vertices) {
     CAPTURE(to_string(vertex.id));
-    const auto& told = known.optimized.at(vertex.id.index);
-    CHECK(told.anchor == 0);
-    CHECK((told.T.translation() - vertex.T_world_kf.translation()).norm() <
-          ViewTeller::kMaxShift_m + 1e-4);
+    const auto& sent = known.optimized.at(vertex.id.index);
+    CHECK(sent.anchor == 0);
+    CHECK((sent.T.translation() - vertex.T_world_kf.translation()).norm() <
+          ViewSelector::kMaxShift_m + 1e-4);
   }
   std::set<ClosureId> edges, kept;
   for (const RelativePose& edge : graph.edges)

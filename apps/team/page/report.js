@@ -148,8 +148,8 @@ function closureLines() {
   const lines = [];
   for (const [, [fromRobot, from, toRobot, to]] of closuresOf(KEPT)) {
     const a = places.get(fromRobot)?.get(from), b = places.get(toRobot)?.get(to);
-    const tell = `${nameOf(fromRobot)} ${from} – ${nameOf(toRobot)} ${to}`;
-    if (a && b) lines.push([...a, tell], [...b, tell], [NaN, NaN]);
+    const ends = `${nameOf(fromRobot)} ${from} – ${nameOf(toRobot)} ${to}`;
+    if (a && b) lines.push([...a, ends], [...b, ends], [NaN, NaN]);
   }
   return lines;
 }
@@ -169,7 +169,7 @@ function showTrajectories() {
   const at = (what) => (p) => `${what}, ${duration(p[2])}`;
   const series = [];
   const truths = run.robots.flatMap((robot) => [...lineOf(robot.truth), [NaN, NaN]]);
-  if (known) series.push({name: 'truth', color: GREY, points: truths, width: 3, tell: () => ''});
+  if (known) series.push({name: 'truth', color: GREY, points: truths, width: 3, describe: () => ''});
   const links = closureLines();
   if (links.length)
     series.push({
@@ -178,14 +178,14 @@ function showTrajectories() {
       opacity: 0.4,
       points: links,
       width: 0.8,
-      tell: (p) => p[2] ?? ''
+      describe: (p) => p[2] ?? ''
     });
   for (const robot of run.robots)
     series.push({
       name: robot.name,
       color: robotColor(robot.id),
       points: lineOf(robot.optimized),
-      tell: at('optimised')
+      describe: at('optimised')
     });
   if (known)
     for (const robot of run.robots)
@@ -195,7 +195,7 @@ function showTrajectories() {
         points: lineOf(robot.odometry),
         dashed: true,
         width: 1,
-        tell: at('aligned alone')
+        describe: at('aligned alone')
       });
   for (const one of series)
     if (one.dashed) chart.hidden.add(one.name);

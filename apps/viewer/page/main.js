@@ -25,7 +25,7 @@ let changed = true, chartsChanged = true, caughtUp = false;
 let source = 'run';  // live; replay: a finished run in real time; run: a finished run
 let pointed = null;  // position of the pointer in the scene
 let camera = null;   // robot whose images are shown
-let heardAt = 0;     // time of the last message [ms since 1970]
+let receivedAt = 0;  // time of the last message [ms since 1970]
 let waiting = [];    // messages that have arrived and are not in the scene yet
 let showing = [];    // messages that are in the scene and have not been drawn yet
 const delays = [];   // {kind, ms}: from the reception by the viewer to the drawing
@@ -43,14 +43,14 @@ const connection = new Connection({
     setLink('viewer gone', 'bad');
   },
   message(message) {
-    if (message.kind === 'hello') return greet(message);
+    if (message.kind === 'hello') return begin(message);
     if (message.kind === 'forgotten') return model.forgetNumbers(message.numbers);
     if (message.kind === 'caught_up') {
       caughtUp = true;
       if (camera !== null) connection.wantImages(camera, true);
       showLink();
     } else {
-      heardAt = Date.now();
+      receivedAt = Date.now();
       model.add(message);
       if (caughtUp && timeline.follows) waiting.push(message);
     }
@@ -58,7 +58,7 @@ const connection = new Connection({
   },
 });
 
-function greet({source: shown, title, labels}) {
+function begin({source: shown, title, labels}) {
   source = shown;
   $('title').textContent = title;
   $('live').textContent = {live: 'Live', replay: 'Newest', run: 'End'}[source];
@@ -72,11 +72,11 @@ function setLink(text, className) {
   $('link').className = `badge ${className}`;
 }
 
-// Shows whether robots are heard, or since when not.
+// Shows whether robots send, or since when not.
 function showLink() {
   if (!caughtUp) return;
   if (source === 'run') return setLink('finished run', '');
-  const over = model.over((Date.now() - heardAt) / 1000);
+  const over = model.over((Date.now() - receivedAt) / 1000);
   if (source === 'replay') return setLink(over ? 'replay, at its end' : 'replay', '');
   const at = over && new Date(over.at_ms).toTimeString().slice(0, 8);
   if (!over)
@@ -140,9 +140,9 @@ requestAnimationFrame(tick);
 scene.onDrawn = () => {
   if (!scene.building) drawLegend();
   const now = Date.now();
-  showing = showing.filter(({kind, told}) => {
+  showing = showing.filter(({kind, sent}) => {
     if (kind === 'mesh' && scene.building) return true;
-    delays.push({kind, ms: now - told});
+    delays.push({kind, ms: now - sent});
     return false;
   });
   if (delays.length > 20000) delays.splice(0, 10000);
@@ -330,7 +330,7 @@ window.kimera = {
   get end() { return model.end; },
   get robots() {
     return [...model.robots.values()]
-        .filter((r) => r.heard !== null)
+        .filter((r) => r.lastReceived !== null)
         .map((r) => ({
                id: r.id,
                name: model.name(r.id),

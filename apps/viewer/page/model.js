@@ -39,7 +39,7 @@ export class Robot {
     this.closures = new Map();
     this.meshes = new Map();
     this.image = null;
-    this.heard = null;  // time of its last message [s]
+    this.lastReceived = null;  // time of its last message [s]
   }
 
   add(message) {
@@ -59,7 +59,7 @@ export class Robot {
     if (message.boot !== this.boot) this.renew(message.boot);
     if (message.kind === 'state') ++this.statesShown;
     if (message.gone) return;
-    this.heard = message.t;
+    this.lastReceived = message.t;
     this[`apply_${message.kind}`]?.(message);
   }
 
@@ -104,7 +104,7 @@ export class Robot {
         inliers,
         reason,
         t: message.t,
-        told: message.told
+        sent: message.sent
       });
   }
 
@@ -141,7 +141,7 @@ export class Model {
 
   add(message) {
     this.start_ms ??= message.t;
-    message.told = message.t;  // [ms since 1970]
+    message.sent = message.t;  // [ms since 1970]
     message.t = (message.t - this.start_ms) / 1000;
     this.robot(message.robot).add(message);
     this.end = Math.max(this.end, message.t);
@@ -187,7 +187,7 @@ export class Model {
   frames() {
     const frames = new Map();
     for (const robot of this.robots.values()) {
-      if (robot.heard === null) continue;
+      if (robot.lastReceived === null) continue;
       const anchor = robot.optimized.length ? robot.anchor : robot.id;
       if (!frames.has(anchor)) frames.set(anchor, []);
       frames.get(anchor).push(robot);

@@ -90,7 +90,7 @@ export class Panels {
     card.camera.onclick = () => this.actions.camera(robot.id);
     card.facts = new Facts(
         make('dl', root),
-        ['Frame', 'Last told', 'Keyframes', 'Recording', 'Skipped', 'Processor', 'Memory']);
+        ['Frame', 'Last update', 'Keyframes', 'Recording', 'Skipped', 'Processor', 'Memory']);
     this.cards.set(robot.id, card);
     const ids = [...this.cards.keys()].sort((a, b) => a - b);
     const next = ids[ids.indexOf(robot.id) + 1];
@@ -101,12 +101,12 @@ export class Panels {
   updateCard(robot, model) {
     const card = this.card(robot);
     const shown = robot.state;
-    const silent = robot.heard === null ? Infinity : model.time - robot.heard;
+    const silent = robot.lastReceived === null ? Infinity : model.time - robot.lastReceived;
     const over = shown && shown.phase !== 'running';
     card.name.textContent = model.name(robot.id);
-    card.root.classList.toggle('gone', robot.heard === null);
+    card.root.classList.toggle('gone', robot.lastReceived === null);
     const lost = silent > SILENT_S[1] && !over;
-    card.phase.textContent = robot.heard === null ? 'not there yet' :
+    card.phase.textContent = robot.lastReceived === null ? 'not there yet' :
         lost                                      ? 'silent' :
         shown?.phase === 'leaving'                ? 'left' :
                                                     shown?.phase ?? 'starting';
@@ -115,13 +115,13 @@ export class Panels {
             shown?.phase === 'settled'    ? 'good' :
             silent > SILENT_S[0] && !over ? 'warn' :
                                             ''}`;
-    const lastTold = over ? `at ${duration(robot.heard)}` : `${silent.toFixed(1)} s ago`;
+    const lastUpdate = over ? `at ${duration(robot.lastReceived)}` : `${silent.toFixed(1)} s ago`;
     card.facts.set(
         'Frame',
         !shown || shown.anchor === robot.id ?
             'its own' :
             `of ${model.name(shown.anchor)}${shown.tentative ? ', tentatively' : ''}`);
-    card.facts.set('Last told', Number.isFinite(silent) ? lastTold : '–');
+    card.facts.set('Last update', Number.isFinite(silent) ? lastUpdate : '–');
     card.facts.set('Keyframes', String(shown?.keyframes ?? robot.odometry.length));
     card.facts.set('Recording', shown ? duration(shown.dataset_time_s) : '–');
     card.facts.set('Skipped', String(shown?.skipped_frames ?? '–'));
@@ -162,9 +162,9 @@ export class Panels {
                   robots
                       .map((other) => {
                         if (other === robot) return '<td class="self"></td>';
-                        if (!silent.has(other.id)) return '<td title="never heard">–</td>';
+                        if (!silent.has(other.id)) return '<td title="never received">–</td>';
                         const s = silent.get(other.id);
-                        return `<td class="${state(s)}" title="${robot.id} heard ${other.id} ${
+                        return `<td class="${state(s)}" title="${robot.id} received ${other.id} ${
                             s.toFixed(1)} s ago">${s < 100 ? s.toFixed(1) : s.toFixed(0)}</td>`;
                       })
                       .join('');
@@ -173,14 +173,14 @@ export class Panels {
             })
             .join('');
     const html = `<table><thead><tr><th></th>${head}</tr></thead><tbody>${rows}</tbody>
-      <caption>Seconds since the robot of the row heard that of the column</caption></table>`;
+      <caption>Seconds since the robot of the row received the robot of the column</caption></table>`;
     if (html !== this.matrix) this.elements.matrix.innerHTML = this.matrix = html;
   }
 
   updateTotals(model, counts) {
     const robots = [...model.robots.values()];
     const sum = (valueOf) => robots.reduce((all, robot) => all + valueOf(robot), 0);
-    this.totals.set('Robots', String(robots.filter((r) => r.heard !== null).length));
+    this.totals.set('Robots', String(robots.filter((r) => r.lastReceived !== null).length));
     this.totals.set(
         'Keyframes', quantity(sum((r) => Math.max(r.odometry.length, r.optimized.length))));
     this.totals.set('Faces', quantity(model.faces()));

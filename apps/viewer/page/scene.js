@@ -312,7 +312,7 @@ export class Scene {
     }
     const figure = this.figures.get(robot.id);
     const frame = this.frames.get(this.frameOf(robot));
-    figure.here = !!frame && robot.heard !== null;
+    figure.here = !!frame && robot.lastReceived !== null;
     figure.group.visible = figure.here;
     if (!figure.here) return;
     if (figure.group.parent !== frame.group) frame.group.add(figure.group);

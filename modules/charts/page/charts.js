@@ -507,13 +507,13 @@ function point(chart, s, x, y) {
   if (!found) return;
   const [one, place] = found;
   const head = `${place[0].toFixed(2)}, ${place[1].toFixed(2)} m`;
-  showTip(chart, x, head, [[one, one.tell?.(place) ?? '']]);
+  showTip(chart, x, head, [[one, one.describe?.(place) ?? '']]);
   chart.tip.style.top = `${y + 12}px`;
 }
 
 /**
  * Trajectories seen from above [m], both axes with one scale. set() takes series of lineChart()
- * with a function `tell`, which returns the text for the point at the pointer. A point that is not a
+ * with a function `describe`, which returns the text for the point at the pointer. A point that is not a
  * number interrupts a line. Options: title, height [px].
  */
 export function mapChart(host, options = {}) {

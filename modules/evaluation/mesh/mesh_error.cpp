@@ -181,7 +181,7 @@ class Evaluation {
   }
 
  private:
-  void tell(std::string_view stage, double share) const {
+  void report_progress(std::string_view stage, double share) const {
     if (progress_) progress_(stage, share);
   }
 
@@ -219,7 +219,7 @@ class Evaluation {
   }
 
   void register_estimates() {
-    tell("registering", 0.0);
+    report_progress("registering", 0.0);
     const double per_m2 = std::min(per_m2_, kRegistrationPerM2);
     const auto estimates = sampled_estimates(per_m2);
     const SurfaceSamples truth = sampled_truth(per_m2, options_.registration.reach_m, estimates);
@@ -259,7 +259,7 @@ class Evaluation {
 
   // Samples both sides with the same density, below max_samples.
   void sample() {
-    tell("sampling", 0.0);
+    report_progress("sampling", 0.0);
     for (;;) {
       estimates_ = sampled_estimates(per_m2_);
       true_samples_ = sampled_truth(per_m2_, options_.crop_m, estimates_);
@@ -306,7 +306,7 @@ class Evaluation {
   void compare_truth() {
     PointMatches nearest_of_all;
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
-      tell("indexing the estimate", 0.0);
+      report_progress("indexing the estimate", 0.0);
       const NearestSurface nearest(moved_[i], estimates_[i]);
       PointMatches matches =
           match_points({truth_, true_samples_}, {moved_[i], estimates_[i]}, nearest,
@@ -348,7 +348,7 @@ class Evaluation {
   }
 
   void compare_estimates() {
-    tell("indexing the truth", 0.0);
+    report_progress("indexing the truth", 0.0);
     const NearestSurface nearest(truth_, true_samples_);
     std::vector<float> all_point_m;
     std::vector<float> all_surface_m;

@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 
 [[noreturn]] void fail(const fs::path& file, int error) {
   const char* const help = error == ENOSPC || error == EDQUOT
-                               ? "; make room and run the same command again to go on"
+                               ? "; make room and run the same command again to continue"
                                : "";
   throw RecordingError(file.string() + ": cannot be written: " + std::strerror(error) + help);
 }

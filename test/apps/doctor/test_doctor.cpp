@@ -43,9 +43,9 @@ class SmallHall {
                     (folder.path() / "out.json").string());
     INFO(run.output);
     CHECK(run.exit_code == expected_exit_code);
-    const Json told = read_json(folder.path() / "out.json");
+    const Json result = read_json(folder.path() / "out.json");
     std::string ids;
-    for (const auto& finding : told["findings"]) ids += finding["id"].get<std::string>() + ' ';
+    for (const auto& finding : result["findings"]) ids += finding["id"].get<std::string>() + ' ';
     return ids;
   }
 
@@ -64,9 +64,9 @@ TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") 
   }
   SECTION("the cameras' images swapped") {
     for (const char* file : {"data", "data.csv"}) {
-      fs::rename(hall.mav0_ / "cam0" / file, hall.mav0_ / "aside");
+      fs::rename(hall.mav0_ / "cam0" / file, hall.mav0_ / "moved");
       fs::rename(hall.mav0_ / "cam1" / file, hall.mav0_ / "cam0" / file);
-      fs::rename(hall.mav0_ / "aside", hall.mav0_ / "cam1" / file);
+      fs::rename(hall.mav0_ / "moved", hall.mav0_ / "cam1" / file);
     }
     CHECK(hall.ids(2) == "stereo.swapped ");
   }
@@ -87,20 +87,22 @@ TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") 
 
 TEST_CASE("The doctor gives the reason why no robot can play a file", "[doctor]") {
   const TemporaryFolder folder;
-  const auto told = [&](const std::string& file) {
+  const auto output_of = [&](const std::string& file) {
     const CommandResult run = run_command(kDoctor + ' ' + (folder.path() / file).string());
     CHECK(run.exit_code == 2);
     return run.output;
   };
   folder.write("world.ply", "ply\nformat ascii 1.0\n");
-  CHECK_THAT(told("world.ply"), Catch::Contains("begins as none of .bag, .mcap and .db3 files do"));
+  CHECK_THAT(output_of("world.ply"),
+             Catch::Contains("begins as none of .bag, .mcap and .db3 files do"));
   McapSink record(folder.path() / "record.mcap", [](const std::string& why) { FAIL(why); });
   record.put(record.open({"/rosout", RosLog::kType}), Stamp{1}, encode_ros(RosLog{}));
   record.finish();
-  CHECK_THAT(told("record.mcap"), Catch::Contains("no topic of it has images"));
+  CHECK_THAT(output_of("record.mcap"), Catch::Contains("no topic of it has images"));
 }
 
-TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that says why", "[doctor]") {
+TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that gives the reason",
+          "[doctor]") {
   const TemporaryFolder folder;
   const CommandResult empty = run_command(kDoctor + ' ' + folder.path().string());
   CHECK(empty.exit_code == 2);
@@ -134,9 +136,9 @@ TEST_CASE("The doctor listens to the topics of a rig file, and examines their me
                     " --set ros.domain=" + domain + " --json " + out.string());
     INFO(run.output);
     REQUIRE(fs::exists(out));
-    const Json told = read_json(out);
+    const Json result = read_json(out);
     std::string found;
-    for (const auto& finding : told["findings"]) found += finding["id"].get<std::string>() + ' ';
+    for (const auto& finding : result["findings"]) found += finding["id"].get<std::string>() + ' ';
     return found;
   };
   CHECK(ids("/left/image_raw") == "live.similar_name ");
@@ -176,25 +178,25 @@ class Look {
                                         "--seconds", "1",         "--json",   out};
     command.insert(command.end(), options.begin(), options.end());
     exit_code_ = Process(command, network.host(1)).wait();
-    told_ = read_json(out);
+    result_ = read_json(out);
   }
   [[nodiscard]] int exit_code() const { return exit_code_; }
   // Ids of warnings and errors.
   [[nodiscard]] std::string ids() const {
     std::string found;
-    for (const auto& finding : told_["findings"])
+    for (const auto& finding : result_["findings"])
       if (finding["severity"] != "note") found += finding["id"].get<std::string>() + ' ';
     return found;
   }
   [[nodiscard]] std::string figure(const std::string& name) const {
-    for (const auto& figure : told_["figures"])
+    for (const auto& figure : result_["figures"])
       if (figure["name"] == name) return figure["value"];
     return "";
   }
 
  private:
   int exit_code_ = -1;
-  Json told_;
+  Json result_;
 };
 
 }  // namespace

@@ -15,7 +15,7 @@ Finding the_finding(const Examination& result) {
 
 }  // namespace
 
-TEST_CASE("Live topics that are heard are sound", "[doctor]") {
+TEST_CASE("Live topics that are received are sound", "[doctor]") {
   const std::vector<TopicPublisher> publishers = {{"/left", kImage, true}, {"/imu", kImu, false}};
   const auto result =
       examine_topics({{"/left", kImage, 60}, {"/imu", kImu, 600}}, publishers, 3.0, 0);
@@ -44,7 +44,7 @@ TEST_CASE("The reason why a live topic is silent follows from the publishers", "
   CHECK_THAT(the_finding(result).what, Contains("but /other1 is of that type"));
 }
 
-TEST_CASE("If there is no publisher at all, one finding says so, whatever topics are missing",
+TEST_CASE("If there is no publisher at all, one finding reports it, whatever topics are missing",
           "[doctor]") {
   const auto result = examine_topics({{"/left", kImage, 0}, {"/imu", kImu, 0}}, {}, 3.0, 7);
   REQUIRE(result.findings.size() == 1);

@@ -50,7 +50,7 @@ TEST_CASE("A sound network has no findings", "[doctor]") {
   NetworkFacts facts = sound();
   CHECK(ids_of(facts).empty());
   facts.announced = {robot(7, "alice")};
-  facts.heard = facts.announced;  // the same process, heard twice
+  facts.received = facts.announced;  // the same process, heard twice
   facts.echoes = {
       {.host = "10.0.0.2", .sent = 20, .received = 20, .median_s = 2e-3, .worst_s = 9e-3}};
   facts.clocks = {{"alice (id 7)", -0.002}};
@@ -131,7 +131,7 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
   }
   SECTION("peers") {
     facts.config.peers = {"10.0.0.2"};
-    facts.heard = {robot(7, "alice")};
+    facts.received = {robot(7, "alice")};
     facts.echoes = {{.host = "10.0.0.2", .sent = 20}};
     CHECK(ids_of(facts) == "warning network.unreachable ");
     facts.echoes[0].received = 15;
@@ -139,7 +139,7 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
     facts.echoes[0] = {.host = "10.0.0.2", .sent = 20, .received = 20, .median_s = 0.4};
     CHECK(ids_of(facts) == "warning network.slow ");
     facts.echoes[0] = {.host = "10.0.0.2", .may_ask = false};
-    facts.heard.clear();
+    facts.received.clear();
     facts.announced.clear();
     CHECK(ids_of(facts) == "warning network.nobody ");
   }
@@ -157,7 +157,8 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
   }
 }
 
-TEST_CASE("A robot is heard on its domain and in its team, whichever is looked for", "[doctor]") {
+TEST_CASE("A robot is received on its domain and in its team, whichever is looked for",
+          "[doctor]") {
   std::random_device device;
   const int domain = static_cast<int>(device() % 90);
   const std::string team = "test-" + std::to_string(device());

@@ -11,9 +11,9 @@ using Catch::Contains;
 namespace fs = std::filesystem;
 
 // The shipped configuration, to be corrupted.
-struct SpoiledConfig {
+struct CorruptedConfig {
   TemporaryFolder folder;
-  SpoiledConfig() { fs::copy("config", folder.path(), fs::copy_options::recursive); }
+  CorruptedConfig() { fs::copy("config", folder.path(), fs::copy_options::recursive); }
   fs::path experiments() const { return folder.path() / "experiments"; }
   std::string problems() const {
     try {
@@ -43,7 +43,7 @@ TEST_CASE("Quick keys replace those beside them", "[experiments]") {
 }
 
 TEST_CASE("Errors of the configuration are named by file, line and key", "[experiments]") {
-  const SpoiledConfig config;
+  const CorruptedConfig config;
   REQUIRE(config.problems().empty());
   config.folder.write("experiments/pcm.yaml",
                       "graph: g.g2o\nseeds: [1]\nsearches: [exact, clever]\noutlier: 3\n");
@@ -58,7 +58,7 @@ TEST_CASE("Errors of the configuration are named by file, line and key", "[exper
 }
 
 TEST_CASE("Worlds that are not there are named", "[experiments]") {
-  const SpoiledConfig config;
+  const CorruptedConfig config;
   config.folder.write("experiments/mesh.yaml", "worlds: [city, moon, mars]\n");
   config.folder.write("experiments/worlds.yaml",
                       "city: {robots: [a], simulation: ../simulation/none.yaml, rate: 2}\n");

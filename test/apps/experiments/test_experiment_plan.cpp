@@ -94,7 +94,7 @@ TEST_CASE("Graphs of COSMO-Bench are solved where they are", "[experiments]") {
   const Plan plan;
   const auto steps = plan_experiment("cosmo", plan.config, plan.paths());
   REQUIRE(steps.size() == plan.config.cosmo.sets.size());
-  for (const Step& step : steps) CHECK_THAT(step.missing, Contains("--graphs says where it is"));
+  for (const Step& step : steps) CHECK_THAT(step.missing, Contains("--graphs names its folder"));
   plan.folder.write("data/kth_r3_00_d06_d09_d10_wifi.jrl", "{}");
   const Step step = plan.step("cosmo", "cosmo-kth_r3_00_d06_d09_d10_wifi");
   CHECK(step.missing.empty());

@@ -129,7 +129,7 @@ TEST_CASE("The tool names faults and missing inputs", "[experiments]") {
   fails_with("report --programs " + laboratory.folder.path().string() + "/none", 1, "--programs");
   fails_with("run pcm --programs " + laboratory.folder.path().string(), 3, "no such program");
   fs::remove(laboratory.folder.path() / "graphs/polygon.g2o");
-  fails_with("run pcm", 3, "--graphs says where it is");
+  fails_with("run pcm", 3, "--graphs names its folder");
   laboratory.folder.write("graphs/polygon.g2o", "VERTEX_SE2 0 0 0\n");
   fails_with("run pcm", 3, "polygon.g2o:1");
   laboratory.folder.write("config/experiments/mesh.yaml", "wolds: [city]\n");

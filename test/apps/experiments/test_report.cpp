@@ -138,7 +138,7 @@ TEST_CASE("The page stands alone and is well formed", "[experiments]") {
   CHECK_THAT(city.read("numbers.json"), Contains("\"paper\": \"1113.1\""));
 }
 
-TEST_CASE("Without results the report says so", "[experiments]") {
+TEST_CASE("Without results the report states that there are none", "[experiments]") {
   const CannedCity city;
   city.forget("pgo-city-rbcd");
   for (const char* step : {"pcm-1", "pcm-2", "pcm-3"}) city.forget(step);

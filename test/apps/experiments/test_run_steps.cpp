@@ -103,7 +103,8 @@ TEST_CASE("Steps that fail for the same reason share a message", "[experiments]"
   CHECK_THAT(outcome.problems[1], Catch::StartsWith("c: exit code 2"));
 }
 
-TEST_CASE("A program that complains on standard output is heard", "[experiments]") {
+TEST_CASE("The report of a failed step contains the standard output of its program",
+          "[experiments]") {
   Workshop workshop;
   const StepsOutcome outcome = workshop.run({workshop.step("bad", "echo robot1 failed; exit 3")});
   REQUIRE(outcome.problems.size() == 1);
@@ -211,7 +212,7 @@ TEST_CASE("A record keeps how a result was made", "[experiments]") {
   CHECK_THAT(record->started, Contains("UTC"));
 }
 
-TEST_CASE("The display says which step runs and how long all will take", "[experiments]") {
+TEST_CASE("The display shows which step runs and how long all will take", "[experiments]") {
   std::ostringstream out;
   StepDisplay display(out, false, 80);
   display.expect(

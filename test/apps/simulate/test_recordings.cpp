@@ -130,7 +130,7 @@ TEST_CASE("A run that is stopped continues to the same bytes", "[simulate]") {
   wait_for_file(stopped / "robot0/mav0/cam0/data/1001100000000.jpg");  // the third
   program.kill(SIGINT);
   CHECK(program.wait() == 130);
-  CHECK(program.lines("Stopped; the same command goes on").size() == 1);
+  CHECK(program.lines("Stopped; the same command continues").size() == 1);
   CHECK_FALSE(fs::exists(stopped / "robot0/mav0/cam0/data.csv"));  // not yet a recording
   CHECK_THROWS_AS(open_euroc(stopped / "robot0"), DatasetError);
 
@@ -149,7 +149,7 @@ TEST_CASE("One signal ends the preparation in order, and a second one ends it at
   REQUIRE(program.wait_for_prefix("Stopping after this step"));
   SECTION("one signal") {
     CHECK(program.wait() == 130);
-    CHECK(program.lines("Stopped; the same command goes on").size() == 1);
+    CHECK(program.lines("Stopped; the same command continues").size() == 1);
     CHECK(program.lines("0 of ").empty());
   }
   SECTION("two signals") {

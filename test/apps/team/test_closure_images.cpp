@@ -60,7 +60,7 @@ TEST_CASE("Small images are not blown up", "[closure_images]") {
   CHECK(grey_of(closure_images(robots).jpegs.at({0, 1}), 32) > 0.0);
 }
 
-TEST_CASE("If there are too many closures, the rejected ones come first, and a note says so",
+TEST_CASE("If there are too many closures, the rejected ones come first, and a note reports it",
           "[closure_images]") {
   const EurocFolder recording;
   std::vector<RobotResult> robots{robot_on(recording.root(), 0), robot_on(recording.root(), 1)};

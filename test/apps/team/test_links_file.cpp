@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -156,7 +156,7 @@ TEST_CASE("Every problem of a file of links is reported with its line", "[links]
 
 TEST_CASE("A corrupted file of links is refused by name, or makes a script", "[links]") {
   const Team team;
-  check_spoilt<ConfigError>(
+  check_corrupted<ConfigError>(
       "seed: 3\nloss: 0.1\nrate_bytes_per_s: 1000\nqueue_bytes: 5000\noutages:\n"
       "  - {from_s: 1, to_s: 2}\npairs:\n  - {from: a, to: b, loss: 0.5}\n"
       "partitions:\n  - {from_s: 9, groups: [[a, c], [b]]}\n",

@@ -43,8 +43,8 @@ TEST_CASE("A process gives its lines, its end and its last words", "[team]") {
   CHECK(script.lines == std::vector<std::string>{"one", "two", "three"});
   CHECK(script.process.exit()->code == 3);
   CHECK(to_string(*script.process.exit()) == "exit code 3");
-  REQUIRE(script.process.last_words().size() == 1);
-  CHECK(script.process.last_words().back() == "bad");
+  REQUIRE(script.process.last_log_lines().size() == 1);
+  CHECK(script.process.last_log_lines().back() == "bad");
   CHECK_THAT(script.folder.read("log"), Catch::Contains("one\n") && Catch::Contains("bad\n"));
 }
 
@@ -52,8 +52,8 @@ TEST_CASE("Only the last words are kept", "[team]") {
   Script script("for i in $(seq 1 1000); do echo $i >&2; done");
   script.wait();
   CHECK(script.process.exit()->ok());
-  CHECK(script.process.last_words().size() == 12);
-  CHECK(script.process.last_words().back() == "1000");
+  CHECK(script.process.last_log_lines().size() == 12);
+  CHECK(script.process.last_log_lines().back() == "1000");
 }
 
 TEST_CASE("Its standard input is empty and its process group its own", "[team]") {
@@ -63,11 +63,11 @@ TEST_CASE("Its standard input is empty and its process group its own", "[team]")
 }
 
 TEST_CASE("A signal reaches the process", "[team]") {
-  Script script("trap 'echo told; exit 0' INT; echo ready; while :; do sleep 0.02; done");
+  Script script("trap 'echo interrupted; exit 0' INT; echo ready; while :; do sleep 0.02; done");
   while (script.lines.empty()) script.read_once();
   script.process.send(SIGINT);
   script.wait();
-  CHECK(script.lines == std::vector<std::string>{"ready", "told"});
+  CHECK(script.lines == std::vector<std::string>{"ready", "interrupted"});
   CHECK(script.process.exit()->ok());
 }
 
@@ -83,8 +83,8 @@ TEST_CASE("A program that cannot be started fails with a reason", "[team]") {
   RobotProcess process({folder.path() / "missing"}, Script::no_signals(), folder.path() / "log");
   while (!process.exit()) process.read();
   CHECK(process.exit()->code == 127);
-  REQUIRE(process.last_words().size() == 1);
-  CHECK_THAT(process.last_words().back(), Catch::StartsWith("cannot be started: No such file"));
+  REQUIRE(process.last_log_lines().size() == 1);
+  CHECK_THAT(process.last_log_lines().back(), Catch::StartsWith("cannot be started: No such file"));
 }
 
 TEST_CASE("A process does not outlive its owner", "[team]") {

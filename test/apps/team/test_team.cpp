@@ -143,7 +143,7 @@ TEST_CASE("The domain is drawn once for the whole team", "[team]") {
 
 TEST_CASE("An interrupt is passed on once and the table still printed", "[team]") {
   const Team team(
-      "trap 'echo \"$name told\"; exit 0' INT\n"
+      "trap 'echo \"$name interrupted\"; exit 0' INT\n"
       "touch \"$out/ready\"\n"
       "while [ $name = alice ] && [ ! -e \"$out/../bob/ready\" ]; do :; done\n"
       "[ $name = alice ] && kill -INT $PPID\n"
@@ -151,7 +151,8 @@ TEST_CASE("An interrupt is passed on once and the table still printed", "[team]"
   const auto result = run_command("exec " + team.command);
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
-  CHECK_THAT(result.output, Catch::Contains("alice told") && Catch::Contains("bob   | bob told"));
+  CHECK_THAT(result.output,
+             Catch::Contains("alice interrupted") && Catch::Contains("bob   | bob interrupted"));
   CHECK_THAT(result.output, Catch::Contains("team, one frame"));
 }
 
@@ -274,25 +275,25 @@ TEST_CASE("How a robot ended elsewhere is read from its folder", "[team]") {
   const TemporaryFolder folder;
   const std::string summary = json_text(finished_summary());
   folder.write("done/summary.json", summary);
-  folder.write("told/summary.json", summary);
-  folder.write("told/exit_code", "3\n");
+  folder.write("failed/summary.json", summary);
+  folder.write("failed/exit_code", "3\n");
   folder.write("torn/exit_code", "");
   std::string log;
   for (int i = 0; i < 30; ++i) log += "line " + std::to_string(i) + '\n';
-  folder.write("told/robot.log", log);
+  folder.write("failed/robot.log", log);
 
   TeamPlan plan;
   plan.output = folder.path();
-  for (const char* name : {"done", "told", "torn", "absent"})
+  for (const char* name : {"done", "failed", "torn", "absent"})
     plan.robots.emplace_back().name = name;
   const auto runs = finished_runs(plan);
   REQUIRE(runs.size() == 4);
   CHECK(runs[0].exit.ok());
-  CHECK(runs[0].last_words.empty());
+  CHECK(runs[0].last_log_lines.empty());
   CHECK(runs[1].exit.code == 3);
-  REQUIRE(runs[1].last_words.size() == 10);
-  CHECK(runs[1].last_words.front() == "line 20");
-  CHECK(runs[1].last_words.back() == "line 29");
+  REQUIRE(runs[1].last_log_lines.size() == 10);
+  CHECK(runs[1].last_log_lines.front() == "line 20");
+  CHECK(runs[1].last_log_lines.back() == "line 29");
   CHECK(runs[2].exit.code == 1);
   CHECK(runs[3].exit.code == 1);
 }

@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 
 #include "apps/team/run_team.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -38,7 +38,7 @@ std::string problems_of(const fs::path& file, const fs::path& dataset) {
 
 TEST_CASE("A corrupted team file is refused by name, or plans robots", "[team]") {
   const Inputs inputs;
-  check_spoilt<ConfigError>(
+  check_corrupted<ConfigError>(
       "config: common.yaml\ntruth: truth.csv\nrate: max\ndomain: 7\ntime_limit_s: 12.5\nrobots:\n"
       "  - {id: 3, name: a, dataset: \"${DATASET}\", from: 0, to: 7.5}\n"
       "  - {id: 300, graph: \"${DATASET}/g.csv\", arguments: --verbose}\n",

@@ -34,11 +34,11 @@ export class Browser {
     this.process.stdio[4].on('data', (data) => {
       rest = Buffer.concat([rest, data]);
       for (let end; (end = rest.indexOf(0)) >= 0; rest = rest.subarray(end + 1))
-        this.hear(JSON.parse(rest.subarray(0, end)));
+        this.receive(JSON.parse(rest.subarray(0, end)));
     });
   }
 
-  hear({id, result, error, method, params, sessionId}) {
+  receive({id, result, error, method, params, sessionId}) {
     if (id === undefined)
       return this.listeners.forEach((listener) => listener(method, params, sessionId));
     const [done, failed, asked] = this.waiting.get(id);

@@ -7,7 +7,7 @@ const {Model} = await import(`data:text/javascript,${encodeURIComponent(text)}`)
 
 const at = (x) => [x, 0, 0, 0, 0, 0, 1];
 let number = 0;
-const tell = (model, robot, t, content, boot = 'a') =>
+const add = (model, robot, t, content, boot = 'a') =>
     model.add({n: number++, t: 1000 * (100 + t), robot, boot, ...content});
 const keyframes = (first, xs, anchor = null) => ({
   kind: 'keyframes',
@@ -30,11 +30,11 @@ function test(name, body) {
 }
 
 test('any time can be gone to, forth and back', (model) => {
-  tell(model, 0, 0, keyframes(0, [0]));
-  tell(model, 0, 1, mesh([0, 0, 0], 10));
-  tell(model, 0, 2, keyframes(1, [1]));
-  tell(model, 0, 3, mesh([0, 0, 0], 20));
-  tell(model, 0, 4, mesh([0, 0, 0], 0));
+  add(model, 0, 0, keyframes(0, [0]));
+  add(model, 0, 1, mesh([0, 0, 0], 10));
+  add(model, 0, 2, keyframes(1, [1]));
+  add(model, 0, 3, mesh([0, 0, 0], 20));
+  add(model, 0, 4, mesh([0, 0, 0], 0));
   const facesAt = (t) => (model.seek(t), model.faces());
   assert.deepEqual([0.5, 1, 3.5, 4, 2.9, 0].map(facesAt), [0, 10, 20, 0, 10, 0]);
   model.seek(1.9);
@@ -44,9 +44,9 @@ test('any time can be gone to, forth and back', (model) => {
 });
 
 test('robots are in the frame of their optimised keyframes, else in their own', (model) => {
-  tell(model, 1, 0, keyframes(0, [0]));
-  tell(model, 0, 0, keyframes(0, [0]));
-  tell(model, 1, 1, keyframes(0, [5], 0));
+  add(model, 1, 0, keyframes(0, [0]));
+  add(model, 0, 0, keyframes(0, [0]));
+  add(model, 1, 1, keyframes(0, [5], 0));
   const frames = (t) =>
       (model.seek(t), model.frames().map((f) => [f.anchor, f.robots.map((r) => r.id)]));
   assert.deepEqual(frames(0.5), [[0, [0]], [1, [1]]]);
@@ -54,19 +54,19 @@ test('robots are in the frame of their optimised keyframes, else in their own', 
 });
 
 test('keyframes of a former frame go with it', (model) => {
-  tell(model, 1, 0, keyframes(0, [0, 1, 2], 1));
-  tell(model, 1, 1, keyframes(0, [7], 0));
+  add(model, 1, 0, keyframes(0, [0, 1, 2], 1));
+  add(model, 1, 1, keyframes(0, [7], 0));
   model.seek(1);
   assert.deepEqual(model.robots.get(1).optimized, [at(7)]);
 });
 
 test('a time without a pose, far longer than usual, is a hole', (model) => {
   const pose = (stamp_s) => ({kind: 'pose', stamp_s, T_odom_body: at(stamp_s)});
-  for (let i = 0; i <= 20; ++i) tell(model, 0, 0.1 * i, pose(500 + 0.1 * i));
-  tell(model, 0, 2.1, {...keyframes(0, [0, 1]), stamps_s: [500, 501.9]});
-  tell(model, 0, 8.3, pose(508.3));
-  tell(model, 0, 8.4, pose(508.4));
-  tell(model, 0, 8.5, {...keyframes(2, [3]), stamps_s: [508.4]});
+  for (let i = 0; i <= 20; ++i) add(model, 0, 0.1 * i, pose(500 + 0.1 * i));
+  add(model, 0, 2.1, {...keyframes(0, [0, 1]), stamps_s: [500, 501.9]});
+  add(model, 0, 8.3, pose(508.3));
+  add(model, 0, 8.4, pose(508.4));
+  add(model, 0, 8.5, {...keyframes(2, [3]), stamps_s: [508.4]});
   model.seek(9);
   const robot = model.robots.get(0);
   assert.equal(robot.holes.length, 1);
@@ -78,27 +78,27 @@ test('a time without a pose, far longer than usual, is a hole', (model) => {
   assert.equal(robot.hasHole(500, 600), false);
 });
 
-test('a live run is over when all robots have left, or none is heard any more', (model) => {
+test('a live run is over when all robots have left, or none sends any more', (model) => {
   const state = (phase) => ({kind: 'state', phase});
   assert.equal(model.over(99), null);
-  tell(model, 0, 0, state('running'));
-  tell(model, 1, 1, state('leaving'));
+  add(model, 0, 0, state('running'));
+  add(model, 1, 1, state('leaving'));
   assert.equal(model.over(3), null);
   assert.deepEqual(model.over(11), {ended: false, at_ms: 101000});
-  tell(model, 0, 4, state('settled'));
+  add(model, 0, 4, state('settled'));
   assert.equal(model.over(3), null);
   assert.deepEqual(model.over(11), {ended: true, at_ms: 104000});
-  tell(model, 0, 5, state('leaving'));
+  add(model, 0, 5, state('leaving'));
   assert.deepEqual(model.over(0), {ended: true, at_ms: 105000});
-  tell(model, 0, 9, state('running'), 'b');  // started again
+  add(model, 0, 9, state('running'), 'b');  // started again
   assert.equal(model.over(0), null);
 });
 
-test('with another process goes what the former told', (model) => {
-  tell(model, 0, 0, keyframes(0, [0, 1]));
-  tell(model, 0, 0, mesh([0, 0, 0], 10));
-  tell(model, 0, 0, closures([0, 0, 1, 0, 'kept', 9, 9, '']));
-  tell(model, 0, 2, keyframes(0, [3]), 'b');
+test('a new process of a robot replaces the updates of the former one', (model) => {
+  add(model, 0, 0, keyframes(0, [0, 1]));
+  add(model, 0, 0, mesh([0, 0, 0], 10));
+  add(model, 0, 0, closures([0, 0, 1, 0, 'kept', 9, 9, '']));
+  add(model, 0, 2, keyframes(0, [3]), 'b');
   model.seek(2);
   assert.equal(model.faces(), 0);
   assert.equal(model.closures().size, 0);
@@ -107,10 +107,10 @@ test('with another process goes what the former told', (model) => {
   assert.equal(model.faces(), 10);
 });
 
-test('of a closure the newest word counts, whoever says it', (model) => {
-  tell(model, 0, 0, closures([0, 0, 1, 0, 'candidate', 0, 0, '']));
-  tell(model, 1, 1, closures([0, 0, 1, 0, 'verified', 30, 20, '']));
-  tell(model, 0, 2, closures([0, 0, 1, 0, 'rejected', 30, 20, 'too far']));
+test('the newest verdict on a closure counts, of whichever robot', (model) => {
+  add(model, 0, 0, closures([0, 0, 1, 0, 'candidate', 0, 0, '']));
+  add(model, 1, 1, closures([0, 0, 1, 0, 'verified', 30, 20, '']));
+  add(model, 0, 2, closures([0, 0, 1, 0, 'rejected', 30, 20, 'too far']));
   const verdicts =
       [0, 1, 2].map((t) => (model.seek(t), [...model.closures().values()].map((c) => c.verdict)));
   assert.deepEqual(verdicts, [['candidate'], ['verified'], ['rejected']]);
@@ -118,8 +118,8 @@ test('of a closure the newest word counts, whoever says it', (model) => {
 
 test('what the viewer let go of is let go of', (model) => {
   const first = number;
-  tell(model, 0, 0, mesh([0, 0, 0], 10));
-  tell(model, 0, 1, mesh([0, 0, 0], 20));
+  add(model, 0, 0, mesh([0, 0, 0], 10));
+  add(model, 0, 1, mesh([0, 0, 0], 20));
   model.seek(0);
   assert.equal(model.faces(), 10);
   assert.equal(model.bytes, 180);
@@ -131,8 +131,8 @@ test('what the viewer let go of is let go of', (model) => {
 });
 
 test('a clock that was set back does not turn the order', (model) => {
-  tell(model, 0, 5, mesh([0, 0, 0], 10));
-  tell(model, 0, 3, mesh([0, 0, 0], 20));
+  add(model, 0, 5, mesh([0, 0, 0], 10));
+  add(model, 0, 3, mesh([0, 0, 0], 20));
   model.seek(model.end);
   assert.equal(model.faces(), 20);
 });

@@ -21,7 +21,7 @@ class PageListener {
     connection_ = mg_connect_websocket_client(
         "127.0.0.1", port, 0, error.data(), error.size(), path.c_str(), nullptr,
         [](mg_connection*, int, char* data, size_t size, void* self) {
-          static_cast<PageListener*>(self)->hear({data, size});
+          static_cast<PageListener*>(self)->receive({data, size});
           return 1;
         },
         [](const mg_connection*, void*) {}, this);
@@ -30,18 +30,18 @@ class PageListener {
   }
   ~PageListener() { mg_close_connection(connection_); }
 
-  void say(const std::string& text) {
+  void send(const std::string& text) {
     mg_websocket_client_write(connection_, MG_WEBSOCKET_OPCODE_TEXT, text.data(), text.size());
   }
 
   /// Waits until a frame holds this.
-  bool hears(const std::string& text) {
+  bool receives(const std::string& text) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kPatience, [&] { return all_.find(text) != std::string::npos; });
   }
 
  private:
-  void hear(std::string_view frame) {
+  void receive(std::string_view frame) {
     const std::lock_guard lock(mutex_);
     all_.append(frame);
     changed_.notify_all();

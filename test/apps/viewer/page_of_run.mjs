@@ -33,9 +33,9 @@ try {
   assert.equal(await page.evaluate('kimera.drawnFaces'), await page.evaluate('kimera.faces'));
   const badge = (page) => page.evaluate(`document.getElementById('link').textContent`);
   assert.equal(await badge(page), 'finished run');
-  const told = await page.evaluate(
+  const lastUpdates = await page.evaluate(
       `[...document.querySelectorAll('#robots dd:first-of-type')].map((d) => d.textContent)`);
-  assert.ok(told[0].startsWith('at '), told[0]);
+  assert.ok(lastUpdates[0].startsWith('at '), lastUpdates[0]);
   await page.until(  // charts come a little later
       `/sensors|odometry|vio/.test([...document.querySelectorAll('#right > div')].at(-1).textContent)`);
   const anchors =
@@ -96,4 +96,4 @@ try {
   await replay.stop();
   await other.close();
 }
-console.log('as the files say');
+console.log('as in the files');

@@ -22,19 +22,19 @@ class Demo {
     this.ended = new Promise((done) => this.process.on('exit', done));
     this.lines = createInterface({input: this.process.stdout});
     this.lines.on('line', (line) => console.log(line));
-    this.url = this.says(/http:\S+/);
-    this.finished = this.says(/The viewer goes on showing it/);
+    this.url = this.output_line(/http:\S+/);
+    this.finished = this.output_line(/The viewer continues to show it/);
   }
 
-  says(pattern) {
-    const said = new Promise((done) => this.lines.on('line', (line) => {
+  output_line(pattern) {
+    const found = new Promise((done) => this.lines.on('line', (line) => {
       const match = pattern.exec(line);
       if (match) done(match[0]);
     }));
     const ended = this.ended.then((code) => {
-      throw new Error(`the demo ended with ${code}, and had not said ${pattern}`);
+      throw new Error(`the demo ended with ${code}, and had not printed ${pattern}`);
     });
-    const first = Promise.race([said, ended]);
+    const first = Promise.race([found, ended]);
     first.catch(() => {});  // every caller that waits for it still gets the error
     return first;
   }
@@ -117,9 +117,9 @@ try {
   console.log(`kept: ${known.length} in the page, ${kept.size} in the files, ${agreed} in both`);
   assert.ok(agreed > 0 && agreed >= 0.9 * Math.max(known.length, kept.size));
   // The last correction of a large mesh is not sent completely.
-  const faces = facesOfMeshes(results, team.robots), told = await page.evaluate('kimera.faces');
-  console.log(`faces: ${told} in the page, ${faces} in the files`);
-  assert.ok(Math.abs(told - faces) <= 0.01 * faces);
+  const faces = facesOfMeshes(results, team.robots), pageFaces = await page.evaluate('kimera.faces');
+  console.log(`faces: ${pageFaces} in the page, ${faces} in the files`);
+  assert.ok(Math.abs(pageFaces - faces) <= 0.01 * faces);
   assert.deepEqual(errors.flat(), []);
 } finally {
   await demo.stop();

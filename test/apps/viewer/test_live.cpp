@@ -30,11 +30,11 @@ TEST_CASE("Messages of the robots of a domain are shown in the page, and recorde
   const int domain = random_domain();
   Process viewer({KM_BIN_DIR "/kimera_multi_viewer", "--domain", std::to_string(domain),
                   "--interface", "lo", "--port", "0", "--record", record.string()});
-  const auto told = viewer.wait_for_prefix("Open http://127.0.0.1:");
-  REQUIRE(told);
-  PageListener page(std::stoi(told->text.substr(std::string("Open http://127.0.0.1:").size())),
+  const auto address = viewer.wait_for_prefix("Open http://127.0.0.1:");
+  REQUIRE(address);
+  PageListener page(std::stoi(address->text.substr(std::string("Open http://127.0.0.1:").size())),
                     "/updates");
-  CHECK(page.hears(R"("source":"live")"));
+  CHECK(page.receives(R"("source":"live")"));
 
   const DdsParticipant robot(loopback(domain), {.robot = 7, .name = "alpha", .boot = 57});
   ViewWriter writer(robot.handle(), ViewChannel::kView, TeamPeer{7, 57});
@@ -47,14 +47,14 @@ TEST_CASE("Messages of the robots of a domain are shown in the page, and recorde
   state.phase = "running";
   state.keyframes = 4711;
   writer.write(state);
-  CHECK(page.hears(R"("keyframes":4711)"));
+  CHECK(page.receives(R"("keyframes":4711)"));
   writer.write(ViewPose{5'000'000'000, SE3::Identity()});
-  CHECK(page.hears(R"("kind":"pose")"));
+  CHECK(page.receives(R"("kind":"pose")"));
   viewer.kill(SIGINT);
   CHECK(viewer.wait() == 0);
   McapReader reader(record);
-  const auto messages = told_by(reader);
-  CHECK(std::ranges::count(messages, "/alpha/pose", &ToldMessage::topic) == 1);
+  const auto messages = topic_messages_of(reader);
+  CHECK(std::ranges::count(messages, "/alpha/pose", &TopicMessage::topic) == 1);
   CHECK(to_string(reader.report()) == "");
 }
 

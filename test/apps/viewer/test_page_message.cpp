@@ -35,29 +35,29 @@ TEST_CASE("A state is sent with its members' names", "[page_message]") {
   state.tentative = true;
   state.links = {{3, 1.25F}};
   state.sent_bytes = {{"pgo", 1234.0}};
-  const json told = text_of({5, 0xfedcba9876543210U, 1'500'000'000, state});
-  CHECK(told["n"] == 42);
-  CHECK(told["t"] == 1500.0);
-  CHECK(told["robot"] == 5);
-  CHECK(told["boot"] == "fedcba9876543210");  // JSON's numbers end at 2^53
-  CHECK(told["kind"] == "state");
-  CHECK(told["name"] ==
+  const json message = text_of({5, 0xfedcba9876543210U, 1'500'000'000, state});
+  CHECK(message["n"] == 42);
+  CHECK(message["t"] == 1500.0);
+  CHECK(message["robot"] == 5);
+  CHECK(message["boot"] == "fedcba9876543210");  // JSON's numbers end at 2^53
+  CHECK(message["kind"] == "state");
+  CHECK(message["name"] ==
         "ro\xEF\xBF\xBD"
         "bot");  // invalid UTF-8 is replaced and not fatal
-  CHECK(told["keyframes"] == 7);
-  CHECK(told["tentative"] == true);
-  CHECK(told["links"] == json::parse("[[3, 1.25]]"));
-  CHECK(told["sent_bytes"] == json::parse(R"({"pgo": 1234.0})"));
+  CHECK(message["keyframes"] == 7);
+  CHECK(message["tentative"] == true);
+  CHECK(message["links"] == json::parse("[[3, 1.25]]"));
+  CHECK(message["sent_bytes"] == json::parse(R"({"pgo": 1234.0})"));
 }
 
 TEST_CASE("Poses are position and quaternion, x first", "[page_message]") {
   const Eigen::Quaterniond turn(0.8, 0.0, 0.0, 0.6);
-  const json told = text_of(
+  const json message = text_of(
       {0, 1, 0, ViewKeyframes{true, 2, 9, {make_pose(turn.toRotationMatrix(), {1.00004, 2, -3})}}});
-  CHECK(told["optimized"] == true);
-  CHECK(told["anchor"] == 2);
-  CHECK(told["first"] == 9);
-  CHECK(told["T_world_kf"] == json::parse("[[1, 2, -3, 0, 0, 0.6, 0.8]]"));
+  CHECK(message["optimized"] == true);
+  CHECK(message["anchor"] == 2);
+  CHECK(message["first"] == 9);
+  CHECK(message["T_world_kf"] == json::parse("[[1, 2, -3, 0, 0, 0.6, 0.8]]"));
 }
 
 TEST_CASE("A closure is sent with its verdict and the reason", "[page_message]") {

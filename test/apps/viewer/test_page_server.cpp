@@ -53,7 +53,7 @@ Answer get(int port, const std::string& path, const std::string& headers = {}) {
 PageServerOptions any_port() {
   PageServerOptions options;
   options.port = 0;
-  options.greeting = R"({"kind":"hello"})";
+  options.hello = R"({"kind":"hello"})";
   return options;
 }
 
@@ -107,16 +107,16 @@ ViewUpdate state_of(const std::string& name) {
   return {3, 1, 0, state};
 }
 
-TEST_CASE("A page receives the greeting, all past messages, and new ones", "[page_server]") {
+TEST_CASE("A page receives the hello message, all past messages, and new ones", "[page_server]") {
   ViewStore store(1'000'000);
   store.add(state_of("early"));
   const PageServer server(store, any_port());
   PageListener page(port_of(server), "/updates");
-  CHECK(page.hears(R"([{"kind":"hello"}])"));
-  CHECK(page.hears(R"("name":"early")"));
-  CHECK(page.hears(R"([{"kind":"caught_up"}])"));
+  CHECK(page.receives(R"([{"kind":"hello"}])"));
+  CHECK(page.receives(R"("name":"early")"));
+  CHECK(page.receives(R"([{"kind":"caught_up"}])"));
   store.add(state_of("later"));
-  CHECK(page.hears(R"("name":"later")"));
+  CHECK(page.receives(R"("name":"later")"));
 }
 
 TEST_CASE("A robot is asked for images as long as any page requests them", "[page_server]") {
@@ -137,15 +137,15 @@ TEST_CASE("A robot is asked for images as long as any page requests them", "[pag
   const PageServer server(store, options);
   {
     PageListener one(port_of(server), "/updates");
-    one.say("no JSON");
-    one.say(R"({"images":-1,"on":true})");
-    one.say(R"({"images":70000,"on":true})");
-    one.say(R"({"images":3,"on":true})");
+    one.send("no JSON");
+    one.send(R"({"images":-1,"on":true})");
+    one.send(R"({"images":70000,"on":true})");
+    one.send(R"({"images":3,"on":true})");
     REQUIRE(wait_for(1));
     {
       PageListener other(port_of(server), "/updates");
-      other.say(R"({"images":3,"on":true})");
-      other.say(R"({"images":4,"on":true})");
+      other.send(R"({"images":3,"on":true})");
+      other.send(R"({"images":4,"on":true})");
       REQUIRE(wait_for(2));
     }
     REQUIRE(wait_for(3));  // the other page has gone

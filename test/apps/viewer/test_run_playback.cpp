@@ -10,12 +10,12 @@ constexpr Stamp kBegin = 1'000'000'000'000;
 
 // The updates of a kind from a robot, with their time [s].
 template <typename T>
-std::vector<std::pair<double, T>> told(const RunPlayback& run, RobotId robot) {
+std::vector<std::pair<double, T>> updates_of(const RunPlayback& run, RobotId robot) {
   std::vector<std::pair<double, T>> found;
   for (const ViewUpdate& update : run.updates)
     if (const T* const content = std::get_if<T>(&update.content);
         content != nullptr && update.robot == robot)
-      found.emplace_back(seconds_between(kBegin, update.told), *content);
+      found.emplace_back(seconds_between(kBegin, update.sent), *content);
   return found;
 }
 
@@ -25,8 +25,8 @@ TEST_CASE("The updates of a run are in the order of time, and the last ones are 
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   CHECK(run.notes.empty());
   for (std::size_t i = 1; i < run.updates.size(); ++i)
-    REQUIRE(run.updates[i - 1].told <= run.updates[i].told);
-  const auto states = told<ViewState>(run, 1);
+    REQUIRE(run.updates[i - 1].sent <= run.updates[i].sent);
+  const auto states = updates_of<ViewState>(run, 1);
   REQUIRE(states.size() == 12);
   const auto& [end_s, last] = states.back();
   CHECK(end_s == Approx(12.0));
@@ -46,13 +46,13 @@ TEST_CASE("The updates of a run are in the order of time, and the last ones are 
 TEST_CASE("Robots join with the first closure of theirs that was kept", "[run_playback]") {
   const SmallRun files;
   const RunPlayback run = read_run(files.folder.path(), kBegin);
-  for (const auto& [time_s, state] : told<ViewState>(run, 1)) {
+  for (const auto& [time_s, state] : updates_of<ViewState>(run, 1)) {
     CAPTURE(time_s);
     CHECK(state.anchor == (time_s < 4.5 ? 1 : 0));
     CHECK(state.cost == (time_s < 2.25 ? 0.0 : time_s < 5.0 ? 5.0 : 7.0));
   }
   std::vector<double> optimized_s;
-  for (const auto& [time_s, keyframes] : told<ViewKeyframes>(run, 1)) {
+  for (const auto& [time_s, keyframes] : updates_of<ViewKeyframes>(run, 1)) {
     if (!keyframes.optimized) continue;
     optimized_s.push_back(time_s);
     CHECK(keyframes.anchor == 0);
@@ -66,7 +66,7 @@ TEST_CASE("Robots join with the first closure of theirs that was kept", "[run_pl
 TEST_CASE("The mesh appears when the robot is near, and is replaced once the robot joins",
           "[run_playback]") {
   const SmallRun files;
-  const auto chunks = told<MeshChunk>(read_run(files.folder.path(), kBegin), 1);
+  const auto chunks = updates_of<MeshChunk>(read_run(files.folder.path(), kBegin), 1);
   REQUIRE(chunks.size() == 4);
   CHECK(chunks[0].first == Approx(0.5).margin(0.11));
   CHECK(chunks[0].second.anchor == 1);
@@ -80,7 +80,7 @@ TEST_CASE("The mesh appears when the robot is near, and is replaced once the rob
 
 TEST_CASE("A closure appears when both keyframes exist, then with its outcome", "[run_playback]") {
   const SmallRun files;
-  const auto closures = told<ViewClosures>(read_run(files.folder.path(), kBegin), 0);
+  const auto closures = updates_of<ViewClosures>(read_run(files.folder.path(), kBegin), 0);
   REQUIRE(closures.size() == 4);
   CHECK(closures[0].first == Approx(4.0));
   CHECK(closures[0].second.closures[0].verdict == ViewVerdict::kCandidate);
@@ -102,7 +102,7 @@ TEST_CASE("Missing parts of a run are noted, and a folder without a run is refus
   REQUIRE(run.notes.size() == 2);
   CHECK_THAT(run.notes[0], Catch::Contains("r0/timing.csv"));
   CHECK_THAT(run.notes[1], Catch::Contains("r1/traffic.csv line 2: fewer than 8 fields"));
-  CHECK(told<ViewState>(run, 0).size() == 12);
+  CHECK(updates_of<ViewState>(run, 0).size() == 12);
   CHECK(read_run(files.folder.path() / "r0", kBegin).updates.size() > 10);  // one robot's
 
   const TemporaryFolder empty;

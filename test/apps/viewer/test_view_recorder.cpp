@@ -42,33 +42,31 @@ LabelPalette palette() {
 std::vector<ViewUpdate> team() {
   std::vector<ViewUpdate> all;
   for (const RobotId robot : {RobotId{0}, RobotId{1}}) {
-    const auto tell = [&](ViewContent content) {
-      all.push_back({robot, 9, 0, std::move(content)});
-    };
+    const auto add = [&](ViewContent content) { all.push_back({robot, 9, 0, std::move(content)}); };
     const Stamp begin = kBegin + robot * 10 * kSecond;
-    tell(ViewState{.name = robot == 0 ? "alice" : "bob", .phase = "running"});
-    tell(ViewKeyframes{false,
-                       robot,
-                       0,
-                       {at(0, 0), at(1, 0), at(2, 0)},
-                       {begin, begin + kSecond, begin + 2 * kSecond}});
+    add(ViewState{.name = robot == 0 ? "alice" : "bob", .phase = "running"});
+    add(ViewKeyframes{false,
+                      robot,
+                      0,
+                      {at(0, 0), at(1, 0), at(2, 0)},
+                      {begin, begin + kSecond, begin + 2 * kSecond}});
     const double y = 2.0 * robot;
-    tell(ViewKeyframes{true, 0, 0, {at(0, y), at(1, y), at(2, y)}});
-    tell(ViewPose{begin + 5 * kSecond / 2, at(2.5, 0)});
-    tell(ViewClosures{{{kClosure, ViewVerdict::kKept, 80, 60, ""}}});
-    tell(ViewImage{.stamp = begin, .jpeg = {0xFF, 0xD8}, .features = {}});
+    add(ViewKeyframes{true, 0, 0, {at(0, y), at(1, y), at(2, y)}});
+    add(ViewPose{begin + 5 * kSecond / 2, at(2.5, 0)});
+    add(ViewClosures{{{kClosure, ViewVerdict::kKept, 80, 60, ""}}});
+    add(ViewImage{.stamp = begin, .jpeg = {0xFF, 0xD8}, .features = {}});
     LabelledMesh sheet = wavy_sheet(4, 0.1);
     sheet.labels.assign(sheet.vertices.size(), 5);
-    for (MeshChunk& chunk : split_mesh(sheet, robot, 0, {}).chunks) tell(std::move(chunk));
+    for (MeshChunk& chunk : split_mesh(sheet, robot, 0, {}).chunks) add(std::move(chunk));
   }
   return all;
 }
 
 struct Record {
-  explicit Record(const fs::path& file) : reader(file), messages(told_by(reader)) {}
+  explicit Record(const fs::path& file) : reader(file), messages(topic_messages_of(reader)) {}
 
   [[nodiscard]] std::size_t count(const std::string& topic) const {
-    return static_cast<std::size_t>(std::ranges::count(messages, topic, &ToldMessage::topic));
+    return static_cast<std::size_t>(std::ranges::count(messages, topic, &TopicMessage::topic));
   }
   template <typename Message>
   [[nodiscard]] Message last(const std::string& topic) const {
@@ -79,7 +77,7 @@ struct Record {
   }
 
   McapReader reader;
-  std::vector<ToldMessage> messages;
+  std::vector<TopicMessage> messages;
 };
 
 }  // namespace
@@ -116,7 +114,7 @@ TEST_CASE("A viewer's record has the messages of each robot as the robot's own r
         std::vector<std::uint8_t>{0xFF, 0xD8});
 
   std::set<std::pair<std::string, std::string>> links;
-  for (const ToldMessage& message : record.messages)
+  for (const TopicMessage& message : record.messages)
     if (message.topic == "/tf") {
       const auto transforms = decode_ros<RosTransforms>("cdr", message.bytes);
       REQUIRE(transforms.value);
@@ -129,13 +127,13 @@ TEST_CASE("A viewer's record has the messages of each robot as the robot's own r
                                                                {"bob/map", "bob/odom"},
                                                                {"bob/odom", "bob/base_link"}});
 
-  const auto told = told_by_others(file, folder);
-  if (!told) {
+  const auto read = read_by_others(file, folder);
+  if (!read) {
     WARN("npm cannot install the readers of test/system/record");
     return;
   }
-  CHECK(told->at("whole") == true);
-  CHECK(told->at("messages") == record.messages.size());
+  CHECK(read->at("whole") == true);
+  CHECK(read->at("messages") == record.messages.size());
 }
 
 TEST_CASE("A viewer's record is readable while it is written", "[viewer]") {
@@ -173,25 +171,25 @@ TEST_CASE("After a robot has left or is silent, a record has no more of its mess
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "team.mcap";
   ViewRecorder recorder(file, {}, kGone_s);
-  const auto tell = [&recorder](RobotId robot, const std::string& name, const std::string& phase) {
+  const auto add = [&recorder](RobotId robot, const std::string& name, const std::string& phase) {
     recorder.add({robot, 9, 0, ViewState{.name = name, .phase = phase}});
   };
   for (const ViewUpdate& update : team()) recorder.add(update);
-  tell(2, "carol", "leaving");
+  add(2, "carol", "leaving");
   for (int k = 0; k < 45; ++k) {
-    tell(0, "alice", "running");
+    add(0, "alice", "running");
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   recorder.finish();
 
-  std::map<std::string, int> told;
+  std::map<std::string, int> count;
   const Record record(file);
-  for (const ToldMessage& message : record.messages)
+  for (const TopicMessage& message : record.messages)
     if (message.topic == "/diagnostics")
-      ++told[decode_ros<RosDiagnostics>("cdr", message.bytes).value.value().status[0].hardware_id];
-  CHECK(told["alice"] >= 3);
-  CHECK(told["bob"] <= 1);
-  CHECK(told["carol"] == 0);
+      ++count[decode_ros<RosDiagnostics>("cdr", message.bytes).value.value().status[0].hardware_id];
+  CHECK(count["alice"] >= 3);
+  CHECK(count["bob"] <= 1);
+  CHECK(count["carol"] == 0);
   CHECK(record.count("/bob/closures") <= 2);  // with the path, and as they were received
 }
 

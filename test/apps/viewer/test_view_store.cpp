@@ -111,7 +111,7 @@ TEST_CASE("A message that is repeated without a change reaches pages once", "[vi
         0, 1, 0, ViewKeyframes{true, 0, 0, {make_pose(Eigen::Matrix3d::Identity(), {x_m, 0, 0})}}};
   };
   const auto again = [](ViewUpdate update) {
-    update.told = 5;
+    update.sent = 5;
     return update;
   };
   using enum ViewVerdict;
@@ -133,7 +133,7 @@ TEST_CASE("A message that is repeated without a change reaches pages once", "[vi
 
 TEST_CASE("A page waits for new messages", "[view_store]") {
   ViewStore store(5000);
-  std::jthread teller([&] { store.add(pose(3)); });
+  std::jthread sender([&] { store.add(pose(3)); });
   ViewStore::Cursor page;
   CHECK(numbers(store.take(page, 1000, 60.0)) == Numbers{0});
 }

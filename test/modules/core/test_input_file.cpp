@@ -8,7 +8,7 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 

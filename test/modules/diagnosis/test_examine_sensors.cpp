@@ -147,7 +147,7 @@ TEST_CASE("A vocabulary that maps all features to few words is found", "[diagnos
   CHECK(ids_of(examine_words(alike, vocabulary)) == "warning vocabulary.coverage ");
   CHECK(ids_of(examine_words({}, vocabulary)).empty());
   const std::string varied = to_text(examine_words(images, vocabulary).figures);
-  CHECK_THAT(varied, Catch::Contains("words tell 4000 features apart, of 256"));
+  CHECK_THAT(varied, Catch::Contains("words distinguish 4000 features, of 256"));
 }
 
 }  // namespace km

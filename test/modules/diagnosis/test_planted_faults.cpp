@@ -193,7 +193,7 @@ TEST_CASE("V1_01 at rest gives no findings and no figures that need motion", "[d
   const Recorded recorded = read(folder.path(), 10.0);
   CHECK(found_in(recorded) == Ids{"frames.rate"});  // 5 Hz: every fourth image
   const Examination inertial = examine_inertial(recorded.sample, recorded.rig.stereo);
-  CHECK_THAT(to_text(inertial.figures), Catch::Contains("not told: the camera turns by"));
+  CHECK_THAT(to_text(inertial.figures), Catch::Contains("not determined: the camera turns by"));
 }
 
 TEST_CASE("V1_01 in flight with images a second apart gives findings only on rate and gaps",

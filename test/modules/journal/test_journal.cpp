@@ -230,10 +230,10 @@ TEST_CASE("A flipped bit ends the journal before its entry", "[journal]") {
   const std::string text = (written(folder, run), folder.read("run.journal"));
   std::mt19937 rng(4);
   for (int i = 0; i < 200; ++i) {
-    std::string spoilt = text;
+    std::string corrupted = text;
     const std::size_t at = 8 + rng() % (text.size() - 8);
-    spoilt[at] = static_cast<char>(spoilt[at] ^ (1 << (rng() % 8)));
-    const auto [extent, entries] = read(folder.write("spoilt", spoilt));
+    corrupted[at] = static_cast<char>(corrupted[at] ^ (1 << (rng() % 8)));
+    const auto [extent, entries] = read(folder.write("corrupted", corrupted));
     CHECK(entries.size() < run.size());
     CHECK(extent.whole_bytes <= at);
     CHECK(extent.cut_bytes > 0);
@@ -345,18 +345,18 @@ TEST_CASE("A run continues after its last full keyframe each time it is killed",
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   std::mt19937 rng(7);
-  for (std::uint64_t life = 1; life <= 3; ++life) {
-    entries.emplace_back(step(4 + static_cast<KeyframeIndex>(life), rng));  // incomplete
-    entries.emplace_back(JournalStart{kRobot, 0x123450000 + life, "MH_01_easy"});
-    const KeyframeOdometry next = step(4 + static_cast<KeyframeIndex>(life), rng);
+  for (std::uint64_t process = 1; process <= 3; ++process) {
+    entries.emplace_back(step(4 + static_cast<KeyframeIndex>(process), rng));  // incomplete
+    entries.emplace_back(JournalStart{kRobot, 0x123450000 + process, "MH_01_easy"});
+    const KeyframeOdometry next = step(4 + static_cast<KeyframeIndex>(process), rng);
     entries.emplace_back(state(next.stamp, rng));
     entries.emplace_back(next);
     entries.emplace_back(features(next.id.index, rng));
     const RestoredRun run = restore_run(written(folder, entries));
-    CHECK(run.boot == 0x123450000 + life);
-    REQUIRE(run.odometry.size() == 5 + life);
+    CHECK(run.boot == 0x123450000 + process);
+    REQUIRE(run.odometry.size() == 5 + process);
     CHECK(run.odometry.back().T_odom_kf.matrix() == next.T_odom_kf.matrix());
-    CHECK(run.states.size() == 10 + life);  // next.stamp is later than that of the former image
+    CHECK(run.states.size() == 10 + process);  // next.stamp is later than that of the former image
   }
 }
 

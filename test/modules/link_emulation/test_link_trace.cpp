@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 namespace {
@@ -79,7 +79,7 @@ TEST_CASE("A missing link trace is refused by name", "[link_emulation]") {
 }
 
 TEST_CASE("A corrupted link trace is refused by name or usable", "[link_emulation]") {
-  check_spoilt<LinkTraceError>(
+  check_corrupted<LinkTraceError>(
       "time_s,bytes_per_s,delay_s\n0,125000,0.02\n1.5,60000,0.05\n3,0,0.2\n4,9000,0.1\n",
       "trace.csv", [](const std::string& text) {
         const LinkTrace trace = parse_link_trace(text, "trace.csv");

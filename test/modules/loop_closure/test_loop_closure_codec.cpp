@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "modules/loop_closure/loop_closure_codec.hpp"
+#include "test/support/corrupted_message.hpp"
 #include "test/support/random_pose.hpp"
-#include "test/support/spoilt_message.hpp"
 
 namespace km {
 namespace {

@@ -184,8 +184,8 @@ TEST_CASE("both answers of a repeated request give one closure", "[loop_closure_
 
 TEST_CASE("a reply contains the points whose words the requester's own keyframe has",
           "[loop_closure_node]") {
-  const bool told = GENERATE(true, false);
-  CAPTURE(told);
+  const bool has_bow = GENERATE(true, false);
+  CAPTURE(has_bow);
   const Scene scene(13);
   constexpr std::uint32_t kSent = 50;
   constexpr std::size_t kFirst = 12;  // replies, with three times as many
@@ -198,7 +198,7 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   BagOfWords theirs;  // words of the last points except for the very last
   for (std::uint32_t word = words - kSent; word + 1 < words; ++word) theirs.push_back({word, 1});
   const Vocabulary vocabulary = toy_vocabulary(200);
-  if (told)
+  if (has_bow)
     peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = vocabulary.id(), .words = theirs});
   peer.give(KeyframeBow{.id = {kSelf, 1}, .vocabulary = vocabulary.id(), .words = {{3, 1}}});
   peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = 1, .words = {{4, 1}}});
@@ -209,13 +209,13 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   for (std::size_t reply = 0; reply <= kFirst; ++reply) peer.node.step(robot.requests[0].message);
   REQUIRE(peer.replies.size() == kFirst + 1);
   std::vector<OrbDescriptor> expected;  // the strongest come first, none of them without depth
-  for (std::uint32_t word = words - kSent; told && word + 1 < words; ++word)
+  for (std::uint32_t word = words - kSent; has_bow && word + 1 < words; ++word)
     if (word != 100) expected.push_back(toy_descriptor(word));
-  for (std::uint32_t word = 0; !told && word < kSent; ++word)
+  for (std::uint32_t word = 0; !has_bow && word < kSent; ++word)
     expected.push_back(toy_descriptor(word));
   for (std::size_t reply = 0; reply < kFirst; ++reply)
     CHECK(peer.replies[reply].message->keyframe.features.descriptors.size() ==
-          (told ? expected.size() : 3 * kSent));
+          (has_bow ? expected.size() : 3 * kSent));
   const KeyframeFeatures& sent = peer.replies[kFirst].message->keyframe.features;
   CHECK(sent.descriptors == expected);
   CHECK(sent.keypoints.size() == expected.size());
@@ -283,14 +283,14 @@ TEST_CASE("work with a restarted peer begins again and with a resumed one contin
           "[loop_closure_node]") {
   Meeting meeting(5);
   auto& [scene, robot, peer] = meeting;
-  std::vector<PeerEventKind> told;
-  robot.own_restarts.subscribe([&](const auto& event) { told.push_back(event->kind); });
+  std::vector<PeerEventKind> restarts;
+  robot.own_restarts.subscribe([&](const auto& event) { restarts.push_back(event->kind); });
   robot.give(scene.candidate());
   deliver(robot, peer);
   REQUIRE(robot.closures.size() == 1);
   SECTION("restarted") {
     robot.give(event_of(PeerEventKind::kRestarted));
-    CHECK(told == std::vector{PeerEventKind::kRestarted});
+    CHECK(restarts == std::vector{PeerEventKind::kRestarted});
     robot.give(scene.candidate());
     CHECK(robot.requests.size() == 1);  // its keyframe is another
     deliver(robot, peer);
@@ -298,7 +298,7 @@ TEST_CASE("work with a restarted peer begins again and with a resumed one contin
   }
   SECTION("resumed") {
     robot.give(event_of(PeerEventKind::kResumed));
-    CHECK(told.empty());
+    CHECK(restarts.empty());
     robot.give(scene.candidate());
     CHECK(robot.requests.empty());
     CHECK(robot.closures.size() == 1);
@@ -353,7 +353,7 @@ TEST_CASE("a keyframe its owner does not have yet is asked for again", "[loop_cl
   CHECK(robot.closures.size() == 1);
 }
 
-TEST_CASE("a candidate that fails verification says why", "[loop_closure_node]") {
+TEST_CASE("a candidate that fails verification has a reason", "[loop_closure_node]") {
   Scene views(7);
   for (OrbDescriptor& descriptor : views.peer.features.descriptors) descriptor = {};
   Meeting meeting(views);

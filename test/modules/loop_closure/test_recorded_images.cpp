@@ -81,7 +81,7 @@ TEST_CASE("keypoints cover a recorded image and most have a plausible depth", "[
 }
 
 // A quarter of the table of the benchmark: every second keyframe of each side.
-TEST_CASE("closures of V1_01 are many, accurate, and as uncertain as they say", "[verifier]") {
+TEST_CASE("closures of V1_01 are many, accurate, and as uncertain as they state", "[verifier]") {
   const auto sequence = shared_data("euroc/V1_01_easy");
   if (!sequence) return;
   const std::vector<RecordedKeyframe> keyframes = load_v1_01(*sequence, {}, 2);

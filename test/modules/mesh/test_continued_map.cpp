@@ -54,14 +54,14 @@ TEST_CASE("A map file that is truncated or corrupted is refused by name", "[map_
   write_map_file(folder.path() / "run.map", strip(3, 0.0F, 0));
   const std::string bytes = folder.read("run.map");
   const auto refused = [&](const std::string& text) {
-    CHECK_THROWS_WITH(read_map_file(folder.write("spoilt.map", text)),
-                      Catch::Contains("spoilt.map"));
+    CHECK_THROWS_WITH(read_map_file(folder.write("corrupted.map", text)),
+                      Catch::Contains("corrupted.map"));
   };
   for (std::size_t size = 0; size < bytes.size(); ++size) refused(bytes.substr(0, size));
   for (std::size_t at = 0; at < bytes.size(); ++at) {
-    std::string spoilt = bytes;
-    spoilt[at] = static_cast<char>(spoilt[at] ^ 4);
-    refused(spoilt);
+    std::string corrupted = bytes;
+    corrupted[at] = static_cast<char>(corrupted[at] ^ 4);
+    refused(corrupted);
   }
   refused(bytes + "x");
   CHECK_THROWS_AS(read_map_file(folder.path() / "missing"), InputFileError);

@@ -9,7 +9,7 @@
 #include "modules/mesh/mesh_codec.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
-#include "test/support/spoilt_message.hpp"
+#include "test/support/corrupted_message.hpp"
 
 namespace km {
 namespace {
@@ -148,7 +148,7 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   MeshRobot b(domain, 4);
   a->start();
   b.start();
-  REQUIRE(b.basis.hears(PeerEventKind::kJoined, 3));
+  REQUIRE(b.basis.receives(PeerEventKind::kJoined, 3));
   const auto mesh = sheet(150);
   a->sender.offer(kAnchor, mesh);
   REQUIRE(b.receives(3, *mesh));
@@ -171,7 +171,7 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   late.start();
   CHECK(late.receives(3, *less));
   a.reset();
-  REQUIRE(b.basis.hears(PeerEventKind::kLeft, 3));
+  REQUIRE(b.basis.receives(PeerEventKind::kLeft, 3));
   CHECK(b.receives(3, *less));  // kept
 }
 

@@ -112,7 +112,7 @@ class Mapping {
                                 std::span(run_.T_world_kf).first(keyframes)};
     const double start_s = cpu_s();
     MeshCorrection result =
-        afresh ? corrector_.correct_afresh(input) : corrector_.correct(input).value();
+        afresh ? corrector_.correct_from_scratch(input) : corrector_.correct(input).value();
     const double end_s = cpu_s();
     (void)mapper_.drop(result.superseded);
     const MapSize size = mapper_.size();

@@ -197,9 +197,9 @@ TEST_CASE("Invalid input is refused by name", "[mesh_deformation]") {
     std::vector<SE3> keyframes = keyframes_above(kSheet), optimised = keyframes;
   };
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-  const auto check_refusal = [](const char* reason, const auto& spoil) {
+  const auto check_refusal = [](const char* reason, const auto& corrupt) {
     Call input;
-    spoil(input);
+    corrupt(input);
     CHECK_THAT(refusal(input.map, input.keyframes, input.optimised), Contains(reason));
   };
   check_refusal("optimised pose of keyframe 3",

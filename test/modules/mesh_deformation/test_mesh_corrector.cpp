@@ -107,7 +107,7 @@ TEST_CASE("A refused correction changes nothing", "[mesh_deformation]") {
   CHECK(corrector.correct(corridor.input()));
   ++without.version;
   CHECK_THROWS_AS(corrector.correct(without.input()), std::invalid_argument);
-  CHECK_THROWS_AS(corrector.correct_afresh(without.input()), std::invalid_argument);
+  CHECK_THROWS_AS(corrector.correct_from_scratch(without.input()), std::invalid_argument);
   CHECK_FALSE(corrector.correct(corridor.input()));
 }
 
@@ -116,7 +116,7 @@ TEST_CASE("A mesh corrected from scratch does not depend on earlier corrections"
   Corridor corridor;
   corridor.bend_to(20.0);
   MeshCorrector fresh(MeshDeformationConfig{});
-  const MeshCorrection expected = fresh.correct_afresh(corridor.input());
+  const MeshCorrection expected = fresh.correct_from_scratch(corridor.input());
   CHECK(expected.deformed);
 
   MeshCorrector corrector(MeshDeformationConfig{});
@@ -128,7 +128,7 @@ TEST_CASE("A mesh corrected from scratch does not depend on earlier corrections"
   const auto on_the_way = corrector.correct(corridor.input());
   REQUIRE(on_the_way);
   CHECK(on_the_way->mesh.vertices != expected.mesh.vertices);  // else the test shows nothing
-  CHECK(corrector.correct_afresh(corridor.input()).mesh.vertices == expected.mesh.vertices);
+  CHECK(corrector.correct_from_scratch(corridor.input()).mesh.vertices == expected.mesh.vertices);
   CHECK_FALSE(corrector.correct(corridor.input()));
 }
 

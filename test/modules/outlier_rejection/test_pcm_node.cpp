@@ -8,8 +8,8 @@
 #include "modules/outlier_rejection/pcm_node.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
 #include "test/support/captured_log.hpp"
+#include "test/support/corrupted_message.hpp"
 #include "test/support/inbox.hpp"
-#include "test/support/spoilt_message.hpp"
 
 namespace km {
 namespace {

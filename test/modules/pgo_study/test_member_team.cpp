@@ -45,12 +45,12 @@ class AskedTeam {
           if (place.parent) neighbours_[self].insert(*place.parent);
           auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);
           members_[self] = member.get();
-          return std::make_unique<OverheardMember>(std::move(member),
-                                                   [this, self](const SolverLetter& letter) {
-                                                     letter_bytes_ += letter.bytes->size();
-                                                     if (!neighbours_[self].contains(letter.to))
-                                                       ++misaddressed_;
-                                                   });
+          return std::make_unique<ObservedMember>(std::move(member),
+                                                  [this, self](const SolverLetter& letter) {
+                                                    letter_bytes_ += letter.bytes->size();
+                                                    if (!neighbours_[self].contains(letter.to))
+                                                      ++misaddressed_;
+                                                  });
         },
         shape);
   }

@@ -36,15 +36,15 @@ TEST_CASE("No private pose can be derived from the poses and edges that robots s
   if (!graph) return;
   Eavesdropper ear = listen_to(*graph, false, kRounds);
   // The eavesdropper has received all messages.
-  CHECK(ear.letters() >= static_cast<std::size_t>(kRounds) * 2 * (graph->robots() - 1) - 2);
+  CHECK(ear.messages() >= static_cast<std::size_t>(kRounds) * 2 * (graph->robots() - 1) - 2);
   CHECK(ear.announced_poses() >= graph->robots());
   CHECK(ear.private_poses() > 0);
   CHECK(ear.misfits() == 0);
   CHECK(ear.named_private().empty());
   CHECK(ear.derivable().empty());
   WARN(name << ": of " << ear.private_poses() << " private poses " << ear.derivable().size()
-            << " can be chained; " << ear.public_poses().size() << " public, " << ear.told_edges()
-            << " told edges, " << ear.bytes() << " bytes");
+            << " can be chained; " << ear.public_poses().size() << " public, " << ear.sent_edges()
+            << " sent edges, " << ear.bytes() << " bytes");
 }
 
 TEST_CASE("With tell_private, private poses can be derived from the messages", "[pgo_study]") {
@@ -61,7 +61,7 @@ TEST_CASE("With tell_private, private poses can be derived from the messages", "
             << " can be chained, "
             << 100.0 * static_cast<double>(ear.derivable().size()) /
                    static_cast<double>(ear.private_poses())
-            << " %; " << ear.told_edges() << " told edges, " << ear.bytes() << " bytes");
+            << " %; " << ear.sent_edges() << " sent edges, " << ear.bytes() << " bytes");
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include "modules/place_recognition/place_recognition_codec.hpp"
 #include "modules/place_recognition/place_recognition_node.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
-#include "test/support/spoilt_message.hpp"
+#include "test/support/corrupted_message.hpp"
 
 namespace km {
 namespace {

@@ -15,8 +15,8 @@
 #include "modules/place_recognition/vocabulary_training.hpp"
 #include "test/modules/place_recognition/synthetic_orb.hpp"
 #include "test/support/command.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -242,7 +242,7 @@ TEST_CASE("A truncated or overlong vocabulary is refused at every length", "[pla
   CHECK_THROWS_WITH(deserialize(bytes.substr(0, 39), "cut"),
                     Contains("vocabulary cut, offset 39: ends inside the header"));
   CHECK_THROWS_WITH(deserialize(bytes + 'x', "long"),
-                    Contains("the header promises " + std::to_string(bytes.size())));
+                    Contains("the header states " + std::to_string(bytes.size())));
 }
 
 TEST_CASE("A vocabulary with any byte changed is refused", "[place_recognition]") {
@@ -275,7 +275,7 @@ TEST_CASE("A refusal names the file, the offset and what is wrong there", "[plac
   CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 20: 4294967295 nodes"));
   bytes = good;
   overwrite(bytes, 20, 1U << 26U);
-  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("but the header promises"));
+  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("but the header states"));
   bytes = good;
   bytes.back() = static_cast<char>(bytes.back() ^ 1);
   CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 32: the checksum"));
@@ -289,9 +289,9 @@ TEST_CASE("A malformed tree is refused although its checksum fits", "[place_reco
 }
 
 TEST_CASE("A corrupted vocabulary is refused by name", "[place_recognition]") {
-  check_spoilt<std::runtime_error>(
-      serialize(small_vocabulary()), "spoilt.kmvoc",
-      [](const std::string& bytes) { (void)deserialize(bytes, "spoilt.kmvoc"); });
+  check_corrupted<std::runtime_error>(
+      serialize(small_vocabulary()), "corrupted.kmvoc",
+      [](const std::string& bytes) { (void)deserialize(bytes, "corrupted.kmvoc"); });
   check_no_files<std::runtime_error>(".kmvoc",
                                      [](const auto& place) { (void)load_vocabulary(place); });
 }
@@ -300,15 +300,15 @@ TEST_CASE("A corrupted tree with a matching checksum is refused or finds words",
           "[place_recognition]") {
   const VocabularyData good = small_vocabulary();
   unsigned refused = 0;
-  for (unsigned seed = 0; seed < spoilt_files(); ++seed) {
+  for (unsigned seed = 0; seed < corrupted_files(); ++seed) {
     CAPTURE(seed);
     std::mt19937 rng(seed);
     VocabularyData data = good;
-    const auto spoil = [&](auto& values, auto value) {
+    const auto corrupt = [&](auto& values, auto value) {
       values[std::uniform_int_distribution<std::size_t>(0, values.size() - 1)(rng)] = value;
     };
-    if (seed % 3 == 0) spoil(data.children, static_cast<std::uint8_t>(rng() % 6));
-    if (seed % 3 == 1) spoil(data.idf, std::bit_cast<float>(static_cast<std::uint32_t>(rng())));
+    if (seed % 3 == 0) corrupt(data.children, static_cast<std::uint8_t>(rng() % 6));
+    if (seed % 3 == 1) corrupt(data.idf, std::bit_cast<float>(static_cast<std::uint32_t>(rng())));
     if (seed % 3 == 2) data.depth = static_cast<int>(rng() % 12);
     try {
       const Vocabulary vocabulary(deserialize(serialize(data), "forged"));

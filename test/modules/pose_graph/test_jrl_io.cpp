@@ -7,9 +7,9 @@
 #include "modules/core/covariance.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 #include "modules/pose_graph/jrl_io.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/small_jrl.hpp"
-#include "test/support/spoilt_input.hpp"
 
 namespace km {
 namespace {
@@ -296,7 +296,7 @@ TEST_CASE("A file that is not JSON is refused with its name", "[jrl]") {
 }
 
 TEST_CASE("A corrupted JRL file is refused with its place, or contains a solvable graph", "[jrl]") {
-  check_spoilt<std::runtime_error>(SmallJrl().text(), "team.jrl", [](const std::string& text) {
+  check_corrupted<std::runtime_error>(SmallJrl().text(), "team.jrl", [](const std::string& text) {
     const JrlGraph graph = parse_jrl(text, "team.jrl");
     for (const JrlMeasurement& measured : graph.measurements) {
       CHECK(measured.edge.T_from_to.matrix().allFinite());

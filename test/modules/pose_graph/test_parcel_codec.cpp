@@ -2,7 +2,7 @@
 
 #include "modules/pose_graph/parcel_codec.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
-#include "test/support/spoilt_message.hpp"
+#include "test/support/corrupted_message.hpp"
 
 namespace km {
 namespace {

@@ -3,7 +3,7 @@
 #include "modules/core/covariance.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 #include "modules/pose_graph/recorded_graph.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 namespace {
@@ -66,7 +66,7 @@ void check_drive(const RecordedGraph& graph) {
 
 TEST_CASE("A corrupted g2o file is refused with its line, or contains a solvable graph", "[g2o]") {
   const std::string good = GENERATE(drive_g2o(), planar_g2o());
-  check_spoilt<std::runtime_error>(good, "spoilt.g2o", [](const std::string& text) {
+  check_corrupted<std::runtime_error>(good, "spoilt.g2o", [](const std::string& text) {
     std::istringstream in(text);
     check_graph(read_g2o(in, "spoilt.g2o"));
   });
@@ -76,7 +76,7 @@ TEST_CASE("A corrupted graph of a robot is refused with its name, or can be play
   const TemporaryFolder folder;
   const auto [name, good] =
       GENERATE(table<std::string, std::string>({{"7.g2o", drive_g2o()}, {"7.csv", drive_csv()}}));
-  check_spoilt<std::runtime_error>(good, name, [&, file = name](const std::string& text) {
+  check_corrupted<std::runtime_error>(good, name, [&, file = name](const std::string& text) {
     check_drive(read_recorded_graph(folder.write(file, text)));
   });
 }

@@ -14,22 +14,22 @@ inline std::vector<BagMessage> messages_of(BagReader& reader) {
 }
 
 /// A message with the topic and type of its channel.
-struct ToldMessage {
+struct TopicMessage {
   std::string topic, type, encoding;
   Stamp log_time = 0;
   std::vector<std::uint8_t> bytes;
 
-  bool operator==(const ToldMessage&) const = default;
+  bool operator==(const TopicMessage&) const = default;
 };
 
-inline std::vector<ToldMessage> told_by(BagReader& reader) {
-  std::vector<ToldMessage> told;
+inline std::vector<TopicMessage> topic_messages_of(BagReader& reader) {
+  std::vector<TopicMessage> messages;
   for (BagMessage& message : messages_of(reader)) {
     const BagChannel& channel = reader.channels().at(message.channel);
-    told.push_back({channel.topic, channel.type, channel.encoding, message.log_time,
-                    std::move(message.bytes)});
+    messages.push_back({channel.topic, channel.type, channel.encoding, message.log_time,
+                        std::move(message.bytes)});
   }
-  return told;
+  return messages;
 }
 
 }  // namespace km

@@ -22,7 +22,7 @@ struct ListedSum {
 
 inline ListedSum sum_of(BagReader& reader) {
   ListedSum result;
-  for (const ToldMessage& message : told_by(reader)) {
+  for (const TopicMessage& message : topic_messages_of(reader)) {
     ByteWriter text;
     text.bytes(std::vector<std::uint8_t>(message.topic.begin(), message.topic.end()));
     text.u64(static_cast<std::uint64_t>(message.log_time));

@@ -10,8 +10,8 @@
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/recordings/listed_sum.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -221,7 +221,7 @@ TEST_CASE("Corrupted databases are refused or read in order", "[recordings]") {
       std::string(kTables) + kIndex + kRows +
           "WITH RECURSIVE n(id) AS (SELECT 10 UNION ALL SELECT id + 1 FROM n WHERE id < 400)"
           " INSERT INTO messages SELECT id, 3, id * 7919 % 1000, zeroblob(id * id % 5000) FROM n;");
-  check_spoilt<InputFileError>(
+  check_corrupted<InputFileError>(
       read_input_file(good), folder.path().string(), [&](const std::string& bytes) {
         Db3Reader reader(folder.write("a.db3", bytes));
         const auto messages = messages_of(reader);

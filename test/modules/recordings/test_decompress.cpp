@@ -51,7 +51,7 @@ TEST_CASE("Decompression restores the compressed bytes", "[recordings]") {
   CHECK(*result.value == plain);
 }
 
-TEST_CASE("Compressed bytes of another size than they say are refused", "[recordings]") {
+TEST_CASE("Compressed bytes of another size than they state are refused", "[recordings]") {
   const std::string compression = GENERATE("none", "lz4", "zstd", "bz2");
   CAPTURE(compression);
   const Bytes packed = compressed(compression, plain_bytes(3'000'000));

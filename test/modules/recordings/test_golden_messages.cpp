@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "modules/recordings/ros_messages.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 namespace {
@@ -201,9 +201,9 @@ TEST_CASE("Messages are to the byte those of another CDR library, in both direct
     CHECK(encode_ros(*read.value) == known.bytes);
     for (std::size_t size = 0; size < known.bytes.size(); ++size)
       CHECK(decode_ros<Message>("cdr", std::span(known.bytes).first(size)).refusal);
-    for (unsigned seed = 0; seed < spoilt_files(); ++seed) {
-      const auto spoilt = decode_ros<Message>("cdr", InputSpoiler(seed)({known.bytes}));
-      CHECK(spoilt.value.has_value() == (spoilt.refusal == nullptr));
+    for (unsigned seed = 0; seed < corrupted_files(); ++seed) {
+      const auto corrupted = decode_ros<Message>("cdr", InputCorrupter(seed)({known.bytes}));
+      CHECK(corrupted.value.has_value() == (corrupted.refusal == nullptr));
     }
   };
   check(image(false));

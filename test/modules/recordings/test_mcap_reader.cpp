@@ -9,8 +9,8 @@
 #include "modules/recordings/mcap_reader.hpp"
 #include "test/modules/recordings/listed_sum.hpp"
 #include "test/modules/recordings/mcap_file.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -33,7 +33,7 @@ struct ListedRecord {
 };
 
 struct Listed {
-  std::vector<ToldMessage> messages;
+  std::vector<TopicMessage> messages;
   std::size_t channels = 0;
 };
 
@@ -50,11 +50,11 @@ Listed listed_in(const fs::path& file) {
     if (record.type == "Channel") channels.emplace(record.number("id"), record);
     if (record.type != "Message") continue;
     const ListedRecord& channel = channels.at(record.number("channel_id"));
-    ToldMessage message{.topic = channel.text("topic"),
-                        .type = types.at(channel.number("schema_id")),
-                        .encoding = channel.text("message_encoding"),
-                        .log_time = record.number("log_time"),
-                        .bytes = {}};
+    TopicMessage message{.topic = channel.text("topic"),
+                         .type = types.at(channel.number("schema_id")),
+                         .encoding = channel.text("message_encoding"),
+                         .log_time = record.number("log_time"),
+                         .bytes = {}};
     for (const Json& byte : record.fields.at("data"))
       message.bytes.push_back(static_cast<std::uint8_t>(std::stoi(byte.get<std::string>())));
     listed.messages.push_back(std::move(message));
@@ -107,10 +107,10 @@ TEST_CASE("Every file of the MCAP conformance suite gives the messages that are 
     std::uint64_t count = 0;
     for (const BagChannel& channel : reader.channels()) count += channel.message_count;
     CHECK(count == listed.messages.size());
-    const auto told = told_by(reader);
-    CHECK(told == listed.messages);
+    const auto read = topic_messages_of(reader);
+    CHECK(read == listed.messages);
     CHECK(to_string(reader.report()) == "");
-    messages += told.size();
+    messages += read.size();
   }
   CHECK(files == 342);
   CHECK(messages == 1694);
@@ -177,7 +177,7 @@ TEST_CASE("The complete parts of a truncated file are read", "[recordings]") {
   CHECK(before == 42);
 }
 
-TEST_CASE("A chunk with another checksum than it says is lost with its place", "[recordings]") {
+TEST_CASE("A chunk with another checksum than it states is lost with its place", "[recordings]") {
   const bool has_summary = GENERATE(true, false);
   McapFile file({.compression = "", .has_summary = has_summary});
   file.add_chunk({{.channel = 1, .log_time = 1, .bytes = {'f', 'i', 'n', 'd'}}}, 1);
@@ -223,14 +223,14 @@ TEST_CASE("Corrupted MCAP files are refused or read in order", "[recordings]") {
   options.compression = GENERATE("", "lz4", "zstd");
   options.has_crc = GENERATE(true, false);
   const TemporaryFolder folder;
-  check_spoilt<InputFileError>(mixed_file(options).finish(), folder.path().string(),
-                               [&](const std::string& bytes) {
-                                 McapReader reader(folder.write("a.mcap", bytes));
-                                 check_order(messages_of(reader));
-                                 const BagReport report = reader.report();
-                                 for (const auto& [fault, entry] : report.entries())
-                                   CHECK(entry.first.find("a.mcap byte ") != entry.first.npos);
-                               });
+  check_corrupted<InputFileError>(mixed_file(options).finish(), folder.path().string(),
+                                  [&](const std::string& bytes) {
+                                    McapReader reader(folder.write("a.mcap", bytes));
+                                    check_order(messages_of(reader));
+                                    const BagReport report = reader.report();
+                                    for (const auto& [fault, entry] : report.entries())
+                                      CHECK(entry.first.find("a.mcap byte ") != entry.first.npos);
+                                  });
 }
 
 TEST_CASE("A file that is no MCAP file is refused by name", "[recordings]") {

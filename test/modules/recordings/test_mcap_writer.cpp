@@ -50,7 +50,7 @@ McapMessage numbered(std::uint32_t sequence, Stamp time) {
 // Two channels of one type and one of another; times go up and down.
 struct SmallFile {
   std::string bytes;
-  std::vector<ToldMessage> messages;    // in order of the file
+  std::vector<TopicMessage> messages;   // in order of the file
   std::vector<std::size_t> chunk_ends;  // [bytes]
   std::vector<std::size_t> chunk_messages;
 };
@@ -90,8 +90,8 @@ SmallFile small_file(const std::string& compression) {
   return file;
 }
 
-std::vector<ToldMessage> by_time(std::vector<ToldMessage> messages) {
-  std::ranges::stable_sort(messages, {}, &ToldMessage::log_time);
+std::vector<TopicMessage> by_time(std::vector<TopicMessage> messages) {
+  std::ranges::stable_sort(messages, {}, &TopicMessage::log_time);
   return messages;
 }
 
@@ -121,7 +121,7 @@ TEST_CASE("Messages written to an MCAP file are read in order of time", "[record
   McapReader reader(folder.write("a.mcap", file.bytes));
   CHECK(reader.channels().size() == 3);
   for (const BagChannel& channel : reader.channels()) CHECK(channel.message_count == 10);
-  CHECK(told_by(reader) == by_time(file.messages));
+  CHECK(topic_messages_of(reader) == by_time(file.messages));
   CHECK(to_string(reader.report()) == "");
 }
 
@@ -140,17 +140,17 @@ TEST_CASE("A file cut at any byte gives the chunks before the cut", "[recordings
       if (k == 0 || size >= file.chunk_ends[k - 1]) at_most += file.chunk_messages[k];
     }
     McapReader reader(folder.write("a.mcap", file.bytes.substr(0, size)));
-    const auto told = told_by(reader);
+    const auto read = topic_messages_of(reader);
     CAPTURE(size);
-    REQUIRE(told.size() >= messages);
-    REQUIRE(told.size() <= at_most);
-    REQUIRE(told == by_time({file.messages.begin(),
-                             file.messages.begin() + static_cast<std::ptrdiff_t>(told.size())}));
+    REQUIRE(read.size() >= messages);
+    REQUIRE(read.size() <= at_most);
+    REQUIRE(read == by_time({file.messages.begin(),
+                             file.messages.begin() + static_cast<std::ptrdiff_t>(read.size())}));
     REQUIRE(reader.report().count(BagFault::kTruncated) > 0);
   }
 }
 
-TEST_CASE("Indexes say where messages are", "[recordings]") {
+TEST_CASE("Indexes give the positions of messages", "[recordings]") {
   const SmallFile file = small_file("");
   std::size_t messages = 0;
   McapChunk chunk;

@@ -7,8 +7,8 @@
 #include "modules/recordings/ros1_bag_reader.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/recordings/listed_sum.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -245,14 +245,14 @@ TEST_CASE("The complete chunks of a truncated bag are read", "[recordings]") {
 
 TEST_CASE("Corrupted bags are refused or read in order", "[recordings]") {
   const TemporaryFolder folder;
-  check_spoilt<InputFileError>(small_bag(GENERATE(true, false)), folder.path().string(),
-                               [&](const std::string& bytes) {
-                                 Ros1BagReader reader(folder.write("a.bag", bytes));
-                                 check_bag_order(messages_of(reader));
-                                 const BagReport report = reader.report();
-                                 for (const auto& [fault, entry] : report.entries())
-                                   CHECK(entry.first.find("a.bag byte ") != entry.first.npos);
-                               });
+  check_corrupted<InputFileError>(small_bag(GENERATE(true, false)), folder.path().string(),
+                                  [&](const std::string& bytes) {
+                                    Ros1BagReader reader(folder.write("a.bag", bytes));
+                                    check_bag_order(messages_of(reader));
+                                    const BagReport report = reader.report();
+                                    for (const auto& [fault, entry] : report.entries())
+                                      CHECK(entry.first.find("a.bag byte ") != entry.first.npos);
+                                  });
 }
 
 TEST_CASE("Corrupted bags with compression are refused or read in order", "[recordings]") {
@@ -260,11 +260,11 @@ TEST_CASE("Corrupted bags with compression are refused or read in order", "[reco
                                 GENERATE(std::string("tf_example.bag"), "no-messages.bag"));
   if (!file) return;
   const TemporaryFolder folder;
-  check_spoilt<InputFileError>(read_input_file(*file), folder.path().string(),
-                               [&](const std::string& bytes) {
-                                 Ros1BagReader reader(folder.write("a.bag", bytes));
-                                 check_bag_order(messages_of(reader));
-                               });
+  check_corrupted<InputFileError>(read_input_file(*file), folder.path().string(),
+                                  [&](const std::string& bytes) {
+                                    Ros1BagReader reader(folder.write("a.bag", bytes));
+                                    check_bag_order(messages_of(reader));
+                                  });
 }
 
 TEST_CASE("A file that is no bag of version 2 is refused by name", "[recordings]") {

@@ -7,7 +7,7 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 namespace {
@@ -274,7 +274,7 @@ TEST_CASE("Stamps before 1970 are ROS 2's and those after 2038 ROS 1's", "[recor
   CHECK(decode_ros<RosHeader>("cdr", cdr).value->stamp == -999999995);
 }
 
-TEST_CASE("Images with fewer pixels than they say are refused", "[recordings]") {
+TEST_CASE("Images with fewer pixels than they state are refused", "[recordings]") {
   Bytes bytes = sample(RosImage::kType, Wire::kRos1);
   const std::size_t height = 4 + 8 + 4 + 8;
   REQUIRE(bytes[height] == 2);
@@ -295,13 +295,13 @@ TEST_CASE("Corrupted messages are refused or read", "[recordings]") {
   AllTypes::for_each([&]<typename Message>(const Message&) {
     const std::vector<Bytes> samples = {sample(Message::kType, wire)};
     unsigned refused = 0;
-    for (unsigned seed = 0; seed < spoilt_files(); ++seed) {
-      const auto result = decode_ros<Message>(encoding_of(wire), InputSpoiler(seed)(samples));
+    for (unsigned seed = 0; seed < corrupted_files(); ++seed) {
+      const auto result = decode_ros<Message>(encoding_of(wire), InputCorrupter(seed)(samples));
       CHECK(result.value.has_value() == (result.refusal == nullptr));
       refused += result.value ? 0 : 1;
     }
     CHECK(refused > 0);
-    CHECK(refused < spoilt_files());
+    CHECK(refused < corrupted_files());
   });
 }
 

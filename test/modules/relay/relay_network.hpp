@@ -78,29 +78,29 @@ class Network {
     settle();
   }
   // Publishes a bag to the robots that receive this one directly, as DDS does.
-  void tell_bag(RobotId robot, std::uint32_t index) {
-    const auto content = told({.kind = RelayKind::kBag,
-                               .origin = {robot, boots_.at(robot)},
-                               .number = index,
-                               .content = octets(600)});
+  void send_bag(RobotId robot, std::uint32_t index) {
+    const auto content = signed_content({.kind = RelayKind::kBag,
+                                         .origin = {robot, boots_.at(robot)},
+                                         .number = index,
+                                         .content = octets(600)});
     for (const auto& [other, store] : stores_)
       if (linked(robot, other)) (void)at(other).keep_bag(identity(robot), index, content);
   }
   // Sends a keyframe as a reply to the robot that requested it.
-  void tell_reply(RobotId robot, RobotId to, std::uint32_t index) {
+  void send_reply(RobotId robot, RobotId to, std::uint32_t index) {
     const TeamPeer origin{robot, boots_.at(robot)};
     (void)at(to).keep_reply(origin, index,
-                            told({.kind = RelayKind::kReply,
-                                  .origin = origin,
-                                  .to = to,
-                                  .number = index,
-                                  .content = octets(9000)}));
+                            signed_content({.kind = RelayKind::kReply,
+                                            .origin = origin,
+                                            .to = to,
+                                            .number = index,
+                                            .content = octets(9000)}));
   }
   void run(double seconds) {
     for (const double end_s = now_s_ + seconds; now_s_ < end_s; now_s_ += kPeriod_s) {
       for (auto& [robot, store] : stores_)
         for (auto& [other, to] : stores_)
-          if (linked(robot, other)) to.told(robot, store.summary(), now_s_);
+          if (linked(robot, other)) to.update(robot, store.summary(), now_s_);
       settle();
     }
   }
@@ -138,13 +138,13 @@ class Network {
       (void)member(a).admit(member(b));
       (void)member(b).admit(member(a));
     }
-    at(a).heard(identity(b));
-    at(b).heard(identity(a));
+    at(a).connected(identity(b));
+    at(b).connected(identity(a));
   }
   [[nodiscard]] std::optional<RelayKeys> keys_of(RobotId robot) {
     return has_keys_ ? std::optional(relay_keys(member(robot).seal)) : std::nullopt;
   }
-  [[nodiscard]] std::vector<std::uint8_t> told(RelayMessage message) {
+  [[nodiscard]] std::vector<std::uint8_t> signed_content(RelayMessage message) {
     if (has_keys_) endorse(message, *keys_of(message.origin.robot));
     return message.content;
   }

@@ -16,10 +16,10 @@ RelayMessage some_message(RelayKind kind) {
 }
 
 // Robot with keys that receives c directly; c has introduced a.
-struct Hearing {
-  Hearing() {
+struct Receiver {
+  Receiver() {
     REQUIRE(b.admit(c) == nullptr);
-    store.heard(c.identity);
+    store.connected(c.identity);
   }
   RelayArrival receive(RelayMessage message) {
     return store.receive({kC, std::make_shared<const RelayMessage>(std::move(message))});
@@ -29,7 +29,7 @@ struct Hearing {
                     .origin = robot.peer(),
                     .content = to_octets({robot.identity.name, robot.seal.credentials()})});
   }
-  static RelayMessage said_by(const ToyMember& robot, RelayKind kind, std::uint32_t number = 0) {
+  static RelayMessage message_of(const ToyMember& robot, RelayKind kind, std::uint32_t number = 0) {
     RelayMessage message{
         .kind = kind, .origin = robot.peer(), .to = kB, .number = number, .content = octets(40)};
     endorse(message, relay_keys(robot.seal));
@@ -116,16 +116,16 @@ TEST_CASE("An introduction is a robot name with credentials and nothing else", "
 }
 
 TEST_CASE("A robot out of reach is accepted only with a valid certificate of its team", "[relay]") {
-  Hearing hearing;
-  RelayStore& store = hearing.store;
+  Receiver receiver;
+  RelayStore& store = receiver.store;
   const auto is_forged = [&](const ToyMember& robot, const char* why) {
-    CHECK(hearing.introduce(robot) == RelayArrival::kForged);
+    CHECK(receiver.introduce(robot) == RelayArrival::kForged);
     CHECK(store.refusal() == std::string(why));
     CHECK_FALSE(store.origin(robot.peer().robot));
   };
   SECTION("a member") {
-    CHECK(hearing.introduce(hearing.a) == RelayArrival::kNew);
-    CHECK(hearing.introduce(hearing.a) == RelayArrival::kRepeated);
+    CHECK(receiver.introduce(receiver.a) == RelayArrival::kNew);
+    CHECK(receiver.introduce(receiver.a) == RelayArrival::kRepeated);
     REQUIRE(store.take_output().met.size() == 1);
     CHECK(store.origin(kA) == kOrigin);
   }
@@ -134,19 +134,19 @@ TEST_CASE("A robot out of reach is accepted only with a valid certificate of its
     is_forged(ToyMember(others, kA, "alpha"), "credentials of another team");
   }
   SECTION("a revoked member") {
-    (void)hearing.b.seal.update(hearing.team.revoking({hearing.a.keys.certificate}), kToyNow_s);
-    is_forged(hearing.a, "certificate is revoked");
+    (void)receiver.b.seal.update(receiver.team.revoking({receiver.a.keys.certificate}), kToyNow_s);
+    is_forged(receiver.a, "certificate is revoked");
   }
   SECTION("a member with a name or boot id that it has not signed, or without credentials") {
-    const std::string& shown = hearing.a.seal.credentials();
+    const std::string& shown = receiver.a.seal.credentials();
     for (const auto& [boot, introduction] :
          std::vector<std::pair<std::uint64_t, RelayIntroduction>>{
              {kOrigin.boot, {"beta", shown}},
              {kOrigin.boot + 1, {"alpha", shown}},
              {kOrigin.boot, {"alpha"}}})
-      CHECK(hearing.receive({.kind = RelayKind::kIntroduction,
-                             .origin = {kA, boot},
-                             .content = to_octets(introduction)}) == RelayArrival::kForged);
+      CHECK(receiver.receive({.kind = RelayKind::kIntroduction,
+                              .origin = {kA, boot},
+                              .content = to_octets(introduction)}) == RelayArrival::kForged);
     CHECK_FALSE(store.origin(kA));
   }
   CHECK(store.take_output().delivered.empty());
@@ -154,16 +154,16 @@ TEST_CASE("A robot out of reach is accepted only with a valid certificate of its
 
 TEST_CASE("A message that a neighbour forges or changes is refused before it is stored",
           "[relay]") {
-  Hearing hearing;
-  RelayStore& store = hearing.store;
-  REQUIRE(hearing.introduce(hearing.a) == RelayArrival::kNew);
+  Receiver receiver;
+  RelayStore& store = receiver.store;
+  REQUIRE(receiver.introduce(receiver.a) == RelayArrival::kNew);
   (void)store.take_output();
   const RelayKind kind = GENERATE(RelayKind::kBag, RelayKind::kClosure, RelayKind::kInlierSet,
                                   RelayKind::kRequest, RelayKind::kReply);
   CAPTURE(static_cast<int>(kind));
-  RelayMessage message = Hearing::said_by(hearing.a, kind);
+  RelayMessage message = Receiver::message_of(receiver.a, kind);
   SECTION("unchanged") {
-    CHECK(hearing.receive(message) == RelayArrival::kNew);
+    CHECK(receiver.receive(message) == RelayArrival::kNew);
     const RelayOutput output = store.take_output();
     REQUIRE(output.delivered.size() == 1);
     CHECK(output.delivered[0]->content == octets(40));
@@ -171,27 +171,27 @@ TEST_CASE("A message that a neighbour forges or changes is refused before it is 
   }
   SECTION("changed") {
     message.content[3] ^= 1U;
-    CHECK(hearing.receive(message) == RelayArrival::kForged);
+    CHECK(receiver.receive(message) == RelayArrival::kForged);
   }
   SECTION("without a signature") {
     message.content = octets(40);
-    CHECK(hearing.receive(message) == RelayArrival::kForged);
+    CHECK(receiver.receive(message) == RelayArrival::kForged);
   }
   SECTION("signed by the neighbour") {
     message.content = octets(40);
-    endorse(message, relay_keys(hearing.c.seal));
-    CHECK(hearing.receive(message) == RelayArrival::kForged);
+    endorse(message, relay_keys(receiver.c.seal));
+    CHECK(receiver.receive(message) == RelayArrival::kForged);
   }
   SECTION("under another number") {
     message.number = 3;
-    CHECK(hearing.receive(message) == RelayArrival::kForged);
+    CHECK(receiver.receive(message) == RelayArrival::kForged);
   }
   SECTION("sent by an earlier incarnation") {
-    const ToyMember former(hearing.a, std::uint64_t{4} << kResumeBits);
-    message = Hearing::said_by(former, kind);
-    CHECK(hearing.receive(message) == RelayArrival::kRefused);
+    const ToyMember former(receiver.a, std::uint64_t{4} << kResumeBits);
+    message = Receiver::message_of(former, kind);
+    CHECK(receiver.receive(message) == RelayArrival::kRefused);
     message.origin = kOrigin;
-    CHECK(hearing.receive(message) == RelayArrival::kForged);
+    CHECK(receiver.receive(message) == RelayArrival::kForged);
   }
   CHECK(store.summary().holds == std::vector<RelayHeld>{{kOrigin, 0, 0}});
   const RelayOutput output = store.take_output();
@@ -200,49 +200,52 @@ TEST_CASE("A message that a neighbour forges or changes is refused before it is 
 }
 
 TEST_CASE("Messages of a revoked robot are refused and the robot is removed", "[relay]") {
-  Hearing hearing;
-  RelayStore& store = hearing.store;
-  REQUIRE(hearing.introduce(hearing.a) == RelayArrival::kNew);
-  CHECK(hearing.receive(Hearing::said_by(hearing.a, RelayKind::kBag, 0)) == RelayArrival::kNew);
-  (void)hearing.b.seal.update(hearing.team.revoking({hearing.a.keys.certificate}), kToyNow_s);
-  CHECK(hearing.receive(Hearing::said_by(hearing.a, RelayKind::kBag, 1)) == RelayArrival::kForged);
+  Receiver receiver;
+  RelayStore& store = receiver.store;
+  REQUIRE(receiver.introduce(receiver.a) == RelayArrival::kNew);
+  CHECK(receiver.receive(Receiver::message_of(receiver.a, RelayKind::kBag, 0)) ==
+        RelayArrival::kNew);
+  (void)receiver.b.seal.update(receiver.team.revoking({receiver.a.keys.certificate}), kToyNow_s);
+  CHECK(receiver.receive(Receiver::message_of(receiver.a, RelayKind::kBag, 1)) ==
+        RelayArrival::kForged);
   CHECK(store.refusal() == std::string("certificate is revoked"));
   CHECK(store.summary().holds.empty());
   CHECK(store.take_output().delivered.size() == 1);
-  CHECK(hearing.introduce(hearing.a) == RelayArrival::kForged);
+  CHECK(receiver.introduce(receiver.a) == RelayArrival::kForged);
 }
 
 TEST_CASE("A directly received message is stored for other robots only with its signature",
           "[relay]") {
-  Hearing hearing;
-  RelayStore& store = hearing.store;
-  const auto keep = [&](const RelayMessage& said) {
-    return said.kind == RelayKind::kBag
-               ? store.keep_bag(hearing.c.identity, said.number, said.content)
-               : store.keep_reply(hearing.c.peer(), said.number, said.content);
+  Receiver receiver;
+  RelayStore& store = receiver.store;
+  const auto keep = [&](const RelayMessage& message) {
+    return message.kind == RelayKind::kBag
+               ? store.keep_bag(receiver.c.identity, message.number, message.content)
+               : store.keep_reply(receiver.c.peer(), message.number, message.content);
   };
   const RelayKind kind = GENERATE(RelayKind::kBag, RelayKind::kReply);
-  CHECK(keep(Hearing::said_by(hearing.c, kind)) == RelayArrival::kNew);
-  RelayMessage other = Hearing::said_by(hearing.c, kind, 1);
+  CHECK(keep(Receiver::message_of(receiver.c, kind)) == RelayArrival::kNew);
+  RelayMessage other = Receiver::message_of(receiver.c, kind, 1);
   other.content[0] ^= 1U;
   CHECK(keep(other) == RelayArrival::kForged);
-  other = Hearing::said_by(hearing.c, kind, 1);
+  other = Receiver::message_of(receiver.c, kind, 1);
   other.number = 2;
   CHECK(keep(other) == RelayArrival::kForged);
 }
 
 TEST_CASE("Messages that a robot signed with a former key are sent again", "[relay]") {
-  Hearing hearing;
-  RelayStore& store = hearing.store;
-  CHECK(store.keep_bag(hearing.c.identity, 0,
-                       Hearing::said_by(hearing.c, RelayKind::kBag).content) == RelayArrival::kNew);
+  Receiver receiver;
+  RelayStore& store = receiver.store;
+  CHECK(store.keep_bag(receiver.c.identity, 0,
+                       Receiver::message_of(receiver.c, RelayKind::kBag).content) ==
+        RelayArrival::kNew);
   const bool renewed = GENERATE(false, true);
-  const std::uint64_t boot = next_boot(hearing.c.identity.boot);
+  const std::uint64_t boot = next_boot(receiver.c.identity.boot);
   const ToyMember next =
-      renewed ? ToyMember(hearing.team, kC, "gamma", boot) : ToyMember(hearing.c, boot);
-  REQUIRE(hearing.b.admit(next) == nullptr);
-  store.heard(next.identity);
-  CHECK(store.keep_bag(next.identity, 0, Hearing::said_by(next, RelayKind::kBag).content) ==
+      renewed ? ToyMember(receiver.team, kC, "gamma", boot) : ToyMember(receiver.c, boot);
+  REQUIRE(receiver.b.admit(next) == nullptr);
+  store.connected(next.identity);
+  CHECK(store.keep_bag(next.identity, 0, Receiver::message_of(next, RelayKind::kBag).content) ==
         (renewed ? RelayArrival::kNew : RelayArrival::kRepeated));
 }
 
@@ -251,7 +254,7 @@ TEST_CASE("A neighbour that changes forwarded messages is refused and blocks no 
   Network network(4, true);
   network.link(kA, kC);
   network.link(kC, kB);
-  for (std::uint32_t i = 0; i < 20; ++i) network.tell_bag(kA, i);
+  for (std::uint32_t i = 0; i < 20; ++i) network.send_bag(kA, i);
   network.at(kA).wrote(RelayKind::kClosure, {kB}, 1, octets(700), 0.0);
   network.tamper([](RelayMessage& message) {
     if (message.kind != RelayKind::kIntroduction) message.content.back() ^= 1U;

@@ -47,17 +47,17 @@ struct Relaying {
              [&now_s] { return now_s; }),
         bow_guard(node.guard<KeyframeBow>(
             RelayKind::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); })) {
-    node.join_bags<KeyframeBow>(heard_bows, bows);
+    node.join_bags<KeyframeBow>(received_bows, bows);
     node.join_calls(
         RelayKind::kRequest,
-        RelayedTopics<KeyframeRequest>{own_requests, direct_requests, heard_requests, requests},
+        RelayedTopics<KeyframeRequest>{own_requests, direct_requests, received_requests, requests},
         [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
-    node.join_letters(RelayKind::kInlierSet,
-                      RelayedTopics<InlierSet>{told_sets, direct_sets, heard_sets, sets});
+    node.join_reliable(RelayKind::kInlierSet,
+                       RelayedTopics<InlierSet>{own_sets, direct_sets, received_sets, sets});
   }
 
   // Sends and receives a message to all robots as the bridge does.
-  [[nodiscard]] Octets said(const KeyframeBow& bow) const {
+  [[nodiscard]] Octets content_of(const KeyframeBow& bow) const {
     const auto encoded = Codec<KeyframeBow>::encode(bow);
     Octets content = serialize(Codec<KeyframeBow>::descriptor(), &encoded.wire);
     if (bow_guard.tail_bytes == 0) return content;
@@ -65,9 +65,9 @@ struct Relaying {
     content.insert(content.end(), tail.begin(), tail.end());
     return content;
   }
-  [[nodiscard]] std::string hear(const TeamPeer& sender, const Octets& content) {
+  [[nodiscard]] std::string receive(const TeamPeer& sender, const Octets& content) {
     return reason_of(
-        detail::publish_decoded<KeyframeBow>(heard_bows, sender, content, nullptr, bow_guard));
+        detail::publish_decoded<KeyframeBow>(received_bows, sender, content, nullptr, bow_guard));
   }
 
   RobotId self;
@@ -77,17 +77,17 @@ struct Relaying {
   Topic<PeerEvent> events, reached;
   Topic<RobotStatus> statuses;
   Topic<Addressed<RelayParcel>> own_parcels;
-  Topic<KeyframeBow> heard_bows, bows;
+  Topic<KeyframeBow> received_bows, bows;
   Topic<Addressed<KeyframeRequest>> own_requests, direct_requests;
-  Topic<KeyframeRequest> heard_requests, requests;
-  Topic<Addressed<InlierSet>> told_sets, direct_sets;
-  Topic<InlierSet> heard_sets, sets;
+  Topic<KeyframeRequest> received_requests, requests;
+  Topic<Addressed<InlierSet>> own_sets, direct_sets;
+  Topic<InlierSet> received_sets, sets;
   Inbox<KeyframeBow> got_bows{bows};
   Inbox<KeyframeRequest> got_requests{requests};
   Inbox<InlierSet> got_sets{sets};
   Inbox<PeerEvent> got_ways{reached};
   Inbox<Addressed<KeyframeRequest>> sent_directly{direct_requests};
-  Inbox<Addressed<InlierSet>> told_directly{direct_sets};
+  Inbox<Addressed<InlierSet>> sets_sent_directly{direct_sets};
   RelayNode node;
   ContentGuard<KeyframeBow> bow_guard;
 };
@@ -126,11 +126,11 @@ struct Chain {
   void run(double seconds) {
     for (const double end_s = now_s + seconds; now_s < end_s; now_s += kStatusPeriod_s)
       for (const RobotId end : {RobotId{0}, RobotId{1}}) {
-        tell(end, 2);
-        tell(2, end);
+        send_status(end, 2);
+        send_status(2, end);
       }
   }
-  void tell(RobotId from, RobotId to) {
+  void send_status(RobotId from, RobotId to) {
     robots[to]->statuses.publish(RobotStatus{
         .robot = from, .name = robot_name(from), .relay = robots[from]->node.summary()});
   }
@@ -150,9 +150,9 @@ TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[r
   CAPTURE(has_keys);
   Chain chain(has_keys);
   Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
-  c.peers.tell(identity_of(0));  // Stands for the discovery of robot 0 by DDS.
-  const Octets bow = a.said({.id = {0, 0}, .words = {{3, 1}}});
-  REQUIRE(c.hear(process_of(0), bow).empty());
+  c.peers.reported(identity_of(0));  // Stands for the discovery of robot 0 by DDS.
+  const Octets bow = a.content_of({.id = {0, 0}, .words = {{3, 1}}});
+  REQUIRE(c.receive(process_of(0), bow).empty());
   chain.run(20.0);
   REQUIRE(c.got_bows.messages().size() == 1);
   REQUIRE(b.got_bows.messages().size() == 1);
@@ -161,7 +161,7 @@ TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[r
   CHECK(b.peers.current(0) == process_of(0));
   REQUIRE(b.got_ways.messages().size() == 1);
   CHECK(b.got_ways.messages()[0].identity.robot == 0);
-  CHECK_FALSE(b.got_ways.messages()[0].heard);
+  CHECK_FALSE(b.got_ways.messages()[0].direct);
 
   const KeyframeRequest request{.requester = 1, .number = 4, .keyframe = {0, 0}, .own = 9};
   b.own_requests.publish(
@@ -180,20 +180,20 @@ TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[r
   b.events.publish(PeerEvent{PeerEventKind::kReturned, identity_of(2), {}});
 
   const InlierSet set{.a = 0, .b = 1, .version = 1, .closures = {{{0, 1}, {1, 2}}}};
-  a.told_sets.publish(Addressed<InlierSet>{1, std::make_shared<const InlierSet>(set)});
+  a.own_sets.publish(Addressed<InlierSet>{1, std::make_shared<const InlierSet>(set)});
   chain.run(2.0);
   REQUIRE(b.got_sets.messages().size() == 1);
   CHECK(b.got_sets.messages()[0].closures == set.closures);
-  CHECK(a.told_directly.messages().size() == 1);
+  CHECK(a.sets_sent_directly.messages().size() == 1);
 }
 
 TEST_CASE("With keys a message without the signature of its origin is neither read nor stored",
           "[relay]") {
   Chain chain(true);
   Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
-  c.peers.tell(identity_of(0));
-  Octets bow = a.said({.id = {0, 0}, .words = {{3, 1}}});
-  REQUIRE(c.hear(process_of(0), bow).empty());
+  c.peers.reported(identity_of(0));
+  Octets bow = a.content_of({.id = {0, 0}, .words = {{3, 1}}});
+  REQUIRE(c.receive(process_of(0), bow).empty());
   chain.change = [](RelayMessage& message) {
     if (message.kind == RelayKind::kBag) message.content.front() ^= 1U;
   };
@@ -203,10 +203,10 @@ TEST_CASE("With keys a message without the signature of its origin is neither re
   REQUIRE_FALSE(chain.refusals.empty());
   CHECK(chain.refusals[0] == "not signed by its origin, or changed on its way");
 
-  bow = a.said({.id = {0, 1}, .words = {{3, 1}}});
+  bow = a.content_of({.id = {0, 1}, .words = {{3, 1}}});
   bow.back() ^= 1U;
-  CHECK(c.hear(process_of(0), bow) == "not signed by its origin, or changed on its way");
-  CHECK(c.hear(process_of(0), {1, 2, 3}) == "shorter than its tail");
+  CHECK(c.receive(process_of(0), bow) == "not signed by its origin, or changed on its way");
+  CHECK(c.receive(process_of(0), {1, 2, 3}) == "shorter than its tail");
   CHECK(c.got_bows.messages().size() == 1);
 }
 
@@ -238,7 +238,7 @@ TEST_CASE("Messages from a neighbour are checked before use", "[relay]") {
   }
   SECTION("origin") {
     wrong.origin = {2, 1};
-    CHECK(refusal_of(wrong) == "told by a former process of the robot that sends it");
+    CHECK(refusal_of(wrong) == "its origin is a former process of its sender");
   }
   SECTION("size") {
     wrong.content.resize(kMaxRelayContent + 1);

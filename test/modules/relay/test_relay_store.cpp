@@ -28,13 +28,13 @@ TEST_CASE("Robots that all receive each other forward nothing and report no stor
   network.link(kB, kC);
   network.run(2.0);
   for (std::uint32_t i = 0; i < 50; ++i) {
-    network.tell_bag(kA, i);
+    network.send_bag(kA, i);
     network.at(kA).wrote(RelayKind::kClosure, {kB}, i, octets(700), i);
     network.run(kPeriod_s);
   }
   CHECK(network.parcels() == 0);
   for (const RobotId robot : {kA, kB, kC}) {
-    CHECK(network.at(robot).summary().hears.size() == 2);
+    CHECK(network.at(robot).summary().received.size() == 2);
     CHECK(network.at(robot).summary().holds.empty());
   }
 }
@@ -44,7 +44,7 @@ TEST_CASE("A robot gets each bag of a robot out of range once and in order", "[r
   CAPTURE(has_keys);
   Network network(3, has_keys);
   network.link(kA, kC);
-  for (std::uint32_t i = 0; i < 300; ++i) network.tell_bag(kA, i);
+  for (std::uint32_t i = 0; i < 300; ++i) network.send_bag(kA, i);
   SECTION("at the same time") {}
   SECTION("before") {
     network.run(2.0);
@@ -66,7 +66,7 @@ TEST_CASE("A robot gets each bag of a robot out of range once and in order", "[r
 TEST_CASE("A bag that arrives before its robot is announced is stored", "[relay]") {
   Network network(3);
   CHECK(network.at(kC).keep_bag(network.identity(kA), 0, octets(600)) == RelayArrival::kNew);
-  CHECK_FALSE(network.at(kC).hears(kA));
+  CHECK_FALSE(network.at(kC).receives(kA));
   network.link(kA, kC);
   network.link(kB, kC);
   network.run(10.0);
@@ -93,14 +93,14 @@ TEST_CASE("Bags pass along a chain and only one of two robots in between forward
   network.run(20.0);
   const std::size_t before = network.octets_sent();
   for (std::uint32_t i = 0; i < 100; ++i) {
-    network.tell_bag(kA, i);
+    network.send_bag(kA, i);
     network.run(kPeriod_s);
   }
   network.run(5.0);
   CHECK(network.read(kB, RelayKind::kBag) == first(100));
-  const std::size_t handed_on =
+  const std::size_t forwarded =
       (network.octets_sent() - before) / (600 + (has_keys ? kEndorsementBytes : 0));
-  CHECK(handed_on == (network.read(kD, RelayKind::kBag).empty() ? 100 : 200));
+  CHECK(forwarded == (network.read(kD, RelayKind::kBag).empty() ? 100 : 200));
 }
 
 TEST_CASE("A lost message is sent again and delivered once", "[relay]") {
@@ -110,16 +110,16 @@ TEST_CASE("A lost message is sent again and delivered once", "[relay]") {
   network.lose(0.3);
   network.link(kA, kC);
   network.link(kC, kB);
-  for (std::uint32_t i = 0; i < 100; ++i) network.tell_bag(kA, i);
+  for (std::uint32_t i = 0; i < 100; ++i) network.send_bag(kA, i);
   for (std::uint32_t i = 0; i < 20; ++i)
     network.at(kB).wrote(RelayKind::kClosure, {kA}, i, octets(700), 0.0);
   network.run(400.0);
   std::vector<std::uint32_t> bags = network.read(kB, RelayKind::kBag);
-  std::vector<std::uint32_t> letters = network.read(kA, RelayKind::kClosure);
+  std::vector<std::uint32_t> closures = network.read(kA, RelayKind::kClosure);
   std::ranges::sort(bags);
-  std::ranges::sort(letters);
+  std::ranges::sort(closures);
   CHECK(bags == first(100));
-  CHECK(letters == first(20));
+  CHECK(closures == first(20));
 }
 
 TEST_CASE("A closure reaches a robot once when it returns into range", "[relay]") {
@@ -158,7 +158,7 @@ TEST_CASE("The relay sends nothing between robots that soon receive each other d
   for (std::uint32_t i = 0; i < 20; ++i)
     network.at(kB).wrote(RelayKind::kClosure, {kA}, i, {1}, 0.0);
   network.link(kA, kC);
-  network.tell_bag(kA, 0);
+  network.send_bag(kA, 0);
   network.link(kB, kC);
   network.run(4.0);
   network.link(kA, kB);
@@ -192,11 +192,11 @@ TEST_CASE("A message to one incarnation of a robot does not reach the next", "[r
   network.link(kA, kB);
   network.link(kB, kC);
   network.run(1.0);
-  const auto tell = [&](std::uint64_t slot, std::uint64_t boot, std::uint8_t what) {
+  const auto write = [&](std::uint64_t slot, std::uint64_t boot, std::uint8_t what) {
     network.at(kB).wrote(RelayKind::kClosure, {kA, boot}, slot, octets(700, what), 1.0);
   };
-  tell(1, former, 1);
-  tell(2, former, 1);
+  write(1, former, 1);
+  write(2, former, 1);
   network.cut(kA, kB);
   SECTION("from its origin") {
     network.start(kA, next);
@@ -213,7 +213,7 @@ TEST_CASE("A message to one incarnation of a robot does not reach the next", "[r
   }
   network.run(8.0);
   network.cut(kA, kB);
-  tell(2, next, 2);
+  write(2, next, 2);
   network.link(kA, kB);
   network.run(8.0);
   const auto& read = network.all_read(kA);
@@ -261,8 +261,8 @@ TEST_CASE("A robot that has stored a keyframe replies for its owner after the ow
   CAPTURE(has_keys);
   Network network(3, has_keys);
   network.link(kA, kC);
-  network.tell_bag(kA, 0);
-  network.tell_reply(kA, kC, 17);
+  network.send_bag(kA, 0);
+  network.send_reply(kA, kC, 17);
   network.link(kC, kB);
   network.run(8.0);
   SECTION("the owner is in range and replies itself") {
@@ -302,34 +302,34 @@ TEST_CASE("A new incarnation of a robot out of range replaces the former", "[rel
   network.link(kA, kC);
   network.link(kC, kB);
   network.link(kB, kD);
-  for (std::uint32_t i = 0; i < 10; ++i) network.tell_bag(kA, i);
+  for (std::uint32_t i = 0; i < 10; ++i) network.send_bag(kA, i);
   network.run(20.0);
   REQUIRE(network.read(kD, RelayKind::kBag) == first(10));
-  const std::uint64_t other_life = std::uint64_t{99} << 32U;
+  const std::uint64_t other_incarnation = std::uint64_t{99} << 32U;
   SECTION("its bags replace the former ones") {
-    network.start(kA, other_life);
-    network.tell_bag(kA, 0);
+    network.start(kA, other_incarnation);
+    network.send_bag(kA, 0);
     network.run(20.0);
     for (const RobotId robot : {kB, kD}) {
-      REQUIRE(network.met(robot).back().boot == other_life);
+      REQUIRE(network.met(robot).back().boot == other_incarnation);
       CHECK(network.read(robot, RelayKind::kBag).size() == 11);
-      CHECK(network.at(robot).origin(kA)->boot == other_life);
+      CHECK(network.at(robot).origin(kA)->boot == other_incarnation);
     }
   }
   SECTION("it stays, although one robot has missed the restart") {
     network.cut(kB, kD);
-    network.start(kA, other_life);
-    network.tell_bag(kA, 0);
+    network.start(kA, other_incarnation);
+    network.send_bag(kA, 0);
     network.run(20.0);
     CHECK(network.at(kD).origin(kA)->boot == Network::first_boot(kA));
     network.link(kB, kD);
     network.run(20.0);
-    CHECK(network.at(kB).origin(kA)->boot == other_life);
-    CHECK(network.at(kD).origin(kA)->boot == other_life);
+    CHECK(network.at(kB).origin(kA)->boot == other_incarnation);
+    CHECK(network.at(kD).origin(kA)->boot == other_incarnation);
   }
   SECTION("a resumed process keeps its bags") {
     network.start(kA, Network::first_boot(kA) + 1);
-    for (std::uint32_t i = 0; i < 12; ++i) network.tell_bag(kA, i);
+    for (std::uint32_t i = 0; i < 12; ++i) network.send_bag(kA, i);
     network.run(20.0);
     CHECK(network.read(kD, RelayKind::kBag) == first(12));
   }
@@ -338,7 +338,7 @@ TEST_CASE("A new incarnation of a robot out of range replaces the former", "[rel
 TEST_CASE("A neighbour cannot change the state of this robot or of one received directly",
           "[relay]") {
   RelayStore store({kB, 2});
-  store.heard({.robot = kC, .name = "c", .boot = 3});
+  store.connected({.robot = kC, .name = "c", .boot = 3});
   const auto receive = [&](RobotId from, RelayMessage message) {
     return store.receive({from, std::make_shared<const RelayMessage>(std::move(message))});
   };
@@ -357,19 +357,19 @@ TEST_CASE("A neighbour cannot change the state of this robot or of one received 
   CHECK(receive(kC, introduction(kA, 1)) == RelayArrival::kNew);
   CHECK(receive(kC, bag) == RelayArrival::kNew);
   CHECK(receive(kC, bag) == RelayArrival::kRepeated);
-  store.heard({.robot = kD, .name = "d", .boot = 4});
+  store.connected({.robot = kD, .name = "d", .boot = 4});
   CHECK(receive(kD, introduction(kA, std::uint64_t{7} << 32U)) == RelayArrival::kRefused);
-  store.told(kD, {.hears = {kA}}, 0.0);
+  store.update(kD, {.received = {kA}}, 0.0);
   CHECK(receive(kD, introduction(kA, std::uint64_t{7} << 32U)) == RelayArrival::kNew);
-  store.heard({.robot = kA, .name = "a", .boot = std::uint64_t{7} << 32U});
-  RelayMessage of_heard = bag;
-  of_heard.origin.boot = std::uint64_t{7} << 32U;
-  CHECK(receive(kC, of_heard) == RelayArrival::kRepeated);
+  store.connected({.robot = kA, .name = "a", .boot = std::uint64_t{7} << 32U});
+  RelayMessage of_connected = bag;
+  of_connected.origin.boot = std::uint64_t{7} << 32U;
+  CHECK(receive(kC, of_connected) == RelayArrival::kRepeated);
 }
 
 TEST_CASE("Robots that a neighbour invents cannot exceed the common storage", "[relay]") {
   RelayStore store({kB, 2});
-  store.heard({.robot = kC, .name = "c", .boot = 3});
+  store.connected({.robot = kC, .name = "c", .boot = 3});
   constexpr std::size_t kSize = 1U << 20U;
   std::size_t taken = 0;
   for (RobotId robot = 10; robot < 60; ++robot) {
@@ -387,7 +387,7 @@ TEST_CASE("Robots that a neighbour invents cannot exceed the common storage", "[
   CHECK(taken < RelayStore::kMaxFarBytes);
   CHECK(store.keep_bag({.robot = kA, .name = "a", .boot = 1}, 0, octets(kSize)) ==
         RelayArrival::kNew);
-  store.heard({.robot = kA, .name = "a", .boot = 1});
+  store.connected({.robot = kA, .name = "a", .boot = 1});
   store.lost(kA, 0.0);
   CHECK(store.summary().holds.front().bags == 1);
 }

@@ -33,7 +33,7 @@ Trajectory straight(RobotId anchor) {
 
 const KeyframeId kOwn0{3, 0}, kOwn2{3, 2}, kOther{7, 5};
 
-std::vector<ToldClosure> closures() {
+std::vector<PublishedClosure> closures() {
   return {{closure_id(kOwn0, kOwn2), ClosureStage::kInlier, false, at(2.5)},
           {closure_id(kOwn0, kOther), ClosureStage::kVerified, true, at(10)},
           {closure_id(kOwn2, kOther), ClosureStage::kCandidate, false, std::nullopt},
@@ -42,14 +42,14 @@ std::vector<ToldClosure> closures() {
 
 // The newest message of a topic.
 template <typename Message>
-std::optional<Message> last(const std::vector<ToldMessage>& messages, const std::string& topic) {
+std::optional<Message> last(const std::vector<TopicMessage>& messages, const std::string& topic) {
   for (std::size_t k = messages.size(); k-- > 0;)
     if (messages[k].topic == topic) return decode_ros<Message>("cdr", messages[k].bytes).value;
   return std::nullopt;
 }
 
-std::size_t count(const std::vector<ToldMessage>& messages, const std::string& topic) {
-  return static_cast<std::size_t>(std::ranges::count(messages, topic, &ToldMessage::topic));
+std::size_t count(const std::vector<TopicMessage>& messages, const std::string& topic) {
+  return static_cast<std::size_t>(std::ranges::count(messages, topic, &TopicMessage::topic));
 }
 
 }  // namespace
@@ -142,7 +142,7 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   CHECK(node.left_out() == 0);
 
   McapReader reader(file);
-  const auto messages = told_by(reader);
+  const auto messages = topic_messages_of(reader);
   CHECK(to_string(reader.report()) == "");
   CHECK(count(messages, "/bob_3/odometry") == 30);
   CHECK(count(messages, "/bob_3/pose") == 30);
@@ -174,7 +174,7 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   CHECK(image->format == "jpeg");
   CHECK(image->header.stamp == 1007);
   CHECK(image->data.size() > 100);
-  for (const ToldMessage& message : messages) CHECK(message.log_time >= 1000);
+  for (const TopicMessage& message : messages) CHECK(message.log_time >= 1000);
 }
 
 TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[ros_dds]") {
@@ -196,7 +196,7 @@ TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[
   node.finish({}, {}, {});
   McapReader reader(file);
   std::set<std::pair<std::string, std::string>> links;
-  for (const ToldMessage& message : told_by(reader)) {
+  for (const TopicMessage& message : topic_messages_of(reader)) {
     if (message.topic != "/tf") continue;
     const auto transforms = decode_ros<RosTransforms>("cdr", message.bytes);
     REQUIRE(transforms.value);
@@ -235,7 +235,7 @@ TEST_CASE("The record of a killed process is complete up to the last flush", "[r
   sink.flush();
   sink.put(topic, 5, encode_ros(RosPoseStamped{}));
   McapReader reader(file);
-  const auto messages = told_by(reader);
+  const auto messages = topic_messages_of(reader);
   REQUIRE(messages.size() == 4);
   CHECK(messages[0].log_time == 1);
   CHECK(messages[0].type == "geometry_msgs/msg/PoseStamped");

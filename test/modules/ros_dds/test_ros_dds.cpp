@@ -151,13 +151,13 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
   node.offer(std::make_shared<const LabelledMesh>(mesh));
   std::optional<RosPath> path;
   std::optional<RosPoseStamped> pose;
-  std::optional<RosOdometry> told;
+  std::optional<RosOdometry> received;
   std::optional<RosTransforms> transforms;
   std::optional<RosPointCloud> cloud;
   std::optional<RosDiagnostics> diagnostics;
   std::optional<RosMarker> faces;
   // Publishes until the viewer has received all messages, because it may have subscribed late.
-  while (!(path && pose && told && transforms && cloud && diagnostics && faces)) {
+  while (!(path && pose && received && transforms && cloud && diagnostics && faces)) {
     const auto message = [&] {
       state.stamp += 10;
       odometry.publish(state);
@@ -165,7 +165,7 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
     }();
     REQUIRE(message);
     const auto& bytes = message->bytes;
-    if (message->topic == 0) told = decode_ros<RosOdometry>("cdr", bytes).value;
+    if (message->topic == 0) received = decode_ros<RosOdometry>("cdr", bytes).value;
     if (message->topic == 1) pose = decode_ros<RosPoseStamped>("cdr", bytes).value;
     if (message->topic == 2) transforms = decode_ros<RosTransforms>("cdr", bytes).value;
     if (message->topic == 3) path = decode_ros<RosPath>("cdr", bytes).value;
@@ -177,10 +177,10 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
     if (transforms && transforms->transforms[0].pose.position.x() != 9.0) transforms.reset();
   }
   node.stop();
-  CHECK(told->header.frame == "robot_3/odom");
-  CHECK(told->child_frame == "robot_3/base_link");
-  CHECK(told->pose.position == Eigen::Vector3d(1, 2, 3));
-  CHECK(told->linear_velocity.x() == 0.5);
+  CHECK(received->header.frame == "robot_3/odom");
+  CHECK(received->child_frame == "robot_3/base_link");
+  CHECK(received->pose.position == Eigen::Vector3d(1, 2, 3));
+  CHECK(received->linear_velocity.x() == 0.5);
   CHECK(pose->header.frame == "map");
   CHECK(transforms->transforms[0].child_frame == "robot_3/odom");
   CHECK(transforms->transforms[1].child_frame == "robot_3/base_link");

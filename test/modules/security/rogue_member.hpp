@@ -79,9 +79,9 @@ class RogueMember {
     std::array<std::uint8_t, 64> hash;
     crypto_generichash(hash.data(), hash.size(), text.data(), text.size(), signed_key.data(),
                        signed_key.size());
-    ByteWriter said = statement("kimera_multi sender of a message to all 1");
-    said.bytes(hash);
-    const Signature signature = sign(said.release(), signer);
+    ByteWriter statement_of_hash = statement("kimera_multi sender of a message to all 1");
+    statement_of_hash.bytes(hash);
+    const Signature signature = sign(statement_of_hash.release(), signer);
     sealed.insert(sealed.end(), signature.begin(), signature.end());
     return sealed;
   }

@@ -10,7 +10,7 @@ TEST_CASE("Replayed credentials of former starts do not displace the active proc
   AdmittedPeers peers;
   const TeamPeer live{3, 1000};
   peers.add(live, {});
-  peers.heard(live);
+  peers.received(live);
   for (std::uint64_t boot = 1; boot <= 50; ++boot) peers.add({3, boot}, {});
   CHECK(peers.find(live) != nullptr);
   CHECK(peers.size() == kMaxAdmittedPerRobot);
@@ -21,9 +21,9 @@ TEST_CASE("Among active starts of a robot the one that has been silent for longe
   AdmittedPeers peers;
   for (std::uint64_t boot = 1; boot <= kMaxAdmittedPerRobot; ++boot) {
     peers.add({3, boot}, {});
-    peers.heard({3, boot});
+    peers.received({3, boot});
   }
-  peers.heard({3, 1});
+  peers.received({3, 1});
   peers.add({3, 99}, {});
   CHECK(peers.find({3, 1}) != nullptr);
   CHECK(peers.find({3, 2}) == nullptr);
@@ -34,7 +34,7 @@ TEST_CASE("The number of admitted processes is bounded", "[security]") {
   AdmittedPeers peers;
   const TeamPeer live{0, 1};
   peers.add(live, {});
-  peers.heard(live);
+  peers.received(live);
   for (RobotId robot = 1; robot < 2 * kMaxAdmitted; ++robot) peers.add({robot, 1}, {});
   CHECK(peers.size() == kMaxAdmitted);
   CHECK(peers.find(live) != nullptr);
@@ -47,7 +47,7 @@ TEST_CASE("Many starts of one robot displace no other robot", "[security]") {
   peers.add({4, 7}, {});
   for (std::uint64_t boot = 1; boot <= 500; ++boot) {
     peers.add({3, boot}, {});
-    peers.heard({3, boot});
+    peers.received({3, boot});
   }
   CHECK(peers.find({2, 7}) != nullptr);
   CHECK(peers.find({4, 7}) != nullptr);

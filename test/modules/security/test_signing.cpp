@@ -22,12 +22,12 @@ TEST_CASE("Signatures are the Ed25519 of the standard's first example", "[securi
 
 TEST_CASE("A signature is valid only for its statement and its signer", "[security]") {
   const SigningKey key = make_signing_key();
-  const Octets said = {1, 2, 3};
-  const Signature signature = sign(said, key);
-  REQUIRE(verify(said, signature, public_key_of(key)));
+  const Octets content = {1, 2, 3};
+  const Signature signature = sign(content, key);
+  REQUIRE(verify(content, signature, public_key_of(key)));
   CHECK_FALSE(verify(Octets{1, 2, 4}, signature, public_key_of(key)));
-  CHECK_FALSE(verify(said, signature, public_key_of(make_signing_key())));
-  CHECK_FALSE(verify(said, signature, PublicKey{}));  // key of small order
+  CHECK_FALSE(verify(content, signature, public_key_of(make_signing_key())));
+  CHECK_FALSE(verify(content, signature, PublicKey{}));  // key of small order
 }
 
 TEST_CASE("A secret that was written and read gives equal signatures", "[security]") {

@@ -162,10 +162,10 @@ TEST_CASE("A robot known only by its credentials is not admitted, and lapses", "
 TEST_CASE("An endorsement is verified by the robot's certificate", "[security]") {
   const ToyTeam team;
   const ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
-  const Octets said = statement("toy 1").release();
-  const Signature signature = a.seal.endorse(said);
-  CHECK(verify(said, signature, a.keys.certificate.key));
-  CHECK_FALSE(verify(said, signature, b.keys.certificate.key));
+  const Octets content = statement("toy 1").release();
+  const Signature signature = a.seal.endorse(content);
+  CHECK(verify(content, signature, a.keys.certificate.key));
+  CHECK_FALSE(verify(content, signature, b.keys.certificate.key));
 }
 
 TEST_CASE("A new member reads messages to all that were sealed before a revocation", "[security]") {

@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "test/modules/security/toy_team.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 // Changes that an attacker can make to network traffic: flipping any bit, or random changes.
 
@@ -110,7 +110,7 @@ TEST_CASE("A message of an admitted peer is refused in another context", "[secur
 TEST_CASE("Messages changed at random never open", "[security]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
-  InputSpoiler spoiler(seed);
+  InputCorrupter corrupter(seed);
   Pair pair;
   const SealContext for_b = toy_context(pair.a, pair.b.peer());
   const SealContext to_all = toy_context(pair.a);
@@ -119,9 +119,9 @@ TEST_CASE("Messages changed at random never open", "[security]") {
   const Octets key = pair.a.seal.key_message_for(pair.b.peer()).value();
   int accepted = 0;
   for (int i = 0; i < 3000; ++i) {
-    const Octets one = spoiler(std::vector<Octets>{sealed_for_b});
-    const Octets all = spoiler(std::vector<Octets>{sealed_to_all});
-    const Octets keys = spoiler(std::vector<Octets>{key});
+    const Octets one = corrupter(std::vector<Octets>{sealed_for_b});
+    const Octets all = corrupter(std::vector<Octets>{sealed_to_all});
+    const Octets keys = corrupter(std::vector<Octets>{key});
     accepted += one != sealed_for_b && pair.b.seal.open(for_b, one).status == Status::kOpened;
     accepted += all != sealed_to_all && pair.b.seal.open(to_all, all).status == Status::kOpened;
     accepted += keys != key && pair.b.seal.accept_key_message(pair.a.peer(), keys) == nullptr;
@@ -145,10 +145,10 @@ TEST_CASE("Credentials with any bit flipped, or changed at random, are refused",
   }
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
-  InputSpoiler spoiler(seed);
+  InputCorrupter corrupter(seed);
   int admitted = 0;
   for (int i = 0; i < 3000; ++i) {
-    const Octets octets = spoiler(std::vector<Octets>{Octets(genuine.begin(), genuine.end())});
+    const Octets octets = corrupter(std::vector<Octets>{Octets(genuine.begin(), genuine.end())});
     const std::string shown(octets.begin(), octets.end());
     admitted += shown != genuine && is_admitted(shown);
   }

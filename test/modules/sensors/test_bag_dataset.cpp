@@ -245,12 +245,12 @@ TEST_CASE("A bad message of a bag affects no other message", "[sensors][bag]") {
     bag->add("/right", image(stamp, 2));
     if (k == 8) bag->add_bytes("/left", RosImage::kType, stamp, {0, 1, 0, 0, 7});
     if (k != 9) continue;
-    RosImu spoilt = imu(stamp + kFramePeriod + 1);
-    spoilt.linear_acceleration.x() = std::numeric_limits<double>::quiet_NaN();
-    bag->add("/imu", spoilt);
-    spoilt.linear_acceleration.x() = 1e30;
-    spoilt.header.stamp += 1;
-    bag->add("/imu", spoilt);
+    RosImu corrupted = imu(stamp + kFramePeriod + 1);
+    corrupted.linear_acceleration.x() = std::numeric_limits<double>::quiet_NaN();
+    bag->add("/imu", corrupted);
+    corrupted.linear_acceleration.x() = 1e30;
+    corrupted.header.stamp += 1;
+    bag->add("/imu", corrupted);
   }
   BagDataset dataset("test.bag", std::move(bag), small_rig(), {});
   CHECK(packets_of(dataset).size() == 26);

@@ -153,10 +153,10 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   for (const std::string file : {"cam0/data.csv", "cam1/data.csv", "imu0/data.csv",
                                  "cam0/sensor.yaml", "cam1/sensor.yaml", "imu0/sensor.yaml"}) {
     CAPTURE(file);
-    const EurocFolder spoilt;
-    fs::remove(spoilt.mav0() / file);
-    CHECK_THROWS_WITH(open_euroc(spoilt.root()),
-                      Catch::StartsWith((spoilt.mav0() / file).string() + ": no such file"));
+    const EurocFolder corrupted;
+    fs::remove(corrupted.mav0() / file);
+    CHECK_THROWS_WITH(open_euroc(corrupted.root()),
+                      Catch::StartsWith((corrupted.mav0() / file).string() + ": no such file"));
   }
   fs::remove_all(folder.mav0() / "cam1");
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file") &&
@@ -251,7 +251,7 @@ TEST_CASE("A bad image loses its pair and no inertial sample", "[sensors]") {
   SECTION("wrong size") {
     fault = ReaderFault::kWrongImageSize;
     folder.write_image(fs::relative(image, folder.mav0()).string(), 24, 32, 7);
-    text = "24x32 px, the calibration says 32x24";
+    text = "24x32 px, the calibration states 32x24";
   }
   check_one_pair_less(folder, fault, text);
   const auto packets = read(folder).packets;

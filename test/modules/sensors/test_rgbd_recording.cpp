@@ -174,7 +174,7 @@ TEST_CASE("A depth image that cannot be used loses only itself", "[sensors]") {
   SECTION("another size") {
     folder.write_pixels(name, cv::Mat(32, 24, CV_16UC1, cv::Scalar(1000)));
     fault = ReaderFault::kWrongImageSize;
-    text = "24x32 px, the calibration says 32x24";
+    text = "24x32 px, the calibration states 32x24";
   }
   SECTION("8 bits") {
     folder.write_pixels(name, cv::Mat(24, 32, CV_8UC1, cv::Scalar(10)));

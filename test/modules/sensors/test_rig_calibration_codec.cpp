@@ -7,8 +7,8 @@
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_calibration_codec.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/spoilt_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -393,7 +393,7 @@ void check_calibration(const RigCalibration& calibration) {
 TEST_CASE("A corrupted calibration is refused or gives a valid rig", "[sensors][calibration]") {
   const TemporaryFolder folder;
   SECTION("Kalibr") {
-    check_spoilt<DatasetError>(
+    check_corrupted<DatasetError>(
         kCamera0 + kCamera1 + "imu0:\n  " +
             "T_i_b: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n  update_rate: 200\n  "
             "gyroscope_noise_density: 1e-4\n  gyroscope_random_walk: 1e-5\n  "
@@ -403,7 +403,7 @@ TEST_CASE("A corrupted calibration is refused or gives a valid rig", "[sensors][
         });
   }
   SECTION("Basalt") {
-    check_spoilt<DatasetError>(kBasalt, folder.path().string(), [&](const std::string& text) {
+    check_corrupted<DatasetError>(kBasalt, folder.path().string(), [&](const std::string& text) {
       check_calibration(read_rig({folder.write("calib.json", text)}));
     });
   }

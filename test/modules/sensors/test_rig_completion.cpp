@@ -35,7 +35,7 @@ RosTransform transform(const std::string& parent, const std::string& child,
   return {{0, parent}, child, {position, Eigen::Quaterniond(so3_exp(rotation))}};
 }
 
-void tell(ListedBag& bag, const std::vector<RosTransform>& transforms) {
+void add_transforms(ListedBag& bag, const std::vector<RosTransform>& transforms) {
   bag.add_bytes("/tf_static", RosTransforms::kType, 0, encode_ros(RosTransforms{transforms}));
 }
 
@@ -57,10 +57,10 @@ PartialRig nothing_known() {
 TEST_CASE("CameraInfo and static transforms complete a rig", "[sensors][calibration]") {
   ListedBag bag;
   bag.add("/left_info", info("left_optical", 0.0));
-  tell(bag, {kLeftOnBase});
+  add_transforms(bag, {kLeftOnBase});
   bag.add("/imu", imu("imu"));
   bag.add("/right_info", info("left_optical", -43.0));
-  tell(bag, {kImuOnBase});
+  add_transforms(bag, {kImuOnBase});
   const Rig rig = complete_rig("a.bag", bag, nothing_known());
   const StereoRig& stereo = rig.sensors.stereo;
   CHECK(stereo.cameras[0].fx == 458.0);
@@ -106,8 +106,8 @@ TEST_CASE("Without a stereo calibration the frames give the pose of the right ca
   bag.add("/left_info", info("left_optical", 0.0));
   bag.add("/right_info", info("right_optical", 0.0));
   bag.add("/imu", imu("/imu"));
-  tell(bag, {kImuOnBase, kLeftOnBase,
-             transform("left_optical", "right_optical", {0.12, 0, 0}, {0, 0.01, 0})});
+  add_transforms(bag, {kImuOnBase, kLeftOnBase,
+                       transform("left_optical", "right_optical", {0.12, 0, 0}, {0, 0.01, 0})});
   const StereoRig stereo = complete_rig("a.bag", bag, nothing_known()).sensors.stereo;
   CHECK(stereo.baseline_m() == Approx(0.12));
   CHECK(stereo.T_left_right().linear().isApprox(so3_exp({0, 0.01, 0}), 1e-12));
@@ -122,7 +122,7 @@ TEST_CASE("One CameraInfo completes an RGB-D rig", "[sensors][calibration]") {
   partial.body_frame = "base";
   ListedBag bag;
   bag.add("/left_info", info("left_optical", 0.0));
-  tell(bag, {kLeftOnBase});
+  add_transforms(bag, {kLeftOnBase});
   const SensorRig rig = complete_rig("a.bag", bag, partial).sensors;
   CHECK(rig.stereo.depth_source == DepthSource::kDepthImage);
   CHECK(rig.stereo.baseline_m() == Approx(0.07));
@@ -142,7 +142,7 @@ TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
   odometry.header.frame = "odom";
   odometry.child_frame = "base";
   bag.add("/odom", odometry);
-  tell(bag, {kLeftOnBase});
+  add_transforms(bag, {kLeftOnBase});
   const StereoRig stereo = complete_rig("a.bag", bag, partial).sensors.stereo;
   CHECK(stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
 }
@@ -158,7 +158,7 @@ TEST_CASE("Calibrated cameras get the pose of their images' frame", "[sensors][c
   RosImage image;
   image.header = {5, "left_optical"};
   bag.add("/left", image);
-  tell(bag, {kLeftOnBase});
+  add_transforms(bag, {kLeftOnBase});
   const StereoRig stereo = complete_rig("a.bag", bag, partial).sensors.stereo;
   CHECK(stereo.cameras[0].fx == 300.0);
   CHECK(stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
@@ -186,7 +186,7 @@ TEST_CASE("A missing part of a calibration is named with the topics that could s
   bag.add("/left_info", info("left_optical", 0.0));
   bag.add("/right_info", info("right_optical", 0.0));
   bag.add("/imu", imu("imu"));
-  tell(bag, {kLeftOnBase});
+  add_transforms(bag, {kLeftOnBase});
   CHECK_THAT(complaint(bag),
              Contains("where the right camera is: a baseline in P of /right_info, or /tf_static "
                       "does not join left_optical and right_optical") &&
@@ -195,7 +195,7 @@ TEST_CASE("A missing part of a calibration is named with the topics that could s
   ListedBag uncalibrated;
   uncalibrated.add("/right_info", info("right_optical", 0.0));
   uncalibrated.add("/imu", imu("imu"));
-  tell(uncalibrated, {});
+  add_transforms(uncalibrated, {});
   RosCameraInfo zero = info("left_optical", 0.0);
   zero.K.fill(0.0);
   uncalibrated.add_bytes("/left_info", RosCameraInfo::kType, 1, encode_ros(zero));

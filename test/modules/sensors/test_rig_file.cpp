@@ -216,7 +216,7 @@ TEST_CASE("A robot without an inertial sensor names its odometry", "[sensors]") 
 
 TEST_CASE("A missing key of a rig file is named by file and line", "[sensors]") {
   CHECK_THAT(complaint("left: {topic: /a}\nimu: {topic: /i}\ncalibration: /\n"),
-             Contains("one camera does not tell how far things are"));
+             Contains("one camera does not measure how far things are"));
   CHECK_THAT(complaint("left: {topic: /a}\ndepth: {topic: /d, min_range_m: 9, max_range_m: 8}\n"
                        "imu: {topic: /i}\n"),
              Contains("rig.yaml:2: depth.min_range_m = 9 is not less than max_range_m"));

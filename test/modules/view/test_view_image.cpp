@@ -60,9 +60,9 @@ TEST_CASE("Features are where the image shows them", "[view]") {
   const Camera camera = camera_of(1280, 800);
   image = {std::make_shared<const StereoFrame>(std::move(frame)),
            {{(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy}}};
-  const ViewImage told = view_image(image, camera);
-  REQUIRE(told.features.size() == 1);
-  const cv::Mat pixels = shown(told);
+  const ViewImage sent = view_image(image, camera);
+  REQUIRE(sent.features.size() == 1);
+  const cv::Mat pixels = shown(sent);
   double sum = 0.0, sum_x = 0.0, sum_y = 0.0;
   for (int y = 0; y < pixels.rows; ++y)
     for (int x = 0; x < pixels.cols; ++x) {
@@ -71,8 +71,8 @@ TEST_CASE("Features are where the image shows them", "[view]") {
       sum_x += value * x;
       sum_y += value * y;
     }
-  CHECK(static_cast<double>(told.features[0][0]) == Approx(sum_x / sum).margin(0.2));
-  CHECK(static_cast<double>(told.features[0][1]) == Approx(sum_y / sum).margin(0.2));
+  CHECK(static_cast<double>(sent.features[0][0]) == Approx(sum_x / sum).margin(0.2));
+  CHECK(static_cast<double>(sent.features[0][1]) == Approx(sum_y / sum).margin(0.2));
 }
 
 TEST_CASE("A noisy image fits into an update", "[view]") {

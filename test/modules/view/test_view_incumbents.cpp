@@ -21,12 +21,12 @@ struct Page {
     };
   }
   void serve(double now_s) { incumbents.serve(now_s, taker()); }
-  void tell(std::uint64_t boot, ViewContent content, double now_s) {
+  void send(std::uint64_t boot, ViewContent content, double now_s) {
     incumbents.add({3, boot, 0, std::move(content)}, now_s, taker());
     serve(now_s);
   }
-  void tell(std::uint64_t boot, std::uint32_t keyframe, double now_s) {
-    tell(boot, ViewContent(ViewKeyframes{.first = keyframe}), now_s);
+  void send(std::uint64_t boot, std::uint32_t keyframe, double now_s) {
+    send(boot, ViewContent(ViewKeyframes{.first = keyframe}), now_s);
   }
 };
 
@@ -37,8 +37,8 @@ using Shown = std::vector<std::pair<std::uint64_t, std::uint32_t>>;
 TEST_CASE("A second process with the id of an active robot is not shown", "[view]") {
   Page page;
   for (std::uint32_t second = 0; second < 40; ++second) {
-    page.tell(kFirst, second, second);
-    if (second >= 3 && second < 8) page.tell(kSecond, 1000 + second, second + 0.5);
+    page.send(kFirst, second, second);
+    if (second >= 3 && second < 8) page.send(kSecond, 1000 + second, second + 0.5);
   }
   for (const auto& [boot, keyframe] : page.shown) CHECK(boot == kFirst);
   CHECK(page.shown.size() == 40);
@@ -48,32 +48,32 @@ TEST_CASE("A second process with the id of an active robot is not shown", "[view
 TEST_CASE("A resumed robot is shown from its beginning once the former process is silent",
           "[view]") {
   Page page;
-  page.tell(kFirst, 0, 0.0);
-  for (std::uint32_t k = 0; k < 4; ++k) page.tell(kSecond, k, 1.0 + k);
+  page.send(kFirst, 0, 0.0);
+  for (std::uint32_t k = 0; k < 4; ++k) page.send(kSecond, k, 1.0 + k);
   CHECK(page.shown == Shown{{kFirst, 0}});
   page.serve(4.9);
   CHECK(page.shown.size() == 1);
   page.serve(5.0);
   CHECK(page.shown == Shown{{kFirst, 0}, {kSecond, 0}, {kSecond, 1}, {kSecond, 2}, {kSecond, 3}});
-  page.tell(kSecond, 4, 5.5);
+  page.send(kSecond, 4, 5.5);
   CHECK(page.shown.size() == 6);
-  page.tell(kFirst, 9, 6.0);  // Its last update, which is late.
+  page.send(kFirst, 9, 6.0);  // Its last update, which is late.
   CHECK(page.shown.size() == 6);
 }
 
 TEST_CASE("After a robot has left another process with its id counts at once", "[view]") {
   Page page;
-  page.tell(kFirst, 0, 0.0);
-  page.tell(kFirst, ViewContent(ViewState{.name = "alice", .phase = "leaving"}), 1.0);
-  page.tell(kSecond, 0, 1.1);
+  page.send(kFirst, 0, 0.0);
+  page.send(kFirst, ViewContent(ViewState{.name = "alice", .phase = "leaving"}), 1.0);
+  page.send(kSecond, 0, 1.1);
   CHECK(page.shown == Shown{{kFirst, 0}, {kSecond, 0}});
 }
 
 TEST_CASE("The number of waiting updates is bounded", "[view]") {
   Page page;
   for (std::uint32_t k = 0; k < ViewIncumbents::kMostWaiting + 100; ++k) {
-    page.tell(kFirst, k, 1e-3 * k);
-    page.tell(kSecond, k, 1e-3 * k);
+    page.send(kFirst, k, 1e-3 * k);
+    page.send(kSecond, k, 1e-3 * k);
   }
   CHECK(page.incumbents.dropped() == 100);
 }

@@ -23,15 +23,15 @@ constexpr double kPatience_s = static_cast<double>(kPatience.count());
 constexpr std::array kChannels = {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages};
 
 // The sending half of a robot.
-struct Teller {
-  Teller(const std::shared_ptr<const DdsDomain>& domain, RobotId robot, std::uint64_t boot = 0)
+struct Publisher {
+  Publisher(const std::shared_ptr<const DdsDomain>& domain, RobotId robot, std::uint64_t boot = 0)
       : participant(domain,
                     {.robot = robot, .name = robot_name(robot), .boot = 50U + robot + boot}) {
     for (const ViewChannel channel : kChannels)
       writers.emplace_back(participant.handle(), channel, TeamPeer{robot, 50U + robot + boot});
   }
   ViewWriter& on(ViewChannel channel) { return writers[static_cast<std::size_t>(channel)]; }
-  void tell(const ViewContent& content) { on(channel_of(content)).write(content); }
+  void publish(const ViewContent& content) { on(channel_of(content)).write(content); }
 
   DdsParticipant participant;
   std::vector<ViewWriter> writers;
@@ -44,13 +44,13 @@ MeshChunk chunk(std::int32_t x) {
 
 struct Watching {
   std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
-  Teller teller{domain, 7};
+  Publisher publisher{domain, 7};
   ViewListener listener{domain};
 
   [[nodiscard]] bool is_read(ViewChannel channel, std::size_t readers = 1) {
-    return eventually([&] { return teller.on(channel).readers() == readers; });
+    return eventually([&] { return publisher.on(channel).readers() == readers; });
   }
-  [[nodiscard]] ViewUpdate heard() {
+  [[nodiscard]] ViewUpdate received() {
     auto update = listener.next(kPatience_s);
     REQUIRE(update);
     return *std::move(update);
@@ -65,33 +65,33 @@ TEST_CASE("A viewer receives the updates of robots in order", "[view]") {
   REQUIRE(w.is_read(ViewChannel::kMesh));
   constexpr std::uint32_t kCount = 500;
   for (std::uint32_t k = 0; k < kCount; ++k)
-    w.teller.tell(ViewKeyframes{.first = k, .T_world_kf = {}});
+    w.publisher.publish(ViewKeyframes{.first = k, .T_world_kf = {}});
   for (std::uint32_t k = 0; k < kCount; ++k) {
-    const ViewUpdate update = w.heard();
+    const ViewUpdate update = w.received();
     CHECK(update.robot == 7);
     CHECK(update.boot == 57);
-    CHECK(std::abs(seconds_between(update.told, nanoseconds(wall_now_s()))) < kPatience_s);
+    CHECK(std::abs(seconds_between(update.sent, nanoseconds(wall_now_s()))) < kPatience_s);
     REQUIRE(std::holds_alternative<ViewKeyframes>(update.content));
     CHECK(std::get<ViewKeyframes>(update.content).first == k);
   }
   // More cells than a queue for one reader holds, each with a chunk of its own.
-  for (std::int32_t x = 0; x < 100; ++x) w.teller.tell(chunk(x));
+  for (std::int32_t x = 0; x < 100; ++x) w.publisher.publish(chunk(x));
   for (std::int32_t x = 0; x < 100; ++x) {
-    const ViewUpdate update = w.heard();
+    const ViewUpdate update = w.received();
     REQUIRE(std::holds_alternative<MeshChunk>(update.content));
     const auto& piece = std::get<MeshChunk>(update.content);
     CHECK(piece.key.robot == 7);
     CHECK(piece.boot == 57);
     CHECK(piece.faces == chunk(x).faces);
   }
-  CHECK(w.teller.on(ViewChannel::kView).await_readers(kPatience_s));
+  CHECK(w.publisher.on(ViewChannel::kView).await_readers(kPatience_s));
   CHECK(w.listener.refused() == 0);
 }
 
 TEST_CASE("A robot detects new viewers", "[view]") {
   Watching w;
   REQUIRE(w.is_read(ViewChannel::kView));
-  ViewWriter& writer = w.teller.on(ViewChannel::kView);
+  ViewWriter& writer = w.publisher.on(ViewChannel::kView);
   CHECK(writer.newcomers() == 1);
   CHECK(writer.newcomers() == 0);
   {
@@ -105,30 +105,30 @@ TEST_CASE("A robot detects new viewers", "[view]") {
 
 TEST_CASE("A viewer ignores a second robot with a taken id", "[view]") {
   Watching w;
-  Teller twin(w.domain, 7, 1000);
+  Publisher twin(w.domain, 7, 1000);
   REQUIRE(w.is_read(ViewChannel::kView));
-  w.teller.tell(ViewKeyframes{.first = 0, .T_world_kf = {}});
-  CHECK(w.heard().boot == 57);
+  w.publisher.publish(ViewKeyframes{.first = 0, .T_world_kf = {}});
+  CHECK(w.received().boot == 57);
   REQUIRE(eventually([&] { return twin.on(ViewChannel::kView).readers() == 1; }));
-  twin.tell(ViewKeyframes{.first = 0, .T_world_kf = {}});
+  twin.publish(ViewKeyframes{.first = 0, .T_world_kf = {}});
   CHECK(twin.on(ViewChannel::kView).await_readers(kPatience_s));
-  w.teller.tell(ViewKeyframes{.first = 1, .T_world_kf = {}});
-  const ViewUpdate next = w.heard();
+  w.publisher.publish(ViewKeyframes{.first = 1, .T_world_kf = {}});
+  const ViewUpdate next = w.received();
   CHECK(next.boot == 57);
   CHECK(std::get<ViewKeyframes>(next.content).first == 1);
 }
 
 TEST_CASE("Images arrive only from the robots that are asked", "[view]") {
   Watching w;
-  Teller other(w.domain, 8);
+  Publisher other(w.domain, 8);
   REQUIRE(w.is_read(ViewChannel::kView));
-  CHECK(w.teller.on(ViewChannel::kImages).readers() == 0);
+  CHECK(w.publisher.on(ViewChannel::kImages).readers() == 0);
   w.listener.ask_for_images({7});
   CHECK_FALSE(w.listener.next(0.0));
   REQUIRE(w.is_read(ViewChannel::kImages));
   CHECK(other.on(ViewChannel::kImages).readers() == 0);
-  w.teller.tell(ViewImage{.stamp = 5, .jpeg = {1, 2, 3}, .features = {}});
-  CHECK(std::get<ViewImage>(w.heard().content).stamp == 5);
+  w.publisher.publish(ViewImage{.stamp = 5, .jpeg = {1, 2, 3}, .features = {}});
+  CHECK(std::get<ViewImage>(w.received().content).stamp == 5);
 
   w.listener.ask_for_images({8});
   CHECK_FALSE(w.listener.next(0.0));
@@ -138,22 +138,22 @@ TEST_CASE("Images arrive only from the robots that are asked", "[view]") {
 
 TEST_CASE("Updates that no robot writes are counted and dropped", "[view]") {
   Watching w;
-  const DdsEntity topic = create_view_topic(w.teller.participant.handle(), ViewChannel::kView);
+  const DdsEntity topic = create_view_topic(w.publisher.participant.handle(), ViewChannel::kView);
   const DdsQos qos = make_dds_qos();
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
   dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-  const DdsEntity stranger(
-      dds_create_writer(w.teller.participant.handle(), topic.handle(), qos.get(), nullptr),
+  const DdsEntity outsider(
+      dds_create_writer(w.publisher.participant.handle(), topic.handle(), qos.get(), nullptr),
       "writer");
   REQUIRE(eventually([&] {
     dds_publication_matched_status_t status{};
-    dds_get_publication_matched_status(stranger.handle(), &status);
+    dds_get_publication_matched_status(outsider.handle(), &status);
     return status.current_count == 1;
   }));
   const auto write = [&](std::vector<std::uint8_t> bytes) {
     km_wire_ViewUpdate wire{};
     borrow(wire.content, bytes);
-    check_dds(dds_write(stranger.handle(), &wire), "write");
+    check_dds(dds_write(outsider.handle(), &wire), "write");
   };
   write({});
   write({77, 1, 2});

@@ -53,31 +53,31 @@ struct Watched {
 
   // The node detects a new viewer with the next tick.
   void pass(double seconds) {
-    for (const double end_s = now_s + seconds; now_s < end_s; now_s += kDt_s) node.tell(now_s);
+    for (const double end_s = now_s + seconds; now_s < end_s; now_s += kDt_s) node.send_due(now_s);
   }
   template <typename T>
-  void learn(T message) {
+  void give(T message) {
     node.step(std::make_shared<const T>(std::move(message)));
   }
-  void learn_mesh(std::uint32_t side) {
+  void give_mesh(std::uint32_t side) {
     node.step(
         ViewNode::MeshOffer{kSelf, std::make_shared<const LabelledMesh>(wavy_sheet(side, 0.1))});
   }
-  void learn_keyframes(std::size_t count) {
+  void give_keyframes(std::size_t count) {
     for (std::size_t k = 0; k < count; ++k) {
       KeyframeOdometry keyframe;
       keyframe.id = {kSelf, static_cast<KeyframeIndex>(k)};
-      learn(std::move(keyframe));
+      give(std::move(keyframe));
     }
-    learn_trajectory(count, 0.0);
+    give_trajectory(count, 0.0);
   }
-  void learn_trajectory(std::size_t count, double x_m) {
+  void give_trajectory(std::size_t count, double x_m) {
     SE3 T = SE3::Identity();
     T.translation().x() = x_m;
-    learn(Trajectory{kSelf, kSelf, std::vector<SE3>(count, T)});
+    give(Trajectory{kSelf, kSelf, std::vector<SE3>(count, T)});
   }
-  [[nodiscard]] std::size_t told(ViewChannel channel = ViewChannel::kView) const {
-    return node.told_bytes(channel);
+  [[nodiscard]] std::size_t sent(ViewChannel channel = ViewChannel::kView) const {
+    return node.sent_bytes(channel);
   }
 
   std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
@@ -103,12 +103,12 @@ struct Visitor {
   explicit Visitor(Watched& robot) : listener(robot.domain) {
     REQUIRE(eventually([&] {
       robot.pass(kDt_s);
-      hear_all();
+      receive_all();
       return !watcher.states.empty();
     }));
   }
-  void hear_all() {
-    while (auto update = listener.next(0.0)) watcher.hear(update->content);
+  void receive_all() {
+    while (auto update = listener.next(0.0)) watcher.receive(update->content);
   }
   [[nodiscard]] std::size_t faces() const {
     const auto meshes = watcher.mesh.snapshot();
@@ -123,33 +123,33 @@ struct Visitor {
 
 TEST_CASE("Without viewers nothing is sent", "[view]") {
   Watched robot;
-  robot.learn_keyframes(100);
-  robot.learn_mesh(20);
+  robot.give_keyframes(100);
+  robot.give_mesh(20);
   robot.pass(60.0);
   CHECK(robot.described == 0);
   for (const auto channel : {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages})
-    CHECK(robot.told(channel) == 0);
+    CHECK(robot.sent(channel) == 0);
 }
 
 TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   const ViewConfig config = {};
   Watched robot(config);
   constexpr std::size_t kKeyframes = 3000;  // 108 kB of odometry, and 84 kB as optimised.
-  robot.learn_keyframes(kKeyframes);
+  robot.give_keyframes(kKeyframes);
   const double begin_s = robot.now_s;
   Visitor visitor(robot);
   const double come_s = robot.now_s;
-  const double slack = static_cast<double>(ViewTeller::kUpdateBytes) + 200.0;
-  const auto told = [&] { return static_cast<double>(robot.told()); };
+  const double slack = static_cast<double>(ViewSelector::kUpdateBytes) + 200.0;
+  const auto sent = [&] { return static_cast<double>(robot.sent()); };
   constexpr double kPast_bytes = (36.0 + 28.0) * kKeyframes;
-  while (told() < kPast_bytes) {
+  while (sent() < kPast_bytes) {
     robot.pass(kDt_s);
-    REQUIRE(told() <= config.past_bytes_per_s * (robot.now_s - begin_s + 0.5) + slack);
+    REQUIRE(sent() <= config.past_bytes_per_s * (robot.now_s - begin_s + 0.5) + slack);
     REQUIRE(robot.now_s - come_s < kPast_bytes / config.past_bytes_per_s + 2.0);
   }
   CHECK(eventually([&] {
     robot.pass(kDt_s);
-    visitor.hear_all();
+    visitor.receive_all();
     return visitor.watcher.odometry.size() == kKeyframes &&
            visitor.watcher.optimized.size() == kKeyframes;
   }));
@@ -157,13 +157,13 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   // More moves than the budget allows to send.
   robot.pass(5.0);
   const double present_s = robot.now_s;
-  const std::size_t present = robot.told();
+  const std::size_t present = robot.sent();
   double x_m = 0.0;
   while (robot.now_s < present_s + 60.0) {
-    robot.learn_trajectory(kKeyframes, x_m += 1.0);
+    robot.give_trajectory(kKeyframes, x_m += 1.0);
     robot.pass(1.0);
   }
-  const double rate = static_cast<double>(robot.told() - present) / (robot.now_s - present_s);
+  const double rate = static_cast<double>(robot.sent() - present) / (robot.now_s - present_s);
   CHECK(rate <= config.bytes_per_s + (0.5 * config.bytes_per_s + slack) / 60.0);
   CHECK(rate > 0.9 * config.bytes_per_s);
 }
@@ -171,12 +171,12 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
 TEST_CASE("A state is sent once a second", "[view]") {
   Watched robot;
   Visitor visitor(robot);
-  robot.learn(OptimizerProgress{.anchor = 3, .members = {3, kSelf}, .round = 12, .cost = 5.5});
-  robot.learn(RobotStatus{.robot = 4, .name = "beta"});
+  robot.give(OptimizerProgress{.anchor = 3, .members = {3, kSelf}, .round = 12, .cost = 5.5});
+  robot.give(RobotStatus{.robot = 4, .name = "beta"});
   const std::size_t before = visitor.watcher.states.size();
   robot.pass(10.0);
   REQUIRE(eventually([&] {
-    visitor.hear_all();
+    visitor.receive_all();
     return visitor.watcher.states.size() >= before + 10;
   }));
   CHECK(visitor.watcher.states.size() <= before + 11);
@@ -194,16 +194,16 @@ TEST_CASE("A state is sent once a second", "[view]") {
 
 TEST_CASE("A late viewer receives the full state", "[view]") {
   Watched robot;
-  robot.learn_keyframes(50);
+  robot.give_keyframes(50);
   const ClosureId id = closure_id({kSelf, 3}, {4, 9});
-  robot.learn(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
-  robot.learn_mesh(60);
+  robot.give(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
+  robot.give_mesh(60);
   const std::size_t faces = wavy_sheet(60, 0.1).faces.size();
   std::optional<Visitor> first(std::in_place, robot);
   const auto knows_all = [&](Visitor& visitor) {
     return eventually([&] {
       robot.pass(1.0);
-      visitor.hear_all();
+      visitor.receive_all();
       const Watcher& watcher = visitor.watcher;
       return watcher.odometry.size() == 50 && watcher.optimized.size() == 50 &&
              watcher.closures.contains(id) && visitor.faces() == faces;
@@ -214,9 +214,9 @@ TEST_CASE("A late viewer receives the full state", "[view]") {
   CHECK(knows_all(second));
   first.reset();
   CHECK(eventually([&] {  // Also after the other viewer has gone.
-    robot.learn_mesh(20);
+    robot.give_mesh(20);
     robot.pass(1.0);
-    second.hear_all();
+    second.receive_all();
     return second.faces() == wavy_sheet(20, 0.1).faces.size();
   }));
 }
@@ -226,17 +226,17 @@ TEST_CASE("Chunks that are removed while a viewer appears are removed for the ea
   ViewConfig config = {};
   config.mesh_bytes_per_s = 1000.0;  // Slow enough that both events happen between two chunks.
   Watched robot(config);
-  robot.learn_mesh(60);
+  robot.give_mesh(60);
   Visitor first(robot);
   const auto knows = [&](Visitor& visitor, std::uint32_t side) {
     return eventually([&] {
       robot.pass(10.0);
-      visitor.hear_all();
+      visitor.receive_all();
       return visitor.faces() == wavy_sheet(side, 0.1).faces.size();
     });
   };
   REQUIRE(knows(first, 60));
-  robot.learn_mesh(20);
+  robot.give_mesh(20);
   Visitor second(robot);
   CHECK(knows(second, 20));
   CHECK(knows(first, 20));
@@ -246,33 +246,33 @@ TEST_CASE("Mesh chunks are sent no faster than configured", "[view]") {
   ViewConfig config = {};
   config.mesh_bytes_per_s = 20000.0;
   Watched robot(config);
-  robot.learn_mesh(150);
+  robot.give_mesh(150);
   Visitor visitor(robot);
   const double begin_s = robot.now_s;
-  const std::size_t before = robot.told(ViewChannel::kMesh);
-  const auto told_since = [&] {
-    return static_cast<double>(robot.told(ViewChannel::kMesh) - before);
+  const std::size_t before = robot.sent(ViewChannel::kMesh);
+  const auto sent_since = [&] {
+    return static_cast<double>(robot.sent(ViewChannel::kMesh) - before);
   };
   for (int tick = 0; tick < 100; ++tick) {
     robot.pass(kDt_s);
-    REQUIRE(told_since() <=
+    REQUIRE(sent_since() <=
             config.mesh_bytes_per_s * (robot.now_s - begin_s + 0.5) + kMaxChunkBytes);
   }
-  CHECK(told_since() > 0.8 * config.mesh_bytes_per_s * (robot.now_s - begin_s));
+  CHECK(sent_since() > 0.8 * config.mesh_bytes_per_s * (robot.now_s - begin_s));
 }
 
 TEST_CASE("At the end all remaining updates are sent", "[view]") {
   Watched robot;
   std::optional<Visitor> visitor(std::in_place, robot);
-  robot.learn_keyframes(400);
-  robot.learn_mesh(150);
+  robot.give_keyframes(400);
+  robot.give_mesh(150);
   robot.node.start();
   robot.node.stop();
-  const std::size_t told = robot.told();
+  const std::size_t sent = robot.sent();
   robot.node.stop();
-  CHECK(robot.told() == told);
+  CHECK(robot.sent() == sent);
   CHECK(eventually([&] {
-    visitor->hear_all();
+    visitor->receive_all();
     return visitor->watcher.optimized.size() == 400 &&
            visitor->faces() == wavy_sheet(150, 0.1).faces.size();
   }));
@@ -288,11 +288,11 @@ TEST_CASE("Images are sent while they are requested", "[view]") {
   Visitor visitor(robot);
   robot.node.start();
   for (int k = 0; k < 20; ++k) robot.images.publish(TrackedImage{shared, {{0.1, 0.2}}});
-  CHECK(robot.told(ViewChannel::kImages) == 0);
+  CHECK(robot.sent(ViewChannel::kImages) == 0);
   visitor.listener.ask_for_images({kSelf});
   CHECK(eventually([&] {
     robot.images.publish(TrackedImage{shared, {{0.1, 0.2}}});
-    visitor.hear_all();
+    visitor.receive_all();
     return !visitor.watcher.images.empty();
   }));
   REQUIRE_FALSE(visitor.watcher.images.empty());

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "modules/view/view_update.hpp"
+#include "test/support/corrupted_input.hpp"
 #include "test/support/random_pose.hpp"
-#include "test/support/spoilt_input.hpp"
 
 namespace km {
 namespace {
@@ -251,11 +251,11 @@ TEST_CASE("The size of an update is bounded", "[view]") {
 // Each accepted update equals the result of encoding it again, so it is safe to show.
 TEST_CASE("Corrupted updates are refused or decoded consistently", "[view]") {
   const std::vector<Bytes> good = samples();
-  InputSpoiler spoiler(GENERATE(1U, 2U));
+  InputCorrupter corrupter(GENERATE(1U, 2U));
   int accepted = 0;
   constexpr int kCount = 20'000;
   for (int k = 0; k < kCount; ++k) {
-    const auto content = decode_view(spoiler(good));
+    const auto content = decode_view(corrupter(good));
     if (!content) continue;
     ++accepted;
     REQUIRE(is_understood(*content));

@@ -12,14 +12,14 @@ namespace km {
 
 /// State of a robot as a viewer knows it, from the beginning or from the time when it appeared.
 struct Watcher {
-  void hear(const ViewContent& content) {
+  void receive(const ViewContent& content) {
     std::visit([this](const auto& c) { take(c); }, content);
   }
   void take(const ViewPose& pose) { poses.push_back(pose); }
   void take(const ViewKeyframes& keyframes) {
     auto& known = keyframes.optimized ? optimized : odometry;
     for (std::size_t k = 0; k < keyframes.T_world_kf.size(); ++k) {
-      ++(keyframes.optimized ? optimized_told : odometry_told);
+      ++(keyframes.optimized ? optimized_received : odometry_received);
       known[keyframes.first + static_cast<KeyframeIndex>(k)] = {keyframes.anchor,
                                                                 keyframes.T_world_kf[k]};
     }
@@ -42,7 +42,7 @@ struct Watcher {
   std::map<KeyframeIndex, Placed> odometry, optimized;
   std::map<ClosureId, ViewClosure> closures;
   std::vector<ClosureId> order;
-  std::size_t odometry_told = 0, optimized_told = 0;
+  std::size_t odometry_received = 0, optimized_received = 0;
   std::vector<ViewState> states;
   std::vector<ViewImage> images;
   TeamMesh mesh;

@@ -152,8 +152,8 @@ OdometryErrors killed_errors(const Recording& recording, const OdometryRun& whol
                              const TrackerConfig& tracker, const VioConfig& config) {
   OdometryRun joined, run = whole;
   std::size_t first = 0;
-  for (std::size_t life = 0;; ++life) {
-    const bool killed = life < kills && run.keyframes.size() > keyframes;
+  for (std::size_t run_index = 0;; ++run_index) {
+    const bool killed = run_index < kills && run.keyframes.size() > keyframes;
     for (std::size_t k = 0; k < run.states.size(); ++k) {
       if (killed && run.states[k].stamp > run.keyframes[keyframes - 1].stamp) break;
       joined.states.push_back(run.states[k]);
@@ -185,22 +185,23 @@ void run_resume(const Recording& recording, const TrackerConfig& tracker, const 
     all[0].push_back(anew);
     all[1].push_back(on);
     const Stamp stamp = whole.keyframes[k - 1].stamp;
-    std::printf("killed at %5.2f s: ATE %6.2f mm anew, %6.2f mm from its state\n",
+    std::printf("killed at %5.2f s: ATE %6.2f mm from scratch, %6.2f mm from its state\n",
                 seconds_between(whole.states.front().stamp, stamp), anew, on);
   }
   for (const std::size_t from_state : {0U, 1U}) {
     const std::vector<double>& mm = all[from_state];
     std::printf("%s: ATE median %.2f p90 %.2f max %.2f mm, more than 5 %% worse %zu of %zu\n",
-                from_state == 1 ? "from its state" : "anew", quantile(mm, 0.5), quantile(mm, 0.9),
-                quantile(mm, 1.0),
+                from_state == 1 ? "from its state" : "from scratch", quantile(mm, 0.5),
+                quantile(mm, 0.9), quantile(mm, 1.0),
                 static_cast<std::size_t>(
                     std::ranges::count_if(mm, [&](double v) { return v > 1.05 * whole_mm; })),
                 mm.size());
   }
   for (const std::size_t keyframes : {2U, 3U, 5U, 8U}) {
     const auto [anew, on] = compare(keyframes, whole.keyframes.size());
-    std::printf("killed at every %zu keyframes: ATE %6.2f mm anew, %6.2f mm from its state\n",
-                keyframes, anew, on);
+    std::printf(
+        "killed at every %zu keyframes: ATE %6.2f mm from scratch, %6.2f mm from its state\n",
+        keyframes, anew, on);
   }
 }
 

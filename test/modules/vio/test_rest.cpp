@@ -25,8 +25,8 @@ struct Glide {
   }
   [[nodiscard]] SE3 T_world_body(double t) const {
     const double s = share(t);
-    const double aside = distance_m * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
-    return make_pose(Eigen::Matrix3d::Identity(), {0.0, aside, 0.0});
+    const double sideways = distance_m * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+    return make_pose(Eigen::Matrix3d::Identity(), {0.0, sideways, 0.0});
   }
   [[nodiscard]] double acceleration_mps2(double t) const {
     const double s = share(t);
@@ -68,8 +68,8 @@ class Ride {
   ImuSample sample(Stamp stamp) {
     if (stamp == last_.stamp) return last_;  // the border of two packets
     const double rate_root = std::sqrt(rig_.imu.rate_hz);
-    const double aside = glide_.acceleration_mps2(seconds_between(0, stamp));
-    last_ = {stamp, kGyroBias, {kGravity_mps2, aside, 0.0}};
+    const double sideways = glide_.acceleration_mps2(seconds_between(0, stamp));
+    last_ = {stamp, kGyroBias, {kGravity_mps2, sideways, 0.0}};
     last_.gyro += rate_root * rig_.imu.gyro_noise_density * random_vector<3>(rng_);
     last_.accel += rate_root * rig_.imu.accel_noise_density * random_vector<3>(rng_);
     return last_;

@@ -167,7 +167,7 @@ struct TestRobot {
     return found;
   }
   /// True once there have been `count` such events.
-  bool hears(PeerEventKind kind, RobotId robot, std::size_t count = 1) {
+  bool receives(PeerEventKind kind, RobotId robot, std::size_t count = 1) {
     const auto events =
         peer_events.wait_until([&](const auto& e) { return matching(e, kind, robot) >= count; });
     return matching(events, kind, robot) >= count;
@@ -248,8 +248,8 @@ struct Two {
       : domain(std::make_shared<const DdsDomain>(config)) {
     a.start();
     b.start();
-    REQUIRE(a.hears(PeerEventKind::kJoined, 4));
-    REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+    REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+    REQUIRE(b.receives(PeerEventKind::kJoined, 3));
   }
 
   std::shared_ptr<const DdsDomain> domain;

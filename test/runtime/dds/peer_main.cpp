@@ -18,7 +18,7 @@ namespace {
 
 std::mutex output_mutex;
 
-void say(const std::string& line) {
+void print_line(const std::string& line) {
   const std::lock_guard lock(output_mutex);
   std::cout << line << std::endl;
 }
@@ -27,8 +27,8 @@ const char* name_of(PeerEventKind kind) {
   switch (kind) {
     case PeerEventKind::kJoined:
       return "joined";
-    case PeerEventKind::kTold:
-      return "told of";
+    case PeerEventKind::kReported:
+      return "reported";
     case PeerEventKind::kLost:
       return "lost";
     case PeerEventKind::kReturned:
@@ -49,12 +49,12 @@ const char* name_of(PeerEventKind kind) {
 
 void report(TestRobot& robot) {
   robot.bridge.peers().events().subscribe([](const auto& event) {
-    say(std::string(name_of(event->kind)) + ' ' + std::to_string(event->identity.robot));
+    print_line(std::string(name_of(event->kind)) + ' ' + std::to_string(event->identity.robot));
   });
   const auto print = [](const char* what) {
     return [what](const std::shared_ptr<const Ping>& ping) {
-      say(std::string(what) + ' ' + std::to_string(ping->robot) + ' ' +
-          std::to_string(ping->index));
+      print_line(std::string(what) + ' ' + std::to_string(ping->robot) + ' ' +
+                 std::to_string(ping->index));
     };
   };
   robot.pings.from_peers().subscribe(print("ping"));
@@ -88,8 +88,8 @@ int run(int argc, char** argv) {
   obey(robot);
   robot.stop();
   const TopicTraffic traffic = robot.traffic(Direction::kIn);
-  say("summary " + std::to_string(traffic.count.messages) + ' ' +
-      std::to_string(traffic.duplicates) + ' ' + std::to_string(traffic.missing));
+  print_line("summary " + std::to_string(traffic.count.messages) + ' ' +
+             std::to_string(traffic.duplicates) + ' ' + std::to_string(traffic.missing));
   return 0;
 }
 

@@ -49,7 +49,7 @@ TEST_CASE("A robot that joins late gets every event, request, and the newest sta
   TestRobot a(domain, 3, kind), witness(domain, 4, kind);
   a.start();
   witness.start();
-  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
   // Keys 0 and 1 each written twice.
   for (const std::uint8_t round : std::vector<std::uint8_t>{1, 2})
     for (const std::uint32_t key : {0U, 1U}) a.ping(key, {round});
@@ -58,7 +58,7 @@ TEST_CASE("A robot that joins late gets every event, request, and the newest sta
 
   TestRobot late(domain, 5, kind);
   late.start();
-  REQUIRE(a.hears(PeerEventKind::kJoined, 5));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 5));
   a.ping(2);
   const auto pings = late.received.wait_for(3);
   CHECK(indices(pings) == up_to(3));
@@ -76,7 +76,7 @@ TEST_CASE("A request expires after the lease of a silent robot", "[dds]") {
   std::this_thread::sleep_for(std::chrono::milliseconds(3100));  // the lifespan under test
   TestRobot late(domain, 4, TopicKind::kRequest);
   late.start();
-  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
   a.ping(1);
   CHECK(indices(late.received.wait_for(1)) == std::vector<std::uint32_t>{1});
 }
@@ -115,8 +115,8 @@ TEST_CASE("An addressed message reaches its addressee and no other robot gets a 
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind, kind), b(domain, 4, kind, kind), c(domain, 5, kind, kind);
   for (TestRobot* robot : {&a, &b, &c}) robot->start();
-  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
-  REQUIRE(a.hears(PeerEventKind::kJoined, 5));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 5));
 
   for (std::uint32_t i = 0; i < 10; ++i) a.ping_one(4, i, std::vector<std::uint8_t>(1000));
   CHECK(indices(b.received_addressed.wait_for(10)) == up_to(10));
@@ -137,8 +137,8 @@ TEST_CASE("Sender and receiver count the same bytes for all sizes", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
   for (TestRobot* robot : {&a, &b, &c}) robot->start();
-  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
-  REQUIRE(a.hears(PeerEventKind::kJoined, 5));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 5));
   constexpr std::uint32_t kCount = 50;
   for (std::uint32_t i = 0; i < kCount; ++i) a.ping(i, std::vector<std::uint8_t>(i));
   for (TestRobot* robot : {&b, &c}) REQUIRE(robot->received.wait_for(kCount).size() == kCount);
@@ -164,7 +164,7 @@ TEST_CASE("Earlier messages for a robot that joins late are counted once", "[dds
   TestRobot a(domain, 3, kind), b(domain, 4, kind);
   a.start();
   b.start();
-  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
   for (std::uint32_t i = 0; i < 50; ++i) a.ping(i, std::vector<std::uint8_t>(1000));
   const std::uint32_t newer = kind == TopicKind::kState ? 25 : 0;
   for (std::uint32_t i = 0; i < newer; ++i) a.ping(i, std::vector<std::uint8_t>(2000));
@@ -182,8 +182,8 @@ TEST_CASE("Messages of a hostile peer are counted by reason and change nothing",
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), foe(domain, 9);
   for (TestRobot* robot : {&a, &b, &foe}) robot->start();
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
-  REQUIRE(b.hears(PeerEventKind::kJoined, 9));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 9));
 
   RawWriter writer(foe.participant.handle(), domain->config(), TopicKind::kEvent);
   const RobotIdentity self = foe.participant.identity();
@@ -229,7 +229,7 @@ TEST_CASE("A guard appends a tail to messages and sees them before any node", "[
   b.bridge.exchange(at_b, TopicKind::kEvent, TrafficCategory::kOther, {}, {}, guard);
   a.start();
   b.start();
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
   for (std::uint32_t i = 0; i < 3; ++i) from_a.to_peers().publish(MarkedPing{{3, i, {1, 2, 3}}});
   const auto pings = got.wait_for(2);
   REQUIRE(pings.size() == 2);
@@ -246,14 +246,14 @@ TEST_CASE("Programs without an identity, or with a broken one, are ignored", "[d
   TestRobot a(domain, 3), b(domain, 4);
   const DdsQos qos = make_dds_qos();
   dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
-  const DdsEntity stranger(
+  const DdsEntity outsider(
       dds_create_participant(static_cast<dds_domainid_t>(domain->config().domain), qos.get(),
                              nullptr),
       "participant");
   a.start();
   b.start();
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
-  RawWriter writer(stranger.handle(), domain->config(), TopicKind::kEvent);
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  RawWriter writer(outsider.handle(), domain->config(), TopicKind::kEvent);
   writer.write(header(a.participant.identity(), 0), {3, 0, {}});
   CHECK(eventually([&] { return b.traffic(Direction::kIn).refused["from no known robot"] == 1; }));
   CHECK(b.received.messages().empty());
@@ -269,7 +269,7 @@ TEST_CASE("Robots of another protocol version are refused and ignored", "[dds]")
       newer(domain, 4, TopicKind::kEvent, TopicKind::kRequest, kProtocolVersion + 1);
   a.start();
   newer.start();
-  CHECK(a.hears(PeerEventKind::kRefused, 4));
+  CHECK(a.receives(PeerEventKind::kRefused, 4));
   newer.ping(0);
   CHECK(eventually([&] { return a.traffic(Direction::kIn).refused["from no known robot"] == 1; }));
   CHECK(a.received.messages().empty());
@@ -286,10 +286,10 @@ TEST_CASE("A robot that leaves and starts again is recognised by its boot", "[dd
     first.ping(0, {1});
     REQUIRE(a.received.wait_for(1).size() == 1);
   }
-  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  REQUIRE(a.receives(PeerEventKind::kLeft, 4));
   TestRobot second(domain, 4);
   second.start();
-  CHECK(a.hears(PeerEventKind::kRestarted, 4));
+  CHECK(a.receives(PeerEventKind::kRestarted, 4));
   second.ping(0, {2});  // number 0 again, but of another boot
   const auto pings = a.received.wait_for(2);
   REQUIRE(pings.size() == 2);
@@ -309,16 +309,16 @@ TEST_CASE("Messages to a robot reach its resumed process and not its next incarn
   {
     TestRobot first(domain, former, nullptr, TopicKind::kEvent, TopicKind::kEvent);
     first.start();
-    REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+    REQUIRE(a.receives(PeerEventKind::kJoined, 4));
     a.ping_one(4, 0);
     REQUIRE(first.received_addressed.wait_for(1).size() == 1);
   }
-  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  REQUIRE(a.receives(PeerEventKind::kLeft, 4));
   a.ping_one(4, 1);  // while it is away
 
   TestRobot second(domain, next, nullptr, TopicKind::kEvent, TopicKind::kEvent);
   second.start();
-  REQUIRE(a.hears(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, 4));
+  REQUIRE(a.receives(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, 4));
   a.addressed_pings.to_peers().publish(
       {4, std::make_shared<const Ping>(Ping{3, 2, {}}), former.boot});
   a.addressed_pings.to_peers().publish(
@@ -354,12 +354,12 @@ TEST_CASE("Messages of a new incarnation wait until all nodes know that the robo
     first.ping(0);
     REQUIRE(a.received.wait_for(1).size() == 1);
   }
-  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  REQUIRE(a.receives(PeerEventKind::kLeft, 4));
   TestRobot second(domain, 4);
   second.ping(1);
   second.start();
-  REQUIRE(second.hears(PeerEventKind::kJoined, 3));
-  REQUIRE(a.hears(PeerEventKind::kRestarted, 4));
+  REQUIRE(second.receives(PeerEventKind::kJoined, 3));
+  REQUIRE(a.receives(PeerEventKind::kRestarted, 4));
   std::this_thread::sleep_for(std::chrono::milliseconds(700));  // enough for it to arrive
   CHECK(a.received.messages().size() == 1);
   {
@@ -369,7 +369,7 @@ TEST_CASE("Messages of a new incarnation wait until all nodes know that the robo
   CHECK(a.received.wait_for(2).size() == 2);
 }
 
-TEST_CASE("A subscriber that throws does not stop the robot from hearing", "[dds]") {
+TEST_CASE("A subscriber that throws does not stop the robot from receiving", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4);
   b.pings.from_peers().subscribe([](const auto& ping) {
@@ -377,7 +377,7 @@ TEST_CASE("A subscriber that throws does not stop the robot from hearing", "[dds
   });
   a.start();
   b.start();
-  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
   a.ping(0);
   a.ping(1);
   CHECK(b.received.wait_for(2).size() == 2);

@@ -16,8 +16,8 @@ struct Thrifty {
           TopicKind::kEvent, TopicKind::kEvent, budget) {
     a.start();
     b.start();
-    REQUIRE(a.hears(PeerEventKind::kJoined, 4));
-    REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+    REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+    REQUIRE(b.receives(PeerEventKind::kJoined, 3));
   }
 
   void offer(std::uint32_t count, std::size_t bytes) {

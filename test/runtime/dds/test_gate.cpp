@@ -65,11 +65,11 @@ TEST_CASE("Messages that a robot sent before it left are received", "[gate]") {
   {
     TestRobot b(domain, 4);
     b.start();
-    REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+    REQUIRE(b.receives(PeerEventKind::kJoined, 3));
     for (std::uint32_t i = 0; i < 50; ++i) b.ping(i);
     REQUIRE(eventually([&] { return b.traffic(Direction::kOut).count.messages == 50; }));
   }
-  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  REQUIRE(a.receives(PeerEventKind::kLeft, 4));
   leave.set_value();
   CHECK(a.received.wait_for(50).size() == 50);
 }
@@ -80,9 +80,9 @@ TEST_CASE("No participant can send in a robot's name, not even from a writer tha
   auto& [domain, a, b] = two;
   const bool shows_the_id = GENERATE(false, true);
   {
-    const DdsEntity stranger = participant_with(
+    const DdsEntity outsider = participant_with(
         domain->config(), shows_the_id ? to_user_data(a.participant.identity()) : "");
-    RawWriter writer(stranger.handle(), domain->config(), TopicKind::kEvent);
+    RawWriter writer(outsider.handle(), domain->config(), TopicKind::kEvent);
     for (std::uint32_t i = 0; i < 60; ++i)
       writer.write(header(a.participant.identity(), 1000 + i), {3, 1000 + i, {}});
     REQUIRE(writer.is_read_by(2));
@@ -104,8 +104,8 @@ TEST_CASE("A peer that sends much delays only its own messages", "[gate]") {
       kFlood, Overflow::kBlock, [&](const auto& ping) { handled.publish(ping); }, "node");
   c.pings.from_peers().subscribe([&](const auto& ping) { node.post(ping); });
   for (TestRobot* robot : {&a, &b, &c}) robot->start();
-  REQUIRE(c.hears(PeerEventKind::kJoined, 3));
-  REQUIRE(c.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(c.receives(PeerEventKind::kJoined, 3));
+  REQUIRE(c.receives(PeerEventKind::kJoined, 4));
   for (std::uint32_t i = 0; i < kFlood; ++i) a.ping(i);
   REQUIRE(eventually([&] { return c.received.messages().size() > 10; }));
   b.ping(99999);
@@ -125,8 +125,8 @@ TEST_CASE("Only the status of a robot's twin makes it yield", "[gate]") {
   REQUIRE(eventually([&] { return a.status_count() >= 4; }));
   TestRobot twin(domain, 3);
   twin.start();
-  CHECK(twin.hears(PeerEventKind::kConflict, 3));
-  CHECK(a.hears(PeerEventKind::kRefused, 3));
+  CHECK(twin.receives(PeerEventKind::kConflict, 3));
+  CHECK(a.receives(PeerEventKind::kRefused, 3));
   CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
   twin.ping(0);
   CHECK(eventually([&] { return refusals(a, "claims this robot's id") == 1; }));
@@ -190,11 +190,11 @@ TEST_CASE("Envelopes of any bytes are read or refused by DDS itself", "[gate]") 
   };
   int refused = 0;
   for (int i = 0; i < 100'000; ++i) {
-    std::vector<std::uint8_t> spoilt = bytes;
+    std::vector<std::uint8_t> corrupted = bytes;
     for (std::size_t k = below(3); k < 3; ++k)
-      spoilt[below(i % 2 == 0 ? spoilt.size() : 40)] = static_cast<std::uint8_t>(below(256));
-    if (below(2) == 0) spoilt.resize(below(spoilt.size()) / 4 * 4 + 4);
-    refused += sound.reads(spoilt) ? 0 : 1;
+      corrupted[below(i % 2 == 0 ? corrupted.size() : 40)] = static_cast<std::uint8_t>(below(256));
+    if (below(2) == 0) corrupted.resize(below(corrupted.size()) / 4 * 4 + 4);
+    refused += sound.reads(corrupted) ? 0 : 1;
   }
   CHECK(refused > 10'000);
 }

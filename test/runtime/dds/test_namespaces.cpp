@@ -24,7 +24,7 @@ struct Pair {
 
 // The summary of a robot that quits: new messages, duplicates, missing.
 std::vector<int> summary(Process& robot) {
-  robot.tell("quit");
+  robot.send_line("quit");
   const auto line = robot.wait_for_prefix("summary ");
   REQUIRE(line);
   std::istringstream words(line->text.substr(8));
@@ -47,7 +47,7 @@ TEST_CASE("Robots on two hosts discover each other, and an addressed message pas
   std::cout << "discovery by " << discovery << ", two hosts: " << seconds
             << " s from the launch of the second process\n";
   CHECK(seconds < kDiscoveryBound_s);
-  robots.a->tell("one 4 7");
+  robots.a->send_line("one 4 7");
   CHECK(robots.b->wait_for("one 3 7"));
 }
 
@@ -103,16 +103,16 @@ TEST_CASE("A link that fails and returns loses no event", "[dds][namespaces]") {
   const Pair robots(network, discovery_settings(discovery));
   REQUIRE(robots.a->wait_for("joined 4"));
   REQUIRE(robots.b->wait_for("joined 3"));
-  robots.a->tell("ping 0 49");
+  robots.a->send_line("ping 0 49");
   REQUIRE(robots.b->wait_for("ping 3 49"));
 
   const auto cut = std::chrono::steady_clock::now();
   network.set_link(2, false);
-  robots.a->tell("ping 50 99");
+  robots.a->send_line("ping 50 99");
   const auto lost = robots.b->wait_for("lost 3");
   REQUIRE(lost);
   REQUIRE(robots.a->wait_for("lost 4"));
-  robots.a->tell("ping 100 149");
+  robots.a->send_line("ping 100 149");
   const auto plugged = std::chrono::steady_clock::now();
   network.set_link(2, true);
   const auto returned = robots.b->wait_for("returned 3");
@@ -134,11 +134,11 @@ TEST_CASE("An outage longer than the lease repeats the history, and duplicates a
                                  std::vector<std::string>{"lease_s=3", "liveliness_s=0.5"});
   REQUIRE(robots.a->wait_for("joined 4"));
   REQUIRE(robots.b->wait_for("joined 3"));
-  robots.a->tell("ping 0 49");
+  robots.a->send_line("ping 0 49");
   REQUIRE(robots.b->wait_for("ping 3 49"));
   network.set_link(2, false);
   REQUIRE(robots.b->wait_for("lost 3"));
-  robots.a->tell("ping 50 99");
+  robots.a->send_line("ping 50 99");
   // Outlasts the lease: the condition under test is time itself.
   std::this_thread::sleep_for(std::chrono::seconds(4));
   network.set_link(2, true);

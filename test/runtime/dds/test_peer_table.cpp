@@ -43,12 +43,12 @@ TEST_CASE(
   CHECK(kinds(table).empty());
   REQUIRE(table.peers().size() == 1);
   CHECK(table.peers()[0].state == PeerState::kLost);
-  const auto [life, resumes, kind] =
+  const auto [incarnation, resumes, kind] =
       GENERATE(Catch::Generators::table<std::uint64_t, std::uint64_t, PeerEventKind>(
           {{70, 0, PeerEventKind::kReturned},
            {70, 2, PeerEventKind::kResumed},
            {71, 0, PeerEventKind::kRestarted}}));
-  table.participant(guid(2), data_of(7, (life << kResumeBits) + resumes), "udp/10.0.0.7");
+  table.participant(guid(2), data_of(7, (incarnation << kResumeBits) + resumes), "udp/10.0.0.7");
   table.alive(guid(2));
   CHECK(kinds(table) == Kinds{kind});
   CHECK(table.peers()[0].state == PeerState::kAlive);
@@ -57,48 +57,50 @@ TEST_CASE(
 
 TEST_CASE("Reports of other robots count for a robot that is not received, until it is",
           "[peers]") {
-  constexpr std::uint64_t kLife = std::uint64_t{70} << kResumeBits;
-  constexpr std::uint64_t kOtherLife = std::uint64_t{71} << kResumeBits;
+  constexpr std::uint64_t kIncarnation = std::uint64_t{70} << kResumeBits;
+  constexpr std::uint64_t kOtherIncarnation = std::uint64_t{71} << kResumeBits;
   PeerTable table(kSelf);
-  const auto tell = [&](std::uint64_t boot) { table.tell({7, "peer", kProtocolVersion, boot}); };
-  table.tell({kSelf.robot, "self", kProtocolVersion, 3});
+  const auto report = [&](std::uint64_t boot) {
+    table.reported({7, "peer", kProtocolVersion, boot});
+  };
+  table.reported({kSelf.robot, "self", kProtocolVersion, 3});
   CHECK(table.peers().empty());
-  tell(kLife);
-  const std::vector<PeerEvent> told = table.take_events();
-  REQUIRE(told.size() == 1);
-  CHECK(told[0].kind == PeerEventKind::kTold);
-  CHECK_FALSE(told[0].heard);
-  CHECK(table.peers()[0].state == PeerState::kTold);
-  CHECK(table.current(7) == TeamPeer{7, kLife});
+  report(kIncarnation);
+  const std::vector<PeerEvent> reported = table.take_events();
+  REQUIRE(reported.size() == 1);
+  CHECK(reported[0].kind == PeerEventKind::kReported);
+  CHECK_FALSE(reported[0].direct);
+  CHECK(table.peers()[0].state == PeerState::kReported);
+  CHECK(table.current(7) == TeamPeer{7, kIncarnation});
   SECTION("the same again is no news") {
-    tell(kLife);
+    report(kIncarnation);
     CHECK(kinds(table).empty());
   }
   SECTION("another process of its incarnation") {
-    tell(kLife + 1);
+    report(kIncarnation + 1);
     CHECK(kinds(table) == Kinds{PeerEventKind::kResumed});
     CHECK_FALSE(table.is_arriving(7));
   }
   SECTION("another incarnation waits until all nodes know") {
-    tell(kOtherLife);
+    report(kOtherIncarnation);
     CHECK(kinds(table) == Kinds{PeerEventKind::kRestarted});
     CHECK(table.is_arriving(7));
-    table.told({7, kOtherLife});
+    table.restart_handled({7, kOtherIncarnation});
     CHECK_FALSE(table.is_arriving(7));
   }
   SECTION("it is received itself") {
     const bool restarted = GENERATE(false, true);
     CAPTURE(restarted);
-    const std::uint64_t boot = restarted ? kOtherLife : kLife;
+    const std::uint64_t boot = restarted ? kOtherIncarnation : kIncarnation;
     table.participant(guid(2), data_of(7, boot), "udp/10.0.0.7");
     table.alive(guid(2));
     CHECK(kinds(table) == Kinds{restarted ? PeerEventKind::kRestarted : PeerEventKind::kReturned});
-    tell(kLife + 5);
+    report(kIncarnation + 5);
     CHECK(kinds(table).empty());
     CHECK(table.current(7) == TeamPeer{7, boot});
     table.silent(guid(2));
     CHECK(kinds(table) == Kinds{PeerEventKind::kLost});
-    tell(boot);
+    report(boot);
     CHECK(kinds(table).empty());
   }
 }
@@ -162,7 +164,7 @@ TEST_CASE("An orderly end is not a loss", "[peers]") {
 }
 
 constexpr std::uint64_t kBoot = 70U << kResumeBits;
-constexpr std::uint64_t kOtherLife = 71U << kResumeBits;
+constexpr std::uint64_t kOtherIncarnation = 71U << kResumeBits;
 
 // Robot 7, received from guid 2, with kBoot.
 PeerTable with_robot() {
@@ -176,7 +178,7 @@ PeerTable with_robot() {
 TEST_CASE("A robot that is started again has its id back once its former self is missed",
           "[peers]") {
   const auto [boot, kind] = GENERATE(Catch::Generators::table<std::uint64_t, PeerEventKind>(
-      {{kOtherLife, PeerEventKind::kRestarted}, {kBoot + 1, PeerEventKind::kResumed}}));
+      {{kOtherIncarnation, PeerEventKind::kRestarted}, {kBoot + 1, PeerEventKind::kResumed}}));
   PeerTable table = with_robot();
   SECTION("killed and restarted at once") {
     table.participant(guid(3), data_of(7, boot), "");
@@ -207,9 +209,9 @@ TEST_CASE("A robot that is started again has its id back once its former self is
   CHECK(table.peers()[0].state == PeerState::kAlive);
   if (kind == PeerEventKind::kRestarted) {
     CHECK(table.standing(guid(3)) == Standing::kArriving);
-    table.told({7, kBoot});  // late, for the former incarnation
+    table.restart_handled({7, kBoot});  // late, for the former incarnation
     CHECK(table.standing(guid(3)) == Standing::kArriving);
-    table.told({7, boot});
+    table.restart_handled({7, boot});
   }
   CHECK(table.standing(guid(3)) == Standing::kAdmitted);
   CHECK(table.is_current({7, boot}));
@@ -220,7 +222,7 @@ TEST_CASE("A robot that is started again has its id back once its former self is
 TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
   PeerTable table = with_robot();
   // That of the robot itself is no secret.
-  const std::uint64_t boot = GENERATE(kBoot, kBoot + 1, kOtherLife);
+  const std::uint64_t boot = GENERATE(kBoot, kBoot + 1, kOtherIncarnation);
   for (int i = 0; i < 3; ++i) {
     table.participant(guid(3), data_of(7, boot), "udp/10.0.0.66");
     table.alive(guid(3));
@@ -266,7 +268,7 @@ TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
               Case{"it is younger", 2.0, 5.0, 70, PeerEventKind::kRefused},
               Case{"both are new, and its boot is lower", 2.0, 2.5, 70, PeerEventKind::kConflict},
               Case{"both are new, and its boot is higher", 2.0, 2.5, 7000, PeerEventKind::kRefused},
-              Case{"it says it is older, to one that is not new", 1e6, 11.0, 70,
+              Case{"it reports that it is older, to one that is not new", 1e6, 11.0, 70,
                    PeerEventKind::kRefused}}));
   CAPTURE(what);
   PeerTable table(kSelf);
@@ -274,7 +276,7 @@ TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
   table.alive(guid(2));
   CHECK(kinds(table).empty());
   CHECK(table.standing(guid(2)) == Standing::kTwin);
-  for (int i = 0; i < 3; ++i) table.twin_heard(guid(2), its_s + i, own_s + i);
+  for (int i = 0; i < 3; ++i) table.twin_received(guid(2), its_s + i, own_s + i);
   const auto events = table.take_events();
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == expected);
@@ -302,7 +304,7 @@ TEST_CASE("Many unknown participants do not exhaust the memory", "[peers]") {
   for (std::size_t n = 0; n < PeerTable::kMaxParticipants; ++n)
     table.participant_gone(wide_guid(n));
   table.participant(wide_guid(9999), "some tool", "");
-  CHECK(table.standing(wide_guid(9999)) == Standing::kStranger);
+  CHECK(table.standing(wide_guid(9999)) == Standing::kOutsider);
 }
 
 TEST_CASE("Another protocol version and unreadable user data are refused, once", "[peers]") {
@@ -313,7 +315,7 @@ TEST_CASE("Another protocol version and unreadable user data are refused, once",
   CHECK(kinds(table) == Kinds{PeerEventKind::kRefused});
   CHECK(table.peers().empty());
   CHECK_FALSE(table.identity_of(guid(2)).has_value());
-  CHECK(table.standing(guid(2)) == Standing::kStranger);
+  CHECK(table.standing(guid(2)) == Standing::kOutsider);
 }
 
 TEST_CASE("Programs that are no robots are not our business", "[peers]") {
@@ -394,14 +396,14 @@ TEST_CASE("A name that cannot be sent is refused at home", "[identity]") {
 }
 
 TEST_CASE("The boot id of a new incarnation is unique and not resumed", "[identity]") {
-  std::set<std::uint64_t> lives;
+  std::set<std::uint64_t> incarnations;
   for (int i = 0; i < 100; ++i) {
     const std::uint64_t boot = random_boot_id();
     CHECK(resume_count(boot) == 0);
     CHECK_FALSE(is_same_life(boot, 0));
-    lives.insert(boot >> kResumeBits);
+    incarnations.insert(boot >> kResumeBits);
   }
-  CHECK(lives.size() == 100);
+  CHECK(incarnations.size() == 100);
 }
 
 TEST_CASE("An incarnation can be resumed as often as its counter permits", "[identity]") {

@@ -23,13 +23,13 @@ TEST_CASE("Two processes on one host discover each other", "[dds][processes]") {
             << " s from the launch of the second process\n";
   CHECK(seconds < kDiscoveryBound_s);
 
-  a->tell("ping 0 99");
-  a->tell("one 4 7");
+  a->send_line("ping 0 99");
+  a->send_line("one 4 7");
   CHECK(b->wait_for("ping 3 99"));
   CHECK(b->wait_for("one 3 7"));
-  a->tell("quit");
+  a->send_line("quit");
   CHECK(b->wait_for("left 3"));
-  b->tell("quit");
+  b->send_line("quit");
   CHECK(b->wait_for("summary 100 0 0"));
   CHECK(a->wait() == 0);
   CHECK(b->wait() == 0);
@@ -41,7 +41,7 @@ TEST_CASE("A killed robot is lost within the liveliness time, and restarts as an
   const auto a = start_peer(3, settings);
   auto b = start_peer(4, settings);
   REQUIRE(a->wait_for("joined 4"));
-  a->tell("ping 0 9");
+  a->send_line("ping 0 9");
   REQUIRE(b->wait_for("ping 3 9"));
   const auto killed = std::chrono::steady_clock::now();
   b->kill(SIGKILL);
@@ -52,7 +52,7 @@ TEST_CASE("A killed robot is lost within the liveliness time, and restarts as an
   b = start_peer(4, settings);
   CHECK(a->wait_for("restarted 4"));
   CHECK(b->wait_for("ping 3 9"));  // events of before it was born
-  b->tell("ping 0 0");
+  b->send_line("ping 0 0");
   CHECK(a->wait_for("ping 4 0"));
 }
 
@@ -75,7 +75,7 @@ TEST_CASE("A dozen robots on one host all meet, with either discovery", "[dds][p
   }
   std::cout << "12 robots by " << discovery << ": all 132 meetings within " << last_s
             << " s from the last launch\n";
-  robots[0]->tell("ping 5 5");
+  robots[0]->send_line("ping 5 5");
   for (RobotId id = 1; id < kRobots; ++id) CHECK(robots[id]->wait_for("ping 0 5"));
 }
 

@@ -48,8 +48,8 @@ TEST_CASE("Robots of a team with keys talk, to all and to one", "[sealed]") {
   a.start();
   b.start();
   for (std::uint32_t i = 0; i < 100; ++i) a.ping(i, {1, 2, 3});  // before any robot is known
-  REQUIRE(a.hears(PeerEventKind::kJoined, 4));
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
   CHECK(b.received.wait_for(100).size() == 100);
   a.ping_one(4, 7, {9});
   REQUIRE(b.received_addressed.wait_for(1).size() == 1);
@@ -67,16 +67,16 @@ TEST_CASE("A robot without keys of the team is ignored and receives nothing", "[
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
   const bool has_keys = GENERATE(false, true);
-  TestRobot stranger(domain, 9, has_keys ? member_of(others) : TestRobot::MakeSeal());
-  for (TestRobot* robot : {&a, &b, &stranger}) robot->start();
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
-  CHECK(b.hears(PeerEventKind::kRefused, 9));
-  stranger.ping(1);
+  TestRobot outsider(domain, 9, has_keys ? member_of(others) : TestRobot::MakeSeal());
+  for (TestRobot* robot : {&a, &b, &outsider}) robot->start();
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  CHECK(b.receives(PeerEventKind::kRefused, 9));
+  outsider.ping(1);
   CHECK(eventually([&] { return b.refused() >= 1; }));
   a.ping(2, {42});
   REQUIRE(b.received.wait_for(1).size() == 1);
   CHECK(b.received.messages()[0].index == 2);
-  CHECK(stranger.received.messages().empty());
+  CHECK(outsider.received.messages().empty());
   CHECK(b.bridge.peers().list().size() == 1);
 }
 
@@ -124,11 +124,11 @@ TEST_CASE("Replayed credentials and messages make no participant a member", "[se
     });
     a.start();
     b->start();
-    REQUIRE(b->hears(PeerEventKind::kJoined, 3));
+    REQUIRE(b->receives(PeerEventKind::kJoined, 3));
     a.ping(1);
     REQUIRE(b->received.wait_for(1).size() == 1);
   }
-  REQUIRE(b->hears(PeerEventKind::kLeft, 3));
+  REQUIRE(b->receives(PeerEventKind::kLeft, 3));
   const DdsQos qos = make_dds_qos();
   dds_qset_userdata(qos.get(), shown.data(), shown.size());
   const DdsEntity impostor(
@@ -148,12 +148,12 @@ TEST_CASE("Replayed credentials and messages make no participant a member", "[se
   CHECK(eventually([&] { return b->refused(Codec<RobotStatus>::kTopic) > 0; }));
   TestRobot c(domain, 5, member_of(team));
   c.start();
-  REQUIRE(b->hears(PeerEventKind::kJoined, 5));
+  REQUIRE(b->receives(PeerEventKind::kJoined, 5));
   c.ping(2);
   REQUIRE(b->received.wait_for(2).size() == 2);
   CHECK(b->received.messages()[1].index == 2);
   CHECK_FALSE(TestRobot::matching(b->peer_events.messages(), PeerEventKind::kReturned, 3) > 0);
-  REQUIRE(c.hears(PeerEventKind::kJoined, 4));
+  REQUIRE(c.receives(PeerEventKind::kJoined, 4));
   CHECK(c.bridge.peers().list().size() == 1);
 }
 
@@ -167,12 +167,12 @@ TEST_CASE("The later of two processes with one robot's keys is notified and igno
   TestRobot a(domain, 3, with_its_keys), b(domain, 4, member_of(team));
   a.start();
   b.start();
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
   REQUIRE(eventually([&] { return a.status_count() >= 4; }));
   TestRobot twin(domain, 3, with_its_keys);
   twin.start();
-  CHECK(twin.hears(PeerEventKind::kConflict, 3));
-  CHECK(a.hears(PeerEventKind::kRefused, 3));
+  CHECK(twin.receives(PeerEventKind::kConflict, 3));
+  CHECK(a.receives(PeerEventKind::kRefused, 3));
   twin.ping(1);
   CHECK(eventually([&] { return a.refused() == 1 && b.refused() == 1; }));
   a.ping(2);
@@ -187,8 +187,8 @@ TEST_CASE("Messages under a new key wait for it, however many they are", "[seale
   TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
   TestRobot c(domain, 5, member_of(team));
   for (TestRobot* robot : {&a, &b, &c}) robot->start();
-  REQUIRE(b.hears(PeerEventKind::kJoined, 3));
-  REQUIRE(b.hears(PeerEventKind::kJoined, 5));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 5));
   const Revocations list = team.revoking({team.keys_of(9, "lost").certificate});
   REQUIRE(a.participant.seal()->with(
       [&](TeamSeal& seal) { return seal.update(list, today_s()).new_key; }));
@@ -198,9 +198,9 @@ TEST_CASE("Messages under a new key wait for it, however many they are", "[seale
   // b takes from both in turn: once it has all of c's, it has tried all of a's; and then again.
   for (std::uint32_t i = 0; i < 2 * kCount; ++i) c.ping(i);
   REQUIRE(b.received.wait_for(2 * kCount).size() == 2 * kCount);
-  const std::uint64_t told = c.status_count();
-  REQUIRE(eventually([&] { return c.status_count() > told + 1; }));
-  a.bridge.tell_keys();
+  const std::uint64_t before = c.status_count();
+  REQUIRE(eventually([&] { return c.status_count() > before + 1; }));
+  a.bridge.send_keys();
   CHECK(b.received.wait_for(3 * kCount).size() == 3 * kCount);
   CHECK(b.refused() == 0);
 }
@@ -223,7 +223,7 @@ TEST_CASE("Robots appear and are received while sending is blocked", "[sealed]")
   REQUIRE(eventually([&] { return queued >= DdsBridge::kSendQueue * 9 / 10; }));
   TestRobot b(domain, 4, member_of(team));
   b.start();
-  CHECK(a.hears(PeerEventKind::kJoined, 4));
+  CHECK(a.receives(PeerEventKind::kJoined, 4));
   b.ping(7);
   CHECK(a.received.wait_for(1).size() == 1);
 }
@@ -233,15 +233,15 @@ TEST_CASE("A robot with keys that starts again is known by its new process", "[s
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, member_of(team));
   a.start();
-  for (std::uint32_t life = 0; life < 3; ++life) {
+  for (std::uint32_t run = 0; run < 3; ++run) {
     TestRobot b(domain, 4, member_of(team));
     b.start();
-    b.ping(life);
-    REQUIRE(a.received.wait_for(life + 1).size() == life + 1);
-    REQUIRE(b.hears(PeerEventKind::kJoined, 3));
-    a.ping_one(4, life);
+    b.ping(run);
+    REQUIRE(a.received.wait_for(run + 1).size() == run + 1);
+    REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+    a.ping_one(4, run);
     REQUIRE(b.received_addressed.wait_for(1).size() == 1);
-    CHECK(b.received_addressed.messages()[0].index == life);
+    CHECK(b.received_addressed.messages()[0].index == run);
   }
 }
 
@@ -266,18 +266,18 @@ TEST_CASE("Messages sealed for a robot reach its resumed process and not its nex
   {
     TestRobot first(domain, former, member_of(team), TopicKind::kEvent, kind);
     first.start();
-    REQUIRE(a.hears(PeerEventKind::kJoined, 4));
+    REQUIRE(a.receives(PeerEventKind::kJoined, 4));
     a.ping_one(4, 0);
     a.ping_one(4, 1, {1});
     a.ping_one(4, 1, {2});  // takes the place of the one before
     REQUIRE(first.received_addressed.wait_for(3).size() == 3);
   }
-  REQUIRE(a.hears(PeerEventKind::kLeft, 4));
+  REQUIRE(a.receives(PeerEventKind::kLeft, 4));
   a.ping_one(4, 2);  // while it is away
 
   TestRobot second(domain, successor_of(former, resumed), member_of(team), TopicKind::kEvent, kind);
   second.start();
-  REQUIRE(a.hears(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, 4));
+  REQUIRE(a.receives(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, 4));
   if (!resumed) a.ping_one(4, 3);
   const std::vector<Ping> pings = second.received_addressed.wait_for(resumed ? 3 : 1);
   CHECK(indices(pings) == (resumed ? up_to(3) : std::vector<std::uint32_t>{3}));
@@ -297,8 +297,8 @@ TEST_CASE("Messages for a robot of an earlier process wait until its keys are kn
   a.bridge.peers().recall(met);
   a.start();
   for (std::uint32_t i = 0; i < 3; ++i) a.ping_one(4, i);
-  const std::uint64_t told = a.status_count();  // behind them in the queue
-  REQUIRE(eventually([&] { return a.status_count() > told + 1; }));
+  const std::uint64_t before = a.status_count();  // behind them in the queue
+  REQUIRE(eventually([&] { return a.status_count() > before + 1; }));
   TestRobot b(domain, met, member_of(team), TopicKind::kEvent, TopicKind::kEvent);
   b.start();
   CHECK(indices(b.received_addressed.wait_for(3)) == up_to(3));

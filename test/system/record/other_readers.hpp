@@ -13,7 +13,7 @@
 namespace km {
 
 /// Content of an MCAP file according to readers of npm; nullopt if they are not available.
-inline std::optional<Json> told_by_others(const std::filesystem::path& file,
+inline std::optional<Json> read_by_others(const std::filesystem::path& file,
                                           const TemporaryFolder& folder) {
   const std::filesystem::path work = folder.path() / "npm";
   std::filesystem::create_directories(work);
@@ -25,10 +25,10 @@ inline std::optional<Json> told_by_others(const std::filesystem::path& file,
           .exit_code != 0)
     return std::nullopt;
   const CommandResult result =
-      run_command(in_work + "node read_record.mjs " + file.string() + " > told.json");
+      run_command(in_work + "node read_record.mjs " + file.string() + " > read.json");
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
-  return read_json(work / "told.json");
+  return read_json(work / "read.json");
 }
 
 }  // namespace km

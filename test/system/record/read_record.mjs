@@ -41,17 +41,17 @@ for (let record; (record = stream.nextRecord()) !== undefined;) {
   if (record.type === "Channel") channels.set(record.id, record);
   if (record.type === "Message") inOrder.push(record);
 }
-const told = { whole: stream.done(), topics: {}, last: {}, messages: inOrder.length };
+const read = { whole: stream.done(), topics: {}, last: {}, messages: inOrder.length };
 for (const message of inOrder) {
   const channel = channels.get(message.channelId), schema = schemas.get(channel.schemaId);
   const value = decode(channel, schema, message.data);
-  const topic = (told.topics[channel.topic] ??= { type: schema.name, count: 0 });
+  const topic = (read.topics[channel.topic] ??= { type: schema.name, count: 0 });
   ++topic.count;
-  told.last[channel.topic] = value;
+  read.last[channel.topic] = value;
 }
 
 // By its index: the same messages, in order of time.
-if (told.whole) {
+if (read.whole) {
   const reader = await mcap.McapIndexedReader.Initialize({ readable, decompressHandlers });
   const key = (message) =>
     `${message.logTime} ${message.channelId} ${message.sequence} ${message.data.length}`;
@@ -64,9 +64,9 @@ if (told.whole) {
 }
 
 await file.close();  // otherwise Node may print a warning beside the JSON
-const path = Object.entries(told.last).find(([topic]) => topic.endsWith("/path"))?.[1];
+const path = Object.entries(read.last).find(([topic]) => topic.endsWith("/path"))?.[1];
 console.log(JSON.stringify({
-  whole: told.whole, messages: told.messages, topics: told.topics,
+  whole: read.whole, messages: read.messages, topics: read.topics,
   path: path?.poses.map(({ header: { stamp }, pose: { position: p, orientation: q } }) =>
     [stamp.sec, stamp.nanosec, p.x, p.y, p.z, q.x, q.y, q.z, q.w]) ?? [],
 }));

@@ -268,7 +268,7 @@ TEST_CASE("A flight's thrust is along the vehicle's z axis", "[motion]") {
   }
 }
 
-TEST_CASE("The body is mounted in the vehicle as the options say", "[motion]") {
+TEST_CASE("The body is mounted in the vehicle as the options state", "[motion]") {
   FlightOptions options;
   options.duration_s = 20.0;
   const SplineTrajectory vehicle = make_flight_trajectory(kRoom, options);
@@ -390,7 +390,7 @@ TEST_CASE("A vehicle on level ground keeps to the limits and to its route", "[mo
   CHECK(s.stops >= 1);
 }
 
-TEST_CASE("A vehicle stands still at the start for as long as the options say", "[motion]") {
+TEST_CASE("A vehicle stands still at the start for as long as the options state", "[motion]") {
   VehicleOptions options;
   options.standstill_s = GENERATE(0.5, 2.0);
   options.duration_s = 10.0;

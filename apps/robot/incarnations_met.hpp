@@ -9,7 +9,7 @@
 namespace km {
 
 /// For each other robot, the incarnation with which this robot has closures. Thread-safe.
-class LivesMet {
+class IncarnationsMet {
  public:
   /// From now on, new closures are with this incarnation.
   void meet(const TeamPeer& peer) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/view/view_teller.hpp"
+#include "modules/view/view_selector.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/support/random_pose.hpp"
 
@@ -24,16 +24,16 @@ constexpr double kRounding_m = 2e-5;
 constexpr double kRounding_rad = 1e-6;
 
 // Content after encoding and decoding.
-void hear(const ViewContent& content, Watcher& watcher) {
+void receive(const ViewContent& content, Watcher& watcher) {
   const auto bytes = encode_view(content);
-  CHECK(bytes.size() < ViewTeller::kUpdateBytes + 100);
+  CHECK(bytes.size() < ViewSelector::kUpdateBytes + 100);
   const auto decoded = decode_view(bytes);
   REQUIRE(decoded);
-  watcher.hear(*decoded);
+  watcher.receive(*decoded);
 }
 
-void hear_all(ViewTeller& teller, Watcher& watcher, double now_s) {
-  while (const auto content = teller.next(now_s)) hear(*content, watcher);
+void receive_all(ViewSelector& selector, Watcher& watcher, double now_s) {
+  while (const auto content = selector.next(now_s)) receive(*content, watcher);
 }
 
 KeyframeOdometry keyframe(KeyframeIndex index, const SE3& T) {
@@ -66,9 +66,9 @@ void check_within_bounds(const Watcher& watcher, const std::vector<SE3>& truth, 
     const auto& known = watcher.optimized.at(static_cast<KeyframeIndex>(k));
     CHECK(known.anchor == anchor);
     CHECK((known.T.translation() - truth[k].translation()).norm() <=
-          ViewTeller::kMaxShift_m + kRounding_m);
+          ViewSelector::kMaxShift_m + kRounding_m);
     CHECK(angle_of(known.T.linear().transpose() * truth[k].linear()) <=
-          ViewTeller::kMaxTurn_rad + kRounding_rad);
+          ViewSelector::kMaxTurn_rad + kRounding_rad);
   }
 }
 
@@ -91,39 +91,39 @@ Closure closure(const ClosureId& id, int inliers) {
 }  // namespace
 
 TEST_CASE("The newest pose is sent a few times a second", "[view]") {
-  ViewTeller teller(kSelf);
+  ViewSelector selector(kSelf);
   Watcher watcher;
   Stamp last = 0;
   for (int tick = 0; tick < 200; ++tick) {  // 20 images a second for 10 s.
     OdometryState state;
     state.stamp = last = 1000 + tick;
-    teller.add(state);
-    hear_all(teller, watcher, 0.05 * tick);
+    selector.add(state);
+    receive_all(selector, watcher, 0.05 * tick);
   }
   CHECK(watcher.poses.size() == 25);
-  hear_all(teller, watcher, 11.0);
+  receive_all(selector, watcher, 11.0);
   CHECK(watcher.poses.back().stamp == last);
-  hear_all(teller, watcher, 12.0);
+  receive_all(selector, watcher, 12.0);
   CHECK(watcher.poses.size() == 26);  // Each sent once.
 }
 
 TEST_CASE("Keyframes of odometry are sent once, several at a time", "[view]") {
-  ViewTeller teller(kSelf);
+  ViewSelector selector(kSelf);
   Watcher watcher;
   std::mt19937 rng(5);
   std::vector<SE3> truth;
   int updates = 0;
   for (KeyframeIndex k = 0; k < 100; ++k) {  // 4 keyframes a second.
     truth.push_back(random_pose(rng, 100.0));
-    teller.add(keyframe(k, truth.back()));
-    while (const auto content = teller.next(0.25 * k)) {
-      hear(*content, watcher);
+    selector.add(keyframe(k, truth.back()));
+    while (const auto content = selector.next(0.25 * k)) {
+      receive(*content, watcher);
       ++updates;
     }
   }
-  hear_all(teller, watcher, 100.0);
+  receive_all(selector, watcher, 100.0);
   CHECK(updates <= 26);
-  CHECK(watcher.odometry_told == 100);
+  CHECK(watcher.odometry_received == 100);
   REQUIRE(watcher.odometry.size() == 100);
   for (KeyframeIndex k = 0; k < 100; ++k)
     CHECK((watcher.odometry.at(k).T.translation() - truth[k].translation()).norm() < kRounding_m);
@@ -131,58 +131,58 @@ TEST_CASE("Keyframes of odometry are sent once, several at a time", "[view]") {
 }
 
 TEST_CASE("Optimised poses are sent again when they have moved", "[view]") {
-  ViewTeller teller(kSelf);
+  ViewSelector selector(kSelf);
   Watcher watcher;
   std::vector<SE3> poses = line(100);
-  teller.add(trajectory(poses));
-  hear_all(teller, watcher, 0.0);
-  CHECK(watcher.optimized_told == 100);
+  selector.add(trajectory(poses));
+  receive_all(selector, watcher, 0.0);
+  CHECK(watcher.optimized_received == 100);
   SECTION("not within the bound") {
     for (SE3& T : poses) T = shifted(T, 0.009);
-    teller.add(trajectory(poses));
-    hear_all(teller, watcher, 10.0);
-    CHECK(watcher.optimized_told == 100);
+    selector.add(trajectory(poses));
+    receive_all(selector, watcher, 10.0);
+    CHECK(watcher.optimized_received == 100);
   }
   SECTION("in small steps, once their sum is beyond the bound") {
     for (int step = 1; step <= 12; ++step) {  // 4 mm: sent after 3, 6, 9, 12 of them.
       poses[40] = shifted(poses[40], 0.004);
-      teller.add(trajectory(poses));
-      hear_all(teller, watcher, 10.0 * step);
+      selector.add(trajectory(poses));
+      receive_all(selector, watcher, 10.0 * step);
     }
-    CHECK(watcher.optimized_told == 100 + 4);
+    CHECK(watcher.optimized_received == 100 + 4);
   }
   SECTION("turned") {
     poses[7].linear() = so3_exp({0.0, 0.0, 0.4 / kDegrees});
-    teller.add(trajectory(poses));
-    hear_all(teller, watcher, 10.0);
-    CHECK(watcher.optimized_told == 100);
+    selector.add(trajectory(poses));
+    receive_all(selector, watcher, 10.0);
+    CHECK(watcher.optimized_received == 100);
     poses[7].linear() = so3_exp({0.0, 0.0, 0.6 / kDegrees});
-    teller.add(trajectory(poses));
-    hear_all(teller, watcher, 20.0);
-    CHECK(watcher.optimized_told == 101);
+    selector.add(trajectory(poses));
+    receive_all(selector, watcher, 20.0);
+    CHECK(watcher.optimized_received == 101);
   }
   SECTION("all of them in another frame") {
-    teller.add(trajectory(poses, 9));
-    hear_all(teller, watcher, 10.0);
-    CHECK(watcher.optimized_told == 200);
+    selector.add(trajectory(poses, 9));
+    receive_all(selector, watcher, 10.0);
+    CHECK(watcher.optimized_received == 200);
     check_within_bounds(watcher, poses, 9);
   }
   SECTION("not the poses of other robots, nor poses that are not finite") {
     Trajectory other{9, 9, line(3)};
     other.T_world_kf[0].translation().y() = 50.0;
-    teller.add(std::make_shared<const Trajectory>(other));
+    selector.add(std::make_shared<const Trajectory>(other));
     std::vector<SE3> broken = poses;
     broken[0].translation().y() = std::numeric_limits<double>::quiet_NaN();
-    teller.add(trajectory(broken));
-    hear_all(teller, watcher, 10.0);
-    CHECK(watcher.optimized_told == 100);
+    selector.add(trajectory(broken));
+    receive_all(selector, watcher, 10.0);
+    CHECK(watcher.optimized_received == 100);
   }
 }
 
 // A graph that changes faster than it can be sent: one update per round.
 TEST_CASE("Sent poses are within the bound in the end", "[view]") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
-  ViewTeller teller(kSelf);
+  ViewSelector selector(kSelf);
   Watcher watcher, late;
   std::vector<SE3> poses;
   std::normal_distribution<double> step(0.0, 0.005);
@@ -192,106 +192,106 @@ TEST_CASE("Sent poses are within the bound in the end", "[view]") {
       T.translation() += Eigen::Vector3d(step(rng), step(rng), step(rng));
       T.linear() = T.linear() * so3_exp({step(rng), 0.0, 0.0});
     }
-    teller.add(keyframe(static_cast<KeyframeIndex>(round), poses.back()));
-    teller.add(trajectory(poses, round < 150 ? kSelf : RobotId{1}));
-    const auto content = teller.next(round);
-    if (content) hear(*content, watcher);
+    selector.add(keyframe(static_cast<KeyframeIndex>(round), poses.back()));
+    selector.add(trajectory(poses, round < 150 ? kSelf : RobotId{1}));
+    const auto content = selector.next(round);
+    if (content) receive(*content, watcher);
   }
-  hear_all(teller, watcher, 300.0);
+  receive_all(selector, watcher, 300.0);
   check_within_bounds(watcher, poses, 1);
   CHECK(watcher.odometry.size() == 300);
-  CHECK_FALSE(teller.tells_past());
+  CHECK_FALSE(selector.sends_past());
 
-  teller.begin_again();
-  CHECK(teller.tells_past());
-  hear_all(teller, late, 300.0);
-  CHECK_FALSE(teller.tells_past());
+  selector.begin_again();
+  CHECK(selector.sends_past());
+  receive_all(selector, late, 300.0);
+  CHECK_FALSE(selector.sends_past());
   check_within_bounds(late, poses, 1);
   CHECK(late.odometry.size() == 300);
 }
 
 TEST_CASE("The stage of a pair of keyframes is sent when it changes", "[view]") {
-  ViewTeller teller(kSelf);
+  ViewSelector selector(kSelf);
   Watcher watcher;
   const ClosureId id = pair_of(10, 20);
   const auto verdict = [&] {
-    hear_all(teller, watcher, 0.0);
+    receive_all(selector, watcher, 0.0);
     return watcher.closures.at(id).verdict;
   };
-  teller.add(outcome(id, ClosureStage::kCandidate));
+  selector.add(outcome(id, ClosureStage::kCandidate));
   CHECK(verdict() == ViewVerdict::kCandidate);
-  teller.add(outcome(id, ClosureStage::kRequested));
+  selector.add(outcome(id, ClosureStage::kRequested));
   CHECK(verdict() == ViewVerdict::kCandidate);
   CHECK(watcher.order.size() == 1);  // No second update without a change.
   SECTION("verification stops") {
-    teller.add(outcome(id, ClosureStage::kReceived, "too few matches"));
+    selector.add(outcome(id, ClosureStage::kReceived, "too few matches"));
     CHECK(verdict() == ViewVerdict::kRejected);
     CHECK(watcher.closures.at(id).reason == "too few matches");
     CHECK(watcher.closures.at(id).matches == 40);
-    teller.add(closure(id, 33));  // The other robot has verified it.
+    selector.add(closure(id, 33));  // The other robot has verified it.
     CHECK(verdict() == ViewVerdict::kVerified);
     CHECK(watcher.closures.at(id).reason.empty());
     CHECK(watcher.closures.at(id).inliers == 33);
   }
   SECTION("verified, kept, and overruled") {
-    teller.add(outcome(id, ClosureStage::kVerified));
+    selector.add(outcome(id, ClosureStage::kVerified));
     CHECK(verdict() == ViewVerdict::kVerified);
-    teller.add(InlierSet{kSelf, 7, 2, {id, pair_of(11, 21)}});
+    selector.add(InlierSet{kSelf, 7, 2, {id, pair_of(11, 21)}});
     CHECK(verdict() == ViewVerdict::kKept);
-    teller.add(ClosureVerdicts{{{id, false}}});
+    selector.add(ClosureVerdicts{{{id, false}}});
     CHECK(verdict() == ViewVerdict::kRejected);
     CHECK(watcher.closures.at(id).reason == "the other closures contradict it");
-    teller.add(ClosureVerdicts{{{id, true}}});
+    selector.add(ClosureVerdicts{{{id, true}}});
     CHECK(verdict() == ViewVerdict::kKept);
-    teller.add(InlierSet{kSelf, 7, 1, {}});  // An outdated version.
+    selector.add(InlierSet{kSelf, 7, 1, {}});  // An outdated version.
     CHECK(verdict() == ViewVerdict::kKept);
-    teller.add(InlierSet{kSelf, 7, 3, {pair_of(11, 21)}});
+    selector.add(InlierSet{kSelf, 7, 3, {pair_of(11, 21)}});
     CHECK(verdict() == ViewVerdict::kVerified);
-    teller.restarted(8);
+    selector.restarted(8);
     CHECK(verdict() == ViewVerdict::kVerified);
-    teller.restarted(7);
+    selector.restarted(7);
     CHECK(verdict() == ViewVerdict::kRejected);
     CHECK(watcher.closures.at(id).reason == "its robot was restarted");
   }
   SECTION("an inlier set that arrives before its closure") {
-    teller.add(InlierSet{kSelf, 7, 2, {pair_of(12, 22)}});
-    teller.add(closure(pair_of(12, 22), 50));
-    hear_all(teller, watcher, 0.0);
+    selector.add(InlierSet{kSelf, 7, 2, {pair_of(12, 22)}});
+    selector.add(closure(pair_of(12, 22), 50));
+    receive_all(selector, watcher, 0.0);
     CHECK(watcher.closures.at(pair_of(12, 22)).verdict == ViewVerdict::kKept);
   }
   SECTION("no closures between other robots") {
-    teller.add(closure(closure_id({1, 1}, {2, 2}), 50));
-    hear_all(teller, watcher, 0.0);
+    selector.add(closure(closure_id({1, 1}, {2, 2}), 50));
+    receive_all(selector, watcher, 0.0);
     CHECK(watcher.closures.size() == 1);
   }
   SECTION("the present stage to a late viewer") {
-    teller.add(outcome(id, ClosureStage::kVerified));
-    hear_all(teller, watcher, 0.0);
+    selector.add(outcome(id, ClosureStage::kVerified));
+    receive_all(selector, watcher, 0.0);
     Watcher late;
-    teller.begin_again();
-    hear_all(teller, late, 0.0);
+    selector.begin_again();
+    receive_all(selector, late, 0.0);
     REQUIRE(late.closures.size() == 1);
     CHECK(late.closures.at(id).verdict == ViewVerdict::kVerified);
   }
 }
 
 TEST_CASE("Verified closures are sent before all other updates", "[view]") {
-  ViewTeller teller(kSelf);
+  ViewSelector selector(kSelf);
   for (KeyframeIndex k = 0; k < 500; ++k) {
-    teller.add(keyframe(k, SE3::Identity()));
-    teller.add(outcome(pair_of(k, 1), ClosureStage::kCandidate));
+    selector.add(keyframe(k, SE3::Identity()));
+    selector.add(outcome(pair_of(k, 1), ClosureStage::kCandidate));
   }
-  teller.add(OdometryState{});
-  teller.add(outcome(pair_of(300, 1), ClosureStage::kVerified));
+  selector.add(OdometryState{});
+  selector.add(outcome(pair_of(300, 1), ClosureStage::kVerified));
   Watcher watcher;
-  hear(*teller.next(0.0), watcher);
+  receive(*selector.next(0.0), watcher);
   REQUIRE(watcher.order.size() == 1);
   CHECK(watcher.order[0] == pair_of(300, 1));
-  hear(*teller.next(0.0), watcher);
+  receive(*selector.next(0.0), watcher);
   CHECK(watcher.poses.size() == 1);
-  hear(*teller.next(0.0), watcher);
-  CHECK(watcher.odometry_told > 10);
-  hear_all(teller, watcher, 0.0);
+  receive(*selector.next(0.0), watcher);
+  CHECK(watcher.odometry_received > 10);
+  receive_all(selector, watcher, 0.0);
   CHECK(watcher.closures.size() == 500);
   CHECK(watcher.order.size() == 500);        // Each sent once.
   CHECK(watcher.order[1] == pair_of(0, 1));  // In the order in which they were found.

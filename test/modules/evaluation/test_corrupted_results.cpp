@@ -7,7 +7,7 @@
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 namespace {
@@ -33,13 +33,13 @@ std::string euroc() {
 TEST_CASE("A corrupted trajectory is refused with its line or has finite errors", "[evaluation]") {
   const std::string good = GENERATE(tum(), euroc());
   const auto truth = parse_trajectory(tum(), "truth");
-  check_spoilt<TrajectoryFileError>(good, "spoilt.tum", [&](const std::string& text) {
-    const auto poses = parse_trajectory(text, "spoilt.tum");
+  check_corrupted<TrajectoryFileError>(good, "corrupted.tum", [&](const std::string& text) {
+    const auto poses = parse_trajectory(text, "corrupted.tum");
     for (std::size_t i = 0; i < poses.size(); ++i) {
       CHECK(poses[i].T.matrix().allFinite());
       if (i > 0) CHECK(poses[i - 1].stamp < poses[i].stamp);
     }
-    const TrajectoryInput input{"spoilt", truth, poses, std::nullopt};
+    const TrajectoryInput input{"corrupted", truth, poses, std::nullopt};
     try {
       const auto error = trajectory_error({&input, 1});
       CHECK(std::isfinite(error.joint.position_m.rmse));
@@ -59,7 +59,7 @@ TEST_CASE("A pose beyond the earth is refused with line and value", "[evaluation
 TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluation]") {
   const TemporaryFolder folder;
   SECTION("keyframes.csv") {
-    check_spoilt<ClosureFileError>(
+    check_corrupted<ClosureFileError>(
         "robot,index,stamp_ns,scene_depth_m\n0,0,1403636580838555392,2.5\n0,1,1403636581838555392,"
         "3\n"
         "0,2,1403636582838555392,0\n",
@@ -69,7 +69,7 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
         });
   }
   SECTION("loop_closures.csv") {
-    check_spoilt<ClosureFileError>(
+    check_corrupted<ClosureFileError>(
         "robot_a,index_a,robot_b,index_b,similarity,stage,matches,inliers,x,y,z,qx,qy,qz,qw,"
         "reason\n"
         "0,1,1,7,0.5,inlier,40,30,1.5,2.5,3.5,0,0,0.6,0.8,\n"
@@ -80,7 +80,7 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
         });
   }
   SECTION("JSON") {
-    check_spoilt<std::runtime_error>(
+    check_corrupted<std::runtime_error>(
         "{\n\"frames\": 12,\n\"pgo\": {\"cost\": 1.5, \"members\": [0, 1]},\n\"end\": "
         "\"done\"\n}\n",
         "summary.json", [&](const std::string& text) {
@@ -89,7 +89,7 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
         });
   }
   SECTION("label_palette.csv") {
-    check_spoilt<std::invalid_argument>(
+    check_corrupted<std::invalid_argument>(
         "name,red,green,blue,alpha,id\nfloor,10,20,30,255,1\nwall,11,20,30,255,2\n", "palette",
         [](const std::string& text) { (void)parse_label_palette(text, "palette"); });
   }

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/mesh/ply_file.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 namespace {
@@ -31,10 +31,10 @@ std::string binary() {
 
 TEST_CASE("A corrupted PLY file is refused by name or is a mesh of finite numbers") {
   const TemporaryFolder folder;
-  check_spoilt<MeshFileError>(
-      GENERATE(values<std::string>({kAscii, binary()})), "spoilt.ply",
+  check_corrupted<MeshFileError>(
+      GENERATE(values<std::string>({kAscii, binary()})), "corrupted.ply",
       [&](const std::string& bytes) {
-        const LabelledMesh mesh = read_ply(folder.write("spoilt.ply", bytes));
+        const LabelledMesh mesh = read_ply(folder.write("corrupted.ply", bytes));
         for (const auto& vertex : mesh.vertices) CHECK(vertex.squaredNorm() < 1e19F);
         for (const auto& face : mesh.faces)
           for (const std::uint32_t corner : face) CHECK(corner < mesh.vertices.size());

@@ -18,17 +18,17 @@
 namespace km {
 
 /// Corrupts input as people, programs and networks do. The same seed gives the same faults.
-class InputSpoiler {
+class InputCorrupter {
  public:
   using Bytes = std::vector<std::uint8_t>;
 
-  explicit InputSpoiler(unsigned seed) : rng_(seed) {}
+  explicit InputCorrupter(unsigned seed) : rng_(seed) {}
 
   /// Corrupts a text: invalid numbers, lines lost, repeated, exchanged or cut, garbage, other line
   /// ends.
   [[nodiscard]] std::string operator()(std::string text) {
     const int faults = below(3) + 1;
-    for (int i = 0; i < faults; ++i) spoil(text);
+    for (int i = 0; i < faults; ++i) corrupt(text);
     return text;
   }
 
@@ -38,7 +38,7 @@ class InputSpoiler {
     const auto one_of = [&] { return static_cast<std::size_t>(below(samples.size())); };
     Bytes bytes = samples[one_of()];
     const int faults = below(4) + 1;
-    for (int i = 0; i < faults; ++i) spoil(bytes, samples[one_of()]);
+    for (int i = 0; i < faults; ++i) corrupt(bytes, samples[one_of()]);
     return bytes;
   }
 
@@ -77,7 +77,7 @@ class InputSpoiler {
     return octets.begin() + static_cast<std::ptrdiff_t>(place_in(octets));
   }
 
-  void spoil(std::string& text) {
+  void corrupt(std::string& text) {
     switch (below(12)) {
       case 0:
       case 1:
@@ -90,7 +90,7 @@ class InputSpoiler {
       case 6:
       case 7:
       case 8:
-        return spoil_octets(text);
+        return corrupt_octets(text);
       case 9:
         text.insert(place_in(text), std::string(100'000, "0 ,x\0"[below(5)]));
         return;
@@ -103,7 +103,7 @@ class InputSpoiler {
     }
   }
 
-  void spoil(Bytes& bytes, const Bytes& other) {
+  void corrupt(Bytes& bytes, const Bytes& other) {
     switch (below(6)) {
       case 0:
         return replace_word(bytes);
@@ -117,12 +117,12 @@ class InputSpoiler {
         return;
       }
       default:
-        return spoil_octets(bytes);
+        return corrupt_octets(bytes);
     }
   }
 
   template <typename Octets>
-  void spoil_octets(Octets& octets) {
+  void corrupt_octets(Octets& octets) {
     using Octet = typename Octets::value_type;
     switch (below(4)) {
       case 0: {
@@ -188,9 +188,10 @@ class InputSpoiler {
   std::mt19937 rng_;
 };
 
-/// Number of corrupted files of a kind that a test reads; KIMERA_MULTI_SPOILT_FILES increases it.
-[[nodiscard]] inline unsigned spoilt_files() {
-  const char* const wanted = std::getenv("KIMERA_MULTI_SPOILT_FILES");
+/// Number of corrupted files of a kind that a test reads; KIMERA_MULTI_CORRUPTED_FILES increases
+/// it.
+[[nodiscard]] inline unsigned corrupted_files() {
+  const char* const wanted = std::getenv("KIMERA_MULTI_CORRUPTED_FILES");
   return wanted == nullptr ? 300U : static_cast<unsigned>(std::atoi(wanted));
 }
 
@@ -198,13 +199,13 @@ class InputSpoiler {
 /// throw an `Error` of a few lines that names `name`, and no other exception. It must check the
 /// content that it accepts.
 template <typename Error, typename Read>
-void check_spoilt(const std::string& good, const std::string& name, const Read& read) {
+void check_corrupted(const std::string& good, const std::string& name, const Read& read) {
   REQUIRE_NOTHROW(read(good));
   unsigned refused = 0;
-  for (unsigned seed = 0; seed < spoilt_files(); ++seed) {
+  for (unsigned seed = 0; seed < corrupted_files(); ++seed) {
     CAPTURE(seed);
     try {
-      read(InputSpoiler(seed)(good));
+      read(InputCorrupter(seed)(good));
     } catch (const Error& error) {
       ++refused;
       const std::string_view message = error.what();
@@ -214,7 +215,7 @@ void check_spoilt(const std::string& good, const std::string& name, const Read& 
       FAIL_CHECK("not an error of input: " << error.what());
     }
   }
-  CHECK(refused < spoilt_files());  // otherwise no accepted content was examined
+  CHECK(refused < corrupted_files());  // otherwise no accepted content was examined
 }
 
 /// Paths without a readable file.

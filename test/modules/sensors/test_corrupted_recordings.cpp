@@ -7,7 +7,7 @@
 #include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/image_file.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
-#include "test/support/spoilt_input.hpp"
+#include "test/support/corrupted_input.hpp"
 
 namespace km {
 namespace {
@@ -69,7 +69,7 @@ struct Row {
 };
 
 // Corrupts one row of a list.
-void spoil_row(const EurocFolder& folder, const Row& row) {
+void corrupt_row(const EurocFolder& folder, const Row& row) {
   const std::string text = folder.read(row.file);
   std::size_t begin = 0;
   for (int line = 1; line < row.line; ++line) begin = text.find('\n', begin) + 1;
@@ -108,7 +108,7 @@ TEST_CASE("A bad row is skipped and counted with its line and no other row is", 
           7});
   CAPTURE(row.what);
   const EurocFolder folder;
-  spoil_row(folder, row);
+  corrupt_row(folder, row);
   EurocReader reader = open_euroc(folder.root());
   CHECK(packets_of(reader).size() == row.packets);
   REQUIRE(reader.report().count(row.fault) == 1);
@@ -127,15 +127,15 @@ TEST_CASE("An image with a false header or out of reach loses its pair", "[senso
   std::string why;
   SECTION("65535 x 65535") {
     folder.write(relative, png_of(65535, 65535));
-    why = "65535x65535 px, the calibration says 32x24";
+    why = "65535x65535 px, the calibration states 32x24";
   }
   SECTION("4294967295 x 1") {
     folder.write(relative, png_of(0xffffffffU, 1));
-    why = "px, the calibration says";
+    why = "px, the calibration states";
   }
   SECTION("0 x 0") {
     folder.write(relative, png_of(0, 0));
-    why = "0x0 px, the calibration says";
+    why = "0x0 px, the calibration states";
   }
   SECTION("a symbolic link to itself") {
     fs::create_symlink(image.filename(), image);
@@ -170,7 +170,7 @@ TEST_CASE("A corrupted list or calibration is refused or gives valid packets", "
   CAPTURE(file);
   const EurocFolder folder;
   const std::string good = folder.read(file);
-  check_spoilt<DatasetError>(good, folder.root().string(), [&](const std::string& text) {
+  check_corrupted<DatasetError>(good, folder.root().string(), [&](const std::string& text) {
     folder.write(file, text);
     EurocReader reader = open_euroc(folder.root());
     check_recording(reader);
@@ -180,12 +180,12 @@ TEST_CASE("A corrupted list or calibration is refused or gives valid packets", "
 TEST_CASE("A corrupted depth calibration is refused or gives a valid rig", "[sensors]") {
   const EurocFolder folder;
   folder.make_rgbd();
-  check_spoilt<DatasetError>(EurocFolder::depth_yaml(), folder.root().string(),
-                             [&](const std::string& text) {
-                               folder.write("depth0/sensor.yaml", text);
-                               EurocReader reader = open_euroc(folder.root());
-                               check_recording(reader);
-                             });
+  check_corrupted<DatasetError>(EurocFolder::depth_yaml(), folder.root().string(),
+                                [&](const std::string& text) {
+                                  folder.write("depth0/sensor.yaml", text);
+                                  EurocReader reader = open_euroc(folder.root());
+                                  check_recording(reader);
+                                });
 }
 
 TEST_CASE("A corrupted image gives an image of the right size or none", "[sensors]") {
@@ -196,12 +196,14 @@ TEST_CASE("A corrupted image gives an image of the right size or none", "[sensor
   cv::randu(pixels, 0, 255);
   REQUIRE(cv::imencode(extension, pixels, encoded));
   const TemporaryFolder folder;
-  check_spoilt<DatasetError>({encoded.begin(), encoded.end()}, "", [&](const std::string& bytes) {
-    const ImageResult loaded = load_gray_image(folder.write("image" + extension, bytes), 32, 24);
-    const bool ok = loaded.status == ImageStatus::kOk;
-    CHECK(loaded.image.pixels.size() == (ok ? 32 * 24 : 0));
-    CHECK(loaded.problem.empty() == ok);
-  });
+  check_corrupted<DatasetError>(
+      {encoded.begin(), encoded.end()}, "", [&](const std::string& bytes) {
+        const ImageResult loaded =
+            load_gray_image(folder.write("image" + extension, bytes), 32, 24);
+        const bool ok = loaded.status == ImageStatus::kOk;
+        CHECK(loaded.image.pixels.size() == (ok ? 32 * 24 : 0));
+        CHECK(loaded.problem.empty() == ok);
+      });
 }
 
 TEST_CASE("A file of a recording that is not a file is refused by name", "[sensors]") {

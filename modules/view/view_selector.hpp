@@ -24,7 +24,7 @@ namespace km {
 /// update, the most important first. A pose is sent again when it differs from the last sent one by
 /// more than kMaxShift_m or kMaxTurn_rad. So when no update is left, all sent poses are within
 /// these bounds. Not thread-safe.
-class ViewTeller {
+class ViewSelector {
  public:
   static constexpr double kMaxShift_m = 0.01;
   static constexpr double kMaxTurn_rad = 0.5 / kDegrees;
@@ -34,7 +34,7 @@ class ViewTeller {
   /// Maximum size of an update, except for one closure with a long reason.
   static constexpr std::size_t kUpdateBytes = 1000;
 
-  explicit ViewTeller(RobotId self) : self_(self) {}
+  explicit ViewSelector(RobotId self) : self_(self) {}
 
   // Inputs from the robot. Values that are not finite are ignored.
 
@@ -52,7 +52,7 @@ class ViewTeller {
   /// A viewer has appeared: sends everything again from the beginning.
   void begin_again();
   /// True from begin_again() until everything has been sent once.
-  [[nodiscard]] bool tells_past() const { return tells_past_; }
+  [[nodiscard]] bool sends_past() const { return sends_past_; }
 
   /// The update to send now, at `now_s` [s] of any clock that does not go backwards; it counts as
   /// sent. nullopt if no update is due.
@@ -65,7 +65,7 @@ class ViewTeller {
     std::uint16_t inliers = 0;
     bool is_verified = false;
     std::string reason;  // Why verification stopped.
-    std::optional<ViewClosure> told = {};
+    std::optional<ViewClosure> sent = {};
     std::uint64_t turn = 0;  // Number of its turn in the queue; 0 if it is not queued.
   };
   // Ordered by rank, then by the time of the change.
@@ -84,9 +84,9 @@ class ViewTeller {
   double keyframes_due_s_ = 0.0;
   std::vector<SE3> odometry_;  // Poses of the keyframes.
   std::vector<Stamp> stamps_;
-  std::size_t odometry_told_ = 0;
+  std::size_t odometry_sent_ = 0;
   std::shared_ptr<const Trajectory> trajectory_;
-  std::vector<SE3> optimized_told_;  // In the frame of the trajectory's anchor.
+  std::vector<SE3> optimized_sent_;  // In the frame of the trajectory's anchor.
   std::size_t cursor_ = 0;           // Index at which the search for moved poses starts.
   bool any_moved_ = false;           // False if no pose has moved; true if some may have.
   std::map<ClosureId, Pair> pairs_;
@@ -94,7 +94,7 @@ class ViewTeller {
   std::set<ClosureId> overruled_;  // Closures that the optimiser rejects.
   std::set<Turn> waiting_;
   std::uint64_t turn_ = 0;
-  bool tells_past_ = false;
+  bool sends_past_ = false;
 };
 
 }  // namespace km

@@ -31,20 +31,20 @@ template <typename T>
 
 /// A way to corrupt a message, and the expected reason for its refusal.
 template <typename T>
-struct Spoilt {
+struct Corruption {
   const char* what;
   const char* reason;
-  std::function<void(Arrived<T>&)> spoil;
+  std::function<void(Arrived<T>&)> corrupt;
 };
 
 /// Checks each of `ways` on a new message by `make`.
 template <typename T, typename Make>
-void check_refusals(const Make& make, const std::vector<Spoilt<T>>& ways) {
-  for (const Spoilt<T>& way : ways) {
+void check_refusals(const Make& make, const std::vector<Corruption<T>>& ways) {
+  for (const Corruption<T>& way : ways) {
     CAPTURE(way.what);
     Arrived<T> message = make();
     REQUIRE(decoded(message).value);
-    way.spoil(message);
+    way.corrupt(message);
     const Decoded<T> result = decoded(message);
     CHECK_FALSE(result.value);
     CHECK(std::string(result.refusal == nullptr ? "" : result.refusal) == way.reason);

@@ -1,5 +1,5 @@
 // Announces robots that do not exist, one after the other, until it is killed:
-//   test_strangers DOMAIN TEAM PER_SECOND
+//   test_outsiders DOMAIN TEAM PER_SECOND
 #include <chrono>
 #include <iostream>
 #include <memory>
@@ -17,11 +17,11 @@ int main(int argc, char** argv) try {
   const auto domain = std::make_shared<const km::DdsDomain>(config);
   const std::chrono::duration<double> period(1.0 / std::stod(argv[3]));
   for (std::uint32_t i = 0;; ++i) {
-    const km::DdsParticipant stranger(
-        domain, {static_cast<km::RobotId>(1000 + i), "stranger", km::kProtocolVersion, 1 + i});
+    const km::DdsParticipant outsider(
+        domain, {static_cast<km::RobotId>(1000 + i), "outsider", km::kProtocolVersion, 1 + i});
     std::this_thread::sleep_for(period);
   }
 } catch (const std::exception& error) {
-  std::cerr << "test_strangers: " << error.what() << '\n';
+  std::cerr << "test_outsiders: " << error.what() << '\n';
   return 1;
 }
