@@ -224,7 +224,8 @@ RunSummary summary_of(const RunRecord& record) {
                  .tentative = progress.tentative,
                  .untied = progress.untied,
                  .odometry_rotation_noise = progress.odometry_rotation_noise,
-                 .odometry_translation_noise = progress.odometry_translation_noise};
+                 .odometry_translation_noise = progress.odometry_translation_noise,
+                 .odometry_breaks = progress.odometry_breaks};
   if (record.odometry_statistics()) summary.odometry = odometry_of(*record.odometry_statistics());
   summary.holes = holes_of(record.odometry());
   if (record.calibration()) summary.cameras = cameras_of(*record.calibration());

@@ -219,6 +219,18 @@ void add_noisy_odometry(const RunSummary& run, std::vector<Finding>& findings) {
                 "odometry claims"});
 }
 
+void add_broken_odometry(const RunSummary& run, std::vector<Finding>& findings) {
+  if (run.pgo.odometry_breaks == 0) return;
+  findings.push_back({.id = "odometry.broken",
+                      .severity = Severity::kWarning,
+                      .what = run.name + ": " + std::to_string(run.pgo.odometry_breaks) +
+                              " steps of its odometry are wrong",
+                      .means =
+                          "loop closures inside the robot agree on a jump there, as after lost "
+                          "tracking; the optimised trajectory is corrected, odometry.tum is not",
+                      .to_do = "see the log for the keyframes, and odometry in summary.json"});
+}
+
 // There are more samples and messages than frames. A share of the frames keeps their faults
 // visible.
 void add_sensor_faults(const RunSummary& run, std::vector<Finding>& findings) {
@@ -417,6 +429,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
     add_paused(run.summary, findings);
     add_map_gave_way(run.summary, findings);
     add_noisy_odometry(run.summary, findings);
+    add_broken_odometry(run.summary, findings);
     add_sensor_faults(run.summary, findings);
     add_holes(run.summary, findings);
     add_rejected(run, findings);

@@ -39,6 +39,7 @@ struct OptimizerSummary {
   std::vector<RobotId> tentative = {}, untied = {};  ///< Members; see OptimizerProgress.
   /// Ratio of the actual noise of odometry to the stated one.
   double odometry_rotation_noise = 1.0, odometry_translation_noise = 1.0;
+  std::uint64_t odometry_breaks = 0;  ///< Wrong steps of odometry that closures corrected.
 
   void visit_fields(auto& visitor) {
     visitor.field("rounds", rounds);
@@ -52,6 +53,7 @@ struct OptimizerSummary {
     visitor.field("untied", untied);
     visitor.field("odometry_rotation_noise", odometry_rotation_noise);
     visitor.field("odometry_translation_noise", odometry_translation_noise);
+    visitor.field("odometry_breaks", odometry_breaks);
   }
   bool operator==(const OptimizerSummary&) const = default;
 };

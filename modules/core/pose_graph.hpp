@@ -109,6 +109,7 @@ struct OptimizerProgress {
   /// Noise of this robot's odometry as a multiple of the stated noise, see OdometryNoise.
   double odometry_rotation_noise = 1.0;
   double odometry_translation_noise = 1.0;
+  std::uint32_t odometry_breaks = 0;  ///< Number of wrong steps of odometry, see OdometryBreak.
 };
 
 }  // namespace km

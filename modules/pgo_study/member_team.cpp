@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/odometry_breaks.hpp"
 #include "modules/pose_graph/odometry_noise.hpp"
 #include "modules/pose_graph/precision_limits.hpp"
 #include "modules/pose_graph/team_plan.hpp"
@@ -23,6 +24,8 @@ void weigh_as_robots(std::vector<SessionGraph>& parts) {
   std::map<RobotId, OdometryNoise> noise;
   for (SessionGraph& part : parts) {
     const std::span<PoseEdge> own(part.own);
+    const std::span<PoseEdge> steps = own.first(part.odometry);
+    correct_breaks(steps, find_odometry_breaks(steps, own.subspan(part.odometry)));
     noise[part.self] =
         estimate_odometry_noise(own.first(part.odometry), own.subspan(part.odometry));
     for (PoseEdge& step : own.first(part.odometry))

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <vector>
 
-#include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/cycle_mixture.hpp"
+#include "modules/pose_graph/odometry_cycles.hpp"
 
 namespace km {
 namespace {
@@ -22,61 +22,10 @@ constexpr double kRatioSigma = 0.6931;  // log 2, prior of log sqrt(v_R / v_t)
 constexpr double kEvidence = 6.9;
 constexpr int kSweeps = 4;
 
-// Variance factors of the rotations and translations of steps, and of closures.
-enum Component : std::size_t { kRotation, kTranslation, kClosure, kComponents };
+using Cycle = OdometryCycle;
+using Component = OdometryCycle::Component;
+using enum OdometryCycle::Component;
 using Factors = std::array<double, kComponents>;
-
-struct Cycle {
-  PoseEdge closure;
-  Vector6 error;
-  std::array<Matrix6, kComponents> covariance;
-  double weight = 1.0;
-};
-
-// Claimed covariance of the steps up to each keyframe, as perturbations of the first pose. The
-// difference of two keyframes is the covariance of the chain between them.
-struct Chain {
-  std::vector<SE3> T_first_kf{SE3::Identity()};
-  std::array<std::vector<Matrix6>, 2> covariance{std::vector{Matrix6(Matrix6::Zero())},
-                                                 std::vector{Matrix6(Matrix6::Zero())}};
-
-  explicit Chain(std::span<const PoseEdge> steps) {
-    for (const PoseEdge& step : steps) {
-      T_first_kf.push_back(T_first_kf.back() * step.T_from_to);
-      const Matrix6 Ad = adjoint(T_first_kf.back());
-      const Matrix6 claimed = covariance_of(step.precision);
-      for (const Component part : {kRotation, kTranslation}) {
-        Matrix6 Sigma = Matrix6::Zero();
-        const Eigen::Index begin = part == kRotation ? 0 : 3;
-        Sigma.block<3, 3>(begin, begin) = claimed.block<3, 3>(begin, begin);
-        covariance[part].push_back(covariance[part].back() + Ad * Sigma * Ad.transpose());
-      }
-    }
-  }
-
-  // The cycle from the lower end along the steps to the upper one, and back by the closure.
-  [[nodiscard]] Cycle close(const PoseEdge& closure) const {
-    const bool is_up = closure.from < closure.to;
-    const std::size_t i = (is_up ? closure.from : closure.to).index;
-    const std::size_t j = (is_up ? closure.to : closure.from).index;
-    const SE3 measured = is_up ? closure.T_from_to : closure.T_from_to.inverse();
-    const SE3 T_j_first = T_first_kf[j].inverse();
-    const Matrix6 Ad = adjoint(T_j_first);
-    Cycle cycle;
-    cycle.closure = closure;
-    // From the upper pose by the closure to the upper pose by the chain. It is small, so that both
-    // covariances refer to j.
-    cycle.error = se3_log(measured.inverse() * T_first_kf[i].inverse() * T_first_kf[j]);
-    for (const Component part : {kRotation, kTranslation})
-      cycle.covariance[part] = Ad * (covariance[part][j] - covariance[part][i]) * Ad.transpose();
-    cycle.covariance[kClosure] = covariance_of(closure.precision);
-    if (!is_up) {
-      const Matrix6 Ad_closure = adjoint(closure.T_from_to);
-      cycle.covariance[kClosure] = Ad_closure * cycle.covariance[kClosure] * Ad_closure.transpose();
-    }
-    return cycle;
-  }
-};
 
 std::vector<PoseEdge> in_order(std::span<const PoseEdge> closures, std::size_t keyframes) {
   std::vector<PoseEdge> sorted;
@@ -87,7 +36,7 @@ std::vector<PoseEdge> in_order(std::span<const PoseEdge> closures, std::size_t k
 }
 
 // Cycles, with weights such that each place counts once.
-std::vector<Cycle> cycles_of(const Chain& chain, std::span<const PoseEdge> closures,
+std::vector<Cycle> cycles_of(const OdometryChain& chain, std::span<const PoseEdge> closures,
                              std::size_t& places) {
   const std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
   const ClosurePlaces found = find_places(sorted);
@@ -115,7 +64,7 @@ double log_density_if_true(const Cycle& cycle, const Factors& v) {
 
 // The volume [m^3] in which a false closure may end: twice the bounding box of the trajectory,
 // enlarged on every side by the length of the longest closure.
-double volume_m3(const Chain& chain, std::span<const PoseEdge> closures) {
+double volume_m3(const OdometryChain& chain, std::span<const PoseEdge> closures) {
   Eigen::AlignedBox3d box;
   for (const SE3& T : chain.T_first_kf) box.extend(T.translation());
   double reach_m = 0.0;
@@ -155,7 +104,7 @@ double log_posterior(const std::vector<Cycle>& cycles, const std::vector<double>
 OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
                                       std::span<const PoseEdge> closures) {
   OdometryNoise noise;
-  const Chain chain(steps);
+  const OdometryChain chain(steps);
   const std::vector<Cycle> cycles = cycles_of(chain, closures, noise.places);
   if (cycles.empty()) return noise;
   std::vector<double> if_false;

@@ -171,14 +171,20 @@ const std::vector<PoseEdge>* OwnGraph::newest_edges(RobotId peer) const {
 }
 
 void OwnGraph::judge_odometry() {
+  breaks_.clear();
+  odometry_noise_ = {};
   const std::vector<PoseEdge>* inside = newest_edges(self_);
-  odometry_noise_ =
-      inside == nullptr ? OdometryNoise{} : estimate_odometry_noise(odometry_, *inside);
+  if (inside == nullptr) return;
+  breaks_ = find_odometry_breaks(odometry_, *inside);
+  std::vector<PoseEdge> steps = odometry_;
+  correct_breaks(steps, breaks_);
+  odometry_noise_ = estimate_odometry_noise(steps, *inside);
 }
 
 std::vector<PoseEdge> OwnGraph::own_edges() const {
   std::vector<PoseEdge> edges = odometry_;
   for (PoseEdge& step : edges) step.precision = odometry_noise_.corrected(step.precision);
+  correct_breaks(edges, breaks_);
   if (const std::vector<PoseEdge>* inside = newest_edges(self_))
     edges.insert(edges.end(), inside->begin(), inside->end());
   return edges;

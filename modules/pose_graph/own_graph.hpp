@@ -6,6 +6,7 @@
 
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/pose_graph/odometry_breaks.hpp"
 #include "modules/pose_graph/odometry_noise.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/team_messages.hpp"
@@ -58,9 +59,11 @@ class OwnGraph {
   /// Edges of the newest complete set with a peer; nullptr if there is none.
   [[nodiscard]] const std::vector<PoseEdge>* newest_edges(RobotId peer) const;
 
-  /// Estimates the noise of odometry again, from the closures inside this robot. From now on, steps
-  /// of odometry have the corrected weights.
+  /// Finds wrong steps of odometry and estimates its noise again, from the closures inside this
+  /// robot. From now on, own_edges() has corrected steps and weights.
   void judge_odometry();
+  /// Wrong steps by the last judge_odometry().
+  [[nodiscard]] const std::vector<OdometryBreak>& odometry_breaks() const { return breaks_; }
   /// The last estimate; before the first one, odometry is as precise as it claims.
   [[nodiscard]] const OdometryNoise& odometry_noise() const { return odometry_noise_; }
 
@@ -72,7 +75,7 @@ class OwnGraph {
   [[nodiscard]] const std::vector<VerticalPrior>& verticals() const { return verticals_; }
   /// True if keyframe 0 has a vertical: the frame of odometry then has z up.
   [[nodiscard]] bool upright() const { return !verticals_.empty() && verticals_[0].pose == 0; }
-  /// Odometry step from keyframe i - 1 to i. Precondition: 0 < i < keyframes().
+  /// Odometry step from keyframe i - 1 to i, as measured. Precondition: 0 < i < keyframes().
   [[nodiscard]] const SE3& step_to(std::uint32_t i) const { return odometry_[i - 1].T_from_to; }
   /// Mean weights of a step of odometry; the default while there is none.
   [[nodiscard]] Precision mean_step_precision() const;
@@ -98,6 +101,7 @@ class OwnGraph {
   std::uint32_t keyframes_ = 0;
   std::uint32_t revision_ = 0;
   std::vector<PoseEdge> odometry_;  // with claimed precision
+  std::vector<OdometryBreak> breaks_;
   OdometryNoise odometry_noise_;
   std::vector<VerticalPrior> verticals_;
   std::map<ClosureId, PoseEdge> closures_;

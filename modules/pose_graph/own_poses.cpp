@@ -42,6 +42,16 @@ void OwnPoses::extend(const OwnGraph& graph) {
                           graph.step_to(static_cast<std::uint32_t>(T_frame_kf_.size())));
 }
 
+void OwnPoses::correct(std::span<const OdometryBreak> breaks) {
+  for (const OdometryBreak& found : breaks) {
+    if (!corrected_.insert(found.step).second) continue;
+    const SE3 T_new_old =
+        T_frame_kf_[found.step] * found.T_from_to * T_frame_kf_[found.step + 1].inverse();
+    for (std::size_t k = found.step + 1; k < T_frame_kf_.size(); ++k)
+      T_frame_kf_[k] = T_new_old * T_frame_kf_[k];
+  }
+}
+
 // Returns the closures inside this robot that are likely true before anything is solved. If
 // odometry is noisy, these are the closures that its noise explains. Otherwise, these are the
 // closures that agree with a closure a few keyframes away.

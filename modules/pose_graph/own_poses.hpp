@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <set>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
@@ -21,6 +23,10 @@ class OwnPoses {
   /// Adds new keyframes, by odometry. The first keyframe has its odometry pose.
   void extend(const OwnGraph& graph);
 
+  /// Moves the poses after each wrong step of odometry as a whole, such that the step is corrected.
+  /// Later calls leave it as it is then.
+  void correct(std::span<const OdometryBreak> breaks);
+
   /// Improves the start of a session of this robot alone: the chordal initialisation replaces the
   /// poses if its cost is lower. If closures are `trusted`, all of them count. Otherwise, the
   /// initialisation contains closures that are likely true, and the cost of a closure is truncated.
@@ -32,7 +38,8 @@ class OwnPoses {
                                                       std::span<const PoseEdge> inside) const;
 
   std::vector<SE3> T_frame_kf_;
-  std::size_t improved_with_ = 0;  // number of closures
+  std::set<std::size_t> corrected_;  // steps
+  std::size_t improved_with_ = 0;    // number of closures
 };
 
 }  // namespace km

@@ -331,6 +331,7 @@ OptimizerProgress TeamAgent::make_progress() const {
                              .members = {self_.robot}};
   progress.odometry_rotation_noise = graph_.odometry_noise().rotation;
   progress.odometry_translation_noise = graph_.odometry_noise().translation;
+  progress.odometry_breaks = static_cast<std::uint32_t>(graph_.odometry_breaks().size());
   progress.round = rounds_before_;
   progress.seconds = optimising_s_;
   if (!part_) return progress;

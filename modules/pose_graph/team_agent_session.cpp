@@ -193,6 +193,7 @@ bool TeamAgent::join(const Session& session) {
   if (config_.robust) {
     graph_.judge_odometry();
     notices_.odometry(graph_.odometry_noise());
+    notices_.breaks(graph_.odometry_breaks());
   }
   auto part = freeze(session);
   if (!part) return false;
@@ -204,6 +205,7 @@ bool TeamAgent::join(const Session& session) {
     optimising_s_ += part_->moved_s() - started_s_;
   }
   poses_.extend(graph_);
+  poses_.correct(graph_.odometry_breaks());
   if (alone && part->graph.to_absent.empty())
     poses_.improve_alone(graph_, self_.robot, !expects_false());
   part->graph.start = poses_.T_frame_kf();

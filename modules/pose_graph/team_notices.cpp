@@ -50,6 +50,15 @@ void TeamNotices::odometry(const OdometryNoise& noise) {
       " places of loop closures inside this robot; it is weighed accordingly");
 }
 
+void TeamNotices::breaks(std::span<const OdometryBreak> breaks) {
+  for (const OdometryBreak& found : breaks) {
+    if (!breaks_.insert(found.step).second) continue;
+    add("odometry is wrong near keyframe " + std::to_string(found.step) + ": closures at " +
+        std::to_string(found.places) + " places agree on a jump of " + fixed(found.jump_m, 2) +
+        " m and " + fixed(found.jump_rad, 3) + " rad; the step is corrected");
+  }
+}
+
 void TeamNotices::closures(const ClosureNoiseRecord& noise) {
   for (const auto& [peer, cycles] : noise.pairs) {
     double& last = closure_factors_.try_emplace(peer, 1.0).first->second;

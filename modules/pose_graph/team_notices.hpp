@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <map>
+#include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +11,7 @@
 #include "modules/core/ids.hpp"
 #include "modules/pose_graph/closure_noise.hpp"
 #include "modules/pose_graph/frame_ties.hpp"
+#include "modules/pose_graph/odometry_breaks.hpp"
 #include "modules/pose_graph/odometry_noise.hpp"
 
 namespace km {
@@ -24,6 +27,8 @@ class TeamNotices {
   bool refuse(const std::string& reason);
   /// Odometry of this robot that is noisier than it claims.
   void odometry(const OdometryNoise& noise);
+  /// Wrong steps of odometry of this robot.
+  void breaks(std::span<const OdometryBreak> breaks);
   /// Closures of pairs of robots that are noisier than those of the team.
   void closures(const ClosureNoiseRecord& noise);
   /// Robots whose place in the frame is uncertain, or certain again.
@@ -38,6 +43,7 @@ class TeamNotices {
   std::vector<std::string> notices_;
   std::map<std::string, std::size_t> refused_;
   double odometry_noise_ = 0.0;                // in the last notice
+  std::set<std::size_t> breaks_;               // steps in a notice
   std::map<RobotId, double> closure_factors_;  // in the last notice, by peer
   FrameTies ties_;                             // in the last notice
 };

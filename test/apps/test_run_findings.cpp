@@ -174,6 +174,10 @@ TEST_CASE("A finding on a run is reported with its number", "[robot][findings]")
     summary.pgo.odometry_translation_noise = 1.5;
     CHECK(findings_of_one(run).empty());
   }
+  SECTION("steps of odometry that are wrong") {
+    summary.pgo.odometry_breaks = 2;
+    check_finding("odometry.broken", Severity::kWarning, "2 steps of its odometry are wrong");
+  }
   SECTION("a recording that was paused") {
     summary.paused_s = 3.25;
     check_finding("frames.paused", Severity::kNote, "paused for 3.2 s in all");

@@ -68,6 +68,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/pgo/members/0 /pgo/members/1 /pgo/tentative/0 /pgo/tentative/1 "
         "/pgo/untied/0 /pgo/untied/1 "
         "/pgo/odometry_rotation_noise /pgo/odometry_translation_noise "
+        "/pgo/odometry_breaks "
         "/odometry/starts /odometry/divergences /odometry/inertial_gaps /odometry/refused_images "
         "/odometry/refused_samples /odometry/images_without_pose /odometry/vision_losses "
         "/odometry/blind_seconds "

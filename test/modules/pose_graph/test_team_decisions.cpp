@@ -138,6 +138,29 @@ TEST_CASE("false closures that agree with each other are rejected if others cont
   check_cost(network, without(problem, wrong));
 }
 
+TEST_CASE("a wrong step of odometry is corrected, and closures are kept",
+          "[pose_graph][decisions]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  TeamProblem problem = random_team_problem(
+      {.robots = {2, 5}, .pairs = {{2, 5}}, .keyframes = 60, .closures = 60, .start_sigma = 0.0},
+      seed);
+  for (PoseEdge& e : problem.edges)
+    if (is_step(e) && e.from == KeyframeId{2, 30})
+      e.T_from_to = e.T_from_to * make_pose(so3_exp({0.0, 0.8, 1.6}), {5.0, -3.0, 1.0});
+  TeamNetwork network(seed);
+  add_all(network, problem);
+  REQUIRE(settle(network));
+  // The step is known up to the nearest ends of closures, so closures between may be rejected.
+  CHECK(rejected(network).size() <= 3);
+  CHECK(network.robots.at(2).progress.odometry_breaks == 1);
+  CHECK(network.robots.at(5).progress.odometry_breaks == 0);
+  const auto& notices = network.robots.at(2).notices;
+  CHECK(std::ranges::any_of(notices, [](const std::string& notice) {
+    return notice.find("odometry is wrong near keyframe") != notice.npos;
+  }));
+}
+
 TEST_CASE("a session after new closures takes few rounds and keeps earlier decisions",
           "[pose_graph][decisions]") {
   const unsigned seed = GENERATE(range(1U, 6U));

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/pose_graph/pose_edge.hpp"
+
+namespace km {
+
+/// A wrong step of odometry, as after a loss of tracking, and what closures say about it.
+struct OdometryBreak {
+  std::size_t step = 0;      ///< From keyframe `step` to the next one.
+  SE3 T_from_to;             ///< The step on which the closures agree.
+  Precision precision = {};  ///< One standard deviation is the size of the jump.
+  double jump_rad = 0.0;     ///< Rotation of the claimed step against it.
+  double jump_m = 0.0;       ///< Translation of the claimed step against it.
+  std::size_t places = 0;    ///< Number of places that agree.
+};
+
+/// Finds wrong steps of the odometry of one robot from the closures inside it. `steps[k]` is from
+/// keyframe k to keyframe k + 1, and some closures may be false.
+///
+/// A wrong step spoils every cycle of odometry and a closure that contains it, and each of these
+/// cycles yields the jump that would close it. A step is wrong if the cycles of at least three
+/// places agree on the jump, hardly any consistent cycle contains the step, and most cycles without
+/// it are consistent. False closures do not agree. Cycles are consistent, and jumps agree, up to
+/// the 99.9 % quantile of chi-squared at the claimed noise, or at that of the median cycle without
+/// the step: noisy odometry makes cycles everywhere long. If no closure distinguishes successive
+/// steps, the middle one is taken.
+[[nodiscard]] std::vector<OdometryBreak> find_odometry_breaks(std::span<const PoseEdge> steps,
+                                                              std::span<const PoseEdge> closures);
+
+/// Replaces the wrong steps.
+void correct_breaks(std::span<PoseEdge> steps, std::span<const OdometryBreak> breaks);
+
+}  // namespace km

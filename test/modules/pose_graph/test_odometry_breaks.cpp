@@ -1,0 +1,99 @@
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "modules/core/lie.hpp"
+#include "modules/pose_graph/odometry_breaks.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kRotation = 0.005, kTranslation = 0.02;  // noise of a step and of a closure
+
+// One robot that flies a circle of 50 keyframes six times. Closures join successive rounds.
+struct Rounds {
+  static constexpr std::uint32_t kRound = 50, kKeyframes = 300;
+
+  std::mt19937 rng;
+  std::vector<SE3> truth;
+  std::vector<PoseEdge> steps, closures;
+
+  Rounds(unsigned seed, double odometry, std::uint32_t every) : rng(seed) {
+    for (std::uint32_t k = 0; k < kKeyframes; ++k) {
+      const double angle = 2.0 * 3.14159265358979 * k / kRound;
+      truth.push_back(
+          make_pose(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
+                    Eigen::Vector3d(8.0 * std::cos(angle), 8.0 * std::sin(angle), 0.0)));
+    }
+    for (std::uint32_t k = 0; k + 1 < kKeyframes; ++k) steps.push_back(edge(k, k + 1, odometry));
+    for (std::uint32_t k = 0; k + kRound < kKeyframes; k += every)
+      closures.push_back(edge(k, k + kRound, 1.0));
+  }
+  PoseEdge edge(std::uint32_t i, std::uint32_t j, double noise) {
+    Vector6 xi = noise * random_vector<6>(rng);
+    xi.head<3>() *= kRotation;
+    xi.tail<3>() *= kTranslation;
+    return {{0, i},
+            {0, j},
+            truth[i].inverse() * truth[j] * se3_exp(xi),
+            {0.5 / (kRotation * kRotation), 1.0 / (kTranslation * kTranslation)}};
+  }
+  void add_false(std::size_t count) {
+    std::uniform_int_distribution<std::uint32_t> any(0, kKeyframes - 1);
+    for (std::size_t k = 0; k < count; ++k) {
+      PoseEdge e = closures.front();
+      e.from.index = any(rng);
+      e.to.index = (e.from.index + 20 + any(rng) % 200) % kKeyframes;
+      e.T_from_to = random_pose(rng, 20.0);
+      closures.push_back(e);
+    }
+  }
+  void jump(std::size_t step, const SE3& T) { steps[step].T_from_to = steps[step].T_from_to * T; }
+};
+
+const SE3 kJump = make_pose(so3_exp({0.0, 0.0, 0.3}), {0.5, -0.4, 0.0});
+
+TEST_CASE("A wrong step of odometry is found and corrected", "[odometry_breaks]") {
+  const unsigned seed = GENERATE(range(1U, 11U));
+  const std::size_t step = GENERATE(70, 149, 220);
+  const std::size_t wrong = GENERATE(0, 6);  // false closures
+  CAPTURE(seed, step, wrong);
+  Rounds rounds(seed, 1.0, 3);
+  const SE3 before = rounds.steps[step].T_from_to;
+  rounds.jump(step, kJump);
+  rounds.add_false(wrong);
+  const auto breaks = find_odometry_breaks(rounds.steps, rounds.closures);
+  REQUIRE(breaks.size() == 1);
+  // Places are up to 11 keyframes apart, and closures do not distinguish the steps between them.
+  CHECK(std::abs(static_cast<double>(breaks[0].step) - static_cast<double>(step)) <= 11.0);
+  CHECK(breaks[0].places >= 3);
+  CHECK(breaks[0].jump_rad == Approx(0.3).margin(0.15));
+  if (breaks[0].step != step) return;
+  const Vector6 left = se3_log(before.inverse() * breaks[0].T_from_to);
+  CHECK(left.head<3>().norm() < 0.15);
+}
+
+TEST_CASE("Two wrong steps are both found", "[odometry_breaks]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  Rounds rounds(seed, 1.0, 3);
+  rounds.jump(80, kJump);
+  rounds.jump(210, kJump.inverse());
+  CHECK(find_odometry_breaks(rounds.steps, rounds.closures).size() == 2);
+}
+
+TEST_CASE("Odometry without a wrong step has no break, however noisy it is", "[odometry_breaks]") {
+  const double odometry = GENERATE(1.0, 2.0, 5.0, 10.0);
+  const std::size_t wrong = GENERATE(0, 10, 60);
+  std::size_t found = 0;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    Rounds rounds(seed, odometry, 3);
+    rounds.add_false(wrong);
+    found += find_odometry_breaks(rounds.steps, rounds.closures).size();
+  }
+  CAPTURE(odometry, wrong);
+  CHECK(found == 0);
+}
+
+}  // namespace
+}  // namespace km
