@@ -38,6 +38,7 @@ std::vector<int> fill_reducing_order(const std::vector<bool>& keep,
   }
   const auto n = static_cast<int>(eliminated.size());
   std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(eliminated.size() + pairs.size());
   for (int i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
   for (const auto& [a, b] : pairs) {
     const int i = number[static_cast<std::size_t>(a)];

@@ -50,6 +50,7 @@ std::optional<std::vector<SE3>> moved_into_frame(const std::vector<SE3>& poses, 
   const SE3 T_frame_own =
       make_pose(alignment->L.leftCols<3>(), alignment->L.col(3)) * T_own_centre.inverse();
   std::vector<SE3> moved;
+  moved.reserve(poses.size());
   for (const SE3& T_own_kf : poses) moved.push_back(T_frame_own * T_own_kf);
   return moved;
 }

@@ -1,7 +1,7 @@
 #include "modules/pose_graph/frame_ties.hpp"
 
 #include <algorithm>
-#include <optional>
+#include <iterator>
 #include <set>
 
 namespace km {
@@ -32,18 +32,15 @@ std::set<RobotId> reached(RobotId self, std::span<const RobotTie> ties, const Co
 
 std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses) {
   std::vector<RobotTie> ties;
-  for (const auto& [a, status] : statuses) {
-    std::optional<RobotId> last;
-    for (const EdgeSetOffer& offer : status.offers) {
-      const auto other = statuses.find(offer.peer);
-      if (offer.peer <= a || offer.peer == last || other == statuses.end()) continue;
-      last = offer.peer;
-      const EdgeSetOffer* theirs = newest_offer(other->second, a);
-      const std::uint32_t places = theirs ? std::min(offer.places, theirs->places) : 0;
-      if (places == 0) continue;
-      ties.push_back({a, offer.peer, places, offer.contested || theirs->contested});
+  for (auto one = statuses.begin(); one != statuses.end(); ++one)
+    for (auto other = std::next(one); other != statuses.end(); ++other) {
+      const EdgeSetOffer* ours = newest_offer(one->second, other->first);
+      const EdgeSetOffer* theirs = newest_offer(other->second, one->first);
+      if (ours == nullptr || theirs == nullptr) continue;
+      const std::uint32_t places = std::min(ours->places, theirs->places);
+      if (places > 0)
+        ties.push_back({one->first, other->first, places, ours->contested || theirs->contested});
     }
-  }
   return ties;
 }
 

@@ -16,7 +16,7 @@ constexpr double kMostPatience = 3.0;
 // Rate of repetitions of large messages [bytes/s]. An existing transport loses nothing, and
 // reachable_again() covers outages. The receiver of a large message also needs long before it can
 // acknowledge it.
-constexpr double kRepeated_Bps = 50e3;
+constexpr double kRepeatedBps = 50e3;
 
 // No solver sends messages this far ahead of those that were taken.
 constexpr std::uint32_t kFarAhead = 10000;
@@ -25,12 +25,12 @@ constexpr std::uint32_t kFarAhead = 10000;
 
 SessionLetter LetterBook::write(SolverLetter letter, double now_s) {
   Correspondent& to = correspondents_[letter.to];
-  const SessionLetter written{.sender = self_,
-                              .session = session_,
-                              .number = to.written++,
-                              .to = letter.to,
-                              .bytes = std::move(letter.bytes),
-                              .received = to.taken};
+  SessionLetter written{.sender = self_,
+                        .session = session_,
+                        .number = to.written++,
+                        .to = letter.to,
+                        .bytes = std::move(letter.bytes),
+                        .received = to.taken};
   to.owes_word = false;
   to.waiting.push_back({written, now_s});
   return written;
@@ -70,7 +70,7 @@ double LetterBook::patience_s(const Correspondent& of, const Waiting& waiting) c
   const double first_s = of.answer_s ? kPatience * *of.answer_s : period_s_;
   const double least_s = kLeastPatience * period_s_;
   const double most_s = kMostPatience * period_s_;
-  const double of_size_s = static_cast<double>(waiting.letter.bytes->size()) / kRepeated_Bps;
+  const double of_size_s = static_cast<double>(waiting.letter.bytes->size()) / kRepeatedBps;
   return std::max(
       std::min(std::max(first_s, least_s) * std::ldexp(1.0, waiting.repetitions), most_s),
       of_size_s);

@@ -31,8 +31,8 @@ enum class [[nodiscard]] LetterNews{
 class LetterBook {
  public:
   /// `period_s`: initial estimate of the response time.
-  LetterBook(TeamPeer self, SessionId session, double period_s)
-      : self_(self), session_(std::move(session)), period_s_(period_s) {}
+  LetterBook(TeamPeer self, const SessionId& session, double period_s)
+      : self_(self), session_(session), period_s_(period_s) {}
 
   /// The message on the network for a message of the solver.
   [[nodiscard]] SessionLetter write(SolverLetter letter, double now_s);

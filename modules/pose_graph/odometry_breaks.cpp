@@ -18,8 +18,8 @@ constexpr double kConsistent = 22.46;
 constexpr double kMedian = 5.35;
 // With two places that agree, two false closures of one false place further on would do.
 constexpr double kLeastPlaces = 3.0;
-// A wrong step is clearly beyond the limit, while the longest cycles of noisy odometry are near it:
-// of 360 random trajectories, up to ten times noisier than claimed, one had a break at a factor 1.
+// A wrong step is clearly beyond the limit. The longest cycles of noisy odometry are near it: with
+// a factor of 1, one of 360 random trajectories without a wrong step had a break.
 constexpr double kClearly = 2.0;
 // Share of the cycles with a wrong step that may be consistent: long cycles do not show a jump.
 constexpr double kMostConsistent = 0.1;
@@ -88,8 +88,8 @@ struct Suspicion {
 };
 
 // nullopt unless the cycles allow the step to be wrong: hardly any of those with it is consistent,
-// and most of those without it are. The median of those without it tells how noisy odometry and
-// closures are.
+// and most of those without it are. The median of those without it shows how noisy odometry
+// and closures are.
 std::optional<Suspicion> suspicion_of(const std::vector<ErrorCycle>& cycles, std::size_t step) {
   std::vector<double> without;
   double places_with = 0.0, places_without = 0.0;

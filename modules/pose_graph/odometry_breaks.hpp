@@ -22,13 +22,15 @@ struct OdometryBreak {
 /// Finds wrong steps of the odometry of one robot from the closures inside it. `steps[k]` is from
 /// keyframe k to keyframe k + 1, and some closures may be false.
 ///
-/// A wrong step spoils every cycle of odometry and a closure that contains it, and each of these
-/// cycles yields the jump that would close it. A step is wrong if the cycles of at least three
-/// places agree on the jump, hardly any consistent cycle contains the step, and most cycles without
-/// it are consistent. False closures do not agree. Cycles are consistent, and jumps agree, up to
-/// the 99.9 % quantile of chi-squared at the claimed noise, or at that of the median cycle without
-/// the step: noisy odometry makes cycles everywhere long. If no closure distinguishes successive
-/// steps, the middle one is taken.
+/// A wrong step makes every cycle of odometry and a closure that contains it inconsistent, and each
+/// of these cycles yields the jump that would close it. A step is wrong if the cycles of at least
+/// three places agree on the jump, hardly any consistent cycle contains the step, and most cycles
+/// without it are consistent. False closures do not agree.
+///
+/// Cycles are consistent, and jumps agree, up to the 99.9 % quantile of chi-squared at the claimed
+/// noise. The limit is larger if the median cycle without the step is longer than claimed, because
+/// noisy odometry makes all cycles long. If no closure distinguishes successive steps, the middle
+/// one is taken.
 [[nodiscard]] std::vector<OdometryBreak> find_odometry_breaks(std::span<const PoseEdge> steps,
                                                               std::span<const PoseEdge> closures);
 

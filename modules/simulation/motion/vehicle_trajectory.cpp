@@ -93,19 +93,19 @@ std::vector<double> fastest(const std::vector<double>& limits, double accelerati
 std::vector<double> ways_in_time(const std::vector<double>& speeds, const SpeedPlan& plan,
                                  double wait_s, std::size_t count) {
   std::vector<double> ways;
-  double arrival = wait_s;  // departure from point k, after the stop there
+  double departure_s = wait_s;  // from point k, after the stop there
   for (std::size_t k = 0; k + 1 < speeds.size() && ways.size() < count; ++k) {
     const auto dwell = plan.dwell_s.find(k);
-    if (dwell != plan.dwell_s.end()) arrival += dwell->second;
+    if (dwell != plan.dwell_s.end()) departure_s += dwell->second;
     const double way = kStep_m * static_cast<double>(k);
     const double duration = 2.0 * kStep_m / (speeds[k] + speeds[k + 1]);
     const double acceleration = (speeds[k + 1] - speeds[k]) / duration;
     while (ways.size() < count) {
-      const double t = kInterval_s * static_cast<double>(ways.size()) - arrival;
+      const double t = kInterval_s * static_cast<double>(ways.size()) - departure_s;
       if (t >= duration) break;
       ways.push_back(t <= 0.0 ? way : way + t * (speeds[k] + 0.5 * acceleration * t));
     }
-    arrival += duration;
+    departure_s += duration;
   }
   return ways;
 }

@@ -159,7 +159,7 @@ TEST_CASE("A ring wound once has its known negative eigenvalue", "[pgo_study]") 
 // So do the directions of descent, which rotate all poses equally about x or y. The frames are
 // chosen so that the start of the Lanczos iterations rotates every pose about z, and is orthogonal
 // to these directions.
-TEST_CASE("A direction that the first Lanczos start misses is not certified", "[pose_graph]") {
+TEST_CASE("A direction that the first Lanczos start misses is not certified", "[pgo_study]") {
   constexpr Eigen::Index kPoses = 12;
   const WoundRing ring(kPoses, 1);
   std::mt19937 rng(3);  // the seed of certify() is the rank
@@ -201,7 +201,7 @@ TEST_CASE("A direction that the first Lanczos start misses is not certified", "[
 }
 
 TEST_CASE("The certified bound is below the smallest eigenvalue of the Schur complement",
-          "[pose_graph]") {
+          "[pgo_study]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -234,7 +234,7 @@ TEST_CASE("The certified bound is below the smallest eigenvalue of the Schur com
         solver.certificate()->lambda_bound);
 }
 
-TEST_CASE("The central solver leaves the wound ring, where Newton's method stays", "[pose_graph]") {
+TEST_CASE("The central solver leaves the wound ring, where Newton's method stays", "[pgo_study]") {
   const WoundRing ring(12, 1);
   CentralSolver solver(ring.graph.edges, lift(ring.wound, 3), 3);
   while (solver.step()) {
@@ -245,7 +245,7 @@ TEST_CASE("The central solver leaves the wound ring, where Newton's method stays
   CHECK(solver.certificate()->certified);
 }
 
-TEST_CASE("The staircase leaves the wound ring for the optimum", "[pose_graph]") {
+TEST_CASE("The staircase leaves the wound ring for the optimum", "[pgo_study]") {
   const Eigen::Index n = GENERATE(5, 12, 40);
   CAPTURE(n);
   const WoundRing ring(n, 1);

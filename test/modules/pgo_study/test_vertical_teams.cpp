@@ -109,7 +109,7 @@ TEST_CASE("A team estimates its tilt from any start that is upright on the whole
   CHECK(costs[1] == Approx(costs[0]).epsilon(1e-9));
 }
 
-TEST_CASE("Robots with verticals that solve alone are joined upright", "[pose_graph][vertical]") {
+TEST_CASE("Robots with verticals that solve alone are joined upright", "[pgo_study][vertical]") {
   std::mt19937 rng(4);
   TeamGraph graph = noisy_chain(30, 3, 0.0, rng, 2.0);
   {

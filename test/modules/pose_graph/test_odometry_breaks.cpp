@@ -39,13 +39,11 @@ struct Rounds {
             {0.5 / (kRotation * kRotation), 1.0 / (kTranslation * kTranslation)}};
   }
   void add_false(std::size_t count) {
-    std::uniform_int_distribution<std::uint32_t> any(0, kKeyframes - 1);
-    for (std::size_t k = 0; k < count; ++k) {
-      PoseEdge e = closures.front();
-      e.from.index = any(rng);
-      e.to.index = (e.from.index + 20 + any(rng) % 200) % kKeyframes;
-      e.T_from_to = random_pose(rng, 20.0);
-      closures.push_back(e);
+    std::uniform_int_distribution<std::uint32_t> lower(0, kKeyframes / 3),
+        apart(20, kKeyframes / 2);
+    while (count-- > 0) {
+      const std::uint32_t from = lower(rng), to = from + apart(rng);
+      closures.push_back({{0, from}, {0, to}, random_pose(rng, 20.0), closures.front().precision});
     }
   }
   void jump(std::size_t step, const SE3& T) { steps[step].T_from_to = steps[step].T_from_to * T; }

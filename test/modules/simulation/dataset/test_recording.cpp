@@ -271,7 +271,7 @@ TEST_CASE("A full disk leaves the file that was there", "[simulation][dataset]")
   CHECK(folder.read("table.csv") == "old");
 }
 
-TEST_CASE("A place that cannot be written is named", "[simulation][dataset]") {
+TEST_CASE("A recording whose place cannot be written names it", "[simulation][dataset]") {
   const TemporaryFolder folder;
   const fs::path file = folder.write("file", "") / "below/data.csv";
   CHECK_THAT(refusal(file), Catch::Contains(folder.path().string() + "/file"));
