@@ -296,11 +296,11 @@ std::optional<SE3> TeamAgent::world_of(RobotId anchor) const {
 // The frame in which this robot publishes. If no closure ties it to the anchor of the session, this
 // is the frame of the lowest robot that closures tie to it.
 std::optional<TeamAgent::World> TeamAgent::tied_world() const {
-  if (!world_ || !part_ || !std::ranges::binary_search(ties_.untied, world_->anchor)) return world_;
-  const auto is_tied = [&](RobotId robot) {
-    return !std::ranges::binary_search(ties_.untied, robot);
-  };
-  const RobotId anchor = *std::ranges::find_if(part_->members(), is_tied);
+  if (!world_ || !std::ranges::binary_search(ties_.untied, world_->anchor)) return world_;
+  RobotId anchor = self_.robot;
+  for (const SessionMember& member : plan_.members)
+    if (!std::ranges::binary_search(ties_.untied, member.peer.robot))
+      anchor = std::min(anchor, member.peer.robot);
   const auto T_frame_world = world_of(anchor);
   if (!T_frame_world) return std::nullopt;
   return World{anchor, *T_frame_world};

@@ -32,6 +32,8 @@ void TeamAgent::make_plan() {
       status.frame = told->second.frame;
   }
   SessionPlan plan = plan_session(statuses, relay_.links(), self_.robot);
+  // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
+  if (world_ && !plan.has_member(world_->anchor)) world_ = tied_world();
   schedule_.update(!same_graph(plan, plan_), closures_known(plan, statuses), now_s_);
   plan_ = std::move(plan);
   std::vector<RobotId> members;

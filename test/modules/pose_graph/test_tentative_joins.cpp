@@ -167,6 +167,14 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
   // The frame of an anchor is that of its odometry.
   CHECK(network.robots.at(4).trajectory->T_world_kf.front().isApprox(SE3::Identity(), 1e-6));
 
+  network.kill(2);
+  (void)network.run(10.0);
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  for (const RobotId robot : {RobotId{4}, RobotId{6}})
+    CHECK(network.robots.at(robot).trajectory->anchor == 4);  // still not that of robot 2
+  network.revive(2);
+
   rejects = false;
   for (const RobotId robot : {RobotId{2}, RobotId{4}})
     (void)network.agent(robot).add(inlier_set(problem, 2, 4, 2));
