@@ -36,7 +36,8 @@ CentralSolver::CentralSolver(const std::vector<BlockEdge>& edges, LiftedPoses st
                                                            .absolute_tolerance = 0.0,
                                                            .patience_rounds = kPatience,
                                                            .max_rounds = kMaxRounds,
-                                                           .robust = false});
+                                                           .robust = false,
+                                                           .covariances = false});
   X_ = std::move(start);
 }
 

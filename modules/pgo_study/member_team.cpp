@@ -145,8 +145,9 @@ int MemberTeam::step(RoundMeter& meter) {
     if (!pass_on(round, meter))
       throw std::runtime_error("MemberTeam: the members wait for each other");
   take_poses();
-  // A solver may publish its state every few rounds only.
-  rounds_ = rounds_before_ + std::max(round, state_.round);
+  // A solver may publish its state every few rounds only. The exchange of covariances is not a
+  // round.
+  rounds_ = rounds_before_ + (done() ? state_.round : std::max(round, state_.round));
   return static_cast<int>(rounds_ - before);
 }
 

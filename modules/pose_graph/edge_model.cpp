@@ -24,40 +24,41 @@ struct Relative {
   Eigen::Vector3d u;
 };
 
-Relative relative(const BlockEdge& edge, const SE3& T_i, const SE3& T_j) {
+Relative relative(const SE3& measured, const SE3& T_i, const SE3& T_j) {
   Relative r;
   r.Z.noalias() = T_i.linear().transpose() * T_j.linear();
-  r.M.noalias() = r.Z * edge.T_i_j.linear().transpose();
-  r.N.noalias() = edge.T_i_j.linear().transpose() * r.Z;
-  r.u =
-      T_i.linear().transpose() * (T_j.translation() - T_i.translation()) - edge.T_i_j.translation();
+  r.M.noalias() = r.Z * measured.linear().transpose();
+  r.N.noalias() = measured.linear().transpose() * r.Z;
+  r.u = T_i.linear().transpose() * (T_j.translation() - T_i.translation()) - measured.translation();
   return r;
 }
 
-void set_slope(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, const Relative& r,
-               EdgeModel& model) {
+void set_slope(const SE3& measured, const Precision& precision, const SE3& T_i, const SE3& T_j,
+               const Relative& r, EdgeModel& model) {
   // Computed from residuals, not from 3 - tr M, to avoid cancellation if they are small.
-  model.cost = edge.kappa * (T_j.linear() - T_i.linear() * edge.T_i_j.linear()).squaredNorm() +
-               edge.tau * r.u.squaredNorm();
-  model.g_i.head<3>() =
-      -4.0 * edge.kappa * axis_of(r.M) + 2.0 * edge.tau * r.u.cross(edge.T_i_j.translation());
-  model.g_i.tail<3>() = -2.0 * edge.tau * r.u;
-  model.g_j.head<3>() = 4.0 * edge.kappa * axis_of(r.N);
-  model.g_j.tail<3>() = 2.0 * edge.tau * (r.Z.transpose() * r.u);
+  model.cost = precision.kappa * (T_j.linear() - T_i.linear() * measured.linear()).squaredNorm() +
+               precision.tau * r.u.squaredNorm();
+  model.g_i.head<3>() = -4.0 * precision.kappa * axis_of(r.M) +
+                        2.0 * precision.tau * r.u.cross(measured.translation());
+  model.g_i.tail<3>() = -2.0 * precision.tau * r.u;
+  model.g_j.head<3>() = 4.0 * precision.kappa * axis_of(r.N);
+  model.g_j.tail<3>() = 2.0 * precision.tau * (r.Z.transpose() * r.u);
 }
 
 }  // namespace
 
-void slope_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, EdgeModel& model) {
-  set_slope(edge, T_i, T_j, relative(edge, T_i, T_j), model);
+void slope_edge(const SE3& measured, const Precision& precision, const SE3& T_i, const SE3& T_j,
+                EdgeModel& model) {
+  set_slope(measured, precision, T_i, T_j, relative(measured, T_i, T_j), model);
 }
 
-EdgeModel model_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, Curvature curvature) {
-  const Relative r = relative(edge, T_i, T_j);
+EdgeModel model_edge(const SE3& measured, const Precision& precision, const SE3& T_i,
+                     const SE3& T_j, Curvature curvature) {
+  const Relative r = relative(measured, T_i, T_j);
   EdgeModel model;
-  set_slope(edge, T_i, T_j, r, model);
+  set_slope(measured, precision, T_i, T_j, r, model);
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d t = edge.T_i_j.translation();
+  const Eigen::Vector3d t = measured.translation();
   // du = S w_i - v_i + Z v_j. Gauss-Newton uses the residual in the moving frame of pose i, in
   // which a rigid motion of both poses leaves it unchanged.
   const Eigen::Matrix3d S = skew(curvature == Curvature::kFull ? t : Eigen::Vector3d(t + r.u));
@@ -65,18 +66,18 @@ EdgeModel model_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, Curv
   model.H_ij.setZero();
   model.H_jj.setZero();
   if (curvature == Curvature::kGaussNewton) {
-    model.H_ii.topLeftCorner<3, 3>() = 4.0 * edge.kappa * I;
-    model.H_jj.topLeftCorner<3, 3>() = 4.0 * edge.kappa * I;
-    model.H_ij.topLeftCorner<3, 3>() = -4.0 * edge.kappa * r.Z;
+    model.H_ii.topLeftCorner<3, 3>() = 4.0 * precision.kappa * I;
+    model.H_jj.topLeftCorner<3, 3>() = 4.0 * precision.kappa * I;
+    model.H_ij.topLeftCorner<3, 3>() = -4.0 * precision.kappa * r.Z;
   } else {
     const double trace = r.M.trace();
     model.H_ii.topLeftCorner<3, 3>() =
-        2.0 * edge.kappa * (trace * I - symmetric(r.M)) +
-        2.0 * edge.tau * (r.u.dot(t) * I - symmetric(r.u * t.transpose()));
-    model.H_jj.topLeftCorner<3, 3>() = 2.0 * edge.kappa * (trace * I - symmetric(r.N));
-    model.H_ij.topLeftCorner<3, 3>() = 2.0 * edge.kappa * (r.M - trace * I) * r.Z;
+        2.0 * precision.kappa * (trace * I - symmetric(r.M)) +
+        2.0 * precision.tau * (r.u.dot(t) * I - symmetric(r.u * t.transpose()));
+    model.H_jj.topLeftCorner<3, 3>() = 2.0 * precision.kappa * (trace * I - symmetric(r.N));
+    model.H_ij.topLeftCorner<3, 3>() = 2.0 * precision.kappa * (r.M - trace * I) * r.Z;
   }
-  const double two_tau = 2.0 * edge.tau;
+  const double two_tau = 2.0 * precision.tau;
   model.H_ii.topLeftCorner<3, 3>() += two_tau * S.transpose() * S;
   model.H_ii.topRightCorner<3, 3>() = -two_tau * S.transpose();
   model.H_ii.bottomLeftCorner<3, 3>() = -two_tau * S;

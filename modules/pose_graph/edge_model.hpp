@@ -1,7 +1,7 @@
 #pragma once
 
 #include "modules/core/geometry.hpp"
-#include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/core/precision.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"
 
 namespace km {
@@ -12,11 +12,11 @@ enum class Curvature {
   kFull,         ///< The Riemannian Hessian.
 };
 
-/// Cost of one edge, f = kappa ||R_j - R_i R||_F^2 + tau ||t_j - t_i - R_i t||^2, to second order
-/// in the tangent vectors xi = [w; v] of its poses. They move as R exp(w), t + R v, along geodesics
-/// of SO(3) x R^3, so that the second derivatives are those of the Riemannian Hessian. The model
-/// depends only on T_i^-1 T_j. A rigid motion of the whole team does not change it, and a smooth
-/// deformation hardly does.
+/// Cost of one measured relative pose (R, t), f = kappa ||R_j - R_i R||_F^2 + tau ||t_j - t_i - R_i
+/// t||^2, to second order in the tangent vectors xi = [w; v] of its poses. They move as R exp(w), t
+/// + R v, along geodesics of SO(3) x R^3, so that the second derivatives are those of the
+/// Riemannian Hessian. The model depends only on T_i^-1 T_j. A rigid motion of the whole team does
+/// not change it, and a smooth deformation hardly does.
 struct EdgeModel {
   double cost = 0.0;
   Vector6 g_i;
@@ -26,11 +26,13 @@ struct EdgeModel {
   Matrix6 H_jj;
 };
 
-[[nodiscard]] EdgeModel model_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j,
-                                   Curvature curvature);
+/// `measured` is T_i_j.
+[[nodiscard]] EdgeModel model_edge(const SE3& measured, const Precision& precision, const SE3& T_i,
+                                   const SE3& T_j, Curvature curvature);
 
 /// Sets cost and gradient of `model` and does not touch its second derivatives.
-void slope_edge(const BlockEdge& edge, const SE3& T_i, const SE3& T_j, EdgeModel& model);
+void slope_edge(const SE3& measured, const Precision& precision, const SE3& T_i, const SE3& T_j,
+                EdgeModel& model);
 
 /// Cost of a vertical prior, to second order in the tangent vector w of the rotation of its pose.
 struct VerticalModel {

@@ -169,6 +169,97 @@ void FrontalCholesky::backward(MatrixXd& X) const {
   }
 }
 
+// The inverse at the nodes of a front that are eliminated later. They are nodes of its parent
+// front, or kept nodes.
+MatrixXd FrontalCholesky::inverse_of_rest(const EliminationPlan::Front& front,
+                                          const std::vector<MatrixXd>& inverses,
+                                          const BlockMatrix& kept) const {
+  const auto first = static_cast<std::size_t>(front.pivots);
+  const std::size_t rest = front.nodes.size() - first;
+  std::vector<int> place;
+  const bool in_parent = front.parent >= 0;
+  if (in_parent) {
+    const std::vector<int>& nodes = plan_->fronts()[static_cast<std::size_t>(front.parent)].nodes;
+    for (std::size_t k = first; k < front.nodes.size(); ++k)
+      place.push_back(
+          static_cast<int>(std::find(nodes.begin(), nodes.end(), front.nodes[k]) - nodes.begin()));
+  } else {
+    for (std::size_t k = first; k < front.nodes.size(); ++k)
+      place.push_back(plan_->place_of_kept()[static_cast<std::size_t>(front.nodes[k])]);
+  }
+  MatrixXd Z(block_ * static_cast<Index>(rest), block_ * static_cast<Index>(rest));
+  for (std::size_t i = 0; i < rest; ++i)
+    for (std::size_t j = 0; j < rest; ++j) {
+      const int a = place[i], b = place[j];
+      auto block =
+          Z.block(block_ * static_cast<Index>(i), block_ * static_cast<Index>(j), block_, block_);
+      if (in_parent)
+        block = inverses[static_cast<std::size_t>(front.parent)].block(block_ * a, block_ * b,
+                                                                       block_, block_);
+      else if (a == b)
+        block = kept.at(a);
+      else if (a < b)
+        block = kept.between(kept_pair(a, b));
+      else
+        block = kept.between(kept_pair(a, b)).transpose();
+    }
+  return Z;
+}
+
+// With the columns [L; M] of the factor and G = M L^-1, the blocks are Z_rest, -Z_rest G, and
+// (L L^T)^-1 + G^T Z_rest G.
+BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
+  BlockMatrix inverse =
+      BlockMatrix::zero(block_, static_cast<std::size_t>(plan_->nodes()), plan_->pairs().size());
+  std::vector<MatrixXd> inverses(factors_.size());
+  for (std::size_t f = factors_.size(); f-- > 0;) {
+    const EliminationPlan::Front& front = plan_->fronts()[f];
+    const Index pivots = block_ * front.pivots;
+    const Index rest = factors_[f].rows() - pivots;
+    const MatrixXd inverse_L = factors_[f].topRows(pivots).triangularView<Eigen::Lower>().solve(
+        MatrixXd::Identity(pivots, pivots));
+    const MatrixXd Z_rest = inverse_of_rest(front, inverses, kept);
+    const MatrixXd G = factors_[f].bottomRows(rest) * inverse_L;
+    MatrixXd& Z = inverses[f];
+    Z.resize(pivots + rest, pivots + rest);
+    Z.bottomRightCorner(rest, rest) = Z_rest;
+    Z.bottomLeftCorner(rest, pivots).noalias() = -Z_rest * G;
+    Z.topRightCorner(pivots, rest) = Z.bottomLeftCorner(rest, pivots).transpose();
+    Z.topLeftCorner(pivots, pivots).noalias() = inverse_L.transpose() * inverse_L;
+    Z.topLeftCorner(pivots, pivots).noalias() -= G.transpose() * Z.bottomLeftCorner(rest, pivots);
+    const auto local = [&](int node) {
+      return block_ *
+             (std::find(front.nodes.begin(), front.nodes.end(), node) - front.nodes.begin());
+    };
+    for (int k = 0; k < front.pivots; ++k)
+      inverse.at(front.nodes[static_cast<std::size_t>(k)]) =
+          Z.block(block_ * k, block_ * k, block_, block_);
+    for (const int pair : front.pairs) {
+      const auto& [i, j] = plan_->pairs()[static_cast<std::size_t>(pair)];
+      inverse.between(pair) = Z.block(local(i), local(j), block_, block_);
+    }
+    for (const int c : front.children) inverses[static_cast<std::size_t>(c)].resize(0, 0);
+  }
+  place_kept(kept, inverse);
+  return inverse;
+}
+
+void FrontalCholesky::place_kept(const BlockMatrix& kept, BlockMatrix& inverse) const {
+  for (std::size_t k = 0; k < plan_->kept().size(); ++k)
+    inverse.at(plan_->kept()[k]) = kept.at(static_cast<int>(k));
+  for (std::size_t p = 0; p < plan_->pairs().size(); ++p) {
+    const auto& [i, j] = plan_->pairs()[p];
+    const int a = plan_->place_of_kept()[static_cast<std::size_t>(i)];
+    const int b = plan_->place_of_kept()[static_cast<std::size_t>(j)];
+    if (a < 0 || b < 0) continue;
+    auto block = inverse.between(static_cast<int>(p));
+    if (a < b)
+      block = kept.between(kept_pair(a, b));
+    else
+      block = kept.between(kept_pair(a, b)).transpose();
+  }
+}
+
 double FrontalCholesky::magnitude(const Eigen::VectorXd& b) const {
   double sum = 0.0;
   for (std::size_t f = 0; f < factors_.size(); ++f) {

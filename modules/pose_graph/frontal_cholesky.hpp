@@ -11,7 +11,7 @@ namespace km {
 /// complement onto the kept nodes. forward() reduces a right-hand side to the kept nodes.
 /// backward() computes the solution of all nodes from the solution of the kept ones. Both need only
 /// the factor, so that robots can solve A X = C together, each with some of the nodes. Not
-/// thread-safe. Not thread-safe.
+/// thread-safe.
 class FrontalCholesky {
  public:
   explicit FrontalCholesky(std::shared_ptr<const EliminationPlan> plan) : plan_(std::move(plan)) {}
@@ -32,6 +32,10 @@ class FrontalCholesky {
   /// the kept nodes, and becomes the full solution.
   void backward(Eigen::MatrixXd& X) const;
 
+  /// Blocks of the inverse of A at all nodes and pairs of the plan (selected inversion: Takahashi,
+  /// Fagan, Chin, PICA 1973). `kept` has these blocks at the kept nodes, in the order of schur().
+  [[nodiscard]] BlockMatrix selected_inverse(const BlockMatrix& kept) const;
+
   /// | |L|^T b |^2 for b >= 0 of B nodes entries, which bounds the rounding errors of the
   /// factorisation. L has the columns of the eliminated nodes.
   [[nodiscard]] double magnitude(const Eigen::VectorXd& b) const;
@@ -42,6 +46,10 @@ class FrontalCholesky {
   bool factorise_front(std::size_t f, const BlockMatrix& A);
   void add_to_schur(const EliminationPlan::Front& front, const Eigen::MatrixXd& rest);
   void add_kept(const BlockMatrix& A);
+  [[nodiscard]] Eigen::MatrixXd inverse_of_rest(const EliminationPlan::Front& front,
+                                                const std::vector<Eigen::MatrixXd>& inverses,
+                                                const BlockMatrix& kept) const;
+  void place_kept(const BlockMatrix& kept, BlockMatrix& inverse) const;
   [[nodiscard]] int kept_pair(int a, int b) const;
 
   std::shared_ptr<const EliminationPlan> plan_;

@@ -48,6 +48,7 @@ std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, cons
   frozen.odometry = graph.keyframes() - 1;
   frozen.step_precision[self] = graph.mean_step_precision();
   frozen.upright = session.upright;
+  frozen.origin = {plan.has_member(session.anchor) ? session.anchor : coordinator_of(plan), 0};
   if (session.upright) frozen.verticals = graph.verticals();
   return part;
 }

@@ -59,6 +59,10 @@ class MemberSolver {
   /// Own poses in the frame of the session, with the lowest cost that the team has agreed on. At
   /// first these are the start.
   [[nodiscard]] virtual const std::vector<SE3>& poses() const = 0;
+  /// Covariances of poses() relative to the origin of the session, once it is done, as tangent
+  /// vectors [rotation; translation] at the pose (see core/covariance.hpp). Empty if the solver
+  /// computes none.
+  [[nodiscard]] virtual std::vector<Matrix6> covariances() const { return {}; }
   [[nodiscard]] virtual SolverState state() const = 0;
   /// Present verdicts on the closures that this robot weighs; empty if the solver rejects none.
   [[nodiscard]] virtual ClosureVerdicts verdicts() const = 0;

@@ -37,6 +37,7 @@ struct SessionGraph {
   std::map<RobotId, Precision> step_precision = {};
   std::vector<VerticalPrior> verticals = {};  ///< Priors of own poses; empty unless `upright`.
   bool upright = false;                       ///< All members have verticals: the frame has z up.
+  KeyframeId origin = {};                     ///< Covariances are relative to this keyframe.
   /// Decisions of earlier sessions: kept or rejected. Closures without an entry are undecided.
   std::map<ClosureId, bool> decided = {};
   std::set<ClosureId> trusted = {};  ///< Never weighed; equal on both robots.

@@ -15,9 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Ratio of weights from which on old second derivatives mislead a step: the stiffness of an edge is
-// half or twice its correct value. Weights below kNoWeight are negligible compared to odometry.
-constexpr double kWeightRatio = 2.0;
+// Weights below kNoWeight are negligible compared to odometry.
 constexpr double kNoWeight = 0.02;
 // An edge with a weight below this is rejected. It has no cost and no gradient; its stiffness only
 // keeps the system regular.
@@ -27,12 +25,12 @@ constexpr double kRejected = 1e-6;
   throw std::invalid_argument("TreeFront of robot " + std::to_string(robot) + ": " + what);
 }
 
-bool differs(double weight, double before) {
+bool differs(double weight, double before, double ratio) {
   const auto [less, more] = std::minmax(weight, before);
-  return more > kNoWeight && more > kWeightRatio * less;
+  return more > kNoWeight && more > ratio * less;
 }
 
-std::size_t at(int k) {
+std::size_t at(Index k) {
   return static_cast<std::size_t>(k);
 }
 
@@ -48,6 +46,23 @@ void add_coupling(BlockMatrix& A, int pair, bool transposed, const Values& value
     A.between(pair) += values.transpose();
   else
     A.between(pair) += values;
+}
+
+Precision weighed(const Precision& precision, double weight) {
+  return {weight * precision.kappa, weight * precision.tau};
+}
+
+bool is_usable(const PoseEdge& e) {
+  const auto& [kappa, tau] = e.precision;
+  return e.T_from_to.matrix().allFinite() && kappa > 0.0 && tau > 0.0 && std::isfinite(kappa + tau);
+}
+
+NodePair ordered(int i, int j) {
+  return {std::min(i, j), std::max(i, j)};
+}
+
+int place_in(const std::vector<NodePair>& pairs, const NodePair& pair) {
+  return static_cast<int>(std::lower_bound(pairs.begin(), pairs.end(), pair) - pairs.begin());
 }
 
 }  // namespace
@@ -69,25 +84,33 @@ TreeFront::TreeFront(FrontGraph graph) : graph_(std::move(graph)) {
   if (graph_.poses < 1) refuse(graph_.self, "it has no poses");
   for (Index k = 0; k < graph_.poses; ++k)
     ids_.push_back({graph_.self, static_cast<KeyframeIndex>(k)});
-  const auto usable = [](const PoseEdge& e) {
-    const auto& [kappa, tau] = e.precision;
-    return e.T_from_to.matrix().allFinite() && kappa > 0.0 && tau > 0.0 &&
-           std::isfinite(kappa + tau);
-  };
-  for (const PoseEdge& e : graph_.edges) {
-    if (!usable(e)) refuse(graph_.self, "an edge is not finite with positive precisions");
-    const int i = add_node(e.from), j = add_node(e.to);
-    if (i == j) refuse(graph_.self, "an edge joins pose " + to_string(e.from) + " with itself");
-    edges_.push_back({{i, j, e.T_from_to, e.precision.kappa, e.precision.tau}});
-  }
-  for (const HeldEdge& h : graph_.held)
-    if (!usable(h.edge) || h.edge.end_on(graph_.self).index >= graph_.poses)
-      refuse(graph_.self, "an edge to a held pose is not usable");
+  for (const PoseEdge& e : graph_.edges) places_.push_back(place_of(e));
   for (const VerticalPrior& v : graph_.verticals)
     if (v.pose < 0 || v.pose >= graph_.poses || !v.up.allFinite() || !(v.weight > 0.0))
       refuse(graph_.self, "a vertical prior is not usable");
   followed_ = ids_.size();
-  weights_.assign(graph_.edges.size() + graph_.held.size(), 1.0);
+  weights_.assign(graph_.edges.size(), 1.0);
+}
+
+TreeFront::Place TreeFront::place_of(const PoseEdge& edge) {
+  if (!is_usable(edge)) refuse(graph_.self, "an edge is not finite with positive precisions");
+  if (edge.from == edge.to)
+    refuse(graph_.self, "an edge joins pose " + to_string(edge.from) + " with itself");
+  Place place;
+  const auto node = [&](const KeyframeId& id) {
+    const auto held = graph_.held.find(id);
+    if (held == graph_.held.end()) return add_node(id);
+    place.T_held = held->second;
+    return -1;
+  };
+  place.i = node(edge.from);
+  place.j = node(edge.to);
+  if (place.i < 0 && place.j < 0) refuse(graph_.self, "an edge joins two held poses");
+  return place;
+}
+
+const SE3& TreeFront::pose_of(int node, const Place& place, std::span<const SE3> poses) const {
+  return node < 0 ? place.T_held : poses[at(node)];
 }
 
 int TreeFront::add_node(const KeyframeId& id) {
@@ -110,12 +133,10 @@ void TreeFront::weigh(const std::vector<double>& weights) {
   weights_ = weights;
 }
 
-bool TreeFront::stale() const {
+bool TreeFront::stale(double ratio) const {
   if (linearised_weights_.empty()) return true;
-  for (std::size_t k = 0; k < weights_.size(); ++k) {
-    const bool told = k < edges_.size() && edges_[k].told >= 0;
-    if (!told && differs(weights_[k], linearised_weights_[k])) return true;
-  }
+  for (std::size_t k = 0; k < weights_.size(); ++k)
+    if (places_[k].sent < 0 && differs(weights_[k], linearised_weights_[k], ratio)) return true;
   return false;
 }
 
@@ -124,9 +145,9 @@ void TreeFront::set_child(RobotId name, TreeSystem system) {
   std::set<int> seen;
   for (const TreeVariable& v : child.system.variables) {
     child.node.push_back(add_node(v.id));
-    if (!seen.insert(child.node.back()).second) refuse(name, "tells a pose twice");
+    if (!seen.insert(child.node.back()).second) refuse(name, "sends a pose twice");
   }
-  if (child.system.schur.block() != block()) refuse(name, "tells blocks of another size");
+  if (child.system.schur.block() != block()) refuse(name, "sends blocks of another size");
   const auto before = children_.find(name);
   const auto same_pattern = [&](const TreeSystem& x, const TreeSystem& y) {
     return x.pairs == y.pairs && child.node == before->second.node;
@@ -135,7 +156,7 @@ void TreeFront::set_child(RobotId name, TreeSystem system) {
       child.system.edges.size() == before->second.system.edges.size()) {
     child.pair = std::move(before->second.pair);
     child.transposed = std::move(before->second.transposed);
-    child.told = std::move(before->second.told);
+    child.sent = std::move(before->second.sent);
   } else {
     plan_.reset();
   }
@@ -146,86 +167,93 @@ void TreeFront::set_child(RobotId name, TreeSystem system) {
 void TreeFront::reweigh_child(RobotId name, std::span<const UpLetter::NewWeight> weights) {
   Child& child = children_.at(name);
   for (const auto& [edge, weight] : weights) {
-    if (edge >= child.system.edges.size()) refuse(name, "weighs an edge that it did not tell");
+    if (edge >= child.system.edges.size()) refuse(name, "weighs an edge that it did not send");
     child.system.edges[edge].weight = weight;
-    if (child.told[edge] < 0) changed_ = true;
+    if (child.sent[edge] < 0) changed_ = true;
   }
 }
 
-// Nodes that robots outside the subtree use, as far as this robot knows.
-std::vector<bool> TreeFront::incomplete() const {
-  std::vector<std::uint32_t> touched(ids_.size(), 0), of(ids_.size(), 0);
-  for (std::size_t v = 0; v < followed_; ++v) touched[v] = 1;
-  for (Index k = 0; k < graph_.poses; ++k) of[static_cast<std::size_t>(k)] = 1;
-  for (const auto& [index, robots] : graph_.touched_by) of[index] = robots;
+// All nodes, with the numbers of robots that use them, as far as this robot knows.
+std::vector<TreeVariable> TreeFront::variables() const {
+  std::vector<TreeVariable> all(ids_.size());
+  for (std::size_t v = 0; v < ids_.size(); ++v) all[v] = {ids_[v], v < followed_ ? 1U : 0U, 0};
+  for (Index k = 0; k < graph_.poses; ++k) all[at(k)].of = 1;
+  for (const auto& [index, robots] : graph_.touched_by) all[index].of = robots;
   for (const auto& [name, child] : children_)
     for (std::size_t k = 0; k < child.node.size(); ++k) {
-      touched[at(child.node[k])] += child.system.variables[k].touched;
-      if (child.system.variables[k].of > 0) of[at(child.node[k])] = child.system.variables[k].of;
+      TreeVariable& v = all[at(child.node[k])];
+      v.touched += child.system.variables[k].touched;
+      v.of = std::max(v.of, child.system.variables[k].of);
     }
-  std::vector<bool> result(ids_.size());
-  for (std::size_t v = 0; v < ids_.size(); ++v) result[v] = of[v] == 0 || touched[v] < of[v];
-  return result;
+  return all;
 }
 
 void TreeFront::plan() {
   std::vector<NodePair> pairs;
-  const auto couple = [&](Index i, Index j) {
-    pairs.push_back({static_cast<int>(std::min(i, j)), static_cast<int>(std::max(i, j))});
-  };
-  for (const Edge& e : edges_) couple(e.measured.i, e.measured.j);
+  for (const Place& p : places_)
+    if (p.i >= 0 && p.j >= 0) pairs.push_back(ordered(p.i, p.j));
   for (const auto& [name, child] : children_)
-    for (const auto& [i, j] : child.system.pairs) couple(child.node[at(i)], child.node[at(j)]);
+    for (const auto& [i, j] : child.system.pairs)
+      pairs.push_back(ordered(child.node[at(i)], child.node[at(j)]));
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  const auto place = [&](Index i, Index j) {
-    const NodePair pair{static_cast<int>(std::min(i, j)), static_cast<int>(std::max(i, j))};
-    return static_cast<int>(std::lower_bound(pairs.begin(), pairs.end(), pair) - pairs.begin());
-  };
-  for (Edge& e : edges_) {
-    e.pair = place(e.measured.i, e.measured.j);
-    e.transposed = e.measured.i > e.measured.j;
+  place_pairs(pairs);
+  std::vector<bool> keep = kept_nodes(pairs);
+  plan_ = std::make_shared<const EliminationPlan>(std::move(keep), std::move(pairs));
+  factor_.emplace(plan_);
+  linearised_weights_.clear();
+  list_sent_edges();
+}
+
+void TreeFront::place_pairs(const std::vector<NodePair>& pairs) {
+  for (Place& p : places_) {
+    if (p.i < 0 || p.j < 0) continue;
+    p.pair = place_in(pairs, ordered(p.i, p.j));
+    p.transposed = p.i > p.j;
   }
   for (auto& [name, child] : children_) {
     child.pair.clear();
     child.transposed.clear();
-    for (const auto& [i, j] : child.system.pairs) {
-      child.pair.push_back(place(child.node[at(i)], child.node[at(j)]));
-      child.transposed.push_back(child.node[at(i)] > child.node[at(j)]);
+    for (const auto& [first, second] : child.system.pairs) {
+      const int i = child.node[at(first)], j = child.node[at(second)];
+      child.pair.push_back(place_in(pairs, ordered(i, j)));
+      child.transposed.push_back(i > j);
     }
   }
-  std::vector<bool> keep = incomplete();
-  if (graph_.root) {
-    if (std::find(keep.begin(), keep.end(), true) != keep.end())
-      refuse(graph_.self, "the team's robots do not agree on who touches which pose");
-    if (graph_.free) keep[static_cast<std::size_t>(graph_.poses / 2)] = true;
-  } else {
-    std::vector<bool> hidden(keep.size(), false);
-    for (Index k = 0; k < graph_.poses; ++k)
-      hidden[static_cast<std::size_t>(k)] = !graph_.open.contains(static_cast<KeyframeIndex>(k));
-    keep = keep_sparse(std::move(keep), pairs, hidden);
-  }
-  plan_ = std::make_shared<const EliminationPlan>(std::move(keep), std::move(pairs));
-  factor_.emplace(plan_);
-  linearised_weights_.clear();
-  list_told_edges();
 }
 
-void TreeFront::list_told_edges() {
+// Keeps the nodes that robots outside the subtree use, as far as this robot knows, and those whose
+// elimination does not pay.
+std::vector<bool> TreeFront::kept_nodes(const std::vector<NodePair>& pairs) const {
+  std::vector<bool> keep;
+  for (const TreeVariable& v : variables()) keep.push_back(v.of == 0 || v.touched < v.of);
+  if (graph_.root) {
+    if (std::find(keep.begin(), keep.end(), true) != keep.end())
+      refuse(graph_.self, "the robots of the team do not agree on the robots that use a pose");
+    if (graph_.free) keep[at(graph_.poses / 2)] = true;
+    return keep;
+  }
+  std::vector<bool> hidden(keep.size(), false);
+  for (Index k = 0; k < graph_.poses; ++k)
+    hidden[at(k)] = !graph_.open.contains(static_cast<KeyframeIndex>(k));
+  return keep_sparse(std::move(keep), pairs, hidden);
+}
+
+void TreeFront::list_sent_edges() {
   const std::vector<int>& kept = plan_->place_of_kept();
-  told_.clear();
-  const auto tell = [&](Index i, Index j, RobotId child, std::size_t edge) {
-    if (kept[static_cast<std::size_t>(i)] < 0 || kept[static_cast<std::size_t>(j)] < 0) return -1;
-    told_.push_back({child, edge});
-    return static_cast<int>(told_.size()) - 1;
+  sent_.clear();
+  const auto send = [&](int i, int j, RobotId child, std::size_t edge) {
+    if (i < 0 || j < 0 || kept[at(i)] < 0 || kept[at(j)] < 0) return -1;
+    sent_.push_back({child, edge});
+    return static_cast<int>(sent_.size()) - 1;
   };
-  for (std::size_t k = 0; k < edges_.size(); ++k)
-    edges_[k].told = tell(edges_[k].measured.i, edges_[k].measured.j, graph_.self, k);
+  for (std::size_t k = 0; k < places_.size(); ++k)
+    places_[k].sent = send(places_[k].i, places_[k].j, graph_.self, k);
   for (auto& [name, child] : children_) {
-    child.told.clear();
+    child.sent.clear();
     for (std::size_t k = 0; k < child.system.edges.size(); ++k) {
       const auto& [i, j] = child.system.pairs[at(child.system.edges[k].pair)];
-      child.told.push_back(tell(child.node[at(i)], child.node[at(j)], name, k));
+      child.sent.push_back(send(child.node[at(i)], child.node[at(j)], name, k));
     }
   }
 }
@@ -234,37 +262,20 @@ template <int kBlock>
 void TreeFront::add_own(std::span<const SE3> poses, Curvature curvature, BlockMatrix& A) const {
   constexpr Index kFirst = first_of(kBlock);
   const auto part = [](const Matrix6& H) { return H.block<kBlock, kBlock>(kFirst, kFirst); };
-  const auto weighed = [](BlockEdge e, double weight) {
-    e.kappa *= weight;
-    e.tau *= weight;
-    return e;
-  };
-  for (std::size_t k = 0; k < edges_.size(); ++k) {
-    const Edge& e = edges_[k];
-    if (e.told >= 0 || weights_[k] == 0.0) continue;
-    const auto i = static_cast<std::size_t>(e.measured.i);
-    const auto j = static_cast<std::size_t>(e.measured.j);
-    const EdgeModel model =
-        model_edge(weighed(e.measured, weights_[k]), poses[i], poses[j], curvature);
-    A.diagonal.middleCols<kBlock>(kBlock * e.measured.i) += part(model.H_ii);
-    A.diagonal.middleCols<kBlock>(kBlock * e.measured.j) += part(model.H_jj);
-    add_coupling(A, e.pair, e.transposed, part(model.H_ij));
-  }
-  for (std::size_t k = 0; k < graph_.held.size(); ++k) {
-    const HeldEdge& h = graph_.held[k];
-    const bool from_own = h.edge.from.robot == graph_.self;
-    const KeyframeIndex own = h.edge.end_on(graph_.self).index;
-    const BlockEdge e =
-        weighed({0, 1, h.edge.T_from_to, h.edge.precision.kappa, h.edge.precision.tau},
-                weights_[edges_.size() + k]);
-    const EdgeModel model = from_own ? model_edge(e, poses[own], h.T_world_other, curvature)
-                                     : model_edge(e, h.T_world_other, poses[own], curvature);
-    A.diagonal.middleCols<kBlock>(kBlock * Index{own}) += part(from_own ? model.H_ii : model.H_jj);
+  for (std::size_t k = 0; k < places_.size(); ++k) {
+    const Place& p = places_[k];
+    if (p.sent >= 0 || weights_[k] == 0.0) continue;
+    const PoseEdge& e = graph_.edges[k];
+    const EdgeModel model = model_edge(e.T_from_to, weighed(e.precision, weights_[k]),
+                                       pose_of(p.i, p, poses), pose_of(p.j, p, poses), curvature);
+    if (p.i >= 0) A.diagonal.middleCols<kBlock>(kBlock * p.i) += part(model.H_ii);
+    if (p.j >= 0) A.diagonal.middleCols<kBlock>(kBlock * p.j) += part(model.H_jj);
+    if (p.pair >= 0) add_coupling(A, p.pair, p.transposed, part(model.H_ij));
   }
   if constexpr (kBlock == 6)
     for (const VerticalPrior& v : graph_.verticals)
       A.diagonal.block<3, 3>(0, 6 * v.pose) +=
-          model_vertical(v, poses[static_cast<std::size_t>(v.pose)].linear(), curvature).H;
+          model_vertical(v, poses[at(v.pose)].linear(), curvature).H;
 }
 
 void TreeFront::linearise(std::span<const SE3> poses, Curvature curvature) {
@@ -288,8 +299,8 @@ void TreeFront::add_child(const Child& child, BlockMatrix& A) const {
   const Index B = block();
   const auto part = [B](const Matrix6& H) { return H.block(first_of(B), first_of(B), B, B); };
   for (std::size_t k = 0; k < child.system.edges.size(); ++k) {
-    const ToldEdge& e = child.system.edges[k];
-    if (child.told[k] >= 0 || e.weight == 0.0F) continue;
+    const SentEdge& e = child.system.edges[k];
+    if (child.sent[k] >= 0 || e.weight == 0.0F) continue;
     const auto p = at(e.pair);
     const auto& [first, second] = child.system.pairs[p];
     const int i = child.node[at(e.transposed ? second : first)];
@@ -308,198 +319,239 @@ bool TreeFront::factorise() {
   return factor_->factorise(A);
 }
 
-TreeSystem TreeFront::told_system(std::span<const SE3> poses) {
+TreeSystem TreeFront::system_for_parent(std::span<const SE3> poses) {
   TreeSystem system{.pairs = plan_->kept_pairs(), .schur = factor_->schur()};
-  std::vector<TreeVariable> all(ids_.size());
-  for (std::size_t v = 0; v < ids_.size(); ++v) all[v] = {ids_[v], v < followed_ ? 1U : 0U, 0};
-  for (Index k = 0; k < graph_.poses; ++k) all[static_cast<std::size_t>(k)].of = 1;
-  for (const auto& [index, robots] : graph_.touched_by) all[index].of = robots;
-  for (const auto& [name, child] : children_)
-    for (std::size_t k = 0; k < child.node.size(); ++k) {
-      TreeVariable& v = all[at(child.node[k])];
-      v.touched += child.system.variables[k].touched;
-      v.of = std::max(v.of, child.system.variables[k].of);
-    }
+  const std::vector<TreeVariable> all = variables();
   for (const int node : plan_->kept()) system.variables.push_back(all[at(node)]);
-  const std::vector<int>& place = plan_->place_of_kept();
-  const auto pair_of = [&](int i, int j) {
-    const NodePair pair{std::min(place[at(i)], place[at(j)]), std::max(place[at(i)], place[at(j)])};
-    return static_cast<int>(std::lower_bound(system.pairs.begin(), system.pairs.end(), pair) -
-                            system.pairs.begin());
-  };
-  for (ToldWeight& t : told_) {
-    ToldEdge edge;
-    int i = 0, j = 0;
-    if (t.child == graph_.self) {
-      const BlockEdge& e = edges_[t.edge].measured;
-      i = static_cast<int>(e.i);
-      j = static_cast<int>(e.j);
-      edge.curvature = curvature_;
-      edge.kappa = static_cast<float>(e.kappa);
-      edge.tau = static_cast<float>(e.tau);
-      edge.present = SinglePose::of(poses[at(i)].inverse() * poses[at(j)]);
-      edge.measured = SinglePose::of(e.T_i_j);
-    } else {
-      const Child& child = children_.at(t.child);
-      edge = child.system.edges[t.edge];
-      const auto& [first, second] = child.system.pairs[at(edge.pair)];
-      i = child.node[at(edge.transposed ? second : first)];
-      j = child.node[at(edge.transposed ? first : second)];
-    }
-    edge.pair = pair_of(i, j);
-    edge.transposed = place[at(i)] > place[at(j)];
-    edge.weight = t.told = weight_of(t);
-    system.edges.push_back(edge);
+  for (SentWeight& s : sent_) {
+    system.edges.push_back(sent_edge(s, poses, system.pairs));
+    s.sent = system.edges.back().weight;
   }
   return system;
 }
 
-float TreeFront::weight_of(const ToldWeight& told) const {
-  return told.child == graph_.self ? static_cast<float>(weights_[told.edge])
-                                   : children_.at(told.child).system.edges[told.edge].weight;
+SentEdge TreeFront::sent_edge(const SentWeight& sent, std::span<const SE3> poses,
+                              const std::vector<NodePair>& pairs) const {
+  SentEdge edge;
+  int i = 0, j = 0;
+  if (sent.child == graph_.self) {
+    const PoseEdge& e = graph_.edges[sent.edge];
+    i = places_[sent.edge].i;
+    j = places_[sent.edge].j;
+    edge.curvature = curvature_;
+    edge.kappa = static_cast<float>(e.precision.kappa);
+    edge.tau = static_cast<float>(e.precision.tau);
+    edge.present = SinglePose::of(poses[at(i)].inverse() * poses[at(j)]);
+    edge.measured = SinglePose::of(e.T_from_to);
+  } else {
+    const Child& child = children_.at(sent.child);
+    edge = child.system.edges[sent.edge];
+    const auto& [first, second] = child.system.pairs[at(edge.pair)];
+    i = child.node[at(edge.transposed ? second : first)];
+    j = child.node[at(edge.transposed ? first : second)];
+  }
+  const std::vector<int>& place = plan_->place_of_kept();
+  edge.pair = place_in(pairs, ordered(place[at(i)], place[at(j)]));
+  edge.transposed = place[at(i)] > place[at(j)];
+  edge.weight = weight_of(sent);
+  return edge;
 }
 
-std::vector<UpLetter::NewWeight> TreeFront::told_weights() {
+float TreeFront::weight_of(const SentWeight& sent) const {
+  return sent.child == graph_.self ? static_cast<float>(weights_[sent.edge])
+                                   : children_.at(sent.child).system.edges[sent.edge].weight;
+}
+
+std::vector<UpLetter::NewWeight> TreeFront::changed_weights() {
+  constexpr double kRatio = 2.0;
   std::vector<UpLetter::NewWeight> changes;
-  for (std::size_t k = 0; k < told_.size(); ++k) {
-    const float weight = weight_of(told_[k]);
-    if (!differs(weight, told_[k].told)) continue;
-    told_[k].told = weight;
+  for (std::size_t k = 0; k < sent_.size(); ++k) {
+    const float weight = weight_of(sent_[k]);
+    if (!differs(weight, sent_[k].sent, kRatio)) continue;
+    sent_[k].sent = weight;
     changes.push_back({static_cast<std::uint32_t>(k), weight});
   }
   return changes;
 }
 
-void TreeFront::add_slopes(std::span<const SE3> poses, MatrixXd& C) const {
+// Negative gradients of own edges and verticals.
+MatrixXd TreeFront::slopes(std::span<const SE3> poses) const {
   const Index B = block();
+  MatrixXd rows = MatrixXd::Zero(B * static_cast<Index>(ids_.size()), 1);
   EdgeModel model;
-  const auto subtract = [&](Index node, const Vector6& g) {
-    C.middleRows(B * node, B) -= g.segment(first_of(B), B);
+  const auto subtract = [&](int node, const Vector6& g) {
+    if (node >= 0) rows.middleRows(B * node, B) -= g.segment(first_of(B), B);
   };
-  for (std::size_t k = 0; k < edges_.size(); ++k) {
+  for (std::size_t k = 0; k < places_.size(); ++k) {
     if (weights_[k] < kRejected) continue;
-    BlockEdge e = edges_[k].measured;
-    e.kappa *= weights_[k];
-    e.tau *= weights_[k];
-    slope_edge(e, poses[static_cast<std::size_t>(e.i)], poses[static_cast<std::size_t>(e.j)],
-               model);
-    subtract(e.i, model.g_i);
-    subtract(e.j, model.g_j);
-  }
-  for (std::size_t k = 0; k < graph_.held.size(); ++k) {
-    const HeldEdge& h = graph_.held[k];
-    const bool from_own = h.edge.from.robot == graph_.self;
-    const KeyframeIndex own = h.edge.end_on(graph_.self).index;
-    const double w = weights_[edges_.size() + k];
-    if (w < kRejected) continue;
-    const BlockEdge e{0, 1, h.edge.T_from_to, w * h.edge.precision.kappa, w * h.edge.precision.tau};
-    if (from_own)
-      slope_edge(e, poses[own], h.T_world_other, model);
-    else
-      slope_edge(e, h.T_world_other, poses[own], model);
-    subtract(own, from_own ? model.g_i : model.g_j);
+    const Place& p = places_[k];
+    const PoseEdge& e = graph_.edges[k];
+    slope_edge(e.T_from_to, weighed(e.precision, weights_[k]), pose_of(p.i, p, poses),
+               pose_of(p.j, p, poses), model);
+    subtract(p.i, model.g_i);
+    subtract(p.j, model.g_j);
   }
   if (B == 6)
     for (const VerticalPrior& v : graph_.verticals)
-      C.middleRows<3>(6 * v.pose) -=
-          model_vertical(v, poses[static_cast<std::size_t>(v.pose)].linear(),
-                         Curvature::kGaussNewton)
-              .g;
+      rows.middleRows<3>(6 * v.pose) -=
+          model_vertical(v, poses[at(v.pose)].linear(), Curvature::kGaussNewton).g;
+  return rows;
 }
 
-void TreeFront::reduce(std::span<const SE3> poses, const std::map<RobotId, VectorXd>& children) {
+void TreeFront::reduce(std::span<const SE3> poses, const std::map<RobotId, MatrixXd>& children) {
+  forwarded_ = forward(slopes(poses), children);
+}
+
+MatrixXd TreeFront::forward(MatrixXd rows, const std::map<RobotId, MatrixXd>& children) const {
   const Index B = block();
-  MatrixXd C = MatrixXd::Zero(B * static_cast<Index>(ids_.size()), 1);
-  add_slopes(poses, C);
-  for (const auto& [name, child] : children_) {
-    const VectorXd& rows = children.at(name);
-    if (rows.size() != B * static_cast<Index>(child.node.size()))
-      refuse(name, "tells a right-hand side of another size than its system");
+  for (const auto& [name, of_child] : children) {
+    const Child& child = children_.at(name);
+    if (of_child.rows() != B * static_cast<Index>(child.node.size()) ||
+        of_child.cols() != rows.cols())
+      refuse(name, "sends a right-hand side of another size than its system");
     for (std::size_t k = 0; k < child.node.size(); ++k)
-      C.middleRows(B * child.node[k], B) += rows.segment(B * static_cast<Index>(k), B);
+      rows.middleRows(B * child.node[k], B) += of_child.middleRows(B * static_cast<Index>(k), B);
   }
-  forwarded_ = std::move(C);
-  factor_->forward(forwarded_);
-  // Summed over the eliminated rows, not computed as the whole norm minus that of the kept rows.
-  // Kept rows can be large while only their sum over the team is small. The rounding error of the
-  // difference would then appear as a predicted decrease.
-  decrement_ = 0.0;
-  const std::vector<int>& place = plan_->place_of_kept();
-  for (std::size_t v = 0; v < place.size(); ++v)
-    if (place[v] < 0)
-      decrement_ += forwarded_.middleRows(B * static_cast<Index>(v), B).squaredNorm();
+  factor_->forward(rows);
+  return rows;
 }
 
-VectorXd TreeFront::reduced() const {
+MatrixXd TreeFront::backward(MatrixXd forwarded, const MatrixXd& kept) const {
+  const Index B = block();
+  if (kept.rows() != B * static_cast<Index>(plan_->kept().size()) ||
+      kept.cols() != forwarded.cols())
+    refuse(graph_.self, "receives a step of another size");
+  for (std::size_t k = 0; k < plan_->kept().size(); ++k)
+    forwarded.middleRows(B * plan_->kept()[k], B) = kept.middleRows(B * static_cast<Index>(k), B);
+  factor_->backward(forwarded);
+  return forwarded;
+}
+
+MatrixXd TreeFront::kept_rows(const MatrixXd& rows) const {
   const Index B = block();
   const std::vector<int>& kept = plan_->kept();
-  VectorXd rows(B * static_cast<Index>(kept.size()));
+  MatrixXd result(B * static_cast<Index>(kept.size()), rows.cols());
   for (std::size_t k = 0; k < kept.size(); ++k)
-    rows.segment(B * static_cast<Index>(k), B) = forwarded_.middleRows(B * kept[k], B);
-  return rows;
+    result.middleRows(B * static_cast<Index>(k), B) = rows.middleRows(B * kept[k], B);
+  return result;
+}
+
+MatrixXd TreeFront::rows_of_child(RobotId name, const MatrixXd& rows) const {
+  const Child& child = children_.at(name);
+  MatrixXd result(block() * static_cast<Index>(child.node.size()), rows.cols());
+  for (std::size_t k = 0; k < child.node.size(); ++k)
+    result.middleRows(block() * static_cast<Index>(k), block()) =
+        rows.middleRows(block() * child.node[k], block());
+  return result;
+}
+
+// Summed over the eliminated rows, not computed as the whole minus that of the kept rows. Kept rows
+// can be large while only their sum over the team is small. The rounding error of the difference
+// would then appear as a predicted decrease.
+MatrixXd TreeFront::gram_of_eliminated(const MatrixXd& rows) const {
+  MatrixXd gram = MatrixXd::Zero(rows.cols(), rows.cols());
+  const std::vector<int>& place = plan_->place_of_kept();
+  for (std::size_t v = 0; v < place.size(); ++v) {
+    if (place[v] >= 0) continue;
+    const auto X = rows.middleRows(block() * static_cast<Index>(v), block());
+    gram.noalias() += X.transpose() * X;
+  }
+  return gram;
 }
 
 // The position of the one remaining pose is held, and its rotation, except for its tilt if
 // verticals determine that. A common rotation of the team about the vertical costs nothing, so the
 // softest direction is left out.
-TreeFront::RootStep TreeFront::solve_root(bool upright) const {
-  RootStep result{VectorXd::Zero(block() * static_cast<Index>(plan_->kept().size()))};
-  if (!upright || result.kept.size() != 6) return result;
-  const Eigen::Vector3d c = reduced().head<3>();
+std::optional<TreeFront::Tilts> TreeFront::tilts_of_root(bool upright) const {
+  if (!upright || block() != 6 || plan_->kept().size() != 1) return std::nullopt;
   const Eigen::Matrix3d S = factor_->schur().at(0).topLeftCorner<3, 3>();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(S);
-  const Eigen::Matrix<double, 3, 2> tilts = turns.eigenvectors().rightCols<2>();
-  const Eigen::Vector2d stiffness = turns.eigenvalues().tail<2>();
-  if (!(stiffness.minCoeff() > 0.0)) return result;
-  const Eigen::Vector2d along = tilts.transpose() * c;
-  const Eigen::Vector2d step = along.cwiseQuotient(stiffness);
+  const Tilts tilts{turns.eigenvectors().rightCols<2>(), turns.eigenvalues().tail<2>()};
+  return tilts.stiffness.minCoeff() > 0.0 ? std::optional(tilts) : std::nullopt;
+}
+
+TreeFront::RootStep TreeFront::solve_root(bool upright) const {
+  RootStep result{VectorXd::Zero(block() * static_cast<Index>(plan_->kept().size()))};
+  const auto tilts = tilts_of_root(upright);
+  if (!tilts) return result;
+  const Eigen::Vector2d along = tilts->directions.transpose() * reduced().head<3>();
+  const Eigen::Vector2d step = along.cwiseQuotient(tilts->stiffness);
   result.decrement = along.dot(step);
-  result.kept.head<3>() = tilts * step;
+  result.kept.head<3>() = tilts->directions * step;
   return result;
 }
 
 MatrixXd TreeFront::substitute_back(const VectorXd& kept) const {
-  const Index B = block();
-  if (kept.size() != B * static_cast<Index>(plan_->kept().size()))
-    refuse(graph_.self, "is told a step of another size");
-  MatrixXd X = forwarded_;
-  for (std::size_t k = 0; k < plan_->kept().size(); ++k)
-    X.middleRows(B * plan_->kept()[k], B) = kept.segment(B * static_cast<Index>(k), B);
-  factor_->backward(X);
-  return X.reshaped(B, static_cast<Index>(ids_.size()));
+  return backward(forwarded_, kept).reshaped(block(), static_cast<Index>(ids_.size()));
 }
 
 VectorXd TreeFront::step_of_child(RobotId name, const MatrixXd& steps) const {
+  return rows_of_child(name, steps.reshaped(steps.size(), 1));
+}
+
+BlockMatrix TreeFront::inverse(const BlockMatrix& kept) const {
+  return factor_->selected_inverse(kept);
+}
+
+BlockMatrix TreeFront::inverse_of_root(bool upright) const {
+  BlockMatrix inverse =
+      BlockMatrix::zero(block(), plan_->kept().size(), plan_->kept_pairs().size());
+  if (const auto tilts = tilts_of_root(upright))
+    inverse.at(0).topLeftCorner<3, 3>() = tilts->directions *
+                                          tilts->stiffness.cwiseInverse().asDiagonal() *
+                                          tilts->directions.transpose();
+  return inverse;
+}
+
+// A coupling that is zero in the Schur complement of the child is not part of its factor.
+std::vector<float> TreeFront::inverse_of_child(RobotId name, const BlockMatrix& inverse) const {
   const Child& child = children_.at(name);
-  VectorXd step(block() * static_cast<Index>(child.node.size()));
-  for (std::size_t k = 0; k < child.node.size(); ++k)
-    step.segment(block() * static_cast<Index>(k), block()) = steps.col(child.node[k]);
-  return step;
+  std::vector<float> blocks;
+  for (const int node : child.node)
+    for (Index c = 0; c < block(); ++c)
+      for (Index row = c; row < block(); ++row)
+        blocks.push_back(static_cast<float>(inverse.at(node)(row, c)));
+  for (std::size_t p = 0; p < child.pair.size(); ++p) {
+    if (child.system.schur.between(static_cast<int>(p)).isZero(0.0)) continue;
+    MatrixXd values = inverse.between(child.pair[p]);
+    if (child.transposed[p]) values.transposeInPlace();
+    for (const double x : values.reshaped()) blocks.push_back(static_cast<float>(x));
+  }
+  return blocks;
+}
+
+BlockMatrix TreeFront::inverse_from_parent(std::span<const float> blocks) const {
+  const BlockMatrix& schur = factor_->schur();
+  BlockMatrix inverse =
+      BlockMatrix::zero(block(), plan_->kept().size(), plan_->kept_pairs().size());
+  std::size_t next = 0;
+  const auto number = [&] {
+    if (next >= blocks.size()) refuse(graph_.self, "receives an inverse of another size");
+    return static_cast<double>(blocks[next++]);
+  };
+  for (std::size_t k = 0; k < plan_->kept().size(); ++k) {
+    auto values = inverse.at(static_cast<int>(k));
+    for (Index c = 0; c < block(); ++c)
+      for (Index row = c; row < block(); ++row) values(row, c) = values(c, row) = number();
+  }
+  for (std::size_t p = 0; p < plan_->kept_pairs().size(); ++p)
+    if (!schur.between(static_cast<int>(p)).isZero(0.0))
+      for (double& x : inverse.between(static_cast<int>(p)).reshaped()) x = number();
+  if (next != blocks.size()) refuse(graph_.self, "receives an inverse of another size");
+  return inverse;
 }
 
 double TreeFront::cost(std::span<const SE3> poses) const {
   double cost = 0.0;
-  for (std::size_t k = 0; k < edges_.size(); ++k) {
+  for (std::size_t k = 0; k < places_.size(); ++k) {
     if (weights_[k] < kRejected) continue;
-    const Edge& e = edges_[k];
-    const double r = residual_of(graph_.edges[k], poses[static_cast<std::size_t>(e.measured.i)],
-                                 poses[static_cast<std::size_t>(e.measured.j)]);
+    const Place& p = places_[k];
+    const double r = residual_of(graph_.edges[k], pose_of(p.i, p, poses), pose_of(p.j, p, poses));
     cost += weights_[k] * r * r;
-  }
-  for (std::size_t k = 0; k < graph_.held.size(); ++k) {
-    const HeldEdge& h = graph_.held[k];
-    const double w = weights_[edges_.size() + k];
-    const SE3& own = poses[h.edge.end_on(graph_.self).index];
-    const bool from_own = h.edge.from.robot == graph_.self;
-    const double r =
-        residual_of(h.edge, from_own ? own : h.T_world_other, from_own ? h.T_world_other : own);
-    if (w >= kRejected) cost += w * r * r;
   }
   if (block() == 6)
     for (const VerticalPrior& v : graph_.verticals)
-      cost += model_vertical(v, poses[static_cast<std::size_t>(v.pose)].linear(),
-                             Curvature::kGaussNewton)
-                  .cost;
+      cost += model_vertical(v, poses[at(v.pose)].linear(), Curvature::kGaussNewton).cost;
   return cost;
 }
 

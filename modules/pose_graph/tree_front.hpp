@@ -13,19 +13,13 @@
 
 namespace km {
 
-/// An edge from a pose of this robot to a held pose.
-struct HeldEdge {
-  PoseEdge edge;
-  SE3 T_world_other = SE3::Identity();
-};
-
 /// The contribution of one robot to the equations of its team.
 struct FrontGraph {
   RobotId self = 0;
   Eigen::Index poses = 0;
-  int dimension = 3;                 ///< 2: poses and measurements are planar.
-  std::vector<PoseEdge> edges = {};  ///< Edges with at least one end on this robot.
-  std::vector<HeldEdge> held = {};
+  int dimension = 3;                    ///< 2: poses and measurements are planar.
+  std::vector<PoseEdge> edges = {};     ///< Edges with at least one end on this robot.
+  std::map<KeyframeId, SE3> held = {};  ///< Poses of other robots that do not move.
   std::vector<VerticalPrior> verticals = {};
   /// Own poses that may be sent to other robots.
   std::set<KeyframeIndex> open = {};
@@ -42,12 +36,14 @@ struct FrontGraph {
 /// complements of its children to its own equations. It eliminates the poses that no robot outside
 /// its subtree uses, and sends the remaining system to its parent. A robot may also leave public
 /// poses to its parent if their elimination would add more couplings than it removes. It then sends
-/// the edges between them as edges (ToldEdge). All other poses reach other robots only as their
+/// the edges between them as edges (SentEdge). All other poses reach other robots only as their
 /// Schur complement on the poses sent, never directly.
 ///
 /// Nodes are the own poses in order, then poses of other robots on which own edges end, then poses
 /// that only systems of children contain. The first two groups are "followed": this robot knows
-/// their values. Not thread-safe.
+/// their values. Held poses are not nodes.
+///
+/// Rows of the nodes below are a matrix with 3 or 6 rows per node. Not thread-safe.
 class TreeFront {
  public:
   /// Throws std::invalid_argument if an edge names an unknown pose or has no usable precision.
@@ -55,15 +51,17 @@ class TreeFront {
 
   /// Number of followed nodes: own poses, and poses on which own edges end.
   [[nodiscard]] std::size_t followed() const { return followed_; }
+  [[nodiscard]] std::size_t nodes() const { return ids_.size(); }
   [[nodiscard]] const KeyframeId& id(std::size_t node) const { return ids_[node]; }
   [[nodiscard]] std::size_t node_of(const KeyframeId& id) const;
   [[nodiscard]] const FrontGraph& graph() const { return graph_; }
   [[nodiscard]] Eigen::Index block() const { return graph_.dimension == 2 ? 3 : 6; }
 
-  /// Sets the weights in [0, 1] of the edges, then of the held edges.
+  /// Sets the weights in [0, 1] of the edges.
   void weigh(const std::vector<double>& weights);
-  /// True if the present weights would change the second derivatives much.
-  [[nodiscard]] bool stale() const;
+  /// True if the present weights change the second derivatives of an edge by a factor of `ratio` or
+  /// more. With the default, old second derivatives mislead a step.
+  [[nodiscard]] bool stale(double ratio = 2.0) const;
 
   /// Adds or replaces the system of a child. Throws std::invalid_argument if it does not fit.
   void set_child(RobotId child, TreeSystem system);
@@ -77,18 +75,17 @@ class TreeFront {
   [[nodiscard]] bool changed() const { return changed_; }
 
   /// The system left to the parent, after factorise().
-  [[nodiscard]] TreeSystem told_system(std::span<const SE3> poses);
-  /// Weights of edges in told_ that have changed much since they were last sent. The call counts as
+  [[nodiscard]] TreeSystem system_for_parent(std::span<const SE3> poses);
+  /// Weights of edges in sent_ that have changed much since they were last sent. The call counts as
   /// sending them.
-  [[nodiscard]] std::vector<UpLetter::NewWeight> told_weights();
+  [[nodiscard]] std::vector<UpLetter::NewWeight> changed_weights();
 
   /// Forward substitution of own gradients at `poses` and of the right-hand sides of the children.
-  /// Throws std::invalid_argument if the size of a right-hand side differs from its system.
-  void reduce(std::span<const SE3> poses, const std::map<RobotId, Eigen::VectorXd>& children);
+  void reduce(std::span<const SE3> poses, const std::map<RobotId, Eigen::MatrixXd>& children);
   /// Reduced right-hand side of the poses left to the parent.
-  [[nodiscard]] Eigen::VectorXd reduced() const;
+  [[nodiscard]] Eigen::VectorXd reduced() const { return kept_rows(forwarded_); }
   /// Squared norm of the rows of the eliminated poses.
-  [[nodiscard]] double decrement() const { return decrement_; }
+  [[nodiscard]] double decrement() const { return gram_of_eliminated(forwarded_)(0, 0); }
 
   /// At the root: the step of the remaining poses (none, or one), and its part of the decrement.
   struct RootStep {
@@ -102,55 +99,95 @@ class TreeFront {
   /// The part of a child in `steps`.
   [[nodiscard]] Eigen::VectorXd step_of_child(RobotId child, const Eigen::MatrixXd& steps) const;
 
-  /// Cost of own weighted edges, held edges and verticals.
+  /// Forward substitution of `rows` plus the rows of the children. Throws std::invalid_argument if
+  /// the size of the rows of a child differs from its system.
+  [[nodiscard]] Eigen::MatrixXd forward(Eigen::MatrixXd rows,
+                                        const std::map<RobotId, Eigen::MatrixXd>& children) const;
+  /// Back substitution of the result of forward(), given the solution at the poses left to the
+  /// parent. Throws std::invalid_argument if `kept` has another size.
+  [[nodiscard]] Eigen::MatrixXd backward(Eigen::MatrixXd forwarded,
+                                         const Eigen::MatrixXd& kept) const;
+  /// Rows of the poses left to the parent.
+  [[nodiscard]] Eigen::MatrixXd kept_rows(const Eigen::MatrixXd& rows) const;
+  [[nodiscard]] Eigen::MatrixXd rows_of_child(RobotId child, const Eigen::MatrixXd& rows) const;
+  /// X^T X, where X are the rows of the eliminated poses.
+  [[nodiscard]] Eigen::MatrixXd gram_of_eliminated(const Eigen::MatrixXd& rows) const;
+
+  /// Blocks of the inverse of the second derivatives of the team, at all nodes and at the couplings
+  /// of the front. `kept` are those of the poses left to the parent, in the order of the system.
+  [[nodiscard]] BlockMatrix inverse(const BlockMatrix& kept) const;
+  /// At the root: the inverse at the remaining pose, which has a fixed position.
+  [[nodiscard]] BlockMatrix inverse_of_root(bool upright) const;
+  /// The part of a child in the result of inverse(), see TreeInverse::blocks.
+  [[nodiscard]] std::vector<float> inverse_of_child(RobotId child,
+                                                    const BlockMatrix& inverse) const;
+  /// The inverse at the poses left to the parent, from TreeInverse::blocks. Throws
+  /// std::invalid_argument if `blocks` has another size.
+  [[nodiscard]] BlockMatrix inverse_from_parent(std::span<const float> blocks) const;
+
+  /// Cost of own weighted edges and verticals.
   [[nodiscard]] double cost(std::span<const SE3> poses) const;
 
  private:
-  struct Edge {  // between nodes
-    BlockEdge measured;
+  // The place of an edge of the graph in the equations.
+  struct Place {
+    int i = 0;  // node of `from`; -1: a held pose
+    int j = 0;  // node of `to`
     int pair = -1;
     bool transposed = false;
-    int told = -1;  // place in told_ if both ends are left to the parent
+    int sent = -1;  // place in sent_ if both ends are left to the parent
+    SE3 T_held = SE3::Identity();
   };
   struct Child {
     TreeSystem system;
     std::vector<int> node = {};  // node of each of its variables
     std::vector<int> pair = {};  // pair in the plan of each of its pairs
     std::vector<bool> transposed = {};
-    std::vector<int> told = {};  // place in told_ of each of its edges, or -1
+    std::vector<int> sent = {};  // place in sent_ of each of its edges, or -1
   };
-  struct ToldWeight {
+  struct SentWeight {
     RobotId child = 0;  // this robot for an own edge
     std::size_t edge = 0;
-    float told = 0.0F;
+    float sent = 0.0F;
   };
 
   int add_node(const KeyframeId& id);
+  [[nodiscard]] Place place_of(const PoseEdge& edge);
+  [[nodiscard]] const SE3& pose_of(int node, const Place& place, std::span<const SE3> poses) const;
   void plan();
-  [[nodiscard]] std::vector<bool> incomplete() const;
-  void list_told_edges();
+  void place_pairs(const std::vector<NodePair>& pairs);
+  [[nodiscard]] std::vector<bool> kept_nodes(const std::vector<NodePair>& pairs) const;
+  [[nodiscard]] std::vector<TreeVariable> variables() const;
+  void list_sent_edges();
+  [[nodiscard]] SentEdge sent_edge(const SentWeight& sent, std::span<const SE3> poses,
+                                   const std::vector<NodePair>& pairs) const;
   void add_child(const Child& child, BlockMatrix& A) const;
-  void add_slopes(std::span<const SE3> poses, Eigen::MatrixXd& C) const;
-  [[nodiscard]] float weight_of(const ToldWeight& told) const;
+  [[nodiscard]] Eigen::MatrixXd slopes(std::span<const SE3> poses) const;
+  [[nodiscard]] float weight_of(const SentWeight& sent) const;
   template <int kBlock>
   void add_own(std::span<const SE3> poses, Curvature curvature, BlockMatrix& A) const;
+  // Directions in which the remaining pose of the root may turn, and their stiffness.
+  struct Tilts {
+    Eigen::Matrix<double, 3, 2> directions;
+    Eigen::Vector2d stiffness;
+  };
+  [[nodiscard]] std::optional<Tilts> tilts_of_root(bool upright) const;
 
   FrontGraph graph_;
   std::vector<KeyframeId> ids_;
   std::map<KeyframeId, int> foreign_;  // nodes of poses of other robots
   std::size_t followed_ = 0;
-  std::vector<Edge> edges_;
-  std::vector<double> weights_;             // weights of edges_, then of held edges
-  std::vector<double> linearised_weights_;  // weights of edges that are not in told_
+  std::vector<Place> places_;               // of the edges of the graph
+  std::vector<double> weights_;             // of the edges of the graph
+  std::vector<double> linearised_weights_;  // weights of edges that are not in sent_
   std::map<RobotId, Child> children_;
   std::shared_ptr<const EliminationPlan> plan_;
   std::optional<FrontalCholesky> factor_;
   BlockMatrix own_;
   Curvature curvature_ = Curvature::kGaussNewton;
-  std::vector<ToldWeight> told_;
+  std::vector<SentWeight> sent_;
   bool changed_ = true;
   Eigen::MatrixXd forwarded_;
-  double decrement_ = 0.0;
 };
 
 /// The step of one pose, of 3 or 6 entries, as a tangent vector of SE(3): planar steps are

@@ -28,6 +28,13 @@ class LetterWriter : public ByteWriter {
   void doubles(const auto& values) {
     for (Index k = 0; k < values.size(); ++k) f64(values.reshaped()(k));
   }
+  void inverse(const TreeInverse& inverse) {
+    varint(inverse.blocks.size());
+    for (const float x : inverse.blocks) f32(x);
+    varint(static_cast<std::uint64_t>(inverse.with_frame.rows()));
+    for (const double x : inverse.with_frame.reshaped()) f32(static_cast<float>(x));
+    doubles(inverse.of_frame);
+  }
 };
 
 class LetterReader : public ByteReader {
@@ -63,6 +70,15 @@ class LetterReader : public ByteReader {
     for (float& x : T.t) x = small_number();
     if (std::abs(T.q.norm() - 1.0F) > 1e-3F) fail();
     return T;
+  }
+  TreeInverse inverse() {
+    TreeInverse inverse;
+    inverse.blocks.resize(count(kMaxElements, sizeof(float)));
+    for (float& x : inverse.blocks) x = small_number();
+    inverse.with_frame.resize(static_cast<Index>(count(kMaxElements, 6 * sizeof(float))), 6);
+    for (double& x : inverse.with_frame.reshaped()) x = static_cast<double>(small_number());
+    for (double& x : inverse.of_frame.reshaped()) x = number();
+    return inverse;
   }
   Eigen::VectorXd doubles() {
     Eigen::VectorXd values(static_cast<Index>(count(kMaxElements, sizeof(double))));
@@ -170,7 +186,7 @@ void write(LetterWriter& w, const TreeSystem& system) {
   for (std::size_t p = 0; p < system.pairs.size(); ++p)
     if (present[n + p]) w.doubles(system.schur.between(static_cast<int>(p)));
   w.varint(system.edges.size());
-  for (const ToldEdge& e : system.edges) {
+  for (const SentEdge& e : system.edges) {
     const bool full = e.curvature == Curvature::kFull;
     w.varint(4 * static_cast<std::uint64_t>(e.pair) + (e.transposed ? 2U : 0U) + (full ? 1U : 0U));
     w.f32(e.kappa);
@@ -211,7 +227,7 @@ void read_blocks(LetterReader& r, TreeSystem& system, Index B) {
 
 void read_edges(LetterReader& r, TreeSystem& system) {
   for (std::size_t n = r.count(kMaxElements, 41); n > 0; --n) {
-    ToldEdge e;
+    SentEdge e;
     const std::uint64_t code = r.varint();
     if (code / 4 >= system.pairs.size()) {
       r.fail();
@@ -256,11 +272,11 @@ std::optional<TreeSystem> read_system(LetterReader& r) {
 
 }  // namespace
 
-EdgeModel ToldEdge::model() const {
-  const BlockEdge edge{0, 1, curvature == Curvature::kFull ? measured.pose() : present.pose(),
-                       static_cast<double>(weight) * static_cast<double>(kappa),
-                       static_cast<double>(weight) * static_cast<double>(tau)};
-  return model_edge(edge, SE3::Identity(), present.pose(), curvature);
+EdgeModel SentEdge::model() const {
+  const SE3 T_i_j = curvature == Curvature::kFull ? measured.pose() : present.pose();
+  const auto w = static_cast<double>(weight);
+  const Precision precision{w * static_cast<double>(kappa), w * static_cast<double>(tau)};
+  return model_edge(T_i_j, precision, SE3::Identity(), present.pose(), curvature);
 }
 
 void TreeSums::add(const TreeSums& other) {
@@ -302,6 +318,9 @@ std::vector<std::uint8_t> encode(const UpLetter& letter) {
     w.varint(edge);
     w.f32(weight);
   }
+  w.varint(static_cast<std::uint64_t>(letter.frame.rows()));
+  w.doubles(letter.frame);
+  if (letter.frame.rows() > 0) w.doubles(letter.frame_gram);
   return w.release();
 }
 
@@ -317,6 +336,10 @@ std::optional<UpLetter> decode_up(std::span<const std::uint8_t> bytes) {
     const auto edge = r.varint_as<std::uint32_t>();
     letter.weights.push_back({edge, r.weight()});
   }
+  letter.frame.resize(static_cast<Index>(r.count(kMaxElements, 6 * sizeof(double))), 6);
+  for (double& x : letter.frame.reshaped()) x = r.number();
+  if (letter.frame.rows() > 0)
+    for (double& x : letter.frame_gram.reshaped()) x = r.number();
   return r.done() ? std::optional(std::move(letter)) : std::nullopt;
 }
 
@@ -340,6 +363,8 @@ std::vector<std::uint8_t> encode(const DownLetter& letter) {
   }
   w.varint(static_cast<std::uint64_t>(letter.step.size()));
   w.doubles(letter.step);
+  w.u8(letter.inverse ? 1 : 0);
+  if (letter.inverse) w.inverse(*letter.inverse);
   return w.release();
 }
 
@@ -372,6 +397,7 @@ std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes) {
     v.moves.emplace_back(robot, r.single());
   }
   letter.step = r.doubles();
+  if (r.flag()) letter.inverse = r.inverse();
   return r.done() ? std::optional(std::move(letter)) : std::nullopt;
 }
 

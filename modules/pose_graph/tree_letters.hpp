@@ -19,7 +19,7 @@ namespace km {
 /// An edge between two poses that are both left to the parent. It is sent as an edge instead of its
 /// second derivatives, which takes a seventh of the bytes. Single precision does no harm to soft
 /// modes: a rounded edge still has zero cost along rigid motions of the whole.
-struct ToldEdge {
+struct SentEdge {
   int pair = 0;             ///< The coupling of the system to which it adds.
   bool transposed = false;  ///< It leads from the second pose of `pair` to the first.
   Curvature curvature = Curvature::kGaussNewton;
@@ -45,7 +45,19 @@ struct TreeSystem {
   std::vector<TreeVariable> variables = {};
   std::vector<NodePair> pairs = {};  ///< Coupled variables, as places in `variables`.
   BlockMatrix schur = {};            ///< Schur complement without `edges`.
-  std::vector<ToldEdge> edges = {};
+  std::vector<SentEdge> edges = {};
+};
+
+/// The inverse of the second derivatives of the team at the variables of a TreeSystem, in single
+/// precision.
+struct TreeInverse {
+  /// Lower triangles of the diagonal blocks, then the couplings that are not zero in the Schur
+  /// complement of the system, all column by column.
+  std::vector<float> blocks = {};
+  /// Six columns with 3 or 6 rows per variable, and the 6x6 matrix of the frame, see FrameMotion.
+  /// Empty if held poses fix the frame.
+  Eigen::MatrixXd with_frame = {};
+  Matrix6 of_frame = Matrix6::Zero();
 };
 
 /// Two robots, and the closures between them.
@@ -88,6 +100,10 @@ struct UpLetter {
     float weight = 0.0F;
   };
   std::vector<NewWeight> weights = {};
+  /// After kInverse: right-hand sides for the motion of the frame, see FrameMotion. Six columns,
+  /// reduced as `reduced`; empty if the origin is not in this subtree.
+  Eigen::MatrixXd frame = {};
+  Matrix6 frame_gram = Matrix6::Zero();  ///< X^T X of the rows of `frame` that are eliminated.
 };
 
 /// Decision of the root on a round.
@@ -98,7 +114,8 @@ struct TreeVerdict {
     kRefresh,  ///< Return to the accepted poses, with new second derivatives.
     kStart,    ///< At the beginning: set the weights and send the equations.
     kCount,    ///< Before kStart: defer closures that stand alone, count again.
-    kDone,     ///< The new poses are accepted; this was the last round.
+    kInverse,  ///< The new poses are accepted and final. Prepare the covariances.
+    kDone,     ///< The new poses are accepted, unless they are already; nothing follows.
     kStop,     ///< The new poses are not accepted; the accepted ones are the result.
   };
   enum class Weighing : std::uint8_t { kAllIn, kWeigh, kHold, kDecided };
@@ -130,7 +147,8 @@ struct TreeVerdict {
 /// From a robot to a child, once per round.
 struct DownLetter {
   TreeVerdict verdict;
-  Eigen::VectorXd step = {};  ///< Step of the variables of the child; kStep only.
+  Eigen::VectorXd step = {};                ///< Step of the variables of the child; kStep only.
+  std::optional<TreeInverse> inverse = {};  ///< For the variables of the child; kDone only.
 };
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const UpLetter& letter);

@@ -8,6 +8,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_cover.hpp"
 #include "modules/pose_graph/corroboration.hpp"
+#include "modules/pose_graph/frame_motion.hpp"
 
 namespace km {
 namespace {
@@ -23,6 +24,8 @@ using Weighing = TreeVerdict::Weighing;
 constexpr double kFloor = 1e-10;
 // Weight of a rejected step of odometry, so that the trajectory stays connected.
 constexpr double kJoint = 1e-6;
+// Weights with a smaller ratio give nearly equal covariances.
+constexpr double kSameWeight = 1.1;
 // Largest distance of a pose from the origin; beyond it, single precision overflows.
 constexpr double kOutOfTheWorld_m = 1e15;
 // kStrongest: largest strength of a pair while closures are weighed, relative to the usual pair, so
@@ -123,7 +126,7 @@ void TreeNewton::weigh_by_noise() {
         closures.push_back(known_[k].edge);
     PairCycles& cycles = graph_.noise.pairs[peer];
     Corroboration(closures, pose, graph_.step_precision, options_.dimension).count_cycles(cycles);
-    cycles.factor = estimate_closure_noise(cycles, told_.noise_scale) / told_.noise_scale;
+    cycles.factor = estimate_closure_noise(cycles, verdict_.noise_scale) / verdict_.noise_scale;
     const double weaker = 1.0 / (cycles.factor * cycles.factor);
     for (const std::size_t k : places) {
       known_[k].edge.precision.kappa *= weaker;
@@ -148,7 +151,7 @@ void TreeNewton::find_isolated(double barc) {
     for (std::size_t k = 0; k < open.size() && alone > kFewIsolated; ++k) {
       Known& known = known_[open[k]];
       const bool fits =
-          residual_of(known.edge, pose(known.edge.from), pose(known.edge.to)) <= told_.barc;
+          residual_of(known.edge, pose(known.edge.from), pose(known.edge.to)) <= verdict_.barc;
       known.aside = isolated[k] && known.trust == Trust::kOpen && !fits;
     }
   }
@@ -191,8 +194,8 @@ std::map<RobotId, double> TreeNewton::shares_of_pairs() const {
   }
   std::map<RobotId, double> shares;
   for (const auto& [robot, sum] : sums)
-    shares[robot] = std::min(1.0, kStrongest * std::min(told_.usual_pair.kappa / sum.kappa,
-                                                        told_.usual_pair.tau / sum.tau));
+    shares[robot] = std::min(1.0, kStrongest * std::min(verdict_.usual_pair.kappa / sum.kappa,
+                                                        verdict_.usual_pair.tau / sum.tau));
   return shares;
 }
 
@@ -203,7 +206,7 @@ void TreeNewton::build_front() {
                    .dimension = options_.dimension,
                    .verticals = graph_.verticals,
                    .root = !place_.parent.has_value(),
-                   .free = told_.free};
+                   .free = verdict_.free};
   share_closures(front.touched_by);
   front_edge_.clear();
   for (std::size_t k = 0; k < known_.size(); ++k) {
@@ -215,7 +218,9 @@ void TreeNewton::build_front() {
   for (const PoseEdge& e : graph_.to_absent) {
     const auto decided = graph_.decided.find(e.id());
     const bool rejected = decided != graph_.decided.end() && !decided->second;
-    if (!rejected || !options_.robust) front.held.push_back({e, start_of(e.other(graph_.self))});
+    if (rejected && options_.robust) continue;
+    front.edges.push_back(e);
+    front.held[e.other(graph_.self)] = start_of(e.other(graph_.self));
   }
   for (const PoseEdge& e : graph_.between) front.open.insert(e.end_on(graph_.self).index);
   if (options_.tell_private)
@@ -235,7 +240,7 @@ std::vector<double> TreeNewton::front_weights(bool candidate) const {
         candidate ? known.candidate * known.candidate_share : known.weight * known.share;
     weights.push_back(known.trust == Trust::kOpen ? std::max(weight, kFloor) : weight);
   }
-  weights.resize(weights.size() + front_->graph().held.size(), 1.0);
+  weights.resize(front_->graph().edges.size(), 1.0);  // edges to held poses
   return weights;
 }
 
@@ -316,8 +321,8 @@ const SE3& TreeNewton::pose_at(const KeyframeId& id, const std::vector<SE3>& pos
 // all weights are decided they stay, and weights that would be decided differently here count as
 // changed.
 void TreeNewton::weigh_candidates(TreeSums& sums) {
-  const double c2 = told_.barc * told_.barc;
-  const bool decided = told_.weighing == Weighing::kDecided;
+  const double c2 = verdict_.barc * verdict_.barc;
+  const bool decided = verdict_.weighing == Weighing::kDecided;
   for (const std::size_t k : front_edge_) {
     Known& known = known_[k];
     known.candidate = known.weight;
@@ -326,8 +331,8 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
                                  pose_at(known.edge.to, at_hand_));
     const double least = known.odometry ? kJoint : 0.0;
     const double weight =
-        std::max(least, robust_weight(r * r, c2, decided ? kLargestMu : told_.mu));
-    if (told_.weighing == Weighing::kWeigh) known.candidate = weight;
+        std::max(least, robust_weight(r * r, c2, decided ? kLargestMu : verdict_.mu));
+    if (verdict_.weighing == Weighing::kWeigh) known.candidate = weight;
     ++sums.open;
     sums.largest = std::max(sums.largest, static_cast<float>(r));
     if ((decided ? weight : known.candidate) != known.weight) ++sums.changed;
@@ -374,7 +379,7 @@ std::set<RobotId> TreeNewton::torn_pairs() const {
   std::set<RobotId> torn;
   for (const auto& [robot, pull] : pulls) {
     const double most = std::max(kTorn, kTornOfOne * std::sqrt(pull.closures));
-    if (pull.sum.norm() > most * told_.noise_scale * std::sqrt(pull.weight)) torn.insert(robot);
+    if (pull.sum.norm() > most * verdict_.noise_scale * std::sqrt(pull.weight)) torn.insert(robot);
   }
   return torn;
 }
@@ -387,21 +392,21 @@ UpLetter TreeNewton::equations() {
   weigh_candidates(letter.sums);
   front_->weigh(front_weights(true));
   if (refresh_ || front_->stale())
-    front_->linearise(at_hand_, told_.full ? Curvature::kFull : Curvature::kGaussNewton);
+    front_->linearise(at_hand_, verdict_.full ? Curvature::kFull : Curvature::kGaussNewton);
   refresh_ = false;
-  std::map<RobotId, VectorXd> reduced;
+  std::map<RobotId, MatrixXd> reduced;
   for (auto& [child, up] : ups_) reduced[child] = std::move(up.reduced);
   if (front_->changed()) {
     bool positive = front_->factorise();
-    if (!positive && told_.full && place_.parent) {
+    if (!positive && verdict_.full && place_.parent) {
       front_->linearise(at_hand_, Curvature::kGaussNewton);
       positive = front_->factorise();
     }
     factorised_ = positive;
     letter.failed = !positive && place_.parent.has_value();
-    if (positive && place_.parent) letter.system = front_->told_system(at_hand_);
+    if (positive && place_.parent) letter.system = front_->system_for_parent(at_hand_);
   } else {
-    letter.weights = front_->told_weights();
+    letter.weights = front_->changed_weights();
   }
   if (!factorised_) return letter;
   front_->reduce(at_hand_, reduced);
@@ -438,10 +443,11 @@ bool TreeNewton::can_follow(const DownLetter& letter) const {
     case Next::kStart:
       return !front_;
     case Next::kStep:
-      return front_ && letter.step.size() == told_rows_;
+      return front_ && letter.step.size() == sent_rows_;
     case Next::kShorten:
       return front_ && step_.size() > 0;
     case Next::kRefresh:
+    case Next::kInverse:
     case Next::kDone:
       return front_.has_value();
     case Next::kStop:
@@ -466,6 +472,7 @@ std::vector<SolverLetter> TreeNewton::advance() {
 
 std::vector<SolverLetter> TreeNewton::go_up() {
   UpLetter letter;
+  const bool inverting = verdict_.next == Next::kInverse;
   bool failed =
       std::any_of(ups_.begin(), ups_.end(), [](const auto& up) { return up.second.failed; });
   if (!failed) {
@@ -474,7 +481,7 @@ std::vector<SolverLetter> TreeNewton::go_up() {
         if (up.system) front_->set_child(child, std::move(*up.system));
         if (front_) front_->reweigh_child(child, up.weights);
       }
-      letter = front_ ? equations() : first_letter();
+      letter = inverting ? prepare_inverse() : front_ ? equations() : first_letter();
     } catch (const std::exception&) {
       failed = true;  // the message of a child does not fit
     }
@@ -483,13 +490,14 @@ std::vector<SolverLetter> TreeNewton::go_up() {
   letter.round = round_;
   letter.failed = letter.failed || failed;
   ups_.clear();
-  told_rows_ = letter.failed ? -1 : letter.reduced.size();
+  sent_rows_ = letter.failed ? -1 : letter.reduced.size();
   if (place_.parent) {
     phase_ = Phase::kDown;
     return {letter_to(*place_.parent, encode(letter))};
   }
+  if (inverting) return conclude(letter);
   // Full second derivatives may become indefinite when those of several robots are added.
-  if (letter.failed && told_.full) return go_down(root_->retreat(round_));
+  if (letter.failed && verdict_.full) return go_down(root_->retreat(round_));
   state_.failed = letter.failed;
   if (letter.failed) return go_down(root_->stop(round_));
   if (!front_) return go_down(root_->decide_start(letter.sums, round_));
@@ -531,7 +539,8 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
         throw std::runtime_error("TreeNewton: a step that leads out of the world");
     }
   };
-  told_ = v;
+  const bool inverted = verdict_.next == Next::kInverse;  // that pass was not a round
+  verdict_ = v;
   if (!front_) {
     weigh_by_noise();
     move_robots(v.moves);
@@ -558,8 +567,12 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
       at_hand_ = base_;
       refresh_ = true;
       break;
+    case Next::kInverse:
+      accept();
+      break;
     case Next::kDone:
       accept();
+      if (letter.inverse) take_inverse(*letter.inverse);
       finish();
       break;
     case Next::kStop:
@@ -567,7 +580,7 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
       break;
   }
   const bool set_aside = state_.set_aside || (v.next == Next::kStart && v.set_aside);
-  state_ = {.round = round_ + 1,
+  state_ = {.round = inverted ? state_.round : round_ + 1,
             .cost = v.cost,
             .gradient = v.gradient,
             .noise_scale = v.noise_scale,
@@ -578,9 +591,91 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
   if (!done()) phase_ = Phase::kUp;
   ++round_;
   std::vector<SolverLetter> letters;
-  for (const RobotId child : place_.children)
-    letters.push_back(letter_to(child, encode(DownLetter{v, step_of_child[child]})));
+  for (const RobotId child : place_.children) {
+    DownLetter down{v, step_of_child[child]};
+    if (const auto inverse = inverse_of_child_.find(child); inverse != inverse_of_child_.end())
+      down.inverse = std::move(inverse->second);
+    letters.push_back(letter_to(child, encode(down)));
+  }
   return letters;
+}
+
+// Weights of the last second derivatives may differ by a factor of two from the final ones.
+UpLetter TreeNewton::prepare_inverse() {
+  UpLetter letter{.round = round_, .sums = {}};
+  front_->weigh(front_weights(false));
+  if (front_->stale(kSameWeight)) front_->linearise(base_, Curvature::kGaussNewton);
+  if (front_->changed()) {
+    letter.failed = !front_->factorise();
+    if (!letter.failed && place_.parent) letter.system = front_->system_for_parent(base_);
+  } else {
+    letter.weights = front_->changed_weights();
+  }
+  if (letter.failed || !verdict_.free) return letter;
+  const Index B = front_->block();
+  frame_ = MatrixXd::Zero(B * static_cast<Index>(front_->nodes()), 6);
+  const bool here = graph_.origin.robot == graph_.self && graph_.origin.index < accepted_.size();
+  if (here)
+    frame_.middleRows(B * graph_.origin.index, B) =
+        frame_motion(accepted_[graph_.origin.index], graph_.upright)
+            .middleCols(B == 3 ? 2 : 0, B)
+            .transpose();
+  std::map<RobotId, MatrixXd> children;
+  for (auto& [child, up] : ups_) {
+    if (up.frame.rows() == 0) continue;
+    children[child] = std::move(up.frame);
+    letter.frame_gram += up.frame_gram;
+  }
+  if (!here && children.empty()) return letter;
+  frame_ = front_->forward(std::move(frame_), children);
+  letter.frame = front_->kept_rows(frame_);
+  letter.frame_gram += front_->gram_of_eliminated(frame_);
+  return letter;
+}
+
+// At the root, after the pass up for the covariances. Without them, the poses are final as well.
+std::vector<SolverLetter> TreeNewton::conclude(const UpLetter& letter) {
+  DownLetter down = root_->conclude(round_);
+  if (letter.failed) return go_down(down);
+  const BlockMatrix kept = front_->inverse_of_root(graph_.upright);
+  // Without an origin, covariances are relative to the remaining pose.
+  MatrixXd with_frame = MatrixXd::Zero(kept.diagonal.cols(), 6);
+  Matrix6 of_frame = letter.frame_gram;
+  if (letter.frame.rows() > 0) {
+    with_frame = kept.diagonal * letter.frame;
+    of_frame += letter.frame.transpose() * with_frame;
+  }
+  take_inverse(kept, with_frame, of_frame);
+  return go_down(down);
+}
+
+void TreeNewton::take_inverse(const TreeInverse& inverse) {
+  try {
+    take_inverse(front_->inverse_from_parent(inverse.blocks), inverse.with_frame, inverse.of_frame);
+  } catch (const std::invalid_argument&) {
+    covariances_.clear();  // the message of the parent does not fit, but the poses are final
+  }
+}
+
+// The cost is chi-squared distributed, so the covariance is twice the inverse of its second
+// derivatives. Closures that are noisier than they claim widen it.
+void TreeNewton::take_inverse(const BlockMatrix& kept, const MatrixXd& with_frame,
+                              const Matrix6& of_frame) {
+  const BlockMatrix inverse = front_->inverse(kept);
+  const MatrixXd X = verdict_.free ? front_->backward(frame_, with_frame) : MatrixXd();
+  const Index B = front_->block(), first = B == 3 ? 2 : 0;
+  const double scale = 2.0 * std::max(1.0, verdict_.noise_scale * verdict_.noise_scale);
+  covariances_.clear();
+  for (std::size_t k = 0; k < accepted_.size(); ++k) {
+    Matrix6 P = Matrix6::Zero(), P_frame = Matrix6::Zero();
+    P.block(first, first, B, B) = inverse.at(static_cast<int>(k));
+    if (verdict_.free) P_frame.middleRows(first, B) = X.middleRows(B * static_cast<Index>(k), B);
+    covariances_.push_back(scale * relative_to_origin(P, P_frame, of_frame, accepted_[k]));
+  }
+  for (const RobotId child : place_.children)
+    inverse_of_child_[child] = {front_->inverse_of_child(child, inverse),
+                                verdict_.free ? front_->rows_of_child(child, X) : MatrixXd(0, 6),
+                                of_frame};
 }
 
 // Releases the factors, which take most of the memory of a robot; this object exists until the next
@@ -592,7 +687,7 @@ void TreeNewton::finish() {
 
 ClosureVerdicts TreeNewton::verdicts() const {
   ClosureVerdicts verdicts;
-  if (!options_.robust || told_.weighing != Weighing::kDecided) return verdicts;
+  if (!options_.robust || verdict_.weighing != Weighing::kDecided) return verdicts;
   for (const Known& k : known_) {
     if (k.odometry || graph_.trusted.contains(k.edge.id())) continue;
     const bool tells = takes_part(k) ? k.own : speaks_for(k);

@@ -37,6 +37,9 @@ namespace km {
 /// Exactly one of two robots weighs a closure between them. One end of each closure is chosen by a
 /// vertex cover per pair, equal on both robots. The robot of the other end has the closure among
 /// its own edges; the system up the tree contains the chosen pose.
+///
+/// At the end, one more pass up and down computes the covariances of all poses: the blocks of the
+/// inverse of the second derivatives that each front needs, from the root down the tree.
 class TreeNewton final : public MemberSolver {
  public:
   /// Throws std::invalid_argument if an edge is not usable or a public pose is missing.
@@ -47,6 +50,7 @@ class TreeNewton final : public MemberSolver {
   [[nodiscard]] std::vector<SolverLetter> advance() override;
   [[nodiscard]] bool done() const override { return phase_ == Phase::kDone; }
   [[nodiscard]] const std::vector<SE3>& poses() const override { return accepted_; }
+  [[nodiscard]] std::vector<Matrix6> covariances() const override { return covariances_; }
   [[nodiscard]] SolverState state() const override { return state_; }
   [[nodiscard]] ClosureVerdicts verdicts() const override;
   [[nodiscard]] ClosureNoiseRecord noise() const override { return graph_.noise; }
@@ -97,6 +101,11 @@ class TreeNewton final : public MemberSolver {
                  std::map<RobotId, Eigen::VectorXd>& children);
   void accept();
   void finish();
+  [[nodiscard]] UpLetter prepare_inverse();
+  [[nodiscard]] std::vector<SolverLetter> conclude(const UpLetter& letter);
+  void take_inverse(const TreeInverse& inverse);
+  void take_inverse(const BlockMatrix& kept, const Eigen::MatrixXd& with_frame,
+                    const Matrix6& of_frame);
 
   SessionGraph graph_;
   TreePlace place_;
@@ -108,18 +117,21 @@ class TreeNewton final : public MemberSolver {
   Phase phase_ = Phase::kUp;
   std::uint32_t round_ = 0;
   std::map<RobotId, UpLetter> ups_;  // messages of the children in this round
-  Eigen::Index told_rows_ = 0;       // rows of the message up in this round
+  Eigen::Index sent_rows_ = 0;       // rows of the message up in this round
   std::optional<DownLetter> down_;
   std::vector<SE3> accepted_;  // own poses
   std::vector<SE3> base_;      // accepted followed poses
   std::vector<SE3> at_hand_;   // followed poses after the step
   Eigen::MatrixXd step_;       // step of the followed poses
-  TreeVerdict told_;           // last decision of the root
+  TreeVerdict verdict_;        // last decision of the root
   bool refresh_ = true;
   SolverState state_;
   std::optional<TreeRoot> root_;
   bool factorised_ = true;
   bool noise_known_ = false;  // weigh_by_noise() has been called
+  Eigen::MatrixXd frame_;     // right-hand sides for the motion of the frame, forward-substituted
+  std::map<RobotId, TreeInverse> inverse_of_child_;
+  std::vector<Matrix6> covariances_;
 };
 
 }  // namespace km

@@ -101,6 +101,11 @@ DownLetter TreeRoot::stop(std::uint32_t round) {
   return say(Next::kStop);
 }
 
+DownLetter TreeRoot::conclude(std::uint32_t round) {
+  round_ = round;
+  return say(Next::kDone);
+}
+
 DownLetter TreeRoot::retreat(std::uint32_t round) {
   round_ = round;
   convex_ = true;
@@ -181,7 +186,8 @@ DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   weighing_ = decided              ? Weighing::kDecided
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
-  if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds) return say(Next::kDone);
+  if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds)
+    return say(options_.covariances ? Next::kInverse : Next::kDone);
   if (decided && worth_refreshing(decrement_)) {
     full_ = true;
     convex_ = false;

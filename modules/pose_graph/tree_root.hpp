@@ -23,6 +23,7 @@ struct TreeNewtonOptions {
   bool reject_odometry = false;  ///< Steps of odometry are weighed as well.
   /// Private poses may be sent as well, if that saves bytes.
   bool tell_private = false;
+  bool covariances = true;  ///< The members compute covariances in one more pass at the end.
 };
 
 /// Decisions of the root of the tree in each round, from the sums of the team and from its front,
@@ -44,6 +45,8 @@ class TreeRoot {
   [[nodiscard]] DownLetter retreat(std::uint32_t round);
   /// Ends the session, because the team cannot continue.
   [[nodiscard]] DownLetter stop(std::uint32_t round);
+  /// Ends the session after kInverse.
+  [[nodiscard]] DownLetter conclude(std::uint32_t round);
 
  private:
   [[nodiscard]] DownLetter say(TreeVerdict::Next next) const;

@@ -123,7 +123,7 @@ class Eavesdropper {
       const TreeSystem& system = *up.system;
       systems_[from] = system.variables.size();
       for (const TreeVariable& v : system.variables) named_.insert(v.id);
-      for (const ToldEdge& e : system.edges) {
+      for (const SentEdge& e : system.edges) {
         ++sent_edges_;
         const auto& [i, j] = system.pairs[static_cast<std::size_t>(e.pair)];
         chains_.join(system.variables[static_cast<std::size_t>(i)].id,

@@ -32,6 +32,7 @@ struct TeamProblem {
   std::map<RobotId, std::vector<VerticalPrior>> verticals = {};
   std::set<RobotId> absent = {};  ///< Robots of `start` that have left.
   std::map<ClosureId, bool> decided = {};
+  TeamPoses truth = {};  ///< Empty if unknown.
 
   [[nodiscard]] std::vector<RobotId> members() const {
     std::vector<RobotId> ids;
@@ -117,8 +118,8 @@ struct RandomTeam {
   const auto noisy = [&](const SE3& T, double sigma) {
     return T * se3_exp(Vector6(sigma * random_vector<6>(rng)));
   };
-  TeamPoses truth;
   TeamProblem problem;
+  TeamPoses& truth = problem.truth;
   const Precision precision{0.5 / (team.sigma * team.sigma), 1.0 / (team.sigma * team.sigma)};
   const auto measure = [&](const KeyframeId& from, const KeyframeId& to) {
     const SE3 T = truth.at(from.robot)[from.index].inverse() * truth.at(to.robot)[to.index];
@@ -156,7 +157,8 @@ struct RandomTeam {
 
 /// Input of the solver of `robot` in a session.
 [[nodiscard]] inline SessionGraph session_graph(const TeamProblem& problem, RobotId robot) {
-  SessionGraph graph{.self = robot, .start = problem.start.at(robot)};
+  SessionGraph graph{
+      .self = robot, .start = problem.start.at(robot), .origin = {problem.members().front(), 0}};
   std::map<RobotId, std::pair<Precision, double>> steps;
   for (const PoseEdge& e : problem.edges) {
     const bool starts = e.from.robot == robot, ends = e.to.robot == robot;

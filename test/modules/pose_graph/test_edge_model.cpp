@@ -12,16 +12,17 @@ using Vector12 = Eigen::Matrix<double, 12, 1>;
 using Matrix12 = Eigen::Matrix<double, 12, 12>;
 
 struct Moved {
-  BlockEdge edge;
+  SE3 measured;
+  Precision precision;
   SE3 T_i;
   SE3 T_j;
 
   [[nodiscard]] double cost(const Vector12& xi) const {
     const SE3 i = retract(T_i, xi.head<6>());
     const SE3 j = retract(T_j, xi.tail<6>());
-    return edge.kappa * (j.linear() - i.linear() * edge.T_i_j.linear()).squaredNorm() +
-           edge.tau * (j.translation() - i.translation() - i.linear() * edge.T_i_j.translation())
-                          .squaredNorm();
+    return precision.kappa * (j.linear() - i.linear() * measured.linear()).squaredNorm() +
+           precision.tau * (j.translation() - i.translation() - i.linear() * measured.translation())
+                               .squaredNorm();
   }
 };
 
@@ -29,7 +30,7 @@ Moved random_edge(std::mt19937& rng) {
   const SE3 T_i = random_pose(rng, 2.0);
   const SE3 T_j = random_pose(rng, 2.0);
   SE3 T_i_j = random_pose(rng, 2.0);
-  return {{0, 1, T_i_j, 1.3, 0.7}, T_i, T_j};
+  return {T_i_j, {1.3, 0.7}, T_i, T_j};
 }
 
 Matrix12 hessian_of(const EdgeModel& model) {
@@ -45,7 +46,8 @@ TEST_CASE("gradient and Hessian of an edge agree with finite differences", "[new
   CAPTURE(seed);
   std::mt19937 rng(seed);
   const Moved moved = random_edge(rng);
-  const EdgeModel model = model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kFull);
+  const EdgeModel model =
+      model_edge(moved.measured, moved.precision, moved.T_i, moved.T_j, Curvature::kFull);
   const Matrix12 H = hessian_of(model);
   Vector12 g;
   g << model.g_i, model.g_j;
@@ -66,9 +68,10 @@ TEST_CASE("gradient and Hessian of an edge agree with finite differences", "[new
 TEST_CASE("an edge without second derivatives has the same gradient", "[newton]") {
   std::mt19937 rng(7);
   const Moved moved = random_edge(rng);
-  const EdgeModel model = model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kFull);
+  const EdgeModel model =
+      model_edge(moved.measured, moved.precision, moved.T_i, moved.T_j, Curvature::kFull);
   EdgeModel slope;
-  slope_edge(moved.edge, moved.T_i, moved.T_j, slope);
+  slope_edge(moved.measured, moved.precision, moved.T_i, moved.T_j, slope);
   CHECK(slope.cost == model.cost);
   CHECK(slope.g_i == model.g_i);
   CHECK(slope.g_j == model.g_j);
@@ -80,8 +83,8 @@ TEST_CASE("the Gauss-Newton Hessian is never indefinite, and the full one is not
   CAPTURE(seed);
   std::mt19937 rng(seed);
   Moved moved = random_edge(rng);
-  const Matrix12 gauss_newton =
-      hessian_of(model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kGaussNewton));
+  const Matrix12 gauss_newton = hessian_of(
+      model_edge(moved.measured, moved.precision, moved.T_i, moved.T_j, Curvature::kGaussNewton));
   CHECK(Eigen::SelfAdjointEigenSolver<Matrix12>(gauss_newton).eigenvalues().minCoeff() > -1e-12);
   // A rigid motion of both poses about the origin, to first order.
   const Eigen::Vector3d w = random_vector<3>(rng);
@@ -92,10 +95,11 @@ TEST_CASE("the Gauss-Newton Hessian is never indefinite, and the full one is not
       moved.T_j.linear().transpose() * w,
       moved.T_j.linear().transpose() * (w.cross(moved.T_j.translation()) + u);
   CHECK((gauss_newton * rigid).norm() < 1e-12 * gauss_newton.norm() * rigid.norm());
-  moved.T_j = moved.T_i * moved.edge.T_i_j;
-  const Matrix12 full = hessian_of(model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kFull));
-  const Matrix12 same =
-      hessian_of(model_edge(moved.edge, moved.T_i, moved.T_j, Curvature::kGaussNewton));
+  moved.T_j = moved.T_i * moved.measured;
+  const Matrix12 full = hessian_of(
+      model_edge(moved.measured, moved.precision, moved.T_i, moved.T_j, Curvature::kFull));
+  const Matrix12 same = hessian_of(
+      model_edge(moved.measured, moved.precision, moved.T_i, moved.T_j, Curvature::kGaussNewton));
   CHECK((full - same).norm() < 1e-12 * full.norm());
 }
 

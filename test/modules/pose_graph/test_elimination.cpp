@@ -108,6 +108,39 @@ TEST_CASE("the Schur complement equals that of the dense matrix", "[newton]") {
   CHECK((schur - expected).norm() < 1e-11 * expected.norm());
 }
 
+TEST_CASE("the selected inverse equals the blocks of the dense inverse", "[newton]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
+  const Index block = GENERATE(1, 3, 6);
+  const double kept = GENERATE(0.0, 0.2, 1.0);
+  CAPTURE(seed, block, kept);
+  std::mt19937 rng(seed);
+  const Problem problem = random_problem(rng, 60, 40, block, kept);
+  const auto plan = std::make_shared<const EliminationPlan>(problem.keep, problem.pairs);
+  FrontalCholesky factor(plan);
+  REQUIRE(factor.factorise(problem.A));
+  const MatrixXd expected = problem.dense.inverse();
+  const auto block_of = [&](int i, int j) {
+    return expected.block(block * i, block * j, block, block);
+  };
+  BlockMatrix of_kept = BlockMatrix::zero(block, plan->kept().size(), plan->kept_pairs().size());
+  for (std::size_t k = 0; k < plan->kept().size(); ++k)
+    of_kept.at(static_cast<int>(k)) = block_of(plan->kept()[k], plan->kept()[k]);
+  for (std::size_t p = 0; p < plan->kept_pairs().size(); ++p) {
+    const auto& [a, b] = plan->kept_pairs()[p];
+    of_kept.between(static_cast<int>(p)) = block_of(plan->kept()[static_cast<std::size_t>(a)],
+                                                    plan->kept()[static_cast<std::size_t>(b)]);
+  }
+  const BlockMatrix inverse = factor.selected_inverse(of_kept);
+  double worst = 0.0;
+  for (int i = 0; i < plan->nodes(); ++i)
+    worst = std::max(worst, (inverse.at(i) - block_of(i, i)).norm());
+  for (std::size_t p = 0; p < problem.pairs.size(); ++p) {
+    const auto& [i, j] = problem.pairs[p];
+    worst = std::max(worst, (inverse.between(static_cast<int>(p)) - block_of(i, j)).norm());
+  }
+  CHECK(worst < 1e-11 * expected.norm());
+}
+
 TEST_CASE("forward and backward solve the dense system", "[newton]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   const double kept = GENERATE(0.0, 0.2, 1.0);

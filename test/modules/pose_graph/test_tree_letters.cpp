@@ -62,7 +62,7 @@ TreeSystem some_system(std::mt19937& rng, Index block) {
   for (int p = 0; p < 2; ++p) system.schur.between(p).reshaped() = some_numbers(rng, block * block);
   for (const Curvature curvature : {Curvature::kGaussNewton, Curvature::kFull})
     for (const bool transposed : {false, true}) {
-      ToldEdge edge{.pair = 2,
+      SentEdge edge{.pair = 2,
                     .transposed = transposed,
                     .curvature = curvature,
                     .kappa = 123.5F,
@@ -266,7 +266,7 @@ std::size_t held_by(const UpLetter& letter) {
   if (!letter.system) return bytes;
   const TreeSystem& s = *letter.system;
   return bytes + sizeof(TreeVariable) * s.variables.capacity() +
-         sizeof(NodePair) * s.pairs.capacity() + sizeof(ToldEdge) * s.edges.capacity() +
+         sizeof(NodePair) * s.pairs.capacity() + sizeof(SentEdge) * s.edges.capacity() +
          sizeof(double) *
              static_cast<std::size_t>(s.schur.diagonal.size() + s.schur.coupling.size());
 }
