@@ -11,6 +11,7 @@ namespace km {
 /// exception with a message of one line.
 void add_trajectory(CLI::App& app);
 void add_closures(CLI::App& app);
+void add_consistency(CLI::App& app);
 void add_images(CLI::App& app);
 void add_mesh(CLI::App& app);
 void add_render(CLI::App& app);

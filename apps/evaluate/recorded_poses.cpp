@@ -36,6 +36,9 @@ void take(const BagChannel& channel, const BagMessage& message, const std::strin
   } else if (is_of_type(channel, RosPoseStamped::kType)) {
     const RosPoseStamped pose = decode(RosPoseStamped());
     poses.push_back(pose_of(pose.header.stamp, pose.pose));
+  } else if (is_of_type(channel, RosPoseWithCovarianceStamped::kType)) {
+    const RosPoseWithCovarianceStamped pose = decode(RosPoseWithCovarianceStamped());
+    poses.push_back(pose_of(pose.header.stamp, pose.pose));
   } else {
     throw InputFileError(place + ": " + channel.type + " has no poses");
   }

@@ -41,8 +41,8 @@ Examples
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
-Files written to --output: odometry.tum, optimized.tum, pose_graph.g2o, keyframes.csv, loop_closures.csv,
-optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json, rig_estimated.yaml (for --rig of
+Files written to --output: odometry.tum, optimized.tum, optimized_keyframes.tum, pose_graph.g2o, keyframes.csv,
+loop_closures.csv, optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json, rig_estimated.yaml (for --rig of
 the next run), run.journal (for --resume and --session); with mapping.mode on also mesh.ply,
 mesh_optimized.ply and label_palette.csv; with --record record.mcap.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.

@@ -7,7 +7,9 @@
 
 #include "apps/output_file.hpp"
 #include "apps/robot/pose_holes.hpp"
+#include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/pose_graph/g2o_io.hpp"
 
 namespace km {
@@ -162,18 +164,35 @@ std::optional<HolesSummary> holes_of(const std::vector<StampedPose>& path) {
 }
 
 // TUM: "time[s] tx ty tz qx qy qz qw", nine decimals of seconds.
+void write_pose(std::ostream& out, const StampedPose& pose) {
+  const Eigen::Vector3d& t = pose.T.translation();
+  const Eigen::Quaterniond q(pose.T.linear());
+  char line[256];
+  // Whole and fractional seconds are separate, because a double holds epoch nanoseconds only to
+  // 0.2 us.
+  std::snprintf(line, sizeof line, "%" PRId64 ".%09" PRId64 " %.9f %.9f %.9f %.9f %.9f %.9f %.9f",
+                pose.stamp / 1'000'000'000, pose.stamp % 1'000'000'000, t.x(), t.y(), t.z(), q.x(),
+                q.y(), q.z(), q.w());
+  out << line;
+}
+
 void write_poses(std::ostream& out, const std::vector<StampedPose>& poses) {
   for (const StampedPose& pose : poses) {
-    const Eigen::Vector3d& t = pose.T.translation();
-    const Eigen::Quaterniond q(pose.T.linear());
-    char line[256];
-    // Whole and fractional seconds are separate, because a double holds epoch nanoseconds only to
-    // 0.2 us.
-    std::snprintf(line, sizeof line,
-                  "%" PRId64 ".%09" PRId64 " %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n",
-                  pose.stamp / 1'000'000'000, pose.stamp % 1'000'000'000, t.x(), t.y(), t.z(),
-                  q.x(), q.y(), q.z(), q.w());
-    out << line;
+    write_pose(out, pose);
+    out << '\n';
+  }
+}
+
+// Each pose is followed by the 36 numbers of geometry_msgs/PoseWithCovariance, if known.
+void write_keyframe_poses(std::ostream& out, const RunRecord& record) {
+  const std::vector<StampedPose> poses = record.optimized_keyframes();
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    write_pose(out, poses[k]);
+    const std::vector<Matrix6>& covariances = record.trajectory()->covariances;
+    if (k < covariances.size())
+      for (const double x : along_fixed_axes({poses[k].T, covariances[k]}).reshaped())
+        out << ' ' << rounded(x, 9);
+    out << '\n';
   }
 }
 
@@ -187,6 +206,7 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
   };
   write("odometry.tum", write_poses, record.odometry());
   write("optimized.tum", write_poses, record.optimized());
+  write("optimized_keyframes.tum", write_keyframe_poses, record);
   results.write(folder / "pose_graph.g2o",
                 [&](const fs::path& file) { write_g2o(file, graph_of(record)); });
   write("keyframes.csv", write_keyframes, record);

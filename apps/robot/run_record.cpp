@@ -148,11 +148,16 @@ std::vector<ClosureOutcome> RunRecord::outcomes() const {
   return result;
 }
 
-std::vector<StampedPose> RunRecord::optimized() const {
+std::vector<StampedPose> RunRecord::optimized_keyframes() const {
   std::vector<StampedPose> keyframes;
   const std::size_t solved = trajectory_ ? trajectory_->T_world_kf.size() : 0;
   for (std::size_t i = 0; i < std::min(solved, keyframes_.size()); ++i)
     keyframes.push_back({keyframes_[i].stamp, trajectory_->T_world_kf[i]});
+  return keyframes;
+}
+
+std::vector<StampedPose> RunRecord::optimized() const {
+  const std::vector<StampedPose> keyframes = optimized_keyframes();
   return odometry_.empty() ? keyframes : correct_odometry(odometry_, keyframes);
 }
 

@@ -121,6 +121,8 @@ class RunRecord {
 
   /// Poses in the team's frame: of every image, or of every keyframe if there are no images.
   [[nodiscard]] std::vector<StampedPose> optimized() const;
+  /// The last optimised keyframes.
+  [[nodiscard]] std::vector<StampedPose> optimized_keyframes() const;
 
   /// Closures that this robot found, by the other robot (or itself).
   [[nodiscard]] std::map<RobotId, ClosureCounts> closures_per_peer() const;

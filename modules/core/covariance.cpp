@@ -25,6 +25,13 @@ UncertainPose between_on_chain(const UncertainPose& T_a_b, const UncertainPose& 
   return {T_b_c, eigen.eigenvectors() * clipped.asDiagonal() * eigen.eigenvectors().transpose()};
 }
 
+Matrix6 along_fixed_axes(const UncertainPose& T_a_b) {
+  Matrix6 to_fixed = Matrix6::Zero();
+  to_fixed.topRightCorner<3, 3>() = T_a_b.T.linear();
+  to_fixed.bottomLeftCorner<3, 3>() = T_a_b.T.linear();
+  return to_fixed * T_a_b.Sigma * to_fixed.transpose();
+}
+
 bool is_covariance(const Matrix6& Sigma) {
   if (!Sigma.allFinite()) return false;
   const double scale = Sigma.cwiseAbs().maxCoeff();

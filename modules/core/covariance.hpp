@@ -29,6 +29,10 @@ struct UncertainPose {
 [[nodiscard]] UncertainPose between_on_chain(const UncertainPose& T_a_b,
                                              const UncertainPose& T_a_c);
 
+/// Covariance of [position; rotation about fixed axes] along the axes of frame a, as in
+/// geometry_msgs/PoseWithCovariance.
+[[nodiscard]] Matrix6 along_fixed_axes(const UncertainPose& T_a_b);
+
 /// True if every element is finite, the matrix symmetric to 1e-6 of its largest element, and no
 /// eigenvalue below -1e-9 of the largest. For untrusted matrices.
 [[nodiscard]] bool is_covariance(const Matrix6& Sigma);

@@ -89,6 +89,9 @@ struct Trajectory {
   RobotId robot = 0;
   RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; `robot` itself if it is alone.
   std::vector<SE3> T_world_kf;
+  /// Covariances of T_world_kf relative to the first keyframe of the anchor, see covariance.hpp;
+  /// empty while they are unknown.
+  std::vector<Matrix6> covariances = {};
 };
 
 /// State of distributed optimisation as seen by one robot, for status lines and tables.

@@ -58,6 +58,20 @@ class RowParser {
     return {*stamp, make_pose(q.toRotationMatrix(), {v[1], v[2], v[3]})};
   }
 
+  // The covariance along the axes of the pose, from that along fixed axes.
+  Matrix6 parse_covariance(const SE3& T) const {
+    Matrix6 along_axes;
+    if (row_.fields.size() != kFields + 36)
+      fail(std::to_string(row_.fields.size()) +
+           " fields, expected 44: t[s], p x y z, q x y z w, and 36 of the covariance");
+    for (Eigen::Index k = 0; k < 36; ++k)
+      along_axes(k / 6, k % 6) = number(row_.fields[kFields + static_cast<std::size_t>(k)]);
+    Matrix6 to_pose = Matrix6::Zero();
+    to_pose.topRightCorner<3, 3>() = T.linear().transpose();
+    to_pose.bottomLeftCorner<3, 3>() = T.linear().transpose();
+    return to_pose * along_axes * to_pose.transpose();
+  }
+
   [[noreturn]] void fail(const std::string& problem) const {
     throw TrajectoryFileError(name_ + " line " + std::to_string(row_.line) + ": " +
                               readable(problem));
@@ -79,9 +93,8 @@ bool is_header(const TextRow& row) {
          std::isalpha(static_cast<unsigned char>(row.fields.front().front())) != 0;
 }
 
-}  // namespace
-
-std::vector<StampedPose> parse_trajectory(std::string_view text, const std::string& name) {
+// Calls use(parser, pose) for every row, but not for one with the stamp of the row before.
+void for_each_pose(std::string_view text, const std::string& name, const auto& use) {
   std::vector<TextRow> rows = split_rows(text);
   if (!rows.empty() && is_header(rows.front())) rows.erase(rows.begin());
   if (rows.empty()) throw TrajectoryFileError(name + ": holds no pose");
@@ -89,17 +102,39 @@ std::vector<StampedPose> parse_trajectory(std::string_view text, const std::stri
   const auto after_first = static_cast<std::size_t>(first.data() + first.size() - text.data());
   const std::size_t separator = text.find_first_not_of(" \t", after_first);
   const bool euroc = separator != text.npos && text[separator] == ',';
-
-  std::vector<StampedPose> poses;
-  poses.reserve(rows.size());
+  std::optional<Stamp> last;
   for (const TextRow& row : rows) {
     const RowParser parser(name, row);
     const StampedPose pose = parser.parse(euroc);
-    if (!poses.empty() && pose.stamp < poses.back().stamp)
-      parser.fail("the stamp is before the last one");
-    if (!poses.empty() && pose.stamp == poses.back().stamp) continue;
-    poses.push_back(pose);
+    if (last && pose.stamp < *last) parser.fail("the stamp is before the last one");
+    if (last != pose.stamp) use(parser, pose);
+    last = pose.stamp;
   }
+}
+
+// Calls use(text, name) with the content and the name of the file at `place`.
+auto with_file(const std::filesystem::path& place, const auto& use) {
+  const auto file = find_trajectory(place);
+  if (!file) {
+    const std::string problem = problem_of_file(place);
+    throw TrajectoryFileError(place.string() + ": " +
+                              (is_folder(place)  ? "no data.csv or groundtruth_tum.txt in it"
+                               : problem.empty() ? "not a file"
+                                                 : problem));
+  }
+  try {
+    return use(read_input_file(*file), file->string());
+  } catch (const InputFileError& error) {
+    throw TrajectoryFileError(error.what());
+  }
+}
+
+}  // namespace
+
+std::vector<StampedPose> parse_trajectory(std::string_view text, const std::string& name) {
+  std::vector<StampedPose> poses;
+  for_each_pose(text, name,
+                [&](const RowParser&, const StampedPose& pose) { poses.push_back(pose); });
   return poses;
 }
 
@@ -110,19 +145,20 @@ std::optional<std::filesystem::path> find_trajectory(const std::filesystem::path
 }
 
 std::vector<StampedPose> read_trajectory(const std::filesystem::path& place) {
-  const auto file = find_trajectory(place);
-  if (!file) {
-    const std::string problem = problem_of_file(place);
-    throw TrajectoryFileError(place.string() + ": " +
-                              (is_folder(place)  ? "no data.csv or groundtruth_tum.txt in it"
-                               : problem.empty() ? "not a file"
-                                                 : problem));
-  }
-  try {
-    return parse_trajectory(read_input_file(*file), file->string());
-  } catch (const InputFileError& error) {
-    throw TrajectoryFileError(error.what());
-  }
+  return with_file(place, [](const std::string& text, const std::string& name) {
+    return parse_trajectory(text, name);
+  });
+}
+
+UncertainTrajectory read_uncertain_trajectory(const std::filesystem::path& place) {
+  return with_file(place, [](const std::string& text, const std::string& name) {
+    UncertainTrajectory result;
+    for_each_pose(text, name, [&](const RowParser& parser, const StampedPose& pose) {
+      result.poses.push_back(pose);
+      result.covariances.push_back(parser.parse_covariance(pose.T));
+    });
+    return result;
+  });
 }
 
 }  // namespace km

@@ -33,6 +33,16 @@ struct TrajectoryFileError : std::runtime_error {
 /// - a stamp beyond 146 years, or before the last one.
 [[nodiscard]] std::vector<StampedPose> read_trajectory(const std::filesystem::path& file);
 
+/// Poses with covariances, in the order of their stamps.
+struct UncertainTrajectory {
+  std::vector<StampedPose> poses;
+  std::vector<Matrix6> covariances;  ///< See core/covariance.hpp.
+};
+
+/// A TUM file as read_trajectory() reads it, whose rows also have the 36 numbers of
+/// geometry_msgs/PoseWithCovariance. Throws TrajectoryFileError also for a row without them.
+[[nodiscard]] UncertainTrajectory read_uncertain_trajectory(const std::filesystem::path& file);
+
 /// Parses the text of a file; `name` replaces the file name in messages.
 [[nodiscard]] std::vector<StampedPose> parse_trajectory(std::string_view text,
                                                         const std::string& name);

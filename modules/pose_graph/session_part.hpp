@@ -83,6 +83,10 @@ class SessionPart {
   }
   /// The best poses; in the frame of the session once there is a stage.
   [[nodiscard]] const std::vector<SE3>& poses() const;
+  /// Covariances of poses() once it is solved; empty if the solver computes none.
+  [[nodiscard]] std::vector<Matrix6> covariances() const {
+    return solver_ ? solver_->covariances() : std::vector<Matrix6>{};
+  }
   /// Poses of the last round that is known to be completed by all members.
   [[nodiscard]] const std::vector<SE3>& committed_poses() const { return committed_; }
   /// Time of the last activity or message of the session [s].

@@ -321,6 +321,8 @@ void TeamAgent::publish(TeamOutput& output) {
   Trajectory trajectory{self_.robot, world->anchor, {}};
   const SE3 T_world_frame = world->T_frame_world.inverse();
   for (const SE3& T_frame_kf : poses()) trajectory.T_world_kf.push_back(T_world_frame * T_frame_kf);
+  if (state_ == SessionState::kSolved && world->anchor == part_->session().anchor)
+    trajectory.covariances = part_->covariances();
   output.trajectory = std::move(trajectory);
   output.progress = make_progress();
 }

@@ -27,6 +27,9 @@ constexpr std::array kDefinitions = std::to_array<Definition>({
      "geometry_msgs/Quaternion orientation\n"},
     {"geometry_msgs/PoseStamped", "std_msgs/Header header\ngeometry_msgs/Pose pose\n"},
     {"geometry_msgs/PoseWithCovariance", "geometry_msgs/Pose pose\nfloat64[36] covariance\n"},
+    {"geometry_msgs/PoseWithCovarianceStamped",
+     "std_msgs/Header header\n"
+     "geometry_msgs/PoseWithCovariance pose\n"},
     {"geometry_msgs/Twist",
      "geometry_msgs/Vector3 linear\n"
      "geometry_msgs/Vector3 angular\n"},

@@ -84,6 +84,12 @@ void fields(auto& wire, Is<RosPoseStamped> auto& pose) {
   fields(wire, pose.pose);
 }
 
+void fields(auto& wire, Is<RosPoseWithCovarianceStamped> auto& pose) {
+  fields(wire, pose.header);
+  fields(wire, pose.pose);
+  wire.f64(pose.covariance);
+}
+
 void fields(auto& wire, Is<RosPath> auto& path) {
   constexpr std::size_t kLeast_bytes = 7 * sizeof(double);
   fields(wire, path.header);
@@ -249,7 +255,10 @@ template std::vector<std::uint8_t> encode_ros(const RosImu&);
 template Decoded<RosCameraInfo> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosCameraInfo&);
 template Decoded<RosPoseStamped> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template Decoded<RosPoseWithCovarianceStamped> decode_ros(std::string_view,
+                                                          std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosPoseStamped&);
+template std::vector<std::uint8_t> encode_ros(const RosPoseWithCovarianceStamped&);
 template Decoded<RosPath> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosPath&);
 template Decoded<RosOdometry> decode_ros(std::string_view, std::span<const std::uint8_t>);

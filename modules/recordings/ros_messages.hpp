@@ -84,6 +84,14 @@ struct RosPoseStamped {
   RosPose pose;
 };
 
+struct RosPoseWithCovarianceStamped {
+  static constexpr std::string_view kType = "geometry_msgs/PoseWithCovarianceStamped";
+  RosHeader header;
+  RosPose pose;
+  /// Of [position; rotation about fixed axes], row by row, along the axes of the header's frame.
+  std::array<double, 36> covariance{};
+};
+
 struct RosPath {
   static constexpr std::string_view kType = "nav_msgs/Path";
   RosHeader header;

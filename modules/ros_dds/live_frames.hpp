@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "modules/core/covariance.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 
@@ -22,6 +23,10 @@ class LiveFrames {
 
   [[nodiscard]] const SE3& T_map_odom() const { return T_map_odom_; }
 
+  /// The pose of the body in `map`. Its covariance is that of the newest keyframe: the covariance
+  /// of the trajectory, plus that of the steps of odometry since.
+  [[nodiscard]] UncertainPose T_map_body(const SE3& T_odom_body) const;
+
   /// Stamps of the keyframes by index; 0 for keyframes of an earlier incarnation of the robot.
   [[nodiscard]] const std::vector<Stamp>& keyframe_stamps() const { return stamps_; }
 
@@ -31,7 +36,9 @@ class LiveFrames {
  private:
   std::deque<OdometryState> recent_;
   std::vector<Stamp> stamps_;
-  std::vector<std::optional<SE3>> T_odom_kf_;  // poses from live odometry
+  std::vector<std::optional<SE3>> T_odom_kf_;    // poses from live odometry
+  std::vector<UncertainPose> steps_;             // T_previous_kf by keyframe
+  Matrix6 newest_covariance_ = Matrix6::Zero();  // of the newest keyframe in `map`
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();
   SE3 T_map_odom_ = SE3::Identity();
 };

@@ -84,7 +84,7 @@ void RosOutputNode::open_topics(bool has_images) {
   };
   constexpr int kManyTransforms = 100;
   odometry_ = sink_->open({prefix + "odometry", RosOdometry::kType});
-  pose_ = sink_->open({prefix + "pose", RosPoseStamped::kType});
+  pose_ = sink_->open({prefix + "pose", RosPoseWithCovarianceStamped::kType});
   tf_ = sink_->open({"/tf", RosTransforms::kType, false, kManyTransforms});
   path_ = state("path", RosPath::kType);
   mesh_ = state("mesh", RosPointCloud::kType);
@@ -180,8 +180,10 @@ void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
   odometry.linear_velocity = state->T_odom_body.linear().transpose() * state->v_odom;
   odometry.angular_velocity = frames_.angular_rate();
   publish(odometry_, odometry);
-  publish(pose_, RosPoseStamped{{state->stamp, map_},
-                                message_of(frames_.T_map_odom() * state->T_odom_body)});
+  const UncertainPose T_map_body = frames_.T_map_body(state->T_odom_body);
+  RosPoseWithCovarianceStamped pose{{state->stamp, map_}, message_of(T_map_body.T), {}};
+  Eigen::Map<Matrix6>(pose.covariance.data()) = along_fixed_axes(T_map_body);
+  publish(pose_, pose);
   publish(tf_,
           RosTransforms{{{{state->stamp, map_}, odom_, message_of(frames_.T_map_odom())},
                          {{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)}}});

@@ -63,7 +63,8 @@ struct RosOutputOptions {
 /// Publishes the state of a robot NAME to ROS viewers and planners, or into a file that they read:
 ///   /NAME/odometry     nav_msgs/Odometry, NAME/odom -> NAME/base_link, for every image; no
 ///                      covariance
-///   /NAME/pose         geometry_msgs/PoseStamped in `map`, for every image
+///   /NAME/pose         geometry_msgs/PoseWithCovarianceStamped in `map`, for every image; relative
+///                      to the origin of `map`, see LiveFrames::T_map_body()
 ///   /tf                map -> NAME/odom -> NAME/base_link, for every image
 ///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised; a state
 ///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected; a

@@ -20,12 +20,14 @@ struct KnownType {
   const dds_topic_descriptor_t* descriptor;
 };
 
-constexpr std::array<KnownType, 11> kTypes = {{
+constexpr std::array<KnownType, 12> kTypes = {{
     {"sensor_msgs", "Image", &sensor_msgs_msg_dds__Image__desc},
     {"sensor_msgs", "CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
     {"sensor_msgs", "Imu", &sensor_msgs_msg_dds__Imu__desc},
     {"sensor_msgs", "CameraInfo", &sensor_msgs_msg_dds__CameraInfo__desc},
     {"geometry_msgs", "PoseStamped", &geometry_msgs_msg_dds__PoseStamped__desc},
+    {"geometry_msgs", "PoseWithCovarianceStamped",
+     &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc},
     {"nav_msgs", "Odometry", &nav_msgs_msg_dds__Odometry__desc},
     {"nav_msgs", "Path", &nav_msgs_msg_dds__Path__desc},
     {"sensor_msgs", "PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc},

@@ -41,6 +41,32 @@ TEST_CASE("The newest keyframe has its pose in the pose graph", "[ros_dds]") {
   CHECK(frames.angular_rate().isApprox(Eigen::Vector3d(0, 0, 0.4), 1e-9));  // 0.02 rad in 50 ms
 }
 
+TEST_CASE("The pose in the map has the covariance of the trajectory and of the steps since",
+          "[ros_dds]") {
+  LiveFrames frames;
+  const auto add = [&](int k, KeyframeIndex index) {
+    frames.add(state_at(k));
+    KeyframeOdometry keyframe = keyframe_at(k, index);
+    keyframe.T_previous_kf = make_pose(Eigen::Matrix3d::Identity(), {1.0, 0.0, 0.0});
+    keyframe.covariance = 0.01 * Matrix6::Identity();
+    frames.add(keyframe);
+  };
+  for (int k = 0; k < 3; ++k) add(10 * k, static_cast<KeyframeIndex>(k));
+  const UncertainPose step{make_pose(Eigen::Matrix3d::Identity(), {1.0, 0.0, 0.0}),
+                           0.01 * Matrix6::Identity()};
+  const UncertainPose two = compose(step, step);
+  const SE3& T_odom_body = state_at(20).T_odom_body;
+  CHECK(frames.T_map_body(T_odom_body).Sigma.isApprox(two.Sigma, 1e-12));
+  // A session that has solved the first two keyframes.
+  Trajectory trajectory{3, 3, {SE3::Identity(), SE3::Identity()}};
+  trajectory.covariances = {Matrix6::Zero(), 0.5 * Matrix6::Identity()};
+  frames.add(trajectory);
+  const UncertainPose solved{SE3::Identity(), 0.5 * Matrix6::Identity()};
+  CHECK(frames.T_map_body(T_odom_body).Sigma.isApprox(compose(solved, step).Sigma, 1e-12));
+  frames.add(Trajectory{3, 3, {SE3::Identity(), SE3::Identity()}});  // in the next session
+  CHECK(frames.T_map_body(T_odom_body).Sigma.isApprox(compose(solved, step).Sigma, 1e-12));
+}
+
 TEST_CASE("Keyframes of an earlier incarnation do not correct odometry", "[ros_dds]") {
   LiveFrames frames;
   frames.add(state_at(0));

@@ -96,6 +96,10 @@ TEST_CASE("Every known type can be sent and received", "[ros_dds]") {
   camera.D = {1, 2, 3, 4, 5};
   crosses(camera);
   crosses(RosPoseStamped{{6, "map"}, {}});
+  RosPoseWithCovarianceStamped pose;
+  pose.header.frame = "map";
+  pose.covariance[7] = 2.5;
+  crosses(pose);
   RosOdometry odometry;
   odometry.child_frame = "body";
   crosses(odometry);
@@ -127,7 +131,7 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
                      {odometry, keyframes, trajectories, {}});
   RosSubscription viewer(network(),
                          {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
-                          {"/robot_3/pose", "geometry_msgs/PoseStamped"},
+                          {"/robot_3/pose", "geometry_msgs/PoseWithCovarianceStamped"},
                           {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
                           {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched},
                           {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
@@ -150,13 +154,14 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
   mesh.faces = {{0, 1, 2}};
   node.offer(std::make_shared<const LabelledMesh>(mesh));
   std::optional<RosPath> path;
-  std::optional<RosPoseStamped> pose;
+  std::optional<RosPoseWithCovarianceStamped> pose;
   std::optional<RosOdometry> received;
   std::optional<RosTransforms> transforms;
   std::optional<RosPointCloud> cloud;
   std::optional<RosDiagnostics> diagnostics;
   std::optional<RosMarker> faces;
   // Publishes until the viewer has received all messages, because it may have subscribed late.
+  std::size_t messages = 0;
   while (!(path && pose && received && transforms && cloud && diagnostics && faces)) {
     const auto message = [&] {
       state.stamp += 10;
@@ -164,9 +169,10 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
       return viewer.next();
     }();
     REQUIRE(message);
+    REQUIRE(++messages < 100'000);  // some seconds
     const auto& bytes = message->bytes;
     if (message->topic == 0) received = decode_ros<RosOdometry>("cdr", bytes).value;
-    if (message->topic == 1) pose = decode_ros<RosPoseStamped>("cdr", bytes).value;
+    if (message->topic == 1) pose = decode_ros<RosPoseWithCovarianceStamped>("cdr", bytes).value;
     if (message->topic == 2) transforms = decode_ros<RosTransforms>("cdr", bytes).value;
     if (message->topic == 3) path = decode_ros<RosPath>("cdr", bytes).value;
     if (message->topic == 4) cloud = decode_ros<RosPointCloud>("cdr", bytes).value;

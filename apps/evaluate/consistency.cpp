@@ -1,0 +1,142 @@
+#include "modules/evaluation/consistency.hpp"
+
+#include <CLI/CLI.hpp>
+#include <deque>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "apps/evaluate/commands.hpp"
+#include "apps/evaluate/inputs.hpp"
+#include "apps/output_file.hpp"
+#include "modules/core/json.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/evaluation/association.hpp"
+#include "modules/evaluation/closure_truth.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "modules/pose_graph/g2o_io.hpp"
+
+namespace km {
+namespace {
+
+struct ConsistencyCommand {
+  std::vector<std::filesystem::path> truths;
+  std::vector<std::filesystem::path> results;
+  bool upright = false;
+  std::filesystem::path json;
+};
+
+std::string to_table(const std::vector<Consistency>& robots) {
+  std::vector<std::vector<std::string>> rows = {{"NEES / degrees of freedom", "poses", "pose",
+                                                 "median", "rotation", "translation",
+                                                 "within 95 %"}};
+  for (const Consistency& c : robots)
+    rows.push_back({c.name, std::to_string(c.poses), fixed(c.pose, 2), fixed(c.median, 2),
+                    fixed(c.rotation, 2), fixed(c.translation, 2),
+                    fixed(100.0 * c.share_within_95, 1) + '%'});
+  return align_columns(rows);
+}
+
+Json to_json(const std::vector<Consistency>& robots) {
+  Json json = Json::array();
+  for (const Consistency& c : robots)
+    json.push_back({{"name", c.name},
+                    {"poses", c.poses},
+                    {"pose", c.pose},
+                    {"median", c.median},
+                    {"rotation", c.rotation},
+                    {"translation", c.translation},
+                    {"share_within_95", c.share_within_95}});
+  return json;
+}
+
+// Edges of the graphs of all robots: each closure once, although both of its robots write it.
+struct Edges {
+  std::vector<RelativePose> steps;
+  std::map<ClosureId, RelativePose> closures;
+  std::map<KeyframeId, SE3> truth;
+
+  void add(const std::filesystem::path& folder, std::span<const StampedPose> true_poses) {
+    for (const KeyframeRecord& keyframe : read_keyframes(folder / "keyframes.csv"))
+      if (const auto T = pose_at(true_poses, keyframe.stamp, kMaxGap_s, kMaxDifference_s))
+        truth[keyframe.id] = *T;
+    for (const RelativePose& e : read_g2o(folder / "pose_graph.g2o").edges) {
+      const bool step = e.from.robot == e.to.robot && e.to.index == e.from.index + 1;
+      if (step)
+        steps.push_back(e);
+      else
+        closures.try_emplace(closure_id(e.from, e.to), e);
+    }
+  }
+
+ private:
+  static constexpr double kMaxGap_s = 0.1;
+  static constexpr double kMaxDifference_s = 0.01;
+};
+
+void run(const ConsistencyCommand& command) {
+  check_output_folder(command.json);
+  if (command.truths.size() != 1 && command.truths.size() != command.results.size())
+    throw std::invalid_argument("give one --truth, or as many as there are --results");
+  std::vector<std::vector<StampedPose>> truths;
+  for (const auto& file : command.truths) truths.push_back(read_trajectory(file));
+  std::deque<UncertainTrajectory> estimates;  // inputs refer to them
+  std::vector<ConsistencyInput> inputs;
+  Edges edges;
+  for (std::size_t i = 0; i < command.results.size(); ++i) {
+    const auto& truth = truths[truths.size() == 1 ? 0 : i];
+    const auto file = command.results[i] / "optimized_keyframes.tum";
+    const UncertainTrajectory& estimate = estimates.emplace_back(read_uncertain_trajectory(file));
+    inputs.push_back({"poses of " + short_name(command.results[i]), truth, estimate.poses,
+                      estimate.covariances});
+    edges.add(command.results[i], truth);
+  }
+  std::vector<Consistency> rows = consistency(inputs, command.upright);
+  rows.back().name = "all poses";
+  rows.push_back(consistency_of_edges("steps of odometry", edges.steps, edges.truth));
+  std::vector<RelativePose> closures;
+  for (const auto& [id, closure] : edges.closures) closures.push_back(closure);
+  rows.push_back(consistency_of_edges("closures", closures, edges.truth));
+  std::cout << to_table(rows);
+  write_output(command.json, [&](std::ostream& out) { out << to_json(rows).dump(2) << '\n'; });
+}
+
+constexpr const char* kDetails =
+    "Whether covariances are as large as the errors against the truth\n\n"
+    "--results are the folders of the robots of one team. Three kinds of covariances are "
+    "compared:\n"
+    "  poses              of optimized_keyframes.tum, relative to the first keyframe of the team,\n"
+    "                     at which the frame of the team is placed in the truth\n"
+    "  steps of odometry  from keyframe to keyframe, in pose_graph.g2o\n"
+    "  closures           that the team has kept, in pose_graph.g2o\n"
+    "Printed is the normalised estimation error squared (NEES) divided by its degrees of freedom.\n"
+    "It is 1 if covariances are right, 4 if standard deviations are half as large as the errors.\n"
+    "Poses of one run are correlated, so the mean of one run differs from 1 by chance. The median "
+    "is\n"
+    "relative to that of its distribution.\n\n"
+    "Example:\n"
+    "  kimera_multi_evaluate consistency --upright --truth robot0/truth.csv --truth "
+    "robot1/truth.csv \\\n"
+    "      --results results/robot0 results/robot1";
+
+}  // namespace
+
+void add_consistency(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("consistency", kDetails);
+  const auto command = std::make_shared<ConsistencyCommand>();
+  app.add_option("--truth", command->truths, "True poses: one file for all robots or one for each")
+      ->required();
+  app.add_option("--results", command->results, "Folders of the results, one per robot")
+      ->required();
+  app.add_flag("--upright", command->upright,
+               "Both frames have z up: runs with inertial sensing, and a truth with z up");
+  app.add_option("--json", command->json, "Also write the numbers to this file");
+  app.callback([command] { run(*command); });
+}
+
+}  // namespace km
