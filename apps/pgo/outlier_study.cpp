@@ -15,8 +15,8 @@
 #include "modules/pgo_study/team_closures.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
 #include "modules/pose_graph/rounding.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {
 std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config,

@@ -8,7 +8,7 @@
 #include "apps/output_file.hpp"
 #include "apps/robot/pose_holes.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/config.hpp"
-#include "modules/pose_graph/measurement_limits.hpp"
+#include "modules/core/measurement_limits.hpp"
 
 namespace km {
 namespace {

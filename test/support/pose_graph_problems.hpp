@@ -8,8 +8,8 @@
 
 #include "modules/core/precision.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
 #include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

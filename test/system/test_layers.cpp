@@ -32,7 +32,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"relay", {"security"}},
     {"ros_dds", {"images", "mesh", "recordings"}},
     {"sensors", {"recordings"}},
-    {"pgo_study", {"pose_graph", "outlier_rejection"}},
+    {"pgo_study", {"outlier_rejection", "pose_graph", "recorded_graph"}},
     {"evaluation", {"charts", "images", "mesh"}},
     {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},

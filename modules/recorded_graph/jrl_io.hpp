@@ -8,7 +8,7 @@
 
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/stamp.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {
 

@@ -1,8 +1,8 @@
 #include <catch2/catch.hpp>
 
 #include "modules/core/covariance.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 #include "test/support/corrupted_input.hpp"
 
 namespace km {

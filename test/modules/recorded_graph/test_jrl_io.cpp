@@ -5,8 +5,8 @@
 #include <sstream>
 
 #include "modules/core/covariance.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
-#include "modules/pose_graph/jrl_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/recorded_graph/jrl_io.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/small_jrl.hpp"

@@ -1,4 +1,4 @@
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -12,9 +12,9 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/core/measurement_limits.hpp"
 #include "modules/core/write_file.hpp"
-#include "modules/pose_graph/measurement_limits.hpp"
-#include "modules/pose_graph/text_fields.hpp"
+#include "modules/recorded_graph/text_fields.hpp"
 
 namespace km {
 namespace {

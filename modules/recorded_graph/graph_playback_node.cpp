@@ -1,4 +1,4 @@
-#include "modules/pose_graph/graph_playback_node.hpp"
+#include "modules/recorded_graph/graph_playback_node.hpp"
 
 #include <algorithm>
 #include <cmath>

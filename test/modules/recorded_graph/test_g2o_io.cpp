@@ -5,7 +5,7 @@
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/precision.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"
 

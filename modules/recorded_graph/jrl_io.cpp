@@ -1,4 +1,4 @@
-#include "modules/pose_graph/jrl_io.hpp"
+#include "modules/recorded_graph/jrl_io.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -13,10 +13,10 @@
 #include <utility>
 
 #include "modules/core/input_file.hpp"
+#include "modules/core/measurement_limits.hpp"
 #include "modules/core/text_rows.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
-#include "modules/pose_graph/measurement_limits.hpp"
-#include "modules/pose_graph/text_fields.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/recorded_graph/text_fields.hpp"
 
 namespace km {
 namespace {

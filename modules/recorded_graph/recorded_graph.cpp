@@ -1,4 +1,4 @@
-#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,11 +14,11 @@
 #include "modules/core/covariance.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/core/measurement_limits.hpp"
 #include "modules/core/precision.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
-#include "modules/pose_graph/jrl_io.hpp"
-#include "modules/pose_graph/measurement_limits.hpp"
-#include "modules/pose_graph/text_fields.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/recorded_graph/jrl_io.hpp"
+#include "modules/recorded_graph/text_fields.hpp"
 
 namespace km {
 namespace {

@@ -4,8 +4,8 @@
 #include <sstream>
 
 #include "modules/core/precision.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
