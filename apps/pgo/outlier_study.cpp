@@ -15,7 +15,7 @@
 #include "modules/pgo_study/team_closures.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/rounding.hpp"
+#include "modules/rbcd/rounding.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {

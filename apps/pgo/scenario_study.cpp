@@ -13,8 +13,8 @@
 #include "modules/pgo_study/odometry_start.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/robust_schedule.hpp"
-#include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
+#include "modules/rbcd/rounding.hpp"
 
 namespace km {
 namespace {

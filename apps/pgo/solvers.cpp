@@ -12,9 +12,9 @@
 #include "modules/pgo_study/local_team.hpp"
 #include "modules/pgo_study/odometry_start.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/member_rbcd.hpp"
-#include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
+#include "modules/rbcd/rounding.hpp"
 
 namespace km {
 namespace {

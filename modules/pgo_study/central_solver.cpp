@@ -1,7 +1,6 @@
 #include "modules/pgo_study/central_solver.hpp"
 
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/rounding.hpp"
+#include "modules/rbcd/rounding.hpp"
 
 namespace km {
 namespace {

@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/odometry_breaks.hpp"
 #include "modules/pose_graph/odometry_noise.hpp"
 #include "modules/pose_graph/precision_limits.hpp"

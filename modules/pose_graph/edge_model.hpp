@@ -1,7 +1,7 @@
 #pragma once
 
 #include "modules/core/geometry.hpp"
-#include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/pose_graph/block_edge.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"
 
 namespace km {

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 #include <random>
 
-#include "modules/pose_graph/block_cholesky.hpp"
+#include "modules/rbcd/block_cholesky.hpp"
 
 namespace km {
 namespace {
@@ -25,7 +25,7 @@ Eigen::SparseMatrix<double> random_definite(int size, int block, std::mt19937& r
 
 }  // namespace
 
-TEST_CASE("The factor solves for rows of the right-hand side with any pattern", "[pose_graph]") {
+TEST_CASE("The factor solves for rows of the right-hand side with any pattern", "[rbcd]") {
   const int block = GENERATE(1, 2, 4);
   const int poses = GENERATE(1, 2, 7, 40);
   const Eigen::Index rank = GENERATE(1, 3, 4, 5);
@@ -41,7 +41,7 @@ TEST_CASE("The factor solves for rows of the right-hand side with any pattern", 
   CHECK((X * A - B).norm() < 1e-10 * B.norm());
 }
 
-TEST_CASE("An indefinite matrix is not factorised", "[pose_graph]") {
+TEST_CASE("An indefinite matrix is not factorised", "[rbcd]") {
   Eigen::SparseMatrix<double> A(4, 4);
   A.setIdentity();
   A.coeffRef(2, 2) = -1.0;

@@ -1,4 +1,4 @@
-#include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/rbcd/truncated_newton.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/rbcd/quadratic_problem.hpp"
 #include "test/support/pose_graph_problems.hpp"
 
 namespace km {
@@ -36,7 +36,7 @@ LiftedPoses random_direction(std::mt19937& rng, const LiftedPoses& X) {
 
 }  // namespace
 
-TEST_CASE("the cost is the sum of squared residuals", "[pose_graph]") {
+TEST_CASE("the cost is the sum of squared residuals", "[rbcd]") {
   std::mt19937 rng(1);
   const QuadraticProblem problem = random_problem(rng, 3);
   const LiftedPoses X = random_lifted_poses(rng, 3, kPoses);
@@ -56,7 +56,7 @@ TEST_CASE("the cost is the sum of squared residuals", "[pose_graph]") {
   CHECK(problem.cost(X) == Approx(expected).epsilon(1e-12));
 }
 
-TEST_CASE("gradient and Hessian agree with finite differences along retractions", "[pose_graph]") {
+TEST_CASE("gradient and Hessian agree with finite differences along retractions", "[rbcd]") {
   const Eigen::Index rank = GENERATE(3, 4, 5);
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(rank, seed);
@@ -75,7 +75,7 @@ TEST_CASE("gradient and Hessian agree with finite differences along retractions"
   CHECK(std::abs((plus - 2.0 * problem.cost(X) + minus) / (h * h) - curvature) < 1e-4 * scale);
 }
 
-TEST_CASE("the Hessian is symmetric and the preconditioner positive definite", "[pose_graph]") {
+TEST_CASE("the Hessian is symmetric and the preconditioner positive definite", "[rbcd]") {
   std::mt19937 rng(7);
   const QuadraticProblem problem = random_problem(rng, 5);
   const LiftedPoses X = random_lifted_poses(rng, 5, kPoses);
@@ -90,8 +90,7 @@ TEST_CASE("the Hessian is symmetric and the preconditioner positive definite", "
         Approx(problem.precondition(X, U).cwiseProduct(V).sum()).epsilon(1e-10));
 }
 
-TEST_CASE("a problem refuses edges without poses, infinite ones and missing poses",
-          "[pose_graph]") {
+TEST_CASE("a problem refuses edges without poses, infinite ones and missing poses", "[rbcd]") {
   const double inf = std::numeric_limits<double>::infinity();
   const auto make = [](std::vector<BlockEdge> edges, std::vector<PublicEdge> public_edges) {
     return QuadraticProblem(5, 2, std::move(edges), std::move(public_edges));
@@ -107,6 +106,36 @@ TEST_CASE("a problem refuses edges without poses, infinite ones and missing pose
   QuadraticProblem problem = make({}, {{1, 3, true, SE3::Identity(), 1, 1}});
   CHECK_THROWS_AS(problem.set_fixed(LiftedPoses::Zero(5, 12)), std::invalid_argument);
   CHECK_THROWS_AS(problem.set_fixed(LiftedPoses::Zero(3, 16)), std::invalid_argument);
+}
+
+TEST_CASE("vertical priors of a block are part of its cost, gradient and Hessian",
+          "[rbcd][vertical]") {
+  const Eigen::Index rank = GENERATE(3, 5);
+  std::mt19937 rng(2);
+  const std::vector<BlockEdge> edges{{0, 1, random_pose(rng), 2.0, 3.0},
+                                     {1, 2, random_pose(rng), 1.0, 0.5}};
+  const std::vector<VerticalPrior> priors{{0, random_vector<3>(rng).normalized(), 4.0},
+                                          {2, random_vector<3>(rng).normalized(), 0.7}};
+  const QuadraticProblem with(rank, 3, edges, {}, priors);
+  const QuadraticProblem without(rank, 3, edges, {});
+  const LiftedPoses X = random_lifted_poses(rng, rank, 3);
+  double expected = without.cost(X);
+  for (const VerticalPrior& v : priors) expected += vertical_cost(v, X.middleCols<3>(4 * v.pose));
+  CHECK(with.cost(X) == Approx(expected).epsilon(1e-12));
+  const LiftedPoses gradient = with.euclidean_gradient(X);
+  constexpr double h = 1e-4;
+  for (int k = 0; k < 5; ++k) {
+    const LiftedPoses V = project_tangent(X, random_lifted_poses(rng, rank, 3));
+    const double up = with.cost(retract(X, h * V));
+    const double down = with.cost(retract(X, -h * V));
+    CHECK((up - down) / (2.0 * h) == Approx(gradient.cwiseProduct(V).sum()).margin(1e-4));
+    CHECK((up - 2.0 * with.cost(X) + down) / (h * h) ==
+          Approx(with.hessian_product(X, gradient, V).cwiseProduct(V).sum()).margin(1e-2));
+  }
+  const auto make = [&](VerticalPrior v) { return QuadraticProblem(rank, 3, edges, {}, {v}); };
+  CHECK_THROWS_AS(make({3, Eigen::Vector3d::UnitZ(), 1.0}), std::invalid_argument);
+  CHECK_THROWS_AS(make({0, Eigen::Vector3d::UnitZ(), 0.0}), std::invalid_argument);
+  CHECK_THROWS_AS(make({0, Eigen::Vector3d::Constant(NAN), 1.0}), std::invalid_argument);
 }
 
 }  // namespace km

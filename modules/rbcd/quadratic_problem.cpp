@@ -1,11 +1,11 @@
-#include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/rbcd/quadratic_problem.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
-#include "modules/pose_graph/rank_dispatch.hpp"
+#include "modules/rbcd/rank_dispatch.hpp"
 
 namespace km {
 namespace {

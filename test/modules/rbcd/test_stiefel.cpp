@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/stiefel.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/rbcd/stiefel.hpp"
 #include "test/support/pose_graph_problems.hpp"
 
 namespace km {
@@ -17,7 +18,7 @@ LiftedPoses random_tangent(std::mt19937& rng, const LiftedPoses& X) {
 
 }  // namespace
 
-TEST_CASE("nearest_stiefel has orthonormal columns and is the nearest", "[pose_graph]") {
+TEST_CASE("nearest_stiefel has orthonormal columns and is the nearest", "[rbcd]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -33,7 +34,7 @@ TEST_CASE("nearest_stiefel has orthonormal columns and is the nearest", "[pose_g
   }
 }
 
-TEST_CASE("the projected vector is tangent and the rest is normal", "[pose_graph]") {
+TEST_CASE("the projected vector is tangent and the rest is normal", "[rbcd]") {
   std::mt19937 rng(4);
   const Eigen::Index rank = GENERATE(3, 4, 5);
   const LiftedPoses X = random_lifted_poses(rng, rank, 7);
@@ -49,7 +50,7 @@ TEST_CASE("the projected vector is tangent and the rest is normal", "[pose_graph
   CHECK((project_tangent(X, V) - V).norm() < kRounding);
 }
 
-TEST_CASE("the retraction is feasible and of second order", "[pose_graph]") {
+TEST_CASE("the retraction is feasible and of second order", "[rbcd]") {
   std::mt19937 rng(5);
   const LiftedPoses X = random_lifted_poses(rng, 5, 3);
   const LiftedPoses V = random_tangent(rng, X);
@@ -63,7 +64,7 @@ TEST_CASE("the retraction is feasible and of second order", "[pose_graph]") {
   CHECK(project_tangent(X, (plus - 2.0 * X + minus) / (h * h)).norm() < 1e-6);
 }
 
-TEST_CASE("lifting a chain of poses gives a chain", "[pose_graph]") {
+TEST_CASE("lifting a chain of poses gives a chain", "[rbcd]") {
   std::mt19937 rng(6);
   const SE3 T_a_b = random_pose(rng);
   const SE3 T_b_c = random_pose(rng);

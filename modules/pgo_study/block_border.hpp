@@ -1,17 +1,13 @@
 #pragma once
 
 #include <map>
-#include <span>
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "modules/pose_graph/quadratic_problem.hpp"
 #include "modules/pose_graph/session_graph.hpp"
+#include "modules/rbcd/quadratic_problem.hpp"
 
 namespace km {
-
-/// Edges of a robot between its own poses, as edges of the block of these poses.
-[[nodiscard]] std::vector<BlockEdge> block_edges(std::span<const PoseEdge> own);
 
 /// Edges between a robot and others, as public edges of its block. The poses at their other ends
 /// are fixed.

@@ -1,16 +1,10 @@
-#include "modules/pose_graph/stiefel.hpp"
+#include "modules/rbcd/stiefel.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 
-#include "modules/pose_graph/rank_dispatch.hpp"
+#include "modules/rbcd/rank_dispatch.hpp"
 
 namespace km {
-
-Eigen::MatrixXd nearest_stiefel(const Eigen::MatrixXd& M) {
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(M, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  return svd.matrixU() * svd.matrixV().transpose();
-}
 
 double stiefel_error(const LiftedPoses& X) {
   double error = 0.0;
@@ -75,6 +69,14 @@ Eigen::MatrixXd lift(const Eigen::MatrixXd& L, const SE3& T) {
 
 Eigen::MatrixXd lifted_identity(Eigen::Index rank) {
   return Eigen::MatrixXd::Identity(rank, 3) * Eigen::Matrix<double, 3, 4>::Identity();
+}
+
+LiftedPoses lift(std::span<const SE3> poses, Eigen::Index rank) {
+  const Eigen::MatrixXd L = lifted_identity(rank);
+  LiftedPoses X(rank, 4 * static_cast<Eigen::Index>(poses.size()));
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    X.middleCols<4>(4 * static_cast<Eigen::Index>(i)) = lift(L, poses[i]);
+  return X;
 }
 
 }  // namespace km

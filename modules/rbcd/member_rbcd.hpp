@@ -8,8 +8,8 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/quadratic_problem.hpp"
 #include "modules/pose_graph/session_graph.hpp"
+#include "modules/rbcd/quadratic_problem.hpp"
 
 namespace km {
 

@@ -5,21 +5,12 @@
 #include <vector>
 
 #include "modules/core/geometry.hpp"
-#include "modules/pose_graph/block_cholesky.hpp"
-#include "modules/pose_graph/stiefel.hpp"
+#include "modules/pose_graph/block_edge.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"
+#include "modules/rbcd/block_cholesky.hpp"
+#include "modules/rbcd/stiefel.hpp"
 
 namespace km {
-
-/// A relative pose between poses i and j of one block, with its precisions: kappa of the rotation
-/// [1/rad^2], tau of the translation [1/m^2].
-struct BlockEdge {
-  Eigen::Index i = 0;
-  Eigen::Index j = 0;
-  SE3 T_i_j = SE3::Identity();
-  double kappa = 1.0;
-  double tau = 1.0;
-};
 
 /// A relative pose between pose `own` of the block and pose `fixed` outside it. The cost is not
 /// symmetric in its ends, so the direction of the measurement is kept.

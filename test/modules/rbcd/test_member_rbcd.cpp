@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "modules/pose_graph/member_rbcd.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/solver_team.hpp"
 

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/rounding.hpp"
+#include "modules/rbcd/rounding.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"
 
@@ -23,7 +23,7 @@ struct Known {
 
 }  // namespace
 
-TEST_CASE("a block with exact measurements converges from any start", "[pose_graph]") {
+TEST_CASE("a block with exact measurements converges from any start", "[rbcd]") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -38,7 +38,7 @@ TEST_CASE("a block with exact measurements converges from any start", "[pose_gra
   for (std::size_t i = 0; i < 3; ++i) CHECK(poses[i].isApprox(truth[i], 1e-6));
 }
 
-TEST_CASE("steps never increase the cost and keep the poses feasible", "[pose_graph]") {
+TEST_CASE("steps never increase the cost and keep the poses feasible", "[rbcd]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -60,7 +60,7 @@ TEST_CASE("steps never increase the cost and keep the poses feasible", "[pose_gr
   }
 }
 
-TEST_CASE("the relaxation unwinds a ring that rigid poses cannot unwind", "[pose_graph]") {
+TEST_CASE("the relaxation unwinds a ring that rigid poses cannot unwind", "[rbcd]") {
   // Equal poses on a ring, with one full turn at the start. This closed geodesic cannot be
   // contracted in SO(3), but St(3, 5) is simply connected.
   constexpr Eigen::Index kPoses = 24;
@@ -86,7 +86,7 @@ TEST_CASE("the relaxation unwinds a ring that rigid poses cannot unwind", "[pose
   CHECK(lowest_cost(5, 1e-3) < 1e-6);
 }
 
-TEST_CASE("whole graphs reach their certified optima", "[pose_graph]") {
+TEST_CASE("whole graphs reach their certified optima", "[rbcd]") {
   // Relative tolerance: quaternions in the files are rounded; this code normalises them, SE-Sync
   // does not.
   const Known known = GENERATE(Known{"tinyGrid3D", 18.5193868}, Known{"smallGrid3D", 1025.39802},

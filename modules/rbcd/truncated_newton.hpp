@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/rbcd/quadratic_problem.hpp"
 
 namespace km {
 

@@ -1,9 +1,9 @@
-#include "modules/pose_graph/solver_choice.hpp"
+#include "modules/rbcd/solver_choice.hpp"
 
 #include <utility>
 
-#include "modules/pose_graph/member_rbcd.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
 
 namespace km {
 namespace {

@@ -1,4 +1,4 @@
-#include "modules/pose_graph/rounding.hpp"
+#include "modules/rbcd/rounding.hpp"
 
 #include "modules/core/lie.hpp"
 

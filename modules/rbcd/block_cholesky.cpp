@@ -1,8 +1,8 @@
-#include "modules/pose_graph/block_cholesky.hpp"
+#include "modules/rbcd/block_cholesky.hpp"
 
 #include <stdexcept>
 
-#include "modules/pose_graph/rank_dispatch.hpp"
+#include "modules/rbcd/rank_dispatch.hpp"
 
 namespace km {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "modules/pose_graph/stiefel.hpp"
+#include "modules/rbcd/stiefel.hpp"
 
 namespace km {
 

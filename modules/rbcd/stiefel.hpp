@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <random>
+#include <span>
 
 #include "modules/core/geometry.hpp"
 
@@ -17,9 +18,6 @@ using LiftedPoses = Eigen::MatrixXd;
 inline Eigen::Index pose_count(const LiftedPoses& X) {
   return X.cols() / 4;
 }
-
-/// The matrix of St(3, r) nearest to `M` (r x 3) in the Frobenius norm: U V^T of its SVD.
-[[nodiscard]] Eigen::MatrixXd nearest_stiefel(const Eigen::MatrixXd& M);
 
 /// Largest entry of |Y_i^T Y_i - I| over the poses: 0 if X is feasible.
 [[nodiscard]] double stiefel_error(const LiftedPoses& X);
@@ -52,5 +50,8 @@ inline Eigen::Index pose_count(const LiftedPoses& X) {
 
 /// The transform [lifting_matrix(rank) 0], for lift().
 [[nodiscard]] Eigen::MatrixXd lifted_identity(Eigen::Index rank);
+
+/// Poses lifted to rank r by lifted_identity(r).
+[[nodiscard]] LiftedPoses lift(std::span<const SE3> poses, Eigen::Index rank);
 
 }  // namespace km

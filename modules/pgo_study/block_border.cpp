@@ -1,15 +1,8 @@
-#include "modules/pgo_study/block_edges.hpp"
+#include "modules/pgo_study/block_border.hpp"
 
 #include <set>
 
 namespace km {
-
-std::vector<BlockEdge> block_edges(std::span<const PoseEdge> own) {
-  std::vector<BlockEdge> edges;
-  for (const PoseEdge& e : own)
-    edges.push_back({e.from.index, e.to.index, e.T_from_to, e.precision.kappa, e.precision.tau});
-  return edges;
-}
 
 BlockBorder border_of(const SessionGraph& part) {
   BlockBorder border;

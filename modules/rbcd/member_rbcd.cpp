@@ -1,4 +1,4 @@
-#include "modules/pose_graph/member_rbcd.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/rounding.hpp"
-#include "modules/pose_graph/stiefel.hpp"
-#include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/stiefel.hpp"
+#include "modules/rbcd/truncated_newton.hpp"
 
 namespace km {
 namespace {
