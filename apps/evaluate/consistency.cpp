@@ -19,7 +19,7 @@
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
 namespace {

@@ -11,12 +11,8 @@
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/random_outliers.hpp"
-#include "modules/pgo_study/central_solver.hpp"
 #include "modules/pgo_study/team_closures.hpp"
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
-#include "modules/pose_graph/rounding.hpp"
+#include "modules/rbcd/rounding.hpp"
 
 namespace km {
 std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config,
@@ -42,13 +38,7 @@ double rmse_m(const std::vector<SE3>& truth, const std::vector<SE3>& estimate) {
   std::vector<PosePair> pairs;
   for (std::size_t i = 0; i < truth.size(); ++i)
     pairs.push_back({static_cast<Stamp>(i), truth[i], estimate[i]});
-  const Alignment alignment = align(pairs, false);
-  std::vector<double> errors;
-  for (const PosePair& pair : pairs)
-    errors.push_back(
-        (pair.T_truth_body.translation() - alignment.apply(pair.T_estimate_body).translation())
-            .norm());
-  return statistics_of(std::move(errors)).rmse;
+  return statistics_of(aligned_errors_m(pairs)).rmse;
 }
 
 // Runs one method on a graph whose edges from index `own_edges` are false closures.
@@ -89,6 +79,16 @@ OutlierResult attempt(const std::string& method, const TeamGraph& graph, std::si
 
 }  // namespace
 
+std::vector<double> aligned_errors_m(std::span<const PosePair> pairs) {
+  const Alignment alignment = align(pairs, false);
+  std::vector<double> errors;
+  for (const PosePair& pair : pairs)
+    errors.push_back(
+        (pair.T_truth_body.translation() - alignment.apply(pair.T_estimate_body).translation())
+            .norm());
+  return errors;
+}
+
 double half_extent_m(const std::vector<SE3>& poses) {
   Eigen::AlignedBox3d box;
   for (const SE3& T : poses) box.extend(T.translation());
@@ -125,6 +125,20 @@ TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m, u
   return spoiled;
 }
 
+std::vector<BlockEdge> false_place(const std::vector<SE3>& poses, Eigen::Index a, Eigen::Index b,
+                                   std::size_t size, const SE3& T_a_b, const Precision& claimed) {
+  std::vector<BlockEdge> edges;
+  for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(size); ++k) {
+    const auto moved = [&](Eigen::Index first) {
+      return poses[static_cast<std::size_t>(first)].inverse() *
+             poses[static_cast<std::size_t>(first + k)];
+    };
+    edges.push_back(
+        {a + k, b + k, moved(a).inverse() * T_a_b * moved(b), claimed.kappa, claimed.tau});
+  }
+  return edges;
+}
+
 TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
                             const std::vector<SE3>& poses, double half_side_m, unsigned seed) {
   TeamGraph spoiled = graph;
@@ -149,14 +163,9 @@ TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
     const Eigen::Index a = any_place(0);
     const Eigen::Index b = any_place(graph.robots() - 1);
     const SE3 T_a_b = random_outliers(1, model, rng).front().T_from_to;
-    for (Eigen::Index k = 0; k < length; ++k) {
-      const auto moved = [&](Eigen::Index first) {
-        return poses[static_cast<std::size_t>(first)].inverse() *
-               poses[static_cast<std::size_t>(first + k)];
-      };
-      spoiled.edges.push_back(
-          {a + k, b + k, moved(a).inverse() * T_a_b * moved(b), claimed.kappa, claimed.tau});
-    }
+    for (const BlockEdge& e :
+         false_place(poses, a, b, clusters.size, T_a_b, {claimed.kappa, claimed.tau}))
+      spoiled.edges.push_back(e);
   }
   return spoiled;
 }

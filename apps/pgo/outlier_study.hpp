@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "apps/pgo/solvers.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 #include "modules/pgo_study/round_meter.hpp"
 #include "modules/pgo_study/team_graph.hpp"
@@ -79,6 +81,9 @@ using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
                                              const TeamMeter& meter,
                                              const OutlierProgress& progress = {});
 
+/// Distances of the positions of `pairs`, after the estimate is aligned by one rigid transform.
+[[nodiscard]] std::vector<double> aligned_errors_m(std::span<const PosePair> pairs);
+
 /// Half the longest side of the box around all positions.
 [[nodiscard]] double half_extent_m(const std::vector<SE3>& poses);
 
@@ -89,6 +94,12 @@ using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
 /// from.
 [[nodiscard]] TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m,
                               unsigned seed);
+
+/// False closures from poses a, a + 1, ... of one robot to poses b, b + 1, ... of another. They
+/// agree with the motion of `poses` and with `T_a_b` between the first two.
+[[nodiscard]] std::vector<BlockEdge> false_place(const std::vector<SE3>& poses, Eigen::Index a,
+                                                 Eigen::Index b, std::size_t size, const SE3& T_a_b,
+                                                 const Precision& claimed);
 
 /// Appends clusters of false closures between the first robot and the last. `poses` give the motion
 /// of the robots within a cluster. Weights and ranges are as in `spoil`. Throws

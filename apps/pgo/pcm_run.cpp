@@ -14,9 +14,9 @@
 #include "modules/outlier_rejection/max_clique.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/random_outliers.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
-#include "modules/pose_graph/text_fields.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/text_fields.hpp"
 
 namespace km {
 namespace {

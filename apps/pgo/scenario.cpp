@@ -320,14 +320,9 @@ void add_clusters(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& 
     const Index a = any_place(robots.first);
     const Index b = any_place(robots.second);
     const SE3 T_a_b = random_outliers(1, model, rng).front().T_from_to;
-    for (Index k = 0; k < length; ++k) {
-      const auto moved = [&](Index first) {
-        return drawn.truth[static_cast<std::size_t>(first)].inverse() *
-               drawn.truth[static_cast<std::size_t>(first + k)];
-      };
-      const SE3 T = moved(a).inverse() * T_a_b * moved(b);
-      graph.edges.push_back({a + k, b + k, moved_by(T, normal_tangent(graph.dimension, rng), sigma),
-                             claims.kappa, claims.tau});
+    for (BlockEdge& e : false_place(drawn.truth, a, b, scenario.clusters.size, T_a_b, claims)) {
+      e.T_i_j = moved_by(e.T_i_j, normal_tangent(graph.dimension, rng), sigma);
+      graph.edges.push_back(e);
     }
   }
 }

@@ -9,83 +9,35 @@
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/pgo_study/agent_team.hpp"
-#include "modules/pgo_study/central_solver.hpp"
+#include "modules/pgo_study/connected_parts.hpp"
 #include "modules/pgo_study/odometry_start.hpp"
 #include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/lone_solution.hpp"
 #include "modules/pose_graph/robust_schedule.hpp"
-#include "modules/pose_graph/rounding.hpp"
-#include "modules/pose_graph/tree_newton.hpp"
+#include "modules/pose_graph/tree_front.hpp"
+#include "modules/rbcd/rounding.hpp"
 
 namespace km {
 namespace {
 
 using Eigen::Index;
 
-PoseEdge own_edge(const BlockEdge& e) {
-  return {{0, static_cast<KeyframeIndex>(e.i)},
-          {0, static_cast<KeyframeIndex>(e.j)},
-          e.T_i_j,
-          {e.kappa, e.tau}};
+std::vector<ConnectedPart> parts_of(const TeamGraph& graph, const std::vector<bool>& kept) {
+  return connected_parts(graph, std::vector<bool>(graph.ids.size(), true), kept);
 }
 
-struct Minimum {
-  std::vector<SE3> poses;
-  bool decided = true;
-};
-
-// Minimum of the cost of edges that connect all poses.
-Minimum minimum_near(std::vector<SE3> start, const std::vector<BlockEdge>& edges, int dimension,
-                     std::uint32_t most_steps) {
-  constexpr double kPatience = 8.0;  // rounds; generous, because no messages are sent
-  SessionGraph graph{.start = std::move(start)};
-  for (const BlockEdge& e : edges) graph.own.push_back(own_edge(e));
-  TreeNewton newton(std::move(graph), TreePlace{.members = {0}},
-                    TreeNewtonOptions{.dimension = dimension,
-                                      .absolute_tolerance = 1e-12,
-                                      .patience_rounds = kPatience,
-                                      .max_rounds = most_steps,
-                                      .robust = false});
-  while (!newton.done()) (void)newton.advance();
-  return {newton.poses(), !newton.state().failed && newton.state().round + 1 < most_steps};
-}
-
-// Poses and edges of one connected part, with numbers of its own.
-struct Part {
-  std::vector<Index> poses;  // indices in the whole graph
-  std::vector<BlockEdge> edges;
-};
-
-std::map<Index, Part> parts_of(const TeamGraph& graph) {
-  const std::vector<Index> part_of = part_of_poses(graph);
-  std::map<Index, Part> parts;
-  std::vector<Index> number;
-  for (Index i = 0; i < graph.poses(); ++i) {
-    std::vector<Index>& poses = parts[part_of[static_cast<std::size_t>(i)]].poses;
-    number.push_back(static_cast<Index>(poses.size()));
-    poses.push_back(i);
-  }
-  for (const BlockEdge& e : graph.edges) {
-    BlockEdge own = e;
-    own.i = number[static_cast<std::size_t>(e.i)];
-    own.j = number[static_cast<std::size_t>(e.j)];
-    parts.at(part_of[static_cast<std::size_t>(e.i)]).edges.push_back(own);
-  }
-  return parts;
-}
-
-// Chordal initialisation of each connected part.
-std::vector<SE3> chordal_start(const TeamGraph& graph) {
+// Chordal initialisation of each connected part of the `kept` edges.
+std::vector<SE3> chordal_start(const TeamGraph& graph, const std::vector<bool>& kept) {
   std::vector<SE3> start(static_cast<std::size_t>(graph.poses()));
-  for (const auto& [lowest, part] : parts_of(graph)) {
-    const auto poses = chordal_initialisation(static_cast<Index>(part.poses.size()), part.edges);
-    for (std::size_t k = 0; k < poses.size(); ++k)
-      start[static_cast<std::size_t>(part.poses[k])] = poses[k];
+  for (const ConnectedPart& part : parts_of(graph, kept)) {
+    const auto poses = chordal_initialisation(part.graph.poses(), part.graph.edges);
+    for (std::size_t k = 0; k < poses.size(); ++k) start[part.poses[k]] = poses[k];
   }
   return start;
 }
 
 double residual(const BlockEdge& e, const std::vector<SE3>& poses) {
-  return residual_of(own_edge(e), poses[static_cast<std::size_t>(e.i)],
+  return residual_of(edge_of_one_robot(e), poses[static_cast<std::size_t>(e.i)],
                      poses[static_cast<std::size_t>(e.j)]);
 }
 
@@ -133,7 +85,7 @@ PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
     kept = pairwise_consistent(graph, options.pcm);
   else if (method != "trust-all")
     throw std::invalid_argument("scenario study: unknown method " + method);
-  std::vector<SE3> start = chordal_start(with_edges(graph, kept));
+  std::vector<SE3> start = chordal_start(graph, kept);
   return solve_centrally(graph, std::move(kept), std::move(start));
 }
 
@@ -141,17 +93,19 @@ PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
 
 PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::vector<SE3> start,
                            std::uint32_t most_steps) {
-  const TeamGraph used = with_edges(graph, kept);
-  PlacedTeam placed{
-      .T_frame_kf = std::move(start), .frame_of = part_of_poses(used), .kept = std::move(kept)};
-  for (const auto& [lowest, part] : parts_of(used)) {
-    std::vector<SE3> poses;
-    for (const Index i : part.poses)
-      poses.push_back(placed.T_frame_kf[static_cast<std::size_t>(i)]);
-    const Minimum minimum = minimum_near(std::move(poses), part.edges, graph.dimension, most_steps);
-    placed.decided = placed.decided && minimum.decided;
+  PlacedTeam placed{.T_frame_kf = std::move(start), .frame_of = {}, .kept = std::move(kept)};
+  placed.frame_of = part_of_poses(with_edges(graph, placed.kept));
+  for (const ConnectedPart& part : parts_of(graph, placed.kept)) {
+    SessionGraph alone;
+    for (const std::size_t i : part.poses) alone.start.push_back(placed.T_frame_kf[i]);
+    for (const BlockEdge& e : part.graph.edges) alone.own.push_back(edge_of_one_robot(e));
+    const LoneSolution solved = solve_alone(std::move(alone), {.dimension = graph.dimension,
+                                                               .absolute_tolerance = 1e-12,
+                                                               .max_rounds = most_steps,
+                                                               .robust = false});
+    placed.decided = placed.decided && solved.converged;
     for (std::size_t k = 0; k < part.poses.size(); ++k)
-      placed.T_frame_kf[static_cast<std::size_t>(part.poses[k])] = minimum.poses[k];
+      placed.T_frame_kf[part.poses[k]] = solved.poses[k];
   }
   return placed;
 }
@@ -167,7 +121,7 @@ PlacedTeam solve_by_gnc(const TeamGraph& graph) {
   const std::vector<bool> all(graph.edges.size(), true);
   const bool joined = std::ranges::count(part_of_poses(graph), 0) == graph.poses();
   PlacedTeam placed =
-      solve_centrally(graph, all, joined ? odometry_start(graph) : chordal_start(graph));
+      solve_centrally(graph, all, joined ? odometry_start(graph) : chordal_start(graph, all));
   double largest = 0.0;
   for (std::size_t k = 0; k < odometry.size(); ++k)
     if (!odometry[k]) largest = std::max(largest, residual(graph.edges[k], placed.T_frame_kf));
@@ -217,11 +171,8 @@ ScenarioResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed) {
         {static_cast<Stamp>(i), drawn.truth[i], placed.T_frame_kf[i]});
   std::vector<double> errors;
   for (const auto& [frame, pairs] : frames) {
-    const Alignment alignment = align(pairs, false);
-    for (const PosePair& pair : pairs)
-      errors.push_back(
-          (pair.T_truth_body.translation() - alignment.apply(pair.T_estimate_body).translation())
-              .norm());
+    const std::vector<double> of_frame = aligned_errors_m(pairs);
+    errors.insert(errors.end(), of_frame.begin(), of_frame.end());
   }
   const Statistics statistics = statistics_of(std::move(errors));
   result.frames = frames.size();
@@ -233,14 +184,10 @@ ScenarioResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed) {
 
 ScenarioStudy run_scenario_study(const TeamGraph& whole, const ScenarioStudyOptions& options,
                                  const TeamMeter& meter, const OutlierProgress& progress) {
-  CentralSolver central(whole.edges, lift(chordal_initialisation(whole.poses(), whole.edges), 3),
-                        whole.dimension);
-  while (central.step()) {
-  }
-  const std::vector<SE3> optimum = round_to_poses(central.X(), central.X().leftCols<4>());
-  ScenarioStudy study{.scenario = options.scenario.name,
-                      .certified = central.certificate() && central.certificate()->certified,
-                      .results = {}};
+  const CentralOptimum central = central_optimum(whole);
+  const std::vector<SE3> optimum = round_to_poses(central.X, central.X.leftCols<4>());
+  ScenarioStudy study{
+      .scenario = options.scenario.name, .certified = central.certified, .results = {}};
   const std::size_t all = options.seeds.size() * options.methods.size();
   for (const unsigned seed : options.seeds) {
     const ScenarioGraph drawn = draw_scenario(whole, optimum, options.scenario, seed);

@@ -9,7 +9,7 @@
 #include "apps/pgo/commands.hpp"
 #include "apps/pgo/solve_report.hpp"
 #include "modules/core/precision.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
 namespace {

@@ -12,21 +12,31 @@
 #include "modules/pgo_study/local_team.hpp"
 #include "modules/pgo_study/odometry_start.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/member_rbcd.hpp"
-#include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
+#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/solver_choice.hpp"
 
 namespace km {
 namespace {
 
 constexpr Eigen::Index kRigidRank = 3;
 
+// The configuration of robots with these options.
+PoseGraphConfig config_of(const SolverOptions& options) {
+  PoseGraphConfig config;
+  config.robust = !options.trust_all;
+  config.barc = options.barc;
+  config.tell_private = options.tell_private;
+  config.rank = static_cast<int>(options.rank);
+  config.max_over_relaxation = options.over_relaxation;
+  return config;
+}
+
 // The robots' own block descent, with their own stopping rule.
 std::unique_ptr<TeamSolver> rbcd_team(const TeamGraph& graph, const std::vector<SE3>& start,
                                       const SolverOptions& options) {
-  const RbcdOptions rbcd{.rank = options.rank,
-                         .max_rounds = static_cast<std::uint32_t>(options.run.max_rounds),
-                         .max_over_relaxation = options.over_relaxation};
+  RbcdOptions rbcd = rbcd_options(config_of(options));
+  rbcd.max_rounds = static_cast<std::uint32_t>(options.run.max_rounds);
   return std::make_unique<MemberTeam>(
       graph, kRigidRank, start,
       [rbcd](SessionGraph part, const TreePlace& place) {
@@ -55,15 +65,10 @@ std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<
 // No gradient tolerance ends the run: at a gradient of 0 the weights may still change.
 SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const SolverOptions& options,
                      const TeamMeter& meter) {
-  // Rounds. As many as second derivatives save here.
-  constexpr double kPatience = 8.0;
-  const TreeNewtonOptions newton{.dimension = graph.dimension,
-                                 .absolute_tolerance = 1e-12,
-                                 .patience_rounds = kPatience,
-                                 .robust = !options.trust_all,
-                                 .barc = options.barc,
-                                 .reject_odometry = options.reject_odometry,
-                                 .tell_private = options.tell_private};
+  TreeNewtonOptions newton = newton_options(config_of(options));
+  newton.dimension = graph.dimension;
+  newton.absolute_tolerance = 1e-12;
+  newton.reject_odometry = options.reject_odometry;
   if (start.empty()) start = odometry_start(graph);
   MemberTeam team(
       graph, kRigidRank, std::move(start),

@@ -7,7 +7,7 @@
 
 #include "apps/pgo/solvers.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
-#include "modules/pose_graph/rounding.hpp"
+#include "modules/rbcd/rounding.hpp"
 
 namespace km {
 namespace {

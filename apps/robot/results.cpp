@@ -10,7 +10,7 @@
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
 namespace {

@@ -10,7 +10,7 @@
 #include "modules/core/camera_calibration.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "modules/mesh/continued_map.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
 #include "runtime/dds/ros_network.hpp"

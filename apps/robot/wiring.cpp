@@ -21,6 +21,7 @@
 #include "modules/place_recognition/place_recognition_node.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/pose_graph/team_node.hpp"
+#include "modules/rbcd/solver_choice.hpp"
 #include "modules/ros_dds/live_sink_codec.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
@@ -304,6 +305,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                                  .inlier_sets = topics_.own_inlier_sets},
                        resume_count(identity_.boot) << kResumeBits);
   add<TeamNode>(false, config.pose_graph, TeamPeer{identity_.robot, identity_.boot},
+                solver_choice(config.pose_graph),
                 TeamTopics{.odometry = topics_.keyframe_odometry,
                            .closures = topics_.closures,
                            .inlier_sets = topics_.own_inlier_sets,

@@ -104,4 +104,9 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M) {
   return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
 }
 
+Eigen::MatrixXd nearest_stiefel(const Eigen::MatrixXd& M) {
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(M, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  return svd.matrixU() * svd.matrixV().transpose();
+}
+
 }  // namespace km

@@ -46,4 +46,8 @@ Eigen::Matrix3d turn_to_z(const Eigen::Vector3d& up);
 /// The rotation nearest to `M` in the Frobenius norm (projection by SVD).
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M);
 
+/// The matrix with orthonormal columns nearest to `M` (r x 3) in the Frobenius norm: U V^T of its
+/// SVD. It is a point of the Stiefel manifold St(3, r).
+Eigen::MatrixXd nearest_stiefel(const Eigen::MatrixXd& M);
+
 }  // namespace km

@@ -10,9 +10,9 @@
 
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "modules/pgo_study/team_closures.hpp"
-#include "modules/pose_graph/solver_choice.hpp"
 #include "modules/pose_graph/team_agent.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
+#include "modules/rbcd/solver_choice.hpp"
 
 namespace km {
 namespace {

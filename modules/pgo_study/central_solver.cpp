@@ -1,7 +1,7 @@
 #include "modules/pgo_study/central_solver.hpp"
 
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/rounding.hpp"
+#include "modules/pgo_study/team_graph.hpp"
+#include "modules/rbcd/rounding.hpp"
 
 namespace km {
 namespace {
@@ -24,11 +24,7 @@ CentralSolver::CentralSolver(const std::vector<BlockEdge>& edges, LiftedPoses st
     : staircase_(edges, start, options, verticals) {
   if (!rigid(start)) return;
   SessionGraph graph{.start = round_to_poses(start, lifted_identity(3))};
-  for (const BlockEdge& e : edges)
-    graph.own.push_back({{0, static_cast<KeyframeIndex>(e.i)},
-                         {0, static_cast<KeyframeIndex>(e.j)},
-                         e.T_i_j,
-                         {e.kappa, e.tau}});
+  for (const BlockEdge& e : edges) graph.own.push_back(edge_of_one_robot(e));
   graph.upright = !verticals.empty();
   graph.verticals = std::move(verticals);
   newton_ = std::make_unique<TreeNewton>(std::move(graph), TreePlace{.members = {0}},

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/rbcd/quadratic_problem.hpp"
 
 namespace km {
 

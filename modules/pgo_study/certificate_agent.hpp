@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "modules/pgo_study/block_edges.hpp"
-#include "modules/pose_graph/block_cholesky.hpp"
+#include "modules/pgo_study/block_border.hpp"
+#include "modules/rbcd/block_cholesky.hpp"
 
 namespace km {
 

@@ -1,49 +1,26 @@
 #include "modules/pgo_study/connected_parts.hpp"
 
 #include <map>
-#include <numeric>
 
 namespace km {
-namespace {
-
-// Union-find over poses.
-class JoinedPoses {
- public:
-  explicit JoinedPoses(Eigen::Index poses) : parent_(static_cast<std::size_t>(poses)) {
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-  }
-  std::size_t root(std::size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::size_t i, std::size_t j) { parent_[root(i)] = root(j); }
-
- private:
-  std::vector<std::size_t> parent_;
-};
-
-}  // namespace
 
 std::vector<ConnectedPart> connected_parts(const TeamGraph& graph,
                                            const std::vector<bool>& keep_pose,
                                            const std::vector<bool>& keep_edge) {
-  const auto is_kept = [&](std::size_t k) {
+  std::vector<bool> kept = keep_edge;
+  for (std::size_t k = 0; k < kept.size(); ++k) {
     const BlockEdge& e = graph.edges[k];
-    return keep_edge[k] && keep_pose[static_cast<std::size_t>(e.i)] &&
-           keep_pose[static_cast<std::size_t>(e.j)];
-  };
-  JoinedPoses joined(graph.poses());
-  for (std::size_t k = 0; k < graph.edges.size(); ++k)
-    if (is_kept(k))
-      joined.join(static_cast<std::size_t>(graph.edges[k].i),
-                  static_cast<std::size_t>(graph.edges[k].j));
+    kept[k] = kept[k] && keep_pose[static_cast<std::size_t>(e.i)] &&
+              keep_pose[static_cast<std::size_t>(e.j)];
+  }
+  const std::vector<Eigen::Index> lowest = part_of_poses(with_edges(graph, kept));
   std::vector<ConnectedPart> parts;
-  std::map<std::size_t, std::size_t> part_of_root;
+  std::map<Eigen::Index, std::size_t> part_of_lowest;
   std::vector<std::size_t> last_robot;  // last robot of each part so far
   std::vector<Eigen::Index> number(static_cast<std::size_t>(graph.poses()), -1);
   for (std::size_t i = 0; i < number.size(); ++i) {
     if (!keep_pose[i]) continue;
-    const auto [at, is_new] = part_of_root.emplace(joined.root(i), parts.size());
+    const auto [at, is_new] = part_of_lowest.emplace(lowest[i], parts.size());
     const std::size_t robot = graph.robot_of(static_cast<Eigen::Index>(i));
     if (is_new)
       parts.push_back({.graph = {.dimension = graph.dimension}, .poses = {}, .edges = {}});
@@ -58,9 +35,9 @@ std::vector<ConnectedPart> connected_parts(const TeamGraph& graph,
   for (ConnectedPart& part : parts)
     part.graph.first.push_back(static_cast<Eigen::Index>(part.poses.size()));
   for (std::size_t k = 0; k < graph.edges.size(); ++k) {
-    if (!is_kept(k)) continue;
+    if (!kept[k]) continue;
     BlockEdge edge = graph.edges[k];
-    ConnectedPart& part = parts[part_of_root.at(joined.root(static_cast<std::size_t>(edge.i)))];
+    ConnectedPart& part = parts[part_of_lowest.at(lowest[static_cast<std::size_t>(edge.i)])];
     edge.i = number[static_cast<std::size_t>(edge.i)];
     edge.j = number[static_cast<std::size_t>(edge.j)];
     part.graph.edges.push_back(edge);
@@ -69,7 +46,7 @@ std::vector<ConnectedPart> connected_parts(const TeamGraph& graph,
   for (const VerticalPrior& prior : graph.verticals) {
     const auto pose = static_cast<std::size_t>(prior.pose);
     if (keep_pose[pose])
-      parts[part_of_root.at(joined.root(pose))].graph.verticals.push_back(
+      parts[part_of_lowest.at(lowest[pose])].graph.verticals.push_back(
           {number[pose], prior.up, prior.weight});
   }
   return parts;

@@ -4,10 +4,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "modules/pgo_study/block_edges.hpp"
+#include "modules/pgo_study/block_border.hpp"
 #include "modules/pgo_study/message_sizes.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/rbcd/truncated_newton.hpp"
 
 namespace km {
 namespace {

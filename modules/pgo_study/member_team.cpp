@@ -5,9 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/odometry_breaks.hpp"
-#include "modules/pose_graph/odometry_noise.hpp"
+#include "modules/pose_graph/odometry_judgement.hpp"
 #include "modules/pose_graph/precision_limits.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 #include "modules/pose_graph/tree_front.hpp"
@@ -18,18 +16,15 @@ using Eigen::Index;
 
 namespace {
 
-// Corrects weights as robots do before a session. Odometry that is noisier than stated gets a lower
-// weight, and all robots know that weight. No robot remains much more precise than the others.
+// Corrects weights as robots do when a session begins. All robots know the weights of each other.
 void weigh_as_robots(std::vector<SessionGraph>& parts) {
   std::map<RobotId, OdometryNoise> noise;
   for (SessionGraph& part : parts) {
     const std::span<PoseEdge> own(part.own);
-    const std::span<PoseEdge> steps = own.first(part.odometry);
-    correct_breaks(steps, find_odometry_breaks(steps, own.subspan(part.odometry)));
-    noise[part.self] =
-        estimate_odometry_noise(own.first(part.odometry), own.subspan(part.odometry));
-    for (PoseEdge& step : own.first(part.odometry))
-      step.precision = noise[part.self].corrected(step.precision);
+    const OdometryJudgement judgement =
+        judge_odometry(own.first(part.odometry), own.subspan(part.odometry));
+    judgement.correct(own.first(part.odometry));
+    noise[part.self] = judgement.noise;
   }
   for (SessionGraph& part : parts) {
     for (auto& [robot, step] : part.step_precision) step = noise.at(robot).corrected(step);
@@ -53,7 +48,7 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
   for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
   if (as_robots) weigh_as_robots(parts_);
   places_ = places(shape);
-  tell_starts(std::move(start), nullptr);
+  tell_starts(std::move(start));
   open_session();
   take_poses();
 }
@@ -85,7 +80,7 @@ std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
 }
 
 // Sends all public poses to all robots in single precision, as MemberPoses does.
-void MemberTeam::tell_starts(std::vector<SE3> start, RoundMeter* meter) {
+void MemberTeam::tell_starts(std::vector<SE3> start) {
   std::set<KeyframeId> ends;
   for (const SessionGraph& part : parts_)
     for (const PoseEdge& e : part.between) ends.insert({e.from, e.to});
@@ -103,7 +98,6 @@ void MemberTeam::tell_starts(std::vector<SE3> start, RoundMeter* meter) {
       sent_[id.robot] += kBytes;
       received_[k] += kBytes;
     }
-  if (meter != nullptr) meter->sent(to_announce_);
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     parts_[k].start.assign(start.begin() + graph_.first[k], start.begin() + graph_.first[k + 1]);
     parts_[k].told.clear();
@@ -118,7 +112,7 @@ void MemberTeam::open_session() {
   const auto before = std::exchange(members_, {});
   post_.clear();
   for (std::size_t k = 0; k < parts_.size(); ++k) {
-    parts_[k].decided = decided_;
+    parts_[k].decided = decisions_.decided();
     if (k < before.size()) parts_[k].noise = before[k]->noise();
     members_.push_back(make_(parts_[k], places_.at(k)));
   }
@@ -133,8 +127,8 @@ void MemberTeam::take_poses() {
 }
 
 int MemberTeam::step(RoundMeter& meter) {
-  if (to_announce_ > 0) meter.sent(std::exchange(to_announce_, 0));
-  if (done() && !reconsider(meter)) return 0;
+  if (done() && !reconsider()) return 0;
+  meter.sent(std::exchange(to_announce_, 0));
   const std::uint32_t before = rounds_;
   const std::uint32_t round = rounds_ - rounds_before_ + 1;
   const auto arrived = [&] {
@@ -180,10 +174,8 @@ bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
   return worked;
 }
 
-bool MemberTeam::reconsider(RoundMeter& meter) {
-  for (const auto& member : members_)
-    for (const WeighedClosure& closure : member->verdicts().closures)
-      decided_[closure.id] = closure.kept;
+bool MemberTeam::reconsider() {
+  for (const auto& member : members_) decisions_.decide(member->verdicts().closures, false);
   if (!state_.set_aside) return false;
   std::vector<SE3> poses;
   for (const auto& member : members_)
@@ -193,13 +185,8 @@ bool MemberTeam::reconsider(RoundMeter& meter) {
   };
   bool any = false;
   const auto look_again = [&](const PoseEdge& e) {
-    const auto decided = decided_.find(e.id());
-    if (decided == decided_.end() || decided->second || chances_[e.id()] >= kChances ||
-        residual_of(e, pose(e.from), pose(e.to)) > kSecondChance * state_.barc)
-      return;
-    ++chances_[e.id()];
-    decided_.erase(decided);
-    any = true;
+    const bool fits = residual_of(e, pose(e.from), pose(e.to)) <= kSecondChance * state_.barc;
+    if (fits) any |= decisions_.reopen(e.id());
   };
   for (const SessionGraph& part : parts_) {
     for (std::size_t k = part.odometry; k < part.own.size(); ++k) look_again(part.own[k]);
@@ -207,8 +194,7 @@ bool MemberTeam::reconsider(RoundMeter& meter) {
       if (part.self < e.other(part.self).robot) look_again(e);
   }
   if (!any) return false;
-  tell_starts(std::move(poses), &meter);
-  to_announce_ = 0;
+  tell_starts(std::move(poses));
   open_session();
   return true;
 }
@@ -221,12 +207,7 @@ std::vector<bool> MemberTeam::kept() const {
   std::vector<bool> kept = odometry_edges(graph_);
   for (std::size_t k = 0; k < kept.size(); ++k) {
     const BlockEdge& e = graph_.edges[k];
-    const auto id = [&](Index pose) {
-      const std::size_t robot = graph_.robot_of(pose);
-      return KeyframeId{static_cast<RobotId>(robot),
-                        static_cast<KeyframeIndex>(pose - graph_.first[robot])};
-    };
-    const auto found = verdict.find(closure_id(id(e.i), id(e.j)));
+    const auto found = verdict.find(closure_id(graph_.keyframe_of(e.i), graph_.keyframe_of(e.j)));
     kept[k] = kept[k] || found == verdict.end() || found->second;
   }
   return kept;

@@ -7,6 +7,7 @@
 
 #include "modules/pgo_study/team_graph.hpp"
 #include "modules/pgo_study/team_solver.hpp"
+#include "modules/pose_graph/closure_decisions.hpp"
 #include "modules/pose_graph/member_solver.hpp"
 #include "modules/pose_graph/session_graph.hpp"
 
@@ -27,7 +28,7 @@ class MemberTeam final : public TeamSolver {
   using Factory = std::function<std::unique_ptr<MemberSolver>(SessionGraph, TreePlace)>;
 
   /// `start`: one pose for each pose of the graph. `as_robots`: weights are corrected as robots do
-  /// that expect false closures, see estimate_odometry_noise() and limit_precisions(). Throws
+  /// that expect false closures, see judge_odometry() and limit_precisions(). Throws
   /// std::invalid_argument if the number of poses differs, and what `make` throws.
   MemberTeam(const TeamGraph& graph, Eigen::Index rank, std::vector<SE3> start, Factory make,
              TeamShape shape = TeamShape::kAll, bool as_robots = false);
@@ -55,9 +56,9 @@ class MemberTeam final : public TeamSolver {
   };
 
   [[nodiscard]] std::map<std::size_t, TreePlace> places(TeamShape shape) const;
-  void tell_starts(std::vector<SE3> start, RoundMeter* meter);
+  void tell_starts(std::vector<SE3> start);
   void open_session();
-  bool reconsider(RoundMeter& meter);
+  bool reconsider();
   void take_poses();
   bool pass_on(std::uint32_t round, RoundMeter& meter);
 
@@ -69,8 +70,7 @@ class MemberTeam final : public TeamSolver {
   std::vector<std::unique_ptr<MemberSolver>> members_;
   std::vector<Delivery> post_;
   std::vector<LiftedPoses> blocks_;
-  std::map<ClosureId, bool> decided_;
-  std::map<ClosureId, int> chances_;
+  ClosureDecisions decisions_;  // decisions of all members
   std::vector<std::size_t> sent_;
   std::vector<std::size_t> received_;
   std::size_t to_announce_ = 0;  // bytes of the public poses still to be counted

@@ -73,13 +73,10 @@ SE3 elected(const std::vector<Vote>& votes) {
   for (const Vote& vote : votes) T_own_centre.translation() += vote.T_own_end.translation();
   T_own_centre.translation() /= static_cast<double>(votes.size());
   const std::size_t stride = (votes.size() + kMaxVotes - 1) / kMaxVotes;
-  std::vector<Eigen::MatrixXd> candidates;
+  std::vector<SE3> candidates;
   for (std::size_t k = 0; k < votes.size(); k += stride)
-    candidates.emplace_back(
-        (votes[k].T_world_end * votes[k].T_own_end.inverse() * T_own_centre).matrix().topRows<3>());
-  SE3 T_world_centre = SE3::Identity();
-  T_world_centre.matrix().topRows<3>() = align_frames(candidates, {}).value().L;
-  return T_world_centre * T_own_centre.inverse();
+    candidates.push_back(votes[k].T_world_end * votes[k].T_own_end.inverse() * T_own_centre);
+  return align_frames(candidates, {}).value().T * T_own_centre.inverse();
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "modules/pgo_study/block_edges.hpp"
+#include "modules/pgo_study/block_border.hpp"
 #include "modules/pgo_study/told_block.hpp"
-#include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/rbcd/truncated_newton.hpp"
 
 namespace km {
 

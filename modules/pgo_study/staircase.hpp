@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "modules/pgo_study/certificate.hpp"
-#include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/rbcd/truncated_newton.hpp"
 
 namespace km {
 

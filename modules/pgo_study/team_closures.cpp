@@ -6,19 +6,14 @@
 #include <utility>
 
 #include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {
 namespace {
 
 // An edge in the robots' own numbering of poses.
 RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e, double noise_scale) {
-  const auto id = [&](Eigen::Index pose) {
-    const std::size_t robot = graph.robot_of(pose);
-    return KeyframeId{static_cast<RobotId>(robot),
-                      static_cast<KeyframeIndex>(pose - graph.first[robot])};
-  };
-  return {id(e.i), id(e.j), e.T_i_j,
+  return {graph.keyframe_of(e.i), graph.keyframe_of(e.j), e.T_i_j,
           noise_scale * noise_scale * covariance_in({e.kappa, e.tau}, graph.dimension)};
 }
 

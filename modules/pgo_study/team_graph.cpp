@@ -14,6 +14,18 @@ std::size_t TeamGraph::robot_of(Eigen::Index pose) const {
          1;
 }
 
+KeyframeId TeamGraph::keyframe_of(Eigen::Index pose) const {
+  const std::size_t robot = robot_of(pose);
+  return {static_cast<RobotId>(robot), static_cast<KeyframeIndex>(pose - first[robot])};
+}
+
+PoseEdge edge_of_one_robot(const BlockEdge& edge) {
+  return {{0, static_cast<KeyframeIndex>(edge.i)},
+          {0, static_cast<KeyframeIndex>(edge.j)},
+          edge.T_i_j,
+          {edge.kappa, edge.tau}};
+}
+
 std::vector<bool> odometry_edges(const TeamGraph& graph) {
   std::vector<bool> odometry;
   std::set<KeyframeId> has_step;
@@ -63,17 +75,12 @@ std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph) {
 
 SessionGraph part_of(const TeamGraph& graph, std::size_t robot) {
   SessionGraph part{.self = static_cast<RobotId>(robot), .upright = !graph.verticals.empty()};
-  const auto id = [&](Eigen::Index pose) {
-    const std::size_t owner = graph.robot_of(pose);
-    return KeyframeId{static_cast<RobotId>(owner),
-                      static_cast<KeyframeIndex>(pose - graph.first[owner])};
-  };
   const std::vector<bool> odometry = odometry_edges(graph);
   std::map<RobotId, std::size_t> steps;
   std::vector<PoseEdge> closures;
   for (std::size_t k = 0; k < graph.edges.size(); ++k) {
     const BlockEdge& e = graph.edges[k];
-    const PoseEdge edge{id(e.i), id(e.j), e.T_i_j, {e.kappa, e.tau}};
+    const PoseEdge edge{graph.keyframe_of(e.i), graph.keyframe_of(e.j), e.T_i_j, {e.kappa, e.tau}};
     const bool inside = edge.from.robot == edge.to.robot;
     if (odometry[k] && inside) {
       const std::size_t n = ++steps[edge.from.robot];

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "modules/pose_graph/quadratic_problem.hpp"
 #include "modules/pose_graph/session_graph.hpp"
+#include "modules/rbcd/quadratic_problem.hpp"
 
 namespace km {
 
@@ -29,7 +29,12 @@ struct TeamGraph {
     return first[robot + 1] - first[robot];
   }
   [[nodiscard]] std::size_t robot_of(Eigen::Index pose) const;
+  /// Id of a pose in the team: robot k has id k, and its keyframes are its poses from 0.
+  [[nodiscard]] KeyframeId keyframe_of(Eigen::Index pose) const;
 };
+
+/// `edge` in a graph whose poses all belong to robot 0.
+[[nodiscard]] PoseEdge edge_of_one_robot(const BlockEdge& edge);
 
 /// By edge: whether it is odometry, that is the first edge from a pose to the next of the same
 /// robot of the file.
@@ -46,8 +51,8 @@ struct TeamGraph {
 [[nodiscard]] std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph);
 
 /// The edges and priors that one robot of the team knows, without any poses: `start` and `told` are
-/// empty. Robot k has id k, and its keyframes are its poses, numbered from 0. Odometry that was cut
-/// between two robots is trusted. `step_precision` has the values of all robots.
+/// empty. Ids are those of TeamGraph::keyframe_of(). Odometry that was cut between two robots is
+/// trusted. `step_precision` has the values of all robots.
 [[nodiscard]] SessionGraph part_of(const TeamGraph& graph, std::size_t robot);
 
 /// Cost function of the whole graph at rank r. Throws std::invalid_argument as QuadraticProblem

@@ -7,7 +7,7 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "modules/core/precision.hpp"
 #include "modules/pgo_study/team_graph.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
-#include "modules/pose_graph/jrl_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/recorded_graph/jrl_io.hpp"
 
 namespace km {
 

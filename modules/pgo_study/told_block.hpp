@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "modules/pose_graph/stiefel.hpp"
+#include "modules/rbcd/stiefel.hpp"
 
 namespace km {
 

@@ -1,6 +1,7 @@
 #include "modules/pose_graph/chordal.hpp"
 
 #include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 #include <stdexcept>
 #include <string>
 
@@ -102,14 +103,6 @@ std::vector<SE3> odometry_initialisation(Eigen::Index poses, std::span<const Blo
     result[i] = result[i - 1] * step_to[i]->T_i_j;
   }
   return result;
-}
-
-LiftedPoses lift(std::span<const SE3> poses, Eigen::Index rank) {
-  const Eigen::MatrixXd L = lifted_identity(rank);
-  LiftedPoses X(rank, 4 * static_cast<Eigen::Index>(poses.size()));
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    X.middleCols<4>(4 * static_cast<Eigen::Index>(i)) = lift(L, poses[i]);
-  return X;
 }
 
 }  // namespace km

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/pose_graph/quadratic_problem.hpp"
+#include "modules/pose_graph/block_edge.hpp"
 
 namespace km {
 
@@ -19,8 +19,5 @@ namespace km {
 /// std::invalid_argument if one of these edges is missing.
 [[nodiscard]] std::vector<SE3> odometry_initialisation(Eigen::Index poses,
                                                        std::span<const BlockEdge> edges);
-
-/// Poses lifted to rank r by lifted_identity(r).
-[[nodiscard]] LiftedPoses lift(std::span<const SE3> poses, Eigen::Index rank);
 
 }  // namespace km

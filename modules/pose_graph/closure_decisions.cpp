@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "modules/pose_graph/closure_places.hpp"
+#include "modules/pose_graph/member_solver.hpp"
 
 namespace km {
 

@@ -22,9 +22,6 @@ namespace km {
 /// poses, because these poses may be wrong.
 class ClosureDecisions {
  public:
-  /// Largest number of times that a rejected closure becomes undecided again.
-  static constexpr int kChances = 2;
-
   /// True if the closure is kept, false if it is rejected. Undecided closures have no entry.
   [[nodiscard]] const std::map<ClosureId, bool>& decided() const { return decided_; }
   [[nodiscard]] bool is_rejected(const ClosureId& id) const;
@@ -36,7 +33,7 @@ class ClosureDecisions {
   void decide(std::span<const WeighedClosure> verdicts, bool provisional);
   /// Adopts the noise at the end of a session, which was one of a team or of a robot alone.
   void set_noise(ClosureNoiseRecord noise, bool with_team);
-  /// Makes a rejected closure undecided. False if it is not rejected, or has had its chances.
+  /// Makes a rejected closure undecided. False if it is not rejected, or has had its kChances.
   [[nodiscard]] bool reopen(const ClosureId& id);
   /// Discards all decisions on closures with a robot whose keyframe indices have a new meaning.
   void forget(RobotId robot);

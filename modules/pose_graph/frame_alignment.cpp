@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "modules/pose_graph/stiefel.hpp"
+#include "modules/core/lie.hpp"
 
 namespace km {
 namespace {
@@ -20,9 +20,9 @@ class Distance {
       : max_chordal_(2.0 * std::sqrt(2.0) * std::sin(0.5 * tolerance.rotation_rad)),
         max_translation_(tolerance.translation_m) {}
 
-  double operator()(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) const {
-    const double rotation = (a.leftCols<3>() - b.leftCols<3>()).norm() / max_chordal_;
-    const double translation = (a.col(3) - b.col(3)).norm() / max_translation_;
+  double operator()(const SE3& a, const SE3& b) const {
+    const double rotation = (a.linear() - b.linear()).norm() / max_chordal_;
+    const double translation = (a.translation() - b.translation()).norm() / max_translation_;
     const double d = std::max(rotation, translation);
     return d * d;
   }
@@ -32,39 +32,28 @@ class Distance {
   double max_translation_;
 };
 
-void check(std::span<const Eigen::MatrixXd> candidates, const AlignmentTolerance& tolerance) {
-  if (!(tolerance.rotation_rad > 0.0 && tolerance.translation_m > 0.0))
-    throw std::invalid_argument("align_frames: a tolerance is not positive");
-  for (const Eigen::MatrixXd& candidate : candidates)
-    if (candidate.cols() != 4 || candidate.rows() != candidates.front().rows() ||
-        candidate.rows() < 3)
-      throw std::invalid_argument("align_frames: candidates are not all r x 4 with r >= 3");
-}
-
-std::vector<std::size_t> inliers_of(const Eigen::MatrixXd& L,
-                                    std::span<const Eigen::MatrixXd> candidates,
+std::vector<std::size_t> inliers_of(const SE3& T, std::span<const SE3> candidates,
                                     const Distance& distance) {
   std::vector<std::size_t> inliers;
   for (std::size_t k = 0; k < candidates.size(); ++k)
-    if (distance(L, candidates[k]) <= 1.0) inliers.push_back(k);
+    if (distance(T, candidates[k]) <= 1.0) inliers.push_back(k);
   return inliers;
 }
 
-Eigen::MatrixXd average(std::span<const Eigen::MatrixXd> candidates,
-                        const std::vector<std::size_t>& inliers) {
-  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(candidates.front().rows(), 4);
-  for (const std::size_t k : inliers) mean += candidates[k];
+SE3 average(std::span<const SE3> candidates, const std::vector<std::size_t>& inliers) {
+  Eigen::Matrix<double, 3, 4> mean = Eigen::Matrix<double, 3, 4>::Zero();
+  for (const std::size_t k : inliers) mean += candidates[k].matrix().topRows<3>();
   mean /= static_cast<double>(inliers.size());
-  mean.leftCols<3>() = nearest_stiefel(mean.leftCols<3>());
-  return mean;
+  return make_pose(nearest_stiefel(mean.leftCols<3>()), mean.col(3));
 }
 
 }  // namespace
 
-std::optional<FrameAlignment> align_frames(std::span<const Eigen::MatrixXd> candidates,
+std::optional<FrameAlignment> align_frames(std::span<const SE3> candidates,
                                            const AlignmentTolerance& tolerance,
                                            const std::vector<double>& given_weights) {
-  check(candidates, tolerance);
+  if (!(tolerance.rotation_rad > 0.0 && tolerance.translation_m > 0.0))
+    throw std::invalid_argument("align_frames: a tolerance is not positive");
   if (candidates.empty()) return std::nullopt;
   std::vector<double> weights = given_weights;
   if (weights.empty()) weights.resize(candidates.size(), 1.0);
@@ -85,11 +74,11 @@ std::optional<FrameAlignment> align_frames(std::span<const Eigen::MatrixXd> cand
   }
   FrameAlignment result{candidates[best], inliers_of(candidates[best], candidates, distance)};
   for (int i = 0; i < kMaxRefinements; ++i) {
-    Eigen::MatrixXd L = average(candidates, result.inliers);
-    auto inliers = inliers_of(L, candidates, distance);
+    const SE3 T = average(candidates, result.inliers);
+    auto inliers = inliers_of(T, candidates, distance);
     if (inliers.empty()) break;  // the average of a ring can lie outside of it
     const bool settled = inliers == result.inliers;
-    result = {std::move(L), std::move(inliers)};
+    result = {T, std::move(inliers)};
     if (settled) break;
   }
   return result;

@@ -1,10 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
+
+#include "modules/core/geometry.hpp"
 
 namespace km {
 
@@ -15,23 +16,22 @@ struct AlignmentTolerance {
 };
 
 struct [[nodiscard]] FrameAlignment {
-  Eigen::MatrixXd L;                 ///< r x 4, [Y p] with Y in St(3, r).
-  std::vector<std::size_t> inliers;  ///< Candidates within tolerance of L, ascending.
+  SE3 T = SE3::Identity();
+  std::vector<std::size_t> inliers;  ///< Candidates within tolerance of T, ascending.
 };
 
-/// Robust average of candidates [Y p] (r x 4) for one transform. Many of them may be wrong. It
-/// minimises the truncated sum of squares sum_k w_k min(1, d_k^2). d_k^2 is the larger of two
-/// squared distances, each relative to its tolerance: the chordal distance of the rotations and the
-/// distance of the translations. Every candidate is tried as the start. The best one is refined:
-/// its inliers, with equal weights, are averaged until they no longer change. With rank 3,
-/// candidates are ordinary rigid transforms.
+/// Robust average of candidates for one transform. Many of them may be wrong. It minimises the
+/// truncated sum of squares sum_k w_k min(1, d_k^2). d_k^2 is the larger of two squared distances,
+/// each relative to its tolerance: the chordal distance of the rotations and the distance of the
+/// translations. Every candidate is tried as the start. The best one is refined: its inliers, with
+/// equal weights, are averaged until they no longer change.
 ///
 /// Translations are compared at the origin of the frames. It should be near the measurements,
 /// because otherwise rotation errors count a second time through the lever arm. nullopt if there is
-/// no candidate. O(n^2 r). `weights` w: one per candidate; empty: all are 1. Throws
-/// std::invalid_argument if shapes differ or a tolerance or a weight is not positive.
-[[nodiscard]] std::optional<FrameAlignment> align_frames(
-    std::span<const Eigen::MatrixXd> candidates, const AlignmentTolerance& tolerance,
-    const std::vector<double>& weights = {});
+/// no candidate. O(n^2). `weights` w: one per candidate; empty: all are 1. Throws
+/// std::invalid_argument if a tolerance or a weight is not positive.
+[[nodiscard]] std::optional<FrameAlignment> align_frames(std::span<const SE3> candidates,
+                                                         const AlignmentTolerance& tolerance,
+                                                         const std::vector<double>& weights = {});
 
 }  // namespace km

@@ -20,10 +20,9 @@ namespace km {
     const std::vector<SE3>& poses, RobotId self, std::span<const PoseEdge> closures,
     const std::map<KeyframeId, SE3>& told, const AlignmentTolerance& tolerance);
 
-/// Deforms `poses`, in the frame of the received poses `told`, by a few Newton steps on the own
-/// edges and on the closures to received poses, which stay fixed. A long odometry drifts so far
-/// that no rigid transform fits. The closures must be true, because false ones would deform the
-/// trajectory.
+/// Deforms `poses`, in the frame of the received poses `told`, by solve_alone() on the own edges
+/// and on the closures to received poses, which stay fixed. A long odometry drifts so far that no
+/// rigid transform fits. The closures must be true, because false ones would deform the trajectory.
 [[nodiscard]] std::vector<SE3> bent_to_told(const std::vector<SE3>& poses, RobotId self,
                                             std::span<const PoseEdge> own,
                                             std::span<const PoseEdge> closures,

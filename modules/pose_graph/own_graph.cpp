@@ -8,7 +8,7 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/config.hpp"
-#include "modules/pose_graph/measurement_limits.hpp"
+#include "modules/core/measurement_limits.hpp"
 
 namespace km {
 namespace {
@@ -171,20 +171,14 @@ const std::vector<PoseEdge>* OwnGraph::newest_edges(RobotId peer) const {
 }
 
 void OwnGraph::judge_odometry() {
-  breaks_.clear();
-  odometry_noise_ = {};
   const std::vector<PoseEdge>* inside = newest_edges(self_);
-  if (inside == nullptr) return;
-  breaks_ = find_odometry_breaks(odometry_, *inside);
-  std::vector<PoseEdge> steps = odometry_;
-  correct_breaks(steps, breaks_);
-  odometry_noise_ = estimate_odometry_noise(steps, *inside);
+  odometry_judgement_ =
+      inside == nullptr ? OdometryJudgement() : km::judge_odometry(odometry_, *inside);
 }
 
 std::vector<PoseEdge> OwnGraph::own_edges() const {
   std::vector<PoseEdge> edges = odometry_;
-  for (PoseEdge& step : edges) step.precision = odometry_noise_.corrected(step.precision);
-  correct_breaks(edges, breaks_);
+  odometry_judgement_.correct(edges);
   if (const std::vector<PoseEdge>* inside = newest_edges(self_))
     edges.insert(edges.end(), inside->begin(), inside->end());
   return edges;
@@ -198,7 +192,7 @@ Precision OwnGraph::mean_step_precision() const {
     sum.tau += step.precision.tau;
   }
   const auto steps = static_cast<double>(odometry_.size());
-  return odometry_noise_.corrected({sum.kappa / steps, sum.tau / steps});
+  return odometry_noise().corrected({sum.kappa / steps, sum.tau / steps});
 }
 
 }  // namespace km

@@ -6,8 +6,7 @@
 
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
-#include "modules/pose_graph/odometry_breaks.hpp"
-#include "modules/pose_graph/odometry_noise.hpp"
+#include "modules/pose_graph/odometry_judgement.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"
@@ -63,9 +62,11 @@ class OwnGraph {
   /// robot. From now on, own_edges() has corrected steps and weights.
   void judge_odometry();
   /// Wrong steps by the last judge_odometry().
-  [[nodiscard]] const std::vector<OdometryBreak>& odometry_breaks() const { return breaks_; }
+  [[nodiscard]] const std::vector<OdometryBreak>& odometry_breaks() const {
+    return odometry_judgement_.breaks;
+  }
   /// The last estimate; before the first one, odometry is as precise as it claims.
-  [[nodiscard]] const OdometryNoise& odometry_noise() const { return odometry_noise_; }
+  [[nodiscard]] const OdometryNoise& odometry_noise() const { return odometry_judgement_.noise; }
 
   /// Odometry from each keyframe to the next, then closures inside this robot, ascending by id.
   [[nodiscard]] std::vector<PoseEdge> own_edges() const;
@@ -101,8 +102,7 @@ class OwnGraph {
   std::uint32_t keyframes_ = 0;
   std::uint32_t revision_ = 0;
   std::vector<PoseEdge> odometry_;  // with claimed precision
-  std::vector<OdometryBreak> breaks_;
-  OdometryNoise odometry_noise_;
+  OdometryJudgement odometry_judgement_;
   std::vector<VerticalPrior> verticals_;
   std::map<ClosureId, PoseEdge> closures_;
   std::map<RobotId, std::size_t> closures_to_;  // number of `closures_` by peer

@@ -147,14 +147,14 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
   }
   result.centre /= static_cast<double>(ends.size());
   const SE3 to_centre = make_pose(Eigen::Matrix3d::Identity(), result.centre);
-  std::vector<Eigen::MatrixXd> candidates;
+  std::vector<SE3> candidates;
   for (const auto& [placed, measured] : ends) {
-    candidates.emplace_back((measured * placed.inverse() * to_centre).matrix().topRows<3>());
+    candidates.push_back(measured * placed.inverse() * to_centre);
     result.radius_m += (placed.translation() - result.centre).squaredNorm();
   }
   result.radius_m = std::sqrt(result.radius_m / static_cast<double>(ends.size()));
   const auto alignment = align_frames(candidates, {}, weights);
-  const SE3 T = make_pose(alignment->L.leftCols<3>(), alignment->L.col(3)) * to_centre.inverse();
+  const SE3 T = alignment->T * to_centre.inverse();
   result.T = SinglePose::of(T);
   for (const PoseEdge& e : closures) {
     result.strength.kappa += e.precision.kappa;

@@ -2,7 +2,7 @@
 
 #include <tuple>
 
-#include "modules/pose_graph/measurement_limits.hpp"
+#include "modules/core/measurement_limits.hpp"
 
 namespace km {
 namespace {

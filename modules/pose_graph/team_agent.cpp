@@ -6,9 +6,9 @@
 #include <tuple>
 #include <utility>
 
-#include "modules/pose_graph/stiefel.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/team_plan.hpp"
+#include "modules/pose_graph/vertical_prior.hpp"
 
 // Other robots, their messages and the messages of this robot. The sessions are in
 // team_agent_session.cpp.

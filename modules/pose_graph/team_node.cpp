@@ -3,7 +3,6 @@
 #include <chrono>
 #include <utility>
 
-#include "modules/pose_graph/solver_choice.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
@@ -22,10 +21,11 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;  // Clang before 17 does not
 
 }  // namespace
 
-TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, const TeamTopics& topics)
+TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory solvers,
+                   const TeamTopics& topics)
     : self_(self),
       topics_(topics),
-      agent_(config, self, solver_choice(config)),
+      agent_(config, self, std::move(solvers)),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
           PoseGraphConfig::kSection),

@@ -38,8 +38,10 @@ struct TeamTopics {
 /// logged at a limited rate.
 class TeamNode final : public Node {
  public:
-  /// `self`: as announced by the participant. Throws ConfigError if `config` is out of bounds.
-  TeamNode(const PoseGraphConfig& config, TeamPeer self, const TeamTopics& topics);
+  /// `self`: as announced by the participant. `solvers`: creates the solver of each session. Throws
+  /// ConfigError if `config` is out of bounds.
+  TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory solvers,
+           const TeamTopics& topics);
   ~TeamNode() override { stop(); }
 
   std::string_view name() const override { return PoseGraphConfig::kSection; }

@@ -1,12 +1,11 @@
 #include "modules/pose_graph/vertical_prior.hpp"
 
 #include "modules/core/lie.hpp"
-#include "modules/pose_graph/stiefel.hpp"
 
 namespace km {
 
 double vertical_cost(const VerticalPrior& prior, const Eigen::Ref<const Eigen::MatrixXd>& Y) {
-  return prior.weight * (Y * prior.up - lifting_matrix(Y.rows()).col(2)).squaredNorm();
+  return prior.weight * (Y * prior.up - Eigen::VectorXd::Unit(Y.rows(), 2)).squaredNorm();
 }
 
 std::vector<SE3> levelled(std::vector<SE3> poses, std::span<const VerticalPrior> priors) {
@@ -23,7 +22,7 @@ Eigen::MatrixXd level(const Eigen::MatrixXd& world, const Eigen::Vector3d& origi
   // Each frame is levelled from the previous one, so rounding errors of the orthonormality of Y
   // must not accumulate.
   const Eigen::MatrixXd Y = nearest_stiefel(world.leftCols<3>());
-  const Eigen::VectorXd z = lifting_matrix(Y.rows()).col(2);
+  const Eigen::VectorXd z = Eigen::VectorXd::Unit(Y.rows(), 2);
   const Eigen::VectorXd up = Y.col(2);
   Eigen::MatrixXd turned(Y.rows(), 3);
   constexpr double kUpsideDown = 1e-12;

@@ -13,10 +13,10 @@
 #include "modules/core/bytes.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/session_graph.hpp"
 #include "modules/pose_graph/team_messages.hpp"
-#include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/truncated_newton.hpp"
 
 namespace km {
 

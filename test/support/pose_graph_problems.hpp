@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/lie.hpp"
 #include "modules/core/precision.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
-#include "modules/pose_graph/truncated_newton.hpp"
+#include "modules/rbcd/truncated_newton.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

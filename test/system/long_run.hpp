@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/patience.hpp"
 
 namespace km {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "apps/robot/run_summary.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "test/support/command.hpp"
 #include "test/support/pose_graph_problems.hpp"

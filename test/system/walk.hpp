@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "modules/core/geometry.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
 

@@ -12,7 +12,7 @@
 #include "apps/pgo/scenario_study.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/pgo_study/team_graph_file.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "apps/pgo/solve_report.hpp"
-#include "modules/pose_graph/g2o_io.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/command.hpp"
 #include "test/support/page_text.hpp"
 #include "test/support/shared_data.hpp"

@@ -12,8 +12,8 @@
 #include "modules/pgo_study/member_team.hpp"
 #include "modules/pgo_study/odometry_start.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
+#include "modules/rbcd/rounding.hpp"
 #include "test/support/team_graphs.hpp"
 
 namespace km {

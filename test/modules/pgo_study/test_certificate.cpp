@@ -5,7 +5,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/pgo_study/central_solver.hpp"
 #include "modules/pgo_study/lanczos.hpp"
-#include "modules/pose_graph/rounding.hpp"
+#include "modules/rbcd/rounding.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"

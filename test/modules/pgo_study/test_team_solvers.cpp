@@ -6,7 +6,7 @@
 #include "modules/pgo_study/member_team.hpp"
 #include "modules/pgo_study/message_sizes.hpp"
 #include "modules/pgo_study/team_verification.hpp"
-#include "modules/pose_graph/member_rbcd.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
 #include "test/modules/pgo_study/certified_optimum.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"

@@ -5,9 +5,9 @@
 #include "modules/pgo_study/local_team.hpp"
 #include "modules/pgo_study/member_team.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/member_rbcd.hpp"
-#include "modules/pose_graph/rounding.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
+#include "modules/rbcd/rounding.hpp"
 #include "test/support/team_graphs.hpp"
 
 // Teams with vertical priors, solved in one process.

@@ -1,18 +1,13 @@
 #include <catch2/catch.hpp>
 
 #include "modules/pose_graph/frame_alignment.hpp"
-#include "modules/pose_graph/stiefel.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
 namespace {
 
-Eigen::MatrixXd as_candidate(const SE3& T) {
-  return T.matrix().topRows<3>();
-}
-
-double angle_between(const Eigen::MatrixXd& a, const SE3& b) {
-  return angle_of(a.leftCols<3>().transpose() * b.linear());
+double angle_between(const SE3& a, const SE3& b) {
+  return angle_of(a.linear().transpose() * b.linear());
 }
 
 }  // namespace
@@ -22,15 +17,15 @@ TEST_CASE("ten equal candidates win over forty random ones", "[pose_graph]") {
   CAPTURE(seed);
   std::mt19937 rng(seed);
   const SE3 truth = random_pose(rng);
-  std::vector<Eigen::MatrixXd> candidates(10, as_candidate(truth));
+  std::vector<SE3> candidates(10, truth);
   while (candidates.size() < 50) {
     const SE3 other = random_pose(rng);
-    if (angle_between(candidates.front(), other) > 0.36) candidates.push_back(as_candidate(other));
+    if (angle_between(candidates.front(), other) > 0.36) candidates.push_back(other);
   }
   const auto alignment = align_frames(candidates, {.rotation_rad = 0.3, .translation_m = 1.0});
   REQUIRE(alignment);
-  CHECK(angle_between(alignment->L, truth) < 1e-6);
-  CHECK((alignment->L.col(3) - truth.translation()).norm() < 1e-9);
+  CHECK(angle_between(alignment->T, truth) < 1e-6);
+  CHECK((alignment->T.translation() - truth.translation()).norm() < 1e-9);
   CHECK(alignment->inliers == std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
 }
 
@@ -38,8 +33,8 @@ TEST_CASE("candidates count by their weights", "[pose_graph]") {
   std::mt19937 rng(1);
   const SE3 few = random_pose(rng);
   const SE3 many = few * make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(100.0, 0.0, 0.0));
-  std::vector<Eigen::MatrixXd> candidates(3, as_candidate(few));
-  candidates.resize(10, as_candidate(many));
+  std::vector<SE3> candidates(3, few);
+  candidates.resize(10, many);
   CHECK(align_frames(candidates, {})->inliers.size() == 7);
   std::vector<double> weights(3, 1.0);
   weights.resize(10, 1.0 / 7.0);
@@ -55,55 +50,47 @@ TEST_CASE("noise of the agreeing candidates averages out", "[pose_graph]") {
   CAPTURE(seed);
   std::mt19937 rng(seed);
   const SE3 truth = random_pose(rng);
-  std::vector<Eigen::MatrixXd> candidates;
+  std::vector<SE3> candidates;
   for (int k = 0; k < 400; ++k) {
     const Eigen::Vector3d phi = 0.05 * random_vector<3>(rng);
     const Eigen::AngleAxisd R(phi.norm(), phi.normalized());
-    candidates.push_back(
-        as_candidate(truth * make_pose(R.toRotationMatrix(), 0.2 * random_vector<3>(rng))));
+    candidates.push_back(truth * make_pose(R.toRotationMatrix(), 0.2 * random_vector<3>(rng)));
   }
   const auto alignment = align_frames(candidates, {.rotation_rad = 0.3, .translation_m = 2.0});
   REQUIRE(alignment);
   CHECK(alignment->inliers.size() == 400);
   // Five standard deviations of the mean of 400 candidates: 0.05 sqrt(3) rad, 0.2 sqrt(3) m, over
   // 20.
-  CHECK(angle_between(alignment->L, truth) < 0.022);
-  CHECK((alignment->L.col(3) - truth.translation()).norm() < 0.087);
+  CHECK(angle_between(alignment->T, truth) < 0.022);
+  CHECK((alignment->T.translation() - truth.translation()).norm() < 0.087);
 }
 
-TEST_CASE("alignment does not depend on the frame, lifted or not", "[pose_graph]") {
+TEST_CASE("alignment does not depend on the frame", "[pose_graph]") {
   std::mt19937 rng(5);
-  std::vector<Eigen::MatrixXd> candidates;
-  std::vector<Eigen::MatrixXd> lifted;
-  Eigen::MatrixXd frame = Eigen::MatrixXd::Zero(5, 4);
-  for (double& x : frame.reshaped()) x = random_vector<1>(rng)(0);
-  frame.leftCols<3>() = nearest_stiefel(frame.leftCols<3>());
+  std::vector<SE3> candidates;
+  std::vector<SE3> moved;
+  const SE3 frame = random_pose(rng);
   const SE3 centre = random_pose(rng);
   for (int k = 0; k < 20; ++k) {
     const SE3 T = k % 2 == 0
                       ? centre * make_pose(Eigen::Matrix3d::Identity(), 0.1 * random_vector<3>(rng))
                       : random_pose(rng);
-    candidates.push_back(as_candidate(T));
-    lifted.push_back(lift(frame, T));
+    candidates.push_back(T);
+    moved.push_back(frame * T);
   }
   const auto plain = align_frames(candidates, {});
-  const auto in_frame = align_frames(lifted, {});
+  const auto in_frame = align_frames(moved, {});
   REQUIRE(plain);
   REQUIRE(in_frame);
   CHECK(plain->inliers == in_frame->inliers);
-  SE3 T = SE3::Identity();
-  T.matrix().topRows<3>() = plain->L;
-  CHECK((lift(frame, T) - in_frame->L).norm() < 1e-9);
+  CHECK((frame * plain->T).isApprox(in_frame->T, 1e-9));
 }
 
-TEST_CASE("alignment without candidates has no result, and invalid candidates are refused",
+TEST_CASE("alignment without candidates has no result, and a tolerance of zero is refused",
           "[pose_graph]") {
   CHECK_FALSE(align_frames({}, {}).has_value());
-  std::vector<Eigen::MatrixXd> mixed{Eigen::MatrixXd::Identity(3, 4),
-                                     Eigen::MatrixXd::Identity(5, 4)};
-  CHECK_THROWS_AS(align_frames(mixed, {}), std::invalid_argument);
-  mixed.pop_back();
-  CHECK_THROWS_AS(align_frames(mixed, {.rotation_rad = 0.0}), std::invalid_argument);
+  const std::vector<SE3> candidates{SE3::Identity()};
+  CHECK_THROWS_AS(align_frames(candidates, {.rotation_rad = 0.0}), std::invalid_argument);
 }
 
 }  // namespace km

@@ -4,7 +4,7 @@
 #include <iostream>
 #include <limits>
 
-#include "modules/pose_graph/solver_choice.hpp"
+#include "modules/rbcd/solver_choice.hpp"
 #include "test/support/team_network.hpp"
 
 // One robot of four runs the stock program on an invented graph. The result of the three other

@@ -2,7 +2,7 @@
 #include <random>
 
 #include "modules/core/lie.hpp"
-#include "modules/pose_graph/odometry_breaks.hpp"
+#include "modules/pose_graph/odometry_judgement.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
@@ -69,6 +69,26 @@ TEST_CASE("A wrong step of odometry is found and corrected", "[odometry_breaks]"
   if (breaks[0].step != step) return;
   const Vector6 left = se3_log(before.inverse() * breaks[0].T_from_to);
   CHECK(left.head<3>().norm() < 0.15);
+}
+
+TEST_CASE("A wrong step keeps the weight of its correction in noisy odometry",
+          "[odometry_breaks]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  Rounds rounds(seed, 5.0, 1);
+  rounds.jump(149, make_pose(so3_exp({0.0, 0.0, 1.5}), {5.0, -4.0, 0.0}));
+  const OdometryJudgement judgement = judge_odometry(rounds.steps, rounds.closures);
+  REQUIRE(judgement.breaks.size() == 1);
+  CHECK(judgement.noise.rotation > 2.0);
+  std::vector<PoseEdge> corrected = rounds.steps;
+  judgement.correct(corrected);
+  for (std::size_t k = 0; k < corrected.size(); ++k) {
+    const bool wrong = k == judgement.breaks[0].step;
+    const Precision expected = wrong ? judgement.breaks[0].precision
+                                     : judgement.noise.corrected(rounds.steps[k].precision);
+    CHECK(corrected[k].precision.kappa == expected.kappa);
+    CHECK(corrected[k].precision.tau == expected.tau);
+  }
 }
 
 TEST_CASE("Two wrong steps are both found", "[odometry_breaks]") {

@@ -1,9 +1,9 @@
 #include <catch2/catch.hpp>
 
 #include "modules/pose_graph/odometry_noise.hpp"
-#include "modules/pose_graph/recorded_graph.hpp"
-#include "modules/pose_graph/solver_choice.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
+#include "modules/rbcd/solver_choice.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 #include "test/support/gather_solver.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_network.hpp"

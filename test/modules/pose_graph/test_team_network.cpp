@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/solver_choice.hpp"
 #include "modules/pose_graph/tree_letters.hpp"
+#include "modules/rbcd/solver_choice.hpp"
 #include "test/support/team_network.hpp"
 
 namespace km {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "modules/pose_graph/team_node.hpp"
+#include "modules/rbcd/solver_choice.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/patience.hpp"
 #include "test/support/split_graph.hpp"
@@ -15,7 +16,7 @@ namespace {
 // The node of one robot with its topics.
 struct Robot {
   explicit Robot(TeamPeer peer, PgoMethod method = PgoMethod::kNewton)
-      : self(peer), node({.method = method}, peer, topics()) {
+      : self(peer), node({.method = method}, peer, solver_choice({.method = method}), topics()) {
     trajectory.subscribe([this](const auto& message) {
       const std::lock_guard lock(mutex);
       latest = *message;

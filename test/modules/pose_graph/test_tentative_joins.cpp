@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/solver_choice.hpp"
+#include "modules/rbcd/solver_choice.hpp"
 #include "test/support/gather_solver.hpp"
 #include "test/support/team_network.hpp"
 

@@ -2,9 +2,8 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/edge_model.hpp"
-#include "modules/pose_graph/quadratic_problem.hpp"
-#include "modules/pose_graph/truncated_newton.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"
+#include "modules/rbcd/stiefel.hpp"
 #include "test/support/pose_graph_problems.hpp"
 
 // Verticals in pose graph optimisation.
@@ -54,36 +53,6 @@ TEST_CASE("gradient and Hessian of a vertical prior agree with finite difference
   CHECK(convex.g == model.g);
   CHECK((convex.H * R.row(2).transpose()).norm() <
         1e-12);  // rotations about the vertical cost nothing
-}
-
-TEST_CASE("vertical priors of a block are part of its cost, gradient and Hessian",
-          "[pose_graph][vertical]") {
-  const Eigen::Index rank = GENERATE(3, 5);
-  std::mt19937 rng(2);
-  const std::vector<BlockEdge> edges{{0, 1, random_pose(rng), 2.0, 3.0},
-                                     {1, 2, random_pose(rng), 1.0, 0.5}};
-  const std::vector<VerticalPrior> priors{{0, random_vector<3>(rng).normalized(), 4.0},
-                                          {2, random_vector<3>(rng).normalized(), 0.7}};
-  const QuadraticProblem with(rank, 3, edges, {}, priors);
-  const QuadraticProblem without(rank, 3, edges, {});
-  const LiftedPoses X = random_lifted_poses(rng, rank, 3);
-  double expected = without.cost(X);
-  for (const VerticalPrior& v : priors) expected += vertical_cost(v, X.middleCols<3>(4 * v.pose));
-  CHECK(with.cost(X) == Approx(expected).epsilon(1e-12));
-  const LiftedPoses gradient = with.euclidean_gradient(X);
-  constexpr double h = 1e-4;
-  for (int k = 0; k < 5; ++k) {
-    const LiftedPoses V = project_tangent(X, random_lifted_poses(rng, rank, 3));
-    const double up = with.cost(retract(X, h * V));
-    const double down = with.cost(retract(X, -h * V));
-    CHECK((up - down) / (2.0 * h) == Approx(gradient.cwiseProduct(V).sum()).margin(1e-4));
-    CHECK((up - 2.0 * with.cost(X) + down) / (h * h) ==
-          Approx(with.hessian_product(X, gradient, V).cwiseProduct(V).sum()).margin(1e-2));
-  }
-  const auto make = [&](VerticalPrior v) { return QuadraticProblem(rank, 3, edges, {}, {v}); };
-  CHECK_THROWS_AS(make({3, Eigen::Vector3d::UnitZ(), 1.0}), std::invalid_argument);
-  CHECK_THROWS_AS(make({0, Eigen::Vector3d::UnitZ(), 0.0}), std::invalid_argument);
-  CHECK_THROWS_AS(make({0, Eigen::Vector3d::Constant(NAN), 1.0}), std::invalid_argument);
 }
 
 TEST_CASE("poses are levelled as a whole, by the vertical of most of their priors",

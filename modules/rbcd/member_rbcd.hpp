@@ -1,0 +1,129 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "modules/core/bytes.hpp"
+#include "modules/pose_graph/member_solver.hpp"
+#include "modules/pose_graph/session_graph.hpp"
+#include "modules/rbcd/quadratic_problem.hpp"
+
+namespace km {
+
+/// Parameters of block descent, equal on all members of a session.
+struct RbcdOptions {
+  Eigen::Index rank = 5;                ///< Rank r of the relaxation.
+  std::uint32_t max_rounds = 0;         ///< 0: no limit.
+  double min_relative_decrease = 1e-7;  ///< Per round, of the team cost.
+  int max_newton_steps = 3;             ///< Newton steps per block update.
+  int max_cg_iterations = 50;           ///< CG iterations per Newton step.
+  double max_over_relaxation = 1.95;    ///< 1: to the minimum of the block, see minimise_beyond().
+};
+
+/// Riemannian block-coordinate descent on the rank relaxation (Tian et al., "Distributed
+/// Certifiably Correct Pose-Graph Optimization", TRO 2021, Alg. 3). The blocks take turns.
+///
+/// In a round every member lowers the cost of its own lifted poses, with all other poses fixed. It
+/// waits for those neighbours in the graph of closures that have a lower id: a Gauss-Seidel sweep.
+/// Only one of two neighbours may move at any time, so the team cost rises by no more than rounding
+/// to single precision. A member sends each neighbour the poses on which closures to it end. It
+/// sends its share of cost and gradient to the root of the tree. From time to time the root sends
+/// the number of the last complete round to all, and at the end the number of the final round. The
+/// tree has no other use. Every member passes through each of these rounds, one at a time, so that
+/// all members can return to one that all have completed.
+///
+/// Only this class knows the relaxation. It begins at the lifted start, perturbed slightly away
+/// from rigid poses (perturb_rotations()). Every robot computes the same perturbation of the public
+/// poses, so the first round needs no exchange before it. Rigid poses are rounded in the frame of
+/// the first pose of the root, which keeps its place. If poses of absent robots or verticals fix
+/// the frame, they are rounded in that frame.
+class MemberRbcd final : public MemberSolver {
+ public:
+  /// Throws std::invalid_argument if the graph is not usable, see QuadraticProblem, if the pose at
+  /// the other end of a closure is missing, or for a rank below 3.
+  MemberRbcd(SessionGraph graph, const TreePlace& place, const RbcdOptions& options);
+
+  bool receive(RobotId from, std::span<const std::uint8_t> bytes) override;
+  [[nodiscard]] bool ready() const override;
+  [[nodiscard]] std::vector<SolverLetter> advance() override;
+  [[nodiscard]] bool done() const override { return done_; }
+
+  [[nodiscard]] const std::vector<SE3>& poses() const override { return poses_; }
+  /// State of the relaxation at the round of poses().
+  [[nodiscard]] SolverState state() const override { return state_; }
+  [[nodiscard]] ClosureVerdicts verdicts() const override { return {}; }
+
+ private:
+  // A robot with closures to this one; it may be absent.
+  struct Neighbour {
+    std::map<KeyframeIndex, Eigen::Index> slot_of;  // places in fixed_
+    std::vector<KeyframeIndex> own;                 // poses sent to it, ascending
+    std::uint32_t round = 0;
+    bool absent = false;
+    bool before = false;  // it updates before this robot
+  };
+  struct Share {
+    double cost = 0.0;
+    double squared_gradient = 0.0;
+    bool held = false;  // by poses of absent robots
+  };
+  struct Total {
+    double cost = 0.0;
+    double gradient = 0.0;
+  };
+  struct RoundTotal {
+    std::uint32_t round = 0;
+    Total total;
+  };
+  // Message of the root to all members; each one refers to the message before it.
+  struct Progress {
+    RoundTotal at;
+    std::uint32_t before = 0;  // round of the message before
+    bool stop = false;
+    Eigen::MatrixXd anchor;  // r x 4: frame of the session, lifted
+  };
+
+  [[nodiscard]] QuadraticProblem make_problem();
+  [[nodiscard]] LiftedPoses lifted_start() const;
+  [[nodiscard]] bool is_root() const { return !place_.parent; }
+  [[nodiscard]] bool is_member(RobotId robot) const;
+  [[nodiscard]] bool can_update() const;
+  [[nodiscard]] bool round_is_complete() const;
+
+  void update(std::vector<SolverLetter>& letters);
+  std::map<KeyframeIndex, Eigen::MatrixXf> round_public_poses();
+  void report_share(double squared_gradient, std::vector<SolverLetter>& letters);
+  [[nodiscard]] bool close_round(std::vector<SolverLetter>& letters);
+  void tell(const RoundTotal& at, bool stop, std::vector<SolverLetter>& letters);
+  [[nodiscard]] Eigen::MatrixXd anchor_at(std::uint32_t round) const;
+  void adopt(const Progress& progress);
+
+  bool take_poses(RobotId from, std::uint32_t round, ByteReader& reader);
+  bool take_share(RobotId from, std::uint32_t round, ByteReader& reader);
+  bool take_progress(RobotId from, std::uint32_t round, ByteReader& reader);
+
+  SessionGraph graph_;
+  TreePlace place_;
+  RbcdOptions options_;
+  std::map<RobotId, Neighbour> neighbours_;
+  std::vector<RobotId> robot_of_edge_;  // [k]: other robot of public edge k of problem_
+  LiftedPoses fixed_;
+  QuadraticProblem problem_;
+  std::map<std::uint32_t, LiftedPoses> history_;  // by round, since last Progress
+  std::map<std::uint32_t, Progress> heard_;  // not adopted yet; by the round of the message before
+  bool started_ = false;
+  bool done_ = false;
+  std::vector<SE3> poses_;
+  SolverState state_;
+
+  // Members that only the root uses.
+  std::map<std::uint32_t, std::map<RobotId, Share>> shares_;  // shares of incomplete rounds
+  std::optional<RoundTotal> last_;                            // last complete round
+  Total start_;
+  bool held_ = false;
+};
+
+}  // namespace km

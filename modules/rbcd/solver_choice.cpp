@@ -1,0 +1,41 @@
+#include "modules/rbcd/solver_choice.hpp"
+
+#include <utility>
+
+#include "modules/pose_graph/tree_newton.hpp"
+
+namespace km {
+
+TreeNewtonOptions newton_options(const PoseGraphConfig& config) {
+  TreeNewtonOptions options;
+  options.robust = config.robust;
+  options.barc = config.barc;
+  options.tell_private = config.tell_private;
+  // In a team, the latency of a round costs more than the bytes of new second derivatives.
+  options.patience_rounds = 8.0;
+  return options;
+}
+
+RbcdOptions rbcd_options(const PoseGraphConfig& config) {
+  return {.rank = config.rank,
+          .min_relative_decrease = config.min_relative_decrease,
+          .max_newton_steps = config.max_newton_steps,
+          .max_cg_iterations = config.max_cg_iterations,
+          .max_over_relaxation = config.max_over_relaxation};
+}
+
+MemberSolverFactory solver_choice(const PoseGraphConfig& config) {
+  return [config](const Session& session, SessionGraph graph,
+                  TreePlace place) -> std::unique_ptr<MemberSolver> {
+    if (session.method == PgoMethod::kRbcd) {
+      RbcdOptions options = rbcd_options(config);
+      options.max_rounds = session.max_rounds;
+      return std::make_unique<MemberRbcd>(std::move(graph), place, options);
+    }
+    TreeNewtonOptions options = newton_options(config);
+    if (session.max_rounds > 0) options.max_rounds = session.max_rounds;
+    return std::make_unique<TreeNewton>(std::move(graph), std::move(place), options);
+  };
+}
+
+}  // namespace km

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "modules/pose_graph/pose_graph_config.hpp"
+#include "modules/pose_graph/session_part.hpp"
+#include "modules/pose_graph/tree_root.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
+
+namespace km {
+
+/// Parameters of the methods in a session without a limit of rounds.
+[[nodiscard]] TreeNewtonOptions newton_options(const PoseGraphConfig& config);
+[[nodiscard]] RbcdOptions rbcd_options(const PoseGraphConfig& config);
+
+/// Creates the solver for the method of a session, with the parameters of `config`.
+[[nodiscard]] MemberSolverFactory solver_choice(const PoseGraphConfig& config);
+
+}  // namespace km

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <exception>
+#include <stop_token>
+#include <string_view>
+#include <vector>
+
+#include "modules/core/covariance.hpp"
+#include "modules/core/keyframe.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/recorded_graph/graph_playback_config.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// End of the recorded graph. The node publishes it once, after everything else, and does not
+/// publish it if it is stopped earlier.
+struct GraphPlaybackEnd {
+  std::size_t keyframes = 0;
+  std::size_t closures = 0;  ///< Published by this robot.
+};
+
+/// Outputs of the playback. All topics must outlive the node.
+struct GraphPlaybackTopics {
+  Out<KeyframeOdometry> odometry;
+  Out<Keyframe> keyframes;  ///< Without features; covariance since keyframe 0.
+  Out<RelativePose> closures;
+  Out<GraphPlaybackEnd> end;
+};
+
+/// Plays the part of one robot of a recorded pose graph as if it were being driven. It publishes
+/// the keyframes in order, each followed by the closures that it makes known. A closure inside the
+/// robot appears with the later of its keyframes. A closure between two robots is in the records of
+/// both. The robot of its end `from` publishes it with its own keyframe, whether or not the other
+/// robot has reached its end. Verticals are published with their keyframes; odometry then starts
+/// upright, see RecordedGraph::T_odom_first(). Keyframes have the stamps of the graph. If it has
+/// none, keyframe i has the stamp i / poses_per_second.
+class GraphPlaybackNode final : public Node {
+ public:
+  /// `rate`: recorded seconds per second; infinity: as fast as the consumers accept messages.
+  /// Throws ConfigError if `config` is out of bounds, std::invalid_argument for a bad rate.
+  GraphPlaybackNode(const GraphPlaybackConfig& config, double rate, RecordedGraph graph,
+                    const GraphPlaybackTopics& topics);
+
+  /// Declares the first `keyframes` known: the node plays only their closures, without waiting.
+  /// Call before start().
+  void continue_after(std::size_t keyframes) { known_ = std::min(keyframes, graph_.poses()); }
+  ~GraphPlaybackNode() override { stop(); }
+
+  std::string_view name() const override { return GraphPlaybackConfig::kSection; }
+  void start() override;
+  /// Ends at once and publishes nothing that is not yet due.
+  void stop() noexcept override;
+  std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+
+  /// Publishes keyframe `index` and its closures, without waiting, and after the last keyframe the
+  /// end. Call with 0, 1, ... in turn. The thread only calls this function and waits.
+  void step(std::size_t index);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void play(std::size_t index);
+  void wait_until_due(std::size_t index);
+  [[nodiscard]] Stamp stamp_of(std::size_t index) const;
+
+  const double poses_per_second_;
+  const double rate_;
+  const RecordedGraph graph_;
+  const GraphPlaybackTopics topics_;
+  std::vector<std::vector<RelativePose>> closures_of_;  // [i]: closures that keyframe i makes known
+  UncertainPose T_odom_kf_;                             // pose of the last published keyframe
+  GraphPlaybackEnd published_;
+  std::size_t known_ = 0;  // number of known keyframes
+  Clock::time_point begin_;
+  std::stop_source stop_;
+  Worker<std::size_t> worker_;  // last member: stops first; posts the next keyframe to itself
+};
+
+}  // namespace km
