@@ -92,7 +92,7 @@ Examination examine_results(const fs::path& folder) {
     for (const Finding& finding : runs.back().summary.findings)
       if (finding.id == kFailedRun) result.findings.push_back(finding);
   }
-  // A single robot knew at its end which robots it had heard; its own findings include this.
+  // A single robot knew at its end which robots it had received; its own findings include this.
   const bool is_alone = runs.size() == 1 && !runs.front().summary.findings.empty();
   const std::vector<Finding> found = is_alone ? runs.front().summary.findings : findings_of(runs);
   for (const Finding& finding : found)

@@ -95,13 +95,13 @@ double half_extent_m(const std::vector<SE3>& poses) {
   return 0.5 * box.sizes().maxCoeff();
 }
 
-TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m, unsigned seed) {
+TeamGraph corrupt(const TeamGraph& graph, std::size_t count, double half_side_m, unsigned seed) {
   const std::vector<bool> odometry = odometry_edges(graph);
   std::vector<std::size_t> closures;
   for (std::size_t k = 0; k < odometry.size(); ++k)
     if (!odometry[k]) closures.push_back(k);
-  if (closures.empty()) throw std::invalid_argument("spoil: the graph has no loop closure");
-  TeamGraph spoiled = graph;
+  if (closures.empty()) throw std::invalid_argument("corrupt: the graph has no loop closure");
+  TeamGraph corrupted = graph;
   std::mt19937 rng(seed);
   const RandomOutlierModel model{.keyframes = static_cast<std::size_t>(graph.poses()),
                                  .planar = graph.dimension == 2,
@@ -112,17 +112,17 @@ TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m, u
   for (const BlockEdge& e : graph.edges) taken.insert(std::minmax(e.i, e.j));
   const auto poses = static_cast<std::size_t>(graph.poses());
   if (2 * (taken.size() + count) > poses * (poses - 1))
-    throw std::invalid_argument("spoil: " + std::to_string(poses) + " poses are too few for " +
+    throw std::invalid_argument("corrupt: " + std::to_string(poses) + " poses are too few for " +
                                 std::to_string(count) + " false closures");
-  while (spoiled.edges.size() < graph.edges.size() + count) {
+  while (corrupted.edges.size() < graph.edges.size() + count) {
     const RelativePose e = random_outliers(1, model, rng).front();
     const auto i = static_cast<Eigen::Index>(e.from.index);
     const auto j = static_cast<Eigen::Index>(e.to.index);
     if (!taken.insert(std::minmax(i, j)).second) continue;
     const BlockEdge& claimed = graph.edges[closures[closure(rng)]];
-    spoiled.edges.push_back({i, j, e.T_from_to, claimed.kappa, claimed.tau});
+    corrupted.edges.push_back({i, j, e.T_from_to, claimed.kappa, claimed.tau});
   }
-  return spoiled;
+  return corrupted;
 }
 
 std::vector<BlockEdge> false_place(const std::vector<SE3>& poses, Eigen::Index a, Eigen::Index b,
@@ -139,20 +139,20 @@ std::vector<BlockEdge> false_place(const std::vector<SE3>& poses, Eigen::Index a
   return edges;
 }
 
-TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
-                            const std::vector<SE3>& poses, double half_side_m, unsigned seed) {
-  TeamGraph spoiled = graph;
-  if (clusters.places == 0) return spoiled;
+TeamGraph corrupt_in_clusters(const TeamGraph& graph, const Clusters& clusters,
+                              const std::vector<SE3>& poses, double half_side_m, unsigned seed) {
+  TeamGraph corrupted = graph;
+  if (clusters.places == 0) return corrupted;
   const std::vector<bool> odometry = odometry_edges(graph);
   const auto closure = std::find(odometry.begin(), odometry.end(), false);
   if (closure == odometry.end())
-    throw std::invalid_argument("spoil: the graph has no loop closure");
+    throw std::invalid_argument("corrupt: the graph has no loop closure");
   const BlockEdge& claimed = graph.edges[static_cast<std::size_t>(closure - odometry.begin())];
   const auto length = static_cast<Eigen::Index>(clusters.size);
   std::mt19937 rng(seed);
   const auto any_place = [&](std::size_t robot) {
     if (graph.poses_of(robot) < length)
-      throw std::invalid_argument("spoil: robot " + std::to_string(robot) + " has " +
+      throw std::invalid_argument("corrupt: robot " + std::to_string(robot) + " has " +
                                   std::to_string(graph.poses_of(robot)) + " poses");
     return std::uniform_int_distribution<Eigen::Index>(graph.first[robot],
                                                        graph.first[robot + 1] - length)(rng);
@@ -165,9 +165,9 @@ TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
     const SE3 T_a_b = random_outliers(1, model, rng).front().T_from_to;
     for (const BlockEdge& e :
          false_place(poses, a, b, clusters.size, T_a_b, {claimed.kappa, claimed.tau}))
-      spoiled.edges.push_back(e);
+      corrupted.edges.push_back(e);
   }
-  return spoiled;
+  return corrupted;
 }
 
 OutlierStudy run_outlier_study(const TeamGraph& clean, const OutlierStudyOptions& options,
@@ -194,13 +194,14 @@ OutlierStudy run_outlier_study(const TeamGraph& clean, const OutlierStudyOptions
         if (progress) progress(study.results.size(), all);
         const auto count = static_cast<std::size_t>(
             std::lround(0.01 * percent * static_cast<double>(study.true_closures)));
-        const TeamGraph spoiled =
-            spoil_in_clusters(spoil(clean, count, study.half_side_m, seed), options.clusters, truth,
-                              study.half_side_m, seed);
-        OutlierResult result = attempt(method, spoiled, clean.edges.size(), truth, options, meter);
+        const TeamGraph corrupted =
+            corrupt_in_clusters(corrupt(clean, count, study.half_side_m, seed), options.clusters,
+                                truth, study.half_side_m, seed);
+        OutlierResult result =
+            attempt(method, corrupted, clean.edges.size(), truth, options, meter);
         result.share_percent = percent;
         result.seed = seed;
-        result.false_closures = spoiled.edges.size() - clean.edges.size();
+        result.false_closures = corrupted.edges.size() - clean.edges.size();
         study.results.push_back(std::move(result));
       }
   if (progress) progress(all, all);

@@ -92,8 +92,8 @@ using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
 /// +-half_side_m along every axis (both in the plane for planar graphs). It claims the weights of a
 /// true closure drawn at random. Throws std::invalid_argument if `graph` has no closures to draw
 /// from.
-[[nodiscard]] TeamGraph spoil(const TeamGraph& graph, std::size_t count, double half_side_m,
-                              unsigned seed);
+[[nodiscard]] TeamGraph corrupt(const TeamGraph& graph, std::size_t count, double half_side_m,
+                                unsigned seed);
 
 /// False closures from poses a, a + 1, ... of one robot to poses b, b + 1, ... of another. They
 /// agree with the motion of `poses` and with `T_a_b` between the first two.
@@ -102,10 +102,10 @@ using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
                                                  const Precision& claimed);
 
 /// Appends clusters of false closures between the first robot and the last. `poses` give the motion
-/// of the robots within a cluster. Weights and ranges are as in `spoil`. Throws
+/// of the robots within a cluster. Weights and ranges are as in `corrupt`. Throws
 /// std::invalid_argument if a robot has fewer poses than a cluster has closures.
-[[nodiscard]] TeamGraph spoil_in_clusters(const TeamGraph& graph, const Clusters& clusters,
-                                          const std::vector<SE3>& poses, double half_side_m,
-                                          unsigned seed);
+[[nodiscard]] TeamGraph corrupt_in_clusters(const TeamGraph& graph, const Clusters& clusters,
+                                            const std::vector<SE3>& poses, double half_side_m,
+                                            unsigned seed);
 
 }  // namespace km

@@ -366,7 +366,7 @@ ScenarioGraph draw_scenario(const TeamGraph& whole, const std::vector<SE3>& opti
   const auto closures = static_cast<double>(std::ranges::count(odometry, false));
   const auto random =
       static_cast<std::size_t>(std::lround(0.01 * scenario.random_percent * closures));
-  if (random > 0) drawn.graph = spoil(drawn.graph, random, half_extent_m(drawn.truth), seed);
+  if (random > 0) drawn.graph = corrupt(drawn.graph, random, half_extent_m(drawn.truth), seed);
   add_clusters(drawn, scenario, rng);
   for (std::size_t k = 0; k < drawn.graph.edges.size(); ++k) {
     drawn.is_false.push_back(k >= true_edges);

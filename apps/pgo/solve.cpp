@@ -108,7 +108,7 @@ std::vector<Takers> takers() {
           {"--seed", {"rbcd-asynchronous"}},
           {"--barc", {"newton"}},
           {"--reject-odometry", {"newton"}},
-          {"--tell-private", newton},
+          {"--share-private", newton},
           {"--links", {"newton", "newton --trust-all", "rbcd"}}};
 }
 
@@ -166,7 +166,7 @@ void define_newton(CLI::App& app, SolveCommand& command) {
          "Largest residual [sigma] of a closure that is kept, sqrt of its cost; 0: exceeded by\n"
          "one in a million Gaussian residuals, times the noise scale that the team estimates")
       ->check(CLI::NonNegativeNumber);
-  app.add_flag("--tell-private", solver.tell_private,
+  app.add_flag("--share-private", solver.share_private,
                "Also send private poses to other robots if that saves bytes");
   app.add_flag("--reject-odometry", solver.reject_odometry,
                "Also reject false steps of odometry inside a robot");

@@ -26,7 +26,7 @@ PoseGraphConfig config_of(const SolverOptions& options) {
   PoseGraphConfig config;
   config.robust = !options.trust_all;
   config.barc = options.barc;
-  config.tell_private = options.tell_private;
+  config.share_private = options.share_private;
   config.rank = static_cast<int>(options.rank);
   config.max_over_relaxation = options.over_relaxation;
   return config;

@@ -32,7 +32,7 @@ struct SolverOptions {
   bool trust_all = false;        ///< newton: all closures are treated as true.
   double barc = 0.0;             ///< newton: largest residual of an inlier [sigma]; 0: estimated.
   bool reject_odometry = false;  ///< newton: false steps of odometry are rejected too.
-  bool tell_private = false;     ///< newton: see TreeNewtonOptions.
+  bool share_private = false;    ///< newton: see TreeNewtonOptions.
   TeamShape shape = TeamShape::kAll;  ///< newton, rbcd: links between the robots.
 
   [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }

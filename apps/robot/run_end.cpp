@@ -46,7 +46,7 @@ Departure::Present Departure::update(double now_s, const Inputs& inputs) {
   const bool settled = inputs.graph_settled && now_s - active_s_ >= 0.5 * settle_s_;
   const std::uint8_t links = settled ? settled_links(inputs.present_peers) : 0;
   const bool peers_settled = links > 1;
-  // The distance in links to a robot that is not heard is at most the number of such robots plus
+  // The distance in links to a robot that is not received is at most the number of such robots plus
   // one.
   const bool all_settled =
       peers_settled && links > std::min(inputs.not_received + 1, std::size_t{kManyLinks} - 1);

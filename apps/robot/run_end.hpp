@@ -18,7 +18,7 @@ namespace km {
 /// Decides how far a robot is with its run, and when it may leave its team.
 ///
 /// A robot whose input has ended continues to serve its team. It leaves when it and every robot of
-/// the team, heard or not, have been settled for `settle_s`, or `serve_limit_s` after its input
+/// the team, received or not, have been settled for `settle_s`, or `serve_limit_s` after its input
 /// ended. Pure: time is an argument [s], with any origin.
 class Departure {
  public:
@@ -55,8 +55,8 @@ class Departure {
 };
 
 /// Reason why a robot ends without another one of its team. kSilent: the other robot went silent
-/// without a leave message and has not come back: out of reach, or dead. kApart: it is heard, but
-/// has no frame in common with this robot.
+/// without a leave message and has not come back: out of reach, or dead. kApart: it is received,
+/// but has no frame in common with this robot.
 enum class Absence { kSilent, kApart };
 
 struct MissedPeer {
@@ -76,14 +76,14 @@ class Absentees {
     Contact contact = Contact::kReceived;
   };
 
-  /// `members`: all robots in one frame with this one, itself included, heard directly or only by
-  /// others.
+  /// `members`: all robots in one frame with this one, itself included, received directly or only
+  /// by others.
   void update(double now_s, const std::map<RobotId, Known>& known,
               std::span<const RobotId> members);
 
-  /// Missed robots as of the last update(), ascending by id. A former member that was never heard
-  /// is listed only after it has been missed for `second_hand_s`. It may have left in order, which
-  /// only other robots know.
+  /// Missed robots as of the last update(), ascending by id. A former member that was never
+  /// received is listed only after it has been missed for `second_hand_s`. It may have left in
+  /// order, which only other robots know.
   [[nodiscard]] std::vector<MissedPeer> missed(double second_hand_s) const;
 
  private:

@@ -35,7 +35,7 @@ struct RunFacts {
   RunSummary summary;
   std::map<RobotId, ClosureTally> closures;  ///< Closures found by this robot, by the other robot;
                                              ///< own closures under its own id.
-  std::map<RobotId, std::string> names;      ///< Names of the robots that it has heard of.
+  std::map<RobotId, std::string> names;      ///< Names of the robots that it knows.
   PcmConfig pcm;
 };
 

@@ -232,7 +232,7 @@ struct RunSummary {
   double seconds = 0.0;  ///< Wall time of the run.
   /// By name, robots that went silent and did not return, with the time of their silence [s].
   std::map<std::string, double> lost_peers;
-  /// By name, robots that were heard but not in one frame with this one, with the time of that
+  /// By name, robots that were received but not in one frame with this one, with the time of that
   /// state [s].
   std::map<std::string, double> apart_peers;
   /// By name, robots with another vocabulary, with the number of keyframes that could not be

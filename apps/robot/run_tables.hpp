@@ -50,7 +50,7 @@ class TrafficUntil {
   [[nodiscard]] const std::map<std::string, double>& sent() const { return sent_; }
   [[nodiscard]] double sent(const std::string& category) const;
 
-  /// Robots heard so far, and the time since they were last heard [s].
+  /// Robots received so far, and the time since their last message [s].
   [[nodiscard]] std::map<RobotId, double> silent_s() const;
 
  private:

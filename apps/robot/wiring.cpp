@@ -312,8 +312,8 @@ void Robot::add_back_end(const RobotConfig& config) {
                            .peer_inlier_sets = topics_.peer_inlier_sets,
                            .peer_events = bridge_->peers().events(),
                            .restarts = topics_.closure_restarts,
-                           .peer_parcels = topics_.parcels.from_peers(),
-                           .parcels = topics_.parcels.to_peers(),
+                           .peer_packets = topics_.team_packets.from_peers(),
+                           .packets = topics_.team_packets.to_peers(),
                            .trajectory = topics_.trajectory,
                            .progress = topics_.progress,
                            .verdicts = topics_.closure_verdicts});
@@ -326,7 +326,7 @@ void Robot::add_relay() {
   relay_.emplace(TeamPeer{identity_.robot, identity_.boot}, seal_.get(), bridge_->peers(),
                  RelayTopics{.peer_events = peer_events,
                              .statuses = t.status.from_peers(),
-                             .own_parcels = t.relay_parcels.to_peers(),
+                             .own_packets = t.relay_packets.to_peers(),
                              .reached = t.ways});
   relay_->join_bags<KeyframeBow>(t.bows.from_peers(), t.peer_bows);
   const auto around = []<typename T>(Topic<Addressed<T>>& own, AddressedCrossing<T>& crossing,
@@ -360,8 +360,8 @@ void Robot::add_network(CrossingEnds meshes) {
                relay_->guard<KeyframeReply>(RelayKind::kReply, keyframe_of));
   dds.exchange(t.shared_closures, kEvent, kGeometricVerification);
   dds.exchange(t.shared_inlier_sets, kState, kPoseGraphOptimization);
-  dds.exchange(t.parcels, kRequest, kPoseGraphOptimization);
-  dds.exchange(t.relay_parcels, kRequest, kOther, {}, {}, relay_->guard_parcels());
+  dds.exchange(t.team_packets, kRequest, kPoseGraphOptimization);
+  dds.exchange(t.relay_packets, kRequest, kOther, {}, {}, relay_->guard_packets());
   dds.exchange(t.chunks, kState, kOther, meshes);
   dds.exchange(t.status, kStatus, kOther);
   // Closures and inlier sets are sent only to the robots that they connect.

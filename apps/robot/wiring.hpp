@@ -32,7 +32,7 @@
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/candidate_filter.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
-#include "modules/pose_graph/parcel_codec.hpp"
+#include "modules/pose_graph/packet_codec.hpp"
 #include "modules/recorded_graph/graph_playback_node.hpp"
 #include "modules/relay/relay_node.hpp"
 #include "modules/ros_dds/ros_output_node.hpp"
@@ -95,8 +95,8 @@ struct Topics {
   AddressedCrossing<KeyframeReply> replies;
   AddressedCrossing<Closure> shared_closures;
   AddressedCrossing<InlierSet> shared_inlier_sets;
-  AddressedCrossing<TeamParcel> parcels;
-  AddressedCrossing<RelayParcel> relay_parcels;
+  AddressedCrossing<TeamPacket> team_packets;
+  AddressedCrossing<RelayPacket> relay_packets;
   Crossing<MeshChunk> chunks;
   Crossing<RobotStatus> status;
 };

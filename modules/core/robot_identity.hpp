@@ -18,7 +18,7 @@ inline constexpr std::uint16_t kProtocolVersion = 1;
 /// keyframes. In another incarnation an index means another keyframe.
 inline constexpr unsigned kResumeBits = 16;
 
-[[nodiscard]] constexpr bool is_same_life(std::uint64_t a, std::uint64_t b) {
+[[nodiscard]] constexpr bool is_same_incarnation(std::uint64_t a, std::uint64_t b) {
   return a >> kResumeBits == b >> kResumeBits;
 }
 
@@ -29,7 +29,7 @@ inline constexpr unsigned kResumeBits = 16;
 /// Boot id of the process that resumes the incarnation of `boot`. Throws std::overflow_error if
 /// there have been too many.
 [[nodiscard]] inline std::uint64_t next_boot(std::uint64_t boot) {
-  if (!is_same_life(boot, boot + 1))
+  if (!is_same_incarnation(boot, boot + 1))
     throw std::overflow_error("an incarnation of a robot was resumed " +
                               std::to_string(resume_count(boot)) + " times, which is the maximum");
   return boot + 1;

@@ -4,14 +4,14 @@
 
 namespace km {
 
-bool TeamLinks::tell(RobotId robot, std::set<RobotId> received) {
+bool TeamLinks::report(RobotId robot, std::set<RobotId> received) {
   const auto [known, is_new] = received_by_.try_emplace(robot);
   if (!is_new && known->second == received) return false;
   known->second = std::move(received);
   return true;
 }
 
-bool TeamLinks::hears(RobotId a, RobotId b) const {
+bool TeamLinks::receives(RobotId a, RobotId b) const {
   const auto known = received_by_.find(a);
   return known != received_by_.end() && known->second.contains(b);
 }
@@ -21,7 +21,7 @@ std::vector<RobotId> TeamLinks::neighbours(RobotId robot) const {
   const auto known = received_by_.find(robot);
   if (known == received_by_.end()) return neighbours;
   for (const RobotId other : known->second)
-    if (other != robot && hears(other, robot)) neighbours.push_back(other);
+    if (other != robot && receives(other, robot)) neighbours.push_back(other);
   return neighbours;
 }
 

@@ -14,13 +14,13 @@ namespace km {
 class TeamLinks {
  public:
   /// Reports that `robot` receives the robots `received` and no others. True if this is a change.
-  bool tell(RobotId robot, std::set<RobotId> received);
+  bool report(RobotId robot, std::set<RobotId> received);
   /// Removes the report of `robot`.
   void forget(RobotId robot) { received_by_.erase(robot); }
 
   /// True if `a` reports that it receives `b`.
-  [[nodiscard]] bool hears(RobotId a, RobotId b) const;
-  [[nodiscard]] bool linked(RobotId a, RobotId b) const { return hears(a, b) && hears(b, a); }
+  [[nodiscard]] bool receives(RobotId a, RobotId b) const;
+  [[nodiscard]] bool linked(RobotId a, RobotId b) const { return receives(a, b) && receives(b, a); }
   /// Ascending robot ids.
   [[nodiscard]] std::vector<RobotId> neighbours(RobotId robot) const;
 

@@ -116,7 +116,7 @@ void RunRestorer::forget_closures(const std::function<bool(const KeyframeId&)>& 
 // A new incarnation has other keyframes, so its former closures are removed.
 void RunRestorer::add(JournalPeer peer) {
   const auto known = run_.peers.find(peer.robot);
-  if (known != run_.peers.end() && !is_same_life(known->second.boot, peer.boot))
+  if (known != run_.peers.end() && !is_same_incarnation(known->second.boot, peer.boot))
     forget_closures([&](const KeyframeId& id) { return id.robot == peer.robot; });
   run_.peers[peer.robot] = std::move(peer);
 }

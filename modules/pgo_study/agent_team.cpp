@@ -183,9 +183,9 @@ class AgentTeam {
     if (output.progress) member.progress = std::move(*output.progress);
     for (std::string& notice : output.notices)
       notices_.push_back("robot " + std::to_string(robot) + ": " + std::move(notice));
-    for (const Parcel& parcel : output.parcels)
+    for (const LinkPacket& packet : output.packets)
       in_flight_.push_back(
-          {static_cast<RobotId>(robot), parcel.next, across_the_wire(parcel.message)});
+          {static_cast<RobotId>(robot), packet.next, across_the_wire(packet.message)});
   }
 
   TeamMessagePtr across_the_wire(const TeamMessagePtr& message) {

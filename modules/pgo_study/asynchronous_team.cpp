@@ -34,8 +34,8 @@ AsynchronousTeam::AsynchronousTeam(const TeamGraph& graph, const LiftedPoses& st
   for (std::size_t k = 0; k < graph.robots(); ++k) {
     const SessionGraph part = part_of(graph, k);
     const LiftedPoses X = start.middleCols(4 * graph.first[k], 4 * graph.poses_of(k));
-    Robot robot{.block = ProximalBlock(part, X, weight_for(options.max_delay)), .heard = {}};
-    for (const PoseEdge& e : part.between) robot.heard.emplace(e.other(part.self).robot, 0);
+    Robot robot{.block = ProximalBlock(part, X, weight_for(options.max_delay)), .received = {}};
+    for (const PoseEdge& e : part.between) robot.received.emplace(e.other(part.self).robot, 0);
     robots_.push_back(std::move(robot));
   }
 }
@@ -56,22 +56,23 @@ int AsynchronousTeam::step(RoundMeter& meter) {
 
 // Poses that arrive after newer ones of the same neighbour are dropped.
 void AsynchronousTeam::deliver(RoundMeter& meter) {
-  for (const Letter& letter : letters_) {
-    if (letter.due > round_) continue;
-    Robot& receiver = robots_[letter.receiver];
-    int& heard = receiver.heard.at(letter.sender);
-    if (letter.round <= heard) continue;
-    heard = letter.round;
-    meter.run(letter.receiver,
-              [&] { (void)receiver.block.set_neighbour(letter.sender, letter.poses); });
+  for (const Message& message : messages_) {
+    if (message.due > round_) continue;
+    Robot& receiver = robots_[message.receiver];
+    int& received = receiver.received.at(message.sender);
+    if (message.round <= received) continue;
+    received = message.round;
+    meter.run(message.receiver,
+              [&] { (void)receiver.block.set_neighbour(message.sender, message.poses); });
   }
-  std::erase_if(letters_, [&](const Letter& letter) { return letter.due <= round_; });
+  std::erase_if(messages_, [&](const Message& message) { return message.due <= round_; });
 }
 
 // Poses sent in the previous round miss no update. No robot moves in round 1, even one without
 // neighbours.
 bool AsynchronousTeam::may_move(const Robot& robot) const {
-  return round_ > 1 && std::all_of(robot.heard.begin(), robot.heard.end(), [&](const auto& entry) {
+  return round_ > 1 &&
+         std::all_of(robot.received.begin(), robot.received.end(), [&](const auto& entry) {
            return entry.second > 0 && round_ - 1 - entry.second <= options_.max_delay;
          });
 }
@@ -79,13 +80,13 @@ bool AsynchronousTeam::may_move(const Robot& robot) const {
 // A robot that has not moved sends its poses too, because its last message may be lost.
 void AsynchronousTeam::send(std::size_t k, RoundMeter& meter) {
   Robot& robot = robots_[k];
-  const ToldBlock poses = meter.run(k, [&] { return robot.block.round_public_poses(); });
+  const SentPoses poses = meter.run(k, [&] { return robot.block.round_public_poses(); });
   meter.sent(kMessageHeader + bytes_of_poses(poses.keyframes.size(), poses.X.rows()));
-  for (const auto& [peer, heard] : robot.heard) {
+  for (const auto& [peer, received] : robot.received) {
     const bool lost = std::bernoulli_distribution(options_.loss)(rng_);
     const int delay = std::uniform_int_distribution(0, options_.max_delay)(rng_);
     if (!lost)
-      letters_.push_back({round_ + 1 + delay, round_, static_cast<RobotId>(k), peer, poses});
+      messages_.push_back({round_ + 1 + delay, round_, static_cast<RobotId>(k), peer, poses});
   }
 }
 

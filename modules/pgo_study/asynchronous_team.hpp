@@ -31,7 +31,7 @@ struct AsynchronousOptions {
 ///
 /// Proof of descent. Let D_a^t be the change of block a in round t, and |D_a^t|_e the change of the
 /// residual of edge e = (a, b). The cost is quadratic in the lifted poses, so round t changes it by
-///     sum_a (f_a(X_a + D_a; heard) - f_a(X_a; heard))
+///     sum_a (f_a(X_a + D_a; received) - f_a(X_a; received))
 ///       + sum_e 2 <D_a^t, D_b^t>_e + 2 <D_a^t, S_b>_e + 2 <D_b^t, S_a>_e ,
 /// and S_b is the sum of those updates of b, at most B, that a had not received. A product 2 <u,
 /// v> is at most |u|^2 + |v|^2. The product of the current round and those with missed updates
@@ -58,14 +58,14 @@ class AsynchronousTeam : public TeamSolver {
  private:
   struct Robot {
     ProximalBlock block;
-    std::map<RobotId, int> heard;  // round of the newest received poses, by neighbour; 0: none
+    std::map<RobotId, int> received;  // round of the newest received poses, by neighbour; 0: none
   };
-  struct Letter {
+  struct Message {
     int due = 0;  // round before whose updates the message arrives
     int round = 0;
     RobotId sender = 0;
     std::size_t receiver = 0;
-    ToldBlock poses;
+    SentPoses poses;
   };
 
   void deliver(RoundMeter& meter);
@@ -75,7 +75,7 @@ class AsynchronousTeam : public TeamSolver {
   AsynchronousOptions options_;
   std::mt19937 rng_;
   std::vector<Robot> robots_;
-  std::vector<Letter> letters_;
+  std::vector<Message> messages_;
   int round_ = 0;
   std::size_t updates_ = 0;
 };

@@ -87,7 +87,7 @@ int GaussSeidelTeam::step(RoundMeter& meter) {
   const std::vector<std::size_t> turn =
       flagged ? std::vector<std::size_t>{tree_.order[turn_]} : colours_[turn_];
   for (const std::size_t k : turn) solve(k, meter);
-  for (const std::size_t k : turn) tell(k, meter);
+  for (const std::size_t k : turn) send(k, meter);
   turn_ = (turn_ + 1) % (flagged ? tree_.order.size() : colours_.size());
   if (turn_ != 0) return 1;
   ++sweep_;
@@ -132,30 +132,30 @@ void GaussSeidelTeam::update_poses(Robot& robot) const {
 
 // The first stage sends the matrices of the relaxation, which are not rotations yet. The second
 // stage sends poses.
-void GaussSeidelTeam::tell(std::size_t k, RoundMeter& meter) {
+void GaussSeidelTeam::send(std::size_t k, RoundMeter& meter) {
   const Robot& robot = robots_[k];
-  ToldBlock told{robot.separators,
+  SentPoses sent{robot.separators,
                  LiftedPoses::Zero(3, 4 * static_cast<Eigen::Index>(robot.separators.size()))};
   meter.run(k, [&] {
-    for (std::size_t s = 0; s < told.keyframes.size(); ++s) {
-      const Eigen::Index i = told.keyframes[s];
-      auto pose = told.X.middleCols<4>(4 * static_cast<Eigen::Index>(s));
+    for (std::size_t s = 0; s < sent.keyframes.size(); ++s) {
+      const Eigen::Index i = sent.keyframes[s];
+      auto pose = sent.X.middleCols<4>(4 * static_cast<Eigen::Index>(s));
       if (poses_stage_)
         pose = robot.X.middleCols<4>(4 * i);
       else
         pose.leftCols<3>() = robot.unknowns.at(i).transpose();
     }
-    told.X = told.X.cast<float>().cast<double>();
+    sent.X = sent.X.cast<float>().cast<double>();
   });
-  meter.sent(kMessageHeader + bytes_of_poses(told.keyframes.size(), 3));
+  meter.sent(kMessageHeader + bytes_of_poses(sent.keyframes.size(), 3));
   for (const std::size_t peer : neighbours_[k])
-    meter.run(peer, [&] { hear(robots_[peer], k, told); });
+    meter.run(peer, [&] { receive(robots_[peer], k, sent); });
 }
 
-void GaussSeidelTeam::hear(Robot& robot, std::size_t peer, const ToldBlock& told) const {
-  for (std::size_t s = 0; s < told.keyframes.size(); ++s) {
-    const auto pose = told.X.middleCols<4>(4 * static_cast<Eigen::Index>(s));
-    const KeyframeIndex i = told.keyframes[s];
+void GaussSeidelTeam::receive(Robot& robot, std::size_t peer, const SentPoses& sent) const {
+  for (std::size_t s = 0; s < sent.keyframes.size(); ++s) {
+    const auto pose = sent.X.middleCols<4>(4 * static_cast<Eigen::Index>(s));
+    const KeyframeIndex i = sent.keyframes[s];
     Eigen::Matrix3d& R = robot.R_other[{static_cast<RobotId>(peer), i}];
     if (!poses_stage_) {
       robot.unknowns.set_other(peer, i, pose.leftCols<3>().transpose());

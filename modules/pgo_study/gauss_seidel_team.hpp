@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "modules/pgo_study/least_squares_block.hpp"
+#include "modules/pgo_study/sent_poses.hpp"
 #include "modules/pgo_study/team_schedule.hpp"
 #include "modules/pgo_study/team_solver.hpp"
-#include "modules/pgo_study/told_block.hpp"
 
 namespace km {
 
@@ -49,9 +49,9 @@ class GaussSeidelTeam : public TeamSolver {
   };
 
   void solve(std::size_t k, RoundMeter& meter);
-  void tell(std::size_t k, RoundMeter& meter);
+  void send(std::size_t k, RoundMeter& meter);
   void update_poses(Robot& robot) const;
-  void hear(Robot& robot, std::size_t peer, const ToldBlock& told) const;
+  void receive(Robot& robot, std::size_t peer, const SentPoses& sent) const;
   bool sweep_ended();
   void start_second_stage(RoundMeter& meter);
   [[nodiscard]] LeastSquaresBlock second_stage(std::size_t k) const;

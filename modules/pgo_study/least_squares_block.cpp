@@ -19,12 +19,12 @@ void LeastSquaresBlock::add_other(Eigen::Index own, std::size_t peer, Eigen::Ind
 }
 
 void LeastSquaresBlock::set_other(std::size_t peer, Eigen::Index other, const Eigen::MatrixXd& x) {
-  heard_[{peer, other}] = x;
+  received_[{peer, other}] = x;
 }
 
 const Eigen::MatrixXd* LeastSquaresBlock::known(const Other& edge) const {
-  const auto found = heard_.find({edge.peer, edge.other});
-  return found == heard_.end() ? nullptr : &found->second;
+  const auto found = received_.find({edge.peer, edge.other});
+  return found == received_.end() ? nullptr : &found->second;
 }
 
 void LeastSquaresBlock::factorise() {
@@ -52,13 +52,13 @@ void LeastSquaresBlock::factorise() {
       factor_->info() == Eigen::Success &&
       factor_->vectorD().minCoeff() > 1e-13 * std::max(1e-300, factor_->vectorD().maxCoeff());
   if (!fixed) throw std::invalid_argument("what is known does not fix all poses of the block");
-  heard_when_factorised_ = heard_.size();
+  received_when_factorised_ = received_.size();
 }
 
 void LeastSquaresBlock::solve() {
   const Eigen::Index unknowns = width_ * (poses_ - held_);
   if (unknowns == 0) return;
-  if (!factor_ || heard_when_factorised_ != heard_.size()) factorise();
+  if (!factor_ || received_when_factorised_ != received_.size()) factorise();
   Eigen::MatrixXd g = Eigen::MatrixXd::Zero(width_ * poses_, x_.cols());
   for (const Own& e : own_) {
     g.middleRows(width_ * e.i, width_) += e.form.g_i;

@@ -61,8 +61,8 @@ class LeastSquaresBlock {
   Eigen::MatrixXd x_;  // (w n) x c
   std::vector<Own> own_;
   std::vector<Other> others_;
-  std::map<std::pair<std::size_t, Eigen::Index>, Eigen::MatrixXd> heard_;
-  std::size_t heard_when_factorised_ = 0;
+  std::map<std::pair<std::size_t, Eigen::Index>, Eigen::MatrixXd> received_;
+  std::size_t received_when_factorised_ = 0;
   std::unique_ptr<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>> factor_;
   double change_ = 0.0;
 };

@@ -48,7 +48,7 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
   for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
   if (as_robots) weigh_as_robots(parts_);
   places_ = places(shape);
-  tell_starts(std::move(start));
+  announce_starts(std::move(start));
   open_session();
   take_poses();
 }
@@ -63,12 +63,13 @@ std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
     std::map<RobotId, std::uint32_t> edges;
     for (const PoseEdge& e : part.between) ++edges[e.other(part.self).robot];
     for (const auto& [peer, count] : edges) status.offers.push_back({peer, count, {1, count}});
-    std::set<RobotId> heard;
+    std::set<RobotId> received;
     for (const SessionGraph& other : parts_) {
       const bool beside = other.self + 1 == part.self || part.self + 1 == other.self;
-      if (other.self != part.self && (shape == TeamShape::kAll || beside)) heard.insert(other.self);
+      if (other.self != part.self && (shape == TeamShape::kAll || beside))
+        received.insert(other.self);
     }
-    links.tell(part.self, heard);
+    links.report(part.self, received);
   }
   const SessionPlan plan = plan_session(statuses, links, 0);
   if (plan.members.size() != parts_.size())
@@ -80,15 +81,15 @@ std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
 }
 
 // Sends all public poses to all robots in single precision, as MemberPoses does.
-void MemberTeam::tell_starts(std::vector<SE3> start) {
+void MemberTeam::announce_starts(std::vector<SE3> start) {
   std::set<KeyframeId> ends;
   for (const SessionGraph& part : parts_)
     for (const PoseEdge& e : part.between) ends.insert({e.from, e.to});
-  std::map<KeyframeId, SE3> told;
+  std::map<KeyframeId, SE3> public_poses;
   for (const KeyframeId& id : ends) {
     SE3& T = start[static_cast<std::size_t>(graph_.first[id.robot] + id.index)];
     T = SinglePose::of(T).pose();
-    told[id] = T;
+    public_poses[id] = T;
   }
   constexpr std::size_t kBytes = sizeof(float) * 7 + 2;
   to_announce_ = kBytes * ends.size();
@@ -100,17 +101,17 @@ void MemberTeam::tell_starts(std::vector<SE3> start) {
     }
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     parts_[k].start.assign(start.begin() + graph_.first[k], start.begin() + graph_.first[k + 1]);
-    parts_[k].told.clear();
+    parts_[k].public_poses.clear();
     for (const PoseEdge& e : parts_[k].between) {
       const KeyframeId& other = e.other(parts_[k].self);
-      parts_[k].told[other] = told.at(other);
+      parts_[k].public_poses[other] = public_poses.at(other);
     }
   }
 }
 
 void MemberTeam::open_session() {
   const auto before = std::exchange(members_, {});
-  post_.clear();
+  in_flight_.clear();
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     parts_[k].decided = decisions_.decided();
     if (k < before.size()) parts_[k].noise = before[k]->noise();
@@ -151,23 +152,23 @@ bool MemberTeam::done() const {
 
 // Every member that is ready advances, except for members that have completed `round` already.
 bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
-  bool worked = !post_.empty();
-  for (const Delivery& delivery : std::exchange(post_, {})) {
-    received_[delivery.letter.to] += delivery.letter.bytes->size();
-    const bool taken = meter.run(delivery.letter.to, [&] {
-      return members_[delivery.letter.to]->receive(delivery.from, *delivery.letter.bytes);
+  bool worked = !in_flight_.empty();
+  for (const Delivery& delivery : std::exchange(in_flight_, {})) {
+    received_[delivery.message.to] += delivery.message.bytes->size();
+    const bool taken = meter.run(delivery.message.to, [&] {
+      return members_[delivery.message.to]->receive(delivery.from, *delivery.message.bytes);
     });
     if (!taken)
-      throw std::runtime_error("MemberTeam: robot " + std::to_string(delivery.letter.to) +
-                               " refuses a letter of robot " + std::to_string(delivery.from));
+      throw std::runtime_error("MemberTeam: robot " + std::to_string(delivery.message.to) +
+                               " refuses a message of robot " + std::to_string(delivery.from));
   }
   for (std::size_t k = 0; k < members_.size(); ++k) {
     if (members_[k]->state().round >= round || !members_[k]->ready()) continue;
     worked = true;
-    for (SolverLetter& letter : meter.run(k, [&] { return members_[k]->advance(); })) {
-      meter.sent(letter.bytes->size());
-      sent_[k] += letter.bytes->size();
-      post_.push_back({static_cast<RobotId>(k), std::move(letter)});
+    for (SolverMessage& message : meter.run(k, [&] { return members_[k]->advance(); })) {
+      meter.sent(message.bytes->size());
+      sent_[k] += message.bytes->size();
+      in_flight_.push_back({static_cast<RobotId>(k), std::move(message)});
     }
   }
   meter.finish_exchange();
@@ -176,7 +177,7 @@ bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
 
 bool MemberTeam::reconsider() {
   for (const auto& member : members_) decisions_.decide(member->verdicts().closures, false);
-  if (!state_.set_aside) return false;
+  if (!state_.deferred) return false;
   std::vector<SE3> poses;
   for (const auto& member : members_)
     poses.insert(poses.end(), member->poses().begin(), member->poses().end());
@@ -194,7 +195,7 @@ bool MemberTeam::reconsider() {
       if (part.self < e.other(part.self).robot) look_again(e);
   }
   if (!any) return false;
-  tell_starts(std::move(poses));
+  announce_starts(std::move(poses));
   open_session();
   return true;
 }

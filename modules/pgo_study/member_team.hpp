@@ -52,11 +52,11 @@ class MemberTeam final : public TeamSolver {
  private:
   struct Delivery {
     RobotId from = 0;
-    SolverLetter letter;
+    SolverMessage message;
   };
 
   [[nodiscard]] std::map<std::size_t, TreePlace> places(TeamShape shape) const;
-  void tell_starts(std::vector<SE3> start);
+  void announce_starts(std::vector<SE3> start);
   void open_session();
   bool reconsider();
   void take_poses();
@@ -68,7 +68,7 @@ class MemberTeam final : public TeamSolver {
   std::vector<SessionGraph> parts_;
   std::map<std::size_t, TreePlace> places_;
   std::vector<std::unique_ptr<MemberSolver>> members_;
-  std::vector<Delivery> post_;
+  std::vector<Delivery> in_flight_;
   std::vector<LiftedPoses> blocks_;
   ClosureDecisions decisions_;  // decisions of all members
   std::vector<std::size_t> sent_;

@@ -32,19 +32,19 @@ ProximalBlock::ProximalBlock(const SessionGraph& part, LiftedPoses X, double wei
       border_(border_of(part)),
       weight_(checked_weight(weight)),
       problem_(X_.rows(), pose_count(X_), block_edges(part.own), weighted(border_.edges, weight)),
-      heard_(LiftedPoses::Zero(X_.rows(), 4 * static_cast<Eigen::Index>(border_.fixed_of.size()))) {
-}
+      received_(
+          LiftedPoses::Zero(X_.rows(), 4 * static_cast<Eigen::Index>(border_.fixed_of.size()))) {}
 
-bool ProximalBlock::set_neighbour(RobotId robot, const ToldBlock& told) {
-  LiftedPoses heard = heard_;
+bool ProximalBlock::set_neighbour(RobotId robot, const SentPoses& sent) {
+  LiftedPoses received = received_;
   const auto begin = border_.fixed_of.lower_bound({robot, 0});
   for (auto it = begin; it != border_.fixed_of.end() && it->first.robot == robot; ++it) {
-    const auto& keyframes = told.keyframes;
+    const auto& keyframes = sent.keyframes;
     const auto at = std::lower_bound(keyframes.begin(), keyframes.end(), it->first.index);
     if (at == keyframes.end() || *at != it->first.index) return false;
-    heard.middleCols<4>(4 * it->second) = told.X.middleCols<4>(4 * (at - keyframes.begin()));
+    received.middleCols<4>(4 * it->second) = sent.X.middleCols<4>(4 * (at - keyframes.begin()));
   }
-  heard_ = std::move(heard);
+  received_ = std::move(received);
   return true;
 }
 
@@ -53,7 +53,7 @@ TruncatedNewtonResult ProximalBlock::update(const TruncatedNewtonOptions& option
   LiftedPoses targets(X_.rows(), 4 * static_cast<Eigen::Index>(border_.edges.size()));
   for (std::size_t k = 0; k < border_.edges.size(); ++k) {
     const PublicEdge& e = border_.edges[k];
-    const auto neighbour = heard_.middleCols<4>(4 * e.fixed);
+    const auto neighbour = received_.middleCols<4>(4 * e.fixed);
     const SE3 T_own_fixed = e.from_own ? e.T : e.T.inverse();
     targets.middleCols<4>(4 * static_cast<Eigen::Index>(k)) =
         (neighbour + weight_ * lift(X_.middleCols<4>(4 * e.own), T_own_fixed)) / (1.0 + weight_);
@@ -64,7 +64,7 @@ TruncatedNewtonResult ProximalBlock::update(const TruncatedNewtonOptions& option
   return result;
 }
 
-ToldBlock ProximalBlock::round_public_poses() {
+SentPoses ProximalBlock::round_public_poses() {
   const auto& keyframes = border_.own;
   LiftedPoses poses(X_.rows(), 4 * static_cast<Eigen::Index>(keyframes.size()));
   for (std::size_t k = 0; k < keyframes.size(); ++k)

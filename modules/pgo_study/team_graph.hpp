@@ -50,9 +50,9 @@ struct TeamGraph {
 /// By pose: the lowest pose of its connected part.
 [[nodiscard]] std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph);
 
-/// The edges and priors that one robot of the team knows, without any poses: `start` and `told` are
-/// empty. Ids are those of TeamGraph::keyframe_of(). Odometry that was cut between two robots is
-/// trusted. `step_precision` has the values of all robots.
+/// The edges and priors that one robot of the team knows, without any poses: `start` and
+/// `public_poses` are empty. Ids are those of TeamGraph::keyframe_of(). Odometry that was cut
+/// between two robots is trusted. `step_precision` has the values of all robots.
 [[nodiscard]] SessionGraph part_of(const TeamGraph& graph, std::size_t robot);
 
 /// Cost function of the whole graph at rank r. Throws std::invalid_argument as QuadraticProblem

@@ -12,21 +12,21 @@
 
 namespace km {
 
-/// Moves `poses` of robot `self` as a whole from its own frame into the frame of the poses `told`,
-/// received from other robots. The transform is the one on which most of the `closures` to these
-/// poses agree, see align_frames(). Candidates are compared at the centre of the closure ends on
-/// `self`. nullopt if no closure ends on a received pose.
+/// Moves `poses` of robot `self` as a whole from its own frame into the frame of the `received`
+/// poses of other robots. The transform is the one on which most of the `closures` to these poses
+/// agree, see align_frames(). Candidates are compared at the centre of the closure ends on `self`.
+/// nullopt if no closure ends on a received pose.
 [[nodiscard]] std::optional<std::vector<SE3>> moved_into_frame(
     const std::vector<SE3>& poses, RobotId self, std::span<const PoseEdge> closures,
-    const std::map<KeyframeId, SE3>& told, const AlignmentTolerance& tolerance);
+    const std::map<KeyframeId, SE3>& received, const AlignmentTolerance& tolerance);
 
-/// Deforms `poses`, in the frame of the received poses `told`, by solve_alone() on the own edges
+/// Deforms `poses`, in the frame of the `received` poses, by solve_alone() on the own edges
 /// and on the closures to received poses, which stay fixed. A long odometry drifts so far that no
 /// rigid transform fits. The closures must be true, because false ones would deform the trajectory.
-[[nodiscard]] std::vector<SE3> bent_to_told(const std::vector<SE3>& poses, RobotId self,
-                                            std::span<const PoseEdge> own,
-                                            std::span<const PoseEdge> closures,
-                                            const std::map<KeyframeId, SE3>& told);
+[[nodiscard]] std::vector<SE3> deformed_to_received(const std::vector<SE3>& poses, RobotId self,
+                                                    std::span<const PoseEdge> own,
+                                                    std::span<const PoseEdge> closures,
+                                                    const std::map<KeyframeId, SE3>& received);
 
 /// The one with the lower cost: `poses`, or the chordal initialisation from the own edges of the
 /// robot, which begins at the first of `poses`. Throws std::invalid_argument if `own` does not

@@ -13,15 +13,16 @@ namespace {
 void add_absent(const MemberPoses& poses, RobotId self, const std::vector<PoseEdge>& edges,
                 SessionGraph& graph) {
   for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
-    graph.told[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
+    graph.public_poses[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
   for (const PoseEdge& e : edges)
-    if (graph.told.contains(e.other(self))) graph.to_absent.push_back(e);
+    if (graph.public_poses.contains(e.other(self))) graph.to_absent.push_back(e);
 }
 
 }  // namespace
 
 std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, const OwnGraph& graph,
-                                      std::span<const RobotId> peers, const ToldPoses& told) {
+                                      std::span<const RobotId> peers,
+                                      const PublicPoses& published) {
   const SessionPlan& plan = session.plan;
   FrozenPart part{.place = *place_in(plan, self)};
   SessionGraph& frozen = part.graph;
@@ -38,8 +39,8 @@ std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, cons
     const auto* edges = graph.newest_edges(robot);
     if (edges == nullptr) continue;
     for (const PoseEdge& e : *edges) ends.insert(e.end_on(self).index);
-    const auto poses = told.find(robot);
-    if (!plan.has_member(robot) && poses != told.end() && poses->second.frame == plan.frame)
+    const auto poses = published.find(robot);
+    if (!plan.has_member(robot) && poses != published.end() && poses->second.frame == plan.frame)
       add_absent(poses->second, self, *edges, frozen);
   }
   for (const PoseEdge& e : frozen.between) ends.insert(e.end_on(self).index);

@@ -11,14 +11,14 @@
 
 namespace km {
 
-/// The newest poses received from each of the other robots.
-using ToldPoses = std::map<RobotId, MemberPoses>;
+/// The newest public poses of each robot.
+using PublicPoses = std::map<RobotId, MemberPoses>;
 
 /// The contribution of a robot to a session, frozen when it joins.
 struct FrozenPart {
-  /// `told` has the poses of absent robots, and `step_precision` has the entry of this robot. The
-  /// agent supplies `start`, in the present frame of the robot, and what it has decided. The
-  /// members supply the rest.
+  /// `public_poses` has the poses of absent robots, and `step_precision` has the entry of this
+  /// robot. The agent supplies `start`, in the present frame of the robot, and what it has decided.
+  /// The members supply the rest.
   SessionGraph graph = {};
   TreePlace place = {};
   bool in_frame = false;  ///< `start` is already in the frame of the session.
@@ -33,6 +33,6 @@ struct FrozenPart {
 [[nodiscard]] std::optional<FrozenPart> freeze_part(const Session& session, RobotId self,
                                                     const OwnGraph& graph,
                                                     std::span<const RobotId> peers,
-                                                    const ToldPoses& told);
+                                                    const PublicPoses& published);
 
 }  // namespace km

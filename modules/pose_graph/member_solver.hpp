@@ -15,7 +15,7 @@ namespace km {
 
 /// Message of a solver to one other member. Only the solver knows its content. The sizes are those
 /// on the network.
-struct SolverLetter {
+struct SolverMessage {
   RobotId to = 0;
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
 };
@@ -33,10 +33,10 @@ struct SolverState {
   double gradient = 0.0;     ///< Newton: sqrt(g^T H^-1 g); rbcd: norm of the Riemannian gradient.
   double noise_scale = 1.0;  ///< Noise scale of the closures, estimated by the team.
   double barc = 0.0;  ///< Largest residual of a closure that is kept [sigma]; 0: none is rejected.
-  std::uint32_t lag = 1;   ///< Every member has had the poses() of `round` - `lag`.
-  bool set_aside = false;  ///< Closures that stand alone were deferred: they may be true.
-  bool held = false;       ///< Held poses fix the frame of the team.
-  bool failed = false;     ///< The graph of the team could not be solved.
+  std::uint32_t lag = 1;  ///< Every member has had the poses() of `round` - `lag`.
+  bool deferred = false;  ///< Closures that stand alone were deferred: they may be true.
+  bool held = false;      ///< Held poses fix the frame of the team.
+  bool failed = false;    ///< The graph of the team could not be solved.
 };
 
 /// The part of one robot in solving the graph of a session. Messages may arrive early, late,
@@ -53,7 +53,7 @@ class MemberSolver {
   [[nodiscard]] virtual bool ready() const = 0;
   /// Does one piece of work and returns the resulting messages. Throws std::exception if the graph
   /// of the team cannot be solved. The session is then over, and poses() remain valid.
-  [[nodiscard]] virtual std::vector<SolverLetter> advance() = 0;
+  [[nodiscard]] virtual std::vector<SolverMessage> advance() = 0;
   [[nodiscard]] virtual bool done() const = 0;
 
   /// Own poses in the frame of the session, with the lowest cost that the team has agreed on. At

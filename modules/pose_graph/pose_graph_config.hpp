@@ -14,7 +14,7 @@ struct PoseGraphConfig {
   PgoMethod method = PgoMethod::kNewton;
   bool robust = true;
   double barc = 0.0;
-  bool tell_private = false;
+  bool share_private = false;
   int rank = 5;
   int max_rounds = 0;
   double exchange_budget_kb_s = 20.0;
@@ -37,7 +37,7 @@ struct PoseGraphConfig {
     visitor.field("barc", barc, {0.0, 1e6},
                   "[sigma] newton: largest residual (square root of the cost) of a closure that is "
                   "kept; equal on all robots; 0: the team estimates it from the closures");
-    visitor.field("tell_private", tell_private,
+    visitor.field("share_private", share_private,
                   "newton: send relative poses between private poses if that saves bytes; other "
                   "robots can then derive parts of the trajectory of this robot");
     visitor.field("rank", rank, {3, 10}, "rbcd: rank r of the relaxation; equal on all robots");

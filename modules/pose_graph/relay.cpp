@@ -22,7 +22,7 @@ std::size_t bytes_of(const TeamMessage& message) {
             (lists.size() * sizeof(typename std::decay_t<decltype(lists)>::value_type)));
   };
   if (const auto* status = std::get_if<TeamStatus>(&message))
-    return bytes(status->hears, status->offers);
+    return bytes(status->receives, status->offers);
   if (const auto* session = std::get_if<Session>(&message))
     return bytes(session->plan.members, session->plan.pairs);
   const auto& poses = std::get<MemberPoses>(message);
@@ -74,30 +74,30 @@ void Relay::step(double now_s) {
     renew_own_links();
 }
 
-std::vector<TeamPeer> Relay::hears() const {
-  std::vector<TeamPeer> hears;
-  for (const auto& [robot, neighbour] : direct_) hears.push_back({robot, neighbour.boot});
-  for (const auto& [robot, gone] : gone_) hears.push_back({robot, gone.boot});
-  std::sort(hears.begin(), hears.end());
-  return hears;
+std::vector<TeamPeer> Relay::receives() const {
+  std::vector<TeamPeer> receives;
+  for (const auto& [robot, neighbour] : direct_) receives.push_back({robot, neighbour.boot});
+  for (const auto& [robot, gone] : gone_) receives.push_back({robot, gone.boot});
+  std::sort(receives.begin(), receives.end());
+  return receives;
 }
 
 void Relay::renew_own_links() {
-  std::set<RobotId> heard;
-  for (const TeamPeer& peer : hears()) heard.insert(peer.robot);
-  links_version_ += links_.tell(self_.robot, std::move(heard)) ? 1 : 0;
+  std::set<RobotId> received;
+  for (const TeamPeer& peer : receives()) received.insert(peer.robot);
+  links_version_ += links_.report(self_.robot, std::move(received)) ? 1 : 0;
 }
 
-void Relay::tell_links(const TeamStatus& status) {
-  std::set<RobotId> heard;
-  for (const TeamPeer& peer : status.hears) {
+void Relay::report_links(const TeamStatus& status) {
+  std::set<RobotId> received;
+  for (const TeamPeer& peer : status.receives) {
     const auto known = origins_.find(peer.robot);
     const bool former = peer.robot == self_.robot
                             ? peer.boot != self_.boot
                             : known != origins_.end() && known->second.boot != peer.boot;
-    if (!former) heard.insert(peer.robot);
+    if (!former) received.insert(peer.robot);
   }
-  links_version_ += links_.tell(status.sender.robot, std::move(heard)) ? 1 : 0;
+  links_version_ += links_.report(status.sender.robot, std::move(received)) ? 1 : 0;
 }
 
 void Relay::renew_links() {
@@ -107,18 +107,18 @@ void Relay::renew_links() {
       links_.forget(robot);
       ++links_version_;
     } else {
-      tell_links(std::get<TeamStatus>(*origin.newest[kStatusKind]->message));
+      report_links(std::get<TeamStatus>(*origin.newest[kStatusKind]->message));
     }
   }
 }
 
-bool Relay::heard_by_someone(const TeamPeer& peer) const {
+bool Relay::received_by_any(const TeamPeer& peer) const {
   for (const RobotId robot : links_.component(self_.robot)) {
     const auto known = origins_.find(robot);
     if (known == origins_.end() || !known->second.newest[kStatusKind]) continue;
     const auto& status = std::get<TeamStatus>(*known->second.newest[kStatusKind]->message);
     if (robot != peer.robot &&
-        std::find(status.hears.begin(), status.hears.end(), peer) != status.hears.end())
+        std::find(status.receives.begin(), status.receives.end(), peer) != status.receives.end())
       return true;
   }
   return false;
@@ -129,7 +129,7 @@ bool Relay::accepts(const TeamPeer& origin) {
   const auto known = origins_.find(origin.robot);
   if (known == origins_.end() && origins_.size() >= kMaxTeam) return false;
   if (known != origins_.end() && known->second.boot != origin.boot &&
-      (direct_.contains(origin.robot) || !heard_by_someone(origin)))
+      (direct_.contains(origin.robot) || !received_by_any(origin)))
     return false;
   meet(origin);
   return true;
@@ -138,24 +138,24 @@ bool Relay::accepts(const TeamPeer& origin) {
 void Relay::send(RobotId next, RobotId origin, std::size_t kind, double now_s) {
   const Held& held = *origins_.at(origin).newest[kind];
   direct_.at(next).served[{origin, kind}] = {held.number, now_s, false};
-  parcels_.push_back({next, held.message});
+  packets_.push_back({next, held.message});
 }
 
-std::size_t Relay::say(TeamMessage message, double now_s) {
+std::size_t Relay::publish(TeamMessage message, double now_s) {
   const std::size_t kind = message.index();
   if (kind >= kFlooded) {
-    auto& letter = std::get<SessionLetter>(message);
-    letter.copy = copies_[letter.to]++;
-    const auto next = next_hop(letter.to);
+    auto& reliable = std::get<ReliableMessage>(message);
+    reliable.copy = copies_[reliable.to]++;
+    const auto next = next_hop(reliable.to);
     if (!next) return 0;
-    parcels_.push_back({*next, std::make_shared<const TeamMessage>(std::move(message))});
+    packets_.push_back({*next, std::make_shared<const TeamMessage>(std::move(message))});
     return 1;
   }
   std::visit([&](auto& m) { m.number = ++numbers_[kind]; }, message);
   Origin& own = origins_.try_emplace(self_.robot, Origin{self_.boot}).first->second;
   own.newest[kind] = Held{nullptr, numbers_[kind], now_s};
   if (auto* status = std::get_if<TeamStatus>(&message)) {
-    status->hears = hears();
+    status->receives = receives();
     status->holds = holds();
   }
   own.newest[kind]->message = std::make_shared<const TeamMessage>(std::move(message));
@@ -196,7 +196,7 @@ Arrival Relay::receive(RobotId from, const TeamMessagePtr& message, double now_s
   const bool newer = !held || held->number < number;
   if (newer) {
     if (!hold(held, {message, number, now_s, from, bytes_of(*message)})) return Arrival::kNoRoom;
-    if (const auto* status = std::get_if<TeamStatus>(message.get())) tell_links(*status);
+    if (const auto* status = std::get_if<TeamStatus>(message.get())) report_links(*status);
   }
   if (const auto neighbour = direct_.find(from); neighbour != direct_.end()) {
     Served& served = neighbour->second.served[{sender.robot, kind}];
@@ -241,8 +241,8 @@ void Relay::compare(const TeamStatus& status, double now_s) {
   for (const auto& [other, origin] : origins_)
     for (std::size_t kind = 0; kind < kFlooded; ++kind) {
       const auto& held = origin.newest[kind];
-      const bool told_by_origin = other != self_.robot && links_.linked(robot, other);
-      if (!held || other == robot || told_by_origin || now_s - held->learned_s < period_s_)
+      const bool receives_origin = other != self_.robot && links_.linked(robot, other);
+      if (!held || other == robot || receives_origin || now_s - held->learned_s < period_s_)
         continue;
       const auto served = neighbour.served.find({other, kind});
       if (served != neighbour.served.end() && served->second.number == held->number &&
@@ -273,19 +273,19 @@ std::optional<RobotId> Relay::next_hop(RobotId to, std::optional<RobotId> from) 
 }
 
 Arrival Relay::route(RobotId from, const TeamMessagePtr& message) {
-  const auto& letter = std::get<SessionLetter>(*message);
-  if (letter.sender.robot == self_.robot) return Arrival::kLost;
-  if (!accepts(letter.sender)) return Arrival::kRefused;
-  if (letter.to == self_.robot) return Arrival::kNew;
-  const auto next = next_hop(letter.to, from);
+  const auto& reliable = std::get<ReliableMessage>(*message);
+  if (reliable.sender.robot == self_.robot) return Arrival::kLost;
+  if (!accepts(reliable.sender)) return Arrival::kRefused;
+  if (reliable.to == self_.robot) return Arrival::kNew;
+  const auto next = next_hop(reliable.to, from);
   if (!next) return Arrival::kLost;
-  Passed& passed = passed_[{letter.sender.robot, letter.to}];
-  if (passed.boot != letter.sender.boot) passed = {letter.sender.boot};
+  Passed& passed = passed_[{reliable.sender.robot, reliable.to}];
+  if (passed.boot != reliable.sender.boot) passed = {reliable.sender.boot};
   const bool old =
-      passed.copies.size() >= kRememberedCopies && letter.copy < *passed.copies.begin();
-  if (old || !passed.copies.insert(letter.copy).second) return Arrival::kLost;
+      passed.copies.size() >= kRememberedCopies && reliable.copy < *passed.copies.begin();
+  if (old || !passed.copies.insert(reliable.copy).second) return Arrival::kLost;
   if (passed.copies.size() > kRememberedCopies) passed.copies.erase(passed.copies.begin());
-  parcels_.push_back({*next, message});
+  packets_.push_back({*next, message});
   return Arrival::kPassedOn;
 }
 

@@ -62,9 +62,9 @@ class Relay {
   void step(double now_s);
 
   /// Sends a message of this robot, with the next number of its kind (reliable messages: copy), to
-  /// all its receivers. Fills in `hears` and `holds` of a status. Returns the number of
+  /// all its receivers. Fills in `receives` and `holds` of a status. Returns the number of
   /// transmissions.
-  std::size_t say(TeamMessage message, double now_s);
+  std::size_t publish(TeamMessage message, double now_s);
   /// Sends the last status again to the robots that receive this one, with the present hash.
   void repeat_status(double now_s);
 
@@ -72,10 +72,10 @@ class Relay {
   Arrival receive(RobotId from, const TeamMessagePtr& message, double now_s);
 
   /// The messages to send, in order; empty thereafter.
-  [[nodiscard]] std::vector<Parcel> take_parcels() { return std::exchange(parcels_, {}); }
+  [[nodiscard]] std::vector<LinkPacket> take_packets() { return std::exchange(packets_, {}); }
 
   /// Robots that were received directly within the last kPatience_s; ascending.
-  [[nodiscard]] std::vector<TeamPeer> hears() const;
+  [[nodiscard]] std::vector<TeamPeer> receives() const;
   [[nodiscard]] const TeamLinks& links() const { return links_; }
   /// Grows when links() changes.
   [[nodiscard]] std::uint64_t links_version() const { return links_version_; }
@@ -118,9 +118,9 @@ class Relay {
 
   [[nodiscard]] bool accepts(const TeamPeer& origin);
   [[nodiscard]] bool hold(std::optional<Held>& held, Held newer);
-  [[nodiscard]] bool heard_by_someone(const TeamPeer& peer) const;
+  [[nodiscard]] bool received_by_any(const TeamPeer& peer) const;
   void meet(const TeamPeer& peer);
-  void tell_links(const TeamStatus& status);
+  void report_links(const TeamStatus& status);
   void renew_links();
   void renew_own_links();
   void pass_on(RobotId from, RobotId origin, std::size_t kind, double now_s);
@@ -143,7 +143,7 @@ class Relay {
   std::map<std::pair<RobotId, RobotId>, Passed> passed_;  // by sender and receiver
   std::map<RobotId, std::uint32_t> copies_;               // number of the next copy, by receiver
   std::array<std::uint32_t, kFlooded> numbers_ = {};      // last numbers of this robot, by kind
-  std::vector<Parcel> parcels_;
+  std::vector<LinkPacket> packets_;
 };
 
 }  // namespace km

@@ -32,7 +32,7 @@ struct SessionGraph {
   std::vector<PoseEdge> between = {};  ///< Closures to other members, ascending by id.
   std::vector<PoseEdge> to_absent = {};  ///< Closures to held poses of robots out of reach.
   /// Start of the public poses of other robots, including absent robots.
-  std::map<KeyframeId, SE3> told = {};
+  std::map<KeyframeId, SE3> public_poses = {};
   /// Mean weights of one step of odometry, as reported by each robot.
   std::map<RobotId, Precision> step_precision = {};
   std::vector<VerticalPrior> verticals = {};  ///< Priors of own poses; empty unless `upright`.

@@ -14,12 +14,12 @@ namespace {
 constexpr std::size_t kRememberedRounds = 16;
 
 // Limit of the messages kept before there is a solver. Senders repeat the messages beyond it.
-constexpr std::size_t kMaxEarlyLetters = 1000;
+constexpr std::size_t kMaxEarlyMessages = 1000;
 constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
 
-void add_told(const MemberPoses& poses, std::map<KeyframeId, SE3>& told) {
+void add_public_poses(const MemberPoses& poses, std::map<KeyframeId, SE3>& public_poses) {
   for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
-    told[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
+    public_poses[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
 }
 
 }  // namespace
@@ -36,28 +36,28 @@ SessionPart::SessionPart(Session session, TeamPeer self, FrozenPart part,
       public_(std::move(part.public_keyframes)),
       factory_(std::move(factory)),
       tolerance_(tolerance),
-      letters_(self, session_.id, period_s),
+      channel_(self, session_.id, period_s),
       moved_s_(now_s) {
   for (const SessionMember& member : session_.plan.members)
     boot_of_[member.peer.robot] = member.peer.boot;
   for (const PoseEdge& e : graph_.between) between_.push_back(e.id());
 }
 
-const MemberPoses* SessionPart::told_by(const ToldPoses& told, RobotId robot,
-                                        MemberStage stage) const {
+const MemberPoses* SessionPart::poses_of(const PublicPoses& published, RobotId robot,
+                                         MemberStage stage) const {
   const auto member = boot_of_.find(robot);
-  const auto poses = told.find(robot);
-  const bool has = member != boot_of_.end() && poses != told.end() &&
+  const auto poses = published.find(robot);
+  const bool has = member != boot_of_.end() && poses != published.end() &&
                    poses->second.sender.boot == member->second &&
                    poses->second.session == session_.id && poses->second.stage >= stage;
   return has ? &poses->second : nullptr;
 }
 
-bool SessionPart::all_solved(const ToldPoses& told) const {
+bool SessionPart::all_solved(const PublicPoses& published) const {
   return stage_ == MemberStage::kSolved &&
          std::all_of(boot_of_.begin(), boot_of_.end(), [&](const auto& member) {
            if (member.first == self_.robot) return true;
-           const MemberPoses* poses = told_by(told, member.first, MemberStage::kSolved);
+           const MemberPoses* poses = poses_of(published, member.first, MemberStage::kSolved);
            return poses != nullptr && poses->stage == MemberStage::kSolved;
          });
 }
@@ -66,24 +66,24 @@ bool SessionPart::joins_members(const ClosureId& closure) const {
   return std::binary_search(between_.begin(), between_.end(), closure);
 }
 
-std::vector<SessionLetter> SessionPart::advance(const ToldPoses& told, double now_s) {
+std::vector<ReliableMessage> SessionPart::advance(const PublicPoses& published, double now_s) {
   worked_ = false;
   if (!stage_) {
-    worked_ = enter(told);
+    worked_ = enter(published);
   } else if (*stage_ == MemberStage::kEntered && !solver_) {
-    worked_ = gather(told);
+    worked_ = gather(published);
     if (worked_) start_solver(now_s);
   } else if (*stage_ == MemberStage::kEntered && (solver_->ready() || solver_->done())) {
     worked_ = true;
     solve(now_s);
   }
   if (worked_) moved_s_ = now_s;
-  for (SessionLetter& letter : letters_.due(now_s)) to_send_.push_back(std::move(letter));
+  for (ReliableMessage& message : channel_.due(now_s)) to_send_.push_back(std::move(message));
   return std::exchange(to_send_, {});
 }
 
-bool SessionPart::enter(const ToldPoses& told) {
-  if (!in_frame_ && !align(told)) return false;
+bool SessionPart::enter(const PublicPoses& published) {
+  if (!in_frame_ && !align(published)) return false;
   for (const KeyframeIndex keyframe : public_) {
     SE3& T = graph_.start[keyframe];
     T = SinglePose::of(T).pose();
@@ -93,17 +93,17 @@ bool SessionPart::enter(const ToldPoses& told) {
   return true;
 }
 
-bool SessionPart::align(const ToldPoses& told) {
-  std::map<KeyframeId, SE3> poses = graph_.told;  // poses of absent robots
+bool SessionPart::align(const PublicPoses& published) {
+  std::map<KeyframeId, SE3> poses = graph_.public_poses;  // poses of absent robots
   for (const SessionMember& member : session_.plan.members) {
     if (member.peer == self_) break;
     const bool neighbour = std::any_of(
         graph_.between.begin(), graph_.between.end(),
         [&](const PoseEdge& e) { return e.other(self_.robot).robot == member.peer.robot; });
     if (!neighbour) continue;
-    const MemberPoses* of_member = told_by(told, member.peer.robot, MemberStage::kEntered);
+    const MemberPoses* of_member = poses_of(published, member.peer.robot, MemberStage::kEntered);
     if (of_member == nullptr) return false;
-    add_told(*of_member, poses);
+    add_public_poses(*of_member, poses);
   }
   std::vector<PoseEdge> closures = graph_.between;
   closures.insert(closures.end(), graph_.to_absent.begin(), graph_.to_absent.end());
@@ -115,19 +115,20 @@ bool SessionPart::align(const ToldPoses& told) {
   auto moved = moved_into_frame(graph_.start, self_.robot, kept, poses, tolerance_);
   if (!moved) moved = moved_into_frame(graph_.start, self_.robot, closures, poses, tolerance_);
   if (!moved) return false;
-  graph_.start = suspicious_ ? std::move(*moved)
-                             : bent_to_told(*moved, self_.robot, graph_.own, closures, poses);
+  graph_.start = suspicious_
+                     ? std::move(*moved)
+                     : deformed_to_received(*moved, self_.robot, graph_.own, closures, poses);
   return true;
 }
 
-bool SessionPart::gather(const ToldPoses& told) {
+bool SessionPart::gather(const PublicPoses& published) {
   for (const auto& [robot, boot] : boot_of_)
-    if (robot != self_.robot && told_by(told, robot, MemberStage::kEntered) == nullptr)
+    if (robot != self_.robot && poses_of(published, robot, MemberStage::kEntered) == nullptr)
       return false;
   for (const auto& [robot, boot] : boot_of_) {
     if (robot == self_.robot) continue;
-    const MemberPoses& poses = *told_by(told, robot, MemberStage::kEntered);
-    add_told(poses, graph_.told);
+    const MemberPoses& poses = *poses_of(published, robot, MemberStage::kEntered);
+    add_public_poses(poses, graph_.public_poses);
     graph_.step_precision[robot] = poses.step_precision;
     combine_decisions(poses);
   }
@@ -137,11 +138,11 @@ bool SessionPart::gather(const ToldPoses& told) {
 
 // Both robots of a closure compute the same decision: rejected if either has rejected it, kept if
 // both have kept it.
-void SessionPart::combine_decisions(const MemberPoses& told) {
+void SessionPart::combine_decisions(const MemberPoses& received) {
   std::map<ClosureId, bool> theirs;
-  for (const WeighedClosure& closure : told.verdicts) theirs[closure.id] = closure.kept;
+  for (const WeighedClosure& closure : received.verdicts) theirs[closure.id] = closure.kept;
   for (const PoseEdge& e : graph_.between) {
-    if (e.other(self_.robot).robot != told.sender.robot) continue;
+    if (e.other(self_.robot).robot != received.sender.robot) continue;
     const auto here = graph_.decided.find(e.id());
     const auto there = theirs.find(e.id());
     const bool here_rejected = here != graph_.decided.end() && !here->second;
@@ -156,28 +157,28 @@ void SessionPart::combine_decisions(const MemberPoses& told) {
 void SessionPart::start_solver(double now_s) {
   try {
     for (const PoseEdge& e : graph_.between)
-      if (!graph_.told.contains(e.other(self_.robot)))
+      if (!graph_.public_poses.contains(e.other(self_.robot)))
         throw std::runtime_error("a closure ends on " + to_string(e.other(self_.robot)) +
-                                 ", which its robot has not told");
+                                 ", whose pose its robot has not published");
     solver_ = factory_(session_, std::move(graph_), place_);
   } catch (const std::exception& e) {
     return fail(e.what());
   }
   moved_s_ = now_s;
-  for (const auto& [from, letter] : std::exchange(early_, {}))
-    if (!hand_over(letter, now_s)) refused_.push_back(from.first);
+  for (const auto& [from, message] : std::exchange(early_, {}))
+    if (!hand_over(message, now_s)) refused_.push_back(from.first);
 }
 
 void SessionPart::solve(double now_s) {
-  std::vector<SolverLetter> letters;
+  std::vector<SolverMessage> messages;
   try {
-    letters = solver_->advance();
+    messages = solver_->advance();
   } catch (const std::exception& e) {
     return fail(e.what());
   }
-  for (SolverLetter& letter : letters)
-    if (boot_of_.contains(letter.to) && letter.to != self_.robot)
-      to_send_.push_back(letters_.write(std::move(letter), now_s));
+  for (SolverMessage& message : messages)
+    if (boot_of_.contains(message.to) && message.to != self_.robot)
+      to_send_.push_back(channel_.write(std::move(message), now_s));
   remember_round();
   if (!solver_->done()) return;
   if (solver_->state().failed) return fail("the team's equations cannot be solved");
@@ -205,36 +206,37 @@ void SessionPart::commit(std::uint32_t round) {
   }
 }
 
-bool SessionPart::receive(const SessionLetter& letter, double now_s) {
-  const auto member = boot_of_.find(letter.sender.robot);
-  if (letter.sender.robot == self_.robot || member == boot_of_.end() ||
-      member->second != letter.sender.boot)
+bool SessionPart::receive(const ReliableMessage& message, double now_s) {
+  const auto member = boot_of_.find(message.sender.robot);
+  if (message.sender.robot == self_.robot || member == boot_of_.end() ||
+      member->second != message.sender.boot)
     return false;
-  switch (letters_.read(letter, now_s)) {
-    case LetterNews::kNone:
+  switch (channel_.read(message, now_s)) {
+    case ReliableArrival::kNone:
       return true;
-    case LetterNews::kFalse:
+    case ReliableArrival::kFalse:
       return false;
-    case LetterNews::kNew:
+    case ReliableArrival::kNew:
       break;
   }
-  if (solver_) return hand_over(letter, now_s);
-  keep(letter);
+  if (solver_) return hand_over(message, now_s);
+  keep(message);
   return true;
 }
 
-bool SessionPart::hand_over(const SessionLetter& letter, double now_s) {
-  if (!solver_->receive(letter.sender.robot, *letter.bytes)) return false;
-  letters_.take(letter);
+bool SessionPart::hand_over(const ReliableMessage& message, double now_s) {
+  if (!solver_->receive(message.sender.robot, *message.bytes)) return false;
+  channel_.take(message);
   moved_s_ = now_s;
   remember_round();
   return true;
 }
 
-void SessionPart::keep(const SessionLetter& letter) {
-  const std::size_t bytes = early_bytes_ + letter.bytes->size();
-  if (early_.size() >= kMaxEarlyLetters || bytes > kMaxEarlyBytes) return;
-  if (early_.try_emplace({letter.sender.robot, letter.number}, letter).second) early_bytes_ = bytes;
+void SessionPart::keep(const ReliableMessage& message) {
+  const std::size_t bytes = early_bytes_ + message.bytes->size();
+  if (early_.size() >= kMaxEarlyMessages || bytes > kMaxEarlyBytes) return;
+  if (early_.try_emplace({message.sender.robot, message.number}, message).second)
+    early_bytes_ = bytes;
 }
 
 bool SessionPart::follow(const Session& session) {

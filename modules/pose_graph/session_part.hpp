@@ -13,8 +13,8 @@
 
 #include "modules/pose_graph/frame_alignment.hpp"
 #include "modules/pose_graph/frozen_part.hpp"
-#include "modules/pose_graph/letter_book.hpp"
 #include "modules/pose_graph/member_solver.hpp"
+#include "modules/pose_graph/reliable_channel.hpp"
 #include "modules/pose_graph/session_graph.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 
@@ -41,17 +41,17 @@ class SessionPart {
               const AlignmentTolerance& tolerance, double period_s, double now_s);
 
   /// Does one piece of work, if there is any, and returns the messages to send.
-  [[nodiscard]] std::vector<SessionLetter> advance(const ToldPoses& told, double now_s);
+  [[nodiscard]] std::vector<ReliableMessage> advance(const PublicPoses& published, double now_s);
   /// True if the last advance() has changed anything; there may then be more to do.
   [[nodiscard]] bool worked() const { return worked_; }
 
   /// Processes a message of a member. It is acknowledged once the solver has taken it. Messages
   /// that arrive before there is a solver are kept if there is room, and are repeated otherwise.
   /// False if the sender is not a member, or if the solver cannot use the message at present.
-  bool receive(const SessionLetter& letter, double now_s);
+  bool receive(const ReliableMessage& message, double now_s);
   /// Senders of early messages that the solver then refused; empty thereafter.
   [[nodiscard]] std::vector<RobotId> take_refused() { return std::exchange(refused_, {}); }
-  void reachable_again(RobotId robot) { letters_.reachable_again(robot); }
+  void reachable_again(RobotId robot) { channel_.reachable_again(robot); }
 
   /// Takes the newest message of the coordinator. True if it ends the session.
   bool follow(const Session& session);
@@ -62,10 +62,10 @@ class SessionPart {
   [[nodiscard]] std::optional<MemberStage> stage() const { return stage_; }
   [[nodiscard]] const std::string& failure() const { return failure_; }
   /// Poses that a member has sent in this session at `stage` or later; nullptr if there are none.
-  [[nodiscard]] const MemberPoses* told_by(const ToldPoses& told, RobotId robot,
-                                           MemberStage stage) const;
+  [[nodiscard]] const MemberPoses* poses_of(const PublicPoses& published, RobotId robot,
+                                            MemberStage stage) const;
   /// True if all members, including this one, have sent their part of the solution.
-  [[nodiscard]] bool all_solved(const ToldPoses& told) const;
+  [[nodiscard]] bool all_solved(const PublicPoses& published) const;
   /// True if `closure` is between this robot and another member.
   [[nodiscard]] bool joins_members(const ClosureId& closure) const;
 
@@ -94,13 +94,13 @@ class SessionPart {
   void moved(double now_s) { moved_s_ = now_s; }
 
  private:
-  [[nodiscard]] bool enter(const ToldPoses& told);
-  [[nodiscard]] bool align(const ToldPoses& told);
-  [[nodiscard]] bool gather(const ToldPoses& told);
-  void combine_decisions(const MemberPoses& told);
+  [[nodiscard]] bool enter(const PublicPoses& published);
+  [[nodiscard]] bool align(const PublicPoses& published);
+  [[nodiscard]] bool gather(const PublicPoses& published);
+  void combine_decisions(const MemberPoses& received);
   void start_solver(double now_s);
-  [[nodiscard]] bool hand_over(const SessionLetter& letter, double now_s);
-  void keep(const SessionLetter& letter);
+  [[nodiscard]] bool hand_over(const ReliableMessage& message, double now_s);
+  void keep(const ReliableMessage& message);
   void solve(double now_s);
   void fail(const std::string& why);
   void remember_round();
@@ -116,11 +116,11 @@ class SessionPart {
   MemberSolverFactory factory_;
   AlignmentTolerance tolerance_;
   std::map<RobotId, std::uint64_t> boot_of_;  // members
-  LetterBook letters_;
-  std::map<std::pair<RobotId, std::uint32_t>, SessionLetter> early_;  // before there is a solver
+  ReliableChannel channel_;
+  std::map<std::pair<RobotId, std::uint32_t>, ReliableMessage> early_;  // before there is a solver
   std::size_t early_bytes_ = 0;
   std::vector<RobotId> refused_;  // senders of early messages that the solver refused
-  std::vector<SessionLetter> to_send_;
+  std::vector<ReliableMessage> to_send_;
   std::unique_ptr<MemberSolver> solver_;
   std::optional<MemberStage> stage_;
   std::string failure_;

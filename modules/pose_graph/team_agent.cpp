@@ -22,8 +22,8 @@ constexpr double kEarlyLinks = 0.05;
 
 bool same_content(const TeamStatus& a, const TeamStatus& b) {
   const auto rest = [](const TeamStatus& s) {
-    return std::tie(s.sender, s.hears, s.frame, s.frame_version, s.keyframes, s.revision, s.offers,
-                    s.method, s.upright);
+    return std::tie(s.sender, s.receives, s.frame, s.frame_version, s.keyframes, s.revision,
+                    s.offers, s.method, s.upright);
   };
   return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
 }
@@ -113,8 +113,8 @@ void TeamAgent::peer_lost(RobotId robot) {
 TeamAgent::Peer& TeamAgent::meet(const TeamPeer& peer) {
   Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
   if (entry.boot != peer.boot) {
-    if (!is_same_life(entry.boot, peer.boot)) forget_measured(peer.robot);
-    told_.erase(peer.robot);
+    if (!is_same_incarnation(entry.boot, peer.boot)) forget_measured(peer.robot);
+    public_poses_.erase(peer.robot);
     plan_outdated_ = true;
     entry = Peer{.boot = peer.boot};
   }
@@ -192,10 +192,10 @@ bool TeamAgent::take(const TeamPeer& sender, const MemberPoses& poses) {
     return refuse("poses of robot " + std::to_string(sender.robot) + " that are not in order");
   plan_outdated_ = true;
   const auto is_member = [&] {
-    return part_ && part_->told_by(told_, sender.robot, MemberStage::kEntered) != nullptr;
+    return part_ && part_->poses_of(public_poses_, sender.robot, MemberStage::kEntered) != nullptr;
   };
   const bool was_member = is_member();
-  told_[sender.robot] = poses;
+  public_poses_[sender.robot] = poses;
   if (was_member && poses.session != part_->session().id && state_ == SessionState::kRunning)
     state_ = SessionState::kDeserted;
   if (!is_member()) return true;
@@ -204,10 +204,10 @@ bool TeamAgent::take(const TeamPeer& sender, const MemberPoses& poses) {
   return true;
 }
 
-bool TeamAgent::take(const TeamPeer& sender, const SessionLetter& letter) {
-  if (!in_session() || letter.session != part_->session().id) return true;  // too early or late
-  return part_->receive(letter, now_s_) ||
-         refuse("a letter of robot " + std::to_string(sender.robot) + " that is of no use");
+bool TeamAgent::take(const TeamPeer& sender, const ReliableMessage& message) {
+  if (!in_session() || message.session != part_->session().id) return true;  // too early or late
+  return part_->receive(message, now_s_) ||
+         refuse("a message of robot " + std::to_string(sender.robot) + " that is of no use");
 }
 
 TeamOutput TeamAgent::step(double now_s) {
@@ -232,7 +232,7 @@ TeamStatus TeamAgent::make_status() {
   for (EdgeSetOffer& offer : offers)
     decisions_.count_places(offer, *graph_.edges(offer.peer, offer.id));
   return {.sender = self_,
-          .hears = relay_.hears(),
+          .receives = relay_.receives(),
           .frame = frame_,
           .frame_version = frame_version_,
           .keyframes = graph_.keyframes(),
@@ -246,7 +246,7 @@ TeamStatus TeamAgent::make_status() {
 void TeamAgent::send_status(TeamOutput& output) {
   const double age_s = now_s_ - status_sent_s_;
   if (age_s < kEarlyLinks * config_.status_period_s) return;
-  const bool links_changed = !sent_status_ || sent_status_->hears != relay_.hears();
+  const bool links_changed = !sent_status_ || sent_status_->receives != relay_.receives();
   if (!links_changed && age_s < kEarlyStatus * config_.status_period_s) return;
   TeamStatus status = make_status();
   const bool changed = !sent_status_ || !same_content(status, *sent_status_);
@@ -255,19 +255,19 @@ void TeamAgent::send_status(TeamOutput& output) {
   output.progress = make_progress();
   if (!changed) return relay_.repeat_status(now_s_);
   sent_status_ = status;
-  relay_.say(std::move(status), now_s_);
+  relay_.publish(std::move(status), now_s_);
 }
 
 // Messages of the session of this robot count as its bytes, including forwarded ones.
 void TeamAgent::hand_out(TeamOutput& output) {
   std::map<const TeamMessage*, std::size_t> sizes;
-  for (Parcel& parcel : relay_.take_parcels()) {
-    if (part_ && session_of(*parcel.message) == part_->session().id) {
-      const auto [size, is_new] = sizes.try_emplace(parcel.message.get(), 0);
-      if (is_new) size->second = encode(*parcel.message).size();
+  for (LinkPacket& packet : relay_.take_packets()) {
+    if (part_ && session_of(*packet.message) == part_->session().id) {
+      const auto [size, is_new] = sizes.try_emplace(packet.message.get(), 0);
+      if (is_new) size->second = encode(*packet.message).size();
       sent_bytes_ += size->second;
     }
-    output.parcels.push_back(std::move(parcel));
+    output.packets.push_back(std::move(packet));
   }
 }
 
@@ -284,9 +284,9 @@ std::optional<SE3> TeamAgent::world_of(RobotId anchor) const {
   };
   // Uses the pose that all other robots have received, so that all have one frame to the last
   // digit.
-  const auto told = told_.find(anchor);
-  if (told == told_.end() || told->second.frame != frame_) return std::nullopt;
-  const SE3 T_frame_first = told->second.T_frame_kf.front().pose();
+  const auto published = public_poses_.find(anchor);
+  if (published == public_poses_.end() || published->second.frame != frame_) return std::nullopt;
+  const SE3 T_frame_first = published->second.T_frame_kf.front().pose();
   if (anchor == self_.robot) return world(T_frame_first, graph_.T_odom_first());
   const auto peer = peers_.find(anchor);
   if (peer == peers_.end() || !peer->second.status) return std::nullopt;

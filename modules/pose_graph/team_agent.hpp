@@ -26,7 +26,7 @@ namespace km {
 
 /// Outputs of a step of the agent, to other robots and to its own robot.
 struct [[nodiscard]] TeamOutput {
-  std::vector<Parcel> parcels = {};
+  std::vector<LinkPacket> packets = {};
   std::optional<Trajectory> trajectory = {};
   std::optional<OptimizerProgress> progress = {};
   std::optional<ClosureVerdicts> verdicts = {};  ///< After a session.
@@ -137,7 +137,7 @@ class TeamAgent {
   bool take(const TeamPeer& sender, const TeamStatus& status);
   bool take(const TeamPeer& sender, const Session& session);
   bool take(const TeamPeer& sender, const MemberPoses& poses);
-  bool take(const TeamPeer& sender, const SessionLetter& letter);
+  bool take(const TeamPeer& sender, const ReliableMessage& message);
   bool refuse(const std::string& what) { return notices_.refuse(what); }
   [[nodiscard]] TeamStatus make_status();
   [[nodiscard]] std::uint32_t revision() const { return graph_.revision() + reconsidered_; }
@@ -166,7 +166,7 @@ class TeamAgent {
   }
   void advance(TeamOutput& output);
   void enter_stage(TeamOutput& output);
-  void tell_poses();
+  void publish_poses();
   void conclude();
   void leave(bool with_solution);
   [[nodiscard]] bool misses_member(const SessionPlan& plan) const;
@@ -189,7 +189,7 @@ class TeamAgent {
   OwnGraph graph_;
   Relay relay_;
   std::map<RobotId, Peer> peers_;
-  ToldPoses told_;  // the newest poses, including those of this robot
+  PublicPoses public_poses_;  // the newest ones of each robot, own ones included
   ClosureDecisions decisions_;
   bool reconsider_due_ = false;     // once all members have sent the solution
   std::uint32_t reconsidered_ = 0;  // number of times that closures became undecided again

@@ -27,9 +27,9 @@ void TeamAgent::make_plan() {
     if (!peer.status || peer.other_method || !in_reach(peer.status->sender)) continue;
     TeamStatus& status = statuses.emplace(robot, *peer.status).first->second;
     // Poses are sent at once, but statuses only periodically.
-    const auto told = told_.find(robot);
-    if (told != told_.end() && told->second.frame_version > status.frame_version)
-      status.frame = told->second.frame;
+    const auto published = public_poses_.find(robot);
+    if (published != public_poses_.end() && published->second.frame_version > status.frame_version)
+      status.frame = published->second.frame;
   }
   SessionPlan plan = plan_session(statuses, relay_.links(), self_.robot);
   // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
@@ -66,7 +66,7 @@ void TeamAgent::announce() {
     session.gradient = state.gradient;
     part_->commit(session.round);
   }
-  if (part_->members().size() > 1) relay_.say(session, now_s_);
+  if (part_->members().size() > 1) relay_.publish(session, now_s_);
 }
 
 bool TeamAgent::all_upright(const SessionPlan& plan) const {
@@ -80,8 +80,8 @@ bool TeamAgent::all_upright(const SessionPlan& plan) const {
 std::uint64_t TeamAgent::price_bytes() const {
   std::uint64_t most = sent_bytes_;
   for (const RobotId member : part_->members())
-    if (const MemberPoses* told = part_->told_by(told_, member, MemberStage::kSolved))
-      most = std::max(most, told->sent_bytes);
+    if (const MemberPoses* published = part_->poses_of(public_poses_, member, MemberStage::kSolved))
+      most = std::max(most, published->sent_bytes);
   return most;
 }
 
@@ -94,7 +94,8 @@ bool TeamAgent::is_next_due() const {
 // True if a member has been in another session since the last one.
 bool TeamAgent::has_moved_on() const {
   const auto elsewhere = [&](RobotId robot) {
-    return robot != self_.robot && part_->told_by(told_, robot, MemberStage::kEntered) == nullptr;
+    return robot != self_.robot &&
+           part_->poses_of(public_poses_, robot, MemberStage::kEntered) == nullptr;
   };
   return std::any_of(part_->members().begin(), part_->members().end(), elsewhere);
 }
@@ -165,7 +166,7 @@ void TeamAgent::consider(const Session& session) {
                                     session.id.coordinator == part_->session().id.coordinator &&
                                     part_->session().id.number < session.id.number;
   // The other members continue without this robot.
-  if (from_own_coordinator && !member) return leave(part_->all_solved(told_));
+  if (from_own_coordinator && !member) return leave(part_->all_solved(public_poses_));
   // This robot joins only if it knows a connection to the coordinator, and if all members are
   // present.
   if (!member || session.finished || !accepts(session) || misses_member(session.plan) ||
@@ -183,7 +184,7 @@ void TeamAgent::consider(const Session& session) {
 std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
   std::vector<RobotId> peers;
   for (const auto& [robot, peer] : peers_) peers.push_back(robot);
-  auto part = freeze_part(session, self_.robot, graph_, peers, told_);
+  auto part = freeze_part(session, self_.robot, graph_, peers, public_poses_);
   if (!part) return std::nullopt;
   part->in_frame = frame_ == session.plan.frame || session.plan.members.front().peer == self_;
   part->suspicious = expects_false();
@@ -199,7 +200,7 @@ bool TeamAgent::join(const Session& session) {
   }
   auto part = freeze(session);
   if (!part) return false;
-  if (in_session()) leave(part_->all_solved(told_));
+  if (in_session()) leave(part_->all_solved(public_poses_));
   const bool alone = session.plan.members.size() == 1;
   decisions_.begin_session(!alone);
   if (part_) {
@@ -232,8 +233,9 @@ bool TeamAgent::misses_member(const SessionPlan& plan) const {
 
 bool TeamAgent::has_failed() const {
   const auto failed = [&](RobotId robot) {
-    return robot == self_.robot ? part_->stage() == MemberStage::kFailed
-                                : part_->told_by(told_, robot, MemberStage::kFailed) != nullptr;
+    return robot == self_.robot
+               ? part_->stage() == MemberStage::kFailed
+               : part_->poses_of(public_poses_, robot, MemberStage::kFailed) != nullptr;
   };
   return std::any_of(part_->members().begin(), part_->members().end(), failed);
 }
@@ -241,9 +243,10 @@ bool TeamAgent::has_failed() const {
 void TeamAgent::advance(TeamOutput& output) {
   if (!in_session()) return;
   const auto stage = part_->stage();
-  for (SessionLetter& letter : part_->advance(told_, now_s_)) relay_.say(std::move(letter), now_s_);
+  for (ReliableMessage& message : part_->advance(public_poses_, now_s_))
+    relay_.publish(std::move(message), now_s_);
   for (const RobotId sender : part_->take_refused())
-    refuse("a letter of robot " + std::to_string(sender) + " that is of no use");
+    refuse("a message of robot " + std::to_string(sender) + " that is of no use");
   output.more |= part_->worked();
   publish_due_ |= part_->worked() && part_->stage() == MemberStage::kEntered;
   if (part_->stage() != stage) enter_stage(output);
@@ -266,10 +269,10 @@ void TeamAgent::enter_stage(TeamOutput& output) {
                  std::to_string(session.id.coordinator.robot) +
                  " cannot be solved: " + part_->failure());
   hand_out(output);  // sent_bytes_ of the poses includes these
-  tell_poses();
+  publish_poses();
 }
 
-void TeamAgent::tell_poses() {
+void TeamAgent::publish_poses() {
   MemberPoses message{.sender = self_, .session = part_->session().id};
   message.stage = *part_->stage();
   message.frame = frame_;
@@ -282,9 +285,9 @@ void TeamAgent::tell_poses() {
   for (const WeighedClosure& verdict : part_->verdicts().closures)
     if (verdict.id.from.robot != verdict.id.to.robot) message.verdicts.push_back(verdict);
   message.sent_bytes = sent_bytes_;
-  told_[self_.robot] = message;
+  public_poses_[self_.robot] = message;
   const bool concerns_others = part_->members().size() > 1 || message.keyframes.size() > 1;
-  if (concerns_others) relay_.say(std::move(message), now_s_);
+  if (concerns_others) relay_.publish(std::move(message), now_s_);
 }
 
 void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
@@ -308,7 +311,7 @@ void TeamAgent::decide_with(const MemberPoses& poses) {
 // For a closure between robots, both robots use the poses that both have sent, and so decide
 // equally.
 void TeamAgent::reconsider() {
-  if (!reconsider_due_ || !part_->all_solved(told_)) return;
+  if (!reconsider_due_ || !part_->all_solved(public_poses_)) return;
   reconsider_due_ = false;
   std::vector<PoseEdge> closures;
   for (const RobotId member : part_->members())
@@ -328,10 +331,11 @@ bool TeamAgent::fits(const PoseEdge& closure) const {
   const auto pose = [&](const KeyframeId& id) -> std::optional<SE3> {
     const std::vector<SE3>& own = poses_.T_frame_kf();
     if (inside) return id.index < own.size() ? std::optional(own[id.index]) : std::nullopt;
-    const MemberPoses& told = told_.at(id.robot);
-    const auto at = std::lower_bound(told.keyframes.begin(), told.keyframes.end(), id.index);
-    if (at == told.keyframes.end() || *at != id.index) return std::nullopt;
-    return told.T_frame_kf[static_cast<std::size_t>(at - told.keyframes.begin())].pose();
+    const MemberPoses& published = public_poses_.at(id.robot);
+    const auto at =
+        std::lower_bound(published.keyframes.begin(), published.keyframes.end(), id.index);
+    if (at == published.keyframes.end() || *at != id.index) return std::nullopt;
+    return published.T_frame_kf[static_cast<std::size_t>(at - published.keyframes.begin())].pose();
   };
   const auto from = pose(closure.from), to = pose(closure.to);
   return from && to && residual_of(closure, *from, *to) <= kSecondChance * part_->state().barc;
@@ -342,15 +346,15 @@ void TeamAgent::conclude() {
   Session& session = part_->session();
   const RobotId anchor = session.anchor;
   if (part_->stage() == MemberStage::kEntered && (!world_ || world_->anchor != anchor)) {
-    const bool told =
-        anchor == self_.robot || part_->told_by(told_, anchor, MemberStage::kEntered) != nullptr;
+    const bool published = anchor == self_.robot ||
+                           part_->poses_of(public_poses_, anchor, MemberStage::kEntered) != nullptr;
     const auto world = session.T_frame_world ? session.T_frame_world
-                       : told                ? world_of(anchor)
+                       : published           ? world_of(anchor)
                                              : std::nullopt;
     if (world) world_ = World{anchor, *world};
   }
   const bool coordinates = session.id.coordinator == self_;
-  if (part_->all_solved(told_) && coordinates) {
+  if (part_->all_solved(public_poses_) && coordinates) {
     const SolverState state = part_->state();
     session.round = state.round;
     session.cost = state.cost;
@@ -364,7 +368,7 @@ void TeamAgent::conclude() {
     if (coordinates) announce();
     leave(false);
   } else if (misses_member(session.plan)) {
-    leave(part_->all_solved(told_));
+    leave(part_->all_solved(public_poses_));
   }
 }
 
@@ -379,12 +383,12 @@ void TeamAgent::leave(bool with_solution) {
   if (!with_solution) return;
   decide(part_->verdicts().closures);
   for (const RobotId member : part_->members())
-    if (const MemberPoses* told = part_->told_by(told_, member, MemberStage::kSolved);
-        told && member != self_.robot)
-      decide_with(*told);
+    if (const MemberPoses* published = part_->poses_of(public_poses_, member, MemberStage::kSolved);
+        published && member != self_.robot)
+      decide_with(*published);
   decisions_.set_noise(part_->noise(), part_->members().size() > 1);
   notices_.closures(decisions_.noise());
-  reconsider_due_ = part_->state().set_aside;
+  reconsider_due_ = part_->state().deferred;
 }
 
 }  // namespace km

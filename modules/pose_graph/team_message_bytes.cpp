@@ -39,8 +39,8 @@ class MessageWriter {
   void put(const TeamStatus& m) {
     put(m.sender);
     out_.varint(m.number);
-    out_.varint(m.hears.size());
-    for (const TeamPeer& peer : m.hears) put(peer);
+    out_.varint(m.receives.size());
+    for (const TeamPeer& peer : m.receives) put(peer);
     put(m.frame);
     out_.varint(m.frame_version);
     out_.varint(m.keyframes);
@@ -120,7 +120,7 @@ class MessageWriter {
     out_.varint(m.sent_bytes);
   }
 
-  void put(const SessionLetter& m) {
+  void put(const ReliableMessage& m) {
     put(m.sender);
     put(m.session);
     out_.varint(m.number);
@@ -167,7 +167,7 @@ class MessageReader {
       case 2:
         return finished(member_poses());
       case 3:
-        return finished(letter());
+        return finished(reliable());
       default:
         return Decoded<TeamMessage>::refuse("unknown kind of message");
     }
@@ -192,11 +192,12 @@ class MessageReader {
     TeamStatus m;
     m.sender = peer();
     m.number = u32();
-    m.hears.resize(in_.count(kMaxTeam, kPeerBytes));
-    for (std::size_t k = 0; k < m.hears.size(); ++k) {
-      m.hears[k] = peer();
-      require(k == 0 || m.hears[k - 1].robot < m.hears[k].robot, "heard robots do not ascend");
-      require(m.hears[k].robot != m.sender.robot, "a robot that hears itself");
+    m.receives.resize(in_.count(kMaxTeam, kPeerBytes));
+    for (std::size_t k = 0; k < m.receives.size(); ++k) {
+      m.receives[k] = peer();
+      require(k == 0 || m.receives[k - 1].robot < m.receives[k].robot,
+              "received robots do not ascend");
+      require(m.receives[k].robot != m.sender.robot, "a robot that receives itself");
     }
     m.frame = peer();
     m.frame_version = u32();
@@ -336,13 +337,13 @@ class MessageReader {
     return verdict;
   }
 
-  SessionLetter letter() {
-    SessionLetter m;
+  ReliableMessage reliable() {
+    ReliableMessage m;
     m.sender = peer();
     m.session = session_id();
     m.number = u32();
     m.to = robot();
-    require(m.to != m.sender.robot, "a letter to its own robot");
+    require(m.to != m.sender.robot, "a message to its own robot");
     m.copy = u32();
     m.received = u32();
     const auto bytes = in_.bytes(in_.left());

@@ -65,9 +65,9 @@ struct TeamStatus {
   TeamPeer sender;
   std::uint32_t number = 0;  ///< Counts statuses of the sender: the highest is the newest. A
                              ///< repetition keeps the number.
-  std::vector<TeamPeer> hears = {};  ///< Robots that it receives directly at present; ascending.
-  TeamFrame frame;                   ///< Frame of its present solution.
-  std::uint32_t frame_version = 0;   ///< Counts the changes of its frame.
+  std::vector<TeamPeer> receives = {};  ///< Robots that it receives directly at present; ascending.
+  TeamFrame frame;                      ///< Frame of its present solution.
+  std::uint32_t frame_version = 0;      ///< Counts the changes of its frame.
   std::uint32_t keyframes = 0;
   std::uint32_t revision = 0;  ///< Increases with its keyframes and the closures inside it.
   std::vector<EdgeSetOffer> offers = {};
@@ -157,7 +157,7 @@ struct MemberPoses {
 
 /// Reliable message of a solver to one member of a session, or, without bytes, only an
 /// acknowledgement.
-struct SessionLetter {
+struct ReliableMessage {
   TeamPeer sender;
   SessionId session = {};
   std::uint32_t number = 0;  ///< Counts the messages of the sender to `to` in this session, from 0.
@@ -167,7 +167,7 @@ struct SessionLetter {
   std::uint32_t received = 0;  ///< Messages of `to` that have all been taken.
 };
 
-using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, SessionLetter>;
+using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, ReliableMessage>;
 
 /// The robot that sent the message first.
 [[nodiscard]] inline const TeamPeer& origin_of(const TeamMessage& message) {
@@ -197,7 +197,7 @@ using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, SessionLetter
 
 /// A message on its way over one link, to a robot that is received directly. Its origin may be
 /// another robot than the one that forwards it, and its receiver yet another.
-struct Parcel {
+struct LinkPacket {
   RobotId next = 0;  ///< Robot at the other end of the link.
   std::shared_ptr<const TeamMessage> message;
 };

@@ -38,9 +38,9 @@ TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFac
   topics.peer_inlier_sets.subscribe(post);
   topics.peer_events.subscribe(post);
   topics.restarts.subscribe([this](const auto& event) {
-    worker_.post(NewLife{{event->identity.robot, event->identity.boot}});
+    worker_.post(NewIncarnation{{event->identity.robot, event->identity.boot}});
   });
-  topics.peer_parcels.subscribe(post);
+  topics.peer_packets.subscribe(post);
 }
 
 void TeamNode::start() {
@@ -71,9 +71,9 @@ void TeamNode::step(const Input& input, double now_s) {
 void TeamNode::take(const Input& input) {
   const auto take_in = Overloaded{
       [](const Tick&) {},
-      [&](const NewLife& life) { agent_.peer_restarted(life.peer); },
+      [&](const NewIncarnation& incarnation) { agent_.peer_restarted(incarnation.peer); },
       [&](const Topic<PeerEvent>::Message& m) { take_peer_event(*m); },
-      [&](const Topic<TeamParcel>::Message& m) { agent_.receive(m->from, m->message); },
+      [&](const Topic<TeamPacket>::Message& m) { agent_.receive(m->from, m->message); },
       [&](const auto& measured) { agent_.add(*measured); },
   };
   std::visit(take_in, input);
@@ -98,9 +98,9 @@ void TeamNode::take_peer_event(const PeerEvent& event) {
 }
 
 void TeamNode::publish(TeamOutput output) const {
-  for (Parcel& parcel : output.parcels)
-    topics_.parcels.publish({parcel.next, std::make_shared<const TeamParcel>(
-                                              TeamParcel{self_.robot, std::move(parcel.message)})});
+  for (LinkPacket& packet : output.packets)
+    topics_.packets.publish({packet.next, std::make_shared<const TeamPacket>(
+                                              TeamPacket{self_.robot, std::move(packet.message)})});
   for (const std::string& notice : output.notices)
     log::limited(log::Level::kWarn, name(), notice) << notice;
   if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));

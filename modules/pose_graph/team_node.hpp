@@ -6,7 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "modules/pose_graph/parcel_codec.hpp"
+#include "modules/pose_graph/packet_codec.hpp"
 #include "modules/pose_graph/team_agent.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/node.hpp"
@@ -24,8 +24,8 @@ struct TeamTopics {
   In<InlierSet> peer_inlier_sets;  ///< Decided by other robots.
   In<PeerEvent> peer_events;       ///< Robots that are received directly.
   In<PeerEvent> restarts;          ///< kRestarted, before the first closure of the new incarnation.
-  In<TeamParcel> peer_parcels;     ///< From robots that are received directly.
-  Out<Addressed<TeamParcel>> parcels;  ///< To robots that are received directly.
+  In<TeamPacket> peer_packets;     ///< From robots that are received directly.
+  Out<Addressed<TeamPacket>> packets;  ///< To robots that are received directly.
   Out<Trajectory> trajectory;
   Out<OptimizerProgress> progress;
   Out<ClosureVerdicts> verdicts;  ///< After sessions that weigh closures.
@@ -57,12 +57,12 @@ class TeamNode final : public Node {
   /// warning of GCC 12.
   using Tick = std::shared_ptr<const struct TickTag>;
   /// A restarted robot: its keyframe indices have a new meaning.
-  struct NewLife {
+  struct NewIncarnation {
     TeamPeer peer;
   };
   using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
-                             Topic<InlierSet>::Message, Topic<PeerEvent>::Message, NewLife,
-                             Topic<TeamParcel>::Message>;
+                             Topic<InlierSet>::Message, Topic<PeerEvent>::Message, NewIncarnation,
+                             Topic<TeamPacket>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
   void step(const Input& input, double now_s);

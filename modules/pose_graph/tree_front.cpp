@@ -164,7 +164,7 @@ void TreeFront::set_child(RobotId name, TreeSystem system) {
   changed_ = true;
 }
 
-void TreeFront::reweigh_child(RobotId name, std::span<const UpLetter::NewWeight> weights) {
+void TreeFront::reweigh_child(RobotId name, std::span<const UpMessage::NewWeight> weights) {
   Child& child = children_.at(name);
   for (const auto& [edge, weight] : weights) {
     if (edge >= child.system.edges.size()) refuse(name, "weighs an edge that it did not send");
@@ -362,9 +362,9 @@ float TreeFront::weight_of(const SentWeight& sent) const {
                                    : children_.at(sent.child).system.edges[sent.edge].weight;
 }
 
-std::vector<UpLetter::NewWeight> TreeFront::changed_weights() {
+std::vector<UpMessage::NewWeight> TreeFront::changed_weights() {
   constexpr double kRatio = 2.0;
-  std::vector<UpLetter::NewWeight> changes;
+  std::vector<UpMessage::NewWeight> changes;
   for (std::size_t k = 0; k < sent_.size(); ++k) {
     const float weight = weight_of(sent_[k]);
     if (!differs(weight, sent_[k].sent, kRatio)) continue;

@@ -9,7 +9,7 @@
 
 #include "modules/pose_graph/frontal_cholesky.hpp"
 #include "modules/pose_graph/session_graph.hpp"
-#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/tree_messages.hpp"
 
 namespace km {
 
@@ -65,7 +65,7 @@ class TreeFront {
 
   /// Adds or replaces the system of a child. Throws std::invalid_argument if it does not fit.
   void set_child(RobotId child, TreeSystem system);
-  void reweigh_child(RobotId child, std::span<const UpLetter::NewWeight> weights);
+  void reweigh_child(RobotId child, std::span<const UpMessage::NewWeight> weights);
 
   /// Computes second derivatives of own edges at `poses` (of the followed nodes).
   void linearise(std::span<const SE3> poses, Curvature curvature);
@@ -78,7 +78,7 @@ class TreeFront {
   [[nodiscard]] TreeSystem system_for_parent(std::span<const SE3> poses);
   /// Weights of edges in sent_ that have changed much since they were last sent. The call counts as
   /// sending them.
-  [[nodiscard]] std::vector<UpLetter::NewWeight> changed_weights();
+  [[nodiscard]] std::vector<UpMessage::NewWeight> changed_weights();
 
   /// Forward substitution of own gradients at `poses` and of the right-hand sides of the children.
   void reduce(std::span<const SE3> poses, const std::map<RobotId, Eigen::MatrixXd>& children);

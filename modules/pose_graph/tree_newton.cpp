@@ -42,7 +42,7 @@ constexpr std::size_t kShareOfLengths = 60;
 // Number of isolated closures of a pair up to which they do no harm and are weighed from the start.
 constexpr std::ptrdiff_t kFewIsolated = 16;
 
-SolverLetter letter_to(RobotId to, std::vector<std::uint8_t> bytes) {
+SolverMessage message_to(RobotId to, std::vector<std::uint8_t> bytes) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))};
 }
 
@@ -66,10 +66,10 @@ TreeNewton::TreeNewton(SessionGraph graph, TreePlace place, const TreeNewtonOpti
 
 const SE3& TreeNewton::start_of(const KeyframeId& id) const {
   if (id.robot == graph_.self && id.index < graph_.start.size()) return graph_.start[id.index];
-  const auto told = graph_.told.find(id);
-  if (told == graph_.told.end())
-    throw std::invalid_argument("TreeNewton: nobody told pose " + to_string(id));
-  return told->second;
+  const auto found = graph_.public_poses.find(id);
+  if (found == graph_.public_poses.end())
+    throw std::invalid_argument("TreeNewton: no robot has published pose " + to_string(id));
+  return found->second;
 }
 
 // Both robots of a pair classify its closures equally.
@@ -109,7 +109,7 @@ RobotId TreeNewton::peer_of(const Known& k) const {
 
 // True if this robot reports the closure: of both robots that know it, only the one with the lower
 // id does.
-bool TreeNewton::speaks_for(const Known& k) const {
+bool TreeNewton::reports(const Known& k) const {
   return graph_.self <= std::min(k.edge.from.robot, k.edge.to.robot);
 }
 
@@ -152,7 +152,7 @@ void TreeNewton::find_isolated(double barc) {
       Known& known = known_[open[k]];
       const bool fits =
           residual_of(known.edge, pose(known.edge.from), pose(known.edge.to)) <= verdict_.barc;
-      known.aside = isolated[k] && known.trust == Trust::kOpen && !fits;
+      known.deferred = isolated[k] && known.trust == Trust::kOpen && !fits;
     }
   }
 }
@@ -223,7 +223,7 @@ void TreeNewton::build_front() {
     front.held[e.other(graph_.self)] = start_of(e.other(graph_.self));
   }
   for (const PoseEdge& e : graph_.between) front.open.insert(e.end_on(graph_.self).index);
-  if (options_.tell_private)
+  if (options_.share_private)
     for (KeyframeIndex k = 0; k < graph_.start.size(); ++k) front.open.insert(k);
   front_.emplace(std::move(front));
   base_.clear();
@@ -247,8 +247,8 @@ std::vector<double> TreeNewton::front_weights(bool candidate) const {
 void TreeNewton::count_closures(TreeSums& sums) const {
   std::map<RobotId, PairVote> votes;
   for (const Known& k : known_) {
-    if (!speaks_for(k)) continue;
-    if (k.aside) ++sums.isolated;
+    if (!reports(k)) continue;
+    if (k.deferred) ++sums.isolated;
     if (!takes_part(k)) continue;
     if (k.trust == Trust::kOpen) {
       ++sums.open;
@@ -280,7 +280,7 @@ void TreeNewton::move_robots(const std::vector<std::pair<RobotId, SinglePose>>& 
   for (const PoseEdge& e : graph_.between) ends.insert(e.end_on(graph_.self).index);
   for (const auto& [robot, move] : moves) {
     const SE3 T = move.pose();
-    for (auto& [id, pose] : graph_.told)
+    for (auto& [id, pose] : graph_.public_poses)
       if (id.robot == robot) pose = SinglePose::of(T * pose).pose();
     if (robot != graph_.self) continue;
     for (SE3& pose : graph_.start) pose = T * pose;
@@ -289,20 +289,20 @@ void TreeNewton::move_robots(const std::vector<std::pair<RobotId, SinglePose>>& 
   }
 }
 
-UpLetter TreeNewton::first_letter() {
-  UpLetter letter{.round = round_, .sums = {}};
-  TreeSums& sums = letter.sums;
+UpMessage TreeNewton::first_message() {
+  UpMessage message{.round = round_, .sums = {}};
+  TreeSums& sums = message.sums;
   sums.poses = static_cast<std::uint32_t>(graph_.start.size());
   sums.fixed = static_cast<std::uint32_t>(graph_.to_absent.size());
   count_closures(sums);
-  if (!options_.robust || round_ > 0) return letter;
+  if (!options_.robust || round_ > 0) return message;
   const std::size_t most =
       place_.members.size() < kEnoughToOutvote ? kEnoughLengths : kShareOfLengths;
   const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
   for (const auto& [peer, places] : by_peer()) {
     std::vector<PoseEdge> closures;
     for (const std::size_t k : places)
-      if (known_[k].trust == Trust::kOpen && speaks_for(known_[k]) &&
+      if (known_[k].trust == Trust::kOpen && reports(known_[k]) &&
           !graph_.decided.contains(known_[k].edge.id()))
         closures.push_back(known_[k].edge);
     // Counts a cycle only once: optimised poses agree with closures better than odometry does.
@@ -310,7 +310,7 @@ UpLetter TreeNewton::first_letter() {
         .count_lengths(graph_.noise.lengths, most);
   }
   sums.lengths = graph_.noise.lengths;
-  return letter;
+  return message;
 }
 
 const SE3& TreeNewton::pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const {
@@ -384,12 +384,12 @@ std::set<RobotId> TreeNewton::torn_pairs() const {
   return torn;
 }
 
-UpLetter TreeNewton::equations() {
-  UpLetter letter{.round = round_, .sums = {}};
+UpMessage TreeNewton::equations() {
+  UpMessage message{.round = round_, .sums = {}};
   front_->weigh(front_weights(false));
-  letter.sums.base_cost = front_->cost(base_);
-  letter.sums.cost = front_->cost(at_hand_);
-  weigh_candidates(letter.sums);
+  message.sums.base_cost = front_->cost(base_);
+  message.sums.cost = front_->cost(at_hand_);
+  weigh_candidates(message.sums);
   front_->weigh(front_weights(true));
   if (refresh_ || front_->stale())
     front_->linearise(at_hand_, verdict_.full ? Curvature::kFull : Curvature::kGaussNewton);
@@ -403,47 +403,48 @@ UpLetter TreeNewton::equations() {
       positive = front_->factorise();
     }
     factorised_ = positive;
-    letter.failed = !positive && place_.parent.has_value();
-    if (positive && place_.parent) letter.system = front_->system_for_parent(at_hand_);
+    message.failed = !positive && place_.parent.has_value();
+    if (positive && place_.parent) message.system = front_->system_for_parent(at_hand_);
   } else {
-    letter.weights = front_->changed_weights();
+    message.weights = front_->changed_weights();
   }
-  if (!factorised_) return letter;
+  if (!factorised_) return message;
   front_->reduce(at_hand_, reduced);
-  letter.reduced = front_->reduced();
-  letter.sums.decrement = front_->decrement();
-  return letter;
+  message.reduced = front_->reduced();
+  message.sums.decrement = front_->decrement();
+  return message;
 }
 
 bool TreeNewton::receive(RobotId from, std::span<const std::uint8_t> bytes) {
   if (done()) return true;
-  if (is_up_letter(bytes)) {
+  if (is_up_message(bytes)) {
     const bool child = std::binary_search(place_.children.begin(), place_.children.end(), from);
-    auto letter = child ? decode_up(bytes) : std::nullopt;
-    if (!letter) return false;
-    if (letter->round > round_)
+    auto message = child ? decode_up(bytes) : std::nullopt;
+    if (!message) return false;
+    if (message->round > round_)
       return false;  // impossible: the child waits for the message down of this round
-    if (letter->round == round_ && phase_ == Phase::kUp) ups_.try_emplace(from, std::move(*letter));
+    if (message->round == round_ && phase_ == Phase::kUp)
+      ups_.try_emplace(from, std::move(*message));
     return true;
   }
   if (place_.parent != from) return false;
-  auto letter = decode_down(bytes);
-  if (!letter) return false;
-  if (letter->verdict.round < round_) return true;
-  if (letter->verdict.round > round_ || phase_ != Phase::kDown || !can_follow(*letter))
+  auto message = decode_down(bytes);
+  if (!message) return false;
+  if (message->verdict.round < round_) return true;
+  if (message->verdict.round > round_ || phase_ != Phase::kDown || !can_follow(*message))
     return false;
-  if (!down_) down_ = std::move(*letter);
+  if (!down_) down_ = std::move(*message);
   return true;
 }
 
 // True if the decision of the root fits the last message up of this robot.
-bool TreeNewton::can_follow(const DownLetter& letter) const {
-  switch (letter.verdict.next) {
+bool TreeNewton::can_follow(const DownMessage& message) const {
+  switch (message.verdict.next) {
     case Next::kCount:
     case Next::kStart:
       return !front_;
     case Next::kStep:
-      return front_ && letter.step.size() == sent_rows_;
+      return front_ && message.step.size() == sent_rows_;
     case Next::kShorten:
       return front_ && step_.size() > 0;
     case Next::kRefresh:
@@ -462,16 +463,16 @@ bool TreeNewton::ready() const {
   return ups_.size() == place_.children.size();
 }
 
-std::vector<SolverLetter> TreeNewton::advance() {
+std::vector<SolverMessage> TreeNewton::advance() {
   if (!ready()) return {};
   if (phase_ == Phase::kUp) return go_up();
-  const DownLetter letter = std::move(*down_);
+  const DownMessage message = std::move(*down_);
   down_.reset();
-  return go_down(letter);
+  return go_down(message);
 }
 
-std::vector<SolverLetter> TreeNewton::go_up() {
-  UpLetter letter;
+std::vector<SolverMessage> TreeNewton::go_up() {
+  UpMessage message;
   const bool inverting = verdict_.next == Next::kInverse;
   bool failed =
       std::any_of(ups_.begin(), ups_.end(), [](const auto& up) { return up.second.failed; });
@@ -481,27 +482,27 @@ std::vector<SolverLetter> TreeNewton::go_up() {
         if (up.system) front_->set_child(child, std::move(*up.system));
         if (front_) front_->reweigh_child(child, up.weights);
       }
-      letter = inverting ? prepare_inverse() : front_ ? equations() : first_letter();
+      message = inverting ? prepare_inverse() : front_ ? equations() : first_message();
     } catch (const std::exception&) {
       failed = true;  // the message of a child does not fit
     }
   }
-  for (const auto& [child, up] : ups_) letter.sums.add(up.sums);
-  letter.round = round_;
-  letter.failed = letter.failed || failed;
+  for (const auto& [child, up] : ups_) message.sums.add(up.sums);
+  message.round = round_;
+  message.failed = message.failed || failed;
   ups_.clear();
-  sent_rows_ = letter.failed ? -1 : letter.reduced.size();
+  sent_rows_ = message.failed ? -1 : message.reduced.size();
   if (place_.parent) {
     phase_ = Phase::kDown;
-    return {letter_to(*place_.parent, encode(letter))};
+    return {message_to(*place_.parent, encode(message))};
   }
-  if (inverting) return conclude(letter);
+  if (inverting) return conclude(message);
   // Full second derivatives may become indefinite when those of several robots are added.
-  if (letter.failed && verdict_.full) return go_down(root_->retreat(round_));
-  state_.failed = letter.failed;
-  if (letter.failed) return go_down(root_->stop(round_));
-  if (!front_) return go_down(root_->decide_start(letter.sums, round_));
-  return go_down(root_->decide(letter.sums, round_, *front_, at_hand_, factorised_));
+  if (message.failed && verdict_.full) return go_down(root_->retreat(round_));
+  state_.failed = message.failed;
+  if (message.failed) return go_down(root_->stop(round_));
+  if (!front_) return go_down(root_->decide_start(message.sums, round_));
+  return go_down(root_->decide(message.sums, round_, *front_, at_hand_, factorised_));
 }
 
 void TreeNewton::accept() {
@@ -529,8 +530,8 @@ void TreeNewton::take_step(const VectorXd& step, const TreeVerdict& verdict,
   }
 }
 
-std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
-  const TreeVerdict& v = letter.verdict;
+std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
+  const TreeVerdict& v = message.verdict;
   std::map<RobotId, VectorXd> step_of_child;
   const auto move = [&](double scale) {
     for (std::size_t k = 0; k < base_.size(); ++k) {
@@ -550,13 +551,13 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
       find_isolated(default_threshold(options_.dimension) * v.noise_scale);
       break;
     case Next::kStart:
-      if (!v.set_aside)
-        for (Known& k : known_) k.aside = false;
+      if (!v.deferred)
+        for (Known& k : known_) k.deferred = false;
       build_front();
       break;
     case Next::kStep:
       accept();
-      take_step(letter.step, v, step_of_child);
+      take_step(message.step, v, step_of_child);
       move(v.scale);
       break;
     case Next::kShorten:
@@ -572,46 +573,46 @@ std::vector<SolverLetter> TreeNewton::go_down(const DownLetter& letter) {
       break;
     case Next::kDone:
       accept();
-      if (letter.inverse) take_inverse(*letter.inverse);
+      if (message.inverse) take_inverse(*message.inverse);
       finish();
       break;
     case Next::kStop:
       finish();
       break;
   }
-  const bool set_aside = state_.set_aside || (v.next == Next::kStart && v.set_aside);
+  const bool deferred = state_.deferred || (v.next == Next::kStart && v.deferred);
   state_ = {.round = inverted ? state_.round : round_ + 1,
             .cost = v.cost,
             .gradient = v.gradient,
             .noise_scale = v.noise_scale,
             .barc = options_.robust ? v.barc : 0.0,
-            .set_aside = set_aside,
+            .deferred = deferred,
             .held = !v.free,
             .failed = state_.failed};
   if (!done()) phase_ = Phase::kUp;
   ++round_;
-  std::vector<SolverLetter> letters;
+  std::vector<SolverMessage> messages;
   for (const RobotId child : place_.children) {
-    DownLetter down{v, step_of_child[child]};
+    DownMessage down{v, step_of_child[child]};
     if (const auto inverse = inverse_of_child_.find(child); inverse != inverse_of_child_.end())
       down.inverse = std::move(inverse->second);
-    letters.push_back(letter_to(child, encode(down)));
+    messages.push_back(message_to(child, encode(down)));
   }
-  return letters;
+  return messages;
 }
 
 // Weights of the last second derivatives may differ by a factor of two from the final ones.
-UpLetter TreeNewton::prepare_inverse() {
-  UpLetter letter{.round = round_, .sums = {}};
+UpMessage TreeNewton::prepare_inverse() {
+  UpMessage message{.round = round_, .sums = {}};
   front_->weigh(front_weights(false));
   if (front_->stale(kSameWeight)) front_->linearise(base_, Curvature::kGaussNewton);
   if (front_->changed()) {
-    letter.failed = !front_->factorise();
-    if (!letter.failed && place_.parent) letter.system = front_->system_for_parent(base_);
+    message.failed = !front_->factorise();
+    if (!message.failed && place_.parent) message.system = front_->system_for_parent(base_);
   } else {
-    letter.weights = front_->changed_weights();
+    message.weights = front_->changed_weights();
   }
-  if (letter.failed || !verdict_.free) return letter;
+  if (message.failed || !verdict_.free) return message;
   const Index B = front_->block();
   frame_ = MatrixXd::Zero(B * static_cast<Index>(front_->nodes()), 6);
   const bool here = graph_.origin.robot == graph_.self && graph_.origin.index < accepted_.size();
@@ -624,26 +625,26 @@ UpLetter TreeNewton::prepare_inverse() {
   for (auto& [child, up] : ups_) {
     if (up.frame.rows() == 0) continue;
     children[child] = std::move(up.frame);
-    letter.frame_gram += up.frame_gram;
+    message.frame_gram += up.frame_gram;
   }
-  if (!here && children.empty()) return letter;
+  if (!here && children.empty()) return message;
   frame_ = front_->forward(std::move(frame_), children);
-  letter.frame = front_->kept_rows(frame_);
-  letter.frame_gram += front_->gram_of_eliminated(frame_);
-  return letter;
+  message.frame = front_->kept_rows(frame_);
+  message.frame_gram += front_->gram_of_eliminated(frame_);
+  return message;
 }
 
 // At the root, after the pass up for the covariances. Without them, the poses are final as well.
-std::vector<SolverLetter> TreeNewton::conclude(const UpLetter& letter) {
-  DownLetter down = root_->conclude(round_);
-  if (letter.failed) return go_down(down);
+std::vector<SolverMessage> TreeNewton::conclude(const UpMessage& message) {
+  DownMessage down = root_->conclude(round_);
+  if (message.failed) return go_down(down);
   const BlockMatrix kept = front_->inverse_of_root(graph_.upright);
   // Without an origin, covariances are relative to the remaining pose.
   MatrixXd with_frame = MatrixXd::Zero(kept.diagonal.cols(), 6);
-  Matrix6 of_frame = letter.frame_gram;
-  if (letter.frame.rows() > 0) {
-    with_frame = kept.diagonal * letter.frame;
-    of_frame += letter.frame.transpose() * with_frame;
+  Matrix6 of_frame = message.frame_gram;
+  if (message.frame.rows() > 0) {
+    with_frame = kept.diagonal * message.frame;
+    of_frame += message.frame.transpose() * with_frame;
   }
   take_inverse(kept, with_frame, of_frame);
   return go_down(down);
@@ -690,8 +691,8 @@ ClosureVerdicts TreeNewton::verdicts() const {
   if (!options_.robust || verdict_.weighing != Weighing::kDecided) return verdicts;
   for (const Known& k : known_) {
     if (k.odometry || graph_.trusted.contains(k.edge.id())) continue;
-    const bool tells = takes_part(k) ? k.own : speaks_for(k);
-    if (tells) verdicts.closures.push_back({k.edge.id(), takes_part(k) && k.weight > 0.5});
+    const bool reported = takes_part(k) ? k.own : reports(k);
+    if (reported) verdicts.closures.push_back({k.edge.id(), takes_part(k) && k.weight > 0.5});
   }
   return verdicts;
 }

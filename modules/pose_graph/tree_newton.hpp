@@ -8,7 +8,7 @@
 #include "modules/pose_graph/member_solver.hpp"
 #include "modules/pose_graph/session_graph.hpp"
 #include "modules/pose_graph/tree_front.hpp"
-#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/tree_messages.hpp"
 #include "modules/pose_graph/tree_root.hpp"
 
 namespace km {
@@ -47,7 +47,7 @@ class TreeNewton final : public MemberSolver {
 
   bool receive(RobotId from, std::span<const std::uint8_t> bytes) override;
   [[nodiscard]] bool ready() const override;
-  [[nodiscard]] std::vector<SolverLetter> advance() override;
+  [[nodiscard]] std::vector<SolverMessage> advance() override;
   [[nodiscard]] bool done() const override { return phase_ == Phase::kDone; }
   [[nodiscard]] const std::vector<SE3>& poses() const override { return accepted_; }
   [[nodiscard]] std::vector<Matrix6> covariances() const override { return covariances_; }
@@ -62,7 +62,7 @@ class TreeNewton final : public MemberSolver {
   struct Known {
     PoseEdge edge;
     Trust trust = Trust::kIn;
-    bool aside = false;  ///< Stands alone: deferred in this session.
+    bool deferred = false;  ///< Stands alone: deferred in this session.
     bool odometry = false;
     bool own = true;               ///< This robot weighs it.
     double weight = 1.0;           ///< Weight at the accepted poses.
@@ -73,8 +73,10 @@ class TreeNewton final : public MemberSolver {
   };
 
   void classify();
-  [[nodiscard]] bool takes_part(const Known& k) const { return k.trust != Trust::kOut && !k.aside; }
-  [[nodiscard]] bool speaks_for(const Known& k) const;
+  [[nodiscard]] bool takes_part(const Known& k) const {
+    return k.trust != Trust::kOut && !k.deferred;
+  }
+  [[nodiscard]] bool reports(const Known& k) const;
   /// The other robot of the edge; this robot for an edge inside it.
   [[nodiscard]] RobotId peer_of(const Known& k) const;
   [[nodiscard]] const SE3& start_of(const KeyframeId& id) const;
@@ -87,22 +89,22 @@ class TreeNewton final : public MemberSolver {
   [[nodiscard]] const SE3& pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const;
   [[nodiscard]] std::vector<double> front_weights(bool candidate) const;
 
-  [[nodiscard]] UpLetter first_letter();
+  [[nodiscard]] UpMessage first_message();
   void count_closures(TreeSums& sums) const;
   void move_robots(const std::vector<std::pair<RobotId, SinglePose>>& moves);
-  [[nodiscard]] UpLetter equations();
+  [[nodiscard]] UpMessage equations();
   void weigh_candidates(TreeSums& sums);
   void limit_candidates(bool decided);
   [[nodiscard]] std::set<RobotId> torn_pairs() const;
-  [[nodiscard]] std::vector<SolverLetter> go_up();
-  [[nodiscard]] bool can_follow(const DownLetter& letter) const;
-  [[nodiscard]] std::vector<SolverLetter> go_down(const DownLetter& letter);
+  [[nodiscard]] std::vector<SolverMessage> go_up();
+  [[nodiscard]] bool can_follow(const DownMessage& message) const;
+  [[nodiscard]] std::vector<SolverMessage> go_down(const DownMessage& message);
   void take_step(const Eigen::VectorXd& step, const TreeVerdict& verdict,
                  std::map<RobotId, Eigen::VectorXd>& children);
   void accept();
   void finish();
-  [[nodiscard]] UpLetter prepare_inverse();
-  [[nodiscard]] std::vector<SolverLetter> conclude(const UpLetter& letter);
+  [[nodiscard]] UpMessage prepare_inverse();
+  [[nodiscard]] std::vector<SolverMessage> conclude(const UpMessage& message);
   void take_inverse(const TreeInverse& inverse);
   void take_inverse(const BlockMatrix& kept, const Eigen::MatrixXd& with_frame,
                     const Matrix6& of_frame);
@@ -116,9 +118,9 @@ class TreeNewton final : public MemberSolver {
 
   Phase phase_ = Phase::kUp;
   std::uint32_t round_ = 0;
-  std::map<RobotId, UpLetter> ups_;  // messages of the children in this round
-  Eigen::Index sent_rows_ = 0;       // rows of the message up in this round
-  std::optional<DownLetter> down_;
+  std::map<RobotId, UpMessage> ups_;  // messages of the children in this round
+  Eigen::Index sent_rows_ = 0;        // rows of the message up in this round
+  std::optional<DownMessage> down_;
   std::vector<SE3> accepted_;  // own poses
   std::vector<SE3> base_;      // accepted followed poses
   std::vector<SE3> at_hand_;   // followed poses after the step

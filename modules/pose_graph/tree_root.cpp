@@ -80,45 +80,45 @@ std::array<double, 6> drift_against(std::span<const SE3> poses, const Eigen::Mat
 
 }  // namespace
 
-DownLetter TreeRoot::say(Next next) const {
-  DownLetter letter;
-  letter.verdict = {.round = round_,
-                    .next = next,
-                    .full = full_,
-                    .free = free_,
-                    .weighing = weighing_,
-                    .mu = schedule_.mu(),
-                    .barc = barc_,
-                    .noise_scale = noise_scale_,
-                    .usual_pair = usual_pair_,
-                    .cost = cost_,
-                    .gradient = std::sqrt(std::max(0.0, decrement_))};
-  return letter;
+DownMessage TreeRoot::answer(Next next) const {
+  DownMessage message;
+  message.verdict = {.round = round_,
+                     .next = next,
+                     .full = full_,
+                     .free = free_,
+                     .weighing = weighing_,
+                     .mu = schedule_.mu(),
+                     .barc = barc_,
+                     .noise_scale = noise_scale_,
+                     .usual_pair = usual_pair_,
+                     .cost = cost_,
+                     .gradient = std::sqrt(std::max(0.0, decrement_))};
+  return message;
 }
 
-DownLetter TreeRoot::stop(std::uint32_t round) {
+DownMessage TreeRoot::stop(std::uint32_t round) {
   round_ = round;
-  return say(Next::kStop);
+  return answer(Next::kStop);
 }
 
-DownLetter TreeRoot::conclude(std::uint32_t round) {
+DownMessage TreeRoot::conclude(std::uint32_t round) {
   round_ = round;
-  return say(Next::kDone);
+  return answer(Next::kDone);
 }
 
-DownLetter TreeRoot::retreat(std::uint32_t round) {
+DownMessage TreeRoot::retreat(std::uint32_t round) {
   round_ = round;
   convex_ = true;
   return refresh(false, weighing_);
 }
 
-DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
+DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   round_ = round;
   if (first_) {  // closures that stand alone are deferred
     const std::uint32_t left = sums.open;
     const bool enough = static_cast<double>(left) >= kClosuresPerPose * sums.poses;
-    const bool aside = sums.isolated > kFewOpen && enough && joined(members_, sums.votes);
-    return start(aside, aside ? sums : *first_);
+    const bool deferred = sums.isolated > kFewOpen && enough && joined(members_, sums.votes);
+    return start(deferred, deferred ? sums : *first_);
   }
   first_ = sums;
   free_ = sums.fixed == 0;
@@ -127,25 +127,25 @@ DownLetter TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
   barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
   const bool count = noise && noise->consistent >= kMostlyConsistent && sums.open > kFewOpen;
-  DownLetter letter = count ? say(Next::kCount) : start(false, sums);
-  if (options_.robust && free_ && sums.open > 0) letter.verdict.moves = moves_of(sums.votes);
-  return letter;
+  DownMessage message = count ? answer(Next::kCount) : start(false, sums);
+  if (options_.robust && free_ && sums.open > 0) message.verdict.moves = moves_of(sums.votes);
+  return message;
 }
 
-DownLetter TreeRoot::start(bool set_aside, const TreeSums& sums) {
+DownMessage TreeRoot::start(bool deferred, const TreeSums& sums) {
   schedule_.start(sums.largest, options_.robust ? sums.open : 0, barc_,
                   options_.reject_odometry ? kAllInSteps : 0);
   if (options_.robust) usual_pair_ = usual_strength(motions_of(sums.votes));
   weighing_ = schedule_.decided()  ? Weighing::kDecided
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
-  DownLetter letter = say(Next::kStart);
-  letter.verdict.set_aside = set_aside;
-  return letter;
+  DownMessage message = answer(Next::kStart);
+  message.verdict.deferred = deferred;
+  return message;
 }
 
-DownLetter TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const TreeFront& front,
-                            std::span<const SE3> poses, bool factorised) {
+DownMessage TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const TreeFront& front,
+                             std::span<const SE3> poses, bool factorised) {
   round_ = round;
   const bool may_rise = weighing_ != Weighing::kDecided && rises_ < kMaxRises;
   const double limit =
@@ -162,7 +162,7 @@ DownLetter TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const Tre
   }
   cost_ = sums.cost;
   if (!factorised) {
-    if (!full_) return say(Next::kStop);
+    if (!full_) return answer(Next::kStop);
     convex_ = true;
     return refresh(true, weighing_);
   }
@@ -170,8 +170,8 @@ DownLetter TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const Tre
   return step(sums, front, poses);
 }
 
-DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
-                          std::span<const SE3> poses) {
+DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
+                           std::span<const SE3> poses) {
   const TreeFront::RootStep root = front.solve_root(upright_);
   decrement_ = sums.decrement + root.decrement;
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
@@ -187,7 +187,7 @@ DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
   if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds)
-    return say(options_.covariances ? Next::kInverse : Next::kDone);
+    return answer(options_.covariances ? Next::kInverse : Next::kDone);
   if (decided && worth_refreshing(decrement_)) {
     full_ = true;
     convex_ = false;
@@ -195,21 +195,21 @@ DownLetter TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   }
   at_base_ = false;
   if (decided) length_ = 1.0;
-  DownLetter letter = say(Next::kStep);
-  letter.verdict.scale = length_;
-  letter.step = root.kept;
+  DownMessage message = answer(Next::kStep);
+  message.verdict.scale = length_;
+  message.step = root.kept;
   if (free_)
-    letter.verdict.drift = drift_against(
+    message.verdict.drift = drift_against(
         poses, front.substitute_back(root.kept).leftCols(static_cast<Index>(poses.size())),
         upright_);
-  return letter;
+  return message;
 }
 
-DownLetter TreeRoot::go_back() {
+DownMessage TreeRoot::go_back() {
   ++backtracks_;
   const bool decided = weighing_ == Weighing::kDecided;
   if (backtracks_ > (decided ? kMaxBacktracks : kMaxBacktracksUndecided)) {
-    if (decided) return say(Next::kStop);
+    if (decided) return answer(Next::kStop);
     retried_ = false;
     return refresh(false, weighing_);  // with the next weights, the next step may succeed
   }
@@ -221,21 +221,21 @@ DownLetter TreeRoot::go_back() {
     retried_ = true;
     return refresh(false, Weighing::kHold);
   }
-  DownLetter letter = say(Next::kShorten);
-  letter.verdict.scale = length_ *= kShorten;
-  return letter;
+  DownMessage message = answer(Next::kShorten);
+  message.verdict.scale = length_ *= kShorten;
+  return message;
 }
 
-DownLetter TreeRoot::refresh(bool accept, Weighing weighing) {
+DownMessage TreeRoot::refresh(bool accept, Weighing weighing) {
   if (convex_) full_ = false;
   weighing_ = weighing;
   at_base_ = true;
   stale_ = false;
   length_ = 1.0;
   last_decrement_.reset();
-  DownLetter letter = say(Next::kRefresh);
-  letter.verdict.accept = accept;
-  return letter;
+  DownMessage message = answer(Next::kRefresh);
+  message.verdict.accept = accept;
+  return message;
 }
 
 bool TreeRoot::worth_refreshing(double decrement) {

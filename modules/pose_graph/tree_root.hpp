@@ -6,7 +6,7 @@
 
 #include "modules/pose_graph/robust_schedule.hpp"
 #include "modules/pose_graph/tree_front.hpp"
-#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/tree_messages.hpp"
 
 namespace km {
 
@@ -22,7 +22,7 @@ struct TreeNewtonOptions {
   double barc = 0.0;  ///< Largest residual of an inlier [sigma]; 0: the team estimates it.
   bool reject_odometry = false;  ///< Steps of odometry are weighed as well.
   /// Private poses may be sent as well, if that saves bytes.
-  bool tell_private = false;
+  bool share_private = false;
   bool covariances = true;  ///< The members compute covariances in one more pass at the end.
 };
 
@@ -35,26 +35,27 @@ class TreeRoot {
       : members_(std::move(members)), options_(options), upright_(upright) {}
 
   /// Decides, before there are equations, when the team starts and with which closures.
-  [[nodiscard]] DownLetter decide_start(const TreeSums& sums, std::uint32_t round);
+  [[nodiscard]] DownMessage decide_start(const TreeSums& sums, std::uint32_t round);
   /// Decides after the pass up of a round. `front` has the equations at `poses` (of its followed
   /// nodes), unless they could not be factorised.
-  [[nodiscard]] DownLetter decide(const TreeSums& sums, std::uint32_t round, const TreeFront& front,
-                                  std::span<const SE3> poses, bool factorised);
+  [[nodiscard]] DownMessage decide(const TreeSums& sums, std::uint32_t round,
+                                   const TreeFront& front, std::span<const SE3> poses,
+                                   bool factorised);
   /// Repeats the round with Gauss-Newton derivatives, because a robot could not eliminate with full
   /// ones.
-  [[nodiscard]] DownLetter retreat(std::uint32_t round);
+  [[nodiscard]] DownMessage retreat(std::uint32_t round);
   /// Ends the session, because the team cannot continue.
-  [[nodiscard]] DownLetter stop(std::uint32_t round);
+  [[nodiscard]] DownMessage stop(std::uint32_t round);
   /// Ends the session after kInverse.
-  [[nodiscard]] DownLetter conclude(std::uint32_t round);
+  [[nodiscard]] DownMessage conclude(std::uint32_t round);
 
  private:
-  [[nodiscard]] DownLetter say(TreeVerdict::Next next) const;
-  [[nodiscard]] DownLetter start(bool set_aside, const TreeSums& sums);
-  [[nodiscard]] DownLetter step(const TreeSums& sums, const TreeFront& front,
-                                std::span<const SE3> poses);
-  [[nodiscard]] DownLetter go_back();
-  [[nodiscard]] DownLetter refresh(bool accept, TreeVerdict::Weighing weighing);
+  [[nodiscard]] DownMessage answer(TreeVerdict::Next next) const;
+  [[nodiscard]] DownMessage start(bool deferred, const TreeSums& sums);
+  [[nodiscard]] DownMessage step(const TreeSums& sums, const TreeFront& front,
+                                 std::span<const SE3> poses);
+  [[nodiscard]] DownMessage go_back();
+  [[nodiscard]] DownMessage refresh(bool accept, TreeVerdict::Weighing weighing);
   [[nodiscard]] bool worth_refreshing(double decrement);
 
   std::vector<RobotId> members_;

@@ -15,7 +15,7 @@
 namespace km {
 namespace {
 
-enum class LetterKind : std::uint8_t { kPoses, kShare, kProgress };
+enum class RbcdMessageKind : std::uint8_t { kPoses, kShare, kProgress };
 
 // Perturbation of the start, see perturb_rotations(): small relative to any measurement, large
 // relative to rounding.
@@ -33,14 +33,14 @@ Eigen::MatrixXd perturbed(const SE3& start, const KeyframeId& keyframe, Eigen::I
   return perturb_rotations(lift(lifted_identity(rank), start), kPerturbation, rng);
 }
 
-ByteWriter letter(LetterKind kind, std::uint32_t round) {
+ByteWriter begin_message(RbcdMessageKind kind, std::uint32_t round) {
   ByteWriter writer;
   writer.u8(static_cast<std::uint8_t>(kind));
   writer.varint(round);
   return writer;
 }
 
-SolverLetter addressed(RobotId to, ByteWriter writer) {
+SolverMessage addressed(RobotId to, ByteWriter writer) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(writer.release())};
 }
 
@@ -94,12 +94,13 @@ QuadraticProblem MemberRbcd::make_problem() {
                         neighbour.own.end());
     for (const auto& [keyframe, slot] : neighbour.slot_of) {
       const KeyframeId id{robot, keyframe};
-      const auto told = graph_.told.find(id);
-      if (told == graph_.told.end())
-        throw std::invalid_argument("MemberRbcd: keyframe " + to_string(id) + " was not told");
+      const auto found = graph_.public_poses.find(id);
+      if (found == graph_.public_poses.end())
+        throw std::invalid_argument("MemberRbcd: keyframe " + to_string(id) +
+                                    " has no published pose");
       fixed_.middleCols<4>(4 * slot) = neighbour.absent
-                                           ? lift(lifted_identity(options_.rank), told->second)
-                                           : perturbed(told->second, id, options_.rank);
+                                           ? lift(lifted_identity(options_.rank), found->second)
+                                           : perturbed(found->second, id, options_.rank);
     }
   }
   return {options_.rank, static_cast<Eigen::Index>(graph_.start.size()), std::move(own),
@@ -135,20 +136,20 @@ bool MemberRbcd::round_is_complete() const {
 
 bool MemberRbcd::ready() const {
   return !done_ &&
-         (!started_ || can_update() || round_is_complete() || heard_.contains(state_.round));
+         (!started_ || can_update() || round_is_complete() || pending_.contains(state_.round));
 }
 
-std::vector<SolverLetter> MemberRbcd::advance() {
-  std::vector<SolverLetter> letters;
-  if (done_) return letters;
-  if (!std::exchange(started_, true)) report_share(0.0, letters);
-  if (const auto next = heard_.extract(state_.round)) adopt(next.mapped());
-  if (!done_ && can_update()) update(letters);
-  for (bool told = false; !told && round_is_complete();) told = close_round(letters);
-  return letters;
+std::vector<SolverMessage> MemberRbcd::advance() {
+  std::vector<SolverMessage> messages;
+  if (done_) return messages;
+  if (!std::exchange(started_, true)) report_share(0.0, messages);
+  if (const auto next = pending_.extract(state_.round)) adopt(next.mapped());
+  if (!done_ && can_update()) update(messages);
+  for (bool reported = false; !reported && round_is_complete();) reported = close_round(messages);
+  return messages;
 }
 
-void MemberRbcd::update(std::vector<SolverLetter>& letters) {
+void MemberRbcd::update(std::vector<SolverMessage>& messages) {
   const auto& [round, X] = *history_.rbegin();
   problem_.set_fixed(fixed_);
   const bool alone = place_.members.size() == 1;
@@ -162,12 +163,12 @@ void MemberRbcd::update(std::vector<SolverLetter>& letters) {
   const auto rounded = round_public_poses();
   for (const auto& [robot, neighbour] : neighbours_) {
     if (neighbour.absent) continue;
-    ByteWriter writer = letter(LetterKind::kPoses, history_.rbegin()->first);
+    ByteWriter writer = begin_message(RbcdMessageKind::kPoses, history_.rbegin()->first);
     for (const KeyframeIndex keyframe : neighbour.own)
       for (const float x : rounded.at(keyframe).reshaped()) writer.f32(x);
-    letters.push_back(addressed(robot, std::move(writer)));
+    messages.push_back(addressed(robot, std::move(writer)));
   }
-  report_share(result.initial_gradient_norm * result.initial_gradient_norm, letters);
+  report_share(result.initial_gradient_norm * result.initial_gradient_norm, messages);
 }
 
 // This robot keeps the rounded poses, exactly as the other robots decode them.
@@ -179,25 +180,25 @@ std::map<KeyframeIndex, Eigen::MatrixXf> MemberRbcd::round_public_poses() {
     for (const KeyframeIndex keyframe : neighbour.own) {
       if (rounded.contains(keyframe)) continue;
       auto pose = X.middleCols<4>(4 * Eigen::Index{keyframe});
-      const Eigen::MatrixXf& told = rounded[keyframe] = pose.cast<float>();
-      pose = restore_stiefel(told.cast<double>());
+      const Eigen::MatrixXf& sent = rounded[keyframe] = pose.cast<float>();
+      pose = restore_stiefel(sent.cast<double>());
     }
   }
   return rounded;
 }
 
-void MemberRbcd::report_share(double squared_gradient, std::vector<SolverLetter>& letters) {
+void MemberRbcd::report_share(double squared_gradient, std::vector<SolverMessage>& messages) {
   const auto& [round, X] = *history_.rbegin();
   // Before the first round, the rigid start counts: a session without an improvement ends with it.
   const LiftedPoses start = round == 0 ? lift(graph_.start, options_.rank) : LiftedPoses();
   const LiftedPoses& at = round == 0 ? start : X;
   if (round == 0) {
-    LiftedPoses told = fixed_;
+    LiftedPoses fixed = fixed_;
     for (const auto& [robot, neighbour] : neighbours_)
       for (const auto& [keyframe, slot] : neighbour.slot_of)
-        told.middleCols<4>(4 * slot) =
-            lift(lifted_identity(options_.rank), graph_.told.at({robot, keyframe}));
-    problem_.set_fixed(std::move(told));
+        fixed.middleCols<4>(4 * slot) =
+            lift(lifted_identity(options_.rank), graph_.public_poses.at({robot, keyframe}));
+    problem_.set_fixed(std::move(fixed));
   }
   // The cost between two neighbours is counted by the one that moves last.
   Share share{problem_.cost(at), squared_gradient, !graph_.to_absent.empty()};
@@ -209,15 +210,15 @@ void MemberRbcd::report_share(double squared_gradient, std::vector<SolverLetter>
     shares_[round][graph_.self] = share;
     return;
   }
-  ByteWriter writer = letter(LetterKind::kShare, round);
+  ByteWriter writer = begin_message(RbcdMessageKind::kShare, round);
   writer.f64(share.cost);
   writer.f64(share.squared_gradient);
   writer.u8(share.held ? 1 : 0);
-  letters.push_back(addressed(place_.root, std::move(writer)));
+  messages.push_back(addressed(place_.root, std::move(writer)));
 }
 
 // True if the round is reported to the members.
-bool MemberRbcd::close_round(std::vector<SolverLetter>& letters) {
+bool MemberRbcd::close_round(std::vector<SolverMessage>& messages) {
   const auto shares = shares_.extract(shares_.begin());
   const std::uint32_t round = shares.key();
   Total total;
@@ -238,21 +239,23 @@ bool MemberRbcd::close_round(std::vector<SolverLetter>& letters) {
   const bool stop = settled || (options_.max_rounds > 0 && round >= options_.max_rounds);
   if (!stop && round % kProgressPeriod != 0) return false;
   const RoundTotal& better = decrease < 0.0 ? *last : *last_;
-  tell(stop && start_.cost <= better.total.cost ? RoundTotal{0, start_} : better, stop, letters);
+  report_progress(stop && start_.cost <= better.total.cost ? RoundTotal{0, start_} : better, stop,
+                  messages);
   return true;
 }
 
-void MemberRbcd::tell(const RoundTotal& at, bool stop, std::vector<SolverLetter>& letters) {
+void MemberRbcd::report_progress(const RoundTotal& at, bool stop,
+                                 std::vector<SolverMessage>& messages) {
   const Progress progress{at, state_.round, stop, anchor_at(at.round)};
   for (const RobotId robot : place_.members) {
     if (robot == graph_.self) continue;
-    ByteWriter writer = letter(LetterKind::kProgress, at.round);
+    ByteWriter writer = begin_message(RbcdMessageKind::kProgress, at.round);
     writer.varint(progress.before);
     writer.u8(stop ? 1 : 0);
     writer.f64(at.total.cost);
     writer.f64(at.total.gradient);
     for (const double x : progress.anchor.reshaped()) writer.f64(x);
-    letters.push_back(addressed(robot, std::move(writer)));
+    messages.push_back(addressed(robot, std::move(writer)));
   }
   adopt(progress);
 }
@@ -281,12 +284,12 @@ bool MemberRbcd::receive(RobotId from, std::span<const std::uint8_t> bytes) {
   ByteReader reader(bytes);
   const std::uint8_t kind = reader.u8();
   const auto round = reader.varint_as<std::uint32_t>();
-  switch (static_cast<LetterKind>(kind)) {
-    case LetterKind::kPoses:
+  switch (static_cast<RbcdMessageKind>(kind)) {
+    case RbcdMessageKind::kPoses:
       return take_poses(from, round, reader);
-    case LetterKind::kShare:
+    case RbcdMessageKind::kShare:
       return take_share(from, round, reader);
-    case LetterKind::kProgress:
+    case RbcdMessageKind::kProgress:
       return take_progress(from, round, reader);
   }
   return false;
@@ -339,7 +342,7 @@ bool MemberRbcd::take_progress(RobotId from, std::uint32_t round, ByteReader& re
       progress.stop ? round == 0 || round >= progress.before : round > progress.before;
   // The root never reports rounds to a member that has not completed them.
   if (!forward || std::max(round, progress.before) > history_.rbegin()->first) return false;
-  heard_.try_emplace(progress.before, std::move(progress));
+  pending_.try_emplace(progress.before, std::move(progress));
   return true;
 }
 

@@ -48,7 +48,7 @@ class MemberRbcd final : public MemberSolver {
 
   bool receive(RobotId from, std::span<const std::uint8_t> bytes) override;
   [[nodiscard]] bool ready() const override;
-  [[nodiscard]] std::vector<SolverLetter> advance() override;
+  [[nodiscard]] std::vector<SolverMessage> advance() override;
   [[nodiscard]] bool done() const override { return done_; }
 
   [[nodiscard]] const std::vector<SE3>& poses() const override { return poses_; }
@@ -93,11 +93,11 @@ class MemberRbcd final : public MemberSolver {
   [[nodiscard]] bool can_update() const;
   [[nodiscard]] bool round_is_complete() const;
 
-  void update(std::vector<SolverLetter>& letters);
+  void update(std::vector<SolverMessage>& messages);
   std::map<KeyframeIndex, Eigen::MatrixXf> round_public_poses();
-  void report_share(double squared_gradient, std::vector<SolverLetter>& letters);
-  [[nodiscard]] bool close_round(std::vector<SolverLetter>& letters);
-  void tell(const RoundTotal& at, bool stop, std::vector<SolverLetter>& letters);
+  void report_share(double squared_gradient, std::vector<SolverMessage>& messages);
+  [[nodiscard]] bool close_round(std::vector<SolverMessage>& messages);
+  void report_progress(const RoundTotal& at, bool stop, std::vector<SolverMessage>& messages);
   [[nodiscard]] Eigen::MatrixXd anchor_at(std::uint32_t round) const;
   void adopt(const Progress& progress);
 
@@ -113,7 +113,7 @@ class MemberRbcd final : public MemberSolver {
   LiftedPoses fixed_;
   QuadraticProblem problem_;
   std::map<std::uint32_t, LiftedPoses> history_;  // by round, since last Progress
-  std::map<std::uint32_t, Progress> heard_;  // not adopted yet; by the round of the message before
+  std::map<std::uint32_t, Progress> pending_;     // not adopted; by the round of the message before
   bool started_ = false;
   bool done_ = false;
   std::vector<SE3> poses_;

@@ -10,7 +10,7 @@ TreeNewtonOptions newton_options(const PoseGraphConfig& config) {
   TreeNewtonOptions options;
   options.robust = config.robust;
   options.barc = config.barc;
-  options.tell_private = config.tell_private;
+  options.share_private = config.share_private;
   // In a team, the latency of a round costs more than the bytes of new second derivatives.
   options.patience_rounds = 8.0;
   return options;

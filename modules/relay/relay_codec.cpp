@@ -5,14 +5,14 @@
 
 namespace km {
 
-MessageKey Codec<RelayParcel>::key_of(const RelayParcel& parcel) {
-  const RelayMessage& message = *parcel.message;
+MessageKey Codec<RelayPacket>::key_of(const RelayPacket& packet) {
+  const RelayMessage& message = *packet.message;
   return message_key({static_cast<std::uint64_t>(message.kind), message.origin.robot,
                       message.origin.boot, message.to, message.number});
 }
 
-Codec<RelayParcel>::Encoded Codec<RelayParcel>::encode(const RelayParcel& parcel) {
-  const RelayMessage& message = *parcel.message;
+Codec<RelayPacket>::Encoded Codec<RelayPacket>::encode(const RelayPacket& packet) {
+  const RelayMessage& message = *packet.message;
   Encoded encoded;
   encoded.content = message.content;
   Wire& wire = encoded.wire;
@@ -27,8 +27,8 @@ Codec<RelayParcel>::Encoded Codec<RelayParcel>::encode(const RelayParcel& parcel
   return encoded;
 }
 
-Decoded<RelayParcel> Codec<RelayParcel>::decode(const Wire& wire, const TeamPeer& writer) {
-  using Result = Decoded<RelayParcel>;
+Decoded<RelayPacket> Codec<RelayPacket>::decode(const Wire& wire, const TeamPeer& writer) {
+  using Result = Decoded<RelayPacket>;
   if (wire.kind > static_cast<std::uint8_t>(RelayKind::kReply))
     return Result::refuse("a kind that is not known");
   const auto kind = static_cast<RelayKind>(wire.kind);

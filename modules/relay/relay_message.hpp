@@ -43,7 +43,7 @@ using RelayMessagePtr = std::shared_ptr<const RelayMessage>;
 }
 
 /// Message on one hop, between a robot and a neighbour that receives it directly.
-struct RelayParcel {
+struct RelayPacket {
   RobotId neighbour = 0;  ///< Receiver of a sent message, sender of a received one.
   RelayMessagePtr message;
 };

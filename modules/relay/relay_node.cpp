@@ -75,25 +75,25 @@ void RelayNode::take(const PeerEvent& event) {
   });
 }
 
-ContentGuard<RelayParcel> RelayNode::guard_parcels() {
-  return {.check = [this](const TeamPeer& /*sender*/, const RelayParcel& parcel, auto /*content*/) {
-    return take(parcel);
+ContentGuard<RelayPacket> RelayNode::guard_packets() {
+  return {.check = [this](const TeamPeer& /*sender*/, const RelayPacket& packet, auto /*content*/) {
+    return take(packet);
   }};
 }
 
 // Returns the reason if the message is forged, otherwise null. A message that this robot does not
 // expect, because it has missed an earlier one, is not forged.
-const char* RelayNode::take(const RelayParcel& parcel) {
+const char* RelayNode::take(const RelayPacket& packet) {
   RelayArrival arrival = RelayArrival::kNew;
   const char* forged = nullptr;
   act([&](RelayStore& store) {
-    arrival = store.receive(parcel);
+    arrival = store.receive(packet);
     if (arrival == RelayArrival::kForged) forged = store.refusal();
   });
   if (arrival == RelayArrival::kRefused)
-    log::limited(log::Level::kDebug, kTag, "refused " + std::to_string(parcel.neighbour))
-        << "robot " << parcel.neighbour << " forwards a message of robot "
-        << parcel.message->origin.robot << " that is not taken";
+    log::limited(log::Level::kDebug, kTag, "refused " + std::to_string(packet.neighbour))
+        << "robot " << packet.neighbour << " forwards a message of robot "
+        << packet.message->origin.robot << " that is not taken";
   return forged;
 }
 
@@ -131,8 +131,8 @@ std::vector<std::uint8_t> RelayNode::signature_of(RelayKind kind, std::uint32_t 
 
 void RelayNode::carry_out(const RelayOutput& output, std::uint64_t given_up) {
   for (const RobotIdentity& robot : output.met) peers_.reported(robot);
-  for (const RelayParcel& parcel : output.parcels)
-    topics_.own_parcels.publish({parcel.neighbour, std::make_shared<const RelayParcel>(parcel)});
+  for (const RelayPacket& packet : output.packets)
+    topics_.own_packets.publish({packet.neighbour, std::make_shared<const RelayPacket>(packet)});
   for (const RelayMessagePtr& message : output.delivered) deliver(*message);
   for (const RobotId robot : output.reachable)
     topics_.reached.publish(

@@ -26,7 +26,7 @@ namespace km {
 struct RelayTopics {
   In<PeerEvent> peer_events;  ///< Robots that this robot receives directly.
   In<RobotStatus> statuses;   ///< Statuses of these robots.
-  Out<Addressed<RelayParcel>> own_parcels;
+  Out<Addressed<RelayPacket>> own_packets;
   Out<PeerEvent> reached;  ///< kReturned for a robot that is not received directly, when a route to
                            ///< it appears.
 };
@@ -77,7 +77,7 @@ class RelayNode {
   template <typename T, typename NumberOf>
   [[nodiscard]] ContentGuard<T> guard(RelayKind kind, const NumberOf& number_of);
   /// Guard of the relay's own topic, which reads its messages.
-  [[nodiscard]] ContentGuard<RelayParcel> guard_parcels();
+  [[nodiscard]] ContentGuard<RelayPacket> guard_packets();
 
   /// Summary that this robot publishes in its status.
   [[nodiscard]] RelaySummary summary() const;
@@ -110,7 +110,7 @@ class RelayNode {
   void carry_out(const RelayOutput& output, std::uint64_t given_up);
   void deliver(const RelayMessage& message) const;
   void take(const PeerEvent& event);
-  [[nodiscard]] const char* take(const RelayParcel& parcel);
+  [[nodiscard]] const char* take(const RelayPacket& packet);
   [[nodiscard]] const char* keep(RelayKind kind, const TeamPeer& sender, std::uint32_t number,
                                  std::span<const std::uint8_t> content);
   [[nodiscard]] std::vector<std::uint8_t> signature_of(RelayKind kind, std::uint32_t number,

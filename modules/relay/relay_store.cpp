@@ -103,7 +103,7 @@ void RelayStore::become(Origin& origin, const RobotIdentity& identity, Membershi
   origin.membership = std::move(membership);
   if (former == identity.boot) return;
   origin.reliable = {};
-  const bool other_incarnation = !is_same_life(former, identity.boot);
+  const bool other_incarnation = !is_same_incarnation(former, identity.boot);
   if (other_key || other_incarnation) origin.bags = origin.replies = {};
   if (other_incarnation) drop_messages_to_former_incarnations({identity.robot, identity.boot});
 }
@@ -111,7 +111,7 @@ void RelayStore::become(Origin& origin, const RobotIdentity& identity, Membershi
 void RelayStore::drop_messages_to_former_incarnations(const TeamPeer& peer) {
   const auto is_over = [&](const RelayMessage& message) {
     return message.to == peer.robot && message.to_boot != 0 &&
-           !is_same_life(message.to_boot, peer.boot);
+           !is_same_incarnation(message.to_boot, peer.boot);
   };
   std::erase_if(recent_, [&](const Recent& recent) { return is_over(recent.message); });
   std::erase_if(own_slots_, [&](const auto& slot) {
@@ -160,7 +160,7 @@ RelayArrival RelayStore::keep_bag(const RobotIdentity& origin, std::uint32_t num
 RelayArrival RelayStore::keep_reply(const TeamPeer& from, std::uint32_t number,
                                     std::vector<std::uint8_t> content) {
   const auto known = origin(from.robot);
-  if (!known || !is_same_life(known->boot, from.boot)) return RelayArrival::kRefused;
+  if (!known || !is_same_incarnation(known->boot, from.boot)) return RelayArrival::kRefused;
   RelayMessage reply{
       .kind = RelayKind::kReply, .origin = *known, .number = number, .content = std::move(content)};
   if (!is_known(reply.origin)) return RelayArrival::kRefused;
@@ -243,9 +243,9 @@ void RelayStore::call(RelayKind kind, RobotId to, std::uint32_t number,
   (void)route(std::move(message), {});
 }
 
-RelayArrival RelayStore::receive(const RelayParcel& parcel) {
-  const RelayMessage& message = *parcel.message;
-  const RobotId from = parcel.neighbour;
+RelayArrival RelayStore::receive(const RelayPacket& packet) {
+  const RelayMessage& message = *packet.message;
+  const RobotId from = packet.neighbour;
   const RobotId robot = message.origin.robot;
   if (!receives(from) || robot == self_.robot) return RelayArrival::kRefused;
   if (message.kind == RelayKind::kIntroduction) return introduce(from, message);
@@ -274,9 +274,9 @@ RelayArrival RelayStore::receive(const RelayParcel& parcel) {
     if (!is_mine) return route(message, from);
   }
   const bool is_this_incarnation =
-      message.to_boot == 0 || is_same_life(message.to_boot, self_.boot);
+      message.to_boot == 0 || is_same_incarnation(message.to_boot, self_.boot);
   const bool is_for_self = message.kind == RelayKind::kBag || (is_mine && is_this_incarnation);
-  if (arrival == RelayArrival::kNew && is_for_self) deliver(parcel.message);
+  if (arrival == RelayArrival::kNew && is_for_self) deliver(packet.message);
   return arrival;
 }
 
@@ -515,7 +515,7 @@ RelaySummary RelayStore::summary() const {
 }
 
 void RelayStore::send(RobotId neighbour, RelayMessage message) {
-  output_.parcels.push_back({neighbour, std::make_shared<const RelayMessage>(std::move(message))});
+  output_.packets.push_back({neighbour, std::make_shared<const RelayMessage>(std::move(message))});
 }
 
 }  // namespace km

@@ -39,7 +39,7 @@ struct RelayWays {
 
 /// Work that a RelayStore requests.
 struct RelayOutput {
-  std::vector<RelayParcel> parcels;        ///< Messages to send.
+  std::vector<RelayPacket> packets;        ///< Messages to send.
   std::vector<RelayMessagePtr> delivered;  ///< Messages for this robot, in order.
   std::vector<RobotIdentity> met;          ///< Robots that neighbours have introduced: new ones or
                                            ///< new boot ids.
@@ -127,7 +127,7 @@ class RelayStore {
   /// Processes the summary in the status of a neighbour.
   void update(RobotId neighbour, const RelaySummary& summary, double now_s);
   /// Processes a message from a neighbour.
-  RelayArrival receive(const RelayParcel& parcel);
+  RelayArrival receive(const RelayPacket& packet);
   /// Reason why the last message was kForged (a string literal).
   [[nodiscard]] const char* refusal() const { return refusal_; }
 

@@ -76,7 +76,7 @@ std::optional<ViewUpdate> update_of(const km_wire_ViewUpdate& wire, ViewChannel 
     chunk->key.robot = wire.robot;
     chunk->boot = wire.boot;
   }
-  return ViewUpdate{wire.robot, wire.boot, wire.told, *std::move(content)};
+  return ViewUpdate{wire.robot, wire.boot, wire.sent, *std::move(content)};
 }
 
 }  // namespace
@@ -123,7 +123,7 @@ std::size_t ViewWriter::write(const ViewContent& content) {
   km_wire_ViewUpdate wire{};
   wire.robot = self_.robot;
   wire.boot = self_.boot;
-  wire.told = system_now();
+  wire.sent = system_now();
   borrow(wire.content, bytes);
   check_dds(dds_write(writer_.handle(), &wire),
             std::string("cannot publish on ") + name_of(channel_));

@@ -40,7 +40,7 @@ std::optional<TeamPeer> OutgoingTopic::receiver_of(const Addressee& addressee) c
   if (spec_.carries_keys) return TeamPeer{addressee.robot, 0};
   const auto current = peers_.current(addressee.robot);
   const bool is_over =
-      current && addressee.boot != 0 && !is_same_life(addressee.boot, current->boot);
+      current && addressee.boot != 0 && !is_same_incarnation(addressee.boot, current->boot);
   return is_over ? std::nullopt : current;
 }
 
@@ -58,7 +58,7 @@ OutgoingTopic::Writer& OutgoingTopic::writer_to(const std::optional<TeamPeer>& r
   const std::string partition = partition_for(receiver);
   if (!fresh && writer.partition == partition) return writer;
 
-  if (!fresh && !is_same_life(writer.receiver->boot, receiver->boot)) writer.kept.clear();
+  if (!fresh && !is_same_incarnation(writer.receiver->boot, receiver->boot)) writer.kept.clear();
   writer.due.clear();
   for (const auto& [key, content] : writer.kept) writer.due.insert(key);
   writer.receiver = receiver;

@@ -29,7 +29,7 @@ void PeerTable::reported(const RobotIdentity& identity) {
   KnownPeer& known = found->second;
   const std::uint64_t former_boot = known.peer.identity.boot;
   if (known.peer.state == PeerState::kAlive || former_boot == identity.boot) return;
-  const bool resumed = is_same_life(former_boot, identity.boot);
+  const bool resumed = is_same_incarnation(former_boot, identity.boot);
   known = {{identity, PeerState::kReported, "unknown"}, Guid{}, known.arriving || !resumed};
   emit(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, identity,
        resumed ? "resumed, as other robots report" : "restarted, as other robots report", false);
@@ -181,14 +181,15 @@ void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant&
   const RobotIdentity& identity = *participant.identity;
   const std::uint64_t former_boot = known.peer.identity.boot;
   const Guid former = known.guid;
-  const bool arriving =
-      former_boot == identity.boot ? known.arriving : !is_same_life(former_boot, identity.boot);
+  const bool arriving = former_boot == identity.boot
+                            ? known.arriving
+                            : !is_same_incarnation(former_boot, identity.boot);
   known = {{identity, PeerState::kAlive, participant.addresses}, guid, arriving};
   const auto predecessor = participants_.find(former);
   if (former != guid && predecessor != participants_.end() && !predecessor->second.announced)
     participants_.erase(predecessor);
   if (former_boot == identity.boot) return emit(PeerEventKind::kReturned, identity, "returned");
-  if (is_same_life(former_boot, identity.boot))
+  if (is_same_incarnation(former_boot, identity.boot))
     return emit(PeerEventKind::kResumed, identity, "resumed");
   emit(PeerEventKind::kRestarted, identity, "restarted");
 }

@@ -38,7 +38,7 @@ Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status
   encoded.received = status.relay.received;
   for (const auto& [origin, bags, reliable] : status.relay.holds)
     encoded.holds.push_back({origin.robot, origin.boot, bags, reliable});
-  borrow(wire.hears, encoded.received);
+  borrow(wire.receives, encoded.received);
   borrow(wire.holds, encoded.holds);
   return encoded;
 }
@@ -51,12 +51,12 @@ Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire, const TeamPeer
   if (!std::ranges::all_of(name, printable)) return Result::refuse("name is not printable");
   if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
   if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
-  const auto received = elements_of(wire.hears, kMaxNamed);
+  const auto received = elements_of(wire.receives, kMaxNamed);
   const auto holds = elements_of(wire.holds, kMaxNamed);
   if (!received || !holds) return Result::refuse("it names too many robots");
   RelaySummary relay{.received = {received->begin(), received->end()}};
   for (const km_wire_RelayHeld& held : *holds)
-    relay.holds.push_back({{held.robot, held.boot}, held.bags, held.letters});
+    relay.holds.push_back({{held.robot, held.boot}, held.bags, held.reliable});
   const auto phase = static_cast<RobotPhase>(wire.phase);
   return Result::accept({writer.robot, name, phase, wire.dataset_time_s, wire.keyframes,
                          wire.settled_links, writer.boot, std::move(relay)});

@@ -73,8 +73,8 @@ TEST_CASE("A robot whose graph never settles leaves at the limit", "[departure]"
   CHECK(robot.departure.reason() != nullptr);
 }
 
-// Leaving times [s] of a chain of robots that all poll ten times a second and hear their neighbours
-// a poll later. Robot `restless` settles at `from_s` only.
+// Leaving times [s] of a chain of robots that all poll ten times a second and receive their
+// neighbours a poll later. Robot `restless` settles at `from_s` only.
 std::vector<double> departures(std::size_t count, std::size_t restless, double from_s) {
   std::vector<Departure> robots(count, Departure(kSettle_s, kLimit_s));
   std::vector<Departure::Present> reported(count);
@@ -203,7 +203,7 @@ TEST_CASE("A robot is missed for as long as it has been silent or in another fra
   absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
   CHECK(text_of(absentees) == "bob silent 10 carol silent 7 ");
   absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, with_bob);
-  CHECK(text_of(absentees) == "carol silent 7 ");  // others hear bob
+  CHECK(text_of(absentees) == "carol silent 7 ");  // others receive bob
   absentees.update(111.0, {{2, {"bob", kReceived}}, {7, {"carol", kSilent}}}, alone);
   absentees.update(112.0, {{2, {"bob", kReceived}}, {7, {"carol", kLeft}}}, alone);
   CHECK(text_of(absentees) == "bob apart 1 ");

@@ -8,8 +8,8 @@
 #include "modules/mesh/mesh_codec.hpp"
 #include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/place_recognition_codec.hpp"
-#include "modules/pose_graph/parcel_codec.hpp"
-#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/packet_codec.hpp"
+#include "modules/pose_graph/tree_messages.hpp"
 #include "modules/relay/relay_codec.hpp"
 #include "modules/security/credentials.hpp"
 #include "runtime/dds/envelope.hpp"
@@ -68,38 +68,45 @@ MeshChunk some_chunk() {
           .faces = {{0, 1, 2}, {0, 2, 3}}};
 }
 
-TeamParcel parcel(TeamMessage message) {
+TeamPacket packet(TeamMessage message) {
   return {kWriter.robot, std::make_shared<const TeamMessage>(std::move(message))};
 }
 
-RelayParcel relayed(RelayMessage message) {
+RelayPacket relayed(RelayMessage message) {
   return {kWriter.robot, std::make_shared<const RelayMessage>(std::move(message))};
 }
 
-std::vector<TeamParcel> some_parcels() {
+std::vector<TeamPacket> some_packets() {
   const TeamPeer self{kWriter.robot, kWriter.boot};
   const TeamPeer far{9, 1};
-  MemberPoses poses{.sender = self, .number = 2, .session = {self, 4}, .stage = MemberStage::kSolved, .frame = self};
+  MemberPoses poses{.sender = self,
+                    .number = 2,
+                    .session = {self, 4},
+                    .stage = MemberStage::kSolved,
+                    .frame = self};
   poses.keyframes = {0, 3, 200};
   poses.T_frame_kf.resize(3, SinglePose::of(SE3::Identity()));
   return {
-      parcel(TeamStatus{
-          .sender = self, .number = 3, .hears = {far}, .frame = self, .offers = {{9, 1, {2, 77}}}}),
-      parcel(Session{.id = {self, 4},
+      packet(TeamStatus{.sender = self,
+                        .number = 3,
+                        .receives = {far},
+                        .frame = self,
+                        .offers = {{9, 1, {2, 77}}}}),
+      packet(Session{.id = {self, 4},
                      .plan = {.frame = self,
                               .members = {{self, 4, {}}, {far, 3, kWriter.robot}},
                               .pairs = {{2, 9, {1, 6}}}}}),
-      parcel(std::move(poses)),
-      parcel(SessionLetter{.sender = self,
-                           .session = {self, 4},
-                           .number = 130,
-                           .to = kReader,
-                           .bytes = std::make_shared<const Bytes>(100, std::uint8_t{5})}),
+      packet(std::move(poses)),
+      packet(ReliableMessage{.sender = self,
+                             .session = {self, 4},
+                             .number = 130,
+                             .to = kReader,
+                             .bytes = std::make_shared<const Bytes>(100, std::uint8_t{5})}),
   };
 }
 
-UpLetter some_up_message(Eigen::Index block) {
-  UpLetter message{
+UpMessage some_up_message(Eigen::Index block) {
+  UpMessage message{
       .round = 3, .sums = {}, .reduced = Eigen::VectorXd::LinSpaced(2 * block, 0.0, 1.0)};
   TreeSystem system;
   system.variables = {{{2, 0}, 1, 1}, {{9, 300}, 1, 1}};
@@ -130,7 +137,7 @@ std::vector<MessageReader> all_messages() {
                            .name = "beta",
                            .settled_links = 3,
                            .relay = {.received = {kReader, 9}, .holds = {{{11, 12}, 13, 14}}}}}),
-      topic<RelayParcel>(
+      topic<RelayPacket>(
           {relayed({.kind = RelayKind::kIntroduction, .origin = {9, 1}, .content = {'c'}}),
            relayed({.kind = RelayKind::kIntroduction,
                     .origin = {9, 1},
@@ -146,11 +153,11 @@ std::vector<MessageReader> all_messages() {
                     .to = kReader,
                     .number = 3,
                     .content = {1, 2, 3}})}),
-      topic<TeamParcel>(some_parcels())};
+      topic<TeamPacket>(some_packets())};
   all.push_back({"messages up",
                  [](std::span<const std::uint8_t> bytes) { return decode_up(bytes).has_value(); },
                  {encode(some_up_message(3)), encode(some_up_message(6))}});
-  DownLetter down;
+  DownMessage down;
   down.verdict.round = 2;
   down.step = Eigen::VectorXd::LinSpaced(6, 0.0, 1.0);
   all.push_back({"messages down",

@@ -12,7 +12,7 @@
 #include "modules/pgo_study/member_team.hpp"
 #include "modules/pgo_study/odometry_start.hpp"
 #include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/tree_messages.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
 
 namespace km {
@@ -20,7 +20,7 @@ namespace km {
 /// A member's solver whose messages are passed to a listener.
 class ObservedMember final : public MemberSolver {
  public:
-  using Listener = std::function<void(const SolverLetter&)>;
+  using Listener = std::function<void(const SolverMessage&)>;
 
   ObservedMember(std::unique_ptr<MemberSolver> member, Listener listener)
       : member_(std::move(member)), listener_(std::move(listener)) {}
@@ -29,10 +29,10 @@ class ObservedMember final : public MemberSolver {
     return member_->receive(from, bytes);
   }
   [[nodiscard]] bool ready() const override { return member_->ready(); }
-  [[nodiscard]] std::vector<SolverLetter> advance() override {
-    std::vector<SolverLetter> letters = member_->advance();
-    for (const SolverLetter& letter : letters) listener_(letter);
-    return letters;
+  [[nodiscard]] std::vector<SolverMessage> advance() override {
+    std::vector<SolverMessage> messages = member_->advance();
+    for (const SolverMessage& message : messages) listener_(message);
+    return messages;
   }
   [[nodiscard]] bool done() const override { return member_->done(); }
   [[nodiscard]] const std::vector<SE3>& poses() const override { return member_->poses(); }
@@ -76,20 +76,20 @@ class Eavesdropper {
   // Adds the poses that the others have announced to a robot.
   void announced(const SessionGraph& part) {
     systems_.clear();
-    for (const auto& [id, T] : part.told) known_.insert(id);
+    for (const auto& [id, T] : part.public_poses) known_.insert(id);
   }
 
-  void receive(RobotId from, const SolverLetter& letter) {
+  void receive(RobotId from, const SolverMessage& message) {
     ++messages_;
-    bytes_ += letter.bytes->size();
-    if (is_up_letter(*letter.bytes)) {
-      const auto up = decode_up(*letter.bytes);
+    bytes_ += message.bytes->size();
+    if (is_up_message(*message.bytes)) {
+      const auto up = decode_up(*message.bytes);
       REQUIRE(up);
       receive(from, *up);
     } else {
-      const auto down = decode_down(*letter.bytes);
+      const auto down = decode_down(*message.bytes);
       REQUIRE(down);
-      receive(letter.to, *down);
+      receive(message.to, *down);
     }
   }
 
@@ -118,7 +118,7 @@ class Eavesdropper {
   }
 
  private:
-  void receive(RobotId from, const UpLetter& up) {
+  void receive(RobotId from, const UpMessage& up) {
     if (up.system) {
       const TreeSystem& system = *up.system;
       systems_[from] = system.variables.size();
@@ -133,7 +133,7 @@ class Eavesdropper {
     check_size(from, up.reduced.size());
   }
 
-  void receive(RobotId child, const DownLetter& down) { check_size(child, down.step.size()); }
+  void receive(RobotId child, const DownMessage& down) { check_size(child, down.step.size()); }
 
   // The numbers belong to the poses that the child has named.
   void check_size(RobotId child, Eigen::Index size) {
@@ -165,16 +165,17 @@ class Eavesdropper {
 };
 
 // Runs the default solver for at most `max_rounds` rounds.
-inline Eavesdropper listen_to(const TeamGraph& graph, bool tell_private, int max_rounds) {
+inline Eavesdropper listen_to(const TeamGraph& graph, bool share_private, int max_rounds) {
   Eavesdropper ear(graph);
-  const TreeNewtonOptions options{.dimension = graph.dimension, .tell_private = tell_private};
+  const TreeNewtonOptions options{.dimension = graph.dimension, .share_private = share_private};
   REQUIRE(options.robust);
   MemberTeam team(graph, 3, odometry_start(graph), [&](SessionGraph part, TreePlace place) {
     const RobotId self = part.self;
     ear.announced(part);
     auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);
     return std::make_unique<ObservedMember>(
-        std::move(member), [&ear, self](const SolverLetter& letter) { ear.receive(self, letter); });
+        std::move(member),
+        [&ear, self](const SolverMessage& message) { ear.receive(self, message); });
   });
   RoundMeter meter(graph.robots(), {});
   for (int round = 0; round < max_rounds && team.step(meter); ++round) {

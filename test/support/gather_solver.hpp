@@ -33,7 +33,7 @@ class GatherSolver final : public MemberSolver {
     double largest_residual = std::numeric_limits<double>::infinity();
     std::set<ClosureId> rejects = {};  ///< Further closures to reject.
     double barc = 0.0;
-    bool set_aside = false;  ///< Fields of the reported SolverState.
+    bool deferred = false;  ///< Fields of the reported SolverState.
     bool held = false;
   };
 
@@ -67,7 +67,7 @@ class GatherSolver final : public MemberSolver {
     return (ups == ups_.end() ? 0 : ups->second.size()) == place_.children.size();
   }
 
-  [[nodiscard]] std::vector<SolverLetter> advance() override {
+  [[nodiscard]] std::vector<SolverMessage> advance() override {
     if (options_.fails_in_round > 0 && round_ >= options_.fails_in_round)
       throw std::runtime_error("as requested by the test");
     if (options_.gives_up_in_round > 0 && round_ >= options_.gives_up_in_round) {
@@ -84,7 +84,7 @@ class GatherSolver final : public MemberSolver {
             .cost = cost_,
             .gradient = gradient_,
             .barc = options_.barc,
-            .set_aside = options_.set_aside,
+            .deferred = options_.deferred,
             .held = options_.held,
             .failed = failed_};
   }
@@ -155,7 +155,7 @@ class GatherSolver final : public MemberSolver {
     out.varint(graph_.to_absent.size());
     for (const PoseEdge& e : graph_.to_absent) {
       put(out, e);
-      put(out, graph_.told.at(e.other(graph_.self)));
+      put(out, graph_.public_poses.at(e.other(graph_.self)));
     }
     return out.release();
   }
@@ -175,14 +175,14 @@ class GatherSolver final : public MemberSolver {
     if (!in.done()) throw std::runtime_error("a message that cannot be read");
   }
 
-  SolverLetter letter(RobotId to, const std::vector<std::uint8_t>& rest) const {
+  SolverMessage message_to(RobotId to, const std::vector<std::uint8_t>& rest) const {
     auto bytes = std::make_shared<std::vector<std::uint8_t>>(4 + rest.size());
     for (std::size_t k = 0; k < 4; ++k) (*bytes)[k] = static_cast<std::uint8_t>(round_ >> (8U * k));
     std::copy(rest.begin(), rest.end(), bytes->begin() + 4);
     return {to, std::move(bytes)};
   }
 
-  std::vector<SolverLetter> go_up() {
+  std::vector<SolverMessage> go_up() {
     std::vector<std::uint8_t> gathered;
     if (round_ == 0) {
       gathered = own_part();
@@ -191,7 +191,7 @@ class GatherSolver final : public MemberSolver {
     }
     if (place_.parent) {
       waits_for_down_ = true;
-      return {letter(*place_.parent, gathered)};
+      return {message_to(*place_.parent, gathered)};
     }
     if (round_ == 0) {
       read_parts(gathered);
@@ -210,7 +210,7 @@ class GatherSolver final : public MemberSolver {
     return go_down(solution());
   }
 
-  std::vector<SolverLetter> go_down(const std::vector<std::uint8_t>& bytes) {
+  std::vector<SolverMessage> go_down(const std::vector<std::uint8_t>& bytes) {
     ByteReader in(bytes);
     cost_ = in.f64();
     gradient_ = in.f64();
@@ -229,12 +229,12 @@ class GatherSolver final : public MemberSolver {
                                     e.T_from_to, e.precision.kappa, e.precision.tau);
       residuals_[e.id()] = std::sqrt(cost);
     }
-    std::vector<SolverLetter> letters;
-    for (const RobotId child : place_.children) letters.push_back(letter(child, bytes));
+    std::vector<SolverMessage> messages;
+    for (const RobotId child : place_.children) messages.push_back(message_to(child, bytes));
     complete_ = round_++;
     waits_for_down_ = false;
     done_ = last;
-    return letters;
+    return messages;
   }
 
   void build() {

@@ -28,7 +28,7 @@ class VirtualNetwork {
   /// Disconnects or connects the cable of `host`.
   void set_link(int host, bool up);
 
-  /// Connects `a` and `b`, as at first, or disconnects them; other hosts still hear both. This
+  /// Connects `a` and `b`, as at first, or disconnects them; other hosts still receive both. This
   /// models robots on one radio channel of which some are out of reach.
   void set_link_between(int a, int b, bool up);
 

@@ -177,10 +177,10 @@ struct RandomTeam {
     }
     for (const KeyframeId& id : {e.from, e.to})
       if (e.from.robot != e.to.robot && id.robot != robot)
-        graph.told.emplace(id, problem.start.at(id.robot)[id.index]);
+        graph.public_poses.emplace(id, problem.start.at(id.robot)[id.index]);
   }
   for (const auto& [other, poses] : problem.start)
-    if (other != robot) graph.told.emplace(KeyframeId{other, 0}, poses[0]);
+    if (other != robot) graph.public_poses.emplace(KeyframeId{other, 0}, poses[0]);
   for (const auto& [other, sum] : steps)
     graph.step_precision[other] = {sum.first.kappa / sum.second, sum.first.tau / sum.second};
   graph.upright = !problem.verticals.empty();
@@ -293,7 +293,7 @@ using TeamTree = std::map<RobotId, TreePlace>;
 }
 
 /// Faults of the transport of messages, in steps of the clock.
-struct LetterPost {
+struct TransportFaults {
   int max_delay = 0;        ///< Each message is delayed by 0 to this many steps, so that messages
                             ///< overtake each other.
   double duplicated = 0.0;  ///< Share of the messages that arrive twice.
@@ -306,8 +306,8 @@ class SolverTeam {
  public:
   using Members = std::map<RobotId, std::unique_ptr<MemberSolver>>;
 
-  explicit SolverTeam(Members members, const LetterPost& post = {})
-      : members_(std::move(members)), post_(post), rng_(post.seed) {}
+  explicit SolverTeam(Members members, const TransportFaults& faults = {})
+      : members_(std::move(members)), faults_(faults), rng_(faults.seed) {}
 
   /// Runs until all are done. False if that takes more steps, or if no member has anything left to
   /// do.
@@ -327,8 +327,8 @@ class SolverTeam {
     for (auto& [robot, member] : members_) {
       if (!member->ready()) continue;
       busy = true;
-      if (post_.max_delay > 0 && std::bernoulli_distribution(0.5)(rng_)) continue;
-      for (SolverLetter& letter : member->advance()) send(robot, std::move(letter));
+      if (faults_.max_delay > 0 && std::bernoulli_distribution(0.5)(rng_)) continue;
+      for (SolverMessage& message : member->advance()) send(robot, std::move(message));
       if (after_advance) after_advance(robot, *member);
     }
     return busy;
@@ -361,15 +361,15 @@ class SolverTeam {
  private:
   struct Delivery {
     RobotId from = 0;
-    SolverLetter letter;
+    SolverMessage message;
   };
 
-  void send(RobotId from, SolverLetter letter) {
-    bytes_[from] += letter.bytes->size();
-    const int copies = std::bernoulli_distribution(post_.duplicated)(rng_) ? 2 : 1;
+  void send(RobotId from, SolverMessage message) {
+    bytes_[from] += message.bytes->size();
+    const int copies = std::bernoulli_distribution(faults_.duplicated)(rng_) ? 2 : 1;
     for (int copy = 0; copy < copies; ++copy) {
-      const int delay = std::uniform_int_distribution<int>(0, post_.max_delay)(rng_);
-      in_flight_.emplace(now_ + 1 + static_cast<std::size_t>(delay), Delivery{from, letter});
+      const int delay = std::uniform_int_distribution<int>(0, faults_.max_delay)(rng_);
+      in_flight_.emplace(now_ + 1 + static_cast<std::size_t>(delay), Delivery{from, message});
     }
   }
 
@@ -377,16 +377,16 @@ class SolverTeam {
     std::vector<Delivery> due;
     while (!in_flight_.empty() && in_flight_.begin()->first <= now_)
       due.push_back(in_flight_.extract(in_flight_.begin()).mapped());
-    if (post_.max_delay > 0) std::shuffle(due.begin(), due.end(), rng_);
+    if (faults_.max_delay > 0) std::shuffle(due.begin(), due.end(), rng_);
     for (const Delivery& delivery : due) {
-      const auto to = members_.find(delivery.letter.to);
-      if (to != members_.end() && !to->second->receive(delivery.from, *delivery.letter.bytes))
+      const auto to = members_.find(delivery.message.to);
+      if (to != members_.end() && !to->second->receive(delivery.from, *delivery.message.bytes))
         ++refused_;
     }
   }
 
   Members members_;
-  LetterPost post_;
+  TransportFaults faults_;
   std::mt19937 rng_;
   std::multimap<std::size_t, Delivery> in_flight_;
   std::map<RobotId, std::size_t> bytes_;
@@ -397,11 +397,11 @@ class SolverTeam {
 /// A member for every place of the tree: `make(graph, place)` returns the solver.
 template <typename Make>
 [[nodiscard]] SolverTeam solver_team(const TeamProblem& problem, const TeamTree& tree,
-                                     const LetterPost& post, Make&& make) {
+                                     const TransportFaults& faults, Make&& make) {
   SolverTeam::Members members;
   for (const auto& [robot, place] : tree)
     members[robot] = make(session_graph(problem, robot), place);
-  return SolverTeam(std::move(members), post);
+  return SolverTeam(std::move(members), faults);
 }
 
 }  // namespace km

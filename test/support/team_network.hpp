@@ -44,7 +44,7 @@ class TeamNetwork {
     std::vector<std::string> notices = {};
     std::size_t bytes =
         0;  ///< Bytes sent, counted for every reader, including relayed and lost ones.
-    std::size_t parcels = 0;  ///< Messages sent, counted in the same way.
+    std::size_t packets = 0;  ///< Messages sent, counted in the same way.
     bool steps_now = true;
   };
 
@@ -59,9 +59,9 @@ class TeamNetwork {
   /// After every step of a robot.
   std::function<void(const Robot&)> on_step = {};
   /// Called with every message before it is sent.
-  std::function<void(RobotId from, const Parcel&)> on_parcel = {};
+  std::function<void(RobotId from, const LinkPacket&)> on_packet = {};
   /// Loses the messages for which it returns true.
-  std::function<bool(RobotId from, const Parcel&)> loses = {};
+  std::function<bool(RobotId from, const LinkPacket&)> loses = {};
 
   TeamAgent& add(TeamPeer peer, const PoseGraphConfig& config, const MemberSolverFactory& factory) {
     Robot& robot = robots[peer.robot];
@@ -251,22 +251,22 @@ class TeamNetwork {
     if (output.progress) robot.progress = std::move(*output.progress);
     if (output.verdicts) robot.verdicts = std::move(*output.verdicts);
     for (std::string& notice : output.notices) robot.notices.push_back(std::move(notice));
-    for (const Parcel& parcel : output.parcels) send(robot, parcel);
+    for (const LinkPacket& packet : output.packets) send(robot, packet);
     if (on_step) on_step(robot);
   }
 
-  void send(Robot& from, const Parcel& parcel) {
-    if (on_parcel) on_parcel(from.peer.robot, parcel);
-    const auto& [size, message] = across(parcel.message);
+  void send(Robot& from, const LinkPacket& packet) {
+    if (on_packet) on_packet(from.peer.robot, packet);
+    const auto& [size, message] = across(packet.message);
     from.bytes += size;
-    ++from.parcels;
-    if (!message || !connected(from.peer.robot, parcel.next)) {
+    ++from.packets;
+    if (!message || !connected(from.peer.robot, packet.next)) {
       ++lost;
       return;
     }
-    const NetworkLink link = this->link(from.peer.robot, parcel.next);
+    const NetworkLink link = this->link(from.peer.robot, packet.next);
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
-    if (uniform(rng_) < link.lost || (loses && loses(from.peer.robot, parcel))) {
+    if (uniform(rng_) < link.lost || (loses && loses(from.peer.robot, packet))) {
       ++lost;
       return;
     }
@@ -274,7 +274,7 @@ class TeamNetwork {
     for (int copy = 0; copy < copies; ++copy) {
       const double delay_s =
           link.min_delay_s + (link.max_delay_s - link.min_delay_s) * uniform(rng_);
-      in_flight_.emplace(now_s_ + delay_s, Delivery{from.peer.robot, parcel.next, message});
+      in_flight_.emplace(now_s_ + delay_s, Delivery{from.peer.robot, packet.next, message});
     }
   }
 

@@ -11,7 +11,7 @@
 #include "modules/mesh/mesh_codec.hpp"
 #include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/place_recognition_codec.hpp"
-#include "modules/pose_graph/parcel_codec.hpp"
+#include "modules/pose_graph/packet_codec.hpp"
 #include "modules/relay/relay_endorsement.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 
@@ -38,7 +38,7 @@ struct FloodPeer {
     bridge.exchange(replies, kRequest, kOther, {}, {}, unsigned_guard<KeyframeReply>(has_keys));
     bridge.exchange(closures, kEvent, kOther, kSends);
     bridge.exchange(inlier_sets, kState, kOther, kSends);
-    bridge.exchange(parcels, kRequest, kOther);
+    bridge.exchange(packets, kRequest, kOther);
     bridge.exchange(chunks, kState, kOther, kSends);
   }
   ~FloodPeer() {
@@ -91,7 +91,7 @@ struct FloodPeer {
   AddressedCrossing<KeyframeReply> replies;
   AddressedCrossing<Closure> closures;
   AddressedCrossing<InlierSet> inlier_sets;
-  AddressedCrossing<TeamParcel> parcels;
+  AddressedCrossing<TeamPacket> packets;
   Crossing<MeshChunk> chunks;
   Crossing<RobotStatus> statuses;
   DdsBridge bridge;

@@ -159,7 +159,7 @@ void find_closures_between_ends(bool has_keys) {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
-  // c hears a alone, then b as well.
+  // c receives a alone, then b as well.
   const std::string links = folder
                                 .write("links.yaml",
                                        "pairs:\n"

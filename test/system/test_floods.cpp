@@ -59,8 +59,8 @@ TeamPeer made_up(std::uint32_t number) {
 
 template <typename Message>
 void send(FloodPeer& from, Message message) {
-  from.parcels.to_peers().publish(
-      {kVictim, std::make_shared<const TeamParcel>(TeamParcel{
+  from.packets.to_peers().publish(
+      {kVictim, std::make_shared<const TeamPacket>(TeamPacket{
                     from.self().robot, std::make_shared<const TeamMessage>(std::move(message))})});
 }
 
@@ -140,20 +140,20 @@ std::vector<Flood> all_floods() {
       {"team statuses",
        [](FloodPeer& from, std::uint32_t i) {
          TeamStatus status{.sender = made_up(i), .number = i + 1, .frame = made_up(i)};
-         for (RobotId robot = 1000; robot < 1200; ++robot) status.hears.push_back({robot, i});
+         for (RobotId robot = 1000; robot < 1200; ++robot) status.receives.push_back({robot, i});
          send(from, std::move(status));
        }},
       {"sessions", [](FloodPeer& from, std::uint32_t i) { send(from, large_session(i)); }},
       {"public poses", [](FloodPeer& from, std::uint32_t i) { send(from, many_poses(i)); }},
       {"session messages",
        [](FloodPeer& from, std::uint32_t i) {
-         send(from, SessionLetter{.sender = made_up(i),
-                                  .session = {made_up(i), 1},
-                                  .number = i,
-                                  .to = i % 2 == 0 ? kVictim : kFar,
-                                  .bytes = std::make_shared<const std::vector<std::uint8_t>>(
-                                      10000, std::uint8_t{1}),
-                                  .copy = i});
+         send(from, ReliableMessage{.sender = made_up(i),
+                                    .session = {made_up(i), 1},
+                                    .number = i,
+                                    .to = i % 2 == 0 ? kVictim : kFar,
+                                    .bytes = std::make_shared<const std::vector<std::uint8_t>>(
+                                        10000, std::uint8_t{1}),
+                                    .copy = i});
        }},
       {"statuses",
        [](FloodPeer& from, std::uint32_t i) {
@@ -195,8 +195,8 @@ class Scene {
         far_(peer(flood, kFar)) {
     friend_.replies.from_peers().subscribe(
         [this](const auto& reply) { replies.answered(reply->number); });
-    far_.parcels.from_peers().subscribe([this](const auto& parcel) {
-      const auto* status = std::get_if<TeamStatus>(parcel->message.get());
+    far_.packets.from_peers().subscribe([this](const auto& packet) {
+      const auto* status = std::get_if<TeamStatus>(packet->message.get());
       if (status != nullptr && status->sender == friend_.self()) relayed.answered(status->number);
     });
     for (FloodPeer* peer : {&flooder, &friend_, &far_}) peer->start();
@@ -215,9 +215,9 @@ class Scene {
     relayed.asked(number);
     const TeamStatus status{
         .sender = friend_.self(), .number = number, .frame = friend_.self(), .keyframes = number};
-    friend_.parcels.to_peers().publish(
-        {kVictim, std::make_shared<const TeamParcel>(
-                      TeamParcel{kFriend, std::make_shared<const TeamMessage>(status)})});
+    friend_.packets.to_peers().publish(
+        {kVictim, std::make_shared<const TeamPacket>(
+                      TeamPacket{kFriend, std::make_shared<const TeamMessage>(status)})});
   }
   [[nodiscard]] bool all_answered() const {
     return replies.all_answered() && relayed.all_answered();

@@ -12,7 +12,7 @@
 #include "test/system/team_run.hpp"
 
 // Teams on recorded pose graphs: a process for each robot, in one network, and in separate networks
-// if some robots do not hear each other.
+// if some robots do not receive each other.
 
 namespace km {
 namespace {

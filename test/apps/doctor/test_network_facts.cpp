@@ -50,7 +50,7 @@ TEST_CASE("A sound network has no findings", "[doctor]") {
   NetworkFacts facts = sound();
   CHECK(ids_of(facts).empty());
   facts.announced = {robot(7, "alice")};
-  facts.received = facts.announced;  // the same process, heard twice
+  facts.received = facts.announced;  // the same process, received twice
   facts.echoes = {
       {.host = "10.0.0.2", .sent = 20, .received = 20, .median_s = 2e-3, .worst_s = 9e-3}};
   facts.clocks = {{"alice (id 7)", -0.002}};

@@ -123,12 +123,12 @@ TeamGraph clean_graph(unsigned seed) {
 TEST_CASE("false closures follow a graph's own edges and depend on the seed alone", "[outliers]") {
   TeamGraph graph = clean_graph(1);
   graph.edges[1].kappa = 7.0;
-  const TeamGraph spoiled = spoil(graph, 50, 4.0, 3);
-  REQUIRE(spoiled.edges.size() == graph.edges.size() + 50);
-  const TeamGraph again = spoil(graph, 50, 4.0, 3);
+  const TeamGraph corrupted = corrupt(graph, 50, 4.0, 3);
+  REQUIRE(corrupted.edges.size() == graph.edges.size() + 50);
+  const TeamGraph again = corrupt(graph, 50, 4.0, 3);
   std::set<double> kappas;
-  for (std::size_t k = 0; k < spoiled.edges.size(); ++k) {
-    const BlockEdge& e = spoiled.edges[k];
+  for (std::size_t k = 0; k < corrupted.edges.size(); ++k) {
+    const BlockEdge& e = corrupted.edges[k];
     CHECK(e.T_i_j.matrix() == again.edges[k].T_i_j.matrix());
     if (k < graph.edges.size()) continue;
     CHECK(std::abs(e.i - e.j) > 1);
@@ -136,18 +136,18 @@ TEST_CASE("false closures follow a graph's own edges and depend on the seed alon
     kappas.insert(e.kappa);
   }
   CHECK(kappas.contains(0.5 / (kSigma * kSigma)));
-  CHECK(spoil(graph, 1, 4.0, 4).edges.back().T_i_j.matrix() !=
-        spoiled.edges[graph.edges.size()].T_i_j.matrix());
+  CHECK(corrupt(graph, 1, 4.0, 4).edges.back().T_i_j.matrix() !=
+        corrupted.edges[graph.edges.size()].T_i_j.matrix());
   std::erase_if(graph.edges, [](const BlockEdge& e) { return e.j != e.i + 1; });
-  CHECK_THROWS_AS(spoil(graph, 1, 4.0, 3), std::invalid_argument);
+  CHECK_THROWS_AS(corrupt(graph, 1, 4.0, 3), std::invalid_argument);
 }
 
 TEST_CASE("pairwise consistency keeps true closures and no false ones", "[outliers]") {
   const unsigned seed = GENERATE(1U, 2U);
   CAPTURE(seed);
   const std::size_t own_edges = clean_graph(seed).edges.size();
-  const TeamGraph spoiled = spoil(clean_graph(seed), 40, 30.0, seed);
-  const std::vector<bool> kept = pairwise_consistent(spoiled, {});
+  const TeamGraph corrupted = corrupt(clean_graph(seed), 40, 30.0, seed);
+  const std::vector<bool> kept = pairwise_consistent(corrupted, {});
   std::size_t true_lost = 0, false_kept = 0;
   for (std::size_t k = 0; k < kept.size(); ++k) {
     if (k >= own_edges && kept[k]) ++false_kept;
@@ -164,10 +164,10 @@ TEST_CASE("pairwise consistency multiplies all sigmas by the given scale", "[out
     e.kappa *= kScale * kScale;
     e.tau *= kScale * kScale;
   }
-  const auto kept = pairwise_consistent(spoil(clean_graph(1), 40, 30.0, 1), {});
-  const TeamGraph spoiled = spoil(modest, 40, 30.0, 1);
-  CHECK(pairwise_consistent(spoiled, {}, kScale) == kept);
-  CHECK(pairwise_consistent(spoiled, {}) != kept);
+  const auto kept = pairwise_consistent(corrupt(clean_graph(1), 40, 30.0, 1), {});
+  const TeamGraph corrupted = corrupt(modest, 40, 30.0, 1);
+  CHECK(pairwise_consistent(corrupted, {}, kScale) == kept);
+  CHECK(pairwise_consistent(corrupted, {}) != kept);
 }
 
 TEST_CASE("pairwise consistency refuses a robot with interrupted odometry", "[outliers]") {
@@ -179,15 +179,15 @@ TEST_CASE("pairwise consistency refuses a robot with interrupted odometry", "[ou
 TEST_CASE("rejected closures do not distort the map, and kept false ones do", "[outliers]") {
   const OutlierStudyOptions options{
       .shares_percent = {0.0, 30.0}, .methods = kRejections, .barc = 6.0};
-  std::vector<std::size_t> told;
-  const OutlierStudy study =
-      run_outlier_study(clean_graph(5), options, {},
-                        [&](std::size_t done, std::size_t all) { told.push_back(all - done); });
+  std::vector<std::size_t> remaining;
+  const OutlierStudy study = run_outlier_study(
+      clean_graph(5), options, {},
+      [&](std::size_t done, std::size_t all) { remaining.push_back(all - done); });
   CHECK(study.certified);
   CHECK(study.half_side_m > 1.0);
   REQUIRE(study.results.size() == 8);
-  CHECK(told.size() == 9);
-  CHECK(told.back() == 0);
+  CHECK(remaining.size() == 9);
+  CHECK(remaining.back() == 0);
   for (const OutlierResult& result : study.results) {
     CAPTURE(result.method, result.share_percent);
     CHECK(result.true_kept <= study.true_closures);

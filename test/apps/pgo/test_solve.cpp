@@ -130,7 +130,7 @@ TEST_CASE("newton decides on closures and reports their noise", "[pgo]") {
   const std::string step = folder.write("step.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string();
   const auto json = folder.path() / "out.json";
   for (const std::string& arguments : {step, square + " --robots 2", square + " --reject-odometry",
-                                       square + " --robots 2 --tell-private"}) {
+                                       square + " --robots 2 --share-private"}) {
     const CommandResult result = run_command(kSolveTool + arguments + " --json " + json.string());
     CAPTURE(arguments, result.output);
     CHECK(result.exit_code == 0);

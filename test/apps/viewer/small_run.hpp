@@ -52,14 +52,14 @@ class SmallRun {
                  "seconds,round,members,cost,gradient_norm\n0,1,1,5,0.1\n0.1,2,2,7,0.01\n");
     folder.write(at + "traffic.csv",
                  "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
-                 "2,out,parcels,pgo," +
+                 "2,out,packets,pgo," +
                      other +
                      ",1,100,0\n"
-                     "6,out,parcels,pgo," +
+                     "6,out,packets,pgo," +
                      other +
                      ",2,200,40\n"
-                     "6,out,parcels,pgo,*,0,0,15\n"
-                     "6,in,parcels,pgo," +
+                     "6,out,packets,pgo,*,0,0,15\n"
+                     "6,in,packets,pgo," +
                      other + ",2,200,0\n");
     folder.write(at + "timing.csv",
                  "module,calls,median_ms,p95_ms,max_ms,total_s\nvio,9,1,1,1,3\n");

@@ -46,9 +46,9 @@ class AskedTeam {
           auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);
           members_[self] = member.get();
           return std::make_unique<ObservedMember>(std::move(member),
-                                                  [this, self](const SolverLetter& letter) {
-                                                    letter_bytes_ += letter.bytes->size();
-                                                    if (!neighbours_[self].contains(letter.to))
+                                                  [this, self](const SolverMessage& message) {
+                                                    message_bytes_ += message.bytes->size();
+                                                    if (!neighbours_[self].contains(message.to))
                                                       ++misaddressed_;
                                                   });
         },
@@ -72,7 +72,7 @@ class AskedTeam {
   }
   [[nodiscard]] const MemberTeam& team() const { return *team_; }
   [[nodiscard]] const TreeNewton& member(std::size_t robot) const { return *members_[robot]; }
-  [[nodiscard]] std::size_t letter_bytes() const { return letter_bytes_; }
+  [[nodiscard]] std::size_t message_bytes() const { return message_bytes_; }
   [[nodiscard]] std::size_t misaddressed() const { return misaddressed_; }
   [[nodiscard]] std::size_t counted_bytes() { return meter_.finish_round().bytes; }
 
@@ -81,7 +81,7 @@ class AskedTeam {
   std::vector<TreeNewton*> members_;  // members of the last session; MemberTeam owns them
   std::vector<std::set<RobotId>> neighbours_;
   RoundMeter meter_;
-  std::size_t letter_bytes_ = 0;
+  std::size_t message_bytes_ = 0;
   std::size_t misaddressed_ = 0;
   std::optional<MemberTeam> team_;
 };
@@ -127,9 +127,9 @@ double half_side_m(const std::vector<SE3>& poses) {
 
 // Adds false closures between poses that no true edge joins, because a robot uses only one closure
 // between two keyframes.
-class Spoiler {
+class Corrupter {
  public:
-  Spoiler(TeamGraph graph, const std::vector<SE3>& truth, unsigned seed)
+  Corrupter(TeamGraph graph, const std::vector<SE3>& truth, unsigned seed)
       : graph_(std::move(graph)), truth_(truth), half_side_m_(half_side_m(truth)), rng_(seed) {
     const std::vector<bool> odometry = odometry_edges(graph_);
     for (std::size_t k = 0; k < odometry.size(); ++k) {
@@ -203,8 +203,8 @@ struct Kept {
   std::size_t of_false = 0;
 };
 
-Kept count_kept(const MemberTeam& team, const TeamGraph& spoiled, std::size_t true_edges) {
-  const std::vector<bool> odometry = odometry_edges(spoiled);
+Kept count_kept(const MemberTeam& team, const TeamGraph& corrupted, std::size_t true_edges) {
+  const std::vector<bool> odometry = odometry_edges(corrupted);
   const std::vector<bool> kept = team.kept();
   Kept count;
   for (std::size_t k = 0; k < kept.size(); ++k) {
@@ -218,7 +218,7 @@ Kept count_kept(const MemberTeam& team, const TeamGraph& spoiled, std::size_t tr
 constexpr const char* kSphere = "pose_graphs/3d/sphere2500.g2o";
 constexpr const char* kGarage = "pose_graphs/3d/parking-garage.g2o";
 
-struct Spoilt {
+struct FalseClosures {
   double share = 0.0;  // random false closures per true one
   std::size_t places = 0;
   Index size = 0;  // closures of the cluster at each place
@@ -226,12 +226,12 @@ struct Spoilt {
 
 constexpr std::size_t kPlaces = 5;
 
-TeamGraph spoilt_graph(const TeamGraph& clean, const std::vector<SE3>& truth, const Spoilt& spoilt,
-                       unsigned seed) {
-  Spoiler spoiler(clean, truth, seed);
-  spoiler.add_random(spoilt.share);
-  spoiler.add_clusters(spoilt.places, spoilt.size);
-  return spoiler.graph();
+TeamGraph corrupted_graph(const TeamGraph& clean, const std::vector<SE3>& truth,
+                          const FalseClosures& added, unsigned seed) {
+  Corrupter corrupter(clean, truth, seed);
+  corrupter.add_random(added.share);
+  corrupter.add_clusters(added.places, added.size);
+  return corrupter.graph();
 }
 
 // Largest accepted RMSE to the optimum of the true closures. Measured with up to 100 false closures
@@ -243,17 +243,17 @@ double most_rmse_m(const std::string& name) {
 
 // Checks that a team with default options reaches the optimum of the true closures and keeps them
 // all. Returns the number of rounds; 0 if there are no data.
-std::uint32_t check_spoilt(const std::string& name, std::size_t robots, const Spoilt& spoilt,
-                           unsigned seed) {
+std::uint32_t check_false_closures(const std::string& name, std::size_t robots,
+                                   const FalseClosures& added, unsigned seed) {
   const auto clean = dealt(name, robots);
   if (!clean) return 0;
   const std::vector<SE3> truth = optimum_of(*clean);
-  const TeamGraph graph = spoilt_graph(*clean, truth, spoilt, seed);
+  const TeamGraph graph = corrupted_graph(*clean, truth, added, seed);
   REQUIRE(graph.edges.size() > clean->edges.size());
   AskedTeam asked(graph, odometry_start(graph), {});
   const bool ended = asked.run(kMostRounds);
   const Kept kept = count_kept(asked.team(), graph, clean->edges.size());
-  CAPTURE(name, robots, spoilt.share, spoilt.places, spoilt.size, seed);
+  CAPTURE(name, robots, added.share, added.places, added.size, seed);
   CAPTURE(asked.team().rounds(), asked.team().state().noise_scale);
   CHECK(ended);
   CHECK_FALSE(asked.team().state().failed);
@@ -264,11 +264,11 @@ std::uint32_t check_spoilt(const std::string& name, std::size_t robots, const Sp
 }
 
 TEST_CASE("A team rejects random false closures", "[pgo_study]") {
-  (void)check_spoilt(kSphere, 3, {.share = 0.3}, 1);
+  (void)check_false_closures(kSphere, 3, {.share = 0.3}, 1);
 }
 
 TEST_CASE("A team rejects false closures that agree with each other", "[pgo_study]") {
-  (void)check_spoilt(kSphere, 3, {.places = kPlaces, .size = 5}, 1);
+  (void)check_false_closures(kSphere, 3, {.places = kPlaces, .size = 5}, 1);
 }
 
 // Number of closures by pair of robots, the lower one first.
@@ -283,23 +283,24 @@ std::map<std::pair<std::size_t, std::size_t>, std::size_t> closures_between(
 }
 
 TEST_CASE("False closures of the pair with most closures do not place the robots", "[pgo_study]") {
-  const Spoilt spoilt{.share = 0.1, .places = 8, .size = 10};
+  const FalseClosures added{.share = 0.1, .places = 8, .size = 10};
   const auto clean = dealt(kSphere, 5);
   if (!clean) return;
   // Most closures are between the first robot and the last, and all of these are false.
   REQUIRE_FALSE(closures_between(*clean).contains({0, 4}));
-  const auto count = closures_between(spoilt_graph(*clean, optimum_of(*clean), spoilt, 1));
+  const auto count = closures_between(corrupted_graph(*clean, optimum_of(*clean), added, 1));
   for (const auto& [pair, closures] : count)
     if (pair != std::pair<std::size_t, std::size_t>(0, 4)) CHECK(closures < count.at({0, 4}));
-  (void)check_spoilt(kSphere, 5, spoilt, 1);
+  (void)check_false_closures(kSphere, 5, added, 1);
 }
 
 // Measured: 29, 26, 25 rounds with places of 2 closures, 46, 30, 28 with places of 10.
 TEST_CASE("Many false closures that agree cost less than twice the rounds of few", "[pgo_study]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
-  const std::uint32_t few = check_spoilt(kGarage, 3, {.places = kPlaces, .size = 2}, seed);
-  const std::uint32_t many = check_spoilt(kGarage, 3, {.places = kPlaces, .size = 10}, seed);
+  const std::uint32_t few = check_false_closures(kGarage, 3, {.places = kPlaces, .size = 2}, seed);
+  const std::uint32_t many =
+      check_false_closures(kGarage, 3, {.places = kPlaces, .size = 10}, seed);
   CHECK((many < 2 * few || few == 0));  // 0: no data
 }
 
@@ -308,7 +309,7 @@ TEST_CASE("A team rejects random false closures, however many", "[.][slow][pgo_s
   const std::size_t robots = GENERATE(3, 5);
   const double share = GENERATE(0.1, 0.3, 0.8);
   const unsigned seed = GENERATE(1U, 2U, 3U);
-  (void)check_spoilt(name, robots, {.share = share}, seed);
+  (void)check_false_closures(name, robots, {.share = share}, seed);
 }
 
 TEST_CASE("A team rejects false closures that agree, few or many", "[.][slow][pgo_study]") {
@@ -318,7 +319,7 @@ TEST_CASE("A team rejects false closures that agree, few or many", "[.][slow][pg
   const unsigned seed = GENERATE(1U, 2U, 3U);
   const std::size_t places = GENERATE(as<std::size_t>(), kPlaces, 2 * kPlaces);
   const double share = GENERATE(0.0, 0.1);
-  (void)check_spoilt(name, robots, {.share = share, .places = places, .size = size}, seed);
+  (void)check_false_closures(name, robots, {.share = share, .places = places, .size = size}, seed);
 }
 
 struct Certified {
@@ -399,8 +400,8 @@ TEST_CASE("A solver message goes to one neighbour in the tree", "[pgo_study]") {
     for (const PoseEdge& e : part_of(graph, k).between) announced.insert({e.from, e.to});
   // Public poses go to all other robots. As a broadcast each counts once.
   const std::size_t poses = announced.size() * (7 * sizeof(float) + 2);
-  CHECK(sent == asked.letter_bytes() + (graph.robots() - 1) * poses);
-  CHECK(asked.counted_bytes() == asked.letter_bytes() + poses);
+  CHECK(sent == asked.message_bytes() + (graph.robots() - 1) * poses);
+  CHECK(asked.counted_bytes() == asked.message_bytes() + poses);
 }
 
 // Checks that one of the two robots of a closure decides it, and that all verdicts agree.
@@ -425,7 +426,7 @@ void check_decided_once(const AskedTeam& asked, const TeamGraph& graph) {
   std::size_t not_once = 0, contradictory = 0;
   for (const ClosureId& id : parallel) verdicts.erase(id);
   for (const auto& [id, count] : undecided) not_once += count != 0 ? 1 : 0;
-  for (const auto& [id, told] : verdicts) contradictory += told.size() > 1 ? 1 : 0;
+  for (const auto& [id, given] : verdicts) contradictory += given.size() > 1 ? 1 : 0;
   CHECK(not_once == 0);
   CHECK(contradictory == 0);
 }
@@ -434,11 +435,11 @@ TEST_CASE("Every closure is decided by exactly one of its two robots", "[pgo_stu
   const auto clean = dealt("pose_graphs/3d/smallGrid3D.g2o", 4);
   if (!clean) return;
   const std::vector<SE3> truth = optimum_of(*clean);
-  Spoiler spoiler(*clean, truth, 4);
-  spoiler.add_random(GENERATE(0.1, 0.8));
-  AskedTeam asked(spoiler.graph(), odometry_start(spoiler.graph()), kExact);
+  Corrupter corrupter(*clean, truth, 4);
+  corrupter.add_random(GENERATE(0.1, 0.8));
+  AskedTeam asked(corrupter.graph(), odometry_start(corrupter.graph()), kExact);
   REQUIRE(asked.run(100));
-  check_decided_once(asked, spoiler.graph());
+  check_decided_once(asked, corrupter.graph());
 }
 
 // Number of groups of robots that kept edges connect.

@@ -47,7 +47,7 @@ TEST_CASE("No private pose can be derived from the poses and edges that robots s
             << " sent edges, " << ear.bytes() << " bytes");
 }
 
-TEST_CASE("With tell_private, private poses can be derived from the messages", "[pgo_study]") {
+TEST_CASE("With share_private, private poses can be derived from the messages", "[pgo_study]") {
   const auto [name, robots] = GENERATE(values(kGraphs));
   CAPTURE(name);
   const auto graph = recorded(name, robots);

@@ -40,12 +40,12 @@ TEST_CASE("a drifted trajectory is deformed to the poses of other robots", "[pos
   CAPTURE(seed);
   const Drifted robot(seed);
   std::mt19937 rng(seed + 10);
-  std::map<KeyframeId, SE3> told;
+  std::map<KeyframeId, SE3> received;
   std::vector<PoseEdge> closures;
   for (const std::uint32_t k : {0U, 14U, 29U}) {
     const KeyframeId other{0, k};
-    told[other] = robot.truth[k] * random_pose(rng, 1.0);
-    const SE3 T_own_other = robot.truth[k].inverse() * told[other];
+    received[other] = robot.truth[k] * random_pose(rng, 1.0);
+    const SE3 T_own_other = robot.truth[k].inverse() * received[other];
     if (k == 14U)  // measured from the other robot
       closures.push_back({other, {1, k}, T_own_other.inverse(), {100.0, 10.0}});
     else
@@ -54,7 +54,7 @@ TEST_CASE("a drifted trajectory is deformed to the poses of other robots", "[pos
   // Its other robot has not sent this pose.
   closures.push_back({{1, 3}, {2, 0}, random_pose(rng), {100.0, 10.0}});
   CHECK_FALSE(robot.equals_truth(robot.poses));
-  CHECK(robot.equals_truth(bent_to_told(robot.poses, 1, robot.own, closures, told)));
+  CHECK(robot.equals_truth(deformed_to_received(robot.poses, 1, robot.own, closures, received)));
 }
 
 TEST_CASE("the chordal initialisation replaces poses of a higher cost only", "[pose_graph]") {

@@ -126,11 +126,11 @@ TeamProblem with_lie(const Walk& walk, const Lie& lie, unsigned seed) {
       moved[robot] = lie.offset_m * direction(rng);
     }
   std::uniform_int_distribution<std::uint32_t> any(0, kKeyframes - 1);
-  for (int told = 0; told < lie.closures;) {
+  for (int sent = 0; sent < lie.closures;) {
     const KeyframeId from{lie.liar, any(rng)};
-    const KeyframeId to{others[static_cast<std::size_t>(told) % others.size()], any(rng)};
+    const KeyframeId to{others[static_cast<std::size_t>(sent) % others.size()], any(rng)};
     if (!known.insert(closure_id(from, to)).second) continue;
-    ++told;
+    ++sent;
     const Eigen::Vector3d off = lie.consistent ? moved[to.robot] : lie.offset_m * direction(rng);
     SE3 T_world_to = walk.truth.at(to.robot)[to.index];
     T_world_to.translation() += off;

@@ -17,7 +17,7 @@ struct Relays {
 
   explicit Relays(const std::vector<std::pair<RobotId, RobotId>>& pairs) {
     for (const auto& [a, b] : pairs) up(a, b);
-    for (int k = 0; k < 10; ++k) tell_all();
+    for (int k = 0; k < 10; ++k) send_statuses();
   }
   Relay& at(RobotId robot) { return of.try_emplace(robot, TeamPeer{robot, 1}, 1.0).first->second; }
   void up(RobotId a, RobotId b) {
@@ -32,10 +32,10 @@ struct Relays {
     at(b).link_down(a, now_s);
   }
   // All robots send statuses, after a possible change of links.
-  void tell_all() {
+  void send_statuses() {
     for (auto& [robot, relay] : of) {
       relay.step(now_s);
-      (void)relay.say(TeamStatus{.sender = {robot, 1}, .frame = {robot, 1}}, now_s);
+      (void)relay.publish(TeamStatus{.sender = {robot, 1}, .frame = {robot, 1}}, now_s);
     }
     carry();
   }
@@ -44,20 +44,20 @@ struct Relays {
     carry();
   }
   void carry() {
-    std::deque<std::pair<RobotId, Parcel>> on_the_way;
+    std::deque<std::pair<RobotId, LinkPacket>> on_the_way;
     const auto collect = [&] {
       for (auto& [robot, relay] : of)
-        for (Parcel& parcel : relay.take_parcels()) {
+        for (LinkPacket& packet : relay.take_packets()) {
           ++sent[robot];
-          on_the_way.emplace_back(robot, std::move(parcel));
+          on_the_way.emplace_back(robot, std::move(packet));
         }
     };
     for (collect(); !on_the_way.empty(); collect()) {
-      const auto [from, parcel] = on_the_way.front();
+      const auto [from, packet] = on_the_way.front();
       on_the_way.pop_front();
-      if (!links.contains({from, parcel.next}) || losing) continue;
-      if (at(parcel.next).receive(from, parcel.message, now_s) == Arrival::kNew)
-        read[parcel.next].push_back(parcel.message);
+      if (!links.contains({from, packet.next}) || losing) continue;
+      if (at(packet.next).receive(from, packet.message, now_s) == Arrival::kNew)
+        read[packet.next].push_back(packet.message);
     }
   }
   void forget() {
@@ -79,7 +79,7 @@ struct Relays {
 
 using Pairs = std::vector<std::pair<RobotId, RobotId>>;
 
-SessionLetter letter(RobotId from, RobotId to) {
+ReliableMessage reliable(RobotId from, RobotId to) {
   return {
       .sender = {from, 1}, .to = to, .bytes = std::make_shared<const std::vector<std::uint8_t>>(3)};
 }
@@ -94,7 +94,7 @@ TEST_CASE("all robots receive each message once, over any links", "[pose_graph][
   Relays relays(pairs);
   relays.forget();
   for (const RobotId robot : {RobotId{1}, RobotId{3}, RobotId{6}})
-    (void)relays.at(robot).say(MemberPoses{.sender = {robot, 1}}, 0.0);
+    (void)relays.at(robot).publish(MemberPoses{.sender = {robot, 1}}, 0.0);
   relays.carry();
   for (const auto& [robot, relay] : relays.of) {
     CAPTURE(robot);
@@ -109,7 +109,7 @@ TEST_CASE("nothing is forwarded if all robots receive each other", "[pose_graph]
     for (RobotId b = 1; b < a; ++b) pairs.emplace_back(a, b);
   Relays relays(pairs);
   relays.forget();
-  CHECK(relays.at(2).say(MemberPoses{.sender = {2, 1}}, 0.0) == 5);
+  CHECK(relays.at(2).publish(MemberPoses{.sender = {2, 1}}, 0.0) == 5);
   relays.carry();
   CHECK(relays.total_sent() == 5);
   for (const RobotId robot : std::vector<RobotId>{1, 3, 4, 5, 6})
@@ -119,15 +119,15 @@ TEST_CASE("nothing is forwarded if all robots receive each other", "[pose_graph]
 TEST_CASE("in a line of robots, each message passes each link once", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}, {3, 4}, {4, 5}});
   relays.forget();
-  (void)relays.at(3).say(MemberPoses{.sender = {3, 1}}, 0.0);
+  (void)relays.at(3).publish(MemberPoses{.sender = {3, 1}}, 0.0);
   relays.carry();
   CHECK(relays.total_sent() == 4);
 }
 
 TEST_CASE("a robot with a new link receives all present messages", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}});
-  (void)relays.at(1).say(MemberPoses{.sender = {1, 1}}, 0.0);
-  (void)relays.at(3).say(MemberPoses{.sender = {3, 1}}, 0.0);
+  (void)relays.at(1).publish(MemberPoses{.sender = {1, 1}}, 0.0);
+  (void)relays.at(3).publish(MemberPoses{.sender = {3, 1}}, 0.0);
   relays.carry();
   relays.up(3, 4);
   relays.carry();
@@ -137,7 +137,7 @@ TEST_CASE("a robot with a new link receives all present messages", "[pose_graph]
 TEST_CASE("a lost message is forwarded when the hashes show its loss", "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}, {3, 4}});
   relays.losing = true;
-  (void)relays.at(1).say(MemberPoses{.sender = {1, 1}}, 0.0);
+  (void)relays.at(1).publish(MemberPoses{.sender = {1, 1}}, 0.0);
   relays.carry();
   relays.losing = false;
   relays.forget();
@@ -158,18 +158,18 @@ TEST_CASE("reliable messages take the shortest path, and another one after an ou
           "[pose_graph][relay]") {
   Relays relays({{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 1}});
   relays.forget();
-  CHECK(relays.at(1).say(letter(1, 3), 0.0) == 1);
+  CHECK(relays.at(1).publish(reliable(1, 3), 0.0) == 1);
   relays.carry();
   CHECK(relays.read[3].size() == 1);
   CHECK(relays.sent[2] == 1);
   relays.down(1, 2);  // no other robot knows it yet
   relays.forget();
-  CHECK(relays.at(1).say(letter(1, 3), 0.0) == 1);
+  CHECK(relays.at(1).publish(reliable(1, 3), 0.0) == 1);
   relays.carry();
   CHECK(relays.read[3].size() == 1);
   CHECK(relays.sent[5] == 1);
   relays.down(1, 5);
-  CHECK(relays.at(1).say(letter(1, 3), 0.0) == 0);
+  CHECK(relays.at(1).publish(reliable(1, 3), 0.0) == 0);
 }
 
 TEST_CASE("the lowest robot id decides between several shortest paths", "[pose_graph][relay]") {
@@ -187,16 +187,16 @@ TEST_CASE("a reliable message does not circulate, whatever links robots report",
   relay.link_up({3, 1}, 0.0);
   TeamStatus lie{.sender = {3, 1}, .frame = {3, 1}};
   lie.number = 1;
-  lie.hears = {{1, 1}, {2, 1}, {9, 1}};
+  lie.receives = {{1, 1}, {2, 1}, {9, 1}};
   CHECK(relay.receive(3, std::make_shared<const TeamMessage>(lie), 0.0) == Arrival::kNew);
   lie.sender = {9, 1};
-  lie.hears = {{3, 1}};
+  lie.receives = {{3, 1}};
   CHECK(relay.receive(3, std::make_shared<const TeamMessage>(lie), 0.0) == Arrival::kNew);
-  const auto message = std::make_shared<const TeamMessage>(letter(1, 9));
+  const auto message = std::make_shared<const TeamMessage>(reliable(1, 9));
   CHECK(relay.receive(1, message, 0.0) == Arrival::kPassedOn);
   CHECK(relay.receive(3, message, 0.0) == Arrival::kLost);
   CHECK(relay.receive(1, message, 0.0) == Arrival::kLost);  // a repetition
-  SessionLetter again = letter(1, 9);
+  ReliableMessage again = reliable(1, 9);
   again.copy = 1;
   CHECK(relay.receive(1, std::make_shared<const TeamMessage>(again), 0.0) == Arrival::kPassedOn);
 }
@@ -244,7 +244,7 @@ TEST_CASE("a link that returns at once counts as uninterrupted", "[pose_graph][r
   relays.down(2, 3);
   relays.now_s += 2.0;
   relays.at(2).step(relays.now_s);
-  CHECK(relays.at(2).hears().size() == 2);
+  CHECK(relays.at(2).receives().size() == 2);
   relays.up(2, 3);
   relays.now_s += 2.0;
   relays.at(2).step(relays.now_s);
@@ -252,7 +252,7 @@ TEST_CASE("a link that returns at once counts as uninterrupted", "[pose_graph][r
   relays.down(2, 3);
   relays.now_s += Relay::kPatience_s;
   relays.at(2).step(relays.now_s);
-  CHECK(relays.at(2).hears() == std::vector<TeamPeer>{{1, 1}});
+  CHECK(relays.at(2).receives() == std::vector<TeamPeer>{{1, 1}});
   CHECK(relays.at(2).links().component(2) == std::set<RobotId>{1, 2});
 }
 
@@ -266,7 +266,7 @@ TEST_CASE("after a restart of a robot only the new process counts", "[pose_graph
   CHECK(receive(1, 2, fresh) == Arrival::kRefused);  // no robot receives it directly yet
   relays.at(2).link_down(3, 0.0);
   relays.at(2).link_up({3, 2}, 0.0);
-  relays.tell_all();
+  relays.send_statuses();
   CHECK(receive(2, 3, old) == Arrival::kRefused);
   CHECK(receive(2, 3, fresh) == Arrival::kNew);
   CHECK(receive(1, 2, fresh) == Arrival::kNew);

@@ -26,7 +26,7 @@ class OrderlySolver final : public MemberSolver {
     return true;
   }
   [[nodiscard]] bool ready() const override { return false; }
-  [[nodiscard]] std::vector<SolverLetter> advance() override { return {}; }
+  [[nodiscard]] std::vector<SolverMessage> advance() override { return {}; }
   [[nodiscard]] bool done() const override { return false; }
   [[nodiscard]] const std::vector<SE3>& poses() const override { return poses_; }
   [[nodiscard]] SolverState state() const override { return {}; }
@@ -56,34 +56,34 @@ struct Correspondence {
                    {},
                    1.0,
                    0.0};
-  LetterBook others{kOther, session.id, 1.0};
-  ToldPoses told = {};
+  ReliableChannel others{kOther, session.id, 1.0};
+  PublicPoses published = {};
 
   Correspondence() {
-    (void)part.advance(told, 0.0);
+    (void)part.advance(published, 0.0);
     REQUIRE(part.stage() == MemberStage::kEntered);
   }
   // Lets the solver begin.
   void begin(double now_s) {
-    told[kOther.robot] = {.sender = kOther, .session = session.id, .keyframes = {0}};
-    told[kOther.robot].T_frame_kf.resize(1);
-    (void)part.advance(told, now_s);
+    published[kOther.robot] = {.sender = kOther, .session = session.id, .keyframes = {0}};
+    published[kOther.robot].T_frame_kf.resize(1);
+    (void)part.advance(published, now_s);
     REQUIRE(part.worked());
   }
-  SessionLetter write(const std::vector<std::uint8_t>& bytes, double now_s = 0.0) {
+  ReliableMessage write(const std::vector<std::uint8_t>& bytes, double now_s = 0.0) {
     return others.write({kSelf.robot, std::make_shared<const std::vector<std::uint8_t>>(bytes)},
                         now_s);
   }
-  SessionLetter write_number(std::uint32_t number) {
+  ReliableMessage write_number(std::uint32_t number) {
     ByteWriter out;
     out.u32(number);
     return write(out.release());
   }
   void exchange(double from_s, double to_s) {
     for (double now_s = from_s; now_s < to_s; now_s += 0.1) {
-      for (const SessionLetter& letter : others.due(now_s)) (void)part.receive(letter, now_s);
-      for (const SessionLetter& letter : part.advance(told, now_s))
-        (void)others.read(letter, now_s);
+      for (const ReliableMessage& message : others.due(now_s)) (void)part.receive(message, now_s);
+      for (const ReliableMessage& message : part.advance(published, now_s))
+        (void)others.read(message, now_s);
     }
   }
 };
@@ -93,7 +93,7 @@ struct Correspondence {
 TEST_CASE("a message that the solver cannot take yet is repeated", "[pose_graph][session]") {
   Correspondence c;
   c.begin(0.0);
-  const SessionLetter first = c.write_number(0), second = c.write_number(1);
+  const ReliableMessage first = c.write_number(0), second = c.write_number(1);
   CHECK_FALSE(c.part.receive(second, 0.0));
   CHECK(c.part.receive(first, 0.0));
   CHECK(c.taken == 1);
@@ -104,15 +104,15 @@ TEST_CASE("a message that the solver cannot take yet is repeated", "[pose_graph]
 
 TEST_CASE("messages before the solver begins are not lost, in any number and order",
           "[pose_graph][session]") {
-  constexpr std::uint32_t kLetters = 1500;
+  constexpr std::uint32_t kMessages = 1500;
   Correspondence c;
-  std::vector<SessionLetter> letters;
-  for (std::uint32_t k = 0; k < kLetters; ++k) letters.push_back(c.write_number(k));
-  std::shuffle(letters.begin(), letters.end(), std::mt19937(1));
-  for (const SessionLetter& letter : letters) CHECK(c.part.receive(letter, 0.0));
+  std::vector<ReliableMessage> messages;
+  for (std::uint32_t k = 0; k < kMessages; ++k) messages.push_back(c.write_number(k));
+  std::shuffle(messages.begin(), messages.end(), std::mt19937(1));
+  for (const ReliableMessage& message : messages) CHECK(c.part.receive(message, 0.0));
   c.begin(0.1);
   c.exchange(0.2, 60.0);
-  CHECK(c.taken == kLetters);
+  CHECK(c.taken == kMessages);
   CHECK(c.others.due(1000.0).empty());
 }
 
@@ -123,12 +123,12 @@ TEST_CASE("refused messages do not keep a session alive", "[pose_graph][session]
   c.begin(0.0);
   CHECK(c.part.take_refused() == std::vector<RobotId>{2});
   CHECK_FALSE(c.part.receive(c.write({1, 2, 3}), 5.0));
-  SessionLetter stranger = c.write_number(0);
+  ReliableMessage stranger = c.write_number(0);
   stranger.sender = {3, 1};
   CHECK_FALSE(c.part.receive(stranger, 5.0));
   stranger.sender = {kOther.robot, 2};
   CHECK_FALSE(c.part.receive(stranger, 5.0));
-  SessionLetter impossible = c.write_number(0);
+  ReliableMessage impossible = c.write_number(0);
   impossible.number = 1'000'000;
   CHECK_FALSE(c.part.receive(impossible, 5.0));
   impossible = c.write_number(0);

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/letter_book.hpp"
+#include "modules/pose_graph/reliable_channel.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/gather_solver.hpp"
 #include "test/support/team_network.hpp"
@@ -43,56 +43,56 @@ void check_optimal(const TeamNetwork& network, const TeamProblem& problem) {
         Approx(whole.optimum(problem.start)).epsilon(kTolerance));
 }
 
-SolverLetter solver_letter(RobotId to, std::uint8_t content) {
+SolverMessage solver_message(RobotId to, std::uint8_t content) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(1, content)};
 }
 
 }  // namespace
 
 TEST_CASE("a large message is repeated more rarely than a small one", "[pose_graph][agent]") {
-  LetterBook book({1, 1}, {}, 1.0);
-  const SolverLetter large{3, std::make_shared<const std::vector<std::uint8_t>>(1'000'000)};
-  (void)book.write(solver_letter(2, 10), 0.0);
-  (void)book.write(large, 0.0);
+  ReliableChannel channel({1, 1}, {}, 1.0);
+  const SolverMessage large{3, std::make_shared<const std::vector<std::uint8_t>>(1'000'000)};
+  (void)channel.write(solver_message(2, 10), 0.0);
+  (void)channel.write(large, 0.0);
   std::map<RobotId, int> repeated;
   std::size_t bytes = 0;
   constexpr int kSeconds = 100;
   for (int s = 1; s <= kSeconds; ++s)
-    for (const SessionLetter& letter : book.due(s)) {
-      ++repeated[letter.to];
-      bytes += letter.bytes->size();
+    for (const ReliableMessage& message : channel.due(s)) {
+      ++repeated[message.to];
+      bytes += message.bytes->size();
     }
   CHECK(repeated[2] >= kSeconds / 3);  // at least every three periods
   CHECK(repeated[3] >= 3);
   CHECK(bytes <= 60'000 * kSeconds);
-  book.reachable_again(3);
-  const auto due = book.due(kSeconds);
-  CHECK(std::ranges::any_of(due, [](const SessionLetter& letter) { return letter.to == 3; }));
+  channel.reachable_again(3);
+  const auto due = channel.due(kSeconds);
+  CHECK(std::ranges::any_of(due, [](const ReliableMessage& message) { return message.to == 3; }));
 }
 
 TEST_CASE("messages are repeated until they are acknowledged", "[pose_graph][agent]") {
-  LetterBook a({1, 1}, {}, 1.0), b({2, 1}, {}, 1.0);
-  const auto arrives = [](LetterBook& at, const SessionLetter& letter, double now_s) {
-    const bool is_new = at.read(letter, now_s) == LetterNews::kNew;
-    if (is_new) at.take(letter);
+  ReliableChannel a({1, 1}, {}, 1.0), b({2, 1}, {}, 1.0);
+  const auto arrives = [](ReliableChannel& at, const ReliableMessage& message, double now_s) {
+    const bool is_new = at.read(message, now_s) == ReliableArrival::kNew;
+    if (is_new) at.take(message);
     return is_new;
   };
-  const SessionLetter first = a.write(solver_letter(2, 10), 0.0);
-  const SessionLetter second = a.write(solver_letter(2, 11), 0.0);
+  const ReliableMessage first = a.write(solver_message(2, 10), 0.0);
+  const ReliableMessage second = a.write(solver_message(2, 11), 0.0);
   CHECK(a.due(0.9).empty());
   CHECK(a.due(1.0).size() == 2);
   CHECK(a.due(2.5).empty());  // increasing timeout
   CHECK(arrives(b, second, 1.0));
   CHECK_FALSE(arrives(b, second, 1.0));
   CHECK(arrives(b, first, 1.0));
-  const auto word = b.due(1.0);  // the second message arrived twice
-  REQUIRE(word.size() == 1);
-  CHECK(word[0].received == 2);
-  CHECK_FALSE(arrives(a, word[0], 1.0));
+  const auto acknowledgements = b.due(1.0);  // the second message arrived twice
+  REQUIRE(acknowledgements.size() == 1);
+  CHECK(acknowledgements[0].received == 2);
+  CHECK_FALSE(arrives(a, acknowledgements[0], 1.0));
   CHECK(a.due(100.0).empty());
-  const SessionLetter answer = b.write(solver_letter(1, 12), 2.0);
+  const ReliableMessage answer = b.write(solver_message(1, 12), 2.0);
   CHECK(arrives(a, answer, 2.0));
-  (void)a.write(solver_letter(2, 13), 2.0);
+  (void)a.write(solver_message(2, 13), 2.0);
   a.reachable_again(2);
   CHECK(a.due(2.0).size() == 1);
 }
@@ -152,14 +152,14 @@ TEST_CASE("a resumed robot takes part again with its known closures", "[pose_gra
   const bool chain = GENERATE(true, false);
   CAPTURE(resumed, chain);
   const TeamProblem problem = ring(9);
-  const std::uint64_t life = 1U << kResumeBits;
+  const std::uint64_t boot = 1U << kResumeBits;
   TeamNetwork network;
-  for (const RobotId id : kIds) feed(network.add({id, life}, {}, gather()), id, problem);
+  for (const RobotId id : kIds) feed(network.add({id, boot}, {}, gather()), id, problem);
   if (chain) network.wire({{7, 33}, {33, 50}, {50, 1200}});
   REQUIRE(settle(network));
   network.kill(resumed);
   (void)network.run(1.0);
-  feed(network.add({resumed, next_boot(life)}, {}, gather()), resumed, problem);
+  feed(network.add({resumed, next_boot(boot)}, {}, gather()), resumed, problem);
   (void)network.run(1.0);
   REQUIRE(settle(network));
   check_optimal(network, problem);
@@ -292,9 +292,9 @@ TEST_CASE("the member that has sent most determines the wait for the next sessio
   config.session_wait_s = 600.0;
   TeamNetwork network;
   std::map<std::optional<SessionId>, std::map<RobotId, double>> sent_in;
-  network.on_parcel = [&](RobotId from, const Parcel& parcel) {
-    sent_in[session_of(*parcel.message)][from] +=
-        static_cast<double>(encode(*parcel.message).size());
+  network.on_packet = [&](RobotId from, const LinkPacket& packet) {
+    sent_in[session_of(*packet.message)][from] +=
+        static_cast<double>(encode(*packet.message).size());
   };
   for (const RobotId id : ids) feed(network.add({id, 1}, config, gather()), id, problem);
   network.wire({{7, 33}, {33, 50}});
@@ -401,7 +401,7 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
   victim.peer_alive({666, 1});
   for (int k = 0; k < 400; ++k) {
     TeamStatus status{.sender = {666, 1}, .number = any(rng), .frame = peer()};
-    for (std::uint32_t n = any(rng) % 6; n > 0; --n) status.hears.push_back(peer());
+    for (std::uint32_t n = any(rng) % 6; n > 0; --n) status.receives.push_back(peer());
     status.offers = {{robot(), any(rng) + 1, {any(rng), any(rng)}}};
     status.holds = any(rng);
     (void)network.inject(666, 33, status);
@@ -425,14 +425,14 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
     poses.verdicts = {{closure_id({7, 1}, {33, 2}), false}};
     (void)network.inject(666, 33, poses);
 
-    SessionLetter letter{.sender = {}, .session = session.id, .number = any(rng), .bytes = {}};
-    if (victim.part() != nullptr && any(rng) > 10) letter.session = victim.part()->session().id;
-    letter.sender = {any(rng) > 10 ? RobotId{666} : RobotId{667}, 1};
-    letter.to = any(rng) > 5 ? RobotId{33} : robot();
-    letter.copy = any(rng);
-    letter.received = any(rng);
-    letter.bytes = std::make_shared<const std::vector<std::uint8_t>>(any(rng), std::uint8_t{7});
-    (void)network.inject(666, 33, letter);
+    ReliableMessage message{.sender = {}, .session = session.id, .number = any(rng), .bytes = {}};
+    if (victim.part() != nullptr && any(rng) > 10) message.session = victim.part()->session().id;
+    message.sender = {any(rng) > 10 ? RobotId{666} : RobotId{667}, 1};
+    message.to = any(rng) > 5 ? RobotId{33} : robot();
+    message.copy = any(rng);
+    message.received = any(rng);
+    message.bytes = std::make_shared<const std::vector<std::uint8_t>>(any(rng), std::uint8_t{7});
+    (void)network.inject(666, 33, message);
     (void)network.run(0.003);
   }
   victim.peer_lost(666);
@@ -499,9 +499,9 @@ TEST_CASE("decisions of a session hold in the next one, even for a robot that mi
   PoseGraphConfig config;
   config.exchange_budget_kb_s = 1e6;
   TeamNetwork network;
-  network.loses = [](RobotId, const Parcel& parcel) {
-    const auto* session = std::get_if<Session>(parcel.message.get());
-    return session != nullptr && session->finished && parcel.next == 33;
+  network.loses = [](RobotId, const LinkPacket& packet) {
+    const auto* session = std::get_if<Session>(packet.message.get());
+    return session != nullptr && session->finished && packet.next == 33;
   };
   std::size_t known = 0;  // decisions known to 33 at the beginning of its last session of four
   const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
@@ -531,20 +531,22 @@ TEST_CASE("every message may arrive late, twice and in any order", "[pose_graph]
   const TeamProblem problem = ring(seed);
   TeamNetwork network(seed);
   network.usual = {.max_delay_s = 0.3, .lost = 0.05, .duplicated = 0.5};
-  std::vector<std::pair<RobotId, Parcel>> seen;
-  network.on_parcel = [&](RobotId from, const Parcel& parcel) { seen.emplace_back(from, parcel); };
+  std::vector<std::pair<RobotId, LinkPacket>> seen;
+  network.on_packet = [&](RobotId from, const LinkPacket& packet) {
+    seen.emplace_back(from, packet);
+  };
   for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
   std::mt19937 rng(seed);
   for (int k = 0; k < 200; ++k) {
     (void)network.run(0.01);
     if (seen.empty()) continue;
-    const auto& [from, parcel] = seen[rng() % seen.size()];  // an old message
-    (void)network.inject(from, parcel.next, *parcel.message);
+    const auto& [from, packet] = seen[rng() % seen.size()];  // an old message
+    (void)network.inject(from, packet.next, *packet.message);
   }
   REQUIRE(settle(network));
   for (int k = 0; k < 100; ++k) {
-    const auto& [from, parcel] = seen[rng() % seen.size()];
-    (void)network.inject(from, parcel.next, *parcel.message);
+    const auto& [from, packet] = seen[rng() % seen.size()];
+    (void)network.inject(from, packet.next, *packet.message);
   }
   (void)network.run(5.0);
   REQUIRE(settle(network));

@@ -286,7 +286,7 @@ TEST_CASE("deferred closures that fit are weighed in up to two more sessions",
   std::map<SessionId, std::set<std::optional<bool>>> sessions;  // decision before each session
   const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
                                           TreePlace place) {
-    GatherSolver::Options options{.barc = 100.0, .set_aside = true};
+    GatherSolver::Options options{.barc = 100.0, .deferred = true};
     if (place.members.size() == kFour.size()) {
       const auto decided = graph.decided.find(closure->id());
       if (graph.self == 5 || graph.self == 9)

@@ -6,24 +6,24 @@ namespace km {
 namespace {
 
 void link(TeamLinks& links, const std::vector<std::pair<RobotId, RobotId>>& pairs) {
-  std::map<RobotId, std::set<RobotId>> heard;
+  std::map<RobotId, std::set<RobotId>> received;
   for (const auto& [a, b] : pairs) {
-    heard[a].insert(b);
-    heard[b].insert(a);
+    received[a].insert(b);
+    received[b].insert(a);
   }
-  for (const auto& [robot, others] : heard) (void)links.tell(robot, others);
+  for (const auto& [robot, others] : received) (void)links.report(robot, others);
 }
 
 }  // namespace
 
 TEST_CASE("a link counts if both of its robots report it", "[core]") {
   TeamLinks links;
-  CHECK(links.tell(1, {2}));
-  CHECK_FALSE(links.tell(1, {2}));
-  CHECK(links.hears(1, 2));
+  CHECK(links.report(1, {2}));
+  CHECK_FALSE(links.report(1, {2}));
+  CHECK(links.receives(1, 2));
   CHECK_FALSE(links.linked(1, 2));
   CHECK(links.component(1) == std::set<RobotId>{1});
-  CHECK(links.tell(2, {1, 7}));
+  CHECK(links.report(2, {1, 7}));
   CHECK(links.linked(2, 1));
   CHECK(links.neighbours(2) == std::vector<RobotId>{1});
   links.forget(1);

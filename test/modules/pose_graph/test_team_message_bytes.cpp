@@ -21,7 +21,7 @@ TeamStatus some_status() {
   return {
       .sender = kPeer7,
       .number = 300,
-      .hears = {kPeer2, kPeer60000},
+      .receives = {kPeer2, kPeer60000},
       .frame = kPeer2,
       .frame_version = 5,
       .keyframes = 1000,
@@ -70,7 +70,7 @@ MemberPoses some_poses() {
   return poses;
 }
 
-SessionLetter some_letter() {
+ReliableMessage some_reliable_message() {
   return {.sender = kPeer60000,
           .session = {kPeer2, 9},
           .number = 130,
@@ -81,7 +81,7 @@ SessionLetter some_letter() {
 }
 
 std::vector<TeamMessage> one_of_each() {
-  return {some_status(), some_session(), some_poses(), some_letter()};
+  return {some_status(), some_session(), some_poses(), some_reliable_message()};
 }
 
 template <typename T>
@@ -105,92 +105,92 @@ const char* refusal_of(const TeamMessage& message) {
 constexpr double kRounding = 1e-14;  // rotation sent as a quaternion
 
 TEST_CASE("Decoding restores an encoded status", "[pose_graph]") {
-  const TeamStatus told = some_status();
-  const TeamStatus heard = round_trip(told);
-  CHECK(heard.sender == told.sender);
-  CHECK(heard.number == told.number);
-  CHECK(heard.hears == told.hears);
-  CHECK(heard.frame == told.frame);
-  CHECK(heard.frame_version == told.frame_version);
-  CHECK(heard.keyframes == told.keyframes);
-  CHECK(heard.revision == told.revision);
-  CHECK(heard.offers == told.offers);
-  CHECK(heard.method == told.method);
-  CHECK(heard.T_odom_first.isApprox(told.T_odom_first, kRounding));
-  CHECK(heard.upright == told.upright);
-  CHECK(heard.holds == told.holds);
+  const TeamStatus sent = some_status();
+  const TeamStatus received = round_trip(sent);
+  CHECK(received.sender == sent.sender);
+  CHECK(received.number == sent.number);
+  CHECK(received.receives == sent.receives);
+  CHECK(received.frame == sent.frame);
+  CHECK(received.frame_version == sent.frame_version);
+  CHECK(received.keyframes == sent.keyframes);
+  CHECK(received.revision == sent.revision);
+  CHECK(received.offers == sent.offers);
+  CHECK(received.method == sent.method);
+  CHECK(received.T_odom_first.isApprox(sent.T_odom_first, kRounding));
+  CHECK(received.upright == sent.upright);
+  CHECK(received.holds == sent.holds);
 }
 
 TEST_CASE("Decoding restores an encoded session", "[pose_graph]") {
-  Session told = some_session();
-  const Session heard = round_trip(told);
-  CHECK(heard.id == told.id);
-  CHECK(heard.number == told.number);
-  CHECK(heard.plan == told.plan);
-  CHECK(heard.method == told.method);
-  CHECK(heard.upright == told.upright);
-  CHECK(heard.max_rounds == told.max_rounds);
-  CHECK(heard.anchor == told.anchor);
-  REQUIRE(heard.T_frame_world);
-  CHECK(heard.T_frame_world->isApprox(*told.T_frame_world, kRounding));
-  CHECK(heard.round == told.round);
-  CHECK(heard.cost == told.cost);
-  CHECK(heard.gradient == told.gradient);
-  CHECK(heard.finished == told.finished);
-  told.T_frame_world.reset();
-  CHECK_FALSE(round_trip(told).T_frame_world);
+  Session sent = some_session();
+  const Session received = round_trip(sent);
+  CHECK(received.id == sent.id);
+  CHECK(received.number == sent.number);
+  CHECK(received.plan == sent.plan);
+  CHECK(received.method == sent.method);
+  CHECK(received.upright == sent.upright);
+  CHECK(received.max_rounds == sent.max_rounds);
+  CHECK(received.anchor == sent.anchor);
+  REQUIRE(received.T_frame_world);
+  CHECK(received.T_frame_world->isApprox(*sent.T_frame_world, kRounding));
+  CHECK(received.round == sent.round);
+  CHECK(received.cost == sent.cost);
+  CHECK(received.gradient == sent.gradient);
+  CHECK(received.finished == sent.finished);
+  sent.T_frame_world.reset();
+  CHECK_FALSE(round_trip(sent).T_frame_world);
 }
 
 TEST_CASE("Decoding restores poses of a member to the last bit, from 29 bytes each",
           "[pose_graph]") {
-  const MemberPoses told = some_poses();
-  const MemberPoses heard = round_trip(told);
-  CHECK(heard.sender == told.sender);
-  CHECK(heard.number == told.number);
-  CHECK(heard.session == told.session);
-  CHECK(heard.stage == told.stage);
-  CHECK(heard.frame == told.frame);
-  CHECK(heard.frame_version == told.frame_version);
-  CHECK(heard.step_precision.kappa == told.step_precision.kappa);
-  CHECK(heard.step_precision.tau == told.step_precision.tau);
-  CHECK(heard.keyframes == told.keyframes);
-  REQUIRE(heard.T_frame_kf.size() == told.T_frame_kf.size());
-  for (std::size_t k = 0; k < told.T_frame_kf.size(); ++k) {
-    CHECK(heard.T_frame_kf[k].q.coeffs() == told.T_frame_kf[k].q.coeffs());
-    CHECK(heard.T_frame_kf[k].t == told.T_frame_kf[k].t);
+  const MemberPoses sent = some_poses();
+  const MemberPoses received = round_trip(sent);
+  CHECK(received.sender == sent.sender);
+  CHECK(received.number == sent.number);
+  CHECK(received.session == sent.session);
+  CHECK(received.stage == sent.stage);
+  CHECK(received.frame == sent.frame);
+  CHECK(received.frame_version == sent.frame_version);
+  CHECK(received.step_precision.kappa == sent.step_precision.kappa);
+  CHECK(received.step_precision.tau == sent.step_precision.tau);
+  CHECK(received.keyframes == sent.keyframes);
+  REQUIRE(received.T_frame_kf.size() == sent.T_frame_kf.size());
+  for (std::size_t k = 0; k < sent.T_frame_kf.size(); ++k) {
+    CHECK(received.T_frame_kf[k].q.coeffs() == sent.T_frame_kf[k].q.coeffs());
+    CHECK(received.T_frame_kf[k].t == sent.T_frame_kf[k].t);
   }
-  REQUIRE(heard.verdicts.size() == told.verdicts.size());
-  for (std::size_t k = 0; k < told.verdicts.size(); ++k) {
-    CHECK(heard.verdicts[k].id == told.verdicts[k].id);
-    CHECK(heard.verdicts[k].kept == told.verdicts[k].kept);
+  REQUIRE(received.verdicts.size() == sent.verdicts.size());
+  for (std::size_t k = 0; k < sent.verdicts.size(); ++k) {
+    CHECK(received.verdicts[k].id == sent.verdicts[k].id);
+    CHECK(received.verdicts[k].kept == sent.verdicts[k].kept);
   }
-  CHECK(heard.sent_bytes == told.sent_bytes);
+  CHECK(received.sent_bytes == sent.sent_bytes);
 
-  MemberPoses many = told;
+  MemberPoses many = sent;
   many.keyframes.clear();
   many.verdicts.clear();
   for (KeyframeIndex k = 0; k < 1000; ++k) many.keyframes.push_back(3 * k);
-  many.T_frame_kf.assign(1000, told.T_frame_kf[0]);
+  many.T_frame_kf.assign(1000, sent.T_frame_kf[0]);
   CHECK(encode(many).size() < 29 * 1000 + 80);
 }
 
 TEST_CASE("Decoding restores an encoded reliable message", "[pose_graph]") {
-  SessionLetter told = some_letter();
-  const SessionLetter heard = round_trip(told);
-  CHECK(heard.sender == told.sender);
-  CHECK(heard.session == told.session);
-  CHECK(heard.number == told.number);
-  CHECK(heard.to == told.to);
-  CHECK(heard.copy == told.copy);
-  CHECK(heard.received == told.received);
-  REQUIRE(heard.bytes);
-  CHECK(*heard.bytes == *told.bytes);
-  told.bytes = nullptr;
-  CHECK(round_trip(told).bytes->empty());
+  ReliableMessage sent = some_reliable_message();
+  const ReliableMessage received = round_trip(sent);
+  CHECK(received.sender == sent.sender);
+  CHECK(received.session == sent.session);
+  CHECK(received.number == sent.number);
+  CHECK(received.to == sent.to);
+  CHECK(received.copy == sent.copy);
+  CHECK(received.received == sent.received);
+  REQUIRE(received.bytes);
+  CHECK(*received.bytes == *sent.bytes);
+  sent.bytes = nullptr;
+  CHECK(round_trip(sent).bytes->empty());
 }
 
 TEST_CASE("Empty messages are valid", "[pose_graph]") {
-  CHECK(round_trip(TeamStatus{.sender = kPeer2, .frame = kPeer2}).hears.empty());
+  CHECK(round_trip(TeamStatus{.sender = kPeer2, .frame = kPeer2}).receives.empty());
   CHECK(round_trip(MemberPoses{.sender = kPeer2}).keyframes.empty());
 }
 
@@ -208,17 +208,18 @@ TEST_CASE("Decoding accepts every encoded message and uses it to the last byte",
 
 TEST_CASE("No truncated message is accepted", "[pose_graph]") {
   for (const TeamMessage& message : one_of_each()) {
-    const bool is_letter = std::holds_alternative<SessionLetter>(message);
+    const bool is_reliable = std::holds_alternative<ReliableMessage>(message);
     const Bytes bytes = encode(message);
     // The content of a reliable message may have any length.
-    const std::size_t end = is_letter ? bytes.size() - some_letter().bytes->size() : bytes.size();
+    const std::size_t end =
+        is_reliable ? bytes.size() - some_reliable_message().bytes->size() : bytes.size();
     for (std::size_t size = 0; size < end; ++size) {
       CAPTURE(message.index(), size);
       const auto result = decode_team_message(std::span(bytes).first(size));
       CHECK_FALSE(result.value);
       CHECK(result.refusal != nullptr);
     }
-    if (is_letter) continue;
+    if (is_reliable) continue;
     Bytes longer = bytes;
     longer.push_back(0);
     CHECK_FALSE(decode_team_message(longer).value);
@@ -248,13 +249,13 @@ TEST_CASE("Impossible counts are refused before memory is allocated", "[pose_gra
 TEST_CASE("An inconsistent status is refused", "[pose_graph]") {
   TeamStatus m = some_status();
   SECTION("received robots out of order") {
-    std::swap(m.hears[0], m.hears[1]);
+    std::swap(m.receives[0], m.receives[1]);
   }
   SECTION("a duplicate received robot") {
-    m.hears[1] = {m.hears[0].robot, 99};
+    m.receives[1] = {m.receives[0].robot, 99};
   }
   SECTION("a robot that receives itself") {
-    m.hears[1] = m.sender;
+    m.receives[1] = m.sender;
   }
   SECTION("offers out of order") {
     std::swap(m.offers[0], m.offers[2]);
@@ -275,9 +276,9 @@ TEST_CASE("An inconsistent status is refused", "[pose_graph]") {
     m.T_odom_first.translation().x() = 1e9;
   }
   SECTION("a team that is too large") {
-    m.hears.clear();
+    m.receives.clear();
     for (std::size_t k = 0; k <= kMaxTeam; ++k)
-      m.hears.push_back({static_cast<RobotId>(k + 10), 1});
+      m.receives.push_back({static_cast<RobotId>(k + 10), 1});
   }
   CHECK(refusal_of(m) != std::string());
 }
@@ -357,7 +358,7 @@ TEST_CASE("Invalid poses of a member are refused", "[pose_graph]") {
 }
 
 TEST_CASE("A reliable message to its own sender is refused", "[pose_graph]") {
-  SessionLetter m = some_letter();
+  ReliableMessage m = some_reliable_message();
   m.to = m.sender.robot;
   CHECK(refusal_of(m) != std::string());
 }

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/tree_messages.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/team_network.hpp"
 
@@ -198,9 +198,9 @@ TEST_CASE("delays up to a second cost only time", "[pose_graph][network]") {
 TEST_CASE("the others complete a session when a member stops, and it catches up when it returns",
           "[pose_graph][network]") {
   const RobotId gone = GENERATE(RobotId{1}, RobotId{2}, RobotId{4});
-  const std::size_t after_parcels = GENERATE(range<std::size_t>(0, 320, 20));
+  const std::size_t after_packets = GENERATE(range<std::size_t>(0, 320, 20));
   const bool weighed = GENERATE(true, false);
-  CAPTURE(gone, after_parcels, weighed);
+  CAPTURE(gone, after_packets, weighed);
   const auto ids = numbered(4);
   const TeamProblem problem = problem_of(ids, {{1, 2}, {2, 3}, {3, 4}, {1, 4}}, 5);
   TeamNetwork network;
@@ -214,9 +214,9 @@ TEST_CASE("the others complete a session when a member stops, and it catches up 
     if (e.from.robot != e.to.robot && e.id().from.robot + 2 == e.id().to.robot)
       more.edges.push_back(e);
   for (const RobotId robot : ids) feed_closures(network.agent(robot), robot, more, 2);
-  std::size_t parcels = 0;
-  network.on_parcel = [&](RobotId, const Parcel& parcel) {
-    parcels += std::holds_alternative<TeamStatus>(*parcel.message) ? 0 : 1;
+  std::size_t packets = 0;
+  network.on_packet = [&](RobotId, const LinkPacket& packet) {
+    packets += std::holds_alternative<TeamStatus>(*packet.message) ? 0 : 1;
   };
   std::map<RobotId, std::vector<SessionId>> sessions;
   network.on_step = [&](const TeamNetwork::Robot& robot) {
@@ -224,7 +224,7 @@ TEST_CASE("the others complete a session when a member stops, and it catches up 
     const SessionId& id = robot.agent->part()->session().id;
     if (of_robot.empty() || of_robot.back() != id) of_robot.push_back(id);
   };
-  (void)network.run(60.0, [&] { return parcels >= after_parcels && parcels > 0; });
+  (void)network.run(60.0, [&] { return packets >= after_packets && packets > 0; });
   network.kill(gone);
   const double gone_s = network.now_s();
   const double before = CentralProblem(more).cost(network.trajectories());
@@ -343,29 +343,29 @@ TEST_CASE("messages contain no private keyframe", "[pose_graph][network]") {
   for (const RobotId robot : ids) open.insert({robot, 0});
   for (const PoseEdge& e : problem.edges)
     if (e.from.robot != e.to.robot) open.insert({e.from, e.to});
-  std::size_t named = 0, letters = 0;
+  std::size_t named = 0, messages = 0;
   std::set<KeyframeId> secret;
   const auto see = [&](const KeyframeId& id) {
     ++named;
     if (!open.contains(id)) secret.insert(id);
   };
   TeamNetwork network;
-  network.on_parcel = [&](RobotId, const Parcel& parcel) {
-    if (const auto* poses = std::get_if<MemberPoses>(parcel.message.get())) {
+  network.on_packet = [&](RobotId, const LinkPacket& packet) {
+    if (const auto* poses = std::get_if<MemberPoses>(packet.message.get())) {
       for (const KeyframeIndex keyframe : poses->keyframes) see({poses->sender.robot, keyframe});
       for (const WeighedClosure& closure : poses->verdicts) {
         see(closure.id.from);
         see(closure.id.to);
       }
     }
-    const auto* letter = std::get_if<SessionLetter>(parcel.message.get());
-    if (letter == nullptr || !letter->bytes || letter->bytes->empty()) return;
-    ++letters;
-    if (!is_up_letter(*letter->bytes)) {
-      REQUIRE(decode_down(*letter->bytes));
+    const auto* message = std::get_if<ReliableMessage>(packet.message.get());
+    if (message == nullptr || !message->bytes || message->bytes->empty()) return;
+    ++messages;
+    if (!is_up_message(*message->bytes)) {
+      REQUIRE(decode_down(*message->bytes));
       return;
     }
-    const auto up = decode_up(*letter->bytes);
+    const auto up = decode_up(*message->bytes);
     REQUIRE(up);
     if (up->system)
       for (const TreeVariable& variable : up->system->variables) see(variable.id);
@@ -373,7 +373,7 @@ TEST_CASE("messages contain no private keyframe", "[pose_graph][network]") {
   add_all(network, problem, robust(weighed));
   if (chain) network.wire(line(ids));
   REQUIRE(settle(network, 120.0));
-  CHECK(letters > 20);
+  CHECK(messages > 20);
   CHECK(named > 100);
   CHECK(open.size() < 100);
   CHECK(secret.empty());

@@ -31,17 +31,17 @@ struct Robot {
             .peer_inlier_sets = peer_inlier_sets,
             .peer_events = peer_events,
             .restarts = restarts,
-            .peer_parcels = peer_parcels,
-            .parcels = parcels,
+            .peer_packets = peer_packets,
+            .packets = packets,
             .trajectory = trajectory,
             .progress = progress,
             .verdicts = verdicts};
   }
 
   // Delivers the messages that `other` sends to this robot.
-  void hears(Robot& other) {
-    other.parcels.subscribe([this](const auto& parcel) {
-      if (parcel->to == self.robot) peer_parcels.publish(parcel->message);
+  void receives(Robot& other) {
+    other.packets.subscribe([this](const auto& packet) {
+      if (packet->to == self.robot) peer_packets.publish(packet->message);
     });
   }
 
@@ -78,8 +78,8 @@ struct Robot {
   Topic<Closure> closures;
   Topic<InlierSet> inlier_sets, peer_inlier_sets;
   Topic<PeerEvent> peer_events, restarts;
-  Topic<TeamParcel> peer_parcels;
-  Topic<Addressed<TeamParcel>> parcels;
+  Topic<TeamPacket> peer_packets;
+  Topic<Addressed<TeamPacket>> packets;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   Topic<ClosureVerdicts> verdicts;
@@ -111,8 +111,8 @@ TEST_CASE("Two nodes on their threads end in one frame", "[pose_graph][node]") {
   const SplitGraph graph = parallel_lines();
   Robot two({2, 11}, method);
   Robot nine({9, 12}, method);
-  two.hears(nine);
-  nine.hears(two);
+  two.receives(nine);
+  nine.receives(two);
   two.node.start();
   nine.node.start();
   two.meet(nine);
@@ -137,8 +137,8 @@ TEST_CASE("Two nodes on their threads end in one frame", "[pose_graph][node]") {
 TEST_CASE("A node alone publishes its own trajectory and sends nothing", "[pose_graph][node]") {
   const SplitGraph graph = parallel_lines();
   Robot nine({9, 12});
-  int parcels = 0;
-  nine.parcels.subscribe([&](const auto&) { ++parcels; });
+  int packets = 0;
+  nine.packets.subscribe([&](const auto&) { ++packets; });
   KeyframeOdometry first;
   first.id = {9, 0};
   double now_s = 100.0;
@@ -149,16 +149,16 @@ TEST_CASE("A node alone publishes its own trajectory and sends nothing", "[pose_
   REQUIRE(nine.latest);
   CHECK(nine.latest->anchor == 9);
   CHECK(nine.latest->T_world_kf.size() == 5);
-  CHECK(parcels == 0);
+  CHECK(packets == 0);
 }
 
 TEST_CASE("A node sends statuses to robots that it receives, until they are lost",
           "[pose_graph][node]") {
   Robot two({2, 11});
   std::vector<RobotId> to;
-  two.parcels.subscribe([&](const auto& parcel) {
-    CHECK(parcel->message->from == 2);
-    to.push_back(parcel->to);
+  two.packets.subscribe([&](const auto& packet) {
+    CHECK(packet->message->from == 2);
+    to.push_back(packet->to);
   });
   const auto event = [](PeerEventKind kind) {
     PeerEvent e{.kind = kind, .identity = {}, .text = {}};

@@ -26,13 +26,13 @@ std::vector<RobotId> order_of(const SessionPlan& plan) {
 }
 
 TeamLinks links_of(const std::vector<std::pair<RobotId, RobotId>>& pairs) {
-  std::map<RobotId, std::set<RobotId>> heard;
+  std::map<RobotId, std::set<RobotId>> received;
   for (const auto& [a, b] : pairs) {
-    heard[a].insert(b);
-    heard[b].insert(a);
+    received[a].insert(b);
+    received[b].insert(a);
   }
   TeamLinks links;
-  for (const auto& [robot, others] : heard) (void)links.tell(robot, others);
+  for (const auto& [robot, others] : received) (void)links.report(robot, others);
   return links;
 }
 

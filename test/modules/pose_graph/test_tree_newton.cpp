@@ -99,35 +99,35 @@ TEST_CASE("Impossible verdicts are refused, and the true one is accepted afterwa
   const TeamTree tree = star(problem.members());
   TreeNewton root(session_graph(problem, 1), tree.at(1), kTrusting);
   TreeNewton leaf(session_graph(problem, 2), tree.at(2), kTrusting);
-  const auto says = [&](std::uint32_t round, Next next, Eigen::Index size = 0) {
-    DownLetter letter{.verdict = {.round = round, .next = next}};
-    letter.step = Eigen::VectorXd::Constant(size, 1e-3);
-    return leaf.receive(1, encode(letter));
+  const auto accepts = [&](std::uint32_t round, Next next, Eigen::Index size = 0) {
+    DownMessage message{.verdict = {.round = round, .next = next}};
+    message.step = Eigen::VectorXd::Constant(size, 1e-3);
+    return leaf.receive(1, encode(message));
   };
   const auto carry_up = [&] {
     while (leaf.ready())
-      for (const SolverLetter& letter : leaf.advance()) CHECK(root.receive(2, *letter.bytes));
+      for (const SolverMessage& message : leaf.advance()) CHECK(root.receive(2, *message.bytes));
   };
-  CHECK_FALSE(says(0, Next::kStart));  // no message up was sent
+  CHECK_FALSE(accepts(0, Next::kStart));  // no message up was sent
   carry_up();
-  CHECK_FALSE(says(1, Next::kStart));
+  CHECK_FALSE(accepts(1, Next::kStart));
   for (const Next next : {Next::kStep, Next::kShorten, Next::kRefresh, Next::kDone})
-    CHECK_FALSE(says(0, next));  // the solver has not begun
+    CHECK_FALSE(accepts(0, next));  // the solver has not begun
   CHECK_FALSE(leaf.ready());
   for (std::uint32_t round = 0; round < 100 && !leaf.done(); ++round) {
-    for (const SolverLetter& letter : root.advance()) {
-      const auto up = encode(UpLetter{.round = round + 2, .sums = {}});
+    for (const SolverMessage& message : root.advance()) {
+      const auto up = encode(UpMessage{.round = round + 2, .sums = {}});
       if (!root.done()) CHECK_FALSE(root.receive(2, up));  // no robot is this far
-      CHECK(leaf.receive(1, *letter.bytes));
-      CHECK(leaf.receive(1, *letter.bytes));
+      CHECK(leaf.receive(1, *message.bytes));
+      CHECK(leaf.receive(1, *message.bytes));
     }
     carry_up();
     if (leaf.done()) break;
-    CHECK(says(round, Next::kStop));  // an old verdict
-    if (round == 0) CHECK_FALSE(says(1, Next::kShorten));
-    CHECK_FALSE(says(round + 1, Next::kStart));
-    CHECK_FALSE(says(round + 1, Next::kCount));
-    CHECK_FALSE(says(round + 1, Next::kStep, 1));
+    CHECK(accepts(round, Next::kStop));  // an old verdict
+    if (round == 0) CHECK_FALSE(accepts(1, Next::kShorten));
+    CHECK_FALSE(accepts(round + 1, Next::kStart));
+    CHECK_FALSE(accepts(round + 1, Next::kCount));
+    CHECK_FALSE(accepts(round + 1, Next::kStep, 1));
     CHECK_FALSE(leaf.ready());
   }
   const CentralProblem central(problem);

@@ -12,13 +12,13 @@ namespace km {
 namespace {
 
 SolverTeam rbcd_team(const TeamProblem& problem, const TeamTree& tree,
-                     const RbcdOptions& options = {}, const LetterPost& post = {}) {
-  return solver_team(problem, tree, post, [&](SessionGraph graph, const TreePlace& place) {
+                     const RbcdOptions& options = {}, const TransportFaults& faults = {}) {
+  return solver_team(problem, tree, faults, [&](SessionGraph graph, const TreePlace& place) {
     return std::make_unique<MemberRbcd>(std::move(graph), place, options);
   });
 }
 
-constexpr LetterPost kRoughPost{.max_delay = 7, .duplicated = 0.3, .seed = 3};
+constexpr TransportFaults kRoughTransport{.max_delay = 7, .duplicated = 0.3, .seed = 3};
 
 // Above the error of single precision in messages, below any error of the method.
 constexpr double kGap = 2e-6;
@@ -50,7 +50,7 @@ TEST_CASE("Block descent of a team ends at the optimum of the whole graph", "[rb
   if (!file) return;
   const TeamProblem problem = deal_file(*file, robots);
   const TeamTree tree = rough ? chain(problem.members()) : star(problem.members());
-  SolverTeam team = rbcd_team(problem, tree, {}, rough ? kRoughPost : LetterPost());
+  SolverTeam team = rbcd_team(problem, tree, {}, rough ? kRoughTransport : TransportFaults());
   REQUIRE(team.run());
   CHECK(team.refused() == 0);
   CHECK(gap_of(problem, team.poses()) < kGap);
@@ -63,7 +63,7 @@ TEST_CASE("Block descent of a team ends at the optimum of the whole graph", "[rb
 TEST_CASE("The result depends neither on the order of messages nor on the tree", "[rbcd]") {
   const TeamProblem problem = three_robots();
   SolverTeam calm = rbcd_team(problem, star(problem.members(), 1));
-  SolverTeam rough = rbcd_team(problem, chain(problem.members()), {}, kRoughPost);
+  SolverTeam rough = rbcd_team(problem, chain(problem.members()), {}, kRoughTransport);
   REQUIRE(calm.run());
   REQUIRE(rough.run());
   for (const RobotId robot : problem.members())
@@ -74,12 +74,12 @@ TEST_CASE("The result depends neither on the order of messages nor on the tree",
 TEST_CASE("Cost falls from one state of the team to the next", "[rbcd]") {
   const TeamProblem problem = three_robots();
   const CentralProblem central(problem);
-  SolverTeam team = rbcd_team(problem, star(problem.members()), {}, kRoughPost);
+  SolverTeam team = rbcd_team(problem, star(problem.members()), {}, kRoughTransport);
   std::map<std::uint32_t, TeamPoses> states;
-  std::map<std::uint32_t, double> told;
+  std::map<std::uint32_t, double> reported;
   team.after_advance = [&](RobotId robot, const MemberSolver& member) {
     states[member.state().round][robot] = member.poses();
-    told[member.state().round] = member.state().cost;
+    reported[member.state().round] = member.state().cost;
   };
   REQUIRE(team.run());
   double last = central.cost(problem.start);
@@ -90,7 +90,7 @@ TEST_CASE("Cost falls from one state of the team to the next", "[rbcd]") {
     CAPTURE(round);
     const double cost = central.cost(poses);
     CHECK(cost < last);
-    CHECK(cost == Approx(told.at(round)).epsilon(1e-3));
+    CHECK(cost == Approx(reported.at(round)).epsilon(1e-3));
     last = cost;
   }
   CHECK(complete >= 2);
@@ -182,14 +182,14 @@ TEST_CASE("Every member passes through every state that the root reports, in ord
   std::vector<std::uint32_t> rounds{0};  // rounds of the member whose messages are delayed
   MemberRbcd& late = held_back == kShare ? root : leaf;
   const RobotId from = held_back == kShare ? 5 : 2;
-  std::vector<SolverLetter> held;
+  std::vector<SolverMessage> held;
   const auto carry = [&](MemberRbcd& member, MemberRbcd& to) {
     const RobotId sender = &member == &root ? 2 : 5;
-    for (SolverLetter& letter : member.advance())
-      if (letter.bytes->front() == held_back)
-        held.push_back(std::move(letter));
+    for (SolverMessage& message : member.advance())
+      if (message.bytes->front() == held_back)
+        held.push_back(std::move(message));
       else
-        CHECK(to.receive(sender, *letter.bytes));
+        CHECK(to.receive(sender, *message.bytes));
   };
   const std::size_t enough = held_back == kShare ? 17 : 3;  // 16 rounds; a report every 5
   for (int n = 0; n < 100 && held.size() < enough; ++n) {
@@ -201,8 +201,8 @@ TEST_CASE("Every member passes through every state that the root reports, in ord
     if (rounds.back() != late.state().round) rounds.push_back(late.state().round);
   };
   std::reverse(held.begin(), held.end());
-  for (const SolverLetter& letter : held) {
-    CHECK(late.receive(from, *letter.bytes));
+  for (const SolverMessage& message : held) {
+    CHECK(late.receive(from, *message.bytes));
     note();
   }
   for (int n = 0; n < 20 && late.ready(); ++n) {
@@ -219,12 +219,12 @@ TEST_CASE("Impossible messages are refused", "[rbcd]") {
   const TeamTree tree = star(problem.members(), 1);
   MemberRbcd root(session_graph(problem, 5), tree.at(5), {});
   MemberRbcd leaf(session_graph(problem, 2), tree.at(2), {});
-  const std::vector<SolverLetter> letters = leaf.advance();
-  REQUIRE(letters.size() == 3);  // shares of rounds 0 and 1, poses
+  const std::vector<SolverMessage> messages = leaf.advance();
+  REQUIRE(messages.size() == 3);  // shares of rounds 0 and 1, poses
   const TeamPoses before{{5, root.poses()}};
-  for (const SolverLetter& letter : letters) {
-    CHECK(letter.to == 5);
-    std::vector<std::uint8_t> bytes = *letter.bytes;
+  for (const SolverMessage& message : messages) {
+    CHECK(message.to == 5);
+    std::vector<std::uint8_t> bytes = *message.bytes;
     CHECK_FALSE(root.receive(4, bytes));  // not a member
     CHECK_FALSE(root.receive(5, bytes));  // itself
     CHECK_FALSE(leaf.receive(7, bytes));  // neither root nor neighbour
@@ -235,14 +235,14 @@ TEST_CASE("Impossible messages are refused", "[rbcd]") {
     bytes.pop_back();
     bytes[0] = 9;
     CHECK_FALSE(root.receive(2, bytes));
-    bytes[0] = letter.bytes->front();
+    bytes[0] = message.bytes->front();
     bytes[1] = 100;  // a round beyond the present one
     CHECK_FALSE(root.receive(2, bytes));
     std::fill(bytes.begin() + 2, bytes.end(), std::uint8_t{0xff});  // not numbers
     bytes[1] = 1;
     CHECK_FALSE(root.receive(2, bytes));
-    CHECK(root.receive(2, *letter.bytes));
-    CHECK(root.receive(2, *letter.bytes));
+    CHECK(root.receive(2, *message.bytes));
+    CHECK(root.receive(2, *message.bytes));
   }
 }
 

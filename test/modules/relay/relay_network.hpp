@@ -115,7 +115,7 @@ class Network {
   [[nodiscard]] const std::vector<RobotIdentity>& met(RobotId robot) { return met_[robot]; }
   [[nodiscard]] const std::vector<RobotId>& reachable(RobotId robot) { return reachable_[robot]; }
   [[nodiscard]] RelayStore& at(RobotId robot) { return stores_.at(robot); }
-  [[nodiscard]] std::size_t parcels() const { return parcels_; }
+  [[nodiscard]] std::size_t packets() const { return packets_; }
   [[nodiscard]] std::size_t octets_sent() const { return octets_; }
   void lose(double part) { loss_ = part; }
   /// Team whose keys the robots use.
@@ -157,17 +157,17 @@ class Network {
         std::ranges::move(output.delivered, std::back_inserter(read_[robot]));
         std::ranges::move(output.met, std::back_inserter(met_[robot]));
         std::ranges::move(output.reachable, std::back_inserter(reachable_[robot]));
-        for (const RelayParcel& parcel : output.parcels) {
+        for (const RelayPacket& packet : output.packets) {
           more = true;
-          ++parcels_;
-          octets_ += parcel.message->content.size();
-          if (!linked(robot, parcel.neighbour) || uniform_(random_) < loss_) continue;
-          RelayMessage message = *parcel.message;
+          ++packets_;
+          octets_ += packet.message->content.size();
+          if (!linked(robot, packet.neighbour) || uniform_(random_) < loss_) continue;
+          RelayMessage message = *packet.message;
           if (change_) change_(message);
-          RelayStore& to = at(parcel.neighbour);
+          RelayStore& to = at(packet.neighbour);
           if (to.receive({robot, std::make_shared<const RelayMessage>(std::move(message))}) ==
               RelayArrival::kForged)
-            refusals_[parcel.neighbour].emplace_back(to.refusal());
+            refusals_[packet.neighbour].emplace_back(to.refusal());
         }
       }
     }
@@ -188,7 +188,7 @@ class Network {
   std::uniform_real_distribution<double> uniform_{0.0, 1.0};
   double loss_ = 0.0;
   double now_s_ = 0.0;
-  std::size_t parcels_ = 0;
+  std::size_t packets_ = 0;
   std::size_t octets_ = 0;
 };
 

@@ -196,7 +196,7 @@ TEST_CASE("A message that a neighbour forges or changes is refused before it is 
   CHECK(store.summary().holds == std::vector<RelayHeld>{{kOrigin, 0, 0}});
   const RelayOutput output = store.take_output();
   CHECK(output.delivered.empty());
-  CHECK(output.parcels.empty());
+  CHECK(output.packets.empty());
 }
 
 TEST_CASE("Messages of a revoked robot are refused and the robot is removed", "[relay]") {

@@ -43,7 +43,7 @@ struct Relaying {
         participant(domain, identity_of(robot)),
         peers(participant),
         seal(std::move(keys)),
-        node(process_of(robot), seal.get(), peers, {events, statuses, own_parcels, reached},
+        node(process_of(robot), seal.get(), peers, {events, statuses, own_packets, reached},
              [&now_s] { return now_s; }),
         bow_guard(node.guard<KeyframeBow>(
             RelayKind::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); })) {
@@ -76,7 +76,7 @@ struct Relaying {
   std::unique_ptr<SharedSeal> seal;
   Topic<PeerEvent> events, reached;
   Topic<RobotStatus> statuses;
-  Topic<Addressed<RelayParcel>> own_parcels;
+  Topic<Addressed<RelayPacket>> own_packets;
   Topic<KeyframeBow> received_bows, bows;
   Topic<Addressed<KeyframeRequest>> own_requests, direct_requests;
   Topic<KeyframeRequest> received_requests, requests;
@@ -99,12 +99,12 @@ struct Chain {
       robots.push_back(std::make_unique<Relaying>(domain, robot, now_s,
                                                   has_keys ? seal_of(team, robot) : nullptr));
     for (auto& robot : robots)
-      robot->own_parcels.subscribe([this, from = robot->self](const auto& parcel) {
-        RelayMessage message = *parcel->message->message;
+      robot->own_packets.subscribe([this, from = robot->self](const auto& packet) {
+        RelayMessage message = *packet->message->message;
         if (change) change(message);
-        const RelayParcel arrived{from, std::make_shared<const RelayMessage>(std::move(message))};
-        Relaying& to = *robots[parcel->to];
-        if (const char* why = to.node.guard_parcels().check(process_of(from), arrived, {}))
+        const RelayPacket arrived{from, std::make_shared<const RelayMessage>(std::move(message))};
+        Relaying& to = *robots[packet->to];
+        if (const char* why = to.node.guard_packets().check(process_of(from), arrived, {}))
           refusals.emplace_back(why);
       });
     for (const RobotId end : {RobotId{0}, RobotId{1}}) {
@@ -212,11 +212,11 @@ TEST_CASE("With keys a message without the signature of its origin is neither re
 
 TEST_CASE("Messages from a neighbour are checked before use", "[relay]") {
   const auto refusal_of = [](RelayMessage message) -> std::string {
-    const RelayParcel parcel{2, std::make_shared<const RelayMessage>(std::move(message))};
-    const auto encoded = Codec<RelayParcel>::encode(parcel);
-    const auto decoded = Codec<RelayParcel>::decode(encoded.wire, process_of(2));
+    const RelayPacket packet{2, std::make_shared<const RelayMessage>(std::move(message))};
+    const auto encoded = Codec<RelayPacket>::encode(packet);
+    const auto decoded = Codec<RelayPacket>::decode(encoded.wire, process_of(2));
     if (!decoded.value) return decoded.refusal;
-    CHECK(*decoded.value->message == *parcel.message);
+    CHECK(*decoded.value->message == *packet.message);
     CHECK(decoded.value->neighbour == 2);
     return {};
   };

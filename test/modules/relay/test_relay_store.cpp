@@ -32,7 +32,7 @@ TEST_CASE("Robots that all receive each other forward nothing and report no stor
     network.at(kA).wrote(RelayKind::kClosure, {kB}, i, octets(700), i);
     network.run(kPeriod_s);
   }
-  CHECK(network.parcels() == 0);
+  CHECK(network.packets() == 0);
   for (const RobotId robot : {kA, kB, kC}) {
     CHECK(network.at(robot).summary().received.size() == 2);
     CHECK(network.at(robot).summary().holds.empty());
@@ -167,7 +167,7 @@ TEST_CASE("The relay sends nothing between robots that soon receive each other d
   network.run(4.0);
   network.link(kA, kB);
   network.run(20.0);
-  CHECK(network.parcels() == 0);
+  CHECK(network.packets() == 0);
 }
 
 TEST_CASE("A message sent just before a link failed becomes a reliable message", "[relay]") {
@@ -178,7 +178,7 @@ TEST_CASE("A message sent just before a link failed becomes a reliable message",
   network.at(kB).wrote(RelayKind::kClosure, {kA}, 1, octets(700), 0.0);
   network.run(40.0);
   network.at(kB).wrote(RelayKind::kClosure, {kA}, 2, octets(700), 39.0);
-  CHECK(network.parcels() == 0);
+  CHECK(network.packets() == 0);
   network.cut(kA, kB);
   network.run(20.0);
   CHECK(network.read(kA, RelayKind::kClosure).size() == 1);
@@ -249,7 +249,7 @@ TEST_CASE("A reply that DDS keeps for a known robot is not carried by the relay"
   network.at(kA).call(RelayKind::kReply, kB, 17, octets(9000));
   network.link(kA, kB);
   network.run(5.0);
-  CHECK(network.parcels() == 0);
+  CHECK(network.packets() == 0);
   network.link(kB, kC);
   network.run(10.0);
   CHECK(network.at(kA).ways_to(kC) == RelayWays{.direct = false, .relay = true});

@@ -400,7 +400,7 @@ TEST_CASE("The boot id of a new incarnation is unique and not resumed", "[identi
   for (int i = 0; i < 100; ++i) {
     const std::uint64_t boot = random_boot_id();
     CHECK(resume_count(boot) == 0);
-    CHECK_FALSE(is_same_life(boot, 0));
+    CHECK_FALSE(is_same_incarnation(boot, 0));
     incarnations.insert(boot >> kResumeBits);
   }
   CHECK(incarnations.size() == 100);
@@ -415,8 +415,8 @@ TEST_CASE("An incarnation can be resumed as often as its counter permits", "[ide
     REQUIRE(resume_count(boot) == count);
   }
   CHECK(boot != first);
-  CHECK(is_same_life(boot, first));
-  CHECK_FALSE(is_same_life(boot + 1, first));
+  CHECK(is_same_incarnation(boot, first));
+  CHECK_FALSE(is_same_incarnation(boot + 1, first));
   CHECK_THROWS_AS(next_boot(boot), std::overflow_error);
 }
 

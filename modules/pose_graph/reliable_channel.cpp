@@ -1,4 +1,4 @@
-#include "modules/pose_graph/letter_book.hpp"
+#include "modules/pose_graph/reliable_channel.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -23,23 +23,23 @@ constexpr std::uint32_t kFarAhead = 10000;
 
 }  // namespace
 
-SessionLetter LetterBook::write(SolverLetter letter, double now_s) {
-  Correspondent& to = correspondents_[letter.to];
-  SessionLetter written{.sender = self_,
-                        .session = session_,
-                        .number = to.written++,
-                        .to = letter.to,
-                        .bytes = std::move(letter.bytes),
-                        .received = to.taken};
-  to.owes_word = false;
+ReliableMessage ReliableChannel::write(SolverMessage message, double now_s) {
+  Correspondent& to = correspondents_[message.to];
+  ReliableMessage written{.sender = self_,
+                          .session = session_,
+                          .number = to.written++,
+                          .to = message.to,
+                          .bytes = std::move(message.bytes),
+                          .received = to.taken};
+  to.owes_acknowledgement = false;
   to.waiting.push_back({written, now_s});
   return written;
 }
 
-LetterNews LetterBook::read(const SessionLetter& letter, double now_s) {
-  Correspondent& from = correspondents_[letter.sender.robot];
-  if (letter.received > from.written) return LetterNews::kFalse;
-  while (!from.waiting.empty() && from.waiting.front().letter.number < letter.received) {
+ReliableArrival ReliableChannel::read(const ReliableMessage& message, double now_s) {
+  Correspondent& from = correspondents_[message.sender.robot];
+  if (message.received > from.written) return ReliableArrival::kFalse;
+  while (!from.waiting.empty() && from.waiting.front().message.number < message.received) {
     const Waiting& arrived = from.waiting.front();
     if (arrived.repetitions == 0) {
       const double took_s = now_s - arrived.sent_s;
@@ -48,46 +48,46 @@ LetterNews LetterBook::read(const SessionLetter& letter, double now_s) {
     }
     from.waiting.pop_front();
   }
-  if (!letter.bytes || letter.bytes->empty()) return LetterNews::kNone;
-  const bool repeated = letter.number < from.taken || from.taken_early.contains(letter.number);
+  if (!message.bytes || message.bytes->empty()) return ReliableArrival::kNone;
+  const bool repeated = message.number < from.taken || from.taken_early.contains(message.number);
   if (repeated) {
-    from.owes_word = true;
-    return LetterNews::kNone;
+    from.owes_acknowledgement = true;
+    return ReliableArrival::kNone;
   }
-  return letter.number - from.taken > kFarAhead ? LetterNews::kFalse : LetterNews::kNew;
+  return message.number - from.taken > kFarAhead ? ReliableArrival::kFalse : ReliableArrival::kNew;
 }
 
-void LetterBook::take(const SessionLetter& letter) {
-  Correspondent& from = correspondents_[letter.sender.robot];
-  from.taken_early.insert(letter.number);
+void ReliableChannel::take(const ReliableMessage& message) {
+  Correspondent& from = correspondents_[message.sender.robot];
+  from.taken_early.insert(message.number);
   while (!from.taken_early.empty() && *from.taken_early.begin() == from.taken) {
     from.taken_early.erase(from.taken_early.begin());
     ++from.taken;
   }
 }
 
-double LetterBook::patience_s(const Correspondent& of, const Waiting& waiting) const {
+double ReliableChannel::patience_s(const Correspondent& of, const Waiting& waiting) const {
   const double first_s = of.answer_s ? kPatience * *of.answer_s : period_s_;
   const double least_s = kLeastPatience * period_s_;
   const double most_s = kMostPatience * period_s_;
-  const double of_size_s = static_cast<double>(waiting.letter.bytes->size()) / kRepeatedBps;
+  const double of_size_s = static_cast<double>(waiting.message.bytes->size()) / kRepeatedBps;
   return std::max(
       std::min(std::max(first_s, least_s) * std::ldexp(1.0, waiting.repetitions), most_s),
       of_size_s);
 }
 
-std::vector<SessionLetter> LetterBook::due(double now_s) {
-  std::vector<SessionLetter> due;
+std::vector<ReliableMessage> ReliableChannel::due(double now_s) {
+  std::vector<ReliableMessage> due;
   for (auto& [robot, of] : correspondents_) {
     for (Waiting& waiting : of.waiting) {
       if (now_s - waiting.sent_s < patience_s(of, waiting)) continue;
       waiting.sent_s = now_s;
       waiting.repetitions = std::min(waiting.repetitions + 1, 16);
-      waiting.letter.received = of.taken;
-      of.owes_word = false;
-      due.push_back(waiting.letter);
+      waiting.message.received = of.taken;
+      of.owes_acknowledgement = false;
+      due.push_back(waiting.message);
     }
-    if (!std::exchange(of.owes_word, false)) continue;
+    if (!std::exchange(of.owes_acknowledgement, false)) continue;
     due.push_back({.sender = self_,
                    .session = session_,
                    .number = of.written,
@@ -98,7 +98,7 @@ std::vector<SessionLetter> LetterBook::due(double now_s) {
   return due;
 }
 
-void LetterBook::reachable_again(RobotId robot) {
+void ReliableChannel::reachable_again(RobotId robot) {
   const auto of = correspondents_.find(robot);
   if (of == correspondents_.end()) return;
   for (Waiting& waiting : of->second.waiting)

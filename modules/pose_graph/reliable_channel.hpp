@@ -16,7 +16,7 @@
 namespace km {
 
 /// Result of the arrival of a message.
-enum class [[nodiscard]] LetterNews{
+enum class [[nodiscard]] ReliableArrival{
     kNew,    ///< Content that has not been taken yet.
     kNone,   ///< An acknowledgement without content, or a repetition.
     kFalse,  ///< A message that no correct member sends.
@@ -28,29 +28,29 @@ enum class [[nodiscard]] LetterNews{
 /// rule, repeated messages do not count for the response time. The receiver may take messages in
 /// any order, each once; a message that it does not take is sent again. Deterministic; not
 /// thread-safe.
-class LetterBook {
+class ReliableChannel {
  public:
   /// `period_s`: initial estimate of the response time.
-  LetterBook(TeamPeer self, const SessionId& session, double period_s)
+  ReliableChannel(TeamPeer self, const SessionId& session, double period_s)
       : self_(self), session_(session), period_s_(period_s) {}
 
   /// The message on the network for a message of the solver.
-  [[nodiscard]] SessionLetter write(SolverLetter letter, double now_s);
+  [[nodiscard]] ReliableMessage write(SolverMessage message, double now_s);
 
   /// Processes a message that has arrived. It does not check the boot id of the sender.
-  LetterNews read(const SessionLetter& letter, double now_s);
+  ReliableArrival read(const ReliableMessage& message, double now_s);
   /// Marks a new message as taken: its sender will receive an acknowledgement.
-  void take(const SessionLetter& letter);
+  void take(const ReliableMessage& message);
 
   /// The messages that are due for repetition, and acknowledgements for the robots that repeat
   /// theirs.
-  [[nodiscard]] std::vector<SessionLetter> due(double now_s);
+  [[nodiscard]] std::vector<ReliableMessage> due(double now_s);
   /// Reports that `robot` is reachable again: messages that it may have missed are due at once.
   void reachable_again(RobotId robot);
 
  private:
   struct Waiting {
-    SessionLetter letter;
+    ReliableMessage message;
     double sent_s = 0.0;
     int repetitions = 0;
   };
@@ -60,7 +60,7 @@ class LetterBook {
     std::uint32_t taken = 0;                   // all numbers below this are taken
     std::set<std::uint32_t> taken_early = {};  // taken numbers above `taken`
     std::optional<double> answer_s = {};       // mean time until an acknowledgement
-    bool owes_word = false;
+    bool owes_acknowledgement = false;
   };
 
   [[nodiscard]] double patience_s(const Correspondent& of, const Waiting& waiting) const;

@@ -13,7 +13,7 @@
 namespace km {
 
 /// A message as it arrives over a link, with the robot that forwarded it.
-struct TeamParcel {
+struct TeamPacket {
   RobotId from = 0;
   std::shared_ptr<const TeamMessage> message;
 };
@@ -22,20 +22,20 @@ struct TeamParcel {
 /// newest of each key. After an outage of dds.lease_s they are discarded, and a robot that is
 /// received again gets the state from scratch.
 template <>
-struct Codec<TeamParcel> {
-  using Wire = km_wire_TeamParcel;
-  static constexpr const char* kTopic = "team_parcels";
+struct Codec<TeamPacket> {
+  using Wire = km_wire_TeamPacket;
+  static constexpr const char* kTopic = "team_packets";
   static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = kMaxTeamMessageBytes + 64;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_TeamParcel_desc; }
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_TeamPacket_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<std::uint8_t> content;
   };
-  static MessageKey key_of(const TeamParcel& parcel);
-  static Encoded encode(const TeamParcel& parcel);
-  static Decoded<TeamParcel> decode(const Wire& wire, const TeamPeer& writer);
+  static MessageKey key_of(const TeamPacket& packet);
+  static Encoded encode(const TeamPacket& packet);
+  static Decoded<TeamPacket> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 }  // namespace km

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/parcel_codec.hpp"
+#include "modules/pose_graph/packet_codec.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
 #include "test/support/corrupted_message.hpp"
 
@@ -10,12 +10,12 @@ namespace {
 constexpr TeamPeer kSelf{7, 70};
 constexpr TeamPeer kFar{300, 3};
 
-Arrived<TeamParcel> written(const TeamMessage& message, const TeamPeer& by) {
-  return encoded_by<TeamParcel>(TeamPeer{by.robot, by.boot},
+Arrived<TeamPacket> written(const TeamMessage& message, const TeamPeer& by) {
+  return encoded_by<TeamPacket>(TeamPeer{by.robot, by.boot},
                                 {by.robot, std::make_shared<const TeamMessage>(message)});
 }
 
-SessionLetter letter(const TeamPeer& sender, std::uint32_t number, RobotId to) {
+ReliableMessage reliable(const TeamPeer& sender, std::uint32_t number, RobotId to) {
   return {.sender = sender,
           .session = {kSelf, 1},
           .number = number,
@@ -25,20 +25,20 @@ SessionLetter letter(const TeamPeer& sender, std::uint32_t number, RobotId to) {
 
 TEST_CASE("A message arrives with its origin and the robot that forwarded it", "[pose_graph]") {
   const TeamPeer origin = GENERATE(kSelf, kFar);
-  const auto sent = written(letter(origin, 130, 9), kSelf);
+  const auto sent = written(reliable(origin, 130, 9), kSelf);
   const auto arrived = decoded(sent);
   REQUIRE(arrived.value);
   CHECK(arrived.value->from == 7);
-  const auto& heard = std::get<SessionLetter>(*arrived.value->message);
-  CHECK(heard.sender == origin);
-  CHECK(heard.number == 130);
-  CHECK(heard.bytes->size() == 100);
+  const auto& received = std::get<ReliableMessage>(*arrived.value->message);
+  CHECK(received.sender == origin);
+  CHECK(received.number == 130);
+  CHECK(received.bytes->size() == 100);
 }
 
 TEST_CASE("Messages of which only the newest counts have one key per origin and kind",
           "[pose_graph]") {
   const auto key = [](const TeamMessage& message) {
-    return Codec<TeamParcel>::key_of({7, std::make_shared<const TeamMessage>(message)});
+    return Codec<TeamPacket>::key_of({7, std::make_shared<const TeamMessage>(message)});
   };
   const auto status = [&](const TeamPeer& sender, std::uint32_t number) {
     return key(TeamStatus{.sender = sender, .number = number, .frame = {}});
@@ -53,22 +53,22 @@ TEST_CASE("Messages of which only the newest counts have one key per origin and 
 
 TEST_CASE("Reliable messages replace each other after 64 numbers, and acknowledgements at once",
           "[pose_graph]") {
-  const auto key = [](const SessionLetter& message) {
-    return Codec<TeamParcel>::key_of({7, std::make_shared<const TeamMessage>(message)});
+  const auto key = [](const ReliableMessage& message) {
+    return Codec<TeamPacket>::key_of({7, std::make_shared<const TeamMessage>(message)});
   };
-  CHECK(key(letter(kFar, 1, 9)) != key(letter(kFar, 2, 9)));
-  CHECK(key(letter(kFar, 1, 9)) != key(letter(kFar, 1, 8)));
-  CHECK(key(letter(kFar, 1, 9)) == key(letter(kFar, 65, 9)));
-  SessionLetter receipt = letter(kFar, 1, 9);
+  CHECK(key(reliable(kFar, 1, 9)) != key(reliable(kFar, 2, 9)));
+  CHECK(key(reliable(kFar, 1, 9)) != key(reliable(kFar, 1, 8)));
+  CHECK(key(reliable(kFar, 1, 9)) == key(reliable(kFar, 65, 9)));
+  ReliableMessage receipt = reliable(kFar, 1, 9);
   receipt.bytes = std::make_shared<const std::vector<std::uint8_t>>();
-  SessionLetter next = receipt;
+  ReliableMessage next = receipt;
   next.number = 2;
   CHECK(key(receipt) == key(next));
-  CHECK(key(receipt) != key(letter(kFar, 64, 9)));
+  CHECK(key(receipt) != key(reliable(kFar, 64, 9)));
 }
 
 TEST_CASE("An inconsistent message is refused", "[pose_graph]") {
-  auto sent = written(letter(kSelf, 1, 9), kSelf);
+  auto sent = written(reliable(kSelf, 1, 9), kSelf);
   REQUIRE(decoded(sent).value);
   SECTION("sent by a former process") {
     sent.writer.boot = 71;

@@ -87,7 +87,7 @@ struct TreeSums {
 };
 
 /// From a robot to its parent, once per round.
-struct UpLetter {
+struct UpMessage {
   std::uint32_t round = 0;
   TreeSums sums;
   bool failed = false;  ///< The subtree cannot continue.
@@ -122,10 +122,10 @@ struct TreeVerdict {
 
   std::uint32_t round = 0;  ///< Round to which this is the answer.
   Next next = Next::kStep;
-  bool accept = false;     ///< kRefresh: the new poses are accepted.
-  bool full = false;       ///< Send full second derivatives from now on.
-  bool set_aside = false;  ///< kStart: closures that stand alone remain deferred.
-  bool free = true;        ///< kStart: nothing holds the frame of the team.
+  bool accept = false;    ///< kRefresh: the new poses are accepted.
+  bool full = false;      ///< Send full second derivatives from now on.
+  bool deferred = false;  ///< kStart: closures that stand alone remain deferred.
+  bool free = true;       ///< kStart: nothing holds the frame of the team.
   Weighing weighing = Weighing::kDecided;
   double scale = 1.0;
   double mu = 0.0;    ///< For the next weights.
@@ -145,18 +145,18 @@ struct TreeVerdict {
 };
 
 /// From a robot to a child, once per round.
-struct DownLetter {
+struct DownMessage {
   TreeVerdict verdict;
   Eigen::VectorXd step = {};                ///< Step of the variables of the child; kStep only.
   std::optional<TreeInverse> inverse = {};  ///< For the variables of the child; kDone only.
 };
 
-[[nodiscard]] std::vector<std::uint8_t> encode(const UpLetter& letter);
-[[nodiscard]] std::vector<std::uint8_t> encode(const DownLetter& letter);
+[[nodiscard]] std::vector<std::uint8_t> encode(const UpMessage& message);
+[[nodiscard]] std::vector<std::uint8_t> encode(const DownMessage& message);
 /// nullopt for anything that encode() does not make, or whose numbers are not finite.
-[[nodiscard]] std::optional<UpLetter> decode_up(std::span<const std::uint8_t> bytes);
-[[nodiscard]] std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes);
-/// True for an UpLetter, by the first byte.
-[[nodiscard]] bool is_up_letter(std::span<const std::uint8_t> bytes);
+[[nodiscard]] std::optional<UpMessage> decode_up(std::span<const std::uint8_t> bytes);
+[[nodiscard]] std::optional<DownMessage> decode_down(std::span<const std::uint8_t> bytes);
+/// True for an UpMessage, by the first byte.
+[[nodiscard]] bool is_up_message(std::span<const std::uint8_t> bytes);
 
 }  // namespace km

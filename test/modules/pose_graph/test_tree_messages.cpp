@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "modules/core/bytes.hpp"
-#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/tree_messages.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
@@ -76,44 +76,44 @@ TreeSystem some_system(std::mt19937& rng, Index block) {
   return system;
 }
 
-UpLetter some_up_letter(Index block, bool with_system) {
+UpMessage some_up_message(Index block, bool with_system) {
   std::mt19937 rng(5);
-  UpLetter letter{.round = 70000, .sums = some_sums(), .failed = false};
-  letter.reduced = some_numbers(rng, 4 * block);
+  UpMessage message{.round = 70000, .sums = some_sums(), .failed = false};
+  message.reduced = some_numbers(rng, 4 * block);
   if (with_system)
-    letter.system = some_system(rng, block);
+    message.system = some_system(rng, block);
   else
-    letter.weights = {{0, 1.0F}, {300, 0.0F}, {4'000'000'000U, 0.125F}};
-  return letter;
+    message.weights = {{0, 1.0F}, {300, 0.0F}, {4'000'000'000U, 0.125F}};
+  return message;
 }
 
-DownLetter some_down_letter(TreeVerdict::Next next, TreeVerdict::Weighing weighing) {
+DownMessage some_down_message(TreeVerdict::Next next, TreeVerdict::Weighing weighing) {
   std::mt19937 rng(6);
-  DownLetter letter;
-  letter.verdict = {.round = 70000,
-                    .next = next,
-                    .accept = true,
-                    .full = false,
-                    .set_aside = true,
-                    .free = false,
-                    .weighing = weighing,
-                    .scale = 0.25,
-                    .mu = 1e30,
-                    .barc = 5.28,
-                    .noise_scale = 1.0 / 3.0,
-                    .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
-                    .usual_pair = {.kappa = 12.5, .tau = 1e-7},
-                    .cost = 1687.0,
-                    .gradient = 1e-9,
-                    .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
-  letter.step = some_numbers(rng, 12);
-  return letter;
+  DownMessage message;
+  message.verdict = {.round = 70000,
+                     .next = next,
+                     .accept = true,
+                     .full = false,
+                     .deferred = true,
+                     .free = false,
+                     .weighing = weighing,
+                     .scale = 0.25,
+                     .mu = 1e30,
+                     .barc = 5.28,
+                     .noise_scale = 1.0 / 3.0,
+                     .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
+                     .usual_pair = {.kappa = 12.5, .tau = 1e-7},
+                     .cost = 1687.0,
+                     .gradient = 1e-9,
+                     .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
+  message.step = some_numbers(rng, 12);
+  return message;
 }
 
-UpLetter up_again(const UpLetter& letter) {
-  auto heard = decode_up(encode(letter));
-  REQUIRE(heard);
-  return std::move(*heard);
+UpMessage up_again(const UpMessage& message) {
+  auto received = decode_up(encode(message));
+  REQUIRE(received);
+  return std::move(*received);
 }
 
 void check_same(const TreeSums& a, const TreeSums& b) {
@@ -175,41 +175,41 @@ void check_same(const TreeSystem& a, const TreeSystem& b) {
 TEST_CASE("Decoding restores a message up the tree", "[pose_graph]") {
   const Index block = GENERATE(3, 6);
   const bool with_system = GENERATE(true, false);
-  const UpLetter told = some_up_letter(block, with_system);
-  const UpLetter heard = up_again(told);
-  CHECK(heard.round == told.round);
-  CHECK(heard.failed == told.failed);
-  check_same(heard.sums, told.sums);
-  CHECK(heard.reduced == told.reduced);
-  REQUIRE(heard.system.has_value() == with_system);
-  if (with_system) check_same(*heard.system, *told.system);
-  REQUIRE(heard.weights.size() == told.weights.size());
-  for (std::size_t k = 0; k < told.weights.size(); ++k) {
-    CHECK(heard.weights[k].edge == told.weights[k].edge);
-    CHECK(heard.weights[k].weight == told.weights[k].weight);
+  const UpMessage sent = some_up_message(block, with_system);
+  const UpMessage received = up_again(sent);
+  CHECK(received.round == sent.round);
+  CHECK(received.failed == sent.failed);
+  check_same(received.sums, sent.sums);
+  CHECK(received.reduced == sent.reduced);
+  REQUIRE(received.system.has_value() == with_system);
+  if (with_system) check_same(*received.system, *sent.system);
+  REQUIRE(received.weights.size() == sent.weights.size());
+  for (std::size_t k = 0; k < sent.weights.size(); ++k) {
+    CHECK(received.weights[k].edge == sent.weights[k].edge);
+    CHECK(received.weights[k].weight == sent.weights[k].weight);
   }
-  CHECK(encode(heard) == encode(told));
-  CHECK(is_up_letter(encode(told)));
-  CHECK_FALSE(decode_down(encode(told)));
+  CHECK(encode(received) == encode(sent));
+  CHECK(is_up_message(encode(sent)));
+  CHECK_FALSE(decode_down(encode(sent)));
 }
 
 TEST_CASE("Decoding restores a message of a robot that cannot continue", "[pose_graph]") {
-  const UpLetter heard = up_again({.round = 3, .sums = {}, .failed = true});
-  CHECK(heard.failed);
-  CHECK_FALSE(heard.system);
-  CHECK(heard.reduced.size() == 0);
+  const UpMessage received = up_again({.round = 3, .sums = {}, .failed = true});
+  CHECK(received.failed);
+  CHECK_FALSE(received.system);
+  CHECK(received.reduced.size() == 0);
 }
 
 TEST_CASE("A subtree that leaves no pose to other robots sends an empty system", "[pose_graph]") {
-  UpLetter told{.round = 1, .sums = {}};
-  told.system.emplace().schur = BlockMatrix::zero(6, 0, 0);
-  const UpLetter heard = up_again(told);
-  REQUIRE(heard.system);
-  CHECK(heard.system->variables.empty());
+  UpMessage sent{.round = 1, .sums = {}};
+  sent.system.emplace().schur = BlockMatrix::zero(6, 0, 0);
+  const UpMessage received = up_again(sent);
+  REQUIRE(received.system);
+  CHECK(received.system->variables.empty());
 }
 
 TEST_CASE("A zero block costs one bit", "[pose_graph]") {
-  UpLetter dense = some_up_letter(6, true), sparse = dense;
+  UpMessage dense = some_up_message(6, true), sparse = dense;
   sparse.system->schur = BlockMatrix::zero(6, 4, 3);
   CHECK(encode(dense).size() - encode(sparse).size() == 8 * (3 * 21 + 2 * 36));
 }
@@ -221,59 +221,59 @@ TEST_CASE("Decoding restores a message down the tree", "[pose_graph]") {
                              Next::kCount, Next::kDone, Next::kStop);
   const Weighing weighing =
       GENERATE(Weighing::kAllIn, Weighing::kWeigh, Weighing::kHold, Weighing::kDecided);
-  const DownLetter told = some_down_letter(next, weighing);
-  const auto heard = decode_down(encode(told));
-  REQUIRE(heard);
-  const TreeVerdict& v = heard->verdict;
-  CHECK(v.round == told.verdict.round);
+  const DownMessage sent = some_down_message(next, weighing);
+  const auto received = decode_down(encode(sent));
+  REQUIRE(received);
+  const TreeVerdict& v = received->verdict;
+  CHECK(v.round == sent.verdict.round);
   CHECK(v.next == next);
   CHECK(v.weighing == weighing);
-  CHECK(v.accept == told.verdict.accept);
-  CHECK(v.full == told.verdict.full);
-  CHECK(v.set_aside == told.verdict.set_aside);
-  CHECK(v.free == told.verdict.free);
-  CHECK(v.scale == told.verdict.scale);
-  CHECK(v.mu == told.verdict.mu);
-  CHECK(v.barc == told.verdict.barc);
-  CHECK(v.noise_scale == told.verdict.noise_scale);
-  CHECK(v.usual_pair.kappa == told.verdict.usual_pair.kappa);
-  CHECK(v.usual_pair.tau == told.verdict.usual_pair.tau);
+  CHECK(v.accept == sent.verdict.accept);
+  CHECK(v.full == sent.verdict.full);
+  CHECK(v.deferred == sent.verdict.deferred);
+  CHECK(v.free == sent.verdict.free);
+  CHECK(v.scale == sent.verdict.scale);
+  CHECK(v.mu == sent.verdict.mu);
+  CHECK(v.barc == sent.verdict.barc);
+  CHECK(v.noise_scale == sent.verdict.noise_scale);
+  CHECK(v.usual_pair.kappa == sent.verdict.usual_pair.kappa);
+  CHECK(v.usual_pair.tau == sent.verdict.usual_pair.tau);
   REQUIRE(v.moves.size() == 2);
   CHECK(v.moves[0].first == 7);
-  CHECK(v.moves[0].second.t == told.verdict.moves[0].second.t);
+  CHECK(v.moves[0].second.t == sent.verdict.moves[0].second.t);
   CHECK(v.moves[1].first == 9);
-  CHECK(v.cost == told.verdict.cost);
-  CHECK(v.gradient == told.verdict.gradient);
-  CHECK(v.drift == told.verdict.drift);
-  CHECK(heard->step == told.step);
-  CHECK(encode(*heard) == encode(told));
-  CHECK_FALSE(is_up_letter(encode(told)));
-  CHECK_FALSE(decode_up(encode(told)));
+  CHECK(v.cost == sent.verdict.cost);
+  CHECK(v.gradient == sent.verdict.gradient);
+  CHECK(v.drift == sent.verdict.drift);
+  CHECK(received->step == sent.step);
+  CHECK(encode(*received) == encode(sent));
+  CHECK_FALSE(is_up_message(encode(sent)));
+  CHECK_FALSE(decode_up(encode(sent)));
 }
 
 std::vector<Bytes> one_of_each() {
-  return {encode(some_up_letter(6, true)), encode(some_up_letter(3, true)),
-          encode(some_up_letter(6, false)),
-          encode(some_down_letter(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh))};
+  return {encode(some_up_message(6, true)), encode(some_up_message(3, true)),
+          encode(some_up_message(6, false)),
+          encode(some_down_message(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh))};
 }
 
 // Memory of a decoded message [bytes].
-std::size_t held_by(const UpLetter& letter) {
-  std::size_t bytes = sizeof(letter) + 64 * letter.sums.lengths.size() +
-                      sizeof(PairVote) * letter.sums.votes.capacity() +
-                      sizeof(UpLetter::NewWeight) * letter.weights.capacity() +
-                      sizeof(double) * static_cast<std::size_t>(letter.reduced.size());
-  if (!letter.system) return bytes;
-  const TreeSystem& s = *letter.system;
+std::size_t held_by(const UpMessage& message) {
+  std::size_t bytes = sizeof(message) + 64 * message.sums.lengths.size() +
+                      sizeof(PairVote) * message.sums.votes.capacity() +
+                      sizeof(UpMessage::NewWeight) * message.weights.capacity() +
+                      sizeof(double) * static_cast<std::size_t>(message.reduced.size());
+  if (!message.system) return bytes;
+  const TreeSystem& s = *message.system;
   return bytes + sizeof(TreeVariable) * s.variables.capacity() +
          sizeof(NodePair) * s.pairs.capacity() + sizeof(SentEdge) * s.edges.capacity() +
          sizeof(double) *
              static_cast<std::size_t>(s.schur.diagonal.size() + s.schur.coupling.size());
 }
 
-std::size_t held_by(const DownLetter& letter) {
-  return sizeof(letter) + sizeof(letter.verdict.moves[0]) * letter.verdict.moves.capacity() +
-         sizeof(double) * static_cast<std::size_t>(letter.step.size());
+std::size_t held_by(const DownMessage& message) {
+  return sizeof(message) + sizeof(message.verdict.moves[0]) * message.verdict.moves.capacity() +
+         sizeof(double) * static_cast<std::size_t>(message.step.size());
 }
 
 // A coupling of two bytes may result in a block of 36 numbers.
@@ -322,11 +322,11 @@ std::size_t largest_resident_kb() {
 
 TEST_CASE("A message with a wrong byte is refused, or is another valid message", "[pose_graph]") {
   std::mt19937 rng(7);
-  const std::vector<Bytes> letters = one_of_each();
+  const std::vector<Bytes> messages = one_of_each();
   constexpr int kChanges = 100000;
   const std::size_t before_kb = largest_resident_kb();
   for (int n = 0; n < kChanges; ++n) {
-    Bytes bytes = letters[static_cast<std::size_t>(n) % letters.size()];
+    Bytes bytes = messages[static_cast<std::size_t>(n) % messages.size()];
     const std::size_t at = std::uniform_int_distribution<std::size_t>(0, bytes.size() - 1)(rng);
     bytes[at] = static_cast<std::uint8_t>(std::uniform_int_distribution<int>(0, 255)(rng));
     CAPTURE(n, at);
@@ -421,9 +421,10 @@ TEST_CASE("Counts beyond the size of the message are refused", "[pose_graph]") {
 
 TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
   const auto with = [](auto&& change) {
-    DownLetter letter = some_down_letter(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh);
-    change(letter.verdict);
-    return decode_down(encode(letter)).has_value();
+    DownMessage message =
+        some_down_message(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh);
+    change(message.verdict);
+    return decode_down(encode(message)).has_value();
   };
   CHECK(with([](TreeVerdict&) {}));
   CHECK_FALSE(with([](TreeVerdict& v) { v.scale = 1.5; }));
@@ -439,9 +440,9 @@ TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
 
 TEST_CASE("Inconsistent systems are refused", "[pose_graph]") {
   const auto with = [](auto&& change) {
-    UpLetter letter = some_up_letter(6, true);
-    change(*letter.system);
-    return decode_up(encode(letter)).has_value();
+    UpMessage message = some_up_message(6, true);
+    change(*message.system);
+    return decode_up(encode(message)).has_value();
   };
   CHECK(with([](TreeSystem&) {}));
   CHECK_FALSE(with([](TreeSystem& s) { s.pairs[0] = {0, 4}; }));

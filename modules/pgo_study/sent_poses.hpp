@@ -8,7 +8,7 @@
 namespace km {
 
 /// Poses that one robot sends to the others.
-struct ToldBlock {
+struct SentPoses {
   std::vector<KeyframeIndex> keyframes = {};  ///< Ascending.
   LiftedPoses X = {};                         ///< r x 4 per keyframe.
 };

@@ -1,4 +1,4 @@
-#include "modules/pose_graph/tree_letters.hpp"
+#include "modules/pose_graph/tree_messages.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@ constexpr std::uint8_t kUp = 1;
 constexpr std::uint8_t kDown = 2;
 constexpr std::size_t kMaxElements = 1U << 24U;
 
-class LetterWriter : public ByteWriter {
+class TreeWriter : public ByteWriter {
  public:
   void id(const KeyframeId& k) {
     varint(k.robot);
@@ -37,7 +37,7 @@ class LetterWriter : public ByteWriter {
   }
 };
 
-class LetterReader : public ByteReader {
+class TreeReader : public ByteReader {
  public:
   using ByteReader::ByteReader;
   KeyframeId id() {
@@ -91,7 +91,7 @@ bool below(const PairVote& x, const PairVote& y) {
   return std::pair(x.a, x.b) < std::pair(y.a, y.b);
 }
 
-void write(LetterWriter& w, const TreeSums& s) {
+void write(TreeWriter& w, const TreeSums& s) {
   for (const double x : {s.base_cost, s.cost, s.decrement}) w.f64(x);
   w.f32(s.largest);
   for (const std::uint32_t n : {s.open, s.changed, s.fractional, s.isolated, s.fixed, s.poses})
@@ -115,7 +115,7 @@ void write(LetterWriter& w, const TreeSums& s) {
   }
 }
 
-TreeSums read_sums(LetterReader& r) {
+TreeSums read_sums(TreeReader& r) {
   TreeSums s;
   for (double* x : {&s.base_cost, &s.cost, &s.decrement}) *x = r.number();
   s.largest = r.small_number();
@@ -157,7 +157,7 @@ std::vector<bool> present_blocks(const TreeSystem& system) {
   return present;
 }
 
-void write(LetterWriter& w, const TreeSystem& system) {
+void write(TreeWriter& w, const TreeSystem& system) {
   const Index B = system.schur.block();
   w.u8(static_cast<std::uint8_t>(B));
   w.varint(system.variables.size());
@@ -197,7 +197,7 @@ void write(LetterWriter& w, const TreeSystem& system) {
   }
 }
 
-void read_blocks(LetterReader& r, TreeSystem& system, Index B) {
+void read_blocks(TreeReader& r, TreeSystem& system, Index B) {
   const std::size_t n = system.variables.size();
   const std::size_t blocks = n + system.pairs.size();
   const auto bits = r.bytes((blocks + 7) / 8);
@@ -225,7 +225,7 @@ void read_blocks(LetterReader& r, TreeSystem& system, Index B) {
     if (present(k) != (k < blocks && nonzero[k])) r.fail();
 }
 
-void read_edges(LetterReader& r, TreeSystem& system) {
+void read_edges(TreeReader& r, TreeSystem& system) {
   for (std::size_t n = r.count(kMaxElements, 41); n > 0; --n) {
     SentEdge e;
     const std::uint64_t code = r.varint();
@@ -246,7 +246,7 @@ void read_edges(LetterReader& r, TreeSystem& system) {
   }
 }
 
-std::optional<TreeSystem> read_system(LetterReader& r) {
+std::optional<TreeSystem> read_system(TreeReader& r) {
   TreeSystem system;
   const Index B = r.u8();
   if (B != 3 && B != 6) r.fail();
@@ -303,54 +303,54 @@ void TreeSums::add(const TreeSums& other) {
   }
 }
 
-std::vector<std::uint8_t> encode(const UpLetter& letter) {
-  LetterWriter w;
+std::vector<std::uint8_t> encode(const UpMessage& message) {
+  TreeWriter w;
   w.u8(kUp);
-  w.varint(letter.round);
-  w.u8(letter.failed ? 1 : 0);
-  write(w, letter.sums);
-  w.varint(static_cast<std::uint64_t>(letter.reduced.size()));
-  w.doubles(letter.reduced);
-  w.u8(letter.system ? 1 : 0);
-  if (letter.system) write(w, *letter.system);
-  w.varint(letter.weights.size());
-  for (const auto& [edge, weight] : letter.weights) {
+  w.varint(message.round);
+  w.u8(message.failed ? 1 : 0);
+  write(w, message.sums);
+  w.varint(static_cast<std::uint64_t>(message.reduced.size()));
+  w.doubles(message.reduced);
+  w.u8(message.system ? 1 : 0);
+  if (message.system) write(w, *message.system);
+  w.varint(message.weights.size());
+  for (const auto& [edge, weight] : message.weights) {
     w.varint(edge);
     w.f32(weight);
   }
-  w.varint(static_cast<std::uint64_t>(letter.frame.rows()));
-  w.doubles(letter.frame);
-  if (letter.frame.rows() > 0) w.doubles(letter.frame_gram);
+  w.varint(static_cast<std::uint64_t>(message.frame.rows()));
+  w.doubles(message.frame);
+  if (message.frame.rows() > 0) w.doubles(message.frame_gram);
   return w.release();
 }
 
-std::optional<UpLetter> decode_up(std::span<const std::uint8_t> bytes) {
-  LetterReader r(bytes);
+std::optional<UpMessage> decode_up(std::span<const std::uint8_t> bytes) {
+  TreeReader r(bytes);
   if (r.u8() != kUp) return std::nullopt;
-  UpLetter letter{.round = r.varint_as<std::uint32_t>(), .sums = {}};
-  letter.failed = r.flag();
-  letter.sums = read_sums(r);
-  letter.reduced = r.doubles();
-  if (r.flag()) letter.system = read_system(r);
+  UpMessage message{.round = r.varint_as<std::uint32_t>(), .sums = {}};
+  message.failed = r.flag();
+  message.sums = read_sums(r);
+  message.reduced = r.doubles();
+  if (r.flag()) message.system = read_system(r);
   for (std::size_t n = r.count(kMaxElements, 5); n > 0; --n) {
     const auto edge = r.varint_as<std::uint32_t>();
-    letter.weights.push_back({edge, r.weight()});
+    message.weights.push_back({edge, r.weight()});
   }
-  letter.frame.resize(static_cast<Index>(r.count(kMaxElements, 6 * sizeof(double))), 6);
-  for (double& x : letter.frame.reshaped()) x = r.number();
-  if (letter.frame.rows() > 0)
-    for (double& x : letter.frame_gram.reshaped()) x = r.number();
-  return r.done() ? std::optional(std::move(letter)) : std::nullopt;
+  message.frame.resize(static_cast<Index>(r.count(kMaxElements, 6 * sizeof(double))), 6);
+  for (double& x : message.frame.reshaped()) x = r.number();
+  if (message.frame.rows() > 0)
+    for (double& x : message.frame_gram.reshaped()) x = r.number();
+  return r.done() ? std::optional(std::move(message)) : std::nullopt;
 }
 
-std::vector<std::uint8_t> encode(const DownLetter& letter) {
-  const TreeVerdict& v = letter.verdict;
-  LetterWriter w;
+std::vector<std::uint8_t> encode(const DownMessage& message) {
+  const TreeVerdict& v = message.verdict;
+  TreeWriter w;
   w.u8(kDown);
   w.varint(v.round);
   w.u8(static_cast<std::uint8_t>(v.next));
   w.u8(static_cast<std::uint8_t>(v.weighing));
-  w.u8(static_cast<std::uint8_t>((v.accept ? 1 : 0) + (v.full ? 2 : 0) + (v.set_aside ? 4 : 0) +
+  w.u8(static_cast<std::uint8_t>((v.accept ? 1 : 0) + (v.full ? 2 : 0) + (v.deferred ? 4 : 0) +
                                  (v.free ? 8 : 0)));
   for (const double x : {v.scale, v.mu, v.barc, v.noise_scale, v.usual_pair.kappa, v.usual_pair.tau,
                          v.cost, v.gradient})
@@ -361,18 +361,18 @@ std::vector<std::uint8_t> encode(const DownLetter& letter) {
     w.varint(robot);
     w.single(T);
   }
-  w.varint(static_cast<std::uint64_t>(letter.step.size()));
-  w.doubles(letter.step);
-  w.u8(letter.inverse ? 1 : 0);
-  if (letter.inverse) w.inverse(*letter.inverse);
+  w.varint(static_cast<std::uint64_t>(message.step.size()));
+  w.doubles(message.step);
+  w.u8(message.inverse ? 1 : 0);
+  if (message.inverse) w.inverse(*message.inverse);
   return w.release();
 }
 
-std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes) {
-  LetterReader r(bytes);
+std::optional<DownMessage> decode_down(std::span<const std::uint8_t> bytes) {
+  TreeReader r(bytes);
   if (r.u8() != kDown) return std::nullopt;
-  DownLetter letter;
-  TreeVerdict& v = letter.verdict;
+  DownMessage message;
+  TreeVerdict& v = message.verdict;
   v.round = r.varint_as<std::uint32_t>();
   const std::uint8_t next = r.u8(), weighing = r.u8(), flags = r.u8();
   if (next > static_cast<std::uint8_t>(TreeVerdict::Next::kStop) ||
@@ -382,7 +382,7 @@ std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes) {
   v.weighing = static_cast<TreeVerdict::Weighing>(weighing);
   v.accept = (flags & 1U) != 0;
   v.full = (flags & 2U) != 0;
-  v.set_aside = (flags & 4U) != 0;
+  v.deferred = (flags & 4U) != 0;
   v.free = (flags & 8U) != 0;
   for (double* x : {&v.scale, &v.mu, &v.barc, &v.noise_scale, &v.usual_pair.kappa,
                     &v.usual_pair.tau, &v.cost, &v.gradient})
@@ -396,12 +396,12 @@ std::optional<DownLetter> decode_down(std::span<const std::uint8_t> bytes) {
     const auto robot = r.varint_as<RobotId>();
     v.moves.emplace_back(robot, r.single());
   }
-  letter.step = r.doubles();
-  if (r.flag()) letter.inverse = r.inverse();
-  return r.done() ? std::optional(std::move(letter)) : std::nullopt;
+  message.step = r.doubles();
+  if (r.flag()) message.inverse = r.inverse();
+  return r.done() ? std::optional(std::move(message)) : std::nullopt;
 }
 
-bool is_up_letter(std::span<const std::uint8_t> bytes) {
+bool is_up_message(std::span<const std::uint8_t> bytes) {
   return !bytes.empty() && bytes.front() == kUp;
 }
 
