@@ -154,7 +154,7 @@ Matrix6 read_covariance(const JsonPlace& place) {
   const double error = (given - given.transpose()).cwiseAbs().maxCoeff();
   if (!(error <= kSymmetry * given.cwiseAbs().maxCoeff()))
     place.fail("is not symmetric: mirrored elements differ by " + shortest_text(error));
-  const Matrix6 Sigma = 0.5 * (given + given.transpose());
+  Matrix6 Sigma = 0.5 * (given + given.transpose());
   const Eigen::LLT<Matrix6> llt(Sigma);
   if (llt.info() != Eigen::Success) place.fail("is not positive definite");
   for (const double variance : Sigma.diagonal())
