@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "modules/pose_graph/odometry_judgement.hpp"
+#include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/precision_limits.hpp"
 #include "modules/pose_graph/team_plan.hpp"
-#include "modules/pose_graph/tree_front.hpp"
 
 namespace km {
 
@@ -140,9 +140,8 @@ int MemberTeam::step(RoundMeter& meter) {
     if (!pass_on(round, meter))
       throw std::runtime_error("MemberTeam: the members wait for each other");
   take_poses();
-  // A solver may publish its state every few rounds only. The exchange of covariances is not a
-  // round.
-  rounds_ = rounds_before_ + (done() ? state_.round : std::max(round, state_.round));
+  // A solver may publish its state every few rounds only.
+  rounds_ = rounds_before_ + std::max(round, state_.round);
   return static_cast<int>(rounds_ - before);
 }
 
@@ -185,14 +184,12 @@ bool MemberTeam::reconsider() {
     return poses[static_cast<std::size_t>(graph_.first[id.robot] + id.index)];
   };
   bool any = false;
-  const auto look_again = [&](const PoseEdge& e) {
-    const bool fits = residual_of(e, pose(e.from), pose(e.to)) <= kSecondChance * state_.barc;
-    if (fits) any |= decisions_.reopen(e.id());
-  };
   for (const SessionGraph& part : parts_) {
-    for (std::size_t k = part.odometry; k < part.own.size(); ++k) look_again(part.own[k]);
+    std::vector<PoseEdge> closures(part.own.begin() + static_cast<std::ptrdiff_t>(part.odometry),
+                                   part.own.end());
     for (const PoseEdge& e : part.between)
-      if (part.self < e.other(part.self).robot) look_again(e);
+      if (part.self < e.other(part.self).robot) closures.push_back(e);
+    any |= decisions_.reconsider(closures, pose, state_.barc);
   }
   if (!any) return false;
   announce_starts(std::move(poses));

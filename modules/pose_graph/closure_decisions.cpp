@@ -40,10 +40,20 @@ void ClosureDecisions::set_noise(ClosureNoiseRecord noise, bool with_team) {
   if (with_team) team_noise_ = noise_;
 }
 
-bool ClosureDecisions::reopen(const ClosureId& id) {
-  if (!is_rejected(id) || reopened_[id] >= kChances) return false;
-  ++reopened_[id];
-  decided_.erase(id);
+bool ClosureDecisions::reconsider(std::span<const PoseEdge> closures, const PoseOf& pose,
+                                  double barc) {
+  bool any = false;
+  for (const PoseEdge& e : closures) {
+    const ClosureId id = e.id();
+    if (!is_rejected(id)) continue;
+    const auto from = pose(e.from), to = pose(e.to);
+    if (!from || !to || residual_of(e, *from, *to) > kSecondChance * barc) continue;
+    if (++reopened_[id] > kChances) continue;
+    decided_.erase(id);
+    any = true;
+  }
+  if (!any) return false;
+  ++reconsidered_;
   counted_.clear();
   return true;
 }

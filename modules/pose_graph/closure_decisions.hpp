@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -33,8 +35,13 @@ class ClosureDecisions {
   void decide(std::span<const WeighedClosure> verdicts, bool provisional);
   /// Adopts the noise at the end of a session, which was one of a team or of a robot alone.
   void set_noise(ClosureNoiseRecord noise, bool with_team);
-  /// Makes a rejected closure undecided. False if it is not rejected, or has had its kChances.
-  [[nodiscard]] bool reopen(const ClosureId& id);
+  /// Makes the rejected ones of `closures` undecided whose residual in a solution is at most
+  /// kSecondChance times `barc`, each at most kChances times. `pose` returns poses of the solution;
+  /// closures with an end without a pose are left out. False if there is none.
+  using PoseOf = std::function<std::optional<SE3>(const KeyframeId&)>;
+  bool reconsider(std::span<const PoseEdge> closures, const PoseOf& pose, double barc);
+  /// Number of times that closures became undecided again.
+  [[nodiscard]] std::uint32_t reconsidered() const { return reconsidered_; }
   /// Discards all decisions on closures with a robot whose keyframe indices have a new meaning.
   void forget(RobotId robot);
 
@@ -48,6 +55,7 @@ class ClosureDecisions {
   std::map<ClosureId, bool> decided_;
   std::set<ClosureId> provisional_;
   std::map<ClosureId, int> reopened_;  // number of times
+  std::uint32_t reconsidered_ = 0;
   ClosureNoiseRecord noise_;
   ClosureNoiseRecord team_noise_;  // noise without the sessions of this robot alone
   std::map<ClosureId, bool> verdicts_;

@@ -8,6 +8,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::MatrixXf;
 
 // Eliminates the first `pivots` scalar columns of the dense `front` (lower triangle) in place.
 // These columns become L, and the rest becomes the Schur complement. False if a pivot is not
@@ -171,8 +172,8 @@ void FrontalCholesky::backward(MatrixXd& X) const {
 
 // The inverse at the nodes of a front that are eliminated later. They are nodes of its parent
 // front, or kept nodes.
-MatrixXd FrontalCholesky::inverse_of_rest(const EliminationPlan::Front& front,
-                                          const std::vector<MatrixXd>& inverses,
+MatrixXf FrontalCholesky::inverse_of_rest(const EliminationPlan::Front& front,
+                                          const std::vector<MatrixXf>& inverses,
                                           const BlockMatrix& kept) const {
   const auto first = static_cast<std::size_t>(front.pivots);
   const std::size_t rest = front.nodes.size() - first;
@@ -187,7 +188,7 @@ MatrixXd FrontalCholesky::inverse_of_rest(const EliminationPlan::Front& front,
     for (std::size_t k = first; k < front.nodes.size(); ++k)
       place.push_back(plan_->place_of_kept()[static_cast<std::size_t>(front.nodes[k])]);
   }
-  MatrixXd Z(block_ * static_cast<Index>(rest), block_ * static_cast<Index>(rest));
+  MatrixXf Z(block_ * static_cast<Index>(rest), block_ * static_cast<Index>(rest));
   for (std::size_t i = 0; i < rest; ++i)
     for (std::size_t j = 0; j < rest; ++j) {
       const int a = place[i], b = place[j];
@@ -197,46 +198,60 @@ MatrixXd FrontalCholesky::inverse_of_rest(const EliminationPlan::Front& front,
         block = inverses[static_cast<std::size_t>(front.parent)].block(block_ * a, block_ * b,
                                                                        block_, block_);
       else if (a == b)
-        block = kept.at(a);
+        block = kept.at(a).cast<float>();
       else if (a < b)
-        block = kept.between(kept_pair(a, b));
+        block = kept.between(kept_pair(a, b)).cast<float>();
       else
-        block = kept.between(kept_pair(a, b)).transpose();
+        block = kept.between(kept_pair(a, b)).transpose().cast<float>();
     }
   return Z;
 }
 
-// With the columns [L; M] of the factor and G = M L^-1, the blocks are Z_rest, -Z_rest G, and
-// (L L^T)^-1 + G^T Z_rest G.
+// Z has the inverse of a front at the nodes below its pivots. The pivots follow in groups, the last
+// ones first: with the columns [L; M] of the factor and G = M L^-1, the new blocks are -Z G and
+// (L L^T)^-1 + G^T Z G. These are sums of positive terms, so single precision suffices.
+void FrontalCholesky::invert_pivots(const MatrixXd& factor, MatrixXf& Z) const {
+  constexpr Index kGroup = 48;  // columns
+  const Index rows = factor.rows();
+  for (Index end = factor.cols(); end > 0;) {
+    const Index first = std::max(Index{0}, end - kGroup), columns = end - first, rest = rows - end;
+    const auto L = factor.block(first, first, columns, columns).triangularView<Eigen::Lower>();
+    const MatrixXd inverse_L = L.solve(MatrixXd::Identity(columns, columns));
+    MatrixXf corner = (inverse_L.transpose() * inverse_L).cast<float>();
+    if (rest > 0) {
+      const MatrixXf G = (factor.block(end, first, rest, columns) * inverse_L).cast<float>();
+      auto below = Z.block(end, first, rest, columns);
+      below.noalias() = -Z.bottomRightCorner(rest, rest) * G;
+      Z.block(first, end, columns, rest) = below.transpose();
+      corner.noalias() -= G.transpose() * below;
+    }
+    Z.block(first, first, columns, columns) = corner;
+    end = first;
+  }
+}
+
 BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
   BlockMatrix inverse =
       BlockMatrix::zero(block_, static_cast<std::size_t>(plan_->nodes()), plan_->pairs().size());
-  std::vector<MatrixXd> inverses(factors_.size());
+  std::vector<MatrixXf> inverses(factors_.size());
   for (std::size_t f = factors_.size(); f-- > 0;) {
     const EliminationPlan::Front& front = plan_->fronts()[f];
     const Index pivots = block_ * front.pivots;
     const Index rest = factors_[f].rows() - pivots;
-    const MatrixXd inverse_L = factors_[f].topRows(pivots).triangularView<Eigen::Lower>().solve(
-        MatrixXd::Identity(pivots, pivots));
-    const MatrixXd Z_rest = inverse_of_rest(front, inverses, kept);
-    const MatrixXd G = factors_[f].bottomRows(rest) * inverse_L;
-    MatrixXd& Z = inverses[f];
+    MatrixXf& Z = inverses[f];
     Z.resize(pivots + rest, pivots + rest);
-    Z.bottomRightCorner(rest, rest) = Z_rest;
-    Z.bottomLeftCorner(rest, pivots).noalias() = -Z_rest * G;
-    Z.topRightCorner(pivots, rest) = Z.bottomLeftCorner(rest, pivots).transpose();
-    Z.topLeftCorner(pivots, pivots).noalias() = inverse_L.transpose() * inverse_L;
-    Z.topLeftCorner(pivots, pivots).noalias() -= G.transpose() * Z.bottomLeftCorner(rest, pivots);
+    Z.bottomRightCorner(rest, rest) = inverse_of_rest(front, inverses, kept);
+    invert_pivots(factors_[f], Z);
     const auto local = [&](int node) {
       return block_ *
              (std::find(front.nodes.begin(), front.nodes.end(), node) - front.nodes.begin());
     };
     for (int k = 0; k < front.pivots; ++k)
       inverse.at(front.nodes[static_cast<std::size_t>(k)]) =
-          Z.block(block_ * k, block_ * k, block_, block_);
+          Z.block(block_ * k, block_ * k, block_, block_).cast<double>();
     for (const int pair : front.pairs) {
       const auto& [i, j] = plan_->pairs()[static_cast<std::size_t>(pair)];
-      inverse.between(pair) = Z.block(local(i), local(j), block_, block_);
+      inverse.between(pair) = Z.block(local(i), local(j), block_, block_).cast<double>();
     }
     for (const int c : front.children) inverses[static_cast<std::size_t>(c)].resize(0, 0);
   }

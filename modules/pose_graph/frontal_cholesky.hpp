@@ -34,6 +34,7 @@ class FrontalCholesky {
 
   /// Blocks of the inverse of A at all nodes and pairs of the plan (selected inversion: Takahashi,
   /// Fagan, Chin, PICA 1973). `kept` has these blocks at the kept nodes, in the order of schur().
+  /// In single precision.
   [[nodiscard]] BlockMatrix selected_inverse(const BlockMatrix& kept) const;
 
   /// | |L|^T b |^2 for b >= 0 of B nodes entries, which bounds the rounding errors of the
@@ -46,8 +47,9 @@ class FrontalCholesky {
   bool factorise_front(std::size_t f, const BlockMatrix& A);
   void add_to_schur(const EliminationPlan::Front& front, const Eigen::MatrixXd& rest);
   void add_kept(const BlockMatrix& A);
-  [[nodiscard]] Eigen::MatrixXd inverse_of_rest(const EliminationPlan::Front& front,
-                                                const std::vector<Eigen::MatrixXd>& inverses,
+  void invert_pivots(const Eigen::MatrixXd& factor, Eigen::MatrixXf& Z) const;
+  [[nodiscard]] Eigen::MatrixXf inverse_of_rest(const EliminationPlan::Front& front,
+                                                const std::vector<Eigen::MatrixXf>& inverses,
                                                 const BlockMatrix& kept) const;
   void place_kept(const BlockMatrix& kept, BlockMatrix& inverse) const;
   [[nodiscard]] int kept_pair(int a, int b) const;

@@ -11,9 +11,6 @@
 
 namespace km {
 
-/// The newest public poses of each robot.
-using PublicPoses = std::map<RobotId, MemberPoses>;
-
 /// The contribution of a robot to a session, frozen when it joins.
 struct FrozenPart {
   /// `public_poses` has the poses of absent robots, and `step_precision` has the entry of this

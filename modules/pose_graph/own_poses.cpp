@@ -8,8 +8,8 @@
 
 #include "modules/pose_graph/corroboration.hpp"
 #include "modules/pose_graph/frame_entry.hpp"
+#include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/robust_schedule.hpp"
-#include "modules/pose_graph/tree_front.hpp"
 
 namespace km {
 namespace {

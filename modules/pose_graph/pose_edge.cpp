@@ -1,5 +1,7 @@
 #include "modules/pose_graph/pose_edge.hpp"
 
+#include <cmath>
+
 #include <tuple>
 
 #include "modules/core/measurement_limits.hpp"
@@ -29,6 +31,13 @@ std::optional<PoseEdge> pose_edge(const RelativePose& measured) {
 
 bool is_better(const PoseEdge& a, const PoseEdge& b) {
   return rank_of(a) < rank_of(b);
+}
+
+double residual_of(const PoseEdge& edge, const SE3& T_world_from, const SE3& T_world_to) {
+  const SE3 predicted = T_world_from * edge.T_from_to;
+  return std::sqrt(edge.precision.kappa * (T_world_to.linear() - predicted.linear()).squaredNorm() +
+                   edge.precision.tau *
+                       (T_world_to.translation() - predicted.translation()).squaredNorm());
 }
 
 }  // namespace km

@@ -37,4 +37,9 @@ struct PoseEdge {
 /// smaller trace of the covariance. A total order, equal on all robots.
 [[nodiscard]] bool is_better(const PoseEdge& a, const PoseEdge& b);
 
+/// Square root of the cost of an edge with weight 1 [sigma]. For small Gaussian noise with these
+/// precisions, its square is chi-squared distributed.
+[[nodiscard]] double residual_of(const PoseEdge& edge, const SE3& T_world_from,
+                                 const SE3& T_world_to);
+
 }  // namespace km

@@ -15,6 +15,7 @@ struct PoseGraphConfig {
   bool robust = true;
   double barc = 0.0;
   bool share_private = false;
+  bool covariances = true;
   int rank = 5;
   int max_rounds = 0;
   double exchange_budget_kb_s = 20.0;
@@ -40,6 +41,8 @@ struct PoseGraphConfig {
     visitor.field("share_private", share_private,
                   "newton: send relative poses between private poses if that saves bytes; other "
                   "robots can then derive parts of the trajectory of this robot");
+    visitor.field("covariances", covariances,
+                  "newton: compute the covariances of the optimised poses at the end of a session");
     visitor.field("rank", rank, {3, 10}, "rbcd: rank r of the relaxation; equal on all robots");
     visitor.field("max_rounds", max_rounds, {0, 1000000},
                   "rounds after which a session ends even if it has not converged; the paper stops "

@@ -37,6 +37,7 @@ SessionPart::SessionPart(Session session, TeamPeer self, FrozenPart part,
       factory_(std::move(factory)),
       tolerance_(tolerance),
       channel_(self, session_.id, period_s),
+      started_s_(now_s),
       moved_s_(now_s) {
   for (const SessionMember& member : session_.plan.members)
     boot_of_[member.peer.robot] = member.peer.boot;

@@ -92,6 +92,10 @@ class SessionPart {
   /// Time of the last activity or message of the session [s].
   [[nodiscard]] double moved_s() const { return moved_s_; }
   void moved(double now_s) { moved_s_ = now_s; }
+  [[nodiscard]] double started_s() const { return started_s_; }
+  /// Bytes that this robot has sent for the session, per receiver, and with forwarded messages.
+  [[nodiscard]] std::uint64_t sent_bytes() const { return sent_bytes_; }
+  void count_sent(std::size_t bytes) { sent_bytes_ += bytes; }
 
  private:
   [[nodiscard]] bool enter(const PublicPoses& published);
@@ -127,7 +131,9 @@ class SessionPart {
   std::deque<std::pair<std::uint32_t, std::vector<SE3>>> rounds_;  // poses of the last rounds
   std::vector<SE3> committed_;
   bool worked_ = false;
+  double started_s_;
   double moved_s_;
+  std::uint64_t sent_bytes_ = 0;
 };
 
 }  // namespace km

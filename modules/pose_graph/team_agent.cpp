@@ -14,44 +14,6 @@
 // team_agent_session.cpp.
 
 namespace km {
-namespace {
-
-// Earliest time of a changed status, and of one with changed links [periods].
-constexpr double kEarlyStatus = 0.5;
-constexpr double kEarlyLinks = 0.05;
-
-bool same_content(const TeamStatus& a, const TeamStatus& b) {
-  const auto rest = [](const TeamStatus& s) {
-    return std::tie(s.sender, s.receives, s.frame, s.frame_version, s.keyframes, s.revision,
-                    s.offers, s.method, s.upright);
-  };
-  return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
-}
-
-// Checks everything that this robot relies on, including the checks of the codec, because no other
-// robot is trusted.
-bool in_order(const MemberPoses& poses) {
-  const auto& keyframes = poses.keyframes;
-  const auto finite = [](const SinglePose& T) {
-    constexpr float kUnit = 1e-3F;
-    return std::abs(T.q.norm() - 1.0F) < kUnit && T.t.allFinite();
-  };
-  const Precision& step = poses.step_precision;
-  return !keyframes.empty() && keyframes.front() == 0 &&
-         std::adjacent_find(keyframes.begin(), keyframes.end(), std::greater_equal<>()) ==
-             keyframes.end() &&
-         poses.T_frame_kf.size() == keyframes.size() &&
-         std::all_of(poses.T_frame_kf.begin(), poses.T_frame_kf.end(), finite) &&
-         step.kappa > 0.0 && step.tau > 0.0 && std::isfinite(step.kappa + step.tau);
-}
-
-bool in_order(const TeamStatus& status) {
-  const auto by_peer = [](const EdgeSetOffer& a, const EdgeSetOffer& b) { return a.peer < b.peer; };
-  return std::is_sorted(status.offers.begin(), status.offers.end(), by_peer) &&
-         status.T_odom_first.matrix().allFinite();
-}
-
-}  // namespace
 
 TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory factory)
     : config_(checked(config)),
@@ -59,10 +21,13 @@ TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverF
       factory_(std::move(factory)),
       graph_(self.robot),
       relay_(self, config_.status_period_s),
-      component_{self.robot},
+      roster_(self, config_.method),
+      status_schedule_(config_.status_period_s),
+      notices_(self.robot),
       schedule_(config_),
-      frame_(self),
-      notices_(self.robot) {}
+      frame_(self) {
+  roster_.connect(relay_.links());
+}
 
 bool TeamAgent::add(const KeyframeOdometry& keyframe) {
   const bool taken = graph_.add(keyframe);
@@ -110,15 +75,18 @@ void TeamAgent::peer_lost(RobotId robot) {
   relay_.link_down(robot, now_s_);
 }
 
-TeamAgent::Peer& TeamAgent::meet(const TeamPeer& peer) {
-  Peer& entry = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot}).first->second;
-  if (entry.boot != peer.boot) {
-    if (!is_same_incarnation(entry.boot, peer.boot)) forget_measured(peer.robot);
-    public_poses_.erase(peer.robot);
-    plan_outdated_ = true;
-    entry = Peer{.boot = peer.boot};
+void TeamAgent::meet(const TeamPeer& peer) {
+  switch (roster_.meet(peer)) {
+    case TeamRoster::Meeting::kKnown:
+    case TeamRoster::Meeting::kNew:
+      return;
+    case TeamRoster::Meeting::kOtherIncarnation:
+      forget_measured(peer.robot);
+      break;
+    case TeamRoster::Meeting::kOtherProcess:
+      break;
   }
-  return entry;
+  plan_outdated_ = true;
 }
 
 void TeamAgent::peer_restarted(const TeamPeer& peer) {
@@ -136,15 +104,8 @@ void TeamAgent::watch_links() {
   relay_.step(now_s_);
   if (links_seen_ == relay_.links_version()) return;
   links_seen_ = relay_.links_version();
-  component_ = relay_.links().component(self_.robot);
+  roster_.connect(relay_.links());
   plan_outdated_ = true;
-}
-
-bool TeamAgent::in_reach(const TeamPeer& peer) const {
-  if (peer == self_) return true;
-  const auto known = peers_.find(peer.robot);
-  return known != peers_.end() && known->second.boot == peer.boot &&
-         component_.contains(peer.robot);
 }
 
 bool TeamAgent::receive(RobotId from, const TeamMessagePtr& message) {
@@ -167,35 +128,34 @@ bool TeamAgent::receive(RobotId from, const TeamMessagePtr& message) {
 }
 
 bool TeamAgent::take(const TeamPeer& sender, const TeamStatus& status) {
-  Peer& peer = meet(sender);
-  if (!in_order(status))
+  meet(sender);
+  if (!is_well_formed(status))
     return refuse("a status of robot " + std::to_string(sender.robot) + " that is not in order");
   plan_outdated_ = true;
-  peer.other_method = status.method != config_.method;
-  peer.status = status;
-  return !peer.other_method ||
+  roster_.take(status);
+  return !roster_.at(sender.robot).other_method ||
          refuse("robot " + std::to_string(sender.robot) + " is configured for another method");
 }
 
 bool TeamAgent::take(const TeamPeer& sender, const Session& session) {
-  Peer& peer = meet(sender);
+  meet(sender);
   if (!well_formed(session))
     return refuse("a session of robot " + std::to_string(sender.robot) + " that is not in order");
-  peer.session = session;
+  roster_.take(session);
   consider(session);
   return true;
 }
 
 bool TeamAgent::take(const TeamPeer& sender, const MemberPoses& poses) {
   meet(sender);
-  if (!in_order(poses))
+  if (!is_well_formed(poses))
     return refuse("poses of robot " + std::to_string(sender.robot) + " that are not in order");
   plan_outdated_ = true;
   const auto is_member = [&] {
-    return part_ && part_->poses_of(public_poses_, sender.robot, MemberStage::kEntered) != nullptr;
+    return part_ && poses_of(sender.robot, MemberStage::kEntered) != nullptr;
   };
   const bool was_member = is_member();
-  public_poses_[sender.robot] = poses;
+  roster_.take(poses);
   if (was_member && poses.session != part_->session().id && state_ == SessionState::kRunning)
     state_ = SessionState::kDeserted;
   if (!is_member()) return true;
@@ -233,8 +193,8 @@ TeamStatus TeamAgent::make_status() {
     decisions_.count_places(offer, *graph_.edges(offer.peer, offer.id));
   return {.sender = self_,
           .receives = relay_.receives(),
-          .frame = frame_,
-          .frame_version = frame_version_,
+          .frame = frame_.frame(),
+          .frame_version = frame_.version(),
           .keyframes = graph_.keyframes(),
           .revision = revision(),
           .offers = std::move(offers),
@@ -244,17 +204,12 @@ TeamStatus TeamAgent::make_status() {
 }
 
 void TeamAgent::send_status(TeamOutput& output) {
-  const double age_s = now_s_ - status_sent_s_;
-  if (age_s < kEarlyLinks * config_.status_period_s) return;
-  const bool links_changed = !sent_status_ || sent_status_->receives != relay_.receives();
-  if (!links_changed && age_s < kEarlyStatus * config_.status_period_s) return;
+  if (!status_schedule_.may_be_due(relay_.receives(), now_s_)) return;
   TeamStatus status = make_status();
-  const bool changed = !sent_status_ || !same_content(status, *sent_status_);
-  if (!changed && age_s < config_.status_period_s) return;
-  status_sent_s_ = now_s_;
+  const StatusSchedule::Due due = status_schedule_.due(status, now_s_);
+  if (due == StatusSchedule::Due::kNo) return;
   output.progress = make_progress();
-  if (!changed) return relay_.repeat_status(now_s_);
-  sent_status_ = status;
+  if (due == StatusSchedule::Due::kRepeat) return relay_.repeat_status(now_s_);
   relay_.publish(std::move(status), now_s_);
 }
 
@@ -265,45 +220,22 @@ void TeamAgent::hand_out(TeamOutput& output) {
     if (part_ && session_of(*packet.message) == part_->session().id) {
       const auto [size, is_new] = sizes.try_emplace(packet.message.get(), 0);
       if (is_new) size->second = encode(*packet.message).size();
-      sent_bytes_ += size->second;
+      part_->count_sent(size->second);
     }
     output.packets.push_back(std::move(packet));
   }
 }
 
-std::optional<SE3> TeamAgent::world_of(RobotId anchor) const {
-  const bool upright = part_ && part_->session().upright;
-  // In an upright session, the optimum has a better estimate of the tilt of keyframe 0 than its own
-  // vertical.
-  const auto world = [&](const SE3& T_frame_first, const SE3& T_odom_first) {
-    const SE3 T_frame_world = T_frame_first * T_odom_first.inverse();
-    if (!upright) return T_frame_world;
-    const Eigen::MatrixXd turned =
-        level(T_frame_world.matrix().topRows<3>(), T_odom_first.translation());
-    return make_pose(turned.leftCols<3>(), turned.col(3));
-  };
-  // Uses the pose that all other robots have received, so that all have one frame to the last
-  // digit.
-  const auto published = public_poses_.find(anchor);
-  if (published == public_poses_.end() || published->second.frame != frame_) return std::nullopt;
-  const SE3 T_frame_first = published->second.T_frame_kf.front().pose();
-  if (anchor == self_.robot) return world(T_frame_first, graph_.T_odom_first());
-  const auto peer = peers_.find(anchor);
-  if (peer == peers_.end() || !peer->second.status) return std::nullopt;
-  return world(T_frame_first, peer->second.status->T_odom_first);
+std::optional<World> TeamAgent::world_of(RobotId anchor) const {
+  return frame_.world_of(anchor, roster_, graph_.T_odom_first(), part_ && part_->session().upright);
 }
 
 // The frame in which this robot publishes. If no closure ties it to the anchor of the session, this
 // is the frame of the lowest robot that closures tie to it.
-std::optional<TeamAgent::World> TeamAgent::tied_world() const {
-  if (!world_ || !std::ranges::binary_search(ties_.untied, world_->anchor)) return world_;
-  RobotId anchor = self_.robot;
-  for (const SessionMember& member : plan_.members)
-    if (!std::ranges::binary_search(ties_.untied, member.peer.robot))
-      anchor = std::min(anchor, member.peer.robot);
-  const auto T_frame_world = world_of(anchor);
-  if (!T_frame_world) return std::nullopt;
-  return World{anchor, *T_frame_world};
+std::optional<World> TeamAgent::tied_world() const {
+  const std::optional<World>& world = frame_.world();
+  if (!world || !std::ranges::binary_search(ties_.untied, world->anchor)) return world;
+  return world_of(frame_.tied_anchor(plan_, ties_));
 }
 
 const std::vector<SE3>& TeamAgent::poses() const {
@@ -312,7 +244,7 @@ const std::vector<SE3>& TeamAgent::poses() const {
 
 void TeamAgent::publish(TeamOutput& output) {
   const bool early = now_s_ - published_s_ < config_.publish_period_s;
-  if (!world_ || (in_session() && early)) return;
+  if (!frame_.world() || (in_session() && early)) return;
   const auto world = tied_world();
   if (!world || (!publish_due_ && published_anchor_ == world->anchor)) return;
   publish_due_ = false;
@@ -346,7 +278,7 @@ OptimizerProgress TeamAgent::make_progress() const {
   progress.round += part_->state().round;
   progress.cost = session.finished ? session.cost : part_->state().cost;
   progress.gradient_norm = session.finished ? session.gradient : part_->state().gradient;
-  progress.seconds += part_->moved_s() - started_s_;
+  progress.seconds += part_->moved_s() - part_->started_s();
   progress.settled = !in_session() && session.finished && !publish_due_ && holds_all(session.plan);
   return progress;
 }
@@ -359,9 +291,9 @@ bool TeamAgent::holds_all(const SessionPlan& plan) const {
   for (const EdgeSetOffer& offer : graph_.offers()) {
     const bool newest = offer.peer != last;
     last = offer.peer;
-    const auto peer = peers_.find(offer.peer);
-    if (!newest || peer == peers_.end() || peer->second.other_method ||
-        !in_reach({offer.peer, peer->second.boot}))
+    const TeamRoster::Peer* peer = roster_.find(offer.peer);
+    if (!newest || peer == nullptr || peer->other_method ||
+        !roster_.in_reach({offer.peer, peer->boot}))
       continue;
     const SessionPair pair{std::min(self_.robot, offer.peer), std::max(self_.robot, offer.peer),
                            offer.id};

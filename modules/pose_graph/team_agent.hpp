@@ -13,14 +13,17 @@
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/pose_graph/closure_decisions.hpp"
 #include "modules/pose_graph/frame_ties.hpp"
+#include "modules/pose_graph/own_frame.hpp"
 #include "modules/pose_graph/own_graph.hpp"
 #include "modules/pose_graph/own_poses.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
 #include "modules/pose_graph/relay.hpp"
 #include "modules/pose_graph/session_part.hpp"
 #include "modules/pose_graph/session_schedule.hpp"
+#include "modules/pose_graph/status_schedule.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 #include "modules/pose_graph/team_notices.hpp"
+#include "modules/pose_graph/team_roster.hpp"
 
 namespace km {
 
@@ -94,7 +97,7 @@ class TeamAgent {
 
   /// Present own poses in frame().
   [[nodiscard]] const std::vector<SE3>& poses() const;
-  [[nodiscard]] const TeamFrame& frame() const { return frame_; }
+  [[nodiscard]] const TeamFrame& frame() const { return frame_.frame(); }
   /// The present or last session of this robot.
   [[nodiscard]] const SessionPart* part() const { return part_ ? &*part_ : nullptr; }
   /// False if the session of part() has ended.
@@ -116,31 +119,19 @@ class TeamAgent {
     kAbandoned,  // it ended without a solution of all members
     kSolved,     // it ended, and all members have its solution
   };
-  struct Peer {
-    std::uint64_t boot = 0;
-    std::optional<TeamStatus> status = {};
-    std::optional<Session> session = {};  // the newest one that it coordinates
-    std::uint32_t joined = 0;             // number of its last session that this robot has joined
-    std::uint32_t missed = 0;   // number of its last session that this robot could not join
-    bool other_method = false;  // its edges are not optimised
-  };
-  struct World {
-    RobotId anchor = 0;
-    SE3 T_frame_world = SE3::Identity();
-  };
-
   // Other robots and their messages.
-  Peer& meet(const TeamPeer& peer);
+  void meet(const TeamPeer& peer);
   void forget_measured(RobotId robot);
   void watch_links();
-  [[nodiscard]] bool in_reach(const TeamPeer& peer) const;
   bool take(const TeamPeer& sender, const TeamStatus& status);
   bool take(const TeamPeer& sender, const Session& session);
   bool take(const TeamPeer& sender, const MemberPoses& poses);
   bool take(const TeamPeer& sender, const ReliableMessage& message);
   bool refuse(const std::string& what) { return notices_.refuse(what); }
   [[nodiscard]] TeamStatus make_status();
-  [[nodiscard]] std::uint32_t revision() const { return graph_.revision() + reconsidered_; }
+  [[nodiscard]] std::uint32_t revision() const {
+    return graph_.revision() + decisions_.reconsidered();
+  }
   void send_status(TeamOutput& output);
   void hand_out(TeamOutput& output);
 
@@ -169,15 +160,21 @@ class TeamAgent {
   void publish_poses();
   void conclude();
   void leave(bool with_solution);
+  /// Poses that a member has sent in the session of part_ at `stage` or later.
+  [[nodiscard]] const MemberPoses* poses_of(RobotId robot, MemberStage stage) const {
+    return part_->poses_of(roster_.public_poses(), robot, stage);
+  }
+  [[nodiscard]] bool all_solved() const { return part_->all_solved(roster_.public_poses()); }
   [[nodiscard]] bool misses_member(const SessionPlan& plan) const;
   [[nodiscard]] bool has_failed() const;
   void decide(const std::vector<WeighedClosure>& verdicts);
   void decide_with(const MemberPoses& poses);
   void reconsider();
-  [[nodiscard]] bool fits(const PoseEdge& closure) const;
+  [[nodiscard]] std::optional<SE3> own_pose(KeyframeIndex index) const;
+  [[nodiscard]] std::optional<SE3> public_pose(const KeyframeId& id) const;
 
   // Results.
-  [[nodiscard]] std::optional<SE3> world_of(RobotId anchor) const;
+  [[nodiscard]] std::optional<World> world_of(RobotId anchor) const;
   [[nodiscard]] std::optional<World> tied_world() const;
   void publish(TeamOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
@@ -188,37 +185,28 @@ class TeamAgent {
   MemberSolverFactory factory_;
   OwnGraph graph_;
   Relay relay_;
-  std::map<RobotId, Peer> peers_;
-  PublicPoses public_poses_;  // the newest ones of each robot, own ones included
-  ClosureDecisions decisions_;
-  bool reconsider_due_ = false;     // once all members have sent the solution
-  std::uint32_t reconsidered_ = 0;  // number of times that closures became undecided again
-
   std::uint64_t links_seen_ = 0;
-  std::set<RobotId> component_;  // robots that links connect to this one
+  TeamRoster roster_;
+  StatusSchedule status_schedule_;
+  TeamNotices notices_;
 
   SessionPlan plan_;  // from the present knowledge
   bool plan_outdated_ = true;
   SessionSchedule schedule_;
   FrameTies ties_;  // between the members of the plan
 
-  TeamFrame frame_;
-  std::uint32_t frame_version_ = 0;
-  std::optional<World> world_;  // in frame_
+  OwnFrame frame_;
   OwnPoses poses_;
+  ClosureDecisions decisions_;
   std::optional<SessionPart> part_;
-  SessionState state_ = SessionState::kNone;  // state of the session of part_
-  double started_s_ = 0.0;
-  std::uint64_t sent_bytes_ = 0;     // for this session, per receiver, and with forwarded messages
-  std::uint32_t rounds_before_ = 0;  // rounds of earlier sessions
-  double optimising_s_ = 0.0;        // in earlier sessions
+  SessionState state_ = SessionState::kNone;  // of the session of part_
+  bool reconsider_due_ = false;               // once all members have sent the solution
+  std::uint32_t rounds_before_ = 0;           // rounds of earlier sessions
+  double optimising_s_ = 0.0;                 // in earlier sessions
 
-  TeamNotices notices_;
-  std::optional<TeamStatus> sent_status_;
   bool publish_due_ = false;
   std::optional<RobotId> published_anchor_;
   double now_s_ = 0.0;
-  double status_sent_s_ = -1e9;
   double session_sent_s_ = -1e9;
   double published_s_ = -1e9;
 };

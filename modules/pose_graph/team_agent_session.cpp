@@ -3,7 +3,6 @@
 
 #include "modules/pose_graph/team_agent.hpp"
 #include "modules/pose_graph/team_plan.hpp"
-#include "modules/pose_graph/tree_front.hpp"
 
 // Sessions: how they are opened, and how this robot joins and leaves them.
 
@@ -22,18 +21,10 @@ bool same_members(const SessionPlan& x, const SessionPlan& y) {
 // Plans and sessions that this robot coordinates.
 
 void TeamAgent::make_plan() {
-  std::map<RobotId, TeamStatus> statuses{{self_.robot, make_status()}};
-  for (const auto& [robot, peer] : peers_) {
-    if (!peer.status || peer.other_method || !in_reach(peer.status->sender)) continue;
-    TeamStatus& status = statuses.emplace(robot, *peer.status).first->second;
-    // Poses are sent at once, but statuses only periodically.
-    const auto published = public_poses_.find(robot);
-    if (published != public_poses_.end() && published->second.frame_version > status.frame_version)
-      status.frame = published->second.frame;
-  }
+  const std::map<RobotId, TeamStatus> statuses = roster_.statuses(make_status());
   SessionPlan plan = plan_session(statuses, relay_.links(), self_.robot);
   // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
-  if (world_ && !plan.has_member(world_->anchor)) world_ = tied_world();
+  if (frame_.world() && !plan.has_member(frame_.world()->anchor)) frame_.set_world(tied_world());
   schedule_.update(!same_graph(plan, plan_), closures_known(plan, statuses), now_s_);
   plan_ = std::move(plan);
   std::vector<RobotId> members;
@@ -47,8 +38,8 @@ void TeamAgent::make_plan() {
 void TeamAgent::coordinate() {
   if (std::exchange(plan_outdated_, false)) {
     make_plan();
-    for (const auto& [robot, peer] : peers_)
-      if (peer.session && in_reach(peer.session->id.coordinator)) consider(*peer.session);
+    for (const auto& [robot, peer] : roster_.peers())
+      if (peer.session && roster_.in_reach(peer.session->id.coordinator)) consider(*peer.session);
   }
   if (coordinator_of(plan_) != self_.robot) return;
   if (should_open()) open_session();
@@ -71,16 +62,17 @@ void TeamAgent::announce() {
 
 bool TeamAgent::all_upright(const SessionPlan& plan) const {
   return std::all_of(plan.members.begin(), plan.members.end(), [&](const SessionMember& member) {
-    return member.peer == self_ ? graph_.upright() : peers_.at(member.peer.robot).status->upright;
+    return member.peer == self_ ? graph_.upright()
+                                : roster_.find(member.peer.robot)->status->upright;
   });
 }
 
 // Bytes of the member that has sent most in the last session, because the budget applies to every
 // robot.
 std::uint64_t TeamAgent::price_bytes() const {
-  std::uint64_t most = sent_bytes_;
+  std::uint64_t most = part_->sent_bytes();
   for (const RobotId member : part_->members())
-    if (const MemberPoses* published = part_->poses_of(public_poses_, member, MemberStage::kSolved))
+    if (const MemberPoses* published = poses_of(member, MemberStage::kSolved))
       most = std::max(most, published->sent_bytes);
   return most;
 }
@@ -94,8 +86,7 @@ bool TeamAgent::is_next_due() const {
 // True if a member has been in another session since the last one.
 bool TeamAgent::has_moved_on() const {
   const auto elsewhere = [&](RobotId robot) {
-    return robot != self_.robot &&
-           part_->poses_of(public_poses_, robot, MemberStage::kEntered) == nullptr;
+    return robot != self_.robot && poses_of(robot, MemberStage::kEntered) == nullptr;
   };
   return std::any_of(part_->members().begin(), part_->members().end(), elsewhere);
 }
@@ -118,9 +109,10 @@ void TeamAgent::open_session() {
   session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);
   session.anchor = coordinator_of(plan_);
   // `world` keeps its place when its robot is no longer a member.
-  if (world_ && world_->anchor < session.anchor && frame_ == plan_.frame) {
-    session.anchor = world_->anchor;
-    session.T_frame_world = world_->T_frame_world;
+  const std::optional<World>& world = frame_.world();
+  if (world && world->anchor < session.anchor && frame_.frame() == plan_.frame) {
+    session.anchor = world->anchor;
+    session.T_frame_world = world->T_frame_world;
   }
   if (!join(session)) return;
   schedule_.opened();
@@ -143,7 +135,7 @@ bool TeamAgent::well_formed(const Session& session) const {
 bool TeamAgent::accepts(const Session& session) const {
   // A robot joins a session only once: the other members could not distinguish its new messages
   // from those before it left.
-  if (session.id.number <= peers_.at(session.id.coordinator.robot).joined) return false;
+  if (session.id.number <= roster_.find(session.id.coordinator.robot)->joined) return false;
   if (!part_) return true;
   const SessionId& running = part_->session().id;
   if (session.id.coordinator == running.coordinator) return true;
@@ -166,7 +158,7 @@ void TeamAgent::consider(const Session& session) {
                                     session.id.coordinator == part_->session().id.coordinator &&
                                     part_->session().id.number < session.id.number;
   // The other members continue without this robot.
-  if (from_own_coordinator && !member) return leave(part_->all_solved(public_poses_));
+  if (from_own_coordinator && !member) return leave(all_solved());
   // This robot joins only if it knows a connection to the coordinator, and if all members are
   // present.
   if (!member || session.finished || !accepts(session) || misses_member(session.plan) ||
@@ -174,7 +166,7 @@ void TeamAgent::consider(const Session& session) {
     return;
   // consider() runs again with every new message, but counts the refusal only once.
   const RobotId coordinator = session.id.coordinator.robot;
-  if (std::exchange(peers_.at(coordinator).missed, session.id.number) != session.id.number)
+  if (std::exchange(roster_.at(coordinator).missed, session.id.number) != session.id.number)
     refuse("a session of robot " + std::to_string(coordinator) +
            " over closures that are not at hand");
 }
@@ -183,10 +175,11 @@ void TeamAgent::consider(const Session& session) {
 
 std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
   std::vector<RobotId> peers;
-  for (const auto& [robot, peer] : peers_) peers.push_back(robot);
-  auto part = freeze_part(session, self_.robot, graph_, peers, public_poses_);
+  for (const auto& [robot, peer] : roster_.peers()) peers.push_back(robot);
+  auto part = freeze_part(session, self_.robot, graph_, peers, roster_.public_poses());
   if (!part) return std::nullopt;
-  part->in_frame = frame_ == session.plan.frame || session.plan.members.front().peer == self_;
+  part->in_frame =
+      frame_.frame() == session.plan.frame || session.plan.members.front().peer == self_;
   part->suspicious = expects_false();
   return part;
 }
@@ -200,12 +193,12 @@ bool TeamAgent::join(const Session& session) {
   }
   auto part = freeze(session);
   if (!part) return false;
-  if (in_session()) leave(part_->all_solved(public_poses_));
+  if (in_session()) leave(all_solved());
   const bool alone = session.plan.members.size() == 1;
   decisions_.begin_session(!alone);
   if (part_) {
     rounds_before_ += part_->state().round;
-    optimising_s_ += part_->moved_s() - started_s_;
+    optimising_s_ += part_->moved_s() - part_->started_s();
   }
   poses_.extend(graph_);
   poses_.correct(graph_.odometry_breaks());
@@ -217,25 +210,22 @@ bool TeamAgent::join(const Session& session) {
   part_.emplace(session, self_, std::move(*part), factory_,
                 AlignmentTolerance{config_.alignment_rotation_rad, config_.alignment_translation_m},
                 config_.status_period_s, now_s_);
-  if (const auto peer = peers_.find(session.id.coordinator.robot); peer != peers_.end())
-    peer->second.joined = session.id.number;
+  if (roster_.find(session.id.coordinator.robot) != nullptr)
+    roster_.at(session.id.coordinator.robot).joined = session.id.number;
   state_ = SessionState::kRunning;
-  started_s_ = now_s_;
-  sent_bytes_ = 0;
   reconsider_due_ = false;
   return true;
 }
 
 bool TeamAgent::misses_member(const SessionPlan& plan) const {
   return std::any_of(plan.members.begin(), plan.members.end(),
-                     [&](const SessionMember& member) { return !in_reach(member.peer); });
+                     [&](const SessionMember& member) { return !roster_.in_reach(member.peer); });
 }
 
 bool TeamAgent::has_failed() const {
   const auto failed = [&](RobotId robot) {
-    return robot == self_.robot
-               ? part_->stage() == MemberStage::kFailed
-               : part_->poses_of(public_poses_, robot, MemberStage::kFailed) != nullptr;
+    return robot == self_.robot ? part_->stage() == MemberStage::kFailed
+                                : poses_of(robot, MemberStage::kFailed) != nullptr;
   };
   return std::any_of(part_->members().begin(), part_->members().end(), failed);
 }
@@ -243,7 +233,7 @@ bool TeamAgent::has_failed() const {
 void TeamAgent::advance(TeamOutput& output) {
   if (!in_session()) return;
   const auto stage = part_->stage();
-  for (ReliableMessage& message : part_->advance(public_poses_, now_s_))
+  for (ReliableMessage& message : part_->advance(roster_.public_poses(), now_s_))
     relay_.publish(std::move(message), now_s_);
   for (const RobotId sender : part_->take_refused())
     refuse("a message of robot " + std::to_string(sender) + " that is of no use");
@@ -257,26 +247,22 @@ void TeamAgent::enter_stage(TeamOutput& output) {
   const Session& session = part_->session();
   output.more = true;
   if (part_->stage() == MemberStage::kEntered) {
-    if (frame_ != session.plan.frame) {
-      ++frame_version_;
-      world_.reset();
-    }
-    frame_ = session.plan.frame;
+    frame_.enter(session.plan.frame);
     plan_outdated_ = true;
   }
   if (part_->stage() == MemberStage::kFailed)
     notices_.add("session " + std::to_string(session.id.number) + " of robot " +
                  std::to_string(session.id.coordinator.robot) +
                  " cannot be solved: " + part_->failure());
-  hand_out(output);  // sent_bytes_ of the poses includes these
+  hand_out(output);  // the bytes in the message of the poses include these
   publish_poses();
 }
 
 void TeamAgent::publish_poses() {
   MemberPoses message{.sender = self_, .session = part_->session().id};
   message.stage = *part_->stage();
-  message.frame = frame_;
-  message.frame_version = frame_version_;
+  message.frame = frame_.frame();
+  message.frame_version = frame_.version();
   message.step_precision = graph_.mean_step_precision();
   message.keyframes = part_->public_keyframes();
   const std::vector<SE3>& poses = part_->poses();
@@ -284,8 +270,8 @@ void TeamAgent::publish_poses() {
     message.T_frame_kf.push_back(SinglePose::of(poses[keyframe]));
   for (const WeighedClosure& verdict : part_->verdicts().closures)
     if (verdict.id.from.robot != verdict.id.to.robot) message.verdicts.push_back(verdict);
-  message.sent_bytes = sent_bytes_;
-  public_poses_[self_.robot] = message;
+  message.sent_bytes = part_->sent_bytes();
+  roster_.take(message);
   const bool concerns_others = part_->members().size() > 1 || message.keyframes.size() > 1;
   if (concerns_others) relay_.publish(std::move(message), now_s_);
 }
@@ -311,56 +297,53 @@ void TeamAgent::decide_with(const MemberPoses& poses) {
 // For a closure between robots, both robots use the poses that both have sent, and so decide
 // equally.
 void TeamAgent::reconsider() {
-  if (!reconsider_due_ || !part_->all_solved(public_poses_)) return;
+  if (!reconsider_due_ || !all_solved()) return;
   reconsider_due_ = false;
-  std::vector<PoseEdge> closures;
-  for (const RobotId member : part_->members())
-    if (const auto* edges = graph_.newest_edges(member))
-      closures.insert(closures.end(), edges->begin(), edges->end());
-  bool any = false;
-  for (const PoseEdge& e : closures) {
-    if (decisions_.is_rejected(e.id()) && fits(e)) any |= decisions_.reopen(e.id());
+  for (const RobotId member : part_->members()) {
+    const auto* closures = graph_.newest_edges(member);
+    if (closures == nullptr) continue;
+    const bool inside = member == self_.robot;
+    const auto pose = [&](const KeyframeId& id) {
+      return inside ? own_pose(id.index) : public_pose(id);
+    };
+    plan_outdated_ |= decisions_.reconsider(*closures, pose, part_->state().barc);
   }
-  if (!any) return;
-  ++reconsidered_;
-  plan_outdated_ = true;
 }
 
-bool TeamAgent::fits(const PoseEdge& closure) const {
-  const bool inside = closure.from.robot == closure.to.robot;
-  const auto pose = [&](const KeyframeId& id) -> std::optional<SE3> {
-    const std::vector<SE3>& own = poses_.T_frame_kf();
-    if (inside) return id.index < own.size() ? std::optional(own[id.index]) : std::nullopt;
-    const MemberPoses& published = public_poses_.at(id.robot);
-    const auto at =
-        std::lower_bound(published.keyframes.begin(), published.keyframes.end(), id.index);
-    if (at == published.keyframes.end() || *at != id.index) return std::nullopt;
-    return published.T_frame_kf[static_cast<std::size_t>(at - published.keyframes.begin())].pose();
-  };
-  const auto from = pose(closure.from), to = pose(closure.to);
-  return from && to && residual_of(closure, *from, *to) <= kSecondChance * part_->state().barc;
+std::optional<SE3> TeamAgent::own_pose(KeyframeIndex index) const {
+  const std::vector<SE3>& own = poses_.T_frame_kf();
+  return index < own.size() ? std::optional(own[index]) : std::nullopt;
+}
+
+// The pose that its robot has sent.
+std::optional<SE3> TeamAgent::public_pose(const KeyframeId& id) const {
+  const MemberPoses& sent = roster_.public_poses().at(id.robot);
+  const auto at = std::ranges::lower_bound(sent.keyframes, id.index);
+  if (at == sent.keyframes.end() || *at != id.index) return std::nullopt;
+  return sent.T_frame_kf[static_cast<std::size_t>(at - sent.keyframes.begin())].pose();
 }
 
 // Ends the session or sets `world`, if the poses received from the members allow it.
 void TeamAgent::conclude() {
   Session& session = part_->session();
   const RobotId anchor = session.anchor;
-  if (part_->stage() == MemberStage::kEntered && (!world_ || world_->anchor != anchor)) {
-    const bool published = anchor == self_.robot ||
-                           part_->poses_of(public_poses_, anchor, MemberStage::kEntered) != nullptr;
-    const auto world = session.T_frame_world ? session.T_frame_world
-                       : published           ? world_of(anchor)
-                                             : std::nullopt;
-    if (world) world_ = World{anchor, *world};
+  const std::optional<World>& known = frame_.world();
+  if (part_->stage() == MemberStage::kEntered && (!known || known->anchor != anchor)) {
+    const bool published =
+        anchor == self_.robot || poses_of(anchor, MemberStage::kEntered) != nullptr;
+    if (session.T_frame_world)
+      frame_.set_world(World{anchor, *session.T_frame_world});
+    else if (const auto world = published ? world_of(anchor) : std::nullopt)
+      frame_.set_world(world);
   }
   const bool coordinates = session.id.coordinator == self_;
-  if (part_->all_solved(public_poses_) && coordinates) {
+  if (all_solved() && coordinates) {
     const SolverState state = part_->state();
     session.round = state.round;
     session.cost = state.cost;
     session.gradient = state.gradient;
     session.finished = true;
-    if (const auto world = world_of(session.anchor)) session.T_frame_world = world;
+    if (const auto world = world_of(session.anchor)) session.T_frame_world = world->T_frame_world;
     announce();
     leave(true);
   } else if (has_failed()) {
@@ -368,7 +351,7 @@ void TeamAgent::conclude() {
     if (coordinates) announce();
     leave(false);
   } else if (misses_member(session.plan)) {
-    leave(part_->all_solved(public_poses_));
+    leave(all_solved());
   }
 }
 
@@ -377,13 +360,13 @@ void TeamAgent::leave(bool with_solution) {
   state_ = with_solution ? SessionState::kSolved : SessionState::kAbandoned;
   const Session& session = part_->session();
   if (with_solution && session.finished && session.T_frame_world)
-    world_ = World{session.anchor, *session.T_frame_world};
+    frame_.set_world(World{session.anchor, *session.T_frame_world});
   publish_due_ = true;
   plan_outdated_ = true;
   if (!with_solution) return;
   decide(part_->verdicts().closures);
   for (const RobotId member : part_->members())
-    if (const MemberPoses* published = part_->poses_of(public_poses_, member, MemberStage::kSolved);
+    if (const MemberPoses* published = poses_of(member, MemberStage::kSolved);
         published && member != self_.robot)
       decide_with(*published);
   decisions_.set_noise(part_->noise(), part_->members().size() > 1);

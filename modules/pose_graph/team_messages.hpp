@@ -5,6 +5,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <variant>
@@ -154,6 +155,9 @@ struct MemberPoses {
   /// Bytes that it has sent in this session so far, per receiver, and with forwarded messages.
   std::uint64_t sent_bytes = 0;
 };
+
+/// The newest public poses of each robot.
+using PublicPoses = std::map<RobotId, MemberPoses>;
 
 /// Reliable message of a solver to one member of a session, or, without bytes, only an
 /// acknowledgement.

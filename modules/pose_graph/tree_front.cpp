@@ -15,19 +15,24 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Weights below kNoWeight are negligible compared to odometry.
+// Ratio of weights from which on old second derivatives mislead a step: the stiffness of an edge is
+// half or twice its correct value. Weights below kNoWeight are negligible compared to odometry.
+constexpr double kWeightRatio = 2.0;
 constexpr double kNoWeight = 0.02;
 // An edge with a weight below this is rejected. It has no cost and no gradient; its stiffness only
 // keeps the system regular.
 constexpr double kRejected = 1e-6;
+// Damping of singular equations, relative to their largest entry: above the rounding errors of a
+// factorisation.
+constexpr double kDamping = 1e-9;
 
 [[noreturn]] void refuse(RobotId robot, const std::string& what) {
   throw std::invalid_argument("TreeFront of robot " + std::to_string(robot) + ": " + what);
 }
 
-bool differs(double weight, double before, double ratio) {
+bool differs(double weight, double before) {
   const auto [less, more] = std::minmax(weight, before);
-  return more > kNoWeight && more > ratio * less;
+  return more > kNoWeight && more > kWeightRatio * less;
 }
 
 std::size_t at(Index k) {
@@ -71,13 +76,6 @@ Vector6 tangent_of_step(const Eigen::Ref<const VectorXd>& step) {
   Vector6 xi = Vector6::Zero();
   xi.segment(first_of(step.size()), step.size()) = step;
   return xi;
-}
-
-double residual_of(const PoseEdge& edge, const SE3& T_world_from, const SE3& T_world_to) {
-  const SE3 predicted = T_world_from * edge.T_from_to;
-  return std::sqrt(edge.precision.kappa * (T_world_to.linear() - predicted.linear()).squaredNorm() +
-                   edge.precision.tau *
-                       (T_world_to.translation() - predicted.translation()).squaredNorm());
 }
 
 TreeFront::TreeFront(FrontGraph graph) : graph_(std::move(graph)) {
@@ -129,14 +127,23 @@ std::size_t TreeFront::node_of(const KeyframeId& id) const {
   return at(foreign_.at(id));
 }
 
+std::optional<std::size_t> TreeFront::origin_node() const {
+  if (!graph_.origin) return std::nullopt;
+  if (graph_.origin->robot == graph_.self)
+    return graph_.origin->index < graph_.poses ? std::optional(std::size_t{graph_.origin->index})
+                                               : std::nullopt;
+  const auto foreign = foreign_.find(*graph_.origin);
+  return foreign == foreign_.end() ? std::nullopt : std::optional(at(foreign->second));
+}
+
 void TreeFront::weigh(const std::vector<double>& weights) {
   weights_ = weights;
 }
 
-bool TreeFront::stale(double ratio) const {
+bool TreeFront::stale() const {
   if (linearised_weights_.empty()) return true;
   for (std::size_t k = 0; k < weights_.size(); ++k)
-    if (places_[k].sent < 0 && differs(weights_[k], linearised_weights_[k], ratio)) return true;
+    if (places_[k].sent < 0 && differs(weights_[k], linearised_weights_[k])) return true;
   return false;
 }
 
@@ -233,6 +240,7 @@ std::vector<bool> TreeFront::kept_nodes(const std::vector<NodePair>& pairs) cons
     if (graph_.free) keep[at(graph_.poses / 2)] = true;
     return keep;
   }
+  if (const auto origin = origin_node()) keep[*origin] = true;
   std::vector<bool> hidden(keep.size(), false);
   for (Index k = 0; k < graph_.poses; ++k)
     hidden[at(k)] = !graph_.open.contains(static_cast<KeyframeIndex>(k));
@@ -312,10 +320,24 @@ void TreeFront::add_child(const Child& child, BlockMatrix& A) const {
   }
 }
 
-bool TreeFront::factorise() {
+// The second derivatives of own edges and of the children.
+BlockMatrix TreeFront::assembled() const {
   BlockMatrix A = own_;
   for (const auto& [name, child] : children_) add_child(child, A);
+  return A;
+}
+
+bool TreeFront::factorise() {
   changed_ = false;
+  return factor_->factorise(assembled());
+}
+
+bool TreeFront::factorise_damped() {
+  changed_ = false;
+  BlockMatrix A = assembled();
+  const double damping = kDamping * A.diagonal.cwiseAbs().maxCoeff();
+  for (int node = 0; node < static_cast<int>(ids_.size()); ++node)
+    A.at(node).diagonal().array() += damping;
   return factor_->factorise(A);
 }
 
@@ -363,11 +385,10 @@ float TreeFront::weight_of(const SentWeight& sent) const {
 }
 
 std::vector<UpMessage::NewWeight> TreeFront::changed_weights() {
-  constexpr double kRatio = 2.0;
   std::vector<UpMessage::NewWeight> changes;
   for (std::size_t k = 0; k < sent_.size(); ++k) {
     const float weight = weight_of(sent_[k]);
-    if (!differs(weight, sent_[k].sent, kRatio)) continue;
+    if (!differs(weight, sent_[k].sent)) continue;
     sent_[k].sent = weight;
     changes.push_back({static_cast<std::uint32_t>(k), weight});
   }
@@ -462,9 +483,9 @@ MatrixXd TreeFront::gram_of_eliminated(const MatrixXd& rows) const {
 // The position of the one remaining pose is held, and its rotation, except for its tilt if
 // verticals determine that. A common rotation of the team about the vertical costs nothing, so the
 // softest direction is left out.
-std::optional<TreeFront::Tilts> TreeFront::tilts_of_root(bool upright) const {
-  if (!upright || block() != 6 || plan_->kept().size() != 1) return std::nullopt;
-  const Eigen::Matrix3d S = factor_->schur().at(0).topLeftCorner<3, 3>();
+std::optional<TreeFront::Tilts> TreeFront::tilts_of(const BlockMatrix& held, bool upright) {
+  if (!upright || held.diagonal.cols() != 6) return std::nullopt;
+  const Eigen::Matrix3d S = held.at(0).topLeftCorner<3, 3>();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(S);
   const Tilts tilts{turns.eigenvectors().rightCols<2>(), turns.eigenvalues().tail<2>()};
   return tilts.stiffness.minCoeff() > 0.0 ? std::optional(tilts) : std::nullopt;
@@ -472,7 +493,7 @@ std::optional<TreeFront::Tilts> TreeFront::tilts_of_root(bool upright) const {
 
 TreeFront::RootStep TreeFront::solve_root(bool upright) const {
   RootStep result{VectorXd::Zero(block() * static_cast<Index>(plan_->kept().size()))};
-  const auto tilts = tilts_of_root(upright);
+  const auto tilts = tilts_of(factor_->schur(), upright);
   if (!tilts) return result;
   const Eigen::Vector2d along = tilts->directions.transpose() * reduced().head<3>();
   const Eigen::Vector2d step = along.cwiseQuotient(tilts->stiffness);
@@ -493,20 +514,26 @@ BlockMatrix TreeFront::inverse(const BlockMatrix& kept) const {
   return factor_->selected_inverse(kept);
 }
 
-BlockMatrix TreeFront::inverse_of_root(bool upright) const {
-  BlockMatrix inverse =
-      BlockMatrix::zero(block(), plan_->kept().size(), plan_->kept_pairs().size());
-  if (const auto tilts = tilts_of_root(upright))
-    inverse.at(0).topLeftCorner<3, 3>() = tilts->directions *
-                                          tilts->stiffness.cwiseInverse().asDiagonal() *
-                                          tilts->directions.transpose();
-  return inverse;
+// Steps are computed with a pose in the middle held, because second derivatives of earlier rounds
+// converge faster so. Covariances need another factorisation, with the origin held.
+std::optional<BlockMatrix> TreeFront::inverse_about_origin(bool upright) const {
+  if (!graph_.free) return factor_->selected_inverse(BlockMatrix::zero(block(), 0, 0));
+  std::vector<bool> keep(ids_.size(), false);
+  keep[origin_node().value_or(at(graph_.poses / 2))] = true;
+  FrontalCholesky factor(std::make_shared<const EliminationPlan>(std::move(keep), plan_->pairs()));
+  if (!factor.factorise(assembled())) return std::nullopt;
+  BlockMatrix held = BlockMatrix::zero(block(), 1, 0);
+  if (const auto tilts = tilts_of(factor.schur(), upright))
+    held.at(0).topLeftCorner<3, 3>() = tilts->directions *
+                                       tilts->stiffness.cwiseInverse().asDiagonal() *
+                                       tilts->directions.transpose();
+  return factor.selected_inverse(held);
 }
 
 // A coupling that is zero in the Schur complement of the child is not part of its factor.
-std::vector<float> TreeFront::inverse_of_child(RobotId name, const BlockMatrix& inverse) const {
+TreeInverse TreeFront::inverse_of_child(RobotId name, const BlockMatrix& inverse) const {
   const Child& child = children_.at(name);
-  std::vector<float> blocks;
+  TreeInverse blocks;
   for (const int node : child.node)
     for (Index c = 0; c < block(); ++c)
       for (Index row = c; row < block(); ++row)
@@ -520,7 +547,7 @@ std::vector<float> TreeFront::inverse_of_child(RobotId name, const BlockMatrix& 
   return blocks;
 }
 
-BlockMatrix TreeFront::inverse_from_parent(std::span<const float> blocks) const {
+BlockMatrix TreeFront::inverse_from_parent(const TreeInverse& blocks) const {
   const BlockMatrix& schur = factor_->schur();
   BlockMatrix inverse =
       BlockMatrix::zero(block(), plan_->kept().size(), plan_->kept_pairs().size());

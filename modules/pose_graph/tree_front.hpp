@@ -29,6 +29,7 @@ struct FrontGraph {
   bool root = false;  ///< Root of the tree: it has no parent to leave poses to.
   /// Nothing holds the frame of the team: the root then solves for all poses but one.
   bool free = true;
+  std::optional<KeyframeId> origin = {};  ///< nullopt: no covariances are needed.
 };
 
 /// The front of one robot in the Newton equations of a team: multifrontal Cholesky factorisation
@@ -41,7 +42,7 @@ struct FrontGraph {
 ///
 /// Nodes are the own poses in order, then poses of other robots on which own edges end, then poses
 /// that only systems of children contain. The first two groups are "followed": this robot knows
-/// their values. Held poses are not nodes.
+/// their values. Held poses are not nodes. The origin stays a node up to the root.
 ///
 /// Rows of the nodes below are a matrix with 3 or 6 rows per node. Not thread-safe.
 class TreeFront {
@@ -59,9 +60,8 @@ class TreeFront {
 
   /// Sets the weights in [0, 1] of the edges.
   void weigh(const std::vector<double>& weights);
-  /// True if the present weights change the second derivatives of an edge by a factor of `ratio` or
-  /// more. With the default, old second derivatives mislead a step.
-  [[nodiscard]] bool stale(double ratio = 2.0) const;
+  /// True if the present weights would change the second derivatives much.
+  [[nodiscard]] bool stale() const;
 
   /// Adds or replaces the system of a child. Throws std::invalid_argument if it does not fit.
   void set_child(RobotId child, TreeSystem system);
@@ -71,6 +71,10 @@ class TreeFront {
   void linearise(std::span<const SE3> poses, Curvature curvature);
   /// Eliminates all poses of the plan. False if their block is not positive definite.
   [[nodiscard]] bool factorise();
+  /// The same with a small damping of all poses (Levenberg, Quart. Appl. Math. 1944). Positive
+  /// definite also if a robot claims so little precision that its equations are singular to rounding:
+  /// it then cannot stop the team.
+  [[nodiscard]] bool factorise_damped();
   /// True if factorise() is due because own equations or those of children have changed.
   [[nodiscard]] bool changed() const { return changed_; }
 
@@ -116,14 +120,14 @@ class TreeFront {
   /// Blocks of the inverse of the second derivatives of the team, at all nodes and at the couplings
   /// of the front. `kept` are those of the poses left to the parent, in the order of the system.
   [[nodiscard]] BlockMatrix inverse(const BlockMatrix& kept) const;
-  /// At the root: the inverse at the remaining pose, which has a fixed position.
-  [[nodiscard]] BlockMatrix inverse_of_root(bool upright) const;
-  /// The part of a child in the result of inverse(), see TreeInverse::blocks.
-  [[nodiscard]] std::vector<float> inverse_of_child(RobotId child,
-                                                    const BlockMatrix& inverse) const;
-  /// The inverse at the poses left to the parent, from TreeInverse::blocks. Throws
+  /// At the root: the same relative to the origin, without other robots above it. nullopt if the
+  /// equations are not regular.
+  [[nodiscard]] std::optional<BlockMatrix> inverse_about_origin(bool upright) const;
+  /// The part of a child in the result of inverse(), see TreeInverse.
+  [[nodiscard]] TreeInverse inverse_of_child(RobotId child, const BlockMatrix& inverse) const;
+  /// The inverse at the poses left to the parent, from the message of the parent. Throws
   /// std::invalid_argument if `blocks` has another size.
-  [[nodiscard]] BlockMatrix inverse_from_parent(std::span<const float> blocks) const;
+  [[nodiscard]] BlockMatrix inverse_from_parent(const TreeInverse& blocks) const;
 
   /// Cost of own weighted edges and verticals.
   [[nodiscard]] double cost(std::span<const SE3> poses) const;
@@ -153,6 +157,7 @@ class TreeFront {
 
   int add_node(const KeyframeId& id);
   [[nodiscard]] Place place_of(const PoseEdge& edge);
+  [[nodiscard]] std::optional<std::size_t> origin_node() const;
   [[nodiscard]] const SE3& pose_of(int node, const Place& place, std::span<const SE3> poses) const;
   void plan();
   void place_pairs(const std::vector<NodePair>& pairs);
@@ -166,12 +171,13 @@ class TreeFront {
   [[nodiscard]] float weight_of(const SentWeight& sent) const;
   template <int kBlock>
   void add_own(std::span<const SE3> poses, Curvature curvature, BlockMatrix& A) const;
-  // Directions in which the remaining pose of the root may turn, and their stiffness.
+  [[nodiscard]] BlockMatrix assembled() const;
+  // Directions in which a held pose may turn, and their stiffness.
   struct Tilts {
     Eigen::Matrix<double, 3, 2> directions;
     Eigen::Vector2d stiffness;
   };
-  [[nodiscard]] std::optional<Tilts> tilts_of_root(bool upright) const;
+  [[nodiscard]] static std::optional<Tilts> tilts_of(const BlockMatrix& held, bool upright);
 
   FrontGraph graph_;
   std::vector<KeyframeId> ids_;
@@ -193,10 +199,5 @@ class TreeFront {
 /// The step of one pose, of 3 or 6 entries, as a tangent vector of SE(3): planar steps are
 /// [w_z; v_x; v_y].
 [[nodiscard]] Vector6 tangent_of_step(const Eigen::Ref<const Eigen::VectorXd>& step);
-
-/// Square root of the cost of an edge with weight 1 [sigma]. For small Gaussian noise with these
-/// precisions, its square is chi-squared.
-[[nodiscard]] double residual_of(const PoseEdge& edge, const SE3& T_world_from,
-                                 const SE3& T_world_to);
 
 }  // namespace km

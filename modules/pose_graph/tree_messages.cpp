@@ -28,13 +28,6 @@ class TreeWriter : public ByteWriter {
   void doubles(const auto& values) {
     for (Index k = 0; k < values.size(); ++k) f64(values.reshaped()(k));
   }
-  void inverse(const TreeInverse& inverse) {
-    varint(inverse.blocks.size());
-    for (const float x : inverse.blocks) f32(x);
-    varint(static_cast<std::uint64_t>(inverse.with_frame.rows()));
-    for (const double x : inverse.with_frame.reshaped()) f32(static_cast<float>(x));
-    doubles(inverse.of_frame);
-  }
 };
 
 class TreeReader : public ByteReader {
@@ -70,15 +63,6 @@ class TreeReader : public ByteReader {
     for (float& x : T.t) x = small_number();
     if (std::abs(T.q.norm() - 1.0F) > 1e-3F) fail();
     return T;
-  }
-  TreeInverse inverse() {
-    TreeInverse inverse;
-    inverse.blocks.resize(count(kMaxElements, sizeof(float)));
-    for (float& x : inverse.blocks) x = small_number();
-    inverse.with_frame.resize(static_cast<Index>(count(kMaxElements, 6 * sizeof(float))), 6);
-    for (double& x : inverse.with_frame.reshaped()) x = static_cast<double>(small_number());
-    for (double& x : inverse.of_frame.reshaped()) x = number();
-    return inverse;
   }
   Eigen::VectorXd doubles() {
     Eigen::VectorXd values(static_cast<Index>(count(kMaxElements, sizeof(double))));
@@ -318,9 +302,6 @@ std::vector<std::uint8_t> encode(const UpMessage& message) {
     w.varint(edge);
     w.f32(weight);
   }
-  w.varint(static_cast<std::uint64_t>(message.frame.rows()));
-  w.doubles(message.frame);
-  if (message.frame.rows() > 0) w.doubles(message.frame_gram);
   return w.release();
 }
 
@@ -336,10 +317,6 @@ std::optional<UpMessage> decode_up(std::span<const std::uint8_t> bytes) {
     const auto edge = r.varint_as<std::uint32_t>();
     message.weights.push_back({edge, r.weight()});
   }
-  message.frame.resize(static_cast<Index>(r.count(kMaxElements, 6 * sizeof(double))), 6);
-  for (double& x : message.frame.reshaped()) x = r.number();
-  if (message.frame.rows() > 0)
-    for (double& x : message.frame_gram.reshaped()) x = r.number();
   return r.done() ? std::optional(std::move(message)) : std::nullopt;
 }
 
@@ -363,8 +340,8 @@ std::vector<std::uint8_t> encode(const DownMessage& message) {
   }
   w.varint(static_cast<std::uint64_t>(message.step.size()));
   w.doubles(message.step);
-  w.u8(message.inverse ? 1 : 0);
-  if (message.inverse) w.inverse(*message.inverse);
+  w.varint(message.inverse.size());
+  for (const float x : message.inverse) w.f32(x);
   return w.release();
 }
 
@@ -397,7 +374,8 @@ std::optional<DownMessage> decode_down(std::span<const std::uint8_t> bytes) {
     v.moves.emplace_back(robot, r.single());
   }
   message.step = r.doubles();
-  if (r.flag()) message.inverse = r.inverse();
+  message.inverse.resize(r.count(kMaxElements, sizeof(float)));
+  for (float& x : message.inverse) x = r.small_number();
   return r.done() ? std::optional(std::move(message)) : std::nullopt;
 }
 

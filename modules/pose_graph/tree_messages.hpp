@@ -48,17 +48,10 @@ struct TreeSystem {
   std::vector<SentEdge> edges = {};
 };
 
-/// The inverse of the second derivatives of the team at the variables of a TreeSystem, in single
-/// precision.
-struct TreeInverse {
-  /// Lower triangles of the diagonal blocks, then the couplings that are not zero in the Schur
-  /// complement of the system, all column by column.
-  std::vector<float> blocks = {};
-  /// Six columns with 3 or 6 rows per variable, and the 6x6 matrix of the frame, see FrameMotion.
-  /// Empty if held poses fix the frame.
-  Eigen::MatrixXd with_frame = {};
-  Matrix6 of_frame = Matrix6::Zero();
-};
+/// The inverse of the second derivatives of the team at the variables of a TreeSystem: the lower
+/// triangles of its diagonal blocks, then the couplings that are not zero in the Schur complement
+/// of the system, all column by column.
+using TreeInverse = std::vector<float>;
 
 /// Two robots, and the closures between them.
 struct PairVote {
@@ -100,10 +93,6 @@ struct UpMessage {
     float weight = 0.0F;
   };
   std::vector<NewWeight> weights = {};
-  /// After kInverse: right-hand sides for the motion of the frame, see FrameMotion. Six columns,
-  /// reduced as `reduced`; empty if the origin is not in this subtree.
-  Eigen::MatrixXd frame = {};
-  Matrix6 frame_gram = Matrix6::Zero();  ///< X^T X of the rows of `frame` that are eliminated.
 };
 
 /// Decision of the root on a round.
@@ -114,8 +103,7 @@ struct TreeVerdict {
     kRefresh,  ///< Return to the accepted poses, with new second derivatives.
     kStart,    ///< At the beginning: set the weights and send the equations.
     kCount,    ///< Before kStart: defer closures that stand alone, count again.
-    kInverse,  ///< The new poses are accepted and final. Prepare the covariances.
-    kDone,     ///< The new poses are accepted, unless they are already; nothing follows.
+    kDone,     ///< The new poses are accepted; this was the last round.
     kStop,     ///< The new poses are not accepted; the accepted ones are the result.
   };
   enum class Weighing : std::uint8_t { kAllIn, kWeigh, kHold, kDecided };
@@ -147,8 +135,8 @@ struct TreeVerdict {
 /// From a robot to a child, once per round.
 struct DownMessage {
   TreeVerdict verdict;
-  Eigen::VectorXd step = {};                ///< Step of the variables of the child; kStep only.
-  std::optional<TreeInverse> inverse = {};  ///< For the variables of the child; kDone only.
+  Eigen::VectorXd step = {};  ///< Step of the variables of the child; kStep only.
+  TreeInverse inverse = {};   ///< For the variables of the child; kDone only, empty if unknown.
 };
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const UpMessage& message);

@@ -8,7 +8,6 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_cover.hpp"
 #include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/frame_motion.hpp"
 
 namespace km {
 namespace {
@@ -24,8 +23,6 @@ using Weighing = TreeVerdict::Weighing;
 constexpr double kFloor = 1e-10;
 // Weight of a rejected step of odometry, so that the trajectory stays connected.
 constexpr double kJoint = 1e-6;
-// Weights with a smaller ratio give nearly equal covariances.
-constexpr double kSameWeight = 1.1;
 // Largest distance of a pose from the origin; beyond it, single precision overflows.
 constexpr double kOutOfTheWorld_m = 1e15;
 // kStrongest: largest strength of a pair while closures are weighed, relative to the usual pair, so
@@ -207,6 +204,7 @@ void TreeNewton::build_front() {
                    .verticals = graph_.verticals,
                    .root = !place_.parent.has_value(),
                    .free = verdict_.free};
+  if (options_.covariances) front.origin = graph_.origin;
   share_closures(front.touched_by);
   front_edge_.clear();
   for (std::size_t k = 0; k < known_.size(); ++k) {
@@ -402,6 +400,7 @@ UpMessage TreeNewton::equations() {
       front_->linearise(at_hand_, Curvature::kGaussNewton);
       positive = front_->factorise();
     }
+    if (!positive && (place_.parent || !verdict_.full)) positive = front_->factorise_damped();
     factorised_ = positive;
     message.failed = !positive && place_.parent.has_value();
     if (positive && place_.parent) message.system = front_->system_for_parent(at_hand_);
@@ -448,7 +447,6 @@ bool TreeNewton::can_follow(const DownMessage& message) const {
     case Next::kShorten:
       return front_ && step_.size() > 0;
     case Next::kRefresh:
-    case Next::kInverse:
     case Next::kDone:
       return front_.has_value();
     case Next::kStop:
@@ -473,7 +471,6 @@ std::vector<SolverMessage> TreeNewton::advance() {
 
 std::vector<SolverMessage> TreeNewton::go_up() {
   UpMessage message;
-  const bool inverting = verdict_.next == Next::kInverse;
   bool failed =
       std::any_of(ups_.begin(), ups_.end(), [](const auto& up) { return up.second.failed; });
   if (!failed) {
@@ -482,7 +479,7 @@ std::vector<SolverMessage> TreeNewton::go_up() {
         if (up.system) front_->set_child(child, std::move(*up.system));
         if (front_) front_->reweigh_child(child, up.weights);
       }
-      message = inverting ? prepare_inverse() : front_ ? equations() : first_message();
+      message = front_ ? equations() : first_message();
     } catch (const std::exception&) {
       failed = true;  // the message of a child does not fit
     }
@@ -496,7 +493,6 @@ std::vector<SolverMessage> TreeNewton::go_up() {
     phase_ = Phase::kDown;
     return {message_to(*place_.parent, encode(message))};
   }
-  if (inverting) return conclude(message);
   // Full second derivatives may become indefinite when those of several robots are added.
   if (message.failed && verdict_.full) return go_down(root_->retreat(round_));
   state_.failed = message.failed;
@@ -540,7 +536,6 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
         throw std::runtime_error("TreeNewton: a step that leads out of the world");
     }
   };
-  const bool inverted = verdict_.next == Next::kInverse;  // that pass was not a round
   verdict_ = v;
   if (!front_) {
     weigh_by_noise();
@@ -568,12 +563,9 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       at_hand_ = base_;
       refresh_ = true;
       break;
-    case Next::kInverse:
-      accept();
-      break;
     case Next::kDone:
       accept();
-      if (message.inverse) take_inverse(*message.inverse);
+      compute_covariances(message.inverse);
       finish();
       break;
     case Next::kStop:
@@ -581,7 +573,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       break;
   }
   const bool deferred = state_.deferred || (v.next == Next::kStart && v.deferred);
-  state_ = {.round = inverted ? state_.round : round_ + 1,
+  state_ = {.round = round_ + 1,
             .cost = v.cost,
             .gradient = v.gradient,
             .noise_scale = v.noise_scale,
@@ -593,90 +585,33 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
   ++round_;
   std::vector<SolverMessage> messages;
   for (const RobotId child : place_.children) {
-    DownMessage down{v, step_of_child[child]};
-    if (const auto inverse = inverse_of_child_.find(child); inverse != inverse_of_child_.end())
-      down.inverse = std::move(inverse->second);
+    const DownMessage down{v, step_of_child[child], std::move(inverse_of_child_[child])};
     messages.push_back(message_to(child, encode(down)));
   }
   return messages;
 }
 
-// Weights of the last second derivatives may differ by a factor of two from the final ones.
-UpMessage TreeNewton::prepare_inverse() {
-  UpMessage message{.round = round_, .sums = {}};
-  front_->weigh(front_weights(false));
-  if (front_->stale(kSameWeight)) front_->linearise(base_, Curvature::kGaussNewton);
-  if (front_->changed()) {
-    message.failed = !front_->factorise();
-    if (!message.failed && place_.parent) message.system = front_->system_for_parent(base_);
-  } else {
-    message.weights = front_->changed_weights();
-  }
-  if (message.failed || !verdict_.free) return message;
-  const Index B = front_->block();
-  frame_ = MatrixXd::Zero(B * static_cast<Index>(front_->nodes()), 6);
-  const bool here = graph_.origin.robot == graph_.self && graph_.origin.index < accepted_.size();
-  if (here)
-    frame_.middleRows(B * graph_.origin.index, B) =
-        frame_motion(accepted_[graph_.origin.index], graph_.upright)
-            .middleCols(B == 3 ? 2 : 0, B)
-            .transpose();
-  std::map<RobotId, MatrixXd> children;
-  for (auto& [child, up] : ups_) {
-    if (up.frame.rows() == 0) continue;
-    children[child] = std::move(up.frame);
-    message.frame_gram += up.frame_gram;
-  }
-  if (!here && children.empty()) return message;
-  frame_ = front_->forward(std::move(frame_), children);
-  message.frame = front_->kept_rows(frame_);
-  message.frame_gram += front_->gram_of_eliminated(frame_);
-  return message;
-}
-
-// At the root, after the pass up for the covariances. Without them, the poses are final as well.
-std::vector<SolverMessage> TreeNewton::conclude(const UpMessage& message) {
-  DownMessage down = root_->conclude(round_);
-  if (message.failed) return go_down(down);
-  const BlockMatrix kept = front_->inverse_of_root(graph_.upright);
-  // Without an origin, covariances are relative to the remaining pose.
-  MatrixXd with_frame = MatrixXd::Zero(kept.diagonal.cols(), 6);
-  Matrix6 of_frame = message.frame_gram;
-  if (message.frame.rows() > 0) {
-    with_frame = kept.diagonal * message.frame;
-    of_frame += message.frame.transpose() * with_frame;
-  }
-  take_inverse(kept, with_frame, of_frame);
-  return go_down(down);
-}
-
-void TreeNewton::take_inverse(const TreeInverse& inverse) {
-  try {
-    take_inverse(front_->inverse_from_parent(inverse.blocks), inverse.with_frame, inverse.of_frame);
-  } catch (const std::invalid_argument&) {
-    covariances_.clear();  // the message of the parent does not fit, but the poses are final
-  }
-}
-
 // The cost is chi-squared distributed, so the covariance is twice the inverse of its second
 // derivatives. Closures that are noisier than they claim widen it.
-void TreeNewton::take_inverse(const BlockMatrix& kept, const MatrixXd& with_frame,
-                              const Matrix6& of_frame) {
-  const BlockMatrix inverse = front_->inverse(kept);
-  const MatrixXd X = verdict_.free ? front_->backward(frame_, with_frame) : MatrixXd();
+void TreeNewton::compute_covariances(const TreeInverse& from_parent) {
+  if (!options_.covariances || !factorised_ || (place_.parent && from_parent.empty())) return;
+  std::optional<BlockMatrix> solved;
+  try {
+    solved = place_.parent ? front_->inverse(front_->inverse_from_parent(from_parent))
+                           : front_->inverse_about_origin(graph_.upright);
+  } catch (const std::invalid_argument&) {
+    return;  // the message of the parent does not fit, but the poses are final
+  }
+  if (!solved) return;
+  const BlockMatrix& inverse = *solved;
   const Index B = front_->block(), first = B == 3 ? 2 : 0;
   const double scale = 2.0 * std::max(1.0, verdict_.noise_scale * verdict_.noise_scale);
-  covariances_.clear();
   for (std::size_t k = 0; k < accepted_.size(); ++k) {
-    Matrix6 P = Matrix6::Zero(), P_frame = Matrix6::Zero();
-    P.block(first, first, B, B) = inverse.at(static_cast<int>(k));
-    if (verdict_.free) P_frame.middleRows(first, B) = X.middleRows(B * static_cast<Index>(k), B);
-    covariances_.push_back(scale * relative_to_origin(P, P_frame, of_frame, accepted_[k]));
+    covariances_.emplace_back(Matrix6::Zero());
+    covariances_.back().block(first, first, B, B) = scale * inverse.at(static_cast<int>(k));
   }
   for (const RobotId child : place_.children)
-    inverse_of_child_[child] = {front_->inverse_of_child(child, inverse),
-                                verdict_.free ? front_->rows_of_child(child, X) : MatrixXd(0, 6),
-                                of_frame};
+    inverse_of_child_[child] = front_->inverse_of_child(child, inverse);
 }
 
 // Releases the factors, which take most of the memory of a robot; this object exists until the next

@@ -38,8 +38,8 @@ namespace km {
 /// vertex cover per pair, equal on both robots. The robot of the other end has the closure among
 /// its own edges; the system up the tree contains the chosen pose.
 ///
-/// At the end, one more pass up and down computes the covariances of all poses: the blocks of the
-/// inverse of the second derivatives that each front needs, from the root down the tree.
+/// The last pass down carries the blocks of the inverse of the second derivatives that each front
+/// needs for the covariances of its poses.
 class TreeNewton final : public MemberSolver {
  public:
   /// Throws std::invalid_argument if an edge is not usable or a public pose is missing.
@@ -103,11 +103,7 @@ class TreeNewton final : public MemberSolver {
                  std::map<RobotId, Eigen::VectorXd>& children);
   void accept();
   void finish();
-  [[nodiscard]] UpMessage prepare_inverse();
-  [[nodiscard]] std::vector<SolverMessage> conclude(const UpMessage& message);
-  void take_inverse(const TreeInverse& inverse);
-  void take_inverse(const BlockMatrix& kept, const Eigen::MatrixXd& with_frame,
-                    const Matrix6& of_frame);
+  void compute_covariances(const TreeInverse& from_parent);
 
   SessionGraph graph_;
   TreePlace place_;
@@ -131,7 +127,6 @@ class TreeNewton final : public MemberSolver {
   std::optional<TreeRoot> root_;
   bool factorised_ = true;
   bool noise_known_ = false;  // weigh_by_noise() has been called
-  Eigen::MatrixXd frame_;     // right-hand sides for the motion of the frame, forward-substituted
   std::map<RobotId, TreeInverse> inverse_of_child_;
   std::vector<Matrix6> covariances_;
 };

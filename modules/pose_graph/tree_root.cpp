@@ -101,11 +101,6 @@ DownMessage TreeRoot::stop(std::uint32_t round) {
   return answer(Next::kStop);
 }
 
-DownMessage TreeRoot::conclude(std::uint32_t round) {
-  round_ = round;
-  return answer(Next::kDone);
-}
-
 DownMessage TreeRoot::retreat(std::uint32_t round) {
   round_ = round;
   convex_ = true;
@@ -187,7 +182,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
   if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds)
-    return answer(options_.covariances ? Next::kInverse : Next::kDone);
+    return answer(Next::kDone);
   if (decided && worth_refreshing(decrement_)) {
     full_ = true;
     convex_ = false;

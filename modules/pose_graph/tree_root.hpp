@@ -23,7 +23,7 @@ struct TreeNewtonOptions {
   bool reject_odometry = false;  ///< Steps of odometry are weighed as well.
   /// Private poses may be sent as well, if that saves bytes.
   bool share_private = false;
-  bool covariances = true;  ///< The members compute covariances in one more pass at the end.
+  bool covariances = true;  ///< The members compute covariances at the end.
 };
 
 /// Decisions of the root of the tree in each round, from the sums of the team and from its front,
@@ -46,8 +46,6 @@ class TreeRoot {
   [[nodiscard]] DownMessage retreat(std::uint32_t round);
   /// Ends the session, because the team cannot continue.
   [[nodiscard]] DownMessage stop(std::uint32_t round);
-  /// Ends the session after kInverse.
-  [[nodiscard]] DownMessage conclude(std::uint32_t round);
 
  private:
   [[nodiscard]] DownMessage answer(TreeVerdict::Next next) const;

@@ -11,6 +11,7 @@ TreeNewtonOptions newton_options(const PoseGraphConfig& config) {
   options.robust = config.robust;
   options.barc = config.barc;
   options.share_private = config.share_private;
+  options.covariances = config.covariances;
   // In a team, the latency of a round costs more than the bytes of new second derivatives.
   options.patience_rounds = 8.0;
   return options;

@@ -187,8 +187,7 @@ TEST_CASE("The origin has no covariance", "[pose_graph]") {
   CHECK(covariances.front().norm() < 1e-6 * covariances.back().norm());
 }
 
-TEST_CASE("Covariances of a solver without rejected closures do not change its poses",
-          "[pose_graph]") {
+TEST_CASE("Covariances do not change the poses, except for rounding", "[pose_graph]") {
   const TeamProblem problem =
       random_team_problem({.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}}}, 7);
   SolverTeam with = solver_team(problem, chain(problem.members()), {}, newton({}));
@@ -200,7 +199,7 @@ TEST_CASE("Covariances of a solver without rejected closures do not change its p
   CHECK(without.member(1).covariances().empty());
   for (const auto& [robot, poses] : with.poses())
     for (std::size_t k = 0; k < poses.size(); ++k)
-      CHECK(without.poses().at(robot)[k].matrix() == poses[k].matrix());
+      CHECK(without.poses().at(robot)[k].isApprox(poses[k], 1e-9));
 }
 
 }  // namespace

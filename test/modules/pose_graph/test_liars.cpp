@@ -285,6 +285,12 @@ TEST_CASE("wrong odometry of one robot of four adds at most twice the noise of a
   check_cost({.liar = 1, .stretched = 1.1, .odometry_variance = kTiny}, kWrongOdometry_m);
 }
 
+TEST_CASE("odometry that claims no precision at all does not stop the team",
+          "[pose_graph][liars]") {
+  const double stretched = GENERATE(1.1, 10.0);
+  check_cost({.liar = 4, .stretched = stretched, .odometry_variance = kHuge}, 2.0 * kNoise_m);
+}
+
 TEST_CASE("table: false closures of one robot", "[.][liars_long]") {
   std::vector<Lie> lies;
   for (const RobotId liar : {RobotId{1}, RobotId{4}})

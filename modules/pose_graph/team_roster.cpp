@@ -1,0 +1,76 @@
+#include "modules/pose_graph/team_roster.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+namespace km {
+
+bool is_well_formed(const MemberPoses& poses) {
+  const auto& keyframes = poses.keyframes;
+  const auto finite = [](const SinglePose& T) {
+    constexpr float kUnit = 1e-3F;
+    return std::abs(T.q.norm() - 1.0F) < kUnit && T.t.allFinite();
+  };
+  const Precision& step = poses.step_precision;
+  return !keyframes.empty() && keyframes.front() == 0 &&
+         std::adjacent_find(keyframes.begin(), keyframes.end(), std::greater_equal<>()) ==
+             keyframes.end() &&
+         poses.T_frame_kf.size() == keyframes.size() &&
+         std::all_of(poses.T_frame_kf.begin(), poses.T_frame_kf.end(), finite) &&
+         step.kappa > 0.0 && step.tau > 0.0 && std::isfinite(step.kappa + step.tau);
+}
+
+bool is_well_formed(const TeamStatus& status) {
+  const auto by_peer = [](const EdgeSetOffer& a, const EdgeSetOffer& b) { return a.peer < b.peer; };
+  return std::is_sorted(status.offers.begin(), status.offers.end(), by_peer) &&
+         status.T_odom_first.matrix().allFinite();
+}
+
+TeamRoster::Meeting TeamRoster::meet(const TeamPeer& peer) {
+  const auto [entry, added] = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot});
+  if (added) return Meeting::kNew;
+  const std::uint64_t before = entry->second.boot;
+  if (before == peer.boot) return Meeting::kKnown;
+  public_poses_.erase(peer.robot);
+  entry->second = Peer{.boot = peer.boot};
+  return is_same_incarnation(before, peer.boot) ? Meeting::kOtherProcess
+                                                : Meeting::kOtherIncarnation;
+}
+
+void TeamRoster::take(const TeamStatus& status) {
+  Peer& peer = at(status.sender.robot);
+  peer.other_method = status.method != method_;
+  peer.status = status;
+}
+
+void TeamRoster::take(const Session& session) {
+  at(session.id.coordinator.robot).session = session;
+}
+
+const TeamRoster::Peer* TeamRoster::find(RobotId robot) const {
+  const auto known = peers_.find(robot);
+  return known == peers_.end() ? nullptr : &known->second;
+}
+
+bool TeamRoster::in_reach(const TeamPeer& peer) const {
+  if (peer == self_) return true;
+  const Peer* known = find(peer.robot);
+  return known != nullptr && known->boot == peer.boot && component_.contains(peer.robot);
+}
+
+std::map<RobotId, TeamStatus> TeamRoster::statuses(TeamStatus own) const {
+  std::map<RobotId, TeamStatus> statuses;
+  statuses.emplace(self_.robot, std::move(own));
+  for (const auto& [robot, peer] : peers_) {
+    if (!peer.status || peer.other_method || !in_reach(peer.status->sender)) continue;
+    TeamStatus& status = statuses.emplace(robot, *peer.status).first->second;
+    const auto poses = public_poses_.find(robot);
+    if (poses != public_poses_.end() && poses->second.frame_version > status.frame_version)
+      status.frame = poses->second.frame;
+  }
+  return statuses;
+}
+
+}  // namespace km

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "modules/core/team_links.hpp"
+#include "modules/pose_graph/pgo_method.hpp"
+#include "modules/pose_graph/team_messages.hpp"
+
+namespace km {
+
+/// True if a message of another robot, which is not trusted, has everything on which this robot
+/// relies, including the checks of the codec.
+[[nodiscard]] bool is_well_formed(const TeamStatus& status);
+[[nodiscard]] bool is_well_formed(const MemberPoses& poses);
+
+/// The other robots of a team as one robot knows them: their newest messages, and which of them
+/// links connect to it. Not thread-safe.
+class TeamRoster {
+ public:
+  struct Peer {
+    std::uint64_t boot = 0;
+    std::optional<TeamStatus> status = {};
+    std::optional<Session> session = {};  ///< The newest one that it coordinates.
+    std::uint32_t joined = 0;             ///< Number of its last session that this robot joined.
+    std::uint32_t missed = 0;             ///< Number of its last session that it could not join.
+    bool other_method = false;            ///< Its edges are not optimised.
+  };
+  /// How a robot has been met.
+  enum class Meeting {
+    kKnown,
+    kNew,
+    kOtherProcess,      ///< Its former process has ended; its keyframes keep their meaning.
+    kOtherIncarnation,  ///< Its keyframe indices have a new meaning.
+  };
+
+  TeamRoster(TeamPeer self, PgoMethod method) : self_(self), method_(method) {}
+
+  /// Registers a robot. The messages of its former process are discarded.
+  Meeting meet(const TeamPeer& peer);
+  /// Precondition of the following: the sender was met.
+  void take(const TeamStatus& status);
+  void take(const Session& session);
+  void take(const MemberPoses& poses) { public_poses_[poses.sender.robot] = poses; }
+
+  /// Adopts the robots that `links` connect to this one.
+  void connect(const TeamLinks& links) { component_ = links.component(self_.robot); }
+  /// True for this robot, and for a known process that links connect to it.
+  [[nodiscard]] bool in_reach(const TeamPeer& peer) const;
+
+  /// By robot, without this one.
+  [[nodiscard]] const std::map<RobotId, Peer>& peers() const { return peers_; }
+  [[nodiscard]] const Peer* find(RobotId robot) const;
+  /// Precondition: the robot was met.
+  [[nodiscard]] Peer& at(RobotId robot) { return peers_.at(robot); }
+  /// The newest public poses of each robot, those of this robot included.
+  [[nodiscard]] const PublicPoses& public_poses() const { return public_poses_; }
+
+  /// The statuses from which sessions are planned: `own`, and those of robots in reach with the
+  /// same method. Poses are sent at once, but statuses only periodically; the frame of a robot is
+  /// that of the newer one.
+  [[nodiscard]] std::map<RobotId, TeamStatus> statuses(TeamStatus own) const;
+
+ private:
+  TeamPeer self_;
+  PgoMethod method_;
+  std::map<RobotId, Peer> peers_;
+  PublicPoses public_poses_;
+  std::set<RobotId> component_;
+};
+
+}  // namespace km
