@@ -12,11 +12,12 @@ enum class Curvature {
   kFull,         ///< The Riemannian Hessian.
 };
 
-/// Cost of one measured relative pose (R, t), f = kappa ||R_j - R_i R||_F^2 + tau ||t_j - t_i - R_i
-/// t||^2, to second order in the tangent vectors xi = [w; v] of its poses. They move as R exp(w), t
-/// + R v, along geodesics of SO(3) x R^3, so that the second derivatives are those of the
-/// Riemannian Hessian. The model depends only on T_i^-1 T_j. A rigid motion of the whole team does
-/// not change it, and a smooth deformation hardly does.
+/// Cost of one measured relative pose (R, t), to second order in the tangent vectors xi = [w; v] of
+/// its poses:
+///     f = kappa ||R_j - R_i R||_F^2 + tau ||t_j - t_i - R_i t||^2
+/// Poses move as R exp(w), t + R v, along geodesics of SO(3) x R^3, so that the second derivatives
+/// are those of the Riemannian Hessian. The model depends only on T_i^-1 T_j. A rigid motion of the
+/// whole team does not change it, and a smooth deformation hardly does.
 struct EdgeModel {
   double cost = 0.0;
   Vector6 g_i;

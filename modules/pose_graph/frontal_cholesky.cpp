@@ -208,8 +208,9 @@ MatrixXf FrontalCholesky::inverse_of_rest(const EliminationPlan::Front& front,
 }
 
 // Z has the inverse of a front at the nodes below its pivots. The pivots follow in groups, the last
-// ones first: with the columns [L; M] of the factor and G = M L^-1, the new blocks are -Z G and
-// (L L^T)^-1 + G^T Z G. These are sums of positive terms, so single precision suffices.
+// ones first. Let [L; M] be the columns of a group in the factor, and G = M L^-1. Then the new
+// blocks are -Z G and (L L^T)^-1 + G^T Z G. Both are sums of positive terms, so single precision
+// suffices.
 void FrontalCholesky::invert_pivots(const MatrixXd& factor, MatrixXf& Z) const {
   constexpr Index kGroup = 48;  // columns
   const Index rows = factor.rows();

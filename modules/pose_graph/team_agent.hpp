@@ -199,7 +199,7 @@ class TeamAgent {
   OwnPoses poses_;
   ClosureDecisions decisions_;
   std::optional<SessionPart> part_;
-  SessionState state_ = SessionState::kNone;  // of the session of part_
+  SessionState state_ = SessionState::kNone;  // state of the session of part_
   bool reconsider_due_ = false;               // once all members have sent the solution
   std::uint32_t rounds_before_ = 0;           // rounds of earlier sessions
   double optimising_s_ = 0.0;                 // in earlier sessions

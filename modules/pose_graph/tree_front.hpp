@@ -72,8 +72,8 @@ class TreeFront {
   /// Eliminates all poses of the plan. False if their block is not positive definite.
   [[nodiscard]] bool factorise();
   /// The same with a small damping of all poses (Levenberg, Quart. Appl. Math. 1944). Positive
-  /// definite also if a robot claims so little precision that its equations are singular to rounding:
-  /// it then cannot stop the team.
+  /// definite also if a robot claims so little precision that its equations are singular to
+  /// rounding: it then cannot stop the team.
   [[nodiscard]] bool factorise_damped();
   /// True if factorise() is due because own equations or those of children have changed.
   [[nodiscard]] bool changed() const { return changed_; }
@@ -183,8 +183,8 @@ class TreeFront {
   std::vector<KeyframeId> ids_;
   std::map<KeyframeId, int> foreign_;  // nodes of poses of other robots
   std::size_t followed_ = 0;
-  std::vector<Place> places_;               // of the edges of the graph
-  std::vector<double> weights_;             // of the edges of the graph
+  std::vector<Place> places_;               // one for each edge of the graph
+  std::vector<double> weights_;             // one for each edge of the graph
   std::vector<double> linearised_weights_;  // weights of edges that are not in sent_
   std::map<RobotId, Child> children_;
   std::shared_ptr<const EliminationPlan> plan_;

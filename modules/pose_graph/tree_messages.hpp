@@ -48,9 +48,9 @@ struct TreeSystem {
   std::vector<SentEdge> edges = {};
 };
 
-/// The inverse of the second derivatives of the team at the variables of a TreeSystem: the lower
-/// triangles of its diagonal blocks, then the couplings that are not zero in the Schur complement
-/// of the system, all column by column.
+/// The inverse of the second derivatives of the team at the variables of a TreeSystem, column by
+/// column. The lower triangles of the diagonal blocks come first. The couplings follow that are not
+/// zero in the Schur complement of the system.
 using TreeInverse = std::vector<float>;
 
 /// Two robots, and the closures between them.

@@ -39,6 +39,10 @@ constexpr std::size_t kShareOfLengths = 60;
 // Number of isolated closures of a pair up to which they do no harm and are weighed from the start.
 constexpr std::ptrdiff_t kFewIsolated = 16;
 
+bool is_in_the_world(const SE3& T) {
+  return T.matrix().allFinite() && T.translation().norm() <= kOutOfTheWorld_m;
+}
+
 SolverMessage message_to(RobotId to, std::vector<std::uint8_t> bytes) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))};
 }
@@ -531,9 +535,10 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
   std::map<RobotId, VectorXd> step_of_child;
   const auto move = [&](double scale) {
     for (std::size_t k = 0; k < base_.size(); ++k) {
-      at_hand_[k] = retract(base_[k], scale * tangent_of_step(step_.col(static_cast<Index>(k))));
-      if (!at_hand_[k].matrix().allFinite() || at_hand_[k].translation().norm() > kOutOfTheWorld_m)
-        throw std::runtime_error("TreeNewton: a step that leads out of the world");
+      const SE3 moved =
+          retract(base_[k], scale * tangent_of_step(step_.col(static_cast<Index>(k))));
+      // A robot whose equations are singular to rounding does not carry the team away.
+      at_hand_[k] = is_in_the_world(moved) ? moved : base_[k];
     }
   };
   verdict_ = v;

@@ -88,7 +88,8 @@ struct RosPoseWithCovarianceStamped {
   static constexpr std::string_view kType = "geometry_msgs/PoseWithCovarianceStamped";
   RosHeader header;
   RosPose pose;
-  /// Of [position; rotation about fixed axes], row by row, along the axes of the header's frame.
+  /// Covariance of [position; rotation about fixed axes], row by row, along the axes of the
+  /// header's frame.
   std::array<double, 36> covariance{};
 };
 

@@ -38,7 +38,7 @@ class LiveFrames {
   std::vector<Stamp> stamps_;
   std::vector<std::optional<SE3>> T_odom_kf_;    // poses from live odometry
   std::vector<UncertainPose> steps_;             // T_previous_kf by keyframe
-  Matrix6 newest_covariance_ = Matrix6::Zero();  // of the newest keyframe in `map`
+  Matrix6 newest_covariance_ = Matrix6::Zero();  // covariance of the newest keyframe
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();
   SE3 T_map_odom_ = SE3::Identity();
 };

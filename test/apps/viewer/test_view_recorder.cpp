@@ -97,7 +97,7 @@ TEST_CASE("A viewer's record has the messages of each robot as the robot's own r
   REQUIRE(path.poses.size() == 3);
   CHECK(path.poses[1].header.stamp == kBegin + 11 * kSecond);
   CHECK(path.poses[1].pose.position == Eigen::Vector3d(1, 2, 0));
-  const auto pose = record.last<RosPoseStamped>("/bob/pose");  // corrected as the keyframes are
+  const auto pose = record.last<RosPoseWithCovarianceStamped>("/bob/pose");  // corrected
   CHECK(pose.header.stamp == kBegin + 25 * kSecond / 2);
   CHECK(pose.pose.position == Eigen::Vector3d(2.5, 2, 0));
   CHECK(record.count("/bob/odometry") == 4);  // three keyframes, one pose
