@@ -34,6 +34,8 @@ write_basic_package_version_file(kimera_multiConfigVersion.cmake COMPATIBILITY S
 install(FILES ${PROJECT_BINARY_DIR}/kimera_multiConfig.cmake
   ${PROJECT_BINARY_DIR}/kimera_multiConfigVersion.cmake DESTINATION ${config_dir})
 
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
 get_property(programs GLOBAL PROPERTY KM_PROGRAMS)
 install(TARGETS ${programs} RUNTIME COMPONENT programs)
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/kimera_multi COMPONENT programs

@@ -2,12 +2,14 @@
 //   fuse_depth FOLDER MESH.ply [VOXEL_M]
 // FOLDER, a sequence of 7-Scenes, has frame-NNNNNN.depth.png (640 x 480, 16 bits, mm). Each row of
 // its poses.txt is the number of a frame and the first three rows of the matrix T_world_cam.
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <sstream>
+#include <stdexcept>
 #include <string>
 
 #include "modules/mesh/ply_file.hpp"

@@ -4,6 +4,7 @@
 #include <exception>
 #include <fstream>
 #include <iostream>
+#include <stdexcept>
 
 #include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/vio/vio.hpp"

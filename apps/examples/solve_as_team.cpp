@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "modules/pose_graph/chordal.hpp"
@@ -17,35 +20,34 @@
 
 using namespace km;
 
-int main(int argc, char** argv) try {
-  if (argc != 4) throw std::invalid_argument("usage: solve_as_team GRAPH.g2o ROBOTS POSES.tum");
-  const G2oGraph graph = read_g2o(std::filesystem::path(argv[1]));
-  const auto robots = static_cast<RobotId>(std::max(1, std::atoi(argv[2])));
-  if (graph.dimension != 3) throw std::invalid_argument("the graph is not 3D");
+namespace {
 
-  // Without robots in the file, its poses count as those of robot 0. They are divided into blocks,
-  // one for each robot.
+// Divides the graph of one robot into parts of consecutive poses, one for each robot of the team.
+// The start is the chordal initialisation of the whole graph, for simplicity. Robots in the field
+// start from their odometry.
+std::vector<SessionGraph> divide(const G2oGraph& graph, RobotId robots) {
+  if (graph.dimension != 3) throw std::invalid_argument("the graph is not 3D");
   std::vector<BlockEdge> edges;
   KeyframeIndex poses = 0;
   for (const RelativePose& e : graph.edges) {
+    if (e.from.robot != 0 || e.to.robot != 0) throw std::invalid_argument("the graph has robots");
     const auto [kappa, tau] = precision_of(e.covariance);
     edges.push_back({e.from.index, e.to.index, e.T_from_to, kappa, tau});
     poses = std::max({poses, e.from.index + 1, e.to.index + 1});
   }
-  const KeyframeIndex size = std::max(poses / robots, 1U);
+  if (robots == 0 || robots > poses) throw std::invalid_argument("no poses for so many robots");
   const auto id = [&](KeyframeIndex pose) {
-    const KeyframeIndex robot = std::min<KeyframeIndex>(pose / size, robots - 1U);
-    return KeyframeId{static_cast<RobotId>(robot), pose - robot * size};
+    const KeyframeIndex robot = std::min<KeyframeIndex>(pose / (poses / robots), robots - 1U);
+    return KeyframeId{static_cast<RobotId>(robot), pose - robot * (poses / robots)};
   };
 
-  // The start is the chordal initialisation of the whole graph, for simplicity. Robots in the field
-  // start from their odometry.
   const std::vector<SE3> start = chordal_initialisation(poses, edges);
   std::vector<SessionGraph> parts(robots);
   for (RobotId k = 0; k < robots; ++k) parts[k].self = k;
   for (KeyframeIndex i = 0; i < poses; ++i) parts[id(i).robot].start.push_back(start[i]);
 
-  // Both robots of an edge know it, and the pose of its other end. Steps of odometry come first.
+  // Steps of odometry come first among the own edges of a robot. Both robots of an edge between
+  // robots have this edge, and the pose of its other end.
   std::stable_sort(edges.begin(), edges.end(), [](auto& a, auto& b) { return a.i < b.i; });
   for (const BlockEdge& e : edges) {
     const auto i = static_cast<KeyframeIndex>(e.i), j = static_cast<KeyframeIndex>(e.j);
@@ -62,21 +64,31 @@ int main(int argc, char** argv) try {
       from.own.push_back(edge);
     }
   }
+  for (SessionGraph& part : parts)
+    std::stable_sort(part.between.begin(), part.between.end(),
+                     [](auto& a, auto& b) { return a.id() < b.id(); });
+  return parts;
+}
 
-  // Messages pass along a tree: robot 0 is the root, and all others are its children.
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc != 4) throw std::invalid_argument("usage: solve_as_team GRAPH.g2o ROBOTS POSES.tum");
+  const auto robots = static_cast<RobotId>(std::atoi(argv[2]));
+
+  // Messages pass along a tree: robot 0 is the root, and all others are its children. Here all
+  // edges are trusted; if `robust` is true, the team rejects false closures.
   std::vector<std::unique_ptr<TreeNewton>> solvers;
-  for (SessionGraph& part : parts) {
-    std::sort(part.between.begin(), part.between.end(),
-              [](auto& a, auto& b) { return a.id() < b.id(); });
+  for (SessionGraph& part : divide(read_g2o(std::filesystem::path(argv[1])), robots)) {
     TreePlace place;
     for (RobotId k = 0; k < robots; ++k) place.members.push_back(k);
     if (part.self != 0) place.parent = 0;
     if (part.self == 0) place.children.assign(place.members.begin() + 1, place.members.end());
-    // All edges are trusted. With `robust`, the team rejects false closures.
-    solvers.push_back(
-        std::make_unique<TreeNewton>(std::move(part), place, TreeNewtonOptions{.robust = false}));
+    solvers.push_back(std::make_unique<TreeNewton>(std::move(part), std::move(place),
+                                                   TreeNewtonOptions{.robust = false}));
   }
 
+  // A message passes as bytes from advance() of its sender to receive() of its receiver.
   std::size_t bytes = 0;
   const auto is_done = [](const auto& solver) { return solver->done(); };
   while (!std::all_of(solvers.begin(), solvers.end(), is_done))
@@ -88,13 +100,13 @@ int main(int argc, char** argv) try {
       }
     }
 
-  const SolverState state = solvers[0]->state();
-  std::cout << poses << " poses, " << robots << " robots, " << state.round << " rounds, " << bytes
-            << " bytes, cost " << state.cost << '\n';
   std::ofstream out(argv[3]);
   double number = 0.0;  // in place of a time
   for (const auto& solver : solvers)
     for (const SE3& T_world_kf : solver->poses()) write_tum_row(out, number++, T_world_kf);
+  const SolverState state = solvers[0]->state();
+  std::cout << number << " poses, " << robots << " robots, " << state.round << " rounds, " << bytes
+            << " bytes, cost " << state.cost << '\n';
   return out.good() ? 0 : 1;
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
