@@ -16,9 +16,10 @@
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/image_file.hpp"
 
-using namespace km;
+namespace km {
+namespace {
 
-int main(int argc, char** argv) try {
+int run(int argc, char** argv) {
   if (argc < 3) throw std::invalid_argument("usage: fuse_depth FOLDER MESH.ply [VOXEL_M]");
   const std::filesystem::path folder = argv[1];
   SemanticMappingConfig config{.voxel_size_m = 0.05, .max_range_m = 5.0};
@@ -53,6 +54,13 @@ int main(int argc, char** argv) try {
   write_ply(argv[2], map.mesh);
   std::cout << frames << " depth images, " << map.mesh.faces.size() << " faces\n";
   return map.mesh.empty() ? 1 : 0;
+}
+
+}  // namespace
+}  // namespace km
+
+int main(int argc, char** argv) try {
+  return km::run(argc, argv);
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
   return 1;

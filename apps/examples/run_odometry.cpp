@@ -10,9 +10,10 @@
 #include "modules/vio/vio.hpp"
 #include "tum_row.hpp"
 
-using namespace km;
+namespace km {
+namespace {
 
-int main(int argc, char** argv) try {
+int run(int argc, char** argv) {
   if (argc < 3) throw std::invalid_argument("usage: run_odometry FOLDER POSES.tum [SECONDS]");
   EurocOptions part;
   if (argc > 3) part.to_s = std::atof(argv[3]);
@@ -36,6 +37,13 @@ int main(int argc, char** argv) try {
   std::cout << reader.pair_count() << " images, " << poses << " poses, " << keyframes
             << " keyframes\n";
   return poses > 0 && out.good() ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace km
+
+int main(int argc, char** argv) try {
+  return km::run(argc, argv);
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
   return 1;

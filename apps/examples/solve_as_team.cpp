@@ -18,8 +18,7 @@
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "tum_row.hpp"
 
-using namespace km;
-
+namespace km {
 namespace {
 
 // Divides the graph of one robot into parts of consecutive poses, one for each robot of the team.
@@ -70,9 +69,7 @@ std::vector<SessionGraph> divide(const G2oGraph& graph, RobotId robots) {
   return parts;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+int run(int argc, char** argv) {
   if (argc != 4) throw std::invalid_argument("usage: solve_as_team GRAPH.g2o ROBOTS POSES.tum");
   const auto robots = static_cast<RobotId>(std::atoi(argv[2]));
 
@@ -108,6 +105,13 @@ int main(int argc, char** argv) try {
   std::cout << number << " poses, " << robots << " robots, " << state.round << " rounds, " << bytes
             << " bytes, cost " << state.cost << '\n';
   return out.good() ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace km
+
+int main(int argc, char** argv) try {
+  return km::run(argc, argv);
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
   return 1;
