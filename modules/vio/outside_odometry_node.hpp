@@ -7,6 +7,9 @@
 
 #include "modules/vio/outside_odometry.hpp"
 #include "modules/vio/vio_node.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
 
 namespace km {
 
