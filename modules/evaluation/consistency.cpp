@@ -1,7 +1,9 @@
 #include "modules/evaluation/consistency.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -76,9 +78,14 @@ SE3 place_in_truth(std::span<const ConsistencyInput> inputs, bool upright) {
 
 std::vector<Consistency> consistency(std::span<const ConsistencyInput> inputs, bool upright) {
   const SE3 T_truth_world = place_in_truth(inputs, upright);
-  double largest = 0.0;
+  double largest = 0.0, smallest = std::numeric_limits<double>::infinity();
   for (const ConsistencyInput& input : inputs)
-    for (const Matrix6& Sigma : input.covariances) largest = std::max(largest, Sigma.trace());
+    for (const Matrix6& Sigma : input.covariances) {
+      largest = std::max(largest, Sigma.trace());
+      smallest = std::min(smallest, Sigma.trace());
+    }
+  // The origin may have a tilt, but no heading and no position: its covariance is singular.
+  const double of_origin = std::max(kOrigin * largest, smallest);
   std::vector<Consistency> results;
   Sample all;
   for (const ConsistencyInput& input : inputs) {
@@ -86,7 +93,7 @@ std::vector<Consistency> consistency(std::span<const ConsistencyInput> inputs, b
     for (std::size_t k = 0; k < input.covariances.size(); ++k) {
       const StampedPose& pose = input.estimate[k];
       const auto truth = pose_at(input.truth, pose.stamp, kMaxGap_s, kMaxDifference_s);
-      if (!truth || input.covariances[k].trace() < kOrigin * largest) continue;
+      if (!truth || input.covariances[k].trace() <= of_origin) continue;
       sample.add(se3_log((T_truth_world * pose.T).inverse() * *truth), input.covariances[k]);
     }
     if (sample.pose.empty())

@@ -35,9 +35,9 @@ struct Consistency {
 
 /// Compares the errors of all robots with their covariances. The frame of the team is placed in the
 /// truth at its origin: the pose with the smallest covariance. If `upright`, both have z up, and
-/// only the position and the heading of the origin are used. Poses whose covariance is below a
-/// millionth of the largest one are the origin and do not count. Returns one result per input, and
-/// one for all together as the last.
+/// only the position and the heading of the origin are used. The origin and poses
+/// whose covariance is below a millionth of the largest one do not count. Returns one result per
+/// input, and one for all together as the last.
 ///
 /// Throws std::invalid_argument with the name of the input if it shares no pose with its truth, or
 /// if the truth has no pose at the origin.
