@@ -16,7 +16,6 @@
 #include "apps/output_file.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/evaluation/association.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
@@ -63,8 +62,7 @@ struct Edges {
 
   void add(const std::filesystem::path& folder, std::span<const StampedPose> true_poses) {
     for (const KeyframeRecord& keyframe : read_keyframes(folder / "keyframes.csv"))
-      if (const auto T = pose_at(true_poses, keyframe.stamp, kMaxGap_s, kMaxDifference_s))
-        truth[keyframe.id] = *T;
+      if (const auto T = true_pose_at(true_poses, keyframe.stamp)) truth[keyframe.id] = *T;
     for (const RelativePose& e : read_g2o(folder / "pose_graph.g2o").edges) {
       const bool step = e.from.robot == e.to.robot && e.to.index == e.from.index + 1;
       if (step)
@@ -73,10 +71,6 @@ struct Edges {
         closures.try_emplace(closure_id(e.from, e.to), e);
     }
   }
-
- private:
-  static constexpr double kMaxGap_s = 0.1;
-  static constexpr double kMaxDifference_s = 0.01;
 };
 
 void run(const ConsistencyCommand& command) {

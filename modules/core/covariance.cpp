@@ -5,6 +5,17 @@
 #include "modules/core/lie.hpp"
 
 namespace km {
+namespace {
+
+// Turns vectors and exchanges the halves [position; rotation] and [rotation; translation].
+Matrix6 swapped_blocks(const Eigen::Matrix3d& R) {
+  Matrix6 J = Matrix6::Zero();
+  J.topRightCorner<3, 3>() = R;
+  J.bottomLeftCorner<3, 3>() = R;
+  return J;
+}
+
+}  // namespace
 
 UncertainPose compose(const UncertainPose& T_a_b, const UncertainPose& T_b_c) {
   const Matrix6 Ad_c_b = adjoint(T_b_c.T.inverse());
@@ -26,10 +37,13 @@ UncertainPose between_on_chain(const UncertainPose& T_a_b, const UncertainPose& 
 }
 
 Matrix6 along_fixed_axes(const UncertainPose& T_a_b) {
-  Matrix6 to_fixed = Matrix6::Zero();
-  to_fixed.topRightCorner<3, 3>() = T_a_b.T.linear();
-  to_fixed.bottomLeftCorner<3, 3>() = T_a_b.T.linear();
+  const Matrix6 to_fixed = swapped_blocks(T_a_b.T.linear());
   return to_fixed * T_a_b.Sigma * to_fixed.transpose();
+}
+
+Matrix6 from_fixed_axes(const SE3& T_a_b, const Matrix6& fixed) {
+  const Matrix6 to_pose = swapped_blocks(T_a_b.linear().transpose());
+  return to_pose * fixed * to_pose.transpose();
 }
 
 bool is_covariance(const Matrix6& Sigma) {

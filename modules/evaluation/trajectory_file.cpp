@@ -9,6 +9,7 @@
 #include <string>
 
 #include "modules/core/config.hpp"
+#include "modules/core/covariance.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 
@@ -66,10 +67,7 @@ class RowParser {
            " fields, expected 44: t[s], p x y z, q x y z w, and 36 of the covariance");
     for (Eigen::Index k = 0; k < 36; ++k)
       along_axes(k / 6, k % 6) = number(row_.fields[kFields + static_cast<std::size_t>(k)]);
-    Matrix6 to_pose = Matrix6::Zero();
-    to_pose.topRightCorner<3, 3>() = T.linear().transpose();
-    to_pose.bottomLeftCorner<3, 3>() = T.linear().transpose();
-    return to_pose * along_axes * to_pose.transpose();
+    return from_fixed_axes(T, along_axes);
   }
 
   [[noreturn]] void fail(const std::string& problem) const {

@@ -67,4 +67,12 @@ FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
   return result;
 }
 
+RobotId lowest_tied(RobotId self, const SessionPlan& plan, const FrameTies& ties) {
+  RobotId lowest = self;
+  for (const SessionMember& member : plan.members)
+    if (!std::ranges::binary_search(ties.untied, member.peer.robot))
+      lowest = std::min(lowest, member.peer.robot);
+  return lowest;
+}
+
 }  // namespace km

@@ -40,4 +40,7 @@ struct FrameTies {
 [[nodiscard]] FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
                                    std::span<const RobotTie> ties);
 
+/// The lowest robot of `plan` that closures tie to `self`; `self` itself if there is no lower one.
+[[nodiscard]] RobotId lowest_tied(RobotId self, const SessionPlan& plan, const FrameTies& ties);
+
 }  // namespace km

@@ -171,32 +171,17 @@ void FrontalCholesky::backward(MatrixXd& X) const {
 }
 
 // The inverse at the nodes of a front that are eliminated later. They are nodes of its parent
-// front, or kept nodes.
-MatrixXf FrontalCholesky::inverse_of_rest(const EliminationPlan::Front& front,
-                                          const std::vector<MatrixXf>& inverses,
+// front, which has the inverse `of_parent`, or kept nodes. `place`: their places there.
+MatrixXf FrontalCholesky::inverse_of_rest(const std::vector<int>& place, const MatrixXf& of_parent,
                                           const BlockMatrix& kept) const {
-  const auto first = static_cast<std::size_t>(front.pivots);
-  const std::size_t rest = front.nodes.size() - first;
-  std::vector<int> place;
-  const bool in_parent = front.parent >= 0;
-  if (in_parent) {
-    const std::vector<int>& nodes = plan_->fronts()[static_cast<std::size_t>(front.parent)].nodes;
-    for (std::size_t k = first; k < front.nodes.size(); ++k)
-      place.push_back(
-          static_cast<int>(std::find(nodes.begin(), nodes.end(), front.nodes[k]) - nodes.begin()));
-  } else {
-    for (std::size_t k = first; k < front.nodes.size(); ++k)
-      place.push_back(plan_->place_of_kept()[static_cast<std::size_t>(front.nodes[k])]);
-  }
-  MatrixXf Z(block_ * static_cast<Index>(rest), block_ * static_cast<Index>(rest));
-  for (std::size_t i = 0; i < rest; ++i)
-    for (std::size_t j = 0; j < rest; ++j) {
-      const int a = place[i], b = place[j];
-      auto block =
-          Z.block(block_ * static_cast<Index>(i), block_ * static_cast<Index>(j), block_, block_);
-      if (in_parent)
-        block = inverses[static_cast<std::size_t>(front.parent)].block(block_ * a, block_ * b,
-                                                                       block_, block_);
+  const auto rest = static_cast<Index>(place.size());
+  MatrixXf Z(block_ * rest, block_ * rest);
+  for (Index i = 0; i < rest; ++i)
+    for (Index j = 0; j < rest; ++j) {
+      const int a = place[static_cast<std::size_t>(i)], b = place[static_cast<std::size_t>(j)];
+      auto block = Z.block(block_ * i, block_ * j, block_, block_);
+      if (of_parent.size() > 0)
+        block = of_parent.block(block_ * a, block_ * b, block_, block_);
       else if (a == b)
         block = kept.at(a).cast<float>();
       else if (a < b)
@@ -235,29 +220,54 @@ BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
   BlockMatrix inverse =
       BlockMatrix::zero(block_, static_cast<std::size_t>(plan_->nodes()), plan_->pairs().size());
   std::vector<MatrixXf> inverses(factors_.size());
+  MatrixXf none;
+  std::vector<int> local(static_cast<std::size_t>(plan_->nodes()));  // place in a front
+  const auto number = [&](const EliminationPlan::Front& front) {
+    for (std::size_t k = 0; k < front.nodes.size(); ++k)
+      local[static_cast<std::size_t>(front.nodes[k])] = static_cast<int>(k);
+  };
+  const auto is_first_child = [&](std::size_t f) {
+    const auto parent = static_cast<std::size_t>(plan_->fronts()[f].parent);
+    return plan_->fronts()[parent].children.front() == static_cast<int>(f);
+  };
   for (std::size_t f = factors_.size(); f-- > 0;) {
     const EliminationPlan::Front& front = plan_->fronts()[f];
-    const Index pivots = block_ * front.pivots;
-    const Index rest = factors_[f].rows() - pivots;
-    MatrixXf& Z = inverses[f];
-    Z.resize(pivots + rest, pivots + rest);
-    Z.bottomRightCorner(rest, rest) = inverse_of_rest(front, inverses, kept);
-    invert_pivots(factors_[f], Z);
-    const auto local = [&](int node) {
-      return block_ *
-             (std::find(front.nodes.begin(), front.nodes.end(), node) - front.nodes.begin());
-    };
-    for (int k = 0; k < front.pivots; ++k)
-      inverse.at(front.nodes[static_cast<std::size_t>(k)]) =
-          Z.block(block_ * k, block_ * k, block_, block_).cast<double>();
-    for (const int pair : front.pairs) {
-      const auto& [i, j] = plan_->pairs()[static_cast<std::size_t>(pair)];
-      inverse.between(pair) = Z.block(local(i), local(j), block_, block_).cast<double>();
+    const bool has_parent = front.parent >= 0;
+    if (has_parent) number(plan_->fronts()[static_cast<std::size_t>(front.parent)]);
+    std::vector<int> place;
+    for (std::size_t k = static_cast<std::size_t>(front.pivots); k < front.nodes.size(); ++k) {
+      const auto node = static_cast<std::size_t>(front.nodes[k]);
+      place.push_back(has_parent ? local[node] : plan_->place_of_kept()[node]);
     }
-    for (const int c : front.children) inverses[static_cast<std::size_t>(c)].resize(0, 0);
+    MatrixXf& Z = inverses[f];
+    Z.resize(factors_[f].rows(), factors_[f].rows());
+    const Index rest = block_ * static_cast<Index>(place.size());
+    MatrixXf& of_parent = has_parent ? inverses[static_cast<std::size_t>(front.parent)] : none;
+    Z.bottomRightCorner(rest, rest) = inverse_of_rest(place, of_parent, kept);
+    invert_pivots(factors_[f], Z);
+    number(front);
+    add_front(front, Z, local, inverse);
+    // Only the children of a front need its inverse; the first one is the last of them here.
+    if (front.children.empty()) Z.resize(0, 0);
+    if (has_parent && is_first_child(f)) of_parent.resize(0, 0);
   }
   place_kept(kept, inverse);
   return inverse;
+}
+
+// The diagonal blocks of the pivots of a front, and its couplings.
+void FrontalCholesky::add_front(const EliminationPlan::Front& front, const MatrixXf& Z,
+                                const std::vector<int>& local, BlockMatrix& inverse) const {
+  const auto block = [&](int i, int j) {
+    return Z.block(block_ * i, block_ * j, block_, block_).cast<double>();
+  };
+  for (int k = 0; k < front.pivots; ++k)
+    inverse.at(front.nodes[static_cast<std::size_t>(k)]) = block(k, k);
+  for (const int pair : front.pairs) {
+    const auto& [i, j] = plan_->pairs()[static_cast<std::size_t>(pair)];
+    inverse.between(pair) =
+        block(local[static_cast<std::size_t>(i)], local[static_cast<std::size_t>(j)]);
+  }
 }
 
 void FrontalCholesky::place_kept(const BlockMatrix& kept, BlockMatrix& inverse) const {

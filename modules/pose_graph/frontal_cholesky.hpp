@@ -48,9 +48,11 @@ class FrontalCholesky {
   void add_to_schur(const EliminationPlan::Front& front, const Eigen::MatrixXd& rest);
   void add_kept(const BlockMatrix& A);
   void invert_pivots(const Eigen::MatrixXd& factor, Eigen::MatrixXf& Z) const;
-  [[nodiscard]] Eigen::MatrixXf inverse_of_rest(const EliminationPlan::Front& front,
-                                                const std::vector<Eigen::MatrixXf>& inverses,
+  [[nodiscard]] Eigen::MatrixXf inverse_of_rest(const std::vector<int>& place,
+                                                const Eigen::MatrixXf& of_parent,
                                                 const BlockMatrix& kept) const;
+  void add_front(const EliminationPlan::Front& front, const Eigen::MatrixXf& Z,
+                 const std::vector<int>& local, BlockMatrix& inverse) const;
   void place_kept(const BlockMatrix& kept, BlockMatrix& inverse) const;
   [[nodiscard]] int kept_pair(int a, int b) const;
 

@@ -1,7 +1,5 @@
 #include "modules/pose_graph/own_frame.hpp"
 
-#include <algorithm>
-
 #include "modules/pose_graph/vertical_prior.hpp"
 
 namespace km {
@@ -26,14 +24,6 @@ std::optional<World> OwnFrame::world_of(RobotId anchor, const TeamRoster& roster
   const Eigen::MatrixXd turned =
       level(T_frame_world.matrix().topRows<3>(), T_odom_kf.translation());
   return World{anchor, make_pose(turned.leftCols<3>(), turned.col(3))};
-}
-
-RobotId OwnFrame::tied_anchor(const SessionPlan& plan, const FrameTies& ties) const {
-  RobotId anchor = self_.robot;
-  for (const SessionMember& member : plan.members)
-    if (!std::ranges::binary_search(ties.untied, member.peer.robot))
-      anchor = std::min(anchor, member.peer.robot);
-  return anchor;
 }
 
 }  // namespace km

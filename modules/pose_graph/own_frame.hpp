@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "modules/core/geometry.hpp"
-#include "modules/pose_graph/frame_ties.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 #include "modules/pose_graph/team_roster.hpp"
 
@@ -37,9 +36,6 @@ class OwnFrame {
   /// the anchor are unknown or in another frame.
   [[nodiscard]] std::optional<World> world_of(RobotId anchor, const TeamRoster& roster,
                                               const SE3& T_odom_first, bool upright) const;
-
-  /// The lowest member that closures tie to this robot.
-  [[nodiscard]] RobotId tied_anchor(const SessionPlan& plan, const FrameTies& ties) const;
 
  private:
   TeamPeer self_;

@@ -19,9 +19,13 @@ bool same_content(const TeamStatus& a, const TeamStatus& b) {
 
 }  // namespace
 
+bool StatusSchedule::rests(double now_s) const {
+  return now_s - sent_s_ < kEarlyLinks * period_s_;
+}
+
 bool StatusSchedule::may_be_due(const std::vector<TeamPeer>& receives, double now_s) const {
   const bool links_changed = !sent_ || sent_->receives != receives;
-  return now_s - sent_s_ >= (links_changed ? kEarlyLinks : kEarlyStatus) * period_s_;
+  return links_changed || now_s - sent_s_ >= kEarlyStatus * period_s_;
 }
 
 StatusSchedule::Due StatusSchedule::due(const TeamStatus& status, double now_s) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "modules/pose_graph/team_messages.hpp"
 
@@ -12,7 +13,9 @@ class StatusSchedule {
  public:
   explicit StatusSchedule(double period_s) : period_s_(period_s) {}
 
-  /// True if `receives` may have to be sent now, so that due() is worth its status.
+  /// True if the last status is so recent that nothing is due, not even changed links.
+  [[nodiscard]] bool rests(double now_s) const;
+  /// Unless it rests: true if a status with these `receives` may be due.
   [[nodiscard]] bool may_be_due(const std::vector<TeamPeer>& receives, double now_s) const;
   enum class Due { kNo, kRepeat, kNew };
   /// Whether to send `status` at `now_s`. The caller then does so.

@@ -1,14 +1,10 @@
 #include "modules/pose_graph/team_agent.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <functional>
-#include <tuple>
 #include <utility>
 
 #include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/team_plan.hpp"
-#include "modules/pose_graph/vertical_prior.hpp"
 
 // Other robots, their messages and the messages of this robot. The sessions are in
 // team_agent_session.cpp.
@@ -204,6 +200,7 @@ TeamStatus TeamAgent::make_status() {
 }
 
 void TeamAgent::send_status(TeamOutput& output) {
+  if (status_schedule_.rests(now_s_)) return;
   if (!status_schedule_.may_be_due(relay_.receives(), now_s_)) return;
   TeamStatus status = make_status();
   const StatusSchedule::Due due = status_schedule_.due(status, now_s_);
@@ -235,7 +232,7 @@ std::optional<World> TeamAgent::world_of(RobotId anchor) const {
 std::optional<World> TeamAgent::tied_world() const {
   const std::optional<World>& world = frame_.world();
   if (!world || !std::ranges::binary_search(ties_.untied, world->anchor)) return world;
-  return world_of(frame_.tied_anchor(plan_, ties_));
+  return world_of(lowest_tied(self_.robot, plan_, ties_));
 }
 
 const std::vector<SE3>& TeamAgent::poses() const {

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -119,6 +118,7 @@ class TeamAgent {
     kAbandoned,  // it ended without a solution of all members
     kSolved,     // it ended, and all members have its solution
   };
+
   // Other robots and their messages.
   void meet(const TeamPeer& peer);
   void forget_measured(RobotId robot);
@@ -160,7 +160,7 @@ class TeamAgent {
   void publish_poses();
   void conclude();
   void leave(bool with_solution);
-  /// Poses that a member has sent in the session of part_ at `stage` or later.
+  // Poses that a member has sent in the session of part_ at `stage` or later.
   [[nodiscard]] const MemberPoses* poses_of(RobotId robot, MemberStage stage) const {
     return part_->poses_of(roster_.public_poses(), robot, stage);
   }

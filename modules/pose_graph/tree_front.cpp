@@ -328,12 +328,13 @@ BlockMatrix TreeFront::assembled() const {
 }
 
 bool TreeFront::factorise() {
-  changed_ = false;
+  changed_ = damped_ = false;
   return factor_->factorise(assembled());
 }
 
 bool TreeFront::factorise_damped() {
   changed_ = false;
+  damped_ = true;
   BlockMatrix A = assembled();
   const double damping = kDamping * A.diagonal.cwiseAbs().maxCoeff();
   for (int node = 0; node < static_cast<int>(ids_.size()); ++node)
@@ -419,65 +420,39 @@ MatrixXd TreeFront::slopes(std::span<const SE3> poses) const {
   return rows;
 }
 
-void TreeFront::reduce(std::span<const SE3> poses, const std::map<RobotId, MatrixXd>& children) {
-  forwarded_ = forward(slopes(poses), children);
-}
-
-MatrixXd TreeFront::forward(MatrixXd rows, const std::map<RobotId, MatrixXd>& children) const {
+void TreeFront::reduce(std::span<const SE3> poses, const std::map<RobotId, VectorXd>& children) {
   const Index B = block();
+  MatrixXd rows = slopes(poses);
   for (const auto& [name, of_child] : children) {
     const Child& child = children_.at(name);
-    if (of_child.rows() != B * static_cast<Index>(child.node.size()) ||
-        of_child.cols() != rows.cols())
+    if (of_child.size() != B * static_cast<Index>(child.node.size()))
       refuse(name, "sends a right-hand side of another size than its system");
     for (std::size_t k = 0; k < child.node.size(); ++k)
-      rows.middleRows(B * child.node[k], B) += of_child.middleRows(B * static_cast<Index>(k), B);
+      rows.middleRows(B * child.node[k], B) += of_child.segment(B * static_cast<Index>(k), B);
   }
-  factor_->forward(rows);
+  forwarded_ = std::move(rows);
+  factor_->forward(forwarded_);
+}
+
+VectorXd TreeFront::reduced() const {
+  const Index B = block();
+  const std::vector<int>& kept = plan_->kept();
+  VectorXd rows(B * static_cast<Index>(kept.size()));
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    rows.segment(B * static_cast<Index>(k), B) = forwarded_.middleRows(B * kept[k], B);
   return rows;
 }
 
-MatrixXd TreeFront::backward(MatrixXd forwarded, const MatrixXd& kept) const {
-  const Index B = block();
-  if (kept.rows() != B * static_cast<Index>(plan_->kept().size()) ||
-      kept.cols() != forwarded.cols())
-    refuse(graph_.self, "receives a step of another size");
-  for (std::size_t k = 0; k < plan_->kept().size(); ++k)
-    forwarded.middleRows(B * plan_->kept()[k], B) = kept.middleRows(B * static_cast<Index>(k), B);
-  factor_->backward(forwarded);
-  return forwarded;
-}
-
-MatrixXd TreeFront::kept_rows(const MatrixXd& rows) const {
-  const Index B = block();
-  const std::vector<int>& kept = plan_->kept();
-  MatrixXd result(B * static_cast<Index>(kept.size()), rows.cols());
-  for (std::size_t k = 0; k < kept.size(); ++k)
-    result.middleRows(B * static_cast<Index>(k), B) = rows.middleRows(B * kept[k], B);
-  return result;
-}
-
-MatrixXd TreeFront::rows_of_child(RobotId name, const MatrixXd& rows) const {
-  const Child& child = children_.at(name);
-  MatrixXd result(block() * static_cast<Index>(child.node.size()), rows.cols());
-  for (std::size_t k = 0; k < child.node.size(); ++k)
-    result.middleRows(block() * static_cast<Index>(k), block()) =
-        rows.middleRows(block() * child.node[k], block());
-  return result;
-}
-
-// Summed over the eliminated rows, not computed as the whole minus that of the kept rows. Kept rows
-// can be large while only their sum over the team is small. The rounding error of the difference
-// would then appear as a predicted decrease.
-MatrixXd TreeFront::gram_of_eliminated(const MatrixXd& rows) const {
-  MatrixXd gram = MatrixXd::Zero(rows.cols(), rows.cols());
+// Summed over the eliminated rows, not computed as the whole norm minus that of the kept rows. Kept
+// rows can be large while only their sum over the team is small. The rounding error of the
+// difference would then appear as a predicted decrease.
+double TreeFront::decrement() const {
+  double sum = 0.0;
   const std::vector<int>& place = plan_->place_of_kept();
-  for (std::size_t v = 0; v < place.size(); ++v) {
-    if (place[v] >= 0) continue;
-    const auto X = rows.middleRows(block() * static_cast<Index>(v), block());
-    gram.noalias() += X.transpose() * X;
-  }
-  return gram;
+  for (std::size_t v = 0; v < place.size(); ++v)
+    if (place[v] < 0)
+      sum += forwarded_.middleRows(block() * static_cast<Index>(v), block()).squaredNorm();
+  return sum;
 }
 
 // The position of the one remaining pose is held, and its rotation, except for its tilt if
@@ -503,11 +478,22 @@ TreeFront::RootStep TreeFront::solve_root(bool upright) const {
 }
 
 MatrixXd TreeFront::substitute_back(const VectorXd& kept) const {
-  return backward(forwarded_, kept).reshaped(block(), static_cast<Index>(ids_.size()));
+  const Index B = block();
+  if (kept.size() != B * static_cast<Index>(plan_->kept().size()))
+    refuse(graph_.self, "receives a step of another size");
+  MatrixXd X = forwarded_;
+  for (std::size_t k = 0; k < plan_->kept().size(); ++k)
+    X.middleRows(B * plan_->kept()[k], B) = kept.segment(B * static_cast<Index>(k), B);
+  factor_->backward(X);
+  return X.reshaped(B, static_cast<Index>(ids_.size()));
 }
 
 VectorXd TreeFront::step_of_child(RobotId name, const MatrixXd& steps) const {
-  return rows_of_child(name, steps.reshaped(steps.size(), 1));
+  const Child& child = children_.at(name);
+  VectorXd step(block() * static_cast<Index>(child.node.size()));
+  for (std::size_t k = 0; k < child.node.size(); ++k)
+    step.segment(block() * static_cast<Index>(k), block()) = steps.col(child.node[k]);
+  return step;
 }
 
 BlockMatrix TreeFront::inverse(const BlockMatrix& kept) const {

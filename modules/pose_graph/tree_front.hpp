@@ -42,9 +42,7 @@ struct FrontGraph {
 ///
 /// Nodes are the own poses in order, then poses of other robots on which own edges end, then poses
 /// that only systems of children contain. The first two groups are "followed": this robot knows
-/// their values. Held poses are not nodes. The origin stays a node up to the root.
-///
-/// Rows of the nodes below are a matrix with 3 or 6 rows per node. Not thread-safe.
+/// their values. Held poses are not nodes. The origin stays a node up to the root. Not thread-safe.
 class TreeFront {
  public:
   /// Throws std::invalid_argument if an edge names an unknown pose or has no usable precision.
@@ -52,7 +50,6 @@ class TreeFront {
 
   /// Number of followed nodes: own poses, and poses on which own edges end.
   [[nodiscard]] std::size_t followed() const { return followed_; }
-  [[nodiscard]] std::size_t nodes() const { return ids_.size(); }
   [[nodiscard]] const KeyframeId& id(std::size_t node) const { return ids_[node]; }
   [[nodiscard]] std::size_t node_of(const KeyframeId& id) const;
   [[nodiscard]] const FrontGraph& graph() const { return graph_; }
@@ -75,6 +72,8 @@ class TreeFront {
   /// definite also if a robot claims so little precision that its equations are singular to
   /// rounding: it then cannot stop the team.
   [[nodiscard]] bool factorise_damped();
+  /// True if the last factorisation was damped: the inverse then says nothing about covariances.
+  [[nodiscard]] bool damped() const { return damped_; }
   /// True if factorise() is due because own equations or those of children have changed.
   [[nodiscard]] bool changed() const { return changed_; }
 
@@ -85,11 +84,12 @@ class TreeFront {
   [[nodiscard]] std::vector<UpMessage::NewWeight> changed_weights();
 
   /// Forward substitution of own gradients at `poses` and of the right-hand sides of the children.
-  void reduce(std::span<const SE3> poses, const std::map<RobotId, Eigen::MatrixXd>& children);
+  /// Throws std::invalid_argument if the size of a right-hand side differs from its system.
+  void reduce(std::span<const SE3> poses, const std::map<RobotId, Eigen::VectorXd>& children);
   /// Reduced right-hand side of the poses left to the parent.
-  [[nodiscard]] Eigen::VectorXd reduced() const { return kept_rows(forwarded_); }
+  [[nodiscard]] Eigen::VectorXd reduced() const;
   /// Squared norm of the rows of the eliminated poses.
-  [[nodiscard]] double decrement() const { return gram_of_eliminated(forwarded_)(0, 0); }
+  [[nodiscard]] double decrement() const;
 
   /// At the root: the step of the remaining poses (none, or one), and its part of the decrement.
   struct RootStep {
@@ -102,20 +102,6 @@ class TreeFront {
   [[nodiscard]] Eigen::MatrixXd substitute_back(const Eigen::VectorXd& kept) const;
   /// The part of a child in `steps`.
   [[nodiscard]] Eigen::VectorXd step_of_child(RobotId child, const Eigen::MatrixXd& steps) const;
-
-  /// Forward substitution of `rows` plus the rows of the children. Throws std::invalid_argument if
-  /// the size of the rows of a child differs from its system.
-  [[nodiscard]] Eigen::MatrixXd forward(Eigen::MatrixXd rows,
-                                        const std::map<RobotId, Eigen::MatrixXd>& children) const;
-  /// Back substitution of the result of forward(), given the solution at the poses left to the
-  /// parent. Throws std::invalid_argument if `kept` has another size.
-  [[nodiscard]] Eigen::MatrixXd backward(Eigen::MatrixXd forwarded,
-                                         const Eigen::MatrixXd& kept) const;
-  /// Rows of the poses left to the parent.
-  [[nodiscard]] Eigen::MatrixXd kept_rows(const Eigen::MatrixXd& rows) const;
-  [[nodiscard]] Eigen::MatrixXd rows_of_child(RobotId child, const Eigen::MatrixXd& rows) const;
-  /// X^T X, where X are the rows of the eliminated poses.
-  [[nodiscard]] Eigen::MatrixXd gram_of_eliminated(const Eigen::MatrixXd& rows) const;
 
   /// Blocks of the inverse of the second derivatives of the team, at all nodes and at the couplings
   /// of the front. `kept` are those of the poses left to the parent, in the order of the system.
@@ -193,6 +179,7 @@ class TreeFront {
   Curvature curvature_ = Curvature::kGaussNewton;
   std::vector<SentWeight> sent_;
   bool changed_ = true;
+  bool damped_ = false;
   Eigen::MatrixXd forwarded_;
 };
 

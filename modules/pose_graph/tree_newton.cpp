@@ -396,7 +396,7 @@ UpMessage TreeNewton::equations() {
   if (refresh_ || front_->stale())
     front_->linearise(at_hand_, verdict_.full ? Curvature::kFull : Curvature::kGaussNewton);
   refresh_ = false;
-  std::map<RobotId, MatrixXd> reduced;
+  std::map<RobotId, VectorXd> reduced;
   for (auto& [child, up] : ups_) reduced[child] = std::move(up.reduced);
   if (front_->changed()) {
     bool positive = front_->factorise();
@@ -415,6 +415,7 @@ UpMessage TreeNewton::equations() {
   front_->reduce(at_hand_, reduced);
   message.reduced = front_->reduced();
   message.sums.decrement = front_->decrement();
+  message.failed = !message.reduced.allFinite() || !std::isfinite(message.sums.decrement);
   return message;
 }
 
@@ -599,7 +600,8 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
 // The cost is chi-squared distributed, so the covariance is twice the inverse of its second
 // derivatives. Closures that are noisier than they claim widen it.
 void TreeNewton::compute_covariances(const TreeInverse& from_parent) {
-  if (!options_.covariances || !factorised_ || (place_.parent && from_parent.empty())) return;
+  const bool known = factorised_ && !front_->damped() && !(place_.parent && from_parent.empty());
+  if (!options_.covariances || !known) return;
   std::optional<BlockMatrix> solved;
   try {
     solved = place_.parent ? front_->inverse(front_->inverse_from_parent(from_parent))

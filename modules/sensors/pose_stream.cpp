@@ -29,14 +29,9 @@ std::optional<MeasuredPose> PoseStream::at(Stamp stamp) {
 
 MeasuredPose measured_pose(const SE3& T_odom_child, const Matrix6& covariance,
                            const SE3& T_child_body) {
-  // Converts to [rotation; translation] along the child's axes, which perturb T_odom_child *
-  // exp(xi). Then converts to the body by exp(xi) * T_child_body = T_child_body *
-  // exp(Ad(T_child_body^-1) xi).
-  Matrix6 to_child = Matrix6::Zero();
-  to_child.topRightCorner<3, 3>() = T_odom_child.linear().transpose();
-  to_child.bottomLeftCorner<3, 3>() = T_odom_child.linear().transpose();
-  const Matrix6 J = adjoint(T_child_body.inverse()) * to_child;
-  return {T_odom_child * T_child_body, J * covariance * J.transpose()};
+  const UncertainPose odom_child{T_odom_child, from_fixed_axes(T_odom_child, covariance)};
+  const UncertainPose odom_body = compose(odom_child, {T_child_body, Matrix6::Zero()});
+  return {odom_body.T, odom_body.Sigma};
 }
 
 std::optional<MeasuredPose> measured_pose(const RosOdometry& message, const SE3& T_child_body) {
