@@ -83,11 +83,22 @@ std::vector<ReliableMessage> SessionPart::advance(const PublicPoses& published, 
   return std::exchange(to_send_, {});
 }
 
+// A pose that is rounded twice may differ from the pose that is rounded once, because the
+// quaternion is normalised in between. Copies of a pose on two robots that differ at all drift
+// apart: the same step of the solver moves them along different axes.
+std::vector<SinglePose> SessionPart::public_poses() const {
+  if (stage_ == MemberStage::kEntered) return entered_;
+  std::vector<SinglePose> rounded;
+  for (const KeyframeIndex keyframe : public_) rounded.push_back(SinglePose::of(poses()[keyframe]));
+  return rounded;
+}
+
 bool SessionPart::enter(const PublicPoses& published) {
   if (!in_frame_ && !align(published)) return false;
   for (const KeyframeIndex keyframe : public_) {
     SE3& T = graph_.start[keyframe];
-    T = SinglePose::of(T).pose();
+    entered_.push_back(SinglePose::of(T));
+    T = entered_.back().pose();
   }
   committed_ = graph_.start;
   stage_ = MemberStage::kEntered;

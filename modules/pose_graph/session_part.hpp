@@ -72,6 +72,9 @@ class SessionPart {
   [[nodiscard]] Session& session() { return session_; }
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const std::vector<KeyframeIndex>& public_keyframes() const { return public_; }
+  /// The poses of public_keyframes() as other robots receive them. Those of the stage kEntered are
+  /// the poses with which the solver of this robot begins, to the last bit.
+  [[nodiscard]] std::vector<SinglePose> public_poses() const;
   [[nodiscard]] const std::vector<RobotId>& members() const { return place_.members; }
   /// State of the solver; zeros before there is one.
   [[nodiscard]] SolverState state() const { return solver_ ? solver_->state() : SolverState(); }
@@ -116,7 +119,8 @@ class SessionPart {
   bool in_frame_;
   bool suspicious_;
   std::vector<KeyframeIndex> public_;
-  std::vector<ClosureId> between_;  // to other members, ascending
+  std::vector<SinglePose> entered_;  // poses of public_, when the robot entered the frame
+  std::vector<ClosureId> between_;   // to other members, ascending
   MemberSolverFactory factory_;
   AlignmentTolerance tolerance_;
   std::map<RobotId, std::uint64_t> boot_of_;  // members

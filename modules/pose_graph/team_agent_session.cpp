@@ -265,9 +265,7 @@ void TeamAgent::publish_poses() {
   message.frame_version = frame_.version();
   message.step_precision = graph_.mean_step_precision();
   message.keyframes = part_->public_keyframes();
-  const std::vector<SE3>& poses = part_->poses();
-  for (const KeyframeIndex keyframe : message.keyframes)
-    message.T_frame_kf.push_back(SinglePose::of(poses[keyframe]));
+  message.T_frame_kf = part_->public_poses();
   for (const WeighedClosure& verdict : part_->verdicts().closures)
     if (verdict.id.from.robot != verdict.id.to.robot) message.verdicts.push_back(verdict);
   message.sent_bytes = part_->sent_bytes();

@@ -5,6 +5,7 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/pose_graph/session_part.hpp"
+#include "test/support/random_pose.hpp"
 
 namespace km {
 namespace {
@@ -114,6 +115,30 @@ TEST_CASE("messages before the solver begins are not lost, in any number and ord
   c.exchange(0.2, 60.0);
   CHECK(c.taken == kMessages);
   CHECK(c.others.due(1000.0).empty());
+}
+
+TEST_CASE("a robot computes with the public poses that the other robots receive, to the last bit",
+          "[pose_graph][session]") {
+  std::mt19937 rng(5);
+  FrozenPart frozen{.graph = {.self = kSelf.robot},
+                    .place = {.children = {2}, .members = {1, 2}, .root = 1},
+                    .in_frame = true};
+  for (KeyframeIndex k = 0; k < 200; ++k) {
+    frozen.graph.start.push_back(random_pose(rng, 100.0));
+    frozen.public_keyframes.push_back(k);
+  }
+  SessionPart part(
+      Correspondence().session, kSelf, frozen,
+      [](const Session&, const SessionGraph&, const TreePlace&) {
+        return std::unique_ptr<MemberSolver>();
+      },
+      {}, 1.0, 0.0);
+  (void)part.advance({}, 0.0);
+  REQUIRE(part.stage() == MemberStage::kEntered);
+  const std::vector<SinglePose> received = part.public_poses();
+  REQUIRE(received.size() == part.poses().size());
+  for (std::size_t k = 0; k < received.size(); ++k)
+    CHECK(received[k].pose().matrix() == part.poses()[k].matrix());
 }
 
 TEST_CASE("refused messages do not keep a session alive", "[pose_graph][session]") {
