@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-constexpr double kFactorSigma = 1.0986;    // log 3, prior of log s
+constexpr double kFactorWidth = 1.0986;    // log 3, prior of log s
 constexpr double kOddsAgainstUsual = 6.9;  // log of odds of 1000 to 1
 // Odometry may be this many times noisier than it claims before its errors count as evidence
 // against closures. Sensitivity: METHOD.md.
@@ -32,8 +32,9 @@ constexpr double kAgreeingCycle = 16.8;  // 99 % quantile of chi-squared, 6 degr
 // odometry is that of its mean step.
 constexpr double kNotable = 1.3;
 // Least mean log density ratio of a cycle with the estimated noise to a false cycle. It rejects
-// very large noise, with which closures that are all false would be as likely true.
-constexpr double kDistinct = 3.0;
+// very large noise, with which closures that are all false would be as likely true. Sensitivity:
+// METHOD.md.
+constexpr double kDistinct = 2.0;
 
 struct Posterior {
   double log_density = 0.0;  // log posterior density of the factor s, up to a constant
@@ -53,18 +54,20 @@ Posterior posterior_of(std::span<const NoiseCycle> cycles, std::span<const doubl
     }
     log_ratio.push_back(log_if_true - static_cast<double>(cycle.log_if_false));
   }
-  const double away = std::log(s / usual) / kFactorSigma;
+  const double away = std::log(s / usual) / kFactorWidth;
   const double log_likelihood = fit_cycle_mixture(log_ratio, weights).log_likelihood;
   const double total = weights.front() * static_cast<double>(weights.size());
-  return {log_likelihood - 0.5 * away * away, log_likelihood / total};
+  return {log_likelihood - std::log1p(away * away), log_likelihood / total};
 }
 
-// Share of the cycles that agree with the factor `s`.
-double agreeing(std::span<const NoiseCycle> cycles, double s) {
+// Share of the cycles that agree with the factor `s`. The odometry is `odometry` times noisier than
+// it claims.
+double agreeing(std::span<const NoiseCycle> cycles, double s, double odometry) {
   const auto agrees = [&](const NoiseCycle& cycle) {
     double squared = 0.0;
     for (std::size_t k = 0; k < cycle.error.size(); ++k)
-      squared += cycle.error[k] * cycle.error[k] / (1.0 + s * s * cycle.variance[k]);
+      squared +=
+          cycle.error[k] * cycle.error[k] / (odometry * odometry + s * s * cycle.variance[k]);
     return squared <= kAgreeingCycle;
   };
   return static_cast<double>(std::ranges::count_if(cycles, agrees)) /
@@ -97,15 +100,19 @@ Estimate estimate(std::span<const NoiseCycle> cycles, double observations, doubl
   return {std::ranges::find_if(densities, credible)->first, most - log_usual};
 }
 
-// The factor of cycles of one kind.
+// The factor of cycles of one kind. A team whose cycles are shorter than claimed has better
+// odometry than it claims, too. Errors of its closures would otherwise be within the claims of
+// odometry.
 double factor_of(std::span<const NoiseCycle> cycles, double observations, double usual) {
+  const double odometry = std::min(1.0, kNoisyOdometry * usual);
   if (cycles.empty() || observations < kFewPlaces || usual > kClaimsFail ||
-      agreeing(cycles, usual) > kMostAgree)
+      agreeing(cycles, usual, odometry) > kMostAgree)
     return usual;
-  const Estimate found = estimate(cycles, observations, usual, 1.0, kDistinct);
+  const Estimate found = estimate(cycles, observations, usual, odometry, kDistinct);
   const bool likely =
       found.log_odds >= kOddsAgainstUsual &&
-      estimate(cycles, observations, usual, kNoisyOdometry, 0.0).log_odds >= kOddsAgainstUsual;
+      estimate(cycles, observations, usual, kNoisyOdometry * odometry, 0.0).log_odds >=
+          kOddsAgainstUsual;
   return likely ? found.factor : usual;
 }
 

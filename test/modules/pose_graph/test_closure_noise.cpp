@@ -16,17 +16,22 @@ constexpr double kOdometrySigma = 0.02;  // odometry in a cycle, on each axis [r
 constexpr double kClosureSigma = 0.05;   // both closures together [rad], [m]
 constexpr double kVolume_m3 = 1000.0;
 
+struct OdometrySigma {  // in a cycle, on each axis [rad], [m]
+  double claimed = kOdometrySigma;
+  double actual = kOdometrySigma;
+};
+
 // Cycles whose closures are `scale` times noisier than they claim. Some cycles are false.
 std::vector<NoiseCycle> draw_cycles(std::size_t count, double scale, double share_false,
-                                    int dimension, std::mt19937& rng) {
+                                    int dimension, std::mt19937& rng, OdometrySigma sigma = {}) {
   Matrix6 axes = Matrix6::Identity();
   if (dimension == 2) axes(0, 0) = axes(1, 1) = axes(5, 5) = 0.0;
-  const Matrix6 odometry = kOdometrySigma * kOdometrySigma * axes;
+  const Matrix6 odometry = sigma.claimed * sigma.claimed * axes;
   const Matrix6 closures = kClosureSigma * kClosureSigma * axes;
   std::bernoulli_distribution is_false(share_false);
   std::vector<NoiseCycle> cycles;
   for (std::size_t k = 0; k < count; ++k) {
-    Vector6 e = std::hypot(kOdometrySigma, scale * kClosureSigma) * random_vector<6>(rng);
+    Vector6 e = std::hypot(sigma.actual, scale * kClosureSigma) * random_vector<6>(rng);
     if (is_false(rng)) {
       e = random_vector<6>(rng);
       e.tail<3>() *= 4.0;
@@ -95,6 +100,19 @@ TEST_CASE("Closures that are as noisy as claimed keep the factor of the team", "
   const PairCycles cycles =
       pair_of(draw_cycles(80, usual, 0.3, 3, rng), draw_cycles(20, usual, 0.3, 3, rng));
   CHECK(estimate_closure_noise(cycles, usual) == usual);
+}
+
+TEST_CASE("Closures as noisy as they claim stand out in a team that claims far too much noise",
+          "[closure_noise]") {
+  constexpr double kUsual = 0.005;
+  const unsigned seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  const OdometrySigma odometry{.claimed = 0.5, .actual = kUsual * 0.5};  // closures claim 0.05
+  const PairCycles usual = pair_of(draw_cycles(60, kUsual, 0.0, 3, rng, odometry), {});
+  const PairCycles noisy = pair_of(draw_cycles(60, 1.0, 0.0, 3, rng, odometry), {});
+  CHECK(estimate_closure_noise(usual, kUsual) == kUsual);
+  CHECK(estimate_closure_noise(noisy, kUsual) == Approx(1.0).epsilon(0.25));
 }
 
 TEST_CASE("An error that the closures of a place share shows between places", "[closure_noise]") {
