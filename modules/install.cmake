@@ -7,17 +7,21 @@ set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME library)
 set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/kimera_multi)
 
 set(modules core images vio_frontend vio place_recognition loop_closure outlier_rejection pose_graph
-  recorded_graph mesh semantic_mapping mesh_deformation recordings sensors)
-# sensors_node reads calibrations; the others are its libraries.
-set(KM_EXPORTED ${modules} sensors_node runtime security idl opencv)
+  rbcd recorded_graph mesh semantic_mapping mesh_deformation recordings sensors charts evaluation)
+# sensors_node reads calibrations, team_plan reads team files and starts programs, program and heap
+# are parts of every program. The others are libraries of these.
+set(KM_EXPORTED ${modules} sensors_node team_plan program heap runtime security idl opencv chart_files)
 list(TRANSFORM KM_EXPORTED PREPEND km_ OUTPUT_VARIABLE targets)
 foreach(name ${KM_EXPORTED})
   set_target_properties(km_${name} PROPERTIES EXPORT_NAME ${name})
+  add_library(kimera_multi::${name} ALIAS km_${name})
 endforeach()
-install(TARGETS ${targets} EXPORT kimera_multiTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS ${targets} EXPORT kimera_multiTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+  OBJECTS DESTINATION ${CMAKE_INSTALL_LIBDIR}/kimera_multi)
 install(EXPORT kimera_multiTargets NAMESPACE kimera_multi:: DESTINATION ${config_dir})
 
-# Headers with threads or network include those of runtime/, and are not installed.
+# Headers with threads or network include those of runtime/, and are not installed. The headers
+# below are those of the runtime and the programs that have a use outside robots.
 foreach(module ${modules})
   file(GLOB module_headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} modules/${module}/*.hpp)
   foreach(header ${module_headers})
@@ -26,6 +30,13 @@ foreach(module ${modules})
       install(FILES ${header} DESTINATION include/kimera_multi/modules/${module})
     endif()
   endforeach()
+endforeach()
+foreach(header apps/output_file.hpp apps/program_folder.hpp apps/program_version.hpp
+               apps/report_files.hpp apps/stage_progress.hpp apps/subcommands.hpp
+               apps/team/robot_process.hpp apps/team/team_file.hpp
+               runtime/clock.hpp runtime/config_text.hpp runtime/signal_watch.hpp runtime/yaml_config.hpp)
+  get_filename_component(folder ${header} DIRECTORY)
+  install(FILES ${header} DESTINATION include/kimera_multi/${folder})
 endforeach()
 
 configure_package_config_file(modules/kimera_multiConfig.cmake.in kimera_multiConfig.cmake

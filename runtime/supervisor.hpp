@@ -1,6 +1,5 @@
 #pragma once
 
-#include <csignal>
 #include <exception>
 #include <functional>
 #include <future>
@@ -13,37 +12,10 @@
 
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
+#include "runtime/signal_watch.hpp"
 #include "runtime/watchdog.hpp"
 
 namespace km {
-
-/// Turns SIGINT, SIGTERM and SIGHUP into a question that can be asked, SIGHUP unless it is ignored
-/// (nohup); SIGPIPE is ignored: a closed pipe is an error of a write. Make one before any other
-/// thread exists: threads inherit the blocked signals. Programs started by this one inherit both,
-/// unless what starts them restores previous() and the default of SIGPIPE.
-class SignalWatch {
- public:
-  SignalWatch();
-  ~SignalWatch();
-  SignalWatch(const SignalWatch&) = delete;
-  SignalWatch& operator=(const SignalWatch&) = delete;
-
-  /// Waits up to `timeout_s` for a signal; its number, or nullopt.
-  std::optional<int> wait(double timeout_s);
-
-  /// Restores the default: SIGINT and SIGTERM now end the process at once. SIGHUP has no effect any
-  /// more, because a closing terminal may send it several times.
-  void give_up();
-
-  /// The signals that were blocked before.
-  [[nodiscard]] const sigset_t& previous() const { return previous_; }
-
- private:
-  sigset_t watched_{};
-  sigset_t previous_{};
-  void (*previous_pipe_)(int) = nullptr;    // former handler of SIGPIPE
-  void (*previous_hangup_)(int) = nullptr;  // former handler of SIGHUP
-};
 
 /// Why a robot stopped.
 struct RunResult {

@@ -11,9 +11,9 @@
 #include "apps/doctor/examine_recording.hpp"
 #include "apps/doctor/examine_results.hpp"
 #include "apps/doctor/network_probe.hpp"
-#include "apps/evaluate/stage_progress.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_version.hpp"
+#include "apps/stage_progress.hpp"
 #include "modules/sensors/rig_file_codec.hpp"
 #include "runtime/log.hpp"
 

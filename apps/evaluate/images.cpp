@@ -8,8 +8,8 @@
 #include <stdexcept>
 
 #include "apps/evaluate/commands.hpp"
-#include "apps/evaluate/stage_progress.hpp"
 #include "apps/output_file.hpp"
+#include "apps/stage_progress.hpp"
 #include "modules/evaluation/images/image_figure.hpp"
 #include "modules/evaluation/images/image_statistics.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"

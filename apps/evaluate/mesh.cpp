@@ -11,8 +11,8 @@
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
-#include "apps/evaluate/stage_progress.hpp"
 #include "apps/output_file.hpp"
+#include "apps/stage_progress.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
 #include "modules/mesh/ply_file.hpp"

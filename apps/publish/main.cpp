@@ -14,7 +14,7 @@
 #include "modules/sensors/euroc_rig_codec.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
-#include "runtime/supervisor.hpp"
+#include "runtime/signal_watch.hpp"
 
 namespace km {
 namespace {

@@ -14,7 +14,7 @@
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
 #include "runtime/dds/ros_network.hpp"
-#include "runtime/supervisor.hpp"
+#include "runtime/signal_watch.hpp"
 
 namespace km {
 

@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "apps/robot/robot_config.hpp"
-#include "runtime/supervisor.hpp"
+#include "runtime/signal_watch.hpp"
 
 namespace km {
 

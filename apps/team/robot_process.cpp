@@ -43,11 +43,11 @@ std::array<int, 2> make_pipe() {
 
 // Runs in the child between fork and exec: async-signal-safe calls only.
 [[noreturn]] void become(char* const* arguments, int out, int err, const sigset_t& blocked,
-                         pid_t parent, const RobotNetwork* network) {
+                         pid_t parent, const std::function<bool()>& prepare) {
   dup2(out, STDOUT_FILENO);
   dup2(err, STDERR_FILENO);
   // Before prctl(): a change of privileges clears its setting.
-  if (network != nullptr && !network->enter()) give_up();
+  if (prepare && !prepare()) give_up();
   // Not SIGTERM: after a first request to end, the robot would take it as the second, which ends at
   // once.
   prctl(PR_SET_PDEATHSIG, SIGHUP);
@@ -74,7 +74,7 @@ std::string to_string(const ProcessExit& exit) {
 }
 
 RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset_t& blocked,
-                           const std::filesystem::path& log, const RobotNetwork* network)
+                           const std::filesystem::path& log, const std::function<bool()>& prepare)
     : log_(log) {
   if (!log_) throw std::runtime_error(log.string() + ": cannot be written");
   std::vector<char*> arguments;
@@ -87,7 +87,7 @@ RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset
   const auto err = make_pipe();
   const pid_t parent = getpid();
   pid_ = fork();
-  if (pid_ == 0) become(arguments.data(), out[1], err[1], blocked, parent, network);
+  if (pid_ == 0) become(arguments.data(), out[1], err[1], blocked, parent, prepare);
   close(out[1]);
   close(err[1]);
   out_.fd = out[0];

@@ -7,11 +7,10 @@
 #include <deque>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include "apps/team/robot_network.hpp"
 
 namespace km {
 
@@ -32,10 +31,11 @@ struct ProcessExit {
 class RobotProcess {
  public:
   /// Starts `command` (the program first), with the signals in `blocked` blocked and all others
-  /// unblocked. It runs in `network` if that is not null. Its output is also written to `log`.
-  /// Throws std::runtime_error.
+  /// unblocked. Its output is also written to `log`. `prepare` runs in the new process before the
+  /// program, and must be async-signal-safe; false, with errno, means that it failed. Throws
+  /// std::runtime_error.
   RobotProcess(const std::vector<std::string>& command, const sigset_t& blocked,
-               const std::filesystem::path& log, const RobotNetwork* network = nullptr);
+               const std::filesystem::path& log, const std::function<bool()>& prepare = {});
   /// If the process is still running, sends SIGTERM, and kills it 20 s later.
   ~RobotProcess();
   RobotProcess(const RobotProcess&) = delete;

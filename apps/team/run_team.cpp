@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <csignal>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 
@@ -42,11 +43,12 @@ class RunningTeam {
       : plan_(plan), signals_(signals), display_(display) {
     remove_earlier_run(plan);
     for (const RobotPlan& robot : plan.robots) {
-      const RobotNetwork* const network =
-          links == nullptr ? nullptr : &links->network(robots_.size());
+      std::function<bool()> enter_network;
+      if (links != nullptr)
+        enter_network = [&network = links->network(robots_.size())] { return network.enter(); };
       robots_.push_back(
           std::make_unique<RobotProcess>(robot_command(binary, plan, robot), signals.previous(),
-                                         plan.output / robot.name / "robot.log", network));
+                                         plan.output / robot.name / "robot.log", enter_network));
       display_.update(robots_.size() - 1, "started");
     }
   }

@@ -9,7 +9,7 @@
 #include "apps/team/robot_process.hpp"
 #include "apps/team/team_display.hpp"
 #include "apps/team/team_file.hpp"
-#include "runtime/supervisor.hpp"
+#include "runtime/signal_watch.hpp"
 
 namespace km {
 

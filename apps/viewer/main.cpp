@@ -19,7 +19,7 @@
 #include "runtime/clock.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/log.hpp"
-#include "runtime/supervisor.hpp"
+#include "runtime/signal_watch.hpp"
 
 namespace km {
 namespace {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "modules/pgo_study/member_team.hpp"
-#include "modules/pgo_study/odometry_start.hpp"
+#include "apps/lab/pgo_study/member_team.hpp"
+#include "apps/lab/pgo_study/odometry_start.hpp"
 #include "modules/pose_graph/member_solver.hpp"
 #include "modules/pose_graph/tree_messages.hpp"
 #include "modules/pose_graph/tree_newton.hpp"

@@ -5,8 +5,8 @@
 #include <numbers>
 #include <vector>
 
+#include "apps/lab/pgo_study/team_graph_file.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/pgo_study/team_graph_file.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

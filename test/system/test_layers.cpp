@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <regex>
 #include <set>
@@ -14,13 +15,17 @@
 //   modules/<m>         core, its own folder, and the modules listed below
 //   runtime             core, security
 //   modules/<m>/*_node, *_codec   their own module, core, runtime
-//   apps, test          everything
+//   apps/lab/<library>  core, its own folder, and the modules listed below
+//   apps, test          everything; of apps/lab only tests and apps/lab itself
+// The laboratory links only libraries that are installed.
 // Everywhere: what takes seconds to compile, JSON, is no header's to include.
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kLab = "apps/lab/";
 
 // Modules an algorithm may use beside core and itself.
 const std::map<std::string, std::set<std::string>> kModuleUses = {
@@ -55,11 +60,16 @@ bool is_source(const fs::path& file) {
   return file.extension() == ".hpp" || file.extension() == ".cpp";
 }
 
-// "modules/vio/vio.hpp" -> "vio"; empty if it is not below modules/.
+// "modules/vio/vio.hpp" and "apps/lab/vio/vio.hpp" -> "vio"; empty for other paths.
 std::string module_of(const std::string& path) {
-  static const std::string root = "modules/";
-  if (!path.starts_with(root)) return {};
-  return path.substr(root.size(), path.find('/', root.size()) - root.size());
+  for (const std::string root : {"modules/", kLab})
+    if (path.starts_with(root))
+      return path.substr(root.size(), path.find('/', root.size()) - root.size());
+  return {};
+}
+
+bool is_lab(const std::string& path) {
+  return path.starts_with(kLab);
 }
 
 bool joins_runtime(const fs::path& file) {
@@ -79,7 +89,9 @@ std::string violation(const fs::path& file, const std::string& header) {
   const std::string own = module_of(file.generic_string());
   const std::string used = module_of(header);
   const bool in_runtime = file.generic_string().starts_with("runtime/");
-  if (header.starts_with("apps/") || header.starts_with("test/")) return "a lower layer";
+  const bool is_own_lab = is_lab(file.generic_string()) && is_lab(header) && used == own;
+  if ((header.starts_with("apps/") && !is_own_lab) || header.starts_with("test/"))
+    return "a lower layer";
   if (in_runtime)
     return used.empty() || used == "core" || used == "security" ? "" : "runtime knows no module";
   if (header.starts_with("runtime/"))
@@ -93,7 +105,7 @@ std::string violation(const fs::path& file, const std::string& header) {
 
 TEST_CASE("Every include obeys the layers", "[layers]") {
   std::size_t files = 0;
-  for (const char* root : {"modules", "runtime"})
+  for (const char* root : {"modules", "runtime", "apps/lab/pgo_study", "apps/lab/simulation"})
     for (const auto& entry : fs::recursive_directory_iterator(root)) {
       if (!is_source(entry.path())) continue;
       ++files;
@@ -103,6 +115,52 @@ TEST_CASE("Every include obeys the layers", "[layers]") {
       }
     }
   CHECK(files > 20);  // run from the root of the repository
+}
+
+TEST_CASE("Only tests and the laboratory include headers of the laboratory", "[layers]") {
+  std::size_t files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator("apps")) {
+    if (!is_source(entry.path()) || is_lab(entry.path().generic_string())) continue;
+    ++files;
+    for (const std::string& header : includes_of(entry.path())) {
+      CAPTURE(entry.path().string(), header);
+      CHECK_FALSE(is_lab(header));
+    }
+  }
+  CHECK(files > 20);
+}
+
+std::vector<std::string> matches(const std::string& text, const std::string& pattern) {
+  const std::regex regex(pattern);
+  std::vector<std::string> found;
+  for (std::sregex_iterator match(text.begin(), text.end(), regex), end; match != end; ++match)
+    found.push_back((*match)[1]);
+  return found;
+}
+
+// Targets of the tree that CMake files of the laboratory name, except for their own and those with
+// the name they have when installed.
+std::set<std::string> internal_targets(const std::string& lab_text) {
+  std::set<std::string> names;
+  for (const std::string& name : matches(lab_text, R"(\b(km_[a-z_]+)\b)")) names.insert(name);
+  for (const std::string& own : matches(lab_text, R"(km_module\(([a-z_]+))"))
+    names.erase("km_" + own);
+  for (const char* function : {"km_module", "km_app", "km_group_sources"}) names.erase(function);
+  return names;
+}
+
+TEST_CASE("The laboratory links only libraries that are installed", "[layers]") {
+  std::string text;
+  for (const auto& entry : fs::recursive_directory_iterator("apps/lab"))
+    if (entry.path().filename() == "CMakeLists.txt") {
+      std::ifstream stream(entry.path());
+      text.append(std::istreambuf_iterator<char>(stream), {});
+    }
+  for (const std::string& name : internal_targets(text)) FAIL_CHECK(name);
+  CHECK(matches(text, "(kimera_multi::[a-z_]+)").size() > 10);
+  // CMake refuses kimera_multi::<name> unless modules/install.cmake exports it.
+  CHECK(internal_targets("km_module(a LINK km_b kimera_multi::c)\nkm_app(d LINK km_a)") ==
+        std::set<std::string>{"km_b"});
 }
 
 TEST_CASE("No header of the programs includes all of JSON", "[layers]") {
@@ -122,6 +180,11 @@ TEST_CASE("The layer rules refuse what they are for", "[layers]") {
   CHECK_FALSE(violation("modules/vio/vio.cpp", "modules/loop_closure/verifier.hpp").empty());
   CHECK_FALSE(violation("modules/vio/vio_node.cpp", "modules/sensors/sensors_node.hpp").empty());
   CHECK_FALSE(violation("runtime/log.hpp", "modules/vio/vio.hpp").empty());
+  CHECK_FALSE(violation("modules/vio/vio.cpp", "apps/lab/simulation/world/world.hpp").empty());
+  CHECK_FALSE(violation("apps/lab/simulation/world/world.cpp", "thread").empty());
+  CHECK_FALSE(violation("apps/lab/simulation/a.cpp", "apps/lab/pgo_study/b.hpp").empty());
+  CHECK_FALSE(violation("apps/lab/simulation/a.cpp", "modules/vio/vio.hpp").empty());
+  CHECK(violation("apps/lab/simulation/a.cpp", "apps/lab/simulation/b.hpp").empty());
   CHECK(violation("modules/vio/vio_node.cpp", "runtime/node.hpp").empty());
   CHECK(violation("runtime/dds/codec.hpp", "modules/core/ids.hpp").empty());
 }

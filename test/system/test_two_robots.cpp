@@ -3,7 +3,7 @@
 #include <csignal>
 #include <cstdio>
 
-#include "modules/pgo_study/team_graph_file.hpp"
+#include "apps/lab/pgo_study/team_graph_file.hpp"
 #include "test/support/eavesdropper.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"

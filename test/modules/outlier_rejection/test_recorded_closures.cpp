@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "apps/lab/pgo_study/member_team.hpp"
+#include "apps/lab/pgo_study/odometry_start.hpp"
+#include "apps/lab/pgo_study/team_graph_file.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
-#include "modules/pgo_study/member_team.hpp"
-#include "modules/pgo_study/odometry_start.hpp"
-#include "modules/pgo_study/team_graph_file.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 #include "runtime/yaml_config.hpp"

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "apps/report_files.hpp"
+
+namespace km {
+
+/// Adds a subcommand of kimera_multi_pgo to `app`, which runs as soon as the command line names it.
+/// Throws a std::exception with the reason if the input cannot be used.
+void add_solve(CLI::App& app);
+void add_pcm(CLI::App& app);
+void add_outliers(CLI::App& app);
+
+/// The pose graph of a team, as the command line names it.
+struct GraphInput {
+  std::filesystem::path file = {};
+  std::size_t robots = 1;
+  std::string partition = "contiguous";
+  bool keep_steps = false;
+
+  /// Defines FILE, --robots, --partition and --keep-steps, which set the members. This object must
+  /// outlive `app`.
+  void define(CLI::App& app);
+
+  /// Reads the graph with the ground truth of the file, and without odometry between robots unless
+  /// keep_steps. Throws std::runtime_error if there is no such graph, or if it is not connected
+  /// after a g2o graph is divided. Throws it too if --robots was given to `app` and differs from
+  /// the number of robots.
+  [[nodiscard]] LabelledTeamGraph read(const CLI::App& app) const;
+};
+
+/// Notice on edges whose information matrix is not positive definite. They were weighed by its
+/// diagonal blocks alone, as SE-Sync reads them. Empty if there are none.
+[[nodiscard]] std::string indefinite_text(std::size_t edges);
+
+/// Notice on measurements of the file that are not in the graph. Empty if all are.
+[[nodiscard]] std::string left_out_text(const LabelledTeamGraph& team);
+
+}  // namespace km

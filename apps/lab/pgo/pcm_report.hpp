@@ -1,0 +1,24 @@
+#pragma once
+
+#include <iosfwd>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/lab/pgo/pcm_run.hpp"
+#include "modules/charts/plot.hpp"
+
+namespace km {
+
+/// Table of the run at about ten sizes of its graph, and its totals, as text.
+[[nodiscard]] std::string pcm_text(const PcmRun& run);
+
+/// One object for one run: {"search", "additions": [{"vertices", "check_s", "search_s", "clique",
+/// "true_members", "false_members"}]}. Members are null without labels. Several runs are an array
+/// of such objects.
+void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs);
+
+/// Time of search and checks, and size of the clique, against vertices.
+[[nodiscard]] std::vector<Plot> pcm_plots(std::span<const PcmRun> runs);
+
+}  // namespace km

@@ -1,0 +1,208 @@
+#include "apps/lab/pgo/pcm_run.hpp"
+
+#include <algorithm>
+#include <istream>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <span>
+#include <stdexcept>
+
+#include "apps/lab/pgo/solvers.hpp"
+#include "modules/core/text_rows.hpp"
+#include "modules/outlier_rejection/cycle_test.hpp"
+#include "modules/outlier_rejection/max_clique.hpp"
+#include "modules/outlier_rejection/pcm.hpp"
+#include "modules/outlier_rejection/random_outliers.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
+#include "modules/recorded_graph/text_fields.hpp"
+
+namespace km {
+namespace {
+
+// The clique search of one run and the record of its additions.
+class RecordedSearch {
+ public:
+  explicit RecordedSearch(const PcmConfig& config)
+      : clique_(static_cast<std::uint64_t>(config.max_search_nodes), config.search) {
+    run.search = to_string(config.search);
+  }
+
+  PcmAddition& add(const std::vector<std::size_t>& neighbours, double check_s) {
+    const double begin_s = thread_cpu_s();
+    clique_.add(neighbours);
+    const double search_s = thread_cpu_s() - begin_s;
+    run.edges += neighbours.size();
+    run.search_nodes = clique_.search_nodes();
+    run.searches_ended = clique_.searches_ended();
+    return run.additions.emplace_back(PcmAddition{.vertices = clique_.size(),
+                                                  .check_s = check_s,
+                                                  .search_s = search_s,
+                                                  .clique = clique_.clique().size(),
+                                                  .bound = clique_.bound()});
+  }
+
+  [[nodiscard]] std::span<const std::size_t> clique() const { return clique_.clique(); }
+
+  PcmRun run;
+
+ private:
+  MaxClique clique_;
+};
+
+}  // namespace
+
+PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& config,
+               const PcmProgress& progress) {
+  const CycleTest test(config);
+  RecordedSearch additions(config);
+  std::vector<PreparedClosure> vertices;
+  std::vector<bool> is_true;
+  for (std::size_t n = 0; n < closures.size(); ++n) {
+    if (progress) progress(n);
+    const auto& [closure, outlier] = closures[n];
+    if (!is_usable(closure))
+      throw std::invalid_argument("closure " + to_string(closure.from.id) + " -> " +
+                                  to_string(closure.to.id) + " cannot be weighed");
+    const double begin_s = thread_cpu_s();
+    const OrientedClosure oriented = test.orient(closure);
+    if (config.odometry_gate && !test.agrees_with_odometry(oriented)) {
+      ++(outlier ? additions.run.dropped_false : additions.run.dropped_true);
+      continue;
+    }
+    PreparedClosure added(oriented);
+    const std::vector<std::size_t> consistent = test.consistent_with(added, vertices);
+    vertices.push_back(std::move(added));
+    is_true.push_back(!outlier);
+    PcmAddition& addition = additions.add(consistent, thread_cpu_s() - begin_s);
+    const auto members = additions.clique();
+    addition.true_members = static_cast<std::size_t>(
+        std::count_if(members.begin(), members.end(), [&](std::size_t v) { return is_true[v]; }));
+    addition.true_vertices =
+        static_cast<std::size_t>(std::count(is_true.begin(), is_true.end(), true));
+  }
+  return std::move(additions.run);
+}
+
+PcmRun run_pcm(const ConsistencyRows& rows, const PcmConfig& config, const PcmProgress& progress) {
+  RecordedSearch additions(checked(config));
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    if (progress) progress(n);
+    additions.add(rows[n], 0.0);
+  }
+  return std::move(additions.run);
+}
+
+std::string to_string(CliqueMethod method) {
+  return method == CliqueMethod::kExact         ? "exact"
+         : method == CliqueMethod::kIncremental ? "incremental"
+                                                : "batch";
+}
+
+namespace {
+
+constexpr std::int64_t kMaxIndex = std::numeric_limits<std::uint32_t>::max();
+constexpr std::int64_t kMostVertices = 100000;  // the adjacency of more takes over a gigabyte
+
+std::string text_of(std::istream& in, const std::string& file) {
+  std::string text(std::istreambuf_iterator<char>(in), {});
+  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
+  return text;
+}
+
+std::vector<std::size_t> read_neighbours(TextFields& fields, std::size_t vertex) {
+  std::set<std::size_t> earlier;
+  while (!fields.at_end()) {
+    const std::uint64_t u = fields.integer("neighbour");
+    if (u >= vertex)
+      fields.fail("neighbour " + std::to_string(u) + " of vertex " + std::to_string(vertex) +
+                  " is not an earlier one");
+    if (!earlier.insert(u).second)
+      fields.fail("a neighbour of vertex " + std::to_string(vertex) + " is given twice");
+  }
+  return {earlier.begin(), earlier.end()};
+}
+
+}  // namespace
+
+KeyframePairs read_outlier_labels(std::istream& in, const std::string& file) {
+  const std::string text = text_of(in, file);
+  KeyframePairs pairs;
+  for (const TextRow& row : split_rows(text)) {
+    TextFields fields(row, file);
+    const auto i = static_cast<std::uint32_t>(fields.integer("keyframe", kMaxIndex));
+    const auto j = static_cast<std::uint32_t>(fields.integer("keyframe", kMaxIndex));
+    const bool outlier = fields.integer("label", 1) == 1;
+    if (!fields.at_end()) fields.fail("more fields than two keyframes and a label");
+    if (outlier) pairs.insert(std::minmax(i, j));
+  }
+  return pairs;
+}
+
+ClosureInput read_closures(const std::filesystem::path& file, const KeyframePairs& false_pairs,
+                           const ClosureChoice& selection) {
+  const G2oGraph g2o = read_g2o(file);
+  const RecordedGraph graph = make_recorded_graph(g2o.edges, file.string());
+  if (!graph.inter_closures.empty())
+    throw std::runtime_error(file.string() + ": has closures between robots, must hold one robot");
+  const std::vector<RelativePose>& closures = graph.intra_closures;
+  if (closures.empty()) throw std::runtime_error(file.string() + ": has no loop closure");
+  if (selection.keep > closures.size())
+    throw std::runtime_error(file.string() + ": has " + std::to_string(closures.size()) +
+                             " loop closures, " + std::to_string(selection.keep) +
+                             " were asked for");
+
+  const std::vector<OdometryPose> poses = odometry_poses(graph);
+  std::vector<LabelledClosure> labelled;
+  const auto add = [&](const RelativePose& edge, bool outlier) {
+    labelled.push_back({{poses.at(edge.from.index), poses.at(edge.to.index), edge.T_from_to,
+                         edge.covariance, 0, 0.0},
+                        outlier});
+  };
+  std::mt19937 rng(selection.seed);
+  std::vector<RelativePose> kept = closures;
+  if (selection.keep > 0) {
+    kept.clear();
+    std::sample(closures.begin(), closures.end(), std::back_inserter(kept), selection.keep, rng);
+  }
+  for (const RelativePose& edge : kept)
+    add(edge, false_pairs.contains(std::minmax({edge.from.index, edge.to.index})));
+  if (selection.outliers > 0)
+    for (const RelativePose& edge : random_outliers(selection.outliers,
+                                                    {.robot = graph.robot,
+                                                    .keyframes = graph.poses(),
+                                                    .planar = g2o.dimension == 2,
+                                                    .half_side_m = selection.outlier_half_side_m,
+                                                    .covariance = closures.front().covariance},
+                                                    rng))
+      add(edge, true);
+  if (selection.shuffle) std::shuffle(labelled.begin(), labelled.end(), rng);
+  return {std::move(labelled), g2o.indefinite_edges};
+}
+
+ConsistencyRows read_consistency_rows(std::istream& in, const std::string& file) {
+  const std::string text = text_of(in, file);
+  const std::vector<TextRow> table = split_rows(text);  // empty lines of isolated vertices are
+                                                        // dropped
+  if (table.empty() || table.front().line != 1)
+    throw std::runtime_error(file + ":1: must be the number of vertices");
+  TextFields header(table.front(), file);
+  const std::uint64_t vertices = header.integer("number of vertices", kMostVertices);
+  if (!header.at_end()) header.fail("more than the number of vertices");
+  const auto lines = static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')) +
+                     (text.ends_with('\n') ? 0 : 1);
+  if (lines <= vertices)
+    throw std::runtime_error(file + ": ends after " + std::to_string(lines) + " lines, " +
+                             std::to_string(vertices) + " vertices need one each and the first");
+  ConsistencyRows rows(vertices);
+  for (const TextRow& row : std::span(table).subspan(1)) {
+    const auto v = static_cast<std::size_t>(row.line) - 2;
+    TextFields fields(row, file);
+    if (v >= vertices) fields.fail("more lines than vertices");
+    rows[v] = read_neighbours(fields, v);
+  }
+  return rows;
+}
+
+}  // namespace km

@@ -1,0 +1,329 @@
+#include "apps/lab/pgo/solve_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <sstream>
+
+#include "apps/lab/pgo/commands.hpp"
+#include "modules/core/json.hpp"
+#include "modules/core/text_table.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kMostMarks = 40;  // with more rounds, marks would hide the line
+
+// Gap relative to the optimum. Without noise the optimum is only rounding error, so kNoCost bounds
+// the divisor.
+double gap(const Solution& solution, const TeamRound& round) {
+  constexpr double kNoCost = 1e-9;
+  const double optimum = solution.judgement->optimum;
+  return (round.cost - optimum) / std::max(optimum, kNoCost);
+}
+
+// Bottom of a logarithmic axis of gaps: the decade below the least positive gap. Rounding makes
+// gaps at the optimum 0 or negative.
+double gap_floor(const Solution& solution) {
+  double least = 1.0;
+  for (const TeamRound& round : solution.run.rounds)
+    if (const double g = gap(solution, round); g > 0.0) least = std::min(least, g);
+  return std::pow(10.0, std::floor(std::log10(least)));
+}
+
+std::string work_bytes(const TeamWork& work) {
+  return bytes_text(static_cast<double>(work.bytes));
+}
+
+std::string table(const Solution& solution) {
+  const std::vector<TeamRound>& rounds = solution.run.rounds;
+  std::vector<std::vector<std::string>> rows{
+      {"", "rounds", "cost", "gap", "gradient", "sent", "critical s", "CPU s"}};
+  const auto add = [&](const std::string& name, const TeamRound& round) {
+    rows.push_back({name, std::to_string(round.round), rounded(round.cost, 9),
+                    rounded(gap(solution, round), 2), rounded(round.gradient_norm, 2),
+                    work_bytes(round.work), fixed(round.work.critical_path_s, 3),
+                    fixed(round.work.total_cpu_s, 3)});
+  };
+  add("start", rounds.front());
+  for (const double target : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
+    const auto reached = std::find_if(rounds.begin(), rounds.end(), [&](const TeamRound& round) {
+      return gap(solution, round) < target;
+    });
+    const std::string name = "gap < " + rounded(target, 1);
+    if (reached == rounds.end()) {
+      rows.push_back({name, "-", "", "", "", "", "", ""});
+      break;
+    }
+    add(name, *reached);
+  }
+  add("end", rounds.back());
+  return align_columns(rows);
+}
+
+std::string verification_text(const TeamVerification& verification) {
+  const std::string verdict = verification.negative    ? "found a direction that leads down"
+                              : verification.converged ? "found no direction that leads down"
+                                                       : "came to no end";
+  return "the team's own verification " + verdict + " (" + std::to_string(verification.rounds) +
+         " rounds, " + work_bytes(verification.work) + ", critical " +
+         fixed(verification.work.critical_path_s, 3) + " s, least curvature beyond the kernel " +
+         rounded(verification.lambda_min, 3) + ")\n";
+}
+
+std::string certificate_text(const Certificate& certificate) {
+  std::string text = certificate.certified ? "certified" : "not certified";
+  text += ": proven that the cost lies above that of any poses by at most " +
+          rounded(std::max(certificate.relative_gap, 1e-12), 2) +
+          " of itself (lambda_min at least " + rounded(certificate.lambda_bound, 3);
+  if (certificate.lambda_min) text += ", estimated " + rounded(*certificate.lambda_min, 3);
+  if (certificate.hidden_by_rounding) text += ", the rest being what rounding could hide";
+  return text + ")\n";
+}
+
+std::string judged_text(const Solution& solution) {
+  const Judgement& judged = *solution.judgement;
+  std::ostringstream text;
+  text << table(solution) << "chordal start in " << fixed(solution.start_s, 3) << " s, "
+       << (judged.optimum_certified ? "optimum " : "least cost known ")
+       << rounded(judged.optimum, 9) << ", rounded cost " << rounded(judged.rounded_cost, 9)
+       << ", rank " << judged.rank << '\n'
+       << certificate_text(judged.certificate);
+  if (solution.run.verification) text << verification_text(*solution.run.verification);
+  return text.str();
+}
+
+struct Count {
+  std::size_t kept = 0, all = 0;
+
+  [[nodiscard]] std::string text() const {
+    return std::to_string(kept) + " of " + std::to_string(all);
+  }
+};
+
+std::string decision_text(const TeamGraph& graph, const Solution& solution) {
+  const Decision& decision = *solution.run.decision;
+  const std::vector<bool> odometry = odometry_edges(graph);
+  Count between, inside, steps;
+  for (std::size_t k = 0; k < decision.kept.size(); ++k) {
+    const BlockEdge& e = graph.edges[k];
+    Count& count = odometry[k]                                  ? steps
+                   : graph.robot_of(e.i) != graph.robot_of(e.j) ? between
+                                                                : inside;
+    ++count.all;
+    if (decision.kept[k]) ++count.kept;
+  }
+  const TeamWork& work = solution.run.rounds.back().work;
+  std::ostringstream text;
+  text << "kept " << between.text() << " closures between robots, " << inside.text()
+       << " inside a robot, " << steps.text() << " steps of odometry\n"
+       << "closures are " << rounded(decision.noise_scale, 3)
+       << " times as noisy as the graph says; kept up to " << rounded(decision.threshold, 3)
+       << " sigma of the graph\n"
+       << solution.run.rounds.back().round << " rounds, " << work_bytes(work)
+       << " sent, by one robot at most " << bytes_text(static_cast<double>(decision.most_sent))
+       << " and to one " << bytes_text(static_cast<double>(decision.most_received))
+       << ", critical path " << fixed(work.critical_path_s, 3) << " s, CPU "
+       << fixed(work.total_cpu_s, 3) << " s\n";
+  if (!decision.decided) text << "not decided: --rounds did not suffice\n";
+  return text.str();
+}
+
+std::vector<std::string> count_row(const std::string& name, const ClosureCounts& counts) {
+  return {name, std::to_string(counts.true_kept), std::to_string(counts.true_lost),
+          std::to_string(counts.false_kept), std::to_string(counts.false_rejected)};
+}
+
+Json counts_json(const ClosureCounts& counts) {
+  return {{"true_kept", counts.true_kept},
+          {"true_lost", counts.true_lost},
+          {"false_kept", counts.false_kept},
+          {"false_rejected", counts.false_rejected}};
+}
+
+RobotId robot_id(const TeamGraph& graph, std::size_t robot) {
+  return graph.ids[static_cast<std::size_t>(graph.first[robot])].robot;
+}
+
+std::vector<std::string> ate_row(const std::string& name, const TeamAte& ate) {
+  constexpr int kDecimals = 3;
+  std::vector<std::string> row{name, fixed(ate.team_m, kDecimals)};
+  for (std::size_t k = 0; k < ate.alone_m.size(); ++k)
+    row.insert(row.end(), {fixed(ate.in_team_m[k], kDecimals), fixed(ate.alone_m[k], kDecimals)});
+  return row;
+}
+
+Json ate_json(const TeamGraph& graph, const TeamAte& ate) {
+  Json robots = Json::array();
+  for (std::size_t k = 0; k < ate.alone_m.size(); ++k)
+    robots.push_back({{"robot", robot_id(graph, k)},
+                      {"in_team_m", ate.in_team_m[k]},
+                      {"alone_m", ate.alone_m[k]}});
+  return {{"team_m", ate.team_m}, {"parts", ate.parts}, {"robots", std::move(robots)}};
+}
+
+// NaN if either is unknown.
+double ate_ratio(const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum) {
+  return ate && optimum ? ate->team_m / optimum->team_m : std::numeric_limits<double>::quiet_NaN();
+}
+
+void add_truth(const TeamGraph& graph, const std::optional<LabelCounts>& closures,
+               const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum,
+               Json& json) {
+  if (closures)
+    json["closures"] = {{"inside", counts_json(closures->inside)},
+                        {"between", counts_json(closures->between)}};
+  if (ate) json["ate"] = ate_json(graph, *ate);
+  if (!ate || !optimum) return;
+  json["optimum_of_true"] = ate_json(graph, *optimum);
+  json["ate_ratio"] = ate_ratio(ate, optimum);
+}
+
+Json instant_json(const TeamGraph& graph, const Instant& instant) {
+  Json json = {{"after_s", instant.after_s},
+               {"poses", instant.poses},
+               {"known_closures", instant.closures},
+               {"parts", instant.parts},
+               {"decided", instant.decided},
+               {"rounds", instant.rounds},
+               {"critical_path_s", instant.critical_path_s}};
+  add_truth(graph, instant.counts, instant.ate, instant.optimum_of_true, json);
+  return json;
+}
+
+std::string metres(const std::optional<TeamAte>& ate) {
+  return ate ? fixed(ate->team_m, 3) : "-";
+}
+
+}  // namespace
+
+std::string solution_text(const TeamGraph& graph, const Solution& solution) {
+  std::ostringstream text;
+  text << solution.method << ": " << graph.poses() << " poses, " << graph.edges.size()
+       << " edges, ";
+  if (!graph.verticals.empty()) text << graph.verticals.size() << " verticals, ";
+  text << graph.robots() << (graph.robots() == 1 ? " robot\n" : " robots\n")
+       << indefinite_text(graph.indefinite_edges)
+       << (solution.judgement ? judged_text(solution) : decision_text(graph, solution));
+  return text.str();
+}
+
+std::string score_text(const TeamGraph& graph, const TruthScore& truth) {
+  std::string text;
+  if (truth.closures)
+    text += align_columns({{"closures", "true kept", "true lost", "false kept", "false rejected"},
+                           count_row("inside a robot", truth.closures->inside),
+                           count_row("between robots", truth.closures->between)});
+  if (!truth.ate) return text;
+  std::vector<std::string> header{"ATE [m]", "team"};
+  for (std::size_t k = 0; k < graph.robots(); ++k) {
+    const std::string robot = std::to_string(robot_id(graph, k));
+    header.insert(header.end(), {"robot " + robot + " in team", "alone"});
+  }
+  std::vector<std::vector<std::string>> rows{std::move(header), ate_row("solution", *truth.ate)};
+  if (truth.optimum_of_true) {
+    rows.push_back(ate_row("optimum of the true closures", *truth.optimum_of_true));
+    rows.push_back({"ratio", fixed(ate_ratio(truth.ate, truth.optimum_of_true), 3)});
+    rows.back().resize(rows.front().size());
+  }
+  text += align_columns(rows);
+  if (truth.optimum_of_true && truth.optimum_of_true->parts > 1)
+    text += "the true closures leave " + std::to_string(truth.optimum_of_true->parts) +
+            " unconnected parts, each aligned by itself\n";
+  if (truth.optimum_of_true && !truth.certified)
+    text += "the optimum of the true closures is not certified\n";
+  return text;
+}
+
+std::string timeline_text(const std::vector<Instant>& instants) {
+  if (instants.empty()) return {};
+  std::vector<std::vector<std::string>> rows{{"after [s]", "poses", "closures", "parts",
+                                              "true lost", "false kept", "rounds", "ATE [m]",
+                                              "optimum of true", "ratio"}};
+  for (const Instant& instant : instants) {
+    const auto& counts = instant.counts;
+    const auto sum = [&](auto ClosureCounts::*member) {
+      return counts ? std::to_string(counts->inside.*member + counts->between.*member) : "-";
+    };
+    rows.push_back({fixed(instant.after_s, 1), std::to_string(instant.poses),
+                    std::to_string(instant.closures), std::to_string(instant.parts),
+                    sum(&ClosureCounts::true_lost), sum(&ClosureCounts::false_kept),
+                    std::to_string(instant.rounds) + (instant.decided ? "" : ", not decided"),
+                    metres(instant.ate), metres(instant.optimum_of_true),
+                    fixed(ate_ratio(instant.ate, instant.optimum_of_true), 3)});
+  }
+  return align_columns(rows);
+}
+
+void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
+                         const TruthScore& truth, const std::vector<Instant>& instants) {
+  Json rounds = Json::array();
+  for (const TeamRound& round : solution.run.rounds)
+    rounds.push_back({{"round", round.round},
+                      {"cost", round.cost},
+                      {"gradient_norm", round.gradient_norm},
+                      {"bytes", round.work.bytes},
+                      {"critical_path_s", round.work.critical_path_s},
+                      {"total_cpu_s", round.work.total_cpu_s}});
+  Json json = {{"poses", graph.poses()},
+               {"edges", graph.edges.size()},
+               {"verticals", graph.verticals.size()},
+               {"indefinite_edges", graph.indefinite_edges},
+               {"robots", graph.robots()},
+               {"method", solution.method},
+               {"rounds", std::move(rounds)},
+               {"start_cpu_s", solution.start_s}};
+  if (const auto& judged = solution.judgement) {
+    const Certificate& certificate = judged->certificate;
+    json.update({{"rounded_cost", judged->rounded_cost},
+                 {"relative_gap", certificate.relative_gap},
+                 {"lambda_bound", certificate.lambda_bound},
+                 {"certified", certificate.certified},
+                 {"rank", judged->rank},
+                 {"optimum", judged->optimum}});
+    if (certificate.lambda_min) json["lambda_min"] = *certificate.lambda_min;
+  }
+  if (const auto& decision = solution.run.decision) {
+    json.update({{"noise_scale", decision->noise_scale},
+                 {"barc", decision->threshold},
+                 {"most_sent", decision->most_sent},
+                 {"most_received", decision->most_received},
+                 {"decided", decision->decided},
+                 {"kept", Json::array()}});
+    for (std::size_t k = 0; k < decision->kept.size(); ++k)
+      if (decision->kept[k]) json["kept"].push_back(k);
+  }
+  add_truth(graph, truth.closures, truth.ate, truth.optimum_of_true, json);
+  if (truth.optimum_of_true) json["optimum_of_true"]["certified"] = truth.certified;
+  for (const Instant& instant : instants) json["instants"].push_back(instant_json(graph, instant));
+  out << json_text(json);
+}
+
+std::vector<Plot> gap_plots(const Solution& solution) {
+  const std::vector<TeamRound>& rounds = solution.run.rounds;
+  const double floor = gap_floor(solution);
+  const bool clipped = std::any_of(rounds.begin(), rounds.end(), [&](const TeamRound& round) {
+    return gap(solution, round) < floor;
+  });
+  const auto panel = [&](const char* label, const auto& abscissa) {
+    PlotSeries curve;
+    if (rounds.size() <= kMostMarks) curve.style = PlotSeries::Style::kMarkedLine;
+    for (std::size_t k = 0; k < rounds.size(); ++k)
+      curve.points.push_back({abscissa(k), std::max(floor, gap(solution, rounds[k]))});
+    return Plot{.title = solution.method + ": gap to the optimum" +
+                         (clipped ? " (none: at the bottom)" : ""),
+                .x_label = label,
+                .y_label = "(F - F*) / F*",
+                .log_y = true,
+                .series = {std::move(curve)}};
+  };
+  return {panel("rounds", [&](std::size_t k) { return static_cast<double>(rounds[k].round); }),
+          panel("sent by all robots [MB]",
+                [&](std::size_t k) { return 1e-6 * static_cast<double>(rounds[k].work.bytes); }),
+          panel("critical path [s of CPU time]",
+                [&](std::size_t k) { return rounds[k].work.critical_path_s; })};
+}
+
+}  // namespace km

@@ -1,0 +1,180 @@
+#include "apps/lab/pgo/solvers.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+
+#include "apps/lab/pgo_study/asynchronous_team.hpp"
+#include "apps/lab/pgo_study/central_solver.hpp"
+#include "apps/lab/pgo_study/central_team.hpp"
+#include "apps/lab/pgo_study/gauss_seidel_team.hpp"
+#include "apps/lab/pgo_study/local_team.hpp"
+#include "apps/lab/pgo_study/odometry_start.hpp"
+#include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/tree_newton.hpp"
+#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/solver_choice.hpp"
+
+namespace km {
+namespace {
+
+constexpr Eigen::Index kRigidRank = 3;
+
+// The configuration of robots with these options.
+PoseGraphConfig config_of(const SolverOptions& options) {
+  PoseGraphConfig config;
+  config.robust = !options.trust_all;
+  config.barc = options.barc;
+  config.share_private = options.share_private;
+  config.rank = static_cast<int>(options.rank);
+  config.max_over_relaxation = options.over_relaxation;
+  return config;
+}
+
+// The robots' own block descent, with their own stopping rule.
+std::unique_ptr<TeamSolver> rbcd_team(const TeamGraph& graph, const std::vector<SE3>& start,
+                                      const SolverOptions& options) {
+  RbcdOptions rbcd = rbcd_options(config_of(options));
+  rbcd.max_rounds = static_cast<std::uint32_t>(options.run.max_rounds);
+  return std::make_unique<MemberTeam>(
+      graph, kRigidRank, start,
+      [rbcd](SessionGraph part, const TreePlace& place) {
+        return std::make_unique<MemberRbcd>(std::move(part), place, rbcd);
+      },
+      options.shape);
+}
+
+std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<SE3>& start,
+                                      const SolverOptions& options) {
+  const std::string& method = options.method;
+  if (method == "local") return std::make_unique<LocalTeam>(graph);
+  if (method == "dgs") return std::make_unique<GaussSeidelTeam>(graph, start);
+  if (method == "rbcd") return rbcd_team(graph, start, options);
+  if (method == "rbcd-asynchronous")
+    return std::make_unique<AsynchronousTeam>(
+        graph, lift(start, options.rank),
+        AsynchronousOptions{.max_delay = options.max_delay,
+                            .loss = options.loss,
+                            .seed = options.seed,
+                            .max_over_relaxation = options.over_relaxation});
+  if (method == "centralized") return std::make_unique<CentralTeam>(graph, lift(start, kRigidRank));
+  throw std::invalid_argument("unknown method " + method);
+}
+
+// No gradient tolerance ends the run: at a gradient of 0 the weights may still change.
+SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const SolverOptions& options,
+                     const TeamMeter& meter) {
+  TreeNewtonOptions newton = newton_options(config_of(options));
+  newton.dimension = graph.dimension;
+  newton.absolute_tolerance = 1e-12;
+  newton.reject_odometry = options.reject_odometry;
+  if (start.empty()) start = odometry_start(graph);
+  MemberTeam team(
+      graph, kRigidRank, std::move(start),
+      [&](SessionGraph part, TreePlace place) {
+        return std::make_unique<TreeNewton>(std::move(part), std::move(place), newton);
+      },
+      options.shape, !options.trust_all);
+  SolverRun run;
+  run.rounds = run_team(graph, team,
+                        {.max_rounds = options.run.max_rounds, .gradient_tolerance = -1.0}, meter);
+  run.X = team_poses(graph, team);
+  run.decision = Decision{.kept = team.kept(),
+                          .noise_scale = team.state().noise_scale,
+                          .threshold = team.state().barc,
+                          .decided = team.done() && !team.state().failed};
+  for (std::size_t k = 0; k < graph.robots(); ++k) {
+    run.decision->most_sent = std::max(run.decision->most_sent, team.sent_by(k));
+    run.decision->most_received = std::max(run.decision->most_received, team.received_by(k));
+  }
+  return run;
+}
+
+// Refuses verticals for methods that support only edges.
+void check_verticals(const TeamGraph& graph, const SolverOptions& options) {
+  const std::string who = options.verify ? "the team's own verification (--verify)"
+                          : options.method == "dgs" || options.method == "rbcd-asynchronous"
+                              ? "method " + options.method
+                              : "";
+  if (!graph.verticals.empty() && !who.empty())
+    throw std::invalid_argument(who + " does not know verticals, and the graph has " +
+                                std::to_string(graph.verticals.size()) +
+                                ": leave them out by --no-vertical");
+}
+
+}  // namespace
+
+SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
+                     const SolverOptions& options, const TeamMeter& meter) {
+  check_verticals(graph, options);
+  if (options.method == "newton") return run_newton(graph, start, options, meter);
+  const auto team = make_team(graph, start, options);
+  SolverRun run;
+  run.rounds = run_team(graph, *team, options.run, meter);
+  run.X = team_poses(graph, *team);
+  if (options.verify) run.verification = verify_team(graph, run.X, {}, meter);
+  return run;
+}
+
+CentralOptimum central_optimum(const TeamGraph& graph, const std::vector<SE3>& start) {
+  CentralSolver solver(graph.edges, lift(start, kRigidRank), graph.dimension, {}, graph.verticals);
+  while (solver.step()) {
+  }
+  return {solver.X(), solver.cost(), solver.certificate() && solver.certificate()->certified};
+}
+
+CentralOptimum central_optimum(const TeamGraph& graph) {
+  return central_optimum(
+      graph, levelled(chordal_initialisation(graph.poses(), graph.edges), graph.verticals));
+}
+
+TeamMeter cpu_meter() {
+  return {.cpu_s = thread_cpu_s};
+}
+
+namespace {
+
+Eigen::Index numerical_rank(const LiftedPoses& X, int dimension) {
+  constexpr double kRelative = 1e-3;  // relative to the largest singular value
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(X.rows(), X.rows());
+  for (Eigen::Index i = 0; i < pose_count(X); ++i)
+    gram += X.middleCols<3>(4 * i) * X.middleCols<3>(4 * i).transpose();
+  const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(gram).eigenvalues();
+  const double least = kRelative * kRelative * values.maxCoeff();
+  return (values.array() > least).count() - (dimension == 2 ? 1 : 0);
+}
+
+// The frame of the first pose. With verticals, it is rotated by the smallest angle so that z is up.
+Eigen::MatrixXd world_of(const TeamGraph& graph, const LiftedPoses& X) {
+  if (graph.verticals.empty()) return X.leftCols<4>();
+  return level(X.leftCols<4>(), Eigen::Vector3d::Zero());
+}
+
+}  // namespace
+
+Solution solve(const TeamGraph& graph, const SolverOptions& options, std::optional<double> optimum,
+               const TeamMeter& meter) {
+  Solution solution{.method = options.name()};
+  std::vector<SE3> start;
+  if (!options.rejects()) {
+    const double begin_s = meter.cpu_s();
+    start = levelled(chordal_initialisation(graph.poses(), graph.edges), graph.verticals);
+    solution.start_s = meter.cpu_s() - begin_s;
+  }
+  solution.run = run_solver(graph, start, options, meter);
+  const LiftedPoses& X = solution.run.X;
+  solution.T_world_kf = round_to_poses(X, world_of(graph, X));
+  if (options.rejects()) return solution;
+  const CentralOptimum least =
+      optimum ? CentralOptimum{{}, *optimum, true} : central_optimum(graph, start);
+  solution.judgement =
+      Judgement{.rounded_cost = problem_of(graph, 3).cost(lift(solution.T_world_kf, 3)),
+                .optimum = least.cost,
+                .optimum_certified = least.certified,
+                .certificate = certify(problem_of(graph, X.rows()), X),
+                .rank = numerical_rank(X, graph.dimension)};
+  return solution;
+}
+
+}  // namespace km

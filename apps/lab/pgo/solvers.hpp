@@ -1,0 +1,110 @@
+#pragma once
+
+#include <ctime>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/lab/pgo_study/certificate.hpp"
+#include "apps/lab/pgo_study/member_team.hpp"
+#include "apps/lab/pgo_study/team_solver.hpp"
+#include "apps/lab/pgo_study/team_verification.hpp"
+
+namespace km {
+
+/// CPU time of the calling thread [s].
+[[nodiscard]] inline double thread_cpu_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// A method, by its name in kMethods, and its parameters.
+struct SolverOptions {
+  std::string method = "newton";
+  Eigen::Index rank = 5;  ///< Only for rbcd, rbcd-asynchronous: rank of the relaxation.
+  TeamRunOptions run = {.max_rounds = 100};
+  bool verify = false;            ///< rbcd: the team searches for a direction of descent.
+  double over_relaxation = 1.95;  ///< rbcd, rbcd-asynchronous: largest value; 1: as published.
+  int max_delay = 0;              ///< rbcd-asynchronous, as loss and seed: see AsynchronousOptions.
+  double loss = 0.0;
+  unsigned seed = 1;
+  bool trust_all = false;        ///< newton: all closures are treated as true.
+  double barc = 0.0;             ///< newton: largest residual of an inlier [sigma]; 0: estimated.
+  bool reject_odometry = false;  ///< newton: false steps of odometry are rejected too.
+  bool share_private = false;    ///< newton: see TreeNewtonOptions.
+  TeamShape shape = TeamShape::kAll;  ///< newton, rbcd: links between the robots.
+
+  [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }
+  /// The method as given on the command line.
+  [[nodiscard]] std::string name() const { return method + (trust_all ? " --trust-all" : ""); }
+};
+
+inline const std::vector<std::string> kMethods = {
+    "local", "dgs", "rbcd", "rbcd-asynchronous", "centralized", "newton"};
+
+/// The edges that a method has kept, and the estimates behind this decision.
+struct Decision {
+  std::vector<bool> kept;     ///< By edge of the graph.
+  double noise_scale = 1.0;   ///< Noise of closures, as a multiple of the graph's.
+  double threshold = 0.0;     ///< Largest residual of an inlier [sigma of the graph].
+  std::size_t most_sent = 0;  ///< Bytes that one robot sent; below: received.
+  std::size_t most_received = 0;
+  bool decided = false;  ///< False: the rounds did not suffice, or the team failed.
+};
+
+struct SolverRun {
+  std::vector<TeamRound> rounds;  ///< [0]: the start. Costs of all edges, at weight 1.
+  LiftedPoses X;
+  std::optional<TeamVerification> verification;  ///< The team's own, if requested.
+  std::optional<Decision> decision;              ///< Only of newton.
+};
+
+/// Solves `graph` from `start`. If `start` is empty, newton begins at odometry. Throws
+/// std::invalid_argument if method, options and graph do not fit together.
+[[nodiscard]] SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
+                                   const SolverOptions& options, const TeamMeter& meter);
+
+/// The least known cost of a graph with all edges trusted, computed on one computer.
+struct CentralOptimum {
+  LiftedPoses X;
+  double cost = 0.0;
+  bool certified = false;
+};
+
+/// Computed by CentralSolver, from `start` or from the chordal initialisation.
+[[nodiscard]] CentralOptimum central_optimum(const TeamGraph& graph, const std::vector<SE3>& start);
+[[nodiscard]] CentralOptimum central_optimum(const TeamGraph& graph);
+
+/// Returns a meter of the CPU time of the calling thread.
+[[nodiscard]] TeamMeter cpu_meter();
+
+/// Evaluation of poses by one computer that has the whole graph.
+struct Judgement {
+  double rounded_cost = 0.0;
+  /// The certified or given optimum; otherwise the least known cost.
+  double optimum = 0.0;
+  bool optimum_certified = false;  ///< Certified, or given.
+  Certificate certificate = {};
+  /// Numerical rank of the rotations; 3 (2 in the plane): the poses are rigid.
+  Eigen::Index rank = 0;
+};
+
+/// Result of one method on one graph.
+struct Solution {
+  std::string method;    ///< SolverOptions::name().
+  double start_s = 0.0;  ///< CPU time of the chordal initialisation.
+  SolverRun run = {};
+  /// Rounded poses in the frame of the first pose; z up with verticals.
+  std::vector<SE3> T_world_kf = {};
+  /// nullopt if the method rejects closures: its optimum depends on its own decision.
+  std::optional<Judgement> judgement = {};
+};
+
+/// Runs a method from the chordal initialisation, which is computed centrally and not counted. With
+/// verticals, the initialisation is levelled as a whole. A method that rejects closures starts from
+/// odometry. The optimum is computed if not given. Throws as run_solver() does.
+[[nodiscard]] Solution solve(const TeamGraph& graph, const SolverOptions& options,
+                             std::optional<double> optimum, const TeamMeter& meter);
+
+}  // namespace km

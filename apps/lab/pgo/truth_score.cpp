@@ -1,0 +1,132 @@
+#include "apps/lab/pgo/truth_score.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <span>
+
+#include "apps/lab/pgo/solvers.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
+#include "modules/rbcd/rounding.hpp"
+
+namespace km {
+namespace {
+
+// A sum of squared position errors.
+struct SquaredErrors {
+  double sum_m2 = 0.0;
+  std::size_t poses = 0;
+
+  void add(const Alignment& alignment, std::span<const PosePair> pairs) {
+    for (const PosePair& pair : pairs)
+      sum_m2 +=
+          (alignment.apply(pair.T_estimate_body).translation() - pair.T_truth_body.translation())
+              .squaredNorm();
+    poses += pairs.size();
+  }
+  [[nodiscard]] double rmse_m() const {
+    return poses == 0 ? std::numeric_limits<double>::quiet_NaN()
+                      : std::sqrt(sum_m2 / static_cast<double>(poses));
+  }
+};
+
+std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team,
+                                      const std::vector<bool>& keep_pose,
+                                      std::vector<bool> keep_edge) {
+  for (std::size_t k = 0; k < keep_edge.size(); ++k)
+    if (team.truth.is_false[k]) keep_edge[k] = false;
+  return connected_parts(team.graph, keep_pose, keep_edge);
+}
+
+std::vector<bool> all_of(std::size_t n) {
+  return std::vector<bool>(n, true);
+}
+
+}  // namespace
+
+std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team) {
+  return true_parts(team, all_of(team.graph.ids.size()), all_of(team.graph.edges.size()));
+}
+
+TrueOptimum optimum_of_true(const LabelledTeamGraph& team, const std::vector<bool>& keep_pose,
+                            const std::vector<bool>& keep_edge) {
+  TrueOptimum optimum;
+  for (const ConnectedPart& part : true_parts(team, keep_pose, keep_edge)) {
+    if (part.edges.empty()) {  // a single pose
+      optimum.parts.push_back({part.poses, {SE3::Identity()}});
+      continue;
+    }
+    const CentralOptimum solved = central_optimum(part.graph);
+    optimum.parts.push_back({part.poses, round_to_poses(solved.X, solved.X.leftCols<4>())});
+    optimum.certified = optimum.certified && solved.certified;
+  }
+  return optimum;
+}
+
+LabelCounts count_closures(const LabelledTeamGraph& team, const std::vector<bool>& known,
+                           const std::vector<bool>& kept) {
+  const std::vector<bool> odometry = odometry_edges(team.graph);
+  LabelCounts counts;
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    if (odometry[k] || !known[k]) continue;
+    const BlockEdge& e = team.graph.edges[k];
+    const bool inside = team.graph.robot_of(e.i) == team.graph.robot_of(e.j);
+    ClosureCounts& count = inside ? counts.inside : counts.between;
+    if (team.truth.is_false[k])
+      ++(kept[k] ? count.false_kept : count.false_rejected);
+    else
+      ++(kept[k] ? count.true_kept : count.true_lost);
+  }
+  return counts;
+}
+
+TeamAte ate_of(const LabelledTeamGraph& team, const std::vector<SolvedPart>& parts) {
+  const std::size_t robots = team.graph.robots();
+  SquaredErrors all;
+  std::vector<SquaredErrors> in_team(robots), alone(robots);
+  for (const SolvedPart& part : parts) {
+    std::vector<std::vector<PosePair>> of_robot(robots);
+    std::vector<PosePair> pairs;
+    for (std::size_t i = 0; i < part.poses.size(); ++i) {
+      const auto& truth = team.truth.T_world_kf[part.poses[i]];
+      if (!truth) continue;
+      pairs.push_back({.T_truth_body = *truth, .T_estimate_body = part.T_world_kf[i]});
+      of_robot[team.graph.robot_of(static_cast<Eigen::Index>(part.poses[i]))].push_back(
+          pairs.back());
+    }
+    if (pairs.empty()) continue;
+    const Alignment alignment = align(pairs, false);
+    all.add(alignment, pairs);
+    for (std::size_t k = 0; k < robots; ++k) {
+      if (of_robot[k].empty()) continue;
+      in_team[k].add(alignment, of_robot[k]);
+      alone[k].add(align(of_robot[k], false), of_robot[k]);
+    }
+  }
+  TeamAte ate{.team_m = all.rmse_m(), .in_team_m = {}, .alone_m = {}, .parts = parts.size()};
+  for (std::size_t k = 0; k < robots; ++k) {
+    ate.in_team_m.push_back(in_team[k].rmse_m());
+    ate.alone_m.push_back(alone[k].rmse_m());
+  }
+  return ate;
+}
+
+TruthScore score(const LabelledTeamGraph& team, const std::vector<SE3>& T_world_kf,
+                 std::vector<bool> kept) {
+  TruthScore score;
+  const std::vector<bool> all_edges = all_of(team.graph.edges.size());
+  const bool labels = !team.truth.is_false.empty();
+  if (kept.empty()) kept = all_edges;
+  if (labels) score.closures = count_closures(team, all_edges, kept);
+  if (team.truth.T_world_kf.empty()) return score;
+  SolvedPart whole{std::vector<std::size_t>(T_world_kf.size()), T_world_kf};
+  std::iota(whole.poses.begin(), whole.poses.end(), std::size_t{0});
+  score.ate = ate_of(team, {std::move(whole)});
+  if (!labels) return score;
+  const TrueOptimum optimum = optimum_of_true(team, all_of(team.graph.ids.size()), all_edges);
+  score.optimum_of_true = ate_of(team, optimum.parts);
+  score.certified = optimum.certified;
+  return score;
+}
+
+}  // namespace km

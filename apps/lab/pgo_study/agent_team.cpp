@@ -1,0 +1,270 @@
+#include "apps/lab/pgo_study/agent_team.hpp"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "apps/lab/pgo_study/team_closures.hpp"
+#include "modules/outlier_rejection/witnessed_pair.hpp"
+#include "modules/pose_graph/team_agent.hpp"
+#include "modules/pose_graph/team_message_bytes.hpp"
+#include "modules/rbcd/solver_choice.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kTick_s = 0.05;  // period of TeamNode
+constexpr double kDelay_s = 1e-3;
+// Longest wait for the next session, beyond PoseGraphConfig::session_wait_s. A team without a
+// change for that long is finished.
+constexpr double kMargin_s = 5.0;
+
+using RobotPair = std::pair<RobotId, RobotId>;
+
+// A closure, and the time at which both of its ends have been played.
+struct PlayedClosure {
+  double at_s = 0.0;
+  Closure closure;
+};
+
+// Decides whether a pair of robots is joined, as PcmNode does.
+class PlayedPair {
+ public:
+  PlayedPair(const RobotPair& pair, const PcmConfig& config)
+      : pair_(pair), wait_s_(config.witness_wait_s), closures_(pair.first, pair.second, config) {}
+
+  void add(const Closure& closure, double now_s) {
+    const PcmVerdict verdict = closures_.add(closure);
+    changed_ |= verdict == PcmVerdict::kAdded || verdict == PcmVerdict::kGrew;
+    if (!since_s_) since_s_ = now_s;
+  }
+  // The inlier set, if it has changed and its closures count.
+  std::optional<InlierSet> take(double now_s) {
+    const bool inside = pair_.first == pair_.second;
+    if (!changed_ || !(inside || closures_.is_witnessed() || now_s - *since_s_ >= wait_s_))
+      return std::nullopt;
+    changed_ = false;
+    return InlierSet{pair_.first, pair_.second, ++version_, closures_.closures()};
+  }
+  [[nodiscard]] bool waits() const { return changed_; }
+
+ private:
+  RobotPair pair_;
+  double wait_s_;
+  WitnessedPair closures_;
+  std::optional<double> since_s_;
+  bool changed_ = false;
+  std::uint32_t version_ = 0;
+};
+
+class AgentTeam {
+ public:
+  AgentTeam(const TeamGraph& graph, const AgentTeamOptions& options)
+      : graph_(graph), options_(options), odometry_(team_odometry(graph)) {
+    for (const TeamClosure& measured : team_closures(graph)) {
+      const Closure& closure = measured.closure;
+      const auto later = std::max(closure.from.id.index, closure.to.id.index);
+      closures_.push_back({played_s(later), closure});
+    }
+    std::ranges::stable_sort(closures_, {}, &PlayedClosure::at_s);
+    for (std::size_t k = 0; k < graph.robots(); ++k)
+      members_.push_back({.agent = std::make_unique<TeamAgent>(options.pose_graph, peer(k),
+                                                               solver_choice(options.pose_graph))});
+    for (std::size_t k = 0; k < members_.size(); ++k)
+      for (std::size_t other = 0; other < members_.size(); ++other)
+        if (other != k) members_[k].agent->peer_alive(peer(other));
+  }
+
+  AgentTeamRun run() {
+    const double quiet_s = options_.pose_graph.session_wait_s + kMargin_s;
+    double last_change_s = 0.0;
+    while (now_s_ - last_change_s < quiet_s && now_s_ < options_.longest_s) {
+      const bool played = play();
+      const bool idle = exchange();
+      if (played || pending() || !settled()) last_change_s = now_s_;
+      if (settled() && changed_) last_change_s = now_s_;
+      changed_ = false;
+      if (idle) {
+        next_tick_s_ = std::max(next_tick_s_, now_s_) + kTick_s;
+        now_s_ = next_tick_s_;
+        for (Member& member : members_) member.due = true;
+      } else {
+        now_s_ += kDelay_s;
+      }
+    }
+    return result(now_s_ - last_change_s >= quiet_s, last_change_s);
+  }
+
+ private:
+  struct Member {
+    std::unique_ptr<TeamAgent> agent;
+    std::optional<Trajectory> trajectory = {};
+    OptimizerProgress progress = {};
+    std::size_t keyframes = 0;  // played
+    bool due = true;
+  };
+  struct Delivery {
+    RobotId from = 0;
+    RobotId to = 0;
+    TeamMessagePtr message;
+  };
+
+  static TeamPeer peer(std::size_t robot) { return {static_cast<RobotId>(robot), 1}; }
+  [[nodiscard]] double played_s(KeyframeIndex keyframe) const {
+    return options_.keyframes_per_s > 0.0 ? keyframe / options_.keyframes_per_s : 0.0;
+  }
+
+  // Gives the robots their measurements up to now. True if there were any.
+  bool play() {
+    bool any = false;
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      Member& member = members_[k];
+      const auto poses = static_cast<std::size_t>(graph_.poses_of(k));
+      for (std::size_t& i = member.keyframes;
+           i < poses && played_s(static_cast<KeyframeIndex>(i)) <= now_s_; ++i) {
+        KeyframeOdometry keyframe;
+        keyframe.id = {static_cast<RobotId>(k), static_cast<KeyframeIndex>(i)};
+        if (i > 0) {
+          keyframe.T_previous_kf = odometry_[k][i - 1].T_from_to;
+          keyframe.covariance = odometry_[k][i - 1].covariance;
+        }
+        (void)member.agent->add(keyframe);
+        member.due = any = true;
+      }
+    }
+    for (; next_closure_ < closures_.size() && closures_[next_closure_].at_s <= now_s_;
+         ++next_closure_) {
+      const Closure& closure = closures_[next_closure_].closure;
+      const RobotPair pair = std::minmax({closure.from.id.robot, closure.to.id.robot});
+      for (const RobotId robot : std::set{pair.first, pair.second})
+        (void)members_[robot].agent->add(closure);
+      pairs_.try_emplace(pair, pair, options_.pcm).first->second.add(closure, now_s_);
+      any = true;
+    }
+    for (auto& [pair, played] : pairs_)
+      if (const auto set = played.take(now_s_)) {
+        for (const RobotId robot : std::set{pair.first, pair.second}) {
+          (void)members_[robot].agent->add(*set);
+          members_[robot].due = true;
+        }
+        any = true;
+      }
+    return any;
+  }
+
+  [[nodiscard]] bool pending() const {
+    return next_closure_ < closures_.size() ||
+           std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.waits(); });
+  }
+
+  // Delivers the messages in flight and steps each robot that is due. True if no robot is due and
+  // no message is in flight afterwards.
+  bool exchange() {
+    for (const Delivery& delivery : std::exchange(in_flight_, {})) {
+      (void)members_[delivery.to].agent->receive(delivery.from, delivery.message);
+      members_[delivery.to].due = true;
+    }
+    for (std::size_t k = 0; k < members_.size(); ++k)
+      if (members_[k].due) step(k);
+    return in_flight_.empty() &&
+           std::ranges::none_of(members_, [](const Member& member) { return member.due; });
+  }
+
+  void step(std::size_t robot) {
+    Member& member = members_[robot];
+    TeamOutput output = member.agent->step(now_s_);
+    member.due = output.more;
+    changed_ |= output.trajectory.has_value();
+    if (output.trajectory) member.trajectory = std::move(output.trajectory);
+    if (output.progress) member.progress = std::move(*output.progress);
+    for (std::string& notice : output.notices)
+      notices_.push_back("robot " + std::to_string(robot) + ": " + std::move(notice));
+    for (const LinkPacket& packet : output.packets)
+      in_flight_.push_back(
+          {static_cast<RobotId>(robot), packet.next, across_the_wire(packet.message)});
+  }
+
+  TeamMessagePtr across_the_wire(const TeamMessagePtr& message) {
+    if (sent_ != message) {
+      const std::vector<std::uint8_t> bytes = encode(*message);
+      auto decoded = decode_team_message(bytes);
+      if (!decoded.value) throw std::runtime_error("run_agent_team: a message cannot be decoded");
+      sent_ = message;
+      received_ = std::make_shared<const TeamMessage>(std::move(*decoded.value));
+      message_bytes_ = bytes.size();
+    }
+    bytes_ += message_bytes_;
+    return received_;
+  }
+
+  [[nodiscard]] bool settled() const {
+    return std::ranges::all_of(members_,
+                               [](const Member& member) { return member.progress.settled; });
+  }
+
+  [[nodiscard]] AgentTeamRun result(bool settled, double seconds) const {
+    AgentTeamRun run{.T_world_kf = {},
+                     .world_of = {},
+                     .tentative = {},
+                     .kept = odometry_edges(graph_),
+                     .settled = settled,
+                     .seconds = seconds,
+                     .bytes = bytes_,
+                     .notices = notices_};
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      const Member& member = members_[k];
+      const auto poses = static_cast<std::size_t>(graph_.poses_of(k));
+      const bool published = member.trajectory && member.trajectory->T_world_kf.size() == poses;
+      const std::vector<SE3>& own =
+          published ? member.trajectory->T_world_kf : member.agent->poses();
+      run.T_world_kf.insert(run.T_world_kf.end(), own.begin(), own.end());
+      run.world_of.push_back(published ? member.trajectory->anchor : static_cast<RobotId>(k));
+      const std::vector<RobotId>& uncertain = members_[run.world_of.back()].progress.tentative;
+      run.tentative.push_back(std::ranges::binary_search(uncertain, static_cast<RobotId>(k)));
+      run.rounds = std::max(run.rounds, static_cast<std::size_t>(member.progress.round));
+    }
+    for (const TeamClosure& measured : team_closures(graph_)) {
+      const ClosureId id = measured.closure.id();
+      const auto [a, b] = std::pair(id.from.robot, id.to.robot);
+      run.kept[measured.edge] =
+          run.world_of[a] == run.world_of[b] && !rejects(a, id) && !rejects(b, id);
+    }
+    return run;
+  }
+
+  [[nodiscard]] bool rejects(RobotId robot, const ClosureId& id) const {
+    const auto& decided = members_[robot].agent->decided();
+    const auto verdict = decided.find(id);
+    return verdict != decided.end() && !verdict->second;
+  }
+
+  const TeamGraph& graph_;
+  const AgentTeamOptions& options_;
+  std::vector<std::vector<RelativePose>> odometry_;
+  std::vector<PlayedClosure> closures_;  // ascending by time
+  std::size_t next_closure_ = 0;
+  std::map<RobotPair, PlayedPair> pairs_;
+  std::vector<Member> members_;
+  std::vector<Delivery> in_flight_;
+  TeamMessagePtr sent_, received_;  // the last message
+  std::size_t message_bytes_ = 0;
+  std::size_t bytes_ = 0;
+  std::vector<std::string> notices_;
+  double now_s_ = 0.0;
+  double next_tick_s_ = 0.0;
+  bool changed_ = false;
+};
+
+}  // namespace
+
+AgentTeamRun run_agent_team(const TeamGraph& graph, const AgentTeamOptions& options) {
+  if (graph.dimension != 3)
+    throw std::invalid_argument("run_agent_team: the graph is planar, robots solve in space");
+  return AgentTeam(graph, options).run();
+}
+
+}  // namespace km

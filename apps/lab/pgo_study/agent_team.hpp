@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "apps/lab/pgo_study/team_graph.hpp"
+#include "modules/outlier_rejection/pcm_config.hpp"
+#include "modules/pose_graph/pose_graph_config.hpp"
+
+namespace km {
+
+struct AgentTeamOptions {
+  PoseGraphConfig pose_graph = {};
+  PcmConfig pcm = {};            ///< Decides when the closures of a pair count; `selection` is
+                                 ///< witness.
+  double keyframes_per_s = 0.0;  ///< Rate at which robots play their graphs [1/s]; 0: all at once.
+  double longest_s = 3600.0;     ///< Limit of the virtual time of the run [s].
+};
+
+/// Result of a run.
+struct AgentTeamRun {
+  std::vector<SE3> T_world_kf;    ///< Published poses, in the numbering of the graph.
+  std::vector<RobotId> world_of;  ///< By robot: id of the robot whose odometry frame is its
+                                  ///< `world`.
+  std::vector<bool> tentative;    ///< By robot: closures at a single place tie it to `world`.
+  std::vector<bool> kept;         ///< By edge of the graph: used in the published solution.
+  bool settled = false;           ///< False: the run ended at longest_s.
+  double seconds = 0.0;           ///< Virtual time of the last change [s].
+  std::size_t rounds = 0;         ///< Maximum over the robots.
+  std::size_t bytes = 0;          ///< Sent by all robots; a message counts once per receiver.
+  std::vector<std::string> notices;
+};
+
+/// Runs the robots' own code on a recorded graph, from measurements to published poses. Each robot
+/// is a TeamAgent with the solvers of solver_choice(). The agents exchange encoded messages over
+/// perfect links in virtual time. Closures inside a robot count at once. Closures between two
+/// robots count when WitnessedPair has its witnesses, or `pcm.witness_wait_s` after the first one.
+/// If several closures join the same two poses, the robots use one (see OwnGraph), and all of
+/// them have the same value in `kept`. Deterministic. Throws std::invalid_argument if the graph is
+/// planar or the odometry of a robot is interrupted.
+[[nodiscard]] AgentTeamRun run_agent_team(const TeamGraph& graph, const AgentTeamOptions& options);
+
+}  // namespace km

@@ -1,0 +1,152 @@
+#include "apps/lab/simulate/robot_scenario.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "apps/lab/simulation/motion/default_rig.hpp"
+#include "apps/lab/simulation/motion/flight_trajectory.hpp"
+#include "apps/lab/simulation/motion/imu_simulator.hpp"
+#include "apps/lab/simulation/motion/recorded_trajectory.hpp"
+#include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
+#include "apps/lab/simulation/world/seeded_random.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kImuLead_s = 1.0;           // inertial data begin this long before the first image
+constexpr double kImuTail_s = 0.1;           // inertial data end this long after the last image
+constexpr Stamp kEpoch = 1'000'000'000'000;  // readers require stamps above 0
+constexpr std::uint64_t kMotion = 1, kImu = 2, kNoise = 3;  // parts of a robot's seed
+
+// First + k / rate, up to `last`.
+std::vector<Stamp> image_stamps(Stamp first, Stamp last, double rate_hz) {
+  std::vector<Stamp> stamps;
+  for (std::size_t k = 0;; ++k) {
+    const Stamp stamp =
+        first + static_cast<Stamp>(std::llround(static_cast<double>(k) * 1e9 / rate_hz));
+    if (stamp > last) return stamps;
+    stamps.push_back(stamp);
+  }
+}
+
+std::unique_ptr<const BodyTrajectory> drive(const World& world, std::size_t robot,
+                                            std::uint64_t seed, double duration_s) {
+  const Route& route = world.routes[robot % world.routes.size()];
+  VehicleOptions vehicle;
+  vehicle.seed = seed;
+  vehicle.duration_s = duration_s;
+  return std::make_unique<SplineTrajectory>(
+      make_vehicle_trajectory(route, world.ground_height, vehicle));
+}
+
+std::unique_ptr<const BodyTrajectory> fly(const World& world, std::uint64_t seed,
+                                          double duration_s) {
+  FlightOptions flight;
+  flight.seed = seed;
+  flight.duration_s = duration_s;
+  flight.R_vehicle_body = vehicle_from_body(RigKind::kFlying);
+  return std::make_unique<SplineTrajectory>(make_flight_trajectory(world.flight_volume, flight));
+}
+
+RobotScenario simulated_robot(const World& world, const SimulationOptions& options,
+                              std::size_t robot) {
+  const bool drives = !world.routes.empty();
+  const double duration_s = kImuLead_s + options.duration_s + kImuTail_s;
+  RobotScenario scenario;
+  scenario.name = options.names[robot];
+  scenario.seed = derived_seed(options.seed, robot);
+  scenario.rig =
+      default_rig(drives ? RigKind::kVehicle : RigKind::kFlying, options.width, options.height);
+  scenario.epoch = kEpoch;
+  const std::uint64_t seed = derived_seed(scenario.seed, kMotion);
+  scenario.trajectory =
+      drives ? drive(world, robot, seed, duration_s) : fly(world, seed, duration_s);
+  const Stamp first = kEpoch + nanoseconds(kImuLead_s);
+  scenario.images =
+      image_stamps(first, first + nanoseconds(options.duration_s) - 1, options.rate_hz);
+
+  ImuSimulation imu;
+  imu.noise = scenario.rig.imu;
+  imu.seed = derived_seed(scenario.seed, kImu);
+  for (const SimulatedImu& at : simulate_imu(*scenario.trajectory, kEpoch, imu)) {
+    const BodyMotion motion = scenario.motion(at.sample.stamp);
+    scenario.imu.push_back(at.sample);
+    scenario.truth.push_back(
+        {at.sample.stamp, motion.T_world_body, motion.velocity_world, at.gyro_bias, at.accel_bias});
+  }
+  return scenario;
+}
+
+// Rows from `from` to `to`, and one more on either side if it exists.
+template <typename Row>
+std::vector<Row> part_of(const std::vector<Row>& rows, Stamp from, Stamp to) {
+  const auto before = [](const Row& row, Stamp stamp) { return row.stamp < stamp; };
+  auto first = std::lower_bound(rows.begin(), rows.end(), from, before);
+  auto last = std::lower_bound(first, rows.end(), to, before);
+  if (first != rows.begin()) --first;
+  if (last != rows.end()) ++last;
+  return {first, last};
+}
+
+// Stamps of images, within the time of both truth and inertial data.
+std::vector<Stamp> recorded_stamps(const RecordedFlight& flight, const SimulationOptions& options) {
+  const Stamp origin = flight.truth.front().stamp;
+  Stamp last = std::min(flight.truth.back().stamp, flight.imu.back().stamp);
+  if (options.end_s > 0.0) last = std::min(last, origin + nanoseconds(options.end_s));
+  const Stamp start = std::max(origin + nanoseconds(options.start_s), flight.imu.front().stamp);
+  const auto first =
+      std::lower_bound(flight.imu.begin(), flight.imu.end(), start,
+                       [](const ImuSample& sample, Stamp stamp) { return sample.stamp < stamp; });
+  if (first == flight.imu.end()) return {};
+  // Such rigs trigger the cameras with an inertial sample.
+  return image_stamps(std::max(first->stamp, origin), last, options.rate_hz);
+}
+
+RobotScenario recorded_robot(const RecordedFlight& flight, const SimulationOptions& options,
+                             std::size_t robot) {
+  RobotScenario scenario;
+  scenario.name = options.names[robot];
+  scenario.seed = derived_seed(options.seed, robot);
+  scenario.rig =
+      options.rig ? *options.rig : default_rig(RigKind::kFlying, options.width, options.height);
+  scenario.images = recorded_stamps(flight, options);
+  if (scenario.images.empty())
+    throw std::invalid_argument(
+        scenario.name + ": nothing was recorded between --start and --end; the flight lasts " +
+        std::to_string(seconds_between(flight.truth.front().stamp, flight.truth.back().stamp)) +
+        " s");
+  const std::vector<StampedPose>& poses = flight.motion.poses;
+  RecordedTrajectory fitted = fit_recording(poses, poses.front().stamp);
+  scenario.epoch = fitted.epoch;
+  scenario.trajectory = std::make_unique<SplineTrajectory>(std::move(fitted.trajectory));
+  const Stamp first = scenario.images.front();
+  const Stamp last = scenario.images.back();
+  scenario.imu =
+      part_of(flight.imu, first - nanoseconds(kImuLead_s), last + nanoseconds(kImuTail_s));
+  scenario.truth = part_of(flight.truth, first, last);
+  return scenario;
+}
+
+}  // namespace
+
+std::uint64_t derived_seed(std::uint64_t seed, std::uint64_t part) {
+  return scrambled(seed + (part + 1) * 0x9E3779B97F4A7C15U);
+}
+
+std::vector<RobotScenario> simulated_robots(const World& world, const SimulationOptions& options) {
+  std::vector<RobotScenario> robots;
+  for (std::size_t i = 0; i < options.names.size(); ++i)
+    robots.push_back(simulated_robot(world, options, i));
+  return robots;
+}
+
+std::vector<RobotScenario> recorded_robots(const std::vector<RecordedFlight>& flights,
+                                           const SimulationOptions& options) {
+  std::vector<RobotScenario> robots;
+  for (std::size_t i = 0; i < flights.size(); ++i)
+    robots.push_back(recorded_robot(flights[i], options, i));
+  return robots;
+}
+
+}  // namespace km

@@ -1,0 +1,235 @@
+#include "apps/lab/simulate/simulation_options.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <thread>
+#include <tuple>
+
+#include "apps/lab/simulation/dataset/number_text.hpp"
+#include "modules/sensors/rig_calibration_codec.hpp"
+#include "runtime/yaml_config.hpp"
+
+namespace km {
+namespace {
+
+template <typename T>
+constexpr bool kIsList = false;
+template <typename T>
+constexpr bool kIsList<std::vector<T>> = true;
+
+// Visitor that makes each field an option of the command line. A given value is stored under the
+// same key, as if a file contained it.
+class OptionFields : public FieldVisitor<OptionFields> {
+ public:
+  OptionFields(CLI::App& app, ConfigSection& given) : app_(app), given_(given) {}
+
+  template <typename T, typename Accepted>
+  void visit(const char* key, const T& value, const Accepted& accepted, std::string text) {
+    const std::string name = std::string("--").append(key);
+    const auto give = [this, key](const auto& written) {
+      given_.values.insert_or_assign(key, ConfigValue{YAML::Node(written), "", "command line"});
+    };
+    if (required_.contains(key)) text += " (required)";
+    if (!accepted.text().empty()) text += "; " + accepted.text();
+    if constexpr (std::is_same_v<T, bool>)
+      app_.add_flag_function(
+          name, [give](std::int64_t count) { give(count > 0); }, text);
+    else if constexpr (kIsList<T>)
+      app_.add_option_function<std::vector<std::string>>(name, give, text);
+    else
+      app_.add_option_function<std::string>(name, give, text)
+          ->default_str(required_.contains(key) ? "" : yaml_text(value, accepted));
+  }
+  void required(std::initializer_list<const char*> keys) {
+    required_.insert(keys.begin(), keys.end());
+  }
+
+ private:
+  CLI::App& app_;
+  ConfigSection& given_;
+  std::set<std::string> required_;
+};
+
+// "752x480" as width and height.
+std::optional<std::pair<int, int>> parse_resolution(const std::string& text) {
+  int width = 0, height = 0, end = 0;
+  const bool ok = std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &end) == 2 &&
+                  static_cast<std::size_t>(end) == text.size();
+  if (!ok || std::min(width, height) < 16 || std::max(width, height) > 8192) return std::nullopt;
+  return std::pair(width, height);
+}
+
+// Reads the file of options if there is one, then overrides it with the command line.
+void read_options(const std::string& file, const ConfigSection& given, SimulationOptions& options) {
+  ConfigProblems problems;
+  const ConfigContext context{problems};
+  ConfigSection section = given;
+  if (!file.empty()) section.values.merge(read_section(load_yaml(file), "", file, context).values);
+  fill_config(section, "", context, options);
+  problems.finish();
+}
+
+}  // namespace
+
+bool is_resolution(const std::string& text) {
+  return parse_resolution(text).has_value();
+}
+
+void define(CLI::App& app, SimulationOptions& options) {
+  struct CommandLine {
+    explicit CommandLine(CLI::App& app) : fields(app, given) {}
+    std::string file;
+    ConfigSection given{"command line", {}, {}};
+    OptionFields fields;
+  };
+  const auto line = std::make_shared<CommandLine>(app);
+  app.add_option("--config", line->file, "File of options, see config/simulation/");
+  options.visit_fields(line->fields);
+  app.callback([line, &options] {
+    try {
+      read_options(line->file, line->given, options);
+    } catch (const ConfigError& error) {
+      throw CLI::ValidationError(error.what());
+    }
+  });
+}
+
+namespace {
+
+// "V1_02_medium" for "V1_02_medium.csv.gz", the folder's name for ".../V1_01/mav0/x/data.csv".
+std::string recording_name(const std::filesystem::path& file) {
+  std::filesystem::path path = std::filesystem::absolute(file);
+  std::string name = path.filename().string();
+  while (name == "data.csv" || name == "mav0" || name == "state_groundtruth_estimate0") {
+    path = path.parent_path();
+    name = path.filename().string();
+  }
+  return name.substr(0, name.find('.'));
+}
+
+void complete_recorded(SimulationOptions& options) {
+  if (options.imus.size() != options.truths.size())
+    throw std::invalid_argument("--trajectory names " + std::to_string(options.truths.size()) +
+                                " files, --imu " + std::to_string(options.imus.size()) +
+                                ": recorded motion needs one of each per robot");
+  if (options.names.empty())
+    for (const auto& file : options.truths) options.names.push_back(recording_name(file));
+  if (options.names.size() != options.truths.size())
+    throw std::invalid_argument("--names needs one name per --trajectory");
+  if (options.end_s > 0.0 && options.end_s <= options.start_s)
+    throw std::invalid_argument("--end is not after --start");
+  options.robots = static_cast<int>(options.truths.size());
+}
+
+// Sets the rig of `calibrations`, which also determines the resolution.
+void complete_rig(SimulationOptions& options) {
+  RigChoice choice;
+  if (options.cameras == CameraKind::kRgbd) choice = {.right = {}, .depth = DepthChoice{}};
+  options.rig = read_rig(options.calibrations, choice).rig;
+  const Camera& left = options.rig->stereo.cameras[0];
+  options.width = left.width;
+  options.height = left.height;
+}
+
+void complete_names(const SimulationOptions& options) {
+  std::set<std::string> seen;
+  for (const std::string& name : options.names) {
+    const bool is_folder = !name.empty() && name.front() != '.' &&
+                           std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                             return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
+                           });
+    if (!is_folder)
+      throw std::invalid_argument("robot name '" + name +
+                                  "' is not made of letters, digits, _, - and .");
+    if (!seen.insert(name).second)
+      throw std::invalid_argument("two robots are named " + name + "; distinguish them by --names");
+  }
+}
+
+}  // namespace
+
+SimulationOptions completed(SimulationOptions options) {
+  std::tie(options.width, options.height) = parse_resolution(options.resolution).value();
+  if (options.is_recorded()) {
+    complete_recorded(options);
+  } else {
+    if (!options.imus.empty() || !options.calibrations.empty() || !options.names.empty() ||
+        options.start_s > 0.0 || options.end_s > 0.0 || options.steady)
+      throw std::invalid_argument(
+          "--imu, --steady, --calibration, --names, --start and --end need --trajectory");
+    for (int i = 0; i < options.robots; ++i) options.names.push_back("robot" + std::to_string(i));
+  }
+  complete_names(options);
+  if (!options.calibrations.empty()) complete_rig(options);
+  if (options.cameras == CameraKind::kRgbd) options.depth = true;
+  if (!options.depth && (options.depth_rate_hz > 0.0 || options.ideal_depth))
+    throw std::invalid_argument("--depth-rate and --ideal-depth need --depth or --rig rgbd");
+  if (options.depth_rate_hz <= 0.0) options.depth_rate_hz = options.rate_hz;
+  const double steps = options.rate_hz / options.depth_rate_hz;
+  if (steps < 1.0 || std::abs(steps - std::round(steps)) > 1e-6)
+    throw std::invalid_argument("--rate " + number_text(options.rate_hz) +
+                                " is not a multiple of --depth-rate " +
+                                number_text(options.depth_rate_hz));
+  if (options.threads == 0)
+    options.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  return options;
+}
+
+std::string name_of(WorldKind world) {
+  return Choices<WorldKind>{kWorlds}.name_of(world);
+}
+
+ParameterList parameters(const SimulationOptions& options) {
+  const auto yes = [](bool value) { return std::string(value ? "yes" : "no"); };
+  ParameterList list = {{"world", name_of(options.world)},
+                        {"seed", std::to_string(options.seed)},
+                        {"robots", std::to_string(options.robots)}};
+  if (options.is_recorded()) {
+    list.emplace_back("start", number_text(options.start_s));
+    list.emplace_back("end", number_text(options.end_s));
+    if (options.steady) list.emplace_back("steady", "yes");
+  } else {
+    list.emplace_back("duration", number_text(options.duration_s));
+  }
+  list.emplace_back("rig", Choices<CameraKind>{kCameras}.name_of(options.cameras));
+  list.emplace_back("resolution",
+                    std::to_string(options.width) + 'x' + std::to_string(options.height));
+  list.emplace_back("rate", number_text(options.rate_hz));
+  list.emplace_back("depth", yes(options.depth));
+  if (options.depth) {
+    list.emplace_back("depth-rate", number_text(options.depth_rate_hz));
+    list.emplace_back("ideal-depth", yes(options.ideal_depth));
+  }
+  list.emplace_back("labels", yes(options.labels));
+  list.emplace_back("color", yes(options.color));
+  list.emplace_back("motion-blur", yes(options.motion_blur));
+  list.emplace_back("image-format", Choices<ImageFormat>{kFormats}.name_of(options.format));
+  return list;
+}
+
+std::string command_line(const SimulationOptions& options) {
+  std::string text = "kimera_multi_simulate";
+  for (const auto& [name, value] : parameters(options)) {
+    if (value == "no" || (options.is_recorded() && name == "robots")) continue;
+    text += " --" + name + (value == "yes" ? "" : ' ' + value);
+  }
+  const auto add = [&text](const char* name, const auto& values, const auto& shown) {
+    if (values.empty()) return;
+    text += name;
+    for (const auto& value : values) text += ' ' + shown(value);
+  };
+  const auto file_name = [](const std::filesystem::path& file) { return file.filename().string(); };
+  add(" --trajectory", options.truths, file_name);
+  add(" --imu", options.imus, file_name);
+  add(" --calibration", options.calibrations, file_name);
+  if (options.is_recorded())
+    add(" --names", options.names, [](const std::string& name) { return name; });
+  return text + " --output DIR";
+}
+
+}  // namespace km

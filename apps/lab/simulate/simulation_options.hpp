@@ -1,0 +1,122 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/lab/simulation/dataset/dataset_record.hpp"
+#include "apps/lab/simulation/dataset/image_encoding.hpp"
+#include "modules/core/camera.hpp"
+#include "modules/core/config.hpp"
+
+namespace km {
+
+enum class WorldKind { kCity, kCamp, kViconRoom };
+enum class CameraKind { kStereo, kRgbd };
+inline constexpr Choice<WorldKind> kWorlds[] = {
+    {"city", WorldKind::kCity}, {"camp", WorldKind::kCamp}, {"vicon_room", WorldKind::kViconRoom}};
+inline constexpr Choice<CameraKind> kCameras[] = {{"stereo", CameraKind::kStereo},
+                                                  {"rgbd", CameraKind::kRgbd}};
+inline constexpr Choice<ImageFormat> kFormats[] = {{"jpg", ImageFormat::kJpeg},
+                                                   {"png", ImageFormat::kPng}};
+
+/// True for "752x480": both sides from 16 to 8192.
+[[nodiscard]] bool is_resolution(const std::string& text);
+
+/// Options of kimera_multi_simulate, from its command line and its file of options.
+struct SimulationOptions {
+  WorldKind world = WorldKind::kCity;
+  int robots = 3;
+  std::uint64_t seed = 1;
+  double duration_s = 60.0;
+  CameraKind cameras = CameraKind::kStereo;
+  std::string resolution = "752x480";
+  double rate_hz = 20.0;
+  bool depth = false;
+  double depth_rate_hz = 0.0;
+  bool ideal_depth = false;
+  bool labels = false;
+  bool color = false;
+  bool motion_blur = false;
+  ImageFormat format = ImageFormat::kJpeg;
+  std::vector<std::filesystem::path> truths;
+  std::vector<std::filesystem::path> imus;
+  bool steady = false;
+  std::vector<std::filesystem::path> calibrations;
+  std::vector<std::string> names;
+  double start_s = 0.0;
+  double end_s = 0.0;
+  std::filesystem::path output;
+  int threads = 0;
+
+  int width = 752;               ///< [px], from `resolution` or `rig`.
+  int height = 480;              ///< [px]
+  std::optional<SensorRig> rig;  ///< Rig of the files in `calibrations`.
+
+  [[nodiscard]] bool is_recorded() const { return !truths.empty(); }
+
+  void visit_fields(auto& visitor) {
+    constexpr double kDay_s = 24.0 * 3600.0;
+    visitor.required({"world", "output"});
+    visitor.field("world", world, kWorlds, "World that the robots see");
+    visitor.field("robots", robots, {1, 99}, "Number of robots that move through the world");
+    visitor.field("seed", seed, {0U, 9'999'999'999'999'999'999U},
+                  "Seed of all random numbers: the same seed gives the same bytes");
+    visitor.field("duration", duration_s, {0.5, kDay_s}, "Duration of the recordings [s]");
+    visitor.field("rig", cameras, kCameras, "Cameras of each robot");
+    visitor.field("resolution", resolution, "Size of the images, WIDTHxHEIGHT [px]");
+    visitor.field("rate", rate_hz, {0.1, 200.0}, "Images per second");
+    visitor.field("depth", depth, "Also depth images of the left camera (16 bit, mm)");
+    visitor.field("depth-rate", depth_rate_hz, {0.0, 200.0},
+                  "Depth images per second, --rate divided by a whole number; 0: --rate");
+    visitor.field("ideal-depth", ideal_depth, "Depth without noise and holes");
+    visitor.field("labels", labels, "Also class ids of the left camera's pixels");
+    visitor.field("color", color, "Also colour images of the left camera");
+    visitor.field("motion-blur", motion_blur, "Smear images along their motion");
+    visitor.field("image-format", format, kFormats, "jpg: quality 92, as recordings were stored");
+    visitor.field("trajectory", truths, Input{},
+                  "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV "
+                  "or TUM text, also gzipped; in the frame of the world");
+    visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
+    visitor.field("steady", steady,
+                  "Correct recorded rotations by the gyroscope: motion capture has errors of "
+                  "milliradians that change fast, so images along it would show turns that the "
+                  "gyroscope does not measure");
+    visitor.field("calibration", calibrations, Input{},
+                  "The sensors of recorded motion: a folder of EuRoC, one or two files of Kalibr, "
+                  "or one of Basalt (default: EuRoC's, its cameras scaled to the resolution)");
+    visitor.field("names", names, "Names of the robots of recorded motion (default: the files')");
+    visitor.field("start", start_s, {0.0, kDay_s},
+                  "For recorded motion: first image [s since the first true pose]");
+    visitor.field("end", end_s, {0.0, kDay_s},
+                  "For recorded motion: last image [s], 0: the flight's end");
+    visitor.field("output", output, "Folder of the recordings; a stopped run is continued");
+    visitor.field("threads", threads, {0, 256},
+                  "Number of threads that render; 0: one per processor");
+    visitor.check(is_resolution(resolution), "resolution",
+                  "is not WIDTHxHEIGHT with both from 16 to 8192");
+  }
+};
+
+/// Adds the options to a command line, and --config for a file of them: a YAML map. The command
+/// line has priority over the file. All errors of both are reported together, by name and line.
+void define(CLI::App& app, SimulationOptions& options);
+
+/// Options with derived values filled in: names, the number of robots, the rate of depth images,
+/// and the rig of the calibration files. Throws std::invalid_argument for contradicting options,
+/// and DatasetError as read_rig() does.
+[[nodiscard]] SimulationOptions completed(SimulationOptions options);
+
+/// All parameters that the bytes of the recordings depend on; neither the threads nor the output
+/// folder.
+[[nodiscard]] ParameterList parameters(const SimulationOptions& options);
+
+/// The command that makes the same recordings, with DIR for the output.
+[[nodiscard]] std::string command_line(const SimulationOptions& options);
+
+[[nodiscard]] std::string name_of(WorldKind world);
+
+}  // namespace km

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "apps/lab/simulation/rendering/light_volume.hpp"
+#include "apps/lab/simulation/rendering/sky.hpp"
+#include "apps/lab/simulation/rendering/surfaces.hpp"
+#include "apps/lab/simulation/world/world.hpp"
+
+namespace km {
+
+/// A world made ready for rendering. Immutable.
+struct RenderScene {
+  explicit RenderScene(const World& world);
+
+  const Lighting lighting;
+  const SurfaceTable surfaces;
+  const RayTracer tracer;
+  const Sky sky;
+  const LightVolume light;
+};
+
+/// Radiance along one ray, split into two parts, of which a shadow removes one. Value is float
+/// (grey) or Eigen::Vector3f (colour).
+template <typename Value>
+struct Shade {
+  Value ambient;  ///< All light except for the sun.
+  Value sun;      ///< Light of the sun if it is not hidden.
+};
+
+/// Lanes of `wanted` that the sun does not reach: in shadow, or turned away from it. Precondition:
+/// all lanes of `wanted` have been located.
+[[nodiscard]] LaneMask shadowed(const RenderScene& scene, LaneMask wanted,
+                                const SurfacePoints& points);
+
+/// Radiance of each wanted lane, haze included; undefined for the other lanes. Precondition: the
+/// lanes of `wanted` that are in hits.surface have been located.
+template <typename Value>
+void shade(const RenderScene& scene, const SurfaceHits& hits, const SurfacePoints& points,
+           LaneMask wanted, std::array<Shade<Value>, kLanes>& shades);
+
+}  // namespace km

@@ -1,0 +1,426 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <map>
+#include <random>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "apps/lab/pgo/scenario.hpp"
+#include "apps/lab/pgo/scenario_study.hpp"
+#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
+#include "test/support/command.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/team_graphs.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+using Catch::Contains;
+using Eigen::Index;
+
+const std::string kScenarioTool = KM_BIN_DIR "/kimera_multi_pgo outliers ";
+constexpr NoiseSigma kStep{.rotation_rad = 0.002, .translation_m = 0.01};
+constexpr NoiseSigma kClosure{.rotation_rad = 0.005, .translation_m = 0.03};
+
+// One robot's graph without noise, and its poses.
+struct Whole {
+  TeamGraph graph;
+  std::vector<SE3> truth;
+
+  explicit Whole(Index poses, unsigned seed = 1) {
+    std::mt19937 rng(seed);
+    graph = noisy_chain(poses, 1, 0.0, rng);
+    std::set<std::pair<Index, Index>> known;  // robots use one edge per pair of poses
+    std::erase_if(graph.edges,
+                  [&](const BlockEdge& e) { return !known.insert(std::minmax(e.i, e.j)).second; });
+    truth.push_back(SE3::Identity());
+    for (const BlockEdge& e : graph.edges)
+      if (e.j == e.i + 1) truth.push_back(truth.back() * e.T_i_j);
+  }
+};
+
+Scenario two_robots() {
+  return {.name = "two", .robots = 2, .step_sigma = kStep, .closure_sigma = kClosure};
+}
+
+// Errors of the rotation and translation of an edge, as multiples of the claimed sigmas.
+Vector6 error_of(const ScenarioGraph& drawn, const BlockEdge& e) {
+  const SE3 T = drawn.truth[static_cast<std::size_t>(e.i)].inverse() *
+                drawn.truth[static_cast<std::size_t>(e.j)];
+  Vector6 error;
+  error << std::sqrt(2.0 * e.kappa) * so3_log(T.linear().transpose() * e.T_i_j.linear()),
+      std::sqrt(e.tau) * (e.T_i_j.translation() - T.translation());
+  return error;
+}
+
+struct Spread {
+  double squares = 0.0;
+  double count = 0.0;
+
+  void add(const Vector6& error) {
+    squares += error.squaredNorm();
+    count += 6.0;
+  }
+  [[nodiscard]] double scale() const { return std::sqrt(squares / count); }
+  // Relative standard deviation of the estimated scale: the square of a standard normal has
+  // variance 2.
+  [[nodiscard]] double sigma() const { return std::sqrt(0.5 / count); }
+};
+
+constexpr double kConfidence = 4.0;  // sigmas: one failure in 16000
+
+void check_scale(const Spread& spread, double expected) {
+  CAPTURE(spread.scale(), spread.count);
+  REQUIRE(spread.count > 100.0);
+  CHECK(std::abs(spread.scale() / expected - 1.0) < kConfidence * spread.sigma());
+}
+
+TEST_CASE("The ratio of noise to claim is that of the scenario", "[scenario]") {
+  const unsigned seed = GENERATE(1U, 2U);
+  CAPTURE(seed);
+  const Whole whole(600);
+  Scenario scenario = two_robots();
+  scenario.odometry_noise = {{1, 7.0}};
+  scenario.odometry_sigma = {{0, 0.1}};
+  scenario.closure_noise = {{0, 0.25}};
+  const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, seed);
+  const std::vector<bool> odometry = odometry_edges(drawn.graph);
+  std::map<std::pair<std::size_t, std::size_t>, Spread> steps, closures;
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    const BlockEdge& e = drawn.graph.edges[k];
+    const auto robots = std::minmax({drawn.graph.robot_of(e.i), drawn.graph.robot_of(e.j)});
+    (odometry[k] ? steps : closures)[robots].add(error_of(drawn, e));
+    const double better = odometry[k] && robots.first == 0 ? 0.1 : 1.0;
+    const double sigma_m = better * (odometry[k] ? kStep : kClosure).translation_m;
+    CHECK(e.tau == Approx(1.0 / (sigma_m * sigma_m)));
+  }
+  CHECK(steps.size() == 2);  // no steps between the robots
+  check_scale(steps[{0, 0}], 1.0);
+  check_scale(steps[{1, 1}], 7.0);
+  check_scale(closures[{0, 0}], 0.25);
+  check_scale(closures[{0, 1}], 1.0);  // larger factor of both robots
+  check_scale(closures[{1, 1}], 1.0);
+}
+
+TEST_CASE("Honest weights are those of the drawn noise", "[scenario]") {
+  const Whole whole(600);
+  Scenario scenario = two_robots();
+  scenario.odometry_noise = {{1, 7.0}};
+  scenario.closure_noise = {{0, 0.25}, {1, 0.25}};
+  scenario.place_bias = 3.0;
+  const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, 1);
+  const std::vector<bool> odometry = odometry_edges(drawn.graph);
+  REQUIRE(drawn.honest.size() == odometry.size());
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    const BlockEdge& e = drawn.graph.edges[k];
+    const double factor = drawn.graph.robot_of(e.i) == 1 ? 7.0 : 1.0;
+    const double variance = odometry[k] ? factor * factor : 0.25 * 0.25 + 3.0 * 3.0;
+    CHECK(drawn.honest[k].kappa == Approx(e.kappa / variance));
+    CHECK(drawn.honest[k].tau == Approx(e.tau / variance));
+  }
+}
+
+TEST_CASE("Closures of one place share their bias, and closures of two places do not",
+          "[scenario]") {
+  const Whole whole(600);
+  Scenario scenario = two_robots();
+  scenario.closure_noise = {{0, 0.0}, {1, 0.0}};  // no noise, only the bias
+  scenario.place_bias = 3.0;
+  const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, 1);
+  const std::vector<bool> odometry = odometry_edges(drawn.graph);
+  std::map<std::array<Index, 4>, std::vector<Vector6>> places;
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    if (odometry[k]) continue;
+    const BlockEdge& e = drawn.graph.edges[k];
+    const auto run_of = [&](Index pose) {
+      return (pose - drawn.graph.first[drawn.graph.robot_of(pose)]) / kPlaceKeyframes;
+    };
+    places[{static_cast<Index>(drawn.graph.robot_of(e.i)), run_of(e.i),
+            static_cast<Index>(drawn.graph.robot_of(e.j)), run_of(e.j)}]
+        .push_back(error_of(drawn, e));
+  }
+  Spread between;
+  std::size_t shared = 0;
+  for (const auto& [place, errors] : places) {
+    for (const Vector6& error : errors) CHECK((error - errors.front()).norm() < 1e-9);
+    if (errors.size() > 1) ++shared;
+    between.add(errors.front());
+  }
+  CHECK(shared > 20);
+  check_scale(between, 3.0);
+}
+
+TEST_CASE("Closures of a cluster agree with each other within their noise, not with the truth",
+          "[scenario]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  constexpr std::size_t kPlaces = 20, kSize = 7;
+  const Whole whole(600);
+  Scenario scenario = two_robots();
+  scenario.clusters = {.places = kPlaces, .size = kSize};
+  const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, seed);
+  const auto& edges = drawn.graph.edges;
+  const std::size_t first = edges.size() - kPlaces * kSize;
+  CHECK(std::count(drawn.is_false.begin(), drawn.is_false.end(), true) == kPlaces * kSize);
+  // Only rotations: R_a_b of each closure, transported to the ends of the first one along the
+  // truth.
+  double squares = 0.0, count = 0.0;
+  for (std::size_t place = 0; place < kPlaces; ++place) {
+    const BlockEdge& e0 = edges[first + place * kSize];
+    CHECK(drawn.graph.robot_of(e0.i) == 0);
+    CHECK(drawn.graph.robot_of(e0.j) == 1);
+    CHECK(error_of(drawn, e0).norm() > 20.0);
+    for (std::size_t k = 1; k < kSize; ++k) {
+      const BlockEdge& e = edges[first + place * kSize + k];
+      const auto step = static_cast<Index>(k);
+      REQUIRE(e.i == e0.i + step);
+      REQUIRE(e.j == e0.j + step);
+      const auto R = [&](Index pose) -> Eigen::Matrix3d {
+        return drawn.truth[static_cast<std::size_t>(pose)].linear();
+      };
+      const Eigen::Matrix3d moved =
+          R(e0.i).transpose() * R(e.i) * e.T_i_j.linear() * R(e.j).transpose() * R(e0.j);
+      const Eigen::Vector3d apart = so3_log(e0.T_i_j.linear().transpose() * moved);
+      squares += apart.squaredNorm() / (2.0 * kClosure.rotation_rad * kClosure.rotation_rad);
+      count += 3.0;
+    }
+  }
+  // All six differences of a place share its first closure, so that as few as half are independent.
+  CHECK(std::abs(std::sqrt(squares / count) - 1.0) < kConfidence * std::sqrt(0.5 / (0.3 * count)));
+}
+
+TEST_CASE("A scenario limits the closures between two robots", "[scenario]") {
+  const Whole whole(600);
+  Scenario scenario = two_robots();
+  scenario.robots = 3;
+  scenario.closures_per_pair = 6;
+  const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, 1);
+  const std::vector<bool> odometry = odometry_edges(drawn.graph);
+  std::map<std::pair<std::size_t, std::size_t>, int> closures;
+  for (std::size_t k = 0; k < odometry.size(); ++k)
+    if (!odometry[k])
+      ++closures[std::minmax({drawn.graph.robot_of(drawn.graph.edges[k].i),
+                              drawn.graph.robot_of(drawn.graph.edges[k].j)})];
+  CHECK(closures[{0, 1}] == 6);
+  CHECK(closures[{0, 2}] == 6);
+  CHECK(closures[{1, 2}] == 6);
+  CHECK(closures[{0, 0}] > 100);
+  scenario.closures_per_pair = 0;
+  scenario.closure_share = 0.0;
+  const ScenarioGraph apart = draw_scenario(whole.graph, whole.truth, scenario, 1);
+  const std::vector<Index> parts = part_of_poses(apart.graph);
+  CHECK(std::set<Index>(parts.begin(), parts.end()) == std::set<Index>{0, 200, 400});
+}
+
+TEST_CASE("A scenario scales its truth and takes the first poses", "[scenario]") {
+  const Whole whole(600);
+  Scenario scenario = two_robots();
+  scenario.first_poses = 90;
+  scenario.step_length_m = 0.22;
+  const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, 1);
+  CHECK(drawn.graph.first == std::vector<Index>{0, 45, 90});
+  double length_m = 0.0, steps = 0.0;
+  for (std::size_t i = 1; i < drawn.truth.size(); ++i) {
+    if (i == 45) continue;  // edge between two robots
+    length_m += (drawn.truth[i].translation() - drawn.truth[i - 1].translation()).norm();
+    steps += 1.0;
+  }
+  CHECK(length_m / steps == Approx(0.22));
+  CHECK(drawn.truth[7].linear() == whole.truth[7].linear());
+}
+
+TEST_CASE("A scenario depends on its seed alone", "[scenario]") {
+  const Whole whole(90);
+  Scenario scenario = two_robots();
+  scenario.random_percent = 20.0;
+  scenario.clusters = {.places = 1, .size = 3};
+  const auto measured = [&](unsigned seed) {
+    std::vector<double> numbers;
+    for (const BlockEdge& e : draw_scenario(whole.graph, whole.truth, scenario, seed).graph.edges)
+      numbers.push_back(e.T_i_j.translation().x());
+    return numbers;
+  };
+  CHECK(measured(1) == measured(1));
+  CHECK(measured(1) != measured(2));
+}
+
+TEST_CASE("A scenario that does not fit the graph is refused", "[scenario]") {
+  const Whole whole(30);
+  const auto refused = [&](auto change, const char* why) {
+    Scenario scenario = two_robots();
+    change(scenario);
+    CHECK_THROWS_WITH(draw_scenario(whole.graph, whole.truth, scenario, 1), Contains(why));
+  };
+  refused([](Scenario& s) { s.odometry_noise = {{2, 7.0}}; }, "robot 2 of 2");
+  refused([](Scenario& s) { s.robots = 40; }, "cannot be dealt to 40 robots");
+  refused([](Scenario& s) { s.clusters = {.places = 1, .size = 16}; }, "has 15 poses");
+  refused([](Scenario& s) { s.cluster_robots = {1, 1}; }, "clusters between robots 1 and 1");
+  CHECK_THROWS_WITH(scenario_of("rain"), Contains("rain"));
+}
+
+// Every method on one drawn scenario.
+std::map<std::string, ScenarioResult> results_of(const Whole& whole, const Scenario& scenario) {
+  const ScenarioStudy study =
+      run_scenario_study(whole.graph, {.scenario = scenario, .seeds = {1}}, {});
+  std::map<std::string, ScenarioResult> results;
+  for (const ScenarioResult& result : study.results) results[result.method] = result;
+  REQUIRE(results.size() == kScenarioMethods.size());
+  return results;
+}
+
+TEST_CASE("Without noise every method finds the truth", "[scenario]") {
+  const Whole whole(90);
+  Scenario scenario = two_robots();
+  scenario.odometry_noise = {{0, 0.0}, {1, 0.0}};
+  scenario.closure_noise = {{0, 0.0}, {1, 0.0}};
+  for (const auto& [method, result] : results_of(whole, scenario)) {
+    CAPTURE(method);
+    CHECK(result.decided);
+    CHECK(result.true_lost == 0);
+    CHECK(result.frames == 1);
+    CHECK(result.max_m < 1e-5);  // public poses start in single precision
+  }
+}
+
+TEST_CASE("The central solver finds the truth of exact edges from a wrong start", "[scenario]") {
+  const Whole whole(90);
+  std::mt19937 rng(1);
+  std::normal_distribution<double> normal(0.0, 0.1);
+  std::vector<SE3> start = whole.truth;
+  for (SE3& T : start) {
+    Vector6 error;
+    for (double& e : error) e = normal(rng);
+    T = T * se3_exp(error);
+  }
+  Scenario scenario = two_robots();
+  scenario.odometry_noise = {{0, 0.0}, {1, 0.0}};
+  scenario.closure_noise = {{0, 0.0}, {1, 0.0}};
+  const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, 1);
+  const std::vector<bool> all(drawn.graph.edges.size(), true);
+  const PlacedTeam placed = solve_centrally(drawn.graph, all, start);
+  CHECK(placed.decided);
+  CHECK(judge(drawn, placed).max_m < 1e-6);
+  CHECK(judge(drawn, {start, placed.frame_of, all}).max_m > 0.05);
+}
+
+TEST_CASE("With honest noise the robots' error is close to the reference", "[scenario]") {
+  const Whole whole(90);
+  auto results = results_of(whole, two_robots());
+  CHECK(results["robots"].decided);
+  CHECK(results["robots"].true_lost == 0);
+  CHECK(results["reference"].rms_m > 1e-3);
+  CHECK(results["robots"].rms_m == Approx(results["reference"].rms_m).epsilon(0.01));
+  CHECK(results["trust-all"].rms_m == Approx(results["reference"].rms_m).epsilon(1e-6));
+}
+
+TEST_CASE("Kept false closures are counted by method", "[scenario]") {
+  const Whole whole(90);
+  Scenario scenario = two_robots();
+  scenario.random_percent = 20.0;
+  auto results = results_of(whole, scenario);
+  for (const auto& [method, result] : results) {
+    CAPTURE(method);
+    CHECK(result.false_closures == std::lround(0.2 * static_cast<double>(result.true_closures)));
+    CHECK(result.false_kept == (method == "trust-all" ? result.false_closures : 0));
+  }
+  CHECK(results["gnc"].rms_m < 0.1);
+  CHECK(results["trust-all"].rms_m > 10.0 * results["reference"].rms_m);
+}
+
+TEST_CASE("Robots without a true closure between them have a reference of two frames",
+          "[scenario]") {
+  const Whole whole(90);
+  Scenario scenario = two_robots();
+  scenario.closures_per_pair = 0;
+  scenario.clusters = {.places = 1, .size = 1};
+  auto results = results_of(whole, scenario);
+  CHECK(results["reference"].frames == 2);
+  CHECK(results["reference"].max_m < 0.5);
+  CHECK(results["trust-all"].frames == 1);
+  CHECK(results["trust-all"].false_kept == 1);
+}
+
+// Each scenario that a robust team must stand, on the graph that it is meant for.
+TEST_CASE("The robots' own code stands noise and places that are not as claimed", "[scenario]") {
+  struct Row {
+    std::string scenario;
+    std::string graph;
+    double most_lost;   // share of true closures
+    double most_ratio;  // RMS error over that of the reference
+  };
+  const Row row = GENERATE(Row{"noisy-odometry", "sphere2500", 0.02, 1.1},
+                           Row{"clusters", "parking-garage", 0.0, 1.01},
+                           Row{"three-folders", "sphere2500", 0.0, 1.1},
+                           Row{"place-bias", "parking-garage", 0.03, 1.25});
+  const auto file = shared_data("pose_graphs/3d/" + row.graph + ".g2o");
+  if (!file) return;
+  const unsigned seed = GENERATE(2U, 4U);
+  CAPTURE(row.scenario, seed);
+  const ScenarioStudy study = run_scenario_study(
+      deal_contiguously(read_g2o(*file), 1, row.graph),
+      {.scenario = scenario_of(row.scenario), .methods = {"robots", "reference"}, .seeds = {seed}},
+      {});
+  const ScenarioResult& robots = study.results.at(0);
+  CHECK(robots.decided);
+  CHECK(robots.false_kept == 0);
+  CHECK(static_cast<double>(robots.true_lost) <=
+        row.most_lost * static_cast<double>(robots.true_closures));
+  CHECK(robots.rms_m <= row.most_ratio * study.results.at(1).rms_m);
+}
+
+TEST_CASE("outliers runs a scenario that options have changed", "[scenario]") {
+  const TemporaryFolder folder;
+  std::string text;
+  for (int i = 0; i < 39; ++i)
+    text +=
+        "EDGE_SE3:QUAT " + std::to_string(i) + ' ' + std::to_string(i + 1) +
+        " 1 0 0 0 0 0.0871557 0.9961947 400 0 0 0 0 0 400 0 0 0 0 400 0 0 0 900 0 0 900 0 900\n";
+  for (int i = 0; i < 30; ++i)
+    text += "EDGE_SE3:QUAT " + std::to_string(i) + ' ' + std::to_string(i + 10) +
+            " 5.6712818 9.8229523 0 0 0 0.7660444 0.6427876 400 0 0 0 0 0 400 0 0 0 0 400 0 0 0 "
+            "900 0 0 900 "
+            "0 900\n";
+  const std::string graph = folder.write("laps.g2o", text).string();
+  const CommandResult result = run_command(
+      kScenarioTool + graph + " --scenario noisy-odometry --first 0 --robots 2 --seeds 4,5 " +
+      "--odometry-noise 1:2 --closure-share 1 --shares 10 --json " +
+      (folder.path() / "out.json").string() + " --csv " + (folder.path() / "out.csv").string() +
+      " --plot " + (folder.path() / "out.html").string());
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.output, Contains("noisy-odometry: 40 poses, 2 robots") &&
+                                Contains("median / worst") && Contains("trust-all") &&
+                                Contains("of 30") && Contains("of 3 "));
+  const std::string csv = folder.read("out.csv");
+  CHECK(std::count(csv.begin(), csv.end(), '\n') == 11);
+  CHECK_THAT(csv, Contains("noisy-odometry,gnc,5,30,"));
+  CHECK_THAT(folder.read("out.json"), Contains("\"between_robots_lost\":"));
+}
+
+TEST_CASE("outliers refuses options that do not fit the kind of study", "[scenario]") {
+  const TemporaryFolder folder;
+  const std::string graph = folder.write("steps.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string();
+  const auto fails_with = [&](const std::string& arguments, const std::string& message) {
+    const CommandResult result = run_command(kScenarioTool + graph + arguments);
+    CAPTURE(arguments, result.output);
+    CHECK(result.exit_code == 1);
+    CHECK_THAT(result.output, Contains(message));
+  };
+  fails_with(" --scenario rain", "rain not in");
+  fails_with(" --scenario clusters --barc 3", "--barc is not for scenarios");
+  fails_with(" --scenario clusters --methods newton", "newton is not for scenarios");
+  fails_with(" --scenario clusters --shares 1,2", "one share");
+  fails_with(" --odometry-noise 1", "not two numbers");
+  fails_with(" --methods gnc --robots 1", "gnc is not for shares");
+  fails_with(" --csv out.csv --robots 1", "--csv is for scenarios only");
+  fails_with(" --robots 2", "--keep-steps");
+}
+
+}  // namespace
+}  // namespace km

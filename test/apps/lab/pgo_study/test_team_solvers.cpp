@@ -1,0 +1,210 @@
+#include <catch2/catch.hpp>
+
+#include "apps/lab/pgo_study/central_team.hpp"
+#include "apps/lab/pgo_study/gauss_seidel_team.hpp"
+#include "apps/lab/pgo_study/local_team.hpp"
+#include "apps/lab/pgo_study/member_team.hpp"
+#include "apps/lab/pgo_study/message_sizes.hpp"
+#include "apps/lab/pgo_study/team_verification.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
+#include "test/apps/lab/pgo_study/certified_optimum.hpp"
+#include "test/support/pose_graph_problems.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/team_graphs.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kSmallGridOptimum = 1025.398056;  // SE-Sync, unit quaternions
+std::vector<SE3> chordal(const TeamGraph& graph) {
+  return chordal_initialisation(graph.poses(), graph.edges);
+}
+
+// Clock that advances by one unit at every use.
+TeamMeter counting_meter(double& clock) {
+  return {.cpu_s = [&clock] { return clock += 1.0; }};
+}
+
+MemberTeam rbcd_team(const TeamGraph& graph, std::vector<SE3> start, const RbcdOptions& options) {
+  return {graph, 3, std::move(start), [options](SessionGraph part, const TreePlace& place) {
+            return std::make_unique<MemberRbcd>(std::move(part), place, options);
+          }};
+}
+
+}  // namespace
+
+TEST_CASE("The work of a round has the times of its slowest robot and of all robots",
+          "[pgo_study]") {
+  double clock = 0.0;
+  RoundMeter meter(3, counting_meter(clock));
+  meter.run(0, [] {});
+  meter.run(0, [] {});
+  CHECK(meter.run(2, [] { return 7; }) == 7);
+  meter.sent(3);
+  meter.sent(4);
+  const TeamWork work = meter.finish_round();
+  CHECK(work.critical_path_s == 2.0);
+  CHECK(work.total_cpu_s == 3.0);
+  CHECK(work.bytes == 7);
+  CHECK(meter.finish_round().total_cpu_s == 0.0);
+}
+
+TEST_CASE("The critical path of a round is the sum over its exchanges", "[pgo_study]") {
+  double clock = 0.0;
+  RoundMeter meter(2, counting_meter(clock));
+  meter.run(0, [] {});
+  meter.run(0, [] {});
+  meter.run(1, [] {});
+  meter.finish_exchange();
+  meter.run(1, [] {});
+  const TeamWork work = meter.finish_round();
+  CHECK(work.critical_path_s == 3.0);
+  CHECK(work.total_cpu_s == 4.0);
+}
+
+TEST_CASE("A round of block descent counts the bytes of its messages", "[pgo_study][rbcd]") {
+  const WoundRing ring(24, 3);  // each robot's first and last pose are public
+  const Eigen::Index rank = GENERATE(3, 5);
+  MemberTeam team = rbcd_team(ring.graph, ring.wound, {.rank = rank, .max_rounds = 1});
+  const auto rounds = run_team(ring.graph, team, {}, {});
+  REQUIRE(rounds.size() == 2);
+  CHECK(rounds[1].round == 1);
+  constexpr std::size_t kHeader = 2;                        // kind and round
+  const auto numbers = static_cast<std::size_t>(4 * rank);  // numbers per pose
+  const std::size_t starts = 6 * (7 * sizeof(float) + 2);
+  const std::size_t poses = 6 * (kHeader + numbers * sizeof(float));
+  const std::size_t shares = 2 * 2 * (kHeader + 2 * sizeof(double) + 1);  // before and after the
+                                                                          // round
+  const std::size_t progress = 2 * (kHeader + 2 + (2 + numbers) * sizeof(double));
+  CHECK(rounds[1].work.bytes == starts + poses + shares + progress);
+}
+
+TEST_CASE("Robots of one colour share no edges, and all have a colour", "[pgo_study]") {
+  const TeamGraph graph = WoundRing(24, 12).graph;
+  const TeamNeighbours neighbours = neighbours_in(graph);
+  std::size_t coloured = 0;
+  for (const auto& members : colours_of(neighbours)) {
+    coloured += members.size();
+    for (const std::size_t a : members)
+      for (const std::size_t b : members)
+        CHECK_FALSE(std::binary_search(neighbours[a].begin(), neighbours[a].end(), b));
+  }
+  CHECK(coloured == 12);
+  CHECK(colours_of(neighbours).size() == 2);  // a ring with an even number of robots
+  const TeamTree tree = breadth_first_tree(neighbours);
+  CHECK(tree.order.size() == 12);
+}
+
+TEST_CASE("Block descent ends at the optimum of the small grid for any number of robots",
+          "[pgo_study]") {
+  const auto file = shared_data("pose_graphs/3d/smallGrid3D.g2o");
+  if (!file) return;
+  const std::size_t robots = GENERATE(1U, 3U, 5U);
+  const double over_relaxation = GENERATE(1.0, 1.95);
+  CAPTURE(robots, over_relaxation);
+  const TeamGraph graph = deal_contiguously(read_g2o(*file), robots, "smallGrid3D");
+  MemberTeam team = rbcd_team(graph, chordal(graph), {.max_over_relaxation = over_relaxation});
+  const auto rounds = run_team(graph, team, {.max_rounds = 300}, {});
+  for (std::size_t k = 1; k < rounds.size(); ++k) {
+    REQUIRE(rounds[k].cost <= rounds[k - 1].cost * (1.0 + kSinglePrecision));
+    // The root publishes the progress after every fifth round and at the end.
+    CHECK((rounds[k].round == 5 * static_cast<int>(k) || k + 1 == rounds.size()));
+  }
+  CHECK(team.done());
+  CHECK(rounds.back().round == static_cast<int>(team.rounds()));
+  CHECK(rounds.back().cost == Approx(kSmallGridOptimum).epsilon(1e-5));
+}
+
+TEST_CASE("Gauss-Seidel sweeps of a team reach the result of one robot", "[pgo_study]") {
+  const std::size_t robots = GENERATE(2U, 4U);
+  CAPTURE(robots);
+  std::mt19937 rng(2);
+  const TeamGraph graph = noisy_chain(40, robots, 0.05, rng);
+  TeamGraph alone = graph;
+  alone.first = {0, 40};
+  const GaussSeidelOptions exact{.max_sweeps = 2000, .tolerance = 1e-7};
+  const auto cost_of = [&](const TeamGraph& dealt) {
+    GaussSeidelTeam team(dealt, chordal(graph), exact);
+    return run_team(dealt, team, {.max_rounds = 20000}, {}).back().cost;
+  };
+  const double team_cost = cost_of(graph);
+  // Positions of some 100 m are sent in single precision, and slow modes accumulate the rounding
+  // errors.
+  CHECK(team_cost == Approx(cost_of(alone)).epsilon(1e-2));
+  // One Gauss-Newton step from the chordal rotations improves on them, and cannot be better than
+  // the optimum.
+  const QuadraticProblem problem(3, 40, graph.edges, {});
+  CHECK(team_cost < problem.cost(lift(chordal(graph), 3)));
+  CHECK(team_cost >= certified_optimum_of(graph) * (1.0 - 1e-9));
+}
+
+TEST_CASE("Without noise, robots that solve alone and are joined have no cost", "[pgo_study]") {
+  std::mt19937 rng(4);
+  const TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
+  LocalTeam team(graph);
+  const auto rounds = run_team(graph, team, {}, {});
+  CHECK(rounds.size() == 3);  // the start, solving alone, joining robot 0
+  CHECK(rounds.back().cost < 1e-9);
+}
+
+TEST_CASE("A robot whose own edges do not connect its poses cannot solve alone", "[pgo_study]") {
+  std::mt19937 rng(4);
+  TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
+  std::erase_if(graph.edges, [&](const BlockEdge& e) {
+    return (e.i == 15 || e.j == 15) && graph.robot_of(e.i) == graph.robot_of(e.j);
+  });
+  CHECK_THROWS_WITH(LocalTeam(graph), Catch::Contains("robot 1 cannot solve alone"));
+}
+
+TEST_CASE("A distributed verification finds that a wound ring is no minimum", "[pgo_study]") {
+  const std::size_t robots = GENERATE(1U, 3U);
+  const Eigen::Index rank = GENERATE(3, 5);
+  CAPTURE(robots, rank);
+  const WoundRing ring(24, robots);
+  const LiftedPoses X = lift(ring.wound, rank);
+  const TeamVerification found = verify_team(ring.graph, X, {}, {});
+  CHECK(found.negative);
+  CHECK(found.lambda_min < 0.0);
+  // The direction has negative curvature: a step along it in an added dimension lowers the cost.
+  const QuadraticProblem higher(rank + 1, 24, ring.graph.edges, {});
+  const LiftedPoses beyond = escape(higher, X, found.direction.row(0).transpose());
+  CHECK(higher.cost(beyond) < 0.999 * QuadraticProblem(rank, 24, ring.graph.edges, {}).cost(X));
+}
+
+TEST_CASE("A distributed verification finds nothing at an optimum", "[pgo_study]") {
+  const std::size_t robots = GENERATE(1U, 3U);
+  const Eigen::Index rank = GENERATE(3, 5);
+  CAPTURE(robots, rank);
+  const WoundRing ring(24, robots);
+  const LiftedPoses X = lift(std::vector<SE3>(24, SE3::Identity()), rank);
+  const TeamVerification found =
+      verify_team(ring.graph, X, {.max_iterations = 500, .tolerance = 1e-6}, {});
+  CHECK_FALSE(found.negative);
+  CHECK(found.converged);
+  // Smallest eigenvalue of the ring's Laplacian outside the kernel.
+  CHECK(found.lambda_min ==
+        Approx(2.0 - 2.0 * std::cos(2.0 * std::numbers::pi / 24)).epsilon(1e-3));
+  CHECK(found.work.bytes > robots * static_cast<std::size_t>(found.rounds) * kMessageHeader);
+}
+
+TEST_CASE("Distributed and central verification agree on a recorded graph", "[pgo_study]") {
+  const auto file = shared_data("pose_graphs/3d/smallGrid3D.g2o");
+  if (!file) return;
+  const TeamGraph graph = deal_contiguously(read_g2o(*file), 5, "smallGrid3D");
+  CentralTeam central(graph, lift(chordal(graph), 3));
+  (void)run_team(graph, central, {}, {});
+  const TeamVerification found = verify_team(graph, team_poses(graph, central), {}, {});
+  CHECK_FALSE(found.negative);
+  CHECK(found.converged);
+  CHECK(found.lambda_min > 0.0);
+}
+
+TEST_CASE("Block descent of rank 5 leaves the wound ring for the optimum", "[pgo_study][rbcd]") {
+  const WoundRing ring(24, 3);
+  MemberTeam team = rbcd_team(ring.graph, ring.wound, {});
+  const auto rounds = run_team(ring.graph, team, {.max_rounds = 1000}, {});
+  CHECK(rounds.front().cost > 1.0);
+  CHECK(rounds.back().cost < 1e-5);
+}
+
+}  // namespace km

@@ -1,0 +1,147 @@
+#include <zlib.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "apps/lab/simulate/recorded_flight.hpp"
+#include "modules/core/lie.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kEuroc =
+    "#timestamp,px,...\n"
+    "1000,1,2,3,0.5,0.5,-0.5,0.5,4,5,6,7,8,9,10,11,12\n"
+    "1000,1,2,3,0.5,0.5,-0.5,0.5,4,5,6,7,8,9,10,11,12\n"  // as published: a stamp twice
+    "2000,1,2,4,0.5,0.5,-0.5,0.5,4,5,6,7,8,9,10,11,12\n";
+const std::string kImu = "#t,gyro,accel\n900,1,2,3,4,5,6\n1900,1,2,3,4,5,7\n";
+
+fs::path write_gzip(const TemporaryFolder& folder, const std::string& name,
+                    const std::string& text) {
+  const fs::path path = folder.path() / name;
+  const gzFile file = gzopen(path.c_str(), "wb");
+  gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
+  gzclose(file);
+  return path;
+}
+
+std::string refusal(const std::string& truth, const std::string& imu) {
+  const TemporaryFolder folder;
+  const auto t = folder.write("truth.csv", truth);
+  const auto i = folder.write("imu.csv", imu);
+  try {
+    (void)read_recorded_flight(t, i);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("Recorded states and samples are read, gzipped or not", "[simulate]") {
+  const TemporaryFolder folder;
+  const bool zipped = GENERATE(false, true);
+  const auto truth =
+      zipped ? write_gzip(folder, "t.csv.gz", kEuroc) : folder.write("t.csv", kEuroc);
+  const auto imu = zipped ? write_gzip(folder, "i.csv.gz", kImu) : folder.write("i.csv", kImu);
+  const RecordedFlight flight = read_recorded_flight(truth, imu);
+  REQUIRE(flight.truth.size() == 2);
+  const TrueState& state = flight.truth[1];
+  CHECK(state.stamp == 2000);
+  CHECK(state.T_world_body.translation() == Eigen::Vector3d(1, 2, 4));
+  const Eigen::Quaterniond q(0.5, 0.5, -0.5, 0.5);
+  CHECK((state.T_world_body.linear() - q.toRotationMatrix()).norm() < 1e-15);
+  CHECK(state.velocity_world == Eigen::Vector3d(4, 5, 6));
+  CHECK(state.accel_bias == Eigen::Vector3d(10, 11, 12));
+  REQUIRE(flight.imu.size() == 2);
+  CHECK(flight.imu[1].accel == Eigen::Vector3d(4, 5, 7));
+  CHECK_THAT(flight.fingerprint, Catch::Contains(truth.filename().string()));
+}
+
+TEST_CASE("True poses may be TUM text", "[simulate]") {
+  const TemporaryFolder folder;
+  const auto truth = folder.write("t.txt", "# t p q\n1.5 1 2 3 0 0 0 1\n1.6 1 2 4 0 0 1 0\n");
+  const auto imu = folder.write("i.csv", "1400000000,0,0,0,0,0,0\n1700000000,0,0,0,0,0,0\n");
+  const RecordedFlight flight = read_recorded_flight(truth, imu);
+  CHECK(flight.truth[1].stamp == 1'600'000'000);
+  CHECK(flight.truth[1].T_world_body.linear().diagonal() == Eigen::Vector3d(-1, -1, 1));
+  CHECK(flight.truth[1].velocity_world.isZero());
+}
+
+TEST_CASE("Files with other contents have other fingerprints", "[simulate]") {
+  const TemporaryFolder folder;
+  const auto truth = folder.write("t.csv", kEuroc);
+  const auto a = read_recorded_flight(truth, folder.write("i.csv", kImu)).fingerprint;
+  const auto b = read_recorded_flight(truth, folder.write("i.csv", kImu + "2900,1,1,1,1,1,1\n"));
+  CHECK(a != b.fingerprint);
+}
+
+TEST_CASE("Recordings that cannot be used are refused by file and line", "[simulate]") {
+  CHECK_THAT(refusal(kEuroc + "3000,1,2,x,1,0,0,0\n", kImu),
+             Catch::Contains("truth.csv line 5: 'x' is not a number"));
+  CHECK_THAT(refusal(kEuroc + "3000,1,2,3,9,0,0,0\n", kImu),
+             Catch::Contains("line 5") && Catch::Contains("norm"));
+  CHECK_THAT(refusal(kEuroc + "1500,1,2,3,1,0,0,0\n", kImu), Catch::Contains("line 5"));
+  CHECK_THAT(refusal(kEuroc, kImu + "2900,1,2\n"),
+             Catch::Contains("imu.csv line 4: has only 3 fields"));
+  CHECK_THAT(refusal("", kImu), Catch::Contains("truth.csv: holds no data"));
+  CHECK_THAT(refusal(kEuroc, "9000,1,2,3,4,5,6\n9900,1,2,3,4,5,7\n"),
+             Catch::Contains("do not overlap in time"));
+}
+
+TEST_CASE("A damaged gzip file is named", "[simulate]") {
+  const TemporaryFolder folder;
+  const auto truth = write_gzip(folder, "t.csv.gz", kEuroc);
+  fs::resize_file(truth, fs::file_size(truth) - 12);
+  CHECK_THROWS_WITH(read_recorded_flight(truth, folder.write("i.csv", kImu)),
+                    Catch::Contains("t.csv.gz: damaged"));
+}
+
+TEST_CASE("A published flight is read whole", "[simulate]") {
+  const auto truth = shared_data("euroc/groundtruth_only/V1_02_medium.csv.gz");
+  const auto imu = shared_data("euroc/imu_only/V1_02_medium.imu.csv.gz");
+  if (!truth || !imu) return;
+  const RecordedFlight flight = read_recorded_flight(*truth, *imu);
+  CHECK(flight.imu.size() == 17100);  // as its description says
+  CHECK(flight.truth.front().stamp == 1403715524907143168);
+}
+
+TEST_CASE(
+    "Motion capture is steadied by the gyroscope, less so poses that were fused with its samples",
+    "[simulate]") {
+  struct Row {
+    const char *truth, *imu;
+    double least_mrad, most_mrad;
+  };
+  const auto [truth_name, imu_name, least_mrad, most_mrad] =
+      GENERATE(Row{"tumvi_rooms/groundtruth/dataset-room1_512_16.txt.gz",
+                   "tumvi_rooms/imu/room1.txt.gz", 5.0, 8.0},
+               Row{"euroc/groundtruth_only/V1_02_medium.csv.gz",
+                   "euroc/imu_only/V1_02_medium.imu.csv.gz", 0.0, 3.0});
+  const auto truth = shared_data(truth_name);
+  const auto imu = shared_data(imu_name);
+  if (!truth || !imu) return;
+  const RecordedFlight as_is = read_recorded_flight(*truth, *imu);
+  const RecordedFlight steadied = read_recorded_flight(*truth, *imu, true);
+  CHECK_THAT(steadied.fingerprint, Catch::Contains("rotations steadied by the gyroscope"));
+  REQUIRE(steadied.truth.size() == as_is.truth.size());
+  double squares = 0.0;
+  for (std::size_t k = 0; k < as_is.truth.size(); ++k) {
+    const SE3 &a = as_is.truth[k].T_world_body, &b = steadied.truth[k].T_world_body;
+    REQUIRE(a.translation() == b.translation());
+    squares += std::pow(angle_of(a.linear().transpose() * b.linear()), 2);
+  }
+  const double rms_mrad = 1e3 * std::sqrt(squares / static_cast<double>(as_is.truth.size()));
+  CAPTURE(truth_name, rms_mrad);
+  CHECK(rms_mrad >= least_mrad);
+  CHECK(rms_mrad <= most_mrad);
+}
+
+}  // namespace km
