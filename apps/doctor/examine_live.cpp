@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-// "sensor_msgs::msg::dds_::Imu_" -> "sensor_msgs/msg/Imu"
+// Name in ROS of a type in DDS: "sensor_msgs/msg/Imu" for "sensor_msgs::msg::dds_::Imu_".
 std::string ros_type(std::string name) {
   const auto replace = [&name](const std::string& from, const std::string& to) {
     for (std::size_t at = name.find(from); at != name.npos; at = name.find(from, at + to.size()))
@@ -75,7 +75,7 @@ std::vector<RosTopic> topics_of(const SensorTopicNames& names) {
   return topics;
 }
 
-// "sensor_msgs/Imu" and "sensor_msgs/msg/Imu" are one.
+// Name of a type in ROS 1: "sensor_msgs/Imu" for "sensor_msgs/msg/Imu" too.
 std::string plain(const std::string& type) {
   return type.substr(0, type.find('/')) + '/' + last_name(type);
 }
@@ -84,8 +84,8 @@ Finding silent(const ListenedTopic& wanted, const std::vector<ListenedTopic>& to
                const std::vector<TopicPublisher>& publishers) {
   Finding finding{.id = "live.silent", .severity = Severity::kError};
   const auto same = std::ranges::find(publishers, wanted.topic, &TopicPublisher::topic);
-  // The topic of this type, not named by the rig, whose name shares the longest prefix with the
-  // wanted one.
+  // Similarity of a topic to the wanted topic: length of the common prefix, plus 1. It is 0 for
+  // another type, and for a topic that the rig file names.
   const auto alike = [&](const TopicPublisher& other) {
     if (std::ranges::find(topics, other.topic, &ListenedTopic::topic) != topics.end()) return 0L;
     const auto [end, rest] = std::ranges::mismatch(wanted.topic, other.topic);

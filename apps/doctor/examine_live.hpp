@@ -13,13 +13,14 @@ struct TopicPublisher {
   bool is_reliable = false;
 };
 
-/// A topic that a rig file names, and the number of its messages received.
+/// A topic that a rig file names, and the number of messages received from it.
 struct ListenedTopic {
   std::string topic, type;
   std::size_t messages = 0;
 };
 
-/// Ids: `live.silent`, `live.other_type`, `live.similar_name`, `live.nobody`.
+/// Compares the topics of a rig file with the publishers. Ids: `live.silent`, `live.other_type`,
+/// `live.similar_name`, `live.nobody`.
 [[nodiscard]] Examination examine_topics(const std::vector<ListenedTopic>& topics,
                                          const std::vector<TopicPublisher>& publishers,
                                          double listened_s, int domain);

@@ -32,7 +32,7 @@ Examination refused(const std::string& why) {
                              "it"}}};
 }
 
-// Ends a live reader in time, also while it waits for sensors that are silent.
+// Stops a live reader after some seconds, also while the reader waits for silent sensors.
 class Stopper {
  public:
   Stopper(DatasetReader& reader, double seconds)
@@ -87,7 +87,7 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
 Examination examine_recording(const RobotOptions& options, const RobotConfig& config, double live_s,
                               const ReportProgress& report_progress) try {
   const auto input = [&] {
-    SignalWatch signals;  // while live topics are to complete the calibration
+    SignalWatch signals;  // interrupts the wait for a live calibration
     return open_robot_input(options, config, std::nullopt, read_rig_input(options), signals);
   }();
   if (!input) return refused("interrupted before the calibration was complete");

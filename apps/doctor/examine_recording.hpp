@@ -13,13 +13,13 @@ namespace km {
 using ReportProgress = std::function<void(std::string_view stage, double share)>;
 
 /// Findings on a recording, or on the live sensors of a rig file: see examine_sensors.hpp.
-/// `options` names the input as for a robot, with the window. Live sensors are examined for
-/// `live_s`. An input that cannot be opened is a finding, too: recording.refused. The vocabulary of
-/// `config` is compared with the images: vocabulary.coverage.
+/// `options` names the input and the window, as for a robot. Live sensors are examined for
+/// `live_s`. An input that cannot be opened is the finding recording.refused. The vocabulary of
+/// `config` is also compared with the images (vocabulary.coverage).
 [[nodiscard]] Examination examine_recording(const RobotOptions& options, const RobotConfig& config,
                                             double live_s, const ReportProgress& report_progress);
 
-/// Findings on the packets of a reader, up to its end; with `live_s` above 0 for that time.
+/// Findings on the packets of a reader: for `live_s` if it is above 0, otherwise up to the end.
 [[nodiscard]] Examination examine_packets(DatasetReader& reader, const RobotConfig& config,
                                           double live_s, const ReportProgress& report_progress);
 

@@ -25,7 +25,7 @@ Finding unfinished_run(const fs::path& folder) {
           .to_do = way_on(folder)};
 }
 
-// Note on a missing file: another program may have left it out, or the run was cut short.
+// Note on a missing or invalid file, which need not be a fault of the run.
 Finding missing(const char* file, const std::string& why) {
   return {.id = std::string("results.") + file,
           .severity = Severity::kNote,
@@ -92,7 +92,7 @@ Examination examine_results(const fs::path& folder) {
     for (const Finding& finding : runs.back().summary.findings)
       if (finding.id == kFailedRun) result.findings.push_back(finding);
   }
-  // A single robot knew at its end which robots it had received; its own findings include this.
+  // The findings in the summary of a single robot include the links to other robots.
   const bool is_alone = runs.size() == 1 && !runs.front().summary.findings.empty();
   const std::vector<Finding> found = is_alone ? runs.front().summary.findings : findings_of(runs);
   for (const Finding& finding : found)

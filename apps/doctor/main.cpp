@@ -183,7 +183,7 @@ int diagnose(const Options& options) {
 
 int main(int argc, char** argv) try {
   const km::Options options = km::parse_options(argc, argv);
-  km::log::set_level(km::log::Level::kError);  // faults are reported as findings instead
+  km::log::set_level(km::log::Level::kError);  // because findings report faults
   cv::setNumThreads(1);
   return km::diagnose(options);
 } catch (const std::exception& error) {

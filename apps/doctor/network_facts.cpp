@@ -20,7 +20,7 @@ constexpr std::uint8_t kLittleEndian = 1, kInlineQos = 2, kHasPayload = 4;
 constexpr std::uint32_t kParticipantWriter = 0x100c2;  // entity id of the SPDP writer
 constexpr std::uint16_t kSentinel = 1, kDomainId = 0x0f, kUserData = 0x2c, kDomainTag = 0x4014;
 
-// Reads numbers of either byte order; never beyond the end.
+// Reads numbers of either byte order, and never beyond the end.
 class Bytes {
  public:
   Bytes(std::span<const std::uint8_t> bytes, bool is_little)
@@ -37,7 +37,7 @@ class Bytes {
     if (at > size()) return {};
     return bytes_.subspan(at, std::min(count, size() - at));
   }
-  // A sequence of octets or characters, whose length comes first.
+  // A sequence of octets or characters, preceded by its length.
   [[nodiscard]] std::string text(std::size_t at) const {
     const auto found = part(at + 4, number(at, 4));
     std::string result(found.begin(), found.end());
@@ -50,7 +50,7 @@ class Bytes {
   bool is_little_;
 };
 
-// Calls use(id, offset of the value) for each parameter; returns the offset behind them.
+// Calls use(id, offset of the value) for each parameter; returns the offset behind the parameters.
 std::size_t for_each_parameter(const Bytes& bytes, std::size_t at, const auto& use) {
   while (at + 4 <= bytes.size()) {
     const auto id = static_cast<std::uint16_t>(bytes.number(at, 2));
@@ -186,7 +186,7 @@ void examine_buffers(const NetworkFacts& facts, Examination& result) {
        .to_do = "sysctl -w net.core.rmem_max=" + std::to_string(asked)});
 }
 
-// Robots by the reason why they are not in this team.
+// Robots of this team, and other robots by the reason why they are not in this team.
 struct Robots {
   std::vector<Announced> of_team, of_other_team, on_other_domain, other_protocol;
   std::size_t other_programs = 0;
@@ -346,7 +346,7 @@ std::optional<Announced> parse_announcement(const std::vector<std::uint8_t>& pac
     const std::size_t end = length == 0 ? packet.size() : std::min(packet.size(), begin + length);
     at = end;
     if (kind != kData || (flags & kHasPayload) == 0 || begin + kDataFieldsBytes > end) continue;
-    // Entity ids are bytes in network order, whatever the order of the rest.
+    // Entity ids are bytes in network order in both byte orders.
     if (Bytes(packet, false).number(begin + 8, 4) != kParticipantWriter) continue;
     const Bytes submessage({packet.data(), end}, (flags & kLittleEndian) != 0);
     std::size_t payload = begin + 4 + submessage.number(begin + 2, 2);

@@ -15,20 +15,21 @@
 
 namespace km {
 
-/// A DDS participant as it announces itself on the link.
+/// A DDS participant by its announcement.
 struct Announced {
-  /// GUID prefix of its process; zero if unknown.
+  /// GUID prefix of the participant's process; zero if unknown.
   std::array<std::uint8_t, 12> guid_prefix = {};
   int domain = 0;
   std::string team = {};                       ///< Domain tag of the team.
-  std::string from = {};                       ///< Address.
-  std::string user_data = {};                  ///< User data as received; empty for other programs.
-  std::optional<RobotIdentity> identity = {};  ///< For a robot with readable user data.
+  std::string from = {};                       ///< Address of the sender.
+  std::string user_data = {};                  ///< User data as received; often empty for programs
+                                               ///< that are no robots.
+  std::optional<RobotIdentity> identity = {};  ///< Identity of a robot with readable user data.
 };
 
 /// The participant that a packet of DDS discovery announces; nullopt for other bytes. `from`:
-/// sender; `domain`: that of the socket that received it. RTPS 2.5, 8.5.3 and 9.6.3.2
-/// (SPDPdiscoveredParticipantData).
+/// address of the sender. `domain`: domain of the socket that received the packet. RTPS 2.5, 8.5.3
+/// and 9.6.3.2 (SPDPdiscoveredParticipantData).
 [[nodiscard]] std::optional<Announced> parse_announcement(const std::vector<std::uint8_t>& packet,
                                                           int domain, const std::string& from);
 
@@ -36,15 +37,15 @@ struct Announced {
 struct PeerEcho {
   std::string host;
   std::size_t sent = 0, received = 0;
-  double median_s = 0.0, worst_s = 0.0;  ///< Round trip; NaN without any.
-  bool may_ask = true;                   ///< False: this user has no permission for ICMP.
+  double median_s = 0.0, worst_s = 0.0;  ///< Round trip time; NaN without a reply.
+  bool may_ask = true;                   ///< False if this user has no permission for ICMP.
 };
 
-/// Offset of the wall clock of a robot from this one, by the stamps of its messages [s]. It is the
-/// least of the differences, so its error is at most the least transmission time.
+/// Offset of the wall clock of a robot from the clock of this host. It is the least difference over
+/// the robot's messages, so its error is at most the least transmission time.
 struct ClockDifference {
   std::string robot;
-  double ahead_s = 0.0;
+  double ahead_s = 0.0;  ///< Positive if the clock of the robot is ahead [s].
 };
 
 /// Facts about the network that are found without taking part in a session.
@@ -52,7 +53,7 @@ struct NetworkFacts {
   DdsConfig config = {};
   std::vector<NetworkInterface> interfaces = {};
   std::optional<NetworkInterface> chosen = {};
-  std::string no_interface = {};  ///< Why none was chosen.
+  std::string no_interface = {};  ///< Reason why no interface was chosen.
   std::optional<int> mtu = {};
   std::optional<std::string> no_multicast =
       {};  ///< Reason why an own datagram to the group did not come back.
@@ -68,7 +69,8 @@ struct NetworkFacts {
   std::vector<ClockDifference> clocks = {};
 };
 
-/// Ids: network.interface, network.several_interfaces, network.loopback, network.no_multicast_flag,
+/// Findings on the facts. Ids: network.interface, network.several_interfaces, network.loopback,
+/// network.no_multicast_flag,
 /// network.multicast, network.firewall, network.mtu, network.buffers, network.domain_ports,
 /// network.other_domain, network.other_team, network.protocol, network.same_id,
 /// network.other_programs, `network.nobody`, network.unreachable, network.loss, network.slow,

@@ -47,7 +47,7 @@ std::optional<long> largest_receive_buffer() {
     const std::string text = read_input_file("/proc/sys/net/core/rmem_max");
     const auto bytes = parse_int64(std::string_view(text).substr(0, text.find('\n')));
     return bytes ? std::optional(static_cast<long>(*bytes)) : std::nullopt;
-  } catch (const InputFileError&) {  // containers hide this file
+  } catch (const InputFileError&) {  // the file does not exist in some containers
     return std::nullopt;
   }
 }
@@ -60,7 +60,8 @@ std::vector<std::uint8_t> own_bytes() {
   return bytes;
 }
 
-// Reason why a datagram to `address` did not come back. Other datagrams may arrive before the echo.
+// Reason why a datagram to `address` did not come back; nullopt if it did. Other datagrams are
+// ignored.
 std::optional<std::string> echo_to(DatagramSocket& socket, const std::string& address) {
   const std::vector<std::uint8_t> bytes = own_bytes();
   if (auto problem = socket.send(address, socket.port(), bytes)) return problem;
@@ -84,7 +85,7 @@ std::optional<std::string> try_unicast(const NetworkInterface& chosen) {
   return echo_to(socket, chosen.address);
 }
 
-// Keeps one announcement of each process.
+// Adds an announcement, unless one with equal domain, team, address and user data is known.
 void keep(std::vector<Announced>& all, const Announced& one) {
   const auto is_same = [&one](const Announced& other) {
     return other.domain == one.domain && other.team == one.team && other.from == one.from &&
@@ -93,7 +94,7 @@ void keep(std::vector<Announced>& all, const Announced& one) {
   if (std::ranges::none_of(all, is_same)) all.push_back(one);
 }
 
-// Receives the multicast announcements of participants, whatever their domain and team.
+// Receives the multicast announcements of participants of all domains and teams.
 class DiscoveryListener {
  public:
   DiscoveryListener(const DdsConfig& config, const NetworkInterface& chosen) {
@@ -105,8 +106,7 @@ class DiscoveryListener {
         if (socket.join(kGroup, chosen.address)) continue;
         sockets_.push_back(std::move(socket));
         domains_.push_back(domain);
-      } catch (const std::system_error&) {  // another program owns the port, so nothing is received
-                                            // on it
+      } catch (const std::system_error&) {  // the port belongs to another program
       }
     }
   }
@@ -132,7 +132,7 @@ class DiscoveryListener {
   std::vector<int> domains_;
 };
 
-// A DDS participant that is no robot: it takes part in discovery only, and robots ignore it.
+// A DDS participant that takes part in discovery only, and that robots ignore.
 class Bystander {
  public:
   explicit Bystander(const DdsConfig& config)
@@ -163,11 +163,11 @@ class Bystander {
       if (!info.valid_data) return;
       Announced one{.guid_prefix = {},
                     .domain = domain_.config().domain,
-                    .team = domain_.config().team,  // only this team is discovered
+                    .team = domain_.config().team,  // the only team that DDS discovers
                     .from = {},
                     .user_data = user_data_of(found.qos),
                     .identity = {}};
-      if (!claims_to_be_a_robot(one.user_data)) return;  // other programs, among them this one
+      if (!claims_to_be_a_robot(one.user_data)) return;  // the doctor, and other programs
       if (const auto announcement = parse_user_data(one.user_data).value) {
         one.identity = announcement->identity;
         of_participant_[info.instance_handle] = to_string(*one.identity);
@@ -233,7 +233,8 @@ std::uint16_t checksum(const std::vector<std::uint8_t>& bytes) {
   return static_cast<std::uint16_t>(~sum);
 }
 
-// RFC 792: type 8, code 0, checksum, identifier and sequence number, and the echoed bytes: `data`.
+// RFC 792: type 8, code 0, checksum, identifier, sequence number, and `data`, which the reply
+// repeats.
 std::vector<std::uint8_t> echo_request(const std::vector<std::uint8_t>& data) {
   std::vector<std::uint8_t> bytes(8, 0);
   bytes[0] = 8;
@@ -249,7 +250,7 @@ bool is_echo(const std::vector<std::uint8_t>& bytes, const std::vector<std::uint
          std::equal(data.begin(), data.end(), bytes.begin() + 8);
 }
 
-// Sends echo requests one after the other, and waits for each.
+// Sends echo requests one after the other, and waits for each reply.
 PeerEcho ask(const std::string& host) {
   PeerEcho echo{.host = host,
                 .median_s = std::numeric_limits<double>::quiet_NaN(),
@@ -269,7 +270,7 @@ PeerEcho ask(const std::string& host) {
       times_s.push_back(steady_now_s() - start_s);
       break;
     }
-    if (times_s.empty() && echo.sent >= 3) return echo;  // no answer: waiting longer is of no use
+    if (times_s.empty() && echo.sent >= 3) return echo;  // no reply to four requests
   }
   echo.received = times_s.size();
   if (times_s.empty()) return echo;

@@ -5,10 +5,11 @@
 
 namespace km {
 
-/// Examines the network that `config` names, for `listen_s` [s]. Sends datagrams to itself, by
-/// multicast and by address, and echo requests to the peers. Listens to DDS discovery on the
-/// domains up to kLastQuietDomain, and on that of `config` also as a participant that is no robot.
-/// It does not take part in a session. Throws DdsError if DDS refuses the configuration.
+/// Examines the network of `config` for `listen_s` [s], without taking part in a session. The
+/// function sends datagrams to its own host, by multicast and by address, and echo requests to the
+/// peers. It listens to DDS discovery on the domains up to kLastQuietDomain, and on the domain of
+/// `config` also as a participant that is no robot. Throws DdsError if DDS refuses the
+/// configuration.
 [[nodiscard]] NetworkFacts probe_network(const DdsConfig& config, double listen_s,
                                          const ReportProgress& report_progress);
 

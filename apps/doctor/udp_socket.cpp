@@ -51,7 +51,7 @@ bool set_option(int socket, int level, int name, const T& value) {
 DatagramSocket DatagramSocket::udp(std::uint16_t port) {
   DatagramSocket made(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   const sockaddr_in any = address_with(in_addr{INADDR_ANY}, port);
-  // As DDS does it: robots of one host share the port of discovery.
+  // Shared, as in DDS, because robots on one host use one port of discovery.
   const bool is_ready =
       made.socket_ >= 0 && set_option(made.socket_, SOL_SOCKET, SO_REUSEADDR, 1) &&
       bind(made.socket_, reinterpret_cast<const sockaddr*>(&any), sizeof any) == 0;
@@ -112,7 +112,7 @@ std::optional<Datagram> DatagramSocket::receive(std::chrono::milliseconds patien
   if (count < 0) return std::nullopt;
   bytes.resize(static_cast<std::size_t>(count));
   if (has_ip_header_ && !bytes.empty()) {
-    const std::size_t words = bytes[0] & 0x0fU;  // RFC 791, Sec. 3.1: IHL, of 4 bytes
+    const std::size_t words = bytes[0] & 0x0fU;  // length in words of 4 bytes (RFC 791, Sec. 3.1)
     bytes.erase(bytes.begin(),
                 bytes.begin() + std::min(std::ptrdiff_t(bytes.size()), std::ptrdiff_t(4 * words)));
   }

@@ -29,8 +29,9 @@ class DatagramSocket {
   [[nodiscard]] int handle() const { return socket_; }
   [[nodiscard]] std::uint16_t port() const;
 
-  /// Joins `group` on the interface with this address: receives its datagrams, and sends to it
-  /// through that interface, also to itself. Returns the reason if this fails.
+  /// Joins `group` on the interface with this address. The socket then receives datagrams of the
+  /// group, also its own, and sends to the group through this interface. Returns the reason if this
+  /// fails.
   [[nodiscard]] std::optional<std::string> join(const std::string& group,
                                                 const std::string& interface_address);
 
@@ -45,10 +46,11 @@ class DatagramSocket {
   explicit DatagramSocket(int socket, bool has_ip_header = false)
       : socket_(socket), has_ip_header_(has_ip_header) {}
   int socket_;
-  bool has_ip_header_;  // received bytes begin with an IP header
+  bool has_ip_header_;  // true if received bytes begin with an IP header
 };
 
-/// Address of a host, dotted, by its name or address, with or without ":port"; nullopt if unknown.
+/// IPv4 address of a host as dotted text; nullopt if unknown. `host` is a name or an address, with
+/// or without ":port".
 [[nodiscard]] std::optional<std::string> address_of(const std::string& host);
 
 }  // namespace km

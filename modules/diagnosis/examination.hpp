@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// A measured number as text with its unit, or the reason for its absence.
+/// A measured number as text with its unit, or the reason why it is not determined.
 struct Figure {
   std::string name;
   std::string value;
@@ -25,7 +25,7 @@ struct Examination {
   }
 };
 
-/// A line per figure, aligned.
+/// One aligned line of text per figure.
 [[nodiscard]] std::string to_text(const std::vector<Figure>& figures);
 
 /// True if a finding has this id.

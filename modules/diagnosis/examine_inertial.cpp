@@ -20,10 +20,10 @@ double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return so3_log(a.transpose() * b).norm();
 }
 
-// Rotation below which the fit to the gyroscope makes no statement, and bounds for more statements.
+// Least rotation for statements on the gyroscope, and bounds for further statements.
 constexpr double kMinRate_radps = 0.02;
-constexpr double kRelated = 0.6, kUnrelated = 0.3;  // share explained
-constexpr double kSecondAxis_radps = 0.02;          // about a second axis, for directions
+constexpr double kRelated = 0.6, kUnrelated = 0.3;  // bounds on InertialFit::explained
+constexpr double kSecondAxis_radps = 0.02;          // least rate about a second axis
 
 void examine_relation(const InertialFit& fit, Examination& result) {
   if (fit.explained > kRelated) return;

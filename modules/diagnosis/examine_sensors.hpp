@@ -7,23 +7,25 @@
 
 namespace km {
 
-// Compare the calibration of a recording with its data. Each finding has a bound that sound
-// recordings keep by a wide margin. If motion or images do not determine a quantity, there is no
-// finding, and a figure states the reason.
+// These functions compare the calibration of a recording with its data. Each finding has a bound
+// that sound recordings keep by a wide margin. If motion or images do not determine a quantity,
+// there is no finding, and a figure states the reason.
 
-/// Rates, gaps and faults of the reader. Ids: frames.rate, frames.gap, imu.rate, imu.gap,
+/// Examines rates, gaps and faults of the reader. Ids: frames.rate, frames.gap, imu.rate, imu.gap,
 /// recording.no_frames, recording.<fault>.
 [[nodiscard]] Examination examine_streams(const SensorSample& sample, const ReaderReport& report);
 
-/// Exposure, blur, corners. Ids: images.dark, images.bright, images.blurred, images.few_corners.
+/// Examines exposure, blur and corners. Ids: images.dark, images.bright, images.blurred,
+/// images.few_corners.
 [[nodiscard]] Examination examine_images(const SensorSample& sample);
 
-/// Points in both images against the calibration of the pair (see StereoFit), and its baseline.
+/// Compares points in both images with the calibration of the pair (see StereoFit), and examines
+/// the baseline.
 /// Ids: stereo.swapped, stereo.inverted, stereo.inverted_cameras, stereo.inverted_left,
 /// stereo.inverted_right, stereo.exchanged_lenses, stereo.focal, stereo.epipolar, stereo.baseline.
 [[nodiscard]] Examination examine_stereo(const SensorSample& sample, const StereoRig& rig);
 
-/// Rotations of the gyroscope against those that images show (see InertialFit), and gravity. Ids:
+/// Compares rotations of gyroscope and images (see InertialFit), and examines gravity. Ids:
 /// imu.gyro_in_degrees, imu.gyro_scale, imu.unrelated, imu.mirrored, imu.time_offset,
 /// extrinsics.inverted, extrinsics.rotation, camera.focal, imu.accel_in_g, imu.no_gravity,
 /// imu.gravity.

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-// Texts for a fault of the pair.
+// Texts of the finding for a StereoFault.
 struct FaultWords {
   const char* id;
   const char* what;

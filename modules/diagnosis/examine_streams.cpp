@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-// "missing images" -> "recording.missing_images"
+// Id of the finding: "recording.missing_images" for "missing images".
 std::string id_of(ReaderFault fault) {
   std::string id = std::string("recording.") + to_string(fault);
   std::ranges::replace(id, ' ', '_');
@@ -31,8 +31,8 @@ Finding fault_finding(ReaderFault fault, const ReaderReport::Entry& entry, doubl
           .to_do = "repair or record it again, where there are many"};
 }
 
-// Total number of the items of which a fault counts some. Images missing between others are counted
-// per camera, lost messages per topic.
+// Number of usable items of the kind that a fault counts. Images are counted per camera, lost
+// messages per topic.
 double sound_ones(ReaderFault fault, const SensorSample& sample) {
   const auto frames = static_cast<double>(sample.frames.size());
   const auto samples = static_cast<double>(sample.imu.size());

@@ -8,9 +8,9 @@
 
 namespace km {
 
-/// How well the words of a vocabulary distinguish the features of these images. The measure is the
-/// number of equally frequent words that would be as informative, exp(entropy), relative to the
-/// number of features and of words. Id: vocabulary.coverage.
+/// Examines how well the words of a vocabulary distinguish the features of `images`. The measure is
+/// exp(entropy), the number of equally frequent words with the same information. It is compared
+/// with the numbers of features and of words. Id: vocabulary.coverage.
 [[nodiscard]] Examination examine_words(std::span<const std::vector<OrbDescriptor>> images,
                                         const Vocabulary& vocabulary);
 

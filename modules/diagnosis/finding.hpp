@@ -33,16 +33,17 @@ struct Finding {
 /// error.
 [[nodiscard]] int exit_code_of(std::span<const Finding> findings);
 
-/// The most severe first, otherwise in their order.
+/// Sorts by descending severity; findings of equal severity keep their order.
 void sort_by_severity(std::vector<Finding>& findings);
 
-/// For people: "warning stereo.swapped: WHAT", and below it, indented, the consequence and the
-/// advice. Empty if there are none.
+/// Text for people: "warning stereo.swapped: WHAT", and indented lines with the consequence and the
+/// advice. Empty if there are no findings.
 [[nodiscard]] std::string to_text(std::span<const Finding> findings);
 
-/// {"id", "severity", "what", "means", "to_do"}.
+/// Object with the keys id, severity, what, means and to_do.
 void to_json(Json& json, const Finding& finding);
-/// Throws std::runtime_error for an unknown severity. Fields that `json` lacks stay empty.
+/// Inverse of to_json(). Missing texts become empty, a missing severity kNote. Throws
+/// std::runtime_error for an unknown severity.
 void from_json(const Json& json, Finding& finding);
 
 }  // namespace km

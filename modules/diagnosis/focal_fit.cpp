@@ -12,25 +12,25 @@
 namespace km {
 namespace {
 
-constexpr double kFactorStep = 1e-4;  // step of the numeric derivative; smaller changes end the
-                                      // iteration
+constexpr double kFactorStep = 1e-4;  // step of the numeric derivative, and of convergence
 constexpr double kSystematic_px = 0.01;
 
-using Shared = Eigen::Matrix<double, 7, 1>;  // rotation of the mounting, constant, factor
+using Shared = Eigen::Matrix<double, 7, 1>;  // variables common to all steps: rotation of the
+                                             // mounting, constant, factor
 using SharedSquare = Eigen::Matrix<double, 7, 7>;
 
 struct Step {
   Eigen::Vector3d rate;  // rate of the gyroscope, about its axes [rad/s]
   double seconds = 0.0;
-  std::vector<TrackedPoint> points;                     // with depth
+  std::vector<TrackedPoint> points;                     // points with depth
   Eigen::Vector3d t_from_to = Eigen::Vector3d::Zero();  // [m]
 };
 
-// A point as bearings and inverse depth of a rig.
+// A tracked point in the left camera.
 struct SeenPoint {
-  Eigen::Vector3d from;  // z = 1
-  double inverse_depth = 0.0;
-  Eigen::Vector2d to;  // z = 1
+  Eigen::Vector3d from;        // bearing in the first image, z = 1
+  double inverse_depth = 0.0;  // in the first image [1/m]
+  Eigen::Vector2d to;          // bearing in the second image, z = 1
 };
 
 std::optional<SeenPoint> seen_by(const StereoRig& rig, const SE3& T_right_left,
@@ -111,7 +111,7 @@ class FocalProblem {
   }
 
  private:
-  // The rig with the focal lengths times `factor`, and with a slightly larger factor.
+  // The rig with the focal lengths times `factor`, and times `factor` + kFactorStep.
   struct Rigs {
     Rigs(const StereoRig& rig, double factor)
         : now(scaled(rig, factor)), beyond(scaled(rig, factor + kFactorStep)) {}
@@ -125,7 +125,7 @@ class FocalProblem {
     SE3 T_right_left = now.T_left_right().inverse();
   };
 
-  // Position of a point after the motion, as a multiple of its depth before.
+  // Position of a point after the motion, in units of its depth before the motion.
   static Eigen::Vector3d moved(const SeenPoint& point, const Eigen::Matrix3d& R,
                                const Eigen::Vector3d& t) {
     return R.transpose() * (point.from - point.inverse_depth * t);
@@ -137,7 +137,7 @@ class FocalProblem {
     Eigen::Matrix<double, 2, 3> J_t;
   };
 
-  // nullopt for a point that is behind the camera before or after.
+  // Linearised error of a point; nullopt if the point is behind the camera in one of the images.
   [[nodiscard]] std::optional<Linear> linear(const TrackedPoint& tracked, const Step& step,
                                              const Eigen::Matrix3d& R, const Rigs& rigs) const {
     const auto point = seen_by(rigs.now, rigs.T_right_left, tracked);
@@ -145,7 +145,7 @@ class FocalProblem {
     if (!point || !beyond) return std::nullopt;
     const Eigen::Vector3d m = moved(*point, R, step.t_from_to);
     const Eigen::Vector3d m_beyond = moved(*beyond, R, step.t_from_to);
-    constexpr double kMinDepth = 0.05;  // relative to its depth before
+    constexpr double kMinDepth = 0.05;  // relative to the depth before the motion
     if (!(m.z() > kMinDepth && m_beyond.z() > kMinDepth)) return std::nullopt;
     const double px = rigs.now.cameras[0].fx, px_beyond = rigs.beyond.cameras[0].fx;
     Eigen::Matrix<double, 2, 3> J_m;
@@ -160,7 +160,7 @@ class FocalProblem {
     return result;
   }
 
-  // Adds the equations of the step to normal_ after eliminating its translation.
+  // Adds the equations of a step to normal_ after elimination of its translation.
   StepNormal linearize(const Step& step, const Rigs& rigs, double scale_px) {
     StepNormal own;
     const Eigen::Matrix3d R = so3_exp(Eigen::Vector3d(step.seconds * (Q_ * step.rate + constant_)));

@@ -7,12 +7,12 @@
 
 namespace km {
 
-/// The integral of a gyroscope's rates, linear between samples. Refers to the span.
+/// The integral of a gyroscope's rates, linear between samples. The samples must outlive this.
 class GyroIntegral {
  public:
   explicit GyroIntegral(std::span<const ImuSample> samples);
 
-  /// Whether samples cover the interval.
+  /// True if samples cover the interval.
   [[nodiscard]] bool covers(Stamp from, Stamp to) const;
 
   /// Integral from the first sample on [rad]. Precondition: covered.

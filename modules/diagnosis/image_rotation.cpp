@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMinBearings = 20;
 constexpr double kMinShare = 0.5;
-constexpr double kGate = 3.0;         // sigmas of an inlier
+constexpr double kGate = 3.0;         // largest distance of an inlier, in sigmas
 constexpr double kFirstScale = 20.0;  // initial scale of the robust weight, in sigmas
 constexpr int kIterations = 15;
 
@@ -32,7 +32,7 @@ double weight_of(double residual, double scale) {
   return w * w;
 }
 
-// Sampson distance [bearings], and the divisor that converts the constraint to it.
+// Sampson distance on z = 1, and the divisor that converts the constraint to this distance.
 struct Sampson {
   double distance = 0.0, gradient = 1.0;
 };
@@ -58,7 +58,7 @@ Eigen::Matrix3d rotation_alone(std::span<const BearingStep> steps, double sigma)
       const Eigen::Vector3d from = step.from.homogeneous().normalized();
       const Eigen::Vector3d turned = R * step.to.homogeneous().normalized();
       const Eigen::Vector3d residual = turned - from;
-      const Eigen::Matrix3d J = -skew(turned);  // derivative for R <- exp(x) R
+      const Eigen::Matrix3d J = -skew(turned);  // derivative by x in exp(x) R
       const double w = weight_of(residual.norm(), scale);
       H += w * J.transpose() * J;
       g += w * J.transpose() * residual;
@@ -68,7 +68,7 @@ Eigen::Matrix3d rotation_alone(std::span<const BearingStep> steps, double sigma)
   return R;
 }
 
-// t . (R to x from) = 0 for all points: the best direction.
+// Direction t that satisfies t . (R to x from) = 0 best over all points.
 Eigen::Vector3d best_direction(std::span<const BearingStep> steps, const Eigen::Matrix3d& R) {
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
   for (const BearingStep& step : steps) {

@@ -19,12 +19,12 @@ struct ImageRotation {
 };
 
 /// The rotation from the epipolar constraint, from_i^T [t]x R to_i = 0 for all i, for an unknown
-/// direction t, without inertial data. Gauss-Newton over the five unknowns on the Sampson distance
-/// (Hartley and Zisserman, "Multiple View Geometry", 2nd ed., Eq. (11.9)) with Geman-McClure
-/// weights. Their scale shrinks to `sigma`, the noise of a bearing. There are two starts: the
-/// rotation that explains the points without translation, and no rotation. The method is for small
-/// rotations, between images a fraction of a second apart. nullopt for fewer than 20 points, or if
-/// less than half are inliers.
+/// direction t, without inertial data. The method is Gauss-Newton over the five unknowns on the
+/// Sampson distance (Hartley and Zisserman, "Multiple View Geometry", 2nd ed., Eq. (11.9)) with
+/// Geman-McClure weights. Their scale shrinks to `sigma`, the noise of a bearing. There are two
+/// starts: the rotation that explains the points without translation, and no rotation. The method
+/// is for small rotations, between images a fraction of a second apart. nullopt for fewer than 20
+/// points, or if fewer than half of the points are inliers.
 [[nodiscard]] std::optional<ImageRotation> rotation_between(std::span<const BearingStep> steps,
                                                             double sigma);
 

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kMinSteps = 20;
 constexpr double kCoarse_s = 5e-3, kFine_s = 1e-3;
 constexpr double kTrusted = 0.8;       // share of the steps used for the first offset
-constexpr double kMaxDeviation = 4.0;  // largest deviation of a step, in medians
+constexpr double kMaxDeviation = 4.0;  // largest residual of a trusted step, in medians
 
 using Rates = Eigen::Matrix3Xd;
 
@@ -37,7 +37,7 @@ Rates gyro_rates(const GyroIntegral& gyro, std::span<const SeenRotation> seen, d
   return rates;
 }
 
-// Squared residuals of the best linear map from the gyroscope's rates to the image's.
+// Squared residuals, per step, of the best affine map from gyroscope rates to image rates.
 Eigen::VectorXd residuals(const Rates& image, const Rates& gyro) {
   Eigen::Matrix4Xd inputs(4, gyro.cols());
   inputs << gyro, Eigen::RowVectorXd::Ones(gyro.cols());
@@ -66,7 +66,7 @@ double coarse_offset(const GyroIntegral& gyro, std::span<const SeenRotation> see
   return best_s;
 }
 
-// The steps that the gyroscope explains at `offset_s` about as well as the other steps.
+// The steps whose residual at `offset_s` is at most kMaxDeviation times the median.
 std::vector<SeenRotation> trusted(const GyroIntegral& gyro, std::span<const SeenRotation> seen,
                                   double offset_s) {
   const Eigen::VectorXd squares = residuals(image_rates(seen), gyro_rates(gyro, seen, offset_s));
@@ -94,7 +94,7 @@ void refine_offset(const GyroIntegral& gyro, std::span<const SeenRotation> seen,
     at_s = s;
     sum = here;
   }
-  // Wide enough that noise does not determine the parabola.
+  // A width of kCoarse_s, so that noise does not determine the parabola.
   const double before = sum_at(at_s - kCoarse_s), after = sum_at(at_s + kCoarse_s);
   const double curvature = (before - 2.0 * sum + after) / (kCoarse_s * kCoarse_s);
   fit.offset_at_limit = std::abs(start_s) > kMaxOffset_s - 1.5 * kCoarse_s || !(curvature > 0.0);
@@ -116,7 +116,8 @@ void fit_rotation(const Rates& image, const Rates& gyro, InertialFit& fit) {
   fit.Q = svd.matrixU() * svd.matrixV().transpose();
   const Eigen::Vector3d& gains = svd.singularValues();
   fit.scale = gains.sum() / gyro.squaredNorm();
-  // A rotation instead of the reflection loses twice the smallest gain.
+  // With the nearest rotation instead of a reflection, the sum decreases by twice the smallest
+  // gain.
   const double of_all = gains.sum() * gains.sum();
   const double of_rotation = std::pow(gains.sum() - 2.0 * gains[2], 2);
   if (fit.Q.determinant() < 0.0)
@@ -124,8 +125,8 @@ void fit_rotation(const Rates& image, const Rates& gyro, InertialFit& fit) {
         (of_all - of_rotation) / (gyro.squaredNorm() * std::max(image.squaredNorm(), 1e-12));
 }
 
-// Without rotation about some axis, the sign of this axis is undetermined. Then the proper rotation
-// is preferred to the mirrored solution.
+// If the body hardly turns about some axis, the sign of this axis is undetermined. The proper
+// rotation then replaces the mirrored solution.
 void prefer_rotation(InertialFit& fit, const Rates& image, const Rates& gyro) {
   constexpr double kClearMirror = 0.02;
   if (fit.Q.determinant() > 0.0 || fit.mirror_gain > kClearMirror) return;

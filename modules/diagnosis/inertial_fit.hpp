@@ -8,28 +8,28 @@
 
 namespace km {
 
-/// A rotation of the left camera that images show.
+/// Rotation of the left camera between two images.
 struct SeenRotation {
   Stamp from = 0, to = 0;
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< R_from_to as rotation vector [rad].
 };
 
-/// Relation of the camera's rotations to the gyroscope's: the fit of image = scale * Q * gyro +
-/// constant. It allows any unit, mounting, bias and clock of the gyroscope. Rates [rad/s] are means
-/// over a step.
+/// Fit of the camera's rotations to those of the gyroscope: image = scale * Q * gyro + constant. It
+/// allows any unit, mounting, bias and clock of the gyroscope. Rates [rad/s] are means over a step.
 struct InertialFit {
   std::size_t steps = 0;
   double image_rms = 0.0;  ///< Rms of the image's rates about their mean.
   /// Rms of the gyroscope's rates along their principal axes, descending.
   Eigen::Vector3d gyro_rms = Eigen::Vector3d::Zero();
-  double explained = 0.0;  ///< Share of the image's variance that any linear map explains.
+  double explained = 0.0;  ///< Share of the image's variance that the best affine map explains.
   double offset_s = 0.0;   ///< Added to the stamps of images to get the gyroscope's time.
   double offset_sigma_s = 0.0;
-  bool offset_at_limit = false;  ///< There is no minimum within kMaxOffset_s.
+  bool offset_at_limit = false;  ///< True if there is no minimum within kMaxOffset_s.
   double scale = 0.0;
   Eigen::Matrix3d Q =
       Eigen::Matrix3d::Identity();  ///< Orthogonal: R_cam_body, if no axis is mirrored.
-  double mirror_gain = 0.0;  ///< Loss if the nearest rotation replaces Q; 0 if Q is a rotation.
+  double mirror_gain = 0.0;  ///< Decrease of the explained share if a rotation replaces Q; 0 if Q
+                             ///< is a rotation.
   Eigen::Vector3d constant = Eigen::Vector3d::Zero();  ///< Rate about the camera's axes [rad/s].
 };
 

@@ -9,16 +9,16 @@
 
 namespace km {
 
-/// Rotations of the left camera, and the number of steps with depths from the right image. Without
-/// depths a rotation and a translation across the image are hard to distinguish. The estimated
-/// rotation then depends on the focal length, and cannot be used to estimate it.
+/// Rotations of the left camera. Without depths a rotation and a translation across the image are
+/// hard to distinguish. The estimated rotation then depends on the focal length, so it cannot serve
+/// to estimate the focal length.
 struct SeenRotations {
   std::vector<SeenRotation> steps;
-  std::size_t with_depth = 0;
+  std::size_t with_depth = 0;  ///< Number of steps with depths from the right image.
 };
 
-/// Uses depths if `use_depth` and `rig` is a stereo rig that the images fit (see estimate_motion()
-/// of the tracker), and else rotation_between(). Undetermined steps are dropped. Deterministic.
+/// For each step, rotation_between(), refined by estimate_motion() of the tracker if `use_depth`
+/// and enough points have a depth. Undetermined steps are dropped. Deterministic.
 [[nodiscard]] SeenRotations seen_rotations(std::span<const TrackedStep> steps, const StereoRig& rig,
                                            bool use_depth);
 

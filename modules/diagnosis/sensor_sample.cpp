@@ -38,7 +38,7 @@ std::vector<OrbDescriptor> descriptors_of(const OrbImage& orb) {
   return descriptors;
 }
 
-// The best match of each row of `a` if it is clearly better than the second; -1: none.
+// The best match of each row of `a` if it is clearly better than the second best; otherwise -1.
 std::vector<int> best_matches(const cv::Mat& a, const cv::Mat& b) {
   std::vector<int> best(static_cast<std::size_t>(a.rows), -1);
   if (a.rows == 0 || b.rows < 2) return best;
@@ -66,7 +66,7 @@ StereoMatches match(const OrbImage& left, const OrbImage& right) {
   return matches;
 }
 
-// Shift of the match that is nearest in the left image.
+// Shift of the match that is nearest to `point` in the left image.
 cv::Point2f shift_near(const StereoMatches& matches, const cv::Point2f& point) {
   const Eigen::Vector2d here = vector_of(point);
   const auto nearest = std::ranges::min_element(

@@ -11,18 +11,19 @@
 
 namespace km {
 
-/// One point in two images, with its position in each [px].
+/// Positions of one point in two images [px].
 struct PixelPair {
   Eigen::Vector2d a = Eigen::Vector2d::Zero();
   Eigen::Vector2d b = Eigen::Vector2d::Zero();
 };
 
-/// Points of a left image (a) found in the right one (b), at any position there.
+/// Points of a left image (a) with their matches anywhere in the right image (b).
 struct StereoMatches {
   std::vector<PixelPair> pairs;
 };
 
-/// A point of a left image, in a later one, and in the right image of the earlier pair [px].
+/// Positions of a point in a left image, in a later left image, and in the right image of the
+/// earlier pair [px].
 struct TrackedPoint {
   Eigen::Vector2d from = Eigen::Vector2d::Zero(), to = Eigen::Vector2d::Zero();
   std::optional<Eigen::Vector2d> right;
@@ -37,14 +38,14 @@ struct TrackedStep {
 struct ImageLook {
   double mean_level = 0.0;       ///< Mean grey level, 0 to 255.
   double saturated_share = 0.0;  ///< Share of pixels of 250 and above.
-  /// Strongest gradients (99 %) relative to those of the image at half its size. About 1 if edges
-  /// are as sharp as pixels permit; it approaches 0.5 with more blur. NaN without any gradient.
+  /// 99 % quantile of the gradients, relative to that of the image at half size. The ratio is about
+  /// 1 if edges are as sharp as pixels permit, and approaches 0.5 with blur. NaN without gradients.
   double sharpness = 0.0;
-  std::size_t corners = 0;  ///< FAST corners at a threshold of 12.
+  std::size_t corners = 0;  ///< Number of FAST corners at a threshold of 12.
 };
 
-/// Data of a part of a recording, independent of any calibration, so that calibrations can be
-/// compared with it. It contains some of the images and all inertial samples.
+/// Measurements from a part of a recording, independent of any calibration, so that calibrations
+/// can be compared with them. They are from some of the images and all inertial samples.
 struct SensorSample {
   ImageSize left_size, right_size;
   std::vector<StereoMatches> stereo;
@@ -57,11 +58,11 @@ struct SensorSample {
 
 /// Collects a SensorSample, deterministic for equal packets. Not thread-safe.
 ///
-/// Stereo: OpenCV's ORB, 800 features, brute force in both directions over the whole image with a
-/// ratio test of 0.8. Stereo and looks use a pair every half second, kMaxStereo at most. Steps: KLT
-/// tracks the 200 strongest corners forward and back (1 px), from an image to the first one at
-/// least 90 ms later. There is no step if that image is more than 250 ms later. The corners are
-/// also tracked to the right image, starting with the shift of the nearest ORB match.
+/// Stereo: 800 ORB features of OpenCV are matched by brute force in both directions over the whole
+/// image, with a ratio test of 0.8. Stereo and looks use a pair every half second, kMaxStereo at
+/// most. Steps: KLT tracks the 200 strongest corners forward and back (1 px), from an image to the
+/// first image at least 90 ms later. There is no step if that image is more than 250 ms later. The
+/// corners are also tracked to the right image, starting with the shift of the nearest ORB match.
 class SensorSampler {
  public:
   static constexpr std::size_t kMaxStereo = 60;
@@ -79,7 +80,7 @@ class SensorSampler {
   KltImage last_;
   Stamp last_stamp_ = 0;
   std::vector<cv::Point2f> corners_;
-  // Positions of the corners in the right image
+  // Positions of the corners in the right image [px].
   std::vector<std::optional<Eigen::Vector2d>> right_;
   Stamp last_stereo_ = 0;
 };

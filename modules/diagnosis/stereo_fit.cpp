@@ -12,9 +12,9 @@
 namespace km {
 namespace {
 
-constexpr double kMinParallax_px = 1.5;  // a smaller one may have any sign
-constexpr double kClearGain = 0.15;      // gain in the share on_line
-constexpr double kFair = 0.5;            // share on_line of a calibration that may be right
+constexpr double kMinParallax_px = 1.5;  // least parallax whose sign is certain
+constexpr double kClearGain = 0.15;      // least gain in on_line of a better calibration
+constexpr double kFair = 0.5;            // least on_line of a calibration that may be right
 
 Camera with_pose_of(Camera camera, const SE3& T_body_cam) {
   camera.T_body_cam = T_body_cam;
@@ -34,7 +34,7 @@ std::vector<StereoMatches> swapped(std::span<const StereoMatches> images) {
   return result;
 }
 
-// The best ratio within 20 %.
+// The best ratio of focal lengths between 0.8 and 1.2.
 StereoAlternative best_focal_ratio(std::span<const StereoMatches> images, const StereoRig& rig) {
   constexpr int kSteps = 40;
   constexpr double kStep = 0.005;
@@ -134,7 +134,7 @@ StereoAlternative best_alternative(std::span<const StereoMatches> images, const 
        {StereoFault::kInvertedPair, StereoFault::kInvertedCameras, StereoFault::kInvertedLeft,
         StereoFault::kInvertedRight, StereoFault::kExchangedLenses})
     consider({.fault = fault, .fit = fit_of(images, undone(rig, fault))});
-  // With an entirely wrong calibration another focal length would compensate some of the error.
+  // Only without such a fault, because another focal length compensates some errors of a fault.
   if (best.fit.on_line < given.fit.on_line + kClearGain) consider(best_focal_ratio(images, rig));
   const bool is_clear =
       best.fit.on_line > given.fit.on_line + kClearGain && best.fit.on_line > kFair;

@@ -19,16 +19,17 @@ struct StereoPoint {
   double depth_m = 0.0;  ///< z in the left camera; negative: behind it.
 };
 
-/// nullopt if a lens has no bearing for a pixel, or if only an opposite camera could see the point.
+/// nullopt if a lens has no bearing for a pixel, or if the ray of the left pixel points away from
+/// the right camera or along the baseline.
 [[nodiscard]] std::optional<StereoPoint> stereo_point(const StereoRig& rig, const SE3& T_right_left,
                                                       const PixelPair& pair);
 
 /// Agreement of points in both images of a pair, at any position, with a calibration.
 struct StereoFit {
   std::size_t points = 0;
-  /// Share within kOnLine_px of their epipolar line and not behind the cameras.
+  /// Share of points within kOnLine_px of their epipolar line and not behind the cameras.
   double on_line = 0.0;
-  double behind = 0.0;  ///< Share within kOnLine_px whose rays meet behind the cameras.
+  double behind = 0.0;  ///< Share of points within kOnLine_px whose rays meet behind the cameras.
   double error_px =
       0.0;               ///< Median distance from the line, in the right image; NaN without points.
   double depth_m = 0.0;  ///< Median depth of the points on_line; NaN if there are none.
@@ -36,12 +37,13 @@ struct StereoFit {
 
 inline constexpr double kOnLine_px = 2.0;
 
-/// Fewer points permit no statement.
+/// Least number of points for a statement.
 inline constexpr std::size_t kLeastStereoPoints = 100;
 
 [[nodiscard]] StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig);
 
-/// Enough points, and at least half of them on their lines: sound pairs have 0.65 to 0.97.
+/// True if there are enough points and at least half of them are on their lines. In sound pairs
+/// on_line is 0.65 to 0.97.
 [[nodiscard]] inline bool is_sound(const StereoFit& fit) {
   return fit.points >= kLeastStereoPoints && fit.on_line >= 0.5;
 }
@@ -55,7 +57,7 @@ enum class StereoFault {
   kInvertedLeft,     ///< Only the left T_body_cam is inverted.
   kInvertedRight,    ///< Only the right T_body_cam is inverted.
   kExchangedLenses,  ///< Focal lengths, centres and lenses are exchanged.
-  kFocalLength,      ///< Focal length of the right camera, relative to the left one's.
+  kFocalLength,      ///< The right focal length is wrong, relative to the left focal length.
 };
 
 /// The calibration that fits the images.
@@ -65,11 +67,12 @@ struct StereoAlternative {
   StereoFit fit;
 };
 
-/// `rig` after removal of the fault; the operation is its own inverse.
+/// `rig` after removal of the fault; unchanged for kNone, kSwappedImages and kFocalLength. The
+/// operation is its own inverse.
 [[nodiscard]] StereoRig undone(const StereoRig& rig, StereoFault fault);
 
-/// The fault that explains the images best if it is clearly better than `rig`. Otherwise kNone,
-/// with the fit of `rig`.
+/// The fault whose removal fits the images best, if the fit is clearly better than that of `rig`.
+/// Otherwise kNone, with the fit of `rig`.
 [[nodiscard]] StereoAlternative best_alternative(std::span<const StereoMatches> images,
                                                  const StereoRig& rig);
 

@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-// The patch of the search: 16 columns, one vector register of bytes, from -8 to +7.
+// Patch of the search: 16 columns from -8 to +7, one vector register of bytes.
 constexpr int kSearchLeft = 8;
 constexpr int kSearchColumns = 16;
 constexpr int kSearchHalfRows = 5;
@@ -20,10 +20,10 @@ constexpr int kSearchHalfRows = 5;
 constexpr int kHalf = 5;
 constexpr int kPatchSize = (2 * kHalf + 1) * (2 * kHalf + 1);
 
-// The best match must beat every other one that is not its neighbour by this factor.
+// Least ratio of the cost of any other shift, except for neighbours, to that of the best shift.
 constexpr double kUniqueness = 1.15;
-constexpr int kNeighbour = 2;               // [px]
-constexpr int kMaxLeftRightDifference = 1;  // [px]
+constexpr int kNeighbour = 2;               // largest distance of a neighbour [px]
+constexpr int kMaxLeftRightDifference = 1;  // between the two directions of search [px]
 constexpr double kMaxRefinement_px = 1.5;   // largest change of the disparity by the refinement
 constexpr double kMaxRowOffset_px = 1.5;    // remaining violation of the epipolar constraint after
                                             // calibration
@@ -46,11 +46,13 @@ unsigned patch_difference(const std::uint8_t* a, const std::uint8_t* b, std::siz
   return sum;
 }
 
-// Minimum over shifts [first, last] of `target` against a fixed patch, if it is unique.
+// Range of a search. A patch of the reference at `column` is compared with the target at
+// column - direction * shift, for shift in [first, last].
 struct Search {
-  int first, last, direction;  // column in target: column - direction * shift
+  int first, last, direction;
 };
 
+// Shift with the least sum of absolute differences; nullopt if it is not unique.
 std::optional<int> best_shift(const cv::Mat& reference, const cv::Mat& target, cv::Point at,
                               const Search& search) {
   constexpr int kMaxShifts = 1024;
@@ -134,8 +136,7 @@ std::optional<Refined> refine(const NormalisedPatch& reference, const cv::Mat& t
     H << patch.dx.square().sum(), (patch.dx * patch.dy).sum(), (patch.dx * patch.dy).sum(),
         patch.dy.square().sum();
     const Eigen::Vector2f g((patch.dx * error).sum(), (patch.dy * error).sum());
-    H.diagonal().array() += 1e-6F;  // regularises an edge along the row, so that the match stays
-                                    // there
+    H.diagonal().array() += 1e-6F;  // damping for an edge along the row
     const Eigen::Vector2d delta = H.ldlt().solve(g).cast<double>();
     if (delta.norm() < kConverged_px || i == kSteps)
       return Refined{position, (reference.value * patch.value).sum()};

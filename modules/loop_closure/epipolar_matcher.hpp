@@ -15,9 +15,9 @@ namespace km {
 ///
 /// Both images are resampled so that epipolar lines become rows and equal focal lengths make the
 /// disparity f * baseline / z. A patch is searched along its row by the sum of absolute
-/// differences. The minimum is checked from right to left and against the second best. Lucas-Kanade
-/// steps in disparity, row, gain and offset then refine it to a fraction of a pixel. Const members
-/// are safe to call from several threads.
+/// differences. The minimum is compared with the second best, and with the search from right to
+/// left. Lucas-Kanade steps in disparity, row, gain and offset then refine the disparity to a
+/// fraction of a pixel. Const members are safe to call from several threads.
 class EpipolarMatcher {
  public:
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument for a rig that
@@ -33,7 +33,7 @@ class EpipolarMatcher {
  private:
   struct Rectified {
     cv::Mat left, right;            // resampled
-    cv::Mat left_flat, right_flat;  // without their local mean: brightness drops out
+    cv::Mat left_flat, right_flat;  // resampled, local mean subtracted
   };
 
   [[nodiscard]] Rectified rectify(const StereoFrame& frame) const;
@@ -41,7 +41,7 @@ class EpipolarMatcher {
 
   KeyframeFeaturesConfig config_;
   Rectification rectification_;
-  double focal_baseline_;  // [px m]
+  double focal_baseline_;  // focal length times baseline [px m]
 };
 
 }  // namespace km

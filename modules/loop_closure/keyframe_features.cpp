@@ -18,10 +18,12 @@ constexpr float kScale = 1.2F;
 constexpr int kLevels = 8;
 constexpr int kEdge = 31;
 
-// Candidate corners per kept corner: more give a more even cover and cost time.
+// Candidate corners per kept corner. With more candidates the corners are more evenly spread, and
+// the extraction takes longer.
 constexpr int kCandidatesPerKeypoint = 4;
 
-// Strongest first; ties by position, so that the order does not depend on the detector's.
+// Sorts by descending response, then by position, so that the order does not depend on that of the
+// detector.
 void sort_by_response(std::vector<cv::KeyPoint>& corners) {
   std::sort(corners.begin(), corners.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
     if (a.response != b.response) return a.response > b.response;
@@ -30,8 +32,9 @@ void sort_by_response(std::vector<cv::KeyPoint>& corners) {
   });
 }
 
-// The corners, sorted by response, without those that have a stronger one of the same octave closer
-// than `radius` (which grows with the octave). Cells of half the radius make the test cheap.
+// The corners, sorted by response, without those that are closer than `radius` to a stronger corner
+// of the same octave. The radius grows with the octave. Cells of half the radius make the test
+// cheap.
 std::vector<cv::KeyPoint> suppressed(const std::vector<cv::KeyPoint>& corners, double radius,
                                      cv::Size size) {
   std::vector<cv::KeyPoint> kept;
@@ -53,9 +56,9 @@ std::vector<cv::KeyPoint> suppressed(const std::vector<cv::KeyPoint>& corners, d
   return kept;
 }
 
-// At most `count` corners, as evenly spread as their number allows: the smallest radius that
-// leaves no more than `count` (Bailo et al., "Efficient adaptive non-maximal suppression
-// algorithms for homogeneous spatial keypoint distribution", 2018, with a bisection).
+// At most `count` corners, evenly spread: suppressed() with the smallest radius that leaves at most
+// `count` corners, found by bisection (Bailo et al., "Efficient adaptive non-maximal suppression
+// algorithms for homogeneous spatial keypoint distribution", 2018).
 std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> corners, std::size_t count,
                                  cv::Size size) {
   sort_by_response(corners);

@@ -15,8 +15,8 @@ namespace km {
 
 /// Extracts the features of a frame for place recognition and verification: evenly spread ORB
 /// keypoints of the left image, the strongest first (Rublee et al., "ORB: an efficient alternative
-/// to SIFT or SURF", ICCV 2011). They have a depth if the right image or the depth image yields
-/// one. Const members are safe to call from several threads.
+/// to SIFT or SURF", ICCV 2011). Keypoints have a depth if the right image or the depth image
+/// yields one. Const members are safe to call from several threads.
 class KeyframeFeatureExtractor {
  public:
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
@@ -37,8 +37,8 @@ class KeyframeFeatureExtractor {
   std::optional<EpipolarMatcher> stereo_;  // absent with an RGB-D rig
 };
 
-/// The first `count` keypoints, those with a known depth before all others: enough to verify a
-/// closure, with a part of the bytes.
+/// At most `count` keypoints: first those with a known depth, each group in the order of
+/// `features`.
 [[nodiscard]] KeyframeFeatures reduced(const KeyframeFeatures& features, std::size_t count);
 
 }  // namespace km

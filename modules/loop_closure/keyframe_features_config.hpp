@@ -16,14 +16,14 @@ struct KeyframeFeaturesConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("max_keypoints", max_keypoints, {50, 4000},
-                  "kept per keyframe, spread evenly over the left image; other robots are sent "
-                  "loop_closure.reply_keypoints of them at most");
+                  "maximum number of keypoints of a keyframe, evenly spread over the left image; "
+                  "other robots receive fewer, see loop_closure.reply_keypoints");
     visitor.field("min_contrast", min_contrast, {2, 100},
-                  "[grey levels] smallest of a corner; lower finds more in dim scenes");
+                  "[grey levels] smallest contrast of a corner; lower: more corners in dim scenes");
     visitor.field(
         "min_depth_m", min_depth_m, {0.05, 10.0},
-        "[m along the optical axis] nearest that stereo or a depth image is trusted with");
-    visitor.field("max_depth_m", max_depth_m, {1.0, 1000.0}, "[m] farthest trusted");
+        "[m] smallest depth that is used, along the optical axis, from stereo or a depth image");
+    visitor.field("max_depth_m", max_depth_m, {1.0, 1000.0}, "[m] largest depth that is used");
     visitor.field("min_stereo_correlation", min_stereo_correlation, {0.0, 0.99},
                   "least zero-normalised cross-correlation of left and right patch");
   }

@@ -38,7 +38,7 @@ void KeyframeFeaturesNode::step(const KeyframeOdometry& odometry) {
                                 std::to_string(next_index_) + " was due");
   ++next_index_;
   chain_ = compose(chain_, {odometry.T_previous_kf, odometry.covariance});
-  chain_.T = odometry.T_odom_kf;  // the same product, without its rounding
+  chain_.T = odometry.T_odom_kf;  // equal to the product, without its rounding errors
   Keyframe& keyframe = without_images_.emplace_back();
   keyframe.odometry = {odometry.id, odometry.T_odom_kf, chain_.Sigma};
   keyframe.stamp = odometry.stamp;

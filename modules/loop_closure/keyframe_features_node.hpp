@@ -18,12 +18,11 @@ namespace km {
 /// Channels of the keyframe features node; they must outlive it.
 struct KeyframeFeaturesTopics {
   In<KeyframeOdometry> odometry;  ///< Indices 0, 1, 2, ...
-  In<LocatedFrame> frames;        ///< Each keyframe's comes after it, in the same order.
+  In<LocatedFrame> frames;        ///< Images; that of a keyframe arrives after its odometry.
   Out<Keyframe> keyframes;
 };
 
-/// Makes Keyframes of the keyframes of odometry: features from the images, and the covariance
-/// accumulated along the chain.
+/// Adds to the keyframes of odometry their features and the covariance accumulated along the chain.
 class KeyframeFeaturesNode final : public Node {
  public:
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
@@ -31,7 +30,8 @@ class KeyframeFeaturesNode final : public Node {
   KeyframeFeaturesNode(const KeyframeFeaturesConfig& config, const StereoRig& rig,
                        const KeyframeFeaturesTopics& topics);
 
-  /// The keyframes up to this one are known: their odometry is ignored. Call before start().
+  /// Continues after the keyframe `last` of an earlier process. The odometry of keyframes up to
+  /// `last` is ignored. Call before start().
   void continue_from(const OdometryPose& last);
 
   std::string_view name() const override { return "keyframe_features"; }
@@ -40,9 +40,9 @@ class KeyframeFeaturesNode final : public Node {
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
 
-  /// Handle one input synchronously. The thread calls only these; so can tests and replay. Throw
-  /// std::invalid_argument for an index that does not follow the one before, and for images of a
-  /// keyframe that do not fit the rig.
+  /// Handle one input synchronously. The thread calls only these functions; tests and replay can
+  /// call them too. Throw std::invalid_argument for an index that does not follow the previous
+  /// index, and for images of a keyframe that do not fit the rig.
   void step(const KeyframeOdometry& odometry);
   void step(const LocatedFrame& located);
 
@@ -54,7 +54,7 @@ class KeyframeFeaturesNode final : public Node {
   std::deque<Keyframe> without_images_;
   UncertainPose chain_;  // from the first keyframe's odometry frame to the latest keyframe
   std::uint32_t next_index_ = 0;
-  std::uint32_t known_ = 0;  // keyframes with features already
+  std::uint32_t known_ = 0;  // number of keyframes of the earlier process
   Worker<Input> worker_;     // last member: stops first
 };
 

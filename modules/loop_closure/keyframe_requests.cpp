@@ -75,7 +75,7 @@ void KeyframeRequests::absent(const KeyframeId& keyframe, double now_s) {
   Request& request = found->second;
   request.asked = false;
   request.next_s = now_s + timeout_s_;
-  request.attempts = 1;  // the peer replies, so no longer time-out is needed
+  request.attempts = 1;  // the peer replies, so the time-out need not grow
   --peer->second.outstanding;
   peer->second.waiting.push_back(keyframe.index);
 }

@@ -14,17 +14,17 @@
 
 namespace km {
 
-/// Asks the owner of `keyframe` for its odometry, points and descriptors. The reply prefers points
-/// that keyframe `own` of the requester may also show.
+/// Asks the owner of `keyframe` for its odometry, keypoints and descriptors. The reply prefers
+/// keypoints that keyframe `own` of the requester may also show.
 struct KeyframeRequest {
   RobotId requester = 0;
-  std::uint32_t number = 0;  ///< Counts the requester's requests.
+  std::uint32_t number = 0;  ///< Sequence number of the requester.
   KeyframeId keyframe;
   KeyframeIndex own = 0;
 };
 
-/// The reply. `found` is false if the owner does not have the keyframe (yet): then only the
-/// keyframe's id is set.
+/// Reply to a KeyframeRequest. `found` is false if the owner does not have the keyframe (yet); only
+/// the id of `keyframe` is then set.
 struct KeyframeReply {
   std::uint32_t number = 0;  ///< Number of the request.
   bool found = false;
@@ -32,19 +32,20 @@ struct KeyframeReply {
 };
 
 /// Schedules the requests for keyframes of peers. Every wanted keyframe is requested until it
-/// arrives, a few at a time per peer. Requests are repeated after a time-out that doubles up to
-/// eightfold without a reply. So a vanished peer costs little and is served soon after it returns.
-/// A keyframe that its owner does not have (yet) is requested again later, after others. Time is an
-/// argument and must not decrease. Not thread-safe.
+/// arrives, a few at a time per peer. Requests are repeated after a time-out. Each time without a
+/// reply the time-out doubles, up to eightfold, so that an absent peer costs little. If the owner
+/// does not have the keyframe (yet), it is requested again later, after other keyframes. Time is
+/// an argument and must not decrease. Not thread-safe.
 class KeyframeRequests {
  public:
   /// Throws std::invalid_argument unless both are positive.
   KeyframeRequests(double timeout_s, int max_outstanding_per_peer);
 
-  /// Adds a keyframe of a peer, unless it is wanted already.
+  /// Adds a keyframe of a peer to the wanted keyframes.
   void want(const KeyframeId& keyframe);
 
-  /// Keyframes to request now, repeated ones first. They count as requested at `now_s`.
+  /// Keyframes to request now, for each peer the repeated requests first. The keyframes count as
+  /// requested at `now_s`.
   [[nodiscard]] std::vector<KeyframeId> due(double now_s);
 
   /// Notes that the keyframe has arrived. False if it was not requested.
@@ -59,18 +60,18 @@ class KeyframeRequests {
   /// Drops the requests to a peer, because its keyframe indices now mean other keyframes.
   void forget(RobotId robot) { peers_.erase(robot); }
 
-  /// Number of keyframes that have not arrived.
+  /// Number of wanted keyframes that have not arrived.
   [[nodiscard]] std::size_t size() const;
 
  private:
   struct Request {
-    bool asked = false;   // under way
+    bool asked = false;   // sent, and not answered
     int attempts = 0;     // requests without an answer so far
     double next_s = 0.0;  // time before which no (further) request is sent
   };
   struct Peer {
     std::map<std::uint32_t, Request> requests;
-    std::deque<std::uint32_t> waiting;  // keyframes whose request is not sent yet, oldest first
+    std::deque<std::uint32_t> waiting;  // keyframes whose request has to be sent, oldest first
     int outstanding = 0;
   };
 
@@ -81,7 +82,7 @@ class KeyframeRequests {
   std::map<RobotId, Peer> peers_;
 };
 
-/// Keeps the keyframes used last, at most `capacity`. Not thread-safe.
+/// Keeps the most recently used keyframes, at most `capacity`. Not thread-safe.
 class KeyframeCache {
  public:
   explicit KeyframeCache(std::size_t capacity) : capacity_(capacity) {}

@@ -26,7 +26,7 @@ bool in_range(float value, float max) {
   return value >= 0.0F && value <= max;
 }  // false for NaN
 
-// Steps that spread the 16-bit range over the largest value present.
+// Quantisation steps, chosen so that the largest value uses the full range.
 struct Steps {
   float bearing = 0.0F;
   float inverse_depth = 0.0F;
@@ -50,7 +50,7 @@ km_wire_Keypoint to_wire(const Keypoint& point, const OrbDescriptor& descriptor,
   km_wire_Keypoint wire{};
   wire.bearing[0] = bearing(point.bearing.x());
   wire.bearing[1] = bearing(point.bearing.y());
-  // A depth that is known must not become "unknown" by rounding.
+  // Rounding must not turn a known depth into 0, which means unknown.
   if (point.has_depth())
     wire.inverse_depth = static_cast<std::uint16_t>(
         std::max(1L, std::lround(point.inverse_depth / steps.inverse_depth)));
@@ -69,7 +69,7 @@ Keypoint from_wire(const km_wire_Keypoint& wire, const Steps& steps) {
 
 using WireKeypoints = std::span<const km_wire_Keypoint>;
 
-// Why the part of a reply that describes features cannot be used, or nullptr.
+// Reason why the features of a reply cannot be used, or nullptr.
 const char* refusal(const km_wire_KeyframeReply& wire, WireKeypoints keypoints) {
   if (!in_range(wire.bearing_step, kMaxBearing / kBearingSteps)) return "bearings out of range";
   if (!in_range(wire.inverse_depth_step, kMaxInverseDepth / kDepthSteps))

@@ -12,10 +12,10 @@
 
 namespace km {
 
-/// No keyframe has more points; a message that claims more is refused.
+/// Largest number of keypoints of a keyframe; a message that claims more is refused.
 inline constexpr std::size_t kMaxKeypoints = 10000;
 
-/// Written by the robot that asks.
+/// Written by the requester.
 template <>
 struct Codec<KeyframeRequest> {
   using Wire = km_wire_KeyframeRequest;
@@ -32,8 +32,8 @@ struct Codec<KeyframeRequest> {
   static Decoded<KeyframeRequest> decode(const Wire& wire, const TeamPeer& writer);
 };
 
-/// Written by the owner of the keyframe. Bearings and inverse depths travel as 16-bit numbers in
-/// steps of the largest one: rounding is below 0.01 px, see idl/loop_closure.idl.
+/// Written by the owner of the keyframe. Bearings and inverse depths are sent as 16-bit numbers,
+/// scaled by the largest value. Rounding is below 0.01 px, see idl/loop_closure.idl.
 template <>
 struct Codec<KeyframeReply> {
   using Wire = km_wire_KeyframeReply;
@@ -51,7 +51,7 @@ struct Codec<KeyframeReply> {
   static Decoded<KeyframeReply> decode(const Wire& wire, const TeamPeer& writer);
 };
 
-/// Written by the robot that verified it, which owns the keyframe it starts from.
+/// Written by the robot that verified the closure, which owns the keyframe Closure::from.
 template <>
 struct Codec<Closure> {
   using Wire = km_wire_Closure;

@@ -38,17 +38,17 @@ struct LoopClosureConfig {
     visitor.field("disparity_noise_px", disparity_noise_px, {0.02, 10.0},
                   "[px] standard deviation of the disparity of a keypoint's stereo match");
     visitor.field("max_match_ratio", max_match_ratio, {0.1, 1.0},
-                  "best over second best descriptor distance of a match");
+                  "largest ratio of the best to the second best descriptor distance of a match");
     visitor.field("max_match_distance", max_match_distance, {1, 256},
                   "[bit of 256] largest descriptor distance of a match");
     visitor.field("max_ransac_iterations", max_ransac_iterations, {10, 1000000},
                   "maximum number of samples; more samples find poses among more wrong matches, "
                   "and take longer");
     visitor.field("min_consensus", min_consensus, {3, 1000},
-                  "matches, made without knowing the pose, that must agree with the pose; below "
-                  "about ten, some agree by chance");
+                  "least number of matches, made without knowing the pose, that agree with the "
+                  "pose; about ten may agree by chance");
     visitor.field("min_inliers", min_inliers, {6, 1000},
-                  "correspondences that must support a closure in the end");
+                  "least number of correspondences that support the refined pose of a closure");
     visitor.field("max_position_sigma_m", max_position_sigma_m, {1e-3, 100.0},
                   "[m] largest standard deviation of a closure's position without the 15 % of its "
                   "inliers that determine it most; larger accepts closures that depend on a few "
@@ -71,9 +71,11 @@ struct LoopClosureConfig {
         "[keyframes] a peer's keyframe is not requested if both keyframes of the candidate are "
         "this near to those of a verified closure; the distance grows up to this value with the "
         "number of the peer's keyframes that led to closures, see RequestEconomy; 0: request all");
-    visitor.field("attempt_separation", attempt_separation, {0, 1000},
-                  "[keyframes] a peer's keyframe is not requested if it is this near to another "
-                  "requested one; grows as for max_link_separation; 0: request all");
+    visitor.field(
+        "attempt_separation", attempt_separation, {0, 1000},
+        "[keyframes] a peer's keyframe is not requested if both keyframes of the candidate "
+        "are this near to those of another requested candidate; the distance grows in the "
+        "same way; 0: request all");
     visitor.field("failure_patience", failure_patience, {0.0, 100.0},
                   "after n failures of similar candidates beyond the first few, this value times n "
                   "such candidates are skipped before one is requested; 0: none");

@@ -22,27 +22,26 @@ namespace {
 // Robots that meet again after a while produce candidates in bursts.
 constexpr std::size_t kQueueCapacity = 16384;
 constexpr std::chrono::milliseconds kTickPeriod(100);
-// The first replies to a robot may hold more keypoints: what joins two that have hardly met is
-// worth its bytes.
+// The first replies to a robot may contain more keypoints, because the first closures join the maps
+// of the two robots.
 constexpr int kFirstReplies = 12;
 constexpr std::size_t kFirstFactor = 3;
-constexpr std::size_t kLeastPart = 4;  // reciprocal of the least part of reply_keypoints,
-                                       // independent of the words
+constexpr std::size_t kLeastPart = 4;  // reply_keypoints over KeypointBudget::least
 
 // Number of keypoints of one image to send.
 struct KeypointBudget {
-  std::size_t least = 0;  // bound if there are enough keypoints
+  std::size_t least = 0;  // lower bound, if there are enough keypoints
   std::size_t most = 0;
 };
 
-// The keypoints of `features` that are worth sending to a robot whose own image of the place has
-// the words `theirs`, ascending. These are keypoints with a known depth whose word occurs there,
-// too, within `budget`. If they are fewer than its least number, others with a known depth follow.
-// The shared words indicate corresponding points and cost no bytes, because bags of words are
-// published anyway (Galvez-Lopez and Tardos, TRO 2012, use the same association to save
-// comparisons). If few words are shared, the two images seldom show one place. With
-// depth, 400 keypoints verify 229 pairs of EuRoC V1_01. If 200 keypoints are so chosen, they verify
-// 183 of these pairs, and 135 without the words.
+// The keypoints of `features` for a robot whose own image of the place has the words `theirs`,
+// ascending. Keypoints with a known depth whose word is in `theirs` come first, up to budget.most.
+// If there are fewer than budget.least, other keypoints follow, those with depth first. The shared
+// words indicate corresponding points and cost no bytes, because bags of words are published anyway
+// (Galvez-Lopez and Tardos, TRO 2012, use the same association to save comparisons). If few words
+// are shared, the two images seldom show one place. On EuRoC V1_01, 400 keypoints with depth verify
+// 229 pairs. With 200 keypoints, 183 of these pairs are verified if words decide, and 135
+// otherwise.
 KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const KeypointBudget& budget,
                                  const Vocabulary& vocabulary,
                                  std::span<const std::uint32_t> theirs) {
@@ -57,7 +56,7 @@ KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const Keypoin
   std::iota(order.begin(), order.end(), 0U);
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return rank[a] > rank[b]; });
-  constexpr int kBest = 3;  // with depth, of a shared word
+  constexpr int kBest = 3;  // rank of a keypoint with depth and a shared word
   const auto best = static_cast<std::size_t>(std::count(rank.begin(), rank.end(), kBest));
   order.resize(std::min(order.size(), std::clamp(best, budget.least, budget.most)));
   KeyframeFeatures chosen = features;
@@ -127,8 +126,8 @@ void LoopClosureNode::step(const std::shared_ptr<const Keyframe>& own_keyframe) 
   arrived(own_keyframe);
 }
 
-// The keyframe that is no longer among the newest is read again when it is asked for. Whether it
-// can be is tried once: of one that is not on the disk part of the keypoints stays.
+// Removes a keyframe that is no longer among the newest from memory, if it can be read from the
+// disk. Otherwise a part of its keypoints stays in memory.
 void LoopClosureNode::put_away_before(KeyframeIndex newest) {
   if (newest < full_keyframes_) return;
   const auto old = own_.find({self_, newest - full_keyframes_});
@@ -173,7 +172,7 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
   if (!reply->found) return requests_.absent(id, now_s_);
   // Ignores the reply to a repeated request, or one without a request.
   if (!requests_.arrived(id)) return;
-  // A copy is stored, because the message itself counts as queued while it is referenced.
+  // A copy is stored, because a referenced message counts as queued.
   const auto keyframe = std::make_shared<const Keyframe>(reply->keyframe);
   peers_.put(keyframe);
   arrived(keyframe);
@@ -263,13 +262,13 @@ KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features
   return chosen_by_words(features, {reply_keypoints_ / kLeastPart, most}, *vocabulary_, *words);
 }
 
-// Continues with the keyframes that are available, and waits for or requests the others. True if
-// the work led to a closure.
+// Completes the work if both keyframes are available; otherwise waits for a keyframe or requests
+// it. True if the work led to a closure.
 bool LoopClosureNode::advance(const Work& work) {
   const KeyframePtr from = find(work.id.from);
   const KeyframePtr to = find(work.id.to);
   if (from && to) return complete(work, *from, *to);
-  // The own one first: without it the other would only fill the cache.
+  // The own keyframe first: without it, the peer's keyframe would only fill the cache.
   const KeyframeId& missing = from ? work.id.to : work.id.from;
   if (missing.robot != self_) {
     ask_for(missing, work);

@@ -32,20 +32,20 @@ namespace km {
 struct LoopClosureTopics {
   In<Keyframe> keyframes;              ///< Keyframes of this robot.
   In<LoopCandidate> candidates;        ///< Pairs that may show the same place.
-  In<RelativePose> measured_closures;  ///< Closures of a recorded graph from keyframes of this
-                                       ///< robot.
+  In<RelativePose> measured_closures;  ///< Closures of a recorded graph that start at this robot.
   In<KeyframeRequest> peer_requests;   ///< Requests of peers for keyframes of this robot.
   In<KeyframeReply> peer_replies;      ///< Replies of peers to requests of this robot.
   In<PeerEvent> peer_events;           ///< Beginning and end of links to peers.
   In<PeerEvent> restarts;              ///< kRestarted, before the first candidate of the new
                                        ///< incarnation.
   In<KeyframeBow> peer_bows;           ///< Words of the peers' keyframes.
-  In<ClosureOutcome> restored;         ///< Outcomes of candidates from a former process of this
+  In<ClosureOutcome> restored;         ///< Outcomes of candidates from an earlier process of this
                                        ///< robot.
   Out<Addressed<KeyframeRequest>> own_requests;
   Out<Addressed<KeyframeReply>> own_replies;
   Out<Closure> own_closures;     ///< Verified closures of this robot.
-  Out<PeerEvent> own_restarts;   ///< kRestarted, after the last closure with a former keyframe.
+  Out<PeerEvent> own_restarts;   ///< kRestarted, after the last closure with a keyframe from before
+                                 ///< the restart.
   Out<ClosureOutcome> outcomes;  ///< Published whenever a candidate reaches a further stage or
                                  ///< stops.
 };
@@ -55,24 +55,27 @@ struct LoopClosureTick {
   double now_s = 0.0;  ///< Clock with any origin, not decreasing.
 };
 
-/// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A): requests the
-/// keyframes of peers from their owners, verifies, and publishes. A candidate is never dropped
-/// because a reply is missing, but not every candidate is worth a request (see RequestEconomy).
-/// Measured closures are processed in the same way, but need only the odometry of the other end.
-/// The node also replies to the peers' requests for own keyframes.
+/// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A). The node
+/// requests the keyframes of peers from their owners, verifies the candidates, and publishes the
+/// closures. A candidate is never dropped because a reply is missing, but not every candidate is
+/// worth a request (see RequestEconomy). Measured closures are processed in the same way, but
+/// without RequestEconomy and without verification: only the odometry of the peer's keyframe is
+/// used. The node also replies to the peers' requests for own keyframes.
 ///
-/// A closure starts at an own keyframe: `from` is the candidate's match, `to` its query. Each pair
-/// is verified once here; its other robot may find and verify it as well, with the ends exchanged.
+/// A closure starts at an own keyframe: `from` is the candidate's match, `to` the candidate's
+/// query. The node verifies each pair once. The other robot may find and verify the pair too, with
+/// the ends exchanged.
 ///
-/// When a robot has restarted, its keyframe indices mean other keyframes. All work on closures with
-/// it is dropped, also on measured ones, and begins again.
+/// When a robot has restarted, its keyframe indices mean other keyframes. The node then drops all
+/// candidates and measured closures with this robot, and begins again.
 class LoopClosureNode final : public Node {
  public:
   /// Reads an own keyframe from the disk; null if it is not there. Called on any thread.
   using Recall = std::function<std::shared_ptr<const Keyframe>(KeyframeIndex)>;
 
-  /// If `vocabulary` is null, keypoints are chosen without regard to their words. Without `recall`,
-  /// all stored keyframes stay in memory. Throws ConfigError if `config` is out of bounds.
+  /// If `vocabulary` is null, the choice of keypoints does not depend on words. Without `recall`,
+  /// older own keyframes stay in memory with some of their keypoints. Throws ConfigError if
+  /// `config` is out of bounds.
   LoopClosureNode(const LoopClosureConfig& config, RobotId self,
                   std::shared_ptr<const Vocabulary> vocabulary, const LoopClosureTopics& topics,
                   Recall recall = {});
@@ -84,7 +87,8 @@ class LoopClosureNode final : public Node {
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handle one input synchronously. The thread calls only these; so can tests and replay.
+  /// Handle one input synchronously. The thread calls only these functions; tests and replay can
+  /// call them too.
   void step(const std::shared_ptr<const Keyframe>& own_keyframe);
   void step(const std::shared_ptr<const LoopCandidate>& candidate);
   void step(const std::shared_ptr<const RelativePose>& measured_closure);
@@ -108,11 +112,9 @@ class LoopClosureNode final : public Node {
   struct Work {
     ClosureId id;
     double similarity = 0.0;
-    int support = 1;                            ///< Support as in LoopCandidate.
-    std::optional<RelativePose> measured = {};  ///< Measured closure; empty if the candidate has to
-                                                ///< be verified.
-    bool requested = false;                     ///< True once the keyframe of the other robot has
-                                                ///< been requested.
+    int support = 1;                            ///< LoopCandidate::support.
+    std::optional<RelativePose> measured = {};  ///< Measured closure; empty for a candidate.
+    bool requested = false;                     ///< The keyframe of the peer has been requested.
   };
 
   void put_away_before(KeyframeIndex newest);
@@ -135,7 +137,7 @@ class LoopClosureNode final : public Node {
   const LoopClosureTopics topics_;
   const Verifier verifier_;
   const Recall recall_;
-  std::map<KeyframeId, KeyframePtr> own_;  // null: on the disk
+  std::map<KeyframeId, KeyframePtr> own_;  // own keyframes; null if stored on the disk
   std::map<RobotId, int> replies_;         // number of replies sent
   PeerWords words_;
   KeyframeCache peers_;
@@ -143,7 +145,7 @@ class LoopClosureNode final : public Node {
   RequestEconomy economy_;
   const std::size_t reply_keypoints_;
   const KeyframeIndex full_keyframes_;
-  std::map<KeyframeId, std::vector<Work>> waiting_;  // work that waits for this keyframe
+  std::map<KeyframeId, std::vector<Work>> waiting_;  // work by the keyframe that is missing
   std::set<ClosureId> known_;                        // candidates and measured closures seen
   double now_s_ = 0.0;
   std::uint32_t next_request_ = 0;

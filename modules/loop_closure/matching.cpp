@@ -59,7 +59,7 @@ std::vector<Bits256> bits_of(std::span<const OrbDescriptor> descriptors) {
   return bits;
 }
 
-// Keypoints of one image in square cells, to find those near a place.
+// Keypoints of one image in square cells, to find the keypoints near a position.
 class KeypointGrid {
  public:
   KeypointGrid(const KeyframeFeatures& features, double cell_px) : cell_(cell_px) {
@@ -70,7 +70,7 @@ class KeypointGrid {
       low_ = low_.cwiseMin(pixel);
       high = high.cwiseMax(pixel);
     }
-    // Features may come from another robot: however far apart they are, the grid stays small.
+    // Bounds the grid, because features from another robot may be arbitrarily far apart.
     constexpr double kMaxCellsAcross = 512.0;
     cell_ = std::max(cell_, (high - low_).maxCoeff() / kMaxCellsAcross);
     columns_ = static_cast<int>((high.x() - low_.x()) / cell_) + 1;
@@ -84,7 +84,7 @@ class KeypointGrid {
 
   const Eigen::Vector2d& pixel(std::size_t i) const { return pixels_[i]; }
 
-  /// Calls visit(i) for every keypoint at most one cell away from that of `pixel`.
+  /// Calls visit(i) for every keypoint in the cell of `pixel` and the eight cells around it.
   void near(const Eigen::Vector2d& pixel, auto&& visit) const {
     if (!((pixel - low_).minCoeff() >= -cell_)) return;
     if (pixel.x() > low_.x() + (columns_ + 1) * cell_ || pixel.y() > low_.y() + (rows_ + 1) * cell_)
@@ -108,7 +108,7 @@ class KeypointGrid {
   std::vector<std::vector<std::uint32_t>> cells_;
 };
 
-// A keypoint seen from the other camera.
+// Projection of a keypoint into the other camera.
 struct Projection {
   Eigen::Vector2d pixel;
   double inverse_depth;
@@ -132,7 +132,7 @@ struct Candidate {
 std::optional<Candidate> best_near(const Projection& projection, const OrbDescriptor& descriptor,
                                    const KeyframeFeatures& features, const KeypointGrid& grid,
                                    const GuidedMatchRules& rules) {
-  // Octaves repeat a corner: a rival this close to the best one is the same corner.
+  // Several octaves show one corner, so a keypoint this close to the best one is no second best.
   constexpr double kSameCorner_px = 3.0;
   const Bits256 query = to_bits(descriptor);
   const double disparity_scale = features.focal_px * features.baseline_m;

@@ -26,8 +26,8 @@ struct MatchRules {
 
 /// Pairs that are each other's nearest descriptor and pass `rules` (the ratio is that of Lowe,
 /// "Distinctive Image Features from Scale-Invariant Keypoints", IJCV 2004), in ascending order of
-/// `a`. The first of equally near descriptors counts. Without a second descriptor in `b` there is
-/// no ratio and so no match. O(|a| |b|): see the benchmark.
+/// `a`. The first of equally near descriptors counts. With fewer than two descriptors in `b` there
+/// is no ratio, and so no match. O(|a| |b|).
 [[nodiscard]] std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
                                                    std::span<const OrbDescriptor> b,
                                                    const MatchRules& rules);
@@ -39,9 +39,9 @@ struct GuidedMatchRules {
   int max_distance = 64;   ///< [bit]
 };
 
-/// Matches under a known pose. Every point with depth of one keyframe is projected into the other,
-/// both ways. It is compared with the descriptors near its projection whose depth does not
-/// contradict it. Returns pairs that are each other's best, ascending in a.
+/// Matches under a known pose. Every point with depth of either keyframe is projected into the
+/// other keyframe. The point is compared with the descriptors near its projection whose depth does
+/// not contradict the point. Returns pairs that are each other's best, ascending in a.
 [[nodiscard]] std::vector<Match> match_guided(const SE3& T_a_b, const KeyframeFeatures& a,
                                               const KeyframeFeatures& b,
                                               const GuidedMatchRules& rules);

@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-// A keyframe without words takes memory, too.
+// Memory of a keyframe in words, with the overhead of the map.
 std::size_t cost_of(const std::vector<std::uint32_t>& words) {
   constexpr std::size_t kEntry = 32;
   return words.size() + kEntry;

@@ -9,21 +9,21 @@
 
 namespace km {
 
-/// Words of the peers' keyframes, so that a reply contains points that both keyframes may show. For
-/// each robot it keeps the newest keyframes that have kMaxWordsPerRobot words together. Not
-/// thread-safe.
+/// Words of the peers' keyframes, so that a reply contains points that both keyframes may show.
+/// Keeps the newest keyframes of each robot, up to kMaxWordsPerRobot words. Not thread-safe.
 class PeerWords {
  public:
-  static constexpr std::size_t kMaxWordsPerRobot = 2U << 20U;  ///< 8 MB
+  /// 8 MB. The overhead of a keyframe counts as 32 words.
+  static constexpr std::size_t kMaxWordsPerRobot = 2U << 20U;
 
-  /// `words` are ascending; they replace those of a known keyframe.
+  /// Stores the ascending `words` of a keyframe, in place of former words of this keyframe.
   void put(const KeyframeId& id, std::vector<std::uint32_t> words);
 
   /// Removes the words of a robot, because its keyframe indices now mean other keyframes.
   void forget(RobotId robot) { robots_.erase(robot); }
 
-  /// nullptr if the words are not known (any more). Valid until the next put(), or until the robot
-  /// is removed.
+  /// The words of a keyframe; nullptr if not stored (any more). The pointer is valid until the next
+  /// change of the stored words.
   [[nodiscard]] const std::vector<std::uint32_t>* find(const KeyframeId& id) const;
 
  private:

@@ -31,15 +31,15 @@ Eigen::Vector3d carried(const SE3& T_b_a, const Eigen::Vector3d& m) {
   return T_b_a.linear() * Eigen::Vector3d(m.x(), m.y(), 1.0) + m.z() * T_b_a.translation();
 }
 
-// Least ratio of the second to the first singular value of Arun's H, a ratio of variances. With a
-// smaller ratio the points lie on a line within their noise.
+// Least ratio of the second to the first singular value of Arun's H, a ratio of variances. Points
+// with a smaller ratio lie on a line within their noise.
 constexpr double kLeastSpread = 1e-4;
 
 // 99 % quantiles of the chi-squared distribution with 2 and 3 degrees of freedom.
 constexpr double kQuantile2 = 9.210;
 constexpr double kQuantile3 = 11.345;
 
-// Steps on a minimal sample and on the inliers of a new best model: enough to get near.
+// Numbers of Gauss-Newton steps on a minimal sample and on the inliers of a new best model.
 constexpr int kSampleSteps = 2;
 constexpr int kPolishSteps = 3;
 
@@ -76,7 +76,7 @@ NormalEquations linearise(const SE3& T_a_b, std::span<const ImagePair> pairs,
     if (!measured.in_front) continue;
     const TransferError error = transfer_error(T, first, second, measured.likely);
     if (!error.in_front) continue;
-    // Carried from b to a instead, the same xi acts on T_b_a as -Ad(T_a_b) xi.
+    // The transfer from b to a depends on T_a_b. xi changes T_b_a on its right by -Ad(T_a_b) xi.
     Eigen::Matrix<double, 3, 6> J = transfer_jacobian(T, measured.likely);
     if (!from_a) J = -J * Ad;
     const double weight = 1.0 / (1.0 + error.chi2 / quantile(error.dim));
@@ -89,7 +89,8 @@ NormalEquations linearise(const SE3& T_a_b, std::span<const ImagePair> pairs,
   return sum;
 }
 
-// Three pairs with depth on both sides; their triangles must agree before more is computed.
+// Three pairs with depth on both sides. A sample is solved only if the sides of its two triangles
+// have equal lengths.
 class ThreePointProblem {
  public:
   static constexpr std::size_t kSampleSize = 3;
@@ -134,7 +135,7 @@ class ThreePointProblem {
  private:
   struct Solid {
     Eigen::Vector3d a, b;
-    double range_variance;  // variance of both points together
+    double range_variance;  // sum over both points
     std::size_t pair;
   };
 

@@ -23,7 +23,7 @@ struct ImageNoise {
 };
 
 /// A keypoint as a measurement: m = (x, y, rho) with the bearing (x, y) on z = 1 and rho the
-/// inverse depth [1/m]. Stereo noise is Gaussian in m, whatever the depth, unlike in the point.
+/// inverse depth [1/m]. Stereo noise is Gaussian in m at any depth, but not in the 3D point.
 struct ImagePoint {
   Eigen::Vector3d m = Eigen::Vector3d::Zero();
   Eigen::Vector3d variance = Eigen::Vector3d::Ones();  ///< Independent variances of the entries of
@@ -43,12 +43,12 @@ struct ImagePoint {
 /// measurement in b.
 ///
 /// The homogeneous point (x, y, 1, rho) maps to h = R (x, y, 1) + rho t, which is the measurement
-/// (h_x / h_z, h_y / h_z, rho / h_z) in b. This does not divide by the depth in a, so far points
-/// are as harmless as near ones. `Sigma` is the covariance of r to first order from the noise of
-/// BOTH points: minimising chi2 is maximum likelihood over the pose and the true points. If b has
-/// no depth the third entry is absent: zero residual, zero rows.
+/// (h_x / h_z, h_y / h_z, rho / h_z) in b. The formula does not divide by the depth in a, so it is
+/// stable for far points too. `information` is the inverse covariance of r, to first order from the
+/// noise of both points. The minimum of chi2 is therefore the maximum of the likelihood over the
+/// pose and the true points. If b has no depth, the third entry of r and its rows are zero.
 struct TransferError {
-  bool in_front = false;                        ///< False: behind camera b, the rest is unset.
+  bool in_front = false;                        ///< False: behind camera b; other members unset.
   int dim = 0;                                  ///< 3 with depth on both sides, 2 if only a has it.
   Eigen::Vector3d r = Eigen::Vector3d::Zero();  ///< Predicted minus measured.
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
@@ -60,25 +60,26 @@ struct TransferError {
 [[nodiscard]] TransferError transfer_error(const SE3& T_b_a, const ImagePoint& a,
                                            const ImagePoint& b);
 
-/// Transfer error with the map linearised about `m` instead of a's measurement: minimise it over
-/// the pose with m = transfer_error(T_b_a, a, b).likely. Linearised about the measurement, residual
-/// and derivative contain the same noise. The estimated motion then is too small, by the relative
-/// variance of the disparities ("attenuation", Fuller, "Measurement Error Models", 1987).
+/// Transfer error with the map linearised about `m` instead of a's measurement, for the
+/// optimisation of the pose with m = transfer_error(T_b_a, a, b).likely. With a linearisation about
+/// the measurement, residual and derivative contain the same noise. The estimated motion is then
+/// too small, by the relative variance of the disparities ("attenuation", Fuller, "Measurement
+/// Error Models", 1987).
 [[nodiscard]] TransferError transfer_error(const SE3& T_b_a, const ImagePoint& a,
                                            const ImagePoint& b, const Eigen::Vector3d& m);
 
-/// Derivative of the point m = (x, y, rho) of a, carried into b, with respect to xi in
+/// Derivative of the point m = (x, y, rho) of a, transferred into b, with respect to xi in
 /// T_a_b * exp(xi). Precondition: in front.
 [[nodiscard]] Eigen::Matrix<double, 3, 6> transfer_jacobian(const SE3& T_b_a,
                                                             const Eigen::Vector3d& m);
 
-/// How long to sample.
+/// End of the sampling.
 struct RansacOptions {
   double confidence = 0.999;  ///< Probability of having drawn one sample without outliers.
   int max_iterations = 2000;
 };
 
-/// The model with the least cost and the data that agree with it.
+/// The model with the least cost, and the data that agree with this model.
 template <typename Model>
 struct RansacResult {
   std::optional<Model> model;        ///< Empty if no sample gave one.
@@ -173,7 +174,7 @@ struct PairError {
 struct PoseFit {
   SE3 T_a_b = SE3::Identity();
   Matrix6 information = Matrix6::Zero();  ///< Gauss-Newton, with robust weights.
-  double chi2 = 0.0;                      ///< Weighted sum over the pairs used.
+  double chi2 = 0.0;                      ///< Weighted sum of the squared errors.
   double freedom = 0.0;                   ///< Weighted number of residuals.
 };
 
@@ -184,10 +185,10 @@ struct PoseFit {
                                                  std::span<const std::size_t> indices,
                                                  int max_iterations);
 
-/// `fit.information` without the `share` of the pairs that determine the pose the most, at least
-/// two. A pair determines the pose the more, the larger the trace of its information is in units of
-/// the whole. If a few pairs decide a pose, which may be wrong pairs that fit by chance, little
-/// information remains.
+/// `fit.information` without the `share` of the pairs with the most information, at least two
+/// pairs. The pairs are ranked by the trace of their information relative to the whole information.
+/// If a few pairs decide a pose, perhaps wrong pairs that fit by chance, little information
+/// remains.
 [[nodiscard]] Matrix6 information_without_strongest(const PoseFit& fit,
                                                     std::span<const ImagePair> pairs,
                                                     std::span<const std::size_t> indices,
@@ -195,9 +196,9 @@ struct PoseFit {
 
 /// Relative pose of two stereo cameras from matches with outliers, by RANSAC. A sample is Arun's
 /// method on three pairs with depth on both sides (as Chang et al., "Kimera-Multi", ICRA 2021, Sec.
-/// III-A), refined by their image errors, which are much more accurate than the depths. Inliers are
-/// decided in the images (pair_error()), not by a metric radius, so that far points count according
-/// to their accuracy.
+/// III-A), refined on the image errors, because bearings are much more accurate than depths.
+/// pair_error() decides on inliers in the images, not by a metric radius, so that far points count
+/// according to their accuracy.
 [[nodiscard]] RansacResult<SE3> ransac_pose(std::span<const ImagePair> pairs,
                                             const RansacOptions& options, std::mt19937& rng);
 

@@ -7,7 +7,7 @@ namespace {
 
 using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
 
-// Robots that have hardly met must not be kept apart by a few wrong candidates.
+// A few wrong candidates must not prevent the first closure of two robots.
 constexpr int kForgivenFailures = 4;
 
 KeyframeIndex gap(KeyframeIndex a, KeyframeIndex b) {
@@ -39,7 +39,7 @@ RequestEconomy::Verdict RequestEconomy::judge(const LoopCandidate& candidate) {
   const auto kind_number =
       std::min<std::size_t>(static_cast<std::size_t>(candidate.support), peer.kinds.size() - 1);
   Kind& kind = peer.kinds[kind_number];
-  if (peer.in_vain != query) ++kind.passed_over;  // only one of a query's candidates counts
+  if (peer.in_vain != query) ++kind.passed_over;  // once per query
   const int failures = std::max(0, kind.failures - kForgivenFailures);
   if (kind.passed_over <= config_.failure_patience * failures) {
     peer.in_vain = query;

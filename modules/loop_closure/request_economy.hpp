@@ -15,17 +15,18 @@ namespace km {
 /// requests cause nearly all traffic of loop closure.
 ///
 /// Two robots that share a street or a room produce a candidate with every keyframe. The first
-/// closures join their maps, and further ones near them add little. So a candidate is skipped near
-/// a verified closure of the same two robots: both its keyframes are within max_link_separation
-/// keyframes. While few keyframes of this peer have led to closures, their number replaces that
-/// distance, so that the first closures may be dense. A candidate is also skipped near one that has
-/// been requested already. Before the first closure all are requested.
+/// closures join their maps, and further closures near them add little. A candidate is therefore
+/// skipped near a verified closure of the same two robots: both keyframes of the candidate are
+/// within max_link_separation keyframes of those of the closure. While fewer keyframes of this peer
+/// have led to closures, their number replaces max_link_separation, so that the first closures may
+/// be dense. A candidate is also skipped near a requested candidate, with attempt_separation in
+/// place of max_link_separation. Before the first closure with a peer, neither rule skips a
+/// candidate.
 ///
-/// In an environment with similar places most candidates are wrong. Right ones come in groups,
-/// because the views around the match resemble the query, too. Candidates are grouped by peer and
-/// by how many candidates of their query support each other. After n + 4 failures in a group, only
-/// every n-th candidate (n times failure_patience) is requested, so a group that never succeeds
-/// costs less and less.
+/// In an environment with similar places most candidates are wrong. Right candidates come in
+/// groups, because the views around the match resemble the query too. Candidates are grouped by
+/// peer and by their support. After n + 4 failures in a group, n times failure_patience queries are
+/// skipped before the next request, so a group that never succeeds costs less and less.
 ///
 /// Deterministic, no randomness. Not thread-safe.
 class RequestEconomy {
@@ -33,20 +34,20 @@ class RequestEconomy {
   enum class Verdict {
     kAsk,
     kLinked,  ///< Near a verified closure.
-    kTried,   ///< Near a keyframe that was asked for.
-    kVain,    ///< Most candidates of its group have failed.
+    kTried,   ///< Near a requested candidate.
+    kVain,    ///< Too many candidates of the group have failed.
   };
 
   explicit RequestEconomy(const LoopClosureConfig& config);
 
-  /// Decides about a candidate whose query is a peer's keyframe that is not available here. After
-  /// kAsk the candidate counts as requested.
+  /// Decides about a candidate whose query is a peer's keyframe that this robot does not have.
+  /// After kAsk the candidate counts as requested.
   [[nodiscard]] Verdict judge(const LoopCandidate& candidate);
 
-  /// A closure between own keyframe `from` and a peer's `to` was verified.
+  /// Notes that a closure from an own keyframe to a keyframe of a peer was verified.
   void link(const ClosureId& closure);
 
-  /// The peer's keyframes are others now.
+  /// Discards all about a peer, because its keyframe indices now mean other keyframes.
   void forget(RobotId peer) { peers_.erase(peer); }
 
   /// Notes that a requested keyframe has arrived and whether it has led to closures.
@@ -61,12 +62,12 @@ class RequestEconomy {
   struct Peer {
     std::set<std::pair<KeyframeIndex, KeyframeIndex>> links;  ///< Pairs (keyframe of the peer, own
                                                               ///< keyframe).
-    std::set<std::pair<KeyframeIndex, KeyframeIndex>> tried;
-    int successes = 0;
-    std::array<Kind, 6> kinds;                     ///< Indexed by support; supports of 5 and more
-                                                   ///< share a kind.
-    std::map<KeyframeIndex, std::size_t> kind_of;  ///< Kinds of the requested keyframes.
-    std::optional<KeyframeIndex> in_vain;          ///< The last candidate that was skipped as
+    std::set<std::pair<KeyframeIndex, KeyframeIndex>> tried;  ///< Such pairs that were requested.
+    int successes = 0;          ///< Number of keyframes of the peer that led to closures.
+    std::array<Kind, 6> kinds;  ///< Indexed by support; supports of 5 and more
+                                ///< share a kind.
+    std::map<KeyframeIndex, std::size_t> kind_of;  ///< Index into `kinds` of requested keyframes.
+    std::optional<KeyframeIndex> in_vain;          ///< Query of the last candidate with verdict
                                                    ///< kVain.
   };
 

@@ -17,15 +17,15 @@ namespace {
 constexpr double kRansacConfidence = 0.999;
 constexpr int kRefineIterations = 5;
 
-// Radii of the guided matching [px], one after the other: the pose gets better as they shrink.
+// Radii of the successive guided matchings [px].
 constexpr double kGuidedRadii_px[] = {8.0, 5.6, 3.9};
 constexpr double kGuidedRatio = 0.9;
 
-// Share of the inliers that the pose must do without.
+// Share of the inliers, those that determine the pose most, without which the pose is tested.
 constexpr double kStrongestShare = 0.15;
 
-// Variance of the pose over what independent errors of the points would give: corners of one
-// object move together when seen from elsewhere. Measured on EuRoC V1_01 and MH_01.
+// Ratio of the variance of the pose to that under independent errors of the points. Errors of
+// neighbouring points are correlated. Measured on EuRoC V1_01 and MH_01.
 constexpr double kCommonErrors = 4.0;
 
 std::vector<ImagePair> pairs_of(const std::vector<Match>& matches, const KeyframeFeatures& from,

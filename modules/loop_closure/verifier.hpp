@@ -9,11 +9,11 @@ namespace km {
 /// Result of a verification: accepted, or the first test that failed.
 enum class VerificationStatus {
   kAccepted,
-  kTooFewMatches,  ///< The images do not look alike.
+  kTooFewMatches,  ///< Too few keypoints of the two images have similar descriptors.
   kNoConsensus,    ///< Too few matches agree on any pose.
   kDegenerate,     ///< The matches leave the pose undetermined (few points, on a line).
   kTooFewInliers,  ///< Too few correspondences support the refined pose.
-  kPoorlyHeld,     ///< Without its strongest inliers the pose would be too uncertain.
+  kPoorlyHeld,     ///< The pose is too uncertain without the inliers that determine it most.
 };
 
 /// "accepted", "too few matches", ...
@@ -23,33 +23,32 @@ const char* to_string(VerificationStatus status);
 /// that were not reached are zero.
 struct Verification {
   VerificationStatus status = VerificationStatus::kTooFewMatches;
-  SE3 T_from_to = SE3::Identity();           ///< Relative pose of the bodies; set if accepted, like
-                                             ///< covariance.
+  SE3 T_from_to = SE3::Identity();           ///< Relative pose of the bodies, if accepted.
   Matrix6 covariance = Matrix6::Identity();  ///< Covariance of T_from_to, see
                                              ///< modules/core/covariance.hpp.
-  int matches = 0;                  ///< Pairs of similar descriptors, at least one of them with
-                                    ///< depth.
-  int consensus = 0;                ///< Matches that agree with the best sampled pose.
-  int iterations = 0;               ///< Number of samples drawn.
-  int inliers = 0;                  ///< Correspondences found with the known pose that support it.
-  double position_sigma_m = 0.0;    ///< Without the strongest inliers; all three axes together.
-  double rotation_sigma_rad = 0.0;  ///< Without the strongest inliers; all three axes together.
+  int matches = 0;     ///< Pairs of similar keypoints, at least one with depth.
+  int consensus = 0;   ///< Matches that agree with the best sampled pose.
+  int iterations = 0;  ///< Number of samples drawn.
+  int inliers = 0;     ///< Correspondences that support the refined pose.
+  /// Standard deviations of the pose without the inliers that determine it most: root of the sum of
+  /// the variances of three axes.
+  double position_sigma_m = 0.0;
+  double rotation_sigma_rad = 0.0;
 };
 
 /// Geometric verification of loop closures: computes the relative pose of the bodies of two
 /// keyframes with its covariance, or the reason of the rejection.
 ///
 ///  1. Matches by descriptor alone (match_descriptors()).
-///  2. A pose with which many of them agree (ransac_pose(); Chang et al., "Kimera-Multi", ICRA
-///     2021,
-///     Sec. III-A).
-///  3. Matching again near the predicted places, in narrowing circles, and refinement on the
-///     inliers.
-///     Most correspondences are found in this step, because similar corners elsewhere are excluded.
-///  4. Tests, each against an error that was seen on recorded images.
+///  2. The pose with which most matches agree (ransac_pose(); Chang et al., "Kimera-Multi", ICRA
+///     2021, Sec. III-A).
+///  3. Matches near the projections under this pose, within a decreasing radius, and refinement on
+///     the inliers. Most correspondences are found in this step, because similar corners elsewhere
+///     are excluded.
+///  4. Tests of the number of inliers and of the uncertainty (VerificationStatus).
 ///
-/// The covariance is that of the refinement (both images' noise, scaled up if the residuals are
-/// larger), times a factor for common errors of neighbouring points, plus systematic errors.
+/// The covariance is that of the refinement, scaled up if the residuals exceed the noise, times a
+/// factor for common errors of neighbouring points, plus systematic errors.
 ///
 /// Deterministic: equal features give equal results. verify() is safe to call from several threads.
 class Verifier {

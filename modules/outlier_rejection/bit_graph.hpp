@@ -51,7 +51,8 @@ class BitSet {
       count += static_cast<std::size_t>(std::popcount(words_[w] & other.words_[w]));
     return count;
   }
-  /// True if every element but `i` is in `other`. Precondition: `i` is an element.
+  /// True if every element except for `i` is in `other`. Precondition: `i` is an element of this
+  /// set and not of `other`.
   [[nodiscard]] bool all_but_one_in(std::size_t i, const BitSet& other) const {
     for (std::size_t w = 0; w < words_.size(); ++w) {
       const std::uint64_t itself = w == i / 64 ? std::uint64_t{1} << (i % 64) : 0;
@@ -64,7 +65,7 @@ class BitSet {
       if ((words_[w] & other.words_[w]) != 0) return true;
     return false;
   }
-  /// The common element if there is exactly one; faster than counting them.
+  /// The common element if there is exactly one; faster than count_common().
   [[nodiscard]] std::optional<std::size_t> only_common(const BitSet& other) const {
     std::optional<std::size_t> only;
     for (std::size_t w = 0; w < words_.size(); ++w) {
@@ -87,10 +88,8 @@ class BitGraph {
       : capacity_(vertices), rows_(vertices, BitSet(vertices)), degrees_(vertices, 0) {}
 
   [[nodiscard]] std::size_t size() const { return rows_.size(); }
-  [[nodiscard]] std::size_t capacity() const {
-    return capacity_;
-  }  ///< Capacity of every set of
-     ///< vertices.
+  /// Capacity of every set of vertices.
+  [[nodiscard]] std::size_t capacity() const { return capacity_; }
   [[nodiscard]] const BitSet& neighbours(std::size_t v) const { return rows_[v]; }
   [[nodiscard]] std::size_t degree(std::size_t v) const { return degrees_[v]; }
   [[nodiscard]] bool adjacent(std::size_t u, std::size_t v) const { return rows_[u].contains(v); }
@@ -103,7 +102,7 @@ class BitGraph {
     ++degrees_[v];
   }
 
-  /// Adds one vertex without edges and returns its number. Amortised: the rows double.
+  /// Adds one vertex without edges and returns its number. Doubles the capacity when necessary.
   std::size_t add_vertex() {
     if (size() == capacity_) {
       capacity_ = std::max<std::size_t>(64, 2 * capacity_);

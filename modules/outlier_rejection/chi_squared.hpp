@@ -5,7 +5,7 @@
 namespace km {
 
 /// Probability that the squared Mahalanobis length of a 6-dimensional normal vector is below `x`:
-/// the chi-squared distribution with 6 degrees of freedom, closed for even numbers of them.
+/// the chi-squared distribution with 6 degrees of freedom, in closed form.
 inline double chi_squared_6(double x) {
   const double half = 0.5 * x;
   return 1.0 - std::exp(-half) * (1.0 + half + 0.5 * half * half);

@@ -2,7 +2,7 @@
 
 namespace km {
 
-/// How MaxClique looks for a larger clique after a vertex was added.
+/// Method by which MaxClique searches for a larger clique after a vertex was added.
 enum class CliqueMethod {
   kExact,        ///< Branch and bound among the new vertex's neighbours, up to a limit.
   kIncremental,  ///< Greedy from the new vertex (Chang et al., "Kimera-Multi", ICRA 2021).

@@ -9,8 +9,8 @@ namespace {
 using Vertices = std::vector<std::size_t>;
 
 // Vertices of the k-core of the subgraph that `candidates` induce: each has at least k neighbours
-// among them. In degeneracy order (the vertex of least degree is removed repeatedly), reversed so
-// that the densest part comes first.
+// in the core. The order is the reverse of the degeneracy order, which repeatedly removes the
+// vertex of least degree, so that the densest part comes first.
 Vertices core_in_degeneracy_order(const BitGraph& graph, std::span<const std::size_t> candidates,
                                   std::size_t k) {
   BitSet members(graph.capacity());
@@ -38,8 +38,9 @@ Vertices core_in_degeneracy_order(const BitGraph& graph, std::span<const std::si
   return order;
 }
 
-// True if a greedy colouring in the order of their numbers needs no more colours: the candidates
-// then have no larger clique. Far cheaper than all that follows, and most often enough.
+// True if a greedy colouring of the candidates, in the order of their numbers, needs at most
+// `colours` colours. The candidates then have no larger clique. This test is cheap and most often
+// sufficient.
 bool is_colourable(const BitGraph& graph, std::span<const std::size_t> candidates,
                    std::size_t colours) {
   BitSet uncoloured(graph.capacity());
@@ -63,7 +64,7 @@ BitGraph induced(const BitGraph& graph, const Vertices& vertices) {
   return result;
 }
 
-// Depth-first branch and bound over the whole of one graph.
+// Depth-first branch and bound over all vertices of a graph.
 class BranchAndBound {
  public:
   BranchAndBound(const BitGraph& graph, const CliqueGoal& goal)
@@ -81,14 +82,14 @@ class BranchAndBound {
  private:
   struct Level {
     BitSet candidates, uncoloured, rest;
-    std::vector<BitSet> colours;     // independent sets, [c - 1] for colour c
-    Vertices order;                  // vertices that could lead to a larger clique ...
-    std::vector<std::size_t> bound;  // ... and the colours in use up to each
+    std::vector<BitSet> colours;     // colour classes (independent sets), colour c at index c - 1
+    Vertices order;                  // vertices that could lead to a larger clique
+    std::vector<std::size_t> bound;  // number of colours up to each vertex of `order`
   };
 
   Level& level(std::size_t depth) {
     if (levels_.size() <= depth) levels_.emplace_back();
-    return levels_[depth];  // a deque: references to other levels stay valid
+    return levels_[depth];
   }
 
   void expand(std::size_t depth) {
@@ -107,7 +108,8 @@ class BranchAndBound {
     clique_.resize(size);
   }
 
-  // Candidates adjacent to all others are in a largest clique of them: no need to try without.
+  // Moves candidates that are adjacent to all other candidates to the clique, because a largest
+  // clique contains them.
   void take_universal(Level& here) {
     for (auto v = here.candidates.next(0); v; v = here.candidates.next(*v + 1)) {
       if (!here.candidates.all_but_one_in(*v, graph_.neighbours(*v))) continue;
@@ -166,8 +168,8 @@ class BranchAndBound {
     }
   }
 
-  // Tries to give v one of the first `spare` colours by recolouring the only conflicting vertex of
-  // that colour with another of them.
+  // Tries to give v one of the first `spare` colours. The only conflicting vertex of this colour
+  // then gets another of the first `spare` colours.
   bool recolour(Level& here, std::size_t v, std::size_t spare) {
     for (std::size_t c = 0; c + 1 < spare; ++c) {
       BitSet& colour = here.colours[c];
@@ -187,9 +189,9 @@ class BranchAndBound {
   const BitGraph& graph_;
   const CliqueGoal goal_;
   std::size_t best_size_;
-  std::size_t root_bound_;  // bound of the cliques with any vertex not yet done at the root
+  std::size_t root_bound_;  // bound on cliques with a vertex that the root has not finished
   Vertices clique_;
-  std::deque<Level> levels_;
+  std::deque<Level> levels_;  // no vector, so that references to levels stay valid
   CliqueSearch result_;
   bool done_ = false;
 };

@@ -11,18 +11,18 @@ namespace km {
 
 /// Goal and limit of a clique search.
 struct CliqueGoal {
-  std::size_t more_than = 0;    ///< Smaller cliques, and those of this size, are of no interest.
-  std::size_t enough = 0;       ///< Stop at the first clique of this size.
-  std::uint64_t max_nodes = 0;  ///< Maximum size of the search tree; a count, so that the result is
-                                ///< repeatable.
+  std::size_t more_than = 0;    ///< Size that a clique must exceed.
+  std::size_t enough = 0;       ///< Size of a clique that ends the search.
+  std::uint64_t max_nodes = 0;  ///< Maximum number of nodes of the search tree.
 };
 
 struct [[nodiscard]] CliqueSearch {
-  std::vector<std::size_t> clique;  ///< Ascending; empty if none larger than asked for was found.
-  bool proven = true;               ///< False if the limit ended the search before its goal.
-  std::size_t bound = 0;            ///< No clique of the candidates is larger, unless the search
-                                    ///< stopped at one that was large enough.
-  std::uint64_t nodes = 0;          ///< Nodes of the search tree visited.
+  std::vector<std::size_t>
+      clique;               ///< Ascending; empty if no clique larger than more_than is found.
+  bool proven = true;       ///< False if the limit ended the search before its goal.
+  std::size_t bound = 0;    ///< Upper bound on the size of a clique of the candidates,
+                            ///< except after a search that ended at `enough`.
+  std::uint64_t nodes = 0;  ///< Number of visited nodes of the search tree.
 };
 
 /// Searches the largest clique of `graph` among the vertices `candidates`.
@@ -33,24 +33,25 @@ struct [[nodiscard]] CliqueSearch {
 /// vertices are searched depth-first on bit sets in degeneracy order. Greedy colouring with
 /// recolouring bounds the search (San Segundo et al., "An improved bit parallel exact maximum
 /// clique algorithm", Optim. Lett. 2013). Vertices adjacent to all other candidates are taken
-/// without branching. Exact unless the limit ends it; deterministic. Exponential at worst.
+/// without branching. Exact unless the limit ends the search; deterministic. Exponential at worst.
 CliqueSearch find_clique(const BitGraph& graph, std::span<const std::size_t> candidates,
                          const CliqueGoal& goal);
 
 // The heuristic of Pattabiraman et al., "Fast Algorithms for the Maximum Clique Problem on Massive
-// Graphs with Applications to Overlapping Community Detection", Internet Mathematics 2015:
-// repeatedly take the vertex of greatest degree among those adjacent to all taken so far, without
-// backtracking. Vertices whose degree is too small for a clique larger than the known one are
-// excluded. Equal degrees: the vertex with the lowest number. No guarantee; O(vertices^2 / 64) per
-// start.
+// Graphs with Applications to Overlapping Community Detection", Internet Mathematics 2015. The
+// heuristic repeatedly adds the vertex of greatest degree among those adjacent to the whole clique,
+// without backtracking; of equal degrees, the vertex with the lowest number. Vertices whose degree
+// is too small for a clique of more than `more_than` vertices are excluded. The result need not be
+// a maximum. O(vertices^2 / 64) per start.
 
-/// The clique that this makes of `clique`, which it contains; ascending. Empty unless it has more
-/// than `more_than` vertices. Precondition: `clique` is one and not empty.
+/// Extends `clique` by this heuristic; ascending. Empty unless the result has more than `more_than`
+/// vertices. Precondition: `clique` is a clique with at least one vertex.
 [[nodiscard]] std::vector<std::size_t> greedy_extension(const BitGraph& graph,
                                                         std::vector<std::size_t> clique,
                                                         std::size_t more_than);
 
-/// The largest that it makes of any single vertex; of equally large ones that from the lowest.
+/// The largest result of this heuristic from any single vertex; of equally large ones, the result
+/// from the lowest vertex.
 [[nodiscard]] std::vector<std::size_t> greedy_clique(const BitGraph& graph);
 
 }  // namespace km

@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-// Added to variances so that exact cycles can be weighed: 1e-6 rad and 1e-6 m.
+// Added to the variances of a cycle, so that they are positive: (1e-6 rad)^2 and (1e-6 m)^2.
 constexpr double kLeastVariance = 1e-12;
 
 UncertainPose uncertain(const OdometryPose& pose) {
@@ -70,8 +70,8 @@ OrientedClosure CycleTest::orient(const Closure& closure) const {
 }
 
 bool CycleTest::consistent(const PreparedClosure& i, const PreparedClosure& k) const {
-  // First-order covariances depend a little on the start of the cycle, so it always starts at the
-  // same closure.
+  // First-order covariances depend slightly on the start of the cycle. A fixed start makes the
+  // result symmetric.
   const PairCycle cycle = before(i, k) ? PairCycle(i, k) : PairCycle(k, i);
   if (config_.criterion == CycleCriterion::kMahalanobis)
     return cycle.within_distance(max_distance_squared_);

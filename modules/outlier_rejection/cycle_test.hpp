@@ -12,10 +12,10 @@
 
 namespace km {
 
-/// A chain of transforms that returns to where it began.
+/// A chain of transforms that ends at its start.
 struct Cycle {
-  UncertainPose T;              ///< Its product: the identity if nothing had an error.
-  std::int64_t transforms = 0;  ///< Odometry steps and closures in it.
+  UncertainPose T;              ///< Product of the transforms: the identity without errors.
+  std::int64_t transforms = 0;  ///< Number of odometry steps and closures.
 };
 
 /// Tests closures between two robots, or inside one, for pairwise consistency: the cycle
@@ -24,25 +24,26 @@ struct Cycle {
 /// identity up to noise (Mangelson et al., "Pairwise Consistent Measurement Set Maximization for
 /// Robust Multi-Robot Map Merging", ICRA 2018). The Mahalanobis form composes the covariances of
 /// both closures and of both stretches of odometry along the cycle, as LAMP does (Ebadi et al.,
-/// ICRA 2020, Sec. II-E). The four are taken as independent, which inside one robot they are not
-/// where the stretches overlap.
+/// ICRA 2020, Sec. II-E). The four are assumed to be independent. Inside one robot they are not if
+/// the stretches overlap.
 class CycleTest {
  public:
   /// Throws ConfigError if `config` is out of bounds.
   explicit CycleTest(const PcmConfig& config);
 
-  /// The closure as the functions below take it. Precondition: its two ends differ.
+  /// The closure with a.id < b.id and scaled covariances. Precondition: its two ends differ.
   [[nodiscard]] OrientedClosure orient(const Closure& closure) const;
 
-  /// Symmetric: it does not depend on which closure is named first. Precondition: both are between
-  /// the same robots.
+  /// True if the cycle through both closures is consistent. Symmetric in i and k. Precondition:
+  /// both are between the same robots.
   [[nodiscard]] bool consistent(const PreparedClosure& i, const PreparedClosure& k) const;
 
-  /// Numbers of the `others` that are consistent with `closure`, ascending.
+  /// Indices of the `others` that are consistent with `closure`, ascending.
   [[nodiscard]] std::vector<std::size_t> consistent_with(
       const PreparedClosure& closure, std::span<const PreparedClosure> others) const;
 
-  /// True if the closure, inside one robot, agrees with the odometry between its ends.
+  /// True if the closure agrees with the odometry between its ends. Precondition: both ends are of
+  /// one robot.
   [[nodiscard]] bool agrees_with_odometry(const OrientedClosure& closure) const;
 
  private:
@@ -53,8 +54,8 @@ class CycleTest {
   double max_distance_squared_;
 };
 
-/// The cycle through two closures between the same robots, from ai and back to it, composed link by
-/// link: the definition of what PairCycle computes.
+/// The cycle through two closures between the same robots, from a_i to a_i, composed transform by
+/// transform. PairCycle computes the same test faster.
 [[nodiscard]] Cycle cycle_through(const OrientedClosure& i, const OrientedClosure& k);
 
 /// The cycle of one closure inside a robot and the odometry between its ends.

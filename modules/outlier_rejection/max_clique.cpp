@@ -19,7 +19,7 @@ void check_neighbours(std::span<const std::size_t> neighbours, std::size_t size)
   }
 }
 
-// A wrong set would weld wrong places together: one look at every pair costs little.
+// Throws std::logic_error if `clique` is no clique, because a wrong set would join wrong places.
 void verify(const BitGraph& graph, std::span<const std::size_t> clique) {
   BitSet members(graph.capacity());
   for (const std::size_t v : clique) members.insert(v);

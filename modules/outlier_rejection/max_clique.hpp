@@ -13,15 +13,15 @@ namespace km {
 /// Maximum clique of a graph that grows by one vertex at a time.
 ///
 /// A clique larger than the known one must contain the new vertex (Chang et al., "Kimera-Multi",
-/// ICRA 2021, Sec. III-B). So only its neighbours are searched, and only for cliques larger than
-/// the known one. One vertex increases the maximum by at most one, so the search stops when a
-/// proven maximum has grown by one. The older of equally large cliques is kept. Deterministic. Not
-/// thread-safe. Copyable.
+/// ICRA 2021, Sec. III-B). The search is therefore limited to the neighbours of the new vertex, and
+/// to cliques larger than the known one. One vertex increases the maximum by at most one, so the
+/// search stops when a proven maximum has grown by one. The older of equally large cliques is kept.
+/// Deterministic. Not thread-safe. Copyable.
 ///
 /// The exact method first runs the greedy heuristic, which is cheap: from the new vertex with its
-/// neighbours in the known clique, and from the vertex alone. The search tree then finds more, or
-/// proves that there is none. If its limit ends it, the better result counts, and bound() states
-/// how much may be missing.
+/// neighbours in the known clique, and from the vertex alone. The search tree then finds a larger
+/// clique or proves that there is none. If max_search_nodes ends the search, the larger of both
+/// cliques counts, and bound() is an upper bound on the maximum.
 class MaxClique {
  public:
   /// `max_search_nodes` bounds the search tree of one add() of the exact method.
@@ -29,8 +29,8 @@ class MaxClique {
       : max_search_nodes_(max_search_nodes), method_(method) {}
 
   /// Adds vertex number size(), with edges to the `neighbours`, distinct and below size().
-  /// Returns true if the clique grew. Throws std::invalid_argument for other neighbours; state is
-  /// unchanged then. The batch method, too, keeps a clique that it would not find again.
+  /// Returns true if the clique grew. Throws std::invalid_argument for other neighbours; the state
+  /// is then unchanged. With every method the clique never shrinks.
   bool add(std::span<const std::size_t> neighbours);
 
   [[nodiscard]] std::size_t size() const { return graph_.size(); }
@@ -41,16 +41,18 @@ class MaxClique {
   /// No clique of the graph is larger than this. Heuristic methods compute it from degrees alone.
   [[nodiscard]] std::size_t bound() const { return bound_; }
 
-  /// True if clique() is a maximum for certain. False after a search that its limit ended, until a
+  /// True if clique() is a proven maximum. False after max_search_nodes has ended a search, until a
   /// clique as large as the bound is found.
   [[nodiscard]] bool proven() const { return clique_.size() == bound_; }
 
-  /// Nodes of all search trees so far, and the additions whose tree the limit ended.
+  /// Number of nodes of all search trees so far.
   [[nodiscard]] std::uint64_t search_nodes() const { return search_nodes_; }
+  /// Number of searches that max_search_nodes has ended.
   [[nodiscard]] std::size_t searches_ended() const { return searches_ended_; }
 
  private:
-  // With vertex v added, whose cliques have at most `most` vertices.
+  // Searches for a larger clique with the new vertex v. `most`: upper bound on the size of such a
+  // clique.
   void search_exactly(std::size_t v, std::span<const std::size_t> neighbours, std::size_t most);
   void search_tree(std::size_t v, std::span<const std::size_t> neighbours, std::size_t most);
   void adopt(std::vector<std::size_t> clique);

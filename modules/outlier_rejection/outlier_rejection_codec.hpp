@@ -11,10 +11,10 @@
 
 namespace km {
 
-/// A message that claims more closures for one robot pair is refused.
+/// Largest number of closures in a message; a message that claims more is refused.
 inline constexpr std::size_t kMaxInliers = 1U << 16U;
 
-/// Only the decider `a` may write a set, and only of closures between `a` and `b`, ascending.
+/// Only robot `a` may write the set of a pair. The closures are between `a` and `b` and ascend.
 template <>
 struct Codec<InlierSet> {
   using Wire = km_wire_InlierSet;

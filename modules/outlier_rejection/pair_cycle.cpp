@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Added to a closure's variances so that exact cycles can be weighed: 1e-6 rad and 1e-6 m.
+// Added to the variances of a closure, so that they are positive: (1e-6 rad)^2 and (1e-6 m)^2.
 constexpr double kLeastClosureVariance = 1e-12;
 
 // Covariance that odometry accumulates between two keyframes of a chain, in any common frame.
@@ -43,7 +43,7 @@ bool PairCycle::within_distance(double max_distance_squared) const {
   const BlockCovariance along_a = added(i_.a, i_.odometry_a, k_.a, k_.odometry_a);
   const BlockCovariance along_b = added(i_.b, i_.odometry_b, k_.b, k_.odometry_b);
 
-  // The rotation alone is no further from the identity than the whole, and rejects most outliers.
+  // The distance of the rotation alone is at most that of the cycle, and rejects most outliers.
   const Eigen::Vector3d phi = so3_log(R);
   const Eigen::Matrix3d rr = R.transpose() * i_.measured.rr * R +
                              R_k * along_b.rr * R_k.transpose() + k_.measured.rr + along_a.rr;
@@ -57,7 +57,7 @@ bool PairCycle::within_distance(double max_distance_squared) const {
   Sigma += k_.measured;
   Sigma += along_a;
   const Eigen::Vector3d rho = so3_right_jacobian_inverse(-phi) * T_.translation();
-  // Cholesky factorisation of the whole, by blocks.
+  // Cholesky factorisation of Sigma by blocks.
   const Eigen::Matrix3d W = L_rr.matrixL().solve(Sigma.rt);
   const Eigen::LLT<Eigen::Matrix3d> L_tt(Sigma.tt - W.transpose() * W);
   if (L_tt.info() != Eigen::Success) return false;

@@ -9,8 +9,8 @@
 
 namespace km {
 
-/// A symmetric 6x6 matrix, tangent [rotation; translation], as its three independent blocks: [rr
-/// rt; rt^T tt]. Transforming it into another frame costs a third of the same operation with
+/// A symmetric 6x6 matrix, tangent [rotation; translation], as its three independent blocks:
+/// [rr rt; rt^T tt]. A transform into another frame takes a third of the time that it takes with
 /// Matrix6.
 struct BlockCovariance {
   Eigen::Matrix3d rr = Eigen::Matrix3d::Zero();
@@ -18,7 +18,7 @@ struct BlockCovariance {
   Eigen::Matrix3d tt = Eigen::Matrix3d::Zero();
 
   BlockCovariance() = default;
-  /// Assumes that the lower left block of `Sigma` is the transpose of the upper right one.
+  /// Precondition: `Sigma` is symmetric.
   explicit BlockCovariance(const Matrix6& Sigma)
       : rr(Sigma.topLeftCorner<3, 3>()),
         rt(Sigma.topRightCorner<3, 3>()),
@@ -58,8 +58,8 @@ struct BlockCovariance {
   return moved;
 }
 
-/// A closure oriented so that a.id < b.id, because the direction of its measurement does not matter
-/// to a cycle. Covariances are multiplied by the noise scales of the test.
+/// A closure with a.id < b.id, inverted if necessary, because a cycle does not depend on the
+/// direction. Covariances are multiplied by the squared noise scales of the test.
 struct OrientedClosure {
   ClosureId id;
   OdometryPose a;
@@ -69,35 +69,35 @@ struct OrientedClosure {
 
 /// Quantities of a closure that all cycles through it use, computed once.
 ///
-/// Expressed in odom_a, where robot a began, covariances do not depend on the rest of the cycle.
-/// The covariance of the closure is one matrix. The covariance of the odometry between two
-/// keyframes is the difference of the covariances accumulated at each.
+/// Expressed in odom_a, the frame in which robot a's odometry began, covariances do not depend on
+/// the rest of the cycle. The covariance of the odometry between two keyframes is the difference of
+/// the covariances accumulated at each.
 struct PreparedClosure {
   explicit PreparedClosure(const OrientedClosure& closure);
 
   ClosureId id;
   KeyframeId a, b;
   Eigen::Vector3d t_odoma_a;
-  SE3 T_odoma_odomb;           ///< Start of b's odometry according to this closure.
+  SE3 T_odoma_odomb;           ///< Transform between the odometry frames, by this closure.
   BlockCovariance odometry_a;  ///< Covariance accumulated at a, expressed in odom_a.
   BlockCovariance odometry_b;  ///< Covariance accumulated at b, expressed in odom_b.
   BlockCovariance measured;    ///< Covariance of the closure, at b, expressed in odom_a.
 };
 
-/// The cycle through two closures between the same robots. From ai it follows closure i, the
-/// odometry of b, closure k reversed and the odometry of a. It is expressed in odom_a, where it
-/// begins and ends.
+/// The cycle through two closures between the same robots: from keyframe a_i along closure i, the
+/// odometry of b, closure k reversed and the odometry of a. The cycle is expressed in odom_a.
 class PairCycle {
  public:
-  /// Borrows both.
+  /// Both closures must outlive this.
   PairCycle(const PreparedClosure& i, const PreparedClosure& k);
 
-  /// True if the squared Mahalanobis distance of the identity from the cycle is at most the given.
+  /// True if the squared Mahalanobis distance between the cycle and the identity is at most
+  /// `max_distance_squared`.
   [[nodiscard]] bool within_distance(double max_distance_squared) const;
 
-  [[nodiscard]] double translation_m() const;  ///< Length of the cycle's, as ai sees it.
+  [[nodiscard]] double translation_m() const;  ///< Distance by which the cycle moves keyframe a_i.
   [[nodiscard]] double rotation_rad() const;
-  [[nodiscard]] std::int64_t transforms() const;  ///< Odometry steps and closures.
+  [[nodiscard]] std::int64_t transforms() const;  ///< Number of odometry steps and closures.
 
  private:
   [[nodiscard]] BlockCovariance covariance() const;

@@ -7,16 +7,16 @@
 
 namespace km {
 
-/// How a cycle of two closures and the odometry between them is judged.
+/// Test of a cycle of two closures and the odometry between them.
 enum class CycleCriterion {
   kMahalanobis,  ///< Mahalanobis distance of the cycle from the identity, with the covariance along
                  ///< the cycle.
   kBounds,       ///< Fixed bounds on translation and rotation of the cycle.
 };
 
-/// Which closures of a robot pair are handed to the optimiser.
+/// Closures of a robot pair that the optimiser receives.
 enum class ClosureSelection {
-  kWitness,  ///< All, once independent ones agree or the wait for them is over (WitnessedPair).
+  kWitness,  ///< All, once witnesses agree or the wait for witnesses is over (WitnessedPair).
   kPcm,      ///< The largest set that agrees pairwise (Pcm).
 };
 
@@ -46,8 +46,8 @@ struct PcmConfig {
                   "witness: all closures of a pair that is joined, because the optimiser weighs "
                   "them; pcm: the largest set that agrees pairwise");
     visitor.field("min_witnesses", min_witnesses, {1, 1000},
-                  "witness: number of closures that agree pairwise, share no neighbourhood and so "
-                  "join robots");
+                  "witness: number of closures that join two robots; they must agree pairwise and "
+                  "share no neighbourhood");
     visitor.field("witness_wait_s", witness_wait_s, {0.0, 1e6},
                   "[s of keyframe stamps since the first closure] witness: time after which a pair "
                   "is joined without witnesses, tentatively");
@@ -56,24 +56,24 @@ struct PcmConfig {
         {{"mahalanobis", CycleCriterion::kMahalanobis}, {"bounds", CycleCriterion::kBounds}},
         "test of a cycle. mahalanobis: by covariance; bounds: fixed bounds");
     visitor.field("confidence", confidence, {0.01, 1.0 - 1e-12},
-                  "mahalanobis: quantile of chi-squared with 6 degrees of freedom (0.99: 16.8) for "
-                  "the squared distance");
+                  "mahalanobis: probability whose chi-squared quantile with 6 degrees of freedom "
+                  "bounds the squared distance (0.99: 16.8)");
     visitor.field("odometry_noise_scale", odometry_noise_scale, {0.01, 1000.0},
-                  "mahalanobis: factor on odometry's standard deviations; larger if they are known "
-                  "to be too small");
+                  "mahalanobis: factor on the standard deviations of odometry");
     visitor.field("closure_noise_scale", closure_noise_scale, {0.01, 1000.0},
-                  "mahalanobis: factor on closures' standard deviations");
+                  "mahalanobis: factor on the standard deviations of closures");
     visitor.field("max_cycle_translation_m", max_cycle_translation_m, {1e-6, 1000.0},
                   "[m] bounds: largest translation error of a consistent cycle");
     visitor.field("max_cycle_rotation_rad", max_cycle_rotation_rad, {1e-6, std::numbers::pi},
                   "[rad] bounds: largest rotation error of a consistent cycle");
     visitor.field("bounds_per_transform", bounds_per_transform,
                   "bounds: multiply the bounds by the number of transforms in the cycle");
-    visitor.field("odometry_gate", odometry_gate,
-                  "closures inside one robot must agree with its odometry alone; wrong if odometry "
-                  "jumps, because such a closure is the correction");
+    visitor.field(
+        "odometry_gate", odometry_gate,
+        "closures inside one robot must agree with its odometry; not suitable if odometry "
+        "jumps, because closures then correct the jump");
     visitor.field("min_inliers", min_inliers, {1, 1000},
-                  "pcm: smaller sets are not trusted and not published");
+                  "pcm: least number of closures in a published set");
     visitor.field(
         "search", search,
         {{"exact", CliqueMethod::kExact},
@@ -84,7 +84,7 @@ struct PcmConfig {
                   "exact: bound on the search after one closure; beyond it the better result of "
                   "search and heuristic is kept");
     visitor.field("publish_period_s", publish_period_s, {0.01, 60.0},
-                  "[s] changed sets are published together this often");
+                  "[s] period at which changed sets are published");
   }
 };
 

@@ -40,7 +40,7 @@ void PcmNode::start() {
 }
 
 void PcmNode::stop() noexcept {
-  worker_.stop();  // refuses further ticks, so that none waits for room
+  worker_.stop();  // first, so that no tick waits for room in the queue
   ticks_.stop();
   if (worker_.error() == nullptr) publish_changes();
 }

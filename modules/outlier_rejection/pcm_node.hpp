@@ -24,26 +24,26 @@ namespace km {
 
 /// Channels of the PCM node; they must outlive it.
 struct PcmTopics {
-  In<Closure> closures;            ///< Own and received ones, in any order, repeated or not.
+  In<Closure> closures;            ///< Own and received closures, in any order, maybe repeated.
   In<KeyframeOdometry> keyframes;  ///< Keyframes of this robot; clock of witness_wait_s.
   In<PeerEvent> restarts;          ///< kRestarted, before the first closure of the new incarnation.
-  Out<InlierSet> inlier_sets;      ///< Versions ascending per pair.
+  Out<InlierSet> inlier_sets;      ///< Sets with ascending versions for each pair.
 };
 
 /// Decides which closures are optimised, for every pair in which this robot has the lower id and
-/// for the closures inside it. Closures of other pairs are left to their deciders; unusable ones
-/// are refused with a warning.
+/// for the closures inside this robot. Closures of other pairs are ignored. Unusable closures are
+/// refused with a warning.
 ///
 /// PcmConfig::selection states the rule. By default all closures are optimised, because the
 /// optimiser weighs them. Two robots are joined only when independent closures agree
 /// (WitnessedPair), when PcmConfig::witness_wait_s is over, or when no witness can arrive any more.
-/// The latter two are logged. The wait is in sensor time, by the stamps of the robot's keyframes,
-/// so results do not depend on the speed of a replay. Closures inside the robot join nothing and
-/// are published at once.
+/// A join without witnesses is logged. The wait is in sensor time, by the stamps of the robot's
+/// keyframes, so results do not depend on the speed of a replay. Closures inside the robot join
+/// nothing and are published at once.
 class PcmNode final : public Node {
  public:
-  /// The versions of its sets follow `first_version`: those of a robot that is resumed must be
-  /// newer than before. Throws ConfigError if `config` is out of bounds.
+  /// The versions of the published sets follow `first_version`, because a resumed robot must
+  /// publish newer versions than before. Throws ConfigError if `config` is out of bounds.
   PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
           std::uint32_t first_version = 0);
   ~PcmNode() override { stop(); }
@@ -56,12 +56,14 @@ class PcmNode final : public Node {
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handles one message synchronously. The thread calls only these and publish_changes().
+  /// Handle one message synchronously. The thread calls only these functions and
+  /// publish_changes().
   void step(const Closure& closure);
   void step(const KeyframeOdometry& keyframe);
   void step(const PeerEvent& event);
 
-  /// Publishes the sets that have changed since the last call, and those whose wait is over.
+  /// Publishes the sets that have changed since the last call, and those of pairs whose wait is
+  /// over.
   void publish_changes();
 
   /// Notes that the runs of all robots are over and all their closures have arrived. No pair waits
@@ -73,10 +75,10 @@ class PcmNode final : public Node {
   using Input = std::variant<Tick, Topic<Closure>::Message, Topic<KeyframeOdometry>::Message,
                              Topic<PeerEvent>::Message>;
 
-  // Closures between this robot and another one, or inside this one.
+  // Closures between this robot and another robot, or inside this robot.
   struct Pair {
     std::variant<WitnessedPair, Pcm> closures;
-    std::optional<Stamp> since = {};  // newest keyframe when its first closure came
+    std::optional<Stamp> since = {};  // stamp of the newest keyframe when the first closure came
     bool changed = false;
     bool waited = false;
   };
@@ -91,10 +93,9 @@ class PcmNode final : public Node {
   const RobotId self_;
   const std::uint32_t first_version_;
   const Out<InlierSet> inlier_sets_;
-  std::map<RobotId, Pair> pairs_;  // pairs by the other robot; `self_` for closures inside this
-                                   // robot
+  std::map<RobotId, Pair> pairs_;  // by the other robot; `self_`: closures inside this robot
   std::map<RobotId, std::uint32_t> version_of_;
-  std::optional<Stamp> newest_;  // keyframe of this robot
+  std::optional<Stamp> newest_;  // stamp of this robot's newest keyframe
   std::atomic<bool> no_more_ = false;
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to

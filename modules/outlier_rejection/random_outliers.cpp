@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-// Two keyframes, the earlier one first, that odometry does not join.
+// Two keyframes that are not consecutive, the earlier one first.
 std::pair<std::uint32_t, std::uint32_t> random_pair(std::size_t keyframes, std::mt19937& rng) {
   std::uniform_int_distribution<std::size_t> keyframe(0, keyframes - 1);
   for (;;) {

@@ -44,7 +44,7 @@ void WitnessedPair::test(const OrientedClosure& closure) {
     if (!share_neighbourhood(added.id, tested_[k].id) && test_.consistent(added, tested_[k]))
       agreeing.push_back(k);
   tested_.push_back(std::move(added));
-  (void)clique_.add(agreeing);  // only witnesses() needs the result
+  (void)clique_.add(agreeing);  // witnesses() contains the result
   if (!is_witnessed()) return;
   tested_.clear();
   tested_.shrink_to_fit();

@@ -8,30 +8,29 @@
 
 namespace km {
 
-/// The closures of one robot pair, and whether independent ones confirm each other.
+/// The closures of one robot pair, with a test whether independent closures confirm each other.
 ///
-/// Places that look alike yield several false closures that agree with each other. So closures
-/// whose ends on both robots lie within kNeighbourhood keyframes of each other count as one
-/// witness. Witnesses are the closures of a largest set that agree pairwise (CycleTest) and of
-/// which no two share a neighbourhood. Not thread-safe. Copyable.
+/// Places that look alike yield several false closures that agree with each other. Closures whose
+/// ends on both robots lie within kNeighbourhood keyframes of each other therefore count as one
+/// witness. The witnesses are a largest set of closures that agree pairwise (CycleTest) and do not
+/// share a neighbourhood. Not thread-safe. Copyable.
 class WitnessedPair {
  public:
-  /// In keyframes.
-  static constexpr KeyframeIndex kNeighbourhood = 3;
+  static constexpr KeyframeIndex kNeighbourhood = 3;  ///< [keyframes]
 
-  /// For the closures between robots `a` and `b`; equal: those inside one robot.
-  /// Throws ConfigError if `config` is out of bounds.
+  /// For the closures between robots `a` and `b`, or inside one robot (a == b). Throws ConfigError
+  /// if `config` is out of bounds.
   WitnessedPair(RobotId a, RobotId b, const PcmConfig& config);
 
-  /// Adds one closure. kAdded: it is one of closures() now; kGrew: and there are more witnesses. At
-  /// most Pcm::kMaxClosures are taken. Once there are PcmConfig::min_witnesses nothing is tested
-  /// any more. Throws std::invalid_argument if the closure is not between the two robots or not
-  /// is_usable(); state is unchanged then.
+  /// Adds one closure. closures() contains it after kAdded and kGrew; after kGrew there are more
+  /// witnesses. At most Pcm::kMaxClosures are accepted. Once there are PcmConfig::min_witnesses, no
+  /// cycle is tested any more. Throws std::invalid_argument if the closure is not between the two
+  /// robots or not is_usable(); the state is then unchanged.
   [[nodiscard]] PcmVerdict add(const Closure& closure);
 
-  /// All that were added, ascending.
+  /// All added closures, ascending.
   [[nodiscard]] std::vector<ClosureId> closures() const { return {added_.begin(), added_.end()}; }
-  /// Number of independent closures that agree: a lower bound, at most PcmConfig::min_witnesses.
+  /// Number of witnesses found, at most PcmConfig::min_witnesses.
   [[nodiscard]] std::size_t witnesses() const { return clique_.clique().size(); }
   /// True if there are PcmConfig::min_witnesses.
   [[nodiscard]] bool is_witnessed() const;
@@ -42,10 +41,10 @@ class WitnessedPair {
   RobotId a_, b_;
   PcmConfig config_;
   CycleTest test_;
-  std::set<ClosureId> known_;  // the refused ones too
+  std::set<ClosureId> known_;  // added closures, and those refused by the odometry gate
   std::set<ClosureId> added_;
   std::vector<PreparedClosure> tested_;
-  MaxClique clique_;  // clique of `tested_`; closures that share a neighbourhood are not connected
+  MaxClique clique_;  // over `tested_`; closures that share a neighbourhood are not connected
 };
 
 /// True if both ends of `x` are within WitnessedPair::kNeighbourhood keyframes of those of `y`.

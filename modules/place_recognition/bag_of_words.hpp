@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// How often one visual word occurs in an image.
+/// A visual word and its number of occurrences in an image.
 struct WordCount {
   std::uint32_t word = 0;
   std::uint32_t count = 0;
@@ -16,16 +16,15 @@ struct WordCount {
   bool operator==(const WordCount&) const = default;
 };
 
-/// The visual words of one image: words strictly ascending, counts positive. Together with the
-/// vocabulary it determines the weighted vector exactly, at a fraction of its size: this is what
-/// robots send each other.
+/// The visual words of one image: words strictly ascending, counts positive. With the vocabulary,
+/// the bag determines the weighted vector exactly, at a fraction of the vector's size.
 using BagOfWords = std::vector<WordCount>;
 
 /// The words of one keyframe, as robots send them to each other.
 struct KeyframeBow {
   KeyframeId id;
   Stamp stamp = 0;
-  std::uint64_t vocabulary = 0;  ///< Vocabulary::id(): words of another one cannot be compared.
+  std::uint64_t vocabulary = 0;  ///< Vocabulary::id() of the words.
   BagOfWords words;
 };
 

@@ -47,7 +47,7 @@ std::vector<float> BowDatabase::accumulate(const BowVector& vector, std::size_t 
   };
   for (std::size_t i = 0; i < vector.words.size(); ++i) {
     const std::vector<Posting>& postings = postings_[vector.words[i]];
-    // The next word's postings arrive while this one's are added.
+    // The postings of the next word are loaded while those of this word are added.
     if (i + 1 < vector.words.size()) __builtin_prefetch(postings_[vector.words[i + 1]].data());
     const float weight = vector.weights[i];
     auto posting = postings.begin();

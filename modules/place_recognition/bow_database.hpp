@@ -21,31 +21,31 @@ struct BowMatch {
 struct BowQuery {
   std::size_t first = 0;  ///< Only images first, ..., last - 1 are compared.
   std::size_t last = std::numeric_limits<std::size_t>::max();
-  double min_score = 0.0;  ///< Images below are counted, not listed.
+  double min_score = 0.0;  ///< Least score of an image in BowMatches::best.
   std::size_t max_matches = std::numeric_limits<std::size_t>::max();
 };
 
 /// Result of a query.
 struct BowMatches {
   std::vector<BowMatch> best;  ///< By descending score, then ascending index.
-  std::size_t compared = 0;    ///< Images that share a word with the query.
+  std::size_t compared = 0;    ///< Number of images that share a word with the query.
   std::size_t above = 0;       ///< Number of compared images with at least min_score.
   float best_score = 0.0F;     ///< Best score of all compared images.
 };
 
 /// Inverted index of images by their words, for finding the most similar images.
 ///
-/// score(), see bag_of_words.hpp, needs only the words two images share: a query walks the postings
-/// of its own words and adds up min(v_i, w_i) per image. Time is that of the postings touched, and
-/// does not depend on thresholds. Const members are thread-safe.
+/// score(), see bag_of_words.hpp, needs only the words that two images share. A query sums
+/// min(v_i, w_i) per image over the postings of its words. The time is linear in the number of
+/// these postings and does not depend on thresholds. Const members are thread-safe.
 class BowDatabase {
  public:
   /// For vectors of a vocabulary of `words` words.
   explicit BowDatabase(std::size_t words) : postings_(words) {}
 
-  /// Adds an image. Returns its index, counted from 0. Throws std::invalid_argument if words are
-  /// not ascending or not of the vocabulary, or if weights are not positive, finite and as many;
-  /// state is unchanged then.
+  /// Adds an image and returns its index, counted from 0. Throws std::invalid_argument if words are
+  /// not ascending or not in the vocabulary, if weights are not positive and finite, or if the
+  /// numbers of words and weights differ. The state is then unchanged.
   std::size_t add(const BowVector& vector);
 
   /// Precondition: `vector` would be accepted by add().

@@ -25,7 +25,7 @@ struct alignas(32) Bits256 {
   return distance;
 }
 
-/// The descriptor of `candidates` nearest to a query; of equally near ones the first.
+/// The candidate descriptor nearest to a query; the first of equally near candidates.
 struct NearestBits {
   std::uint32_t index = 0;
   std::uint32_t distance = 0;
@@ -43,7 +43,7 @@ struct NearestBits {
   return {best & 0xFFFFU, best >> 16U};
 }
 
-/// For each query its nearest candidate. Chooses the instructions of this processor at run time.
+/// The nearest candidate of each query. Chooses the instructions of this processor at run time.
 /// Precondition: 0 < candidates.size() < 65536.
 [[nodiscard]] std::vector<NearestBits> nearest_of_each(std::span<const Bits256> queries,
                                                        std::span<const Bits256> candidates);

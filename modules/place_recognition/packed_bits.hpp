@@ -10,10 +10,10 @@
 
 namespace km {
 
-/// Numbers in few bits: the last byte is filled up with zeros.
+/// Writes numbers in few bits. Zeros fill up the last byte.
 class BitWriter {
  public:
-  /// The lowest `count` bits of `number`, the highest first. At most 63.
+  /// Writes the lowest `count` bits of `number`, the highest first. `count` is at most 63.
   void bits(std::uint64_t number, unsigned count) {
     while (count-- > 0) {
       if (free_ == 0) {
@@ -25,15 +25,15 @@ class BitWriter {
     }
   }
 
-  /// Elias gamma code of a number from 1 to 2^32: one bit for 1, three for 2 and 3, ...
+  /// Writes the Elias gamma code of a number from 1 to 2^32: one bit for 1, three for 2 and 3, ...
   void gamma(std::uint64_t number) {
     const auto length = static_cast<unsigned>(std::bit_width(number));
     bits(0, length - 1);
     bits(number, length);
   }
 
-  /// Golomb-Rice code with parameter k: number / 2^k ones, a zero, and the k lowest bits. Short for
-  /// numbers about 2^k.
+  /// Writes the Golomb-Rice code with parameter k: number / 2^k ones, a zero, and the k lowest
+  /// bits. The code is short for numbers about 2^k.
   void rice(std::uint64_t number, unsigned k) {
     for (std::uint64_t quotient = number >> k; quotient > 0; --quotient) bits(1, 1);
     bits(0, 1);
@@ -44,11 +44,11 @@ class BitWriter {
 
  private:
   std::vector<std::uint8_t> bytes_;
-  unsigned free_ = 0;  // bits of the last byte
+  unsigned free_ = 0;  // number of unused bits of the last byte
 };
 
-/// Reads untrusted bytes of a BitWriter. nullopt if they end too early, or if a number is longer
-/// than the writer accepts.
+/// Reads untrusted bytes in the format of BitWriter. nullopt if the bytes end too early, or if a
+/// gamma code is longer than the writer makes.
 class BitReader {
  public:
   explicit BitReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -89,7 +89,8 @@ class BitReader {
  private:
   [[nodiscard]] std::size_t left() const { return 8 * bytes_.size() - next_; }
 
-  // Bits equal to `value` before one that is not, which is taken too; nullopt beyond `most`.
+  // Number of bits equal to `value` before the first other bit, which is read too; nullopt beyond
+  // `most`.
   [[nodiscard]] std::optional<unsigned> run_of(std::uint64_t value, std::size_t most) {
     for (unsigned run = 0; run <= most; ++run) {
       const auto bit = bits(1);
@@ -100,7 +101,7 @@ class BitReader {
   }
 
   std::span<const std::uint8_t> bytes_;
-  std::size_t next_ = 0;  // bit
+  std::size_t next_ = 0;  // index of the next bit
 };
 
 }  // namespace km

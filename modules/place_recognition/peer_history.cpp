@@ -36,8 +36,8 @@ bool PeerHistory::follows_its_predecessor(Keyframes::const_iterator keyframe) co
 PeerQuery PeerHistory::release(Keyframes::iterator keyframe) {
   PeerQuery query{keyframe->first, keyframe->second, nullptr};
   if (keyframe != keyframes_.begin()) {
-    // The nearest earlier keyframe still has its vector, unless there are too many gaps: only its
-    // successor frees it.
+    // The nearest earlier keyframe still has its vector, unless there are too many gaps, because
+    // only its successor releases the vector.
     const auto before = std::prev(keyframe);
     query.previous = before->second;
     forget_if_done(before);
@@ -56,7 +56,7 @@ void PeerHistory::forget_if_done(Keyframes::iterator keyframe) {
   kept_.erase(keyframe->first);
 }
 
-// Waiting keyframes are kept; their number is bounded.
+// Keeps the waiting keyframes, whose number is bounded.
 void PeerHistory::forget_oldest_gaps() {
   for (auto oldest = kept_.begin();
        kept_.size() > kMaxGaps + deadlines_.size() && oldest != kept_.end();) {

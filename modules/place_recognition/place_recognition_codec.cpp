@@ -11,10 +11,10 @@ namespace km {
 namespace {
 
 constexpr std::uint64_t kMax32 = std::numeric_limits<std::uint32_t>::max();
-constexpr std::size_t kMaxPackedBytes = 16 * kMaxBagWords;  // two numbers of at most 64 bits a word
+constexpr std::size_t kMaxPackedBytes = 16 * kMaxBagWords;  // two 64-bit numbers per word
 constexpr unsigned kParameterBits = 5;
 
-// The parameter of the Golomb-Rice code that is shortest for gaps of this mean: about ln 2 of it.
+// Parameter k of the shortest Golomb-Rice code: 2^k is about ln 2 times the mean gap.
 unsigned rice_parameter(std::uint64_t range, std::size_t words) {
   const std::uint64_t typical = range / words * 45 / 64;
   return typical > 1 ? static_cast<unsigned>(std::bit_width(typical)) - 1 : 0;

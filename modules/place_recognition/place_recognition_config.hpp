@@ -20,13 +20,14 @@ struct PlaceRecognitionConfig {
                   "least similarity of a candidate: its score over the query's score against the "
                   "keyframe before it; lower: more candidates, more work for verification");
     visitor.field("min_normalizer", min_normalizer, {0.0, 1.0},
-                  "a query with a lower score against the keyframe before it is not used, because "
-                  "the ratio would mean nothing (fast rotation, darkness)");
-    visitor.field("max_candidates", max_candidates, {1, 1000}, "number of best ones per query");
+                  "smallest score of a query against the keyframe before it; with a lower score "
+                  "(fast rotation, darkness) the query is not used");
+    visitor.field("max_candidates", max_candidates, {1, 1000},
+                  "maximum number of candidates per query, the most similar ones");
     visitor.field("min_gap_s", min_gap_s, {0.0, 1e6},
-                  "[s] keyframes of one robot closer in time are neighbours, not closures");
+                  "[s] smallest time between two keyframes of one robot for a candidate");
     visitor.field("candidate_separation_s", candidate_separation_s, {0.0, 1e6},
-                  "[s] least time between candidates of a query, the best of each place; 0: any");
+                  "[s] smallest time between the candidates of a query; 0: no limit");
     visitor.field("max_waiting_keyframes", max_waiting_keyframes, {0, 10000},
                   "maximum number of keyframes of a peer that wait for their predecessor; beyond "
                   "it the nearest earlier keyframe replaces the predecessor");

@@ -8,10 +8,10 @@
 namespace km {
 namespace {
 
-// A peer's history arrives in a burst; an hour of keyframes at 4 Hz fits.
+// A peer's history arrives in a burst; the queue holds an hour of keyframes at 4 Hz.
 constexpr std::size_t kQueueCapacity = 16384;
 
-// A step of odometry with a greater standard deviation may end anywhere, also at its start.
+// Standard deviation of an odometry step, per axis, above which its length is unknown.
 constexpr double kLostWay_m = 0.5;
 
 bool loses_way(const UncertainPose& before, const UncertainPose& now) {
@@ -57,7 +57,7 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   if (const auto before = std::exchange(chain_, chain); before && loses_way(*before, chain))
     own_.lose_way();
   CandidateSearch search = own_.search_own(vector, keyframe.stamp);
-  // Known before it is published: see the class comment.
+  // Added before it is published, so that no pair is missed: see the class comment.
   own_.add(std::move(vector), keyframe.stamp);
   own_ids_.push_back(id);
   topics_.own_bows.publish(KeyframeBow{.id = id,

@@ -24,28 +24,29 @@ namespace km {
 
 /// Channels of the place recognition node; they must outlive it.
 struct PlaceRecognitionTopics {
-  In<Keyframe> keyframes;     ///< Own, ascending.
-  In<KeyframeBow> peer_bows;  ///< Bags of peers; own ones that return are ignored.
-  In<PeerEvent> peer_events;  ///< Restarts after which keyframe indices of a peer mean other
-                              ///< keyframes.
-  Out<KeyframeBow> own_bows;  ///< Every own keyframe, for the peers.
+  In<Keyframe> keyframes;     ///< Keyframes of this robot, ascending.
+  In<KeyframeBow> peer_bows;  ///< Words of peers' keyframes; those of this robot are ignored.
+  In<PeerEvent> peer_events;  ///< Only kRestarted is used: the peer's indices begin again at 0.
+  Out<KeyframeBow> own_bows;  ///< Words of every own keyframe, for the peers.
   Out<LoopCandidate> candidates;
-  Out<PeerEvent> restarts;  ///< kRestarted, after the last candidate with a keyframe from before.
+  Out<PeerEvent> restarts;  ///< kRestarted, after the last candidate with a keyframe from before
+                            ///< the restart.
   Out<PlaceQuery> queries;  ///< One per received keyframe.
 };
 
-/// Finds places that were seen before. It searches own keyframes among earlier own ones, and
-/// keyframes of peers, as they arrive, among own ones (Chang et al., "Kimera-Multi", Sec. III-A).
+/// Finds places that were seen before. The node compares each own keyframe with earlier own
+/// keyframes, and each arriving keyframe of a peer with own keyframes (Chang et al.,
+/// "Kimera-Multi", Sec. III-A).
 ///
 /// A pair of keyframes (a_i, b_j) of two robots is never missed while messages arrive in both
 /// directions. If a knew a_i when b_j arrived, a finds the pair. Otherwise a_i was published after
-/// b_j, and b, which knows b_j, finds it. Both find it if the two messages crossed: keyframes of
-/// the same instant, and all earlier ones when robots meet again. So receivers of candidates must
-/// accept a pair from either side. Keyframe 0 of a robot has no normaliser and is found only as the
-/// earlier keyframe.
+/// b_j, and b, which knows b_j, finds the pair. Both find the pair if the two messages crossed.
+/// This happens for keyframes of the same instant, and for all earlier ones when robots meet again.
+/// Receivers of candidates must therefore accept a pair from either side. Keyframe 0 of a robot has
+/// no normaliser, so it occurs only as the match of a candidate.
 ///
-/// A keyframe index means one keyframe during an incarnation of its robot. After a restart its
-/// history begins again.
+/// A keyframe index means one keyframe during an incarnation of its robot. After a restart the
+/// history of the robot begins again.
 class PlaceRecognitionNode final : public Node {
  public:
   /// Throws ConfigError if `config` is out of bounds.
@@ -60,7 +61,8 @@ class PlaceRecognitionNode final : public Node {
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handle one input synchronously. The thread calls only these; so can tests and replay.
+  /// Handle one input synchronously. The thread calls only these functions; tests and replay can
+  /// call them too.
   void step(const Keyframe& keyframe);
   void step(const KeyframeBow& peer_bow);
   void step(const Topic<PeerEvent>::Message& event);
@@ -79,8 +81,8 @@ class PlaceRecognitionNode final : public Node {
   const std::shared_ptr<const Vocabulary> vocabulary_;
   const PlaceRecognitionTopics topics_;
   CandidateFilter own_;
-  std::optional<UncertainPose> chain_;  // up to the keyframe before
-  std::vector<KeyframeId> own_ids_;     // keyframe ids in the order of own_
+  std::optional<UncertainPose> chain_;  // odometry of the newest own keyframe
+  std::vector<KeyframeId> own_ids_;     // ids of the keyframes in own_, in the same order
   std::map<RobotId, PeerHistory> peers_;
   Worker<Input> worker_;  // last member: stops first
 };

@@ -75,8 +75,8 @@ std::string problem_of_tree(const VocabularyData& data) {
   return {};
 }
 
-// Number of descriptors that descend together: while one waits for the memory of its next node, the
-// others compute.
+// Number of descriptors that descend together: while one descriptor waits for the memory of its
+// next node, the others compute.
 constexpr std::size_t kBatch = 32;
 
 void sort_words(std::vector<std::uint32_t>& words, std::size_t vocabulary_size) {
@@ -148,7 +148,7 @@ struct Vocabulary::Descent {
       for (std::size_t i = 0; i < size; ++i) {
         if (at[i].children == 0) continue;
         at[i] = nodes[child[i]];
-        // Two descriptors to a cache line.
+        // A cache line holds two descriptors.
         for (std::uint32_t c = 0; c < at[i].children; c += 2)
           __builtin_prefetch(centers + at[i].first + c);
       }

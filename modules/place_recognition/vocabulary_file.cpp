@@ -37,7 +37,7 @@ std::uint64_t file_size(const FileHeader& header) {
          sizeof(float) * std::uint64_t{header.words};
 }
 
-// Says where a file is wrong.
+// Throws the error of a file with its name and offset.
 class Refusal {
  public:
   explicit Refusal(std::string name) : name_(std::move(name)) {}

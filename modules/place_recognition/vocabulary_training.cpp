@@ -58,8 +58,9 @@ class BitCounter {
   int pending_ = 0;
 };
 
-// Up to k different centres. Each further one is drawn with a probability proportional to its
-// distance from the former ones. Returns fewer if there are fewer different descriptors.
+// Up to k different centres. Each further centre is drawn with a probability proportional to its
+// distance from the nearest former centre. There are fewer than k if the points have fewer
+// different descriptors.
 std::vector<Bits256> spread_centers(std::span<const Bits256> points, int k, std::mt19937& rng) {
   std::uniform_int_distribution<std::size_t> uniform(0, points.size() - 1);
   std::vector<Bits256> centers{points[uniform(rng)]};
@@ -150,7 +151,7 @@ std::vector<float> inverse_document_frequencies(
   std::vector<float> idf;
   idf.reserve(vocabulary.size());
   const auto images = static_cast<double>(descriptors.size());
-  // The tree may send none of the descriptors back to a leaf that was made of them.
+  // n is 0 if all descriptors of a leaf's cluster descend to other leaves.
   for (const std::uint32_t n : images_with)
     idf.push_back(static_cast<float>(std::log(images / std::max(1U, n))));
   return idf;

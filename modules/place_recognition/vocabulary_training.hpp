@@ -15,10 +15,10 @@ namespace km {
 struct VocabularyTrainingConfig {
   static constexpr const char* kSection = "vocabulary_training";
 
-  /// k: clusters a node is split into.
+  /// k: largest number of clusters into which a node is split.
   int branching = 10;
 
-  /// L: levels below the root; at most k^L words.
+  /// L: largest number of levels below the root; there are at most k^L words.
   int depth = 5;
 
   /// Seed of the random choice of the first cluster centres.
@@ -36,9 +36,9 @@ struct VocabularyTrainingConfig {
 /// Every node's descriptors are split into at most k clusters by k-medians. Centres start by
 /// k-means++ (Arthur and Vassilvitskii, SODA 2007; the squared Euclidean distance of binary vectors
 /// is their Hamming distance). A centre is the bitwise majority of its cluster (ties: 0). Lloyd's
-/// iteration ends when no descriptor changes its cluster or after 20 rounds. Nodes with at most k
-/// different descriptors get one leaf each. idf_i = ln(N / n_i), N images, n_i of them with word i
-/// (Nister and Stewenius, CVPR 2006).
+/// iteration ends when no descriptor changes its cluster or after 20 rounds. A node with at most k
+/// different descriptors gets one leaf for each. With N images, n_i of them with word i,
+/// idf_i = ln(N / n_i) (Nister and Stewenius, CVPR 2006).
 ///
 /// The same input and seed give the same result on every run. `progress`, if given, is called
 /// after each level of the tree with the number of levels done.

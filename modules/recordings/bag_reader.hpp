@@ -16,12 +16,12 @@ struct BagChannel {
   std::string topic;                ///< "/camera/left/image_raw".
   std::string type;                 ///< "sensor_msgs/Image", "sensor_msgs/msg/Image".
   std::string encoding;             ///< "ros1", "cdr", or another name in the recording.
-  std::uint64_t message_count = 0;  ///< From the index, or counted if there is none.
+  std::uint64_t message_count = 0;  ///< Number of messages, from the index or counted.
 };
 
 struct BagMessage {
   std::size_t channel = 0;  ///< Index into BagReader::channels().
-  Stamp log_time = 0;       ///< When it was recorded [ns].
+  Stamp log_time = 0;       ///< Time at which the message was recorded [ns].
   std::vector<std::uint8_t> bytes;
 };
 
@@ -35,27 +35,25 @@ enum class BagFault {
   kChecksum,        ///< The bytes differ from those that were written.
   kCompression,     ///< An unknown compression, or corrupted compressed data.
   kUnknownChannel,  ///< A message whose channel is not described before it.
-  kUnordered,       ///< A message earlier than its chunk states: later messages have already been
-                    ///< returned.
-  kLost,            ///< A live message that was dropped because the reader was slow, or of which a
-                    ///< part was lost.
+  kUnordered,  ///< A message earlier than its chunk states, after later messages were returned.
+  kLost,       ///< A live message dropped because the reader was slow, or lost in part.
 };
 
 /// A short plural for tables and log lines: "malformed records".
 [[nodiscard]] const char* to_string(BagFault fault);
 
-/// Its examples state the file, the byte position, and the topic if it is known.
+/// Counts of the faults, with file, byte position and, if known, topic of examples.
 using BagReport = FaultReport<BagFault>;
 
-/// A recording of messages as one stream in order of log time, messages of equal time in that of
-/// the file. Nothing in it is trusted, and only the parts being read are in memory. Not
+/// A recording as one stream of messages in order of log time; messages of equal time are in the
+/// order of the file. The content is untrusted, and only the parts being read are in memory. Not
 /// thread-safe.
 class BagReader {
  public:
   virtual ~BagReader() = default;
 
-  /// All channels that the index describes or, without an index, the recording. A channel that is
-  /// found later is appended.
+  /// All channels by the index or, without an index, by the recording. A channel that is found
+  /// later is appended.
   [[nodiscard]] virtual const std::vector<BagChannel>& channels() const = 0;
 
   /// The next message, or nullopt at the end. Throws InputFileError if the file cannot be read any
@@ -68,7 +66,7 @@ class BagReader {
   /// True for live topics, which have no end: log times are times of arrival.
   [[nodiscard]] virtual bool is_live() const { return false; }
 
-  /// Ends a present or later next() that waits. Thread-safe.
+  /// Ends the present and every later wait in next(). Thread-safe.
   virtual void stop() noexcept {}
 };
 

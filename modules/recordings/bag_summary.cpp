@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-// Types that begin with a header. geometry_msgs has it in those that end in "Stamped".
+// Types that begin with a header. In geometry_msgs, types whose name ends in "Stamped" have one.
 constexpr std::array<std::string_view, 20> kTypesWithHeader = {
     RosImage::kType,
     RosCompressedImage::kType,
@@ -54,7 +54,7 @@ std::optional<TopicImage> image_in(const BagChannel& channel, const BagMessage& 
   return TopicImage{size.value_or(ImageSize{}), image.value->format};
 }
 
-// Stamp that places the message in time; nullopt if the message is not of its type.
+// Stamp of a message; nullopt if the message is not of its type.
 std::optional<Stamp> stamp_in(const BagChannel& channel, const BagMessage& message) {
   if (is_of_type(channel, RosTransforms::kType)) {
     const auto tree = decode_ros<RosTransforms>(channel.encoding, message.bytes);

@@ -17,31 +17,30 @@ struct TopicImage {
   std::string encoding;  ///< "mono8", "jpeg", ...
 };
 
-/// A topic of a recording. Its stamps are those of the sensor if its messages have a header,
-/// otherwise those of the recorder.
+/// A topic of a recording.
 struct TopicSummary {
   std::string topic;
   std::string type;
   std::string encoding;
-  bool has_sensor_stamps = false;
-  std::vector<Stamp> stamps;  ///< As recorded [ns].
+  bool has_sensor_stamps = false;  ///< Stamps are from message headers; else they are log times.
+  std::vector<Stamp> stamps;       ///< Stamps in the order of the recording [ns].
   bool is_image = false;
   std::optional<TopicImage> image;
-  std::size_t undecoded = 0;  ///< Messages that are not of their type: they have no stamp here.
+  std::size_t undecoded = 0;  ///< Number of messages that are not of their type, without a stamp.
 };
 
-/// Two topics of images with one rate.
+/// Two topics of images with about the same rate.
 struct TopicPair {
   std::string first, second;
   StampAgreement agreement;
 };
 
-/// Reads all remaining messages. Returns topics in the order of the channels; several channels may
-/// be one topic. Takes 8 bytes for each message.
+/// Summarises all remaining messages. Returns topics in the order of the channels; a topic may have
+/// several channels. Takes 8 bytes for each message.
 [[nodiscard]] std::vector<TopicSummary> summarise_topics(BagReader& reader);
 
-/// All pairs of image topics whose rates differ by at most 5 %. Stamps are a pair if they are less
-/// than half an interval apart.
+/// All pairs of image topics whose rates differ by at most 5 %. Two stamps belong together if they
+/// are less than half an interval apart.
 [[nodiscard]] std::vector<TopicPair> pairs_of_images(const std::vector<TopicSummary>& topics);
 
 }  // namespace km

@@ -10,11 +10,11 @@
 
 namespace km {
 
-/// Channels with unique topic, type and encoding. A restarted publisher, or another file of the
-/// recording, continues the same channel.
+/// Channels with unique topic, type and encoding. Messages of a restarted publisher, or of another
+/// file of the recording, belong to the same channel.
 class ChannelTable {
  public:
-  /// Returns the index of the channel. Message counts are added up.
+  /// Adds a channel, or the message count of a known one, and returns its index.
   std::size_t add(const BagChannel& channel) {
     const auto [known, is_new] = index_.try_emplace(
         std::tuple(channel.topic, channel.type, channel.encoding), channels_.size());

@@ -13,33 +13,34 @@ namespace km {
 /// A part of a file that is read in one piece: its position, and the time of its messages.
 struct ChunkPlace {
   std::uint64_t begin = 0;  ///< [bytes from the beginning of the file].
-  std::uint64_t end = 0;    ///< Behind the last byte that can belong to it.
-  Stamp first = 0;          ///< No message is earlier [ns].
-  bool is_bare = false;     ///< Records that lie directly in the file, in no chunk.
+  std::uint64_t end = 0;    ///< Position behind the last byte that can belong to the part [bytes].
+  Stamp first = 0;          ///< Lower bound on the log times of the messages [ns].
+  bool is_bare = false;     ///< True for records outside of chunks.
 };
 
-/// Content of such a part.
+/// Content of a part of a file.
 struct Chunk {
   struct Entry {
     Stamp log_time = 0;
     std::uint32_t channel = 0;
     std::uint32_t size = 0;   ///< [bytes].
-    std::uint64_t begin = 0;  ///< Into bytes.
+    std::uint64_t begin = 0;  ///< Position in `bytes`.
   };
   std::vector<std::uint8_t> bytes;
   std::vector<Entry> entries;  ///< In the order of the file.
 };
 
-/// Returns the messages of many chunks in order of time; it reads a chunk when its first message is
-/// due. Several chunks are in memory if they overlap in time. If they exceed kHeld_bytes, their
-/// bytes are read again when they are due.
+/// Returns the messages of many chunks in order of time, and reads a chunk when its first message
+/// is due. Chunks that overlap in time are in memory together. If they exceed kHeld_bytes, the
+/// bytes of some chunks are removed and read again when they are due.
 class ChunkMerge {
  public:
   static constexpr std::uint64_t kHeld_bytes = std::uint64_t{1} << 30U;
 
-  /// Reads a chunk; returns one without entries if the chunk is unusable.
+  /// Reads a chunk. Returns a chunk without entries if it is unusable.
   using Load = std::function<Chunk(const ChunkPlace&)>;
-  /// Called for a message that is dropped because it is earlier than one returned before.
+  /// Called for a message that is dropped, because a later message has been returned or because
+  /// the file has changed.
   using Lost = std::function<void(const ChunkPlace&, const Chunk::Entry&)>;
 
   ChunkMerge(std::vector<ChunkPlace> places, Load load, Lost lost,
@@ -57,7 +58,7 @@ class ChunkMerge {
   void open_due();
   void open(const ChunkPlace& place);
   void make_room();
-  // Nullopt if the file has changed meanwhile.
+  // Bytes of a message; nullopt if the file has changed since the chunk was opened.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> bytes_of(Open& open,
                                                                   const Chunk::Entry& entry);
   // The open chunk with the next message; open_ is not empty.
@@ -67,7 +68,7 @@ class ChunkMerge {
   Lost lost_;
   std::uint64_t max_held_bytes_;
   std::uint64_t held_bytes_ = 0;
-  std::deque<ChunkPlace> waiting_;  // chunks not opened yet, in order of time, then place
+  std::deque<ChunkPlace> waiting_;  // chunks to be opened, in order of time, then position
   std::vector<Open> open_;
   std::optional<Stamp> last_;
 };

@@ -12,7 +12,7 @@ std::vector<std::uint8_t> compress(std::string_view compression,
                                    std::span<const std::uint8_t> bytes) {
   constexpr int kFast = 1;
   std::vector<std::uint8_t> packed;
-  // Neither function fails if the buffer has the size that it asks for.
+  // Both libraries succeed with a buffer of their bound on the compressed size.
   if (compression.empty()) {
     packed.assign(bytes.begin(), bytes.end());
   } else if (compression == "zstd") {

@@ -20,8 +20,8 @@ bool is_in_use(const fs::path& path, const char* suffix) {
   return !none && size > 0;
 }
 
-// URI of `path` with options for SQLite. Without a log or journal beside it the file is complete:
-// "immutable" then needs no lock, and writes nothing beside it.
+// URI of `path` with options for SQLite. If there is no log or journal beside the file, it is
+// complete. With "immutable", SQLite then needs no lock and writes no other file.
 std::string uri_of(const fs::path& path) {
   std::string uri = "file:";
   for (const char c : fs::absolute(path).string()) {
@@ -118,8 +118,7 @@ bool Db3Reader::step(sqlite3_stmt* rows, std::uint64_t& count) {
     return false;
   }
   if (count++ < max_rows_)
-    return true;  // pages that refer to each other would continue without
-                  // end
+    return true;  // bounded, because cyclic pages would yield rows without end
   add_fault(BagFault::kMalformed, "more rows than the file can hold");
   return false;
 }
@@ -133,7 +132,7 @@ std::optional<BagMessage> Db3Reader::next() {
   return std::nullopt;
 }
 
-// Nullopt if the message is unusable.
+// The message in the current row; nullopt if it is unusable.
 std::optional<BagMessage> Db3Reader::message_in_row() {
   const std::int64_t id = sqlite3_column_int64(rows_.get(), 0);
   const auto lose = [&](BagFault fault, const std::string& why) {

@@ -14,13 +14,13 @@
 
 namespace km {
 
-/// Reads the .db3 files of rosbag2: SQLite databases with tables topics and messages. The file is
-/// not written to, and what else is in the database (views, triggers) is not run. Messages that the
-/// recorder left in a write-ahead log beside the file are read, too. Faults name the message by its
-/// id in the table.
+/// Reads the .db3 files of rosbag2: SQLite databases with tables topics and messages. The reader
+/// does not write to the file and runs no views and triggers of the database. It also reads
+/// messages that the recorder left in a write-ahead log beside the file. Faults name the message by
+/// its id in the table.
 class Db3Reader final : public BagReader {
  public:
-  /// Throws InputFileError if `path` is no file, no database, or has not these tables.
+  /// Throws InputFileError if `path` is no file, no database, or lacks one of the two tables.
   explicit Db3Reader(const std::filesystem::path& path);
 
   [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
@@ -39,7 +39,7 @@ class Db3Reader final : public BagReader {
   [[nodiscard]] Statement prepare(const char* sql) const;
   void read_topics();
   void count_messages();
-  // True if there is a row. Rows end at an error, or beyond the number that fits into the file.
+  // Steps to the next row; true if there is one. Rows end at an error, or after max_rows_ rows.
   [[nodiscard]] bool step(sqlite3_stmt* rows, std::uint64_t& count);
   [[nodiscard]] std::optional<BagMessage> message_in_row();
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> data_of(std::int64_t id);
@@ -50,7 +50,7 @@ class Db3Reader final : public BagReader {
   std::uint64_t max_rows_ = 0;
   BagReport report_;
   std::unique_ptr<sqlite3, Close> database_;  // outlives its statements
-  Statement rows_;                            // rows of the messages, in order of time
+  Statement rows_;                            // iterates over the messages in order of time
   Statement data_;                            // reads the data of one message
   std::map<std::int64_t, std::size_t> channel_of_;
   std::vector<BagChannel> channels_;

@@ -10,12 +10,11 @@
 
 namespace km {
 
-/// Maximum decompressed size of a chunk or message; a larger size is treated as an error.
+/// Maximum decompressed size of a chunk or message.
 inline constexpr std::uint64_t kMaxDecompressed_bytes = std::uint64_t{512} << 20U;
 
-/// Decompresses to `size` bytes. Recordings name the compression "none" or "" (a copy), "lz4"
-/// (frames), "zstd", or "bz2". Refuses a result of another size. Memory grows with the result, not
-/// with `size`.
+/// Decompresses to `size` bytes. `compression` is "none" or "" (a copy), "lz4" (frames), "zstd", or
+/// "bz2". Refuses a result of another size. Memory grows with the result, not with `size`.
 Decoded<std::vector<std::uint8_t>> decompress(std::string_view compression,
                                               std::span<const std::uint8_t> bytes,
                                               std::uint64_t size);

@@ -14,7 +14,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint64_t kFooter_bytes = kMcapRecordHeader_bytes + kMcapFooterFields_bytes;
 constexpr std::uint64_t kMaxDefinition_bytes = std::uint64_t{64} << 20U;
-// Messages outside of chunks are read together up to this size.
+// Largest size of a part of messages outside of chunks.
 constexpr std::uint64_t kBarePart_bytes = std::uint64_t{4} << 20U;
 
 struct McapRecord {
@@ -90,7 +90,7 @@ std::uint64_t McapReader::find_data_end() {
 }
 
 void McapReader::read_summary(std::uint64_t begin, std::uint64_t footer, const McapFooter& fields) {
-  // The checksum is of all before itself, the first fields of the footer included.
+  // The checksum covers the summary and the fields of the footer before the checksum.
   const std::uint64_t end = footer + kFooter_bytes - sizeof(fields.summary_crc);
   if (end - begin > kMaxDecompressed_bytes)
     return report_.add(BagFault::kIndex, begin, "a summary of more than 512 MiB");
@@ -122,8 +122,8 @@ void McapReader::read_summary(std::uint64_t begin, std::uint64_t footer, const M
   if (describes_all(summary)) summary_ = std::move(summary);
 }
 
-// The reason why the summary does not fit this file, or null. Sorts its chunks in order of the
-// file.
+// The reason why the summary does not fit this file, or null. Sorts the chunks of the summary by
+// position.
 const char* McapReader::misfit_of(Summary& summary, std::uint64_t data_end) const {
   std::sort(summary.chunks.begin(), summary.chunks.end(),
             [](const auto& a, const auto& b) { return a.chunk_start < b.chunk_start; });
@@ -142,7 +142,8 @@ const char* McapReader::misfit_of(Summary& summary, std::uint64_t data_end) cons
   return counts_others ? "another number of chunks than it states" : nullptr;
 }
 
-// Channels and schemas need not be repeated in the summary, nor chunks be listed.
+// True if the summary lists all channels with their schemas and all chunks, which the specification
+// does not demand.
 bool McapReader::describes_all(const Summary& summary) const {
   if (summary.chunks.empty() || !summary.statistics) return false;
   const auto is_known = [&](std::uint16_t id) {
@@ -202,7 +203,7 @@ void McapReader::walk(std::uint64_t begin, std::uint64_t end, bool has_end) {
   }
 }
 
-// Messages between which there are no chunks are read together.
+// Adds a message outside of chunks to the former part if no chunk lies between the two.
 void McapReader::note_bare_message(std::uint64_t begin, std::uint64_t end) {
   const std::uint64_t content = begin + kMcapRecordHeader_bytes;
   const std::uint64_t size = end - content;
@@ -268,7 +269,7 @@ Chunk McapReader::load(const ChunkPlace& place) {
   return chunk;
 }
 
-// Empty if the records cannot be read.
+// The uncompressed records of a part; empty if they cannot be read.
 Bytes McapReader::records_of(const ChunkPlace& place) {
   const auto refuse = [&](BagFault fault, const std::string& why) {
     report_.add(fault, place.begin, why);
@@ -319,7 +320,7 @@ void McapReader::add_channel(const McapChannel& channel, std::uint64_t place) {
   if (before.topic != channel.topic || before.encoding != channel.message_encoding)
     return report_.add(BagFault::kMalformed, place,
                        channel.topic + ": a channel that was described otherwise before");
-  if (before.type.empty()) before.type = type;  // a summary may have channels without schemas
+  if (before.type.empty()) before.type = type;  // the summary lacked the schema of the channel
 }
 
 }  // namespace km

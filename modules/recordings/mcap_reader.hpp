@@ -20,12 +20,12 @@ namespace km {
 /// Reads MCAP files (mcap.dev/spec), version 0: messages in chunks (not compressed, lz4, zstd) and
 /// outside of them. If the summary at the end describes all channels and chunks, a chunk is read
 /// when its first message is due. Otherwise the whole file is read once before the first message. A
-/// file without an end, whose writer was killed, yields its complete parts. Checksums are verified
-/// if present: those of the summary, of chunks, and of the data section if it has messages outside
-/// of chunks. Attachments, metadata and records of other kinds are skipped.
+/// file without an end, whose writer was killed, yields its complete parts. The reader verifies the
+/// checksums of the summary, of chunks, and of a data section with messages outside of chunks, if
+/// present. Attachments, metadata and records of other kinds are skipped.
 class McapReader final : public BagReader {
  public:
-  /// Throws InputFileError if `path` is no file or does not begin as MCAP files do.
+  /// Throws InputFileError if `path` is no file or does not begin with kMcapMagic.
   explicit McapReader(const std::filesystem::path& path);
 
   [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
@@ -38,7 +38,7 @@ class McapReader final : public BagReader {
     std::optional<McapStatistics> statistics;
   };
 
-  // The end of the data section; sets summary_ if it can be used in place of reading everything.
+  // The end of the data section. Sets summary_ if it describes all channels and chunks.
   [[nodiscard]] std::uint64_t find_data_end();
   void read_summary(std::uint64_t begin, std::uint64_t footer, const McapFooter& fields);
   [[nodiscard]] const char* misfit_of(Summary& summary, std::uint64_t data_end) const;

@@ -29,7 +29,7 @@ class McapIn {
     value.assign(bytes.begin(), bytes.end());
   }
   void octets(std::span<const std::uint8_t>& value) { value = reader_.bytes(reader_.u64()); }
-  // Checksum of all bytes before it; 0: none.
+  // Checksum of all bytes before it; 0: no checksum.
   void crc() {
     const auto before = bytes_.first(bytes_.size() - reader_.left());
     const std::uint32_t crc = reader_.u32();
@@ -68,7 +68,7 @@ class McapIn {
   ByteReader reader_;
 };
 
-// Writes what McapIn reads.
+// Writes the fields that McapIn reads.
 class McapOut {
  public:
   void u8(std::uint8_t value) { writer_.u8(value); }
@@ -117,7 +117,7 @@ class McapOut {
   ByteWriter writer_;
 };
 
-// Fields stand in the order of the specification. One list of them serves for reading and writing.
+// The fields of each record in the order of the specification, for reading and writing.
 template <typename Record, typename Type>
 concept RecordIs = std::same_as<std::remove_const_t<Record>, Type>;
 
@@ -248,7 +248,7 @@ std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> byte
   message.sequence = reader.u32();
   const std::uint64_t log_time = reader.u64();
   message.log_time = static_cast<Stamp>(log_time);
-  message.publish_time = static_cast<Stamp>(reader.u64());  // time of a clock that is not used
+  message.publish_time = static_cast<Stamp>(reader.u64());  // not checked, because it is not used
   if (reader.failed() || log_time > kLatest ||
       size - kMcapMessageFields_bytes > std::numeric_limits<std::uint32_t>::max())
     return std::nullopt;

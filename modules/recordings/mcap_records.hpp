@@ -14,9 +14,9 @@
 
 namespace km {
 
-/// Records of an MCAP file (mcap.dev/spec): a byte with the opcode, eight bytes with the size of
-/// the content, little endian, and the content. Unknown fields at its end are ignored, as the
-/// specification demands.
+/// Records of an MCAP file (mcap.dev/spec). A record is a byte with the opcode, eight bytes with
+/// the size of the content, little endian, and the content. Unknown fields at the end of the
+/// content are ignored, as the specification demands.
 enum class McapOpcode : std::uint8_t {
   kHeader = 0x01,
   kFooter = 0x02,
@@ -33,9 +33,9 @@ enum class McapOpcode : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
-/// First and last bytes of a file.
+/// The first and also the last bytes of a file.
 inline constexpr std::string_view kMcapMagic{"\x89MCAP0\r\n", 8};
-/// Opcode and length.
+/// Size of opcode and length.
 inline constexpr std::uint64_t kMcapRecordHeader_bytes = 9;
 
 struct McapRecordHeader {
@@ -55,7 +55,7 @@ struct McapFooter {
   static constexpr McapOpcode kOpcode = McapOpcode::kFooter;
   std::uint64_t summary_start = 0;         ///< [bytes from the beginning of the file]; 0: none.
   std::uint64_t summary_offset_start = 0;  ///< [bytes from the beginning of the file]; 0: none.
-  std::uint32_t summary_crc = 0;           ///< 0: none.
+  std::uint32_t summary_crc = 0;           ///< Checksum; 0: none.
 };
 inline constexpr std::uint64_t kMcapFooterFields_bytes = 8 + 8 + 4;
 
@@ -70,7 +70,7 @@ struct McapSchema {
 struct McapChannel {
   static constexpr McapOpcode kOpcode = McapOpcode::kChannel;
   std::uint16_t id = 0;
-  std::uint16_t schema_id = 0;  ///< 0: none.
+  std::uint16_t schema_id = 0;  ///< McapSchema::id; 0: no schema.
   std::string topic;
   std::string message_encoding;  ///< "cdr", ...
   std::map<std::string, std::string> metadata = {};
@@ -92,9 +92,9 @@ struct McapChunk {
   Stamp message_start_time = 0;
   Stamp message_end_time = 0;
   std::uint64_t uncompressed_size = 0;
-  std::uint32_t uncompressed_crc = 0;  ///< 0: none.
+  std::uint32_t uncompressed_crc = 0;  ///< Checksum of the uncompressed records; 0: none.
   std::string compression;
-  std::span<const std::uint8_t> records;  ///< Into the parsed bytes, or into those to be written.
+  std::span<const std::uint8_t> records;  ///< Records as compressed; refers to bytes of the caller.
 };
 
 /// Index of the messages of one channel in the chunk before it.
@@ -110,29 +110,29 @@ struct McapChunkIndex {
   Stamp message_start_time = 0;
   Stamp message_end_time = 0;
   std::uint64_t chunk_start = 0;   ///< [bytes from the beginning of the file].
-  std::uint64_t chunk_length = 0;  ///< With opcode and length.
-  /// By channel: position of its index [bytes from the beginning of the file].
+  std::uint64_t chunk_length = 0;  ///< Length of the record with its header [bytes].
+  /// Position of the message index of each channel [bytes from the beginning of the file].
   std::vector<std::pair<std::uint16_t, std::uint64_t>> message_index_offsets = {};
-  std::uint64_t message_index_length = 0;  ///< Length of the indexes right behind the chunk.
+  std::uint64_t message_index_length = 0;  ///< Total length of the message indexes [bytes].
   std::string compression;
   std::uint64_t compressed_size = 0;
   std::uint64_t uncompressed_size = 0;
 };
 
-/// A file in the file. Behind its fields is the checksum of these.
+/// A file inside the MCAP file. A checksum of the fields follows them.
 struct McapAttachment {
   static constexpr McapOpcode kOpcode = McapOpcode::kAttachment;
   Stamp log_time = 0;
   Stamp create_time = 0;
   std::string name;
   std::string media_type;              ///< "text/csv", ...
-  std::span<const std::uint8_t> data;  ///< Into the parsed bytes, or into those to be written.
+  std::span<const std::uint8_t> data;  ///< Content; refers to bytes of the caller.
 };
 
 struct McapAttachmentIndex {
   static constexpr McapOpcode kOpcode = McapOpcode::kAttachmentIndex;
   std::uint64_t start = 0;   ///< [bytes from the beginning of the file]
-  std::uint64_t length = 0;  ///< With opcode and length.
+  std::uint64_t length = 0;  ///< Length of the record with its header [bytes].
   Stamp log_time = 0;
   Stamp create_time = 0;
   std::uint64_t data_size = 0;
@@ -163,22 +163,22 @@ struct McapSummaryOffset {
 
 struct McapDataEnd {
   static constexpr McapOpcode kOpcode = McapOpcode::kDataEnd;
-  std::uint32_t data_section_crc = 0;  ///< 0: none.
+  std::uint32_t data_section_crc = 0;  ///< Checksum of all bytes before this record; 0: none.
 };
 
-/// Checksum (CRC-32) of bytes behind those whose checksum is `before`.
+/// Checksum (CRC-32) of `bytes`, continued from the checksum `before` of the preceding bytes.
 [[nodiscard]] std::uint32_t mcap_crc(std::span<const std::uint8_t> bytes, std::uint32_t before = 0);
 
 [[nodiscard]] std::optional<McapRecordHeader> parse_mcap_record_header(
     std::span<const std::uint8_t> bytes);
 
-/// Parses the content after a record's header; nullopt for bytes that are no such record. Times
-/// beyond 2^63 - 1 ns are refused, and attachments with a wrong checksum. For all records above
-/// except messages.
+/// Parses the content after a record's header, for all record types except messages. nullopt for an
+/// invalid content, times beyond 2^63 - 1 ns, and attachments with a wrong checksum.
 template <typename Record>
 [[nodiscard]] std::optional<Record> parse_mcap(std::span<const std::uint8_t> bytes);
 
-/// `bytes` may end behind kMcapMessageFields_bytes; `size` is the full size of the content.
+/// Parses the fields of a message. `bytes` may end after kMcapMessageFields_bytes; `size` is the
+/// full size of the content.
 [[nodiscard]] std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> bytes,
                                                             std::uint64_t size);
 

@@ -54,8 +54,7 @@ void McapWriter::add(const McapMessage& message, std::span<const std::uint8_t> d
   if (chunk_.records.size() >= options_.chunk_bytes) end_chunk();
 }
 
-// Writes the channel before its first message, in its chunk, for readers that start at the
-// beginning.
+// Writes the channel and its schema to the chunk before the first message of the channel.
 void McapWriter::define(const McapChannel& channel) {
   if (!written_channels_.insert(channel.id).second) return;
   if (written_schemas_.insert(channel.schema_id).second)
@@ -160,7 +159,7 @@ void McapWriter::put_summary() {
   ByteWriter last;
   put_mcap(last, footer);
   auto bytes = last.release();
-  bytes.resize(bytes.size() - sizeof(footer.summary_crc));  // covers all bytes before itself
+  bytes.resize(bytes.size() - sizeof(footer.summary_crc));  // the checksum covers these bytes
   append(bytes);
   last.u32(crc_);
   last.bytes(magic());

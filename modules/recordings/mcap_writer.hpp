@@ -21,29 +21,30 @@ class McapWriter {
   struct Options {
     std::string profile = "ros2";
     std::string library = "kimera_multi";
-    std::string compression = "zstd";                ///< Or "lz4", or "": none.
-    std::size_t chunk_bytes = std::size_t{1} << 20;  ///< A chunk ends once it has as many.
+    std::string compression = "zstd";                ///< "zstd", "lz4", or "" for none.
+    std::size_t chunk_bytes = std::size_t{1} << 20;  ///< Uncompressed size that ends a chunk.
   };
 
   explicit McapWriter(Options options);
 
-  /// The channel's id, which is not that in `channel`, nor is the schema's. A channel with no
-  /// message is not in the file. At most 65535 of each: throws std::length_error.
+  /// Adds a channel and returns its new id; the ids in `channel` and `schema` are ignored. A
+  /// channel without messages is not written. Throws std::length_error for more than 65535 channels
+  /// or schemas.
   std::uint16_t add_channel(McapChannel channel, const McapSchema& schema);
 
-  /// Adds a message of a channel of this file; its size is that of `data`.
+  /// Adds a message of a channel of add_channel(); its data_size is ignored.
   void add(const McapMessage& message, std::span<const std::uint8_t> data);
 
-  /// Ends the chunk; none is empty.
+  /// Ends the chunk, unless it is empty.
   void end_chunk();
 
-  /// Adds a file, behind the chunk, which ends.
+  /// Ends the chunk and adds a file behind it.
   void attach(const McapAttachment& attachment);
 
-  /// Ends the file: call once, and nothing but take() after it.
+  /// Ends the file. Call once; afterwards only take() is allowed.
   void finish();
 
-  /// The bytes that follow those taken before.
+  /// The bytes produced since the last call.
   [[nodiscard]] std::vector<std::uint8_t> take();
 
  private:
@@ -64,7 +65,7 @@ class McapWriter {
   void append(std::span<const std::uint8_t> bytes);
 
   const Options options_;
-  std::vector<McapSchema> schemas_;  // id - 1 is the index, as of channels
+  std::vector<McapSchema> schemas_;  // id - 1 is the index, as in channels_
   std::vector<McapChannel> channels_;
   std::set<std::uint16_t> written_schemas_, written_channels_;
   OpenChunk chunk_;
@@ -73,7 +74,7 @@ class McapWriter {
   McapStatistics statistics_;
   std::map<std::uint16_t, std::uint64_t> counts_;
   std::vector<std::uint8_t> bytes_;  // bytes that the caller has not taken yet
-  std::uint64_t size_ = 0;           // bytes of the file so far
+  std::uint64_t size_ = 0;           // size of the file so far [bytes]
   std::uint32_t crc_ = 0;            // checksum of the file so far
 };
 

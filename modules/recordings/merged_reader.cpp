@@ -17,7 +17,7 @@ MergedReader::MergedReader(std::vector<std::unique_ptr<BagReader>> readers) {
 void MergedReader::advance(Source& source) {
   source.head = source.reader->next();
   if (!source.head) return;
-  const auto& channels = source.reader->channels();  // may have grown
+  const auto& channels = source.reader->channels();  // perhaps more than before next()
   for (std::size_t i = source.channel_of.size(); i < channels.size(); ++i)
     source.channel_of.push_back(channels_.add(channels[i]));
   source.head->channel = source.channel_of[source.head->channel];

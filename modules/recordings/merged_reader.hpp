@@ -9,7 +9,8 @@
 
 namespace km {
 
-/// Several files of one recording as one stream; messages of equal time in the order of the files.
+/// Several files of one recording as one stream. Messages of equal time are in the order of the
+/// files.
 class MergedReader final : public BagReader {
  public:
   explicit MergedReader(std::vector<std::unique_ptr<BagReader>> readers);

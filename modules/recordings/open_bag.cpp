@@ -31,7 +31,7 @@ std::unique_ptr<BagReader> open_file(const fs::path& path) {
   throw InputFileError(file.place(0) + ": begins as none of .bag, .mcap and .db3 files do");
 }
 
-// In the order in which a recorder numbers them: bag_2 before bag_10.
+// Files in the order of their numbers: bag_2 before bag_10.
 std::vector<fs::path> files_of(const fs::path& folder, std::string_view extension) {
   std::vector<fs::path> files;
   std::error_code error;

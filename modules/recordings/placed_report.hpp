@@ -9,10 +9,11 @@
 
 namespace km {
 
-/// Faults in a file with their byte positions. A chunk that is read again is reported once.
+/// Faults in a file with their byte positions. Faults of a chunk that is read again are not counted
+/// again.
 class PlacedReport {
  public:
-  /// `file` outlives the report.
+  /// `file` must outlive the report.
   explicit PlacedReport(const RandomAccessFile& file) : file_(file) {}
 
   void add(BagFault fault, std::uint64_t offset, const std::string& why) {

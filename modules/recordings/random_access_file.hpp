@@ -10,13 +10,13 @@ namespace km {
 /// A file that is read at any position. Not thread-safe.
 class RandomAccessFile {
  public:
-  /// Throws InputFileError if there is no regular file to read.
+  /// Throws InputFileError if `path` is no readable regular file.
   explicit RandomAccessFile(const std::filesystem::path& path);
   ~RandomAccessFile();
   RandomAccessFile(const RandomAccessFile&) = delete;
   RandomAccessFile& operator=(const RandomAccessFile&) = delete;
 
-  /// [bytes], as the file was when opened.
+  /// Size of the file when it was opened [bytes].
   [[nodiscard]] std::uint64_t size() const { return size_; }
 
   /// True if [offset, offset + size) is within the file.
@@ -24,11 +24,11 @@ class RandomAccessFile {
     return offset <= size_ && size <= size_ - offset;
   }
 
-  /// The bytes [offset, offset + size), which the file must have. Throws InputFileError if they
-  /// cannot be read.
+  /// The bytes [offset, offset + size). Throws InputFileError if they cannot be read. Precondition:
+  /// has(offset, size).
   [[nodiscard]] std::vector<std::uint8_t> read(std::uint64_t offset, std::uint64_t size) const;
 
-  /// "FILE byte OFFSET", as messages name a place.
+  /// Position for messages: "FILE byte OFFSET".
   [[nodiscard]] std::string place(std::uint64_t offset) const;
 
  private:

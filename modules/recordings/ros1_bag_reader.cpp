@@ -43,7 +43,7 @@ Ros1BagReader::Ros1BagReader(const std::filesystem::path& path) : file_(path) {
 std::optional<Ros1BagReader::Place> Ros1BagReader::record_at(std::uint64_t begin,
                                                              std::uint64_t end) const {
   constexpr std::uint64_t kLength_bytes = 4;
-  // The length at `at`, if that many bytes are behind it.
+  // The length at `at`, if as many bytes follow.
   const auto length_at = [&](std::uint64_t at) -> std::optional<std::uint32_t> {
     if (end < kLength_bytes || at > end - kLength_bytes) return std::nullopt;
     const std::uint32_t length = ByteReader(file_.read(at, kLength_bytes)).u32();
@@ -152,7 +152,7 @@ Chunk Ros1BagReader::load(const ChunkPlace& place) {
   return chunk;
 }
 
-// Empty if they cannot be had.
+// The uncompressed records of a chunk; empty if they cannot be read.
 Bytes Ros1BagReader::records_of(const ChunkPlace& place) {
   const auto refuse = [&](BagFault fault, const std::string& why) {
     report_.add(fault, place.begin, why);

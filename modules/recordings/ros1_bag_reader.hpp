@@ -21,7 +21,7 @@ namespace km {
 /// recorder was killed, is read once before the first message and yields its complete chunks.
 class Ros1BagReader final : public BagReader {
  public:
-  /// Throws InputFileError if `path` is no file, does not begin as such bags do, or is encrypted.
+  /// Throws InputFileError if `path` is no file, does not begin with kRos1Magic, or is encrypted.
   explicit Ros1BagReader(const std::filesystem::path& path);
 
   [[nodiscard]] const std::vector<BagChannel>& channels() const override {
@@ -31,17 +31,17 @@ class Ros1BagReader final : public BagReader {
   [[nodiscard]] BagReport report() const override { return report_.faults(); }
 
  private:
-  // A record's header in the file, its data not read yet.
+  // Header of a record, and position of its data in the file.
   struct Place {
     std::vector<std::uint8_t> header;  // bytes to which `fields` refer
     Ros1Fields fields;
     std::uint64_t data_begin = 0;
     std::uint32_t data_size = 0;
   };
-  // nullopt if it is no record, or does not end before `end`.
+  // The record at `begin`; nullopt if there is no record that ends before `end`.
   [[nodiscard]] std::optional<Place> record_at(std::uint64_t begin, std::uint64_t end) const;
 
-  // Why the index cannot be used, or null.
+  // Reason why the index cannot be used, or null.
   [[nodiscard]] const char* read_index(const Place& bag_header);
   [[nodiscard]] const char* use_chunk_infos(std::vector<Ros1ChunkInfo> infos, std::uint64_t begin,
                                             std::uint64_t end);

@@ -20,7 +20,7 @@ std::optional<Ros1Fields> Ros1Fields::parse(std::span<const std::uint8_t> bytes)
   return reader.failed() ? std::nullopt : std::optional(std::move(parsed));
 }
 
-// Empty if there is no field of that size.
+// Value of a field; empty if there is no field of this name and size.
 std::span<const std::uint8_t> Ros1Fields::field(const char* name, std::size_t size) const {
   const auto found = fields_.find(std::string_view(name));
   if (found == fields_.end() || found->second.size() != size) return {};

@@ -13,8 +13,8 @@
 
 namespace km {
 
-/// Records of a bag of ROS 1, version 2.0 (wiki.ros.org/Bags/Format/2.0): a header of named fields
-/// and data, each behind its length in four bytes, little endian.
+/// Records of a bag of ROS 1, version 2.0 (wiki.ros.org/Bags/Format/2.0). A record is a header of
+/// named fields and data. The length of each precedes it in four bytes, little endian.
 enum class Ros1Opcode : std::uint8_t {
   kMessage = 0x02,
   kBagHeader = 0x03,
@@ -30,12 +30,12 @@ inline constexpr std::string_view kRos1Magic = "#ROSBAG V2.0\n";
 /// The fields of a record's header.
 class Ros1Fields {
  public:
-  /// nullopt for bytes that are no such fields. They must outlive the result.
+  /// nullopt if `bytes` are no such fields. `bytes` must outlive the result.
   [[nodiscard]] static std::optional<Ros1Fields> parse(std::span<const std::uint8_t> bytes);
 
-  /// The record's kind.
+  /// True if the record is of this kind.
   [[nodiscard]] bool is(Ros1Opcode kind) const;
-  /// Numbers of that many bytes; nullopt if there is no such field, or of another size.
+  // Value of a field; nullopt if there is no field of this name and size.
   [[nodiscard]] std::optional<std::uint32_t> u32(const char* name) const;
   [[nodiscard]] std::optional<std::uint64_t> u64(const char* name) const;
   [[nodiscard]] std::optional<Stamp> time(const char* name) const;
@@ -51,11 +51,11 @@ class Ros1Fields {
 struct Ros1Record {
   Ros1Fields fields;
   std::span<const std::uint8_t> data;
-  std::uint64_t data_begin = 0;  ///< In the bytes that the record is from.
+  std::uint64_t data_begin = 0;  ///< Position of the data in the parsed bytes.
 };
 
-/// The record at `at`, which advances behind it; nullopt if the bytes are no record or end within
-/// it.
+/// Parses the record at `at` and advances `at` behind the record; nullopt if the bytes are no
+/// record or end too early.
 [[nodiscard]] std::optional<Ros1Record> next_ros1_record(std::span<const std::uint8_t> bytes,
                                                          std::uint64_t& at);
 

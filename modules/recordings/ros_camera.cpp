@@ -15,7 +15,7 @@ namespace {
   throw std::invalid_argument("CameraInfo of frame '" + info.header.frame + "': " + problem);
 }
 
-// D with zeros up to `count`; further coefficients must be 0.
+// The first `count` coefficients of D, with zeros for missing ones. Throws if others are not 0.
 std::vector<double> coefficients(const RosCameraInfo& info, std::size_t count) {
   std::vector<double> D = info.D;
   const bool cut = std::any_of(D.begin() + static_cast<std::ptrdiff_t>(std::min(count, D.size())),

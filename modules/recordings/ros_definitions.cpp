@@ -114,7 +114,7 @@ const Definition& definition_of(std::string_view type) {
   return *known;
 }
 
-// The types of fields are followed by a blank, and by [] or a number where there are several.
+// Types of messages in a list of fields. A blank, or "[" for arrays, follows the type of a field.
 std::vector<std::string_view> types_in(std::string_view fields) {
   std::vector<std::string_view> types;
   while (!fields.empty()) {

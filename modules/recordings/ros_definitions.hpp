@@ -5,10 +5,10 @@
 
 namespace km {
 
-/// The definition of a type of ros_messages.hpp that robots write, given its name in ROS 1, in
-/// MCAP's encoding "ros2msg" (mcap.dev/spec/registry). It consists of the fields of the type and
-/// the definitions of all types in it. A line of "=" and a line with the name precede each of
-/// those. Throws std::invalid_argument for other types.
+/// The definition of a type that robots write, in MCAP's encoding "ros2msg"
+/// (mcap.dev/spec/registry). `type` is its name in ROS 1. The definition consists of the fields of
+/// the type and the definitions of the types of these fields. A line of "=" and a line with the
+/// name precede each of the latter. Throws std::invalid_argument for other types.
 [[nodiscard]] std::string ros_definition(std::string_view type);
 
 /// "sensor_msgs/msg/Image" of "sensor_msgs/Image".
@@ -17,8 +17,8 @@ namespace km {
 /// "sensor_msgs/Image" of "sensor_msgs/msg/Image".
 [[nodiscard]] std::string ros1_name(std::string_view type);
 
-/// A valid name for topics and frames: other characters than letters, digits and underscores become
-/// underscores.
+/// A valid name for topics and frames: underscores replace all characters except for letters,
+/// digits and underscores.
 [[nodiscard]] std::string ros_name(std::string name);
 
 }  // namespace km

@@ -8,9 +8,8 @@
 namespace km {
 namespace {
 
-// Fields stand in the order of ROS' definitions: github.com/ros2/common_interfaces. One list of
-// them serves for reading, by a RosWire into a message, and for writing, by a RosWriter out of a
-// constant one.
+// The fields of each message in the order of ROS' definitions (github.com/ros2/common_interfaces).
+// RosWire reads them into a message, and RosWriter writes them from a constant message.
 template <typename Message, typename Type>
 concept Is = std::same_as<std::remove_const_t<Message>, Type>;
 
@@ -24,7 +23,7 @@ void fields(auto& wire, Is<Eigen::Vector3d> auto& vector) {
   wire.f64(std::span(vector.data(), 3));
 }
 
-// x, y, z, w, as Eigen keeps them.
+// Order x, y, z, w, as in Eigen's storage.
 void fields(auto& wire, Is<Eigen::Quaterniond> auto& rotation) {
   wire.f64(std::span(rotation.coeffs().data(), 4));
 }
@@ -158,7 +157,7 @@ void fields(auto& wire, Is<RosDiagnostics> auto& diagnostics) {
 
 void fields(auto& wire, Is<RosMarker> auto& marker) {
   constexpr std::size_t kPoint_bytes = 3 * 8, kColor_bytes = 4 * 4, kTexture_bytes = 2 * 4;
-  std::string blank;  // no texture, no mesh file
+  std::string blank;  // names of textures and mesh files, which are not used
   std::vector<Eigen::Vector2f> none;
   RosCompressedImage no_image;
   std::vector<std::uint8_t> no_file;
@@ -212,9 +211,7 @@ bool is_of_type(const BagChannel& channel, std::string_view type) {
   const std::string_view package = type.substr(0, slash);
   const std::string_view message = type.substr(slash);
   if (name == type) return true;
-  if (type == RosTransforms::kType && name == "tf/tfMessage")
-    return true;  // former name of the
-                  // type
+  if (type == RosTransforms::kType && name == "tf/tfMessage") return true;  // former name
   return name.size() == type.size() + 4 && name.starts_with(package) &&
          name.substr(slash, 4) == "/msg" && name.ends_with(message);
 }

@@ -15,9 +15,8 @@
 
 namespace km {
 
-/// Messages of ROS, field by field as they were recorded. Units and frames are those of ROS (SI,
-/// REP 103). Decoding only checks that the bytes are such a message. kType is the type's name in
-/// ROS 1.
+/// Messages of ROS with all their fields. Units and frames are those of ROS (SI, REP 103). Decoding
+/// does not check the values. kType is the name of the type in ROS 1. Matrices are row-major.
 
 /// std_msgs/Header, with which most messages begin.
 struct RosHeader {
@@ -48,7 +47,7 @@ struct RosImu {
   static constexpr std::string_view kType = "sensor_msgs/Imu";
   RosHeader header;
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  std::array<double, 9> orientation_covariance{};  ///< Row-major, as all; -1 first: none is known.
+  std::array<double, 9> orientation_covariance{};              ///< First entry -1: no orientation.
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s]
   std::array<double, 9> angular_velocity_covariance{};
   Eigen::Vector3d linear_acceleration = Eigen::Vector3d::Zero();  ///< [m/s^2]
@@ -62,10 +61,10 @@ struct RosCameraInfo {
   std::uint32_t width = 0;       ///< [px]
   std::string distortion_model;  ///< "plumb_bob", "equidistant", ...
   std::vector<double> D;
-  std::array<double, 9> K{};                   ///< 3x3, row-major, as all.
+  std::array<double, 9> K{};                   ///< 3x3.
   std::array<double, 9> R{};                   ///< 3x3.
   std::array<double, 12> P{};                  ///< 3x4.
-  std::uint32_t binning_x = 0, binning_y = 0;  ///< Pixels that are one in the images; 0 is 1.
+  std::uint32_t binning_x = 0, binning_y = 0;  ///< Pixels combined into one; 0 means 1.
   struct Region {
     std::uint32_t x_offset = 0, y_offset = 0, height = 0, width = 0;  ///< [px]; 0: all.
     bool do_rectify = false;
@@ -124,22 +123,22 @@ struct RosTransforms {
 
 struct RosPointCloud {
   static constexpr std::string_view kType = "sensor_msgs/PointCloud2";
-  static constexpr std::uint8_t kFloat32 = 7;  ///< A datatype.
+  static constexpr std::uint8_t kFloat32 = 7;  ///< Value of Field::datatype.
   struct Field {
     std::string name;           ///< "x", "rgb", ...
-    std::uint32_t offset = 0;   ///< In a point [bytes].
+    std::uint32_t offset = 0;   ///< Position in a point [bytes].
     std::uint8_t datatype = 0;  ///< kFloat32, ...
     std::uint32_t count = 1;
   };
   RosHeader header;
-  std::uint32_t height = 0;  ///< 1: points in no order.
+  std::uint32_t height = 0;  ///< Number of rows; 1 for points without order.
   std::uint32_t width = 0;
   std::vector<Field> fields;
   bool is_bigendian = false;
   std::uint32_t point_step = 0;  ///< Length of a point [bytes].
   std::uint32_t row_step = 0;    ///< Length of a row [bytes].
   std::vector<std::uint8_t> data;
-  bool is_dense = false;  ///< No point is invalid.
+  bool is_dense = false;  ///< True if no point is invalid.
 };
 
 /// diagnostic_msgs/DiagnosticStatus.
@@ -162,21 +161,19 @@ struct RosDiagnostics {
 /// visualization_msgs/Marker, as of ROS 2 Humble, without textures and mesh files.
 struct RosMarker {
   static constexpr std::string_view kType = "visualization_msgs/Marker";
-  static constexpr std::int32_t kLineList = 5, kTriangleList = 11;  ///< Kinds of markers whose
-                                                                    ///< points form line segments
-                                                                    ///< (2 each) and triangles (3
-                                                                    ///< each).
+  /// Types of markers: line segments of 2 points each, and triangles of 3 points each.
+  static constexpr std::int32_t kLineList = 5, kTriangleList = 11;
   static constexpr std::int32_t kDelete = 2;  ///< Deletes the marker with this name space and id.
   RosHeader header;
-  std::string name_space;  ///< Identifies a marker together with `id`. A new marker replaces an
-                           ///< equally identified one.
+  std::string name_space;  ///< Name space of `id`. A marker replaces that with equal name space and
+                           ///< id.
   std::int32_t id = 0;
   std::int32_t type = 0;
   std::int32_t action = 0;                          ///< 0: add or replace, or kDelete.
   RosPose pose;                                     ///< Pose of the points in the header's frame.
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< x: width of lines [m].
   Eigen::Vector4f color = {1, 1, 1, 1};             ///< Red, green, blue, alpha: 0 to 1.
-  std::array<std::uint32_t, 2> lifetime{};          ///< [s], [ns]; 0: for ever.
+  std::array<std::uint32_t, 2> lifetime{};          ///< [s], [ns]; 0: no limit.
   bool frame_locked = false;
   std::vector<Eigen::Vector3d> points;  ///< [m]
   std::vector<Eigen::Vector4f> colors;  ///< One colour per point, or empty.
@@ -188,7 +185,7 @@ struct RosMarkers {
   std::vector<RosMarker> markers;
 };
 
-/// A line of a log.
+/// A message of a log.
 struct RosLog {
   static constexpr std::string_view kType = "rcl_interfaces/Log";
   static constexpr std::uint8_t kDebug = 10, kInfo = 20, kWarn = 30, kError = 40;
@@ -198,19 +195,19 @@ struct RosLog {
   std::uint32_t line = 0;
 };
 
-/// True if the messages of the channel have `type`, a name of ROS 1. Names of ROS 2 also match,
-/// which contain "/msg/".
+/// True if the messages of the channel have `type`, a name of ROS 1. The name in ROS 2, which
+/// contains "/msg/", also matches.
 [[nodiscard]] bool is_of_type(const BagChannel& channel, std::string_view type);
 
-/// A message of a type above in the encoding of its channel, "ros1" or "cdr". Refuses bytes that
-/// are no such message, and images with fewer pixels than they state. A RosHeader is read from the
-/// beginning of any message that has one.
+/// Decodes a message of a type of this file from the encoding of its channel, "ros1" or "cdr".
+/// Refuses bytes that are too short or too long, and images with fewer pixels than they state. A
+/// RosHeader is read from the beginning of any message that has one.
 template <typename Message>
 Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes);
 template <>
 Decoded<RosHeader> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes);
 
-/// A message of a type above as ROS 2 writes it: little-endian CDR with its encapsulation header.
+/// Encodes a message as ROS 2 does: little-endian CDR with the encapsulation header.
 template <typename Message>
 [[nodiscard]] std::vector<std::uint8_t> encode_ros(const Message& message);
 

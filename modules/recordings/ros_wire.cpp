@@ -15,7 +15,7 @@ Decoded<RosWire> RosWire::open(std::string_view encoding, std::span<const std::u
   if (encoding == "ros1") return Result::accept(RosWire(bytes, false, false));
   if (encoding != "cdr") return Result::refuse("an encoding that is not known");
   if (bytes.size() < kEncapsulation_bytes) return Result::refuse("no encapsulation header");
-  // The second byte of the identifier; its options do not matter for reading.
+  // Values of the second byte of the representation identifier.
   constexpr std::uint8_t kBigEndian = 0, kLittleEndian = 1;
   if (bytes[0] != 0 || (bytes[1] != kBigEndian && bytes[1] != kLittleEndian))
     return Result::refuse("an encapsulation other than plain CDR");
@@ -42,7 +42,8 @@ void RosWire::f64(std::span<double> values) {
 
 void RosWire::text(std::string& value) {
   const auto octets = reader_.bytes(number(4));
-  const bool has_end = is_cdr_ && !octets.empty();  // some writers leave out that of an empty text
+  // CDR ends a text with a zero, which some writers omit for an empty text.
+  const bool has_end = is_cdr_ && !octets.empty();
   if (has_end && octets.back() != 0) reader_.fail();
   value.assign(octets.begin(), octets.end() - (has_end ? 1 : 0));
 }
@@ -69,7 +70,7 @@ void RosWire::skip_sequence() {
 void RosWire::stamp(Stamp& value) {
   const auto seconds = static_cast<std::uint32_t>(number(4));
   const auto rest_ns = static_cast<std::uint32_t>(number(4));
-  // Signed in ROS 2, unsigned in ROS 1.
+  // Seconds are signed in ROS 2 and unsigned in ROS 1.
   const Stamp whole = is_cdr_ ? Stamp{static_cast<std::int32_t>(seconds)} : Stamp{seconds};
   value = whole * kSecond_ns + rest_ns;
 }

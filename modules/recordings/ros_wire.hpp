@@ -18,9 +18,9 @@ namespace km {
 ///   "ros1"  ROS 1: little endian, without gaps (wiki.ros.org/msg);
 ///   "cdr"   ROS 2: OMG's CDR as DDS writes it (DDS-XTypes, XCDR version 1, plain): an
 ///           encapsulation header of four bytes that states the byte order; numbers lie at
-///           multiples of their size behind it.
+///           multiples of their size after the header.
 /// The bytes are untrusted, as for ByteReader: after a read that fails, all values are zero or
-/// empty. They must outlive this object.
+/// empty. The bytes must outlive this object.
 class RosWire {
  public:
   /// Refuses other encodings, and encapsulations with parameter lists or of XCDR version 2.
@@ -37,17 +37,18 @@ class RosWire {
   void octets(std::vector<std::uint8_t>& values);
   /// float64[].
   void doubles(std::vector<double>& values);
-  /// How many elements follow, each of at least `bytes_per_element`: fails for more than can be.
+  /// Reads the number of elements, each of at least `bytes_per_element`, and resizes `elements`.
+  /// Fails if they exceed the remaining bytes.
   template <typename Element>
   void resize(std::vector<Element>& elements, std::size_t bytes_per_element) {
     elements.resize(count(bytes_per_element));
   }
-  /// std_msgs/Header's number, which only ROS 1 has.
+  /// Skips the sequence number of std_msgs/Header, which exists only in ROS 1.
   void skip_sequence();
   /// builtin_interfaces/Time [ns].
   void stamp(Stamp& value);
 
-  /// Why the bytes are no such message: too short or too long; null if they are one.
+  /// Reason why the bytes do not fit the fields read: too short or too long; null if they fit.
   [[nodiscard]] const char* problem() const;
   [[nodiscard]] bool failed() const { return reader_.failed(); }
   void fail() { reader_.fail(); }
@@ -65,7 +66,7 @@ class RosWire {
   bool is_big_endian_;
 };
 
-/// Writes what RosWire reads, as little-endian CDR.
+/// Writes the fields of a ROS message as little-endian CDR, with the interface of RosWire.
 class RosWriter {
  public:
   void u8(std::uint8_t value) { bytes_.push_back(value); }
@@ -85,7 +86,7 @@ class RosWriter {
   void stamp(Stamp value);
   void fail() {}
 
-  /// With the encapsulation header.
+  /// The bytes with the encapsulation header.
   [[nodiscard]] std::vector<std::uint8_t> release() { return std::move(bytes_); }
 
  private:

@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-// The smallest value such that at least `share` of the values are no larger; `values` is not empty.
+// Quantile: the smallest value such that at least `share` of the values are no larger. `values` is
+// not empty.
 double quantile(std::vector<double> values, double share) {
   const auto rank = static_cast<std::size_t>(
       std::max(1.0, std::ceil(share * static_cast<double>(values.size()))));
@@ -20,7 +21,7 @@ double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
-// seconds_between(), for stamps so far apart that their difference has no place in a Stamp.
+// seconds_between() for arbitrary stamps, whose difference may overflow a Stamp.
 double seconds_from_to(Stamp a, Stamp b) {
   const auto difference =
       static_cast<std::int64_t>(static_cast<std::uint64_t>(b) - static_cast<std::uint64_t>(a));
@@ -29,7 +30,7 @@ double seconds_from_to(Stamp a, Stamp b) {
                    : static_cast<double>(difference) * 1e-9;
 }
 
-// The one of `stamps`, which are sorted and not empty, that is nearest to `stamp`.
+// Index of the stamp nearest to `stamp`. `stamps` are sorted and not empty.
 std::size_t nearest(std::span<const Stamp> stamps, Stamp stamp) {
   const auto after = std::lower_bound(stamps.begin(), stamps.end(), stamp);
   const auto index = static_cast<std::size_t>(after - stamps.begin());

@@ -71,7 +71,7 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
   refuse(message.str());
 }
 
-// Adds the faults of the bag, which may be the cause.
+// Throws DatasetError with the problem and the faults of the bag, which may be the cause.
 void BagDataset::refuse(std::string problem) const {
   std::istringstream faults(to_string(report()));
   for (std::string line; std::getline(faults, line);) problem += "; " + line;
@@ -215,7 +215,7 @@ void BagDataset::take_imu(Role role, Stamp stamp, const BagMessage& message) {
 std::optional<JoinedFrame> BagDataset::next_frame() {
   auto frame = joiner_.next();
   while (!frame && read_message()) frame = joiner_.next();
-  return frame ? frame : joiner_.next();  // at the end incomplete frames count as complete
+  return frame ? frame : joiner_.next();  // at the end of the bag no frame waits any more
 }
 
 bool BagDataset::has_imu() const {
@@ -279,7 +279,7 @@ std::optional<SensorPacket> BagDataset::read_packet(const ChooseUse& choose) {
       report_.add(ReaderFault::kFrameWithoutPose, place_of(joined->left) + ": a gap of the poses");
       continue;
     }
-    // A live frame may have waited for other messages: its arrival is that of the newest message.
+    // A live frame may have waited for other messages, so it arrives with the newest message.
     const FrameUse use = choose(joined->stamp, is_live() ? newest_log_time_ : 0);
     if (use == FrameUse::kNone) continue;
     auto frame = decode(*joined, use);

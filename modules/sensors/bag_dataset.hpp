@@ -18,8 +18,8 @@
 
 namespace km {
 
-/// Topics of a robot's sensors. Either `imu`, or `gyro` and `accel`: sensors with their own stamps
-/// (see ImuJoiner), each as sensor_msgs/Imu. Without `right` the rig is an RGB-D one. With
+/// Topics of a robot's sensors. There is either `imu`, or `gyro` and `accel` with their own stamps
+/// (see ImuJoiner), all of type sensor_msgs/Imu. Without `right` the rig is an RGB-D rig. With
 /// `odometry`, the nav_msgs/Odometry of an external odometry, no inertial sensor is needed.
 struct SensorTopicNames {
   std::string left, right, depth;
@@ -27,7 +27,7 @@ struct SensorTopicNames {
   std::string odometry = {};
 };
 
-/// Description of the sensors that a recording itself lacks or spreads over several places.
+/// Topics and calibration of the sensors in a recording.
 struct Rig {
   SensorTopicNames topics;
   SensorRig sensors;
@@ -90,7 +90,7 @@ class BagDataset final : public DatasetReader {
   std::unique_ptr<BagReader> bag_;
   Rig rig_;
   BagWindow window_;
-  std::vector<Role> role_of_;  // role of each channel
+  std::vector<Role> role_of_;  // by channel
   StampOrder order_[kRoles];
   MissingImages missing_[kRoles];
   std::size_t taken_[kRoles] = {};  // number of messages
@@ -100,11 +100,11 @@ class BagDataset final : public DatasetReader {
   PoseStream poses_;
   ReaderReport report_;
   std::size_t pair_count_ = 0;
-  std::optional<Stamp> start_;  // first frame of the recording
+  std::optional<Stamp> start_;  // stamp of the first frame of the recording
   Stamp newest_log_time_ = 0;
   bool ended_ = false;                 // the bag has ended
   bool is_over_ = false;               // the window has ended
-  std::optional<SensorPacket> first_;  // read ahead
+  std::optional<SensorPacket> first_;  // first packet, read by the constructor
 };
 
 }  // namespace km

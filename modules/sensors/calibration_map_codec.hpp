@@ -49,11 +49,11 @@ class CalibrationMap {
   /// A list of lists.
   [[nodiscard]] std::vector<std::vector<double>> lists(const char* key) const;
 
-  /// A 4x4 matrix, row by row in one list or in four, its rotation made exact. transform_problem()
-  /// lists the reasons for refusal. `name` is used in messages.
+  /// A 4x4 matrix, row by row in one list or in four lists. The nearest rotation replaces its
+  /// rotation. transform_problem() lists the reasons for refusal. `name` is used in messages.
   [[nodiscard]] SE3 transform(const char* key, const char* name) const;
 
-  /// Refuses the value of a key, or the map if there is no such key.
+  /// Throws DatasetError with the place of a key, or of the map if there is no such key.
   [[noreturn]] void fail(const char* key, const std::string& problem) const;
   /// "FILE line N" of a key.
   [[nodiscard]] std::string place_of(const char* key) const;

@@ -9,11 +9,11 @@
 namespace km {
 namespace {
 
-// A camera_model, and the names of its numbers in messages.
+// Intrinsics of a camera_model.
 struct Projection {
   const char* name;
-  std::size_t count;  // number of intrinsics
-  const char* meaning;
+  std::size_t count;    // number of intrinsics
+  const char* meaning;  // names of the intrinsics in messages
 };
 constexpr Projection kProjections[] = {{"pinhole", 4, "fu, fv, cu, cv"},
                                        {"omni", 5, "xi, fu, fv, cu, cv"},

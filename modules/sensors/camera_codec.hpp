@@ -19,8 +19,8 @@ namespace km {
 /// for other models and for values that calibration_limits.hpp refuses.
 [[nodiscard]] Camera read_camera(const CalibrationMap& map, const char* coefficients_key);
 
-/// Reads `resolution` and the `intrinsics` of a pinhole into `camera`, and keeps its lens. Errors
-/// as for read_camera().
+/// Reads `resolution` and the `intrinsics` of a pinhole into `camera`, whose lens does not change.
+/// Errors as for read_camera().
 void read_pinhole(const CalibrationMap& map, Camera& camera);
 
 /// The lens of a calibration. If Lens refuses the coefficients, the message contains the place of
@@ -28,7 +28,8 @@ void read_pinhole(const CalibrationMap& map, Camera& camera);
 [[nodiscard]] Lens lens_of(const CalibrationMap& map, const char* key, LensModel model,
                            const std::vector<double>& coefficients);
 
-/// Refuses focal lengths and principal points that no camera has, with the place of `key`.
+/// Throws DatasetError with the place of `key` for focal lengths and principal points that no
+/// camera has.
 void check_intrinsics(const CalibrationMap& map, const char* key, const Camera& camera);
 
 }  // namespace km

@@ -15,23 +15,23 @@
 namespace km {
 
 /// Faults in a part of a recording that leave the rest usable. In general the row, sample or frame
-/// is skipped. An unusable depth or label image only leaves its frame without one. After kImuGap,
+/// is skipped. If a depth or label image is unusable, only this image is omitted. After kImuGap,
 /// kUnknownColor, kMissingBetween and kPause nothing is skipped.
 enum class ReaderFault {
   kMalformedRow,       ///< Too few fields, or a stamp or value that is not a number.
   kNotFinite,          ///< NaN or infinity in an inertial sample.
   kImplausible,        ///< An inertial sample beyond the range of sensors.
-  kUnorderedStamp,     ///< Earlier than previous rows, or later than following rows.
-  kRepeatedStamp,      ///< Equal to a row before.
-  kJumpingStamp,       ///< More than an hour away from most rows.
-  kLeftWithoutRight,   ///< No right image within the tolerance.
-  kRightWithoutLeft,   ///< No left image within the tolerance.
-  kMissingImage,       ///< Listed, but not on disk.
-  kUnreadableImage,    ///< Truncated, corrupt or of an unknown format.
-  kWrongImageSize,     ///< Not the resolution of the calibration.
+  kUnorderedStamp,     ///< A stamp before that of previous rows, or after that of following rows.
+  kRepeatedStamp,      ///< A stamp equal to that of a previous row.
+  kJumpingStamp,       ///< A stamp more than an hour away from most rows.
+  kLeftWithoutRight,   ///< A left image without a right image within the tolerance.
+  kRightWithoutLeft,   ///< A right image without a left image within the tolerance.
+  kMissingImage,       ///< An image that is listed, but not on disk.
+  kUnreadableImage,    ///< A truncated or corrupt image, or one of an unknown format.
+  kWrongImageSize,     ///< An image without the resolution of the calibration.
   kImuGap,             ///< Inertial samples further apart than 2.5 periods.
-  kPairWithoutImu,     ///< Outside the time that inertial samples cover.
-  kWrongImageFormat,   ///< Not the bits or channels of its kind: depth, labels.
+  kPairWithoutImu,     ///< A frame outside the time that inertial samples cover.
+  kWrongImageFormat,   ///< A depth or label image with wrong bits or channels.
   kImageWithoutFrame,  ///< A depth or label image that belongs to no frame.
   kUnknownColor,       ///< A label image with colours that are not in the palette.
   kMalformedMessage,   ///< A message of a bag that is not of its type.
@@ -46,11 +46,11 @@ enum class ReaderFault {
 /// A short plural for tables and log lines: "malformed rows".
 [[nodiscard]] const char* to_string(ReaderFault fault);
 
-/// Examples of faults name file and line.
+/// Counts of the faults, with file and line of examples.
 using ReaderReport = FaultReport<ReaderFault>;
 
-/// A recording that cannot be used at all. what() is one line with the file, the value and, if
-/// there is one, the line.
+/// A recording that cannot be used at all. what() is one line of text with the file, the value and,
+/// for text files, the line number.
 struct DatasetError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -80,13 +80,14 @@ class DatasetReader {
   /// Faults met so far.
   [[nodiscard]] virtual ReaderReport report() const = 0;
 
-  /// Remarks on how the source is read, for the user, a line each; complete with the first packet.
+  /// Remarks for the user on the way the source is read, one line each; complete with the first
+  /// packet.
   [[nodiscard]] virtual std::vector<std::string> remarks() const { return {}; }
 
   /// True if packets have the poses of an external odometry. Then there may be no inertial samples.
   [[nodiscard]] virtual bool gives_poses() const { return false; }
 
-  /// True if sensors measure now: next() waits for them, and there is no end.
+  /// True for live sensors: next() waits for measurements, and there is no end.
   [[nodiscard]] virtual bool is_live() const { return false; }
 
   /// Makes next() return nullopt, now and later, also while it waits. Thread-safe.

@@ -46,7 +46,7 @@ bool is_rgbd(const SensorRig& rig) {
   return rig.stereo.depth_source == DepthSource::kDepthImage;
 }
 
-// For the message if the user named a folder of recordings instead of one recording.
+// Recordings in `folder`, for the message if the user named a folder of recordings.
 std::string recordings_below(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   std::error_code error;

@@ -13,7 +13,7 @@
 
 namespace km {
 
-/// Calibration in a recording.
+/// Calibration that a recording contains.
 struct EurocCalibration {
   SensorRig rig;
   double depth_scale_m = 1e-3;  ///< Depth of one unit in depth images [m].
@@ -25,9 +25,10 @@ struct EurocOptions {
   double from_s = 0.0;                                    ///< First instant of the part.
   double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the part.
   std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
-  /// Largest difference of left to right (depth, label) stamps; nullopt: see find_synchrony().
+  /// Largest difference between the stamps of left and right (depth, label) images; nullopt: see
+  /// find_synchrony().
   std::optional<double> stereo_tolerance_s = {};
-  /// The stamps are corrected here, the cameras in open_euroc().
+  /// EurocReader corrects the stamps, open_euroc() the cameras.
   CameraCalibration correction = {};
   bool imu = true;      ///< False: no inertial sensor is needed, and packets have no samples.
   bool depth = false;   ///< Read depth images although there is a right camera (open_euroc()).
@@ -40,16 +41,16 @@ struct EurocOptions {
 
 /// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv, and images that the csv names, in
 /// any format OpenCV decodes. An RGB-D rig has depth0 in place of cam1: 16-bit images of one
-/// channel. Labels are in label0, as 8-bit ids or as colours of label_palette.csv beside it. Depth
-/// and labels may come at a lower rate than images; a frame then has none.
+/// channel. Labels are in label0, as 8-bit ids or as colours of label_palette.csv beside label0. If
+/// depth or labels have a lower rate than images, some frames have none.
 ///
 /// The first packet starts up to ImuStream::kLeadIn_s before its frame, even if that is before
 /// `from_s`.
 class EurocReader final : public DatasetReader {
  public:
-  /// `folder` as for find_mav0(); open_euroc() of the codec reads the calibration from it. Reads
-  /// the lists, no image. Depth images are read if the rig has a depth range. Throws DatasetError
-  /// for missing or unusable files, including requested labels, and for a window without a frame.
+  /// `folder` as for find_mav0(). Reads the lists, but no image yet. Depth images are read if the
+  /// rig has a depth range. Throws DatasetError for missing or unusable files, including requested
+  /// labels, and for a window without a frame.
   /// Throws std::invalid_argument for a window that is empty or not a number.
   EurocReader(const std::filesystem::path& folder, EurocCalibration calibration,
               const EurocOptions& options = {});

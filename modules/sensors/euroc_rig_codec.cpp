@@ -10,7 +10,7 @@ namespace {
 constexpr double kDefaultDepthScale_m = 1e-3;
 constexpr double kDefaultDepthBaseline_m = 0.1;
 constexpr double kMaxMisalignment_m = 1e-3;   // between depth0 and cam0
-constexpr double kMaxMisalignment_px = 0.05;  // between their intrinsics, and between their axes
+constexpr double kMaxMisalignment_px = 0.05;  // by the intrinsics, and by the directions of axes
 constexpr const char* kCoefficients = "distortion_coefficients";
 
 CalibrationMap sensor_yaml(const std::filesystem::path& mav0, const char* sensor) {

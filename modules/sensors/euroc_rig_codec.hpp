@@ -10,13 +10,13 @@ namespace km {
 
 /// The rig described by the `sensor.yaml` of cam0, cam1 and imu0 below `mav0` (EuRoC/ASL format).
 /// Without a folder cam1 it is an RGB-D rig, with depth0 in place of the right camera. The body
-/// frame is the IMU's: T_body_cam = T_BS(imu0)^-1 T_BS(cam). Unless `needs_imu`, and without a
-/// folder imu0, the body frame is the reference of all T_BS. Rotations that are orthonormal to 1e-3
-/// are replaced by the nearest rotation.
+/// frame is the IMU's: T_body_cam = T_BS(imu0)^-1 T_BS(cam). If there is no folder imu0 and
+/// `needs_imu` is false, the body frame is the reference of all T_BS. The nearest rotation replaces
+/// rotations that are orthonormal to 1e-3.
 ///
 /// Throws DatasetError with file and line for a missing file or key, models that read_camera()
-/// refuses, and numbers that no sensor has (calibration_limits.hpp). Throws it also for a T_BS that
-/// is not a rigid transform, with the deviation.
+/// refuses, and numbers that no sensor has (calibration_limits.hpp). Also throws DatasetError for a
+/// T_BS that is not a rigid transform.
 ///
 /// T_BS, resolution, intrinsics and distortion (if stated) of depth0/sensor.yaml must be those of
 /// cam0, because depth must be aligned with the left image. Optional keys: `depth_scale` (of a
@@ -26,8 +26,8 @@ namespace km {
 [[nodiscard]] SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth = false,
                                        bool needs_imu = true);
 
-/// The calibration in such a folder, with the cameras and the depth of `choice`; depth0 is not
-/// read. Errors as for read_euroc_rig().
+/// The calibration in a folder of this format, with the cameras and the depth of `choice`; depth0
+/// is not read. Errors as for read_euroc_rig().
 [[nodiscard]] RigCalibration read_euroc_calibration(const std::filesystem::path& mav0,
                                                     const RigChoice& choice);
 
@@ -35,7 +35,8 @@ namespace km {
 /// read_euroc_rig().
 [[nodiscard]] double read_depth_scale(const std::filesystem::path& mav0);
 
-/// A reader of the recording in `folder`, calibrated by its own files. Requested depth must exist.
+/// A reader of the recording in `folder`, with the calibration in its files. Requested depth must
+/// exist.
 /// Throws the exceptions of read_euroc_rig() and EurocReader.
 [[nodiscard]] EurocReader open_euroc(const std::filesystem::path& folder,
                                      const EurocOptions& options = {});

@@ -53,8 +53,8 @@ void list_beside(const std::filesystem::path& folder, std::filesystem::path Ster
 [[nodiscard]] std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
                                                               ReaderReport& report);
 
-/// A stereo pair from disk, or the left image with an RGB-D rig; `status` and `problem` are those
-/// of the first image that failed. Without depth and labels.
+/// A stereo pair from disk, or the left image with an RGB-D rig, without depth and labels. `status`
+/// and `problem` are those of the first image that failed.
 struct StereoPairResult {
   ImageStatus status = ImageStatus::kOk;
   std::string problem;
@@ -63,8 +63,8 @@ struct StereoPairResult {
 
 [[nodiscard]] StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& rig);
 
-/// Depth and label images of a EuRoC folder: depth0, label0 and label_palette.csv. An unusable
-/// image is counted, and its frame has none. Const members are thread-safe.
+/// Reads the depth and label images of a EuRoC folder: depth0, label0 and label_palette.csv.
+/// Unusable images are counted and omitted. Const members are thread-safe.
 class SideImages {
  public:
   /// Reads depth if there is a range, with images in units of `depth_scale_m`, and labels if
@@ -78,7 +78,7 @@ class SideImages {
   /// Reads the images of one frame.
   void load(const StereoPairFile& files, StereoFrame& frame, ReaderReport& report) const;
 
-  /// Empty without a file, or unless `labels`.
+  /// Palette of the labels; empty without a file, and if no labels are read.
   [[nodiscard]] const LabelPalette& palette() const { return palette_; }
 
  private:

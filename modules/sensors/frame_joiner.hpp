@@ -20,35 +20,35 @@ struct JoinedFrame {
 };
 
 /// Joins streams of images into frames by their stamps, as they arrive. A frame has a left image, a
-/// right image if there is a right camera, and depth if there is an image for it.
+/// right image if there is a right camera, and a depth image if there is one for this instant.
 ///
 /// The first kSample images of each stream are held back until the difference of their stamps is
-/// known. From then on a frame waits for images of other streams. It waits until one of them has a
-/// later stamp, or until the log has advanced by kPatience_s. Images without a partner are counted.
+/// known. From then on a left image waits for images of the other streams, until a later image of
+/// the stream arrives or the log time has advanced by kPatience_s. Images without a partner are
+/// counted.
 class FrameJoiner {
  public:
   static constexpr std::size_t kSample = 20;
   static constexpr double kPatience_s = 1.0;
-  static constexpr std::size_t kMaxHeld = 200;  ///< Per stream; the oldest image is dropped.
+  static constexpr std::size_t kMaxHeld = 200;  ///< Largest number of images held per stream.
 
   /// `tolerance_s`: largest difference of stamps, without an offset; nullopt: determined from the
   /// stamps.
   FrameJoiner(bool has_right, bool has_depth, std::optional<double> tolerance_s);
 
-  /// Stamps of a stream ascend.
+  /// Adds an image. Precondition: the stamps of each role ascend.
   void add(ImageRole role, Stamp stamp, BagMessage message);
 
-  /// The next frame that is complete.
+  /// The next complete frame; nullopt if none is complete.
   [[nodiscard]] std::optional<JoinedFrame> next();
 
-  /// No further image will come.
+  /// Notes that no further image will come. Frames then wait no longer.
   void finish() { finished_ = true; }
 
-  /// Images that belong to no frame.
+  /// Counts of the images that belong to no frame.
   [[nodiscard]] const ReaderReport& report() const { return report_; }
 
-  /// Synchrony of the right images, or of depth; nullopt until it is known, or without such a
-  /// stream.
+  /// Synchrony of the right and of the depth images; nullopt until known, or without the stream.
   [[nodiscard]] std::optional<Synchrony> right_synchrony() const { return right_.synchrony; }
   [[nodiscard]] std::optional<Synchrony> depth_synchrony() const { return depth_.synchrony; }
 

@@ -18,7 +18,8 @@ namespace {
 // No camera of a rig has a larger image in any format.
 constexpr std::uintmax_t kMaxEncoded_bytes = std::uintmax_t{256} << 20U;
 
-// The end marker must be near the end of the file, because embedded thumbnails have their own.
+// True without the end marker in the last 64 bytes. Elsewhere the marker may be that of a
+// thumbnail.
 bool is_truncated(std::string_view bytes) {
   const std::string_view tail =
       bytes.substr(bytes.size() - std::min<std::size_t>(64, bytes.size()));
@@ -27,8 +28,8 @@ bool is_truncated(std::string_view bytes) {
   return false;
 }
 
-// The size in the header. A decoder allocates memory for it before it reads on, and OpenCV throws
-// beyond 2^30 pixels.
+// The size in the header. A decoder allocates memory for this size before it decodes, and OpenCV
+// throws beyond 2^30 pixels.
 std::optional<cv::Size> stated_size(std::string_view bytes) {
   const auto size = stated_image_size(bytes);
   if (!size) return std::nullopt;
@@ -42,8 +43,7 @@ std::string text(const cv::Size& size) {
 constexpr std::uint16_t kNoMeasurement = 65535;
 constexpr double kMaxStored_mm = 65535.0;
 
-// Ids of an image of BGR or BGRA pixels. Labels form runs of equal colours, so there is one lookup
-// per run.
+// Sets the ids of an image of BGR or BGRA pixels, with one lookup per run of equal colours.
 void map_colors(const cv::Mat& image, const LabelPalette& palette, LabelResult& result) {
   const int channels = image.channels();
   std::optional<std::array<std::uint8_t, 3>> last;

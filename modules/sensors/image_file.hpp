@@ -15,10 +15,10 @@ namespace km {
 
 enum class ImageStatus { kOk, kMissing, kUnreadable, kWrongSize, kWrongFormat };
 
-/// How a failure is counted. Precondition: not kOk.
+/// Fault as which a failure is counted. Precondition: not kOk.
 [[nodiscard]] ReaderFault fault_of(ImageStatus status);
 
-/// An image from disk, or the reason for its absence.
+/// An image from disk, or the reason why it cannot be used.
 template <typename Image>
 struct LoadedImage {
   ImageStatus status = ImageStatus::kOk;
@@ -41,7 +41,7 @@ using ImageResult = LoadedImage<GrayImage>;
 [[nodiscard]] LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& place,
                                                 int flags, const cv::Size& size);
 
-/// The reason why an image cannot be used, as "PLACE: WHY".
+/// Result for an image that cannot be used; its problem is "PLACE: WHY".
 [[nodiscard]] LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,
                                                  const std::string& why);
 
@@ -63,14 +63,14 @@ using DepthResult = LoadedImage<DepthImage>;
 [[nodiscard]] DepthResult load_depth_image(const std::filesystem::path& file, int width, int height,
                                            double scale_m, const DepthRange& range);
 
-/// Converts a decoded image from `place`. One of 32-bit floating point numbers is in metres,
-/// whatever the scale.
+/// Converts a decoded image from `place`. Images of 32-bit floating point numbers are in metres and
+/// do not use `scale_m`.
 [[nodiscard]] DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded,
                                          const std::string& place, double scale_m,
                                          const DepthRange& range);
 
 struct LabelResult : LoadedImage<LabelImage> {
-  std::size_t unknown_pixels = 0;  ///< Pixels with a colour that the palette lacks: id 0.
+  std::size_t unknown_pixels = 0;  ///< Number of pixels with colours outside the palette; id 0.
 };
 
 /// Reads a label image. 8 bits of one channel are ids. Three or four channels are colours, which

@@ -14,8 +14,8 @@ namespace km {
 /// Inertial samples before they are put into packets.
 class ImuStream {
  public:
-  /// The first packet begins this long before its frame if there are samples, so that odometry can
-  /// start with samples from before the first image.
+  /// Time by which the samples of the first packet precede its frame, so that odometry can start
+  /// with samples from before the first image.
   static constexpr double kLeadIn_s = 1.0;
 
   /// Stamps must ascend.
@@ -23,15 +23,16 @@ class ImuStream {
 
   [[nodiscard]] bool is_empty() const { return samples_.empty(); }
 
-  /// starts_by(): some sample was at or before the stamp. reaches(): some sample is at or after it.
+  /// starts_by(): a sample at or before the stamp has been added. reaches(): a sample at or after
+  /// the stamp has been added.
   [[nodiscard]] bool starts_by(Stamp stamp) const { return first_ && *first_ <= stamp; }
   [[nodiscard]] bool reaches(Stamp stamp) const {
     return !samples_.empty() && samples_.back().stamp >= stamp;
   }
 
-  /// The samples of the packet whose frame has this stamp (see SensorPacket). The last one is also
-  /// the first of the next packet. Preconditions: starts_by(stamp) and reaches(stamp); stamps
-  /// ascend from call to call.
+  /// The samples of the packet whose frame has this stamp (see SensorPacket). The last sample is
+  /// also the first sample of the next packet. Preconditions: starts_by(stamp) and reaches(stamp);
+  /// stamps ascend from call to call.
   [[nodiscard]] std::vector<ImuSample> until(Stamp stamp);
 
   /// The next packet begins at this stamp. Precondition: no packet has been made.
@@ -45,14 +46,14 @@ class ImuStream {
 
 /// A pause of an inertial sensor.
 struct ImuGap {
-  Stamp after = 0;  ///< Last sample before the pause.
+  Stamp after = 0;  ///< Stamp of the last sample before the pause.
   double length_s = 0.0;
 };
 
 /// Pauses of more than 2.5 periods, so that a single lost sample does not count.
 [[nodiscard]] std::vector<ImuGap> imu_gaps(std::span<const ImuSample> samples, double rate_hz);
 
-/// "0.25 s after 1403636579758555392".
+/// Length and start of a pause: "0.25 s after 1403636579758555392".
 [[nodiscard]] std::string to_string(const ImuGap& gap);
 
 /// Makes inertial samples from a gyroscope and an accelerometer that have their own stamps. There
@@ -65,15 +66,15 @@ class ImuJoiner {
     Eigen::Vector3d value = Eigen::Vector3d::Zero();
   };
 
-  /// Stamps of each must ascend.
+  /// Precondition: the stamps of each sensor ascend.
   void add_gyro(const Reading& reading) { gyro_.push_back(reading); }
   void add_accel(const Reading& reading) { accel_.push_back(reading); }
 
-  /// The next sample that is complete.
+  /// The next complete sample; nullopt if further readings are needed.
   [[nodiscard]] std::optional<ImuSample> next();
 
-  /// Number of gyroscope readings so far without a sample, because the accelerations around them
-  /// are missing or more than kLongestStep_s apart.
+  /// Number of gyroscope readings that yielded no sample, because the accelerations around them are
+  /// missing or more than kLongestStep_s apart.
   [[nodiscard]] std::size_t lost() const { return lost_; }
 
   static constexpr double kLongestStep_s = 0.1;

@@ -20,7 +20,7 @@ bool is_flat_imu(const CalibrationMap& map) {
   return map.first_of({"gyroscope_noise_density", "accelerometer_noise_density"}) != nullptr;
 }
 
-// The files by their content. One file may contain both.
+// The maps of cameras and of the inertial sensor, perhaps from one file.
 struct Chains {
   std::optional<CalibrationMap> cameras;
   std::optional<CalibrationMap> imu;  // the map of imu0
@@ -113,7 +113,8 @@ void read_imu(const CalibrationMap& imu, RigCalibration& calibration) {
   calibration.imu_topic = read_topic(imu);
   if (imu.has("T_i_b") && !imu.transform("T_i_b", "T_i_b").isApprox(SE3::Identity(), 1e-6))
     imu.fail("T_i_b", "T_i_b: not the identity; the reference of a Kalibr rig is imu0 itself");
-  // Scales and axes of the sensors: keys of Kalibr's extended models, and OpenVINS' names for them.
+  // Notes on scales and axes of the inertial sensor, which are not used. The keys are those of
+  // Kalibr's extended models and of OpenVINS.
   for (const char* key : {"gyroscopes", "accelerometers"})
     if (imu.has(key))
       calibration.notes.push_back(imu.place_of(key) + ": " + key + " are not applied to samples");

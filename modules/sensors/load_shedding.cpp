@@ -11,8 +11,8 @@ namespace {
 constexpr double kFirstCalm_s = 2.0;
 constexpr double kMostCalm_s = 30.0;
 constexpr double kSmoothing = 0.2;          // weight of the newest image in the rate of losses
-constexpr double kLeastShare = 0.01;        // bounds the logarithm
-constexpr double kLongestInterval_s = 1.0;  // between images of one camera; a longer one is a pause
+constexpr double kLeastShare = 0.01;        // lower bound on a share, for the logarithm
+constexpr double kLongestInterval_s = 1.0;  // longest interval between images that is no pause
 
 }  // namespace
 

@@ -11,23 +11,22 @@ namespace km {
 /// How a robot uses a new image.
 enum class FrameUse {
   kNone,      ///< Not used and not decoded; its inertial samples are kept.
-  kOdometry,  ///< Used without depth and labels that only the map needs.
+  kOdometry,  ///< Used for odometry only, without depth and labels for the map.
   kAll,
 };
 
 /// Decides which images a robot uses when its processors are too slow, in this order:
 /// 1. If odometry is late by more than half of max_lag_s, the map gets no new frames.
-/// 2. If it is late by more than max_lag_s, odometry gets every second image, then every third and
-///    fourth. Each step follows only after the one before has had time to take effect. It is taken
-///    only while at least half of the features would still be tracked from one image to the next
-///    (max_stride()).
-/// 3. If it is late by more than twice max_lag_s, a recording's clock waits for pause_s(). Live
-///    images are dropped, as a camera would overwrite them.
+/// 2. If odometry is late by more than max_lag_s, it gets every second image, then every third and
+///    fourth. The next step follows only after the former step has had time to take effect. At
+///    least half of the features must still be tracked from one image to the next (max_stride()).
+/// 3. If odometry is late by more than twice max_lag_s, a recording's clock waits for pause_s().
+///    Live images are dropped.
 ///
-/// The steps are undone one by one after odometry has been on time for a while. If an undone step
-/// has to be repeated soon, that time doubles.
+/// The steps are undone one by one, each after odometry has been on time for 2 s. If the step after
+/// an undone step again reduces the load, this time doubles, up to 30 s.
 ///
-/// Times are in seconds of any one clock, and are arguments. Not thread-safe.
+/// Times are arguments, in seconds of any one clock. Not thread-safe.
 class LoadShedding {
  public:
   static constexpr int kMaxStride = 4;
@@ -36,11 +35,11 @@ class LoadShedding {
   /// Throws std::invalid_argument unless max_lag_s >= 0.
   explicit LoadShedding(double max_lag_s);
 
-  /// The use of the next image, which was or is due at `due_s`. A used image counts as unfinished
-  /// until finish().
+  /// The use of the next image, which is due at `due_s`. A used image counts as unfinished until
+  /// finish().
   [[nodiscard]] FrameUse use_next(Stamp stamp, double due_s, double now_s);
 
-  /// Odometry has finished with this frame and all before it.
+  /// Notes that odometry has finished this frame and all frames before it.
   void finish(const ProcessedFrame& frame);
 
   [[nodiscard]] const ShedLoad& load() const { return load_; }
@@ -54,7 +53,7 @@ class LoadShedding {
   /// is 1.5 times max_lag_s.
   [[nodiscard]] double pause_s(double due_s, double now_s) const;
 
-  /// The clock pauses: all unfinished frames are due later by `s`.
+  /// Notes a pause of the clock: all unfinished frames are due later by `s`.
   void pause(double s);
 
   /// Largest stride at which odometry still works. The share of features that are lost per second
@@ -76,7 +75,7 @@ class LoadShedding {
   ShedLoad load_;
   std::deque<Unfinished> unfinished_;
   int left_out_ = 0;       // unused images in a row
-  double period_s_ = 0.0;  // interval of the images, used or not
+  double period_s_ = 0.0;  // interval between images, used or not
   std::optional<Stamp> last_image_, last_finished_;
   double loss_per_s_ = 0.0;  // rate at which features are lost, smoothed
   double changed_s_ = 0.0;   // time of the last change of the stride

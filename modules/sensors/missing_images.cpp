@@ -8,8 +8,7 @@
 namespace km {
 
 ImageGap MissingImages::before(Stamp stamp) {
-  constexpr double kGap = 1.5;  // smallest gap, in usual intervals; exposure times vary them by
-                                // less
+  constexpr double kGap = 1.5;  // smallest gap in usual intervals, above the effect of exposure
   const std::optional<Stamp> last = std::exchange(last_, stamp);
   if (!last) return {};
   const Stamp interval = stamp - *last;

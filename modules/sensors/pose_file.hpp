@@ -8,7 +8,8 @@
 
 namespace km {
 
-/// Poses of the body by an odometry, in a text file of TUM's format: `t[s] x y z qx qy qz qw`. Each
+/// Reads the body poses of an odometry from a text file of TUM's format:
+/// `t[s] x y z qx qy qz qw`. Each
 /// row may also have the 36 numbers of its covariance, row by row, as in
 /// geometry_msgs/PoseWithCovariance. Faulty rows are skipped and counted in `report`. Throws
 /// DatasetError if there is no row.

@@ -8,8 +8,7 @@
 
 namespace km {
 
-/// Poses of an odometry before they are put into packets: the poses at the stamps of frames are
-/// interpolated.
+/// Interpolates the poses of an odometry at the stamps of frames.
 class PoseStream {
  public:
   /// Longest step over which poses are interpolated.
@@ -18,15 +17,16 @@ class PoseStream {
   /// Stamps must ascend.
   void add(Stamp stamp, const MeasuredPose& pose);
 
-  /// starts_by(): some pose was at or before the stamp. reaches(): some pose is at or after it.
+  /// starts_by(): a pose at or before the stamp has been added. reaches(): a pose at or after the
+  /// stamp has been added.
   [[nodiscard]] bool starts_by(Stamp stamp) const { return first_ && *first_ <= stamp; }
   [[nodiscard]] bool reaches(Stamp stamp) const {
     return !poses_.empty() && poses_.back().stamp >= stamp;
   }
 
   /// The pose at an instant, interpolated at constant velocity, with an interpolated covariance.
-  /// nullopt if the neighbouring poses are too far apart, or one is missing. Stamps ascend from
-  /// call to call.
+  /// nullopt if the neighbouring poses are more than kLongestStep_s apart, or one is missing.
+  /// Stamps ascend from call to call.
   [[nodiscard]] std::optional<MeasuredPose> at(Stamp stamp);
 
  private:
@@ -38,7 +38,7 @@ class PoseStream {
   std::optional<Stamp> first_;  // first stamp of the stream
 };
 
-/// The pose of the body from the pose of a frame `child` on it. The covariance is that of
+/// The pose of the body from the pose of a frame `child` on the body. The covariance is that of
 /// geometry_msgs/PoseWithCovariance: x, y, z and rotations about x, y, z, along the axes of odom;
 /// [m^2], [rad^2].
 [[nodiscard]] MeasuredPose measured_pose(const SE3& T_odom_child, const Matrix6& covariance,

@@ -192,7 +192,7 @@ Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
     throw DatasetError(name +
                        ": the calibration is not complete; missing: " + completion.missing());
   };
-  // If a bag lacks the topics, it need not be searched.
+  // A recorded bag without a needed topic cannot complete the rig, so no message is read.
   for (const auto& source : completion.sources())
     if (!bag.is_live() && source.is_needed &&
         std::ranges::count(bag.channels(), source.topic, &BagChannel::topic) == 0)

@@ -15,15 +15,16 @@
 
 namespace km {
 
-/// A rig that messages complete. sensor_msgs/CameraInfo gives the cameras and, with a stereo
-/// calibration, the pose of the right one. /tf_static gives their poses on the body.
+/// A rig that messages complete. sensor_msgs/CameraInfo contains the cameras and, with a stereo
+/// calibration, the relative pose of the two cameras. /tf_static contains the poses of the cameras
+/// on the body.
 struct PartialRig {
   Rig rig;
   bool has_cameras = true;          ///< The rig has its cameras.
   bool is_placed = true;            ///< False: T_body_cam are poses in the left camera's frame.
   double virtual_baseline_m = 0.1;  ///< Used for an RGB-D rig, see rgbd_rig().
-  /// Topics of the left and the right camera; the right one is used only if it has a topic of
-  /// images.
+  /// Topics of CameraInfo of the left and the right camera. The right topic is used only if there
+  /// is a topic of right images.
   std::array<std::string, 2> info_topics;
   std::array<RosImages, 2> images = {RosImages::kRaw, RosImages::kRaw};
   /// Frame of the inertial sensor. Empty: the frame in its messages, or the odometry's child frame
@@ -41,7 +42,7 @@ class RigCompletion {
  public:
   explicit RigCompletion(PartialRig rig) : partial_(std::move(rig)) {}
 
-  /// A topic that can supply missing parts, with the type of its messages.
+  /// A topic that can supply a missing part, with the type of its messages.
   struct Source {
     std::string topic;
     std::string_view type;
@@ -53,7 +54,8 @@ class RigCompletion {
   /// CameraInfo that is not a calibration.
   bool add(const BagChannel& channel, const BagMessage& message);
 
-  /// nullopt while a part is missing(). Throws DatasetError for cameras that are not a pair.
+  /// The complete rig; nullopt while a part is missing(). Throws DatasetError for cameras that are
+  /// not a pair.
   [[nodiscard]] std::optional<Rig> rig() const;
 
   /// The missing parts and the topics that could supply them; "" if nothing is missing.

@@ -52,7 +52,8 @@ RigCalibration read_calibration(const std::filesystem::path& path, bool is_inlin
   return calibration;
 }
 
-// Notes if a calibration names other topics, because it may be that of another pair of cameras.
+// Adds a note if a calibration names other topics than the rig file, because the calibration may be
+// that of other cameras.
 void note_topics(const RigFile& file, const std::string& path, RigCalibration& calibration) {
   const std::pair<const std::string&, const std::string&> topics[] = {
       {calibration.image_topics[0], file.left.topic},

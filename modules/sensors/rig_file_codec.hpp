@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// Correction of a calibration, in a file.
+/// Keys of a file that correct a calibration.
 struct RigCorrectionFile {
   std::optional<double> camera_time_offset_s;
   std::vector<double> T_body_rig;
@@ -29,8 +29,8 @@ struct RigCorrectionFile {
   }
 };
 
-/// A user's description of the sensors in a recording or of a live robot: their topics, and the
-/// place of their calibration.
+/// A user's description of the sensors of a recording or of a live robot: their topics and their
+/// calibration.
 struct RigFile {
   struct Camera {
     std::string topic;
@@ -112,7 +112,7 @@ struct RigFile {
   std::vector<std::filesystem::path> calibration;
   std::string body_frame;
   RigCorrectionFile correction;
-  bool has_poses = false;  ///< The odometry comes from elsewhere, so the file need not name one.
+  bool has_poses = false;  ///< True if the file need not name an odometry or inertial sensor.
 
   void visit_fields(auto& visitor) {
     visitor.section("left", left);

@@ -98,8 +98,8 @@ RawImage raw_image(const BagChannel& channel, const BagMessage& message, const s
   return {pixels_of(*image.value, *encoding, place, size), encoding->to_gray};
 }
 
-// image_transport puts 12 bytes with the quantisation before the PNG file of a compressed depth
-// image. They have no meaning for depths of 16 bits.
+// The bytes without the header of image_transport: 12 bytes with the quantisation before the PNG
+// file of a compressed depth image. The header has no meaning for depths of 16 bits.
 std::string_view without_depth_header(std::string_view bytes) {
   constexpr std::size_t kHeader_bytes = 12;
   const bool has_header =

@@ -21,7 +21,7 @@ struct SensorsConfig {
                   "[s] largest difference between the stamps of left and right; none: it is "
                   "determined from the first stamps, like a constant offset");
     visitor.field("read_ahead", read_ahead, {1, 1000},
-                  "stereo pairs decoded ahead of the one being published");
+                  "maximum number of stereo pairs decoded ahead of the published pair");
     visitor.field(
         "max_lag_s", max_lag_s, {0.0, 1e6},
         "[s] bound on the delay of odometry. At half of it the map gets no new frames. At this "

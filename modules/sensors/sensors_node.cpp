@@ -49,7 +49,7 @@ void SensorsNode::stop() noexcept {
   stopped_ = true;
   reader_->stop();
   clock_.stop();
-  worker_.stop();  // refuses further posts, so that the decoder ends too
+  worker_.stop();  // further posts are refused, which ends the decoder
   if (!decoder_.joinable()) return;
   decoder_.join();
   take_faults();
@@ -75,7 +75,7 @@ void SensorsNode::decode() {
       if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
     }
   } catch (...) {
-    worker_.post(std::current_exception());  // the worker ends with the exception, as any node does
+    worker_.post(std::current_exception());  // ends the worker with this exception
   }
 }
 

@@ -23,28 +23,27 @@
 
 namespace km {
 
-/// The recording is over; published once, after its last packet. Not published if stop() comes
-/// first.
+/// End of the recording, published once after its last packet. Not published if stop() comes first.
 struct SensorsEnd {
-  std::size_t published = 0;  ///< Packets.
-  std::size_t skipped = 0;    ///< Frames not used because processors were too slow.
-  double paused_s = 0.0;      ///< Time that the recording's clock paused for the same reason.
+  std::size_t published = 0;  ///< Number of published packets.
+  std::size_t skipped = 0;    ///< Number of frames not used because processors were too slow.
+  double paused_s = 0.0;      ///< Total pause of the clock because processors were too slow.
   ReaderReport faults;        ///< Faults of the recording.
 };
 
 /// Channels of the sensors node; they must outlive it.
 struct SensorsTopics {
-  /// From odometry, for each packet. The callback only stores the message.
+  /// Frames that odometry has processed, one message per packet.
   In<ProcessedFrame> processed;
   Out<SensorPacket> packets;
-  Out<ShedLoad> load;  ///< At each change, before the packets that it concerns.
+  Out<ShedLoad> load;  ///< Each change of the shed load, before the packets that it concerns.
   Out<SensorsEnd> end;
 };
 
-/// Plays a recording, or publishes live measurements. One thread decodes ahead. Another one
+/// Plays a recording, or publishes live measurements. One thread decodes ahead. Another thread
 /// publishes each packet when it is due; a live packet is due at once. A consumer with a full queue
-/// (kBlock) delays publication. At a finite rate, and live, LoadShedding chooses which frames are
-/// decoded. The inertial samples of all frames are kept.
+/// (kBlock) delays publication. For live sensors, and at a finite rate, LoadShedding chooses which
+/// frames are decoded. The inertial samples of all frames are kept.
 class SensorsNode final : public Node {
  public:
   /// `rate`: dataset seconds per second; infinity: as fast as consumers take it. Throws ConfigError
@@ -55,14 +54,14 @@ class SensorsNode final : public Node {
 
   std::string_view name() const override { return "sensors"; }
   void start() override;
-  /// Ends at once: packets that are decoded but not yet due are dropped.
+  /// Ends at once and drops packets that are decoded but not yet due.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat(), &decoding_}; }
-  /// Reading and decoding a packet.
+  /// Durations of reading and decoding a packet.
   DurationHistogram timing() const override { return reading_.histogram(); }
 
-  /// Packets published and frames not used so far. Thread-safe.
+  /// Numbers of packets published and of frames not used so far. Thread-safe.
   std::size_t published() const { return published_; }
   std::size_t skipped() const { return skipped_; }
   /// Time for which the recording's clock has paused because processors were too slow [s].
@@ -113,7 +112,7 @@ class SensorsNode final : public Node {
   std::string logged_faults_;  // last logged faults of a live source
   double counted_s_ = 0.0;
   Timing reading_;
-  Heartbeat decoding_;  // a step reads one packet
+  Heartbeat decoding_;  // heartbeat of the decoder thread, one step per packet
   std::thread decoder_;
   Worker<Input> worker_;  // last member: stops first
 };

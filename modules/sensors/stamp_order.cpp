@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-// All ascents so far, by the stamp at which they end: a segment tree over the stamps of the list.
+// Longest ascending subsequences ("ascents"), found with a segment tree over the stamps.
 class Ascents {
  public:
   explicit Ascents(std::span<const Stamp> stamps)
@@ -24,8 +24,8 @@ class Ascents {
     tree_.assign(2 * keys_.size(), kNone);
   }
 
-  // Adds the longest ascent that ends on stamps[i], with steps of at most `pause`. Call with i = 0,
-  // 1, ...
+  // Adds the longest ascent that ends on stamps[i], with steps of at most `pause`. Call with
+  // i = 0, 1, ... in this order.
   void add(std::size_t i, Stamp pause) {
     before_[i] = best_within(key_of(stamps_[i] - pause), key_of(stamps_[i]));
     length_[i] = before_[i] == kNone ? 1 : length_[before_[i]] + 1;
@@ -52,7 +52,7 @@ class Ascents {
                                     keys_.begin());
   }
 
-  // The longer one; of two equal ones, the one that ends first in the list.
+  // The end of the longer ascent; of two equally long ones, the first in the list.
   [[nodiscard]] std::size_t better(std::size_t a, std::size_t b) const {
     if (a == kNone || b == kNone) return std::min(a, b);
     if (length_[a] != length_[b]) return length_[a] > length_[b] ? a : b;

@@ -8,29 +8,27 @@
 
 namespace km {
 
-/// A list whose stamps pause for longer contains two recordings, or one whose clock was set. Images
-/// and inertial samples do not show what happened in between, and playing it in real time would
-/// wait for the whole pause.
+/// Longest pause between the stamps of one recording. A list with a longer pause contains two
+/// recordings, or a recording whose clock was set.
 inline constexpr double kLongestPause_s = 3600.0;
 
 /// Verdict on a stamp within its list.
 enum class StampVerdict {
   kGood,
-  kRepeated,   ///< Equal to a good one before.
-  kUnordered,  ///< Not after the good ones before it, or not before the good ones after it.
+  kRepeated,   ///< Equal to an earlier good stamp.
+  kUnordered,  ///< Out of order with respect to the good stamps.
   kJump,       ///< In order, but more than kLongestPause_s away from most stamps.
 };
 
 /// Judges the stamps [ns, positive] of a list, in its order, so that as few as possible are
 /// rejected. A single wrong stamp, however large its error, does not affect the stamps after it.
-/// The good ones are a longest subsequence that ascends strictly and in steps of at most
+/// The good stamps are a longest subsequence that ascends strictly and in steps of at most
 /// kLongestPause_s. O(n log n).
 [[nodiscard]] std::vector<StampVerdict> judge_stamps(std::span<const Stamp> stamps);
 
 /// Judges the stamps of a stream one by one. Good stamps ascend in steps of at most
-/// kLongestPause_s. If kNewTimes stamps in a row jump to the same other time, the clock was set.
-/// From then on that time is the stream's, unless it is earlier than a time that was good for
-/// longer.
+/// kLongestPause_s. If kNewTimes stamps in a row jump to one other time, the clock was set. Stamps
+/// of this time are then good, unless it is earlier than a time that was good for longer.
 class StampOrder {
  public:
   static constexpr int kNewTimes = 3;
@@ -41,7 +39,7 @@ class StampOrder {
   std::optional<Stamp> last_;  // last good stamp
   int good_ = 0;               // good stamps since the clock was set, at most kNewTimes
   std::optional<Stamp> jump_;  // last stamp that jumped
-  int jumps_ = 0;              // jumps in a row to the same other time
+  int jumps_ = 0;              // number of jumps in a row to one other time
 };
 
 }  // namespace km

@@ -24,8 +24,7 @@ class StaticTransforms {
   [[nodiscard]] std::string frames() const;
 
  private:
-  std::map<std::string, std::map<std::string, SE3>> T_a_b_;  // T_a_b_[a][b], stored in both
-                                                             // directions
+  std::map<std::string, std::map<std::string, SE3>> T_a_b_;  // [a][b] and [b][a]
 };
 
 }  // namespace km

@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-// For each stamp the next good one after it; 0 if there is none.
+// The next good stamp after each stamp; 0 if there is none.
 std::vector<Stamp> next_good(const std::vector<Stamp>& stamps,
                              const std::vector<StampVerdict>& verdicts) {
   std::vector<Stamp> next(stamps.size(), 0);

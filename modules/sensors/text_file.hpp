@@ -16,7 +16,7 @@ namespace km {
 /// The bytes of `file`. Throws DatasetError if it is not a regular file or cannot be read.
 [[nodiscard]] std::string read_file(const std::filesystem::path& file);
 
-/// "FILE line N", the start of every message about a row.
+/// Start of every message about a row: "FILE line N".
 [[nodiscard]] std::string at_line(const std::filesystem::path& file, int line);
 
 /// The reason why a row is skipped.
@@ -33,14 +33,14 @@ struct StampedRow {
   Value value;
 };
 
-/// Rows of `text` without a header: a first row that starts with a letter.
+/// Rows of `text` without the header, which is a first row that starts with a letter.
 [[nodiscard]] std::vector<TextRow> rows_below_header(const std::string& text);
 
-/// The stamp of a row that starts with one [ns] and has at least `fields` fields.
+/// The stamp [ns] at the start of a row; a fault unless the row has at least `fields` fields.
 [[nodiscard]] std::variant<Stamp, RowFault> stamp_of(const TextRow& row, std::size_t fields);
 
-/// For each stamp, of a row at `lines` of `file`, whether it is valid (see judge_stamps()). The
-/// invalid ones are counted in `report`.
+/// True for each valid stamp (see judge_stamps()). Invalid stamps are counted in `report`, with
+/// `file` and their `lines`.
 [[nodiscard]] std::vector<bool> in_order(const std::vector<Stamp>& stamps,
                                          const std::vector<int>& lines,
                                          const std::filesystem::path& file, ReaderReport& report);

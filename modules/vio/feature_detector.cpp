@@ -102,7 +102,7 @@ std::vector<Eigen::Vector2f> FeatureDetector::detect(const ImagePyramid& image,
     ++features[static_cast<std::size_t>(row * columns + column)];
   }
 
-  // Cells without features come first. Cells with features follow if the empty ones do not suffice.
+  // Cells with features follow only if the cells without features do not suffice.
   for (int there = 0; there < kMaxInCell && static_cast<int>(result.size()) < count; ++there) {
     candidates_.clear();
     for (int row = 0; row < rows; ++row) {

@@ -13,9 +13,9 @@
 
 namespace km {
 
-/// Points of an image with a minimum distance from each other. They are stored in square buckets of
-/// that side, so that all points within the distance of a position are in the nine buckets around
-/// it.
+/// Points of an image with a minimum distance from each other. Square buckets whose side is this
+/// distance store the points, so that all points within the distance of a position are in the nine
+/// buckets around it.
 class DistanceGrid {
  public:
   /// `size` of the image, `distance` in pixels.
@@ -89,7 +89,7 @@ class FeatureDetector {
       return a.rank != b.rank ? a.rank < b.rank : better(a, b);
     }
   };
-  static constexpr int kMaxInCell = 3;  // A cell with this many features gets no more.
+  static constexpr int kMaxInCell = 3;  // Largest number of features in a cell.
 
   void add_corners_of(const cv::Rect& cell, int features_there, const ImagePyramid& image);
 

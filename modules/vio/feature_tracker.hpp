@@ -42,7 +42,7 @@ struct TrackerStatistics {
 /// 2. The result is aligned with the patch in which the track began, so that errors do not
 ///    accumulate (AlignmentPatch).
 /// 3. Outliers are rejected against the one motion that most stereo features agree on
-///    (estimate_motion()). If there are too few of them, two-point RANSAC rejects outliers.
+///    (estimate_motion()). If too few features agree, two-point RANSAC rejects outliers.
 /// 4. New corners are added in cells without features.
 /// 5. StereoMatcher matches left points to the right image, starting at the depth that the motion
 ///    predicts. With an RGB-D rig DepthMatcher computes the observations of a virtual right camera.
@@ -52,7 +52,7 @@ class FeatureTracker {
   FeatureTracker(const StereoRig& rig, const TrackerConfig& config);
 
   /// The features of `frame`, possibly none. `R_previous_current_body` is the rotation of the body
-  /// since the frame before, p_previous = R * p_current; identity if it is not known.
+  /// since the frame before, p_previous = R * p_current; identity if unknown.
   /// Throws std::invalid_argument if the frame does not fit the rig (see fits()) or the rotation is
   /// not finite; the tracker is then unchanged.
   [[nodiscard]] TrackedFrame track(const StereoFrame& frame,
@@ -70,7 +70,7 @@ class FeatureTracker {
     std::optional<Eigen::Vector2d> right;
     // Measured in this image, or propagated by the motion [1/m].
     std::optional<double> inverse_depth;
-    // Patch in which the track began; null at the rim.
+    // Patch around the feature in the image where the track began; null near the image border.
     std::unique_ptr<const AlignmentPatch> patch;
     Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // warp from the patch to this image
   };

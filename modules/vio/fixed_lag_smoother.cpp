@@ -14,10 +14,10 @@ namespace km {
 namespace {
 
 constexpr int kStartIterations = 30;
-constexpr int kMinKeyframeFeatures = 20;   // fewer do not justify a keyframe
+constexpr int kMinKeyframeFeatures = 20;   // least number of features in a keyframe
 constexpr double kStartKeyframe_s = 0.15;  // spacing of keyframes in the images of the start
-// Keyframes locate new landmarks. If an image has no depth, a keyframe waits for one that has, up
-// to this factor on the criteria.
+// Keyframes locate new landmarks. If an image has no depth, the keyframe is postponed to an image
+// with depth, up to this factor on the criteria.
 constexpr double kPatience = 2.0;
 
 // True if any landmark in the last frame has a right observation.
@@ -48,19 +48,18 @@ Eigen::Vector3d gyro_at(std::span<const ImuSample> samples, Stamp instant) {
   return after == samples.begin() ? samples.front().gyro : std::prev(after)->gyro;
 }
 
-// [standard deviations] A calibration farther from the rig's values comes from an estimate that has
-// diverged.
+// Largest plausible distance of the calibration from the rig's values [standard deviations].
 constexpr double kMostCalibration = 10.0;
 
 // Bounds that keep instants in order and near to their stamps.
 constexpr double kMostOffset_s = 0.1;
-constexpr double kMostOffsetStep = 0.25;  // fraction of the time between two images
+constexpr double kMostOffsetStep = 0.25;  // largest change, as a fraction of the image interval
 
 // Standard deviation of the first position, which fixes the gauge.
 constexpr double kHeldPosition_m = 1e-3;
 constexpr double kHeldHeading_rad = 1e-3;
-// Noise of samples interpolated over a gap. It is so large (0.35 rad and 1.4 m/s after 0.5 s) that
-// the images determine the motion.
+// Noise of samples interpolated over a gap, so large (0.35 rad and 1.4 m/s after 0.5 s) that the
+// images determine the motion.
 constexpr double kBridgeGyro = 0.5;   // [rad/s/sqrt(Hz)]
 constexpr double kBridgeAccel = 2.0;  // [m/s^2/sqrt(Hz)]
 
@@ -74,8 +73,8 @@ Eigen::MatrixXd held_gauge(const OdometryState& state) {
   return J;
 }
 
-// Maps the 15 variables of a state to those of StateCovariance. A velocity that only rotates with
-// the heading is no error.
+// Maps an error in the 15 variables of a state to the variables of StateCovariance, which do not
+// include heading and position. The change of the velocity due to the heading is removed.
 Eigen::Matrix<double, 11, 15> without_gauge(const OdometryState& state) {
   const Eigen::Matrix3d R = state.T_odom_body.linear();
   Eigen::Matrix<double, 11, 15> J = Eigen::Matrix<double, 11, 15>::Zero();
@@ -130,7 +129,7 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
 void FixedLagSmoother::start(const InertialFrame& frame, const OdometryState& state,
                              const StateCovariance& covariance) {
   clear();
-  (void)append(frame, state, first_offset_s(frame));  // the first needs no inertial factor
+  (void)append(frame, state, first_offset_s(frame));  // true: the first frame has no factor
   observe(window_, frame.tracked);
   window_.frames.back().keyframe = true;
   window_.frames.back().samples = frame.samples;
@@ -201,8 +200,8 @@ bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state, d
   return window_.calibrates ? share_samples() && set_imu(now) : set_imu(now);
 }
 
-// If an instant lies after the stamp of its image, the samples between them arrive with the next
-// image. If it lies before, samples of this image belong to the next interval.
+// If an instant lies after the stamp of its image, the samples between the two arrive with the next
+// image. If the instant lies before the stamp, samples of this image belong to the next interval.
 bool FixedLagSmoother::share_samples() {
   const std::size_t now = window_.frames.size() - 1;
   WindowFrame& newest = window_.frames[now];
@@ -385,7 +384,8 @@ std::optional<StateCovariance> FixedLagSmoother::state_covariance(Stamp stamp) c
   return StateCovariance(Sigma->selfadjointView<Eigen::Upper>());
 }
 
-// If no samples cover the instant, the next inertial factor cannot start there: the offset is 0.
+// A negative offset becomes 0 if no samples cover the instant, because the next inertial factor
+// cannot start there.
 double FixedLagSmoother::first_offset_s(const InertialFrame& frame) const {
   const double offset_s = std::clamp(window_.calibration.offset_s, -kMostOffset_s, kMostOffset_s);
   const Stamp instant = frame.tracked.stamp + nanoseconds(offset_s);
@@ -494,7 +494,7 @@ void FixedLagSmoother::rest_out(std::size_t frame) {
     return window_.frames[o.frame].keyframe;
   };
   for (WindowLandmark& landmark :
-       window_.landmarks)  // may have lost the observations that determined the distance
+       window_.landmarks)  // without an observation in a keyframe the distance is undetermined
     if (std::ranges::none_of(landmark.observations, in_keyframe)) landmark.located = false;
   WindowFrame& later = window_.frames[frame];
   later.imu = ImuFactor::at_rest(

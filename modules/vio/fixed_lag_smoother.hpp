@@ -25,9 +25,9 @@ struct InertialFrame {
 struct SmootherUpdate {
   OdometryState state;  ///< State at the newest image.
   bool keyframe = false;
-  int landmarks = 0;  ///< Landmarks in the optimisation.
-  int seen = 0;       ///< Landmarks of these that the image shows.
-  int outliers = 0;   ///< Dropped observations.
+  int landmarks = 0;  ///< Number of landmarks in the optimisation.
+  int seen = 0;       ///< Number of these landmarks in the newest image.
+  int outliers = 0;   ///< Number of dropped observations.
   WindowSolution solution;
 };
 
@@ -35,27 +35,28 @@ struct SmootherUpdate {
 /// most recent images.
 ///
 /// The window slides in two ways. An image that is neither a keyframe nor recent is removed with
-/// its observations. One inertial factor, integrated from all samples, replaces the two on its
-/// sides. The oldest keyframe is marginalised: a prior replaces its inertial factor, the former
-/// prior, and the landmarks that it has seen (marginalize_oldest()). Derivatives by states in the
-/// prior are first estimates.
+/// its observations. One inertial factor, integrated from all samples, replaces the factors before
+/// and after this image. The oldest keyframe is marginalised: a prior replaces its inertial factor,
+/// the former prior, and the landmarks seen in the keyframe (marginalize_oldest()). Derivatives by
+/// states in the prior are taken at first estimates.
 ///
 /// While the body rests, only images are removed. The first image at rest is a keyframe, and
-/// ImuFactor::at_rest() joins it with the most recent ones. The other frames stay. The pose is
-/// therefore measured from the same keyframes, however long the rest lasts.
+/// ImuFactor::at_rest() joins this keyframe with the most recent images. The other frames stay. The
+/// pose is therefore measured from the same keyframes, however long the rest lasts.
 ///
-/// OKVIS keeps tracked landmarks and drops only the observations of the oldest keyframe. This was
-/// measured to be worse: the rotation errs by 0.24 instead of 0.16 degrees over 1 s on MH_01_easy
-/// from 9.9 s on. Deterministic; not thread-safe.
+/// OKVIS keeps tracked landmarks and drops only the observations of the oldest keyframe. With this
+/// method the error of the rotation is 0.24 instead of 0.16 degrees over 1 s on MH_01_easy from
+/// 9.9 s on.
+/// Deterministic; not thread-safe.
 class FixedLagSmoother {
  public:
   /// Throws ConfigError if `config` is out of bounds.
   FixedLagSmoother(const SensorRig& rig, const VioConfig& config);
 
   /// Starts from guessed states of consecutive images, one for each of `frames`, and discards all
-  /// earlier frames. The first position and heading are held, the biases weakly constrained to
-  /// their guess. Returns the refined states, or nullopt if the optimisation failed or the samples
-  /// between two images make no inertial factor.
+  /// earlier frames. A prior holds the first position and heading, and weakly the guessed biases.
+  /// Returns the refined states, or nullopt if the optimisation failed or the samples between two
+  /// images make no inertial factor.
   [[nodiscard]] std::optional<std::vector<OdometryState>> start(
       std::span<const InertialFrame> frames, std::span<const OdometryState> guess);
 
@@ -78,7 +79,7 @@ class FixedLagSmoother {
   /// Current states of the window, in order of time.
   [[nodiscard]] const Window& window() const { return window_; }
 
-  /// The current estimate at an image in the window; null if it is not there.
+  /// The current estimate at an image; null if the image is not in the window.
   [[nodiscard]] const WindowFrame* frame_at(Stamp stamp) const;
 
   /// The current estimate of the relative pose of two images in the window with its marginal
@@ -89,8 +90,8 @@ class FixedLagSmoother {
   /// the information is singular.
   [[nodiscard]] std::optional<StateCovariance> state_covariance(Stamp stamp) const;
 
-  /// The current estimate with its marginal covariance; the rig's calibration if it is not
-  /// estimated.
+  /// The current estimate with its marginal covariance; the rig's calibration if the window does
+  /// not calibrate.
   [[nodiscard]] UncertainCalibration calibration() const;
 
   /// Factor on the noise of the gyroscope, in addition to VioConfig::gyro_noise_factor.

@@ -5,11 +5,11 @@
 
 namespace km {
 
-/// Factor by which the noise of the gyroscope, judged by images, exceeds the assumed one. It is the
-/// root mean square, over the last seconds, of the difference between gyroscope and estimate from
-/// image to image, in assumed standard deviations. The estimate uses the samples too, so it differs
-/// from them by less than their noise. The scale is therefore 1 if the noise is no larger than
-/// assumed.
+/// Factor by which the noise of the gyroscope, judged by images, exceeds the assumed noise. The
+/// factor is the root mean square, over the last seconds, of the difference between gyroscope and
+/// estimate from image to image, in assumed standard deviations. The estimate uses the samples too,
+/// so the difference is less than the noise of the samples. The scale is therefore 1 if the noise
+/// is no larger than assumed.
 class GyroNoiseScale {
  public:
   static constexpr double kMost = 4.0;

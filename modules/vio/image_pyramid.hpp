@@ -14,8 +14,8 @@ class ImagePyramid {
  public:
   ImagePyramid() = default;
 
-  /// Copies `image` into a bordered pyramid of config.pyramid_levels + 1 levels. The image from
-  /// which windows are taken needs derivatives, the searched image does not.
+  /// Copies `image` into a bordered pyramid of config.pyramid_levels + 1 levels. Only an image from
+  /// which windows are taken needs derivatives.
   ImagePyramid(const GrayImage& image, const TrackerConfig& config, bool with_derivatives);
 
   [[nodiscard]] bool empty() const { return maps_.empty(); }
@@ -23,8 +23,8 @@ class ImagePyramid {
   /// Input of cv::calcOpticalFlowPyrLK: levels, interleaved with derivatives if there are any.
   [[nodiscard]] const std::vector<cv::Mat>& maps() const { return maps_; }
 
-  /// Grey image of `level`, 0 being the full one; its pixel (x, y) is at (2^level x, 2^level y)
-  /// there.
+  /// Grey image of `level`; 0 is the full image. Pixel (x, y) lies at (2^level x, 2^level y) of the
+  /// full image.
   [[nodiscard]] const cv::Mat& level(int level) const;
 
   /// Scharr derivatives (d/dx, d/dy) of the full image, 32 times the grey levels per pixel, as

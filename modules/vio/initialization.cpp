@@ -26,7 +26,7 @@ Window empty_window(const SensorRig& rig, const VioConfig& config) {
   return window;
 }
 
-// Estimates the pose of the last frame from the located landmarks; false if there are too few.
+// Estimates the pose of the last frame from the located landmarks; false if too few are seen.
 bool resect(Window& window) {
   SE3& T = window.frames.back().state.T_odom_body;
   ReprojectionTerm term;

@@ -23,13 +23,13 @@ enum class StartStatus {
          status == StartStatus::kContinues;
 }
 
-/// A guess of the states of the first images, for FixedLagSmoother::start(), or the reason for its
-/// absence.
+/// Guessed states of the first images, for FixedLagSmoother::start(), or the reason why there are
+/// none.
 struct StartGuess {
   StartStatus status = StartStatus::kTooFewImages;
   std::vector<OdometryState> states;  ///< One for each image if started().
   double image_motion_px = 0.0;       ///< Median between the first and the last image.
-  /// Measured length before it is set to the known one; 0 if not measured.
+  /// Measured gravity, before it is set to VioConfig::gravity_mps2; 0 if not measured.
   double gravity_mps2 = 0.0;
 };
 

@@ -24,14 +24,14 @@ struct UnseenWay {
 };
 
 /// Time for which a body is assumed to continue at its former speed, and then at its later speed,
-/// in an interval of `lasts_s` without measurements. It is half of the interval, and less if the
-/// interval is long. The error was compared with that of assuming standstill, on five flights and
-/// walks of EuRoC and TUM-VI. The ratio is 0.3 to 0.8 over 1 s, 0.4 to 1.1 over 2 s, and 0.9 to 1.5
-/// over 10 s.
+/// in an interval of `lasts_s` without measurements. This time is half of the interval, and less if
+/// the interval is long. The error was compared with that of assuming standstill, on five flights
+/// and walks of EuRoC and TUM-VI. The ratio of the two errors is 0.3 to 0.8 over 1 s, 0.4 to 1.1
+/// over 2 s, and 0.9 to 1.5 over 10 s.
 [[nodiscard]] double coasting_s(double lasts_s);
 
-/// Covariance of the relative pose across a new start. It grows with the duration without
-/// measurements and with the speed. Heading is the most uncertain.
+/// Covariance of the relative pose across a new start. The covariance grows with the duration
+/// without measurements and with the speed. The heading is more uncertain than roll and pitch.
 [[nodiscard]] Matrix6 restart_covariance(const UnseenWay& way = {});
 
 }  // namespace km

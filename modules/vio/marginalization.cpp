@@ -39,7 +39,7 @@ SquareRootPrior marginalize(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
   if (count > 0) {
     const ScaledEigen e = decompose(H.topLeftCorner(count, count));
     const Eigen::Index rank = count - e.first;
-    // W^T W is the pseudo-inverse of the part taken out.
+    // W^T W is the pseudo-inverse of the block of H to be eliminated.
     const Eigen::MatrixXd W = e.lambda.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal() *
                               e.V.rightCols(rank).transpose() * e.scale.asDiagonal();
     const Eigen::MatrixXd A = W * H.topRightCorner(count, kept);

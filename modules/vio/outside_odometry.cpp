@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-// A slower motion counts as rest until it has led farther than 1 s at these speeds.
+// A slower motion counts as rest until it exceeds the motion of kRest_s at these speeds.
 constexpr double kLeastSpeed_mps = 0.01;
 constexpr double kLeastRate_radps = 0.01;
 constexpr double kRest_s = 1.0;
@@ -60,7 +60,7 @@ OutsideOdometryResult OutsideOdometry::process(const SensorPacket& packet) {
   const bool is_due =
       !last_keyframe_ || result.has_jumped ||
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
-  // Frames refer to a keyframe, so a first keyframe must exist. One that locates points is better.
+  // A keyframe without points cannot close a loop. Only a jump makes one.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
     add_keyframe(fix, T_odom_body, result.has_jumped, result);
   if (!last_keyframe_) return result;
@@ -80,7 +80,7 @@ bool OutsideOdometry::is_jump(const Fix& fix) const {
   return distance_m > config_.max_speed_mps * seconds_between(last_->stamp, fix.stamp);
 }
 
-// A creeping motion counts as one at the least speed.
+// A slower motion counts as a motion at the least speed.
 void OutsideOdometry::count_motion(const Fix& fix) {
   const SE3& T_odom_body = fix.pose.T_odom_body;
   const double dt_s = seconds_between(last_->stamp, fix.stamp);

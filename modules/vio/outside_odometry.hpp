@@ -13,14 +13,14 @@ namespace km {
 /// Result of one packet.
 struct OutsideOdometryResult {
   std::optional<OdometryState> state;        ///< nullopt: the packet has no usable pose.
-  std::optional<KeyframeOdometry> keyframe;  ///< Only if the packet makes a new one.
+  std::optional<KeyframeOdometry> keyframe;  ///< New keyframe, if any.
   std::optional<LocatedFrame> frame;
-  /// The pose jumped faster than VioConfig::max_speed_mps; the body keeps its place.
+  /// The pose jumped faster than VioConfig::max_speed_mps; the published pose stays.
   bool has_jumped = false;
 };
 
-/// Publishes the poses of an external odometry (see MeasuredPose) in the same way as Vio publishes
-/// its own, with keyframes by the same rules. The covariance of a keyframe's relative pose is the
+/// Publishes the poses of an external odometry (see MeasuredPose) in place of Vio, with keyframes
+/// by the rules of Vio (is_keyframe_due()). The covariance of a keyframe's relative pose is the
 /// growth of the odometry's covariance since the previous keyframe (between_on_chain()), plus the
 /// drift of VioConfig. The steps are assumed to be independent. A constant covariance, as many
 /// drivers report it, adds nothing. No verticals are published, because z of `odom` may not point

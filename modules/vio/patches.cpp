@@ -8,8 +8,8 @@ namespace km {
 namespace {
 
 constexpr int kMaxSteps = 12;
-constexpr float kSettledPx = 0.03F;    // The next step would be several times smaller.
-constexpr float kMaxShiftPx = 4.0F;    // From the start: a minimum farther away is another one.
+constexpr float kSettledPx = 0.03F;    // Length of a step that ends the iteration.
+constexpr float kMaxShiftPx = 4.0F;    // Largest distance from the start.
 constexpr float kMinDeviation = 2.0F;  // Grey levels.
 constexpr float kNoise = 1.0F;         // Grey levels; a weaker template is noise.
 
@@ -87,9 +87,8 @@ std::optional<PatchAlignment> AlignmentPatch::align(const cv::Mat& image,
     const float variance = samples.squaredNorm() / static_cast<float>(kPixels) - mean * mean;
     if (variance < kMinDeviation * kMinDeviation) return std::nullopt;
     const float scale = 1.0F / std::sqrt(variance * static_cast<float>(kPixels));
-    // The patch moved by d explains the difference: values + d * gradient = samples. Mean and
-    // contrast of the samples need not be removed, because the vectors that they multiply have zero
-    // mean.
+    // The shift d of the patch explains the difference: values + d * gradient = samples. The mean
+    // of the samples need not be removed, because values_, dx_ and dy_ have zero mean.
     const float correlation = scale * values_.dot(samples);
     const Eigen::Vector2f g = scale * Eigen::Vector2f(dx_.dot(samples), dy_.dot(samples)) - offset_;
     const Eigen::Vector2f d = H_inverse_ * g;

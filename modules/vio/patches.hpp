@@ -19,8 +19,8 @@ struct PatchAlignment {
 ///
 /// Inverse compositional alignment (Baker and Matthews, IJCV 2004) over the two shifts. The caller
 /// supplies an affine warp from the geometry. Patches are reduced to zero mean and unit contrast.
-/// In contrast to tracking from image to image, the errors do not accumulate. In contrast to
-/// windows without warp, they do not grow with the disparity of near points.
+/// In contrast to tracking from image to image, errors do not accumulate. In contrast to windows
+/// without warp, errors do not grow with the disparity of near points.
 class AlignmentPatch {
  public:
   /// The window around `px`; nullopt if it leaves the image or has no texture.
@@ -48,7 +48,7 @@ class AlignmentPatch {
   Samples dx_;      // Derivatives of values_, zero mean.
   Samples dy_;
   Eigen::Matrix2f H_inverse_ = Eigen::Matrix2f::Zero();
-  Eigen::Vector2f offset_ = Eigen::Vector2f::Zero();  // Gradient times values_.
+  Eigen::Vector2f offset_ = Eigen::Vector2f::Zero();  // Products of dx_ and dy_ with values_.
 };
 
 /// A patch of 16 x 11 pixels of an 8-bit image, prepared to be compared with many others.
@@ -69,14 +69,14 @@ class PatchTemplate {
   /// False if the patch is too flat for any comparison to mean something.
   [[nodiscard]] bool has_contrast() const;
 
-  /// Zero-mean normalised correlation with the patch around (x, y), in [-1, 1]; 0 if that one is
-  /// flat. Precondition: covered_by(image, x, y).
+  /// Zero-mean normalised correlation with the patch around (x, y) of `image`, in [-1, 1]; 0 if the
+  /// patch of `image` is flat. Precondition: covered_by(image, x, y).
   [[nodiscard]] float correlation(const cv::Mat& image, int x, int y) const;
 
  private:
   static constexpr int kPixels = kWidth * kHeight;
   alignas(16) short centred_[kPixels] = {};  // Grey levels minus their rounded mean.
-  int sum_ = 0;                              // Sum of centred_: the remainder of the rounding.
+  int sum_ = 0;                              // Sum of centred_, due to the rounding of the mean.
   float norm_ = 0.0F;
 };
 

@@ -26,9 +26,9 @@ struct PreintegratedMotion {
 /// (63). corrected() is Eq. (44). Its derivatives accumulate sample by sample as in the paper's
 /// appendix on bias correction.
 ///
-/// Deviation: each step uses the mean of its two samples in the frame half-way through the step. It
-/// is therefore of second order in the sampling period. The zero-order hold of the paper is of
-/// first order.
+/// Deviation: each step uses the mean of its two samples in the frame half-way through the step.
+/// The integration is therefore of second order in the sampling period. The zero-order hold of the
+/// paper is of first order.
 class ImuPreintegration {
  public:
   /// Starts at an instant with the biases to integrate with [rad/s], [m/s^2].
@@ -38,8 +38,8 @@ class ImuPreintegration {
   /// Appends the time from `begin.stamp` to `end.stamp`. Precondition: end is later, values finite.
   void add(const ImuSample& begin, const ImuSample& end);
 
-  /// Appends the time from `from` to `to`, interpolating samples at both borders. Precondition:
-  /// `samples` ascend and cover [from, to]; false, and no change, otherwise.
+  /// Appends the time from `from` to `to`, interpolating samples at both borders. False, and no
+  /// change, if `samples` do not cover [from, to]. Precondition: `samples` ascend.
   [[nodiscard]] bool add(std::span<const ImuSample> samples, Stamp from, Stamp to);
 
   [[nodiscard]] double dt_s() const { return dt_s_; }

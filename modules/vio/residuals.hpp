@@ -35,9 +35,9 @@ inline constexpr double kMinDepth_m = 0.05;
                                       const SE3& T_odom_body, const Eigen::Vector3d& p_odom,
                                       Eigen::Vector2d& r);
 
-/// reprojection_error() with derivatives. They are taken at `T_linearization`, while r is the error
-/// at T_odom_body: first-estimate Jacobians (Huang, Mourikis, Roumeliotis, ISER 2008). If no prior
-/// holds this pose, pass T_odom_body twice.
+/// reprojection_error() at T_odom_body, with derivatives at `T_linearization`: first-estimate
+/// Jacobians (Huang, Mourikis, Roumeliotis, ISER 2008). If no prior holds this pose, pass
+/// T_odom_body twice.
 [[nodiscard]] bool linearize_reprojection(const ViewModel& view, const Eigen::Vector2d& bearing,
                                           const SE3& T_odom_body, const SE3& T_linearization,
                                           const Eigen::Vector3d& p_odom, ReprojectionTerm& term);
@@ -57,7 +57,7 @@ struct ImuTerm {
 /// Parts of a state that a prior holds, at the values of their first linearisation.
 struct FirstEstimate {
   std::optional<SE3> pose;
-  std::optional<OdometryState> motion;  ///< Only velocity and biases are used.
+  std::optional<OdometryState> motion;  ///< Velocity and biases; the pose is not used.
 
   /// `state` with these parts replaced.
   [[nodiscard]] OdometryState applied_to(const OdometryState& state) const;

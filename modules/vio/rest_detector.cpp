@@ -7,9 +7,9 @@
 namespace km {
 namespace {
 
-constexpr double kSmoothing_s = 0.2;     // idling rotors shake the sensors, but about a mean
-constexpr double kHold = 2.0;            // factor on the thresholds for the end of a rest
-constexpr double kMostSpeed_mps = 0.05;  // estimated; samples alone do not exclude smooth motion
+constexpr double kSmoothing_s = 0.2;     // averages the vibration of idling rotors
+constexpr double kHold = 2.0;            // factor on rest_parallax_px while the body rests
+constexpr double kMostSpeed_mps = 0.05;  // bound on the estimated speed at rest
 
 }  // namespace
 

@@ -7,8 +7,8 @@
 
 namespace km {
 
-/// Median distance of the features seen in both images [px]; nullopt if too few features are in
-/// both.
+/// Median distance that the features common to both images have moved [px]; nullopt if there are
+/// fewer than 15.
 [[nodiscard]] std::optional<double> image_motion_px(const TrackedFrame& a, const TrackedFrame& b,
                                                     double focal_px);
 
@@ -22,7 +22,7 @@ class RestDetector {
   /// `focal_px`: focal length of the left camera.
   RestDetector(const VioConfig& config, double focal_px) : config_(config), focal_px_(focal_px) {}
 
-  /// Takes the next image, with the samples since the one before and the estimate of its state.
+  /// Takes the next image, with the samples since the image before and the estimated state.
   /// True if the body has stood still for VioConfig::rest_s.
   [[nodiscard]] bool add(const InertialFrame& frame, const OdometryState& state);
 
@@ -31,7 +31,7 @@ class RestDetector {
 
   VioConfig config_;
   double focal_px_;
-  TrackedFrame first_;  // First of the images that show no motion.
+  TrackedFrame first_;  // Features of the first image without motion.
   bool rests_ = false;
   std::optional<Stamp> last_sample_;
   // Smoothed difference of the samples from those of a body at rest, over kSmoothing_s.

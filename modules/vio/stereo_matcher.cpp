@@ -9,11 +9,11 @@
 namespace km {
 namespace {
 
-constexpr float kMinStereoCorrelation = 0.8F;  // Least correlation of a match, full resolution.
-// Least correlation of a search, half resolution, whole pixels.
+constexpr float kMinStereoCorrelation = 0.8F;  // Least correlation of a match at full resolution.
+// Least correlation of a search at half resolution and whole pixels.
 constexpr float kMinSearchCorrelation = 0.7F;
-// The second best place must be less similar by this amount. A fence or a net has many similar
-// places.
+// Least difference of correlation between the best and the second best place. A fence or a net has
+// many similar places.
 constexpr float kMinDistinction = 0.05F;
 constexpr int kPeakWidth = 2;             // Width in steps of one correlation peak.
 constexpr double kMinDisparityPx = -1.0;  // Noise of a point at infinity.

@@ -25,26 +25,26 @@ struct StereoMatch {
   double inverse_depth = 0.0;  ///< 1/z in the left camera [1/m]; not negative, 0 is infinity.
 };
 
-/// Number of queries of one image by result.
+/// Number of queries in the last image, by result.
 struct StereoStatistics {
   int matched = 0;
-  int no_start = 0;    ///< No similar patch along the epipolar line, or several similar ones.
-  int dissimilar = 0;  ///< The patches differ too much, or exceed the image.
-  int epipolar = 0;    ///< Too far from the epipolar line, or behind the cameras.
+  int no_start = 0;    ///< Queries with no or several similar patches along the epipolar line.
+  int dissimilar = 0;  ///< Patches that differ too much or exceed the image.
+  int epipolar = 0;    ///< Positions too far from the epipolar line, or behind the cameras.
 };
 
 /// Finds points of the left image in the right one to a fraction of a pixel. Not thread-safe.
 ///
 /// A point without an expected depth is searched at half resolution along its epipolar curve (the
-/// images are not rectified) by zero-mean normalised correlation. It is refused if a second place
-/// is about as similar. AlignmentPatch then refines all points, with the warp of a surface at that
-/// depth seen from the right. Without this warp, near points would be off by tenths of a pixel. The
-/// refinement is not bound to the curve, so that the distance from it is a test of the match.
+/// images are not rectified) by zero-mean normalised correlation. The point is refused if a second
+/// place is about as similar. AlignmentPatch then refines all points, with the warp of a surface at
+/// that depth seen from the right. Without this warp, near points would be off by tenths of a
+/// pixel. The refinement may leave the curve, so the distance from the curve tests the match.
 class StereoMatcher {
  public:
   StereoMatcher(const StereoRig& rig, const TrackerConfig& config);
 
-  /// One entry for each query. `left` needs derivatives.
+  /// The match of each query; nullopt if there is none. Precondition: `left` has derivatives.
   [[nodiscard]] std::vector<std::optional<StereoMatch>> match(const ImagePyramid& left,
                                                               const ImagePyramid& right,
                                                               std::span<const StereoQuery> queries);
@@ -83,22 +83,21 @@ class StereoMatcher {
 /// Replaces StereoMatcher for RGB-D rigs: computes from a depth image where the virtual right
 /// camera would see the points. Not thread-safe.
 ///
-/// The right bearing is a function of the left one and the depth, so that an error of the left
-/// bearing is in both. The two errors of stereo are independent. The smoother assumes independence
-/// here too, as ORB-SLAM2 does: it weights the image row of a point as if there were two
-/// observations of it.
+/// The right bearing is a function of the left bearing and the depth, so both contain the same
+/// error. The smoother assumes independent errors, as for stereo and as ORB-SLAM2 does: it weights
+/// the image row of a point as if there were two observations.
 class DepthMatcher {
  public:
   /// Precondition: rig.depth_source is kDepthImage.
   DepthMatcher(const StereoRig& rig, const TrackerConfig& config);
 
-  /// One entry for each query; its expected depth is not used. Without an image no point is found.
-  /// A depth below TrackerConfig::min_depth_m counts as none. Precondition: `depth` fits the rig.
+  /// The match of each query, whose expected depth is not used; nullopt if there is none. All are
+  /// nullopt if `depth` is null. A depth below TrackerConfig::min_depth_m counts as none.
+  /// Precondition: `depth` fits the rig.
   [[nodiscard]] std::vector<std::optional<StereoMatch>> match(const DepthImage* depth,
                                                               std::span<const StereoQuery> queries);
 
-  /// Counts of the last match(): `no_start` counts points without a depth, or on an edge between
-  /// two.
+  /// Counts of the last match(): `no_start` counts points without a depth, or on a depth edge.
   [[nodiscard]] const StereoStatistics& statistics() const { return statistics_; }
 
  private:

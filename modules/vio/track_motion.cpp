@@ -14,7 +14,7 @@ namespace km {
 namespace {
 
 constexpr int kSamples = 48;
-constexpr double kCoarseSigmas = 6.0;  // Truncation while the rotation is still the gyroscope's.
+constexpr double kCoarseSigmas = 6.0;  // Truncation of the cost under the gyroscope's rotation.
 
 // Truncated quadratic cost (MSAC).
 double cost_of(std::span<const DepthPair> pairs, const SE3& T, double threshold) {
@@ -73,7 +73,7 @@ SE3 refined(std::span<const DepthPair> pairs, const SE3& T, double scale) {
     H.noalias() += w * w * J.transpose() * J;
     g.noalias() -= w * w * J.transpose() * error;
   }
-  // Damping for directions that no landmark sees (all far away): 1 m against one bearing.
+  // Damping for directions that the landmarks do not determine, for instance if all are far away.
   H.diagonal().array() += 1e-6;
   return T * se3_exp(H.ldlt().solve(g));
 }
@@ -87,7 +87,7 @@ std::vector<bool> inliers_of(std::span<const BearingPair> pairs, const Eigen::Ma
   return inlier;
 }
 
-// Truncated quadratic cost (MSAC): finer than counting.
+// Truncated quadratic cost (MSAC).
 double cost_of(std::span<const BearingPair> pairs, const Eigen::Matrix3d& R,
                const Eigen::Vector3d& direction, double threshold) {
   double cost = 0.0;
@@ -98,7 +98,7 @@ double cost_of(std::span<const BearingPair> pairs, const Eigen::Matrix3d& R,
   return cost;
 }
 
-// Normal of the plane that the translation must lie in; zero without parallax.
+// Normal of the pair's epipolar plane, which contains the translation; zero without parallax.
 Eigen::Vector3d plane_normal(const BearingPair& pair, const Eigen::Matrix3d& R) {
   return pair.previous.homogeneous().cross(R * pair.current.homogeneous());
 }

@@ -34,9 +34,9 @@ struct DepthPair {
 /// degrees of freedom with a Geman-McClure weight whose scale shrinks to `sigma`. The refinement
 /// includes the rotation because the gyroscope's bias alone can rotate the guess by pixels.
 ///
-/// Compared with voting on 3D displacements (1-point stereo of Kimera-VIO) the test is in pixels,
-/// where the noise is known. It is therefore as sharp for far landmarks as for near ones. It does
-/// not need the right image either, so the motion can predict where to search there.
+/// In contrast to voting on 3D displacements (1-point stereo of Kimera-VIO) the test is in pixels,
+/// where the noise is known. The test is therefore as sharp for far landmarks as for near ones. The
+/// test does not need the right image, so the motion can predict where to search in that image.
 /// `sigma`: noise of a bearing on z = 1. Deterministic for equal inputs and state of `rng`.
 [[nodiscard]] std::optional<SE3> estimate_motion(std::span<const DepthPair> pairs,
                                                  const SE3& guess_T_previous_current, double sigma,

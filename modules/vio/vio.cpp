@@ -14,14 +14,14 @@
 namespace km {
 namespace {
 
-constexpr double kMaxAhead_s = 1.0;  // a sample further ahead of its image is refused: a wrong
-                                     // stamp would block all later ones
-constexpr double kMaxCostPerObservation = 100.0;  // a usable fit has less than 1
+// Largest lead of a sample over its image; a wrong stamp would block all later samples.
+constexpr double kMaxAhead_s = 1.0;
+constexpr double kMaxCostPerObservation = 100.0;  // a hundred times that of a usable fit
 
-// An estimate is wrong if only a small share of the landmarks that could be located fits it, for
-// several images in a row. Normally there are more landmarks than features.
+// An estimate is wrong if only a small share of the landmarks that could be located fits the
+// estimate, for several images in a row. Normally there are more landmarks than features.
 constexpr std::ptrdiff_t kSeenFeatures = 40;
-constexpr std::ptrdiff_t kFewOfSeen = 4;  // a quarter
+constexpr std::ptrdiff_t kFewOfSeen = 4;  // reciprocal of the share
 constexpr int kMostUnlocatedImages = 10;
 
 // After a loss of vision longer than kLongDark_s the smoother discards its prior from the dark,
@@ -29,8 +29,8 @@ constexpr int kMostUnlocatedImages = 10;
 constexpr double kLongDark_s = 3.0;
 constexpr double kRecovered_s = 0.8;
 
-// Least number of features and longest time for which images alone carry the pose over a gap of
-// inertial samples.
+// Conditions for bridging a gap of inertial samples by images alone: least number of tracked
+// features and longest gap.
 constexpr int kLeastTracked = 30;
 constexpr double kLongestBridge_s = 3.0;
 
@@ -219,8 +219,8 @@ void Vio::try_start(VioResult& result) {
   }
 }
 
-// A start defines its own first position and heading. The heading is replaced by that of the last
-// pose. The position is replaced by the one that follows from the speeds before and after the
+// A start defines its own first position and heading. The heading of the last pose replaces this
+// heading. The new position follows from the last pose and the velocities before and after the
 // interval without measurements.
 void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
   if (!last_) return;
@@ -255,7 +255,7 @@ void Vio::advance(const Held& held, VioResult& result) {
   if (!plausible(*result.smoother) || unlocated_images_ > kMostUnlocatedImages) {
     ++statistics_.divergences;
     result.problem = VioProblem::kDiverged;
-    last_->v_odom.setZero();  // diverged, so its value is useless
+    last_->v_odom.setZero();  // unknown after the divergence
     restart(held);
     return;
   }
@@ -364,7 +364,7 @@ std::optional<StateCovariance> Vio::state_covariance_at(const OdometryState& sta
   return covariance && is_usable(*covariance) ? covariance : std::nullopt;
 }
 
-// If the first image is that of the last keyframe, the keyframe was published earlier.
+// Adds no keyframe if the first image is that of the last keyframe, which was published earlier.
 void Vio::continue_or_add_first_keyframe(VioResult& result) {
   const OdometryState& first = result.states.front();
   if (!last_keyframe_ || last_keyframe_->stamp != first.stamp) add_first_keyframe(first, result);

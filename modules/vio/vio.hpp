@@ -22,9 +22,9 @@ enum class VioProblem {
   kNone,
   kNoImage,         ///< No image that fits the rig; inertial samples are kept.
   kUnorderedImage,  ///< The image is not later than the one before, and is dropped.
-  kBadSamples,      ///< Some inertial samples are implausible or out of order; these are dropped.
-  /// Too long without inertial samples. Images alone determine the motion, or, if they cannot,
-  /// odometry starts again from the last pose.
+  kBadSamples,      ///< Implausible or unordered inertial samples, which are dropped.
+  /// Gap between inertial samples above VioConfig::max_imu_gap_s. Images alone determine the
+  /// motion. If images cannot, odometry starts again from the last pose.
   kInertialGap,
   /// The estimate was implausible or contradicted the images. Odometry starts again from the last
   /// pose.
@@ -37,7 +37,7 @@ struct VioResult {
   VioProblem problem = VioProblem::kNone;
   std::vector<OdometryState> states;        ///< In order of time; several at a start.
   std::vector<KeyframeOdometry> keyframes;  ///< New keyframes; several at a start.
-  std::vector<LocatedFrame> frames;         ///< Frames of the images, one per state.
+  std::vector<LocatedFrame> frames;         ///< Images with their poses, one per state.
   std::optional<StartStatus> start;         ///< Outcome, if a start was attempted.
   TrackerStatistics tracking;               ///< Counts of this image.
   std::vector<Eigen::Vector2d> tracked;    ///< Features of this image: bearings in the left camera.
@@ -45,8 +45,8 @@ struct VioResult {
   std::optional<VisionEvent> vision;       ///< Loss or return of vision.
 };
 
-/// State in which an earlier process of the robot ended: at a keyframe, whose image is the first
-/// that is processed again.
+/// Last keyframe of an earlier process of the robot, and the state there. The new process begins
+/// with the image of this keyframe.
 struct VioCheckpoint {
   OdometryState state;        ///< State at the image of the keyframe.
   KeyframeOdometry keyframe;  ///< The last published keyframe.
@@ -56,19 +56,19 @@ struct VioCheckpoint {
 ///
 /// Images of the first VioConfig::start_s are held back. Then all their poses are published at
 /// once, and from there one pose per image. A body that stands still makes no keyframes
-/// (RestDetector); the next one is measured from the one before the rest. Bad input is refused and
-/// reported. An estimate that diverges is replaced by a new start from the last pose. Neither
-/// throws. Deterministic; not thread-safe.
+/// (RestDetector). The first keyframe after a rest is measured from the last keyframe before the
+/// rest. Bad input is refused and reported; it does not throw. After an estimate has diverged,
+/// odometry starts again from the last pose. Deterministic; not thread-safe.
 class Vio {
  public:
   /// Throws ConfigError, and std::invalid_argument for an unusable rig.
   Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, const VioConfig& config);
 
-  /// Continues from the checkpoint. The next keyframe follows the checkpoint's keyframe, and is
-  /// measured from it if odometry starts on its image. If this image comes first and the covariance
-  /// of the state is known, odometry starts at once from that state. Otherwise it starts as usual,
-  /// with the images of VioConfig::start_s. The estimated calibration is kept. Call before the
-  /// first process().
+  /// Continues from the checkpoint. The next keyframe index follows that of the checkpoint's
+  /// keyframe. If odometry starts on the image of this keyframe, the next keyframe is measured from
+  /// it. If this image comes first and the covariance of the state is known, odometry starts at
+  /// once from that state. Otherwise odometry starts as usual, with the images of
+  /// VioConfig::start_s. The estimated calibration is kept. Call before the first process().
   void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] VioResult process(const SensorPacket& packet);
@@ -122,10 +122,10 @@ class Vio {
   FixedLagSmoother smoother_;
   RestDetector rest_detector_;
   VisionWatch vision_;
-  // Return of vision; until the prior from the dark is discarded.
+  // Time at which vision returned; nullopt once the prior from the dark is discarded.
   std::optional<Stamp> back_since_;
   VioStatistics statistics_;
-  std::vector<ImuSample> samples_;  // From the last sample not after the last image.
+  std::vector<ImuSample> samples_;  // Samples from the last one before or at the last image on.
   std::optional<Stamp> last_image_;
   std::vector<Held> held_;  // Images held back; not empty while starting.
   bool running_ = false;

@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueuedPackets = 4;  // the sensors hold back at most 0.2 s at 20 Hz
+constexpr std::size_t kQueuedPackets = 4;  // 0.2 s at 20 Hz
 
 const char* text(VioProblem problem) {
   switch (problem) {
@@ -50,8 +50,8 @@ const char* text(StartStatus status) {
   return "unknown start";
 }
 
-// Share of the features of the image before that are still tracked. Crowded ones are not counted,
-// because they ran into features that are still tracked.
+// Share of the features of the previous image that are still tracked. Crowded features are not
+// counted, because they lie at features that are still tracked.
 std::optional<double> tracked_share(const TrackerStatistics& s) {
   const int before = s.tracked + s.lost + s.backward + s.motion;
   if (before == 0) return std::nullopt;

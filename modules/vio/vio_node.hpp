@@ -19,12 +19,12 @@ struct VioTopics {
   Out<OdometryState> odometry;      ///< One per image, in order of time.
   Out<KeyframeOdometry> keyframes;  ///< Indices without gaps.
   Out<LocatedFrame> frames;         ///< One per image, after its keyframe.
-  Out<VioStatistics> statistics;    ///< After events, and while blind.
+  Out<VioStatistics> statistics;    ///< After events, and for each image while vision is lost.
   Out<TrackedImage> images;         ///< All accepted images.
   Out<ProcessedFrame> processed;    ///< For each packet, at the end of its step.
 };
 
-/// Stereo-inertial odometry as a thread, with one Vio. A full queue delays the sensors.
+/// Runs one Vio in a thread. A full queue delays the sensors.
 class VioNode final : public Node {
  public:
   /// Throws ConfigError if a config is out of bounds, std::invalid_argument for an unusable rig.

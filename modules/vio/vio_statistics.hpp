@@ -11,7 +11,7 @@ struct VioStatistics {
   int divergences = 0;
   int starts = 0;
   int start_attempts = 0;
-  int rests = 0;                ///< Number of rests.
+  int rests = 0;
   int images_without_pose = 0;  ///< Images dropped because no start was possible.
   int vision_losses = 0;        ///< Number of losses; see VisionWatch.
   double blind_s = 0.0;         ///< Total duration of the losses.

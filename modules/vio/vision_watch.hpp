@@ -14,15 +14,17 @@ struct VisionEvent {
   int features = 0;       ///< Number of features in this image.
 };
 
-/// Detects from each image whether vision still determines the pose. Vision is lost when no image
-/// has held the pose for kPatience_s, and back with the first image that does.
+/// Detects from each image whether vision still determines the pose. An image holds the pose if it
+/// shows at least kLeastSeen located landmarks. Vision is lost when no image has held the pose for
+/// kPatience_s, and returns with the next image that holds the pose.
 class VisionWatch {
  public:
-  static constexpr int kLeastSeen = 8;  ///< Located landmarks in an image that holds the pose.
+  static constexpr int kLeastSeen = 8;
   static constexpr double kPatience_s = 0.3;
 
-  /// Adds an image with `features` features, `seen` of them located landmarks; 0 while odometry has
-  /// no pose. Stamps ascend. There is no loss before the first image that holds the pose.
+  /// Adds an image with `features` features, `seen` of them located landmarks; `seen` is 0 while
+  /// odometry has no pose. Stamps ascend. There is no loss before the first image that holds the
+  /// pose.
   [[nodiscard]] std::optional<VisionEvent> add(Stamp stamp, int features, int seen);
 
   [[nodiscard]] bool is_lost() const { return is_lost_; }

@@ -22,8 +22,8 @@ struct WindowFrame {
   OdometryState state;
   bool keyframe = false;
   bool rests = false;  ///< The body stands still in this image.
-  /// Samples over the time since the frame before, except for rests. The samples of the first frame
-  /// are needed only by the following frames.
+  /// Samples since the frame before, except for rests. The samples of the first frame are used only
+  /// by the following frames.
   std::vector<ImuSample> samples;
   bool is_bridged = false;       ///< `samples` have a gap: see InertialFrame.
   std::optional<ImuFactor> imu;  ///< Factor from the frame before; none for the first.
@@ -44,7 +44,7 @@ struct WindowObservation {
 struct WindowLandmark {
   std::uint64_t id = 0;
   Eigen::Vector3d p_odom = Eigen::Vector3d::Zero();
-  bool located = false;                         ///< p_odom is known, and the landmark takes part.
+  bool located = false;  ///< p_odom is known, and the optimisation uses the landmark.
   std::vector<WindowObservation> observations;  ///< Ascending frames.
 };
 
@@ -65,7 +65,7 @@ struct Window {
 /// Index of the frame with `id`; frames.size() if there is none.
 [[nodiscard]] std::size_t frame_index(const Window& window, std::uint64_t id);
 
-/// For each frame, the first estimates that the prior holds.
+/// First estimates held by the prior, one entry for each frame.
 [[nodiscard]] std::vector<FirstEstimate> first_estimates(const Window& window);
 
 /// Sets the calibration and updates the views.

@@ -21,10 +21,10 @@ class WindowEquations {
   WindowEquations(const Window& window, double damping);
 
   void add_prior();
-  void add_imu(std::size_t frame);  ///< The factor that ends at `frame`.
+  void add_imu(std::size_t frame);  ///< Adds the inertial factor that ends at `frame`.
 
-  /// Adds the observations of `landmark` and eliminates it; with `keyframes_only`, only those in
-  /// keyframes. A landmark seen in fewer than two frames adds nothing. Call add_images()
+  /// Adds the observations of `landmark`, or those in keyframes (`keyframes_only`), and eliminates
+  /// the landmark. A landmark seen in fewer than two frames adds nothing. Call add_images()
   /// afterwards.
   void add_landmark(const WindowLandmark& landmark, bool keyframes_only = false);
 
@@ -32,7 +32,7 @@ class WindowEquations {
   /// calibration. Call once, after the last landmark.
   void add_images();
 
-  /// Adds the prior and all factors and landmarks of the window.
+  /// Adds the prior, all inertial factors and all landmarks of the window, and calls add_images().
   void add_all();
 
   [[nodiscard]] const Eigen::MatrixXd& H() const { return H_; }  ///< Lower triangle only.
@@ -42,8 +42,8 @@ class WindowEquations {
   /// Solution for the frames; empty if H is not positive definite.
   [[nodiscard]] Eigen::VectorXd solve() const;
 
-  /// Moves every state and landmark of `target`, and its calibration, by `dx` and the landmark
-  /// steps that follow from it. `target` is a window of the same structure.
+  /// Moves the states and the calibration of `target` by `dx`, and its landmarks by the steps that
+  /// follow from `dx`. `target` is a window of the same structure.
   void apply(const Eigen::VectorXd& dx, Window& target) const;
 
  private:
@@ -51,8 +51,9 @@ class WindowEquations {
   struct Eliminated {
     std::size_t landmark = 0;
     Eigen::Vector3d step = Eigen::Vector3d::Zero();  // V_inverse b
-    std::size_t first = 0, count = 0;                // into couplings_
+    std::size_t first = 0, count = 0;                // range in couplings_
   };
+  // Hessian between a landmark and the pose of one image.
   struct Coupling {
     std::size_t frame = 0;
     Eigen::Matrix<double, 6, 3> W;
@@ -63,8 +64,8 @@ class WindowEquations {
 
   const Window& window_;
   double damping_;
-  std::vector<OdometryState> linearization_;  // per frame, where derivatives are taken
-  std::vector<SE3> images_;                   // per frame, pose of the body at the image
+  std::vector<OdometryState> linearization_;  // linearisation point of each frame
+  std::vector<SE3> images_;                   // pose of the body at the image of each frame
   std::vector<ImagePose> image_linearization_;
   Eigen::MatrixXd images_H_;  // Hessian over the pose of each image (6 rows each), landmarks
                               // eliminated
@@ -97,13 +98,13 @@ WindowSolution optimize(Window& window, int max_iterations);
 /// replaces the inertial factors before and after the frame by one.
 void forget_frame(Window& window, std::size_t frame);
 
-/// Replaces the oldest frame by a prior on the frames that it shares information with. The prior
-/// contains its inertial factor, the prior so far, and the observations in keyframes of every
-/// landmark that it has seen. They are linearised at the current estimates, or at the first
-/// estimates of states that the prior already held. These landmarks lose their position and are
-/// located again from the observations of later images. The next frame becomes a keyframe, because
-/// the prior holds it. Precondition: at least two frames, and an inertial factor between the first
-/// two.
+/// Replaces the oldest frame by a prior on the frames that share information with it. The new prior
+/// contains the former prior, the inertial factor after the oldest frame, and the observations in
+/// keyframes of every landmark that the oldest frame has seen. The terms are linearised at the
+/// current estimates, or at the first estimates of states that the former prior held. The landmarks
+/// lose their position and are located again from observations of later images. The second frame
+/// becomes a keyframe, because the prior holds it. Precondition: at least two frames, and an
+/// inertial factor between the first two.
 void marginalize_oldest(Window& window);
 
 }  // namespace km
