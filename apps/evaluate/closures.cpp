@@ -21,10 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ClosuresCommand {
-  std::vector<std::filesystem::path> truths;  // One for all robots, or one for each.
-  std::vector<std::filesystem::path>
-      results;                    // A robot's results folder or record each, or a team's.
-  std::filesystem::path dataset;  // EuRoC/ASL folder with the robots' left camera.
+  std::vector<std::filesystem::path> truths;   // One file for all results, or one for each.
+  std::vector<std::filesystem::path> results;  // Results folder or record of each robot, or
+                                               // record of a team.
+  std::filesystem::path dataset;               // EuRoC/ASL folder with the robots' left camera.
   ClosureTruthOptions options;
   std::filesystem::path json;  // Not written if empty.
 };

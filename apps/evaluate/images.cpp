@@ -27,13 +27,15 @@ struct RecordingWindow {
 
 struct ImagesCommand {
   std::filesystem::path dataset;  // EuRoC/ASL folder.
-  std::filesystem::path compare;  // Another one, beside it; empty: none.
+  std::filesystem::path compare;  // Folder of a second recording; empty: no comparison.
   RecordingWindow window;
-  std::optional<double> compare_from_s;  // Window of the other; by default the same.
+  // Window of the second recording; default: `window`.
+  std::optional<double> compare_from_s;
   std::optional<double> compare_to_s;
-  std::optional<double>
-      still_from_s;  // times in which the camera also stands still, in recordings with
-  std::optional<double> still_to_s;  // `window`; none by default
+  // Further window in which the camera stands still; absent: none. It applies to the second
+  // recording only if that has no window of its own.
+  std::optional<double> still_from_s;
+  std::optional<double> still_to_s;
   ImageStatisticsOptions options;
   std::filesystem::path json;  // Not written if empty.
 };

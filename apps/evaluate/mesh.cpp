@@ -21,10 +21,11 @@ namespace km {
 namespace {
 
 struct MeshCommand {
-  std::filesystem::path truth;                           // PLY.
-  std::vector<std::filesystem::path> estimates;          // PLY, one file per robot.
-  std::vector<std::filesystem::path> trajectories;       // The robots' poses in the meshes' frame,
-  std::vector<std::filesystem::path> true_trajectories;  // and in the truth's: place the meshes.
+  std::filesystem::path truth;                   // PLY.
+  std::vector<std::filesystem::path> estimates;  // PLY, one file per robot.
+  // The robots' poses in the frame of the meshes and in that of the truth. They place the meshes.
+  std::vector<std::filesystem::path> trajectories;
+  std::vector<std::filesystem::path> true_trajectories;
   MeshErrorOptions options;
   std::filesystem::path palette;  // default: the palette beside the truth
   std::filesystem::path json;     // Not written if empty.
@@ -40,7 +41,7 @@ SE3 placed_by(const MeshCommand& command) {
   return placement_of(command.trajectories, command.true_trajectories, true);
 }
 
-constexpr double kLargeMove_m = 0.5;  // beyond, ICP may have found another surface
+constexpr double kLargeMove_m = 0.5;  // motion by ICP above which it may have found a wrong surface
 constexpr const char* kPlacing =
     "the meshes were taken to lie in the frame of the truth; --trajectory and --trajectory-truth "
     "of their robots place them first";

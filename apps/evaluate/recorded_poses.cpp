@@ -18,7 +18,7 @@ StampedPose pose_of(Stamp stamp, const RosPose& pose) {
   return {stamp, make_pose(pose.orientation.normalized().toRotationMatrix(), pose.position)};
 }
 
-// Takes the pose of a message, or the poses of a path, which replace those before.
+// Appends the pose of a message to `poses`, or replaces `poses` by those of a path.
 void take(const BagChannel& channel, const BagMessage& message, const std::string& place,
           std::vector<StampedPose>& poses) {
   const auto decode = [&]<typename Message>(const Message&) {

@@ -14,7 +14,7 @@ struct RecordTopic {
   std::filesystem::path file;
   std::string topic;
 
-  /// "alice"
+  /// Name of the robot: "alice".
   [[nodiscard]] std::string robot() const { return topic.substr(1, topic.find('/', 1) - 1); }
 };
 

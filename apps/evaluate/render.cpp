@@ -27,11 +27,10 @@ namespace fs = std::filesystem;
 
 struct RenderCommand {
   std::vector<std::filesystem::path> meshes;        // PLY files
-  std::vector<std::filesystem::path> trajectories;  // TUM or EuRoC CSV files, in the frame of the
-                                                    // meshes
-  std::vector<std::filesystem::path>
-      references;  // References for the first trajectories. They define the frame of the picture,
-                   // which is by default that of the meshes.
+  std::vector<std::filesystem::path> trajectories;  // TUM or EuRoC CSV, in the meshes' frame
+  // References of the first trajectories. They define the frame of the picture; default: the
+  // meshes' frame.
+  std::vector<std::filesystem::path> references;
   std::vector<std::string> views = {"top"};  // syntax: see parse_view()
   std::string color = "auto";                // auto, label, own, shade, robot.
   std::string size = "1600x1200";

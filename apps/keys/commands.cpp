@@ -23,7 +23,7 @@ constexpr std::int64_t kDay_s = 86400;
 
 struct KeysCommand {
   fs::path team;
-  std::vector<std::string> robots;  // "name:id", or one number
+  std::vector<std::string> robots;  // "name:id" of each robot, or only the number of robots
   int days = 365;
   std::string revoked;
 };

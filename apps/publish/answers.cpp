@@ -10,8 +10,7 @@
 namespace km {
 namespace {
 
-constexpr double kSoon_s =
-    0.05;  // the images of the first second wait at the start and are not counted
+constexpr double kSoon_s = 0.05;  // delay above which an answer counts as late
 
 double quantile(std::vector<double> values, double share) {
   const auto at =

@@ -32,7 +32,7 @@ class Answers {
   std::string topic_;
   RosSubscription subscription_;
   mutable std::mutex mutex_;        // guards the members below
-  std::map<Stamp, double> sent_s_;  // on the steady clock; images without an answer so far
+  std::map<Stamp, double> sent_s_;  // by image without an answer: steady time of sent() [s]
   std::vector<double> latencies_s_;
   std::size_t sent_ = 0;
   std::jthread listener_;  // last member: ends first

@@ -65,7 +65,7 @@ void EurocMessages::add(const char* topic, Stamp stamp, std::vector<std::uint8_t
       {static_cast<std::size_t>(channel - channels_.begin()), stamp, std::move(bytes)});
 }
 
-// The last sample of a packet is not before its frame.
+// Adds the frame before the last sample of its packet, which is not earlier than the frame.
 void EurocMessages::take(const SensorPacket& packet) {
   const StereoFrame& frame = *packet.frame;
   const auto add_frame = [&] {

@@ -182,7 +182,7 @@ void play(const Options& options, SignalWatch& signals) {
 
 int main(int argc, char** argv) try {
   const km::Options options = km::parse_options(argc, argv);
-  km::SignalWatch signals;  // before any thread: they inherit the blocked signals
+  km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::play(options, signals);
   return 0;
 } catch (const std::exception& error) {

@@ -26,7 +26,7 @@ std::optional<std::vector<std::uint8_t>> as_ros_2(const BagChannel& channel,
   return written;
 }
 
-// Little-endian CDR; nullopt if the bytes are no message of the channel's type.
+// The message as little-endian CDR; nullopt if the bytes are no message of the channel's type.
 std::optional<std::vector<std::uint8_t>> as_published(const BagChannel& channel,
                                                       std::vector<std::uint8_t> bytes) {
   constexpr std::uint8_t kLittleEndian = 1;
@@ -88,7 +88,7 @@ std::vector<std::string> MessagePlayer::topics_short_of(std::size_t readers) con
   return topics;
 }
 
-// False after the end of the part to play.
+// Schedules a message; false after the end of the part to play.
 bool MessagePlayer::take(BagMessage message) {
   const Stamp begin = first_.value_or(message.log_time) + nanoseconds(options_.from_s);
   if (!first_) {
@@ -117,7 +117,7 @@ void MessagePlayer::schedule(BagMessage message) {
     ++topics_[topic].refused;
     return;
   }
-  // In time of the recording, like the clock.
+  // Late in time of the recording, as clock_ counts.
   const double late_s = options_.rate * (options_.delay_s + options_.jitter_s * uniform(random_));
   due_.push({message.log_time + nanoseconds(late_s), number_++, topic, std::move(*bytes)});
 }

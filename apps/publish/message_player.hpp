@@ -23,7 +23,7 @@ struct PlayOptions {
   double delay_s = 0.0;     ///< Delay of every message.
   double jitter_s = 0.0;    ///< Additional delay, uniform from 0 to this.
   double drop_share = 0.0;  ///< Share of the messages that are dropped.
-  bool reliable = false;    ///< Otherwise best effort, as drivers of sensors are.
+  bool reliable = false;    ///< False: best effort, as drivers of sensors are.
   unsigned seed = 0;
   std::vector<std::string> topics = {};  ///< Topics to play; empty: all.
   /// Part to play [s since the first message]; of earlier messages only latched ones are published.
@@ -35,7 +35,7 @@ struct PlayedTopic {
   std::string topic, type;
   std::size_t published = 0;
   std::size_t dropped = 0;
-  std::size_t refused = 0;  ///< Messages with an invalid content.
+  std::size_t refused = 0;  ///< Messages with invalid content.
 };
 
 /// Publishes the messages of a recording as live topics of ROS 2, as recorded or with errors.

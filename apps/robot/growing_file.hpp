@@ -13,7 +13,7 @@ namespace km {
 
 /// A result file that grows during the run, so that recorded rows survive a crash. While the disk
 /// is full, rows wait in memory and are written once there is room. No row is lost or cut in two
-/// unless more than kMaxWaiting bytes wait. Not thread-safe.
+/// unless more than kMaxWaiting_bytes wait. Not thread-safe.
 class GrowingFile {
  public:
   static constexpr std::size_t kMaxWaiting_bytes = std::size_t{4} << 20;
@@ -23,7 +23,7 @@ class GrowingFile {
       : file_(std::move(file)), results_(results) {}
 
   /// Continues the file of an earlier process and returns its rows. The next flush() cuts off an
-  /// incomplete last row. If called, then before the first flush().
+  /// incomplete last row. Call before the first flush().
   [[nodiscard]] std::string go_on();
 
   /// Stream to which rows are written.

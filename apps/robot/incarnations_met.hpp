@@ -11,7 +11,7 @@ namespace km {
 /// For each other robot, the incarnation with which this robot has closures. Thread-safe.
 class IncarnationsMet {
  public:
-  /// From now on, new closures are with this incarnation.
+  /// Later closures with `peer` belong to its present incarnation.
   void meet(const TeamPeer& peer) {
     const std::lock_guard lock(mutex_);
     boots_[peer.robot] = peer.boot;

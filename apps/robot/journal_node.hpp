@@ -47,8 +47,9 @@ struct JournalTopics {
 /// Writes everything that a robot must not lose with its process to the disk, several times a
 /// second, so that it survives a crash of the machine. Keyframes and closures are published only
 /// after they are written. Everything that other robots receive can therefore be restored: an index
-/// always stands for one keyframe, and both ends of a closure know the same measurements. If the
-/// disk is full or fails, nothing is held back: the failure is reported and the run continues.
+/// always stands for one keyframe, and both robots of a closure know the same measurement. If the
+/// disk is full or fails, all messages are published, the failure is reported, and the run
+/// continues.
 class JournalNode final : public Node {
  public:
   /// Continues the journal of `restored`, or begins a new one. `results` outlives this. The
@@ -67,7 +68,7 @@ class JournalNode final : public Node {
   /// A keyframe of this run as it was written; null if it is not on the disk. Thread-safe.
   [[nodiscard]] std::shared_ptr<const Keyframe> recall(KeyframeIndex keyframe) const;
 
-  /// True while a keyframe waits for the disk. Thread-safe.
+  /// True while a keyframe waits until it is on the disk. Thread-safe.
   [[nodiscard]] bool holds_back() const { return new_keyframes_ > 0; }
 
   std::string_view name() const override { return "journal"; }

@@ -14,7 +14,7 @@ enum class MappingMode {
 /// Source of the depths, or labels, of all pixels.
 enum class DenseSource {
   kAuto,      ///< Images of the recording if it has them, else computed.
-  kRecorded,  ///< The recording's images.
+  kRecorded,  ///< Images of the recording.
   kComputed,  ///< Stereo matching; the network of `segmentation:`.
 };
 

@@ -48,13 +48,13 @@ class MeshFilesNode final : public Node {
   double step_limit_s() const override { return 300.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Handles one input synchronously, as the thread does.
+  /// Handles one input synchronously. The thread calls these functions; tests can call them too.
   void step(const KeyframeOdometry& keyframe);
   void step(const Trajectory& trajectory);
   void step(const MapMesh& map);
   void step(const OptimizedMesh& mesh);
 
-  /// Call after stop(): writes mesh.ply again, by the trajectory the robot ended with.
+  /// Writes mesh.ply again, with the last trajectory of the robot. Call after stop().
   void finish(const std::optional<Trajectory>& trajectory);
 
  private:

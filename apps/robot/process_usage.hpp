@@ -13,7 +13,7 @@ namespace km {
 struct ProcessUsage {
   double cpu_s = 0.0;                ///< Processor time, user and system.
   double system_s = 0.0;             ///< Processor time in the kernel.
-  std::uint64_t page_faults = 0;     ///< Without input from a disk (minor faults).
+  std::uint64_t page_faults = 0;     ///< Minor page faults: without input from a disk.
   std::uint64_t resident_bytes = 0;  ///< Present value; shared libraries included.
   std::uint64_t peak_bytes = 0;      ///< Largest value since the start.
 };

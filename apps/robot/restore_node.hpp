@@ -23,9 +23,9 @@ struct RestoreTopics {
   Out<ClosureOutcome> outcomes;
 };
 
-/// Publishes a restored run once, before any source starts. The nodes that read it reach the state
-/// that they had, as if they had received all messages. Has no thread: start() returns when
-/// everything is published.
+/// Publishes a restored run once, before any source starts. The nodes that read its messages reach
+/// the state that they had in the former process. Has no thread: start() returns when all messages
+/// are published.
 class RestoreNode final : public Node {
  public:
   explicit RestoreNode(const RestoreTopics& topics) : topics_(topics) {}

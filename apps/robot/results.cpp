@@ -183,7 +183,7 @@ void write_poses(std::ostream& out, const std::vector<StampedPose>& poses) {
   }
 }
 
-// Each pose is followed by the 36 numbers of geometry_msgs/PoseWithCovariance, if known.
+// Writes the optimised keyframes, each with the 36 numbers of its covariance if it is known.
 void write_keyframe_poses(std::ostream& out, const RunRecord& record) {
   const std::vector<StampedPose> poses = record.optimized_keyframes();
   for (std::size_t k = 0; k < poses.size(); ++k) {

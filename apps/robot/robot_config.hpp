@@ -42,7 +42,7 @@ struct RobotOptions {
   std::filesystem::path odometry;  ///< Poses of another odometry, which replaces the robot's own.
   bool is_live = false;            ///< True if drivers that run now publish the topics of `rig`.
   std::filesystem::path graph;     ///< Recorded pose graph: g2o, CSV or JRL.
-  std::filesystem::path session;   ///< Results of a finished run; exclusive with both.
+  std::filesystem::path session;   ///< Results of a finished run; exclusive with dataset and graph.
   std::optional<double> from_s;    ///< Part of the recording [s since its first image].
   std::optional<double> to_s;
   double rate = 1.0;  ///< Times real time; infinity for as fast as possible.
@@ -88,7 +88,7 @@ struct RobotConfig {
   MeshChunksConfig mesh_chunks;
   ViewConfig view;
 
-  std::string effective;  ///< YAML text of a file that gives this configuration again.
+  std::string effective;  ///< YAML text of a file with this configuration.
 
   /// Calls visit(section) for every section, in the order of files.
   void visit_sections(const auto& visit) {

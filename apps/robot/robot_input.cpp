@@ -32,7 +32,7 @@ bool has_messages(const RobotOptions& options) {
   return options.is_live || (!options.dataset.empty() && may_be_bag(options.dataset));
 }
 
-// The run to continue; nullopt if its process ended before its first keyframe.
+// The run to continue; nullopt if its process ended before the first keyframe.
 std::optional<RestoredRun> restore(const RobotOptions& options, const std::string& input) {
   const fs::path file = options.output / kJournal;
   if (!options.resume) return std::nullopt;
@@ -56,7 +56,7 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
   return run;
 }
 
-// A map that is missing or belongs to another run does not prevent the resumption.
+// The map of the former process; nullopt if the file is missing or damaged.
 std::optional<ContinuedMap> restore_map(const RobotOptions& options, const RestoredRun& run) try {
   const fs::path file = options.output / kMap;
   if (is_absent(file)) return std::nullopt;

@@ -43,8 +43,8 @@ bool is_fault_of_disk(const std::error_code& error) {
          error == std::errc::io_error;
 }
 
-// A disk that fails does not separate a robot from its team. A mistake on the command line ends the
-// program with an error.
+// Changes the results folder. If the disk fails, the loss is noted and the robot runs without it.
+// Throws std::runtime_error for a folder that cannot be used.
 void change_output(const RobotOptions& options, ResultWriter& results,
                    const std::function<void(const fs::path&)>& change) try {
   change(options.output);
@@ -186,13 +186,13 @@ class Watch {
         rounds_file_(options.output / "optimizer.csv", results),
         rounds_csv_(rounds_file_.rows(), continues ? rounds_file_.go_on() : std::string()) {}
 
-  /// True when the robot may leave, or must because its id belongs to another. Called ten times a
-  /// second.
+  /// True when the robot may leave, or must leave because another robot has its id. Called ten
+  /// times a second.
   bool poll() {
     const double now_s = steady_now_s() - start_s_;
     const TrafficSnapshot traffic = robot_.bridge().traffic();
     const bool ended = robot_.input_ended() && !waits_for_peers(now_s);
-    // If the recorder is at work, the next call reads it: this thread does not wait.
+    // If the recorder is at work, the next call reads the record: this thread does not wait.
     (void)robot_.recorder().try_with_record([&](const RunRecord& record) {
       log_progress(now_s, record, traffic);
       rounds_csv_.append(record.rounds());
@@ -235,17 +235,17 @@ class Watch {
  private:
   static constexpr double kInterval_s = 1.0;     // between rows of a CSV, and status lines
   static constexpr double kLeaveNotice_s = 1.5;  // three times the period of the status
-  // In a chain, robots leave one after the other: the first are gone before the last receives a
-  // notice.
+  // In a chain, robots leave one after the other. The first ones have left before the last one
+  // receives a notice.
   static constexpr double kSecondHand_s = 2.0 * kLeaveNotice_s;
 
-  // The robot of a finished run serves others: it stays until another robot has come, or until the
-  // limit.
+  // The robot of a finished run stays until another robot has come, or until the limit.
   bool waits_for_peers(double now_s) const {
     return is_past_ && now_s < serve_limit_s_ && robot_.bridge().peers().list().empty();
   }
 
-  // Sends the leave message before the robot ends, so that all robots end with the same solution.
+  // Publishes that the robot leaves, and freezes the record, so that all robots end with the same
+  // solution. True once the peers have had the time to receive this.
   bool leave_notice_sent(double now_s) {
     if (!leaving_since_s_) {
       leaving_since_s_ = now_s;
@@ -408,7 +408,7 @@ void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers, Result
   }
 }
 
-// Completes the MCAP record: attaches the other results, among them the list of closures.
+// Completes the MCAP record with the other results as attachments, among them the closures.
 void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRecord& record,
                    const RunResult& result, ResultWriter& results) {
   if (result.is_left_behind(node.name()))
@@ -598,7 +598,8 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   const int exit_code = result.is_left_behind("recorder") ? end(RunRecord(options.robot))
                                                           : robot.recorder().with_record(end);
   if (result.left_behind.empty()) return exit_code;
-  // Hung threads use objects that a return would destroy. The others see the robot leave.
+  // Hung threads use objects that a return would destroy. The process therefore ends here, after
+  // the robot has left the network.
   if (!result.is_left_behind(robot.bridge().name())) robot.leave();
   drain_standard_output();
   std::_Exit(exit_code);

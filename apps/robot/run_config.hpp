@@ -23,10 +23,12 @@ struct RunConfig {
     visitor.field(
         "settle_s", settle_s, {0.1, 600.0},
         "[s] the robot leaves when it and all present peers have been idle for this time");
-    visitor.field("patience", patience, {0.1, 100.0},
-                  "increase on slow computers: factor on the limit of 30 s (pose graph and map: "
-                  "120 s, mesh files: 300 s) for one step of a module; a module that exceeds the "
-                  "limit counts as hung, and the robot ends without it");
+    visitor.field(
+        "patience", patience, {0.1, 100.0},
+        "increase on slow computers: factor on the time limit for one step of a module "
+        "(30 s; pose graph, map, journal, network and viewers: 120 s; files of meshes and "
+        "of the record: 300 s); a module that exceeds its limit counts as hung, and the "
+        "robot ends without it");
   }
 };
 

@@ -14,7 +14,7 @@ constexpr int kHung = 5;
 
 constexpr const char* kAllSettled = "all present robots have settled";
 
-// Each image is in exactly one of the counts.
+// Number of images without a pose by cause; each image counts once.
 std::string why_no_pose(const ImageCounts& images) {
   const std::size_t given = images.read + images.skipped;
   const std::size_t unusable = images.listed > given ? images.listed - given : 0;
@@ -41,8 +41,8 @@ Departure::Present Departure::update(double now_s, const Inputs& inputs) {
   if (!inputs.input_ended) return {RobotPhase::kRunning, 0};
   if (!ended_s_) ended_s_ = now_s;
 
-  // The robot reports itself as settled after half of the settling time. The other half is for the
-  // peers to answer.
+  // The robot reports itself as settled after half of the settling time. Its peers answer in the
+  // other half.
   const bool settled = inputs.graph_settled && now_s - active_s_ >= 0.5 * settle_s_;
   const std::uint8_t links = settled ? settled_links(inputs.present_peers) : 0;
   const bool peers_settled = links > 1;

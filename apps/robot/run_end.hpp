@@ -35,7 +35,7 @@ class Departure {
     bool graph_settled = false;  ///< The optimiser has nothing left to do.
     std::uint64_t activity = 0;  ///< Changes whenever a module has done new work.
     std::span<const Present> present_peers = {};
-    std::size_t not_received = 0;  ///< Number of robots of the team that only other robots receive.
+    std::size_t not_received = 0;  ///< Number of members that only other robots receive.
   };
 
   /// Takes the state at `now_s` and returns the progress to publish.
@@ -55,18 +55,18 @@ class Departure {
 };
 
 /// Reason why a robot ends without another one of its team. kSilent: the other robot went silent
-/// without a leave message and has not come back: out of reach, or dead. kApart: it is received,
-/// but has no frame in common with this robot.
+/// without a leave message and did not return. kApart: the other robot is received, but has no
+/// frame in common with this robot.
 enum class Absence { kSilent, kApart };
 
 struct MissedPeer {
   std::string name;
   Absence why = Absence::kSilent;
-  double missed_s = 0.0;  ///< Duration until the end of the run.
+  double missed_s = 0.0;  ///< Time without this robot, up to the end of the run.
 };
 
-/// Records since when this robot misses others of its team. Pure: time is an argument [s], with any
-/// origin.
+/// Records the robots of the team that this robot misses, and the time since then. Pure: time is an
+/// argument [s], with any origin.
 class Absentees {
  public:
   /// kLeft: the robot has sent its leave message. kReported: only other robots receive it.
@@ -81,9 +81,9 @@ class Absentees {
   void update(double now_s, const std::map<RobotId, Known>& known,
               std::span<const RobotId> members);
 
-  /// Missed robots as of the last update(), ascending by id. A former member that was never
-  /// received is listed only after it has been missed for `second_hand_s`. It may have left in
-  /// order, which only other robots know.
+  /// Missed robots as of the last update(), ascending by id. A former member that this robot never
+  /// received is listed only after it has been missed for `second_hand_s`, because it may have sent
+  /// its leave message to other robots.
   [[nodiscard]] std::vector<MissedPeer> missed(double second_hand_s) const;
 
  private:

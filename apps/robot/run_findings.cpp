@@ -21,7 +21,7 @@ std::string name_of(const Names& names, RobotId robot) {
                                                         : "robot " + std::to_string(robot);
 }
 
-// "matches do not agree on a pose" (300 of 412)
+// The most common reason, as text: "matches do not agree on a pose" (300 of 412).
 std::string commonest(const std::map<std::string, std::uint64_t>& reasons, std::uint64_t of) {
   const auto most = std::ranges::max_element(reasons, {}, [](const auto& r) { return r.second; });
   return '"' + most->first + "\" (" + std::to_string(most->second) + " of " + std::to_string(of) +

@@ -127,7 +127,7 @@ class RunRecord {
   /// Closures that this robot found, by the other robot (or itself).
   [[nodiscard]] std::map<RobotId, ClosureCounts> closures_per_peer() const;
 
-  /// Closures that this robot found, by the stage they reached and the reason why no further.
+  /// Closures that this robot found, by stage, and by the reason why they went no further.
   [[nodiscard]] std::map<RobotId, ClosureTally> closure_tallies() const;
 
   /// By robot, the number of its keyframes that could not be compared because of its vocabulary.

@@ -19,7 +19,8 @@ using NumberRow = std::vector<double>;
 [[nodiscard]] std::vector<NumberRow> read_number_rows(const std::filesystem::path& file,
                                                       std::size_t columns);
 
-/// A row of traffic.csv: messages and bytes until a time of the run, including retransmissions.
+/// A row of traffic.csv: messages and bytes from the start of the run to `time_s`, with
+/// retransmissions.
 struct TrafficRow {
   double time_s = 0.0;
   bool out = false;

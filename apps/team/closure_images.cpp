@@ -72,7 +72,8 @@ fs::path argument(const RobotPlan& plan, const std::string& option) {
   return {};
 }
 
-// Wanted: keyframes whose left images are requested, by stamp. Take: called with each image found.
+// Wanted: keyframes whose left images are requested, by stamp. Take: function called with each of
+// these images.
 using Wanted = std::map<Stamp, KeyframeId>;
 using Take = std::function<void(const KeyframeId&, const cv::Mat&)>;
 

@@ -129,7 +129,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   return plan;
 }
 
-// Writes the fates of the frames to links.csv. A failure is logged and does not end the program,
+// Writes the counts of the frames to links.csv. A failure is logged and does not end the program,
 // because the run has ended.
 void write_links(const km::TeamPlan& plan, km::EmulatedLinks& links, km::ResultWriter& results) {
   std::vector<std::string> names;

@@ -52,7 +52,7 @@ Stamp first_stamp(const RobotPaths& paths) {
   return first;
 }
 
-// A point for each item. In each hole a point of nulls, which interrupts the line.
+// Makes a point of each item, and a point of nulls in each hole, which interrupts the line.
 template <typename Item, typename PointOf>
 Json broken_line(std::vector<Item> items, const std::vector<PoseHole>& holes, PointOf point_of) {
   Json points = Json::array();

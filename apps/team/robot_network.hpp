@@ -21,8 +21,8 @@ class Descriptor {
 
 /// A network of a robot on this host: a network namespace with loopback and one Ethernet interface,
 /// eth0, whose frames this program reads and writes. It is made as root, or in a user namespace.
-/// Only descriptors keep it, so that it vanishes with this object and the programs in it, however
-/// they end.
+/// Only descriptors keep it. It therefore vanishes when this object and the programs in the network
+/// have ended, even by a crash.
 class RobotNetwork {
  public:
   /// The network of robot `robot`, with ethernet_address() and 10.77.x.y/16, counted from

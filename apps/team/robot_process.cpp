@@ -48,8 +48,7 @@ std::array<int, 2> make_pipe() {
   dup2(err, STDERR_FILENO);
   // Before prctl(): a change of privileges clears its setting.
   if (prepare && !prepare()) give_up();
-  // Not SIGTERM: after a first request to end, the robot would take it as the second, which ends at
-  // once.
+  // SIGHUP, because a second SIGTERM would end the robot at once.
   prctl(PR_SET_PDEATHSIG, SIGHUP);
   if (getppid() != parent) _exit(127);  // the parent died before the line above
   setpgid(0, 0);

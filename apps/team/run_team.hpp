@@ -46,7 +46,7 @@ struct RobotRun {
 /// Ends of the robots of a run that has ended elsewhere, on other hosts or in containers, from
 /// their folders below `plan.output`; in the order of the plan. The exit code is the content of the
 /// file `exit_code`, if there is one. Otherwise it is 0 for a robot with a summary.json, and 1
-/// without. The last words are the last lines of `robot.log`.
+/// without. `last_log_lines` are those of `robot.log`.
 [[nodiscard]] std::vector<RobotRun> finished_runs(const TeamPlan& plan);
 
 }  // namespace km

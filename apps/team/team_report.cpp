@@ -198,7 +198,7 @@ std::string skipped_remark(const RobotResult& robot) {
          " % of its frames: use a lower --rate, or max, which waits, or fewer robots\n";
 }
 
-// For a robot without results, one reason stands for all that is missing: how it failed.
+// Notes on the team and on robots with results. failures() has the reasons of the other robots.
 std::string notes(const TeamResult& team) {
   std::string text;
   for (const std::string& note : team.notes) text.append("note: ").append(note).append("\n");

@@ -28,7 +28,7 @@ auto attempt(std::vector<std::string>& notes, const auto& make, const std::strin
   }
 }
 
-// By robot, in the order of the plan; without the robots that left none.
+// Meshes by robot, in the order of the plan, without the robots that wrote no mesh.
 using Meshes = std::vector<std::pair<std::string, LabelledMesh>>;
 
 Meshes read_meshes(const TeamPlan& plan, const char* file, std::vector<std::string>& notes) {
@@ -136,7 +136,7 @@ void judge_odometry(const TrajectoryInput& input, RobotResult& robot) {
 }
 
 // Compares the optimised poses of the robots in the team's frame with the truth, and moves them to
-// it.
+// the frame of the truth.
 void judge_optimized(TeamResult& team, Trajectories& trajectories) {
   std::vector<TrajectoryInput> inputs;
   for (RobotResult& robot : team.robots)

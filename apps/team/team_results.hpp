@@ -34,7 +34,7 @@ struct RobotResult {
   std::vector<ClosureRecord> closures;    ///< Candidates that a robot with cameras considered.
   std::vector<std::string> notes;
 
-  /// True if the robot failed before it wrote results; its last words say why.
+  /// True if the robot failed before it wrote results; its last log lines have the reason.
   [[nodiscard]] bool left_nothing() const { return !summary && !run.exit.ok(); }
 };
 
@@ -65,9 +65,9 @@ struct TeamResult {
 /// nullopt if it left no summary.
 [[nodiscard]] std::optional<RobotId> frame_of(const RobotResult& robot);
 
-/// Finds the robots whose optimised poses are not in the frame that most robots ended in. If
-/// several frames are equally common, that of the lowest anchor counts. Sets `in_team_frame` of the
-/// other robots to false and notes why. A robot without a summary is assumed to be in it.
+/// Finds the team's frame: that of the optimised poses of most robots. If several frames are
+/// equally common, that of the lowest anchor counts. Sets `in_team_frame` of the robots in other
+/// frames to false and notes why. A robot without a summary is assumed to be in the team's frame.
 void find_team_frame(std::vector<RobotResult>& robots);
 
 /// Reads the meshes of the robots and merges them in the frame of the true poses, to which

@@ -13,7 +13,7 @@ namespace km {
 /// It needs no other file and no network. Text of the plots is shown as text.
 [[nodiscard]] std::string chart_page(const std::string& title, const std::vector<Plot>& plots);
 
-/// For use in another page: script elements that show plots in its elements of these ids.
+/// Script elements for another page. They show each list of plots in the page's element of that id.
 [[nodiscard]] std::string plot_scripts(const std::map<std::string, std::vector<Plot>>& plots);
 
 }  // namespace km

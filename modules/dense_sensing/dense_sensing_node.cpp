@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-// Large enough that images without depth displace none with depth.
+// Length at which frames without depth do not displace frames with depth.
 constexpr std::size_t kQueuedFrames = 4;
 constexpr double kStampJitter_s = 2e-3;
 

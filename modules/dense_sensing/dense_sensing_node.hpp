@@ -19,9 +19,9 @@ namespace km {
 /// Channels of the dense sensing node; they must outlive it.
 struct DenseSensingTopics {
   In<LocatedFrame> located;  ///< In order of time.
-  In<ShedLoad> load;         ///< Whether the map gets no frames, to relieve odometry.
+  In<ShedLoad> load;         ///< If ShedLoad::map, due frames are dropped, to relieve odometry.
   Out<DenseFrame> frames;
-  Out<DenseSensingProgress> progress;  ///< With every due frame.
+  Out<DenseSensingProgress> progress;  ///< Published with every due frame.
 };
 
 /// Makes depth and labels of the frames that are due, as a thread with one DenseSensor.

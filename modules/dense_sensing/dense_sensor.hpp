@@ -35,7 +35,7 @@ struct DenseSensorConfig {
 /// Reason why a frame gives no depth.
 enum class DenseProblem {
   kNone,
-  kNoDepthImage,  ///< This frame has none; depth images may come at a lower rate.
+  kNoDepthImage,  ///< The frame has no depth image. Depth images may come at a lower rate.
   kWrongSize,     ///< An image is missing or has another size than its camera.
 };
 
@@ -43,7 +43,7 @@ enum class DenseProblem {
 struct [[nodiscard]] DenseImages {
   DenseProblem problem = DenseProblem::kNone;
   std::shared_ptr<const DepthImage> depth;   ///< Null if there is a problem.
-  std::shared_ptr<const LabelImage> labels;  ///< Null if there are none.
+  std::shared_ptr<const LabelImage> labels;  ///< Null without labels.
   bool wrong_label_size = false;    ///< Labels of another size than the left camera's are dropped.
   std::size_t classes_outside = 0;  ///< Pixels of classes that the label map of the network lacks,
                                     ///< see Segmentation.
@@ -73,11 +73,11 @@ class DenseSensor {
 
 /// Counts of the frames that were due for the map, so far.
 struct DenseSensingProgress {
-  std::uint64_t frames = 0;            ///< Published with depth.
-  std::uint64_t gave_way = 0;          ///< Dropped because processors were too slow.
-  std::uint64_t without_depth = 0;     ///< No depth image; the next frame was used.
-  std::uint64_t wrong_size = 0;        ///< Images missing, or of another size than their camera.
-  std::uint64_t without_labels = 0;    ///< Published without the requested labels.
+  std::uint64_t frames = 0;            ///< Frames published with depth.
+  std::uint64_t gave_way = 0;          ///< Frames dropped because processors were too slow.
+  std::uint64_t without_depth = 0;     ///< Frames without a depth image; the next one is due.
+  std::uint64_t wrong_size = 0;        ///< Frames with DenseProblem::kWrongSize.
+  std::uint64_t without_labels = 0;    ///< Frames published without the requested labels.
   std::uint64_t wrong_label_size = 0;  ///< Part of without_labels: labels of the wrong size.
   std::uint64_t classes_outside = 0;   ///< Pixels of classes that the label map lacks.
 };

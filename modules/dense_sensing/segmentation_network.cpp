@@ -41,8 +41,7 @@ SegmentationConfig checked_network(SegmentationConfig config) {
   return config;
 }
 
-// OpenCV states the place in its sources, and then the reason in brackets. Only the reason is of
-// use.
+// The reason of an error without the place in OpenCV's sources.
 std::string reason(const cv::Exception& error) {
   std::string text = error.err.empty() ? error.what() : error.err;
   while (!text.empty() && text.back() == '\n') text.pop_back();

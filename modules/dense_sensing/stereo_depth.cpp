@@ -36,8 +36,8 @@ constexpr float kNoise = 5.0F;  // [grey levels]
 constexpr float kMaxRest = 0.4F;
 
 // Sums over the pixels of a window that have a disparity. g: gradient of the right image along the
-// row [grey levels / 32 px], e: right minus left [grey levels / 16], l: left. Integers, so that a
-// pixel that leaves a running sum leaves no rounding error.
+// row [grey levels / 32 px], e: right minus left [grey levels / 16], l: left. Running sums of
+// integers have no rounding errors.
 struct Sums {
   std::int32_t n = 0, g = 0, e = 0, gg = 0, ge = 0, ee = 0, l = 0, ll = 0;
 

@@ -31,8 +31,8 @@ class StereoRectification {
   /// 255 for pixels in the real left camera's view, else 0.
   [[nodiscard]] const cv::Mat& seen() const { return seen_; }
 
-  /// The labels of the nearest pixels; 0 if there are none. Precondition: `labels` has the left
-  /// camera's size.
+  /// The labels of the nearest pixels; 0 outside the real camera's view. Precondition: `labels` has
+  /// the left camera's size.
   [[nodiscard]] LabelImage rectified(const LabelImage& labels) const;
 
  private:
@@ -48,8 +48,8 @@ class StereoRectification {
 
 /// Depth of every pixel from a stereo pair, by semi-global matching (Hirschmueller, "Stereo
 /// Processing by Semiglobal Matching and Mutual Information", PAMI 2008) in OpenCV's variant, on
-/// rectified images. A pixel keeps its depth if its match is unique, equal from right to left, no
-/// speckle, and within range.
+/// rectified images. A pixel has a depth if its match is unique, agrees with the match from right
+/// to left, is no speckle, and is within range.
 ///
 /// The matcher's fractions of a pixel are biased towards whole numbers by up to a quarter. One step
 /// of image alignment (Lucas and Kanade, "An Iterative Image Registration Technique with an

@@ -211,7 +211,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxTruthGap_s = 0.1;  // as for trajectories: longer gaps are not interpolated
+constexpr double kMaxTruthGap_s = 0.1;  // longest interpolated gap, as for trajectories
 constexpr double kMaxTruthDifference_s = 0.01;
 constexpr double kMaxClosureNormError = 0.01;  // norm of a quaternion
 constexpr std::size_t kPoseColumn = 8;
@@ -254,8 +254,8 @@ class Fields {
 
   [[nodiscard]] std::string_view text(std::size_t i) const { return row_.fields[i]; }
 
-  // The text of field `i` and of all fields after it, which its commas have separated, without
-  // quotes.
+  // Text of field `i` and all fields after it, joined by commas, without quotes. The last field may
+  // contain commas.
   [[nodiscard]] std::string rest(std::size_t i) const {
     std::string all;
     for (; i < row_.fields.size(); ++i) all.append(all.empty() ? "" : ", ").append(row_.fields[i]);

@@ -65,8 +65,8 @@ struct ClosureTruthOptions {
 struct StageScore {
   std::size_t judged = 0;          ///< Closures whose keyframes both have a true pose.
   std::size_t correct = 0;         ///< True closures among them.
-  std::size_t pairs_found = 0;     ///< True pairs of keyframes of two robots with a true closure.
-  std::size_t frames_found = 0;    ///< Keyframes that have such a pair with a true closure.
+  std::size_t pairs_found = 0;     ///< Pairs of ClosureScores::true_pairs with a true closure.
+  std::size_t frames_found = 0;    ///< Keyframes of these pairs.
   Statistics translation_error_m;  ///< Errors of measured poses; empty for candidates.
   Statistics rotation_error_deg;
 
@@ -76,8 +76,8 @@ struct StageScore {
 /// All closures of a team against the truth.
 struct ClosureScores {
   StageScore candidates;       ///< All closures; true if both keyframes see the same place.
-  StageScore verified;         ///< Stages kVerified and kInlier; true if the measured pose is.
-  StageScore inliers;          ///< Stage kInlier; true if the measured pose is.
+  StageScore verified;         ///< Stages kVerified and kInlier; judged by the measured pose.
+  StageScore inliers;          ///< Stage kInlier; judged by the measured pose.
   std::size_t true_pairs = 0;  ///< Pairs of keyframes of two robots that see the same place.
   /// Keyframes that see the same place as some keyframe of another robot.
   std::size_t true_frames = 0;
@@ -136,7 +136,7 @@ struct KeyframeRecord {
 [[nodiscard]] std::vector<ClosureRecord> parse_closures(std::string_view text,
                                                         const std::string& name);
 
-/// The keyframes with stamps within the true poses `truth` (ascending), with their true pose.
+/// The keyframes that have a true pose in `truth` (ascending), with this pose.
 [[nodiscard]] std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,
                                                         std::span<const StampedPose> truth);
 

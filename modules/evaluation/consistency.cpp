@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-constexpr double kOrigin = 1e-6;    // relative to the largest covariance
+constexpr double kOrigin = 1e-6;    // smallest trace of a covariance, relative to the largest one
 constexpr double k95Of6 = 12.5916;  // quantile of chi-squared, 6 degrees of freedom
 constexpr double kMedianOf6 = 5.34812;
 
@@ -81,7 +81,7 @@ std::vector<Consistency> consistency(std::span<const ConsistencyInput> inputs, b
       largest = std::max(largest, Sigma.trace());
       smallest = std::min(smallest, Sigma.trace());
     }
-  // The origin may have a tilt, but no heading and no position: its covariance is singular.
+  // At most the tilt of the origin has a variance, so its covariance is singular.
   const double of_origin = std::max(kOrigin * largest, smallest);
   std::vector<Consistency> results;
   Sample all;

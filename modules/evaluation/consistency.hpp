@@ -27,10 +27,10 @@ struct ConsistencyInput {
 struct Consistency {
   std::string name;
   std::size_t poses = 0;         ///< Number of poses compared.
-  double pose = 0.0;             ///< Mean, 6 degrees of freedom.
-  double rotation = 0.0;         ///< Mean, 3 degrees of freedom.
-  double translation = 0.0;      ///< Mean, 3 degrees of freedom.
-  double median = 0.0;           ///< Median of pose NEES over the median of its distribution.
+  double pose = 0.0;             ///< Mean NEES of the pose, 6 degrees of freedom.
+  double rotation = 0.0;         ///< Mean NEES of the rotation, 3 degrees of freedom.
+  double translation = 0.0;      ///< Mean NEES of the translation, 3 degrees of freedom.
+  double median = 0.0;           ///< Median NEES of the pose over the median of chi-squared.
   double share_within_95 = 0.0;  ///< Share of poses whose error lies in their 95 % region.
 };
 
@@ -42,10 +42,10 @@ struct Consistency {
 }
 
 /// Compares the errors of all robots with their covariances. The frame of the team is placed in the
-/// truth at its origin: the pose with the smallest covariance. If `upright`, both have z up, and
-/// only the position and the heading of the origin are used. The origin and poses
-/// whose covariance is below a millionth of the largest one do not count. Returns one result per
-/// input, and one for all together as the last.
+/// truth by its origin: the pose with the smallest covariance. If `upright`, both frames have z up,
+/// and only the position and the heading of the origin are used. Two kinds of poses do not count:
+/// the origin, and poses whose covariance has a trace below a millionth of the largest one. Returns
+/// one result per input, and one for all together as the last.
 ///
 /// Throws std::invalid_argument with the name of the input if it shares no pose with its truth, or
 /// if the truth has no pose at the origin.

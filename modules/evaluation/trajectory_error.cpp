@@ -100,7 +100,7 @@ struct Errors {
 };
 
 TrajectoryError summary(const std::string& name, const Errors& errors) {
-  // Repeated if there are several robots
+  // With several robots, lengths are repeated.
   std::vector<double> lengths_m = errors.segments.lengths_m;
   std::sort(lengths_m.begin(), lengths_m.end());
   lengths_m.erase(std::unique(lengths_m.begin(), lengths_m.end()), lengths_m.end());

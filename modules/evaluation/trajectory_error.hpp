@@ -75,7 +75,7 @@ struct TrajectoryInput {
 /// Errors of one estimate, or of all together.
 struct TrajectoryError {
   std::string name;
-  std::size_t poses = 0;         ///< In the estimate.
+  std::size_t poses = 0;         ///< Number of poses of the estimate.
   Statistics position_m;         ///< Absolute trajectory error; count: pairs compared.
   Statistics rotation_deg;       ///< Angle to the truth after the same alignment.
   Statistics rpe_translation_m;  ///< Relative pose error over rpe_delta_s.

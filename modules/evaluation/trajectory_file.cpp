@@ -59,7 +59,7 @@ class RowParser {
     return {*stamp, make_pose(q.toRotationMatrix(), {v[1], v[2], v[3]})};
   }
 
-  // The covariance along the axes of the pose, from that along fixed axes.
+  // Converts the covariance along fixed axes to that along the axes of the pose.
   Matrix6 parse_covariance(const SE3& T) const {
     Matrix6 along_axes;
     if (row_.fields.size() != kFields + 36)
@@ -91,7 +91,7 @@ bool is_header(const TextRow& row) {
          std::isalpha(static_cast<unsigned char>(row.fields.front().front())) != 0;
 }
 
-// Calls use(parser, pose) for every row, but not for one with the stamp of the row before.
+// Calls use(parser, pose) for every row, except for rows with the stamp of the row before.
 void for_each_pose(std::string_view text, const std::string& name, const auto& use) {
   std::vector<TextRow> rows = split_rows(text);
   if (!rows.empty() && is_header(rows.front())) rows.erase(rows.begin());

@@ -77,7 +77,7 @@ Rectification::Rectification(const StereoRig& rig, Centre centre) : real_(rig.ca
         const auto pixel = seen_pixel(real_[side], R_real_rect * ray);
         map.at<cv::Vec2f>(y, x) =
             pixel ? cv::Vec2f(static_cast<float>(pixel->x()), static_cast<float>(pixel->y()))
-                  : cv::Vec2f(-2.0F, -2.0F);  // remap() makes it 0
+                  : cv::Vec2f(-2.0F, -2.0F);  // outside the image, where remap() gives 0
       }
     cv::convertMaps(map, cv::noArray(), maps_[side], map_fractions_[side], CV_16SC2);
   }

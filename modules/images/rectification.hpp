@@ -9,14 +9,14 @@
 
 namespace km {
 
-/// Pixel at which the image of `camera` shows `ray`, of any length, in its frame [px]; nullopt if
-/// the ray is not in view.
+/// Pixel at which `camera` shows `ray`, a vector of any length in the camera's frame [px]; nullopt
+/// if the ray is not in view.
 [[nodiscard]] std::optional<Eigen::Vector2d> seen_pixel(const Camera& camera,
                                                         const Eigen::Vector3d& ray);
 
-/// Two virtual cameras without distortion, at the positions of a rig's cameras, whose rows are the
-/// same planes of space. A point at depth z is focal length * baseline / z further left in the
-/// right image.
+/// Two virtual cameras without distortion, at the positions of a rig's cameras. Equal rows of both
+/// images show the same plane of space. A point at depth z is focal length * baseline / z further
+/// left in the right image.
 ///
 /// The virtual optical axes are midway between the real ones as far as the direction of the
 /// baseline permits. The focal length is that of the left camera on its axis, so that the centre,

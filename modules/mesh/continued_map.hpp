@@ -10,8 +10,8 @@ namespace km {
 /// that is mapped again. The new mapper's map is appended under ids that follow. Not thread-safe.
 class ContinuedMap {
  public:
-  /// `before` has ids. `keyframes` > 0 is the number of keyframes that the robot had then; views of
-  /// later ones count as views of the last one.
+  /// `before`: map of the former process, with ids. `keyframes` > 0: number of its keyframes that
+  /// were restored. Views by later keyframes count as views by the last of them.
   ContinuedMap(MapMesh before, KeyframeIndex keyframes);
 
   [[nodiscard]] const MapMesh& before() const { return before_; }
@@ -19,8 +19,8 @@ class ContinuedMap {
   /// Returns the former map and `now` as one map.
   [[nodiscard]] MapMesh with(const MapMesh& now) const;
 
-  /// Drops faces of the former map whose vertices are all listed. Returns the rest for the mapper,
-  /// under its own ids: vertices of the mapper whose heirs are the mapper's too.
+  /// Drops faces of the former map whose vertices are all listed. Returns the listed vertices of
+  /// the mapper, under its own ids, if their heirs belong to the mapper too.
   [[nodiscard]] SupersededSurface drop(const SupersededSurface& superseded);
 
  private:

@@ -10,7 +10,7 @@
 namespace km {
 
 /// The mesh of a robot's map, in the robot's odometry frame, from the mapper to Local Mesh
-/// Optimization. `seen_by` is as long as mesh.vertices, and so is `ids`, unless it is empty.
+/// Optimization. `seen_by` is as long as mesh.vertices. `ids` has this length too, or is empty.
 struct MapMesh {
   LabelledMesh mesh;
 
@@ -21,8 +21,8 @@ struct MapMesh {
   /// are in two updates have the same order in both, and new ones come last.
   std::vector<std::uint64_t> ids = {};
 
-  /// Certainty of each vertex, in steps of a factor of four of its weight. As long as the vertices,
-  /// or empty if all are equal.
+  /// Certainty of each vertex: log4 of its weight, rounded down, plus a constant. As long as the
+  /// vertices, or empty if all are equal.
   std::vector<std::uint8_t> certainty = {};
 
   /// Side of the voxels the mesh was made from [m]; 0: unknown.

@@ -18,7 +18,7 @@ using Face = LabelledMesh::Face;
 constexpr double kFarthest_steps = 1U << 30U;  // so that the sum of three fits into 64 bits
 constexpr std::int64_t kMaxOffset = std::numeric_limits<std::uint16_t>::max();
 constexpr std::int64_t kThirdOfMaxOffset = kMaxOffset / 3;
-constexpr double kFarthest_m = 1e7;  // no robot is farther from the origin of a frame
+constexpr double kFarthest_m = 1e7;  // bound on a robot's distance from the origin of a frame
 
 std::vector<GridPoint> quantise(const std::vector<Eigen::Vector3f>& vertices, double step_m) {
   std::vector<GridPoint> points;
@@ -197,7 +197,7 @@ struct SharedVertexHash {
   }
 };
 
-// True if the step of the grid is positive, and the origin lies within the reach of a robot.
+// True if the step of the grid is positive, and the origin lies within kFarthest_m.
 bool are_positions_usable(const MeshChunk& chunk) {
   if (!(chunk.step_m > 0.0F)) return false;
   return std::ranges::all_of(chunk.origin, [&](std::int32_t c) {

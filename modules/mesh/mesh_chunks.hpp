@@ -30,7 +30,7 @@ struct MeshChunk {
   using Triple = std::array<std::uint16_t, 3>;
 
   MeshChunkKey key;
-  std::uint64_t boot = 0;  ///< Process of the robot that sent it; only set in received chunks.
+  std::uint64_t boot = 0;  ///< Boot id of the sender; only set in received chunks.
   RobotId anchor = 0;      ///< Robot whose odometry frame is `world`.
   float step_m = 0.001F;
   std::array<std::int32_t, 3> origin = {0, 0, 0};  ///< [step_m] in `world`.
@@ -42,21 +42,21 @@ struct MeshChunk {
   bool operator==(const MeshChunk&) const = default;
 };
 
-/// Largest size of a chunk on the wire, including everything.
+/// Largest size of a chunk on the wire, with its envelope.
 inline constexpr std::size_t kMaxChunkBytes = 32000;
 
 /// Upper bound on the bytes of a chunk on the wire.
 [[nodiscard]] constexpr std::size_t wire_bytes(std::size_t vertices, std::size_t faces,
                                                bool labelled) {
-  constexpr std::size_t kFixed = 96;  // envelope, cell, part, grid, origin, three lengths, padding
+  constexpr std::size_t kFixed = 96;  // bytes of all fields that are not sequences, and padding
   return kFixed + (labelled ? 7 : 6) * vertices + 6 * faces;
 }
 [[nodiscard]] inline std::size_t wire_bytes(const MeshChunk& chunk) {
   return wire_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty());
 }
 
-/// The reason why this cannot be a chunk of split_mesh() (a string literal), or null. Received
-/// chunks are used only after this check.
+/// The reason why `chunk` cannot be from split_mesh() (a string literal), or null. Received chunks
+/// are used only after this check.
 [[nodiscard]] const char* fault_of(const MeshChunk& chunk);
 
 /// The grid of cells by which a mesh is split, and the grid to which positions are rounded.

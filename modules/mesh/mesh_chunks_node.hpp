@@ -19,9 +19,9 @@
 
 namespace km {
 
-/// Publishes the robot's mesh in chunks, at most max_bytes_per_s. Cells that have changed since
-/// they were last sent are sent in their newest state. The module that has the robot's best mesh
-/// passes it to offer().
+/// Publishes the robot's mesh in chunks, at most max_bytes_per_s on average. Pieces that have
+/// changed since they were last sent are sent in their newest state. The module that has the
+/// robot's best mesh passes it to offer().
 class MeshChunksNode final : public Node {
  public:
   /// A mesh in the frame `world` of the robot `anchor`; a null mesh is a tick of the clock.

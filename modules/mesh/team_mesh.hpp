@@ -30,8 +30,8 @@ struct RobotMesh {
   std::size_t outdated_chunks = 0;  ///< Dropped chunks: another anchor or step.
 };
 
-/// The meshes of other robots, with the newest chunk of each piece. A robot that leaves keeps its
-/// mesh. When a robot restarts, its first chunk replaces its former mesh. Not thread-safe.
+/// The meshes of other robots, with the newest chunk of each piece. The mesh of a robot that leaves
+/// stays. When a robot restarts, its first chunk replaces its former mesh. Not thread-safe.
 class TeamMesh {
  public:
   /// About 2 million vertices with their faces; a bound for misbehaving peers.
@@ -42,7 +42,7 @@ class TeamMesh {
 
   ChunkVerdict add(MeshChunk chunk);
 
-  /// Ascending robot ids.
+  /// One mesh per robot, by ascending id.
   [[nodiscard]] std::vector<RobotMesh> snapshot() const;
 
  private:

@@ -33,10 +33,10 @@ struct DeformationGraph {
   [[nodiscard]] std::size_t term_count() const { return 2 * edges.size() + 2 * ties.size(); }
 };
 
-/// At most `keyframes_per_node` keyframes for each node, from those that saw it: the first, the
-/// last, and others spread evenly between them. If the time between is longer than the window, only
-/// the first and the last are used. The surface was then left and seen again, and the keyframes in
-/// between may not have seen it.
+/// At most `keyframes_per_node` keyframes for each node: the first and the last that saw it, and
+/// others spread evenly between them. If first and last are further apart than the window, only
+/// these two are used. The surface was then left and seen again, and the keyframes in between may
+/// not have seen it.
 [[nodiscard]] std::vector<KeyframeTie> choose_ties(std::span<const MeshNode> nodes,
                                                    std::size_t keyframes_per_node,
                                                    KeyframeIndex window_keyframes);
@@ -45,9 +45,9 @@ struct DeformationGraph {
 
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
-/// Difference between a point moved by pose a and vertex b: second and third term of Eq. (1) in
-/// Kimera-Multi (Chang et al., ICRA 2021, Sec. IV). Between two nodes it is the regularisation of
-/// Sumner et al., "Embedded Deformation for Shape Manipulation", SIGGRAPH 2007.
+/// Difference between vertex b and its position as predicted by vertex a: second and third term of
+/// Eq. (1) in Kimera-Multi (Chang et al., ICRA 2021, Sec. IV). Between two nodes it is the
+/// regularisation of Sumner et al., "Embedded Deformation for Shape Manipulation", SIGGRAPH 2007.
 struct RigidityTerm {
   Eigen::Vector3d residual;  ///< T_world_a * point_a - t_world_b [m].
   Matrix36 by_a;
@@ -117,9 +117,9 @@ struct [[nodiscard]] DeformationSolution {
 [[nodiscard]] DeformationPoses initial_poses(const DeformationGraph& graph,
                                              std::span<const SE3> T_world_kf);
 
-/// First guess from the solution `last` for the anchors `T_world_kf_last`: every vertex of the
-/// graph moves like the anchor of its (first) keyframe since then. Vertices that `last` lacks are
-/// as in initial_poses(). Precondition: the vertices of `last` are the first ones of the graph.
+/// First guess from the solution `last` for the anchors `T_world_kf_last`. Each keyframe and node
+/// of `last` moves like the anchor of its (first) keyframe has moved since. The others are as in
+/// initial_poses(). Precondition: the vertices of `last` are the first ones of the graph.
 [[nodiscard]] DeformationPoses carried_over_poses(const DeformationGraph& graph,
                                                   const DeformationPoses& last,
                                                   std::span<const SE3> T_world_kf_last,
@@ -133,7 +133,7 @@ struct [[nodiscard]] DeformationSolution {
 /// A weak term is added to those of the paper. It rotates each node with its keyframes (see
 /// kRotationNoise_rad in the source). The minimum is then unique even if a node has few neighbours
 /// or all of them are on one line. Keyframes without a tie stay at their anchors; without any tie
-/// the result is `initial`.
+/// nodes stay as in `initial`.
 [[nodiscard]] DeformationSolution solve(const DeformationGraph& graph,
                                         std::span<const SE3> T_world_kf,
                                         const DeformationNoise& noise, const DeformationStop& stop,

@@ -28,7 +28,7 @@ struct KeyframeMotion {
 /// Compares two solutions of the same keyframes, as many as both have. The common motion minimises
 /// the sum of the squared motions relative to it, in units of `scale`, with the chordal distance of
 /// rotations. This is the orthogonal Procrustes problem (Umeyama, PAMI 1991) with rotations as
-/// further observations, so that it is unique for any number of poses. Identity without poses.
+/// further observations, so that one pose suffices. Without poses it is the identity.
 [[nodiscard]] KeyframeMotion keyframe_motion(std::span<const SE3> before,
                                              std::span<const SE3> after, const MotionScale& scale);
 

@@ -67,7 +67,7 @@ bool is_rigid(const SE3& T) {
 // Correspondence of the vertices of two versions of a mesh.
 struct VertexMatch {
   std::vector<std::uint32_t> before;     // old index of each new vertex, or kNoIndex
-  std::vector<std::uint32_t> unchanged;  // old index, but kNoIndex if position or time differ
+  std::vector<std::uint32_t> unchanged;  // `before`, but kNoIndex if position or seen_by differ
   std::vector<std::uint32_t> after;      // new index of each old vertex, or kNoIndex
 };
 
@@ -144,7 +144,7 @@ struct LocalMeshOptimizer::State {
         window(static_cast<KeyframeIndex>(config.time_window_keyframes)),
         interpolation(static_cast<std::size_t>(config.interpolation_nodes), window) {}
 
-  // Nodes whose vertex was seen again, and the indices of their vertices in the new mesh.
+  // Updates the vertex and seen_by of each node. Returns the nodes whose seen_by has changed.
   std::vector<std::uint32_t> follow_vertices(const VertexMatch& matched, const MapMesh& map);
 
   // More than half as many vertices have been removed as remain: many nodes represent little
@@ -256,8 +256,8 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
       solve(graph, anchors, state.noise(),
             {state.config.max_iterations, state.config.energy_tolerance}, std::move(initial));
 
-  std::vector<SE3> T_world_odom;  // correction at each keyframe, which moves vertices without a
-                                  // node
+  // Correction at each keyframe, which moves vertices without a node.
+  std::vector<SE3> T_world_odom;
   for (std::size_t i = 0; i < anchors.size(); ++i)
     T_world_odom.push_back(anchors[i] * T_odom_kf[i].inverse());
   result.mesh = map.mesh;

@@ -34,8 +34,8 @@ MeshCorrection MeshCorrector::correct_from_scratch(const CorrectionInput& input)
   return deform(input, complete(input.T_odom_kf, input.T_world_kf));
 }
 
-// Without ids the mapper could not drop vertices, and without the size of voxels there is no scale
-// for the comparison.
+// Heirs of duplicate surface. All vertices stay if the map has no ids, by which the mapper drops
+// vertices, or an unknown voxel size.
 std::vector<std::uint32_t> MeshCorrector::heirs_in(const LabelledMesh& mesh,
                                                    const MapMesh& map) const {
   constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), plus the deformation

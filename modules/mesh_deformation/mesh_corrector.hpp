@@ -32,12 +32,12 @@ struct [[nodiscard]] MeshCorrection {
   std::size_t superseded_faces = 0;  ///< Faces missing in `mesh`.
 };
 
-/// Keeps a mesh consistent with map and trajectory at the lowest cost. It does nothing while no
-/// keyframe has moved by the configured threshold. If all keyframes have moved equally, as they do
-/// when the origin of `world` changes, one rigid motion suffices. Otherwise it runs Local Mesh
-/// Optimization. This removes drift from the mesh, so that copies of surface from several visits
-/// coincide. The best copy stays (see find_heirs()).
-/// best stays (see find_heirs()).
+/// Keeps a mesh consistent with map and trajectory at the lowest cost. While the map is unchanged,
+/// the mesh is corrected only if a keyframe has moved by the configured threshold. If all keyframes
+/// have moved equally, as they do when the origin of `world` changes, one rigid motion suffices.
+/// Otherwise, and for a changed map, Local Mesh Optimization deforms the mesh. This removes drift,
+/// so that copies of surface from several visits coincide. Above duplicate_faces, only the best
+/// copy stays (see find_heirs()).
 ///
 /// Not thread-safe.
 class MeshCorrector {
@@ -49,8 +49,8 @@ class MeshCorrector {
   /// conditions of LocalMeshOptimizer::optimize().
   [[nodiscard]] std::optional<MeshCorrection> correct(const CorrectionInput& input);
 
-  /// Returns the mesh as from a first correction: it depends only on `input`, bit by bit, and not
-  /// on earlier corrections. Throws under the conditions of LocalMeshOptimizer::optimize().
+  /// Returns the mesh as from a first correction. The mesh depends only on `input`, bit by bit, and
+  /// not on earlier corrections. Throws under the conditions of LocalMeshOptimizer::optimize().
   [[nodiscard]] MeshCorrection correct_from_scratch(const CorrectionInput& input);
 
  private:

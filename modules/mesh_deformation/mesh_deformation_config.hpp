@@ -4,7 +4,7 @@
 
 namespace km {
 
-/// Parameters of LocalMeshOptimizer.
+/// Parameters of LocalMeshOptimizer, MeshCorrector and MeshDeformationNode.
 struct MeshDeformationConfig {
   static constexpr const char* kSection = "mesh_deformation";
 

@@ -19,8 +19,7 @@ struct SameSurface {
   KeyframeIndex window_keyframes = 0;  ///< Largest difference of time within one visit.
 };
 
-/// Time of sight and certainty of the vertices of a mesh: see MapMesh. Views of equal length,
-/// except that `certainty` may be empty.
+/// MapMesh::seen_by and MapMesh::certainty of the vertices of a mesh. `certainty` may be empty.
 struct Sightings {
   std::span<const SeenBy> seen_by;
   std::span<const std::uint8_t> certainty;
@@ -55,7 +54,7 @@ struct Sightings {
 [[nodiscard]] LabelledMesh without_superseded(const LabelledMesh& mesh,
                                               std::span<const std::uint32_t> heirs);
 
-/// The heirs by ids. `ids` are those of the vertices, ascending.
+/// `heirs` with ids in place of indices. `ids` are those of the vertices, ascending.
 [[nodiscard]] SupersededSurface named(std::span<const std::uint32_t> heirs,
                                       std::span<const std::uint64_t> ids);
 

@@ -171,7 +171,8 @@ void MemberRbcd::update(std::vector<SolverMessage>& messages) {
   report_share(result.initial_gradient_norm * result.initial_gradient_norm, messages);
 }
 
-// This robot keeps the rounded poses, exactly as the other robots decode them.
+// Rounds the public poses to single precision. This robot continues from the rounded poses, which
+// are bit by bit those that the other robots decode.
 std::map<KeyframeIndex, Eigen::MatrixXf> MemberRbcd::round_public_poses() {
   LiftedPoses& X = history_.rbegin()->second;
   std::map<KeyframeIndex, Eigen::MatrixXf> rounded;
@@ -189,7 +190,7 @@ std::map<KeyframeIndex, Eigen::MatrixXf> MemberRbcd::round_public_poses() {
 
 void MemberRbcd::report_share(double squared_gradient, std::vector<SolverMessage>& messages) {
   const auto& [round, X] = *history_.rbegin();
-  // Before the first round, the rigid start counts: a session without an improvement ends with it.
+  // Round 0 has the cost of the rigid start, because a session without improvement ends with it.
   const LiftedPoses start = round == 0 ? lift(graph_.start, options_.rank) : LiftedPoses();
   const LiftedPoses& at = round == 0 ? start : X;
   if (round == 0) {
@@ -200,7 +201,7 @@ void MemberRbcd::report_share(double squared_gradient, std::vector<SolverMessage
             lift(lifted_identity(options_.rank), graph_.public_poses.at({robot, keyframe}));
     problem_.set_fixed(std::move(fixed));
   }
-  // The cost between two neighbours is counted by the one that moves last.
+  // The cost between two neighbours is counted by the robot that moves last.
   Share share{problem_.cost(at), squared_gradient, !graph_.to_absent.empty()};
   for (std::size_t k = 0; k < robot_of_edge_.size(); ++k) {
     const Neighbour& neighbour = neighbours_.at(robot_of_edge_[k]);

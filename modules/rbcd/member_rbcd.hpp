@@ -17,10 +17,10 @@ namespace km {
 struct RbcdOptions {
   Eigen::Index rank = 5;                ///< Rank r of the relaxation.
   std::uint32_t max_rounds = 0;         ///< 0: no limit.
-  double min_relative_decrease = 1e-7;  ///< Per round, of the team cost.
+  double min_relative_decrease = 1e-7;  ///< Smallest decrease of the team cost per round.
   int max_newton_steps = 3;             ///< Newton steps per block update.
   int max_cg_iterations = 50;           ///< CG iterations per Newton step.
-  double max_over_relaxation = 1.95;    ///< 1: to the minimum of the block, see minimise_beyond().
+  double max_over_relaxation = 1.95;    ///< 1: no over-relaxation, see minimise_beyond().
 };
 
 /// Riemannian block-coordinate descent on the rank relaxation (Tian et al., "Distributed

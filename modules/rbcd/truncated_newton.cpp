@@ -24,8 +24,8 @@ struct Step {
   bool on_boundary = false;
 };
 
-// Steihaug-Toint conjugate gradients. All products below are in the norm of the preconditioner: e =
-// V, d = direction, z = preconditioned residual.
+// Steihaug-Toint conjugate gradients; z is the preconditioned residual. e_e, e_d and d_d are
+// products of the step e = V and the direction d in the inner product of the preconditioner.
 Step solve_model(const QuadraticProblem& problem, const LiftedPoses& X,
                  const LiftedPoses& euclidean, const LiftedPoses& gradient, double radius,
                  const TruncatedNewtonOptions& options) {

@@ -14,7 +14,7 @@ struct TruncatedNewtonOptions {
   double cg_tolerance = 0.1;         ///< Residual of the Newton system over its right-hand side.
   double gradient_tolerance = 1e-6;  ///< Riemannian gradient norm at convergence.
   double relative_decrease_tolerance = 0.0;  ///< Relative decrease of the cost in the last step.
-  double initial_radius = 0.0;               ///< 0: too large to bind.
+  double initial_radius = 0.0;               ///< 0: so large that it limits no exact Newton step.
 };
 
 struct [[nodiscard]] TruncatedNewtonResult {
@@ -31,8 +31,7 @@ struct [[nodiscard]] TruncatedNewtonResult {
 
 /// Minimises `problem` from feasible `X` by the Riemannian trust-region method with preconditioned
 /// truncated conjugate gradients (Absil, Baker, Gallivan, "Trust-Region Methods on Riemannian
-/// Manifolds", FoCM 2007, Alg. 1 and 2). The radius is measured in the norm of the preconditioner
-/// and, unless given, starts out too large to bind.
+/// Manifolds", FoCM 2007, Alg. 1 and 2). The radius is measured in the norm of the preconditioner.
 [[nodiscard]] TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
                                              const TruncatedNewtonOptions& options);
 

@@ -29,8 +29,8 @@ KeyframeId read_id(TextFields& fields) {
   return *id;
 }
 
-constexpr Bounds<double> kAngle_rad{-1e6,
-                                    1e6};  // with full turns; larger angles have lost their digits
+// Angles may contain full turns. Larger angles are not precise enough.
+constexpr Bounds<double> kAngle_rad{-1e6, 1e6};
 
 SE3 read_pose(TextFields& fields, int dimension, const Bounds<double>& bounds_m) {
   Eigen::Vector3d t = Eigen::Vector3d::Zero();
@@ -73,7 +73,7 @@ struct EdgeCovariance {
   bool definite = true;  // the information matrix is positive definite
 };
 
-// The covariance without cross terms, with the weights of SE-Sync for the blocks of `information`.
+// Covariance without cross terms that has the weights of SE-Sync for the blocks of `information`.
 template <int N>
 EdgeCovariance<N> covariance_of_blocks(const Eigen::Matrix<double, N, N>& information,
                                        const TextFields& fields) {
@@ -121,7 +121,7 @@ Matrix6 swap_blocks(const Matrix6& M) {
   return swapped;
 }
 
-// x, y, angle -> rotation about z, translation in x and y.
+// Covariance of (x, y, angle) as covariance of a pose in 3D.
 Matrix6 lift(const Eigen::Matrix3d& Sigma) {
   constexpr int kPlace[] = {3, 4, 2};
   Matrix6 lifted = Matrix6::Zero();

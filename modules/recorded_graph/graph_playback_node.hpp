@@ -24,7 +24,7 @@ namespace km {
 /// publish it if it is stopped earlier.
 struct GraphPlaybackEnd {
   std::size_t keyframes = 0;
-  std::size_t closures = 0;  ///< Published by this robot.
+  std::size_t closures = 0;  ///< Number of closures that the node published.
 };
 
 /// Outputs of the playback. All topics must outlive the node.

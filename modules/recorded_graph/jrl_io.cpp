@@ -101,8 +101,7 @@ class JsonPlace {
   [[nodiscard]] std::string text() const { return text_of(*value_); }
 
  private:
-  // Lists and objects only as their kind and size, because a document of megabytes does not fit
-  // into a message.
+  // Shows a list or an object by kind and size only, because it may be too large for a message.
   static std::string text_of(const nlohmann::json& value) {
     if (value.is_structured())
       return std::string(value.is_array() ? "a list" : "an object") + " of " +
@@ -375,7 +374,7 @@ class JrlReader {
     }
   }
 
-  // Numbers of the measurements that {"a": [[entry, measurement], ...], ...} names.
+  // Indices of the measurements that labels {"a": [[entry, measurement], ...], ...} name.
   [[nodiscard]] std::vector<std::size_t> labelled(const JsonPlace& labels) const {
     std::vector<std::size_t> numbers;
     const bool of_one_robot = labels.is_list() && robots_.size() == 1;

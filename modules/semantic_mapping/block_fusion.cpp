@@ -8,9 +8,9 @@
 namespace km {
 namespace {
 
-// Distance of samples [px], at most one voxel at the greatest depth of the view.
+// Distance between sampled pixels [px]: about one voxel at the greatest depth of the view.
 int stride_of(const DepthView& view, double voxel_size_m) {
-  constexpr int kLongest = 16;  // [px]
+  constexpr int kLongest = 16;  // upper bound of the distance [px]
   const std::uint16_t farthest = *std::max_element(view.farthest.begin(), view.farthest.end());
   const float focal = std::max(view.fx, view.fy);
   const float pixels =
@@ -73,8 +73,8 @@ NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, doub
                               std::size_t max_blocks, std::uint64_t frame, KeyframeIndex keyframe,
                               BlockMap& map) {
   const double block_m = kBlockSide * voxel_size_m;
-  // In blocks, relative to the camera's block, so that float is precise enough at any distance from
-  // the origin.
+  // Positions are in blocks, relative to the camera's block, so that float is precise enough at any
+  // distance from the origin.
   const Eigen::Vector3d camera = T_odom_cam.translation() / block_m;
   const Eigen::Vector3d base = camera.array().floor();
   const Eigen::Vector3f origin = (camera - base).cast<float>();
@@ -104,8 +104,8 @@ NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, doub
 // Eight voxels along x. Plain loops over arrays, which the compiler vectorises.
 struct BlockFusion::Row {
   alignas(32) std::array<float, kBlockSide> z;                // [m]
-  alignas(32) std::array<std::int32_t, kBlockSide> index;     // index of the pixel
-  alignas(32) std::array<std::uint32_t, kBlockSide> pixel;    // DepthView::pixels
+  alignas(32) std::array<std::int32_t, kBlockSide> index;     // in DepthView::pixels
+  alignas(32) std::array<std::uint32_t, kBlockSide> pixel;    // value at `index`
   alignas(32) std::array<float, kBlockSide> observed_weight;  // 0: not observed
   bool moved = false;                                         // some distance has changed
   unsigned near_bits = 0;                                     // observed near the surface

@@ -17,7 +17,7 @@ namespace km {
 struct NearBlocks {
   std::vector<VoxelBlock*> blocks;
   std::size_t allocated = 0;  ///< New blocks among them.
-  std::size_t refused = 0;    ///< Requests for a new block while the map was full.
+  std::size_t refused = 0;    ///< Requests for a block beyond `max_blocks` or BlockMap::kReach.
 };
 
 /// The blocks within kNearVoxels of the surface, found by a subsample of the pixels about one voxel
@@ -29,14 +29,14 @@ struct NearBlocks {
                                             std::uint64_t frame, KeyframeIndex keyframe,
                                             BlockMap& map);
 
-/// Fuses one depth view, taken from one pose, into blocks. fuse() changes only its block, so it may
-/// run on several blocks at once.
+/// Fuses one depth view into blocks. fuse() changes only its block, so it may run on several blocks
+/// at once.
 ///
 /// A voxel at depth z that projects to a pixel of depth d has the signed distance s = d - z along
 /// the optical axis. If s > -truncation, the voxel's distance becomes the weighted mean of its
-/// former value and min(s, truncation) (Curless and Levoy, 1996). The weight is sigma_0^2 /
-/// sigma(d)^2 (see SemanticMappingConfig). From one voxel behind the surface to the truncation it
-/// falls linearly to zero, because a voxel farther behind may belong to another surface.
+/// former value and min(s, truncation) (Curless and Levoy, 1996). The weight is depth_sigma_m^2 /
+/// sigma(d)^2 (see SemanticMappingConfig). From one voxel behind the surface to the truncation the
+/// weight falls linearly to zero, because a voxel farther behind may belong to another surface.
 class BlockFusion {
  public:
   BlockFusion(const SemanticMappingConfig& config, const DepthView& view, const SE3& T_odom_cam,
@@ -77,7 +77,7 @@ class BlockFusion {
   Eigen::Matrix3f step_;    // columns: M times one voxel along x, y, z
   double block_m_;
   float truncation_, voxel_, near_, limit_, closest_, max_weight_;
-  float variance_, quadratic_variance_;  // sigma_0^2, quadratic^2
+  float variance_, quadratic_variance_;  // depth_sigma_m^2, depth_sigma_per_m^2
 };
 
 }  // namespace km

@@ -59,11 +59,11 @@ struct VoxelBlock {
   /// Bit x of row y + 8 z: the voxel was seen near a surface since the block was last meshed.
   std::array<std::uint8_t, kBlockRows> near_rows = {};
 
-  std::uint64_t selected_in = 0;    ///< Last frame for which it was selected.
-  KeyframeIndex last_seen = 0;      ///< Last keyframe that saw surface in it.
+  std::uint64_t selected_in = 0;    ///< Last frame for which select_near_blocks() chose the block.
+  KeyframeIndex last_seen = 0;      ///< Last keyframe that saw surface in the block.
   double last_seen_m = 0.0;         ///< Distance travelled by the camera at the last selection [m].
   KeyframeIndex changed_since = 0;  ///< First keyframe of the changes not yet meshed.
-  bool changed = false;             ///< Changed since it was last meshed.
+  bool changed = false;             ///< Changed since the block was last meshed.
 };
 
 /// The blocks of a map, hashed by their position (open addressing, linear probing). References to
@@ -80,7 +80,7 @@ class BlockMap {
 
   BlockMap();
 
-  /// nullptr if there is none.
+  /// The block at `position`, or nullptr.
   [[nodiscard]] VoxelBlock* find(const Eigen::Vector3i& position) {
     return const_cast<VoxelBlock*>(std::as_const(*this).find(position));
   }
@@ -109,7 +109,7 @@ class BlockMap {
   void grow();
 
   std::vector<std::unique_ptr<VoxelBlock>> blocks_;
-  std::vector<Slot> slots_;  // a power of two, at most half full
+  std::vector<Slot> slots_;  // hash table: size a power of two, at most half full
 };
 
 }  // namespace km

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint32_t kNoSource = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint32_t kOutside = 1U << 31U;  // code of a label that the palette lacks
 constexpr std::uint32_t kLabelBits = 0xFF0000U;
-constexpr std::uint32_t kNoDepth = 65535;  // some sensors write it for no depth, in addition to 0
+constexpr std::uint32_t kNoDepth = 65535;  // value of some sensors for no depth, in addition to 0
 constexpr double kMaxGrowth = 2.0;  // bound on the size of the ideal image relative to the real one
 
 // Extent of the bearings of an image.

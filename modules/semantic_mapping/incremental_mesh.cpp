@@ -32,7 +32,7 @@ VoxelLabels labels_of(const VoxelBlock& block, std::size_t voxel) {
   return block.labels == nullptr ? VoxelLabels() : (*block.labels)[voxel];
 }
 
-// Steps of a factor of four, from 4^-8 on.
+// MapMesh::certainty of a weight: log4(weight) + 8.
 std::uint8_t certainty_of(float weight) {
   const float steps = 0.5F * std::log2(std::max(weight, std::numeric_limits<float>::min())) + 8.0F;
   return static_cast<std::uint8_t>(std::clamp(steps, 0.0F, 255.0F));

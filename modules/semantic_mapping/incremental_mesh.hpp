@@ -38,17 +38,17 @@ class IncrementalMesh {
   /// Meshes the blocks that changed, and the blocks below them whose cells extend into them.
   MeshUpdateReport update(BlockMap& map);
 
-  /// Call before a block without surface is erased, which `keyframe` showed. The next update()
-  /// removes its faces.
+  /// Call before a block is erased because `keyframe` showed no surface in it. The next update()
+  /// removes the faces of the block.
   void forget(VoxelBlock& block, BlockMap& map, KeyframeIndex keyframe);
 
-  /// Call before blocks are erased whose mesh is to stay. Meshes changed blocks once more, and
-  /// makes the faces of their cells final, and those of other cells that extend into them.
+  /// Call before blocks are erased whose mesh stays. Changed blocks are meshed once more. Faces of
+  /// the blocks' cells, and of cells that extend into the blocks, become final.
   MeshUpdateReport finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
 
-  /// Drops the final faces whose vertices are all listed, and then those of the vertices that have
-  /// no other faces. The votes on labels of such a vertex are added to its heir. A vertex counts
-  /// only if it and its heir are final; unknown ids are ignored. n log n in the mesh.
+  /// Drops the final faces whose vertices are all listed, and then the listed vertices without
+  /// other faces. The votes on labels of such a vertex are added to its heir. A vertex counts only
+  /// if it and its heir are final; unknown ids are ignored. n log n in the mesh.
   SurfaceDrop drop(const SupersededSurface& superseded);
 
   /// All faces and the vertices they use; no labels unless `labelled`.
@@ -67,7 +67,7 @@ class IncrementalMesh {
     Eigen::Vector3f position = Eigen::Vector3f::Zero();
     std::uint32_t uses = 0;       // number of face corners that use it
     std::uint64_t id = kRemoved;  // id as in MapMesh::ids; kRemoved: the entry is free
-    BlockMesh* owner = nullptr;   // null: its block was erased
+    BlockMesh* owner = nullptr;   // mesh of the block of its edge; null: the block was erased
     VoxelLabels labels;
     KeyframeIndex first = 0, last = 0;
     std::uint32_t computed = 0;  // number of the update in which position and labels were computed
@@ -98,7 +98,7 @@ class IncrementalMesh {
 
   std::vector<Vertex> vertices_;
   std::vector<std::uint32_t> free_;          // free indices in vertices_
-  std::vector<std::uint32_t> maybe_unused_;  // lost a face since the last update
+  std::vector<std::uint32_t> maybe_unused_;  // vertices that lost their last face in this update
   std::vector<Face> final_faces_;
   std::vector<Face> forgotten_faces_;
   std::size_t faces_ = 0;

@@ -79,8 +79,8 @@ class BlockCells {
   }
   void copy_row(int y, int z, float min_weight);
 
-  std::array<VoxelBlock*, 8> blocks_ = {};  // block and neighbours, at index x + 2 y + 4 z of their
-                                            // offset; null: none
+  // Block and neighbours, at index x + 2 y + 4 z of their offset; null: no block.
+  std::array<VoxelBlock*, 8> blocks_ = {};
   std::array<std::array<float, kSide>, kSide * kSide> values_;
   std::array<std::uint16_t, kSide* kSide> negative_ = {};  // bits by x
   std::array<std::uint16_t, kSide* kSide> observed_ = {};

@@ -57,8 +57,8 @@ struct SemanticMapper::State {
   // A block in view and the kind of its update.
   struct Update {
     VoxelBlock* block = nullptr;
-    bool near = false;  // surface is in it or beside it
-    bool free = false;  // it is free space entirely
+    bool near = false;  // surface within kNearVoxels of the block
+    bool free = false;  // whole block in free space (Relation::kFree)
   };
 
   State(const SemanticMappingConfig& settings, const Camera& its_camera,

@@ -22,7 +22,8 @@ enum class IntegrationStatus {
   kPoseUnusable,      ///< The pose is not finite or not rigid; the frame is skipped.
 };
 
-/// "integrated", "depth image of another size", ...
+/// "integrated", "depth image of another size than the camera's", "pose not finite or not a
+/// rotation"
 [[nodiscard]] const char* to_string(IntegrationStatus status);
 
 /// Counts of one call of integrate(). All but status are zero for a skipped frame.
@@ -32,10 +33,10 @@ struct [[nodiscard]] IntegrationReport {
   std::size_t labels_outside = 0;    ///< Pixels whose label the palette lacks: unknown.
   bool label_size_differs = false;   ///< Integrated without the labels, whose size is wrong.
   std::size_t blocks_updated = 0;    ///< Blocks near an observed surface.
-  std::size_t blocks_seen_free = 0;  ///< Other blocks, observed as free space.
+  std::size_t blocks_seen_free = 0;  ///< Other blocks in view, updated for carving.
   std::size_t blocks_allocated = 0;  ///< New blocks.
-  std::size_t blocks_refused = 0;    ///< New blocks for which this frame leaves no room.
-  std::size_t blocks_removed = 0;    ///< Blocks that are empty after carving.
+  std::size_t blocks_refused = 0;    ///< See NearBlocks::refused.
+  std::size_t blocks_removed = 0;    ///< Erased blocks: empty after carving.
   std::size_t blocks_finalised = 0;  ///< Blocks that left the window and became final mesh.
 };
 
@@ -114,7 +115,7 @@ struct MappingProgress {
   std::uint64_t too_late = 0;    ///< Skipped frames: newer ones arrived while the mapper was busy.
   std::uint64_t unlabelled = 0;  ///< Frames integrated without labels.
   std::uint64_t labels_outside = 0;  ///< Pixels whose label the palette lacks.
-  std::uint64_t blocks_refused = 0;  ///< Blocks refused by semantic_mapping.max_blocks.
+  std::uint64_t blocks_refused = 0;  ///< Sum of IntegrationReport::blocks_refused.
   MapSize size = {};
 };
 

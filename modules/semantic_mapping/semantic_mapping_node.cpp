@@ -60,7 +60,7 @@ void SemanticMappingNode::step(const DenseFrame& frame) {
   drop_superseded();
   count(frame,
         mapper_.integrate(*frame.depth, frame.labels.get(), frame.T_odom_cam, frame.keyframe));
-  // Once for each keyframe, so that a vertex gets the first keyframe that saw it.
+  // The mesh is updated once for each keyframe, so that a vertex gets the first one that saw it.
   if (meshed_ != frame.keyframe) mapper_.update_mesh();
   meshed_ = frame.keyframe;
   if (!published_) published_ = frame.stamp;

@@ -68,7 +68,8 @@ class SemanticMappingNode final : public Node {
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh
   std::optional<Stamp> published_;       // frame of the last mesh published
   bool stopped_ = false;
-  // Results of the node's own maps must not wait for room in its queue: that would be a deadlock.
+  // Superseded surface results from the node's own maps. It does not wait for room in the node's
+  // queue, because this would be a deadlock.
   Latest<SupersededSurface> superseded_;
   Worker<Topic<DenseFrame>::Message> worker_;  // last member: stops first
 };

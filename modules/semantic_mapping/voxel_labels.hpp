@@ -69,8 +69,8 @@ class VoxelLabels {
   void observe_other(LabelId label, unsigned votes);
   void halve();
 
-  std::array<LabelId, kPlaces> ids_ = {};         // by descending votes; 0: free
-  std::array<std::uint8_t, kPlaces> votes_ = {};  // 0 exactly where ids_ is
+  std::array<LabelId, kPlaces> ids_ = {};         // labels by descending votes; 0: free entry
+  std::array<std::uint8_t, kPlaces> votes_ = {};  // votes of ids_; 0: free entry
 };
 
 }  // namespace km

@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// Part of a sequence that is analysed.
+/// Frames of a sequence that are analysed.
 struct ImageStatisticsOptions {
   /// Interval in frames of the ORB and left-right figures, and of the starts of KLT tracks.
   int stride = 5;

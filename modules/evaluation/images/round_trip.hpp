@@ -20,10 +20,10 @@ struct RoundTrip {
   double error_px = 0.0;  ///< Distance between start and end of the round trip; infinity: lost.
 };
 
-/// Tracks points from `a` to `b`, with the search starting at the same pixel, and the results back
-/// to `a`, with the search starting at the result. With `starts_b`, one for each point, the search
-/// in `b` starts at these, and the search back starts at the original point. This suits views that
-/// are far apart, because the way back is then found if it exists.
+/// Tracks points from `a` to `b` and back to `a`. Each search starts at the pixel of the tracked
+/// point. With `starts_b`, one for each point, the search in `b` starts at these, and the search
+/// back starts at the original point. This suits views that are far apart, because the search back
+/// then succeeds if the point is visible.
 [[nodiscard]] std::vector<RoundTrip> round_trip(const KltImage& a, const KltImage& b,
                                                 const std::vector<cv::Point2f>& points,
                                                 std::vector<cv::Point2f> starts_b = {});

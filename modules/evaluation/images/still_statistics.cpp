@@ -16,7 +16,7 @@ constexpr double kCompareEvery_s = 0.5;
 constexpr double kMaxFlow_px = 0.1;
 constexpr double kReturns_px = 1.0;
 constexpr double kFlatStillGradient = 3.0;   // [levels/px]
-constexpr double kFlatGradientWithin = 2.0;  // the limit that single images have, too
+constexpr double kFlatGradientWithin = 2.0;  // limit for noise_within() [levels/px]
 constexpr std::size_t kMinCorners = 20;
 
 double robust_sigma(std::vector<double> values) {
@@ -29,8 +29,8 @@ double robust_sigma(std::vector<double> values) {
 
 void StillStatistics::add(Stamp stamp, const KltImage& image,
                           const std::vector<cv::Point2f>& corners) {
-  if (!kept_.empty() && stamp <= kept_.back().stamp) {  // stamps restart: another part of the
-                                                        // recording begins
+  // Stamps that do not ascend show that another part of the recording begins.
+  if (!kept_.empty() && stamp <= kept_.back().stamp) {
     kept_.clear();
     last_compared_ = 0;
   }

@@ -13,7 +13,7 @@ namespace {
 constexpr double kSurvives_px = 1.0;
 constexpr double kSurvivesStrictly_px = 0.5;
 constexpr float kRim_px = 10.0F;
-constexpr double kUsualStep = 1.6;  // times the shortest; a longer step misses a frame
+constexpr double kUsualStep = 1.6;  // longest step without a missing frame, over the shortest step
 constexpr std::size_t kMaxAge = 40;
 constexpr std::array<std::size_t, 6> kAges = {1, 2, 5, 10, 20, 40};
 constexpr std::size_t kAgeByFlow = 10;

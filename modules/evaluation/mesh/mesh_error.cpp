@@ -195,7 +195,7 @@ class Evaluation {
 
   [[nodiscard]] std::vector<SurfaceSamples> sampled_estimates(double per_m2) const {
     std::vector<SurfaceSamples> samples;
-    // Another seed than the truth's, because a mesh compared with itself must not meet its own
+    // The seed differs from that of the truth, so that a mesh compared with itself has other
     // points.
     for (std::size_t i = 0; i < moved_.size(); ++i) {
       samples.push_back(sample_surface(moved_[i], per_m2, options_.seed + 1));
@@ -234,7 +234,7 @@ class Evaluation {
     place(report_.registration.T_truth_estimate);
   }
 
-  // `found` moves the estimates from their assumed pose.
+  // Adds notes if `found`, the motion of the estimates by ICP, is not as expected.
   void note_registration(const Registration& found) {
     Eigen::AlignedBox3d box;
     for (const LabelledMesh& mesh : moved_)
@@ -329,8 +329,7 @@ class Evaluation {
     error.seen_coverage = static_cast<double>(error.seen.point.count) / total;
   }
 
-  // Comparison from the true points that have the estimate within reach and for which `counts` is
-  // true.
+  // Comparison from true points that have the estimate within reach and satisfy `counts`.
   [[nodiscard]] SurfaceComparison judged(const PointMatches& matches, const auto& counts) const {
     std::vector<float> point_m;
     std::vector<float> surface_m;

@@ -75,9 +75,9 @@ struct MeshErrorOptions {
   RegistrationOptions registration;
 
   /// True points further from the estimate are not judged, because a true world is larger than the
-  /// part that was seen. It is also the largest error that counts. Half a metre is above the
-  /// remaining drift of a corrected map. A larger value would include the unseen backs of walls and
-  /// furniture.
+  /// part that was seen. The error of an estimated point is at most crop_m. Half a metre is above
+  /// the remaining drift of a corrected map. A larger value would include the unseen backs of walls
+  /// and furniture.
   double crop_m = 0.5;
 
   /// A point is judged by the label of the nearest face on the other side only if the nearest

@@ -146,7 +146,7 @@ std::vector<LabelledMesh::Color> colors_of(const PictureScene& scene, std::size_
   return colors;
 }
 
-// All meshes as one. Their colours were stored separately before.
+// All meshes as one, without colours.
 LabelledMesh merged(const PictureScene& scene) {
   LabelledMesh all;
   for (const LabelledMesh& mesh : scene.meshes) all.append(mesh);
