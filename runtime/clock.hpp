@@ -19,7 +19,7 @@ namespace km {
 [[nodiscard]] std::chrono::steady_clock::duration steady_duration(double s);
 
 /// Paces the playing of a recording: sensor time passes `rate` times as fast as real time, from
-/// the first stamp asked for. Thread-safe.
+/// the first requested stamp. Thread-safe.
 class ReplayClock {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -30,13 +30,13 @@ class ReplayClock {
   /// Waits until `stamp` is due. False if stopped: the source should end.
   bool wait_until(Stamp stamp);
 
-  /// Time at which `stamp` is due; the first call, at `now`, fixes the origin. Nullopt: at once.
+  /// Time at which `stamp` is due; the first call, at `now`, fixes the origin. nullopt: at once.
   [[nodiscard]] std::optional<TimePoint> due(Stamp stamp, TimePoint now);
 
-  /// The same now, as steady_now_s() counts.
+  /// Time at which `stamp` is due, in the time of steady_now_s(). nullopt: at once.
   [[nodiscard]] std::optional<double> due_s(Stamp stamp);
 
-  /// Delays everything that is not yet due by `s`; a wait that has begun is unchanged.
+  /// Delays all later waits by `s` seconds; a wait that has begun is unchanged.
   void pause(double s);
 
   /// Ends every wait, now and later. Idempotent.

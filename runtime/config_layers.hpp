@@ -46,7 +46,7 @@ class ConfigLayers {
   /// Throws ConfigError that lists every problem, including sections that no module loaded.
   void finish() const;
 
-  /// The loaded configuration as the text of a file that gives it again.
+  /// The loaded configuration as text. A file with this text yields the same configuration.
   [[nodiscard]] const std::string& effective() const { return effective_; }
 
  private:

@@ -57,7 +57,7 @@ class ConfigText : public FieldVisitor<ConfigText> {
     indent_.resize(indent_.size() - 2);
   }
 
-  /// One element with its defaults, if the list is empty.
+  /// An empty list is written with one element that has the default values.
   template <typename Config>
   void sections(const char* key, std::vector<Config> list, const char* text = "") {
     if (list.empty()) list.emplace_back();
@@ -81,7 +81,7 @@ class ConfigText : public FieldVisitor<ConfigText> {
   std::string text_;
 };
 
-/// The fields of `config`, a line or more each.
+/// The fields of `config` as YAML, without the name of the section.
 template <typename Config>
 [[nodiscard]] std::string keys_of(Config config) {
   ConfigText text;

@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-constexpr int kTopPad_bytes = 64 << 20;         // size of a thread's heap: glibc then returns none
+constexpr int kTopPad_bytes = 64 << 20;         // size of a thread's heap, so that glibc trims none
 constexpr int kMmapThreshold_bytes = 32 << 20;  // largest value that glibc accepts
 constexpr int kTrimThreshold_bytes = 1 << 30;
 

@@ -37,7 +37,7 @@ class Heartbeat {
     Heartbeat* const outer_;
   };
 
-  /// The calling thread's step, if it is in one, waits to the end of the scope.
+  /// Marks the calling thread's step, if there is one, as waiting until the end of the scope.
   class Waiting {
    public:
     Waiting() : step_(current_) {

@@ -19,7 +19,7 @@ class Latest {
     if (!closed_) message_.swap(message);
   }
 
-  /// Null if nothing came since the last time.
+  /// Null if there was no put() since the last take().
   [[nodiscard]] Message take() {
     const std::lock_guard lock(mutex_);
     return std::exchange(message_, nullptr);

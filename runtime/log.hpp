@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// Passes a message of a kind at most once per interval, and counts the suppressed ones.
+/// Passes at most one message per key and interval, and counts the suppressed messages.
 /// Memory is bounded. Not thread-safe.
 class RateLimit {
  public:
@@ -16,7 +16,7 @@ class RateLimit {
 
   struct Verdict {
     bool pass = false;
-    int held_back = 0;  ///< Since the last one that passed, if this one does.
+    int held_back = 0;  ///< Suppressed since the last message that passed.
   };
   Verdict ask(const std::string& key, double now_s);
 
@@ -85,14 +85,14 @@ std::ostream* set_output(std::ostream* output);
 }  // namespace log
 
 /// One line of state for a person: redrawn in place on a terminal, else printed plainly every few
-/// seconds. Log lines go above it and never into it. One per process. Thread-safe.
+/// seconds. Log lines are printed above it. One per process. Thread-safe.
 class StatusLine {
  public:
   /// Writes to unblocked_stdout(); treats it as a terminal if isatty() is true.
   StatusLine();
   /// For tests: `output` outlives this.
   StatusLine(std::ostream& output, bool terminal, double plain_interval_s = 5.0);
-  /// Leaves the last state standing on its own line.
+  /// Leaves the last text on a line of its own.
   ~StatusLine();
   StatusLine(const StatusLine&) = delete;
   StatusLine& operator=(const StatusLine&) = delete;

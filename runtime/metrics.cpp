@@ -15,7 +15,7 @@ std::size_t bucket_of(double seconds) {
   return static_cast<std::size_t>(std::log(clamped / kSmallest_s) / std::log(kGrowth));
 }
 
-// Geometric middle: within half a bucket, 0.5 %, of everything inside.
+// Geometric middle, which differs from each duration in the bucket by at most 0.5 %.
 double middle_of(std::size_t bucket) {
   return kSmallest_s * std::pow(kGrowth, static_cast<double>(bucket) + 0.5);
 }

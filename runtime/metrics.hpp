@@ -18,8 +18,8 @@ class DurationHistogram {
   [[nodiscard]] double total_s() const { return total_s_; }
   [[nodiscard]] double max_s() const { return max_s_; }
 
-  /// The smallest duration that at least a share `p` of all do not exceed; p in (0, 1]. Zero if
-  /// there is none.
+  /// Smallest duration that at least a share `p` of all durations do not exceed; p in (0, 1]. Zero
+  /// without durations.
   [[nodiscard]] double quantile_s(double p) const;
 
  private:

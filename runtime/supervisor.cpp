@@ -83,7 +83,7 @@ void Supervisor::begin_stop(Entry& entry) {
                                                     // node hangs
 }
 
-// False if the node was given up and does not end for it.
+// False if the node was given up and still does not end.
 bool Supervisor::wait_for_end(Entry& entry) {
   constexpr std::chrono::milliseconds kPoll{20};
   constexpr std::chrono::seconds kGrace{1};
@@ -108,7 +108,7 @@ bool Supervisor::have_stopped(const std::vector<Node*>& nodes) {
 }
 
 void Supervisor::remove(const Node& node) {
-  lookouts_.reset();  // it looks at all of them
+  lookouts_.reset();  // before the node is destroyed, because it checks all nodes
   std::erase_if(nodes_, [&node](const Entry& entry) { return entry.node.get() == &node; });
 }
 

@@ -22,7 +22,7 @@ struct RunResult {
   struct Failure {
     std::string node;
     std::string message;
-    bool hung = false;  ///< It did not fail but did not get on: see Watchdog.
+    bool hung = false;  ///< The node made no progress (see Watchdog).
   };
   std::optional<Failure> failure;  ///< Failure of the first node that failed.
   bool interrupted = false;        ///< True if a signal ended the run.
@@ -39,7 +39,7 @@ struct RunResult {
 /// (see Watchdog), and does not keep other nodes from ending.
 class Supervisor {
  public:
-  /// Asks for the state of the run now and then; true ends it. Runs on the supervisor's thread.
+  /// Polled while nodes run; true ends the run. Runs on the supervisor's thread.
   using Finished = std::function<bool()>;
 
   /// `signals` outlives this. `patience` multiplies the time after which nodes are given up.
@@ -67,8 +67,8 @@ class Supervisor {
   /// begins the orderly end; a second one ends the process at once. Call once.
   [[nodiscard]] RunResult run(const Finished& finished, double poll_interval_s = 0.1);
 
-  /// Stops nodes in turn without waiting for them; true once all have stopped or were given up. To
-  /// be asked again and again, by `finished`.
+  /// Stops nodes in turn without waiting for them; true once all have stopped or were given up.
+  /// `finished` calls it repeatedly.
   bool have_stopped(const std::vector<Node*>& nodes);
 
   /// Destroys a node. Call after run(), for one that was not left behind.
@@ -88,7 +88,7 @@ class Supervisor {
   const double patience_;
   std::vector<Entry> nodes_;
   std::optional<Watchdog> watchdog_;    // while nodes run
-  std::unique_ptr<Periodic> lookouts_;  // last member: stops before what it looks at
+  std::unique_ptr<Periodic> lookouts_;  // last member: stops before the nodes and watchdog_
 };
 
 /// Text of an exception: what(), or a remark if it has none.

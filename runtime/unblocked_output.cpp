@@ -60,8 +60,7 @@ bool write_all(int descriptor, std::string_view text) {
     const ssize_t n = ::write(descriptor, text.data(), text.size());
     if (n > 0) {
       text.remove_prefix(static_cast<std::size_t>(n));
-    } else if (n < 0 && errno == EAGAIN) {  // another process that shares it has made it
-                                            // non-blocking
+    } else if (n < 0 && errno == EAGAIN) {  // another process made it non-blocking
       pollfd room{descriptor, POLLOUT, 0};
       poll(&room, 1, -1);
     } else if (n == 0 || errno != EINTR) {
@@ -97,7 +96,7 @@ void OutputQueue::State::run() {
 
 OutputQueue::OutputQueue(int descriptor, std::size_t capacity_bytes)
     : state_(std::make_shared<State>(descriptor, capacity_bytes)),
-      // A closed pipe is an error of a write here, not death.
+      // Without signals, a closed pipe is an error of write() and does not end the process.
       writer_(start_without_signals([state = state_] { state->run(); })) {}
 
 OutputQueue::~OutputQueue() {
@@ -105,7 +104,7 @@ OutputQueue::~OutputQueue() {
   {
     const std::lock_guard lock(state_->mutex);
     state_->closed = true;
-    state_->waiting.clear();  // the descriptor may be another file's by then
+    state_->waiting.clear();  // because `descriptor` may be reused for another file
     state_->changed.notify_all();
   }
   if (drained)

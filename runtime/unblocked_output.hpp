@@ -16,7 +16,7 @@ class OutputQueue {
   /// `descriptor` stays open as long as this object exists. It is not changed to non-blocking,
   /// because other processes may share it.
   explicit OutputQueue(int descriptor, std::size_t capacity_bytes = std::size_t{1} << 20);
-  /// Waits as drain() does, at most kGrace_s. A thread that is still blocked then is left behind.
+  /// Calls drain(kGrace_s). A thread that is then still blocked is detached.
   ~OutputQueue();
   OutputQueue(const OutputQueue&) = delete;
   OutputQueue& operator=(const OutputQueue&) = delete;
@@ -43,7 +43,7 @@ class OutputQueue {
 std::ostream& unblocked_stdout();
 std::ostream& unblocked_stderr();
 
-/// Waits until both are written, at most OutputQueue::kGrace_s.
+/// Waits until both streams are written, at most OutputQueue::kGrace_s.
 void drain_standard_output();
 
 }  // namespace km

@@ -27,7 +27,7 @@ Watchdog::Watchdog(const std::vector<Node*>& nodes, double patience) {
   }
 }
 
-// Between two steps only one that is to end.
+// Between two steps, a node counts as stuck only if it should end.
 bool Watchdog::is_stuck(const Watched& watched) {
   if (watched.heartbeat == nullptr) return watched.ending;
   return watched.heartbeat->beats() == watched.beats && !watched.heartbeat->waiting() &&

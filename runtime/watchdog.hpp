@@ -18,17 +18,17 @@ class Watchdog {
   /// Time for a node without heartbeats to end: it may have much to send over a slow link.
   static constexpr double kStopLimit_s = 120.0;
 
-  /// `nodes` outlive this. `patience` multiplies all limits of giving up.
+  /// `nodes` outlive this. `patience` multiplies all limits.
   Watchdog(const std::vector<Node*>& nodes, double patience);
 
   /// Checks all nodes; `dt_s` have passed since the last check. It should exclude time in which the
   /// process did not run.
   void tick(double dt_s);
 
-  /// `node` is to end: from now on it gets on only as long as it makes steps.
+  /// From now on, `node` also counts as stuck while it makes no steps, because it should end.
   void expect_end(const Node& node);
 
-  /// `node` has ended: it is no more looked at.
+  /// `node` has ended and is not checked any more.
   void has_ended(const Node& node);
 
   [[nodiscard]] bool has_given_up(const Node& node) const;
@@ -50,7 +50,7 @@ class Watchdog {
     double stuck_s = 0.0;
     bool named = false;
     bool ending = false;
-    std::string why = {};  // it was given up; empty: it was not
+    std::string why = {};  // reason if it was given up, otherwise empty
   };
   [[nodiscard]] static bool is_stuck(const Watched& watched);
   static void look_at(Watched& watched, double dt_s);

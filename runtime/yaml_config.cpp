@@ -37,10 +37,10 @@ std::string one_line(const YAML::Node& node) {
   return emitter.c_str();
 }
 
-// Bounds for all problems together, and for one: a file that is no configuration causes a million.
+// Maximum characters of all problems together and of one. Other files cause very many problems.
 constexpr std::size_t kMaxMessage = 4000, kMaxProblem = 500;
 
-// Text from files in a problem may be long, or not printable.
+// Shortens a problem, because it may contain long or unprintable text of a file.
 std::string line_of(const std::string& problem) {
   return readable(problem, kMaxProblem) + '\n';
 }
@@ -49,7 +49,7 @@ std::string joined(const std::string& name, const std::string& key) {
   return name.empty() ? key : name + '.' + key;
 }
 
-// Moves the map `quick:` over the keys beside it, or out of the way.
+// Replaces keys by those of the map `quick:` in a quick run; otherwise moves them to `unused`.
 void apply_quick(ConfigSection& section, const std::string& name, const ConfigContext& context) {
   const auto quick = section.values.extract("quick");
   if (quick.empty()) return;

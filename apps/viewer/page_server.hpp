@@ -13,7 +13,7 @@ namespace km {
 struct PageServerOptions {
   std::string address =
       "127.0.0.1";          ///< Address to listen on; if not loopback, URLs need the token.
-  int port = 8777;          ///< 0: any free port.
+  int port = 8777;          ///< Port to listen on; 0: any free port.
   std::string page_folder;  ///< Files of the page; empty: those embedded in the program.
   std::string hello;        ///< See hello_message().
   /// Called when the set of robots whose images some page requests has changed; in order, by one
@@ -21,9 +21,8 @@ struct PageServerOptions {
   std::function<void(const std::set<RobotId>&)> on_images;
 };
 
-/// Serves the page, and on its WebSocket all present and future messages of a store. Pages of other
-/// sites are refused: their Origin, or the Host under which they reached this server, is another
-/// one.
+/// Serves the page, and on its WebSocket all present and future messages of a store. Refuses
+/// requests whose Origin is another site and, without a token, requests under another host name.
 class PageServer {
  public:
   /// `store` outlives this. Throws std::runtime_error that names address and port if they cannot be

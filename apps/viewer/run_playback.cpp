@@ -115,10 +115,10 @@ std::vector<ViewLink> links_of(const TrafficUntil& traffic) {
 }
 
 constexpr double kNever_s = std::numeric_limits<double>::infinity();
-constexpr double kAnswer_s = 0.5;  // from a candidate to its outcome
+constexpr double kAnswer_s = 0.5;  // time from a candidate to its outcome
 
 // Time of each row of optimizer.csv. Rounds of the robot alone are spread evenly until it joined.
-// Rounds with others are placed by the share of the bytes that were sent for them afterwards.
+// Later rounds are placed by the share of the bytes that were sent for them after joining.
 std::vector<double> times_of_rounds(const RobotFiles& robot, double joined_s, double end_s) {
   const auto alone = static_cast<std::size_t>(std::count_if(
       robot.rounds.begin(), robot.rounds.end(), [](const NumberRow& r) { return r[2] < 2.0; }));
@@ -209,7 +209,7 @@ class RobotPlayback {
   void add_keyframes() {
     for (std::size_t i = 0; i < robot_.keyframes.size(); ++i) {
       const auto pose = pose_at_keyframe(robot_.odometry, i);
-      if (!pose) break;  // an index stands for all poses before it, so none can be missing
+      if (!pose) break;  // because the updates are numbered without gaps
       add(*seen_s(static_cast<KeyframeIndex>(i)), ViewKeyframes{false,
                                                                 robot_.id,
                                                                 static_cast<std::uint32_t>(i),
@@ -260,7 +260,7 @@ class RobotPlayback {
       return;
     }
     add_mesh(robot_.mesh, robot_.id, robot_.odometry, 0.0);
-    // After its joining nothing is in the robot's own frame.
+    // After the robot has joined, no chunk remains in its own frame.
     std::vector<MeshChunk> ended;
     for (std::size_t i = before; i < updates_.size(); ++i)
       if (updates_[i].sent <= times_.stamp_at(joined_s_))

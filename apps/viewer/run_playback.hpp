@@ -20,12 +20,11 @@ struct RunPlayback {
 ///
 /// Results do not contain the time of every update. Keyframes, poses and closures get the time of
 /// their images, a mesh chunk the time at which the robot came nearest to it. A robot joins others
-/// with the first kept closure between them. Its rounds alone are before that time. Its rounds with
-/// others follow, spaced by the bytes sent for them. Before it joins, its data are in its own frame
-/// and as odometry estimated them. Afterwards they are as they were at the end of the run. Loads of
-/// modules are means.
-/// `notes` lists robots that still run or were killed. Throws std::runtime_error if the folder has
-/// no results of a finished robot.
+/// at the time of the first kept closure between them. Its rounds alone are before that time. Its
+/// rounds with others follow, spaced by the bytes sent for them. Before it joins, its data are in
+/// its own frame and as odometry estimated them. Afterwards they are as they were at the end of the
+/// run. Loads of modules are means. `notes` lists robots that still run or were killed. Throws
+/// std::runtime_error if the folder has no results of a finished robot.
 [[nodiscard]] RunPlayback read_run(const std::filesystem::path& folder, Stamp begin);
 
 }  // namespace km

@@ -18,8 +18,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueue =
-    10000;  // as for the record of a robot; the same holds for the values below
+constexpr std::size_t kQueue = 10000;         // as in the record of a robot
 constexpr double kState_bytes_per_s = 200e3;  // rate of uncompressed paths, meshes and closures
 constexpr int kMeshPoints = 200000;
 constexpr double kMeshPeriod_s = 5.0;  // because merging the chunks of a mesh takes long
@@ -46,7 +45,7 @@ RosDiagnosticStatus status_of(const ViewState& state) {
   return status;
 }
 
-// Sets or appends the element; true if it was appended.
+// Sets or appends an element; true if it was appended.
 template <typename T>
 bool put(std::vector<T>& list, std::size_t index, const T& value) {
   if (index < list.size()) list[index] = value;
@@ -57,7 +56,7 @@ bool put(std::vector<T>& list, std::size_t index, const T& value) {
 
 }  // namespace
 
-// The one file of all robots; their threads write to it.
+// The common file of all robots. Each robot writes to it on a thread of its own.
 class ViewRecorder::File {
  public:
   explicit File(const std::filesystem::path& file)
@@ -224,7 +223,7 @@ class ViewRecorder::Robot {
     odometry_topic_.publish(std::move(state));
   }
 
-  // The state of the keyframe's image comes first, because it connects the frames of the robot.
+  // Publishes the state of the image first, because the state connects the frames of the robot.
   void publish_keyframe(std::size_t index) {
     const auto& [stamp, T_odom_kf] = odometry[index];
     publish_state(stamp, T_odom_kf);

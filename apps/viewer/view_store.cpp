@@ -85,7 +85,7 @@ bool ViewStore::is_known(const std::optional<Key>& key, std::size_t hash) const 
   return known != newest_.end() && known->second.hash == hash && messages_[known->second.number];
 }
 
-// Removes closures that are known with the same values; false if none is left.
+// Removes closures that are known with equal values; false if none is left.
 bool ViewStore::leave_new_closures(RobotId robot, ViewClosures& all) {
   auto& known = closures_[robot];
   std::erase_if(all.closures, [&](const ViewClosure& closure) {
@@ -107,7 +107,7 @@ void ViewStore::supersede(const Key& key, const Newest& newest) {
 void ViewStore::forget_until_it_fits() {
   for (auto& queue : superseded_)
     while (bytes_ > max_bytes_ && !queue.empty()) {
-      if (messages_[queue.front()]) {  // null: it was refused on arrival
+      if (messages_[queue.front()]) {  // null: the message was refused on arrival
         drop(queue.front());
         forgotten_.push_back(queue.front());
       }

@@ -19,10 +19,10 @@ namespace km {
 /// All messages of the robots in the order of arrival, numbered from 0. Each page receives all of
 /// them, so that it can show any time of the past.
 ///
-/// If they exceed the limit, messages are dropped, the oldest of each kind first. First go images
-/// with a newer image, then meshes with a newer version, keyframe poses with a newer version,
-/// poses, and past states. Present states and closures are kept. If they alone exceed the limit,
-/// new ones are refused.
+/// If they exceed the limit, messages are dropped, the oldest of each kind first. The order is
+/// images with a newer image, meshes with a newer version, keyframe poses with a newer version,
+/// poses, past states. Present states and closures are kept. If they alone exceed the limit, new
+/// messages are refused.
 ///
 /// When another viewer starts, robots send past messages again: those without new content are
 /// ignored. Thread-safe.
@@ -35,7 +35,7 @@ class ViewStore {
   /// Position of a page in the messages.
   struct Cursor {
     std::uint64_t next = 0;                ///< Number of the next message.
-    std::optional<std::size_t> forgotten;  ///< Absent in a page without messages.
+    std::optional<std::size_t> forgotten;  ///< Number of dropped messages that the page knows of.
   };
   struct Batch {
     std::vector<std::shared_ptr<const PageMessage>> messages;
@@ -43,21 +43,21 @@ class ViewStore {
         forgotten;           ///< Numbers of messages that the page has and the store has dropped.
     bool caught_up = false;  ///< True if there are no more messages for now.
   };
-  /// Messages after `cursor`, up to about `max_bytes`, and advances `cursor`; waits up to `wait_s`
-  /// for the first.
+  /// Returns messages from `cursor` on, up to about `max_bytes`, and advances `cursor`. Waits up to
+  /// `wait_s` for the first message.
   [[nodiscard]] Batch take(Cursor& cursor, std::size_t max_bytes, double wait_s);
 
   struct Size {
     std::size_t messages = 0;
     std::size_t bytes = 0;
-    std::size_t forgotten = 0;  ///< Messages dropped because there was no memory.
-    std::size_t refused = 0;    ///< Messages refused because there was no memory.
+    std::size_t forgotten = 0;  ///< Messages dropped because of the limit.
+    std::size_t refused = 0;    ///< Messages refused because of the limit.
   };
   [[nodiscard]] Size size() const;
 
  private:
-  using Key = std::array<std::int64_t,
-                         7>;  // key of a message; a newer message with the same key replaces it
+  // Key of a message. Older messages with an equal key may be dropped.
+  using Key = std::array<std::int64_t, 7>;
   struct Newest {
     std::uint64_t number = 0;  // number of the message
     std::size_t hash = 0;      // hash of its content
@@ -74,7 +74,7 @@ class ViewStore {
   const std::size_t max_bytes_;
   mutable std::mutex mutex_;  // guards the members below
   std::condition_variable added_;
-  std::vector<std::shared_ptr<const PageMessage>> messages_;  // null: dropped
+  std::vector<std::shared_ptr<const PageMessage>> messages_;  // null: dropped or refused
   std::vector<std::uint64_t> forgotten_;
   std::size_t bytes_ = 0;
   std::size_t refused_ = 0;

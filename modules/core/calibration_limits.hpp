@@ -25,8 +25,8 @@ inline constexpr Bounds<double> kDepthBaseline_m{1e-3, 100.0};
 /// Time offset of cameras and inertial sensor.
 inline constexpr Bounds<double> kTimeOffset_s{-10.0, 10.0};
 
-/// Each returns the reason why its values are impossible, or nullopt if they are possible. The
-/// values are width and height of an image [px], focal lengths and principal point [px], and
+/// Each function returns the reason why its values are impossible, or nullopt if they are possible.
+/// The values are width and height of an image [px], focal lengths and principal point [px], and
 /// coefficients of a lens.
 [[nodiscard]] std::optional<std::string> resolution_problem(double width, double height);
 [[nodiscard]] std::optional<std::string> intrinsics_problem(const Camera& camera);
@@ -36,7 +36,7 @@ inline constexpr Bounds<double> kTimeOffset_s{-10.0, 10.0};
 /// if it is.
 [[nodiscard]] std::optional<std::string> transform_problem(const Eigen::Matrix4d& T);
 
-/// The reason why two cameras are no pair: both have one position, or the right one is on the left.
+/// The reason why two cameras are no stereo pair: equal positions, or left and right exchanged.
 /// nullopt if they are a pair.
 [[nodiscard]] std::optional<std::string> pair_problem(const StereoRig& rig);
 

@@ -53,8 +53,9 @@ struct StereoRig {
 
 /// Rig of an RGB-D camera: `camera` and a virtual copy of it, `baseline_m` to the right. The larger
 /// the baseline, the larger the weight of the depth. Use the baseline of a sensor that measures
-/// depth by stereo or structured light, or else a b for which depth errors are about z^2 * 1 px /
-/// (f * b). Throws std::invalid_argument unless the baseline is positive and finite.
+/// depth by stereo or structured light, or otherwise a baseline b for which depth errors are
+/// about z^2 * 1 px / (f * b). Throws std::invalid_argument unless the baseline is positive and
+/// finite.
 [[nodiscard]] StereoRig rgbd_rig(const Camera& camera, double baseline_m);
 
 /// Distances along the optical axis that a depth sensor measures [m]; values outside count as no

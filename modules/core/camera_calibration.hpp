@@ -17,15 +17,16 @@ struct CameraCalibration {
   double offset_s = 0.0;
   SE3 T_body_rig = SE3::Identity();  ///< T_body_cam = T_body_rig * the rig's T_body_cam.
 
-  /// Perturbed by [offset; rotation; translation], the latter about the body's axes and on the
-  /// left: T_body_rig becomes retract(identity, [rotation; translation]) * T_body_rig.
+  /// Perturbation by [offset; rotation; translation], with rotation and translation in the body
+  /// frame and on the left: T_body_rig becomes retract(identity, [rotation; translation]) *
+  /// T_body_rig.
   [[nodiscard]] CameraCalibration moved(const Vector7& delta) const;
 
   /// The delta for which moved(delta) is `to`.
   [[nodiscard]] Vector7 offset_to(const CameraCalibration& to) const;
 
-  /// This correction relative to the rig before `correction`, which made the present rig of it. The
-  /// covariance by moved() does not change.
+  /// This correction relative to the rig before `correction` was applied to it. The covariance by
+  /// moved() does not change.
   [[nodiscard]] CameraCalibration on_top_of(const CameraCalibration& correction) const;
 
   /// Inverse of on_top_of(): this correction relative to the rig after `correction`.
@@ -35,7 +36,7 @@ struct CameraCalibration {
   void apply_to(StereoRig& rig) const;
 };
 
-/// Covariance by CameraCalibration::moved().
+/// Calibration and its covariance in the coordinates of CameraCalibration::moved().
 struct UncertainCalibration {
   CameraCalibration calibration;
   Matrix7 covariance = Matrix7::Zero();

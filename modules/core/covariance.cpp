@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-// Turns vectors and exchanges the halves [position; rotation] and [rotation; translation].
+// Matrix that rotates both halves of a vector by R and exchanges these halves.
 Matrix6 swapped_blocks(const Eigen::Matrix3d& R) {
   Matrix6 J = Matrix6::Zero();
   J.topRightCorner<3, 3>() = R;

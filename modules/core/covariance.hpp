@@ -32,7 +32,7 @@ struct UncertainPose {
 /// Covariance of [position; rotation about fixed axes] along the axes of frame a, as in
 /// geometry_msgs/PoseWithCovariance.
 [[nodiscard]] Matrix6 along_fixed_axes(const UncertainPose& T_a_b);
-/// The inverse: `fixed` is along_fixed_axes() of a pose T_a_b.
+/// Inverse of along_fixed_axes(): covariance of the pose T_a_b.
 [[nodiscard]] Matrix6 from_fixed_axes(const SE3& T_a_b, const Matrix6& fixed);
 
 /// True if every element is finite, the matrix symmetric to 1e-6 of its largest element, and no

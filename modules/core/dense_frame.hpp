@@ -13,9 +13,9 @@ namespace km {
 struct DenseFrame {
   Stamp stamp = 0;
   std::shared_ptr<const DepthImage> depth;  ///< Not null.
-  /// From the same camera; null if there are none.
+  /// Labels in the camera of `depth`; null if unknown.
   std::shared_ptr<const LabelImage> labels = nullptr;
-  SE3 T_odom_cam = SE3::Identity();  ///< In the frame of T_odom_kf.
+  SE3 T_odom_cam = SE3::Identity();  ///< Pose in the frame of T_odom_kf.
   KeyframeIndex keyframe = 0;        ///< Last keyframe of the robot at that time.
 };
 

@@ -63,7 +63,7 @@ struct MeasuredPose {
 struct SensorPacket {
   std::shared_ptr<const StereoFrame> frame;
   std::vector<ImuSample> imu;
-  std::optional<MeasuredPose> pose = {};  ///< At the frame, if there is an external odometry.
+  std::optional<MeasuredPose> pose = {};  ///< Pose at the frame, if there is an external odometry.
 };
 
 }  // namespace km

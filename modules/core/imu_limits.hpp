@@ -5,8 +5,8 @@
 namespace km {
 
 /// Bounds that no inertial sensor of a robot reaches. Gyroscopes measure up to 4000 degrees per
-/// second (70 rad/s), accelerometers up to 16 to 40 times gravity. A sample beyond is not a violent
-/// motion but invalid, and an estimate that used it would lose its pose.
+/// second (70 rad/s), accelerometers up to 16 to 40 times gravity. A sample beyond them is
+/// invalid, and an estimate that used this sample would lose its pose.
 inline constexpr double kMaxAngularRate_radps = 100.0;
 inline constexpr double kMaxSpecificForce_mps2 = 1000.0;
 

@@ -17,16 +17,16 @@ inline constexpr std::uintmax_t kMaxInputFile_bytes = std::uintmax_t{8} << 30U;
 
 /// The reason why there is no file to read at `file`: "no such file", "a folder, not a file", or
 /// the system's message. The system reports, for example, a loop of symbolic links, a name too
-/// long, or a folder without permission. Empty if there is a file; pipes count. Does not throw.
+/// long, or a folder without permission. Empty if there is a file or a pipe. Does not throw.
 [[nodiscard]] std::string problem_of_file(const std::filesystem::path& file);
 
-/// True if there is a regular file, a folder, or either. Like the functions of std::filesystem, but
-/// false where those throw.
+/// True if `path` is a regular file, a folder, or either of them. False if std::filesystem would
+/// throw.
 [[nodiscard]] bool is_file(const std::filesystem::path& path) noexcept;
 [[nodiscard]] bool is_folder(const std::filesystem::path& path) noexcept;
 [[nodiscard]] bool is_there(const std::filesystem::path& path) noexcept;
 
-/// True if there is nothing, not even an unreadable file: an optional file was omitted.
+/// True if `path` does not exist: an optional file was omitted. False for an unreadable file.
 [[nodiscard]] bool is_absent(const std::filesystem::path& path) noexcept;
 
 /// The bytes of `file`, at most `max_bytes`. Throws InputFileError.

@@ -7,8 +7,9 @@
 
 namespace km {
 
-/// A JSON document whose keys keep their order. Code that makes or reads one includes
-/// <nlohmann/json.hpp>, which takes two seconds to compile, so include it only in .cpp files.
+/// A JSON document whose keys keep their order. Code that creates or reads a document
+/// includes <nlohmann/json.hpp>, which takes two seconds to compile, so include it only in .cpp
+/// files.
 using Json = nlohmann::ordered_json;
 
 /// The document, indented, with a line end. Doubles have enough digits to distinguish them. NaN and

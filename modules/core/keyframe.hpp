@@ -29,7 +29,7 @@ struct Keypoint {
 /// Features with which another robot aligns itself to a keyframe: points, descriptors, and the
 /// properties of the rig that determine their noise. keypoints and descriptors have equal length.
 struct KeyframeFeatures {
-  SE3 T_body_cam = SE3::Identity();  ///< Left camera.
+  SE3 T_body_cam = SE3::Identity();  ///< Pose of the left camera.
   double focal_px = 0.0;
   double baseline_m = 0.0;
   std::vector<Keypoint> keypoints;

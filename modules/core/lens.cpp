@@ -181,8 +181,8 @@ std::optional<Eigen::Vector2d> bearing_of(const Eigen::Vector2d& plane, double s
   return bearing;
 }
 
-// The bearing of a point on that plane (their lifting function). If a root is of a negative number,
-// the result is NaN, and the point has no bearing.
+// The bearing of a point on that plane (the lifting function of Mei and Rives). If a radicand is
+// negative, the result is NaN, and the point has no bearing.
 std::optional<Eigen::Vector2d> lifted(double xi, const Eigen::Vector2d& m, double max_bearing) {
   const double r2 = m.squaredNorm();
   const double eta = (xi + std::sqrt(1.0 + (1.0 - xi * xi) * r2)) / (r2 + 1.0);

@@ -35,12 +35,13 @@ enum class LensModel {
 ///
 /// A lens has bearings within a disc about its axis, and is one-to-one there. The disc ends before
 /// the model folds back, and at 80 degrees. The plane z = 1 extends to 90 degrees only at infinity.
-/// A pixel of an equidistant lens covers 33 times as much of it at 80 degrees as on the axis, and
-/// 132 times at 85 degrees. Errors of a pixel would then be as large as the measured bearing.
+/// A pixel of an equidistant lens covers 33 times as much of the plane at 80 degrees as on the
+/// axis, and 132 times at 85 degrees. Errors of a pixel would then be as large as the measured
+/// bearing.
 class Lens {
  public:
   static constexpr double kMaxBearing = 5.671281819617709;  ///< tan(80 degrees)
-  /// Coefficients of any model; the rest are 0.
+  /// Coefficients of any model; unused ones are 0.
   using Coefficients = std::array<double, 9>;
 
   /// No distortion.
@@ -52,7 +53,7 @@ class Lens {
   Lens(LensModel model, const std::vector<double>& coefficients);
 
   [[nodiscard]] LensModel model() const { return model_; }
-  /// As many as were passed to the constructor.
+  /// Coefficients that were passed to the constructor.
   [[nodiscard]] std::span<const double> coefficients() const {
     return {coefficients_.data(), count_};
   }
@@ -62,13 +63,13 @@ class Lens {
   /// Radius of the disc of bearings.
   [[nodiscard]] double max_bearing() const { return max_bearing_; }
 
-  /// nullopt outside the disc.
+  /// Image of `bearing`; nullopt outside the disc.
   [[nodiscard]] std::optional<Eigen::Vector2d> distorted(const Eigen::Vector2d& bearing) const;
 
   /// The bearing within the disc with the image `point`; nullopt if there is none.
   [[nodiscard]] std::optional<Eigen::Vector2d> undistorted(const Eigen::Vector2d& point) const;
 
-  /// Equal model and coefficients; missing ones are 0.
+  /// True for equal models and coefficients; missing coefficients count as 0.
   [[nodiscard]] bool operator==(const Lens& other) const {
     return model_ == other.model_ && coefficients_ == other.coefficients_;
   }
@@ -78,7 +79,7 @@ class Lens {
   std::size_t count_ = 4;
   Coefficients coefficients_ = {};
   double max_bearing_ = kMaxBearing;
-  double max_plane_ = kMaxBearing;  // bound on the argument of polynomials: points, or angles [rad]
+  double max_plane_ = kMaxBearing;  // bound on the radius, or the angle [rad], in polynomials
 };
 
 }  // namespace km

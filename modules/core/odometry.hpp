@@ -26,7 +26,7 @@ using StateCovariance = Eigen::Matrix<double, 11, 11>;
 
 /// The vertical as estimated by inertial sensing.
 struct Vertical {
-  Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Unit, against gravity.
+  Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Unit vector against gravity.
   /// Standard deviation of the tilt about each horizontal axis. The errors of keyframes are assumed
   /// to be independent.
   double sigma_rad = 0.0;
@@ -39,13 +39,13 @@ struct KeyframeOdometry {
   KeyframeId id;
   Stamp stamp = 0;
   SE3 T_odom_kf = SE3::Identity();        ///< Product of the relative poses up to this keyframe.
-  SE3 T_previous_kf = SE3::Identity();    ///< Pose in the keyframe before; odom for the first.
+  SE3 T_previous_kf = SE3::Identity();    ///< Pose in the previous keyframe; the first one in odom.
   Matrix6 covariance = Matrix6::Zero();   ///< Covariance of T_previous_kf; zero for the first.
   std::optional<Vertical> vertical = {};  ///< Absent without inertial sensing.
-  /// Covariance of the OdometryState here, from which a later process can continue; absent if
-  /// unknown.
+  /// Covariance of the OdometryState at this keyframe, from which a later process can continue;
+  /// absent if unknown.
   std::optional<StateCovariance> state_covariance = {};
-  /// Calibration of the cameras as estimated here; absent if it is not estimated.
+  /// Calibration of the cameras as estimated at this keyframe; absent if it is not estimated.
   std::optional<UncertainCalibration> calibration = {};
 };
 

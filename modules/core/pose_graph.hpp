@@ -26,13 +26,13 @@ struct LoopCandidate {
   KeyframeId query;
   KeyframeId match;
   double similarity = 0.0;  ///< Normalised score of the bag of words.
-  int support = 1;          ///< See PlaceCandidate.
+  int support = 1;          ///< Number of candidates nearby, see PlaceCandidate.
 };
 
 /// Identity of a loop closure: a pair of keyframes, independent of the robot and the direction of
 /// the measurement.
 struct ClosureId {
-  KeyframeId from;  ///< The lower one: see closure_id().
+  KeyframeId from;  ///< Lower keyframe id, see closure_id().
   KeyframeId to;
   auto operator<=>(const ClosureId&) const = default;
 };
@@ -41,7 +41,7 @@ struct ClosureId {
   return b < a ? ClosureId{b, a} : ClosureId{a, b};
 }
 
-/// True if one of its keyframes belongs to this robot.
+/// True if a keyframe of `closure` belongs to `robot`.
 [[nodiscard]] constexpr bool touches(const ClosureId& closure, RobotId robot) {
   return closure.from.robot == robot || closure.to.robot == robot;
 }
@@ -62,8 +62,8 @@ struct Closure {
   }
 };
 
-/// The closures between robots a <= b (or within one, a == b) that agree with each other. Robot a
-/// decides for the pair, so that both robots use the same edges; the newest version counts.
+/// The mutually consistent closures between robots a <= b (or within one robot, a == b). Robot a
+/// selects them for the pair, so that both robots use the same edges; the newest version counts.
 struct InlierSet {
   RobotId a = 0;
   RobotId b = 0;
@@ -71,10 +71,10 @@ struct InlierSet {
   std::vector<ClosureId> closures;  ///< Ascending.
 };
 
-/// The last stage that a candidate of place recognition reached, and the reason for its end: a row
-/// of loop_closures.csv.
+/// Stages of a loop closure from the candidate of place recognition on.
 enum class ClosureStage { kCandidate, kRequested, kReceived, kVerified, kInlier };
 
+/// Last stage that a candidate reached, and the reason for its end: a row of loop_closures.csv.
 struct ClosureOutcome {
   ClosureId id;
   double similarity = 0.0;
@@ -103,8 +103,8 @@ struct OptimizerProgress {
   std::vector<RobotId> tentative = {};
   /// Members that no accepted closure ties to this robot. They are in another frame. Ascending.
   std::vector<RobotId> untied = {};
-  std::uint32_t round = 0;  ///< Number of rounds; in a round every member sends once.
-  double cost = 0.0;        ///< Team cost, chordal without 1/2.
+  std::uint32_t round = 0;  ///< Number of rounds; every member sends once per round.
+  double cost = 0.0;        ///< Chordal cost of the team, without factor 1/2.
   /// Norm of the team's Riemannian gradient, or (newton) its Newton decrement.
   double gradient_norm = 0.0;
   double seconds = 0.0;  ///< Time spent optimising.

@@ -16,8 +16,8 @@ struct Precision {
 
 /// Isotropic weights of a 6x6 covariance, tangent [rotation; translation]: kappa = 3 / (2 tr
 /// Sigma_R), tau = 3 / tr Sigma_t, as SE-Sync reads pose graphs (Rosen et al., "SE-Sync", IJRR
-/// 2019). With block-diagonal information matrices of g2o the two agree exactly; cross terms are
-/// dropped. Throws std::invalid_argument unless both traces are positive and finite.
+/// 2019). For block-diagonal information matrices of g2o both readings agree exactly; cross terms
+/// are dropped. Throws std::invalid_argument unless both traces are positive and finite.
 [[nodiscard]] inline Precision precision_of(const Matrix6& covariance) {
   const double rotation = covariance.topLeftCorner<3, 3>().trace();
   const double translation = covariance.bottomRightCorner<3, 3>().trace();

@@ -6,11 +6,11 @@
 
 namespace km {
 
-/// Odometry has finished with a frame.
+/// Report that odometry has finished with a frame.
 struct ProcessedFrame {
   Stamp stamp = 0;
-  /// Share of the features of the image before that it still tracks, in [0, 1]; nullopt: no image
-  /// was tracked.
+  /// Share of the features of the previous image that odometry still tracks, in [0, 1]; nullopt: no
+  /// image was tracked.
   std::optional<double> tracked_share = {};
 };
 

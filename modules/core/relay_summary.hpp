@@ -16,11 +16,11 @@ struct RelayHeld {
   bool operator==(const RelayHeld&) const = default;
 };
 
-/// Part of a robot in the relay, as it publishes it, ascending by robot. If all robots receive each
-/// other directly, `holds` is empty.
+/// State of the relay of a robot, as the robot publishes it, ascending by robot. `holds` is empty
+/// if all robots receive each other directly all the time.
 struct RelaySummary {
   std::vector<RobotId> received;  ///< Robots that are received directly.
-  /// For each known robot that is not received directly, or whose other messages are held.
+  /// One for each known robot that is not received directly, or whose reliable messages are held.
   std::vector<RelayHeld> holds = {};
 
   bool operator==(const RelaySummary&) const = default;

@@ -26,8 +26,8 @@ inline constexpr unsigned kResumeBits = 16;
   return static_cast<std::uint32_t>(boot & ((1U << kResumeBits) - 1U));
 }
 
-/// Boot id of the process that resumes the incarnation of `boot`. Throws std::overflow_error if
-/// there have been too many.
+/// Boot id of the next process of the incarnation of `boot`. Throws std::overflow_error if the
+/// incarnation has been resumed too often.
 [[nodiscard]] inline std::uint64_t next_boot(std::uint64_t boot) {
   if (!is_same_incarnation(boot, boot + 1))
     throw std::overflow_error("an incarnation of a robot was resumed " +

@@ -13,7 +13,7 @@ namespace km {
 /// that they receive the other one. Robots with equal reports see the same graph. Not thread-safe.
 class TeamLinks {
  public:
-  /// Reports that `robot` receives the robots `received` and no others. True if this is a change.
+  /// Stores the report that `robot` receives exactly the robots `received`. True if it is a change.
   bool report(RobotId robot, std::set<RobotId> received);
   /// Removes the report of `robot`.
   void forget(RobotId robot) { received_by_.erase(robot); }

@@ -15,7 +15,7 @@ inline constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 /// One line of a table, divided into fields.
 struct TextRow {
   int line = 0;                          ///< Counted from 1.
-  std::vector<std::string_view> fields;  ///< Into the text; without surrounding blanks.
+  std::vector<std::string_view> fields;  ///< Views of the text, without surrounding blanks.
 };
 
 /// Rows of a CSV or blank-separated table. A line with a comma is divided at its commas, any other

@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// Messages that wait until more is known, in one queue per sender. Each queue has a bound, and all
-/// together have one. Not thread-safe.
+/// Messages that cannot be processed yet, in one queue per sender. Each queue has a bound, and
+/// their total has one. Not thread-safe.
 template <typename From, typename Message>
 class WaitingRooms {
  public:

@@ -21,7 +21,7 @@ struct JournalStart {
   std::string input;       ///< Input of the robot as its command line names it.
 };
 
-/// A contact with another robot: later entries about it refer to this incarnation (see
+/// A contact with another robot. Later entries about that robot refer to this incarnation (see
 /// RobotIdentity).
 struct JournalPeer {
   RobotId robot = 0;

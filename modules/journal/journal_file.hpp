@@ -36,7 +36,8 @@ struct JournalPlace {
                                               const JournalPlace& place);
 
 /// A journal is a file that only grows: eight bytes that name the format, then entries. Each entry
-/// consists of its length (u32), its bytes, and a check sum (u64, FNV-1a) over them and all before.
+/// consists of its length (u32), its bytes, and a check sum (u64, FNV-1a) over them and all
+/// earlier entries.
 /// If a process is killed or the machine loses power, an incomplete last entry fails the check. Not
 /// thread-safe.
 class JournalFile {

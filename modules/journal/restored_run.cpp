@@ -43,8 +43,7 @@ class RunRestorer {
   bool started_ = false;
   bool first_state_ = true;                                        // the next state is the first of
                                                                    // its process
-  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // closures by their ends, in the
-                                                                   // order of measurement
+  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends (from, to)
   std::map<ClosureId, ClosureOutcome> outcomes_;
 };
 

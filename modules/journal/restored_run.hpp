@@ -16,7 +16,7 @@ namespace km {
 struct RestoredRun {
   RobotId robot = 0;
   std::uint64_t boot = 0;  ///< Boot id of the last process.
-  std::string input;       ///< See JournalStart.
+  std::string input;       ///< Input of the robot, see JournalStart.
 
   std::vector<KeyframeOdometry> odometry;  ///< Index i is keyframe i.
   std::vector<Keyframe> keyframes;         ///< Index i is keyframe i, as in `odometry`.
@@ -34,7 +34,7 @@ struct RestoredRun {
   [[nodiscard]] std::size_t final_states() const;
 };
 
-/// The run with another robot id, without its sensors and without its results with other robots.
+/// The run with another robot id, without calibrations and without results with other robots.
 [[nodiscard]] RestoredRun alone_as(RobotId robot, RestoredRun run);
 
 /// Reads the journal of a run. Throws InputFileError, also for entries that contradict each other.

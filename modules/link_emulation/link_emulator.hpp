@@ -15,7 +15,7 @@
 
 namespace km {
 
-/// Part of a run [s since its start], without its end.
+/// Interval of a run [s since its start], half open.
 struct RunSpan {
   double from_s = 0.0;
   double to_s = std::numeric_limits<double>::infinity();
@@ -110,13 +110,13 @@ struct LinkCounts {
 
 /// Radio or cables between robots: takes the frames of each robot and decides for every addressee
 /// whether and when the frame arrives. A frame is lost if its robots are in different groups of a
-/// partition or too far apart when it is sent. It is also lost if the link is out or its queue is
-/// full; the queue drains at the rate of the link. A frame can also be lost by chance after it has
-/// left the queue. A frame on its way arrives even if the link fails meanwhile.
+/// partition or too far apart when it is sent. It is also lost during an outage of the link or
+/// if its queue is full; the queue drains at the rate of the link. A frame can also be lost by
+/// chance after it has left the queue. A frame on its way arrives even if the link fails meanwhile.
 ///
 /// Equal scripts and equal frames at equal times give equal results. Every ordered pair has a
-/// random stream of its own, and each frame takes equally many numbers from it. So the chance of
-/// the n-th frame from a to b depends on the seed, a, b and n only. Deterministic: time comes in [s
+/// random generator of its own, and each frame draws equally many numbers. So the random numbers of
+/// the n-th frame from a to b depend only on the seed, a, b and n. Deterministic: time comes in [s
 /// since the start of the run]. Not thread-safe.
 class LinkEmulator {
  public:
@@ -142,8 +142,8 @@ class LinkEmulator {
  private:
   struct State {
     std::mt19937 rng;
-    double sent_off = -std::numeric_limits<double>::infinity();  // in the unit of
-                                                                 // LinkTrace::capacity_until()
+    double sent_off = -std::numeric_limits<double>::infinity();  // LinkTrace::capacity_until()
+                                                                 // when the queue is empty
     LinkCounts counts = {};
   };
   void send_over(std::size_t from, std::size_t to, double now_s, const EthernetFrame& frame);

@@ -13,8 +13,7 @@ namespace {
 
 constexpr std::size_t kColumns = 3;
 
-// The number of the row at which `rows` are no trace, and the reason; an empty reason if they are a
-// trace.
+// Index and problem of the first unusable row; an empty problem if `rows` are a trace.
 std::pair<std::size_t, std::string> problem_of(const std::vector<LinkTraceRow>& rows) {
   if (rows.empty()) return {0, "holds no row"};
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -89,7 +88,7 @@ double LinkTrace::time_of(double bytes) const {
   const LinkTraceRow& first = rows_.front();
   if (bytes < 0.0)
     return first.bytes_per_s > 0.0 ? first.time_s + bytes / first.bytes_per_s : kNever;
-  // The last row with less capacity before it.
+  // The last row before which the link carries less than `bytes`.
   const auto reached = std::ranges::lower_bound(capacity_, bytes);
   const auto i =
       static_cast<std::size_t>(std::max<std::ptrdiff_t>(reached - capacity_.begin() - 1, 0));

@@ -34,10 +34,11 @@ class LinkTrace {
   [[nodiscard]] double delay_s(double time_s) const;
 
   /// Bytes that the link can carry from the first row until `time_s`; negative before that row.
-  /// Needs a limit. O(log rows).
+  /// Precondition: the rate is finite. O(log rows).
   [[nodiscard]] double capacity_until(double time_s) const;
 
-  /// The first time at which capacity_until() is `bytes`; infinite if it never is. Needs a limit.
+  /// The first time at which capacity_until() is `bytes`; infinite if there is none.
+  /// Precondition: the rate is finite.
   [[nodiscard]] double time_of(double bytes) const;
 
  private:

@@ -46,7 +46,7 @@ struct RelayedTopics {
 /// Peers announces that robot like one that is received directly.
 ///
 /// Has no thread: it runs on the threads that publish to it and publishes the results on them, so
-/// that no node waits for another one through it. Thread-safe.
+/// that no node waits for another node. Thread-safe.
 class RelayNode {
  public:
   /// `seal` is null in a team without keys. `seal`, `peers` and the topics outlive this object. Any
@@ -59,13 +59,15 @@ class RelayNode {
   // Wiring, to be called before any node starts. `number_of` returns the number by which a robot
   // requests this message, or nullopt if the message is of no use to other robots.
 
-  /// Bags of words, which each robot sends to all others: see RelayKind::kBag.
+  /// Connects the topics of bags of words, which each robot sends to all others: see
+  /// RelayKind::kBag.
   template <typename T>
   void join_bags(In<T> received, Out<T> to);
-  /// Closures or inlier sets. Messages with equal Codec<T>::key_of() replace each other.
+  /// Connects the topics of closures or of inlier sets. Messages with equal Codec<T>::key_of()
+  /// replace each other.
   template <typename T>
   void join_reliable(RelayKind kind, const RelayedTopics<T>& topics);
-  /// Requests or replies.
+  /// Connects the topics of requests or of replies.
   template <typename T, typename NumberOf>
   void join_calls(RelayKind kind, const RelayedTopics<T>& topics, const NumberOf& number_of);
 
@@ -73,10 +75,10 @@ class RelayNode {
   // each message carries a second signature for forwarding, and the bridge refuses messages without
   // it. Each receiver stores the message.
 
-  /// Guard of the topic of bags or of replies.
+  /// Guard of the topic of bags or of replies: signs and checks messages, and stores received ones.
   template <typename T, typename NumberOf>
   [[nodiscard]] ContentGuard<T> guard(RelayKind kind, const NumberOf& number_of);
-  /// Guard of the relay's own topic, which reads its messages.
+  /// Guard of the relay's own topic: processes each received message.
   [[nodiscard]] ContentGuard<RelayPacket> guard_packets();
 
   /// Summary that this robot publishes in its status.

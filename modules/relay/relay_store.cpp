@@ -57,8 +57,8 @@ RelayStore::Membership RelayStore::membership_of(const RobotIdentity& identity) 
   return {*credentials, keys_->certified(identity, *credentials).value};
 }
 
-// Whether this robot can attribute messages to this process. It cannot after the keys of the
-// process have been removed, even if it receives the process directly.
+// True if this robot can attribute messages to this process. False after the keys of the process
+// have been removed, even if it receives the process directly.
 bool RelayStore::is_known(const TeamPeer& peer) const {
   return origin(peer.robot) == peer &&
          (!keys_ || origins_.at(peer.robot).membership.certificate.has_value());
@@ -265,9 +265,8 @@ RelayArrival RelayStore::receive(const RelayPacket& packet) {
     origins_.at(robot).via = from;
   } else if (is_reliable(message.kind)) {
     RelayMessage kept = message;
-    if (is_mine && !keys_)
-      kept.content = {};  // No other robot needs the content, but the
-                          // signature covers it.
+    // Only the addressee needs the content. With keys it is kept, because the signature covers it.
+    if (is_mine && !keys_) kept.content = {};
     arrival = keep(&Origin::reliable, kMaxReliableBytes, std::move(kept));
   } else {
     if (message.kind == RelayKind::kReply) hold_reply(message);

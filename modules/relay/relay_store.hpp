@@ -51,18 +51,18 @@ struct RelayOutput {
 ///
 /// - stores messages of each other robot (the origin): its bags of words, and its reliable
 ///   messages, which are closures and inlier sets for a robot out of its range;
-/// - reports in its status which robots it receives directly, and how much it holds of the others
-///   (RelaySummary). When a neighbour reports less, it sends the missing messages in order, one
-///   window at a time, and repeats them if they do not arrive. If several robots could send them,
-///   one that receives the origin directly does;
+/// - reports in its status which robots it receives directly, and how many messages of the other
+///   robots it holds (RelaySummary). When a neighbour reports less, it sends the missing messages
+///   in order, one window at a time, and repeats them if they do not arrive. If several robots
+///   could send them, one that receives the origin directly does;
 /// - forwards requests for keyframes and replies, to the addressee, to a neighbour of the
 ///   addressee, or back along the route of the addressee's bags. Without a route it replies with
 ///   its stored copy of the keyframe. If it has no copy it keeps the request until a route appears.
 ///
-/// If all robots receive each other directly, the relay sends nothing. A robot becomes known when
-/// it is received directly or when a neighbour introduces it. A new boot id of a known robot is
-/// accepted only from the neighbour that introduced it before and from robots that receive it
-/// directly. Therefore robots that have missed a restart cannot bring back the older boot id.
+/// If all robots receive each other directly all the time, the relay sends nothing. A robot becomes
+/// known when it is received directly or when a neighbour introduces it. A new boot id of a known
+/// robot is accepted only from the neighbour that introduced it before and from robots that receive
+/// it directly. Therefore robots that have missed a restart cannot bring back the older boot id.
 /// Neighbours cannot change the state of this robot itself, or of robots that it receives directly.
 ///
 /// In a team with keys the introduction of a robot contains its certificate. The signature of the
@@ -166,7 +166,7 @@ class RelayStore {
     RobotIdentity identity;
     Membership membership = {};
     std::optional<RobotId> via = {};  // Neighbour that introduced the origin or sent its last bag.
-    bool reachable = false;           // Last reachability that was reported.
+    bool reachable = false;           // Reachability that was reported last.
     bool was_direct = false;
     Stream bags = {}, reliable = {}, replies = {};
   };
@@ -225,7 +225,7 @@ class RelayStore {
   std::map<RobotId, Neighbour> neighbours_;  // robots with a link to this one
   Stream own_reliable_;
   std::map<std::tuple<RelayKind, RobotId, std::uint64_t>, std::uint32_t> own_slots_;
-  std::deque<Recent> recent_;  // Oldest first.
+  std::deque<Recent> recent_;  // Messages to robots received directly, oldest first.
   std::deque<Recent> unmet_;   // Messages to unknown robots, oldest first.
   // Messages kept for other robots, by addressee, then by kind, origin and number.
   std::map<RobotId, std::map<std::tuple<RelayKind, RobotId, std::uint32_t>, RelayMessage>> carried_;

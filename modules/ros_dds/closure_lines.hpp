@@ -8,7 +8,7 @@
 
 namespace km {
 
-/// Stage of a pair of keyframes.
+/// Present state of a closure candidate, for publication.
 struct PublishedClosure {
   ClosureId id;
   ClosureStage stage = ClosureStage::kCandidate;

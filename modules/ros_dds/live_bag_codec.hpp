@@ -9,13 +9,13 @@
 namespace km {
 
 /// Live topics of ROS 2 as a recording without end, so that the code that plays recordings also
-/// plays drivers. Not thread-safe, except for stop().
+/// reads drivers. Not thread-safe, except for stop().
 class LiveBag final : public BagReader {
  public:
   LiveBag(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics);
 
   [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
-  /// Waits for a message. Nullopt after stop() and give_up_after().
+  /// Waits for a message. nullopt after stop(), or when the time of give_up_after() has passed.
   [[nodiscard]] std::optional<BagMessage> next() override;
   [[nodiscard]] BagReport report() const override;
   [[nodiscard]] bool is_live() const override { return true; }

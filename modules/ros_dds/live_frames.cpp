@@ -7,7 +7,7 @@
 namespace km {
 
 void LiveFrames::add(const OdometryState& state) {
-  constexpr std::size_t kRecent = 200;  // the first images publish their states together
+  constexpr std::size_t kRecent = 200;  // odometry publishes its first states together
   if (!recent_.empty()) {
     const OdometryState& before = recent_.back();
     const double dt = seconds_between(before.stamp, state.stamp);

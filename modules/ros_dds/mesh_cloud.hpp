@@ -13,7 +13,7 @@ namespace km {
 /// returns every n-th one.
 [[nodiscard]] RosPointCloud cloud_of(const LabelledMesh& mesh, std::size_t most, RosHeader header);
 
-/// `faces` of a mesh in the colours of their vertices, or in grey if the mesh has none.
+/// `faces` of a mesh in the colours of their vertices, or in grey if the mesh has no colours.
 [[nodiscard]] RosMarker surface_of(const LabelledMesh& mesh,
                                    std::span<const LabelledMesh::Face> faces, RosHeader header);
 

@@ -35,7 +35,7 @@ struct RosOutputTopics {
   In<OdometryState> odometry;
   In<KeyframeOdometry> keyframes;
   In<Trajectory> trajectory;               ///< Trajectory of this robot.
-  std::optional<In<SensorPacket>> images;  ///< If given, the left images are published, too.
+  std::optional<In<SensorPacket>> images;  ///< Source of the published left images, if any.
 };
 
 /// Selection of optional outputs.
@@ -78,8 +78,8 @@ struct RosOutputOptions {
 ///   /rosout            rcl_interfaces/Log
 ///   /NAME/left/image_raw/compressed  sensor_msgs/CompressedImage
 /// `map` is the frame of the team, or of the robot before it joins others. In files that are merged
-/// later, every robot has a map frame of its own. Then /tf repeats once a second which robot's
-/// frame is the frame of the team. base_link is the inertial sensor's frame.
+/// later, every robot has a map frame of its own. Then /tf contains once a second the transform to
+/// the frame of the team. base_link is the inertial sensor's frame.
 class RosOutputNode final : public Node {
  public:
   /// Returns the diagnostics of the other parts of the robot, by name. nullopt while the robot is
@@ -95,14 +95,14 @@ class RosOutputNode final : public Node {
   ~RosOutputNode() override { stop(); }
 
   std::string_view name() const override { return node_name_; }
-  /// Replaces the mesh, given in `map`. Thread-safe; does not wait.
+  /// Replaces the mesh by `mesh`, whose frame is `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const LabelledMesh> mesh) { worker_.post(std::move(mesh)); }
 
   void start() override;
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override;
-  /// Large, because a disk may block for long and no node waits for it meanwhile.
+  /// Large, because a disk may block for long and no other node waits for this one.
   double step_limit_s() const override { return 300.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 

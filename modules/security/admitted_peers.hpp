@@ -25,7 +25,7 @@ struct TeamKey {
 /// Keys and certificate of an admitted process.
 struct AdmittedPeer {
   Certificate certificate;
-  std::string credentials = {};  ///< In the form in which the process shows them.
+  std::string credentials = {};  ///< Credentials as the process announces them.
   ExchangeKey exchange{};
   SealingKey to_peer, from_peer;
   std::vector<TeamKey> team_keys;  ///< Team keys of the process by number; empty before its first
@@ -37,7 +37,7 @@ struct AdmittedPeer {
 /// removed first, because their credentials may be replayed recordings. Not thread-safe.
 class AdmittedPeers {
  public:
-  /// nullptr if it is not admitted. Valid until the next change.
+  /// Keys of a process; nullptr if it is not admitted. The pointer is valid until the next change.
   [[nodiscard]] AdmittedPeer* find(const TeamPeer& peer);
   [[nodiscard]] const AdmittedPeer* find(const TeamPeer& peer) const;
 
@@ -49,7 +49,7 @@ class AdmittedPeers {
 
   void erase(const TeamPeer& peer) { peers_.erase(peer); }
 
-  /// Erases those whose certificate `lapsed(certificate)`; returns them in ascending order.
+  /// Erases processes for whose certificate `lapsed` returns true; returns them in ascending order.
   template <typename Lapsed>
   [[nodiscard]] std::vector<TeamPeer> erase_if(const Lapsed& lapsed) {
     std::vector<TeamPeer> erased;
@@ -69,7 +69,8 @@ class AdmittedPeers {
   };
   using Entries = std::map<TeamPeer, Entry>;
 
-  // Removes the process of [begin, end) that is least worth keeping, if there are `most` or more.
+  // If [begin, end) has `most` processes or more, removes the one without messages or longest
+  // silent.
   void make_room(Entries::iterator begin, Entries::iterator end, std::size_t most);
 
   Entries peers_;

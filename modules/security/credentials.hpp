@@ -14,8 +14,8 @@ namespace km {
 /// X25519 (RFC 7748): public key from which two processes derive a common key.
 using ExchangeKey = std::array<std::uint8_t, 32>;
 
-/// Data that a process shows in addition to its identity. They are the parts of its certificate
-/// that are not in the identity, and a key of this start that the robot signs.
+/// Data that a process announces in addition to its identity. They are the parts of its certificate
+/// that are not in the identity, and an X25519 key of this process, signed by the robot.
 struct Credentials {
   std::array<std::uint8_t, 8> authority{};  ///< First bytes of the authority's public key, which
                                             ///< identify the team.

@@ -19,8 +19,8 @@ struct Authority {
   PublicKey key{};
 };
 
-/// Each throws std::runtime_error that names file, line, value and the remedy. None checks a
-/// signature.
+/// Each read function throws std::runtime_error that names file, line, value and the remedy. None
+/// checks a signature.
 [[nodiscard]] SigningKey read_secret_key(const std::filesystem::path& file);
 [[nodiscard]] Certificate read_certificate(const std::filesystem::path& file);
 [[nodiscard]] Authority read_authority(const std::filesystem::path& file);

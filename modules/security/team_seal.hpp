@@ -49,7 +49,7 @@ struct [[nodiscard]] Opened {
   const char* reason = nullptr;  ///< Reason if not opened, a string literal.
 };
 
-/// Changes by TeamSeal::update().
+/// Changes of the membership by TeamSeal::update().
 struct [[nodiscard]] MembershipChange {
   std::vector<TeamPeer> forgotten;
   bool new_key = false;  ///< Send key_message_for() to all peers again.
@@ -64,11 +64,12 @@ struct [[nodiscard]] MembershipChange {
 /// process: a robot's long-lived secret that is found later does not open recorded messages.
 ///
 /// Nonces are drawn at random, 24 bytes each. Two equal nonces under one key would reveal the
-/// contents. Among 2^64 messages the probability of that is below 2^-64, and no counter has to
-/// survive a crash.
+/// contents. Among 2^64 messages the probability of equal nonces is below 2^-64, and no counter has
+/// to survive a crash.
 ///
 /// Duties of the caller:
-/// - It announces credentials() with its identity, and first of all admits others by theirs. An
+/// - It announces credentials() with its identity, and first of all admits other processes by
+/// theirs. An
 ///   unknown sender can record and replay credentials, so they do not prove that the process runs.
 ///   A process is proven to run when a message of it opens that is not a repeated one. Only then
 ///   may a new process of a robot replace an older one.
@@ -87,15 +88,16 @@ class TeamSeal {
   TeamSeal(const TeamSeal&) = delete;
   TeamSeal& operator=(const TeamSeal&) = delete;
 
-  /// Credentials of this process: certificate, a key of this start, and a signature over them and
+  /// Credentials of this process: certificate, X25519 key, and the robot's signature over both and
   /// the identity. kCredentialsLength characters.
   [[nodiscard]] const std::string& credentials() const { return credentials_; }
 
-  /// Checks the credentials of a process at `now_s` and stores its keys. nullptr, or the reason why
-  /// it is not a member (a string literal): malformed, another authority, lapsed, revoked, another
-  /// id or name than in the certificate, or an invalid signature. Repeated calls are harmless. If
-  /// kMaxAdmitted or, for one robot, kMaxAdmittedPerRobot is exceeded, the process that has been
-  /// silent for longest is removed. Processes whose messages never opened are removed first.
+  /// Checks the credentials of a process at `now_s` and stores its keys. Returns nullptr, or the
+  /// reason of a refusal (a string literal): malformed, another authority, lapsed, revoked, another
+  /// id or name than in the certificate, or an invalid signature. Repeated calls
+  /// are harmless. If kMaxAdmitted or, for one robot, kMaxAdmittedPerRobot is exceeded, the process
+  /// that has been silent for longest is removed. Processes whose messages never opened are removed
+  /// first.
   [[nodiscard]] const char* admit(const RobotIdentity& identity, std::string_view credentials,
                                   std::int64_t now_s);
 

@@ -30,7 +30,7 @@ enum class ViewChannel {
 /// Writes one robot's updates. Not thread-safe.
 class ViewWriter {
  public:
-  /// `participant` outlives it.
+  /// `participant` outlives this.
   ViewWriter(dds_entity_t participant, ViewChannel channel, const TeamPeer& self);
 
   /// Number of matched readers. Readers of a viewer that died count until its lease is over.
@@ -51,20 +51,20 @@ class ViewWriter {
   ViewChannel channel_;
   TeamPeer self_;
   DdsEntity topic_, publisher_, writer_;
-  std::size_t come_ = 0;  // Number since the beginning.
+  std::size_t come_ = 0;  // Number of readers that have appeared.
 };
 
 /// Reads the updates of robots on one channel. Not thread-safe.
 class ViewReader {
  public:
   /// `of` selects the robot whose images are read; other channels ignore it. `participant` and
-  /// `topic` outlive it.
+  /// `topic` outlive this.
   ViewReader(dds_entity_t participant, dds_entity_t topic, ViewChannel channel, RobotId of = 0);
 
   [[nodiscard]] dds_entity_t handle() const { return reader_.handle(); }
 
-  /// Passes each update that has arrived to `take`. Returns the number of invalid updates, which
-  /// are dropped.
+  /// Passes each update that has arrived to `take_one`. Returns the number of invalid updates,
+  /// which are dropped.
   template <typename Take>
   std::size_t take(const Take& take_one) {
     std::size_t refused = 0;

@@ -19,9 +19,9 @@ constexpr std::size_t kQueue = 4096;  // The oldest inputs are dropped, so that 
 constexpr double kTick_s = 0.1;
 constexpr double kStatePeriod_s = 1.0;
 constexpr double kBurst_s = 0.5;          // Time for which unused budget is kept.
-constexpr double kRest_s = 2.0;           // Worth of budget that is sent at the end.
-constexpr double kMeshRest_s = 10.0;      // The same bound for the mesh, to include its last
-                                          // correction.
+constexpr double kRest_s = 2.0;           // Budget for the end, in seconds of its rate.
+constexpr double kMeshRest_s = 10.0;      // Budget for the mesh at the end, large enough for its
+                                          // last correction.
 constexpr double kAcknowledged_s = 0.5;   // Timeout for the acknowledgements of these last updates.
 constexpr double kCutShare = 1.0 / 30.0;  // Maximum share of the time for splitting the mesh.
 

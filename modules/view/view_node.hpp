@@ -53,15 +53,16 @@ struct ViewMesh {
 
 /// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's
 /// domain. It sends the updates of a ViewSelector, a state once a second, the mesh in chunks, and
-/// camera images on request. Each topic has a budget. While a topic has no reader, the node only
-/// keeps the newest inputs. No node waits for a viewer; updates that DDS cannot accept are lost.
+/// camera images on request. Images have a rate, other topics a budget. While a topic has no
+/// reader, the node only keeps the newest inputs. No node waits for a viewer; updates that DDS
+/// cannot accept are lost.
 class ViewNode final : public Node {
  public:
   /// Returns all fields of a state except for anchor, round, cost, gradient and links. Called on
   /// the node's thread.
   using Describe = std::function<ViewState()>;
 
-  /// `participant` outlives it. Throws ConfigError if `config` is out of bounds. `camera` belongs
+  /// `participant` outlives this. Throws ConfigError if `config` is out of bounds. `camera` belongs
   /// to the images; without it no images are sent.
   ViewNode(const ViewConfig& config, const DdsParticipant& participant, const ViewMesh& mesh,
            const std::optional<Camera>& camera, Describe describe, const ViewTopics& topics);
@@ -72,8 +73,8 @@ class ViewNode final : public Node {
 
   std::string_view name() const override { return ViewConfig::kSection; }
   void start() override;
-  /// Sends the remaining updates: at most two seconds' worth of the budget, and ten seconds' worth
-  /// for the mesh.
+  /// Sends the remaining updates: at most two seconds at ViewConfig::past_bytes_per_s, and ten
+  /// seconds at mesh_bytes_per_s for the mesh.
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }

@@ -49,7 +49,7 @@ void ViewSelector::add(const OdometryState& state) {
   if (state.T_odom_body.matrix().allFinite()) pose_ = ViewPose{state.stamp, state.T_odom_body};
 }
 
-// A keyframe that never reached this node takes the pose and the stamp of the next one.
+// A missing keyframe takes the pose and the stamp of the next one.
 void ViewSelector::add(const KeyframeOdometry& keyframe) {
   if (!keyframe.T_odom_kf.matrix().allFinite()) return;
   const auto index = static_cast<std::size_t>(keyframe.id.index);

@@ -46,7 +46,7 @@ class ViewSelector {
   void add(const InlierSet& set);             ///< Replaces an older version for the same robot
                                               ///< pair.
   void add(const ClosureVerdicts& verdicts);  ///< The latest verdict of a closure counts.
-  /// Removes the closures with this robot, because its keyframe indices now mean other keyframes.
+  /// Rejects the closures with this robot, because its keyframe indices now mean other keyframes.
   void restarted(RobotId peer);
 
   /// A viewer has appeared: sends everything again from the beginning.
@@ -54,8 +54,8 @@ class ViewSelector {
   /// True from begin_again() until everything has been sent once.
   [[nodiscard]] bool sends_past() const { return sends_past_; }
 
-  /// The update to send now, at `now_s` [s] of any clock that does not go backwards; it counts as
-  /// sent. nullopt if no update is due.
+  /// The update to send at `now_s` [s], by any clock that does not go backwards. The update counts
+  /// as sent. nullopt if no update is due.
   [[nodiscard]] std::optional<ViewContent> next(double now_s);
 
  private:
@@ -66,7 +66,7 @@ class ViewSelector {
     bool is_verified = false;
     std::string reason;  // Why verification stopped.
     std::optional<ViewClosure> sent = {};
-    std::uint64_t turn = 0;  // Number of its turn in the queue; 0 if it is not queued.
+    std::uint64_t turn = 0;  // Order in the queue; 0 if the pair is not queued.
   };
   // Ordered by rank, then by the time of the change.
   using Turn = std::tuple<int, std::uint64_t, ClosureId>;
@@ -82,13 +82,13 @@ class ViewSelector {
   std::optional<ViewPose> pose_;  // Pose that has not been sent yet.
   double pose_due_s_ = 0.0;
   double keyframes_due_s_ = 0.0;
-  std::vector<SE3> odometry_;  // Poses of the keyframes.
+  std::vector<SE3> odometry_;  // Poses of the keyframes as estimated by odometry.
   std::vector<Stamp> stamps_;
   std::size_t odometry_sent_ = 0;
   std::shared_ptr<const Trajectory> trajectory_;
-  std::vector<SE3> optimized_sent_;  // In the frame of the trajectory's anchor.
+  std::vector<SE3> optimized_sent_;  // Sent optimised poses, in the frame of the anchor.
   std::size_t cursor_ = 0;           // Index at which the search for moved poses starts.
-  bool any_moved_ = false;           // False if no pose has moved; true if some may have.
+  bool any_moved_ = false;           // False if no pose has moved, true if poses may have.
   std::map<ClosureId, Pair> pairs_;
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
   std::set<ClosureId> overruled_;  // Closures that the optimiser rejects.

@@ -38,7 +38,7 @@ struct ViewState {
   std::uint32_t keyframes = 0;
   std::uint32_t skipped_frames = 0;
   RobotId anchor = 0;       ///< Robot whose odometry frame its optimised poses are in.
-  bool tentative = false;   ///< Closures at a single place tie it to the anchor.
+  bool tentative = false;   ///< True if only closures at one place tie it to the anchor.
   std::uint32_t round = 0;  ///< Round of the optimisation.
   double cost = 0.0;        ///< Cost of the team's graph, see OptimizerProgress.
   double gradient_norm = 0.0;
@@ -66,7 +66,7 @@ struct ViewKeyframes {
   std::vector<Stamp> stamps = {};  ///< Stamps of the same keyframes; empty for optimised poses.
 };
 
-/// Stage of a pair of keyframes as the sending robot knows it; the newest for an id counts.
+/// Stage of a closure candidate as the sending robot knows it; the newest for an id counts.
 /// kVerified means that no inlier set contains the closure, or that none is known yet.
 enum class ViewVerdict : std::uint8_t { kCandidate, kVerified, kKept, kRejected };
 struct ViewClosure {

@@ -12,7 +12,7 @@ namespace km {
 namespace {
 
 constexpr std::chrono::seconds kAcknowledgementTime{2};
-constexpr double kSendKeys_s = 30.0;  // a robot that was short of memory may have lost one
+constexpr double kSendKeys_s = 30.0;  // a robot that was short of memory may have dropped a key
 constexpr std::size_t kMaxKeyMessageBytes = 512;
 constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // interval for changes that only the clock
                                                     // causes

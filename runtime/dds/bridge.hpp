@@ -29,7 +29,7 @@
 
 namespace km {
 
-/// A message for one other robot alone.
+/// A message for one other robot.
 template <typename T>
 struct Addressed {
   RobotId to = 0;
@@ -61,8 +61,8 @@ struct CrossingEnds {
   bool receive = true;
 };
 
-/// How many messages of each peer are delivered per second; more wait. For messages that are cheap
-/// to send and costly to answer.
+/// Rate at which messages of each peer are delivered; further messages wait. For messages that are
+/// cheap to send and costly to answer.
 struct Pace {
   double per_second = std::numeric_limits<double>::infinity();
   double burst = 1.0;  ///< Number of messages delivered at once after a silence.
@@ -74,11 +74,11 @@ template <typename T>
 struct ContentGuard {
   using Content = std::span<const std::uint8_t>;
 
-  /// Octets that `tail` puts behind every message; they are taken off before it is read.
+  /// Octets that `tail` appends to every message. They are removed before the message is parsed.
   std::size_t tail_bytes = 0;
   std::function<std::vector<std::uint8_t>(const T& message, Content serialized)> tail = {};
-  /// Checks each received message before it is published: null, or the reason of a refusal (a
-  /// string literal).
+  /// Checks each received message before it is published. Returns null, or the reason of a refusal
+  /// (a string literal).
   std::function<const char*(const TeamPeer& sender, const T& message, Content content)> check = {};
 };
 
@@ -135,7 +135,7 @@ class DdsBridge final : public Node {
   std::exception_ptr error() const override;
   DurationHistogram timing() const override { return sender_.timing(); }
   std::vector<Heartbeat*> heartbeats() override;
-  /// A thin link may hold up the socket for as long.
+  /// A slow link can block the socket this long.
   double step_limit_s() const override { return 120.0; }
 
  private:
@@ -149,7 +149,7 @@ class DdsBridge final : public Node {
 
   const DdsParticipant& participant_;
   Peers peers_;
-  std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;  // the sender's
+  std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;  // written by sender_
   std::vector<std::unique_ptr<IncomingTopic>> incoming_;
   const std::unique_ptr<OutgoingTopic> keys_;  // null without keys; used by key_sender_
   double keys_sent_s_ = 0.0;                   // receive thread only
@@ -160,8 +160,7 @@ class DdsBridge final : public Node {
   std::exception_ptr receive_error_;
   std::atomic<bool> receive_failed_ = false;
   std::thread receiver_;
-  // A thread apart from the sender's: the receive thread requests keys to be sent, and must not
-  // wait for room there.
+  // Separate from sender_, because the receive thread posts to it and must not wait for room.
   Worker<TeamPeer> key_sender_;
   Sender sender_;  // last members: stop first
 };

@@ -15,11 +15,10 @@
 
 namespace km {
 
-/// Hash that identifies a message: only a message with the same key replaces it. Only the storage
-/// at its own sender depends on it.
+/// Hash that identifies a message. At the sender, a message replaces the stored one with its key.
 using MessageKey = std::uint64_t;
 
-/// The key of a message that these numbers name.
+/// Key of the message that these numbers identify.
 [[nodiscard]] inline MessageKey message_key(std::initializer_list<std::uint64_t> numbers) {
   MessageKey key = kFnv1aBasis;
   for (const std::uint64_t number : numbers) mix_fnv1a(key, number);
@@ -34,7 +33,7 @@ using MessageKey = std::uint64_t;
 ///       using Wire = km_wire_InlierSet;                      // generated from idl/
 ///       static constexpr const char* kTopic = "inlier_sets"; // DDS topic name
 ///       static constexpr std::uint16_t kVersion = 1;         // of the wire type, idl/README.md
-///       static constexpr std::size_t kMaxBytes = 800000;     // a longer one is not even read
+///       static constexpr std::size_t kMaxBytes = 800000;     // longer ones are refused
 ///       static const dds_topic_descriptor_t& descriptor() { return km_wire_InlierSet_desc; }
 ///
 ///       struct Encoded {                         // owns what `wire` points to; movable
@@ -43,12 +42,12 @@ using MessageKey = std::uint64_t;
 ///       };
 ///       static MessageKey key_of(const InlierSet&);
 ///       static Encoded encode(const InlierSet&);
-///       static Decoded<InlierSet> decode(const Wire&, const TeamPeer&);  // trusts nothing in Wire
+///       static Decoded<InlierSet> decode(const Wire&, const TeamPeer&);  // checks all of Wire
 ///     };
 template <typename T>
 struct Codec;
 
-// The sequences of generated types, for all codecs.
+// Sequences of generated types, for all codecs.
 
 /// Points a sequence at `elements`, which it does not own: they outlive it and do not move.
 template <typename Sequence, typename T>

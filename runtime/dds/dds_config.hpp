@@ -7,8 +7,8 @@
 
 namespace km {
 
-/// Above it lie the ports that Linux assigns to any program (net.ipv4.ip_local_port_range, 32768 to
-/// 60999). A robot cannot join such a domain while a program uses one of the domain's ports.
+/// Highest domain below the ports that Linux assigns to any program (net.ipv4.ip_local_port_range,
+/// 32768 to 60999). A robot cannot join a domain while a program uses one of the domain's ports.
 inline constexpr unsigned kLastQuietDomain = 100;
 
 /// How robots find each other: by multicast on the link, or by a list of addresses.

@@ -32,11 +32,11 @@ inline dds_return_t check_dds(dds_return_t result, const std::string& purpose) {
   return result;
 }
 
-/// Owns a DDS entity and with it, as DDS has it, the entity's children.
+/// Owns a DDS entity and its children, which DDS deletes with it.
 class DdsEntity {
  public:
   DdsEntity() = default;
-  /// Takes what a dds_create_* call returned. Throws DdsError if that is an error.
+  /// Takes the result of a dds_create_* call. Throws DdsError if it is an error code.
   DdsEntity(dds_entity_t created, const std::string& purpose)
       : handle_(check_dds(created, "cannot create " + purpose)) {}
   ~DdsEntity() { reset(); }

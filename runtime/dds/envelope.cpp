@@ -32,8 +32,7 @@ WireSample::~WireSample() {
 }
 
 bool WireSample::read(std::span<const std::uint8_t> bytes) {
-  // DDS checks bounds in place, and turns numbers into the machine's, before it reads: in a copy,
-  // which is aligned as it assumes.
+  // An aligned copy, because DDS assumes alignment and converts the byte order in place.
   std::vector<std::uint64_t> aligned(bytes.size() / sizeof(std::uint64_t) + 1);
   std::ranges::copy(bytes, reinterpret_cast<std::uint8_t*>(aligned.data()));  // `bytes` may be
                                                                               // empty

@@ -13,7 +13,7 @@ namespace km {
 /// Bytes of an envelope (idl/envelope.idl) beside its content, DDS's encoding header included.
 inline constexpr std::size_t kEnvelopeBytes = 32;
 
-/// Bytes of an envelope as DDS sends it: the content is padded to 4.
+/// Bytes of an envelope as DDS sends it: the content is padded to a multiple of 4.
 [[nodiscard]] constexpr std::size_t envelope_bytes(std::size_t content_bytes) {
   return kEnvelopeBytes + (content_bytes + 3) / 4 * 4;
 }

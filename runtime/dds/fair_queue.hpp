@@ -33,7 +33,7 @@ class FairQueue {
  public:
   explicit FairQueue(QueueQuota quota) : quota_(quota) {}
 
-  /// False if `peer` has no room: one message was dropped, this one or its oldest.
+  /// False if the queue of `peer` is full. Then this message, or the oldest ones, are dropped.
   bool push(RobotId peer, Message message, std::size_t bytes, double now_s) {
     Line& line = peers_.try_emplace(peer, quota_, now_s).first->second;
     bool fits = has_room(line, bytes);
@@ -106,7 +106,7 @@ class FairQueue {
 
   QueueQuota quota_;
   std::map<RobotId, Line> peers_;
-  RobotId last_ = 0;  // served
+  RobotId last_ = 0;  // peer that was served last
   std::size_t size_ = 0;
 };
 

@@ -17,16 +17,16 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kMaxStreams = 4096;  // boots of robots remembered per topic
-// Time to wait until a writer becomes known. DDS may deliver messages before it announces their
-// robot. A robot that is killed and started again waits until its former process counts as lost.
+constexpr std::size_t kMaxStreams = 4096;  // senders whose message numbers a topic stores
+// Maximum time for which a message waits until its writer is known. DDS may deliver messages before
+// it announces their robot. A restarted robot is not accepted until its former process is lost.
 constexpr double kPatience_s = 8.0;
 constexpr double kRetry_s = 0.1;
 constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};
 constexpr std::size_t kFilingBytes = 256;  // bytes of bookkeeping per message
 
-// An envelope in the form in which DDS reads it, with a count and its elements.
+// A deserialised envelope; the destructor frees it.
 class ReceivedEnvelope {
  public:
   explicit ReceivedEnvelope(const ddsi_serdata& serialized)
@@ -183,7 +183,7 @@ void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid&
 }
 
 // Handles a status of a participant that is not (yet) the robot it claims to be. The status of a
-// twin states how long that has been running; in a team with keys the seal identifies its sender.
+// twin states how long the twin has been running. In a team with keys the seal proves the sender.
 void IncomingTopic::receive_claim(const ddsi_serdata& serialized, const Guid& writer,
                                   const Peers::Claim& claim, double now_s) {
   if (spec_.kind != TopicKind::kStatus) return;
@@ -296,8 +296,7 @@ IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, c
 // Returns the reason of a refusal, otherwise null. A duplicate is dropped without a reason.
 const char* IncomingTopic::pass_to_handler(const km_wire_Envelope& envelope, const Filed& filed,
                                            std::span<const std::uint8_t> content) {
-  std::shared_ptr<void> token = in_flight_->enter();  // before the check who is current, because it
-                                                      // may wait
+  std::shared_ptr<void> token = in_flight_->enter();  // before is_current(), because it may wait
   if (TeamPeer{envelope.robot, envelope.boot} != filed.sender) return "claims another robot's id";
   if (!spec_.carries_keys && !peers_.is_current(filed.sender))
     return "from a former process of its robot";

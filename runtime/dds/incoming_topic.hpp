@@ -59,11 +59,11 @@ class IncomingTopic {
                 const QueueQuota& quota, Handler handler);
   ~IncomingTopic();
 
-  // The gate: for the receive thread.
+  // The gate, called by the receive thread.
 
-  /// Triggers while there is something to take.
+  /// DDS condition that triggers while take() has messages to read.
   [[nodiscard]] dds_entity_t condition() const { return condition_.handle(); }
-  /// Files everything there is.
+  /// Files all received messages.
   void take(double now_s);
   /// Files the messages whose writer has become known. Call at intervals.
   void recall(double now_s);
@@ -90,8 +90,8 @@ class IncomingTopic {
     TeamPeer sender;
     Guid writer{};
   };
-  // Parts of a message that are ready to read. `content`, if it opened, is the envelope's or that
-  // of `how`.
+  // Result of opening a message. `content` refers to the envelope or, if that was sealed, to
+  // `how.content`.
   struct Readable {
     Opened how;
     std::span<const std::uint8_t> content;
@@ -122,8 +122,8 @@ class IncomingTopic {
   const bool addressed_;
   Handler handler_;
   WriterBook writers_;
-  WaitingRooms<Guid, Serdata> waiting_;  // receive thread only: whose writers are not known
-  WaitingRooms<RobotId, Filed> sealed_;  // delivery only: for which a key is missing
+  WaitingRooms<Guid, Serdata> waiting_;  // receive thread only: messages of unknown writers
+  WaitingRooms<RobotId, Filed> sealed_;  // delivery only: messages whose key is missing
   double started_s_ = 0.0;
 
   mutable std::mutex mutex_;  // guards the filed messages and the counts

@@ -35,7 +35,7 @@ bool OutgoingTopic::is_kept() const {
   return is_sealed() && (spec_.kind == TopicKind::kEvent || spec_.kind == TopicKind::kState);
 }
 
-// nullopt if the addressee does not exist.
+// nullopt if the addressee is unknown, or if its incarnation has ended.
 std::optional<TeamPeer> OutgoingTopic::receiver_of(const Addressee& addressee) const {
   if (spec_.carries_keys) return TeamPeer{addressee.robot, 0};
   const auto current = peers_.current(addressee.robot);
@@ -134,8 +134,8 @@ void OutgoingTopic::send(Writer& writer, MessageKey key, Octets content) {
   for (const Guid& reader : writer.readers) writer.sent_to[reader].add(size);
 }
 
-// Keeps the newest message of a state. Requests soon expire, so they count only for the first
-// reader.
+// For a state, counts only the newest message of each key. Requests soon expire, so they count only
+// for the first reader.
 void OutgoingTopic::add_to_history(Writer& writer, MessageKey key, std::uint64_t bytes) const {
   if (spec_.kind == TopicKind::kStatus) return;
   if (spec_.kind == TopicKind::kRequest && !writer.readers.empty()) return;
@@ -164,7 +164,7 @@ std::vector<RobotId> OutgoingTopic::readers_of(std::optional<Addressee> addresse
   return robots;
 }
 
-// Null, or why it cannot be sealed.
+// Returns null, or the reason why the content cannot be sealed.
 const char* OutgoingTopic::seal(const Writer& writer, const km_wire_Envelope& head,
                                 Octets& content) const {
   if (!is_sealed()) return nullptr;
@@ -176,7 +176,7 @@ const char* OutgoingTopic::seal(const Writer& writer, const km_wire_Envelope& he
   return nullptr;
 }
 
-// Called on the writing thread only, as readers_ is used by it alone.
+// Called on the writing thread only, because Writer::readers belongs to it.
 void OutgoingTopic::refresh_readers(Writer& writer) {
   dds_publication_matched_status_t status{};
   dds_get_publication_matched_status(writer.writer.handle(), &status);

@@ -64,8 +64,8 @@ class OutgoingTopic {
   /// without known keys, events and states wait; other messages are dropped, counted and logged.
   void write(std::optional<Addressee> addressee, MessageKey key, Octets content);
 
-  /// The robot is present, perhaps as another process: sends the messages that wait for it, and
-  /// those that its incarnation was sent before.
+  /// In a team with keys, sends the kept messages that the present process of `robot` does not
+  /// have. Call when it appears.
   void catch_up(RobotId robot);
 
   /// Robots that would receive a message written now. An addressee counts before its reader is
@@ -77,13 +77,13 @@ class OutgoingTopic {
   /// Counts the stored messages that DDS has sent to new readers by itself.
   void notice_readers();
 
-  /// Whether such have been noticed since the last call, by whatever was done here.
+  /// True if any member function has noticed such readers since the last call.
   [[nodiscard]] bool take_newcomers() { return std::exchange(newcomers_, false); }
 
   /// Bytes sent so far, counted once per reader and retransmission.
   [[nodiscard]] std::uint64_t sent_bytes() const;
 
-  /// Waits until every matched reader has everything. False on timeout.
+  /// Waits until every matched reader has acknowledged all messages. False on timeout.
   bool wait_for_acks(std::chrono::nanoseconds timeout);
 
   void add_to(TrafficSnapshot& snapshot) const;
@@ -96,16 +96,15 @@ class OutgoingTopic {
     DdsEntity publisher;
     DdsEntity writer;
     std::unique_ptr<dds_statistics, StatisticsDeleter> statistics;
-    std::optional<TeamPeer> receiver;  // none: all
+    std::optional<TeamPeer> receiver;  // empty: all robots
     std::string partition;
     std::map<std::string, std::uint32_t> next_number;  // by partition, because a process may return
     std::vector<Guid> readers;                         // participants of the matched readers
     std::map<MessageKey, Octets> kept;                 // messages to be sealed for the next process
-    std::set<MessageKey> due;                          // messages of these that this process still
-                                                       // needs
+    std::set<MessageKey> due;                          // messages in `kept` that the process lacks
     TrafficCount written;
     TrafficCount history;                        // messages that DDS sends to a new reader
-    std::map<MessageKey, std::uint64_t> newest;  // bytes of a state in it
+    std::map<MessageKey, std::uint64_t> newest;  // bytes of each state in `history`
     std::uint64_t failures = 0;
     std::map<Guid, TrafficCount> sent_to;
   };

@@ -62,8 +62,8 @@ int discovery_port(int domain, int index) {
   return 7400 + 250 * domain + 10 + 2 * index;
 }
 
-// Asks all ports of this host, because that costs nothing on the network. On other hosts each port
-// costs a packet on the air.
+// Writes this host without ports, so that DDS asks all of its ports, which costs nothing on the
+// network. On other hosts each port costs a packet, so only robots_per_peer ports are listed.
 void write_peers(std::ostream& xml, const DdsConfig& config, const std::string& own_address) {
   xml << "<Peers><Peer address='" << own_address << "'/>";
   for (const std::string& peer : config.peers) {

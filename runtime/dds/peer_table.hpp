@@ -44,10 +44,10 @@ enum class Standing {
   kUnknown,   ///< No data are known yet.
   kOutsider,  ///< Not a robot, or refused.
   kTwin,      ///< Claims this robot's id.
-  kRival,     ///< Claims the id of a present robot, or has not been received itself.
-  kArriving,  ///< The robot of its id, but not all nodes know yet that its former incarnation has
+  kRival,     ///< Claims the id of another known process, or is not present yet.
+  kArriving,  ///< Owner of its robot id, but not all nodes know yet that the former incarnation has
               ///< ended.
-  kAdmitted,  ///< The robot of its id.
+  kAdmitted,  ///< Owner of its robot id.
 };
 
 struct PeerEvent {
@@ -63,14 +63,15 @@ struct PeerEvent {
 ///
 /// A robot is present while its participant's user data is accepted and its status writer alive;
 /// the expiry of the participant (dds.lease_s) changes nothing. An id belongs to the first process
-/// that is received with it, as long as that is received; then to the next. Not thread-safe.
+/// that is received with it, as long as this process is received; then to the next process. Not
+/// thread-safe.
 class PeerTable {
  public:
   static constexpr std::size_t kMaxRobots = 64;
   static constexpr std::size_t kMaxParticipants = 1024;
 
-  /// Decides by the credentials whether a robot is accepted: null, or the reason of a refusal (a
-  /// string literal).
+  /// Decides by the credentials whether a robot is accepted. Returns null, or the reason of a
+  /// refusal (a string literal).
   using Admit =
       std::function<const char*(const RobotIdentity& identity, std::string_view credentials)>;
 
@@ -82,9 +83,9 @@ class PeerTable {
   /// A robot that this robot met in a former process: it is lost until it is received.
   void recall(const RobotIdentity& identity);
 
-  /// Other robots receive this robot, or have received it. Their report counts if it is not
-  /// received here directly: kReported if it is new, kResumed or kRestarted if another process of
-  /// it was known.
+  /// Handles a report of other robots about a robot that this one does not receive directly. The
+  /// event is kReported for a new robot, and kResumed or kRestarted if another process of it was
+  /// known.
   void reported(const RobotIdentity& identity);
 
   /// A participant announced itself (again) with this user data.

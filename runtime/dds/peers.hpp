@@ -16,8 +16,8 @@
 
 namespace km {
 
-/// Participant of each writer of a topic, stored when DDS matches the writer. Messages of a writer
-/// that is gone are thus still attributed to its robot. Thread-safe.
+/// Participant of each writer of a topic, stored when DDS matches the writer. Messages of a removed
+/// writer are thus still attributed to its robot. Thread-safe.
 class WriterBook {
  public:
   WriterBook();
@@ -38,7 +38,7 @@ class WriterBook {
   std::deque<dds_instance_handle_t> gone_;  // oldest first
 };
 
-/// Knows when all subscribers are done with an event. Thread-safe.
+/// Detects when all subscribers have released an event. Thread-safe.
 class EventReceipts : public std::enable_shared_from_this<EventReceipts> {
  public:
   /// Returns the event; take() returns its process once all copies of the event are released.
@@ -87,7 +87,8 @@ class Peers {
   [[nodiscard]] bool is_current(const TeamPeer& sender) const;
   [[nodiscard]] std::optional<TeamPeer> current(RobotId robot) const;
 
-  /// Processes whose credentials were admitted since the last call: they need this one's key.
+  /// Processes whose credentials were admitted since the last call: they need the key of this
+  /// process.
   [[nodiscard]] std::vector<TeamPeer> take_admitted();
 
   /// See PeerTable.
@@ -96,11 +97,11 @@ class Peers {
 
   // For the bridge.
 
-  /// For the listener of the status reader; and who its writers are.
+  /// Prepares the listener of the status reader, and stores the writers of the status topic.
   void listen(dds_listener_t* listener);
   void watch(const WriterBook& status_writers) { status_writers_ = &status_writers; }
 
-  /// Entities to wait for; when one triggers, or now and then, poll().
+  /// Call poll() when one of these conditions triggers, and at intervals.
   [[nodiscard]] dds_entity_t discovery_condition() const { return discovered_.handle(); }
   [[nodiscard]] dds_entity_t liveliness_condition() const { return liveliness_changed_.handle(); }
   void poll();
@@ -113,7 +114,7 @@ class Peers {
   struct LivelinessChange {
     dds_instance_handle_t writer = 0;
     int alive = 0;      // change in the number of living writers
-    int not_alive = 0;  // and of silent ones
+    int not_alive = 0;  // change in the number of silent writers
     int attempts = 0;
   };
   static void on_liveliness_changed(dds_entity_t reader, dds_liveliness_changed_status_t status,

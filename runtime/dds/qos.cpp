@@ -42,12 +42,12 @@ DdsQos make_writer_qos(TopicKind kind, const DdsConfig& config) {
 
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
   dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
-  // The history kept for robots that join later is this one, not the one above.
+  // Robots that join later receive this history; the history above does not apply to them.
   dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
                               DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   // A volatile request would be lost if it were the first to its addressee and overtook the
-  // discovery of its writer. A lifespan instead: DDS measures it from the arrival, so that the
-  // clocks of the robots need not agree.
+  // discovery of its writer. A lifespan bounds its age. DDS measures it from the arrival, so that
+  // the clocks of the robots need not agree.
   if (kind == TopicKind::kRequest) dds_qset_lifespan(qos, nanoseconds_of(config.lease_s));
   return owner;
 }

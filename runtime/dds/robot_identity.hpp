@@ -30,8 +30,8 @@ struct Announcement {
 /// Inverse of to_user_data() for untrusted bytes. Unknown keys are ignored.
 [[nodiscard]] Decoded<Announcement> parse_user_data(std::string_view bytes);
 
-/// True if the bytes claim to be a robot's at all; other programs on the domain are not our
-/// business.
+/// True if the bytes have the form of a robot's announcement. Announcements of other programs are
+/// ignored.
 [[nodiscard]] bool claims_to_be_a_robot(std::string_view bytes);
 
 }  // namespace km

@@ -17,8 +17,8 @@
 
 namespace km {
 
-/// kFinished: its input has ended. kSettled: and its graph has, as far as it knows. kLeaving: about
-/// to end.
+/// kFinished: its input has ended. kSettled: additionally, its pose graph does not change any more.
+/// kLeaving: about to end.
 enum class RobotPhase { kRunning, kFinished, kSettled, kLeaving };
 
 /// "running", "finished", "settled", "leaving".
@@ -31,8 +31,9 @@ struct RobotStatus {
   RobotPhase phase = RobotPhase::kRunning;
   double dataset_time_s = 0.0;  ///< Time since the start of the robot's input.
   std::uint32_t keyframes = 0;
-  /// Robots fewer links away than this have settled; 0: not even this one. It is one more than the
-  /// smallest number of the neighbours, so that robots wait also for distant ones.
+  /// All robots fewer than this number of links away have settled; 0: this robot has not settled.
+  /// It is one more than the smallest number of the neighbours, so robots also wait for distant
+  /// robots.
   std::uint8_t settled_links = 0;
   std::uint64_t boot = 0;  ///< Boot id of the sending process.
   RelaySummary relay = {};

@@ -29,8 +29,8 @@ class RosNetwork {
   /// ROS_DOMAIN_ID.
   [[nodiscard]] int domain() const { return ros_domain_; }
 
-  /// A type of messages, as DDS has it, by ROS 1's or ROS 2's name of it: "sensor_msgs/Image",
-  /// "sensor_msgs/msg/Image". Throws std::invalid_argument for others than known_ros_types().
+  /// DDS descriptor of a message type, named as in ROS 1 or ROS 2: "sensor_msgs/Image",
+  /// "sensor_msgs/msg/Image". Throws std::invalid_argument for types outside known_ros_types().
   [[nodiscard]] static const dds_topic_descriptor_t& descriptor_of(std::string_view type);
 
   /// A DDS topic for ROS' `topic`. Throws DdsError and std::invalid_argument for an unknown type.

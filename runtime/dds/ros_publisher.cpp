@@ -11,7 +11,7 @@ namespace km {
 namespace {
 
 // DDS gives access to the type that it makes of a descriptor only through a received message. So
-// one without content is sent over a topic that no other participant uses.
+// a message without content is sent over a topic that no other participant uses.
 ddsi_serdata* receive_blank(const RosNetwork& network, std::string_view type) {
   const dds_topic_descriptor_t& descriptor = RosNetwork::descriptor_of(type);
   std::string name = "kimera_multi/type/" + std::string(descriptor.m_typename);

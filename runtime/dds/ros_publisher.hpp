@@ -15,7 +15,7 @@ struct SerializedDeleter {
   void operator()(ddsi_serdata* serialized) const;
 };
 
-/// Publishes messages that are written already (see encode_ros()) on one topic of ROS 2.
+/// Publishes messages that are already encoded (see encode_ros()) on one topic of ROS 2.
 /// Thread-safe.
 class RosPublisher {
  public:

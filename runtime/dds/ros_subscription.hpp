@@ -22,7 +22,7 @@ struct RosTopic {
   std::string topic;  ///< "/camera/left/image_raw".
   std::string type;   ///< "sensor_msgs/msg/Image"
   RosQos qos = RosQos::kSensorData;
-  int depth = 10;  ///< Messages kept until next() takes them; the oldest go.
+  int depth = 10;  ///< Messages kept for next(); then the oldest are dropped.
 };
 
 /// A serialised message: CDR with its encapsulation header.
@@ -41,9 +41,9 @@ class RosSubscription {
   RosSubscription(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics);
 
   [[nodiscard]] const std::vector<RosTopic>& topics() const { return topics_; }
-  /// Waits for a message. Nullopt after stop() and give_up_after().
+  /// Waits for a message. nullopt after stop(), or when the time of give_up_after() has passed.
   [[nodiscard]] std::optional<RosMessage> next();
-  /// Messages of a topic that came too fast for DDS or for next(), since that was called first.
+  /// Messages of a topic lost since the first next(), because they arrived too fast.
   [[nodiscard]] std::uint64_t lost(std::size_t topic) const;
 
   /// Ends next() when this time [s] has passed from now.

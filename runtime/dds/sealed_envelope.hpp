@@ -11,15 +11,15 @@
 namespace km {
 
 /// The seal of an envelope's content also covers the topic, the participant that writes it, the
-/// envelope's head, and the addressee. So a replayed envelope opens neither on another topic nor
-/// from another participant.
+/// envelope's head, and the addressee. So a replayed envelope cannot be opened on
+/// another topic or from another participant.
 class SealedEnvelope {
  public:
   /// `head` is copied; its content is not looked at. `addressee`: none for a message to all.
   SealedEnvelope(const std::string& topic, const Guid& writer, const km_wire_Envelope& head,
                  std::optional<TeamPeer> addressee);
 
-  /// Valid as long as this.
+  /// The result refers to this object.
   [[nodiscard]] SealContext context() const;
 
  private:

@@ -8,13 +8,13 @@ namespace {
 // A slightly negative balance counts as no debt, because sums of doubles do not reach zero exactly.
 constexpr double kNoDebt_bytes = -1e-3;
 
-// It begins empty: a run's first second is no exception.
+// The bucket begins empty, so that the limit also holds in the first second of a run.
 std::optional<TokenBucket> limit(double per_second) {
   if (per_second <= 0.0) return std::nullopt;
   return TokenBucket(per_second, SendBudget::kBurst_s * per_second, 0.0);
 }
 
-// Share of the run's total that messages of this priority and lower ones may use together.
+// Messages of this priority are sent while all sent bytes are below this share of the run's total.
 double share_of_run(SendPriority priority) {
   switch (priority) {
     case SendPriority::kPresence:

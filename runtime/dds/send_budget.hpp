@@ -31,7 +31,7 @@ class SendBudget {
   [[nodiscard]] std::optional<double> wait_s(SendPriority priority, std::uint64_t bytes,
                                              std::span<const RobotId> readers, double now_s);
 
-  /// Charges such a message to the budget.
+  /// Charges a message of `bytes` to each of `readers` to the budget.
   void spend(SendPriority priority, std::uint64_t bytes, std::span<const RobotId> readers,
              double now_s);
 

@@ -9,7 +9,7 @@ namespace km {
 /// Order of sending when the budget is short, most important first.
 enum class SendPriority {
   kPresence,      ///< Statuses: small, and always sent.
-  kClosures,      ///< Sent once; they join robots.
+  kClosures,      ///< Closures: sent once, and needed to join robots.
   kVerification,  ///< Requests for keyframes, and replies.
   kPoses,         ///< All messages of the pose graph.
   kWords,         ///< Bags of words.
@@ -18,7 +18,8 @@ enum class SendPriority {
 };
 inline constexpr std::size_t kSendPriorities = 7;
 
-/// Priority of a topic: never kBacklog. An event of verification is a closure.
+/// Priority of a topic, never kBacklog. A topic of geometric verification has the priority
+/// kClosures if its kind is kEvent, otherwise kVerification.
 [[nodiscard]] constexpr SendPriority priority_of(TopicKind kind, TrafficCategory category) {
   if (kind == TopicKind::kStatus) return SendPriority::kPresence;
   switch (category) {

@@ -41,11 +41,11 @@ class SendSchedule {
   struct Entry {
     TopicId topic = {};
     SendPriority priority = SendPriority::kMesh;
-    bool newest_wins = false;        ///< It replaces one with its topic, `to` and `key`.
+    bool newest_wins = false;        ///< Replaces a message with equal topic, `to` and `key`.
     std::optional<RobotId> to = {};  ///< Empty: all.
     std::uint64_t key = 0;
-    std::uint64_t bytes = 0;                                    ///< As sent to one reader.
-    double useful_s = std::numeric_limits<double>::infinity();  ///< Later it is dropped.
+    std::uint64_t bytes = 0;                                    ///< Size as sent to one reader.
+    double useful_s = std::numeric_limits<double>::infinity();  ///< Maximum age [s].
     Message message = {};
   };
 
@@ -89,7 +89,7 @@ class SendSchedule {
       while (!lane.messages.empty()) drop_front(lane);
   }
 
-  /// By topic; of those with nothing held back there may be none.
+  /// Counts by topic; topics without held-back messages may be absent.
   [[nodiscard]] const std::map<TopicId, HeldBack>& held_back() const { return held_; }
 
   [[nodiscard]] bool is_limited() const { return limited_; }
@@ -99,14 +99,14 @@ class SendSchedule {
   struct Waiting {
     Entry entry;
     double since_s = 0.0;
-    std::uint64_t stops = 0;                  // stops of its lane at its arrival
+    std::uint64_t stops = 0;                  // Lane::stops at the arrival of the message
     SendPriority lane = SendPriority::kMesh;  // lane in which it waits
   };
   struct Lane {
     SendPriority priority = SendPriority::kPresence;
     std::list<Waiting> messages = {};
     std::uint64_t bytes = 0;
-    std::uint64_t stops = 0;  // how often the budget has stopped it
+    std::uint64_t stops = 0;  // number of times the budget has stopped this lane
   };
   using Place = typename std::list<Waiting>::iterator;
   using Name = std::tuple<TopicId, std::optional<RobotId>, std::uint64_t>;
@@ -123,7 +123,8 @@ class SendSchedule {
     return {entry.topic, entry.to, entry.key};
   }
 
-  // In the place of the one it replaces, so that what changes often has its turn, too.
+  // The new message takes the place of the replaced one, so that a state that changes often is also
+  // sent.
   bool replace(Entry& entry) {
     const auto found = newest_.find(name_of(entry));
     if (found == newest_.end()) return false;
@@ -151,7 +152,7 @@ class SendSchedule {
     drop_surplus(backlog);
   }
 
-  // Whether the first of a lane may go; those that never may are dropped.
+  // True if the first message of a lane may be sent. Drops messages that may never be sent.
   template <typename ReadersOf>
   bool may_go(Lane& lane, double now_s, const ReadersOf& readers_of) {
     while (!lane.messages.empty()) {

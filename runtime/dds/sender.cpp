@@ -85,8 +85,8 @@ void Sender::catch_up_due() {
     for (const auto& topic : topics_) topic->catch_up(robot);
 }
 
-// Files the messages posted so far, but no more than leaves time to send. Without a budget, posting
-// threads wait for room; with a budget, the schedule makes room.
+// Files the posted messages, but only a few at once, so that sending continues. Without a budget,
+// posting threads wait for room; with a budget, the schedule makes room.
 void Sender::file_posted() {
   constexpr int kAtOnce = 64;
   for (int k = 0; k < kAtOnce && (schedule_.is_limited() || schedule_.size() < kQueue); ++k) {
@@ -96,7 +96,7 @@ void Sender::file_posted() {
   }
 }
 
-// False if nothing may go now.
+// False if no message may be sent now.
 bool Sender::send_next() {
   const double now_s = steady_now_s();
   settle(now_s);

@@ -21,7 +21,7 @@
 
 namespace km {
 
-/// A message on its way out.
+/// A message to be sent.
 struct Outgoing {
   OutgoingTopic* topic = nullptr;
   std::optional<Addressee> to = {};  ///< Empty: all.
@@ -34,7 +34,7 @@ struct Outgoing {
 /// all of them to a new reader at once.
 class Sender {
  public:
-  /// How many messages may wait to be encoded; who posts one more waits.
+  /// Number of messages that may wait to be encoded; then post() waits.
   static constexpr std::size_t kQueue = 8192;
 
   /// `topics` are all topics of its messages, and outlive it; the list may grow until start().
@@ -56,8 +56,7 @@ class Sender {
   /// Thread-safe.
   void post(Outgoing message);
 
-  /// Has `robot` sent what the topics keep for it, see OutgoingTopic::catch_up(). Waits for
-  /// nothing. Thread-safe.
+  /// Requests OutgoingTopic::catch_up() of every topic for `robot`. Does not wait. Thread-safe.
   void catch_up(RobotId robot);
 
   /// True while messages wait for the budget. Thread-safe.
@@ -68,7 +67,7 @@ class Sender {
   /// The exception that ended the thread, or null. Thread-safe.
   std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
   Heartbeat& heartbeat() { return heartbeat_; }
-  /// Time of encoding and writing each message. Thread-safe.
+  /// Durations of encoding and writing each message. Thread-safe.
   DurationHistogram timing() const { return timing_.histogram(); }
 
  private:
@@ -91,7 +90,7 @@ class Sender {
   const std::vector<std::unique_ptr<OutgoingTopic>>& topics_;
   const OutgoingTopic* beside_;
   BoundedQueue<Outgoing> posted_;
-  Schedule schedule_;  // the thread's own, as what follows
+  Schedule schedule_;  // used by the thread only, up to loss_reported_
   double settled_s_ = 0.0;
   bool delay_reported_ = false, loss_reported_ = false;
   std::atomic<bool> holds_back_ = false;

@@ -13,7 +13,7 @@ class SequenceTracker {
  public:
   static constexpr std::size_t kMaxIntervals = 1024;
 
-  /// `from_zero`: the stream is expected whole, else from the lowest number that arrives.
+  /// `from_zero`: numbers from 0 on are expected, otherwise from the lowest number that arrives.
   explicit SequenceTracker(bool from_zero) : from_zero_(from_zero) {}
 
   /// Records `number`. False if it had arrived before.

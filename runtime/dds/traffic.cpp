@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-// As of now; all else adds up.
+// The only direction whose counts are present values; all others are cumulative.
 constexpr const char* kWaiting = "waiting";
 
 }  // namespace
@@ -22,7 +22,7 @@ TrafficCsv::TrafficCsv(std::ostream& output, std::string_view former) : output_(
   if (former.empty())
     output_ << "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n";
   for (const TextRow& row : split_rows(former)) {
-    constexpr std::size_t kSubject = 4;  // fields, behind the time
+    constexpr std::size_t kSubject = 4;  // fields of a Subject, after the time
     Counts counts{};
     if (row.fields.size() != 1 + kSubject + counts.size()) continue;
     Subject subject(row.fields[1]);

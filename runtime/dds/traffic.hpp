@@ -34,11 +34,11 @@ struct TrafficCount {
 };
 
 /// Effect of the budget on the messages of one topic since the start, see SendSchedule. Bytes count
-/// once per message, independent of the number of receivers. The published messages are the sum of
-/// those sent at once and of all of these.
+/// once per message, independent of the number of receivers. Each published
+/// message was sent at once or is counted in one of these fields.
 struct HeldBack {
-  TrafficCount delayed;     ///< Sent later than possible.
-  TrafficCount waiting;     ///< Waiting now: for the budget, or for a receiver.
+  TrafficCount delayed;     ///< Sent after waiting for the budget.
+  TrafficCount waiting;     ///< Waiting now for the budget or for a receiver.
   TrafficCount superseded;  ///< Never sent: replaced by a newer state.
   TrafficCount dropped;     ///< Never sent: no budget, no room, too late, or the end of the run.
 
@@ -52,27 +52,28 @@ struct PeerTraffic {
   Direction direction = Direction::kOut;
   std::optional<RobotId> peer;  ///< Empty: a reader that is no robot of the team, or all peers.
   TrafficCount count;           ///< Out: once per reader matched when it was written.
-  std::uint64_t retransmitted_bytes = 0;  ///< Out only; of a topic to all it has no single peer.
+  std::uint64_t retransmitted_bytes = 0;  ///< Out; for a topic to all, in the row without peer.
 };
 
-/// Traffic on one topic in one direction since the start.
+/// Traffic on one topic in one direction since the start. Fields marked Out or In are zero in the
+/// other direction.
 struct TopicTraffic {
   std::string topic;
   TrafficCategory category = TrafficCategory::kOther;
   Direction direction = Direction::kOut;
   TrafficCount count;            ///< Out: once per message. In: new messages from known robots.
-  std::uint64_t duplicates = 0;  ///< In: arrived before.
-  std::uint64_t missing = 0;     ///< In: numbers not arrived (yet), overtaken states included.
-  std::uint64_t failures = 0;    ///< Out: refused by DDS.
-  HeldBack held = {};            ///< Out.
-  std::map<std::string, std::uint64_t> refused;  ///< In: by reason.
+  std::uint64_t duplicates = 0;  ///< In: messages that had arrived before.
+  std::uint64_t missing = 0;     ///< In: numbers that have not arrived, also of replaced states.
+  std::uint64_t failures = 0;    ///< Out: messages that could not be written.
+  HeldBack held = {};            ///< Out: effect of the budget.
+  std::map<std::string, std::uint64_t> refused;  ///< In: number of refused messages by reason.
 };
 
 struct TrafficSnapshot {
   std::vector<PeerTraffic> peers;
   std::vector<TopicTraffic> topics;
 
-  /// Bytes of a category, over all topics and peers; sent ones with their retransmissions.
+  /// Bytes of a category over all topics and peers, with retransmissions.
   [[nodiscard]] std::uint64_t bytes(Direction direction, TrafficCategory category) const;
 };
 
@@ -90,7 +91,7 @@ class TrafficCsv {
  private:
   // Messages, bytes, retransmitted bytes.
   using Counts = std::array<std::uint64_t, 3>;
-  // "out,bow_vectors,place_recognition,7": what the counts of a row are of.
+  // Direction, topic, category and peer of a row: "out,bow_vectors,place_recognition,7".
   using Subject = std::string;
 
   void append(double time_s, const std::string& direction, const PeerTraffic& row);

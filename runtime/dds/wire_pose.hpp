@@ -22,7 +22,7 @@ inline constexpr double kUnitQuaternionTolerance = 1e-3;
 /// No robot is farther than this from the origin of a frame [m]; a larger number is refused.
 inline constexpr double kMaxWireTranslation_m = 1e7;
 
-/// The largest element of a covariance that is still a covariance [rad^2, m^2].
+/// Largest magnitude of an element of an accepted covariance [rad^2, m^2].
 inline constexpr double kMaxWireVariance = 1e14;
 
 inline km_wire_KeyframeRef to_wire(const KeyframeId& id) {
@@ -56,7 +56,7 @@ inline km_wire_Covariance to_wire(const Matrix6& Sigma) {
   return wire;
 }
 
-/// Accepts semi-definite matrices, zero included: what the first keyframe of a chain has.
+/// Accepts semi-definite matrices, also zero: the covariance of the first keyframe of a chain.
 inline std::optional<Matrix6> from_wire(const km_wire_Covariance& wire) {
   Matrix6 Sigma;
   int k = 0;
