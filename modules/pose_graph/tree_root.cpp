@@ -134,7 +134,6 @@ DownMessage TreeRoot::start(bool deferred, const TreeSums& sums) {
   weighing_ = schedule_.decided()  ? Weighing::kDecided
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
-  confirmed_ = schedule_.decided();
   DownMessage message = answer(Next::kStart);
   message.verdict.deferred = deferred;
   return message;
@@ -173,10 +172,8 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
   // Weights are decided before the poses have converged. If the converged poses contradict them,
   // closures are weighed again.
-  if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen()) {
+  if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
     last_decrement_.reset();
-    confirmed_ = false;
-  }
   // If the weights were decided before this pass up, its equations are the final ones, unless pairs
   // were still limited.
   const bool decided = schedule_.decided();
@@ -184,11 +181,9 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   weighing_ = decided              ? Weighing::kDecided
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
-  // Old second derivatives may be too stiff along a soft mode of the team, such as a tunnel, and
-  // then hide a decrease. Once the weights are decided, new ones have to confirm the end.
-  if ((decided && small && unlimited && confirmed_) || round_ + 1 >= options_.max_rounds)
+  if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds)
     return answer(Next::kDone);
-  if (decided && (worth_refreshing(decrement_) || (small && unlimited && !confirmed_))) {
+  if (decided && worth_refreshing(decrement_)) {
     full_ = true;
     convex_ = false;
     return refresh(true, weighing_);
@@ -229,7 +224,6 @@ DownMessage TreeRoot::go_back() {
 DownMessage TreeRoot::refresh(bool accept, Weighing weighing) {
   if (convex_) full_ = false;
   weighing_ = weighing;
-  confirmed_ = confirmed_ || weighing == Weighing::kDecided;
   at_base_ = true;
   stale_ = false;
   length_ = 1.0;
