@@ -156,7 +156,8 @@ class Bystander {
     return to_guid(guid);
   }
 
-  // Adds the participants that DDS has discovered so far.
+  // Adds the robots that DDS has discovered since the last call. Participants that do not claim to
+  // be robots are ignored.
   void take(std::vector<Announced>& received) {
     for_each(participants_, [&](const dds_sample_info_t& info, const void* sample) {
       const auto& found = *static_cast<const dds_builtintopic_participant_t*>(sample);
@@ -224,6 +225,7 @@ class Bystander {
 };
 
 constexpr std::size_t kEchoes = 20;
+constexpr std::size_t kEchoesUnanswered = 4;  // a host that answers none of these is silent
 
 std::uint16_t checksum(const std::vector<std::uint8_t>& bytes) {
   std::uint32_t sum = 0;
@@ -260,7 +262,8 @@ PeerEcho ask(const std::string& host) {
   echo.may_ask = socket.has_value();
   if (!socket || !address) return echo;
   std::vector<double> times_s;
-  for (; echo.sent < kEchoes; ++echo.sent) {
+  const auto is_silent = [&] { return times_s.empty() && echo.sent >= kEchoesUnanswered; };
+  for (; echo.sent < kEchoes && !is_silent(); ++echo.sent) {
     const std::vector<std::uint8_t> data = own_bytes();
     const double start_s = steady_now_s();
     if (socket->send(*address, 0, echo_request(data))) continue;
@@ -270,7 +273,6 @@ PeerEcho ask(const std::string& host) {
       times_s.push_back(steady_now_s() - start_s);
       break;
     }
-    if (times_s.empty() && echo.sent >= 3) return echo;  // no reply to four requests
   }
   echo.received = times_s.size();
   if (times_s.empty()) return echo;

@@ -64,7 +64,8 @@ struct MappingSummary {
   std::uint64_t gave_way = 0;  ///< Frames left out because processors were short.
   std::uint64_t skipped_wrong_size = 0, skipped_bad_pose = 0, skipped_too_late = 0;
   std::uint64_t without_labels = 0, label_pixels_outside_palette = 0;
-  std::uint64_t blocks_refused = 0;  ///< Blocks beyond semantic_mapping.max_blocks.
+  std::uint64_t blocks_refused =
+      0;  ///< Requests for blocks that the map refused, over all frames (see NearBlocks).
   std::uint64_t blocks = 0, vertices = 0, faces = 0, superseded_faces_dropped = 0;
   std::uint64_t corrections = 0, moves_as_a_whole = 0;
   double correction_seconds = 0.0;

@@ -15,7 +15,7 @@ struct PageMessage {
   std::string bytes;
 };
 
-/// An update for the page: an object with n (`number`), t (time of reception [ms since 1970]),
+/// An update for the page: an object with n (`number`), t (time of sending [ms since 1970]),
 /// robot, boot (hexadecimal), kind ("state", "pose", "keyframes", "closures", "mesh", "image") and
 /// the members of the content under their names. Poses are [x, y, z, qx, qy, qz, qw] to 0.1 mm and
 /// 1e-5. Meshes and images are binary, little-endian: length of the object [u32], the object,

@@ -222,7 +222,8 @@ class PageServer::Impl {
     page->sender = std::thread([this, connection, page] { send_messages(connection, *page); });
   }
 
-  // A text frame holds an array of messages, or the hello message.
+  // Each text frame is a JSON array of messages; the first one has only the hello message. Each
+  // binary message has a frame of its own.
   void send_messages(mg_connection* connection, const Page& page) {
     if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.hello + ']')) return;
     ViewStore::Cursor cursor;

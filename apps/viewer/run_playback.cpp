@@ -346,7 +346,8 @@ class RobotPlayback {
   RobotTimes times_;
   std::vector<ViewUpdate>& updates_;
   double end_s_ = 0.0;
-  double joined_s_ = kNever_s;  // time of its first round with others
+  // Time of its first kept closure with another robot; infinite without rounds with others.
+  double joined_s_ = kNever_s;
   std::vector<double> round_times_s_;
 };
 

@@ -17,7 +17,7 @@ bool is_state_of_things(const auto& key) {
   return key && ((*key)[1] == kMesh || (*key)[1] == kKeyframes);
 }
 
-// Hash of the content, independent of the time of reception.
+// Hash of the update without its time of sending.
 std::size_t hash_of(ViewUpdate update) {
   update.sent = 0;
   return std::hash<std::string>{}(page_message(update, 0).bytes);

@@ -21,8 +21,8 @@ struct Camera {
   /// such bearing.
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector2d& bearing) const;
 
-  /// Pixel of a ray of any length in the camera frame [px]. nullopt also if the ray does not point
-  /// forward.
+  /// Distorted pixel of a ray of any length in the camera frame [px]; it may lie outside the image.
+  /// nullopt if the ray does not point forward or the lens has no such bearing.
   [[nodiscard]] std::optional<Eigen::Vector2d> project_ray(const Eigen::Vector3d& ray) const;
 
   /// Bearing of a distorted pixel [px]; nullopt if no bearing of the lens has that pixel.

@@ -56,7 +56,7 @@ class DenseSensor {
   /// SegmentationNetwork.
   DenseSensor(const StereoRig& rig, const DenseSensorConfig& config);
 
-  /// The left camera, or, with stereo matching, an ideal camera at its pose.
+  /// The left camera, or, with stereo matching, the ideal camera of StereoDepth::camera().
   [[nodiscard]] const Camera& camera() const { return stereo_ ? stereo_->camera() : left_; }
 
   DenseImages sense(const StereoFrame& frame);

@@ -60,7 +60,8 @@ class StereoDepth {
   /// Throws std::invalid_argument for a rig that StereoRectification refuses.
   StereoDepth(const StereoRig& rig, const StereoDepthConfig& config);
 
-  /// The camera of the depth images: without distortion, at the pose of the left one.
+  /// The camera of the depth images. It has no distortion, the position of the left camera, and the
+  /// orientation of the rectified images.
   [[nodiscard]] const Camera& camera() const { return rectification_.camera(); }
   [[nodiscard]] const StereoRectification& rectification() const { return rectification_; }
 

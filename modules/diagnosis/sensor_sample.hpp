@@ -51,7 +51,8 @@ struct SensorSample {
   std::vector<StereoMatches> stereo;
   std::vector<TrackedStep> steps;
   std::vector<ImageLook> looks;
-  std::vector<std::vector<OrbDescriptor>> descriptors;  ///< Descriptors of the images of `stereo`.
+  std::vector<std::vector<OrbDescriptor>>
+      descriptors;  ///< ORB descriptors of each left image in `looks`.
   std::vector<Stamp> frames;
   std::vector<ImuSample> imu;
 };

@@ -13,7 +13,8 @@
 namespace km {
 namespace {
 
-constexpr double kOrigin = 1e-6;    // smallest trace of a covariance, relative to the largest one
+// Trace of a covariance up to which a pose is skipped as the origin, relative to the largest trace.
+constexpr double kOrigin = 1e-6;
 constexpr double k95Of6 = 12.5916;  // quantile of chi-squared, 6 degrees of freedom
 constexpr double kMedianOf6 = 5.34812;
 

@@ -12,7 +12,7 @@
 
 namespace km {
 
-/// The intact part of a journal.
+/// Sizes of the intact part of a journal and of its incomplete end, as found by read_journal().
 struct JournalExtent {
   std::uintmax_t whole_bytes = 0;  ///< New entries continue here.
   std::uintmax_t cut_bytes = 0;    ///< Size of the incomplete end.

@@ -8,7 +8,8 @@
 
 namespace km {
 
-/// A trace file that cannot be used. what() is one line that names file and line.
+/// A trace file that cannot be used. what() is one line of text. It names the file, and the line
+/// number if a row is the cause.
 struct LinkTraceError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -24,8 +25,9 @@ struct LinkTraceRow {
 /// the last row.
 class LinkTrace {
  public:
-  /// Throws std::invalid_argument unless there is a row, times increase strictly, nothing is
-  /// negative or NaN, and rates are all finite, or infinite in a single row.
+  /// Throws std::invalid_argument unless there is a row, times are finite and increase strictly,
+  /// delays are finite and not negative, and rates are not negative. All rates must be finite,
+  /// except for the rate of a single row.
   explicit LinkTrace(std::vector<LinkTraceRow> rows);
 
   [[nodiscard]] bool has_limit() const;
@@ -48,8 +50,8 @@ class LinkTrace {
 
 /// Parses a table with the columns time_s, bytes_per_s, delay_s, which may be named in its first
 /// row. `name` stands for the file in messages. Throws LinkTraceError for a row with another number
-/// of fields, a field that is negative or not a finite number, times that do not increase, and a
-/// table without rows.
+/// of fields, a field that is not a finite number, and a negative rate or delay. It also throws if
+/// times do not increase or there are no rows.
 [[nodiscard]] LinkTrace parse_link_trace(std::string_view text, const std::string& name);
 
 /// Reads the table from a file. Throws LinkTraceError.

@@ -14,7 +14,7 @@ namespace km {
 struct MapMesh {
   LabelledMesh mesh;
 
-  /// First and last keyframe that saw each vertex.
+  /// First and last keyframe that saw each vertex; as long as mesh.vertices.
   std::vector<std::array<KeyframeIndex, 2>> seen_by = {};
 
   /// Identifies the vertices from one update to the next; never reused. Ascending: vertices that

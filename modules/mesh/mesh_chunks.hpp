@@ -68,7 +68,7 @@ struct ChunkGrid {
 /// A mesh split into chunks.
 struct MeshPieces {
   std::vector<MeshChunk> chunks;  ///< Keys ascending, none empty.
-  /// Dropped faces: longer than the range of offsets, 65 535 steps.
+  /// Dropped faces: longer along an axis than a third of the range of offsets, 21 845 steps.
   std::size_t oversized_faces = 0;
 };
 

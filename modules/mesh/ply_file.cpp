@@ -178,7 +178,8 @@ class Body {
   PlyFormat format_;
 };
 
-// One instance of an element: its scalar properties by position, and its last list.
+// One instance of an element. scalars: values of its properties by position, 0 for a list. list:
+// its vertex indices; other lists are skipped.
 struct Row {
   std::vector<double> scalars;
   std::vector<double> list;

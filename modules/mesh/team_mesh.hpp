@@ -27,7 +27,8 @@ struct RobotMesh {
   RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
   LabelledMesh mesh;   ///< In `world`.
   std::size_t chunks = 0;
-  std::size_t outdated_chunks = 0;  ///< Dropped chunks: another anchor or step.
+  std::size_t outdated_chunks =
+      0;  ///< Chunks left out of mesh: their anchor robot or step differs from the newest.
 };
 
 /// The meshes of other robots, with the newest chunk of each piece. The mesh of a robot that leaves

@@ -143,7 +143,8 @@ Binding weigh(std::span<const NearNode> nearest, bool all_found) {
     binding.weights[j] = root * root;
     sum += root * root;
   }
-  for (std::size_t j = 0; j < used; ++j)  // equal weights, because all nodes are equally far
+  // If all nodes are equally far, the sum is zero, and the weights are made equal.
+  for (std::size_t j = 0; j < used; ++j)
     binding.weights[j] =
         sum > kNoWeight ? binding.weights[j] / sum : 1.0 / static_cast<double>(used);
   if (all_found)

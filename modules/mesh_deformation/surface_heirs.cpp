@@ -138,7 +138,8 @@ class HeirSearch {
     return nearest_face == kNoIndex ? kNoIndex : nearest_corner(nearest_face, v);
   }
 
-  // Distance along the normal of the face; infinite if the surfaces are different.
+  // Distance along the normal of the face. Infinite if it exceeds distance_, if the normals differ
+  // by more than 60 degrees, or if the vertex is beside the triangle.
   [[nodiscard]] float distance_to(std::uint32_t face, std::uint32_t v) const {
     constexpr float kNot = std::numeric_limits<float>::infinity();
     const Eigen::Vector3f& normal = face_normals_[face];

@@ -56,7 +56,8 @@ void PeerHistory::forget_if_done(Keyframes::iterator keyframe) {
   kept_.erase(keyframe->first);
 }
 
-// Keeps the waiting keyframes, whose number is bounded.
+// Deletes the vectors of the keyframes before the oldest gaps, so that at most kMaxGaps remain.
+// Waiting keyframes keep their vectors. Their number is bounded.
 void PeerHistory::forget_oldest_gaps() {
   for (auto oldest = kept_.begin();
        kept_.size() > kMaxGaps + deadlines_.size() && oldest != kept_.end();) {

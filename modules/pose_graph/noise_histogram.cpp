@@ -79,7 +79,8 @@ std::optional<NoiseScale> fit_noise(const NoiseHistogram& histogram, int dimensi
         fit(histogram, static_cast<double>(result.lengths), scale, dimension == 2 ? 3 : 6);
     best = std::max(best, fits[scale].log_likelihood);
   }
-  // With few lengths, the stated noise stays in use.
+  // Takes the scale nearest to the stated noise among those about as likely as the best one. Few
+  // lengths make most scales about equally likely, so the stated noise then stays in use.
   double farthest = std::numeric_limits<double>::infinity();
   for (const auto& [scale, found] : fits) {
     if (found.log_likelihood < best - kDoubt || std::abs(std::log(scale)) >= farthest) continue;

@@ -22,8 +22,9 @@ void count_length(NoiseHistogram& histogram, double length);
 /// The noise scale of closures, from the Mahalanobis lengths d of cycles through two closures near
 /// each other (see Corroboration::count_lengths()). If both closures are true, d is `scale` times
 /// the length of a normal vector; with a false closure, d may have any value. The model is a
-/// mixture of both, with log d uniform for cycles with a false closure. The result is the most
-/// likely scale (expectation maximisation of the share, for every scale). `dimension` 2: the vector
+/// mixture of both, with log d uniform for cycles with a false closure. The result is
+/// the scale nearest to 1 among those about as likely as the best one (expectation maximisation of
+/// the share, for every scale). `dimension` 2: the vector
 /// has 3 components, otherwise 6. nullopt if there are too few lengths.
 [[nodiscard]] std::optional<NoiseScale> fit_noise(const NoiseHistogram& histogram, int dimension);
 

@@ -16,7 +16,8 @@ namespace {
 // Quantiles of chi-squared, 6 degrees of freedom: 99.9 % and the median.
 constexpr double kConsistent = 22.46;
 constexpr double kMedian = 5.35;
-// With two places that agree, two false closures of one false place further on would do.
+// Least number of places that show a jump. Two are too few: two false closures of one long
+// stretch count as two places if they are more than ten keyframes apart.
 constexpr double kLeastPlaces = 3.0;
 // A wrong step is clearly beyond the limit. The longest cycles of noisy odometry are near it: with
 // a factor of 1, one of 360 random trajectories without a wrong step had a break.

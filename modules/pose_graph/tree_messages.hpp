@@ -27,7 +27,7 @@ struct SentEdge {
   float tau = 0.0F;
   float weight = 1.0F;  ///< In [0, 1].
   SinglePose present;   ///< T_i_j at the poses of the equations.
-  SinglePose measured;  ///< Without effect on Gauss-Newton derivatives.
+  SinglePose measured;  ///< Measured T_i_j; only sent and used with Curvature::kFull.
 
   [[nodiscard]] EdgeModel model() const;
 };

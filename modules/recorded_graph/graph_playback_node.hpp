@@ -76,8 +76,10 @@ class GraphPlaybackNode final : public Node {
   const double rate_;
   const RecordedGraph graph_;
   const GraphPlaybackTopics topics_;
-  std::vector<std::vector<RelativePose>> closures_of_;  // [i]: closures that keyframe i makes known
-  UncertainPose T_odom_kf_;                             // pose of the last published keyframe
+  // [i]: closures published with keyframe i. It is the later end of a closure inside the robot, and
+  // the end `from` of a closure between robots.
+  std::vector<std::vector<RelativePose>> closures_of_;
+  UncertainPose T_odom_kf_;  // pose of the last published keyframe
   GraphPlaybackEnd published_;
   std::size_t known_ = 0;  // number of known keyframes
   Clock::time_point begin_;

@@ -302,7 +302,7 @@ class JrlReader {
 
   // The poses are index 0 and all indices that steps of odometry reach from it.
   void find_chains(const JsonPlace& place) {
-    std::map<KeyframeId, Stamp> known_from;  // by the pose at the end of the step
+    std::map<KeyframeId, Stamp> known_from;  // by keyframe: time of the odometry that ends on it
     for (const JrlMeasurement& measured : graph_.measurements) {
       const auto& [from, to] = std::pair(measured.edge.from, measured.edge.to);
       if (from.robot == to.robot && to.index == std::uint64_t{from.index} + 1)
@@ -398,7 +398,8 @@ class JrlReader {
   std::map<RobotId, Stamp> first_stamp_;
   std::vector<Named> named_;
   std::map<std::pair<KeyframeId, KeyframeId>, std::vector<std::size_t>> by_pair_;
-  std::map<FactorPlace, std::size_t> number_of_;  // into graph_.measurements
+  std::map<FactorPlace, std::size_t>
+      number_of_;  // by place in the document: index in graph_.measurements
 };
 
 }  // namespace

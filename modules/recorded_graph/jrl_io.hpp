@@ -56,8 +56,9 @@ struct JrlGraph {
 /// Parses the text of a JRL file; errors name it `file`.
 [[nodiscard]] JrlGraph parse_jrl(const std::string& text, const std::string& file);
 
-/// The part of the graph that `robot` knows: its odometry, and the closures that end on it. Throws
-/// std::runtime_error "file: what" if the file has no such robot, or if the robot has no odometry.
+/// The part of the graph that `robot` knows: its odometry, and the closures with an end on it.
+/// Throws std::runtime_error "file: what" if the file has no such robot, or if the robot has no
+/// odometry.
 [[nodiscard]] RecordedGraph part_of(const JrlGraph& graph, RobotId robot, const std::string& file);
 
 }  // namespace km

@@ -78,8 +78,8 @@ void check_chain(const std::vector<std::optional<RelativePose>>& odometry, Robot
                            to_string({robot, index + 1}));
 }
 
-// Number of steps of odometry if every index in the file is on the chain. It is limited by the
-// number of edges, so that a wrong index cannot require more memory than the file has rows.
+// Number of steps of odometry if every index in the file is on the chain. Throws if there are fewer
+// edges than steps, so that a wrong index cannot require more memory than the file has rows.
 std::size_t chain_length(const std::vector<RelativePose>& edges, RobotId robot,
                          const std::string& file) {
   std::size_t last = 0;

@@ -136,7 +136,7 @@ struct RosPointCloud {
   std::vector<Field> fields;
   bool is_bigendian = false;
   std::uint32_t point_step = 0;  ///< Length of a point [bytes].
-  std::uint32_t row_step = 0;    ///< Length of a row [bytes].
+  std::uint32_t row_step = 0;    ///< Length of a row of points [bytes].
   std::vector<std::uint8_t> data;
   bool is_dense = false;  ///< True if no point is invalid.
 };

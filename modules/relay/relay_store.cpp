@@ -64,9 +64,9 @@ bool RelayStore::is_known(const TeamPeer& peer) const {
          (!keys_ || origins_.at(peer.robot).membership.certificate.has_value());
 }
 
-// True if the known process that is stated as the origin has not signed the message. An origin
-// whose certificate has lapsed is removed unless it is received directly, so that neighbours stop
-// sending its messages.
+// True if the known process that is stated as the origin has not signed the message, or if its
+// certificate is revoked or not valid now. In the second case the origin is removed, unless it is
+// received directly, so that neighbours stop sending its messages.
 bool RelayStore::is_forged(const RelayMessage& message) {
   if (!keys_) return false;
   const RobotId robot = message.origin.robot;

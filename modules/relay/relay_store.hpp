@@ -29,7 +29,7 @@ enum class [[nodiscard]] RelayArrival{
     kNoRoom,    ///< Dropped because the storage of its origin or of messages in transit is full.
 };
 
-/// Routes by which a message can reach one robot.
+/// Whether a message can reach one robot directly by DDS, over the relay, or both.
 struct RelayWays {
   bool direct = true;  ///< DDS delivers it now, or later to a robot that was received before.
   bool relay = false;
@@ -40,7 +40,7 @@ struct RelayWays {
 /// Work that a RelayStore requests.
 struct RelayOutput {
   std::vector<RelayPacket> packets;        ///< Messages to send.
-  std::vector<RelayMessagePtr> delivered;  ///< Messages for this robot, in order.
+  std::vector<RelayMessagePtr> delivered;  ///< Messages for this robot, in order of arrival.
   std::vector<RobotIdentity> met;          ///< Robots that neighbours have introduced: new ones or
                                            ///< new boot ids.
   std::vector<RobotId> reachable;          ///< Robots out of range to which a route has appeared.

@@ -15,8 +15,8 @@ namespace km {
 namespace {
 
 constexpr double kLate_s = 2.0;
-constexpr std::size_t kImages = 8;  // maximum number of waiting images, and of meshes that wait for
-                                    // coarsening
+// Maximum number of images and meshes, together, that wait for the encoder.
+constexpr std::size_t kImages = 8;
 constexpr double kPiece_bytes = 65536.0;
 
 RosPose message_of(const SE3& T) {

@@ -16,8 +16,9 @@ namespace km {
 /// Splits meshes into markers of a few faces each. DDS loses a large message as a whole, and a
 /// large message delays the messages after it. Pieces have ids from 0 in the name space of
 /// surface_of(), and pieces that no longer exist are deleted. A new mesh waits until all pieces of
-/// the present one are published, and the newest mesh replaces waiting ones. So viewers always show
-/// a complete mesh. Not thread-safe.
+/// the present one are published, and the newest mesh replaces waiting ones. Thus every mesh that
+/// has been begun is published to its end. Until then viewers show some pieces of the former mesh.
+/// Not thread-safe.
 class SurfacePieces {
  public:
   static constexpr std::size_t kFaces = 500;  ///< Maximum number of faces of a piece: 60 kB.

@@ -32,8 +32,9 @@ class TeamFolder {
   /// Opens a folder that make() has made; needs the authority's secret.
   explicit TeamFolder(const std::filesystem::path& folder);
 
-  /// Makes keys and certificates that are valid between the two times [s since 1970-01-01 UTC].
-  /// Makes none if ids or names are equal, or belong to a certificate that is valid at `now_s`.
+  /// Makes keys and certificates that are valid from one day before `now_s`, because clocks differ,
+  /// until `valid_until_s` [s since 1970-01-01 UTC]. Throws std::runtime_error and makes none if
+  /// ids or names are equal, or belong to a certificate that is valid at `now_s`.
   void issue(const std::vector<RobotName>& robots, std::int64_t now_s, std::int64_t valid_until_s);
 
   /// Revokes every certificate of a robot, given by name or otherwise by id, in the authority's

@@ -18,8 +18,8 @@ static_assert(ExchangeKey().size() == crypto_kx_PUBLICKEYBYTES);
 static_assert(Secret<32>::size() == crypto_kx_SECRETKEYBYTES);
 static_assert(SealingKey::size() == crypto_kx_SESSIONKEYBYTES);
 
-// Number of team keys of one process that it sends and that others keep. Late robots can read
-// messages under its older keys.
+// Maximum number of team keys in a key message. A process seals with its newest key only. It also
+// sends its former keys, so that a robot that joins late can open messages sealed with them.
 constexpr std::size_t kTeamKeysKept = 8;
 
 void put_peer(ByteWriter& writer, const TeamPeer& peer) {

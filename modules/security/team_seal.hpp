@@ -145,8 +145,9 @@ class TeamSeal {
   /// `context` names another sender than this process, or this process as addressee.
   [[nodiscard]] std::optional<Octets> seal(const SealContext& context, OctetView content) const;
 
-  /// Opens a message from an unknown sender. The work is bounded by the size of the message. A
-  /// message from a sender outside the team costs no signature check.
+  /// Opens a message that any participant may have sent. It opens only if its sender is admitted.
+  /// The work is bounded by the size of the message. A message from a sender outside the team costs
+  /// no signature check.
   [[nodiscard]] Opened open(const SealContext& context, OctetView sealed);
 
  private:

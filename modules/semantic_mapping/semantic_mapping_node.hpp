@@ -66,7 +66,7 @@ class SemanticMappingNode final : public Node {
   std::optional<ContinuedMap> before_;
   MappingProgress progress_;
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh
-  std::optional<Stamp> published_;       // frame of the last mesh published
+  std::optional<Stamp> published_;       // stamp at the last mesh, or of the first frame
   bool stopped_ = false;
   // Superseded surface results from the node's own maps. It does not wait for room in the node's
   // queue, because this would be a deadlock.

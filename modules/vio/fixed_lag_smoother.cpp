@@ -120,7 +120,8 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
     if (!optimize(window_, kStartIterations).usable) return std::nullopt;
     reject_outliers();
   }
-  // The prior keeps the guess of the biases; heading and position have not moved.
+  // The prior of hold_first() is not set again. It holds the biases near their guess, and the
+  // optimisation has not moved position and heading of the first frame.
   std::vector<OdometryState> states;
   for (const WindowFrame& frame : window_.frames) states.push_back(frame.state);
   return states;

@@ -49,7 +49,7 @@ class OutsideOdometry {
   RobotId robot_;
   DepthSource depth_source_;
   VioConfig config_;
-  bool continues_ = false;             // true until the first pose
+  bool continues_ = false;             // from continue_from() to the first usable pose: true
   std::optional<Fix> last_, last_kf_;  // fixes as measured
   std::optional<KeyframeOdometry> last_keyframe_;
   double moved_s_ = 0.0;                // time in motion since the last keyframe

@@ -5,7 +5,9 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kQueued = 4;  // as in VioNode; the sensors drop late packets
+// Capacity of the queue, as in VioNode. A full queue blocks the sensors. LoadShedding leaves out
+// images before they are queued.
+constexpr std::size_t kQueued = 4;
 
 }  // namespace
 

@@ -34,8 +34,8 @@ enum class PeerEventKind {
   kLeft,       ///< Ended regularly.
   kRestarted,  ///< Same robot id, another incarnation: its keyframe indices now mean other
                ///< keyframes.
-  kRefused,    ///< Ignored because of another protocol version, unreadable user data, too many
-               ///< robots, or the id of a present robot.
+  kRefused,    ///< Ignored because of another protocol version, unreadable user data, refused
+               ///< keys, too many robots, or the id of a present robot.
   kConflict,   ///< This robot's id belongs to a robot that had it first: this one must end.
 };
 

@@ -120,7 +120,7 @@ Peers::Peers(const DdsParticipant& participant)
           kMaxEvents, Overflow::kDropOldest, [this](const auto& event) { events_.publish(event); },
           "peer_events") {}
 
-// The mutex is held, as for all calls of the table.
+// PeerTable calls this function, while the calling member function of Peers holds the mutex.
 const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
   if (credentials.empty()) return "shows no keys";
   const auto now_s = static_cast<std::int64_t>(wall_now_s());

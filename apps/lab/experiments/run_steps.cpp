@@ -105,7 +105,7 @@ class StepsRun {
   }
 
  private:
-  // Time of the last run of the step, or the expected one; 0 if the step is done.
+  // Time of the last run of the step, or the expected one; 0 if the step will not run.
   double thought_s(const Step& step) {
     const StepState state = state_of(step, results_);
     if (state == StepState::kMissing) return 0.0;

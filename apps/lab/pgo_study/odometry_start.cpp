@@ -43,7 +43,8 @@ std::vector<SE3> chained(const TeamGraph& graph, const std::vector<bool>& odomet
       else
         i = *j * e.T_i_j.inverse();
       any = true;
-      if (!step) break;  // odometry is preferred
+      // After one edge that is not odometry, odometry is tried again.
+      if (!step) break;
     }
     return any;
   };

@@ -37,7 +37,8 @@ class SmoothNoise {
       : spacing_(spacing), columns_(width / spacing + 2), along_(columns_), row_(width) {
     for (std::size_t k = 0; k < spacing; ++k) {
       const double u = static_cast<double>(k) / static_cast<double>(spacing);
-      const double scale = 1.0 / std::hypot(1.0 - u, u);  // variance of the weighted sum
+      const double scale =
+          1.0 / std::hypot(1.0 - u, u);  // one over the standard deviation of the sum
       weights_.emplace_back(scale * (1.0 - u), scale * u);
     }
     const std::size_t nodes = columns_ * (height / spacing + 2);
