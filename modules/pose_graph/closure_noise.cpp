@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kFactorWidth = 1.0986;    // log 3, prior of log s
 constexpr double kOddsAgainstUsual = 6.9;  // log of odds of 1000 to 1
-// Odometry may be this many times noisier than it claims before its errors count as evidence
-// against closures. Sensitivity: METHOD.md.
+// Odometry may be this many times noisier than expected before its errors count as evidence against
+// closures. Sensitivity: METHOD.md.
 constexpr double kNoisyOdometry = 1.5;
 constexpr double kOneSigma = 0.5;  // loss of log density at one standard deviation of log s
 // Upper end of the grid, relative to the team: closures with more noise carry no information.

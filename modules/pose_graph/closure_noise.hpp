@@ -43,13 +43,13 @@ struct ClosureNoiseRecord {
 /// of robots are. `usual` is the factor of the whole team.
 ///
 /// Model: the error of a cycle is normal with covariance Sigma_o + s^2 Sigma_c, or one of its
-/// closures is false (see cycle_mixture.hpp). The estimate is the s with the highest posterior
-/// density, a variance component (Foerstner 1979). The prior of log s is a Cauchy distribution
-/// around log usual of width log 3. If `usual` is below 2/3, Sigma_o is scaled by (1.5
-/// usual)^2. The two kinds of cycles are fitted separately, because an error that all closures of a
-/// place share shows only between places; the larger estimate counts. The result is `usual`, unless
-/// the odds against it are 1000 to 1 and the estimate is at least 1.3 times as large. The odds must
-/// also be so if odometry is 1.5 times noisier than it claims. O(cycles).
+/// closures is false (see cycle_mixture.hpp). If `usual` is below 2/3, Sigma_o is scaled by
+/// (1.5 usual)^2. The estimate is the s with the highest posterior density, a variance component
+/// (Foerstner 1979). The prior of log s is a Cauchy distribution around log usual of width log 3.
+/// The two kinds of cycles are fitted separately, because an error that all closures of a place
+/// share shows only between places; the larger estimate counts. The result is `usual`, unless the
+/// odds against it are 1000 to 1 and the estimate is at least 1.3 times as large. The odds must
+/// also be so with odometry that is 1.5 times noisier. O(cycles).
 [[nodiscard]] double estimate_closure_noise(const PairCycles& cycles, double usual);
 
 }  // namespace km
