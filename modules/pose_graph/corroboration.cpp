@@ -21,6 +21,10 @@ constexpr double kLargestTurn = 0.25 * std::numbers::pi;
 // Largest number of steps of odometry in a cycle between two places. The noise of more steps would
 // hide the noise of the closures.
 constexpr std::uint32_t kStepsBetweenPlaces = 60;
+constexpr double kLonger = 0.01;  // relative step of numeric derivatives by length
+// Largest standard deviation of the rotation of odometry in a cycle between two places. Errors of
+// cycles with more are not normal.
+constexpr double kLargestTurnSigma_rad = 0.5;
 constexpr double kLeastBoxSide_m = 1.0;  // least side of the volume for false closures
 
 std::uint32_t steps_between(const KeyframeId& a, const KeyframeId& b) {
@@ -118,8 +122,15 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
   const UncertainPose odometry = compose(compose(compose(exact(up), above), exact(down)), below);
   const UncertainPose closures = compose(compose(compose(up, exact(above)), down), exact(below));
   const Vector6 error = se3_log(odometry.T);
+  const auto longer = [](SE3 T) {
+    T.translation() *= 1.0 + kLonger;
+    return T;
+  };
+  const Vector6 longer_below = se3_log(up.T * above.T * down.T * longer(below.T));
+  const Vector6 longer_above = se3_log(up.T * longer(above.T) * down.T * below.T);
   return NoiseCycle::of(error, odometry.Sigma, closures.Sigma,
-                        log_density_if_false(error, volume, dimension_), dimension_);
+                        log_density_if_false(error, volume, dimension_), dimension_,
+                        {(longer_below - error) / kLonger, (longer_above - error) / kLonger});
 }
 
 // The volume in which a false closure may end: twice the bounding box of the poses, enlarged on
@@ -135,6 +146,17 @@ double Corroboration::volume() const {
   const Eigen::Array3d sides =
       below.sizes().array() + above.sizes().array() + 2.0 * reach_m + kLeastBoxSide_m;
   return sides.head(dimension_).prod();
+}
+
+// Standard deviation of the rotation of the odometry between two closures, on each axis.
+double Corroboration::turn_rad(const Upward& one, const Upward& other) const {
+  double variance = 0.0;
+  for (const auto& [from, to] : {std::pair(one.lower, other.lower), {one.upper, other.upper}}) {
+    const auto step = step_.find(from.robot);
+    const Precision precision = step == step_.end() ? Precision{} : step->second;
+    variance += steps_between(from, to) * covariance_in(precision, dimension_)(2, 2);
+  }
+  return std::sqrt(variance);
 }
 
 void Corroboration::count_cycles(PairCycles& cycles) const {
@@ -162,7 +184,8 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
       if (steps == 0) continue;  // no odometry between them
       const bool same = places.place_of[closures_[a].place] == places.place_of[closures_[b].place];
       if (same && steps <= kSteps) inside.push_back({steps, a, b});
-      if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces)
+      if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces &&
+          turn_rad(closures_[a], closures_[b]) <= kLargestTurnSigma_rad)
         between.push_back({steps, a, b});
     }
   const double room = volume();

@@ -1,8 +1,24 @@
 #include "modules/pose_graph/odometry_cycles.hpp"
 
+#include <algorithm>
+
 #include "modules/core/lie.hpp"
 
 namespace km {
+namespace {
+
+// From the lower keyframe to the upper one.
+UncertainPose upward(const PoseEdge& closure) {
+  const UncertainPose measured{closure.T_from_to, covariance_of(closure.precision)};
+  return closure.from < closure.to ? measured : inverse(measured);
+}
+
+UncertainPose exact(UncertainPose pose) {
+  pose.Sigma.setZero();
+  return pose;
+}
+
+}  // namespace
 
 OdometryChain::OdometryChain(std::span<const PoseEdge> steps) {
   for (const PoseEdge& step : steps) {
@@ -18,23 +34,45 @@ OdometryChain::OdometryChain(std::span<const PoseEdge> steps) {
   }
 }
 
+// The covariance is that of one source of noise, at the end of the steps.
+UncertainPose OdometryChain::steps(std::size_t from, std::size_t to,
+                                   OdometryCycle::Component part) const {
+  const SE3 T_from_to = T_first_kf[from].inverse() * T_first_kf[to];
+  if (from > to) return inverse(steps(to, from, part));
+  const Matrix6 Ad = adjoint(T_first_kf[to].inverse());
+  return {T_from_to, Ad * (covariance_[part][to] - covariance_[part][from]) * Ad.transpose()};
+}
+
 OdometryCycle OdometryChain::close(const PoseEdge& closure) const {
-  const bool is_up = closure.from < closure.to;
-  const std::size_t i = (is_up ? closure.from : closure.to).index;
-  const std::size_t j = (is_up ? closure.to : closure.from).index;
-  const SE3 measured = is_up ? closure.T_from_to : closure.T_from_to.inverse();
-  const Matrix6 Ad = adjoint(T_first_kf[j].inverse());
-  OdometryCycle cycle{.closure = closure, .lower = i, .upper = j};
-  // The error is small, so that both covariances refer to j.
-  cycle.error = se3_log(measured.inverse() * T_first_kf[i].inverse() * T_first_kf[j]);
-  for (const auto part : {OdometryCycle::kRotation, OdometryCycle::kTranslation})
-    cycle.covariance[part] = Ad * (covariance_[part][j] - covariance_[part][i]) * Ad.transpose();
-  cycle.covariance[OdometryCycle::kClosure] = covariance_of(closure.precision);
-  if (!is_up) {
-    const Matrix6 Ad_closure = adjoint(closure.T_from_to);
-    Matrix6& Sigma = cycle.covariance[OdometryCycle::kClosure];
-    Sigma = Ad_closure * Sigma * Ad_closure.transpose();
+  using enum OdometryCycle::Component;
+  const auto [lower, upper] = std::minmax(closure.from.index, closure.to.index);
+  OdometryCycle cycle{.closure = closure, .lower = lower, .upper = upper};
+  const UncertainPose measured = upward(closure);
+  // The error is small, so that both covariances refer to the upper keyframe.
+  cycle.error = se3_log(measured.T.inverse() * steps(lower, upper, kRotation).T);
+  for (const auto part : {kRotation, kTranslation})
+    cycle.covariance[part] = steps(lower, upper, part).Sigma;
+  cycle.covariance[kClosure] = measured.Sigma;
+  return cycle;
+}
+
+OdometryCycle OdometryChain::close(const PoseEdge& one, const PoseEdge& other) const {
+  using enum OdometryCycle::Component;
+  const auto [lower, upper] = std::minmax(one.from.index, one.to.index);
+  const auto [other_lower, other_upper] = std::minmax(other.from.index, other.to.index);
+  const UncertainPose up = upward(one), down = inverse(upward(other));
+  OdometryCycle cycle{.closure = one, .other = other, .lower = lower, .upper = upper};
+  for (const auto part : {kRotation, kTranslation}) {
+    const UncertainPose around =
+        compose(compose(compose(exact(up), steps(upper, other_upper, part)), exact(down)),
+                steps(other_lower, lower, part));
+    cycle.covariance[part] = around.Sigma;
+    cycle.error = se3_log(around.T);
   }
+  cycle.covariance[kTwoClosures] =
+      compose(compose(compose(up, exact(steps(upper, other_upper, kRotation))), down),
+              exact(steps(other_lower, lower, kRotation)))
+          .Sigma;
   return cycle;
 }
 

@@ -18,13 +18,15 @@ namespace km {
 
 /// Channels of the team node; they must outlive it.
 struct TeamTopics {
-  In<KeyframeOdometry> odometry;   ///< Own keyframes, ascending.
-  In<Closure> closures;            ///< Own and received ones.
-  In<InlierSet> inlier_sets;       ///< Decided here.
-  In<InlierSet> peer_inlier_sets;  ///< Decided by other robots.
-  In<PeerEvent> peer_events;       ///< Robots that are received directly.
-  In<PeerEvent> restarts;          ///< kRestarted, before the first closure of the new incarnation.
-  In<TeamPacket> peer_packets;     ///< From robots that are received directly.
+  In<KeyframeOdometry> odometry;       ///< Own keyframes, ascending.
+  In<Closure> closures;                ///< Own and received ones.
+  In<InlierSet> inlier_sets;           ///< Decided here.
+  In<InlierSet> peer_inlier_sets;      ///< Decided by other robots.
+  In<InlierSet> restored_inlier_sets;  ///< Sets of a former process, older than all others.
+  In<TeamSolution> restored_solution;  ///< Before all other inputs.
+  In<PeerEvent> peer_events;           ///< Robots that are received directly.
+  In<PeerEvent> restarts;       ///< kRestarted, before the first closure of the new incarnation.
+  In<TeamPacket> peer_packets;  ///< From robots that are received directly.
   Out<Addressed<TeamPacket>> packets;  ///< To robots that are received directly.
   Out<Trajectory> trajectory;
   Out<OptimizerProgress> progress;
@@ -61,8 +63,8 @@ class TeamNode final : public Node {
     TeamPeer peer;
   };
   using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
-                             Topic<InlierSet>::Message, Topic<PeerEvent>::Message, NewIncarnation,
-                             Topic<TeamPacket>::Message>;
+                             Topic<InlierSet>::Message, Topic<TeamSolution>::Message,
+                             Topic<PeerEvent>::Message, NewIncarnation, Topic<TeamPacket>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
   void step(const Input& input, double now_s);

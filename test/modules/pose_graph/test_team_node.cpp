@@ -29,6 +29,8 @@ struct Robot {
             .closures = closures,
             .inlier_sets = inlier_sets,
             .peer_inlier_sets = peer_inlier_sets,
+            .restored_inlier_sets = restored_inlier_sets,
+            .restored_solution = restored_solution,
             .peer_events = peer_events,
             .restarts = restarts,
             .peer_packets = peer_packets,
@@ -76,7 +78,8 @@ struct Robot {
   TeamPeer self;
   Topic<KeyframeOdometry> odometry;
   Topic<Closure> closures;
-  Topic<InlierSet> inlier_sets, peer_inlier_sets;
+  Topic<InlierSet> inlier_sets, peer_inlier_sets, restored_inlier_sets;
+  Topic<TeamSolution> restored_solution;
   Topic<PeerEvent> peer_events, restarts;
   Topic<TeamPacket> peer_packets;
   Topic<Addressed<TeamPacket>> packets;
