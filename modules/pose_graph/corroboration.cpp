@@ -11,6 +11,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/cycle_mixture.hpp"
+#include "modules/pose_graph/two_closure_cycle.hpp"
 
 namespace km {
 namespace {
@@ -26,10 +27,6 @@ constexpr double kLonger = 0.01;  // relative step of numeric derivatives by len
 // cycles with more are not normal.
 constexpr double kLargestTurnSigma_rad = 0.5;
 constexpr double kLeastBoxSide_m = 1.0;  // least side of the volume for false closures
-
-std::uint32_t steps_between(const KeyframeId& a, const KeyframeId& b) {
-  return std::max(a.index, b.index) - std::min(a.index, b.index);
-}
 
 }  // namespace
 
@@ -65,15 +62,16 @@ double Corroboration::cycle_length(const Upward& one, const Upward& other) const
   const auto measured = [&](const Upward& c) {
     return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
   };
-  const UncertainPose cycle = compose(
-      compose(compose(measured(one), chain(one.upper, other.upper)), inverse(measured(other))),
-      chain(other.lower, one.lower));
-  if (angle_of(cycle.T.linear()) > kLargestTurn) return std::numeric_limits<double>::infinity();
-  const Vector6 xi = se3_log(cycle.T);
-  if (dimension_ == 3) return std::sqrt(xi.dot(cycle.Sigma.ldlt().solve(xi)));
+  const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
+                              inverse(measured(other)), chain(other.lower, one.lower)};
+  const SE3 T = cycle.T();
+  if (angle_of(T.linear()) > kLargestTurn) return std::numeric_limits<double>::infinity();
+  const Vector6 xi = se3_log(T);
+  const Matrix6 covariance = cycle.covariance();
+  if (dimension_ == 3) return std::sqrt(xi.dot(covariance.ldlt().solve(xi)));
   const std::array<int, 3> planar{2, 3, 4};  // angle, x, y
   const Eigen::Vector3d in_plane = xi(planar);
-  const Eigen::Matrix3d Sigma = cycle.Sigma(planar, planar);
+  const Eigen::Matrix3d Sigma = covariance(planar, planar);
   return std::sqrt(in_plane.dot(Sigma.ldlt().solve(in_plane)));
 }
 
@@ -113,24 +111,18 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
   const auto measured = [&](const Upward& c) {
     return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
   };
-  const auto exact = [](UncertainPose pose) {
-    pose.Sigma.setZero();
-    return pose;
+  const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
+                              inverse(measured(other)), chain(other.lower, one.lower)};
+  const Vector6 error = se3_log(cycle.T());
+  // Change of the error with the length of one of the chains.
+  const auto by_length = [&](UncertainPose TwoClosureCycle::*chain_of) {
+    TwoClosureCycle longer = cycle;
+    (longer.*chain_of).T.translation() *= 1.0 + kLonger;
+    return Vector6((se3_log(longer.T()) - error) / kLonger);
   };
-  const UncertainPose above = chain(one.upper, other.upper), below = chain(other.lower, one.lower);
-  const UncertainPose up = measured(one), down = inverse(measured(other));
-  const UncertainPose odometry = compose(compose(compose(exact(up), above), exact(down)), below);
-  const UncertainPose closures = compose(compose(compose(up, exact(above)), down), exact(below));
-  const Vector6 error = se3_log(odometry.T);
-  const auto longer = [](SE3 T) {
-    T.translation() *= 1.0 + kLonger;
-    return T;
-  };
-  const Vector6 longer_below = se3_log(up.T * above.T * down.T * longer(below.T));
-  const Vector6 longer_above = se3_log(up.T * longer(above.T) * down.T * below.T);
-  return NoiseCycle::of(error, odometry.Sigma, closures.Sigma,
+  return NoiseCycle::of(error, cycle.covariance_of_odometry(), cycle.covariance_of_closures(),
                         log_density_if_false(error, volume, dimension_), dimension_,
-                        {(longer_below - error) / kLonger, (longer_above - error) / kLonger});
+                        {by_length(&TwoClosureCycle::below), by_length(&TwoClosureCycle::above)});
 }
 
 // The volume in which a false closure may end: twice the bounding box of the poses, enlarged on

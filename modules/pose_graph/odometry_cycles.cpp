@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "modules/core/lie.hpp"
+#include "modules/pose_graph/two_closure_cycle.hpp"
 
 namespace km {
 namespace {
@@ -11,11 +12,6 @@ namespace {
 UncertainPose upward(const PoseEdge& closure) {
   const UncertainPose measured{closure.T_from_to, covariance_of(closure.precision)};
   return closure.from < closure.to ? measured : inverse(measured);
-}
-
-UncertainPose exact(UncertainPose pose) {
-  pose.Sigma.setZero();
-  return pose;
 }
 
 }  // namespace
@@ -60,19 +56,14 @@ OdometryCycle OdometryChain::close(const PoseEdge& one, const PoseEdge& other) c
   using enum OdometryCycle::Component;
   const auto [lower, upper] = std::minmax(one.from.index, one.to.index);
   const auto [other_lower, other_upper] = std::minmax(other.from.index, other.to.index);
-  const UncertainPose up = upward(one), down = inverse(upward(other));
   OdometryCycle cycle{.closure = one, .other = other, .lower = lower, .upper = upper};
   for (const auto part : {kRotation, kTranslation}) {
-    const UncertainPose around =
-        compose(compose(compose(exact(up), steps(upper, other_upper, part)), exact(down)),
-                steps(other_lower, lower, part));
-    cycle.covariance[part] = around.Sigma;
-    cycle.error = se3_log(around.T);
+    const TwoClosureCycle around{upward(one), steps(upper, other_upper, part),
+                                 inverse(upward(other)), steps(other_lower, lower, part)};
+    cycle.error = se3_log(around.T());
+    cycle.covariance[part] = around.covariance_of_odometry();
+    cycle.covariance[kTwoClosures] = around.covariance_of_closures();
   }
-  cycle.covariance[kTwoClosures] =
-      compose(compose(compose(up, exact(steps(upper, other_upper, kRotation))), down),
-              exact(steps(other_lower, lower, kRotation)))
-          .Sigma;
   return cycle;
 }
 

@@ -43,13 +43,6 @@ std::vector<PoseEdge> in_order(std::span<const PoseEdge> closures, std::size_t k
   return sorted;
 }
 
-std::uint32_t steps_between(const PoseEdge& one, const PoseEdge& other) {
-  const auto distance = [](KeyframeIndex a, KeyframeIndex b) { return a < b ? b - a : a - b; };
-  const auto [lower, upper] = std::minmax(one.from.index, one.to.index);
-  const auto [other_lower, other_upper] = std::minmax(other.from.index, other.to.index);
-  return distance(lower, other_lower) + distance(upper, other_upper);
-}
-
 // Cycles, with weights such that each place counts once.
 std::vector<Cycle> cycles_of(const OdometryChain& chain, std::span<const PoseEdge> closures,
                              std::size_t& places) {
@@ -71,7 +64,8 @@ std::vector<Cycle> short_cycles(const OdometryChain& chain, std::span<const Pose
   const std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
   std::vector<Cycle> cycles;
   for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
-    const auto steps = steps_between(sorted[k], sorted[k + 1]);
+    const ClosureId one = sorted[k].id(), other = sorted[k + 1].id();
+    const auto steps = steps_between(one.from, other.from) + steps_between(one.to, other.to);
     if (steps == 0 || steps > kShort) continue;
     cycles.push_back(chain.close(sorted[k], sorted[k + 1]));
     cycles.back().weight = kShortCycleWeight;
@@ -238,13 +232,14 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (fit.log_odds < kEvidence) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
   std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors);
+  // Without long cycles, noise of closures alone explains the cycles of successive closures. The
+  // first estimate then remains.
+  const bool few_are_long = 2 * normal.size() < cycles.size();
   normal.insert(normal.end(), near.begin(), near.end());
   const Fit refined = fit_factors(normal, volume);
-  // Without long cycles, noise of closures alone explains the cycles of successive closures.
-  const bool has_all = normal.size() == cycles.size() + near.size();
   if (refined.log_odds >= kEvidence)
     fit = refined;
-  else if (has_all)
+  else if (!few_are_long)
     return noise;
   noise.rotation = std::sqrt(fit.factors[kRotation]);
   noise.translation = std::sqrt(fit.factors[kTranslation]);
