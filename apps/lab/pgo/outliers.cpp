@@ -191,7 +191,8 @@ std::string details() {
          "  reference  only the true closures, weighed by the noise that was drawn\n"
          "One table shows each seed of the first method, another the median and the worst of all "
          "seeds\n"
-         "of each method. Errors are of positions to the truth. If a method leaves robots in "
+         "of each method and threshold. Errors are of positions to the truth. If a method leaves "
+         "robots in "
          "several\n"
          "frames, each frame is aligned separately. The ratio is the RMS error divided by that of "
          "the\n"
@@ -203,6 +204,8 @@ std::string details() {
          "      --seeds 1,2,3\n"
          "  kimera_multi_pgo outliers sphere2500.g2o --shares 0 --clusters 5:10\n"
          "  kimera_multi_pgo outliers sphere2500.g2o --scenario noisy-odometry --csv runs.csv\n"
+         "  kimera_multi_pgo outliers sphere2500.g2o --scenario three-folders --plot roc.html \\\n"
+         "      --methods robots,pcm,gnc --thresholds 1,2,3,4,6,8,12\n"
          "  kimera_multi_pgo outliers torus3D.g2o --robots 4 --odometry-noise 1:10 --seeds 1,2";
 }
 
@@ -214,6 +217,7 @@ struct OutliersCommand {
   std::vector<std::function<void(Scenario&)>> changes = {};  // changes that the options make to the
                                                              // scenario
   double keyframes_per_s = 0.0;
+  std::vector<double> thresholds = {0.0};
   std::filesystem::path csv = {};
   ReportFiles files = {};
 };
@@ -381,6 +385,12 @@ void define_scenario(CLI::App& app, OutliersCommand& command) {
                  "robots: keyframes that each robot plays per second of virtual time; 0: all at\n"
                  "once")
       ->check(CLI::NonNegativeNumber);
+  app.add_option(
+         "--thresholds", command.thresholds,
+         "robots, pcm, gnc: one run with each largest residual of a kept closure [sigma of\n"
+         "the claimed noise], for ROC curves; 0: the default of the method")
+      ->check(CLI::NonNegativeNumber)
+      ->delimiter(',');
   app.add_option("--csv", command.csv, "Also write every run to this file");
 }
 
@@ -418,7 +428,8 @@ void run_scenario(const CLI::App& app, const OutliersCommand& command) {
       throw std::runtime_error(std::string(option) + " is not for scenarios");
   ScenarioStudyOptions options{.scenario = scenario_asked(app, command),
                                .pcm = command.study.pcm,
-                               .keyframes_per_s = command.keyframes_per_s};
+                               .keyframes_per_s = command.keyframes_per_s,
+                               .thresholds = command.thresholds};
   if (app.count("--methods") > 0) options.methods = command.study.methods;
   if (app.count("--seeds") > 0) options.seeds = command.study.seeds;
   check_methods(options.methods, kScenarioMethods, "scenarios");
@@ -455,7 +466,7 @@ TeamGraph true_graph(const LabelledTeamGraph& input, const std::string& file) {
 void run(const CLI::App& app, const OutliersCommand& command) {
   command.files.check();
   if (is_scenario(app, command)) return run_scenario(app, command);
-  for (const char* option : {"--keyframes-per-s", "--csv"})
+  for (const char* option : {"--keyframes-per-s", "--thresholds", "--csv"})
     if (app.count(option) > 0)
       throw std::runtime_error(std::string(option) + " is for scenarios only");
   check_methods(command.study.methods, kRejections, "shares: it is for scenarios");

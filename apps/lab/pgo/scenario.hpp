@@ -28,8 +28,8 @@ struct RobotFactor {
 struct Scenario {
   std::string name = {};
   std::size_t first_poses = 0;  ///< Number of poses of the graph to use, from its first; 0: all.
-  std::size_t robots = 0;       ///< Number of contiguous robots; 0: as in the graph.
-  bool keep_steps = false;      ///< Keeps odometry between robots, which remains at a cut.
+  std::size_t robots = 0;       ///< Robots with contiguous poses; 0: as in the graph.
+  bool keep_steps = false;      ///< Keeps steps of odometry from one robot to the next.
   double step_length_m = 0.0;   ///< Mean length of steps after scaling the truth; 0: no scaling.
   std::optional<NoiseSigma> step_sigma = {};     ///< Claimed for steps; nullopt: by the graph.
   std::optional<NoiseSigma> closure_sigma = {};  ///< Claimed for closures; nullopt: by the graph.
@@ -38,7 +38,7 @@ struct Scenario {
   std::optional<std::size_t> closures_per_pair = {};  ///< Largest number between two robots.
 
   std::vector<RobotFactor> odometry_sigma = {};  ///< Factor on claims and noise of odometry.
-  std::vector<RobotFactor> odometry_noise = {};  ///< Ratio of noise to claim, odometry.
+  std::vector<RobotFactor> odometry_noise = {};  ///< Ratio of the noise of odometry to its claim.
   /// Ratio of noise to claim for closures with an end on the robot. Between two robots the larger
   /// factor counts.
   std::vector<RobotFactor> closure_noise = {};
@@ -52,8 +52,8 @@ struct Scenario {
   std::optional<std::pair<std::size_t, std::size_t>> cluster_robots = {};
 };
 
-/// Length of a run of keyframes. Closures share a place if, on each robot, their ends are in the
-/// same run.
+/// Number of keyframes in a run, when each trajectory is divided into runs. In a scenario, closures
+/// share a place if, on each robot, their ends are in the same run.
 inline constexpr Eigen::Index kPlaceKeyframes = 10;
 
 /// All predefined scenarios.

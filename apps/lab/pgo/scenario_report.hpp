@@ -10,7 +10,7 @@
 namespace km {
 
 /// Text with one row per seed for the first method beside the reference, then one row per method
-/// with median and worst of all seeds.
+/// and threshold with median and worst of all seeds.
 [[nodiscard]] std::string scenario_text(const ScenarioStudy& study);
 
 /// Every run. `ratio` is the RMS error divided by that of the reference with the same seed. Without
@@ -18,7 +18,8 @@ namespace km {
 void write_scenario_json(std::ostream& out, const ScenarioStudy& study);
 void write_scenario_csv(std::ostream& out, const ScenarioStudy& study);
 
-/// Plots of the RMS and the largest error of each method by seed.
+/// Plots of the receiver operating characteristic of each method, and of its RMS and largest error
+/// by seed.
 [[nodiscard]] std::vector<Plot> scenario_plots(const ScenarioStudy& study);
 
 }  // namespace km

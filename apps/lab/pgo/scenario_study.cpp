@@ -50,8 +50,9 @@ TeamGraph with_weights(const TeamGraph& graph, const std::vector<double>& weight
   return weighed;
 }
 
-PlacedTeam solve_by_robots(const TeamGraph& graph, double keyframes_per_s) {
-  AgentTeamRun run = run_agent_team(graph, {.keyframes_per_s = keyframes_per_s});
+PlacedTeam solve_by_robots(const TeamGraph& graph, double keyframes_per_s, double threshold) {
+  AgentTeamRun run = run_agent_team(
+      graph, {.pose_graph = {.barc = threshold}, .keyframes_per_s = keyframes_per_s});
   PlacedTeam placed{.T_frame_kf = std::move(run.T_world_kf),
                     .frame_of = {},
                     .kept = std::move(run.kept),
@@ -74,15 +75,22 @@ PlacedTeam solve_reference(const ScenarioGraph& drawn) {
   return solve_centrally(honest, std::move(kept), drawn.truth);
 }
 
+bool has_threshold(const std::string& method) {
+  return method == "robots" || method == "pcm" || method == "gnc";
+}
+
 PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
-                    const ScenarioStudyOptions& options) {
+                    const ScenarioStudyOptions& options, double threshold) {
   const TeamGraph& graph = drawn.graph;
-  if (method == "robots") return solve_by_robots(graph, options.keyframes_per_s);
+  if (method == "robots") return solve_by_robots(graph, options.keyframes_per_s, threshold);
   if (method == "reference") return solve_reference(drawn);
-  if (method == "gnc") return solve_by_gnc(graph);
+  if (method == "gnc") return solve_by_gnc(graph, threshold);
   std::vector<bool> kept(graph.edges.size(), true);
+  PcmConfig pcm = options.pcm;
+  if (threshold > 0.0)
+    pcm.confidence = std::clamp(chi_squared_6(threshold * threshold), 0.01, 1.0 - 1e-12);
   if (method == "pcm")
-    kept = pairwise_consistent(graph, options.pcm);
+    kept = pairwise_consistent(graph, pcm);
   else if (method != "trust-all")
     throw std::invalid_argument("scenario study: unknown method " + method);
   std::vector<SE3> start = chordal_start(graph, kept);
@@ -110,13 +118,13 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
   return placed;
 }
 
-PlacedTeam solve_by_gnc(const TeamGraph& graph) {
+PlacedTeam solve_by_gnc(const TeamGraph& graph, double threshold) {
   constexpr double kConfidence = 0.99;
   constexpr double kSteeper = 1.4;   // as the paper recommends
   constexpr double kFloor = 1e-10;   // keeps the equations regular
   constexpr int kMostUpdates = 100;  // as in the paper
   constexpr std::uint32_t kStepsOfUpdate = 20;
-  const double c2 = chi_squared_6_quantile(kConfidence);
+  const double c2 = threshold > 0.0 ? threshold * threshold : chi_squared_6_quantile(kConfidence);
   const std::vector<bool> odometry = odometry_edges(graph);
   const std::vector<bool> all(graph.edges.size(), true);
   const bool joined = std::ranges::count(part_of_poses(graph), 0) == graph.poses();
@@ -188,20 +196,27 @@ ScenarioStudy run_scenario_study(const TeamGraph& whole, const ScenarioStudyOpti
   const std::vector<SE3> optimum = round_to_poses(central.X, central.X.leftCols<4>());
   ScenarioStudy study{
       .scenario = options.scenario.name, .certified = central.certified, .results = {}};
-  const std::size_t all = options.seeds.size() * options.methods.size();
+  const std::vector<double> none = {0.0};
+  std::size_t all = 0;
+  for (const std::string& method : options.methods)
+    all += options.seeds.size() * (has_threshold(method) ? options.thresholds.size() : 1);
   for (const unsigned seed : options.seeds) {
     const ScenarioGraph drawn = draw_scenario(whole, optimum, options.scenario, seed);
     study.robots = drawn.graph.robots();
     study.poses = drawn.truth.size();
     for (const std::string& method : options.methods) {
-      if (progress) progress(study.results.size(), all);
-      const double begin_s = meter.cpu_s();
-      const PlacedTeam placed = solve_by(method, drawn, options);
-      const double cpu_s = meter.cpu_s() - begin_s;
-      study.results.push_back(judge(drawn, placed));
-      study.results.back().method = method;
-      study.results.back().seed = seed;
-      study.results.back().cpu_s = cpu_s;
+      for (const double threshold : has_threshold(method) ? options.thresholds : none) {
+        if (progress) progress(study.results.size(), all);
+        const double begin_s = meter.cpu_s();
+        const PlacedTeam placed = solve_by(method, drawn, options, threshold);
+        const double cpu_s = meter.cpu_s() - begin_s;
+        ScenarioResult result = judge(drawn, placed);
+        result.method = method;
+        result.seed = seed;
+        result.threshold = threshold;
+        result.cpu_s = cpu_s;
+        study.results.push_back(std::move(result));
+      }
     }
   }
   if (progress) progress(all, all);

@@ -13,7 +13,7 @@ namespace km {
 
 /// Methods by which a scenario is solved:
 ///     robots     by the robots' own code at its defaults, see run_agent_team();
-///     trust-all  all closures, at their claims, by Newton's method on one computer;
+///     trust-all  all closures, with the claimed noise, by Newton's method on one computer;
 ///     pcm        the closures that pairwise consistency keeps, otherwise as trust-all;
 ///     gnc        graduated non-convexity on one computer, see solve_by_gnc();
 ///     reference  only the true closures, all edges weighed by the noise that was drawn, on one
@@ -27,12 +27,17 @@ struct ScenarioStudyOptions {
   std::vector<unsigned> seeds = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
   PcmConfig pcm = {};
   double keyframes_per_s = 0.0;  ///< Only for robots: see AgentTeamOptions.
+  /// Thresholds of robots, pcm and gnc [sigma of the claimed noise], for a receiver operating
+  /// characteristic: each of these methods runs once with each threshold. A closure, or with pcm a
+  /// cycle, is consistent up to this Mahalanobis distance. 0: the default of the method.
+  std::vector<double> thresholds = {0.0};
 };
 
 /// Result of one method for one drawn scenario.
 struct ScenarioResult {
   std::string method = {};
   unsigned seed = 0;
+  double threshold = 0.0;  ///< [sigma]; 0: the default of the method, or it has none.
   std::size_t true_closures = 0;
   std::size_t true_lost = 0;
   std::size_t between = 0;  ///< True closures between two robots.
@@ -53,7 +58,7 @@ struct ScenarioStudy {
   std::size_t robots = 0;
   std::size_t poses = 0;
   bool certified = false;               ///< Whether the optimum that is the truth is certified.
-  std::vector<ScenarioResult> results;  ///< Ordered by seed, then method.
+  std::vector<ScenarioResult> results;  ///< Ordered by seed, then method, then threshold.
 };
 
 /// Throws std::invalid_argument if graph or options are not usable.
@@ -79,10 +84,11 @@ struct PlacedTeam {
 
 /// Graduated non-convexity with truncated least squares at a fixed scale (Yang et al., "Graduated
 /// Non-Convexity for Robust Spatial Perception", RA-L 2020, Algorithm 1). Closures are rejected if
-/// their residual exceeds the 99 % quantile of chi-squared (6 degrees) at their claimed noise.
+/// their residual exceeds `threshold` [sigma of the claimed noise]; 0: that of the 99 % quantile of
+/// chi-squared with 6 degrees of freedom.
 /// Odometry is trusted. The start is odometry_start(), or chordal if closures do not join all
 /// robots. Each change of the weights is followed by at most 20 Newton steps.
-[[nodiscard]] PlacedTeam solve_by_gnc(const TeamGraph& graph);
+[[nodiscard]] PlacedTeam solve_by_gnc(const TeamGraph& graph, double threshold = 0.0);
 
 /// Counts closures lost and kept, and computes the errors of `placed`. Method, seed and time are
 /// not set.

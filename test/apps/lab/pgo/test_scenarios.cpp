@@ -346,6 +346,29 @@ TEST_CASE("Robots without a true closure between them have a reference of two fr
   CHECK(results["trust-all"].false_kept == 1);
 }
 
+TEST_CASE("A lower threshold keeps fewer closures, and methods without one run once",
+          "[scenario]") {
+  const Whole whole(90);
+  Scenario scenario = two_robots();
+  scenario.random_percent = 20.0;
+  const ScenarioStudy study = run_scenario_study(
+      whole.graph, {.scenario = scenario, .seeds = {1}, .thresholds = {1.0, 0.0, 1e5}}, {});
+  std::map<std::string, std::vector<ScenarioResult>> results;
+  for (const ScenarioResult& r : study.results) results[r.method].push_back(r);
+  CHECK(results["reference"].size() == 1);
+  CHECK(results["trust-all"].size() == 1);
+  for (const std::string method : {"robots", "pcm", "gnc"}) {
+    CAPTURE(method);
+    const auto& runs = results[method];
+    REQUIRE(runs.size() == 3);
+    CHECK(runs[0].true_lost > runs[0].true_closures / 10);
+    CHECK(runs[1].true_lost < runs[0].true_lost);
+    CHECK(runs[1].false_kept == 0);
+    CHECK(runs[2].true_lost == 0);
+  }
+  CHECK(results["gnc"][2].false_kept == results["gnc"][2].false_closures);
+}
+
 // Each scenario that a robust team must stand, on the graph that it is meant for.
 TEST_CASE("The robots' own code stands noise and places that are not as claimed", "[scenario]") {
   struct Row {
@@ -412,7 +435,7 @@ TEST_CASE("outliers runs a scenario that options have changed", "[scenario]") {
                                 Contains("of 30") && Contains("of 3 "));
   const std::string csv = folder.read("out.csv");
   CHECK(std::count(csv.begin(), csv.end(), '\n') == 11);
-  CHECK_THAT(csv, Contains("noisy-odometry,gnc,5,30,"));
+  CHECK_THAT(csv, Contains("noisy-odometry,gnc,5,0,30,"));
   CHECK_THAT(folder.read("out.json"), Contains("\"between_robots_lost\":"));
 }
 
