@@ -24,7 +24,7 @@ constexpr double kLargestTurn = 0.25 * std::numbers::pi;
 constexpr std::uint32_t kStepsBetweenPlaces = 60;
 constexpr double kLonger = 0.01;  // relative step of numeric derivatives by length
 // Largest standard deviation of the rotation of odometry in a cycle between two places. Errors of
-// cycles with more are not normal.
+// cycles with a larger one are not normally distributed.
 constexpr double kLargestTurnSigma_rad = 0.5;
 constexpr double kLeastBoxSide_m = 1.0;  // least side of the volume for false closures
 
@@ -114,7 +114,7 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
   const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
                               inverse(measured(other)), chain(other.lower, one.lower)};
   const Vector6 error = se3_log(cycle.T());
-  // Change of the error with the length of one of the chains.
+  // Derivative of the error by the relative length of one chain of odometry.
   const auto by_length = [&](UncertainPose TwoClosureCycle::*chain_of) {
     TwoClosureCycle longer = cycle;
     (longer.*chain_of).T.translation() *= 1.0 + kLonger;
@@ -125,8 +125,8 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
                         {by_length(&TwoClosureCycle::below), by_length(&TwoClosureCycle::above)});
 }
 
-// The volume in which a false closure may end: twice the bounding box of the poses, enlarged on
-// every side by the length of the longest closure.
+// The volume in which a false closure may end. Each side is the sum of the sides of the bounding
+// boxes of the lower and of the upper ends, plus twice the length of the longest closure.
 double Corroboration::volume() const {
   Eigen::AlignedBox3d below, above;
   double reach_m = 0.0;
@@ -201,11 +201,18 @@ bool Corroboration::agree(const Upward& one, const Upward& other, double barc) c
   const auto& [kappa, tau] = one.precision;
   const double turned = kappa * (T.linear() - measured.linear()).squaredNorm();
   const double moved = tau * (T.translation() - measured.translation()).squaredNorm();
-  // Noise of both closures and of every step; a rotation also moves the far end of a closure.
-  const double variances =
-      2.0 + steps_between(one.lower, other.lower) + steps_between(one.upper, other.upper);
-  const double lever = 1.0 + tau / kappa * measured.translation().squaredNorm();
-  return turned <= barc * barc * variances && moved <= barc * barc * variances * lever;
+  // Variances of the cycle, in multiples of the variance of a closure: those of both closures and
+  // of every step. A step counts as at least as noisy as a closure. A rotation also moves the far
+  // end of a closure.
+  double turn = 2.0, shift = 2.0;
+  for (const auto& [from, to] : {std::pair(one.lower, other.lower), {one.upper, other.upper}}) {
+    const auto step = step_.find(from.robot);
+    const Precision precision = step == step_.end() ? one.precision : step->second;
+    turn += steps_between(from, to) * std::max(1.0, kappa / precision.kappa);
+    shift += steps_between(from, to) * std::max(1.0, tau / precision.tau);
+  }
+  const double lever = tau / kappa * measured.translation().squaredNorm();
+  return turned <= barc * barc * turn && moved <= barc * barc * (shift + turn * lever);
 }
 
 std::vector<bool> Corroboration::isolated(double barc) const {

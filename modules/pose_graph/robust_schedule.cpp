@@ -12,9 +12,12 @@ namespace {
 constexpr double kInlierProbability = 0.999999;
 constexpr double kMuStep = 1.4;
 // While the surrogate is nearly convex, mu may increase faster.
-constexpr double kFastMuStep = 2.5;
+constexpr double kFirstMuStep = 2.5;
 constexpr double kNearlyConvex = 0.05;
-constexpr int kMaxUpdates = 100;  // weights are final afterwards
+// Once so few closures are undecided, mu may increase faster, too.
+constexpr double kLastMuStep = 10.0;
+constexpr double kMostlyDecided = 0.1;  // share of fractional weights
+constexpr int kMaxUpdates = 100;        // weights are final afterwards
 // A few more updates let borderline weights settle.
 constexpr int kHardUpdates = 3;
 constexpr int kMaxReopened = 3;
@@ -53,6 +56,7 @@ double default_threshold(int dimension) {
 
 void RobustSchedule::start(float largest, std::uint32_t open, double barc, int all_in) {
   decided_ = open == 0;
+  open_ = open;
   all_in_ = decided_ ? 0 : all_in;
   mu_ = first_mu(static_cast<double>(largest) * largest, barc * barc);
   updates_ = 1;
@@ -71,7 +75,10 @@ void RobustSchedule::next(const Tally& tally) {
              updates_ >= kMaxUpdates;
   if (decided_) return;
   ++updates_;
-  mu_ = std::min(kLargestMu, mu_ * (mu_ < kNearlyConvex ? kFastMuStep : kMuStep));
+  const double step = mu_ < kNearlyConvex                          ? kFirstMuStep
+                      : tally.fractional <= kMostlyDecided * open_ ? kLastMuStep
+                                                                   : kMuStep;
+  mu_ = std::min(kLargestMu, mu_ * step);
   if (mu_ >= kHardMu) ++hard_updates_;
 }
 

@@ -12,8 +12,8 @@ namespace km {
 [[nodiscard]] double robust_weight(double squared_residual, double squared_barc, double mu);
 
 /// The initial mu, c^2 / (2 r^2 - c^2) with the largest residual r (ibid., Remark 5). Weights are
-/// zero from 2 r^2 on, so that all closures have an influence. kLargestMu if r is below c /
-/// sqrt(2): then no residual exceeds c.
+/// zero only from a squared residual of 2 r^2 on, so that at first all closures have an influence.
+/// kLargestMu if r is below c / sqrt(2): then no residual exceeds c.
 [[nodiscard]] double first_mu(double largest_squared_residual, double squared_barc);
 
 inline constexpr double kLargestMu = 1e30;
@@ -24,8 +24,8 @@ inline constexpr double kLargestMu = 1e30;
 [[nodiscard]] double default_threshold(int dimension);
 
 /// Schedule of graduated non-convexity: it decides when mu increases and when the weights are
-/// final. Only the root of the tree runs it, on the sums of the team. There is one step of the
-/// poses between two weighings.
+/// final. Only the root of the tree runs it, on the sums of the team. A weighing sets the weights
+/// of all closures at the present poses. There is one step of the poses between two weighings.
 class RobustSchedule {
  public:
   /// Sums of the team over the last weighing.
@@ -34,13 +34,15 @@ class RobustSchedule {
     std::uint32_t fractional = 0;  ///< Number of weights strictly between 0 and 1.
   };
 
-  /// `largest`: largest residual [sigma] of the edges that may be rejected. `open`: their number;
-  /// if it is zero, all weights are final. The first `all_in` steps precede the first weighing.
+  /// Begins with the edges that may be rejected: their number is `open`, and their largest residual
+  /// is `largest` [sigma]. If `open` is zero, all weights are final. `barc`: largest residual of an
+  /// inlier [sigma]. All weights are 1 during the first `all_in` steps of the poses.
   void start(float largest, std::uint32_t open, double barc, int all_in);
-  /// To be called once per accepted step of a weighing.
+  /// To be called once per accepted step of the poses, with the sums of the last weighing.
+  /// Increases mu or ends the schedule.
   void next(const Tally& tally);
-  /// Repeats the hard weighing, if the resulting poses contradict the decided weights. False if the
-  /// limit of repetitions is reached.
+  /// To be called if the converged poses contradict the decided weights: repeats the weighing by
+  /// which they became 0 or 1. False if the limit of repetitions is reached.
   [[nodiscard]] bool reopen();
 
   [[nodiscard]] bool all_in() const { return all_in_ > 0; }
@@ -49,6 +51,7 @@ class RobustSchedule {
 
  private:
   double mu_ = 0.0;
+  std::uint32_t open_ = 0;  // closures that may be rejected
   int all_in_ = 0;
   int updates_ = 0;
   int hard_updates_ = 0;  // updates since mu exceeded kHardMu

@@ -31,7 +31,7 @@ constexpr int kAllInSteps = 8;
 constexpr double kMargin = 8.0;
 // Share of consistent cycles from which on a closure that stands alone is probably false.
 constexpr double kMostlyConsistent = 0.75;
-constexpr std::uint32_t kFewOpen = 32;  // so few false closures do no harm
+constexpr std::uint32_t kFewOpen = 32;  // closures; so few false ones do no harm
 // Closures per pose below which the deferred closures are needed from the start.
 constexpr double kClosuresPerPose = 0.25;
 
@@ -58,7 +58,8 @@ PairMotions motions_of(const std::vector<PairVote>& votes) {
   return pairs;
 }
 
-// The noise that most pairs reach or exceed. Pairs without an estimate count as 1.
+// The noise that at least half of the pairs reach or exceed. Pairs without an estimate count as 1.
+// With fewer than kEnoughPairs pairs, the result is 1.
 double usual_pair_noise(const std::vector<PairVote>& votes) {
   if (votes.size() < kEnoughPairs) return 1.0;
   std::vector<float> noise;
@@ -76,8 +77,8 @@ std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>
 }
 
 // The rigid motion that removes the mean rotation and translation of `poses` by `steps`. To first
-// order it costs nothing. The resulting step has minimum length and does not depend on the pose
-// that was held. `upright`: only rotations about z cost nothing.
+// order it costs nothing. The resulting step does not depend on the pose that was held. `upright`:
+// only rotations about z cost nothing.
 std::array<double, 6> drift_against(std::span<const SE3> poses, const Eigen::MatrixXd& steps,
                                     bool upright) {
   const double share = 1.0 / static_cast<double>(poses.size());
@@ -191,13 +192,16 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   // If the weights were decided before this pass up, its equations are the final ones, unless pairs
   // were still limited.
   const bool decided = schedule_.decided();
+  const bool newly_decided = decided && weighing_ != Weighing::kDecided;
   const bool unlimited = weighing_ == Weighing::kDecided || usual_pair_.tau >= kUnlimited.tau;
   weighing_ = decided              ? Weighing::kDecided
               : schedule_.all_in() ? Weighing::kAllIn
                                    : Weighing::kWeigh;
   if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds)
     return answer(Next::kDone);
-  if (decided && worth_refreshing(decrement_)) {
+  // Gauss-Newton steps rarely lead to the minimum of the decided weights, so full second
+  // derivatives are needed in any case.
+  if (decided && (worth_refreshing(decrement_) || (newly_decided && !full_))) {
     full_ = true;
     convex_ = false;
     return refresh(true, weighing_);
