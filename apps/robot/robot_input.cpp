@@ -31,7 +31,8 @@ bool has_messages(const RobotOptions& options) {
   return options.is_live || (!options.dataset.empty() && may_be_bag(options.dataset));
 }
 
-// States the damaged parts of the journal, and keeps it as it was found.
+// States the damaged parts of the journal, and keeps a copy from the first time. The damaged bytes
+// stay in the journal, so a later resume finds them again.
 void report_damage(const fs::path& file, const RestoredRun& run) {
   for (const JournalDamage& damage : run.journal.damages)
     log::warn("journal") << to_string(damage, file);
@@ -39,7 +40,7 @@ void report_damage(const fs::path& file, const RestoredRun& run) {
   const fs::path copy = file.string() + kDamaged;
   std::error_code error;
   fs::copy_file(file, copy, fs::copy_options::skip_existing, error);
-  log::warn("journal") << run.lost_keyframes << " keyframes are incomplete; the journal as it was: "
+  log::warn("journal") << run.lost_keyframes << " keyframes are incomplete; a copy of the journal: "
                        << (error ? "not copied, " + error.message() : copy.string());
 }
 

@@ -122,7 +122,9 @@ void RunRecord::judge(const ClosureId& id) {
 }
 
 void RunRecord::add(const Trajectory& trajectory) {
-  if (trajectory.robot == robot_) trajectory_ = trajectory;
+  if (trajectory.robot != robot_) return;
+  trajectory_ = trajectory;
+  trajectory_is_stated_ = false;
 }
 
 void RunRecord::add(const PeerEvent& event) {
@@ -164,7 +166,7 @@ void RunRecord::add(const RobotSample& sample) {
 }
 
 void RunRecord::state_poses() {
-  if (!trajectory_) return;
+  if (!trajectory_ || std::exchange(trajectory_is_stated_, true)) return;
   if (const auto changes = stated_poses_.update(*trajectory_))
     append_in_parts(*changes, &PoseChanges::poses, events_);
 }

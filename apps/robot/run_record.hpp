@@ -168,6 +168,7 @@ class RunRecord {
   std::map<RobotId, std::uint64_t> other_vocabulary_;
   std::optional<Trajectory> trajectory_;
   StatedPoses stated_poses_;
+  bool trajectory_is_stated_ = false;
   MeshCells stated_cells_;  // all of them, ascending
   ClosureJudgements changed_judgements_;
   std::vector<JournalEntry> events_;

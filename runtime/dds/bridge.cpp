@@ -12,7 +12,6 @@ namespace km {
 namespace {
 
 constexpr std::chrono::seconds kAcknowledgementTime{2};
-constexpr double kSendKeys_s = 30.0;  // a robot that was short of memory may have dropped a key
 constexpr std::size_t kMaxKeyMessageBytes = 512;
 constexpr dds_duration_t kWakeUp = DDS_MSECS(250);  // interval for changes that only the clock
                                                     // causes
@@ -170,7 +169,7 @@ void DdsBridge::receive_until_stopped() try {
     const double now_s = steady_now_s();
     peers_.poll();
     for (const TeamPeer& peer : peers_.take_admitted()) key_sender_.post(peer);
-    if (now_s - keys_sent_s_ >= kSendKeys_s) {
+    if (now_s - keys_sent_s_ >= kKeyPeriod_s) {
       keys_sent_s_ = now_s;
       send_keys();
     }

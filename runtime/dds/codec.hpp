@@ -15,10 +15,10 @@
 
 namespace km {
 
-/// Hash that identifies a message. At the sender, a message replaces the stored one with its key.
+/// Hash of the subject of a message. At the sender, a message replaces the stored one of equal key.
 using MessageKey = std::uint64_t;
 
-/// Key of the message that these numbers identify.
+/// Key of messages whose subject these numbers identify.
 [[nodiscard]] inline MessageKey message_key(std::initializer_list<std::uint64_t> numbers) {
   MessageKey key = kFnv1aBasis;
   for (const std::uint64_t number : numbers) mix_fnv1a(key, number);

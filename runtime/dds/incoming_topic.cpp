@@ -21,9 +21,8 @@ constexpr std::size_t kMaxStreams = 4096;  // senders whose message numbers a to
 // Maximum time for which a message waits until its writer is known. DDS may deliver messages before
 // it announces their robot. A restarted robot is not accepted until its former process is lost.
 constexpr double kPatience_s = 8.0;
-// Maximum time for which a message waits for its key. A sender repeats its keys after a shorter
-// time (kSendKeys_s of the bridge), so a lost key loses no message.
-constexpr double kKeyPatience_s = 45.0;
+// Maximum time for which a message waits for its key: the sender repeats a lost key before.
+constexpr double kKeyPatience_s = 1.5 * kKeyPeriod_s;
 constexpr double kRetry_s = 0.1;
 constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};

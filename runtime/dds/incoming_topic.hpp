@@ -23,6 +23,10 @@
 
 namespace km {
 
+/// Time after which a process sends its key again: a robot that was short of memory may have
+/// dropped it [s].
+inline constexpr double kKeyPeriod_s = 30.0;
+
 /// Number of messages that subscribers hold. It is bounded, so that the next message waits with
 /// those of its peer and not before other peers' messages in a node's queue. Thread-safe.
 class InFlight : public std::enable_shared_from_this<InFlight> {

@@ -42,7 +42,7 @@ struct RobotStatus {
 /// Interval between statuses [s].
 inline constexpr double kStatusPeriod_s = 0.5;
 
-/// Upper limit of settled_links.
+/// Largest value of settled_links, which also stands for larger numbers of links.
 inline constexpr std::uint8_t kManyLinks = 255;
 
 template <>

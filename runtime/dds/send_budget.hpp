@@ -31,7 +31,7 @@ class SendBudget {
   [[nodiscard]] std::optional<double> wait_s(SendPriority priority, std::uint64_t bytes,
                                              std::span<const RobotId> readers, double now_s);
 
-  /// Charges a message of `bytes` to each of `readers` to the budget.
+  /// Charges the budget for one copy of a message per reader: bytes * readers.size().
   void spend(SendPriority priority, std::uint64_t bytes, std::span<const RobotId> readers,
              double now_s);
 

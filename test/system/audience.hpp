@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <catch2/catch.hpp>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -75,6 +76,15 @@ inline std::vector<std::string> robot_on(const Walk& walk, const Walk& other,
           "--domain",
           std::to_string(domain),
           "--view"};
+}
+
+/// Runs two robots that meet, watched from beginning to end.
+inline void run_two_robots(const std::filesystem::path& folder, int domain) {
+  const Walk a{0, 0}, b{1, 40};
+  Process first(robot_on(a, b, folder, domain));
+  Process second(robot_on(b, a, folder, domain));
+  CHECK(first.wait() == 0);
+  CHECK(second.wait() == 0);
 }
 
 }  // namespace km

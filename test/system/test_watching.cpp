@@ -43,11 +43,7 @@ TEST_CASE("A viewer of a team knows how it ends, and changes nothing", "[system]
   const TemporaryFolder folder;
   const int domain = random_domain();
   Audience audience(domain);
-  const Walk a{0, 0}, b{1, 40};
-  Process first(robot_on(a, b, folder.path(), domain));
-  Process second(robot_on(b, a, folder.path(), domain));
-  CHECK(first.wait() == 0);
-  CHECK(second.wait() == 0);
+  run_two_robots(folder.path(), domain);
   const auto& known = audience.finish();
   REQUIRE(known.size() == 2);
   for (const RobotId robot : {RobotId{0}, RobotId{1}}) {

@@ -58,11 +58,7 @@ TEST_CASE("A viewer of a running team and the playback of its run show the same"
   const TemporaryFolder folder;
   const int domain = random_domain();
   Audience audience(domain);
-  const Walk a{0, 0}, b{1, 40};
-  Process first(robot_on(a, b, folder.path(), domain));
-  Process second(robot_on(b, a, folder.path(), domain));
-  CHECK(first.wait() == 0);
-  CHECK(second.wait() == 0);
+  run_two_robots(folder.path(), domain);
   const auto& live = audience.finish();
   const RunPlayback run = read_run(folder.path(), 0);
   CHECK(run.notes.empty());
