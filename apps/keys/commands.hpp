@@ -5,8 +5,8 @@
 
 namespace km {
 
-/// Each adds a subcommand to `app`, which runs as soon as the command line names it and prints to
-/// stdout. Failures throw a std::exception.
+/// Each function adds a subcommand to `app`. The subcommand runs when the command line that names
+/// it is parsed, and prints to stdout. It throws a std::exception if it fails.
 void add_make(CLI::App& app);
 void add_add(CLI::App& app);
 void add_revoke(CLI::App& app);

@@ -32,7 +32,7 @@ std::vector<std::string> row_of(const Certificate& certificate, const Revocation
           lapse == nullptr ? "holds" : lapse};
 }
 
-// Prints the faults of a robot's folder, if the folder exists on this host.
+// If the folder of a robot exists on this host, prints its faults, and a reminder to delete it.
 void report_folder(const fs::path& folder, const Revocations& revocations) {
   if (!fs::is_directory(folder)) return;
   try {

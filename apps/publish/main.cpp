@@ -118,7 +118,7 @@ std::string table(const std::vector<PlayedTopic>& topics) {
   return align_columns(rows);
 }
 
-// Prints the progress every few seconds.
+// Times the reports on the progress: is_due() is true once every few seconds.
 class Progress {
  public:
   [[nodiscard]] bool is_due() {

@@ -26,8 +26,8 @@ struct PageMessage {
 /// Source of the messages that a page shows.
 enum class PageSource {
   kTeam,    ///< A running team: "live".
-  kReplay,  ///< A finished run in real time: "replay".
-  kRun,     ///< A complete finished run: "run".
+  kReplay,  ///< The journals of a run, played over time: "replay".
+  kRun,     ///< The journals of a run, all at once: "run".
 };
 
 /// First message to the page: the source (`source`), its name (`title`), and the colours of labels.

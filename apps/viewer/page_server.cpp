@@ -32,7 +32,7 @@ bool is_loopback(const std::string& address) {
   return address.starts_with("127.") || address == "localhost" || address == "::1";
 }
 
-// 128 random bits as letters and digits.
+// 128 random bits as hexadecimal digits.
 std::string random_token() {
   if (sodium_init() < 0) throw std::runtime_error("no random numbers for a token");
   std::array<unsigned char, 16> bytes{};
@@ -174,7 +174,8 @@ class PageServer::Impl {
         this);
   }
 
-  // Refuses pages of other sites, and pages that reached this server under another host name.
+  // False for requests from pages of other sites. Without a token, also false for requests under a
+  // name that is not one of this host.
   bool is_welcome(const mg_connection* connection) const {
     const std::string_view host = header(connection, "Host"), origin = header(connection, "Origin");
     if (!origin.empty() && origin != "http://" + std::string(host)) return false;
@@ -273,8 +274,9 @@ class PageServer::Impl {
     });
   }
 
-  // Passes the set of robots whose images are requested, if it has changed. Holds the lock, so that
-  // the calls are in the order of the changes.
+  // Applies `change` to the requests of pages. Calls on_images if the set of robots whose images
+  // are requested has changed. The caller holds mutex_, so that the calls are in the order of the
+  // changes.
   void ask(const std::function<void()>& change) {
     const std::set<RobotId> before = wanted();
     change();

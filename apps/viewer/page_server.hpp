@@ -14,19 +14,21 @@ struct PageServerOptions {
   std::string address =
       "127.0.0.1";          ///< Address to listen on; if not loopback, URLs need the token.
   int port = 8777;          ///< Port to listen on; 0: any free port.
-  std::string page_folder;  ///< Files of the page; empty: those embedded in the program.
+  std::string page_folder;  ///< Folder with the files of the page, except for three.js; empty: all
+                            ///< files are those embedded in the program.
   std::string hello;        ///< See hello_message().
-  /// Called when the set of robots whose images some page requests has changed; in order, by one
-  /// thread at a time.
+  /// Called with the robots whose images some page requests, when this set has changed. Calls are
+  /// in the order of the changes, by one thread at a time.
   std::function<void(const std::set<RobotId>&)> on_images;
 };
 
 /// Serves the page, and on its WebSocket all present and future messages of a store. Refuses
-/// requests whose Origin is another site and, without a token, requests under another host name.
+/// requests whose Origin is another site. A server without a token (see PageServerOptions::address)
+/// also refuses requests whose host is not a name of this host.
 class PageServer {
  public:
-  /// `store` outlives this. Throws std::runtime_error that names address and port if they cannot be
-  /// used.
+  /// `store` must outlive the server. Throws std::runtime_error that names address and port if they
+  /// cannot be used.
   PageServer(ViewStore& store, PageServerOptions options);
   ~PageServer();
   PageServer(const PageServer&) = delete;

@@ -66,7 +66,7 @@ class RobotPlayback {
   void show(MeshCells& cells) { cells_.emplace_back(time_, std::move(cells)); }
   void show(const auto& event) { selector_->add(event); }
 
-  // `later_s`: time after the present, for updates that are not due yet.
+  // Takes all updates that are due `later_s` after the newest entry.
   void send(double later_s) {
     while (auto content = selector_->next(1e-9 * static_cast<double>(time_) + later_s))
       add(time_, *std::move(content));
@@ -76,7 +76,8 @@ class RobotPlayback {
     updates_.push_back({robot_, boot_, time, std::move(content)});
   }
 
-  // Chunks of the end of the run that no event names are shown at the end.
+  // Adds the chunks of the meshes at the times of the events that state their cells. Chunks whose
+  // cells are in no event are added at the end of the run.
   void add_meshes(const LabelledMesh& map, const LabelledMesh& optimized) {
     const RobotId last = cells_.empty() ? robot_ : cells_.back().second.anchor;
     std::set<MeshChunkKey> shown;
@@ -151,7 +152,7 @@ std::vector<fs::path> folders_of_robots(const fs::path& folder) {
   return folders;
 }
 
-// Moves the first update to `begin`.
+// Shifts the times of all updates so that the first is `begin`, and shortens pauses to kMaxPause_s.
 void move_to(Stamp begin, std::vector<ViewUpdate>& updates) {
   const Stamp most = nanoseconds(kMaxPause_s);
   Stamp before = updates.empty() ? 0 : updates.front().sent, now = begin;

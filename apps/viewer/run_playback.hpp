@@ -13,17 +13,19 @@ namespace km {
 struct RunPlayback {
   std::vector<ViewUpdate> updates;
   LabelPalette palette;            ///< Palette of the first robot that has one.
-  std::vector<std::string> notes;  ///< Missing or damaged files, and robots without an end.
+  std::vector<std::string> notes;  ///< Missing or damaged files, and robots whose run has not
+                                   ///< ended.
 };
 
-/// Reads the folder of a team's results, or of one robot's. The run begins at `begin`. Times in
-/// which no process ran are shortened to kMaxPause_s.
+/// Reads the folder of a team's results, or of one robot's. The first update gets the time `begin`.
+/// Times in which no process ran are shortened to kMaxPause_s.
 ///
 /// The updates are those that a viewer would have received from the running robots, without images
 /// and without the limits of a budget. ViewSelector, which robots use, chooses them from the events
-/// of the journal. Meshes are those of the end of the run. A chunk in the frame of the end
-/// is shown from the time at which its cell had faces, before that in the frame of the robot alone.
-/// Throws std::runtime_error if the folder has no journal of a robot.
+/// of the journal. Meshes are those of the end of the run: a chunk is shown from the event that
+/// states that its cell has faces. While the robot has the final `world`, its optimised mesh is
+/// shown, and while it is alone before that, the mesh of its map. Throws std::runtime_error if the
+/// folder has no journal of a robot.
 [[nodiscard]] RunPlayback read_run(const std::filesystem::path& folder, Stamp begin);
 
 inline constexpr double kMaxPause_s = 10.0;

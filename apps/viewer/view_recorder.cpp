@@ -22,7 +22,7 @@ constexpr std::size_t kQueue = 10000;         // as in the record of a robot
 constexpr double kState_bytes_per_s = 200e3;  // rate of uncompressed paths, meshes and closures
 constexpr int kMeshPoints = 200000;
 constexpr double kMeshPeriod_s = 5.0;  // because merging the chunks of a mesh takes long
-constexpr double kSteady_s = 1.0;      // poses farther apart give no velocity
+constexpr double kSteady_s = 1.0;      // poses farther apart in time give no velocity
 
 RosDiagnosticStatus status_of(const RobotSample& state) {
   RosDiagnosticStatus status;
@@ -210,7 +210,8 @@ class ViewRecorder::Robot {
     odometry_topic_.publish(std::move(state));
   }
 
-  // Publishes the state of the image first, because the state connects the frames of the robot.
+  // Publishes the state of the keyframe's image first, because LiveFrames takes the odometry pose
+  // of the keyframe from this state.
   void publish_keyframe(std::size_t index) {
     const auto& [stamp, T_odom_kf] = odometry[index];
     publish_state(stamp, T_odom_kf);

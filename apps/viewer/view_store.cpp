@@ -8,12 +8,13 @@
 namespace km {
 namespace {
 
-// Ranks of messages that may be dropped, first to drop first; a rank is the second number of a key.
+// Ranks of messages that may be dropped. The lowest rank is dropped first. The second number of a
+// key is the rank.
 constexpr std::int64_t kImage = 0, kMesh = 1, kKeyframes = 2, kPose = 3, kState = 4;
 
-// True for meshes and keyframe poses, which robots send again unchanged; false for poses, states
-// and images.
-bool is_state_of_things(const auto& key) {
+// True for mesh chunks and keyframe poses. Robots repeat them unchanged, and the store ignores the
+// repetitions. Poses, states and images are never ignored.
+bool may_be_repetition(const auto& key) {
   return key && ((*key)[1] == kMesh || (*key)[1] == kKeyframes);
 }
 
@@ -46,12 +47,12 @@ std::optional<ViewStore::Key> ViewStore::key_of(const ViewUpdate& update) {
 
 void ViewStore::add(ViewUpdate update) {
   const auto key = key_of(update);
-  const std::size_t hash = is_state_of_things(key) ? hash_of(update) : 0;
+  const std::size_t hash = may_be_repetition(key) ? hash_of(update) : 0;
   const std::lock_guard lock(mutex_);
   note_boot(update);
   if (is_known(key, hash)) return;
   if (auto* const closures = std::get_if<ViewClosures>(&update.content))
-    if (!leave_new_closures(update.robot, *closures)) return;
+    if (!remove_known_closures(update.robot, *closures)) return;
   const std::uint64_t number = messages_.size();
   messages_.push_back(std::make_shared<const PageMessage>(page_message(update, number)));
   bytes_ += messages_.back()->bytes.size();
@@ -75,13 +76,13 @@ void ViewStore::note_boot(const ViewUpdate& update) {
 }
 
 bool ViewStore::is_known(const std::optional<Key>& key, std::size_t hash) const {
-  if (!is_state_of_things(key)) return false;
+  if (!may_be_repetition(key)) return false;
   const auto known = newest_.find(*key);
   return known != newest_.end() && known->second.hash == hash && messages_[known->second.number];
 }
 
 // Removes closures that are known with equal values; false if none is left.
-bool ViewStore::leave_new_closures(RobotId robot, ViewClosures& all) {
+bool ViewStore::remove_known_closures(RobotId robot, ViewClosures& all) {
   auto& known = closures_[robot];
   std::erase_if(all.closures, [&](const ViewClosure& closure) {
     const auto [last, is_new] = known.try_emplace(closure.id, closure);

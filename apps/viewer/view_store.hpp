@@ -24,7 +24,7 @@ namespace km {
 /// poses, past states. Present states and closures are kept. If they alone exceed the limit, new
 /// messages are refused.
 ///
-/// When another viewer starts, robots send past messages again: those without new content are
+/// When another viewer starts, robots send past messages again. Messages without new content are
 /// ignored. Thread-safe.
 class ViewStore {
  public:
@@ -66,7 +66,7 @@ class ViewStore {
   static std::optional<Key> key_of(const ViewUpdate& update);
   void note_boot(const ViewUpdate& update);
   bool is_known(const std::optional<Key>& key, std::size_t hash) const;
-  bool leave_new_closures(RobotId robot, ViewClosures& all);
+  bool remove_known_closures(RobotId robot, ViewClosures& all);
   void supersede(const Key& key, const Newest& newest);
   void forget_until_it_fits();
   void drop(std::uint64_t number);

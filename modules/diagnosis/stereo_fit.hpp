@@ -24,7 +24,8 @@ struct StereoPoint {
 [[nodiscard]] std::optional<StereoPoint> stereo_point(const StereoRig& rig, const SE3& T_right_left,
                                                       const PixelPair& pair);
 
-/// Agreement of points in both images of a pair, at any position, with a calibration.
+/// Agreement of matched points in both images of a pair with a calibration. The points are matched
+/// over the whole image and not only near their epipolar lines.
 struct StereoFit {
   std::size_t points = 0;
   /// Share of points within kEpipolarInlier_px of their epipolar line and not behind the cameras.

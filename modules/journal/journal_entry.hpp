@@ -33,8 +33,8 @@ struct JournalPeer {
   std::string name;
 };
 
-/// Events of a run, see README. The first eight are results that a robot cannot compute again after
-/// its process has died; the others state what its results and viewers show.
+/// Events of a run, see README. A resumed process restores its state from the first nine; the last
+/// two are for viewers.
 using JournalEntry =
     std::variant<JournalStart, OdometryState, KeyframeOdometry, Keyframe, Closure, ClosureOutcome,
                  JournalPeer, ClosureJudgements, PoseChanges, RobotSample, MeshCells>;

@@ -15,8 +15,8 @@ namespace {
 constexpr std::string_view kMark = "\x7FKMJRNL2";
 constexpr std::size_t kHead_bytes = kMark.size() + 4 + 8;
 constexpr std::size_t kLeast_bytes = kHead_bytes + 8;
-// After marks without an entry whose alleged bytes add up to this, nothing is read: a hostile file
-// could have a mark in every few bytes.
+// Limit on the total length of entries that fail their check. Beyond it nothing more is read: a
+// hostile file could have a mark in every few bytes, and each length would be checked.
 constexpr std::size_t kMostFalse_bytes = std::size_t{64} << 20U;
 
 std::uint64_t check_sum(Stamp time, std::span<const std::uint8_t> bytes) {
@@ -28,7 +28,7 @@ std::uint64_t check_sum(Stamp time, std::span<const std::uint8_t> bytes) {
 }
 
 struct Frame {
-  std::span<const std::uint8_t> bytes;  // empty if there is not room for them
+  std::span<const std::uint8_t> bytes;  // empty if the text ends before them
   Stamp time = 0;
   bool is_whole = false;
 };

@@ -59,22 +59,23 @@ struct StoredEntry {
 /// version of the format, a length (u32), a time (u64), the bytes, and a check sum (u64). The check
 /// sum is FNV-1a over length, time and bytes. If a process is killed or the machine loses power, an
 /// incomplete last entry fails the check. After flipped bytes the next mark begins a readable
-/// entry. Not thread-safe, except that collect() and add() may run beside write().
+/// entry. Not thread-safe, except that add() may run beside write().
 class JournalFile {
  public:
   /// Maximum size of the entries that wait while the disk is full [bytes].
   static constexpr std::size_t kMaxWaiting_bytes = std::size_t{64} << 20U;
 
-  /// Begins a new journal in place of an existing one. Nothing is written before sync().
+  /// Begins a new journal in place of an existing one. Nothing is written before write().
   explicit JournalFile(std::filesystem::path file);
-  /// Continues a journal that was read. The first sync() cuts off its incomplete end.
+  /// Continues a journal that was read. The first write() cuts off its incomplete end.
   JournalFile(std::filesystem::path file, const JournalExtent& read);
 
-  /// Stores an entry for the next write and returns its place. After an entry that does not fit, it
-  /// and all later ones are dropped, and the result is nullopt.
+  /// Stores an entry for the next write and returns its place. If an entry does not fit, it and all
+  /// later entries are dropped, and the result is nullopt.
   std::optional<JournalPlace> add(const JournalEntry& entry, Stamp time);
 
-  /// Hands the added entries to write(), unless it has some; false if there is nothing to write.
+  /// Collects the added entries for the next write(), unless collected entries are still waiting.
+  /// False if write() has nothing to write.
   bool collect();
   /// Writes the collected entries to the disk, so that they survive a power failure, and closes the
   /// file, so that the disk can be unmounted. Throws std::system_error with one line that names the

@@ -11,7 +11,8 @@
 namespace km {
 namespace {
 
-// Most keyframes in a row that are filled in; a damaged disk block has far fewer.
+// Maximum number of consecutive lost keyframes that are filled in. A damaged disk block has far
+// fewer.
 constexpr std::size_t kMostLost = 1000;
 
 bool is_final(const ClosureOutcome& outcome) {
@@ -19,8 +20,9 @@ bool is_final(const ClosureOutcome& outcome) {
          (outcome.stage == ClosureStage::kReceived && !outcome.reason.empty());
 }
 
-// Keyframe `number` of `count` that are lost between `before` and `next`. A single one has its
-// exact pose, because `next` states the step from it.
+// Keyframe `number` (from 1) of the `count` keyframes lost between `before` and `next`. The last of
+// them has its exact pose, because `next` states the step from it. The others have the rotation of
+// the last one, and interpolated positions.
 KeyframeOdometry between(const KeyframeOdometry* before, const KeyframeOdometry& next,
                          std::size_t number, std::size_t count) {
   KeyframeOdometry lost = next;
@@ -70,7 +72,8 @@ void RunRestorer::add(OdometryState state) {
   run_.states.push_back(std::move(state));
 }
 
-// False: only damage explains the gap before the keyframe.
+// True if keyframe `id` is the next one after those of `before`. False if damage of the journal can
+// explain that keyframes between them are missing. Otherwise throws.
 template <typename T>
 bool RunRestorer::follows(const KeyframeId& id, const std::vector<T>& before) const {
   const std::size_t next = before.size();
@@ -150,7 +153,8 @@ void RunRestorer::forget(RobotId robot, KeyframeIndex from) {
   std::erase_if(poses_, [&](const auto& entry) { return is_gone(entry.first); });
 }
 
-// A new incarnation has other keyframes, so its former closures are removed.
+// A new incarnation of a robot has other keyframes, so results with its former keyframes are
+// removed.
 void RunRestorer::add(JournalPeer peer) {
   const auto known = run_.peers.find(peer.robot);
   if (known != run_.peers.end() && !is_same_incarnation(known->second.boot, peer.boot))

@@ -13,8 +13,8 @@
 
 namespace km {
 
-/// A run up to the last keyframe that its journal contains in full. Odometry continues from the
-/// image of that keyframe.
+/// A run up to the last keyframe of which its journal has both odometry and features. Odometry
+/// continues from the image of that keyframe.
 struct RestoredRun {
   RobotId robot = 0;
   std::uint64_t boot = 0;  ///< Boot id of the last process.
@@ -31,8 +31,8 @@ struct RestoredRun {
   std::vector<ClosureOutcome> outcomes;
   std::map<RobotId, JournalPeer> peers;  ///< Last known identities.
 
-  std::vector<InlierSet> inlier_sets = {};  ///< Selected closures that are known, as version 0.
-  TeamSolution solution = {};               ///< Last state of results and viewers; maybe no poses.
+  std::vector<InlierSet> inlier_sets = {};  ///< Selected ones of `closures`, as version 0.
+  TeamSolution solution = {};               ///< Last solution in the journal; may have no poses.
 
   JournalExtent journal = {};      ///< Position at which writing continues.
   std::size_t lost_keyframes = 0;  ///< Keyframes of which damage has left only a part.
@@ -42,8 +42,9 @@ struct RestoredRun {
 };
 
 /// Restores a run from the entries of its journal in order. A resumed process continues after the
-/// last full keyframe, so later entries of the former process are discarded. After damage, the pose
-/// of a lost keyframe follows from its neighbours, and lost features are empty.
+/// last keyframe with odometry and features, so later entries of the former process are discarded.
+/// After damage, the pose of a lost keyframe follows from its neighbours, and lost features are
+/// empty.
 class RunRestorer {
  public:
   /// Throws std::invalid_argument for an entry that cannot follow the former ones.

@@ -48,7 +48,7 @@ struct TimedPosition {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< [m]
 };
 
-/// Links between some robots, numbered from 0, during a run.
+/// Links between `robots` robots during a run. The robots have the numbers from 0.
 struct LinkScript {
   unsigned seed = 1;
   std::size_t robots = 0;
@@ -76,7 +76,7 @@ using EthernetFrame = std::string;
 /// Address of robot `robot`, locally administered.
 [[nodiscard]] std::array<std::uint8_t, 6> ethernet_address(std::size_t robot);
 
-/// A frame that has arrived.
+/// A frame on its way, or one that has arrived.
 struct LinkDelivery {
   std::size_t from = 0;
   std::size_t to = 0;
@@ -116,12 +116,13 @@ struct LinkCounts {
 ///
 /// Equal scripts and equal frames at equal times give equal results. Every ordered pair has a
 /// random generator of its own, and each frame draws equally many numbers. So the random numbers of
-/// the n-th frame from a to b depend only on the seed, a, b and n. Deterministic: time comes in [s
-/// since the start of the run]. Not thread-safe.
+/// the n-th frame from a to b depend only on the seed, a, b and n. No clock is read: times are
+/// arguments [s since the start of the run]. Not thread-safe.
 class LinkEmulator {
  public:
-  /// Throws std::invalid_argument if the script lacks links, paths that a range needs, or groups,
-  /// or if a number is impossible.
+  /// Throws std::invalid_argument if a pair of robots has no link, or a number of a link is out of
+  /// its bounds. Also throws it if a link has a range but a robot has no path, and if a partition
+  /// has no group for a robot. Also throws it for a path that is empty or goes back in time.
   explicit LinkEmulator(LinkScript script);
 
   /// Sends a frame of robot `from` to the robot whose ethernet_address() it bears, or, by broadcast
@@ -133,7 +134,7 @@ class LinkEmulator {
   /// of sending.
   [[nodiscard]] std::vector<LinkDelivery> due(double now_s);
 
-  /// Time at which the next frame is due, if one is on its way.
+  /// Time at which the next frame is due; nullopt if no frame is on its way or none ever arrives.
   [[nodiscard]] std::optional<double> next_s() const;
 
   [[nodiscard]] std::size_t robots() const { return script_.robots; }

@@ -28,7 +28,8 @@ std::pair<std::size_t, std::string> problem_of(const std::vector<LinkTraceRow>& 
   return {};
 }
 
-// Bytes from `a` until `dt_s` later if the rate changes by `slope` [bytes/s^2].
+// Bytes that the link can carry in the time `dt_s` after row `a`, if its rate changes by `slope`
+// [bytes/s^2].
 double carried(const LinkTraceRow& a, double slope, double dt_s) {
   return dt_s * (a.bytes_per_s + 0.5 * slope * dt_s);
 }
@@ -88,15 +89,15 @@ double LinkTrace::time_of(double bytes) const {
   const LinkTraceRow& first = rows_.front();
   if (bytes < 0.0)
     return first.bytes_per_s > 0.0 ? first.time_s + bytes / first.bytes_per_s : kNever;
-  // The last row before which the link carries less than `bytes`.
+  // Index of the last row up to whose time the link can carry less than `bytes`; at least 0.
   const auto reached = std::ranges::lower_bound(capacity_, bytes);
   const auto i =
       static_cast<std::size_t>(std::max<std::ptrdiff_t>(reached - capacity_.begin() - 1, 0));
   const double missing = bytes - capacity_[i];
   if (missing <= 0.0) return rows_[i].time_s;
   const double slope = i + 1 < rows_.size() ? slope_between(rows_[i], rows_[i + 1]) : 0.0;
-  // The root of carried() = missing, in the form that holds for a slope of zero. If the rate falls
-  // to zero, rounding may make the radicand negative.
+  // The root of carried() = missing, in the form that also holds for a slope of zero. If the rate
+  // falls to zero, rounding may make the radicand negative.
   const double rate = rows_[i].bytes_per_s;
   const double divisor = rate + std::sqrt(std::max(rate * rate + 2.0 * slope * missing, 0.0));
   return divisor > 0.0 ? rows_[i].time_s + 2.0 * missing / divisor : kNever;

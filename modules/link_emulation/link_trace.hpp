@@ -14,7 +14,7 @@ struct LinkTraceError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Rate and delay of a link at an instant of the run.
+/// Rate and delay of a link at an instant of the run; see LinkTrace for the times between two rows.
 struct LinkTraceRow {
   double time_s = 0.0;
   double bytes_per_s = 0.0;  ///< Infinite if the link has no limit at any time.
@@ -45,7 +45,7 @@ class LinkTrace {
 
  private:
   std::vector<LinkTraceRow> rows_;
-  std::vector<double> capacity_;  // at the time of each row
+  std::vector<double> capacity_;  // capacity_until() of the time of each row
 };
 
 /// Parses a table with the columns time_s, bytes_per_s, delay_s, which may be named in its first

@@ -4,25 +4,26 @@
 
 namespace km {
 
-void ChunkSchedule::want(Piece& piece, MeshChunk chunk) {
+void ChunkSchedule::want(Versions& versions, MeshChunk chunk) {
   const MeshChunkKey key = chunk.key;
-  const bool news =
-      chunk.empty() ? piece.is_out : piece.sent.empty() || differ(piece.sent, chunk, min_move_m_);
+  const bool news = chunk.empty()
+                        ? versions.is_out
+                        : versions.sent.empty() || differ(versions.sent, chunk, min_move_m_);
   if (news) {
-    piece.waiting = std::move(chunk);
-    order_.emplace(piece.turn, key);
+    versions.waiting = std::move(chunk);
+    order_.emplace(versions.turn, key);
   } else {
-    piece.waiting.reset();
-    order_.erase({piece.turn, key});
+    versions.waiting.reset();
+    order_.erase({versions.turn, key});
   }
 }
 
 void ChunkSchedule::update(std::vector<MeshChunk> chunks) {
   auto chunk = chunks.begin();
-  for (auto known = pieces_.begin(); known != pieces_.end(); ++known) {
+  for (auto known = versions_.begin(); known != versions_.end(); ++known) {
     while (chunk != chunks.end() && chunk->key < known->first) {
       const MeshChunkKey key = chunk->key;
-      want(pieces_[key], std::move(*chunk++));  // a new piece before `known`
+      want(versions_[key], std::move(*chunk++));  // a new key before `known`
     }
     if (chunk != chunks.end() && chunk->key == known->first)
       want(known->second, std::move(*chunk++));
@@ -31,24 +32,25 @@ void ChunkSchedule::update(std::vector<MeshChunk> chunks) {
   }
   for (; chunk != chunks.end(); ++chunk) {
     const MeshChunkKey key = chunk->key;
-    want(pieces_[key], std::move(*chunk));
+    want(versions_[key], std::move(*chunk));
   }
 }
 
 void ChunkSchedule::begin_again() {
   order_.clear();
-  for (auto& [key, piece] : pieces_) piece = {.sent = {}, .is_out = piece.is_out, .waiting = {}};
+  for (auto& [key, versions] : versions_)
+    versions = {.sent = {}, .is_out = versions.is_out, .waiting = {}};
 }
 
 std::optional<MeshChunk> ChunkSchedule::next() {
   if (order_.empty()) return std::nullopt;
-  Piece& piece = pieces_.at(order_.begin()->second);
+  Versions& versions = versions_.at(order_.begin()->second);
   order_.erase(order_.begin());
-  piece.turn = ++turn_;
-  piece.sent = *std::move(piece.waiting);
-  piece.waiting.reset();
-  piece.is_out = !piece.sent.empty();
-  return piece.sent;
+  versions.turn = ++turn_;
+  versions.sent = *std::move(versions.waiting);
+  versions.waiting.reset();
+  versions.is_out = !versions.sent.empty();
+  return versions.sent;
 }
 
 }  // namespace km

@@ -12,22 +12,23 @@
 
 namespace km {
 
-/// Selects the chunks of a changing mesh that are to be sent, and their order. Chunks that were
+/// Selects the chunks of a changing mesh that are to be sent, and their order. Keys whose chunk was
 /// never sent come first, then those sent longest ago, so that each has its turn at any rate of
-/// changes. Only the newest state of a piece is sent. It is not sent if differ() finds no
-/// difference from the sent state.
+/// changes. Only the newest chunk of a key is sent. It is not sent if differ() finds no difference
+/// from the last sent chunk of this key.
 ///
-/// Stores the sent state, which is as large as the mesh. Not thread-safe.
+/// Stores the last sent chunk of each key: as much as the mesh. Not thread-safe.
 class ChunkSchedule {
  public:
   /// See differ().
   explicit ChunkSchedule(double min_move_m) : min_move_m_(min_move_m) {}
 
-  /// The whole current mesh, keys ascending. Each piece that has vanished is sent once more, empty.
+  /// Takes the whole current mesh, keys ascending. For each key that it no longer has, an empty
+  /// chunk is sent once.
   void update(std::vector<MeshChunk> chunks);
 
-  /// Frees the sent state, so that the next update() sends the whole mesh to new receivers. Pieces
-  /// that are missing in that update are sent empty, for receivers that still have them.
+  /// Discards the sent chunks, so that the next update() sends the whole mesh to new receivers. For
+  /// keys that are missing in that update, empty chunks are sent to receivers with former chunks.
   void begin_again();
 
   /// The next chunk to send, which then counts as sent; nullopt if nothing has changed.
@@ -36,17 +37,18 @@ class ChunkSchedule {
   [[nodiscard]] std::size_t waiting() const { return order_.size(); }
 
  private:
-  struct Piece {
-    MeshChunk sent;          // empty: the piece is absent, or is to be sent again
-    bool is_out = false;     // a receiver may have it
+  /// Chunks of one key.
+  struct Versions {
+    MeshChunk sent;          // last sent chunk; empty: there is none, or it is to be sent again
+    bool is_out = false;     // a receiver may have a chunk that is not empty
     std::uint64_t turn = 0;  // value of turn_ when it was last sent; 0: never sent
     std::optional<MeshChunk> waiting;
   };
-  void want(Piece& piece, MeshChunk chunk);
+  void want(Versions& versions, MeshChunk chunk);
 
   double min_move_m_;
-  std::map<MeshChunkKey, Piece> pieces_;
-  std::set<std::pair<std::uint64_t, MeshChunkKey>> order_;  // waiting pieces by turn
+  std::map<MeshChunkKey, Versions> versions_;
+  std::set<std::pair<std::uint64_t, MeshChunkKey>> order_;  // keys of waiting chunks by turn
   std::uint64_t turn_ = 0;
 };
 

@@ -26,7 +26,7 @@ struct MeshChunkKey {
 /// are rounded to a grid that all chunks share, so that a vertex has the same position in all
 /// chunks that contain it: position = step_m * (origin + offset).
 ///
-/// A chunk without faces means that the piece with its key has vanished.
+/// A chunk without faces means that the mesh no longer has a chunk with its key.
 struct MeshChunk {
   using Triple = std::array<std::uint16_t, 3>;
 
@@ -75,7 +75,7 @@ struct MeshPieces {
 
 /// Splits a mesh in `world` into chunks of at most kMaxChunkBytes. Positions err by up to half a
 /// step per axis. Colours, and vertices without faces, are dropped. A face belongs to the cell of
-/// its centroid. An unchanged piece of mesh gives the same chunk if its vertices are in the same
+/// its centroid. An unchanged part of the mesh gives the same chunk if its vertices are in the same
 /// order; the order of faces does not matter.
 ///
 /// Throws std::invalid_argument for a grid that is not positive and for cells that are no longer

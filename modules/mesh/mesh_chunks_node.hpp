@@ -19,8 +19,8 @@
 
 namespace km {
 
-/// Publishes the robot's mesh in chunks, at most max_bytes_per_s on average. Pieces that have
-/// changed since they were last sent are sent in their newest state. The module that has the
+/// Publishes the robot's mesh in chunks, at most max_bytes_per_s on average. Only chunks that have
+/// changed since they were last sent are sent, each in its newest version. The module that has the
 /// robot's best mesh passes it to offer().
 class MeshChunksNode final : public Node {
  public:

@@ -31,7 +31,7 @@ struct RobotMesh {
       0;  ///< Chunks left out of mesh: their anchor robot or step differs from the newest.
 };
 
-/// The meshes of other robots, with the newest chunk of each piece. The mesh of a robot that leaves
+/// The meshes of other robots, with the newest chunk of each key. The mesh of a robot that leaves
 /// stays. When a robot restarts, its first chunk replaces its former mesh. Not thread-safe.
 class TeamMesh {
  public:

@@ -26,9 +26,9 @@ struct Traits : OpenMesh::DefaultTraits {
 using Surface = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 using Decimater = OpenMesh::Decimater::DecimaterT<Surface>;
 
-// Weight of the spread of a merged region, its area times the squared length of the edge, relative
-// to the quadric error, area times squared distance. The spread decides on flat and gently curved
-// surface, the shape decides at corners. Nodes serve to bend the mesh, and it can bend everywhere.
+// Weight of the spread (area of the merged region times squared length of the collapsed edge)
+// relative to the quadric error (area times squared distance from planes). The spread determines
+// the collapses on flat and gently curved surface, the quadric error those at corners.
 constexpr double kSpread = 0.1;
 
 std::uint32_t index_of(OpenMesh::VertexHandle vertex) {
@@ -85,8 +85,8 @@ class SpreadQuadricsT : public OpenMesh::Decimater::ModQuadricT<SurfaceT> {
   std::vector<std::uint32_t>* merged_into_ = nullptr;
 };
 
-// The triangles as a manifold. Vertex i is point i. Corners of faces that would violate the
-// manifold are copies.
+// The triangles as a manifold. Vertex i is point i. A face that would violate the manifold gets
+// copies of its corners as further vertices.
 struct ManifoldSurface {
   Surface surface;
   std::vector<std::uint32_t> point_of_vertex;
@@ -234,7 +234,7 @@ std::vector<LabelledMesh::Face> cluster_faces(const std::vector<LabelledMesh::Fa
 constexpr double kClustersPerSpacing = 2.0;
 constexpr double kNearSpacings = 0.5;  // nodes closer than this are merged
 
-// Assigns vertices to existing nodes.
+// Assigns vertices without a node to the nearest existing node, if one is near.
 void join_near_nodes(SimplifiedMesh& simplified, const MapMesh& map, const NodeGrid& grid) {
   if (simplified.nodes.empty()) return;
   for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v)

@@ -22,26 +22,28 @@ struct TimedTriangles {
 
 /// Remaining points, and for each point the one into which it was merged.
 struct CollapsedPoints {
-  std::vector<std::uint32_t> kept;     ///< Index of a point; twice if surfaces cross there.
+  std::vector<std::uint32_t> kept;     ///< Indices of points; repeated if the surface is cut
+                                       ///< open there.
   std::vector<std::uint32_t> kept_of;  ///< For each point an index into `kept`.
 };
 
 /// Decimates by half-edge collapses in OpenMesh until `target` points with faces remain, or no
-/// collapse is possible. extend() describes their order. Points whose times of sight differ by more
-/// than the window are not merged. Faces may meet in any way: if more than two share an edge, the
+/// collapse is possible. extend() describes their order. Points whose keyframe_gap() exceeds the
+/// window are not merged. Faces may meet in any way: if more than two share an edge, the
 /// surface is cut open.
 [[nodiscard]] CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t target,
                                              KeyframeIndex window_keyframes);
 
 /// Vertices of a mesh clustered by the cells of a grid, and the triangles between the clusters.
 struct VertexClusters {
-  TimedTriangles triangles;           ///< One point per cluster: that of its vertex.
+  TimedTriangles triangles;           ///< One point per cluster: the position of `vertex`.
   std::vector<std::uint32_t> vertex;  ///< For each cluster the vertex nearest to its centroid.
   std::vector<std::uint32_t> cluster_of_vertex;  ///< kNoIndex for vertices without a cluster.
 };
 
 /// Clusters those vertices of `map` whose `node_of_vertex` is kNoIndex, in cells of `width_m`.
-/// Vertices of a cell are in one cluster if they were seen within the window of its first vertex.
+/// Vertices of a cell are in one cluster if their keyframe_gap() to the first vertex of the cluster
+/// is within the window.
 /// Faces with corners in three clusters remain, each once. Linear.
 [[nodiscard]] VertexClusters cluster_vertices(const MapMesh& map,
                                               std::span<const std::uint32_t> node_of_vertex,
@@ -50,7 +52,7 @@ struct VertexClusters {
 /// Resolution of the simplified mesh, and the surfaces that it does not merge.
 struct DecimationScale {
   double spacing_m = 0.5;               ///< Distance between neighbouring nodes.
-  KeyframeIndex window_keyframes = 50;  ///< Surfaces seen further apart in time are not merged.
+  KeyframeIndex window_keyframes = 50;  ///< Largest keyframe_gap() of surfaces that are merged.
 };
 
 /// The simplified mesh of a map: nodes, and the node of each vertex. The vertices of one node are
@@ -63,11 +65,13 @@ struct SimplifiedMesh {
 /// Assigns every vertex of `map` that has no node in `simplified` to one. Vertices within half a
 /// spacing of a node are assigned to it. The others are simplified to new nodes, which are
 /// appended. For speed they are first clustered on a grid of half the spacing. Then OpenMesh
-/// decimates the mesh of the clusters to the number of nodes for its area.
+/// decimates the mesh of the clusters to as many points as a triangular lattice with this spacing
+/// has on the area of the mesh.
 ///
 /// The order of collapses is that of quadric error (Garland and Heckbert, "Surface Simplification
-/// Using Quadric Error Metrics", 1997) plus the spread of the merged region. The spread distributes
-/// nodes over flat surface too, because it also bends. Nodes closer than half a spacing are merged.
+/// Using Quadric Error Metrics", 1997) plus the spread of the merged region (area times squared
+/// length of the edge). The spread distributes nodes over flat surface too, because the deformation
+/// also bends flat surface. Nodes closer than half a spacing are merged.
 ///
 /// `simplified.node_of_vertex` is first extended with kNoIndex to the length of map.mesh.vertices.
 /// Precondition: check_map_mesh() accepts the map. Linear in the new vertices except for the
@@ -75,7 +79,7 @@ struct SimplifiedMesh {
 void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScale& scale);
 
 /// Pairs of nodes a < b, ascending, whose regions share a face: the mesh edges of the simplified
-/// mesh. Pairs whose times of sight differ by more than the window are excluded.
+/// mesh. Pairs whose keyframe_gap() exceeds the window are excluded.
 [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> region_edges(
     const SimplifiedMesh& simplified, std::span<const LabelledMesh::Face> faces,
     KeyframeIndex window_keyframes);

@@ -17,8 +17,8 @@
 namespace km {
 namespace {
 
-// Appends `count` values from `first` to `last`, both included, evenly spread, or all of them if
-// there are fewer.
+// Appends edges between `node` and `count` keyframes spread evenly from `first` to `last`, both
+// included, or all of these keyframes if there are fewer. One edge is to `first`.
 void spread(KeyframeIndex first, KeyframeIndex last, std::size_t count, std::uint32_t node,
             std::vector<KeyframeEdge>& keyframe_edges) {
   const std::size_t steps = std::min<std::size_t>(count - 1, last - first);
@@ -31,7 +31,8 @@ void spread(KeyframeIndex first, KeyframeIndex last, std::size_t count, std::uin
         {first + static_cast<KeyframeIndex>((last - first) * i / steps), node});
 }
 
-// Motion of the surface at a keyframe from its pose `from` to its pose `to`.
+// Motion of surface that is rigidly attached to a keyframe, when the keyframe moves from pose
+// `from` to pose `to`.
 SE3 correction(const SE3& to, const SE3& from) {
   return to * from.inverse();
 }
@@ -45,8 +46,8 @@ std::vector<std::size_t> first_keyframe_edges(const DeformationGraph& graph) {
 }
 
 // The terms for Ceres. A pose block is a quaternion x, y, z, w, then a translation. Costs return
-// derivatives by the six tangent coordinates in the first six of the seven columns of a block. The
-// manifold's PlusJacobian passes these on.
+// derivatives by the six tangent coordinates in the first six of the seven columns of a block,
+// which PlusJacobian of the manifold selects.
 
 using GraphPose = std::array<double, 7>;
 
@@ -88,7 +89,7 @@ class GraphPoseManifold final : public ceres::Manifold {
 
 using Jacobian67 = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
 
-// Rows of two 3 x 6 derivatives, one above the other, with an empty seventh column.
+// Rows of two 3 x 6 derivatives, one above the other, with a zero seventh column.
 void store(double* jacobian, const Matrix36& upper, const Matrix36& lower) {
   Eigen::Map<Jacobian67> J(jacobian);
   J.topLeftCorner<3, 6>() = upper;
@@ -182,8 +183,9 @@ class AnchorCost final : public ceres::SizedCostFunction<6, 7> {
   double translation_weight_;
 };
 
-// Standard deviation of a node's rotation against a keyframe that saw it. It is weak: neighbours
-// half a metre away within 2 cm hold a node's rotation to 2 degrees each, this term to 30.
+// Standard deviation of a node's rotation against a keyframe that saw it. The term is weak: it
+// determines the rotation to 30 degrees. An edge to a neighbour at half a metre determines it to 6
+// degrees, with the default mesh_edge_m.
 constexpr double kRotationNoise_rad = 0.5;
 
 // The solver stops when a step changes the poses by less than this share of their size. The share

@@ -26,10 +26,10 @@ struct DeformationGraph {
   std::vector<Eigen::Vector3d> nodes;               ///< g_k [m].
   std::vector<SE3> T_odom_kf;                       ///< Pose of keyframe i when it saw the nodes.
   std::vector<std::array<std::uint32_t, 2>> edges;  ///< Neighbouring nodes, each pair once.
-  std::vector<KeyframeEdge> keyframe_edges;         ///< Ascending nodes.
+  std::vector<KeyframeEdge> keyframe_edges;         ///< In ascending order of their nodes.
 
-  /// Number of terms in the cost: one per direction of every edge, and position and rotation of
-  /// every keyframe edge.
+  /// Number of terms in the cost without those of the anchors: one per direction of every edge, and
+  /// position and rotation of every keyframe edge.
   [[nodiscard]] std::size_t term_count() const {
     return 2 * edges.size() + 2 * keyframe_edges.size();
   }
@@ -59,7 +59,7 @@ struct RigidityTerm {
                                          const SE3& T_world_b);
 
 /// Rotation of a node against a keyframe that saw it: log(R_odom_kf R_world_kf^T R_world_node). It
-/// is zero if both have rotated equally since then.
+/// is zero if the correction from `odom` to `world` rotates the node as it rotates the keyframe.
 struct RotationTerm {
   Eigen::Vector3d residual;  ///< [rad]
   Matrix36 by_keyframe;
@@ -119,9 +119,10 @@ struct [[nodiscard]] DeformationSolution {
 [[nodiscard]] DeformationPoses initial_poses(const DeformationGraph& graph,
                                              std::span<const SE3> T_world_kf);
 
-/// First guess from the solution `last` for the anchors `T_world_kf_last`. Each keyframe and node
-/// of `last` moves like the anchor of its (first) keyframe has moved since. The others are as in
-/// initial_poses(). Precondition: the vertices of `last` are the first ones of the graph.
+/// First guess from the solution `last` for the anchors `T_world_kf_last`. Each keyframe of `last`
+/// moves as its anchor has moved since `last`, and each node as the anchor of its first keyframe.
+/// Keyframes and nodes that `last` lacks are as in initial_poses(). Precondition: the vertices of
+/// `last` are the first ones of the graph.
 [[nodiscard]] DeformationPoses warm_start_poses(const DeformationGraph& graph,
                                                 const DeformationPoses& last,
                                                 std::span<const SE3> T_world_kf_last,

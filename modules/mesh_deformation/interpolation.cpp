@@ -40,8 +40,8 @@ struct Nodes {
   }
 };
 
-// The nearest points so far, for nanoflann. Points outside the window of time are ignored. At equal
-// distance the lower index comes first.
+// The nearest points so far, for nanoflann. Points whose keyframe_gap() exceeds the window are
+// ignored. At equal distance the lower index comes first.
 class NearestInTime {
  public:
   using DistanceType = double;
@@ -81,7 +81,8 @@ class NearestInTime {
   std::size_t count_ = 0;
 };
 
-// Nearest nodes in space among those within the window of time: a k-d tree of fixed nodes.
+// A k-d tree of nodes. Finds the nearest nodes among those whose keyframe_gap() is within the
+// window.
 class NodeTree {
  public:
   // Copies those of `nodes` that are listed.
@@ -89,7 +90,7 @@ class NodeTree {
            KeyframeIndex window_keyframes)
       : nodes_(chosen(nodes, listed)), window_(window_keyframes), index_(3, nodes_) {}
 
-  // Fills `found` with the nearest nodes whose time of sight is within the window of `seen_by`, by
+  // Fills `found` with the nearest nodes whose keyframe_gap() to `seen_by` is within the window, by
   // distance, closer than the square root of `limit2`. Returns their number.
   std::size_t nearest(const Eigen::Vector3d& point, const SeenBy& seen_by,
                       std::span<NearNode> found,
@@ -119,7 +120,7 @@ class NodeTree {
 };
 
 constexpr std::size_t kMaxNeighbours = 8;
-constexpr double kNoWeight = 1e-12;  // bound on a sum whose terms are at most one
+constexpr double kNoWeight = 1e-12;  // a smaller sum of weights counts as zero
 
 // Nodes of one vertex, and the distance below which a new node would change them.
 struct Binding {

@@ -16,15 +16,15 @@ namespace km {
 /// 2021, Sec. IV, Eq. (2) and (3), after Sumner et al., "Embedded Deformation for Shape
 /// Manipulation", SIGGRAPH 2007):
 ///   v' = sum_j w_j [R_j (v - g_j) + t_j],   w_j = (1 - |v - g_j| / d_max)^2, normalised,
-/// over the k nearest nodes, with d_max the distance of the next one. Only nodes whose time of
-/// sight is within a window of the vertex's count. With k nodes or fewer in the window, the
+/// over the k nearest nodes, with d_max the distance of the next one. Only nodes whose
+/// keyframe_gap() to the vertex is within the window are used. With k of these nodes or fewer, the
 /// farthest of them gives d_max. A single node moves the vertex alone. With no node, the vertex is
 /// not bound and moves with the keyframe that saw it first.
 ///
 /// Stores the nodes of each vertex, so that a new solution costs only one sum per vertex.
 class Interpolation {
  public:
-  /// Uses the k nearest nodes within the window of time.
+  /// `neighbours` is k, limited to 1 to 8; `window_keyframes` is the window.
   Interpolation(std::size_t neighbours, KeyframeIndex window_keyframes);
 
   /// Binds all vertices to nodes. `vertices` [m] and `seen_by` have equal length.
@@ -32,9 +32,10 @@ class Interpolation {
             std::span<const MeshNode> nodes);
 
   /// The result of bind() for a mesh that has changed little. `before` gives each vertex's index in
-  /// the last call, or kNoIndex if it is new or changed in position or time. `changed` lists the
-  /// nodes that are new or were seen again since then. Only vertices that this can affect are bound
-  /// again. Nodes keep their indices and positions.
+  /// the last call, or kNoIndex if its position or seen_by has changed or it is new. `changed`
+  /// lists the nodes that are new or were seen again since the last call. Only vertices near these
+  /// nodes and vertices without an index are bound again. Precondition: earlier nodes have kept
+  /// their indices and positions.
   void update(std::span<const Eigen::Vector3f> vertices, std::span<const SeenBy> seen_by,
               std::span<const MeshNode> nodes, std::span<const std::uint32_t> before,
               std::span<const std::uint32_t> changed);
@@ -60,7 +61,7 @@ class Interpolation {
   KeyframeIndex window_keyframes_;
   std::vector<std::uint32_t> nodes_;  // neighbours_ per vertex
   std::vector<double> weights_;       // neighbours_ per vertex
-  std::vector<float> reach_m_;        // a node that comes closer changes the binding
+  std::vector<float> reach_m_;        // a new node nearer than this changes a vertex's nodes
 };
 
 }  // namespace km

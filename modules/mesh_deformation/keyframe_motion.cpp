@@ -24,8 +24,8 @@ SE3 common_motion(std::span<const SE3> before, std::span<const SE3> after,
   }
   mean_before /= static_cast<double>(before.size());
   mean_after /= static_cast<double>(before.size());
-  // A small angle is the chordal distance over sqrt(2), so it has half the weight of a squared
-  // translation.
+  // The squared chordal distance of rotations is twice the squared angle if the angle is small, so
+  // its weight has the factor one half.
   const double translation_weight = 1.0 / (scale.translation_m * scale.translation_m);
   const double rotation_weight = 0.5 / (scale.rotation_rad * scale.rotation_rad);
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();

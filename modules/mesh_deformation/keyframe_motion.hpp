@@ -8,12 +8,12 @@
 namespace km {
 
 /// Optimised poses of all keyframes of `T_odom_kf`. Keyframes at the end that `T_world_kf` lacks
-/// follow its last pose by odometry. There are never more poses than in odometry, and at least one
-/// unless odometry has none.
+/// follow its last pose by odometry. Precondition: `T_world_kf` is not longer than `T_odom_kf`, and
+/// is empty only if `T_odom_kf` is.
 [[nodiscard]] std::vector<SE3> complete(std::span<const SE3> T_odom_kf,
                                         std::span<const SE3> T_world_kf);
 
-/// Smallest change of a pose that counts.
+/// Change of a pose beyond which the mesh is corrected.
 struct MotionScale {
   double translation_m = 0.01;
   double rotation_rad = 0.005;
@@ -21,8 +21,8 @@ struct MotionScale {
 
 /// Motion of the keyframes from one solution to the next.
 struct KeyframeMotion {
-  SE3 T_after_before = SE3::Identity();  ///< Common motion, mostly of the gauge.
-  double non_rigid = 0.0;  ///< Largest motion relative to the common one, in units of the scale.
+  SE3 T_after_before = SE3::Identity();  ///< Common motion, for example of the origin.
+  double non_rigid = 0.0;  ///< Largest motion relative to the common one, in units of MotionScale.
 };
 
 /// Compares two solutions of the same keyframes, as many as both have. The common motion minimises

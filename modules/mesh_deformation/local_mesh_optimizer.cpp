@@ -78,7 +78,7 @@ struct KnownVertices {
   std::vector<std::uint64_t> ids;
 };
 
-// By ids, in one pass through two ascending lists.
+// For each new vertex the index of the old vertex with its id, or kNoIndex. Both lists ascend.
 std::vector<std::uint32_t> match_ids(const std::vector<std::uint64_t>& old_ids,
                                      const std::vector<std::uint64_t>& new_ids) {
   std::vector<std::uint32_t> before(new_ids.size(), kNoIndex);
@@ -90,6 +90,7 @@ std::vector<std::uint32_t> match_ids(const std::vector<std::uint64_t>& old_ids,
   return before;
 }
 
+// For each new vertex the old vertex of equal index if it has the same position, or kNoIndex.
 std::vector<std::uint32_t> match_positions(const std::vector<Eigen::Vector3f>& old_positions,
                                            const std::vector<Eigen::Vector3f>& new_positions) {
   std::vector<std::uint32_t> before(new_positions.size(), kNoIndex);
@@ -147,8 +148,8 @@ struct LocalMeshOptimizer::State {
   // Updates the vertex and seen_by of each node. Returns the nodes whose seen_by has changed.
   std::vector<std::uint32_t> follow_vertices(const VertexMatch& matched, const MapMesh& map);
 
-  // More than half as many vertices have been removed as remain: many nodes represent little
-  // surface, or none.
+  // True if more than half as many vertices have been removed as remain. Many nodes then represent
+  // little surface, or none.
   [[nodiscard]] bool outgrown() const { return 2 * gone > known.positions.size(); }
 
   // Updates nodes, regions and bindings for `map`. Returns the number of new nodes.
@@ -168,8 +169,8 @@ struct LocalMeshOptimizer::State {
   std::size_t gone = 0;  // number of vertices that were removed
   SimplifiedMesh simplified;
   bool solved = false;
-  DeformationPoses last;             // solution
-  std::vector<SE3> T_world_kf_last;  // anchors of that solution
+  DeformationPoses last;             // last solution
+  std::vector<SE3> T_world_kf_last;  // anchors of `last`
 };
 
 std::vector<std::uint32_t> LocalMeshOptimizer::State::follow_vertices(const VertexMatch& matched,

@@ -30,7 +30,7 @@ void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_w
 /// Sizes and outcome of one call of LocalMeshOptimizer::optimize().
 struct MeshDeformationReport {
   std::size_t vertices = 0;
-  /// Vertices without a node near in time, moved with their keyframe.
+  /// Vertices without a node in their time window, moved with the keyframe that saw them first.
   std::size_t unbound_vertices = 0;
   std::size_t nodes = 0;
   std::size_t new_nodes = 0;
@@ -75,7 +75,7 @@ class LocalMeshOptimizer {
 
   /// Returns the corrected mesh. `T_odom_kf` are the keyframes' poses with which the mesh was
   /// built, index i being keyframe i; `T_world_kf` are their optimised poses. Keyframes at the end
-  /// without an optimised pose follow the last one that has one.
+  /// without an optimised pose follow, by odometry, the last keyframe that has one.
   ///
   /// Throws std::invalid_argument if check_map_mesh() or check_trajectories() refuses the input, or
   /// if there are fewer keyframes than in the call before. The state is then unchanged.

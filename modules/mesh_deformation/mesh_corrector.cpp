@@ -34,8 +34,8 @@ MeshCorrection MeshCorrector::correct_from_scratch(const CorrectionInput& input)
   return deform(input, complete(input.T_odom_kf, input.T_world_kf));
 }
 
-// Replacements of duplicate surface. All vertices stay if the map has no ids, by which the mapper
-// drops vertices, or an unknown voxel size.
+// Replacements of duplicate surface. All vertices stay if the config keeps all copies, or if the
+// map has an unknown voxel size or no ids, by which the mapper drops vertices.
 std::vector<std::uint32_t> MeshCorrector::replacements_in(const LabelledMesh& mesh,
                                                           const MapMesh& map) const {
   constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), plus the deformation

@@ -20,7 +20,7 @@ struct CorrectionInput {
   const MapMesh& map;
   std::uint64_t map_version = 0;  ///< Changes whenever the map does.
   std::span<const SE3> T_odom_kf;
-  std::span<const SE3> T_world_kf;  ///< May be shorter: see LocalMeshOptimizer::optimize().
+  std::span<const SE3> T_world_kf;  ///< May be shorter than T_odom_kf, see optimize().
 };
 
 struct [[nodiscard]] MeshCorrection {
@@ -29,7 +29,7 @@ struct [[nodiscard]] MeshCorrection {
   /// False: the result of the last optimisation, moved as a whole.
   bool deformed = true;
   SupersededSurface superseded;      ///< Superseded surface of the map; empty unless deformed.
-  std::size_t superseded_faces = 0;  ///< Faces missing in `mesh`.
+  std::size_t superseded_faces = 0;  ///< Number of faces of the map that `mesh` lacks.
 };
 
 /// Keeps a mesh consistent with map and trajectory at the lowest cost. While the map is unchanged,
@@ -65,10 +65,10 @@ class MeshCorrector {
   LocalMeshOptimizer optimizer_;
   // State of the last optimisation.
   std::optional<std::uint64_t> map_version_;
-  std::vector<SE3> anchors_;  // the trajectory, completed
+  std::vector<SE3> anchors_;  // complete() of the trajectory
   LabelledMesh optimized_;
   MeshDeformationReport report_;
-  SE3 T_published_optimized_ = SE3::Identity();  // rigid motion of its result since
+  SE3 T_published_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };
 
 /// A robot's mesh, corrected to agree with its optimised trajectory.

@@ -17,10 +17,11 @@ namespace {
 // Larger than the number of messages during any correction, so that publishers do not wait.
 constexpr std::size_t kQueue = 8192;
 
-// Largest delay of a correction, as a share of the period.
+// Interval of the ticks that start a due correction, as a share of MeshDeformationConfig::period_s.
+// A correction is late by at most this interval.
 constexpr double kTickShare = 0.125;
 
-// Number of keyframes to which the vertices of a map refer.
+// Number of keyframes that must be known for a map: one more than the last that saw a vertex.
 std::size_t keyframes_of(const MapMesh& map) {
   KeyframeIndex last = 0;
   for (const auto& seen : map.seen_by) last = std::max(last, seen[1]);
@@ -61,7 +62,7 @@ void MeshDeformationNode::start() {
 void MeshDeformationNode::finish() {
   latest_map_.close();
   latest_trajectory_.close();
-  worker_.post(End());  // refused once stopped
+  worker_.post(End());  // the worker refuses it after stop()
 }
 
 void MeshDeformationNode::stop() noexcept {

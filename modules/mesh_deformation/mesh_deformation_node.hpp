@@ -28,9 +28,10 @@ struct MeshDeformationTopics {
   Out<SupersededSurface> superseded;  ///< Superseded surface of the maps, for the mapper.
 };
 
-/// Corrects the robot's mesh when its map or its trajectory has changed: a MeshCorrector on its
-/// thread. A correction starts at least mesh_deformation.period_s after the end of the last one.
-/// Messages that arrive meanwhile are only stored, so that this node delays no other node.
+/// Corrects the robot's mesh when its map or its trajectory has changed: runs a MeshCorrector on a
+/// thread of its own. A correction starts at least mesh_deformation.period_s after the end of the
+/// last one. Messages that arrive meanwhile are only stored, so that this node delays no other
+/// node.
 class MeshDeformationNode final : public Node {
  public:
   /// Throws ConfigError if `config` is out of bounds.
@@ -43,7 +44,7 @@ class MeshDeformationNode final : public Node {
   void stop() noexcept override;  ///< Call after finish().
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// The time of a correction is proportional to the mesh.
+  /// Large, because the time of a correction is proportional to the size of the mesh.
   double step_limit_s() const override { return 120.0; }
 
   /// Durations of the corrections.
@@ -54,8 +55,8 @@ class MeshDeformationNode final : public Node {
   /// once. Idempotent, thread-safe.
   void finish();
 
-  /// A tick of the clock, and the end. Always null: with plain structs among pointers GCC 12
-  /// reports a false warning.
+  /// Inputs without content: a tick of the clock, and the call of finish(). They are null pointers
+  /// and not structs, because GCC 12 reports a false warning for a variant of structs and pointers.
   using Tick = std::shared_ptr<const struct MeshTickTag>;
   using End = std::shared_ptr<const struct MeshEndTag>;
   using Input = std::variant<Tick, End, Topic<MapMesh>::Message, Topic<KeyframeOdometry>::Message,

@@ -15,7 +15,8 @@ namespace km {
 /// First and last keyframe that saw a piece of surface.
 using SeenBy = std::array<KeyframeIndex, 2>;
 
-/// Keyframes between two times of sight; 0 if they overlap.
+/// Keyframes between the last one that saw the earlier surface and the first one that saw the later
+/// surface; 0 if the two intervals overlap.
 [[nodiscard]] inline KeyframeIndex keyframe_gap(const SeenBy& a, const SeenBy& b) {
   if (a[0] > b[1]) return a[0] - b[1];
   if (b[0] > a[1]) return b[0] - a[1];
@@ -59,14 +60,14 @@ struct GridCellHash {
 /// Nodes by position, for searches within one radius while nodes are added.
 class NodeGrid {
  public:
-  /// Nodes whose times of sight differ by more than the window are not near.
+  /// Nodes whose keyframe_gap() exceeds the window are not near.
   NodeGrid(double radius_m, KeyframeIndex window_keyframes)
       : radius_m_(radius_m), window_keyframes_(window_keyframes) {}
 
   void insert(const MeshNode& node, std::uint32_t index);
 
-  /// The nearest node within the radius and the window of time. At equal distance the lowest index;
-  /// kNoIndex if there is none.
+  /// Index of the nearest node within the radius whose keyframe_gap() is within the window. At
+  /// equal distance the lowest index; kNoIndex if there is no such node.
   [[nodiscard]] std::uint32_t nearest(const Eigen::Vector3d& point, const SeenBy& seen_by) const;
 
  private:

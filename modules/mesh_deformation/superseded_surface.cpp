@@ -12,11 +12,12 @@
 namespace km {
 namespace {
 
-// Surfaces whose normals differ by more are different: cosine of 60 degrees.
+// Cosine of 60 degrees. Surfaces whose normals differ by more are different surfaces.
 constexpr float kMinCosine = 0.5F;
 
-// Distance from a triangle at which a point still counts as on it, relative to the distance along
-// the normal. If faces meet at an angle, a wedge between their normals belongs to neither.
+// Largest distance beside a triangle at which a vertex still counts as on it, as a share of
+// SameSurface::distance_m. It exceeds zero because vertices in the wedge between the normals of two
+// faces that meet at an angle are beside both faces.
 constexpr float kBeside = 0.25F;
 
 float squared_distance_to_segment(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
@@ -41,9 +42,9 @@ float squared_distance_in_plane(const Eigen::Vector3f& p, const std::array<Eigen
   return inside ? 0.0F : nearest2;
 }
 
-class HeirSearch {
+class ReplacementSearch {
  public:
-  HeirSearch(const LabelledMesh& mesh, const SurfaceViews& views, const SameSurface& same)
+  ReplacementSearch(const LabelledMesh& mesh, const SurfaceViews& views, const SameSurface& same)
       : mesh_(mesh),
         seen_by_(views.seen_by),
         certainty_(views.certainty),
@@ -65,7 +66,8 @@ class HeirSearch {
     std::iota(order.begin(), order.end(), 0U);
     std::stable_sort(order.begin(), order.end(),
                      [this](auto a, auto b) { return rank_[a] > rank_[b]; });
-    // All faces that can supersede a corner have a higher rank, so they have been judged.
+    // All faces that can supersede a corner of this face have a higher rank than this face, so they
+    // have been judged before.
     for (const std::uint32_t f : order) {
       const LabelledMesh::Face& face = mesh_.faces[f];
       for (const std::uint32_t v : face)
@@ -172,7 +174,7 @@ class HeirSearch {
   std::vector<std::uint64_t> rank_;  // rank of each face
   std::vector<std::uint32_t> replacements_;
   std::vector<char> asked_;
-  // Remaining faces, by descending rank.
+  // Faces that stay, by descending rank, in the cells of their centroids.
   std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;
 };
 
@@ -187,7 +189,7 @@ void keep(std::vector<T>& values, const std::vector<std::uint32_t>& kept) {
 
 std::vector<std::uint32_t> find_replacements(const LabelledMesh& mesh, const SurfaceViews& views,
                                              const SameSurface& same) {
-  return HeirSearch(mesh, views, same).run();
+  return ReplacementSearch(mesh, views, same).run();
 }
 
 LabelledMesh without_superseded(const LabelledMesh& mesh,

@@ -13,10 +13,11 @@ namespace km {
 
 /// Criteria for two parts of a mesh to show the same surface.
 struct SameSurface {
-  /// Largest distance of a vertex from a face of the other part, along its normal.
+  /// Largest distance of a vertex of one part from a face of the other part, along the normal of
+  /// the face.
   double distance_m = 0.1;
   double longest_edge_m = 0.2;         ///< Faces with longer edges may be missed.
-  KeyframeIndex window_keyframes = 0;  ///< Largest difference of time within one visit.
+  KeyframeIndex window_keyframes = 0;  ///< Largest keyframe_gap() within one visit.
 };
 
 /// MapMesh::seen_by and MapMesh::certainty of the vertices of a mesh. `certainty` may be empty.
@@ -29,11 +30,12 @@ struct SurfaceViews {
 /// stays. The most certain of several copies of a surface stays, or the newest of equally certain
 /// ones.
 ///
-/// A vertex has a replacement if a face of another visit stays, has a higher rank, and meets three
-/// conditions. It is within the distance. The normal through the vertex meets it inside its
-/// triangle, or within a quarter of the distance of the triangle. Its normal differs from that of
-/// the vertex by at most 60 degrees, because the other side of a wall is another surface. The
-/// replacement is the nearest corner of the nearest such face.
+/// A vertex has a replacement if a face of another visit stays, has a higher rank (certainty, then
+/// time), and meets three conditions. Its plane is within SameSurface::distance_m of the vertex.
+/// The projection of the vertex onto this plane is inside the triangle, or at most a quarter of
+/// that distance beside it. Its normal differs from that of the vertex by at most 60 degrees,
+/// because the other side of a wall is another surface. The replacement is the nearest corner of
+/// the nearest such face.
 ///
 /// A face stays unless all its vertices have replacements, so that surface seen only once, with its
 /// rim, is never lost.

@@ -9,8 +9,9 @@
 
 namespace km {
 
-/// A relative pose between poses i and j of one block, with its precisions: kappa of the rotation
-/// [1/rad^2], tau of the translation [1/m^2].
+/// A relative pose between poses i and j of one block: poses that are solved together, e.g. those
+/// of one robot. Its precisions are kappa of the rotation [1/rad^2], tau of the translation
+/// [1/m^2].
 struct BlockEdge {
   Eigen::Index i = 0;
   Eigen::Index j = 0;

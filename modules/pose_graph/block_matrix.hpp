@@ -7,12 +7,14 @@
 
 namespace km {
 
-/// Two nodes of a graph whose unknowns are coupled, the first one above the second.
+/// Two coupled nodes {i, j} of a graph. Their block A(i, j) of a matrix has the rows of i and the
+/// columns of j.
 using NodePair = std::array<int, 2>;
 
-/// A symmetric matrix of square blocks, one block row per node of a graph. The diagonal blocks are
-/// side by side, B x (B nodes). So are the blocks A(i, j), one for each of a list of pairs {i, j},
-/// B x (B pairs). The list is stored elsewhere, because many matrices share it.
+/// A symmetric matrix of square blocks, one block row per node of a graph. `diagonal` has the
+/// diagonal blocks side by side, B x (B nodes). `coupling` has the blocks A(i, j) side by side, one
+/// for each pair {i, j} of a list, B x (B pairs). The list is stored elsewhere (EliminationPlan,
+/// TreeSystem), because several matrices share it.
 struct BlockMatrix {
   Eigen::MatrixXd diagonal = {};
   Eigen::MatrixXd coupling = {};

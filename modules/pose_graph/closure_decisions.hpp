@@ -19,9 +19,10 @@ namespace km {
 /// The decisions of sessions on the closures of one robot, and the noise of these closures. Both
 /// carry over from session to session. Not thread-safe.
 ///
-/// Some decisions are provisional: a later session of the team drops them. These are the decisions
-/// of a robot alone, because the team knows the noise better, and decisions of a team with held
-/// poses, because these poses may be wrong.
+/// Some decisions are provisional: the next session of several robots begins without them. These
+/// are the decisions of a robot alone, because the team knows the noise better, and decisions of a
+/// team with held poses, because these poses may be wrong. Decisions of a former process are
+/// provisional, too.
 class ClosureDecisions {
  public:
   /// True if the closure is kept, false if it is rejected. Undecided closures have no entry.
@@ -29,18 +30,20 @@ class ClosureDecisions {
   [[nodiscard]] bool is_rejected(const ClosureId& id) const;
   [[nodiscard]] const ClosureNoiseRecord& noise() const { return noise_; }
 
-  /// A session begins, alone or with other robots.
+  /// To be called when a session begins. If it has other members (`with_team`), discards
+  /// provisional decisions and the noise that this robot has estimated alone.
   void begin_session(bool with_team);
   /// Adopts verdicts of the present session.
   void decide(std::span<const WeighedClosure> verdicts, bool provisional);
-  /// Adopts the noise at the end of a session, which was one of a team or of a robot alone.
+  /// Adopts the noise at the end of a session of several robots (`with_team`) or of this robot
+  /// alone.
   void set_noise(ClosureNoiseRecord noise, bool with_team);
   /// Makes the rejected ones of `closures` undecided whose residual in a solution is at most
   /// kSecondChance times `barc`, each at most kChances times. `pose` returns poses of the solution;
-  /// closures with an end without a pose are left out. False if there is none.
+  /// closures with an end without a pose are left out. False if no closure has become undecided.
   using PoseOf = std::function<std::optional<SE3>(const KeyframeId&)>;
   bool reconsider(std::span<const PoseEdge> closures, const PoseOf& pose, double barc);
-  /// Number of times that closures became undecided again.
+  /// Number of calls of reconsider() that made closures undecided.
   [[nodiscard]] std::uint32_t reconsidered() const { return reconsidered_; }
   /// Discards all decisions on closures with a robot whose keyframe indices have a new meaning.
   void forget(RobotId robot);
@@ -60,7 +63,8 @@ class ClosureDecisions {
   ClosureNoiseRecord team_noise_;  // noise without the sessions of this robot alone
   std::map<ClosureId, bool> verdicts_;
   bool verdicts_due_ = false;
-  std::map<std::pair<RobotId, EdgeSetId>, EdgeSetOffer> counted_;  // under the present decisions
+  // Offers with places and contested, by the present decisions.
+  std::map<std::pair<RobotId, EdgeSetId>, EdgeSetOffer> counted_;
 };
 
 }  // namespace km

@@ -8,9 +8,10 @@
 
 namespace km {
 
-/// The closures of a place are between the same robots, and their ends are within 10 keyframes of
-/// the ends of its first closure, on both robots. If one closure is false because two places look
-/// alike, the other closures of its place are false, too. They are therefore one piece of evidence.
+/// The places of a list of closures. The closures of a place are between the same robots, and their
+/// ends are within 10 keyframes of the ends of its first closure, on both robots. If one closure is
+/// false because two parts of the environment look alike, the other closures of its place are
+/// false, too. The closures of a place are therefore one piece of evidence.
 struct ClosurePlaces {
   std::vector<std::size_t> place_of = {};  ///< Number of the place of each closure, from 0.
   std::vector<std::size_t> sizes = {};     ///< Number of closures of each place.

@@ -14,27 +14,29 @@ namespace km {
 
 /// The covariance that corresponds to the weights of an edge, tangent [rotation; translation]. In
 /// the plane (`dimension` 2) kappa is the precision of the angle (see precision_of_blocks()), and
-/// the other directions have variance zero.
+/// roll, pitch and z have variance zero.
 [[nodiscard]] Matrix6 covariance_in(const Precision& precision, int dimension);
 
 /// Agreement between the closures of one pair of robots (or inside one robot), before any
 /// optimisation. Robots usually meet for some time. A true closure therefore has other closures
-/// near it that agree with it along the odometry between them; a false one rarely has. The inputs
-/// are poses and weights that both robots of the pair know, so that both compute the same result.
+/// near it that agree with it along the odometry between them; a false one rarely has. Both robots
+/// of the pair know all inputs (poses and weights), so both compute the same result.
 class Corroboration {
  public:
   using PoseOf = std::function<SE3(const KeyframeId&)>;
 
   /// `closures`: of one pair of robots. `pose`: where their ends are, by odometry or by an earlier
-  /// optimisation. `step`: mean weights of an odometry step of each robot; 1 for a robot without an
-  /// entry. `dimension` 2: poses are planar. All arguments must outlive this object.
+  /// optimisation. `step`: mean weights of an odometry step of each robot. For a robot without an
+  /// entry they are 1, and in isolated() those of the closure. `dimension` 2: poses are planar. All
+  /// arguments must outlive this object.
   Corroboration(std::span<const PoseEdge> closures, const PoseOf& pose,
                 const std::map<RobotId, Precision>& step, int dimension);
 
   /// Counts the Mahalanobis lengths of cycles through two closures whose ends are a few keyframes
   /// apart on both robots, and the odometry between them. It counts at most `most` cycles, those
-  /// with the least odometry first. Cycles that turn by more than 45 degrees are left out; most of
-  /// these contain a false closure. An error that both closures share does not show in a cycle.
+  /// with the fewest steps of odometry first. Cycles whose rotation error exceeds 45 degrees are
+  /// left out, because most of them contain a false closure. An error that both closures share
+  /// cancels in the cycle.
   void count_lengths(NoiseHistogram& histogram, std::size_t most) const;
 
   /// Adds the cycles that estimate_closure_noise() needs: at most kMostNoiseCycles through two
@@ -50,8 +52,9 @@ class Corroboration {
   [[nodiscard]] std::vector<bool> isolated(double barc) const;
 
  private:
-  struct Upward {  // from the lower end to the upper one
-    std::size_t place = 0;
+  // A closure, directed from its lower end to its upper one.
+  struct Upward {
+    std::size_t place = 0;  // index in edges_
     KeyframeId lower;
     KeyframeId upper;
     SE3 T_lower_upper;

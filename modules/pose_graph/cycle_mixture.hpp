@@ -6,9 +6,10 @@
 
 namespace km {
 
-/// Cycles of a pose graph, some of which contain a false closure.
+/// Cycles of a pose graph, some of which contain a false closure. A cycle is true if all of its
+/// closures are true, and false otherwise.
 struct CycleMixture {
-  double share = 0.8;           ///< Most likely share of cycles without a false closure.
+  double share = 0.8;           ///< Most likely share of true cycles.
   double log_likelihood = 0.0;  ///< Relative to all cycles being false.
 
   /// Probability that a cycle is true, from its log density ratio (true over false).
@@ -23,7 +24,8 @@ struct CycleMixture {
 
 /// Log density of the error of a cycle with a false closure, in the tangent space at the error. The
 /// rotation is uniform and the translation is uniform in a volume [m^3] (`dimension` 2: an area
-/// [m^2]). det J = 2 (1 - cos |w|) / |w|^2 is the Jacobian of the exponential map of rotations.
+/// [m^2]). det J = 2 (1 - cos |w|) / |w|^2 is the determinant of the Jacobian of the exponential
+/// map of rotations; that of poses has it squared.
 [[nodiscard]] double log_density_if_false(const Vector6& error, double volume, int dimension = 3);
 
 }  // namespace km

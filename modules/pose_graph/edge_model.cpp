@@ -15,8 +15,8 @@ Eigen::Matrix3d symmetric(const Eigen::Matrix3d& M) {
 }
 
 // With Z = R_i^T R_j, M = Z R^T, N = R^T Z and u = R_i^T (t_j - t_i) - t the cost is 2 kappa (3 -
-// tr M) + tau |u|^2. Along w, these terms become tr(exp(-[w_i]) Z exp([w_j]) R^T) and u + Z v_j -
-// v_i - (exp([w_i]) - I) t.
+// tr M) + tau |u|^2. For the tangent vectors [w; v], tr M and u become tr(exp(-[w_i]) Z exp([w_j])
+// R^T) and u + Z v_j - v_i - (exp([w_i]) - I) t.
 struct Relative {
   Eigen::Matrix3d Z;
   Eigen::Matrix3d M;

@@ -9,9 +9,9 @@
 namespace km {
 namespace {
 
-// Largest share of stored zeros with which a front is merged with its last child. Two small fronts
-// are always merged, because dense kernels on a few columns cost less than the bookkeeping of two
-// fronts.
+// Largest share of stored zeros with which a front is merged with its last child. Two fronts with
+// at most kSmallFront columns together are merged with up to half zeros, because dense kernels on a
+// few columns cost less than the bookkeeping of two fronts.
 constexpr double kToleratedZeros = 0.15;
 constexpr int kSmallFront = 4;
 

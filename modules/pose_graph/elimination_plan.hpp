@@ -20,7 +20,7 @@ class EliminationPlan {
   struct Front {
     std::vector<int> nodes = {};
     int pivots = 0;
-    int parent = -1;  ///< Front to which the rest is added; -1: the kept nodes.
+    int parent = -1;  ///< Front to which its Schur complement is added; -1: the kept nodes.
     std::vector<int> children = {};
     std::vector<int> pairs = {};  ///< Couplings whose first eliminated node is in this front.
   };

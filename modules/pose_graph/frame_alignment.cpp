@@ -76,7 +76,7 @@ std::optional<FrameAlignment> align_frames(std::span<const SE3> candidates,
   for (int i = 0; i < kMaxRefinements; ++i) {
     const SE3 T = average(candidates, result.inliers);
     auto inliers = inliers_of(T, candidates, distance);
-    if (inliers.empty()) break;  // the average of a ring can lie outside of it
+    if (inliers.empty()) break;  // candidates on a ring are far from their average
     const bool settled = inliers == result.inliers;
     result = {T, std::move(inliers)};
     if (settled) break;

@@ -26,10 +26,10 @@ struct [[nodiscard]] FrameAlignment {
 /// translations. Every candidate is tried as the start. The best one is refined: its inliers, with
 /// equal weights, are averaged until they no longer change.
 ///
-/// Translations are compared at the origin of the frames. It should be near the measurements,
-/// because otherwise rotation errors count a second time through the lever arm. nullopt if there is
-/// no candidate. O(n^2). `weights` w: one per candidate; empty: all are 1. Throws
-/// std::invalid_argument if a tolerance or a weight is not positive.
+/// Translations are compared at the origin of the frames. This origin should be near the
+/// measurements, because otherwise rotation errors count a second time through the lever arm.
+/// nullopt if there is no candidate. O(n^2). `weights` w: one per candidate; empty: all are 1.
+/// Throws std::invalid_argument if a tolerance or a weight is not positive.
 [[nodiscard]] std::optional<FrameAlignment> align_frames(std::span<const SE3> candidates,
                                                          const AlignmentTolerance& tolerance,
                                                          const std::vector<double>& weights = {});

@@ -13,7 +13,7 @@ const EdgeSetOffer* newest_offer(const TeamStatus& status, RobotId peer) {
   return offer == status.offers.end() ? nullptr : &*offer;
 }
 
-// The robots that `ties` connect to `self`.
+// The robots that the ties with counts(tie) connect to `self`.
 template <typename Counts>
 std::set<RobotId> reached(RobotId self, std::span<const RobotTie> ties, const Counts& counts) {
   std::set<RobotId> robots{self};

@@ -10,37 +10,39 @@
 
 namespace km {
 
-/// Two robots and the number of places at which closures tie them (see find_places()). Rejected
-/// closures do not count.
+/// A tie of two robots: closures between them that are not rejected. `places` is the number of
+/// places of these closures, see find_places().
 struct RobotTie {
   RobotId a = 0;  ///< a < b.
   RobotId b = 0;
   std::uint32_t places = 0;  ///< At least 1.
-  bool contested = false;    ///< One place, and another one that is as likely contradicts it.
+  bool contested = false;    ///< `places` is 1, and a rejected place has as many closures or more.
   auto operator<=>(const RobotTie&) const = default;
 };
 
-/// The ties between all robots of `statuses` (by robot), ascending. The robots of a pair decide on
-/// their closures together; until both have reported it, the lower number of places counts.
+/// The ties between all robots of `statuses` (by robot), ascending. Both robots of a pair report
+/// the number of places of their closures in their statuses. While the two numbers differ, the
+/// lower one counts.
 [[nodiscard]] std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses);
 
-/// Robots whose place relative to one robot is not certain.
+/// Robots whose pose relative to one robot is not certain.
 struct FrameTies {
-  /// A single place ties these robots: if it only looks like another place, they are elsewhere.
+  /// Only a tie of a single place connects these robots to that robot. All closures of a place may
+  /// be false together; then the relative pose is wrong.
   std::vector<RobotId> tentative = {};
-  /// No closure ties these robots, or closures at two places that contradict each other: nothing is
-  /// known about their place.
+  /// No tie connects these robots to that robot, or only a contested one. Their relative pose is
+  /// unknown.
   std::vector<RobotId> untied = {};
   bool operator==(const FrameTies&) const = default;
 };
 
 /// Classifies `members` (ascending) relative to the robot `self`. A tie of one place is certain if
-/// other ties connect its two robots, too: closures that contradict each other along a circle of
-/// robots are rejected. O(ties^2) for robots with one place each.
+/// other ties connect its two robots, too, because closures that contradict each other along a loop
+/// of robots are rejected. O(ties^2) for robots with one place each.
 [[nodiscard]] FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
                                    std::span<const RobotTie> ties);
 
-/// The lowest robot of `plan` that closures tie to `self`; `self` itself if there is no lower one.
+/// The lowest robot of `plan` that is not in `ties.untied`; `self` itself if there is no lower one.
 [[nodiscard]] RobotId lowest_tied(RobotId self, const SessionPlan& plan, const FrameTies& ties);
 
 }  // namespace km

@@ -170,8 +170,9 @@ void FrontalCholesky::backward(MatrixXd& X) const {
   }
 }
 
-// The inverse at the nodes of a front that are eliminated later. They are nodes of its parent
-// front, which has the inverse `of_parent`, or kept nodes. `place`: their places there.
+// The inverse at the nodes of a front that are eliminated later. These are nodes of its parent
+// front, whose inverse is `of_parent`, or kept nodes. `place`: index of each of these nodes in the
+// parent front, or in the list of kept nodes.
 MatrixXf FrontalCholesky::inverse_of_rest(const std::vector<int>& place, const MatrixXf& of_parent,
                                           const BlockMatrix& kept) const {
   const auto rest = static_cast<Index>(place.size());
@@ -192,10 +193,10 @@ MatrixXf FrontalCholesky::inverse_of_rest(const std::vector<int>& place, const M
   return Z;
 }
 
-// Z has the inverse of a front at the nodes below its pivots. The pivots follow in groups, the last
-// ones first. Let [L; M] be the columns of a group in the factor, and G = M L^-1. Then the new
-// blocks are -Z G and (L L^T)^-1 + G^T Z G. Both are sums of positive terms, so single precision
-// suffices.
+// At first, Z has the inverse of a front at the nodes below its pivots. The pivots are added in
+// groups, the last ones first. Let [L; M] be the columns of a group in the factor, and G = M L^-1.
+// Then the new blocks are -Z G and (L L^T)^-1 + G^T Z G. Single precision suffices, because both
+// terms of the second block are positive definite and do not cancel.
 void FrontalCholesky::invert_pivots(const MatrixXd& factor, MatrixXf& Z) const {
   constexpr Index kGroup = 48;  // columns
   const Index rows = factor.rows();
@@ -247,7 +248,8 @@ BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
     invert_pivots(factors_[f], Z);
     number(front);
     add_front(front, Z, local, inverse);
-    // Only the children of a front need its inverse; the first one is the last of them here.
+    // Only the children of a front need its inverse. Because fronts are visited in reverse order,
+    // the first child is the last one to need it.
     if (front.children.empty()) Z.resize(0, 0);
     if (has_parent && is_first_child(f)) of_parent.resize(0, 0);
   }
@@ -255,7 +257,7 @@ BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
   return inverse;
 }
 
-// The diagonal blocks of the pivots of a front, and its couplings.
+// Copies the diagonal blocks of the pivots of a front, and its couplings, to `inverse`.
 void FrontalCholesky::add_front(const EliminationPlan::Front& front, const MatrixXf& Z,
                                 const std::vector<int>& local, BlockMatrix& inverse) const {
   const auto block = [&](int i, int j) {

@@ -37,8 +37,9 @@ class FrontalCholesky {
   /// In single precision.
   [[nodiscard]] BlockMatrix selected_inverse(const BlockMatrix& kept) const;
 
-  /// | |L|^T b |^2 for b >= 0 of B nodes entries, which bounds the rounding errors of the
-  /// factorisation. L has the columns of the eliminated nodes.
+  /// | |L|^T b |^2 for a vector b >= 0 of (B nodes) entries. L has the columns of the eliminated
+  /// nodes. Times the rounding unit, it bounds the error of b^T A b by the rounding of the
+  /// factorisation, up to a constant.
   [[nodiscard]] double magnitude(const Eigen::VectorXd& b) const;
 
   [[nodiscard]] const EliminationPlan& plan() const { return *plan_; }
@@ -59,8 +60,8 @@ class FrontalCholesky {
   std::shared_ptr<const EliminationPlan> plan_;
   Eigen::Index block_ = 0;
   std::vector<Eigen::MatrixXd> factors_;  // per front: columns of L of its pivots
-  std::vector<Eigen::MatrixXd> rests_;    // per front, until its parent has added it
-  std::vector<int> local_;                // place of each node in the present front
+  std::vector<Eigen::MatrixXd> rests_;  // Schur complement per front, until its parent has added it
+  std::vector<int> local_;              // place of each node in the present front
   BlockMatrix schur_;
 };
 

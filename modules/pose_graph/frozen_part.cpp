@@ -9,7 +9,7 @@
 namespace km {
 namespace {
 
-// The received poses of a robot that is not a member, and the closures to them.
+// Adds the received poses of a robot that is not a member, and the closures to these poses.
 void add_absent(const MemberPoses& poses, RobotId self, const std::vector<PoseEdge>& edges,
                 SessionGraph& graph) {
   for (std::size_t k = 0; k < poses.keyframes.size(); ++k)

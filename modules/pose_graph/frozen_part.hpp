@@ -13,20 +13,21 @@ namespace km {
 
 /// The contribution of a robot to a session, frozen when it joins.
 struct FrozenPart {
-  /// `public_poses` has the poses of absent robots, and `step_precision` has the entry of this
-  /// robot. The agent supplies `start`, in the present frame of the robot, and what it has decided.
-  /// The members supply the rest.
+  /// `public_poses` has the poses of absent robots only, and `step_precision` the entry of this
+  /// robot only. The other members of the session send theirs. The agent sets `start`, in the
+  /// present frame of the robot, and `decided` and `noise`, which follow from earlier sessions.
   SessionGraph graph = {};
   TreePlace place = {};
   bool in_frame = false;  ///< `start` is already in the frame of the session.
-  /// False closures are likely. The trajectory is then not deformed to fit closures.
+  /// Closures may be false (pose_graph.robust with Newton's method). The trajectory is then not
+  /// deformed to fit closures, and claimed precisions are limited.
   bool suspicious = true;
   std::vector<KeyframeIndex> public_keyframes = {};  ///< Ascending, 0 first.
 };
 
 /// The measurements of robot `self` in `session`, of which it is a member. `peers` are the robots
-/// that it knows; closures to absent ones are tied to their received poses. nullopt if `self` does
-/// not hold an edge set of the session.
+/// that it knows; closures to absent ones are tied to their received poses. nullopt if `graph` does
+/// not have the edges() by which the plan of the session names the closures of a pair.
 [[nodiscard]] std::optional<FrozenPart> freeze_part(const Session& session, RobotId self,
                                                     const OwnGraph& graph,
                                                     std::span<const RobotId> peers,

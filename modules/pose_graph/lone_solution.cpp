@@ -14,7 +14,7 @@ LoneSolution solve_alone(SessionGraph graph, TreeNewtonOptions options) {
   TreeNewton newton(std::move(graph), TreePlace{.members = {self}, .root = self}, options);
   try {
     while (!newton.done()) (void)newton.advance();
-  } catch (const std::runtime_error&) {  // a step that leads out of the world
+  } catch (const std::runtime_error&) {  // the graph cannot be solved, see MemberSolver::advance()
     return {newton.poses(), false};
   }
   const SolverState state = newton.state();

@@ -14,8 +14,8 @@ struct [[nodiscard]] LoneSolution {
       false;  ///< False: the rounds did not suffice, or the equations have no solution.
 };
 
-/// Solves `graph` by TreeNewton as a session of one member. `graph` has no closures to members.
-/// Second derivatives are computed more often than in a team, because they cost no bytes. Throws
+/// Solves `graph` by TreeNewton as a session of one member. `graph` has no closures to members. New
+/// second derivatives are computed earlier than by default, because they cost no bytes. Throws
 /// std::invalid_argument as TreeNewton does.
 LoneSolution solve_alone(SessionGraph graph, TreeNewtonOptions options);
 

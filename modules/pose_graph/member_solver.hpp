@@ -13,16 +13,16 @@
 
 namespace km {
 
-/// Message of a solver to one other member. Only the solver knows its content. The sizes are those
-/// on the network.
+/// Message of a solver to one other member. Only solvers know the encoding of `bytes`. Their number
+/// is that on the network.
 struct SolverMessage {
   RobotId to = 0;
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
 };
 
-/// A deferred closure is weighed again in the next session, at most kChances times, if its residual
-/// is at most kSecondChance times barc. The limit exceeds barc because the solution was computed
-/// without this closure.
+/// After a session with deferred closures, its deferred and rejected closures may be weighed again
+/// in the next session, at most kChances times each. Their residual must be at most kSecondChance
+/// times barc. The limit exceeds barc because the solution was computed without these closures.
 inline constexpr double kSecondChance = 5.0;
 inline constexpr int kChances = 2;
 
@@ -33,7 +33,7 @@ struct SolverState {
   double gradient = 0.0;     ///< Newton: sqrt(g^T H^-1 g); rbcd: norm of the Riemannian gradient.
   double noise_scale = 1.0;  ///< Noise scale of the closures, estimated by the team.
   double barc = 0.0;  ///< Largest residual of a closure that is kept [sigma]; 0: none is rejected.
-  std::uint32_t lag = 1;  ///< Every member has had the poses() of `round` - `lag`.
+  std::uint32_t lag = 1;  ///< Every member has completed the round `round` - `lag`.
   bool deferred = false;  ///< Closures that stand alone were deferred: they may be true.
   bool held = false;      ///< Held poses fix the frame of the team.
   bool failed = false;    ///< The graph of the team could not be solved.
@@ -56,8 +56,7 @@ class MemberSolver {
   [[nodiscard]] virtual std::vector<SolverMessage> advance() = 0;
   [[nodiscard]] virtual bool done() const = 0;
 
-  /// Own poses in the frame of the session, with the lowest cost that the team has agreed on. At
-  /// first these are the start.
+  /// Own poses in the frame of the session, as the team has last accepted them; at first the start.
   [[nodiscard]] virtual const std::vector<SE3>& poses() const = 0;
   /// Covariances of poses() relative to the origin of the session, once it is done, as tangent
   /// vectors [rotation; translation] at the pose (see core/covariance.hpp). Empty if the solver

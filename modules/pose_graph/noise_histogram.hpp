@@ -21,11 +21,11 @@ void count_length(NoiseHistogram& histogram, double length);
 
 /// The noise scale of closures, from the Mahalanobis lengths d of cycles through two closures near
 /// each other (see Corroboration::count_lengths()). If both closures are true, d is `scale` times
-/// the length of a normal vector; with a false closure, d may have any value. The model is a
-/// mixture of both, with log d uniform for cycles with a false closure. The result is
-/// the scale nearest to 1 among those about as likely as the best one (expectation maximisation of
-/// the share, for every scale). `dimension` 2: the vector
-/// has 3 components, otherwise 6. nullopt if there are too few lengths.
+/// the length of a normal vector; with a false closure, d may have any value. The normal vector has
+/// 6 components (`dimension` 2: 3). The model is a mixture of both, with log d uniform for cycles
+/// with a false closure. For every scale, expectation maximisation fits the share of true cycles.
+/// The result is the scale nearest to 1 among those about as likely as the best one. nullopt if
+/// there are too few lengths.
 [[nodiscard]] std::optional<NoiseScale> fit_noise(const NoiseHistogram& histogram, int dimension);
 
 }  // namespace km

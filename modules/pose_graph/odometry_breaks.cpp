@@ -16,11 +16,12 @@ namespace {
 // Quantiles of chi-squared, 6 degrees of freedom: 99.9 % and the median.
 constexpr double kConsistent = 22.46;
 constexpr double kMedian = 5.35;
-// Least number of places that show a jump. Two are too few: two false closures of one long
-// stretch count as two places if they are more than ten keyframes apart.
+// Least number of places that show a jump. Two are too few: false closures between the same two
+// similar parts of the environment count as two places if they are more than ten keyframes apart.
 constexpr double kLeastPlaces = 3.0;
-// A wrong step is clearly beyond the limit. The longest cycles of noisy odometry are near it: with
-// a factor of 1, one of 360 random trajectories without a wrong step had a break.
+// Factor on the limit, up to which a cycle that contains the step counts as consistent. The largest
+// errors of noisy odometry are near the limit: with a factor of 1, one of 360 random trajectories
+// without a wrong step had a break.
 constexpr double kClearly = 2.0;
 // Share of the cycles with a wrong step that may be consistent: long cycles do not show a jump.
 constexpr double kMostConsistent = 0.1;
@@ -88,9 +89,9 @@ struct Suspicion {
   double consistent = 0.0;  // number of places whose cycle contains the step and is consistent
 };
 
-// nullopt unless the cycles allow the step to be wrong: hardly any of those with it is consistent,
-// and most of those without it are. The median of those without it shows how noisy odometry
-// and closures are.
+// nullopt unless the cycles allow the step to be wrong: hardly any cycle that contains the step is
+// consistent. The median error of the cycles without the step shows how noisy odometry and closures
+// are; it scales the limit.
 std::optional<Suspicion> suspicion_of(const std::vector<ErrorCycle>& cycles, std::size_t step) {
   std::vector<double> without;
   double places_with = 0.0, places_without = 0.0;
@@ -109,7 +110,8 @@ std::optional<Suspicion> suspicion_of(const std::vector<ErrorCycle>& cycles, std
   return Suspicion{limit, consistent};
 }
 
-// The jumps after the step by the cycles with it that agree with one of them: most of them.
+// Every cycle that contains the step yields the jump after the step that would close it. Returns
+// the largest set of jumps that agree with one jump of the set.
 std::vector<Jump> agreeing_jumps(const OdometryChain& chain, const std::vector<ErrorCycle>& cycles,
                                  std::size_t step, double limit) {
   std::vector<Jump> jumps;

@@ -9,13 +9,13 @@
 
 namespace km {
 
-/// A wrong step of odometry, as after a loss of tracking, and what closures say about it.
+/// A wrong step of odometry, as after a loss of tracking, and its correction by closures.
 struct OdometryBreak {
   std::size_t step = 0;      ///< From keyframe `step` to the next one.
   SE3 T_from_to;             ///< The step on which the closures agree.
   Precision precision = {};  ///< One standard deviation is the size of the jump.
-  double jump_rad = 0.0;     ///< Rotation of the claimed step against it.
-  double jump_m = 0.0;       ///< Translation of the claimed step against it.
+  double jump_rad = 0.0;     ///< Rotation between the claimed step and T_from_to.
+  double jump_m = 0.0;       ///< Translation between the claimed step and T_from_to.
   std::size_t places = 0;    ///< Number of places that agree.
 };
 
@@ -24,13 +24,14 @@ struct OdometryBreak {
 ///
 /// A wrong step makes every cycle of odometry and a closure that contains it inconsistent, and each
 /// of these cycles yields the jump that would close it. A step is wrong if the cycles of at least
-/// three places agree on the jump, hardly any consistent cycle contains the step, and most cycles
-/// without it are consistent. False closures do not agree.
+/// three places agree on the jump, and if at most 10 % of the cycles that contain the step are
+/// consistent. At least three places must have cycles without the step, for comparison. False
+/// closures rarely agree on a jump.
 ///
 /// Cycles are consistent, and jumps agree, up to the 99.9 % quantile of chi-squared at the claimed
-/// noise. The limit is larger if the median cycle without the step is longer than claimed, because
-/// noisy odometry makes all cycles long. If no closure distinguishes successive steps, the middle
-/// one is taken.
+/// noise. The limit is larger if the median error of the cycles without the step exceeds the
+/// claimed noise, because noisy odometry increases the errors of all cycles. If successive steps
+/// are in the same cycles, the middle one is taken.
 [[nodiscard]] std::vector<OdometryBreak> find_odometry_breaks(std::span<const PoseEdge> steps,
                                                               std::span<const PoseEdge> closures);
 

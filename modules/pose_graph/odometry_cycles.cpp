@@ -44,7 +44,8 @@ OdometryCycle OdometryChain::close(const PoseEdge& closure) const {
   const auto [lower, upper] = std::minmax(closure.from.index, closure.to.index);
   OdometryCycle cycle{.closure = closure, .lower = lower, .upper = upper};
   const UncertainPose measured = upward(closure);
-  // The error is small, so that both covariances refer to the upper keyframe.
+  // The error is small, so the covariances of steps and closure may both be taken at the upper
+  // keyframe.
   cycle.error = se3_log(measured.T.inverse() * steps(lower, upper, kRotation).T);
   for (const auto part : {kRotation, kTranslation})
     cycle.covariance[part] = steps(lower, upper, part).Sigma;

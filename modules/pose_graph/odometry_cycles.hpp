@@ -12,18 +12,18 @@
 
 namespace km {
 
-/// A cycle of the steps of odometry of one robot and one closure, or two closures near each other.
+/// A cycle along steps of odometry of one robot and one closure, or two closures near each other.
 struct OdometryCycle {
-  /// Sources of its noise: rotations and translations of the steps, its only closure, or its two
-  /// closures. An error that closures of a place share does not show in a cycle through both.
+  /// Sources of the noise of a cycle: rotations and translations of the steps, its only closure, or
+  /// its two closures. An error that two closures of a place share cancels in a cycle through both.
   enum Component : std::size_t { kRotation, kTranslation, kClosure, kTwoClosures, kComponents };
 
   PoseEdge closure;                    ///< The only closure, or the first one.
   std::optional<PoseEdge> other = {};  ///< The second closure.
-  std::size_t lower = 0;               ///< Keyframes at its ends.
+  std::size_t lower = 0;               ///< Keyframes at the ends of `closure`.
   std::size_t upper = 0;
   /// Tangent vector at the upper keyframe, from its pose by the closure to its pose by the steps.
-  /// With two closures: at the lower keyframe, the whole cycle from there.
+  /// With two closures: logarithm of the transform around the whole cycle, from the lower keyframe.
   Vector6 error = Vector6::Zero();
   std::array<Matrix6, kComponents> covariance = {  ///< Claimed covariance of `error`, by source.
       Matrix6::Zero(), Matrix6::Zero(), Matrix6::Zero(), Matrix6::Zero()};

@@ -20,7 +20,7 @@ constexpr std::size_t kMostCycles = 200;
 constexpr std::uint32_t kShort = 10;    // largest number of steps in a cycle of two closures
 constexpr double kPriorSigma = 1.0986;  // log 3, prior of log sqrt(v)
 // Largest standard deviation of the rotation of odometry in a cycle of one closure, on each axis.
-// Errors of cycles with more are not normal.
+// Errors of cycles with a larger one are not normally distributed.
 constexpr double kLargestTurnSigma_rad = 0.7;
 // Weight of a cycle of two closures. Each closure is in two such cycles.
 constexpr double kShortCycleWeight = 0.5;
@@ -232,8 +232,8 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (fit.log_odds < kEvidence) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
   std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors);
-  // Without long cycles, noise of closures alone explains the cycles of successive closures. The
-  // first estimate then remains.
+  // If most cycles of one closure are left out, noise of closures alone may explain the cycles of
+  // successive closures. That does not refute the first estimate, which then remains.
   const bool few_are_long = 2 * normal.size() < cycles.size();
   normal.insert(normal.end(), near.begin(), near.end());
   const Fit refined = fit_factors(normal, volume);

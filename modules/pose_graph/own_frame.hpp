@@ -9,7 +9,8 @@
 
 namespace km {
 
-/// `world`, in which robots publish, in the frame of a solution: the odometry frame of `anchor`.
+/// Pose of `world`, the frame in which robots publish, in the frame of a solution. `world` is the
+/// odometry frame of `anchor`.
 struct World {
   RobotId anchor = 0;
   SE3 T_frame_world = SE3::Identity();
@@ -23,17 +24,19 @@ class OwnFrame {
   [[nodiscard]] const TeamFrame& frame() const { return frame_; }
   /// Counts the changes of the frame.
   [[nodiscard]] std::uint32_t version() const { return version_; }
-  /// nullopt before it is known in this frame.
+  /// nullopt before `world` is known in this frame.
   [[nodiscard]] const std::optional<World>& world() const { return world_; }
 
-  /// The solution is in another frame from now on; `world` is unknown there.
+  /// To be called when the solution is in `frame`. If that is another frame, `world` is unknown
+  /// afterwards.
   void enter(const TeamFrame& frame);
   void set_world(const std::optional<World>& world) { world_ = world; }
 
-  /// `world` with this anchor, from the pose of its keyframe 0 that all robots have received: all
-  /// have one frame to the last digit. If the solution is `upright`, `world` has z up: the optimum
-  /// has a better estimate of the tilt of keyframe 0 than its own vertical. nullopt if the poses of
-  /// the anchor are unknown or in another frame.
+  /// `world` with this anchor. It follows from the pose of keyframe 0 that the anchor has sent to
+  /// all robots, so all compute the same `world` to the last bit. If the solution is `upright`,
+  /// `world` is rotated so that z is up, because the optimum has a better estimate of the tilt of
+  /// keyframe 0 than its own vertical. nullopt if the poses of the anchor are unknown or in another
+  /// frame.
   [[nodiscard]] std::optional<World> world_of(RobotId anchor, const TeamRoster& roster,
                                               const SE3& T_odom_first, bool upright) const;
 

@@ -15,14 +15,16 @@ namespace km {
 
 /// The part of the pose graph that one robot knows: its odometry, the closures that end on it, and
 /// the inlier sets, which name the closures to optimise. Closures and inlier sets may arrive in any
-/// order and repeatedly. An inlier set counts once all its closures, and the keyframes of this
-/// robot on which they end, have arrived. The newest few edge sets of each robot pair are kept, so
-/// that both robots can agree on one. Not thread-safe.
+/// order and repeatedly. Once all closures of an inlier set, and the keyframes of this robot on
+/// which they end, have arrived, the set becomes an edge set: the closures with their measurements.
+/// The newest few edge sets of each robot pair are kept, so that both robots can agree on one. Not
+/// thread-safe.
 ///
 /// A pair of keyframes identifies a closure. The closure counts once, however often and from
 /// whichever end it was measured: of several measurements, the best one by is_better() counts. The
-/// measurements alone determine which one is the best, and the id of an edge set covers them. Two
-/// robots that have not yet exchanged all measurements therefore hold different sets.
+/// measurements alone determine which one is the best, and the id of an edge set has a hash of
+/// them. Two robots that have not yet exchanged all measurements therefore hold edge sets with
+/// different ids.
 class OwnGraph {
  public:
   explicit OwnGraph(RobotId self) : self_(self) {}
@@ -78,7 +80,8 @@ class OwnGraph {
   [[nodiscard]] bool upright() const { return !verticals_.empty() && verticals_[0].pose == 0; }
   /// Odometry step from keyframe i - 1 to i, as measured. Precondition: 0 < i < keyframes().
   [[nodiscard]] const SE3& step_to(std::uint32_t i) const { return odometry_[i - 1].T_from_to; }
-  /// Mean weights of a step of odometry; the default while there is none.
+  /// Mean weights of a step of odometry, corrected by odometry_noise(); the default weights while
+  /// there is no step.
   [[nodiscard]] Precision mean_step_precision() const;
 
  private:

@@ -21,7 +21,8 @@ namespace {
 // chordal start.
 constexpr std::size_t kEnoughForChordal = 20;
 
-// The cost of `steps` steps of odometry and of closures after them. That of a closure is truncated.
+// The cost of `edges`, of which the first `steps` are odometry and the others closures. The cost of
+// each closure is truncated.
 double truncated_cost(std::span<const PoseEdge> edges, std::size_t steps,
                       const std::vector<SE3>& poses) {
   const double barc = default_threshold(3);

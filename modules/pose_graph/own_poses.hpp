@@ -12,8 +12,8 @@
 
 namespace km {
 
-/// The poses of the keyframes of one robot between sessions: those of the last session, and
-/// odometry since. Not thread-safe.
+/// The poses of the keyframes of one robot between sessions: the poses of the last session, and
+/// odometry for later keyframes. Not thread-safe.
 class OwnPoses {
  public:
   /// In the frame of the last session.
@@ -27,7 +27,7 @@ class OwnPoses {
   void extend(const OwnGraph& graph);
 
   /// Moves the poses after each wrong step of odometry as a whole, such that the step is corrected.
-  /// Later calls leave it as it is then.
+  /// Each step is corrected only once.
   void correct(std::span<const OdometryBreak> breaks);
 
   /// Improves the start of a session of this robot alone: the chordal initialisation replaces the

@@ -19,11 +19,12 @@ constexpr double kLeastSpread_m = 1e-3;
 constexpr double kOff = 4.0;
 // Least gain in the number of fitting pairs for which robots are moved.
 constexpr double kBetter = 0.5;
-// Least support of a confirmed pair: the loop through a third robot closes within two spreads.
-constexpr double kBorneOut = 0.2;
+// Least support of a confirmed pair: the loop through a third robot closes within twice the sum of
+// the spreads of its three pairs.
+constexpr double kConfirming = 0.2;
 // Largest spread of consistent closures of a pair, relative to the radius.
 constexpr double kAgreeing = 0.25;
-// So many places of a pair that agree on its motion say more than those that do not.
+// Number of places of a pair that agree on its motion, from which on only those places count.
 constexpr std::size_t kAgreeingPlaces = 3;
 
 // The pairs with a vote.
@@ -45,7 +46,7 @@ const PairMotion* find(const PairMotions& pairs, RobotId a, RobotId b) {
   return found == pairs.end() ? nullptr : &found->second;
 }
 
-// The motion of b if a keeps its place.
+// The motion (see PairMotion) of robot b that fits the closures of a and b if a does not move.
 SE3 along(const PairMotions& pairs, RobotId a, RobotId b) {
   const SE3 T = pairs.at(std::minmax(a, b)).T.pose();
   return a < b ? T : T.inverse();
@@ -95,7 +96,7 @@ std::map<RobotId, SE3> placed_by_tree(const PairMotions& pairs, const std::set<R
   return placed;
 }
 
-// Sum over the pairs of their misfit, limited to 1 each.
+// Sum of the misfits of all pairs after the motions `placed`, each limited to 1.
 double misfit(const PairMotions& pairs, const std::map<RobotId, SE3>& placed) {
   double sum = 0.0;
   for (const auto& [robots, pair] : pairs) {
@@ -106,7 +107,7 @@ double misfit(const PairMotions& pairs, const std::map<RobotId, SE3>& placed) {
   return sum;
 }
 
-// Moves all robots together so that as many as possible keep their place.
+// Shifts all motions together so that as many robots as possible do not move.
 void hold_most(const PairMotions& pairs, std::map<RobotId, SE3>& placed) {
   const auto staying = [&](const SE3& T) {
     std::set<RobotId> moving;
@@ -160,7 +161,7 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
     result.strength.kappa += e.precision.kappa;
     result.strength.tau += e.precision.tau;
   }
-  // Several places do not agree by chance, however many others disagree.
+  // Several places do not agree by chance, however many other places disagree.
   std::set<std::size_t> agreeing_places;
   for (const std::size_t k : alignment->inliers) agreeing_places.insert(places[k]);
   const bool by_places = agreeing_places.size() >= kAgreeingPlaces;
@@ -206,7 +207,7 @@ Precision usual_strength(const PairMotions& all) {
   if (robots.size() < kEnoughToOutvote) return kUnlimited;
   std::map<RobotId, std::vector<Precision>> of_robot;
   for (const auto& [ends, pair] : pairs) {
-    if (support(pairs, robots, ends.first, ends.second) < kBorneOut) continue;
+    if (support(pairs, robots, ends.first, ends.second) < kConfirming) continue;
     for (const RobotId robot : {ends.first, ends.second}) of_robot[robot].push_back(pair.strength);
   }
   if (of_robot.empty()) return kUnlimited;

@@ -16,9 +16,9 @@
 
 namespace km {
 
-/// The motion of robot b after which most closures of a pair a < b would fit, with robot a at its
-/// present place. Motions multiply from the left: T_world_kf becomes T * T_world_kf. Positions are
-/// in the frame of the present poses.
+/// A rigid motion of all poses of robot b after which most closures of a pair a < b would fit,
+/// while robot a does not move. Motions multiply from the left: T_world_kf becomes T * T_world_kf.
+/// Positions are in the frame of the present poses.
 struct PairMotion {
   SinglePose T = {};
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Mean position of the ends on b [m].
@@ -44,17 +44,18 @@ inline constexpr Precision kUnlimited{.kappa = std::numeric_limits<double>::max(
     std::span<const PoseEdge> closures, RobotId a,
     const std::function<SE3(const KeyframeId&)>& pose);
 
-/// Motions of robots after which more pairs fit. Robots that enter the frame one after the other
-/// are placed by the closures of the first ones, which may be false. Here each pair with consistent
-/// closures has one vote, however many closures it has. Closures of a pair are consistent if their
-/// spread is at most a quarter of the radius. Over a long odometry no single motion fits, and false
-/// closures agree on none.
+/// Motions of robots after which more pairs fit. Robots enter the frame one after the other, each
+/// by its closures to earlier robots, which may be false. Here each pair with consistent closures
+/// has one vote, however many closures it has. Closures of a pair are consistent if their spread is
+/// at most a quarter of the radius. If odometry between the closures drifts too far, no single
+/// motion fits them. False closures do not agree on one motion, either.
 ///
-/// A pair is confirmed if the loop through some third robot closes. The maximum spanning tree over
-/// the confirmations of the pairs places the robots, and as many robots as possible keep their
-/// place. The result is empty if the gain in fitting pairs, each counted in [0, 1], is below 0.5.
-/// It is also empty if the pairs with a vote do not connect all of their robots. If these pairs
-/// form no loop, only robots whose place rests on pairs without a vote move. O(pairs * robots).
+/// A pair is confirmed if the loop through some third robot closes. Motions are chained along the
+/// maximum spanning tree over the number of such robots per pair. All motions together are then
+/// shifted so that as many robots as possible do not move. The result is empty if the gain in
+/// fitting pairs, each counted in [0, 1], is below 0.5. It is also empty if the pairs with a vote
+/// do not connect all of their robots. If these pairs form no loop, only robots that entered the
+/// frame by pairs without a vote move. O(pairs * robots).
 [[nodiscard]] std::map<RobotId, SE3> better_placement(const PairMotions& pairs);
 
 /// Lower medians of kappa and of tau, independently. Precondition: `values` is not empty.

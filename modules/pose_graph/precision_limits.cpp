@@ -8,8 +8,9 @@
 namespace km {
 namespace {
 
-// Largest weights, relative to a step of the lower median robot. A closure may have half its sigma.
-// The errors of odometry add up, so the limit on the mean step of a robot is stricter.
+// Largest weights, relative to a step of the lower median robot. A closure may have half the sigma
+// of that step. The errors of odometry add up, so the limit on the mean step of a robot is
+// stricter.
 constexpr double kMostPrecise = 4.0;
 constexpr double kBestOdometry = 1.25;
 constexpr std::size_t kMajority = 3;

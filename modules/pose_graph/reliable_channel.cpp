@@ -13,9 +13,9 @@ constexpr double kMeanOver = 8.0;  // number of messages in the mean
 // Bounds of the timeout [periods].
 constexpr double kLeastPatience = 0.2;
 constexpr double kMostPatience = 3.0;
-// Rate of repetitions of large messages [bytes/s]. An existing transport loses nothing, and
-// reachable_again() covers outages. The receiver of a large message also needs long before it can
-// acknowledge it.
+// Rate of repetitions of large messages [bytes/s]. As long as two robots are connected, the
+// transport loses no message, and reachable_again() covers outages. The receiver of a large message
+// also takes long to acknowledge it.
 constexpr double kRepeatedBps = 50e3;
 
 // No solver sends messages this far ahead of those that were taken.

@@ -15,15 +15,15 @@
 
 namespace km {
 
-/// Factor on the weights of a rejected closure that remains an edge. Its poses remain in the
-/// problem, and its influence is negligible.
+/// Factor on the weights of a rejected closure that remains an edge (rbcd). The pose at its other
+/// end remains in the problem, and the influence of the closure is negligible.
 inline constexpr double kRejectedWeight = 1e-6;
 
-/// The part of one robot of the graph that a session optimises, frozen when the session begins.
+/// The part of the graph of a session that one robot knows, frozen when the session begins.
 ///
-/// Both robots of a closure hold it, with equal numbers. The public keyframes are keyframe 0 and
-/// the keyframes on which closures between robots end. All robots have the same start of a public
-/// pose, to the last bit (see SinglePose).
+/// A closure between two robots is in the parts of both, with equal measurements and weights. The
+/// public keyframes are keyframe 0 and the keyframes on which closures between robots end. The
+/// start of a public pose is equal on all robots, to the last bit (see SinglePose).
 struct SessionGraph {
   RobotId self = 0;
   std::vector<SE3> start = {};         ///< T_world_kf of the own keyframes, in the session's frame.
@@ -40,12 +40,13 @@ struct SessionGraph {
   KeyframeId origin = {};                     ///< Covariances are relative to this keyframe.
   /// Decisions of earlier sessions: kept or rejected. Closures without an entry are undecided.
   std::map<ClosureId, bool> decided = {};
-  std::set<ClosureId> trusted = {};  ///< Never weighed; equal on both robots.
+  std::set<ClosureId> trusted = {};  ///< Closures that are never weighed; equal on both robots.
   /// Cycles through closures that this robot counted in earlier sessions.
   ClosureNoiseRecord noise = {};
 };
 
-/// The place of a robot in the tree of a session. The edges of the tree are links.
+/// The place of a robot in the tree of a session. The edges of the tree are links, or paths over
+/// other robots where members have no link.
 struct TreePlace {
   std::optional<RobotId> parent = {};  ///< nullopt: the root.
   std::vector<RobotId> children = {};  ///< Ascending.

@@ -32,9 +32,9 @@ using MemberSolverFactory = std::function<std::unique_ptr<MemberSolver>(
 /// have arrived, its solver begins. Members exchange messages until the solver is done or fails.
 ///
 /// A session may end early at any time, and its members are then in different rounds. Each member
-/// therefore keeps the poses of the last rounds. From time to time the coordinator sends the last
-/// round that all members have completed, and each member returns to that round. All members that
-/// have received it hold poses of one round. Deterministic; not thread-safe.
+/// therefore keeps the poses of the last rounds. The coordinator repeatedly sends the number of the
+/// last round that all members have completed. A member that leaves early uses committed_poses(),
+/// the poses of that round. Deterministic; not thread-safe.
 class SessionPart {
  public:
   SessionPart(Session session, TeamPeer self, FrozenPart part, MemberSolverFactory factory,
@@ -46,16 +46,17 @@ class SessionPart {
   [[nodiscard]] bool worked() const { return worked_; }
 
   /// Processes a message of a member. It is acknowledged once the solver has taken it. Messages
-  /// that arrive before there is a solver are kept if there is room, and are repeated otherwise.
-  /// False if the sender is not a member, or if the solver cannot use the message at present.
+  /// that arrive before there is a solver are kept if there is room. Otherwise the sender repeats
+  /// them. False if the sender is not a member, or if the solver cannot use the message at present.
   bool receive(const ReliableMessage& message, double now_s);
-  /// Senders of early messages that the solver then refused; empty thereafter.
+  /// Returns the senders of early messages that the solver then refused, and removes them from the
+  /// list.
   [[nodiscard]] std::vector<RobotId> take_refused() { return std::exchange(refused_, {}); }
   void reachable_again(RobotId robot) { channel_.reachable_again(robot); }
 
   /// Takes the newest message of the coordinator. True if it ends the session.
   bool follow(const Session& session);
-  /// Declares a round completed by all members.
+  /// Stores the poses of `round`, which all members have completed, as committed_poses().
   void commit(std::uint32_t round);
 
   /// nullopt before the robot has entered the frame.
@@ -84,9 +85,10 @@ class SessionPart {
   [[nodiscard]] ClosureNoiseRecord noise() const {
     return solver_ ? solver_->noise() : graph_.noise;
   }
-  /// The best poses; in the frame of the session once there is a stage.
+  /// The poses that the solver has last accepted. Before there is a solver: the start. After a
+  /// failure: committed_poses(). In the frame of the session once there is a stage.
   [[nodiscard]] const std::vector<SE3>& poses() const;
-  /// Covariances of poses() once it is solved; empty if the solver computes none.
+  /// Covariances of poses() once the session is solved; empty if the solver computes none.
   [[nodiscard]] std::vector<Matrix6> covariances() const {
     return solver_ ? solver_->covariances() : std::vector<Matrix6>{};
   }
@@ -96,7 +98,8 @@ class SessionPart {
   [[nodiscard]] double moved_s() const { return moved_s_; }
   void moved(double now_s) { moved_s_ = now_s; }
   [[nodiscard]] double started_s() const { return started_s_; }
-  /// Bytes that this robot has sent for the session, per receiver, and with forwarded messages.
+  /// Bytes of all messages of the session that this robot has sent or forwarded. A message counts
+  /// once for each neighbour that receives it.
   [[nodiscard]] std::uint64_t sent_bytes() const { return sent_bytes_; }
   void count_sent(std::size_t bytes) { sent_bytes_ += bytes; }
 

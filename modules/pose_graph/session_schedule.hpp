@@ -7,8 +7,8 @@
 namespace km {
 
 /// When the coordinator of a team opens the next session. New measurements do not interrupt a
-/// session. The next one waits until the bytes of the last one are paid for and it is worth its own
-/// bytes. Not thread-safe.
+/// session. The next session waits until is_paid_for() and is_worthwhile() are true. Not
+/// thread-safe.
 class SessionSchedule {
  public:
   explicit SessionSchedule(const PoseGraphConfig& config) : config_(config) {}
@@ -18,13 +18,13 @@ class SessionSchedule {
     if (graph_changed) changed_s_ = now_s;
     closures_ = closures;
   }
-  /// Number of the next session.
+  /// Number for the next session; every call returns a new one.
   [[nodiscard]] std::uint32_t next_number() { return ++opened_; }
-  /// The next session has begun, with all present closures.
+  /// To be called when a session begins. It has all present closures.
   void opened() { used_ = closures_; }
 
-  /// True if the busiest member may send again after `bytes` in the session that ended at
-  /// `ended_s`. The budget applies to every robot.
+  /// True if the mean rate of the member that has sent most, `bytes` in the session that ended at
+  /// `ended_s`, is within pose_graph.exchange_budget_kb_s by now. Also true after session_wait_s.
   [[nodiscard]] bool is_paid_for(std::uint64_t bytes, double ended_s, double now_s) const;
   /// True if the graph of the members has changed enough since the session that ended at `ended_s`.
   [[nodiscard]] bool is_worthwhile(double ended_s, double now_s) const;

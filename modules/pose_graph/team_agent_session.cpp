@@ -159,8 +159,8 @@ void TeamAgent::consider(const Session& session) {
                                     part_->session().id.number < session.id.number;
   // The other members continue without this robot.
   if (from_own_coordinator && !member) return leave(all_solved());
-  // This robot joins only if it knows a connection to the coordinator, and if all members are
-  // present.
+  // This robot joins only if all members are in reach, and if links and closures that it knows
+  // connect it to the coordinator (`plan_`).
   if (!member || session.finished || !accepts(session) || misses_member(session.plan) ||
       !plan_.has_member(session.id.coordinator.robot) || join(session))
     return;

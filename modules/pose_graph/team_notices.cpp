@@ -8,7 +8,8 @@
 namespace km {
 namespace {
 
-// Noise of odometry over the claimed noise that causes a notice, and its increase that causes
+// kNoisyOdometry: ratio of the noise of odometry to the claimed noise that causes a notice.
+// kNoticedAgain: ratio of the noise of odometry or closures to that in the last notice that causes
 // another one.
 constexpr double kNoisyOdometry = 2.0;
 constexpr double kNoticedAgain = 1.5;

@@ -23,15 +23,16 @@ class TeamNotices {
   explicit TeamNotices(RobotId self) : self_(self) {}
 
   void add(std::string notice) { notices_.push_back(std::move(notice)); }
-  /// Counts a refused input, and reports the first, second, fourth, ... of equal reason. False.
+  /// Counts a refused input, and reports the first, second, fourth, ... of equal reason. Always
+  /// returns false.
   bool refuse(const std::string& reason);
-  /// Odometry of this robot that is noisier than it claims.
+  /// Reports odometry of this robot that is noisier than it claims.
   void odometry(const OdometryNoise& noise);
-  /// Wrong steps of odometry of this robot.
+  /// Reports wrong steps of odometry of this robot.
   void breaks(std::span<const OdometryBreak> breaks);
-  /// Closures of pairs of robots that are noisier than those of the team.
+  /// Reports pairs of robots whose closures are noisier than those of the team.
   void closures(const ClosureNoiseRecord& noise);
-  /// Robots whose place in the frame is uncertain, or certain again.
+  /// Reports robots whose pose relative to this robot is uncertain, or certain again.
   void ties(const FrameTies& ties);
 
   [[nodiscard]] std::vector<std::string> take() { return std::exchange(notices_, {}); }

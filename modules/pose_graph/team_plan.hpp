@@ -19,8 +19,8 @@ namespace km {
 /// with the lowest id coordinates the session.
 ///
 /// The frame is the present frame of most members (ties: most edges to other members, then the
-/// lowest robot). Its robots come first in the order of alignment. Then always follows the robot
-/// with the most edges to the robots before it.
+/// lowest robot). Robots that are in this frame come first in the order of alignment. The next
+/// robot is always the one with the most edges to the robots before it.
 ///
 /// The tree is a maximum spanning tree of the members over links, weighted by agreed edges
 /// (Kruskal's algorithm; ties: lowest ids). If direct links do not connect the members, paths with
@@ -41,8 +41,8 @@ namespace km {
 [[nodiscard]] bool has_lost_member(const SessionPlan& session, const SessionPlan& now);
 
 /// Number of measurements in the session of `plan`, made from `statuses`, except for odometry:
-/// closures between its robots, and changes of closures inside robots. Statuses do not report the
-/// latter one by one.
+/// closures between its robots, and changes of the closures inside robots. Statuses report closures
+/// inside robots only by the number of changes.
 [[nodiscard]] std::uint64_t closures_known(const SessionPlan& plan,
                                            const std::map<RobotId, TeamStatus>& statuses);
 

@@ -12,8 +12,8 @@
 
 namespace km {
 
-/// True if a message of another robot, which is not trusted, has everything on which this robot
-/// relies, including the checks of the codec.
+/// True if the content of a message of another robot, which is not trusted, fulfils all conditions
+/// on which this robot relies. Some of them are also checked when the message is decoded.
 [[nodiscard]] bool is_well_formed(const TeamStatus& status);
 [[nodiscard]] bool is_well_formed(const MemberPoses& poses);
 
@@ -24,10 +24,10 @@ class TeamRoster {
   struct Peer {
     std::uint64_t boot = 0;
     std::optional<TeamStatus> status = {};
-    std::optional<Session> session = {};  ///< The newest one that it coordinates.
+    std::optional<Session> session = {};  ///< The newest session that it coordinates.
     std::uint32_t joined = 0;             ///< Number of its last session that this robot joined.
     std::uint32_t missed = 0;             ///< Number of its last session that it could not join.
-    bool other_method = false;            ///< Its edges are not optimised.
+    bool other_method = false;            ///< It uses another solver: its edges are not optimised.
   };
   /// How a robot has been met.
   enum class Meeting {
@@ -60,8 +60,8 @@ class TeamRoster {
   [[nodiscard]] const PublicPoses& public_poses() const { return public_poses_; }
 
   /// The statuses from which sessions are planned: `own`, and those of robots in reach with the
-  /// same method. Poses are sent at once, but statuses only periodically; the frame of a robot is
-  /// that of the newer one.
+  /// same method. Poses are sent at once, but statuses only periodically. The frame of a robot is
+  /// that of the newer of these two messages.
   [[nodiscard]] std::map<RobotId, TeamStatus> statuses(TeamStatus own) const;
 
  private:

@@ -229,8 +229,8 @@ void TreeFront::place_pairs(const std::vector<NodePair>& pairs) {
   }
 }
 
-// Keeps the nodes that robots outside the subtree use, as far as this robot knows, and those whose
-// elimination does not pay.
+// Keeps the nodes that robots outside the subtree use, as far as this robot knows. Also keeps poses
+// that may be sent, if their elimination would add more couplings than it removes.
 std::vector<bool> TreeFront::kept_nodes(const std::vector<NodePair>& pairs) const {
   std::vector<bool> keep;
   for (const TreeVariable& v : variables()) keep.push_back(v.of == 0 || v.touched < v.of);
@@ -455,9 +455,9 @@ double TreeFront::decrement() const {
   return sum;
 }
 
-// The position of the one remaining pose is held, and its rotation, except for its tilt if
-// verticals determine that. A common rotation of the team about the vertical costs nothing, so the
-// softest direction is left out.
+// The root holds the position and rotation of the one remaining pose, or only its position and
+// heading if verticals determine its tilt. A common rotation of the team about the vertical costs
+// nothing, so the softest direction of rotation is the heading and is left out.
 std::optional<TreeFront::Tilts> TreeFront::tilts_of(const BlockMatrix& held, bool upright) {
   if (!upright || held.diagonal.cols() != 6) return std::nullopt;
   const Eigen::Matrix3d S = held.at(0).topLeftCorner<3, 3>();
@@ -500,8 +500,9 @@ BlockMatrix TreeFront::inverse(const BlockMatrix& kept) const {
   return factor_->selected_inverse(kept);
 }
 
-// Steps are computed with a pose in the middle held, because second derivatives of earlier rounds
-// converge faster so. Covariances need another factorisation, with the origin held.
+// The factorisation for Newton steps holds a pose in the middle of the graph: rounds that reuse
+// earlier second derivatives then converge faster. Covariances need a factorisation with the origin
+// held.
 std::optional<BlockMatrix> TreeFront::inverse_about_origin(bool upright) const {
   if (!graph_.free) return factor_->selected_inverse(BlockMatrix::zero(block(), 0, 0));
   std::vector<bool> keep(ids_.size(), false);
@@ -516,7 +517,8 @@ std::optional<BlockMatrix> TreeFront::inverse_about_origin(bool upright) const {
   return factor.selected_inverse(held);
 }
 
-// A coupling that is zero in the Schur complement of the child is not part of its factor.
+// Leaves out couplings that are zero in the Schur complement of the child. They are not part of its
+// factor, so the child does not need them.
 TreeInverse TreeFront::inverse_of_child(RobotId name, const BlockMatrix& inverse) const {
   const Child& child = children_.at(name);
   TreeInverse blocks;

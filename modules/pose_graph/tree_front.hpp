@@ -27,7 +27,7 @@ struct FrontGraph {
   /// only this robot.
   std::map<KeyframeIndex, std::uint32_t> touched_by = {};
   bool root = false;  ///< Root of the tree: it has no parent to leave poses to.
-  /// Nothing holds the frame of the team: the root then solves for all poses but one.
+  /// Nothing holds the frame of the team: the root then holds one pose and solves for all others.
   bool free = true;
   std::optional<KeyframeId> origin = {};  ///< nullopt: no covariances are needed.
 };
@@ -68,11 +68,11 @@ class TreeFront {
   void linearise(std::span<const SE3> poses, Curvature curvature);
   /// Eliminates all poses of the plan. False if their block is not positive definite.
   [[nodiscard]] bool factorise();
-  /// The same with a small damping of all poses (Levenberg, Quart. Appl. Math. 1944). Positive
-  /// definite also if a robot claims so little precision that its equations are singular to
-  /// rounding: it then cannot stop the team.
+  /// Like factorise(), with a small damping of all poses (Levenberg, Quart. Appl. Math. 1944). The
+  /// result is usually positive definite even if a robot claims so little precision that its
+  /// equations are singular to rounding. Such a robot then cannot stop the team.
   [[nodiscard]] bool factorise_damped();
-  /// True if the last factorisation was damped: the inverse then says nothing about covariances.
+  /// True if the last factorisation was damped: the inverse then yields no covariances.
   [[nodiscard]] bool damped() const { return damped_; }
   /// True if factorise() is due because own equations or those of children have changed.
   [[nodiscard]] bool changed() const { return changed_; }
@@ -88,7 +88,8 @@ class TreeFront {
   void reduce(std::span<const SE3> poses, const std::map<RobotId, Eigen::VectorXd>& children);
   /// Reduced right-hand side of the poses left to the parent.
   [[nodiscard]] Eigen::VectorXd reduced() const;
-  /// Squared norm of the rows of the eliminated poses.
+  /// Part of this robot in the Newton decrement: squared norm of the forward-substituted rows of
+  /// the eliminated poses.
   [[nodiscard]] double decrement() const;
 
   /// At the root: the step of the remaining poses (none, or one), and its part of the decrement.
@@ -97,17 +98,17 @@ class TreeFront {
     double decrement = 0.0;
   };
   [[nodiscard]] RootStep solve_root(bool upright) const;
-  /// Back substitution: from the step of the poses left to the parent to those of all nodes, one
-  /// column each.
+  /// Back substitution: from the step of the poses left to the parent to the steps of all nodes,
+  /// one column each.
   [[nodiscard]] Eigen::MatrixXd substitute_back(const Eigen::VectorXd& kept) const;
-  /// The part of a child in `steps`.
+  /// The steps of the variables of a child, from `steps` of all nodes.
   [[nodiscard]] Eigen::VectorXd step_of_child(RobotId child, const Eigen::MatrixXd& steps) const;
 
   /// Blocks of the inverse of the second derivatives of the team, at all nodes and at the couplings
   /// of the front. `kept` are those of the poses left to the parent, in the order of the system.
   [[nodiscard]] BlockMatrix inverse(const BlockMatrix& kept) const;
-  /// At the root: the same relative to the origin, without other robots above it. nullopt if the
-  /// equations are not regular.
+  /// At the root: these blocks for errors relative to the origin. nullopt if the equations are
+  /// singular.
   [[nodiscard]] std::optional<BlockMatrix> inverse_about_origin(bool upright) const;
   /// The part of a child in the result of inverse(), see TreeInverse.
   [[nodiscard]] TreeInverse inverse_of_child(RobotId child, const BlockMatrix& inverse) const;
@@ -158,7 +159,7 @@ class TreeFront {
   template <int kBlock>
   void add_own(std::span<const SE3> poses, Curvature curvature, BlockMatrix& A) const;
   [[nodiscard]] BlockMatrix assembled() const;
-  // Directions in which a held pose may turn, and their stiffness.
+  // Directions in which a pose with held position may turn, and their stiffness.
   struct Tilts {
     Eigen::Matrix<double, 3, 2> directions;
     Eigen::Vector2d stiffness;

@@ -17,11 +17,11 @@
 namespace km {
 
 /// An edge between two poses that are both left to the parent. It is sent as an edge instead of its
-/// second derivatives, which takes a seventh of the bytes. Single precision does no harm to soft
-/// modes: a rounded edge still has zero cost along rigid motions of the whole.
+/// second derivatives, because an edge takes a seventh of their bytes. Single precision does no
+/// harm to soft modes: a rounded edge still has zero cost along rigid motions of all poses.
 struct SentEdge {
   int pair = 0;             ///< The coupling of the system to which it adds.
-  bool transposed = false;  ///< It leads from the second pose of `pair` to the first.
+  bool transposed = false;  ///< The edge leads from the second pose of `pair` to the first.
   Curvature curvature = Curvature::kGaussNewton;
   float kappa = 0.0F;  ///< Without its weight.
   float tau = 0.0F;
@@ -85,7 +85,7 @@ struct UpMessage {
   std::uint32_t round = 0;
   TreeSums sums;
   bool failed = false;  ///< The subtree cannot continue.
-  /// 3 or 6 rows per variable.
+  /// Reduced right-hand side, 3 or 6 rows per variable.
   Eigen::VectorXd reduced = {};
   /// Empty: as in the round before, except for `weights`.
   std::optional<TreeSystem> system = {};
@@ -107,6 +107,7 @@ struct TreeVerdict {
     kDone,     ///< The new poses are accepted; this was the last round.
     kStop,     ///< The new poses are not accepted; the accepted ones are the result.
   };
+  /// Weights of this round. kAllIn: all are 1. kWeigh: new ones. kHold: unchanged. kDecided: final.
   enum class Weighing : std::uint8_t { kAllIn, kWeigh, kHold, kDecided };
 
   std::uint32_t round = 0;  ///< Round to which this is the answer.
@@ -124,13 +125,13 @@ struct TreeVerdict {
   /// kCount, kStart: first these robots are moved as a whole, see better_placement(). Ascending.
   std::vector<std::pair<RobotId, SinglePose>> moves = {};
   /// kStart: strength of the usual pair of robots, see usual_strength(). While closures are
-  /// weighed, no pair is much stronger; a pair that the rest contradicts also remains limited
-  /// afterwards.
+  /// weighed, no pair is more than 1.25 times as strong. A pair that the other edges contradict
+  /// remains limited afterwards.
   Precision usual_pair = kUnlimited;
   double cost = 0.0;  ///< Team cost at the accepted poses.
   double gradient = 0.0;
-  /// A rigid motion of all poses, to first order: rotation and translation, in the frame of the
-  /// session.
+  /// kStep: a rigid motion of all poses that each robot adds to its step, to first order: rotation
+  /// and translation, in the frame of the session.
   std::array<double, 6> drift = {};
 };
 

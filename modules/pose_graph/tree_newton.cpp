@@ -24,11 +24,11 @@ constexpr double kFloor = 1e-10;
 // Weight of a rejected step of odometry, so that the trajectory stays connected.
 constexpr double kJoint = 1e-6;
 // Largest distance of a pose from the origin; beyond it, single precision overflows.
-constexpr double kOutOfTheWorld_m = 1e15;
+constexpr double kMaxDistance_m = 1e15;
 // kStrongest: largest strength of a pair while closures are weighed, relative to the usual pair, so
 // that no pair overrules the others. At the end, kept closures have their own weight, except for
-// pairs that the rest contradicts. Such a contradiction is kTorn standard deviations of the mean of
-// the closures of the pair, and kTornOfOne standard deviations of a single closure.
+// pairs that the other edges contradict. The mean error of the closures of such a pair exceeds
+// kTorn standard deviations of this mean, and kTornOfOne standard deviations of a single closure.
 constexpr double kStrongest = 1.25;
 constexpr double kTorn = 6.0;
 constexpr double kTornOfOne = 1.0;
@@ -39,8 +39,8 @@ constexpr std::size_t kShareOfLengths = 60;
 // Number of isolated closures of a pair up to which they do no harm and are weighed from the start.
 constexpr std::ptrdiff_t kFewIsolated = 16;
 
-bool is_in_the_world(const SE3& T) {
-  return T.matrix().allFinite() && T.translation().norm() <= kOutOfTheWorld_m;
+bool is_within_limits(const SE3& T) {
+  return T.matrix().allFinite() && T.translation().norm() <= kMaxDistance_m;
 }
 
 SolverMessage message_to(RobotId to, std::vector<std::uint8_t> bytes) {
@@ -122,9 +122,10 @@ std::vector<SE3> TreeNewton::odometry_poses() const {
   return poses;
 }
 
-// The poses for cycles through closures to `peer`. A start that closures have bent hides errors of
-// cycles, so closures inside this robot are compared with its odometry. Two robots know only the
-// starts of each other's public poses.
+// The poses of the ends of closures to `peer`, for cycles. Poses that were optimised with closures
+// hide errors of cycles, so closures inside this robot are compared with its odometry. For closures
+// to another robot, both robots use the starts of public poses, because they know nothing else of
+// each other.
 std::function<SE3(const KeyframeId&)> TreeNewton::pose_before_closures(
     RobotId peer, const std::vector<SE3>& odometry) const {
   if (peer == graph_.self)
@@ -151,7 +152,8 @@ void TreeNewton::weigh_by_noise() {
   }
 }
 
-// A pair whose cycles do not show how noisy its closures are is as noisy as the usual pair.
+// A pair whose cycles do not show how noisy its closures are is assumed to have the noise of the
+// usual pair.
 void TreeNewton::weigh_by_usual_noise() {
   if (verdict_.usual_noise <= 1.0) return;
   for (const auto& [peer, places] : by_peer()) {
@@ -346,7 +348,8 @@ UpMessage TreeNewton::first_message() {
       if (known_[k].trust == Trust::kOpen && reports(known_[k]) &&
           !graph_.decided.contains(known_[k].edge.id()))
         closures.push_back(known_[k].edge);
-    // Counts a cycle only once: optimised poses agree with closures better than odometry does.
+    // Counts only cycles of undecided closures, i.e. each cycle once. In later sessions, poses that
+    // were optimised with these closures would agree with them better than odometry does.
     Corroboration(closures, pose, graph_.step_precision, options_.dimension)
         .count_lengths(graph_.noise.lengths, most);
   }
@@ -358,9 +361,9 @@ const SE3& TreeNewton::pose_at(const KeyframeId& id, const std::vector<SE3>& pos
   return poses[front_->node_of(id)];
 }
 
-// Computes the weights of the closures at the present poses, which the root may still reject. Once
-// all weights are decided they stay, and weights that would be decided differently here count as
-// changed.
+// Computes the weights of the closures at the present poses. The root may still reject these poses.
+// Decided weights do not change; a weight that would be decided differently at the present poses
+// counts as changed.
 void TreeNewton::weigh_candidates(TreeSums& sums) {
   const double c2 = verdict_.barc * verdict_.barc;
   const bool decided = verdict_.weighing == Weighing::kDecided;
@@ -382,9 +385,9 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
   limit_candidates(decided);
 }
 
-// Once all weights are decided, a pair is released in the first round in which its closures no
-// longer all pull in one direction. Before, the poses have not converged, and even consistent pairs
-// show such a pull.
+// Once all weights are decided, the limit of a pair ends in the first round in which its closures
+// no longer all pull in one direction. In earlier rounds even consistent pairs show such a pull,
+// because the poses have not converged.
 void TreeNewton::limit_candidates(bool decided) {
   const std::set<RobotId> torn = decided ? torn_pairs() : std::set<RobotId>{};
   for (const std::size_t k : front_edge_) {
@@ -577,8 +580,8 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
     for (std::size_t k = 0; k < base_.size(); ++k) {
       const SE3 moved =
           retract(base_[k], scale * tangent_of_step(step_.col(static_cast<Index>(k))));
-      // A robot whose equations are singular to rounding does not carry the team away.
-      at_hand_[k] = is_in_the_world(moved) ? moved : base_[k];
+      // The step of a robot whose equations are singular to rounding may be arbitrarily long.
+      at_hand_[k] = is_within_limits(moved) ? moved : base_[k];
     }
   };
   verdict_ = v;
@@ -638,7 +641,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
 }
 
 // The cost is chi-squared distributed, so the covariance is twice the inverse of its second
-// derivatives. Closures that are noisier than they claim widen it.
+// derivatives. If closures are noisier than they claim, the covariance is larger.
 void TreeNewton::compute_covariances(const TreeInverse& from_parent) {
   const bool known = factorised_ && !front_->damped() && !(place_.parent && from_parent.empty());
   if (!options_.covariances || !known) return;

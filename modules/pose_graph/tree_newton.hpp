@@ -20,20 +20,22 @@ namespace km {
 /// A round is one pass up and one pass down. The pass up carries the equations at the present
 /// poses, eliminated onto the poses that other robots use, and the sums of cost and residuals. The
 /// root solves and decides, and the pass down carries the steps of the poses sent. One round is one
-/// Newton step of the whole team, exact except for single precision in second derivatives. A step
-/// counts once the next pass up has brought its cost. If the cost has risen, the step is shortened;
-/// while weights change, the cost may rise by half, twice in a row. Only the root decides.
+/// Newton step of the whole team, exact except for edges that are sent in single precision. A step
+/// is accepted once the next pass up has brought its cost to the root. If the cost has risen, the
+/// step is shortened; while weights change, the cost may rise by half, twice in a row. Only the
+/// root decides.
 ///
 /// Second derivatives hardly change (see edge_model.hpp). They are sent again only when the old
 /// ones slow down convergence (Shamanskii's variant of Newton's method). The first ones are those
 /// of Gauss-Newton, which cannot be indefinite.
 ///
 /// Every closure has a weight: graduated non-convexity with truncated least squares (Yang et al.,
-/// RA-L 2020) sets the weights between two steps. It ends in the plain optimum of the closures that
-/// are kept. The team estimates the largest admissible residual from closures near each other (see
-/// Corroboration). If most of these agree, closures that stand alone are deferred at first.
+/// RA-L 2020) sets the weights between two steps. The result is the plain optimum of the closures
+/// that are kept. The team estimates the largest admissible residual from closures near each other
+/// (see Corroboration). If most of these agree, closures that stand alone are deferred at first.
 /// Decisions of earlier sessions persist. A pair of robots with new closures weighs its closures
-/// again, except for the rejected ones. Edges to held poses keep their earlier weights.
+/// again, except for the rejected ones. A closure to a held pose is left out if an earlier session
+/// has rejected it, and otherwise has weight 1.
 ///
 /// Exactly one of two robots weighs a closure between them. One end of each closure is chosen by a
 /// vertex cover per pair, equal on both robots. The robot of the other end has the closure among
@@ -58,6 +60,7 @@ class TreeNewton final : public MemberSolver {
 
  private:
   enum class Phase { kUp, kDown, kDone };
+  /// kIn: not weighed. kOpen: may be rejected. kOut: rejected by an earlier session.
   enum class Trust { kIn, kOpen, kOut };
   /// An edge that this robot knows. The other robot of the edge may be the one that weighs it.
   struct Known {
@@ -68,8 +71,8 @@ class TreeNewton final : public MemberSolver {
     bool own = true;               ///< This robot weighs it.
     double weight = 1.0;           ///< Weight at the accepted poses.
     double candidate = 1.0;        ///< At the present poses.
-    double limit = 1.0;            ///< Factor on the weight while its pair is limited.
-    double share = 1.0;            ///< Factor on the weight at the accepted poses.
+    double limit = 1.0;            ///< Factor on the weight while the pair of the edge is limited.
+    double share = 1.0;            ///< `limit` or 1: factor on the weight at the accepted poses.
     double candidate_share = 1.0;  ///< At the present poses.
   };
 

@@ -21,7 +21,8 @@ struct TreeNewtonOptions {
   bool robust = true;               ///< Closures are weighed; otherwise all are trusted.
   double barc = 0.0;  ///< Largest residual of an inlier [sigma]; 0: the team estimates it.
   bool reject_odometry = false;  ///< Steps of odometry are weighed as well.
-  /// Private poses may be sent as well, if that saves bytes.
+  /// A member may leave private poses to its parent instead of eliminating them, if it then sends
+  /// fewer bytes.
   bool share_private = false;
   bool covariances = true;  ///< The members compute covariances at the end.
 };

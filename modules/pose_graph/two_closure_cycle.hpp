@@ -5,7 +5,8 @@
 namespace km {
 
 /// The cycle up along one closure, along odometry, down along another closure, and back along
-/// odometry. The first closure begins where it ends. Without noise, T() is the identity.
+/// odometry. It begins and ends at the lower end of the first closure. Without noise, T() is the
+/// identity.
 struct TwoClosureCycle {
   UncertainPose up;     ///< One closure, from its lower to its upper end.
   UncertainPose above;  ///< Odometry between the upper ends.

@@ -9,9 +9,10 @@
 namespace km {
 
 /// The vertical at a pose, from inertial sensing. The cost is weight ||Y up - z||^2, where z is the
-/// third unit vector. It is (tilt / sigma)^2 for small tilts if weight = 1 /
-/// sigma^2; rotations about the vertical and translations cost nothing. The prior is valid if the
-/// frame of the solution has z up. It is linear in the rotation because ||Y up||^2 is 1.
+/// third unit vector. It is (tilt / sigma)^2 for small tilts if weight = 1 / sigma^2; rotations
+/// about the vertical and translations cost nothing. The prior is valid if the frame of the
+/// solution has z up. Up to a constant, the cost is linear in the rotation, because ||Y up||^2 is
+/// 1.
 struct VerticalPrior {
   Eigen::Index pose = 0;
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< Unit vector against gravity, in pose frame.

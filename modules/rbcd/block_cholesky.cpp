@@ -46,7 +46,8 @@ BlockCholesky::BlockCholesky(const Eigen::SimplicialLLT<Factor>& llt) : P_(llt.p
   }
 }
 
-// The part of these columns in B L^-T, in place.
+// One step of the substitution B <- B L^-T. Divides the columns `panel` of B by their triangle of
+// L, and subtracts them from the later columns.
 template <int kRank, int kCols>
 void BlockCholesky::forward(const Panel& panel, Eigen::MatrixXd& B) const {
   const double* entry = values_.data() + panel.entries;
@@ -61,7 +62,8 @@ void BlockCholesky::forward(const Panel& panel, Eigen::MatrixXd& B) const {
         solved * Eigen::Map<const Eigen::Matrix<double, kCols, 1>>(entry);
 }
 
-// The part of these columns in B L^-1, in place.
+// One step of the substitution B <- B L^-1. Subtracts the later columns of B from the columns
+// `panel`, and divides these by their triangle of L.
 template <int kRank, int kCols>
 void BlockCholesky::backward(const Panel& panel, Eigen::MatrixXd& B) const {
   constexpr int kTriangle = kCols * (kCols + 1) / 2;

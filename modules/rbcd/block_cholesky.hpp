@@ -24,8 +24,8 @@ class BlockCholesky {
   [[nodiscard]] Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& B) const;
 
  private:
-  // Columns first to first + width - 1 of L, each with all rows from its diagonal to the last of
-  // them, and the same rows below.
+  // Columns first to first + width - 1 of L. Each column has all rows from its diagonal to row
+  // first + width - 1. The rows below are the same for all of these columns.
   struct Panel {
     int first = 0;
     int width = 0;

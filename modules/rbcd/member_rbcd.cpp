@@ -18,10 +18,11 @@ namespace {
 enum class RbcdMessageKind : std::uint8_t { kPoses, kShare, kProgress };
 
 // Perturbation of the start, see perturb_rotations(): small relative to any measurement, large
-// relative to rounding.
+// relative to round-off errors.
 constexpr double kPerturbation = 1e-3;
-// Rounds between two progress messages of the root, and the largest number of rounds that a member
-// is ahead of the last one. The member keeps its poses of all these rounds.
+// kProgressPeriod: number of rounds between two progress messages of the root. kMaxAhead: number of
+// rounds by which a member is at most ahead of the round in the last progress message. The member
+// keeps its poses of all these rounds.
 constexpr std::uint32_t kProgressPeriod = 5;
 constexpr std::uint32_t kMaxAhead = 20;
 // Received poses are off their manifold only by rounding.
@@ -201,7 +202,7 @@ void MemberRbcd::report_share(double squared_gradient, std::vector<SolverMessage
             lift(lifted_identity(options_.rank), graph_.public_poses.at({robot, keyframe}));
     problem_.set_fixed(std::move(fixed));
   }
-  // The cost between two neighbours is counted by the robot that moves last.
+  // The cost of the edges between two neighbours is counted by the robot that updates last.
   Share share{problem_.cost(at), squared_gradient, !graph_.to_absent.empty()};
   for (std::size_t k = 0; k < robot_of_edge_.size(); ++k) {
     const Neighbour& neighbour = neighbours_.at(robot_of_edge_[k]);
@@ -218,7 +219,7 @@ void MemberRbcd::report_share(double squared_gradient, std::vector<SolverMessage
   messages.push_back(addressed(place_.root, std::move(writer)));
 }
 
-// True if the round is reported to the members.
+// Sums the shares of the next complete round. True if it is reported to the members.
 bool MemberRbcd::close_round(std::vector<SolverMessage>& messages) {
   const auto shares = shares_.extract(shares_.begin());
   const std::uint32_t round = shares.key();
@@ -341,7 +342,7 @@ bool MemberRbcd::take_progress(RobotId from, std::uint32_t round, ByteReader& re
   if (progress.before < state_.round) return true;  // repeated
   const bool forward =
       progress.stop ? round == 0 || round >= progress.before : round > progress.before;
-  // The root never reports rounds to a member that has not completed them.
+  // The root reports only rounds that all members have completed.
   if (!forward || std::max(round, progress.before) > history_.rbegin()->first) return false;
   pending_.try_emplace(progress.before, std::move(progress));
   return true;

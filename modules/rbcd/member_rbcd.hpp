@@ -15,12 +15,13 @@ namespace km {
 
 /// Parameters of block descent, equal on all members of a session.
 struct RbcdOptions {
-  Eigen::Index rank = 5;                ///< Rank r of the relaxation.
-  std::uint32_t max_rounds = 0;         ///< 0: no limit.
-  double min_relative_decrease = 1e-7;  ///< Smallest decrease of the team cost per round.
-  int max_newton_steps = 3;             ///< Newton steps per block update.
-  int max_cg_iterations = 50;           ///< CG iterations per Newton step.
-  double max_over_relaxation = 1.95;    ///< 1: no over-relaxation, see minimise_over_relaxed().
+  Eigen::Index rank = 5;         ///< Rank r of the relaxation.
+  std::uint32_t max_rounds = 0;  ///< 0: no limit.
+  /// The session ends when a round decreases the team cost by less, relative to the cost.
+  double min_relative_decrease = 1e-7;
+  int max_newton_steps = 3;           ///< Newton steps per block update.
+  int max_cg_iterations = 50;         ///< CG iterations per Newton step.
+  double max_over_relaxation = 1.95;  ///< 1: no over-relaxation, see minimise_over_relaxed().
 };
 
 /// Riemannian block-coordinate descent on the rank relaxation (Tian et al., "Distributed
@@ -30,16 +31,18 @@ struct RbcdOptions {
 /// waits for those neighbours in the graph of closures that have a lower id: a Gauss-Seidel sweep.
 /// Only one of two neighbours may move at any time, so the team cost rises by no more than rounding
 /// to single precision. A member sends each neighbour the poses on which closures to it end. It
-/// sends its share of cost and gradient to the root of the tree. From time to time the root sends
-/// the number of the last complete round to all, and at the end the number of the final round. The
-/// tree has no other use. Every member passes through each of these rounds, one at a time, so that
-/// all members can return to one that all have completed.
+/// sends its share of cost and gradient to the root of the tree. Every five rounds the root sends
+/// the number of a complete round to all members, and at the end the number of the final round. The
+/// tree has no other use. poses() are those of the last reported round. Every member adopts all
+/// reported rounds in order. If a session is interrupted, all members can thus return to a round
+/// that all have completed.
 ///
-/// Only this class knows the relaxation. It begins at the lifted start, perturbed slightly away
-/// from rigid poses (perturb_rotations()). Every robot computes the same perturbation of the public
-/// poses, so the first round needs no exchange before it. Rigid poses are rounded in the frame of
-/// the first pose of the root, which keeps its place. If poses of absent robots or verticals fix
-/// the frame, they are rounded in that frame.
+/// Only this class knows the relaxation. The descent begins at the lifted start, perturbed slightly
+/// away from rigid poses (perturb_rotations()). Every robot computes the same perturbation of the
+/// public poses, so the first round needs no exchange before it. Lifted poses are rounded to rigid
+/// poses in the frame in which the first pose of the root keeps its start. With verticals, the
+/// poses are also rotated so that z is up. If poses of absent robots fix the frame, the poses are
+/// rounded in that frame.
 class MemberRbcd final : public MemberSolver {
  public:
   /// Throws std::invalid_argument if the graph is not usable, see QuadraticProblem, if the pose at
@@ -57,18 +60,18 @@ class MemberRbcd final : public MemberSolver {
   [[nodiscard]] ClosureVerdicts verdicts() const override { return {}; }
 
  private:
-  // A robot with closures to this one; it may be absent.
+  // A robot with closures to this one: a member of the session, or a robot out of reach.
   struct Neighbour {
     std::map<KeyframeIndex, Eigen::Index> slot_of;  // places in fixed_
     std::vector<KeyframeIndex> own;                 // poses sent to it, ascending
     std::uint32_t round = 0;
-    bool absent = false;
+    bool absent = false;  // out of reach: its poses are held
     bool before = false;  // it updates before this robot
   };
   struct Share {
     double cost = 0.0;
     double squared_gradient = 0.0;
-    bool held = false;  // by poses of absent robots
+    bool held = false;  // poses of absent robots fix the frame
   };
   struct Total {
     double cost = 0.0;

@@ -10,10 +10,11 @@
 namespace km {
 namespace {
 
-// Diagonal on translations, relative to the largest sum of tau over the edges of one pose. It only
-// keeps the preconditioner definite, because translations have no constraints and long chains of
-// them are soft. On rotations, a much smaller value than the default amplifies directions that only
-// the constraints make stiff.
+// Diagonal that precondition() adds on translations, relative to the largest sum of tau over the
+// edges of one pose. It only keeps the preconditioner definite. A larger value would slow down the
+// motions of long chains of poses, which change the cost little. Rotations need a larger value, see
+// set_rotation_shift(): otherwise the preconditioner amplifies steps of rotations off their
+// manifold.
 constexpr double kTranslationShift = 1e-10;
 
 Eigen::Vector4d weights(double kappa, double tau) {
@@ -160,7 +161,8 @@ double QuadraticProblem::cost(const LiftedPoses& X) const {
 
 namespace {
 
-// 2 X Q with the rank known: Q is symmetric, so column j of the product gathers row j of Q.
+// 2 X Q with the rank as a compile-time constant. Q is symmetric, so column j of the product uses
+// column j of Q.
 LiftedPoses twice_product(const LiftedPoses& X, const Eigen::SparseMatrix<double>& Q) {
   LiftedPoses product(X.rows(), X.cols());
   dispatch_rank(X.rows(), [&]<int kRank>() {

@@ -12,8 +12,8 @@
 
 namespace km {
 
-/// A relative pose between pose `own` of the block and pose `fixed` outside it. The cost is not
-/// symmetric in its ends, so the direction of the measurement is kept.
+/// A relative pose between pose `own` of the block and pose `fixed` outside it. The cost of an edge
+/// is not symmetric in its two ends, so the direction of the measurement is kept.
 struct PublicEdge {
   Eigen::Index own = 0;
   Eigen::Index fixed = 0;
@@ -60,7 +60,8 @@ class QuadraticProblem {
   [[nodiscard]] LiftedPoses precondition(const LiftedPoses& X, const LiftedPoses& V) const;
 
   /// Sets the diagonal that precondition() adds on rotations, relative to the largest sum of kappa
-  /// over the edges of one pose. A small value is fast near a minimum and slow far from it.
+  /// over the edges of one pose. With a small value, truncated Newton steps converge fast near a
+  /// minimum and slowly far from it.
   void set_rotation_shift(double shift);
 
   [[nodiscard]] Eigen::Index rank() const { return rank_; }

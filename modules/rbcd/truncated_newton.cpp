@@ -81,7 +81,8 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
   LiftedPoses euclidean = problem.euclidean_gradient(X);
   LiftedPoses gradient = project_tangent(X, euclidean);
   result.initial_gradient_norm = result.gradient_norm = gradient.norm();
-  // If the model is exact, a full Newton step of a least-squares cost has at most this norm.
+  // In the norm of the preconditioner, a full Newton step of a least-squares cost has a length of
+  // about sqrt(2 cost) at most, if the quadratic model is exact. The first radius is larger.
   double radius = options.initial_radius > 0.0 ? options.initial_radius
                                                : 10.0 * std::sqrt(std::max(result.cost, 1e-12));
   bool last = false;

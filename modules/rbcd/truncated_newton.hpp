@@ -35,11 +35,11 @@ struct [[nodiscard]] TruncatedNewtonResult {
 [[nodiscard]] TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
                                              const TruncatedNewtonOptions& options);
 
-/// Runs minimise() and then goes beyond the minimum by `relaxation` - 1 times the way to it, if the
-/// cost there is below the cost at the start. For the exact minimum of a quadratic this holds for
-/// every relaxation in (0, 2). This is successive over-relaxation, with which sweeps over blocks
-/// reduce their slow modes in a fraction of the rounds (Ostrowski; Young, "Iterative Solution of
-/// Large Linear Systems", 1971, Ch. 4). At most 1: plain minimise().
+/// Runs minimise() and then goes beyond the minimum by `relaxation` - 1 times the step from `X` to
+/// it, if the cost there is below the cost at `X`. For the exact minimum of a quadratic this holds
+/// for every relaxation in (0, 2). This is successive over-relaxation, with which sweeps over
+/// blocks reduce their slow modes in a fraction of the rounds (Ostrowski; Young, "Iterative
+/// Solution of Large Linear Systems", 1971, Ch. 4). At most 1: plain minimise().
 [[nodiscard]] TruncatedNewtonResult minimise_over_relaxed(const QuadraticProblem& problem,
                                                           const LiftedPoses& X,
                                                           const TruncatedNewtonOptions& options,

@@ -57,12 +57,14 @@ Eigen::Matrix<double, N, N> read_information(TextFields& fields) {
   return information;
 }
 
-// 1 / (mean of the eigenvalues of the inverse): not positive, or NaN, if there is no such weight.
+// Weight that SE-Sync gives to a block of an information matrix: 1 / (mean of the eigenvalues of
+// the inverse). See usable().
 template <typename Block>
 double mean_precision(const Block& information) {
   return static_cast<double>(information.rows()) / information.inverse().trace();
 }
 
+// False for the weights of blocks that are singular, or whose inverse has a negative trace.
 bool usable(double weight) {
   return weight > 0.0 && std::isfinite(weight);
 }

@@ -30,7 +30,7 @@ double checked_rate(double rate) {
                               " is not positive");
 }
 
-// Restores orthonormality, from which a long product of rotations drifts.
+// Restores orthonormality, which a long product of rotations loses by rounding.
 SE3 orthonormal(const SE3& T) {
   return make_pose(nearest_rotation(T.linear()), T.translation());
 }
@@ -71,7 +71,7 @@ void GraphPlaybackNode::wait_until_due(std::size_t index) {
   if (std::isinf(rate_) || index < known_) return;
   const double due_s = seconds_between(stamp_of(known_), stamp_of(index)) / rate_;
   const Heartbeat::Waiting waiting;
-  std::mutex unshared;  // needed by wait_until(), which only the stop token ends
+  std::mutex unshared;  // needed by wait_until(); no other thread locks it
   std::condition_variable_any never;
   std::unique_lock lock(unshared);
   never.wait_until(lock, stop_.get_token(), begin_ + steady_duration(due_s), [] { return false; });

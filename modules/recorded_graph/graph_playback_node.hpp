@@ -20,8 +20,8 @@
 
 namespace km {
 
-/// End of the recorded graph. The node publishes it once, after everything else, and does not
-/// publish it if it is stopped earlier.
+/// End of the recorded graph. The node publishes this message once, after everything else, unless
+/// the node is stopped earlier.
 struct GraphPlaybackEnd {
   std::size_t keyframes = 0;
   std::size_t closures = 0;  ///< Number of closures that the node published.
@@ -30,18 +30,18 @@ struct GraphPlaybackEnd {
 /// Outputs of the playback. All topics must outlive the node.
 struct GraphPlaybackTopics {
   Out<KeyframeOdometry> odometry;
-  Out<Keyframe> keyframes;  ///< Without features; covariance since keyframe 0.
+  Out<Keyframe> keyframes;  ///< Without features; covariance relative to keyframe 0.
   Out<RelativePose> closures;
   Out<GraphPlaybackEnd> end;
 };
 
-/// Plays the part of one robot of a recorded pose graph as if it were being driven. It publishes
-/// the keyframes in order, each followed by the closures that it makes known. A closure inside the
-/// robot appears with the later of its keyframes. A closure between two robots is in the records of
-/// both. The robot of its end `from` publishes it with its own keyframe, whether or not the other
-/// robot has reached its end. Verticals are published with their keyframes; odometry then starts
-/// upright, see RecordedGraph::T_odom_first(). Keyframes have the stamps of the graph. If it has
-/// none, keyframe i has the stamp i / poses_per_second.
+/// Publishes the part of one robot of a recorded pose graph as if the robot were driving. It
+/// publishes the keyframes in order, each followed by the closures that it makes known. A closure
+/// inside the robot appears with the later of its keyframes. A closure between two robots is in the
+/// records of both. The robot of its end `from` publishes it with its own keyframe, whether or not
+/// the other robot has reached the other end. Verticals are published with their keyframes;
+/// odometry then starts upright, see RecordedGraph::T_odom_first(). Keyframes have the stamps of
+/// the graph. If the graph has none, keyframe i has the stamp i / poses_per_second.
 class GraphPlaybackNode final : public Node {
  public:
   /// `rate`: recorded seconds per second; infinity: as fast as the consumers accept messages.
@@ -49,8 +49,8 @@ class GraphPlaybackNode final : public Node {
   GraphPlaybackNode(const GraphPlaybackConfig& config, double rate, RecordedGraph graph,
                     const GraphPlaybackTopics& topics);
 
-  /// Declares the first `keyframes` known: the node plays only their closures, without waiting.
-  /// Call before start().
+  /// Declares the first `keyframes` known, e.g. after a resume: the node publishes only their
+  /// closures, without waiting. Call before start().
   void continue_after(std::size_t keyframes) { known_ = std::min(keyframes, graph_.poses()); }
   ~GraphPlaybackNode() override { stop(); }
 
@@ -76,10 +76,10 @@ class GraphPlaybackNode final : public Node {
   const double rate_;
   const RecordedGraph graph_;
   const GraphPlaybackTopics topics_;
-  // [i]: closures published with keyframe i. It is the later end of a closure inside the robot, and
-  // the end `from` of a closure between robots.
+  // [i]: closures published with keyframe i. Keyframe i is the later end of a closure inside the
+  // robot, or the end `from` of a closure between robots.
   std::vector<std::vector<RelativePose>> closures_of_;
-  UncertainPose T_odom_kf_;  // pose of the last published keyframe
+  UncertainPose T_odom_kf_;  // pose of the last keyframe that was published or is known
   GraphPlaybackEnd published_;
   std::size_t known_ = 0;  // number of known keyframes
   Clock::time_point begin_;

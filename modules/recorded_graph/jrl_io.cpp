@@ -194,7 +194,7 @@ class JrlReader {
  private:
   using ByRobot = std::vector<std::pair<RobotId, JsonPlace>>;
 
-  // A key, to be looked up once all odometry is known.
+  // A key in the document, checked by check_keys() once all odometry is known.
   struct Named {
     KeyframeId id;
     JsonPlace place;
@@ -209,7 +209,7 @@ class JrlReader {
     graph_.robots.assign(robots_.begin(), robots_.end());
   }
 
-  // {"a": value, ...} or [["a", value], ...], ascending.
+  // Reads {"a": value, ...} or [["a", value], ...], in any order. The result is ascending by robot.
   [[nodiscard]] ByRobot by_robot(const JsonPlace& place) const {
     std::map<RobotId, JsonPlace> values;
     const auto add = [&](RobotId robot, JsonPlace value) {
@@ -300,7 +300,7 @@ class JrlReader {
     graph_.measurements.push_back(std::move(measured));
   }
 
-  // The poses are index 0 and all indices that steps of odometry reach from it.
+  // The poses of a robot are index 0 and all indices that steps of odometry reach from it.
   void find_chains(const JsonPlace& place) {
     std::map<KeyframeId, Stamp> known_from;  // by keyframe: time of the odometry that ends on it
     for (const JrlMeasurement& measured : graph_.measurements) {
@@ -346,7 +346,7 @@ class JrlReader {
     }
   }
 
-  // [{"key": key, ...}, ...] or {"key": {...}, ...}
+  // Reads [{"key": key, ...}, ...] or {"key": {...}, ...}.
   [[nodiscard]] std::vector<std::pair<KeyframeId, JsonPlace>> keyed_values(
       const JsonPlace& place) const {
     std::vector<std::pair<KeyframeId, JsonPlace>> values;
@@ -374,7 +374,9 @@ class JrlReader {
     }
   }
 
-  // Indices of the measurements that labels {"a": [[entry, measurement], ...], ...} name.
+  // Indices in graph_.measurements of labelled measurements. `labels` is {"a": [[i, j], ...], ...}:
+  // measurement j in entry i of the list of robot a. With a single robot `labels` may be the list
+  // alone.
   [[nodiscard]] std::vector<std::size_t> labelled(const JsonPlace& labels) const {
     std::vector<std::size_t> numbers;
     const bool of_one_robot = labels.is_list() && robots_.size() == 1;

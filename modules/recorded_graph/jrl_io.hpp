@@ -15,7 +15,7 @@ namespace km {
 /// A relative pose of a JRL file, with its unchanged covariance.
 struct JrlMeasurement {
   RelativePose edge;
-  Stamp stamp = 0;            ///< Time of its earliest entry.
+  Stamp stamp = 0;            ///< Time of the earliest entry with this measurement.
   bool may_be_false = false;  ///< Listed in "potential_outlier_factors".
   bool is_false = false;      ///< Listed in "outlier_factors".
 };
@@ -29,8 +29,8 @@ struct JrlGraph {
   std::map<KeyframeId, SE3> truth;           ///< T_world_kf; empty if the file has none.
   std::map<KeyframeId, SE3> initial;  ///< T_world_kf of "initialization"; empty if there is none.
   std::map<RobotId, std::vector<Stamp>> stamps;  ///< [i]: when keyframe i became known.
-  std::size_t priors = 0;                        ///< Priors that were read, checked and not used.
-  std::size_t repeated = 0;                      ///< Exact copies of measurements, left out.
+  std::size_t priors = 0;    ///< Number of priors that were read, checked and not used.
+  std::size_t repeated = 0;  ///< Number of exact copies of measurements, left out.
 };
 
 /// Reads a JRL file of 3D poses (github.com/DanMcGann/jrl, format/*.md), as in COSMO-Bench.
@@ -47,10 +47,10 @@ struct JrlGraph {
 ///
 /// Throws std::runtime_error "file: /place/in/the/document: what" for everything else: invalid
 /// JSON, missing members, wrong types, other types of measurements and values, and robots that the
-/// file does not name. Also for numbers beyond measurement_limits.hpp, quaternions not of unit
-/// length within 1e-3, and covariances that are not symmetric and positive definite. Also for keys
-/// that no chain of odometry from index 0 reaches, labels without a measurement, and poses that
-/// occur twice in one list.
+/// file does not name. It also throws for numbers beyond measurement_limits.hpp, quaternions not of
+/// unit length within 1e-3, and covariances that are not symmetric and positive definite. It also
+/// throws for keys that no chain of odometry from index 0 reaches, labels without a measurement,
+/// and poses that occur twice in one list.
 [[nodiscard]] JrlGraph read_jrl(const std::filesystem::path& file);
 
 /// Parses the text of a JRL file; errors name it `file`.

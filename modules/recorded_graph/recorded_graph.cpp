@@ -51,7 +51,8 @@ RelativePose read_row(TextFields& fields) {
     fields.fail("kappa " + shortest_text(precision.kappa) + " and tau " +
                 shortest_text(precision.tau) + " mean variances outside " + kVariance.text());
   row.covariance = covariance_of(precision);
-  // Columns after tau, such as weight, are only checked, because a damaged row is not trustworthy.
+  // Columns after tau, such as weight, are not used. They are checked, because a row with a damaged
+  // column is not trustworthy.
   while (!fields.at_end()) fields.number("column after tau");
   return row;
 }
@@ -68,7 +69,7 @@ RobotId owner(const std::vector<RelativePose>& edges, const std::string& file) {
                            (owners.empty() ? " none" : list));
 }
 
-// Throws if a step of `odometry` is missing. It has a place for each step up to the last keyframe.
+// Throws if a step is missing. `odometry` has an element for each step up to the last keyframe.
 void check_chain(const std::vector<std::optional<RelativePose>>& odometry, RobotId robot,
                  const std::string& file) {
   const auto gap = std::find(odometry.begin(), odometry.end(), std::nullopt);

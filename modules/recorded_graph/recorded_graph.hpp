@@ -35,10 +35,10 @@ struct RecordedGraph {
 /// accumulated since keyframe 0.
 [[nodiscard]] std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph);
 
-/// Sorts the measurements in the file of one robot. Edges from keyframe i to i + 1 are its odometry
-/// (a second one for the same i is a closure). Other edges inside the robot and edges to other
-/// robots are closures. The robot is the one whose own keyframes have edges between them. `file`
-/// names the source in errors.
+/// Divides the measurements in the file of one robot into odometry and closures. Edges from
+/// keyframe i to i + 1 are its odometry (a second one for the same i is a closure). Other edges
+/// inside the robot and edges to other robots are closures. The robot is the one whose own
+/// keyframes have edges between them. `file` names the source in errors.
 ///
 /// Throws std::runtime_error "file: what" unless exactly one robot has edges between its own
 /// keyframes and every edge ends on it. Also throws if its odometry is not a chain from keyframe 0

@@ -16,7 +16,7 @@ struct PublishedClosure {
                                  ///< one.
 };
 
-/// Draws closures as lines between keyframes, with one marker for each stage: candidates (grey),
+/// Draws closures as lines between keyframes, with one marker for each status: candidates (grey),
 /// verified (yellow), rejected (red) and kept (green). It always returns all four markers, so that
 /// viewers remove old lines. A line to a keyframe of another robot ends where the closure places
 /// that keyframe. Lines to keyframes without a known pose are omitted.

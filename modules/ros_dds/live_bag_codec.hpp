@@ -9,7 +9,7 @@
 namespace km {
 
 /// Live topics of ROS 2 as a recording without end, so that the code that plays recordings also
-/// reads drivers. Not thread-safe, except for stop().
+/// reads the topics of drivers. Not thread-safe, except for stop().
 class LiveBag final : public BagReader {
  public:
   LiveBag(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics);

@@ -24,10 +24,10 @@ class LiveFrames {
   [[nodiscard]] const SE3& T_map_odom() const { return T_map_odom_; }
 
   /// The pose of the body in `map`. Its covariance is that of the newest keyframe: the covariance
-  /// of the trajectory, plus that of the steps of odometry since.
+  /// of the last optimised keyframe plus that of the steps of odometry after it.
   [[nodiscard]] UncertainPose T_map_body(const SE3& T_odom_body) const;
 
-  /// Stamps of the keyframes by index; 0 for keyframes of an earlier incarnation of the robot.
+  /// Stamps of the keyframes by index; 0 for keyframes that have not been added.
   [[nodiscard]] const std::vector<Stamp>& keyframe_stamps() const { return stamps_; }
 
   /// Angular rate in the body frame over the last two states [rad/s]; zero before there are two.
@@ -37,7 +37,7 @@ class LiveFrames {
   std::deque<OdometryState> recent_;
   std::vector<Stamp> stamps_;
   std::vector<std::optional<SE3>> T_odom_kf_;    // poses from live odometry
-  std::vector<UncertainPose> steps_;             // T_previous_kf by keyframe
+  std::vector<UncertainPose> steps_;             // T_previous_kf of each keyframe
   Matrix6 newest_covariance_ = Matrix6::Zero();  // covariance of the newest keyframe
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();
   SE3 T_map_odom_ = SE3::Identity();

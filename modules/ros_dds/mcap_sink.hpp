@@ -18,8 +18,8 @@ namespace km {
 /// the others.
 class McapSink final : public RosSink {
  public:
-  /// The first message replaces `file`. `fail` is called once, with the reason, if the file ends
-  /// early.
+  /// The first message replaces `file`. `fail` is called once, with the reason, if the file cannot
+  /// be written; later messages are dropped.
   McapSink(std::filesystem::path file, std::function<void(const std::string& why)> fail);
 
   std::size_t open(const PublishedTopic& topic) override;

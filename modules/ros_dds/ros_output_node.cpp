@@ -267,7 +267,7 @@ std::size_t RosOutputNode::publish_mesh() {
   return bytes;
 }
 
-// Sends as many pieces as the budget allows now.
+// Sends as many pieces of the mesh as RosOutputOptions::mesh_bytes_per_s allows now.
 void RosOutputNode::publish_pieces() {
   const double now_s = steady_now_s();
   while (piece_bytes_.wait_s(0.0, now_s) <= 0.0) {

@@ -42,18 +42,17 @@ struct RosOutputTopics {
 struct RosOutputOptions {
   std::string robot = {};  ///< Name of the robot.
   RobotId id = 0;
-  /// Names of the robots: each robot then has a frame NAME/map. Without it the frame of the team is
-  /// `map` for all robots.
+  /// Returns the name of a robot. If set, each robot has a frame NAME/map of its own. Otherwise
+  /// `map` is the frame of the team for all robots.
   std::function<std::string(RobotId)> name_of = {};
   int mesh_points = 0;  ///< Maximum number of points of a mesh; 0: no points are published.
   int mesh_faces = 0;   ///< Maximum number of faces, published in pieces so that slow viewers are
                         ///< not blocked.
-  double mesh_bytes_per_s = std::numeric_limits<double>::infinity();  ///< Maximum rate of these
-                                                                      ///< pieces.
+  double mesh_bytes_per_s = std::numeric_limits<double>::infinity();  ///< Maximum rate of the
+                                                                      ///< pieces of faces.
   bool draws = false;  ///< Publish faces of the mesh and closures as markers.
   bool logs = false;   ///< Publish the log of this process.
-  /// Paths, meshes and closures are published again when the budget at this rate has recovered from
-  /// their last publication.
+  /// Maximum rate of each of the topics `path`, `mesh` and `closures`.
   double state_bytes_per_s = std::numeric_limits<double>::infinity();
   /// Maximum number of waiting inputs; beyond it the oldest are dropped, so that no node waits for
   /// viewers.
@@ -63,27 +62,29 @@ struct RosOutputOptions {
 /// Publishes the state of a robot NAME to ROS viewers and planners, or into a file that they read:
 ///   /NAME/odometry     nav_msgs/Odometry, NAME/odom -> NAME/base_link, for every image; no
 ///                      covariance
-///   /NAME/pose         geometry_msgs/PoseWithCovarianceStamped in `map`, for every image; relative
-///                      to the origin of `map`, see LiveFrames::T_map_body()
+///   /NAME/pose         geometry_msgs/PoseWithCovarianceStamped in `map`, for every image; its
+///                      covariance is relative to the origin of `map`, see
+///                      LiveFrames::T_map_body()
 ///   /tf                map -> NAME/odom -> NAME/base_link, for every image
-///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised; a state
-///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected; a
-///                      state
-///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: state and input of
-///                      odometry
+///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised
+///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected
+///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: odometry, and what
+///                      Diagnose returns
 /// and on request:
 ///   /NAME/mesh_faces   visualization_msgs/Marker in `map`: the mesh's faces, in pieces (see
-///                      SurfacePieces) or at once; a state
+///                      SurfacePieces) or at once
 ///   /NAME/closures     visualization_msgs/MarkerArray in `map`, see closure_lines()
 ///   /rosout            rcl_interfaces/Log
 ///   /NAME/left/image_raw/compressed  sensor_msgs/CompressedImage
 /// `map` is the frame of the team, or of the robot before it joins others. In files that are merged
-/// later, every robot has a map frame of its own. Then /tf contains once a second the transform to
-/// the frame of the team. base_link is the inertial sensor's frame.
+/// later, every robot has a map frame of its own (see RosOutputOptions::name_of). Then /tf contains
+/// once a second the transform from the frame of the team to this map frame. base_link is the frame
+/// of the inertial sensor.
 class RosOutputNode final : public Node {
  public:
   /// Returns the diagnostics of the other parts of the robot, by name. nullopt while the robot is
-  /// silent: then nothing is published each second, and changed states are published at once.
+  /// silent: then no diagnostics are published, and changed paths, meshes and closures are
+  /// published without a limit on their rate.
   /// Called on the node's thread.
   using Diagnose = std::function<std::optional<std::vector<RosDiagnosticStatus>>()>;
   /// Returns all closures of the robot, or nullopt if they are unchanged. Called on the node's
@@ -106,9 +107,9 @@ class RosOutputNode final : public Node {
   double step_limit_s() const override { return 300.0; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Publishes the final states and files; call it after stop(), as the last call. `closures` is
-  /// nullopt if they are unchanged. `poses`, in `map`, are the poses of all images and become the
-  /// path unless empty.
+  /// Publishes the final path, mesh, closures and files. Call it after stop(), as the last call.
+  /// `closures` is nullopt if they are unchanged. `poses`, in `map`, are the poses of all images
+  /// and become the path unless empty.
   void finish(std::span<const StampedPose> poses,
               std::optional<std::vector<PublishedClosure>> closures,
               const std::map<std::string, std::string>& files);
@@ -129,7 +130,8 @@ class RosOutputNode final : public Node {
                    std::shared_ptr<const RosCompressedImage>>;
   using Image = std::shared_ptr<const StereoFrame>;
   using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
-  // A state that is published when it has changed and the budget allows.
+  // Topic whose message replaces the former one: path, mesh or closures. A changed message is
+  // published at `due_s`, which limits the rate (RosOutputOptions::state_bytes_per_s).
   struct State {
     std::size_t topic = 0;
     bool changed = false;

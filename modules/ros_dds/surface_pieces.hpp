@@ -23,7 +23,7 @@ class SurfacePieces {
  public:
   static constexpr std::size_t kFaces = 500;  ///< Maximum number of faces of a piece: 60 kB.
 
-  /// Number of pieces that `faces` make.
+  /// Number of pieces of a mesh with `faces` faces.
   [[nodiscard]] static std::size_t count(std::size_t faces) {
     return (faces + kFaces - 1) / kFaces;
   }
@@ -36,7 +36,7 @@ class SurfacePieces {
  private:
   std::shared_ptr<const LabelledMesh> published_, waiting_;
   std::size_t next_ = 0;
-  std::size_t shown_ = 0;  // number of pieces that viewers have
+  std::size_t shown_ = 0;  // number of pieces of the mesh published before
 };
 
 }  // namespace km

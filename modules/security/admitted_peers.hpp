@@ -70,8 +70,8 @@ class AdmittedPeers {
   };
   using Entries = std::map<TeamPeer, Entry>;
 
-  // If [begin, end) has `most` processes or more, removes the one without messages or longest
-  // silent.
+  // If [begin, end) has `most` processes or more, removes one of them: the one that has been silent
+  // for longest, but first those of which no message has been decrypted.
   void make_room(Entries::iterator begin, Entries::iterator end, std::size_t most);
 
   Entries peers_;

@@ -11,7 +11,7 @@ namespace km {
 
 /// Statement of the team's authority that a robot has this id, name and key during a time.
 struct Certificate {
-  std::string team;  ///< For people; the key of the authority identifies the team.
+  std::string team;  ///< Name for people; the key of the authority identifies the team.
   RobotId robot = 0;
   std::string name;
   PublicKey key{};
@@ -49,8 +49,8 @@ void sign(Revocations& revocations, const SigningKey& authority);
 [[nodiscard]] const char* lapse_of(const Certificate& certificate, const Revocations& revocations,
                                    std::int64_t now_s);
 
-/// As lapse_of(), and also checks the signature of the
-/// authority. Does not check the signature of `revocations`.
+/// As lapse_of(), and also checks the signature of the authority on the certificate. Does not check
+/// the signature of `revocations`.
 [[nodiscard]] const char* refusal_of(const Certificate& certificate, const PublicKey& authority,
                                      const Revocations& revocations, std::int64_t now_s);
 

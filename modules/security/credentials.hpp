@@ -49,7 +49,8 @@ inline constexpr std::size_t kCredentialsLength = 290;
                                               const RobotIdentity& identity,
                                               const std::string& team);
 
-/// True if the owner of credentials.key signed this identity and these keys.
+/// True if the owner of credentials.key signed `identity`, credentials.exchange and
+/// credentials.certificate.
 [[nodiscard]] bool is_signed_by_robot(const Credentials& credentials,
                                       const RobotIdentity& identity);
 

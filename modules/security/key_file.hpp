@@ -52,7 +52,7 @@ class KeyFile {
   [[nodiscard]] std::uint64_t number(const Line& line, std::uint64_t max) const;
   [[nodiscard]] std::int64_t time_s(const Line& line) const;
 
-  /// Bytes given by a part of the value of a line.
+  /// Reads `text`, the value of `line` or a part of it, as `size` hexadecimal bytes into `octets`.
   void read_hex(const Line& line, std::string_view text, std::uint8_t* octets,
                 std::size_t size) const;
 

@@ -17,11 +17,12 @@ struct RobotKeys {
 
 /// Reads a robot's folder as `kimera_multi_keys` writes it. Throws std::runtime_error that names
 /// file, line, value and the remedy. Refuses a missing or malformed file, a secret that other users
-/// may read, parts that do not belong together, and a signature that is not the authority's. Does
-/// not check the time.
+/// may read, a secret that is not that of the certificate, and a signature that is not the
+/// authority's. Does not check whether the certificate is valid at the present time.
 [[nodiscard]] RobotKeys load_robot_keys(const std::filesystem::path& folder);
 
-/// Reads the folder's list of revocations alone, for TeamSeal::update(). Throws as above.
+/// Reads only the list of revocations of a robot's folder, for TeamSeal::update(). Throws like
+/// load_robot_keys().
 [[nodiscard]] Revocations load_revocations(const std::filesystem::path& folder);
 
 }  // namespace km

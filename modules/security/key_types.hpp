@@ -11,11 +11,11 @@ namespace km {
 using Octets = std::vector<std::uint8_t>;
 using OctetView = std::span<const std::uint8_t>;
 
-/// Ed25519 (RFC 8032): key and signature of a signer.
+/// Ed25519 (RFC 8032): public key and signature of a signer.
 using PublicKey = std::array<std::uint8_t, 32>;
 using Signature = std::array<std::uint8_t, 64>;
 
-/// Bytes that are wiped when they are no longer needed.
+/// Bytes that the destructor overwrites with zeros.
 template <std::size_t N>
 class Secret {
  public:
@@ -38,7 +38,7 @@ class Secret {
 /// Ed25519, in libsodium's form: the seed and the public key.
 using SigningKey = Secret<64>;
 
-/// XChaCha20-Poly1305.
+/// Key of XChaCha20-Poly1305.
 using SealingKey = Secret<32>;
 
 }  // namespace km

@@ -123,7 +123,7 @@ void TeamFolder::issue_one(const RobotName& robot, std::int64_t now_s, std::int6
                           .valid_from_s = now_s - kClockTolerance_s,
                           .valid_until_s = valid_until_s};
   sign(certificate, secret_);
-  // Writes the copy for revocation before the certificate that can be used.
+  // Writes the copy in issued/ first: a certificate without this copy could not be revoked.
   write_certificate(folder_ / kAuthorityFolder / kIssuedFolder /
                         (robot.name + '-' + fingerprint_of(certificate.key) + ".txt"),
                     certificate);

@@ -23,9 +23,9 @@ struct RobotName {
 /// Errors throw std::runtime_error that names the file or the robot, and the remedy.
 class TeamFolder {
  public:
-  /// Makes a team with an authority, and keys of these robots as issue() does. The team has the
-  /// name of the folder, which must not exist or be empty. Writes nothing if names or ids of the
-  /// robots are invalid.
+  /// Makes a team with an authority, and keys of these robots as issue() does. The folder must be
+  /// empty or not yet exist, and its name becomes that of the team. Writes nothing if names or ids
+  /// of the robots are invalid.
   static TeamFolder make(const std::filesystem::path& folder, const std::vector<RobotName>& robots,
                          std::int64_t now_s, std::int64_t valid_until_s);
 

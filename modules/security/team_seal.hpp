@@ -68,11 +68,10 @@ struct [[nodiscard]] MembershipChange {
 /// to survive a crash.
 ///
 /// Duties of the caller:
-/// - It announces credentials() with its identity, and first of all admits other processes by
-/// theirs. An
-///   unknown sender can record and replay credentials, so they do not prove that the process runs.
-///   A process is proven to run when a message of it opens that is not a repeated one. Only then
-///   may a new process of a robot replace an older one.
+/// - It announces credentials() with its identity, and passes the credentials of other processes to
+///   admit(). An unknown sender can record and replay credentials, so they do not prove that the
+///   process runs. The first message of a process that opens and is not a repeated one proves this.
+///   Only then may a new process of a robot replace an older one.
 /// - It sends key_message_for(peer) to each newly admitted peer and, if update() says so, to all.
 ///   It repeats this message at times, because a peer that has removed and admitted this process
 ///   again has lost the key.
@@ -94,10 +93,12 @@ class TeamSeal {
 
   /// Checks the credentials of a process at `now_s` and stores its keys. Returns nullptr, or the
   /// reason of a refusal (a string literal): malformed, another authority, lapsed, revoked, another
-  /// id or name than in the certificate, or an invalid signature. Repeated calls
-  /// are harmless. If kMaxAdmitted or, for one robot, kMaxAdmittedPerRobot is exceeded, the process
-  /// that has been silent for longest is removed. Processes whose messages never opened are removed
-  /// first.
+  /// id or name than in the certificate, or an invalid signature. Repeated calls are harmless.
+  ///
+  /// At most kMaxAdmitted processes are stored, and at most kMaxAdmittedPerRobot of one robot. To
+  /// make room, one of all processes, or of this robot's processes, is removed: the one that has
+  /// been silent for longest. Processes of which no message has been decrypted are removed before
+  /// all others.
   [[nodiscard]] const char* admit(const RobotIdentity& identity, std::string_view credentials,
                                   std::int64_t now_s);
 
@@ -128,12 +129,14 @@ class TeamSeal {
   void forget(const TeamPeer& peer) { peers_.erase(peer); }
 
   /// Applies a list of revocations and the time. Pass the list in use again to apply only the time.
-  /// Removes members that are revoked or lapsed. Draws a new key for messages to all if the list
-  /// has changed, or if a holder of the last key has lapsed. Throws std::invalid_argument without a
-  /// change if the list is not the authority's, or older than the one in use.
+  /// Removes processes whose certificate is revoked or not valid at `now_s`. Draws a new key for
+  /// messages to all if the list has changed or a process was removed. Also draws one if the
+  /// certificate of a process that has received the newest key has expired. Throws
+  /// std::invalid_argument without a change if the list is not the authority's, or older than the
+  /// one in use.
   MembershipChange update(const Revocations& revocations, std::int64_t now_s);
 
-  /// Message with the keys by which `peer` opens this process's messages to all, sealed for it.
+  /// Message with the keys by which `peer` opens this process's messages to all, sealed for `peer`.
   /// nullopt if `peer` is not admitted.
   [[nodiscard]] std::optional<Octets> key_message_for(const TeamPeer& peer);
 
@@ -145,9 +148,9 @@ class TeamSeal {
   /// `context` names another sender than this process, or this process as addressee.
   [[nodiscard]] std::optional<Octets> seal(const SealContext& context, OctetView content) const;
 
-  /// Opens a message that any participant may have sent. It opens only if its sender is admitted.
-  /// The work is bounded by the size of the message. A message from a sender outside the team costs
-  /// no signature check.
+  /// Decrypts a message of an unknown participant. Succeeds only if the sender that `context` names
+  /// is admitted and has sealed the message. The work is bounded by the size of the message. The
+  /// signature is checked only after decryption, which fails for senders outside the team.
   [[nodiscard]] Opened open(const SealContext& context, OctetView sealed);
 
  private:
@@ -170,8 +173,9 @@ class TeamSeal {
   Revocations revocations_;
   AdmittedPeers peers_;
   std::vector<TeamKey> team_keys_;  // own keys by number; the last one seals
-  // Time [s since 1970-01-01 UTC] at which the first holder of the newest team key lapses. By then
-  // the holder may have been removed from peers_.
+  // Time [s since 1970-01-01 UTC] at which a new team key is due: the earliest end of the
+  // certificates of all processes that have received the newest key. Such a process may have been
+  // removed from peers_ before.
   std::int64_t holder_lapses_s_ = std::numeric_limits<std::int64_t>::max();
 };
 

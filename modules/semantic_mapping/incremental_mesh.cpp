@@ -250,8 +250,8 @@ void IncrementalMesh::forget(VoxelBlock& block, BlockMap& map, KeyframeIndex key
 }
 
 MeshUpdateReport IncrementalMesh::finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map) {
-  // Includes the blocks below, whose cells extend into them, because they can be meshed for the
-  // last time now.
+  // The lower neighbours of `blocks` have cells that extend into `blocks`. They are meshed as well,
+  // because their cells need the voxels of `blocks`, which are discarded afterwards.
   std::vector<VoxelBlock*> last_time;
   const auto add = [&](VoxelBlock& block) {
     if (!block.changed) return;
@@ -263,7 +263,7 @@ MeshUpdateReport IncrementalMesh::finalise(const std::vector<VoxelBlock*>& block
     visit_lower_neighbours(*block, map, [&](VoxelBlock& lower, int) { add(lower); });
   }
   for (VoxelBlock* block : last_time) block->changed = true;
-  for (VoxelBlock* block : last_time)  // the blocks below these are meshed by the next update
+  for (VoxelBlock* block : last_time)  // their lower neighbours are meshed by the next update
     visit_lower_neighbours(*block, map, [&](VoxelBlock& lower, int) {
       if (!lower.changed) mark_changed(lower, block->changed_since);
     });

@@ -10,12 +10,13 @@
 namespace km {
 namespace {
 
-// A slower motion counts as rest until it exceeds the motion of kRest_s at these speeds.
+// A body that moves more slowly counts as at rest until it has moved farther than at these speeds
+// in kRest_s.
 constexpr double kLeastSpeed_mps = 0.01;
 constexpr double kLeastRate_radps = 0.01;
 constexpr double kRest_s = 1.0;
 
-// Duration that `motion` would take at the least speed and rate above.
+// Duration of `motion` at the least speed and rate above; the longer of the two.
 double slowest_s(const SE3& motion) {
   return std::max(motion.translation().norm() / kLeastSpeed_mps,
                   angle_of(motion.linear()) / kLeastRate_radps);
@@ -60,7 +61,7 @@ ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
   const bool is_due =
       !last_keyframe_ || result.has_jumped ||
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
-  // A keyframe without points cannot close a loop. Only a jump makes one.
+  // A keyframe without points cannot close a loop, so it is made only after a jump.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
     add_keyframe(fix, T_odom_body, result.has_jumped, result);
   if (!last_keyframe_) return result;
@@ -80,7 +81,8 @@ bool ExternalOdometry::is_jump(const Fix& fix) const {
   return distance_m > config_.max_speed_mps * seconds_between(last_->stamp, fix.stamp);
 }
 
-// A slower motion counts as a motion at the least speed.
+// Adds the time in motion since the last fix to moved_s_. A motion below the least speed and rate
+// counts with the duration that it would have at them.
 void ExternalOdometry::count_motion(const Fix& fix) {
   const SE3& T_odom_body = fix.pose.T_odom_body;
   const double dt_s = seconds_between(last_->stamp, fix.stamp);

@@ -15,7 +15,8 @@ struct ExternalOdometryResult {
   std::optional<OdometryState> state;        ///< nullopt: the packet has no usable pose.
   std::optional<KeyframeOdometry> keyframe;  ///< New keyframe, if any.
   std::optional<LocatedFrame> frame;
-  /// The pose jumped faster than VioConfig::max_speed_mps; the published pose stays.
+  /// The pose jumped faster than VioConfig::max_speed_mps; the jump is removed from published
+  /// poses.
   bool has_jumped = false;
 };
 
@@ -49,11 +50,11 @@ class ExternalOdometry {
   RobotId robot_;
   DepthSource depth_source_;
   VioConfig config_;
-  bool continues_ = false;             // from continue_from() to the first usable pose: true
+  bool continues_ = false;             // true from continue_from() to the first usable pose
   std::optional<Fix> last_, last_kf_;  // fixes as measured
   std::optional<KeyframeOdometry> last_keyframe_;
   double moved_s_ = 0.0;                // time in motion since the last keyframe
-  SE3 T_odom_rest_ = SE3::Identity();   // measured pose at the last motion
+  SE3 T_odom_rest_ = SE3::Identity();   // measured pose at the last counted motion
   SE3 T_chain_odom_ = SE3::Identity();  // from measured to published odometry; changed by a jump
 };
 

@@ -10,7 +10,7 @@ namespace {
 // Pixels at the rim without corners, because their windows would exceed the image.
 constexpr int kRimPx = 8;
 constexpr int kScoreRadius = 3;       // Window of the gradient matrix: 7 x 7.
-constexpr float kMinScore = 6.0F;     // Smaller eigenvalue, mean of (grey levels per px)^2.
+constexpr float kMinScore = 6.0F;     // Least shi_tomasi_score() [(grey levels per px)^2].
 constexpr int kStrongThreshold = 35;  // FAST threshold tried first.
 
 // Smaller eigenvalue of the mean gradient matrix around `px`.
@@ -23,7 +23,7 @@ float shi_tomasi_score(const cv::Mat& derivatives, const cv::Point2i& px) {
     for (int i = 0; i <= 2 * kScoreRadius; ++i) {
       const int dx = row[2 * i];
       const int dy = row[2 * i + 1];
-      xx += dx * dx >> 5;  // 49 sums of 13-bit squares would not fit into 31 bits.
+      xx += dx * dx >> 5;  // Divided by 32, which kUnit compensates.
       xy += dx * dy >> 5;
       yy += dy * dy >> 5;
     }

@@ -60,10 +60,10 @@ class DistanceGrid {
 /// Finds new corners where an image has no features yet. Not thread-safe, because it reuses
 /// buffers.
 ///
-/// Candidates are FAST corners (Rosten and Drummond, ECCV 2006). The first search uses a high
-/// threshold. If that search finds none, the next one uses config.fast_threshold. Candidates are
-/// ranked by the smaller eigenvalue of the gradient matrix (Shi and Tomasi, CVPR 1994), computed
-/// from the derivatives of the pyramid.
+/// Candidates are FAST corners (Rosten and Drummond, ECCV 2006). They are searched in each cell of
+/// the image with a high threshold, and again with config.fast_threshold in cells without a corner.
+/// Candidates are ranked by the smaller eigenvalue of the gradient matrix (Shi and Tomasi, CVPR
+/// 1994), computed from the derivatives of the pyramid.
 class FeatureDetector {
  public:
   explicit FeatureDetector(const TrackerConfig& config) : config_(config) {}
@@ -89,7 +89,7 @@ class FeatureDetector {
       return a.rank != b.rank ? a.rank < b.rank : better(a, b);
     }
   };
-  static constexpr int kMaxInCell = 3;  // Largest number of features in a cell.
+  static constexpr int kMaxInCell = 3;  // Cells with as many features or more are not searched.
 
   void add_corners_of(const cv::Rect& cell, int features_there, const ImagePyramid& image);
 

@@ -15,9 +15,9 @@
 namespace km {
 namespace {
 
-constexpr float kMinPatchCorrelation = 0.85F;  // Between a track and its first patch.
+constexpr float kMinPatchCorrelation = 0.85F;  // Least correlation of a track with its patch.
 constexpr float kMaxCorrectionPx = 2.0F;       // Largest correction of KLT by the patch.
-constexpr int kSearchEvery = 4;  // Images between searches for features without a stereo match.
+constexpr int kSearchEvery = 4;  // A feature without a depth is searched in every fourth image.
 constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a propagated depth beyond it is discarded.
 constexpr float kMinSpacing = 0.4F;        // Share of min_distance_px to which tracks may approach.
 
@@ -260,7 +260,7 @@ void FeatureTracker::match_right(const ImagePyramid& left, const StereoFrame& fr
   std::vector<StereoQuery> queries;
   std::vector<Track*> asked;
   for (Track& track : tracks_) {
-    const bool search = !depth_matcher_ && !track.inverse_depth;  // costs time
+    const bool search = !depth_matcher_ && !track.inverse_depth;  // slow
     if (search && (track.length - 1) % kSearchEvery != 0) continue;
     queries.push_back({track.px, track.left, track.inverse_depth});
     asked.push_back(&track);
@@ -281,7 +281,7 @@ void FeatureTracker::match_right(const ImagePyramid& left, const StereoFrame& fr
       const Eigen::Vector2d expected =
           stereo_matcher_.right_bearing(track.left, *track.inverse_depth);
       if ((expected - matches[i]->right).norm() > threshold) {
-        // One of the two depths is wrong: both are discarded, and the next image searches again.
+        // One of the two depths is wrong: both are discarded, and a later image searches again.
         track.inverse_depth.reset();
         ++statistics_.stereo_motion;
         continue;

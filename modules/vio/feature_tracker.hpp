@@ -39,11 +39,11 @@ struct TrackerStatistics {
 /// 1. Corners are tracked from left image to left image by pyramidal KLT (Bouguet 2001). The
 ///    predicted start uses the gyroscope's rotation, the last translation, and the depth of the
 ///    feature or of its neighbours.
-/// 2. The result is aligned with the patch in which the track began, so that errors do not
-///    accumulate (AlignmentPatch).
-/// 3. Outliers are rejected against the one motion that most stereo features agree on
+/// 2. Outliers are rejected against the one motion that most stereo features agree on
 ///    (estimate_motion()). If too few features agree, two-point RANSAC rejects outliers.
-/// 4. New corners are added in cells without features.
+/// 3. The positions are aligned with the patches with which the tracks began, so that errors do not
+///    accumulate (AlignmentPatch).
+/// 4. New corners are added, first in cells without features.
 /// 5. StereoMatcher matches left points to the right image, starting at the depth that the motion
 ///    predicts. With an RGB-D rig DepthMatcher computes the observations of a virtual right camera.
 class FeatureTracker {
@@ -70,7 +70,8 @@ class FeatureTracker {
     std::optional<Eigen::Vector2d> right;
     // Measured in this image, or propagated by the motion [1/m].
     std::optional<double> inverse_depth;
-    // Patch around the feature in the image where the track began; null near the image border.
+    // Patch around the feature in the image where the track began, or where a new patch replaced
+    // that one; null near the image border or without texture.
     std::unique_ptr<const AlignmentPatch> patch;
     Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  // warp from the patch to this image
   };

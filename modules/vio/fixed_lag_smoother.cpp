@@ -16,8 +16,8 @@ namespace {
 constexpr int kStartIterations = 30;
 constexpr int kMinKeyframeFeatures = 20;   // least number of features in a keyframe
 constexpr double kStartKeyframe_s = 0.15;  // spacing of keyframes in the images of the start
-// Keyframes locate new landmarks. If an image has no depth, the keyframe is postponed to an image
-// with depth, up to this factor on the criteria.
+// Keyframes locate new landmarks. If no feature of an image has a depth, the criteria for a
+// keyframe have this factor, so that an image with depths is likely to become the keyframe.
 constexpr double kPatience = 2.0;
 
 // True if any landmark in the last frame has a right observation.
@@ -66,7 +66,8 @@ constexpr double kBridgeAccel = 2.0;  // [m/s^2/sqrt(Hz)]
 
 constexpr double kGyroBiasSigma = 0.02;  // around the guess of the start [rad/s]
 
-// Rows that hold position and heading, the rotation about the vertical as seen from the body.
+// Rows of a prior that hold heading and position of a state. The heading is the rotation about the
+// vertical, expressed in the body frame.
 Eigen::MatrixXd held_gauge(const OdometryState& state) {
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(4, 15);
   J.block<1, 3>(0, 0) = state.T_odom_body.linear().row(2) / kHeldHeading_rad;
@@ -149,7 +150,7 @@ void FixedLagSmoother::set_calibration_prior(const UncertainCalibration& known) 
   calibration_covariance_ = known.covariance;
 }
 
-// Keeps the estimated calibration if it is plausible.
+// Removes frames, landmarks and prior. Keeps the estimated calibration if it is plausible.
 void FixedLagSmoother::clear() {
   const UncertainCalibration known = calibration();
   const Vector7 moved = CameraCalibration{}.local_coordinates_to(known.calibration);
@@ -202,8 +203,10 @@ bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state, d
   return window_.calibrates ? share_samples() && set_imu(now) : set_imu(now);
 }
 
-// If an instant lies after the stamp of its image, the samples between the two arrive with the next
-// image. If the instant lies before the stamp, samples of this image belong to the next interval.
+// Distributes the samples of the newest image between the two newest inertial factors. The instant
+// of a state is stamp + offset. If it lies after the stamp, the samples between the two arrive with
+// the next image. If it lies before the stamp, some samples of this image belong to the next
+// factor.
 bool FixedLagSmoother::share_samples() {
   const std::size_t now = window_.frames.size() - 1;
   WindowFrame& newest = window_.frames[now];

@@ -44,9 +44,10 @@ struct SmootherUpdate {
 /// ImuFactor::at_rest() joins this keyframe with the most recent images. The other frames stay. The
 /// pose is therefore measured from the same keyframes, however long the rest lasts.
 ///
-/// OKVIS keeps tracked landmarks and drops only the observations of the oldest keyframe. With this
-/// method the error of the rotation is 0.24 instead of 0.16 degrees over 1 s on MH_01_easy from
-/// 9.9 s on.
+/// OKVIS differs in the marginalisation: it keeps tracked landmarks and drops only their
+/// observations in the oldest keyframe. With its method the error of the rotation is 0.24 instead
+/// of 0.16 degrees over 1 s on MH_01_easy from 9.9 s on.
+///
 /// Deterministic; not thread-safe.
 class FixedLagSmoother {
  public:
@@ -97,7 +98,7 @@ class FixedLagSmoother {
   /// Factor on the noise of the gyroscope, in addition to VioConfig::gyro_noise_factor.
   [[nodiscard]] double gyro_noise_scale() const { return gyro_noise_.scale(); }
 
-  /// True if the next add() will remove the image at `stamp` from the window.
+  /// True if the keyframe at `stamp` has left the window or leaves it in the next add().
   [[nodiscard]] bool leaving(Stamp stamp) const;
 
  private:

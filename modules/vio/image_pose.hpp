@@ -12,9 +12,11 @@ namespace km {
 /// by velocity and gyro bias, which are proportional to `shift_s`, are omitted.
 struct ImagePose {
   SE3 T_odom_body = SE3::Identity();
-  Eigen::Matrix3d by_state = Eigen::Matrix3d::Identity();  ///< For rotation and translation.
-  /// By CameraCalibration::retracted(). A motion of the cameras in the body has the same effect on
-  /// the images as that motion of the body.
+  /// Derivative of the rotation by that of the state, and of the translation by that of the state.
+  Eigen::Matrix3d by_state = Eigen::Matrix3d::Identity();
+  /// Derivative by the delta of CameraCalibration::retracted(). The images cannot distinguish a
+  /// motion of the cameras relative to the body from the same motion of the body. The derivative by
+  /// the mounting is therefore that by the pose itself, the identity.
   Eigen::Matrix<double, 6, 7> by_calibration;
 
   /// `gyro`: angular rate that the gyroscope measures at the state [rad/s].

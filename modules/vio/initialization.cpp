@@ -93,7 +93,7 @@ std::optional<std::vector<SE3>> stereo_odometry(std::span<const InertialFrame> f
   return poses;
 }
 
-// Relative difference of stereo and samples in the length of gravity.
+// Largest relative error of the measured length of gravity.
 constexpr double kMaxGravityError = 0.25;
 constexpr double kStereoPosition_m = 0.003;  // noise of a relative position from stereo
 constexpr double kVelocityStep_mps = 0.005;  // noise of a preintegrated change of velocity
@@ -161,7 +161,7 @@ std::optional<Eigen::Vector3d> gyro_bias_from(std::span<const InertialFrame> fra
 }
 
 struct LinearAlignment {
-  std::vector<Eigen::Vector3d> velocities;  // in the frame of the first body
+  std::vector<Eigen::Vector3d> velocities;  // in the body frame of the first image
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
 };

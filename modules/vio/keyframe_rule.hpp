@@ -19,7 +19,7 @@ namespace km {
 /// An interval of the motion without measurements.
 struct UnmeasuredMotion {
   double lasts_s = 0.0;
-  double speed_mps = 0.0;  ///< The larger speed of before and after the interval.
+  double speed_mps = 0.0;  ///< The larger of the speeds before and after the interval.
   Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Vertical at the end of the interval.
 };
 

@@ -10,8 +10,8 @@ namespace {
 constexpr int kMaxSteps = 12;
 constexpr float kSettledPx = 0.03F;    // Length of a step that ends the iteration.
 constexpr float kMaxShiftPx = 4.0F;    // Largest distance from the start.
-constexpr float kMinDeviation = 2.0F;  // Grey levels.
-constexpr float kNoise = 1.0F;         // Grey levels; a weaker template is noise.
+constexpr float kMinDeviation = 2.0F;  // Least standard deviation of a patch [grey levels].
+constexpr float kNoise = 1.0F;         // Standard deviation that noise can have [grey levels].
 
 }  // namespace
 

@@ -79,8 +79,8 @@ bool ImuPreintegration::add(std::span<const ImuSample> samples, Stamp from, Stam
     if (begin >= end) continue;
     const ImuSample first = begin == a.stamp ? a : interpolate(a, b, begin);
     const ImuSample last = end == b.stamp ? b : interpolate(a, b, end);
-    // With constant noise over one step, position is a multiple of velocity: a covariance of
-    // rank 6.
+    // A single step is split in two. Otherwise the noise would be constant over the whole time, and
+    // the error of the position a multiple of that of the velocity: a covariance of rank 6.
     if (const Stamp middle = begin + (end - begin) / 2;
         begin == from && end == to && begin < middle) {
       const ImuSample half = interpolate(a, b, middle);

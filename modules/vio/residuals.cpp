@@ -80,8 +80,8 @@ std::optional<ImuFactor> ImuFactor::of(const ImuPreintegration& imu, double grav
 }
 
 ImuFactor ImuFactor::at_rest(const ImuNoise& noise, double dt_s) {
-  // Without samples and with dt = 0, the residuals of Eq. (45) are the differences of the two
-  // states.
+  // At rest both states have the same pose and velocity. Without samples and with dt = 0, the
+  // residuals of Eq. (45) of Forster et al. are the differences of the two states.
   const ImuPreintegration none(noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   Vector9 weight;
   weight << Eigen::Vector3d::Constant(1.0 / kRestRotation_rad),

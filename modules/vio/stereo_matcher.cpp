@@ -16,7 +16,7 @@ constexpr float kMinSearchCorrelation = 0.7F;
 // many similar places.
 constexpr float kMinDistinction = 0.05F;
 constexpr int kPeakWidth = 2;             // Width in steps of one correlation peak.
-constexpr double kMinDisparityPx = -1.0;  // Noise of a point at infinity.
+constexpr double kMinDisparityPx = -1.0;  // Least disparity; below 0 due to noise at infinity.
 
 }  // namespace
 
@@ -84,8 +84,8 @@ std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,
                                                       const Eigen::Vector2f& right_px) const {
   const std::optional<Eigen::Vector2d> right = rig_.cameras[1].unproject(right_px.cast<double>());
   if (!right) return std::nullopt;
-  // The epipolar line starts at the bearing at infinity and has direction `along`; both components
-  // are pixels.
+  // The epipolar line starts at the bearing at infinity and has direction `along`. `offset` is the
+  // position relative to that start [px].
   const double f = rig_.cameras[1].fx;
   const Eigen::Vector2d infinity = right_bearing(query.left, 0.0);
   const Eigen::Vector2d along =
@@ -95,7 +95,7 @@ std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,
   if (std::abs(across_px) > config_.max_epipolar_px) return std::nullopt;
   if (along.dot(offset) < kMinDisparityPx) return std::nullopt;
 
-  // (c + rho t) parallel to the right bearing, in the direction of the line.
+  // The inverse depth rho for which c + rho t has the right bearing, measured along the line.
   const Eigen::Vector3d c = T_right_left_.linear() * query.left.homogeneous();
   const Eigen::Vector3d& t = T_right_left_.translation();
   const double rho = along.dot(*right * c.z() - c.head<2>()) /

@@ -84,8 +84,8 @@ class StereoMatcher {
 /// camera would see the points. Not thread-safe.
 ///
 /// The right bearing is a function of the left bearing and the depth, so both contain the same
-/// error. The smoother assumes independent errors, as for stereo and as ORB-SLAM2 does: it weights
-/// the image row of a point as if there were two observations.
+/// error. The smoother assumes independent errors, as for stereo and as ORB-SLAM2 does. The row of
+/// a point therefore has the weight of two observations.
 class DepthMatcher {
  public:
   /// Precondition: rig.depth_source is kDepthImage.

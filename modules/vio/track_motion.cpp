@@ -14,7 +14,7 @@ namespace km {
 namespace {
 
 constexpr int kSamples = 48;
-constexpr double kCoarseSigmas = 6.0;  // Truncation of the cost under the gyroscope's rotation.
+constexpr double kCoarseSigmas = 6.0;  // Truncation of the cost before the rotation is refined.
 
 // Truncated quadratic cost (MSAC).
 double cost_of(std::span<const DepthPair> pairs, const SE3& T, double threshold) {

@@ -18,15 +18,18 @@ namespace {
 constexpr double kMaxAhead_s = 1.0;
 constexpr double kMaxCostPerObservation = 100.0;  // a hundred times that of a usable fit
 
-// An estimate is wrong if only a small share of the landmarks that could be located fits the
-// estimate, for several images in a row. Normally there are more landmarks than features.
+// An image contradicts the estimate if it has at least kSeenFeatures features with a right
+// observation, but the window has fewer located landmarks than 1 / kFewOfSeen of these features.
+// Normally there are more landmarks than features. The estimate is wrong if more than
+// kMostUnlocatedImages images in a row contradict it.
 constexpr std::ptrdiff_t kSeenFeatures = 40;
-constexpr std::ptrdiff_t kFewOfSeen = 4;  // reciprocal of the share
+constexpr std::ptrdiff_t kFewOfSeen = 4;
 constexpr int kMostUnlocatedImages = 10;
 
-// After a loss of vision longer than kLongDark_s the smoother discards its prior from the dark,
-// kRecovered_s after vision is back. By then images have corrected the states of the dark.
-constexpr double kLongDark_s = 3.0;
+// After a loss of vision of at least kLongLoss_s the smoother discards the prior that was formed
+// during the loss, kRecovered_s after vision is back. By then images have corrected the states of
+// the loss.
+constexpr double kLongLoss_s = 3.0;
 constexpr double kRecovered_s = 0.8;
 
 // Conditions for bridging a gap of inertial samples by images alone: least number of tracked
@@ -96,7 +99,7 @@ VioResult Vio::process(const SensorPacket& packet) {
     held.data.samples.clear();
     restart(std::move(held));
   } else if (first && can_continue_at(held)) {
-    process_image(held, result);
+    continue_at(held, result);
   } else if (running_) {
     advance(held, result);
   } else {
@@ -125,7 +128,8 @@ int Vio::take_samples(const SensorPacket& packet) {
   return refused;
 }
 
-// Empty if no sample is at or before `last`.
+// Samples from the last one at or before `last` to the first one at or after `now`. Empty if no
+// sample is at or before `last`.
 std::vector<ImuSample> Vio::samples_since(Stamp last, Stamp now) const {
   std::vector<ImuSample> covering;
   for (std::size_t k = 0; k < samples_.size(); ++k) {
@@ -158,8 +162,9 @@ bool Vio::can_continue_at(const Held& held) const {
          last_->stamp == stamp;
 }
 
-// Precondition: the state of this image and its keyframe have been published.
-void Vio::process_image(const Held& held, VioResult& result) {
+// Starts odometry on the image of the checkpoint (see continue_from()), from the state that an
+// earlier process has published. Precondition: can_continue_at(held).
+void Vio::continue_at(const Held& held, VioResult& result) {
   start_on(held, *last_, *last_keyframe_->state_covariance);
   ++statistics_.start_attempts;
   ++statistics_.starts;
@@ -204,7 +209,7 @@ void Vio::try_start(VioResult& result) {
         locate((*states)[k], held_[k].frame, result);
       }
       held_.clear();
-      // The last pose of the earlier start is final.
+      // States up to the last published one are final and are not published again.
       std::erase_if(result.states,
                     [this](const auto& s) { return last_ && s.stamp <= last_->stamp; });
       return;
@@ -266,24 +271,24 @@ void Vio::advance(const Held& held, VioResult& result) {
   if (recovered ||
       (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame))))
     add_keyframe(result.smoother->state, result);
-  if (recovered) drop_dark(held, result.smoother->state);
+  if (recovered) discard_prior(held, result.smoother->state);
   locate(result.smoother->state, held.frame, result);
 }
 
 bool Vio::has_recovered(const StereoFrame& frame) const {
-  return back_since_ && seconds_between(*back_since_, frame.stamp) >= kRecovered_s &&
+  return vision_back_since_ && seconds_between(*vision_back_since_, frame.stamp) >= kRecovered_s &&
          locates_points(frame) && !smoother_.window().frames.back().rests;
 }
 
-// States from the dark have large errors, and so have the derivatives of the prior at them. With
-// this prior the smoother would move the pose for seconds; without it, images correct the pose at
-// once.
-void Vio::drop_dark(const Held& held, const OdometryState& state) {
-  back_since_.reset();
+// Restarts the smoother at `state` without its prior. States during a loss of vision have large
+// errors, and so have the derivatives of the prior at them. With this prior the smoother would move
+// the pose for seconds. Without it, images correct the pose at once.
+void Vio::discard_prior(const Held& held, const OdometryState& state) {
+  vision_back_since_.reset();
   if (last_keyframe_->state_covariance) start_on(held, state, *last_keyframe_->state_covariance);
 }
 
-// An image on which a start succeeded counts as seen.
+// An image on which a start succeeded counts as an image that holds the pose (see VisionWatch).
 void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
   const bool has_started = result.start && started(*result.start);
   const int seen = has_started                   ? VisionWatch::kMinLandmarks
@@ -291,9 +296,9 @@ void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
                                                  : 0;
   result.vision = vision_.add(stamp, features, seen);
   if (has_started || vision_.is_lost())
-    back_since_.reset();
-  else if (result.vision && result.vision->lasted_s >= kLongDark_s)
-    back_since_ = stamp;
+    vision_back_since_.reset();
+  else if (result.vision && result.vision->lasted_s >= kLongLoss_s)
+    vision_back_since_ = stamp;
   statistics_.vision_losses = vision_.losses();
   statistics_.blind_s = vision_.lost_s();
 }

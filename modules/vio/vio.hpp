@@ -92,13 +92,13 @@ class Vio {
   [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,
                                      Stamp to) const;
   [[nodiscard]] bool can_continue_at(const Held& held) const;
-  void process_image(const Held& held, VioResult& result);
+  void continue_at(const Held& held, VioResult& result);
   void start_on(const Held& held, const OdometryState& state, const StateCovariance& covariance);
   void try_start(VioResult& result);
   void advance(const Held& held, VioResult& result);
   void restart(Held held);
   [[nodiscard]] bool has_recovered(const StereoFrame& frame) const;
-  void drop_dark(const Held& held, const OdometryState& state);
+  void discard_prior(const Held& held, const OdometryState& state);
   void watch_vision(Stamp stamp, int features, VioResult& result);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
@@ -122,8 +122,9 @@ class Vio {
   FixedLagSmoother smoother_;
   RestDetector rest_detector_;
   VisionWatch vision_;
-  // Time at which vision returned; nullopt once the prior from the dark is discarded.
-  std::optional<Stamp> back_since_;
+  // Time at which vision returned after a long loss; nullopt once the prior that was formed during
+  // the loss is discarded.
+  std::optional<Stamp> vision_back_since_;
   VioStatistics statistics_;
   std::vector<ImuSample> samples_;  // Samples from the last one before or at the last image on.
   std::optional<Stamp> last_image_;

@@ -21,7 +21,7 @@ struct VioTopics {
   Out<LocatedFrame> frames;         ///< One per image, after its keyframe.
   Out<VioStatistics> statistics;    ///< After events, and for each image while vision is lost.
   Out<TrackedImage> images;         ///< All accepted images.
-  Out<ProcessedFrame> processed;    ///< For each packet, at the end of its step.
+  Out<ProcessedFrame> processed;    ///< For each packet with an image, at the end of its step.
 };
 
 /// Runs one Vio in a thread. A full queue delays the sensors.

@@ -24,8 +24,8 @@ class WindowEquations {
   void add_imu(std::size_t frame);  ///< Adds the inertial factor that ends at `frame`.
 
   /// Adds the observations of `landmark`, or those in keyframes (`keyframes_only`), and eliminates
-  /// the landmark. A landmark seen in fewer than two frames adds nothing. Call add_images()
-  /// afterwards.
+  /// the landmark. A landmark that is not located, or seen in fewer than two frames, adds nothing.
+  /// Call add_images() afterwards.
   void add_landmark(const WindowLandmark& landmark, bool keyframes_only = false);
 
   /// Adds the information of landmarks on the poses at the images to the equations of states and
@@ -85,13 +85,14 @@ struct WindowSolution {
   int iterations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
-  bool usable = false;  ///< Finite, and not above the initial cost.
+  bool usable = false;  ///< True if the final cost is finite.
 };
 
 /// Minimises the window's cost over all states and landmarks, in place: at most `max_iterations`
 /// Levenberg-Marquardt steps on WindowEquations, fewer on convergence. Derivatives by variables
-/// that the prior holds are first estimates. (Ceres reaches the same minimum, but needs 6.8 ms per
-/// image instead of 4.3 on MH_01_easy, mostly to build a problem of some 2000 residual blocks.)
+/// that the prior holds are taken at first estimates. (Ceres reaches the same minimum, but
+/// needs 6.8 ms per image instead of 4.3 on MH_01_easy, mostly to build a problem of some 2000
+/// residual blocks.)
 WindowSolution optimize(Window& window, int max_iterations);
 
 /// Removes a frame with its observations, and the landmarks that no other frame sees. The caller

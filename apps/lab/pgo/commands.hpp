@@ -34,8 +34,8 @@ struct GraphInput {
   [[nodiscard]] LabelledTeamGraph read(const CLI::App& app) const;
 };
 
-/// Notice on edges whose information matrix is not positive definite. They were weighed by its
-/// diagonal blocks alone, as SE-Sync reads them. Empty if there are none.
+/// Notice on edges whose information matrix is not positive definite. Such edges are weighed only
+/// by the diagonal blocks of that matrix, as SE-Sync does. Empty if there are none.
 [[nodiscard]] std::string indefinite_text(std::size_t edges);
 
 /// Notice on measurements of the file that are not in the graph. Empty if all are.

@@ -41,7 +41,7 @@ double rmse_m(const std::vector<SE3>& truth, const std::vector<SE3>& estimate) {
   return statistics_of(aligned_errors_m(pairs)).rmse;
 }
 
-// Runs one method on a graph whose edges from index `own_edges` are false closures.
+// Runs one method on a graph whose edges from index `own_edges` on are false closures.
 OutlierResult attempt(const std::string& method, const TeamGraph& graph, std::size_t own_edges,
                       const std::vector<SE3>& truth, const OutlierStudyOptions& options,
                       const TeamMeter& meter) {

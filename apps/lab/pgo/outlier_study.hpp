@@ -14,16 +14,17 @@
 
 namespace km {
 
-/// By edge: whether pairwise consistency maximisation keeps it. It keeps odometry. From the
-/// closures between two robots, or inside one, it keeps the largest set that agrees pairwise, see
-/// Pcm. Closures come in the order of the edges. A second closure from the same pose to the same
-/// pose is dropped. The sigmas of all edges are `noise_scale` times those of the graph. Throws
-/// std::invalid_argument if a robot's odometry is interrupted, and as Pcm does.
+/// By edge: whether pairwise consistency maximisation keeps the edge. It keeps all odometry, and
+/// the largest set of closures that agree pairwise, separately for each pair of robots and inside
+/// each robot (see Pcm). Closures come in the order of the edges. A second closure from the same
+/// pose to the same pose is dropped. The sigmas of all edges are `noise_scale` times those of the
+/// graph. Throws std::invalid_argument if a robot's odometry is interrupted, and as Pcm does.
 [[nodiscard]] std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config,
                                                     double noise_scale = 1.0);
 
 /// Methods against false closures: none; pairwise consistency; newton; newton on the closures that
-/// pairwise consistency keeps. The first two end with newton --trust-all.
+/// pairwise consistency keeps. After none and pcm, newton --trust-all solves for the closures that
+/// remain.
 inline const std::vector<std::string> kRejections = {"none", "pcm", "newton", "pcm+newton"};
 
 /// False closures that agree with one another within their noise, as between aisles of the same

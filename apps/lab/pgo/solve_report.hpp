@@ -38,9 +38,9 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
 /// Text with a row for each instant; empty without instants.
 [[nodiscard]] std::string timeline_text(const std::vector<Instant>& instants);
 
-/// Plots of the relative gap to the optimum against rounds, bytes and critical-path time, on a
-/// logarithmic axis. Points without a gap are at its bottom. Precondition: `solution` has a
-/// judgement.
+/// Plots of the relative gap of the cost to the optimum against rounds, bytes and critical-path
+/// time, on a logarithmic axis. Gaps that are zero, or negative by rounding, are at its bottom.
+/// Precondition: `solution.judgement` is not empty.
 [[nodiscard]] std::vector<Plot> gap_plots(const Solution& solution);
 
 }  // namespace km

@@ -48,7 +48,7 @@ struct Decision {
   std::vector<bool> kept;     ///< By edge of the graph.
   double noise_scale = 1.0;   ///< Noise of closures, as a multiple of the graph's.
   double threshold = 0.0;     ///< Largest residual of an inlier [sigma of the graph].
-  std::size_t most_sent = 0;  ///< Bytes that one robot sent; below: received.
+  std::size_t most_sent = 0;  ///< Most bytes that one robot sent; below: received.
   std::size_t most_received = 0;
   bool decided = false;  ///< False: the rounds did not suffice, or the team failed.
 };

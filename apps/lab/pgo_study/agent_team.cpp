@@ -250,7 +250,7 @@ class AgentTeam {
   std::map<RobotPair, PlayedPair> pairs_;
   std::vector<Member> members_;
   std::vector<Delivery> in_flight_;
-  TeamMessagePtr sent_, received_;  // the last message
+  TeamMessagePtr sent_, received_;  // the last message, before encoding and after decoding
   std::size_t message_bytes_ = 0;
   std::size_t bytes_ = 0;
   std::vector<std::string> notices_;

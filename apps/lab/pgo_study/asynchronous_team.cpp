@@ -68,8 +68,8 @@ void AsynchronousTeam::deliver(RoundMeter& meter) {
   std::erase_if(messages_, [&](const Message& message) { return message.due <= round_; });
 }
 
-// Poses sent in the previous round miss no update. No robot moves in round 1, even one without
-// neighbours.
+// Poses that a neighbour sent in the previous round include all its updates before this round. In
+// round 1 robots only send poses, and no robot moves, not even one without neighbours.
 bool AsynchronousTeam::may_move(const Robot& robot) const {
   return round_ > 1 &&
          std::all_of(robot.received.begin(), robot.received.end(), [&](const auto& entry) {

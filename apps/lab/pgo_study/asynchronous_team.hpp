@@ -10,9 +10,9 @@
 namespace km {
 
 struct AsynchronousOptions {
-  /// B [rounds]: the age of neighbours' poses at which a robot still moves. At most B updates of a
-  /// neighbour before the current round may be missing. Messages arrive 0 to B rounds late, drawn
-  /// at random.
+  /// B [rounds]: the largest age of a neighbour's poses with which a robot still moves. At most B
+  /// updates of the neighbour before the current round may then be missing. Messages arrive 0 to B
+  /// rounds late, drawn at random.
   int max_delay = 0;
   double loss = 0.0;  ///< Probability that a message does not reach one of its receivers.
   unsigned seed = 1;  ///< Seed of the delays and losses.

@@ -7,7 +7,8 @@ namespace km {
 namespace {
 
 constexpr std::uint32_t kMaxRounds = 300;
-// Rounds. Generous, because second derivatives cost no messages on one computer.
+// See TreeNewtonOptions::patience_rounds. Below its default, because new second derivatives cost no
+// messages on one computer.
 constexpr double kPatience = 8.0;
 
 bool rigid(const LiftedPoses& X) {

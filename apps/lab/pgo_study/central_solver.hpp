@@ -11,9 +11,9 @@ namespace km {
 
 /// Certified global minimum of a whole pose graph on one computer. The first method is Newton's
 /// among rigid poses with exact sparse factorisations (TreeNewton as a team of one). If the
-/// relaxation is exact and the start is good, its minimum is that of the relaxation, and the
-/// certificate proves it. Otherwise the Riemannian staircase continues from this minimum
-/// (Staircase). Not thread-safe.
+/// relaxation is exact and the start is good, the minimum of Newton's method is that of the
+/// relaxation, and the certificate proves this. Otherwise the Riemannian staircase continues from
+/// this minimum (Staircase). Not thread-safe.
 class CentralSolver {
  public:
   /// `start`: r x 4n, z up if there are verticals. If it does not hold rigid poses (r = 3), the

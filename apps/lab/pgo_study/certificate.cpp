@@ -375,9 +375,9 @@ class ProofOf {
   double assembly_rounding_ = 0.0;
 };
 
-// If no factorisation up to the shift `refused` was definite, the smallest eigenvalue is below
-// -refused. A larger Ritz value then shows that the start was nearly orthogonal to the eigenvector,
-// so other starts are tried.
+// If `refused` > 0, the factorisation with this shift was not definite, so the smallest eigenvalue
+// is below -refused. A larger Ritz value shows that the start was nearly orthogonal to the
+// eigenvector, and other starts are tried.
 LanczosResult eigenpair_below(const ProofOf& proof, double shift, double refused, unsigned seed) {
   constexpr unsigned kStarts = 4;
   constexpr unsigned kBetweenSeeds = 1000;

@@ -28,8 +28,8 @@ struct [[nodiscard]] Certificate {
   /// which the cost decreases.
   bool hidden_by_rounding = false;
   /// Proven: tr(S Z) is at least `lambda_bound` times tr(Z) on the columns of unit length, for all
-  /// Z that cost no more. Up to rounding, no eigenvalue of S is smaller once the translations are
-  /// eliminated.
+  /// Z that cost no more than the point. Up to rounding, no eigenvalue of S is smaller once the
+  /// translations are eliminated.
   double lambda_bound = 0.0;
   /// Estimate of the smallest eigenvalue, from above. nullopt if certified.
   std::optional<double> lambda_min = {};

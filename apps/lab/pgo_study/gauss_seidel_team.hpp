@@ -19,9 +19,9 @@ struct GaussSeidelOptions {
 
 /// Two-stage distributed Gauss-Seidel (Choudhary et al., "Distributed Mapping with Privacy and
 /// Communication Constraints", IJRR 2017). The first stage solves for the rotations of the chordal
-/// relaxation. The second stage is one Gauss-Newton step of the whole poses from there. Both are
-/// linear and are solved by block Gauss-Seidel sweeps over the robots. In the first sweep of a
-/// stage robots follow a tree from robot 0, whose first pose is held. They leave out the edges to
+/// relaxation. The second stage is one Gauss-Newton step of the whole poses from there. Both stages
+/// are linear problems, solved by block Gauss-Seidel sweeps over the robots. In the first sweep of
+/// a stage robots follow a tree from robot 0, whose first pose is held. They leave out the edges to
 /// robots that have not solved yet (flagged initialisation). In later sweeps robots of one colour
 /// solve together. The result is the chordal initialisation improved once, not a minimum. Rank 3.
 class GaussSeidelTeam : public TeamSolver {

@@ -20,9 +20,10 @@ enum class TeamShape {
 };
 
 /// Solves a recorded graph by the members of a session, the same code as in the robots, and their
-/// messages. Sessions follow each other until no rejected closure fits any more. The tree is
-/// planned by the robots' own code. A step is over when every member has advanced by a round. It
-/// covers several rounds if the solver publishes its state every few rounds only.
+/// messages. Sessions follow each other until no rejected closure fits the solution (see
+/// ClosureDecisions::reconsider()). The tree is planned by the robots' own code. A step is over
+/// when every member has advanced by a round. A step covers several rounds if the solver publishes
+/// its state only every few rounds.
 class MemberTeam final : public TeamSolver {
  public:
   using Factory = std::function<std::unique_ptr<MemberSolver>(SessionGraph, TreePlace)>;

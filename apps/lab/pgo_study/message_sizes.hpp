@@ -6,7 +6,7 @@
 namespace km {
 
 // Bytes that a message of the methods in this module would take as a solver message between robots
-// (see SolverMessage). The head takes 4 for kind and round. The content takes
+// (see SolverMessage). The head takes 4 bytes for kind and round. The content takes
 //     public poses   2 for the index of each and 4 rank floats, 16 rank: m (2 + 16 rank);
 //     doubles        8 each: rows and sums of a verification, shares of cost and gradient.
 // The methods run in one process and encode no messages.

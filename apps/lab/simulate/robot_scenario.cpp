@@ -99,7 +99,7 @@ std::vector<Stamp> recorded_stamps(const RecordedFlight& flight, const Simulatio
       std::lower_bound(flight.imu.begin(), flight.imu.end(), start,
                        [](const ImuSample& sample, Stamp stamp) { return sample.stamp < stamp; });
   if (first == flight.imu.end()) return {};
-  // Such rigs trigger the cameras with an inertial sample.
+  // The first image has the stamp of an inertial sample, as if that sample triggered the cameras.
   return image_stamps(std::max(first->stamp, origin), last, options.rate_hz);
 }
 
