@@ -36,7 +36,8 @@ constexpr double kNotable = 1.3;
 // METHOD.md.
 constexpr double kDistinct = 2.0;
 
-// Standard deviation of the relative error of length of odometry, if it has one.
+// Standard deviation of the relative error of length of odometry, if it has one. Sensitivity:
+// METHOD.md.
 constexpr double kLengthSigma = 0.5;
 constexpr int kLengthSteps = 5;
 
