@@ -1,21 +1,22 @@
 #include <catch2/catch.hpp>
 
-#include "test/modules/relay/relay_network.hpp"
+#include "test/runtime/overlay/overlay_network.hpp"
 
 namespace km {
 namespace {
 
-TEST_CASE("Relay with and without keys", "[!benchmark]") {
+TEST_CASE("Overlay with and without keys", "[!benchmark]") {
   const ToyTeam team;
   const ToyMember a(team, kA, "alpha"), b(team, kB, "beta");
-  const RelayKeys keys = relay_keys(a.seal);
+  const OverlayKeys keys = overlay_keys(a.seal);
   for (const std::size_t size : {600U, 24000U}) {
-    RelayMessage message{.kind = RelayKind::kBag, .origin = a.peer(), .content = octets(size)};
+    OverlayMessage message{
+        .stream = OverlayStream::kBag, .origin = a.peer(), .content = octets(size)};
     const std::string what = ", " + std::to_string(size) + " B";
     BENCHMARK("sign" + what) {
       return endorsement_of(message, keys);
     };
-    RelayMessage endorsed = message;
+    OverlayMessage endorsed = message;
     endorse(endorsed, keys);
     BENCHMARK("check" + what) {
       return is_endorsed(endorsed, a.keys.certificate.key);

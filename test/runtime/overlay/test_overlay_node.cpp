@@ -2,15 +2,16 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "modules/loop_closure/loop_closure_codec.hpp"
 #include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/place_recognition_codec.hpp"
-#include "modules/relay/relay_node.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/participant.hpp"
+#include "runtime/overlay/overlay_node.hpp"
 #include "test/modules/security/toy_team.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/inbox.hpp"
@@ -43,16 +44,17 @@ struct Relaying {
         participant(domain, identity_of(robot)),
         peers(participant),
         seal(std::move(keys)),
-        node(process_of(robot), seal.get(), peers, {events, statuses, own_packets, reached},
+        node(process_of(robot), seal.get(), peers,
+             {events, statuses, team_packets, places_packets, reached, links},
              [&now_s] { return now_s; }),
         bow_guard(node.guard<KeyframeBow>(
-            RelayKind::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); })) {
+            OverlayStream::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); })) {
     node.join_bags<KeyframeBow>(received_bows, bows);
     node.join_calls(
-        RelayKind::kRequest,
+        OverlayStream::kRequest,
         RelayedTopics<KeyframeRequest>{own_requests, direct_requests, received_requests, requests},
         [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
-    node.join_reliable(RelayKind::kInlierSet,
+    node.join_reliable(OverlayStream::kInlierSet,
                        RelayedTopics<InlierSet>{own_sets, direct_sets, received_sets, sets});
   }
 
@@ -76,7 +78,9 @@ struct Relaying {
   std::unique_ptr<SharedSeal> seal;
   Topic<PeerEvent> events, reached;
   Topic<RobotStatus> statuses;
-  Topic<Addressed<RelayPacket>> own_packets;
+  Topic<Addressed<TeamLanePacket>> team_packets;
+  Topic<Addressed<PlacesLanePacket>> places_packets;
+  Topic<LinksReport> links;
   Topic<KeyframeBow> received_bows, bows;
   Topic<Addressed<KeyframeRequest>> own_requests, direct_requests;
   Topic<KeyframeRequest> received_requests, requests;
@@ -86,9 +90,10 @@ struct Relaying {
   Inbox<KeyframeRequest> got_requests{requests};
   Inbox<InlierSet> got_sets{sets};
   Inbox<PeerEvent> got_ways{reached};
+  Inbox<LinksReport> got_links{links};
   Inbox<Addressed<KeyframeRequest>> sent_directly{direct_requests};
   Inbox<Addressed<InlierSet>> sets_sent_directly{direct_sets};
-  RelayNode node;
+  OverlayNode node;
   ContentGuard<KeyframeBow> bow_guard;
 };
 
@@ -98,15 +103,13 @@ struct Chain {
     for (RobotId robot = 0; robot < 3; ++robot)
       robots.push_back(std::make_unique<Relaying>(domain, robot, now_s,
                                                   has_keys ? seal_of(team, robot) : nullptr));
-    for (auto& robot : robots)
-      robot->own_packets.subscribe([this, from = robot->self](const auto& packet) {
-        RelayMessage message = *packet->message->message;
-        if (change) change(message);
-        const RelayPacket arrived{from, std::make_shared<const RelayMessage>(std::move(message))};
-        Relaying& to = *robots[packet->to];
-        if (const char* why = to.node.guard_packets().check(process_of(from), arrived, {}))
-          refusals.emplace_back(why);
-      });
+    for (auto& robot : robots) {
+      const auto pass = [this, from = robot->self](const auto& packet) {
+        carry(from, packet->to, *packet->message);
+      };
+      robot->team_packets.subscribe(pass);
+      robot->places_packets.subscribe(pass);
+    }
     for (const RobotId end : {RobotId{0}, RobotId{1}}) {
       if (has_keys) {
         admit(end, 2);
@@ -116,6 +119,16 @@ struct Chain {
       robots[2]->events.publish(PeerEvent{PeerEventKind::kJoined, identity_of(end), {}});
     }
   }
+  template <OverlayLane kLane>
+  void carry(RobotId from, RobotId to, const LanePacket<kLane>& packet) {
+    OverlayMessage message = *packet.message;
+    if (change) change(message);
+    const LanePacket<kLane> arrived{
+        {from, std::make_shared<const OverlayMessage>(std::move(message)), packet.is_own}};
+    if (const char* why =
+            robots[to]->node.template guard_packets<kLane>().check(process_of(from), arrived, {}))
+      refusals.emplace_back(why);
+  }
   void admit(RobotId to, RobotId from) {
     const char* why = robots[to]->seal->with([&](TeamSeal& seal) {
       return seal.admit(identity_of(from), robots[from]->seal->credentials(), today_s());
@@ -124,20 +137,22 @@ struct Chain {
   }
   // Exchanges statuses for a while.
   void run(double seconds) {
-    for (const double end_s = now_s + seconds; now_s < end_s; now_s += kStatusPeriod_s)
+    for (const double end_s = now_s + seconds; now_s < end_s; now_s += kStatusPeriod_s) {
+      for (auto& robot : robots) robot->node.step();
       for (const RobotId end : {RobotId{0}, RobotId{1}}) {
         send_status(end, 2);
         send_status(2, end);
       }
+    }
   }
   void send_status(RobotId from, RobotId to) {
     robots[to]->statuses.publish(RobotStatus{
-        .robot = from, .name = robot_name(from), .relay = robots[from]->node.summary()});
+        .robot = from, .name = robot_name(from), .overlay = robots[from]->node.summary()});
   }
 
   double now_s = 0.0;
   ToyTeam team;
-  std::function<void(RelayMessage&)> change;  // Changes each forwarded message.
+  std::function<void(OverlayMessage&)> change;  // Changes each forwarded message.
   std::vector<std::string> refusals;
   std::shared_ptr<const DdsDomain> domain = std::make_shared<DdsDomain>(loopback_config());
   std::vector<std::unique_ptr<Relaying>> robots;
@@ -145,7 +160,7 @@ struct Chain {
 
 }  // namespace
 
-TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[relay]") {
+TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[overlay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Chain chain(has_keys);
@@ -188,14 +203,14 @@ TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[r
 }
 
 TEST_CASE("With keys a message without the signature of its origin is neither read nor stored",
-          "[relay]") {
+          "[overlay]") {
   Chain chain(true);
   Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
   c.peers.reported(identity_of(0));
   Octets bow = a.content_of({.id = {0, 0}, .words = {{3, 1}}});
   REQUIRE(c.receive(process_of(0), bow).empty());
-  chain.change = [](RelayMessage& message) {
-    if (message.kind == RelayKind::kBag) message.content.front() ^= 1U;
+  chain.change = [](OverlayMessage& message) {
+    if (message.stream == OverlayStream::kBag) message.content.front() ^= 1U;
   };
   chain.run(20.0);
   CHECK(b.peers.current(0) == process_of(0));
@@ -210,48 +225,30 @@ TEST_CASE("With keys a message without the signature of its origin is neither re
   CHECK(c.got_bows.messages().size() == 1);
 }
 
-TEST_CASE("Messages from a neighbour are checked before use", "[relay]") {
-  const auto refusal_of = [](RelayMessage message) -> std::string {
-    const RelayPacket packet{2, std::make_shared<const RelayMessage>(std::move(message))};
-    const auto encoded = Codec<RelayPacket>::encode(packet);
-    const auto decoded = Codec<RelayPacket>::decode(encoded.wire, process_of(2));
-    if (!decoded.value) return decoded.refusal;
-    CHECK(*decoded.value->message == *packet.message);
-    CHECK(decoded.value->neighbour == 2);
-    return {};
-  };
-  const RelayMessage sound{.kind = RelayKind::kReply,
-                           .origin = process_of(0),
-                           .to = 1,
-                           .number = 7,
-                           .hops = 2,
-                           .content = {1, 2, 3}};
-  CHECK(refusal_of(sound).empty());
-  RelayMessage wrong = sound;
-  SECTION("kind") {
-    wrong.kind = static_cast<RelayKind>(6);
-    CHECK(refusal_of(wrong) == "a kind that is not known");
-  }
-  SECTION("boot") {
-    wrong.origin.boot = 0;
-    CHECK(refusal_of(wrong) == "of no process");
-  }
-  SECTION("origin") {
-    wrong.origin = {2, 1};
-    CHECK(refusal_of(wrong) == "its origin is a former process of its sender");
-  }
-  SECTION("size") {
-    wrong.content.resize(kMaxRelayContent + 1);
-    CHECK(refusal_of(wrong) == "the content is missing or too long");
-  }
-  SECTION("name") {
-    wrong.kind = RelayKind::kIntroduction;
-    CHECK(refusal_of(wrong) == "a name that no robot has");
-    wrong.content = {'r', '1'};
-    CHECK(refusal_of(wrong).empty());
-    wrong.content.push_back(';');
-    CHECK(refusal_of(wrong) == "a name that no robot has");
-  }
+TEST_CASE("States and calls of the overlay reach the readers of their streams", "[overlay]") {
+  const bool has_keys = GENERATE(false, true);
+  CAPTURE(has_keys);
+  Chain chain(has_keys);
+  Relaying &a = *chain.robots[0], &b = *chain.robots[1];
+  std::vector<OverlayMessage> read;
+  for (const OverlayStream stream : {OverlayStream::kSession, OverlayStream::kSolver})
+    b.node.read(stream, [&](const OverlayMessage& message) {
+      read.push_back(message);
+      return nullptr;
+    });
+  chain.run(2.0);
+  REQUIRE_FALSE(a.got_links.messages().empty());
+  CHECK(a.got_links.messages().back().links.component(0) == std::set<RobotId>{0, 1, 2});
+  const std::uint64_t before = a.node.session_bytes();
+  a.node.publish(OverlayStream::kSession, {1, 2, 3});
+  a.node.call(OverlayStream::kSolver, 1, 17, {4, 5});
+  REQUIRE(read.size() == 2);
+  CHECK(read[0].origin == process_of(0));
+  CHECK(read[0].content == Octets{1, 2, 3});
+  CHECK(read[1].content == Octets{4, 5});
+  CHECK(read[1].number == 17);
+  CHECK(a.node.session_bytes() > before);
+  CHECK(chain.refusals.empty());
 }
 
 }  // namespace km

@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "modules/relay/relay_store.hpp"
+#include "runtime/overlay/overlay.hpp"
 #include "test/modules/security/toy_team.hpp"
 
 namespace km {
 
-inline constexpr double kPeriod_s = 0.5;  // Period of the summaries.
+inline constexpr double kPeriod_s = 0.5;  // Period of the summaries, and of step().
 inline constexpr RobotId kA = 0, kB = 1, kC = 2, kD = 3;
 
 inline std::vector<std::uint8_t> octets(std::size_t size, std::uint8_t value = 7) {
@@ -29,7 +29,7 @@ inline std::string name_of(RobotId robot) {
 }
 
 /// Signing and checking functions of one member of a toy team.
-inline RelayKeys relay_keys(const TeamSeal& seal) {
+inline OverlayKeys overlay_keys(const TeamSeal& seal) {
   return {
       .endorse = [&](OctetView statement) { return seal.endorse(statement); },
       .credentials_of = [&](const TeamPeer& peer) { return seal.credentials_of(peer); },
@@ -53,13 +53,13 @@ class Network {
 
   void start(RobotId robot, std::uint64_t boot) {
     boots_[robot] = boot;
-    stores_.erase(robot);
+    overlays_.erase(robot);
     if (has_keys_) {
       auto& member = members_[robot];
       member = member ? std::make_unique<ToyMember>(*member, boot)
                       : std::make_unique<ToyMember>(team_, robot, name_of(robot), boot);
     }
-    stores_.emplace(robot, RelayStore({robot, boot}, keys_of(robot)));
+    overlays_.try_emplace(robot, TeamPeer{robot, boot}, keys_of(robot));
     read_[robot].clear();
     met_[robot].clear();
     for (const auto& [a, b] : std::set(links_))
@@ -79,18 +79,18 @@ class Network {
   }
   // Publishes a bag to the robots that receive this one directly, as DDS does.
   void send_bag(RobotId robot, std::uint32_t index) {
-    const auto content = signed_content({.kind = RelayKind::kBag,
+    const auto content = signed_content({.stream = OverlayStream::kBag,
                                          .origin = {robot, boots_.at(robot)},
                                          .number = index,
                                          .content = octets(600)});
-    for (const auto& [other, store] : stores_)
-      if (linked(robot, other)) (void)at(other).keep_bag(identity(robot), index, content);
+    for (auto& [other, overlay] : overlays_)
+      if (linked(robot, other)) (void)overlay.keep_bag(identity(robot), index, content);
   }
   // Sends a keyframe as a reply to the robot that requested it.
   void send_reply(RobotId robot, RobotId to, std::uint32_t index) {
     const TeamPeer origin{robot, boots_.at(robot)};
     (void)at(to).keep_reply(origin, index,
-                            signed_content({.kind = RelayKind::kReply,
+                            signed_content({.stream = OverlayStream::kReply,
                                             .origin = origin,
                                             .to = to,
                                             .number = index,
@@ -98,31 +98,34 @@ class Network {
   }
   void run(double seconds) {
     for (const double end_s = now_s_ + seconds; now_s_ < end_s; now_s_ += kPeriod_s) {
-      for (auto& [robot, store] : stores_)
-        for (auto& [other, to] : stores_)
-          if (linked(robot, other)) to.update(robot, store.summary(), now_s_);
+      for (auto& [robot, overlay] : overlays_)
+        for (auto& [other, to] : overlays_)
+          if (linked(robot, other)) to.update(robot, overlay.summary(), now_s_);
       settle();
     }
   }
-  // Messages of one kind that a robot received to read, in order.
-  [[nodiscard]] std::vector<std::uint32_t> read(RobotId robot, RelayKind kind) {
+  // Messages of one stream that a robot received to read, in order.
+  [[nodiscard]] std::vector<std::uint32_t> read(RobotId robot, OverlayStream stream) {
     std::vector<std::uint32_t> numbers;
-    for (const RelayMessagePtr& message : read_[robot])
-      if (message->kind == kind) numbers.push_back(message->number);
+    for (const OverlayMessagePtr& message : read_[robot])
+      if (message->stream == stream) numbers.push_back(message->number);
     return numbers;
   }
-  [[nodiscard]] std::vector<RelayMessagePtr>& all_read(RobotId robot) { return read_[robot]; }
+  [[nodiscard]] std::vector<OverlayMessagePtr>& all_read(RobotId robot) { return read_[robot]; }
   [[nodiscard]] const std::vector<RobotIdentity>& met(RobotId robot) { return met_[robot]; }
   [[nodiscard]] const std::vector<RobotId>& reachable(RobotId robot) { return reachable_[robot]; }
-  [[nodiscard]] RelayStore& at(RobotId robot) { return stores_.at(robot); }
+  [[nodiscard]] Overlay& at(RobotId robot) { return overlays_.at(robot); }
+  /// Messages other than those of a robot on its own links.
   [[nodiscard]] std::size_t packets() const { return packets_; }
+  /// Octets of messages that are no states.
   [[nodiscard]] std::size_t octets_sent() const { return octets_; }
+  [[nodiscard]] double now_s() const { return now_s_; }
   void lose(double part) { loss_ = part; }
   /// Team whose keys the robots use.
   [[nodiscard]] ToyTeam& team() { return team_; }
   [[nodiscard]] ToyMember& member(RobotId robot) { return *members_.at(robot); }
   /// Sets a function that changes each message that a robot sends.
-  void tamper(std::function<void(RelayMessage&)> change) { change_ = std::move(change); }
+  void tamper(std::function<void(OverlayMessage&)> change) { change_ = std::move(change); }
   [[nodiscard]] const std::vector<std::string>& refusals(RobotId robot) { return refusals_[robot]; }
 
   [[nodiscard]] RobotIdentity identity(RobotId robot) const {
@@ -138,35 +141,38 @@ class Network {
       (void)member(a).admit(member(b));
       (void)member(b).admit(member(a));
     }
-    at(a).connected(identity(b));
-    at(b).connected(identity(a));
+    at(a).connected(identity(b), now_s_);
+    at(b).connected(identity(a), now_s_);
   }
-  [[nodiscard]] std::optional<RelayKeys> keys_of(RobotId robot) {
-    return has_keys_ ? std::optional(relay_keys(member(robot).seal)) : std::nullopt;
+  [[nodiscard]] std::optional<OverlayKeys> keys_of(RobotId robot) {
+    return has_keys_ ? std::optional(overlay_keys(member(robot).seal)) : std::nullopt;
   }
-  [[nodiscard]] std::vector<std::uint8_t> signed_content(RelayMessage message) {
+  [[nodiscard]] std::vector<std::uint8_t> signed_content(OverlayMessage message) {
     if (has_keys_) endorse(message, *keys_of(message.origin.robot));
     return message.content;
   }
   // Delivers messages until no robot has any left to send.
   void settle() {
+    for (auto& [robot, overlay] : overlays_) overlay.step(now_s_);
     for (bool more = true; more;) {
       more = false;
-      for (auto& [robot, store] : stores_) {
-        RelayOutput output = store.take_output();
+      for (auto& [robot, overlay] : overlays_) {
+        OverlayOutput output = overlay.take_output();
         std::ranges::move(output.delivered, std::back_inserter(read_[robot]));
         std::ranges::move(output.met, std::back_inserter(met_[robot]));
         std::ranges::move(output.reachable, std::back_inserter(reachable_[robot]));
-        for (const RelayPacket& packet : output.packets) {
+        for (const OverlayPacket& packet : output.packets) {
           more = true;
-          ++packets_;
-          octets_ += packet.message->content.size();
+          const OverlayStream stream = packet.message->stream;
+          if (stream != OverlayStream::kLinks || !packet.is_own) ++packets_;
+          if (!is_state(stream)) octets_ += packet.message->content.size();
           if (!linked(robot, packet.neighbour) || uniform_(random_) < loss_) continue;
-          RelayMessage message = *packet.message;
+          OverlayMessage message = *packet.message;
           if (change_) change_(message);
-          RelayStore& to = at(packet.neighbour);
-          if (to.receive({robot, std::make_shared<const RelayMessage>(std::move(message))}) ==
-              RelayArrival::kForged)
+          Overlay& to = at(packet.neighbour);
+          if (to.receive(identity(robot),
+                         std::make_shared<const OverlayMessage>(std::move(message)),
+                         now_s_) == OverlayArrival::kForged)
             refusals_[packet.neighbour].emplace_back(to.refusal());
         }
       }
@@ -177,13 +183,13 @@ class Network {
   ToyTeam team_;
   std::map<RobotId, std::unique_ptr<ToyMember>> members_;
   std::map<RobotId, std::uint64_t> boots_;
-  std::map<RobotId, RelayStore> stores_;
+  std::map<RobotId, Overlay> overlays_;
   std::set<std::pair<RobotId, RobotId>> links_;
-  std::map<RobotId, std::vector<RelayMessagePtr>> read_;
+  std::map<RobotId, std::vector<OverlayMessagePtr>> read_;
   std::map<RobotId, std::vector<RobotIdentity>> met_;
   std::map<RobotId, std::vector<RobotId>> reachable_;
   std::map<RobotId, std::vector<std::string>> refusals_;
-  std::function<void(RelayMessage&)> change_;
+  std::function<void(OverlayMessage&)> change_;
   std::mt19937 random_{5};
   std::uniform_real_distribution<double> uniform_{0.0, 1.0};
   double loss_ = 0.0;

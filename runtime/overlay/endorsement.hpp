@@ -7,13 +7,13 @@
 
 #include "modules/core/decoded.hpp"
 #include "modules/core/robot_identity.hpp"
-#include "modules/relay/relay_message.hpp"
 #include "modules/security/certificate.hpp"
+#include "runtime/overlay/overlay_message.hpp"
 
 namespace km {
 
-/// Signing and checking functions of TeamSeal that the relay of a team with keys uses.
-struct RelayKeys {
+/// Signing and checking functions of TeamSeal that the overlay of a team with keys uses.
+struct OverlayKeys {
   std::function<Signature(OctetView statement)> endorse;
   std::function<std::optional<std::string>(const TeamPeer&)> credentials_of;
   std::function<Decoded<Certificate>(const RobotIdentity&, const std::string& credentials)>
@@ -21,31 +21,31 @@ struct RelayKeys {
   std::function<const char*(const Certificate&)> why_lapsed;
 };
 
-/// Bytes of the origin's signature at the end of RelayMessage::content in a team with keys.
+/// Bytes of the origin's signature at the end of OverlayMessage::content in a team with keys.
 inline constexpr std::size_t kEndorsementBytes = Signature().size();
 
 /// Signature of this robot, the origin, over all fields of the message except `hops`. For a bag and
 /// for a reply it covers the incarnation of the origin instead of the boot id, and not the
 /// addressee. Thus bags and replies stay valid for the whole incarnation, and other robots that
 /// request the same keyframe can use a reply.
-[[nodiscard]] Signature endorsement_of(const RelayMessage& message, const RelayKeys& keys);
+[[nodiscard]] Signature endorsement_of(const OverlayMessage& message, const OverlayKeys& keys);
 
 /// Appends the signature to the content.
-void endorse(RelayMessage& message, const RelayKeys& keys);
+void endorse(OverlayMessage& message, const OverlayKeys& keys);
 
 /// True if the content ends with the signature of this message by the owner of `origin`.
-[[nodiscard]] bool is_endorsed(const RelayMessage& message, const PublicKey& origin);
+[[nodiscard]] bool is_endorsed(const OverlayMessage& message, const PublicKey& origin);
 
 /// Content of an introduction: the name of the origin and, in a team with keys, its credentials.
-struct RelayIntroduction {
+struct OverlayIntroduction {
   std::string name;
   std::string credentials = {};
 
-  bool operator==(const RelayIntroduction&) const = default;
+  bool operator==(const OverlayIntroduction&) const = default;
 };
-[[nodiscard]] Octets to_octets(const RelayIntroduction& introduction);
+[[nodiscard]] Octets to_octets(const OverlayIntroduction& introduction);
 /// Nullopt if the content does not begin with a valid robot name or if the rest cannot be
 /// credentials. Does not verify the credentials.
-[[nodiscard]] std::optional<RelayIntroduction> parse_introduction(OctetView content);
+[[nodiscard]] std::optional<OverlayIntroduction> parse_introduction(OctetView content);
 
 }  // namespace km
