@@ -34,6 +34,9 @@ inline constexpr const char* kEstimatedRig = "rig_estimated.yaml";
 /// Input of --resume and --session.
 inline constexpr const char* kJournal = "run.journal";
 
+/// Appended to the name of a journal with flipped bytes: its copy before the run continued.
+inline constexpr const char* kDamaged = ".damaged";
+
 /// The map of such a run.
 inline constexpr const char* kMap = "run.map";
 
@@ -44,7 +47,7 @@ inline constexpr const char* kRecord = "record.mcap";
 [[nodiscard]] inline std::vector<std::filesystem::path> robot_folders(
     const std::filesystem::path& folder) {
   const auto is_of_robot = [](const std::filesystem::path& one) {
-    return is_file(one / kSummary) || is_file(one / kGrowingFiles.back());
+    return is_file(one / kSummary) || is_file(one / kJournal);
   };
   if (is_of_robot(folder)) return {folder};
   std::vector<std::filesystem::path> found;

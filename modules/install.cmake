@@ -50,4 +50,4 @@ install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 get_property(programs GLOBAL PROPERTY KM_PROGRAMS)
 install(TARGETS ${programs} RUNTIME COMPONENT programs)
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/kimera_multi COMPONENT programs
-  PATTERN docker EXCLUDE PATTERN install_packages EXCLUDE PATTERN packages.txt EXCLUDE)
+  PATTERN docker EXCLUDE PATTERN Doxyfile EXCLUDE PATTERN install_packages EXCLUDE PATTERN packages.txt EXCLUDE)

@@ -4,9 +4,9 @@
 #include <array>
 #include <memory>
 
+#include "apps/robot/robot_input.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/sensors/ros_image.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 
@@ -59,22 +59,6 @@ class PublisherList {
   DdsEntity reader_;
 };
 
-std::vector<RosTopic> topics_of(const SensorTopicNames& names) {
-  constexpr int kDepth = 1000;
-  std::vector<RosTopic> topics;
-  for (const std::string& topic : {names.left, names.right, names.depth})
-    if (!topic.empty())
-      topics.push_back(
-          {topic, std::string(type_of_images(topic)), RosQos::kSensorData, kDepth / 100});
-  for (const std::string& topic : {names.imu, names.gyro, names.accel})
-    if (!topic.empty())
-      topics.push_back({topic, std::string(RosImu::kType), RosQos::kSensorData, kDepth});
-  if (!names.odometry.empty())
-    topics.push_back(
-        {names.odometry, std::string(RosOdometry::kType), RosQos::kSensorData, kDepth});
-  return topics;
-}
-
 // Name of a type in ROS 1: "sensor_msgs/Imu" for "sensor_msgs/msg/Imu" too.
 std::string plain(const std::string& type) {
   return type.substr(0, type.find('/')) + '/' + last_name(type);
@@ -99,16 +83,16 @@ Finding silent(const ListenedTopic& wanted, const std::vector<ListenedTopic>& to
     finding.what += ": its publisher sends " + same->type;
     finding.to_do = "a topic of " + wanted.type + ": compressed images have /compressed at the end";
   } else if (same != publishers.end()) {
-    finding.what += ", though somebody publishes it";
+    finding.what += ", although a program publishes it";
     finding.to_do =
         "see whether the driver has data; large images need net.core.rmem_max of "
         "megabytes";
   } else if (similar != publishers.end() && alike(*similar) > 0) {
     finding.id = "live.similar_name";
-    finding.what += ": nobody publishes it, but " + similar->topic + " is of that type";
+    finding.what += ": no program publishes it, but " + similar->topic + " is of that type";
     finding.to_do = "name the topic in the rig file as the driver does";
   } else {
-    finding.what += ": nobody publishes it";
+    finding.what += ": no program publishes it";
     finding.to_do = "start the driver; see ROS_DOMAIN_ID (ros.domain) and ros.interface";
   }
   return finding;
@@ -126,9 +110,9 @@ Examination examine_topics(const std::vector<ListenedTopic>& topics,
   const auto is_silent = [](const ListenedTopic& topic) { return topic.messages == 0; };
   if (publishers.empty() && std::ranges::all_of(topics, is_silent)) {
     result.findings.push_back(
-        {.id = "live.nobody",
+        {.id = "live.no_publishers",
          .severity = Severity::kError,
-         .what = "nobody publishes anything on domain " + std::to_string(domain) + " of ROS",
+         .what = "no program publishes a topic on domain " + std::to_string(domain) + " of ROS",
          .means = "drivers do not run, or on another domain or interface",
          .to_do = "ROS_DOMAIN_ID of the drivers is ros.domain here; ros.interface, ros.peers"});
     return result;
@@ -142,7 +126,7 @@ Examination examine_live_topics(const SensorTopicNames& names, const RosConfig& 
                                 double listen_s, const ReportProgress& report_progress) {
   const auto network = std::make_shared<const RosNetwork>(config);
   PublisherList list(*network);
-  RosSubscription subscription(network, topics_of(names));
+  RosSubscription subscription(network, live_topics(names));
   std::vector<ListenedTopic> topics;
   for (const RosTopic& topic : subscription.topics()) topics.push_back({topic.topic, topic.type});
   const double start_s = steady_now_s();

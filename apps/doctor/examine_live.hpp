@@ -20,7 +20,7 @@ struct ListenedTopic {
 };
 
 /// Compares the topics of a rig file with the publishers. Ids: `live.silent`, `live.other_type`,
-/// `live.similar_name`, `live.nobody`.
+/// `live.similar_name`, `live.no_publishers`.
 [[nodiscard]] Examination examine_topics(const std::vector<ListenedTopic>& topics,
                                          const std::vector<TopicPublisher>& publishers,
                                          double listened_s, int domain);

@@ -63,7 +63,7 @@ std::size_t for_each_parameter(const Bytes& bytes, std::size_t at, const auto& u
   return at;
 }
 
-void read_participant(std::span<const std::uint8_t> payload, Announced& found) {
+void read_participant(std::span<const std::uint8_t> payload, AnnouncedParticipant& found) {
   constexpr std::size_t kEncapsulation = 4;
   if (payload.size() < kEncapsulation) return;
   const Bytes bytes(payload, payload[1] == 3);  // PL_CDR_LE
@@ -85,13 +85,13 @@ Finding warning(const char* id, std::string what, const char* means, const char*
           .to_do = to_do};
 }
 
-std::string name_of(const Announced& robot) {
+std::string name_of(const AnnouncedParticipant& robot) {
   return robot.identity ? to_string(*robot.identity) : robot.from;
 }
 
-std::string names_of(const std::vector<Announced>& robots) {
+std::string names_of(const std::vector<AnnouncedParticipant>& robots) {
   std::set<std::string> names;
-  for (const Announced& robot : robots) names.insert(name_of(robot));
+  for (const AnnouncedParticipant& robot : robots) names.insert(name_of(robot));
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
@@ -188,7 +188,7 @@ void examine_buffers(const NetworkFacts& facts, Examination& result) {
 
 // Robots of this team, and other robots by the reason why they are not in this team.
 struct Robots {
-  std::vector<Announced> of_team, of_other_team, on_other_domain, other_protocol;
+  std::vector<AnnouncedParticipant> of_team, of_other_team, on_other_domain, other_protocol;
   std::size_t other_programs = 0;
 
   [[nodiscard]] bool are_none() const {
@@ -199,9 +199,9 @@ struct Robots {
 
 Robots sorted(const NetworkFacts& facts) {
   Robots robots;
-  std::vector<Announced> all = facts.announced;
+  std::vector<AnnouncedParticipant> all = facts.announced;
   all.insert(all.end(), facts.received.begin(), facts.received.end());
-  for (const Announced& one : all) {
+  for (const AnnouncedParticipant& one : all) {
     const bool is_robot = claims_to_be_a_robot(one.user_data);
     if (!is_robot) {
       robots.other_programs += one.domain == facts.config.domain ? 1 : 0;
@@ -218,9 +218,9 @@ Robots sorted(const NetworkFacts& facts) {
   return robots;
 }
 
-void examine_ids(const std::vector<Announced>& team, Examination& result) {
+void examine_ids(const std::vector<AnnouncedParticipant>& team, Examination& result) {
   std::map<RobotId, std::map<std::uint64_t, std::string>> processes;
-  for (const Announced& robot : team)
+  for (const AnnouncedParticipant& robot : team)
     processes[robot.identity->robot][robot.identity->boot] = name_of(robot) + " at " + robot.from;
   for (const auto& [id, boots] : processes) {
     if (boots.size() < 2) continue;
@@ -256,7 +256,7 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
                  ", not " + facts.config.team,
          .means = "robots of different teams do not see each other",
          .to_do = "the same dds.team, if they are to be one"});
-  for (const Announced& robot : robots.other_protocol)
+  for (const AnnouncedParticipant& robot : robots.other_protocol)
     result.findings.push_back(
         {.id = "network.protocol",
          .severity = Severity::kError,
@@ -274,22 +274,21 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
                                .to_do = "a domain of its own is quieter"});
   examine_ids(robots.of_team, result);
   if (!facts.config.peers.empty() && robots.of_team.empty())
-    result.findings.push_back(warning("network.nobody", "no robot of the team is received",
+    result.findings.push_back(warning("network.no_peers", "no robot of the team is received",
                                       "none runs, or it is kept out by what stands here",
                                       "start it, and see its log for the interface it uses"));
   else if (robots.are_none())
     result.findings.push_back(
-        {.id = "network.nobody",
+        {.id = "network.no_peers",
          .severity = Severity::kNote,
-         .what =
-             "nobody else was seen: no robot on any domain in " + fixed(facts.listened_s, 1) + " s",
+         .what = "no robot announced itself on any domain in " + fixed(facts.listened_s, 1) + " s",
          .means = "this host is ready; whether others reach it is not known",
          .to_do =
              "start a robot on another host and look again; of one that runs, --peers ADDRESS"});
 }
 
 void examine_echo(const PeerEcho& peer, Examination& result) {
-  if (!peer.may_ask) {
+  if (!peer.may_send_icmp) {
     result.figures.push_back(
         {"peer " + peer.host,
          "not determined: this user may not send ICMP (net.ipv4.ping_group_range)"});
@@ -334,8 +333,8 @@ void examine_clock(const ClockDifference& clock, Examination& result) {
 
 }  // namespace
 
-std::optional<Announced> parse_announcement(const std::vector<std::uint8_t>& packet, int domain,
-                                            const std::string& from) {
+std::optional<AnnouncedParticipant> parse_announcement(const std::vector<std::uint8_t>& packet,
+                                                       int domain, const std::string& from) {
   if (packet.size() < kHeaderBytes || std::memcmp(packet.data(), "RTPS", 4) != 0)
     return std::nullopt;
   std::size_t at = kHeaderBytes;
@@ -352,12 +351,12 @@ std::optional<Announced> parse_announcement(const std::vector<std::uint8_t>& pac
     std::size_t payload = begin + 4 + submessage.number(begin + 2, 2);
     if ((flags & kInlineQos) != 0)
       payload = for_each_parameter(submessage, payload, [](std::uint16_t, std::size_t) {});
-    Announced found{.guid_prefix = {},
-                    .domain = domain,
-                    .team = {},
-                    .from = from,
-                    .user_data = {},
-                    .identity = {}};
+    AnnouncedParticipant found{.guid_prefix = {},
+                               .domain = domain,
+                               .team = {},
+                               .from = from,
+                               .user_data = {},
+                               .identity = {}};
     std::copy_n(packet.begin() + kPrefixAt, found.guid_prefix.size(), found.guid_prefix.begin());
     read_participant(submessage.part(payload, end), found);
     return found;

@@ -16,7 +16,7 @@
 namespace km {
 
 /// A DDS participant by its announcement.
-struct Announced {
+struct AnnouncedParticipant {
   /// GUID prefix of the participant's process; zero if unknown.
   std::array<std::uint8_t, 12> guid_prefix = {};
   int domain = 0;
@@ -30,15 +30,15 @@ struct Announced {
 /// The participant that a packet of DDS discovery announces; nullopt for other bytes. `from`:
 /// address of the sender. `domain`: domain of the socket that received the packet. RTPS 2.5, 8.5.3
 /// and 9.6.3.2 (SPDPdiscoveredParticipantData).
-[[nodiscard]] std::optional<Announced> parse_announcement(const std::vector<std::uint8_t>& packet,
-                                                          int domain, const std::string& from);
+[[nodiscard]] std::optional<AnnouncedParticipant> parse_announcement(
+    const std::vector<std::uint8_t>& packet, int domain, const std::string& from);
 
 /// Result of echo requests to a peer.
 struct PeerEcho {
   std::string host;
   std::size_t sent = 0, received = 0;
   double median_s = 0.0, worst_s = 0.0;  ///< Round trip time; NaN without a reply.
-  bool may_ask = true;                   ///< False if this user has no permission for ICMP.
+  bool may_send_icmp = true;             ///< False if this user has no permission for ICMP.
 };
 
 /// Offset of the wall clock of a robot from the clock of this host. It is the least difference over
@@ -59,11 +59,11 @@ struct NetworkFacts {
       {};  ///< Reason why an own datagram to the group did not come back.
   std::optional<std::string> no_unicast =
       {};  ///< Reason why an own datagram to the own address did not come back.
-  std::optional<long> largest_receive_buffer = {};  ///< net.core.rmem_max [B].
-  std::vector<Announced> announced = {};            ///< Participants on all domains up to
-                                                    ///< kLastQuietDomain.
-  std::vector<Announced> received = {};  ///< Participants that DDS itself receives as configured,
-                                         ///< also by address.
+  std::optional<long> largest_receive_buffer = {};   ///< net.core.rmem_max [B].
+  std::vector<AnnouncedParticipant> announced = {};  ///< Participants on all domains up to
+                                                     ///< kLastQuietDomain.
+  std::vector<AnnouncedParticipant> received = {};   ///< Participants that DDS itself receives as
+                                                     ///< configured, also by address.
   double listened_s = 0.0;
   std::vector<PeerEcho> echoes = {};
   std::vector<ClockDifference> clocks = {};
@@ -73,7 +73,7 @@ struct NetworkFacts {
 /// network.no_multicast_flag,
 /// network.multicast, network.firewall, network.mtu, network.buffers, network.domain_ports,
 /// network.other_domain, network.other_team, network.protocol, network.same_id,
-/// network.other_programs, `network.nobody`, network.unreachable, network.loss, network.slow,
+/// network.other_programs, `network.no_peers`, network.unreachable, network.loss, network.slow,
 /// network.clock.
 [[nodiscard]] Examination examine_network(const NetworkFacts& facts);
 

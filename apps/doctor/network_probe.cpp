@@ -86,8 +86,8 @@ std::optional<std::string> try_unicast(const NetworkInterface& chosen) {
 }
 
 // Adds an announcement, unless one with equal domain, team, address and user data is known.
-void keep(std::vector<Announced>& all, const Announced& one) {
-  const auto is_same = [&one](const Announced& other) {
+void keep(std::vector<AnnouncedParticipant>& all, const AnnouncedParticipant& one) {
+  const auto is_same = [&one](const AnnouncedParticipant& other) {
     return other.domain == one.domain && other.team == one.team && other.from == one.from &&
            other.user_data == one.user_data;
   };
@@ -112,7 +112,8 @@ class DiscoveryListener {
   }
 
   // Collects all announcements except for those of `self`.
-  void listen(milliseconds patience, const Guid& self, std::vector<Announced>& received) {
+  void listen(milliseconds patience, const Guid& self,
+              std::vector<AnnouncedParticipant>& received) {
     std::vector<pollfd> waiting;
     for (const DatagramSocket& socket : sockets_)
       waiting.push_back({.fd = socket.handle(), .events = POLLIN, .revents = 0});
@@ -133,9 +134,9 @@ class DiscoveryListener {
 };
 
 // A DDS participant that takes part in discovery only, and that robots ignore.
-class Bystander {
+class DiscoveryObserver {
  public:
-  explicit Bystander(const DdsConfig& config)
+  explicit DiscoveryObserver(const DdsConfig& config)
       : domain_(config),
         participant_(
             dds_create_participant(static_cast<dds_domainid_t>(config.domain), nullptr, nullptr),
@@ -158,16 +159,16 @@ class Bystander {
 
   // Adds the robots that DDS has discovered since the last call. Participants that do not claim to
   // be robots are ignored.
-  void take(std::vector<Announced>& received) {
+  void take(std::vector<AnnouncedParticipant>& received) {
     for_each(participants_, [&](const dds_sample_info_t& info, const void* sample) {
       const auto& found = *static_cast<const dds_builtintopic_participant_t*>(sample);
       if (!info.valid_data) return;
-      Announced one{.guid_prefix = {},
-                    .domain = domain_.config().domain,
-                    .team = domain_.config().team,  // the only team that DDS discovers
-                    .from = {},
-                    .user_data = user_data_of(found.qos),
-                    .identity = {}};
+      AnnouncedParticipant one{.guid_prefix = {},
+                               .domain = domain_.config().domain,
+                               .team = domain_.config().team,  // the only team that DDS discovers
+                               .from = {},
+                               .user_data = user_data_of(found.qos),
+                               .identity = {}};
       if (!claims_to_be_a_robot(one.user_data)) return;  // the doctor, and other programs
       if (const auto announcement = parse_user_data(one.user_data).value) {
         one.identity = announcement->identity;
@@ -259,7 +260,7 @@ PeerEcho ask(const std::string& host) {
                 .worst_s = std::numeric_limits<double>::quiet_NaN()};
   const auto address = address_of(host);
   auto socket = DatagramSocket::icmp();
-  echo.may_ask = socket.has_value();
+  echo.may_send_icmp = socket.has_value();
   if (!socket || !address) return echo;
   std::vector<double> times_s;
   const auto is_silent = [&] { return times_s.empty() && echo.sent >= kEchoesUnanswered; };
@@ -285,16 +286,16 @@ PeerEcho ask(const std::string& host) {
 void listen(const DdsConfig& config, double listen_s, const ReportProgress& report_progress,
             NetworkFacts& facts) {
   DiscoveryListener listener(config, *facts.chosen);
-  Bystander bystander(config);
+  DiscoveryObserver observer(config);
   const double start_s = steady_now_s();
   while (steady_now_s() - start_s < listen_s) {
     report_progress("listening", (steady_now_s() - start_s) / listen_s);
-    listener.listen(milliseconds(20), bystander.guid(), facts.announced);
-    bystander.take(facts.received);
-    bystander.take_clocks();
+    listener.listen(milliseconds(20), observer.guid(), facts.announced);
+    observer.take(facts.received);
+    observer.take_clocks();
   }
   facts.listened_s = listen_s;
-  facts.clocks = bystander.clocks();
+  facts.clocks = observer.clocks();
 }
 
 }  // namespace

@@ -15,7 +15,7 @@
 #include "apps/stage_progress.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 
 namespace km {
 namespace {
@@ -64,11 +64,11 @@ void run(const MeshCommand& command) {
   options.T_truth_estimate = placed_by(command);
   StageProgress progress;
   progress("reading", 0.0);
-  const LabelledMesh truth = read_ply(command.truth);
+  const LabelledMesh truth = read_mesh(command.truth);
   std::deque<LabelledMesh> meshes;  // inputs refer to them
   std::vector<MeshInput> inputs;
   for (const auto& file : command.estimates)
-    inputs.push_back({short_name(file), meshes.emplace_back(read_ply(file))});
+    inputs.push_back({short_name(file), meshes.emplace_back(read_mesh(file))});
   std::vector<MeshInput> all = {{command.truth.string(), truth}};
   for (const MeshInput& input : inputs) all.push_back(input);
   const LabelPalette palette = read_palette(command.palette, command.truth, all);

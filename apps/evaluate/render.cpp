@@ -18,7 +18,7 @@
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/picture/mesh_picture.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 
 namespace km {
 namespace {
@@ -110,7 +110,7 @@ void run(const RenderCommand& command) {
   PictureScene scene;
   LabelledMesh all;
   for (const fs::path& file : command.meshes) {
-    meshes.emplace_back(read_ply(file)).transform(T_picture_mesh);
+    meshes.emplace_back(read_mesh(file)).transform(T_picture_mesh);
     all.append(meshes.back());
     scene.names.push_back(short_name(file));
   }

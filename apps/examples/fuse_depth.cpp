@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/image_file.hpp"
 
@@ -51,7 +51,7 @@ int run(int argc, char** argv) {
 
   (void)mapper.update_mesh();
   const MapMesh map = mapper.mesh();
-  write_ply(argv[2], map.mesh);
+  write_mesh(argv[2], map.mesh);
   std::cout << frames << " depth images, " << map.mesh.faces.size() << " faces\n";
   return map.mesh.empty() ? 1 : 0;
 }

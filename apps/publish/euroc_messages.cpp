@@ -65,7 +65,8 @@ void EurocMessages::add(const char* topic, Stamp stamp, std::vector<std::uint8_t
       {static_cast<std::size_t>(channel - channels_.begin()), stamp, std::move(bytes)});
 }
 
-// Adds the frame before the last sample of its packet, which is not earlier than the frame.
+// Adds the samples of a packet, and its frame before the last sample, because only this sample can
+// be later than the frame.
 void EurocMessages::take(const SensorPacket& packet) {
   const StereoFrame& frame = *packet.frame;
   const auto add_frame = [&] {

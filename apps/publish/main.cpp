@@ -6,9 +6,9 @@
 #include <thread>
 
 #include "apps/program_version.hpp"
-#include "apps/publish/answers.hpp"
 #include "apps/publish/euroc_messages.hpp"
 #include "apps/publish/message_player.hpp"
+#include "apps/publish/pose_latency.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/sensors/euroc_rig_codec.hpp"
@@ -45,7 +45,7 @@ struct Options {
   RosConfig ros;
   PlayOptions play;
   std::size_t wait = 0;
-  std::string answers;
+  std::string latency;
 };
 
 Options parse_options(int argc, char** argv) {
@@ -67,7 +67,7 @@ Options parse_options(int argc, char** argv) {
                  "Number of readers of each topic to wait for before playing")
       ->capture_default_str();
   app.add_option(
-      "--answers", options.answers,
+      "--latency", options.latency,
       "Topic of a robot's nav_msgs/Odometry (/robot0/odometry), to measure the time from an image "
       "to its pose");
   app.add_flag("--reliable", options.play.reliable,
@@ -152,12 +152,12 @@ bool wait_for_readers(const MessagePlayer& player, std::size_t wanted, SignalWat
 void play(const Options& options, SignalWatch& signals) {
   const auto network = std::make_shared<const RosNetwork>(options.ros);
   MessagePlayer player(open(options.recording), network, options.play);
-  std::optional<Answers> answers;
-  if (!options.answers.empty()) {
-    answers.emplace(network, options.answers);
-    player.on_image([&answers](Stamp stamp) { answers->sent(stamp); });
+  std::optional<PoseLatency> latency;
+  if (!options.latency.empty()) {
+    latency.emplace(network, options.latency);
+    player.on_image([&latency](Stamp stamp) { latency->sent(stamp); });
   }
-  for (const std::string& topic : player.left_out())
+  for (const std::string& topic : player.unsupported_topics())
     log::warn("publish") << "left out, its type is not known: " << topic;
   if (player.topics().empty()) throw std::invalid_argument("there is no topic to play");
   if (!wait_for_readers(player, options.wait, signals)) return;
@@ -172,9 +172,9 @@ void play(const Options& options, SignalWatch& signals) {
     if (progress.is_due()) log::info("publish") << fixed(player.played_s(), 1) << " s played";
   ended = true;
   std::cout << table(player.topics());
-  if (!answers) return;
+  if (!latency) return;
   static_cast<void>(signals.wait(1.0));  // time for the last messages to arrive
-  std::cout << answers->text() << '\n';
+  std::cout << latency->text() << '\n';
 }
 
 }  // namespace

@@ -117,9 +117,9 @@ void MessagePlayer::schedule(BagMessage message) {
     ++topics_[topic].refused;
     return;
   }
-  // Late in time of the recording, as clock_ counts.
-  const double late_s = options_.rate * (options_.delay_s + options_.jitter_s * uniform(random_));
-  due_.push({message.log_time + nanoseconds(late_s), number_++, topic, std::move(*bytes)});
+  // Delay in the time of the recording, in which clock_ counts.
+  const double delay_s = options_.rate * (options_.delay_s + options_.jitter_s * uniform(random_));
+  due_.push({message.log_time + nanoseconds(delay_s), number_++, topic, std::move(*bytes)});
 }
 
 void MessagePlayer::notify_image(const Due& due) const {

@@ -42,7 +42,7 @@ struct PlayedTopic {
 /// Messages of ROS 1 are converted to ROS 2.
 class MessagePlayer {
  public:
-  /// Topics with types unknown to RosNetwork are left out: `left_out()`. Throws
+  /// Topics with types unknown to RosNetwork are not played, see unsupported_topics(). Throws
   /// std::invalid_argument for topics to play that the recording does not have.
   MessagePlayer(std::unique_ptr<BagReader> recording,
                 const std::shared_ptr<const RosNetwork>& network, const PlayOptions& options);
@@ -60,7 +60,7 @@ class MessagePlayer {
   void stop() { clock_.stop(); }
 
   [[nodiscard]] const std::vector<PlayedTopic>& topics() const { return topics_; }
-  [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
+  [[nodiscard]] const std::vector<std::string>& unsupported_topics() const { return left_out_; }
   /// Time of the last published message, in the recording's time since its first message.
   [[nodiscard]] double played_s() const { return played_s_; }
 

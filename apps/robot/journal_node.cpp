@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "modules/core/input_file.hpp"
+#include "runtime/clock.hpp"
 
 namespace km {
 namespace {
@@ -41,7 +42,7 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
       known_closures_.emplace(closure.from.id, closure.to.id);
     places_ = restored->places;
   }
-  add(start);
+  for (int copy = 0; copy < 2; ++copy) add(start);  // nothing can be restored without it
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics.states.subscribe(post);
   topics.odometry.subscribe(post);
@@ -53,6 +54,7 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
   topics.new_restarts.subscribe(post);
   topics.peer_closures.subscribe([this](const auto& closure) { worker_.post(FromPeer{closure}); });
   topics.outcomes.subscribe(post);
+  if (restored == nullptr) topics.restored_outcomes.subscribe(post);
   topics.peer_events.subscribe([this](const auto& event) {
     using enum PeerEventKind;
     if (event->kind == kJoined || event->kind == kReported || event->kind == kResumed)
@@ -76,8 +78,14 @@ std::exception_ptr JournalNode::error() const {
 }
 
 std::optional<JournalPlace> JournalNode::add(const JournalEntry& entry) {
-  added_ = true;
-  return journal_.add(entry);
+  const std::lock_guard lock(mutex_);
+  return journal_.add(entry, nanoseconds(wall_now_s()));
+}
+
+// False if there is nothing to write.
+bool JournalNode::collect() {
+  const std::lock_guard lock(mutex_);
+  return journal_.collect();
 }
 
 std::shared_ptr<const Keyframe> JournalNode::recall(KeyframeIndex keyframe) const {
@@ -98,15 +106,16 @@ std::shared_ptr<const Keyframe> JournalNode::recall(KeyframeIndex keyframe) cons
 }
 
 void JournalNode::step(Tick /*tick*/) {
-  if (!added_) return;
-  results_.write(file_, [this](const auto& file) {
-    journal_.sync();
-    added_ = false;
-    if (!journal_.is_whole())
-      throw std::runtime_error(file.string() +
-                               ": ends where the disk was full for too long: a resumed run "
-                               "continues from there");
-  });
+  if (collect())
+    results_.write(file_, [this](const auto& file) {
+      do journal_.write();
+      while (collect());
+      const std::lock_guard lock(mutex_);
+      if (!journal_.is_whole())
+        throw std::runtime_error(file.string() +
+                                 ": ends where the disk was full for too long: a resumed run "
+                                 "continues from there");
+    });
   for (const HeldBack& held : std::exchange(held_back_, {}))
     std::visit([this](const auto& message) { pass(message); }, held);
 }
@@ -124,7 +133,8 @@ void JournalNode::step(const Message<KeyframeOdometry>& odometry) {
   if (odometry->id.index < known_keyframes_) return;
   KeyframeOdometry keyframe = *odometry;
   if (keyframe.calibration)
-    keyframe.calibration->calibration = keyframe.calibration->calibration.on_top_of(correction_);
+    keyframe.calibration->calibration =
+        keyframe.calibration->calibration.composed_with(correction_);
   add(keyframe);
 }
 

@@ -37,6 +37,7 @@ struct JournalTopics {
       new_restarts;  ///< In order with new_closures: later closures belong to a new incarnation.
   In<Closure> peer_closures;
   In<ClosureOutcome> outcomes;
+  In<ClosureOutcome> restored_outcomes;  ///< Written if the journal is new.
   In<PeerEvent> peer_events;
   // Published in the same order once they are on the disk.
   Out<Keyframe> keyframes;
@@ -44,12 +45,11 @@ struct JournalTopics {
   Out<PeerEvent> restarts;
 };
 
-/// Writes everything that a robot must not lose with its process to the disk, several times a
-/// second, so that it survives a crash of the machine. Keyframes and closures are published only
-/// after they are written. Everything that other robots receive can therefore be restored: an index
-/// always stands for one keyframe, and both robots of a closure know the same measurement. If the
-/// disk is full or fails, all messages are published, the failure is reported, and the run
-/// continues.
+/// Writes the events of the run to the disk, several times a second, so that they survive a crash
+/// of the machine. Keyframes and closures are published only after they are written. Everything
+/// that other robots receive can therefore be restored: an index always stands for one keyframe,
+/// and both robots of a closure know the same measurement. If the disk is full or fails, all
+/// messages are published, the failure is reported, and the run continues.
 class JournalNode final : public Node {
  public:
   /// Continues the journal of `restored`, or begins a new one. `results` outlives this. The
@@ -61,9 +61,12 @@ class JournalNode final : public Node {
               const JournalTopics& topics);
   ~JournalNode() override { stop(); }
 
-  /// Writes the boot id of this process to the journal, so that no later process uses it again.
-  /// Call before start().
-  void take_up() { step(Tick()); }
+  /// Writes all entries. Before start(): the boot id of this process, so that no later process uses
+  /// it again. After stop(): entries of nodes that stop later.
+  void write() { step(Tick()); }
+
+  /// Appends an event of another node. Thread-safe; does not wait for the disk.
+  void append(const JournalEntry& entry) { (void)add(entry); }
 
   /// A keyframe of this run as it was written; null if it is not on the disk. Thread-safe.
   [[nodiscard]] std::shared_ptr<const Keyframe> recall(KeyframeIndex keyframe) const;
@@ -102,6 +105,7 @@ class JournalNode final : public Node {
   void step(const Message<ClosureOutcome>& outcome);
   void step(const Message<PeerEvent>& event);
   std::optional<JournalPlace> add(const JournalEntry& entry);
+  bool collect();
   void pass(const Message<Keyframe>& keyframe);
   void pass(const Message<Closure>& closure) { topics_.closures.publish(closure); }
   void pass(const Message<PeerEvent>& restart) { topics_.restarts.publish(restart); }
@@ -114,10 +118,9 @@ class JournalNode final : public Node {
   // Number of keyframes in the continued journal: RestoreNode publishes them once more.
   const std::size_t known_keyframes_;
   std::set<std::pair<KeyframeId, KeyframeId>> known_closures_;
-  bool added_ = false;                          // true if entries were added since the last sync
   std::atomic<std::size_t> new_keyframes_ = 0;  // number of keyframes not yet published
   std::vector<HeldBack> held_back_;
-  mutable std::mutex mutex_;  // guards places_
+  mutable std::mutex mutex_;  // guards places_, and journal_ except for its write()
   std::vector<JournalPlace>
       places_;  // places of keyframes 0, 1, ..., up to the first that is not on the disk
   Worker<Input> worker_;

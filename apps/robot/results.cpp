@@ -1,6 +1,7 @@
 #include "apps/robot/results.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <array>
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
@@ -17,21 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const char* to_string(ClosureStage stage) {
-  switch (stage) {
-    case ClosureStage::kCandidate:
-      return "candidate";
-    case ClosureStage::kRequested:
-      return "requested";
-    case ClosureStage::kReceived:
-      return "received";
-    case ClosureStage::kVerified:
-      return "verified";
-    case ClosureStage::kInlier:
-      return "inlier";
-  }
-  return "";
-}
+// By ClosureStage.
+constexpr std::array kStageNames = {"candidate", "requested", "received", "verified", "inlier"};
 
 void write_keyframes(std::ostream& out, const RunRecord& record) {
   out << "robot,keyframe,stamp_ns,median_depth_m\n";
@@ -50,6 +38,12 @@ std::optional<SE3> measured_pose(const RunRecord& record, const ClosureOutcome& 
   return same_way ? measured.T_from_to : measured.T_from_to.inverse();
 }
 
+ClosureStatus status_of(const ClosureOutcome& outcome) {
+  if (outcome.stage == ClosureStage::kInlier) return ClosureStatus::kKept;
+  if (outcome.stage < ClosureStage::kVerified) return ClosureStatus::kCandidate;
+  return outcome.reason.empty() ? ClosureStatus::kVerified : ClosureStatus::kRejected;
+}
+
 // tx,ty,tz,qx,qy,qz,qw, all empty without a pose.
 std::string pose_fields(const std::optional<SE3>& T_from_to) {
   if (!T_from_to) return ",,,,,,";
@@ -66,9 +60,10 @@ void write_closures(std::ostream& out, const RunRecord& record) {
          "tx,ty,tz,qx,qy,qz,qw,reason\n";
   for (const ClosureOutcome& row : record.outcomes())
     out << row.id.from.robot << ',' << row.id.from.index << ',' << row.id.to.robot << ','
-        << row.id.to.index << ',' << row.similarity << ',' << to_string(row.stage) << ','
-        << row.matches << ',' << row.inliers << ',' << pose_fields(measured_pose(record, row))
-        << ",\"" << row.reason << "\"\n";
+        << row.id.to.index << ',' << row.similarity << ','
+        << kStageNames.at(static_cast<std::size_t>(row.stage)) << ',' << row.matches << ','
+        << row.inliers << ',' << pose_fields(measured_pose(record, row)) << ",\"" << row.reason
+        << "\"\n";
 }
 
 // The covariance of a step of odometry, scaled by the noise that the optimiser used.
@@ -103,12 +98,12 @@ MappingSummary map_counts(const RunRecord& record) {
   const DenseSensingProgress sensing = record.dense_sensing().value_or(DenseSensingProgress{});
   const RunRecord::MeshCorrections& corrections = record.mesh_corrections();
   return {.frames = map.integrated,
-          .gave_way = sensing.gave_way,
+          .dropped_under_load = sensing.dropped_under_load,
           .skipped_wrong_size = sensing.wrong_size + map.wrong_size,
           .skipped_bad_pose = map.bad_pose,
           .skipped_too_late = map.too_late,
           .without_labels = map.unlabelled,
-          .label_pixels_outside_palette = map.labels_outside + sensing.classes_outside,
+          .label_pixels_outside_palette = map.off_palette_pixels + sensing.unmapped_pixels,
           .blocks_refused = map.blocks_refused,
           .blocks = map.size.blocks,
           .vertices = map.size.vertices,
@@ -217,8 +212,7 @@ std::vector<PublishedClosure> published_closures(const RunRecord& record) {
   std::vector<PublishedClosure> published;
   for (const ClosureOutcome& outcome : record.outcomes())
     published.push_back({.id = outcome.id,
-                         .stage = outcome.stage,
-                         .rejected = !outcome.reason.empty(),
+                         .status = status_of(outcome),
                          .T_from_to = measured_pose(record, outcome)});
   return published;
 }

@@ -19,7 +19,6 @@
 #include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/pose_file.hpp"
 #include "modules/sensors/rig_file_codec.hpp"
-#include "modules/sensors/ros_image.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -30,6 +29,18 @@ namespace fs = std::filesystem;
 // True for messages of ROS, recorded or live; false for a EuRoC folder.
 bool has_messages(const RobotOptions& options) {
   return options.is_live || (!options.dataset.empty() && may_be_bag(options.dataset));
+}
+
+// States the damaged parts of the journal, and keeps it as it was found.
+void report_damage(const fs::path& file, const RestoredRun& run) {
+  for (const JournalDamage& damage : run.journal.damages)
+    log::warn("journal") << to_string(damage, file);
+  if (run.journal.damages.empty()) return;
+  const fs::path copy = file.string() + kDamaged;
+  std::error_code error;
+  fs::copy_file(file, copy, fs::copy_options::skip_existing, error);
+  log::warn("journal") << run.lost_keyframes << " keyframes are incomplete; the journal as it was: "
+                       << (error ? "not copied, " + error.message() : copy.string());
 }
 
 // The run to continue; nullopt if its process ended before the first keyframe.
@@ -43,7 +54,9 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
   RestoredRun run = restore_run(file);
   if (run.journal.cut_bytes > 0)
     log::warn("journal") << file.string() << ": the last " << run.journal.cut_bytes
-                         << " bytes are torn: cut after entry " << run.journal.entries;
+                         << " bytes are torn: cut after entry " << run.journal.entries << ", byte "
+                         << run.journal.whole_bytes;
+  report_damage(file, run);
   if (run.journal.entries == 0) return std::nullopt;
   if (run.robot != options.robot || run.input != input)
     throw std::invalid_argument(file.string() + ": is of robot " + std::to_string(run.robot) +
@@ -57,10 +70,10 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
 }
 
 // The map of the former process; nullopt if the file is missing or damaged.
-std::optional<ContinuedMap> restore_map(const RobotOptions& options, const RestoredRun& run) try {
+std::optional<ResumedMap> restore_map(const RobotOptions& options, const RestoredRun& run) try {
   const fs::path file = options.output / kMap;
   if (is_absent(file)) return std::nullopt;
-  return ContinuedMap(read_map_file(file), static_cast<KeyframeIndex>(run.keyframes.size()));
+  return ResumedMap(read_map_file(file), static_cast<KeyframeIndex>(run.keyframes.size()));
 } catch (const InputFileError& error) {
   log::warn("journal") << error.what() << ": the map starts from the beginning";
   return std::nullopt;
@@ -74,22 +87,9 @@ RestoredRun open_session(const RobotOptions& options) {
   return alone_as(options.robot, std::move(run));
 }
 
-// Subscribes to sensors over DDS: of images only the newest few are needed, of inertial samples
-// all.
 std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
                                      const SensorTopicNames& topics) {
-  constexpr int kImages = 10, kSamples = 4000;
-  std::vector<RosTopic> wanted;
-  for (const std::string& topic : {topics.left, topics.right, topics.depth})
-    if (!topic.empty())
-      wanted.push_back({topic, std::string(type_of_images(topic)), RosQos::kSensorData, kImages});
-  for (const std::string& topic : {topics.imu, topics.gyro, topics.accel})
-    if (!topic.empty())
-      wanted.push_back({topic, std::string(RosImu::kType), RosQos::kSensorData, kSamples});
-  if (!topics.odometry.empty())
-    wanted.push_back(
-        {topics.odometry, std::string(RosOdometry::kType), RosQos::kSensorData, kSamples});
-  return std::make_unique<LiveBag>(std::move(network), std::move(wanted));
+  return std::make_unique<LiveBag>(std::move(network), live_topics(topics));
 }
 
 // Ends the wait for messages when a signal arrives.
@@ -249,6 +249,13 @@ RecordedGraph open_graph(const RobotOptions& options) {
 }
 
 }  // namespace
+
+std::vector<RosTopic> live_topics(const SensorTopicNames& names) {
+  std::vector<RosTopic> topics;
+  for (const auto& [kind, topic, type] : sensor_topics(names))
+    topics.push_back({topic, std::string(type), RosQos::kSensorData, kind->queue_size});
+  return topics;
+}
 
 RigInput read_rig_input(const RobotOptions& options) {
   if (options.rig.empty()) return {};

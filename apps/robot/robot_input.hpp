@@ -4,16 +4,18 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "modules/core/camera_calibration.hpp"
 #include "modules/journal/restored_run.hpp"
-#include "modules/mesh/continued_map.hpp"
+#include "modules/mesh/resumed_map.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
 #include "runtime/dds/ros_network.hpp"
+#include "runtime/dds/ros_subscription.hpp"
 #include "runtime/signal_watch.hpp"
 
 namespace km {
@@ -27,7 +29,7 @@ struct RobotInput {
   std::variant<std::unique_ptr<DatasetReader>, RecordedGraph, PastRun> source;
   std::string name;  ///< For the journal.
   std::optional<RestoredRun> restored = {};
-  std::optional<ContinuedMap> map = {};  ///< Map of the restored run; absent without mapping.
+  std::optional<ResumedMap> map = {};  ///< Map of the restored run; absent without mapping.
   std::shared_ptr<const RosNetwork> ros =
       nullptr;  ///< Null unless the robot reads or publishes topics of ROS.
   CameraCalibration rig_correction = {};  ///< Correction already applied to the rig of the sensors.
@@ -39,6 +41,9 @@ struct RigInput {
   std::optional<PartialRig> messages;  ///< Rig of sensors that come as messages.
   CameraCalibration correction;        ///< Correction of the calibration.
 };
+
+/// Subscriptions to the topics of live sensors.
+[[nodiscard]] std::vector<RosTopic> live_topics(const SensorTopicNames& names);
 
 /// Throws ConfigError and DatasetError, see read_rig_file() and read_rig_correction().
 [[nodiscard]] RigInput read_rig_input(const RobotOptions& options);

@@ -219,6 +219,7 @@ class Watch {
         robot_.expect_no_more_closures();
     });
     if (now_s - written_s_ >= kInterval_s) write(now_s, traffic);
+    if (now_s - sampled_s_ >= kInterval_s && !leaving_since_s_) sample(now_s);
     return robot_.id_taken() || (departure_.reason() != nullptr && leave_notice_sent(now_s));
   }
 
@@ -249,8 +250,9 @@ class Watch {
   bool leave_notice_sent(double now_s) {
     if (!leaving_since_s_) {
       leaving_since_s_ = now_s;
-      robot_.freeze_record();
       robot_.set_settled({RobotPhase::kLeaving, kManyLinks});
+      sample(now_s);
+      robot_.freeze_record();
     }
     return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kLeaveNotice_s;
   }
@@ -304,6 +306,11 @@ class Watch {
     return present;
   }
 
+  void sample(double now_s) {
+    sampled_s_ = now_s;
+    robot_.publish_sample();
+  }
+
   void write(double now_s, const TrafficSnapshot& traffic) {
     const double run_s = process_csv_.former_s() + now_s;
     traffic_csv_.append(run_s, traffic);
@@ -328,6 +335,7 @@ class Watch {
   RoundsCsv rounds_csv_;
   double written_s_ = 0.0;
   double logged_s_ = -kInterval_s;
+  double sampled_s_ = -kInterval_s;
   std::optional<double> leaving_since_s_;
   StatusLine status_line_;
 };
@@ -367,16 +375,6 @@ void log_end(const RobotOptions& options, const RunEnd& end, const Verdict& verd
   else
     log::info("robot") << "done (" << verdict.reason << ')' << images << ", results in "
                        << options.output.string();
-}
-
-std::map<std::string, std::uint64_t> sent_bytes(Robot& robot) {
-  const TrafficSnapshot traffic = robot.bridge().traffic();
-  std::map<std::string, std::uint64_t> bytes;
-  for (const auto category :
-       {TrafficCategory::kPlaceRecognition, TrafficCategory::kGeometricVerification,
-        TrafficCategory::kPoseGraphOptimization, TrafficCategory::kOther})
-    bytes[to_string(category)] = traffic.bytes(Direction::kOut, category);
-  return bytes;
 }
 
 HeldBackSums held_back(Robot& robot) {
@@ -470,7 +468,7 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
     for (const auto& [fault, entry] : faults.entries())
       summary.sensor_faults[to_string(fault)] = entry.count;
   }
-  summary.traffic = sent_bytes(robot);
+  summary.traffic = robot.sent_bytes();
   if (config.budget.is_limited()) summary.held_back = held_back(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();
@@ -502,7 +500,7 @@ void write_estimated_rig(const RobotOptions& options, const RigInput& rig, const
                          ResultWriter& results) {
   const std::optional<UncertainCalibration> found = record.calibration();
   if (!found) return;
-  const CameraCalibration correction = found->calibration.on_top_of(rig.correction);
+  const CameraCalibration correction = found->calibration.composed_with(rig.correction);
   results.write(options.output / kEstimatedRig, [&](const auto& file) {
     write_file(file,
                "# Stamps and mounting of the cameras as vio.calibrate found them: for --rig\n" +

@@ -188,13 +188,13 @@ void add_paused(const RunSummary& run, std::vector<Finding>& findings) {
 }
 
 void add_map_gave_way(const RunSummary& run, std::vector<Finding>& findings) {
-  if (!run.mapping || run.mapping->gave_way == 0) return;
-  const auto left_out = static_cast<double>(run.mapping->gave_way);
+  if (!run.mapping || run.mapping->dropped_under_load == 0) return;
+  const auto left_out = static_cast<double>(run.mapping->dropped_under_load);
   const double share = left_out / (left_out + static_cast<double>(run.mapping->frames));
   constexpr double kFew = 0.05;
-  findings.push_back({.id = "map.gave_way",
+  findings.push_back({.id = "map.dropped_under_load",
                       .severity = share < kFew ? Severity::kNote : Severity::kWarning,
-                      .what = run.name + ": " + std::to_string(run.mapping->gave_way) +
+                      .what = run.name + ": " + std::to_string(run.mapping->dropped_under_load) +
                               " frames were left out of the map, " + percent(share),
                       .means = "processors were short, and the map gives way to odometry: it may "
                                "have holes",

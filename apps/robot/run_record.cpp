@@ -1,8 +1,11 @@
 #include "apps/robot/run_record.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "modules/core/odometry_correction.hpp"
+#include "modules/mesh/mesh_chunks.hpp"
 #include "modules/pose_graph/own_graph.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 
@@ -10,6 +13,22 @@ namespace km {
 namespace {
 
 constexpr std::size_t kRecordQueue = 4096;  // far more than a module publishes in a second
+constexpr std::size_t kMostInEvent = 2000;  // so that an event is far smaller than an entry may be
+
+// Appends `whole` in events of at most kMostInEvent elements of its list.
+template <typename Event, typename Element>
+void append_in_parts(const Event& whole, std::vector<Element> Event::*list,
+                     std::vector<JournalEntry>& events) {
+  const std::vector<Element>& all = whole.*list;
+  for (std::size_t begin = 0; begin < all.size(); begin += kMostInEvent) {
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(begin);
+    Event part = whole;
+    (part.*list)
+        .assign(first,
+                first + static_cast<std::ptrdiff_t>(std::min(kMostInEvent, all.size() - begin)));
+    events.emplace_back(std::move(part));
+  }
+}
 
 }  // namespace
 
@@ -59,7 +78,10 @@ void RunRecord::add(const InlierSet& set) {
   ++activity_;
   if (set.a != robot_ && set.b != robot_) return;
   InlierSet& newest = inlier_sets_[{set.a, set.b}];
-  if (set.version >= newest.version) newest = set;
+  if (set.version < newest.version) return;
+  const InlierSet former = std::exchange(newest, set);
+  for (const ClosureId& id : former.closures) judge(id);
+  for (const ClosureId& id : set.closures) judge(id);
 }
 
 void RunRecord::add(const ClosureOutcome& outcome) {
@@ -86,7 +108,17 @@ void RunRecord::add(const ClosureVerdicts& verdicts) {
       rejected_.erase(closure.id);
     else
       rejected_.insert(closure.id);
+    judge(closure.id);
   }
+}
+
+void RunRecord::judge(const ClosureId& id) {
+  const auto set = inlier_sets_.find(std::minmax(id.from.robot, id.to.robot));
+  const ClosureJudgement now{
+      id, set != inlier_sets_.end() && std::ranges::binary_search(set->second.closures, id),
+      rejected_.contains(id)};
+  if (std::exchange(judgements_.try_emplace(id, ClosureJudgement{id}).first->second, now) != now)
+    changed_judgements_.closures.push_back(now);
 }
 
 void RunRecord::add(const Trajectory& trajectory) {
@@ -101,6 +133,7 @@ void RunRecord::add(const PeerEvent& event) {
   std::erase_if(closures_, of_peer);
   std::erase_if(outcomes_, of_peer);
   std::erase_if(rejected_, [&](const ClosureId& id) { return touches(id, peer); });
+  std::erase_if(judgements_, of_peer);
   inlier_sets_.erase(std::minmax(robot_, peer));
   other_vocabulary_.erase(peer);
 }
@@ -110,6 +143,35 @@ void RunRecord::add(const OptimizedMesh& mesh) {
   ++(mesh.deformed ? mesh_corrections_.deformed : mesh_corrections_.moved);
   mesh_corrections_.seconds += mesh.seconds;
   mesh_corrections_.last = mesh.report;
+  if (stated_cells_.anchor != mesh.anchor) stated_cells_ = {mesh.anchor, {}};
+  MeshCells fresh{mesh.anchor, {}};
+  const std::vector<MeshCells::Cell> cells = occupied_cells(mesh.mesh, ChunkGrid{}.cell_m);
+  std::ranges::set_difference(cells, stated_cells_.cells, std::back_inserter(fresh.cells));
+  std::vector<MeshCells::Cell> all;
+  std::ranges::set_union(cells, stated_cells_.cells, std::back_inserter(all));
+  stated_cells_.cells = std::move(all);
+  append_in_parts(fresh, &MeshCells::cells, events_);
+}
+
+void RunRecord::add(const TeamSolution& solution) {
+  add(solution.trajectory);
+  add(solution.verdicts);
+}
+
+void RunRecord::add(const RobotSample& sample) {
+  state_poses();
+  events_.emplace_back(sample);
+}
+
+void RunRecord::state_poses() {
+  if (!trajectory_) return;
+  if (const auto changes = stated_poses_.update(*trajectory_))
+    append_in_parts(*changes, &PoseChanges::poses, events_);
+}
+
+std::vector<JournalEntry> RunRecord::take_events() {
+  append_in_parts(std::exchange(changed_judgements_, {}), &ClosureJudgements::closures, events_);
+  return std::exchange(events_, {});
 }
 
 double RunRecord::median_depth_m(std::uint32_t keyframe) const {
@@ -118,9 +180,8 @@ double RunRecord::median_depth_m(std::uint32_t keyframe) const {
 }
 
 bool RunRecord::is_inlier(const ClosureId& id) const {
-  const auto set = inlier_sets_.find(std::minmax(id.from.robot, id.to.robot));
-  return set != inlier_sets_.end() && !rejected_.contains(id) &&
-         std::binary_search(set->second.closures.begin(), set->second.closures.end(), id);
+  const auto known = judgements_.find(id);
+  return known != judgements_.end() && known->second.is_inlier();
 }
 
 std::vector<RelativePose> RunRecord::inlier_closures() const {
@@ -182,14 +243,26 @@ std::map<RobotId, ClosureTally> RunRecord::closure_tallies() const {
   return result;
 }
 
-RecorderNode::RecorderNode(RobotId robot)
-    : record_(robot),
+RecorderNode::RecorderNode(RobotId robot, std::function<void(JournalEntry)> publish)
+    : publish_(std::move(publish)),
+      record_(robot),
       worker_(
-          kRecordQueue, Overflow::kBlock,
-          [this](const Input& apply) {
-            const std::lock_guard lock(mutex_);
-            apply();
-          },
+          kRecordQueue, Overflow::kBlock, [this](const Input& change) { apply(change); },
           "recorder") {}
+
+void RecorderNode::stop() noexcept {
+  worker_.stop();
+  if (worker_.error() == nullptr) apply([this] { record_.state_poses(); });
+}
+
+void RecorderNode::apply(const Input& change) {
+  std::vector<JournalEntry> events;
+  {
+    const std::lock_guard lock(mutex_);
+    change();
+    events = record_.take_events();
+  }
+  for (JournalEntry& event : events) publish_(std::move(event));
+}
 
 }  // namespace km

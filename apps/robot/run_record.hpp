@@ -15,12 +15,15 @@
 #include "apps/robot/run_findings.hpp"
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/odometry.hpp"
+#include "modules/core/pose_changes.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/stamped_pose.hpp"
+#include "modules/core/team_solution.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
+#include "modules/journal/journal_entry.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
-#include "modules/place_recognition/candidate_filter.hpp"
+#include "modules/place_recognition/place_database.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/vio/vio_statistics.hpp"
 #include "runtime/dds/peer_table.hpp"
@@ -31,7 +34,8 @@
 namespace km {
 
 /// Data that one run leaves behind: filled by the recorder's thread, written to files by
-/// write_results(). Not thread-safe.
+/// write_results(). Turns what the other nodes publish into the events that journal and viewers
+/// receive. Not thread-safe.
 class RunRecord {
  public:
   explicit RunRecord(RobotId robot) : robot_(robot) {}
@@ -52,6 +56,14 @@ class RunRecord {
   void add(const MappingProgress& progress) { mapping_ = progress; }
   void add(const MapMesh& /* the correction of this mesh follows */) { ++activity_; }
   void add(const OptimizedMesh& mesh);
+  void add(const TeamSolution& solution);  ///< Solution of a former process.
+  void add(const RobotSample& sample);     ///< Once a second; states the changed poses, too.
+
+  /// States the poses that have changed since the last sample.
+  void state_poses();
+
+  /// Changes of decisions, poses, states and mesh since the last call, in order.
+  [[nodiscard]] std::vector<JournalEntry> take_events();
 
   [[nodiscard]] RobotId robot() const { return robot_; }
 
@@ -137,6 +149,7 @@ class RunRecord {
 
  private:
   [[nodiscard]] bool is_inlier(const ClosureId& id) const;
+  void judge(const ClosureId& id);
 
   RobotId robot_;
   std::vector<StampedPose> odometry_;
@@ -149,10 +162,15 @@ class RunRecord {
   std::map<RobotId, std::size_t> closures_to_;  // number of entries in `closures_` by the other
                                                 // robot
   std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
+  std::map<ClosureId, ClosureJudgement> judgements_;  // by inlier_sets_ and rejected_
   std::set<ClosureId> rejected_;  // closures of the inlier sets that the optimiser rejected
   std::map<ClosureId, ClosureOutcome> outcomes_;
   std::map<RobotId, std::uint64_t> other_vocabulary_;
   std::optional<Trajectory> trajectory_;
+  StatedPoses stated_poses_;
+  MeshCells stated_cells_;  // all of them, ascending
+  ClosureJudgements changed_judgements_;
+  std::vector<JournalEntry> events_;
   std::optional<DenseSensingProgress> dense_sensing_;
   std::optional<MappingProgress> mapping_;
   MeshCorrections mesh_corrections_;
@@ -161,10 +179,12 @@ class RunRecord {
   std::uint64_t activity_ = 0;
 };
 
-/// Keeps what the other nodes publish, for the status line and the result files.
+/// Keeps what the other nodes publish, for the status line and the result files, and publishes the
+/// events of RunRecord.
 class RecorderNode final : public Node {
  public:
-  explicit RecorderNode(RobotId robot);
+  /// `publish` is called on the recorder's thread, and by stop().
+  RecorderNode(RobotId robot, std::function<void(JournalEntry)> publish);
   ~RecorderNode() override { stop(); }
 
   /// Records everything published on `topic`, for any T that RunRecord takes.
@@ -175,9 +195,7 @@ class RecorderNode final : public Node {
   template <typename T>
   void record(In<T> topic) {
     topic.subscribe([this](const std::shared_ptr<const T>& message) {
-      worker_.post([this, message] {
-        if (!frozen_) record_.add(*message);
-      });
+      if (!frozen_) worker_.post([this, message] { record_.add(*message); });
     });
   }
 
@@ -203,7 +221,7 @@ class RecorderNode final : public Node {
 
   std::string_view name() const override { return "recorder"; }
   void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
+  void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
@@ -211,6 +229,9 @@ class RecorderNode final : public Node {
  private:
   using Input = std::function<void()>;
 
+  void apply(const Input& change);
+
+  const std::function<void(JournalEntry)> publish_;
   mutable std::mutex mutex_;  // guards record_
   RunRecord record_;
   std::atomic<bool> frozen_ = false;

@@ -61,7 +61,7 @@ struct OptimizerSummary {
 /// Frames that went into the map, reasons for skipped ones, and size of the final mesh.
 struct MappingSummary {
   std::uint64_t frames = 0;
-  std::uint64_t gave_way = 0;  ///< Frames left out because processors were short.
+  std::uint64_t dropped_under_load = 0;  ///< Frames left out because processors were short.
   std::uint64_t skipped_wrong_size = 0, skipped_bad_pose = 0, skipped_too_late = 0;
   std::uint64_t without_labels = 0, label_pixels_outside_palette = 0;
   std::uint64_t blocks_refused =
@@ -73,7 +73,7 @@ struct MappingSummary {
 
   void visit_fields(auto& visitor) {
     visitor.field("frames", frames);
-    visitor.field("gave_way", gave_way);
+    visitor.field("dropped_under_load", dropped_under_load);
     visitor.field("skipped_wrong_size", skipped_wrong_size);
     visitor.field("skipped_bad_pose", skipped_bad_pose);
     visitor.field("skipped_too_late", skipped_too_late);

@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
@@ -45,16 +46,21 @@ std::vector<NumberRow> read_number_rows(const fs::path& file, std::size_t column
   return rows;
 }
 
-std::vector<TrafficRow> read_traffic(const fs::path& file) {
+std::vector<SentBytes> read_sent(const fs::path& file) {
   const std::string text = read_input_file(file);
-  std::vector<TrafficRow> rows;
+  std::vector<SentBytes> sent;
+  std::map<std::pair<std::string_view, std::string_view>, double> known;  // by topic and peer
   for (const TextRow& row : rows_below_header(text)) {
     check_fields(row, 8, file);
-    rows.push_back({number(row, 0, file), row.fields[1] == "out", std::string(row.fields[2]),
-                    std::string(row.fields[3]), std::string(row.fields[4]), number(row, 5, file),
-                    number(row, 6, file) + number(row, 7, file)});
+    const double time_s = number(row, 0, file), bytes = number(row, 6, file) + number(row, 7, file);
+    if (sent.empty() || sent.back().time_s < time_s)
+      sent.push_back(
+          {time_s, sent.empty() ? std::map<std::string, double>() : sent.back().by_category});
+    if (row.fields[1] == "out")
+      sent.back().by_category[std::string(row.fields[3])] +=
+          bytes - std::exchange(known[{row.fields[2], row.fields[4]}], bytes);
   }
-  return rows;
+  return sent;
 }
 
 std::vector<ModuleTiming> read_timing(const fs::path& file) {
@@ -66,29 +72,6 @@ std::vector<ModuleTiming> read_timing(const fs::path& file) {
                        number(row, 3, file), number(row, 4, file), number(row, 5, file)});
   }
   return modules;
-}
-
-void TrafficUntil::advance(double time_s) {
-  for (; next_ < rows_.size() && rows_[next_].time_s <= time_s; ++next_) {
-    const TrafficRow& row = rows_[next_];
-    auto& known = sums_[{row.out, row.topic, row.peer}];
-    if (row.out) sent_[row.category] += row.bytes - known.bytes;
-    if (const auto peer = parse_int64(row.peer); !row.out && peer && row.messages > known.messages)
-      last_received_s_[static_cast<RobotId>(*peer)] = row.time_s;
-    known = row;
-  }
-  time_s_ = time_s;
-}
-
-double TrafficUntil::sent(const std::string& category) const {
-  const auto known = sent_.find(category);
-  return known != sent_.end() ? known->second : 0.0;
-}
-
-std::map<RobotId, double> TrafficUntil::silent_s() const {
-  std::map<RobotId, double> silent_s;
-  for (const auto& [robot, received_s] : last_received_s_) silent_s[robot] = time_s_ - received_s;
-  return silent_s;
 }
 
 }  // namespace km

@@ -4,10 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
-#include <tuple>
 #include <vector>
-
-#include "modules/core/ids.hpp"
 
 namespace km {
 
@@ -19,15 +16,13 @@ using NumberRow = std::vector<double>;
 [[nodiscard]] std::vector<NumberRow> read_number_rows(const std::filesystem::path& file,
                                                       std::size_t columns);
 
-/// A row of traffic.csv: messages and bytes from the start of the run to `time_s`, with
-/// retransmissions.
-struct TrafficRow {
+/// Bytes sent from the start of the run to a time of traffic.csv, with retransmissions.
+struct SentBytes {
   double time_s = 0.0;
-  bool out = false;
-  std::string topic, category, peer;
-  double messages = 0.0, bytes = 0.0;
+  std::map<std::string, double> by_category;
 };
-[[nodiscard]] std::vector<TrafficRow> read_traffic(const std::filesystem::path& file);
+/// All times of traffic.csv, which ascend.
+[[nodiscard]] std::vector<SentBytes> read_sent(const std::filesystem::path& file);
 
 /// A row of timing.csv: the steps of one module.
 struct ModuleTiming {
@@ -37,30 +32,5 @@ struct ModuleTiming {
   double total_s = 0.0;
 };
 [[nodiscard]] std::vector<ModuleTiming> read_timing(const std::filesystem::path& file);
-
-/// Reads the traffic of a robot in the order of time.
-class TrafficUntil {
- public:
-  /// `rows` ascend by time and outlive this.
-  explicit TrafficUntil(const std::vector<TrafficRow>& rows) : rows_(rows) {}
-
-  /// Advances to `time_s`, which is not before that of the last call.
-  void advance(double time_s);
-
-  /// Bytes sent so far, by category.
-  [[nodiscard]] const std::map<std::string, double>& sent() const { return sent_; }
-  [[nodiscard]] double sent(const std::string& category) const;
-
-  /// Robots received so far, and the time since their last message [s].
-  [[nodiscard]] std::map<RobotId, double> silent_s() const;
-
- private:
-  const std::vector<TrafficRow>& rows_;
-  std::size_t next_ = 0;
-  double time_s_ = 0.0;
-  std::map<std::tuple<bool, std::string, std::string>, TrafficRow> sums_;
-  std::map<std::string, double> sent_;
-  std::map<RobotId, double> last_received_s_;
-};
 
 }  // namespace km

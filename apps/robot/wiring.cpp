@@ -26,8 +26,7 @@
 #include "modules/ros_dds/live_sink_codec.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/semantic_mapping/semantic_mapping_node.hpp"
-#include "modules/view/view_node.hpp"
-#include "modules/vio/outside_odometry_node.hpp"
+#include "modules/vio/external_odometry_node.hpp"
 #include "modules/vio/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
 
@@ -84,7 +83,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_past();
   if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
   add_loop_closure(config);
-  if (!std::holds_alternative<PastRun>(input.source)) add_journal(options, input, results);
+  add_journal(options, input, results);
   add_back_end(config);
   add_overlay();
   if (mapping) add_mesh_correction(config, options.output, results);
@@ -102,15 +101,19 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->send_keys(); });
   nodes_.push_back(bridge_);
   supervisor_.add(std::move(bridge));
+  loads_.emplace(nodes_);
   if (restore_ != nullptr) restore_->set(*std::exchange(restored_, std::nullopt));
+}
+
+RunResult Robot::run(const Supervisor::Finished& finished) {
+  journal_->write();
+  RunResult result = supervisor_.run(finished);
+  if (!result.is_left_behind(journal_->name())) journal_->write();
+  return result;
 }
 
 void Robot::add_past() {
   add_restore();
-  // Closures that the robot of a finished run finds now are not written to its journal, because
-  // they can be found again.
-  forward<Closure>(topics_.new_closures, topics_.own_closures);
-  forward<PeerEvent>(topics_.new_closure_restarts, topics_.closure_restarts);
   source_ended_ = true;
 }
 
@@ -128,16 +131,19 @@ void Robot::add_restore() {
                                                     .keyframes = topics_.keyframes,
                                                     .own_closures = topics_.own_closures,
                                                     .peer_closures = topics_.closures,
-                                                    .outcomes = topics_.restored_outcomes});
+                                                    .outcomes = topics_.restored_outcomes,
+                                                    .inlier_sets = topics_.restored_inlier_sets,
+                                                    .solution = topics_.restored_solution});
 }
 
 // Call after the nodes that find closures and before those that read them, so that none is lost at
 // the end.
 void Robot::add_journal(const RobotOptions& options, const RobotInput& input,
                         ResultWriter& results) {
+  const bool is_past = std::holds_alternative<PastRun>(input.source);
   journal_ = &add<JournalNode>(false, options.output / kJournal, results,
                                JournalStart{identity_.robot, identity_.boot, input.name},
-                               restored_ ? &*restored_ : nullptr, input.rig_correction,
+                               restored_ && !is_past ? &*restored_ : nullptr, input.rig_correction,
                                JournalTopics{.states = topics_.odometry,
                                              .odometry = topics_.keyframe_odometry,
                                              .new_keyframes = topics_.new_keyframes,
@@ -145,6 +151,7 @@ void Robot::add_journal(const RobotOptions& options, const RobotInput& input,
                                              .new_restarts = topics_.new_closure_restarts,
                                              .peer_closures = topics_.shared_closures.received,
                                              .outcomes = topics_.outcomes,
+                                             .restored_outcomes = topics_.restored_outcomes,
                                              .peer_events = bridge_->peers().events(),
                                              .keyframes = topics_.keyframes,
                                              .closures = topics_.own_closures,
@@ -161,8 +168,7 @@ void Robot::add_odometry(Arguments&&... arguments) {
 
 void Robot::add_sensing(const RobotConfig& config, double rate,
                         std::unique_ptr<DatasetReader> reader,
-                        const std::optional<MappingPlan>& mapping,
-                        std::optional<ContinuedMap> map) {
+                        const std::optional<MappingPlan>& mapping, std::optional<ResumedMap> map) {
   const SensorRig rig = reader->rig();
   const bool gives_poses = reader->gives_poses();
   sensors_ = &add<SensorsNode>(true, config.sensors, rate, std::move(reader),
@@ -179,7 +185,7 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
                            .images = topics_.tracked_images,
                            .processed = topics_.processed_frames};
   if (gives_poses)
-    add_odometry<OutsideOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
+    add_odometry<ExternalOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
   else
     add_odometry<VioNode>(rig, config.tracker, config.vio, odometry);
   if (mapping) add_mapping(config, rate, rig.stereo, *mapping, std::move(map));
@@ -208,7 +214,7 @@ void Robot::add_place_recognition(const RobotConfig& config) {
 // A mapper that is too slow skips frames. At --rate max no frame is late, and the mapper holds the
 // other nodes up, so that the map does not depend on the machine.
 void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
-                        const MappingPlan& plan, std::optional<ContinuedMap> before) {
+                        const MappingPlan& plan, std::optional<ResumedMap> before) {
   const Overflow overflow = std::isinf(rate) ? Overflow::kBlock : Overflow::kDropOldest;
   SemanticMappingConfig map = config.semantic_mapping;
   map.max_range_m =
@@ -292,7 +298,7 @@ void Robot::add_loop_closure(const RobotConfig& config) {
                                          .own_restarts = topics_.new_closure_restarts,
                                          .outcomes = topics_.outcomes},
                        [this](KeyframeIndex keyframe) -> std::shared_ptr<const Keyframe> {
-                         return journal_ == nullptr ? nullptr : journal_->recall(keyframe);
+                         return journal_->recall(keyframe);
                        });
 }
 
@@ -303,6 +309,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                        PcmTopics{.closures = topics_.closures,
                                  .keyframes = topics_.keyframe_odometry,
                                  .restarts = topics_.closure_restarts,
+                                 .restored = topics_.restored_inlier_sets,
                                  .inlier_sets = topics_.own_inlier_sets},
                        resume_count(identity_.boot) << kResumeBits);
   add<TeamNode>(
@@ -312,6 +319,8 @@ void Robot::add_back_end(const RobotConfig& config) {
                  .closures = topics_.closures,
                  .inlier_sets = topics_.own_inlier_sets,
                  .peer_inlier_sets = topics_.shared_inlier_sets.received,
+                 .restored_inlier_sets = topics_.restored_inlier_sets,
+                 .restored_solution = topics_.restored_solution,
                  .peer_events = bridge_->peers().events(),
                  .restarts = topics_.closure_restarts,
                  .links = topics_.links,
@@ -393,7 +402,11 @@ void Robot::add_network(CrossingEnds meshes) {
 }
 
 void Robot::add_records() {
-  recorder_ = &add<RecorderNode>(false, identity_.robot);
+  recorder_ = &add<RecorderNode>(false, identity_.robot,
+                                 [this](JournalEntry event) { publish(std::move(event)); });
+  recorder_->record(topics_.restored_solution);
+  recorder_->record(topics_.restored_inlier_sets);
+  recorder_->record(topics_.samples);
   recorder_->record(topics_.restored_odometry);
   recorder_->record(topics_.odometry);
   recorder_->record(topics_.keyframe_odometry);
@@ -418,6 +431,10 @@ void Robot::add_records() {
   topics_.progress.subscribe([this](const auto& progress) {
     const std::lock_guard lock(progress_mutex_);
     progress_ = progress;
+  });
+  topics_.status.from_peers().subscribe([this](const auto& status) {
+    const std::lock_guard lock(progress_mutex_);
+    received_s_[status->robot] = steady_now_s();
   });
   topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
     input_time_.reach(keyframe->stamp);  // a pose graph and a former process have no packets
@@ -498,32 +515,46 @@ void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& cam
   }
   const MeshChunksConfig& mesh = config.mesh_chunks;
   Topics& t = topics_;
-  auto& view = add<ViewNode>(
-      false, config.view, participant_,
-      ViewMesh{{mesh.cell_m, mesh.position_step_m}, mesh.min_move_m}, camera,
-      [this, loads = ModuleLoads(nodes_)]() mutable { return view_state(loads); },
-      ViewTopics{.odometry = t.odometry,
-                 .keyframes = t.keyframe_odometry,
-                 .trajectory = t.trajectory,
-                 .progress = t.progress,
-                 .outcomes = t.outcomes,
-                 .restored_outcomes = t.restored_outcomes,
-                 .closures = t.closures,
-                 .own_inlier_sets = t.own_inlier_sets,
-                 .peer_inlier_sets = t.shared_inlier_sets.received,
-                 .verdicts = t.closure_verdicts,
-                 .restarts = t.closure_restarts,
-                 .statuses = t.status.from_peers(),
-                 .images = t.tracked_images});
-  t.optimized_meshes.subscribe([&view](const auto& optimized) {
-    view.offer(optimized->anchor, {optimized, &optimized->mesh});
+  view_ = &add<ViewNode>(false, config.view, participant_,
+                         ViewMesh{{mesh.cell_m, mesh.position_step_m}, mesh.min_move_m}, camera,
+                         ViewTopics{.odometry = t.odometry,
+                                    .keyframes = t.keyframe_odometry,
+                                    .outcomes = t.outcomes,
+                                    .restored_outcomes = t.restored_outcomes,
+                                    .closures = t.closures,
+                                    .judgements = t.judgements,
+                                    .pose_changes = t.pose_changes,
+                                    .samples = t.samples,
+                                    .restarts = t.closure_restarts,
+                                    .images = t.tracked_images});
+  t.optimized_meshes.subscribe([this](const auto& optimized) {
+    view_->offer(optimized->anchor, {optimized, &optimized->mesh});
   });
 }
 
-ViewState Robot::view_state(ModuleLoads& loads) const {
-  const ProcessUsage usage = process_usage();
+// Passes an event of the recorder to the journal and to viewers. Samples come from a topic of which
+// both read.
+void Robot::publish(JournalEntry event) {
+  journal_->append(event);
+  if (auto* const judgements = std::get_if<ClosureJudgements>(&event))
+    topics_.judgements.publish(std::move(*judgements));
+  else if (auto* const changes = std::get_if<PoseChanges>(&event))
+    topics_.pose_changes.publish(std::move(*changes));
+}
+
+std::map<std::string, std::uint64_t> Robot::sent_bytes() const {
+  using enum TrafficCategory;
   const TrafficSnapshot traffic = bridge_->traffic();
-  ViewState state;
+  std::map<std::string, std::uint64_t> bytes;
+  for (const auto category :
+       {kPlaceRecognition, kGeometricVerification, kPoseGraphOptimization, kOther})
+    bytes[to_string(category)] = traffic.bytes(Direction::kOut, category);
+  return bytes;
+}
+
+void Robot::publish_sample() {
+  const ProcessUsage usage = process_usage();
+  RobotSample state;
   state.name = identity_.name;
   state.phase = to_string(phase_.load());
   state.dataset_time_s = input_time_.seconds();
@@ -531,15 +562,33 @@ ViewState Robot::view_state(ModuleLoads& loads) const {
   state.skipped_frames = sensors_ != nullptr ? static_cast<std::uint32_t>(sensors_->skipped()) : 0;
   state.cpu_s = usage.cpu_s;
   state.resident_MB = static_cast<double>(usage.resident_bytes) / 1e6;
-  for (const auto category :
-       {TrafficCategory::kPlaceRecognition, TrafficCategory::kGeometricVerification,
-        TrafficCategory::kPoseGraphOptimization, TrafficCategory::kOther})
-    state.sent_bytes.push_back(
-        {to_string(category), static_cast<double>(traffic.bytes(Direction::kOut, category))});
+  for (const auto& [category, bytes] : sent_bytes())
+    state.sent_bytes.push_back({category, static_cast<double>(bytes)});
   constexpr double kIdle = 0.005;  // share below which a module gets no line
-  for (const auto& [name, share] : loads.shares())
+  for (const auto& [name, share] : loads_->shares())
     if (share > kIdle) state.loads.push_back({name, share});
-  return state;
+  for (const auto& [name, channel] : {std::pair{"view", ViewChannel::kView},
+                                      {"view_mesh", ViewChannel::kMesh},
+                                      {"view_images", ViewChannel::kImages}})
+    if (view_ != nullptr)
+      state.sent_bytes.push_back({name, static_cast<double>(view_->sent_bytes(channel))});
+  add_team(state);
+  topics_.samples.publish(std::move(state));
+}
+
+void Robot::add_team(RobotSample& sample) const {
+  const auto finite = [](double value) { return std::isfinite(value) ? value : 0.0; };
+  const double now_s = steady_now_s();
+  sample.anchor = identity_.robot;
+  const std::lock_guard lock(progress_mutex_);
+  for (const auto& [robot, received_s] : received_s_)
+    sample.links.push_back({robot, static_cast<float>(std::max(0.0, now_s - received_s))});
+  if (progress_ == nullptr) return;
+  sample.anchor = progress_->anchor;
+  sample.tentative = std::ranges::binary_search(progress_->tentative, progress_->anchor);
+  sample.round = progress_->round;
+  sample.cost = finite(progress_->cost);
+  sample.gradient_norm = finite(progress_->gradient_norm);
 }
 
 RobotStatus Robot::own_status() const {
@@ -553,8 +602,7 @@ void Robot::freeze_record() {
 }
 
 bool Robot::input_ended() {
-  return source_ended_ && supervisor_.have_stopped(feeding_) &&
-         (journal_ == nullptr || !journal_->holds_back());
+  return source_ended_ && supervisor_.have_stopped(feeding_) && !journal_->holds_back();
 }
 
 void Robot::leave() {

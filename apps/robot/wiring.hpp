@@ -1,9 +1,11 @@
 #pragma once
 
 #include <atomic>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -30,14 +32,14 @@
 #include "modules/mesh_deformation/mesh_deformation_node.hpp"
 #include "modules/outlier_rejection/pcm_node.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
-#include "modules/place_recognition/candidate_filter.hpp"
+#include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 #include "modules/recorded_graph/graph_playback_node.hpp"
 #include "modules/ros_dds/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/sensors_node.hpp"
-#include "modules/view/view_update.hpp"
+#include "modules/view/view_node.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/robot_status.hpp"
 #include "runtime/overlay/overlay_node.hpp"
@@ -89,6 +91,12 @@ struct Topics {
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   Topic<ClosureVerdicts> closure_verdicts;
+  Topic<InlierSet> restored_inlier_sets;
+  Topic<TeamSolution> restored_solution;
+  // Events of the recorder.
+  Topic<RobotSample> samples;
+  Topic<ClosureJudgements> judgements;
+  Topic<PoseChanges> pose_changes;
 
   // Inputs and outputs of OverlayNode, which connects them to the crossings below.
   Topic<PeerEvent> ways;  // peer events, and peers that can be reached through other robots only
@@ -117,10 +125,7 @@ class Robot {
 
   /// Runs until the robot may leave its team, a node fails, or a signal arrives. The results folder
   /// must exist.
-  [[nodiscard]] RunResult run(const Supervisor::Finished& finished) {
-    if (journal_ != nullptr && restore_ != nullptr) journal_->take_up();
-    return supervisor_.run(finished);
-  }
+  [[nodiscard]] RunResult run(const Supervisor::Finished& finished);
 
   /// True once the input has ended and the recorder has processed all messages that follow from it:
   /// no more keyframes come. Does not wait.
@@ -154,21 +159,27 @@ class Robot {
   /// Stops recording; the mesh is then corrected with the present trajectory.
   void freeze_record();
   [[nodiscard]] double dataset_time_s() const { return input_time_.seconds(); }
+  /// Bytes sent since the start, by category.
+  [[nodiscard]] std::map<std::string, std::uint64_t> sent_bytes() const;
+  /// Publishes the present state of the robot. Only one thread calls this.
+  void publish_sample();
   /// For tests: messages that the nodes publish.
   [[nodiscard]] Topics& topics() { return topics_; }
   [[nodiscard]] const std::vector<const Node*>& nodes() const { return nodes_; }
 
  private:
   void add_sensing(const RobotConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
-                   const std::optional<MappingPlan>& mapping, std::optional<ContinuedMap> map);
+                   const std::optional<MappingPlan>& mapping, std::optional<ResumedMap> map);
   template <typename OdometryNode, typename... Arguments>
   void add_odometry(Arguments&&... arguments);
   void add_place_recognition(const RobotConfig& config);
   void add_past();
+  void publish(JournalEntry event);
+  void add_team(RobotSample& sample) const;
   void add_restore();
   void add_journal(const RobotOptions& options, const RobotInput& input, ResultWriter& results);
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
-                   const MappingPlan& plan, std::optional<ContinuedMap> before);
+                   const MappingPlan& plan, std::optional<ResumedMap> before);
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
                            ResultWriter& results);
   [[nodiscard]] CrossingEnds share_meshes(const MeshChunksConfig& config);
@@ -179,7 +190,6 @@ class Robot {
   void add_network(CrossingEnds meshes);
   void add_records();
   void add_view(const RobotConfig& config, const std::optional<Camera>& camera);
-  [[nodiscard]] ViewState view_state(ModuleLoads& loads) const;
   void add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
                       RosOutputOptions options, std::optional<In<SensorPacket>> images);
   void add_record(const RobotOptions& options, const RosConfig& config, ResultWriter& results);
@@ -199,8 +209,9 @@ class Robot {
   std::atomic<bool> source_ended_ = false;
   std::atomic<bool> id_taken_ = false;
   InputTime input_time_;
-  mutable std::mutex progress_mutex_;
-  Topic<OptimizerProgress>::Message progress_;  // the newest, guarded by progress_mutex_
+  mutable std::mutex progress_mutex_;           // guards progress_ and received_s_
+  Topic<OptimizerProgress>::Message progress_;  // the newest
+  std::map<RobotId, double> received_s_;        // time of the last status, by the steady clock
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;
@@ -219,6 +230,8 @@ class Robot {
   RobotStatusNode* status_ = nullptr;
   RosOutputNode* record_ = nullptr;
   OverlayNode* overlay_ = nullptr;
+  ViewNode* view_ = nullptr;
+  std::optional<ModuleLoads> loads_;
   DdsBridge* bridge_ = nullptr;
   Supervisor
       supervisor_;  // last member: stops the nodes before the objects that they use are destroyed

@@ -38,10 +38,10 @@ LinkKeys merged(LinkKeys usual, const LinkKeys& own) {
 LinkPlan plan_of(const LinkKeys& keys) {
   LinkPlan link;
   if (keys.trace.empty())
-    link.course = LinkTrace({{.bytes_per_s = keys.rate_bytes_per_s.value_or(kUnlimited),
-                              .delay_s = keys.delay_s.value_or(0.0)}});
+    link.trace = LinkTrace({{.bytes_per_s = keys.rate_bytes_per_s.value_or(kUnlimited),
+                             .delay_s = keys.delay_s.value_or(0.0)}});
   else
-    link.course = read_link_trace(keys.trace);
+    link.trace = read_link_trace(keys.trace);
   link.jitter_s = keys.jitter_s.value_or(link.jitter_s);
   link.loss = keys.loss.value_or(link.loss);
   link.queue_bytes = keys.queue_bytes.value_or(link.queue_bytes);

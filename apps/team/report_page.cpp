@@ -144,16 +144,10 @@ Json timing_of(const fs::path& file) {
 
 // Bytes sent until each time of the table, by category.
 Json sent_of(const fs::path& file) {
-  const std::vector<TrafficRow> rows = read_traffic(file);
-  std::vector<double> times_s;
-  for (const TrafficRow& row : rows)
-    if (times_s.empty() || row.time_s > times_s.back()) times_s.push_back(row.time_s);
-  TrafficUntil traffic(rows);
   Json sent = Json::object();
-  for (const double time_s : thinned(std::move(times_s))) {
-    traffic.advance(time_s);
-    for (const auto& [category, bytes] : traffic.sent()) sent[category].push_back({time_s, bytes});
-  }
+  for (const SentBytes& until : thinned(read_sent(file)))
+    for (const auto& [category, bytes] : until.by_category)
+      sent[category].push_back({until.time_s, bytes});
   return sent;
 }
 

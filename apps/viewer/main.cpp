@@ -38,10 +38,9 @@ With --domain it joins the team's DDS domain as a listener: robots neither wait 
 it. Robots that run with --view send the data of a page: about 2 kB/s, chunks of the map as they change,
 and small camera images of a robot while a page shows them.
 
-RESULTS is the folder of kimera_multi_team, or of one robot. Results do not contain all times:
-a chunk of the mesh is shown from the time at which the robot came nearest to it, and robots join with
-their first kept closure. Before it, the page has the estimates of odometry, afterwards the optimised
-ones.
+RESULTS is the folder of kimera_multi_team, or of one robot: also of one that runs, or was killed.
+Everything is shown when it became known to the robot, except for the meshes: the page has those of
+the end of the run, each chunk from the time at which the robot saw its surface.
 
 In the page: drag to turn, right button to move, wheel to zoom; double click on a robot's name to
 follow it; measure: two clicks on the map. Keys: space plays and stops, T from above, F all in view.

@@ -29,32 +29,21 @@ Json json_of(const SE3& T) {
   return json;
 }
 
-Json json_of(const std::vector<ViewNumber>& numbers) {
+Json json_of(const std::vector<NamedNumber>& numbers) {
   Json json = Json::object();
-  for (const ViewNumber& number : numbers) json[number.name] = number.value;
+  for (const NamedNumber& number : numbers) json[number.name] = number.value;
   return json;
 }
 
-const char* name_of(ViewVerdict verdict) {
-  switch (verdict) {
-    case ViewVerdict::kCandidate:
-      return "candidate";
-    case ViewVerdict::kVerified:
-      return "verified";
-    case ViewVerdict::kKept:
-      return "kept";
-    case ViewVerdict::kRejected:
-      return "rejected";
-  }
-  return "candidate";
-}
+// By ClosureStatus.
+constexpr std::array kStatusNames = {"candidate", "verified", "rejected", "kept"};
 
 // Writes the members of a content to the object, and binary data to `data`.
 struct Writer {
   Json& json;
   std::string& data;
 
-  void operator()(const ViewState& state) const {
+  void operator()(const RobotSample& state) const {
     json["kind"] = "state";
     json["name"] = state.name;
     json["phase"] = state.phase;
@@ -69,7 +58,7 @@ struct Writer {
     json["cpu_s"] = rounded_to(state.cpu_s, 1e3);
     json["resident_MB"] = rounded_to(state.resident_MB, 10);
     json["links"] = Json::array();
-    for (const ViewLink& link : state.links)
+    for (const RobotLink& link : state.links)
       json["links"].push_back({link.robot, rounded_to(link.silent_s, 100)});
     json["sent_bytes"] = json_of(state.sent_bytes);
     json["loads"] = json_of(state.loads);
@@ -98,8 +87,9 @@ struct Writer {
     json["closures"] = Json::array();
     for (const ViewClosure& one : closures.closures)
       json["closures"].push_back({one.id.from.robot, one.id.from.index, one.id.to.robot,
-                                  one.id.to.index, name_of(one.verdict), one.matches, one.inliers,
-                                  one.reason});
+                                  one.id.to.index,
+                                  kStatusNames.at(static_cast<std::size_t>(one.verdict)),
+                                  one.matches, one.inliers, one.reason});
   }
 
   void operator()(const MeshChunk& chunk) const {

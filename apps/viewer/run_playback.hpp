@@ -9,22 +9,23 @@
 
 namespace km {
 
-/// Updates of the robots of a finished run, as reconstructed from its results, ascending by time.
+/// Updates of the robots of a run, from their journals, ascending by time.
 struct RunPlayback {
   std::vector<ViewUpdate> updates;
   LabelPalette palette;            ///< Palette of the first robot that has one.
-  std::vector<std::string> notes;  ///< Missing files and robots, with the reason.
+  std::vector<std::string> notes;  ///< Missing or damaged files, and robots without an end.
 };
 
-/// Reads the folder of a team's results, or of one robot's. The run begins at `begin`.
+/// Reads the folder of a team's results, or of one robot's. The run begins at `begin`. Times in
+/// which no process ran are shortened to kMaxPause_s.
 ///
-/// Results do not contain the time of every update. Keyframes, poses and closures get the time of
-/// their images, a mesh chunk the time at which the robot came nearest to it. A robot joins others
-/// at the time of the first kept closure between them. Its rounds alone are before that time. Its
-/// rounds with others follow, spaced by the bytes sent for them. Before it joins, its data are in
-/// its own frame and as odometry estimated them. Afterwards they are as they were at the end of the
-/// run. Loads of modules are means. `notes` lists robots that still run or were killed. Throws
-/// std::runtime_error if the folder has no results of a finished robot.
+/// The updates are those that a viewer would have received from the running robots, without images
+/// and without the limits of a budget. ViewSelector, which robots use, chooses them from the events
+/// of the journal. Meshes are those of the end of the run. A chunk in the frame of the end
+/// is shown from the time at which its cell had faces, before that in the frame of the robot alone.
+/// Throws std::runtime_error if the folder has no journal of a robot.
 [[nodiscard]] RunPlayback read_run(const std::filesystem::path& folder, Stamp begin);
+
+inline constexpr double kMaxPause_s = 10.0;
 
 }  // namespace km

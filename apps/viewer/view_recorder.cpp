@@ -24,12 +24,7 @@ constexpr int kMeshPoints = 200000;
 constexpr double kMeshPeriod_s = 5.0;  // because merging the chunks of a mesh takes long
 constexpr double kSteady_s = 1.0;      // poses farther apart give no velocity
 
-ClosureStage stage_of(ViewVerdict verdict) {
-  if (verdict == ViewVerdict::kKept) return ClosureStage::kInlier;
-  return verdict == ViewVerdict::kCandidate ? ClosureStage::kCandidate : ClosureStage::kVerified;
-}
-
-RosDiagnosticStatus status_of(const ViewState& state) {
+RosDiagnosticStatus status_of(const RobotSample& state) {
   RosDiagnosticStatus status;
   status.name = "robot";
   status.message = state.phase;
@@ -38,9 +33,9 @@ RosDiagnosticStatus status_of(const ViewState& state) {
                    {"cost", rounded(state.cost, 6)},
                    {"cpu [s]", fixed(state.cpu_s, 2)},
                    {"memory [MB]", fixed(state.resident_MB, 1)}};
-  for (const ViewNumber& sent : state.sent_bytes)
+  for (const NamedNumber& sent : state.sent_bytes)
     status.values.push_back({"sent: " + sent.name + " [B]", fixed(sent.value, 0)});
-  for (const ViewNumber& load : state.loads)
+  for (const NamedNumber& load : state.loads)
     status.values.push_back({"load: " + load.name, fixed(load.value, 3)});
   return status;
 }
@@ -57,27 +52,16 @@ bool put(std::vector<T>& list, std::size_t index, const T& value) {
 }  // namespace
 
 // The common file of all robots. Each robot writes to it on a thread of its own.
-class ViewRecorder::File {
- public:
+struct ViewRecorder::File {
   explicit File(const std::filesystem::path& file)
-      : sink_(file, [this, file](const std::string& why) {
-          failure_ = file.string() + ": " + why;
-          log::error("viewer") << failure_;
+      : sink(file, [this, file](const std::string& why) {
+          failure = file.string() + ": " + why;
+          log::error("viewer") << failure;
         }) {}
 
-  auto with_sink(const auto& use) {
-    const std::lock_guard lock(mutex_);
-    return use(sink_);
-  }
-  [[nodiscard]] std::string failure() const {
-    const std::lock_guard lock(mutex_);
-    return failure_;
-  }
-
- private:
-  mutable std::mutex mutex_;  // guards the members below
-  std::string failure_;
-  McapSink sink_;
+  std::mutex mutex;  // guards the members below
+  std::string failure;
+  McapSink sink;
 };
 
 // Sink for the messages of one robot.
@@ -86,14 +70,17 @@ class ViewRecorder::Sink final : public RosSink {
   explicit Sink(std::shared_ptr<File> file) : file_(std::move(file)) {}
 
   std::size_t open(const PublishedTopic& topic) override {
-    return file_->with_sink([&](McapSink& sink) { return sink.open(topic); });
+    const std::lock_guard lock(file_->mutex);
+    return file_->sink.open(topic);
   }
   void put(std::size_t topic, std::optional<Stamp> time,
            std::span<const std::uint8_t> message) override {
-    file_->with_sink([&](McapSink& sink) { sink.put(topic, time, message); });
+    const std::lock_guard lock(file_->mutex);
+    file_->sink.put(topic, time, message);
   }
   void flush() override {
-    file_->with_sink([](McapSink& sink) { sink.flush(); });
+    const std::lock_guard lock(file_->mutex);
+    file_->sink.flush();
   }
 
  private:
@@ -145,7 +132,7 @@ class ViewRecorder::Robot {
     last_received_s_ = steady_now_s();
   }
 
-  void receive(const ViewState& state) {
+  void receive(const RobotSample& state) {
     const std::lock_guard lock(mutex_);
     status_ = status_of(state);
     has_left_ = state.phase == "leaving";
@@ -280,7 +267,7 @@ void ViewRecorder::step(const Input& update) {
   }
   Robot& robot = robot_of(*update);
   robot.receive();
-  const auto* const state = std::get_if<ViewState>(&update->content);
+  const auto* const state = std::get_if<RobotSample>(&update->content);
   if (state != nullptr && !robot.has_begun()) {
     {
       const std::lock_guard lock(mutex_);
@@ -319,10 +306,7 @@ std::vector<PublishedClosure> ViewRecorder::closures_of(const Robot& robot) cons
   };
   std::vector<PublishedClosure> published;
   for (const auto& [id, closure] : robot.closures) {
-    PublishedClosure& one = published.emplace_back();
-    one.id = id;
-    one.stage = stage_of(closure.verdict);
-    one.rejected = closure.verdict == ViewVerdict::kRejected;
+    PublishedClosure& one = published.emplace_back(PublishedClosure{id, closure.verdict, {}});
     const SE3* const from = pose_of(id.from);
     const SE3* const to = pose_of(id.to);
     if (from != nullptr && to != nullptr) one.T_from_to = from->inverse() * *to;
@@ -340,9 +324,10 @@ void ViewRecorder::finish() {
   worker_.stop();
   if (worker_.error() != nullptr) std::rethrow_exception(worker_.error());
   for (auto& [id, robot] : robots_) finish_robot(*robot);
-  file_->with_sink([](McapSink& sink) { sink.finish(); });
+  const std::lock_guard lock(file_->mutex);
+  file_->sink.finish();
   lost_ += worker_.load().dropped;
-  if (const std::string why = file_->failure(); !why.empty()) throw std::runtime_error(why);
+  if (!file_->failure.empty()) throw std::runtime_error(file_->failure);
   if (lost_ > 0)
     throw std::runtime_error("the record lacks " + std::to_string(lost_) +
                              " updates: they came faster than they were written");

@@ -37,7 +37,7 @@ class ViewRecorder {
   void finish();
 
  private:
-  class File;
+  struct File;
   class Sink;
   class Robot;
   using Input = std::optional<ViewUpdate>;  // nullopt: a second has passed

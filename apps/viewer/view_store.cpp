@@ -23,18 +23,13 @@ std::size_t hash_of(ViewUpdate update) {
   return std::hash<std::string>{}(page_message(update, 0).bytes);
 }
 
-bool same(const ViewClosure& a, const ViewClosure& b) {
-  return a.verdict == b.verdict && a.matches == b.matches && a.inliers == b.inliers &&
-         a.reason == b.reason;
-}
-
 }  // namespace
 
 std::optional<ViewStore::Key> ViewStore::key_of(const ViewUpdate& update) {
   const std::int64_t robot = update.robot;
   if (std::holds_alternative<ViewImage>(update.content)) return Key{robot, kImage};
   if (std::holds_alternative<ViewPose>(update.content)) return Key{robot, kPose};
-  if (std::holds_alternative<ViewState>(update.content)) return Key{robot, kState};
+  if (std::holds_alternative<RobotSample>(update.content)) return Key{robot, kState};
   if (const auto* const chunk = std::get_if<MeshChunk>(&update.content))
     return Key{robot,
                kMesh,
@@ -90,7 +85,7 @@ bool ViewStore::leave_new_closures(RobotId robot, ViewClosures& all) {
   auto& known = closures_[robot];
   std::erase_if(all.closures, [&](const ViewClosure& closure) {
     const auto [last, is_new] = known.try_emplace(closure.id, closure);
-    if (!is_new && same(last->second, closure)) return true;
+    if (!is_new && last->second == closure) return true;
     last->second = closure;
     return false;
   });

@@ -39,7 +39,7 @@ std::vector<View> views_of(const std::vector<std::string>& inputs, const Vocabul
   auto images = list_images(inputs, command.every);
   std::sort(images.begin(), images.end(),
             [](const auto& a, const auto& b) { return stamp_of_image(a) < stamp_of_image(b); });
-  const auto descriptors = orb_descriptors(images, command.features);
+  const auto descriptors = image_descriptors(images, command.features);
   std::vector<View> views;
   for (std::size_t i = 0; i < images.size(); ++i)
     if (const auto T = pose_at(truth, stamp_of_image(images[i]), 0.0, kTruthTolerance_s))

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstring>
 #include <iostream>
-#include <opencv2/features2d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
+#include "modules/images/keypoint_extractor.hpp"
 
 namespace km {
 namespace {
@@ -79,7 +78,7 @@ Stamp stamp_of_image(const std::filesystem::path& image) {
   return *stamp;
 }
 
-std::vector<OrbDescriptor> orb_descriptors(const std::filesystem::path& image, int features) {
+std::vector<BinaryDescriptor> image_descriptors(const std::filesystem::path& image, int features) {
   cv::Mat grey;
   try {
     grey = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
@@ -88,21 +87,17 @@ std::vector<OrbDescriptor> orb_descriptors(const std::filesystem::path& image, i
   if (grey.empty()) throw std::runtime_error(image.string() + " cannot be decoded as an image");
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
-  cv::ORB::create(features)->detectAndCompute(grey, cv::noArray(), keypoints, descriptors);
-  std::vector<OrbDescriptor> result(static_cast<std::size_t>(descriptors.rows));
-  for (int i = 0; i < descriptors.rows; ++i)
-    std::memcpy(result[static_cast<std::size_t>(i)].data(), descriptors.ptr(i),
-                sizeof(OrbDescriptor));
-  return result;
+  make_keypoint_extractor(features)->detectAndCompute(grey, cv::noArray(), keypoints, descriptors);
+  return descriptors_of_rows(descriptors);
 }
 
-std::vector<std::vector<OrbDescriptor>> orb_descriptors(
+std::vector<std::vector<BinaryDescriptor>> image_descriptors(
     std::span<const std::filesystem::path> images, int features) {
-  std::vector<std::vector<OrbDescriptor>> result;
+  std::vector<std::vector<BinaryDescriptor>> result;
   for (const auto& image : images) {
-    result.push_back(orb_descriptors(image, features));
+    result.push_back(image_descriptors(image, features));
     if (result.size() % 50 == 0 || result.size() == images.size())
-      std::cerr << "ORB: " << result.size() << " of " << images.size() << " images\n";
+      std::cerr << "descriptors: " << result.size() << " of " << images.size() << " images\n";
   }
   return result;
 }

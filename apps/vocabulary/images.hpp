@@ -21,12 +21,12 @@ std::vector<std::filesystem::path> list_images(const std::vector<std::string>& i
 /// The stamp in an image's name: its leading digits [ns]. Throws std::runtime_error without digits.
 Stamp stamp_of_image(const std::filesystem::path& image);
 
-/// ORB descriptors of an image, at most `features`. Throws std::runtime_error that names the file
-/// if it cannot be decoded.
-std::vector<OrbDescriptor> orb_descriptors(const std::filesystem::path& image, int features);
+/// Descriptors of an image by make_keypoint_extractor(), at most `features`. Throws
+/// std::runtime_error that names the file if it cannot be decoded.
+std::vector<BinaryDescriptor> image_descriptors(const std::filesystem::path& image, int features);
 
 /// Descriptors of several images, in order, with progress on stderr.
-std::vector<std::vector<OrbDescriptor>> orb_descriptors(
+std::vector<std::vector<BinaryDescriptor>> image_descriptors(
     std::span<const std::filesystem::path> images, int features);
 
 }  // namespace km

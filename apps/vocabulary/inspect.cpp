@@ -46,7 +46,7 @@ struct Usage {
 };
 
 Usage usage_of(const Vocabulary& vocabulary,
-               const std::vector<std::vector<OrbDescriptor>>& descriptors) {
+               const std::vector<std::vector<BinaryDescriptor>>& descriptors) {
   Usage usage{.images = descriptors.size(), .popularity = std::vector<std::size_t>(1, 0)};
   std::vector<std::size_t> seen(vocabulary.size(), 0);
   for (const auto& image : descriptors) {
@@ -113,13 +113,13 @@ void run(const InspectCommand& command) {
   Usage usage;
   if (!command.images.empty()) {
     const auto images = list_images(command.images, command.every);
-    usage = usage_of(vocabulary, orb_descriptors(images, command.features));
+    usage = usage_of(vocabulary, image_descriptors(images, command.features));
     print(usage);
   }
   double pair_score = std::nan("");
   if (command.pair.size() == 2) {
-    const BowVector v = vocabulary.transform(orb_descriptors(command.pair[0], command.features));
-    const BowVector w = vocabulary.transform(orb_descriptors(command.pair[1], command.features));
+    const BowVector v = vocabulary.transform(image_descriptors(command.pair[0], command.features));
+    const BowVector w = vocabulary.transform(image_descriptors(command.pair[1], command.features));
     pair_score = score(v, w);
     std::cout << "Score of the pair: " << pair_score << " (1: same words, 0: none in common; "
               << v.words.size() << " and " << w.words.size() << " words)\n";

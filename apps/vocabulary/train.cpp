@@ -38,7 +38,7 @@ void run(const TrainCommand& command) {
   const VocabularyTrainingConfig config = checked(VocabularyTrainingConfig{
       .branching = command.branching, .depth = command.depth, .seed = command.seed});
   const auto images = list_images(command.images, command.every);
-  const auto descriptors = orb_descriptors(images, command.features);
+  const auto descriptors = image_descriptors(images, command.features);
   const VocabularyData data = train_vocabulary(descriptors, config, [&](int levels) {
     std::cerr << "training: level " << levels << " of " << config.depth << '\n';
   });

@@ -17,8 +17,8 @@ struct HtmlPage {
 
 [[nodiscard]] std::string html_page(const HtmlPage& page);
 
-/// A script element with `data`, for scripts that parse the text of #id. No text in `data` can end
-/// the element. Bytes that are not UTF-8 become the replacement character.
+/// A script element with `data`, for scripts that parse the text of the element with this `id`. No
+/// text in `data` can end the element. Bytes that are not UTF-8 become the replacement character.
 [[nodiscard]] std::string data_script(std::string_view id, const Json& data);
 
 /// A script element with the sources as one module, in this order.

@@ -4,18 +4,18 @@
 
 namespace km {
 
-CameraCalibration CameraCalibration::moved(const Vector7& delta) const {
+CameraCalibration CameraCalibration::retracted(const Vector7& delta) const {
   return {offset_s + delta(0), retract(SE3::Identity(), delta.tail<6>()) * T_body_rig};
 }
 
-Vector7 CameraCalibration::offset_to(const CameraCalibration& to) const {
+Vector7 CameraCalibration::local_coordinates_to(const CameraCalibration& to) const {
   Vector7 delta;
   delta << to.offset_s - offset_s,
       local_coordinates(SE3::Identity(), to.T_body_rig * T_body_rig.inverse());
   return delta;
 }
 
-CameraCalibration CameraCalibration::on_top_of(const CameraCalibration& correction) const {
+CameraCalibration CameraCalibration::composed_with(const CameraCalibration& correction) const {
   return {offset_s + correction.offset_s, T_body_rig * correction.T_body_rig};
 }
 

@@ -20,23 +20,23 @@ struct CameraCalibration {
   /// Perturbation by [offset; rotation; translation], with rotation and translation in the body
   /// frame and on the left: T_body_rig becomes retract(identity, [rotation; translation]) *
   /// T_body_rig.
-  [[nodiscard]] CameraCalibration moved(const Vector7& delta) const;
+  [[nodiscard]] CameraCalibration retracted(const Vector7& delta) const;
 
-  /// The delta for which moved(delta) is `to`.
-  [[nodiscard]] Vector7 offset_to(const CameraCalibration& to) const;
+  /// The delta for which retracted(delta) is `to`.
+  [[nodiscard]] Vector7 local_coordinates_to(const CameraCalibration& to) const;
 
   /// This correction relative to the rig before `correction` was applied to it. The covariance by
-  /// moved() does not change.
-  [[nodiscard]] CameraCalibration on_top_of(const CameraCalibration& correction) const;
+  /// retracted() does not change.
+  [[nodiscard]] CameraCalibration composed_with(const CameraCalibration& correction) const;
 
-  /// Inverse of on_top_of(): this correction relative to the rig after `correction`.
+  /// Inverse of composed_with(): this correction relative to the rig after `correction`.
   [[nodiscard]] CameraCalibration without(const CameraCalibration& correction) const;
 
   /// Moves the cameras of `rig`.
   void apply_to(StereoRig& rig) const;
 };
 
-/// Calibration and its covariance in the coordinates of CameraCalibration::moved().
+/// Calibration and its covariance in the coordinates of CameraCalibration::retracted().
 struct UncertainCalibration {
   CameraCalibration calibration;
   Matrix7 covariance = Matrix7::Zero();

@@ -44,7 +44,7 @@ std::optional<double> inverse_depth_at(const DepthImage& image, const Eigen::Vec
   return sum / weights;
 }
 
-double depth_edge(const StereoRig& rig) {
+double depth_edge_threshold(const StereoRig& rig) {
   return kEdge_px / (rig.cameras[0].fx * rig.baseline_m());
 }
 

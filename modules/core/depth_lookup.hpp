@@ -18,7 +18,7 @@ namespace km {
 
 /// `max_spread` for inverse_depth_at() with this rig: a step of 1.5 px in the virtual disparity.
 /// Smaller steps are within the noise.
-[[nodiscard]] double depth_edge(const StereoRig& rig);
+[[nodiscard]] double depth_edge_threshold(const StereoRig& rig);
 
 /// True if `image` has the camera's size and as many pixels.
 [[nodiscard]] bool fits(const GrayImage& image, const Camera& camera);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,8 +11,11 @@
 
 namespace km {
 
-/// 256-bit binary descriptor (ORB).
-using OrbDescriptor = std::array<std::uint8_t, 32>;
+/// Bytes of the descriptor of a keypoint. Messages, journals and vocabularies contain as many.
+inline constexpr std::size_t kDescriptorBytes = 32;
+
+/// Binary descriptor of a keypoint, compared by Hamming distance: see make_keypoint_extractor().
+using BinaryDescriptor = std::array<std::uint8_t, kDescriptorBytes>;
 
 /// An image point of the left camera with its depth if stereo measured it.
 struct Keypoint {
@@ -33,7 +37,7 @@ struct KeyframeFeatures {
   double focal_px = 0.0;
   double baseline_m = 0.0;
   std::vector<Keypoint> keypoints;
-  std::vector<OrbDescriptor> descriptors;
+  std::vector<BinaryDescriptor> descriptors;
 };
 
 /// Pose of a keyframe in its robot's odometry frame with the covariance accumulated along the

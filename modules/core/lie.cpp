@@ -93,7 +93,7 @@ Vector6 local_coordinates(const SE3& from, const SE3& to) {
   return delta;
 }
 
-Eigen::Matrix3d turn_to_z(const Eigen::Vector3d& up) {
+Eigen::Matrix3d rotation_to_z(const Eigen::Vector3d& up) {
   return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 

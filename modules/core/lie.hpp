@@ -41,7 +41,7 @@ SE3 retract(const SE3& T, const Eigen::Ref<const Vector6>& delta);
 Vector6 local_coordinates(const SE3& from, const SE3& to);
 
 /// The shortest rotation that maps the direction of `up` to z.
-Eigen::Matrix3d turn_to_z(const Eigen::Vector3d& up);
+Eigen::Matrix3d rotation_to_z(const Eigen::Vector3d& up);
 
 /// The rotation nearest to `M` in the Frobenius norm (projection by SVD).
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M);

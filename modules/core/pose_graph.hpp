@@ -92,6 +92,8 @@ struct Trajectory {
   /// Covariances of T_world_kf relative to the first keyframe of the anchor, see covariance.hpp;
   /// empty while they are unknown.
   std::vector<Matrix6> covariances = {};
+  /// Last known public poses of other robots, T_world_kf.
+  std::map<KeyframeId, SE3> public_poses = {};
 };
 
 /// State of distributed optimisation as seen by one robot, for status lines and tables.

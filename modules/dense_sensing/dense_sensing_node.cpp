@@ -11,7 +11,8 @@
 namespace km {
 namespace {
 
-// Length at which frames without depth do not displace frames with depth.
+// Length of the input queue. With fewer places, frames without depth would displace frames with
+// depth.
 constexpr std::size_t kQueuedFrames = 4;
 constexpr double kStampJitter_s = 2e-3;
 
@@ -45,10 +46,10 @@ void DenseSensingNode::stop() noexcept {
   if (std::exchange(stopped_, true)) return;
   const DenseSensingProgress& p = progress_;
   log::info(name()) << p.frames << " frames with depth, " << p.without_labels << " without labels, "
-                    << p.gave_way << " left out because processors were short";
-  if (p.wrong_size + p.wrong_label_size + p.classes_outside > 0)
+                    << p.dropped_under_load << " left out because processors were short";
+  if (p.wrong_size + p.wrong_label_size + p.unmapped_pixels > 0)
     log::warn(name()) << "images of the wrong size in " << p.wrong_size << " frames, labels in "
-                      << p.wrong_label_size << "; " << p.classes_outside
+                      << p.wrong_label_size << "; " << p.unmapped_pixels
                       << " pixels of classes that segmentation.label_map lacks";
 }
 
@@ -56,7 +57,7 @@ void DenseSensingNode::step(const LocatedFrame& located) {
   const Stamp stamp = located.frame->stamp;
   if (last_ && seconds_between(*last_, stamp) < interval_s_ - kStampJitter_s) return;
   if (gives_way_) {
-    ++progress_.gave_way;
+    ++progress_.dropped_under_load;
     last_ = stamp;
     topics_.progress.publish(progress_);
     return;
@@ -69,7 +70,7 @@ void DenseSensingNode::step(const LocatedFrame& located) {
   progress_.without_depth += images.problem == DenseProblem::kNoDepthImage ? 1 : 0;
   progress_.wrong_size += images.problem == DenseProblem::kWrongSize ? 1 : 0;
   progress_.wrong_label_size += images.wrong_label_size ? 1 : 0;
-  progress_.classes_outside += images.classes_outside;
+  progress_.unmapped_pixels += images.unmapped_pixels;
   if (images.problem == DenseProblem::kNone) {
     last_ = stamp;
     ++progress_.frames;

@@ -48,7 +48,7 @@ void DenseSensor::add_labels(const StereoFrame& frame, DenseImages& images) {
   if (labels_ == LabelsFrom::kImages) labels = frame.labels;
   if (labels_ == LabelsFrom::kNetwork && fits(frame.left, left_)) {
     Segmentation segmentation = network_->segment(frame.left);
-    images.classes_outside = segmentation.classes_outside;
+    images.unmapped_pixels = segmentation.unmapped_pixels;
     labels = std::make_shared<const LabelImage>(std::move(segmentation.labels));
   }
   if (labels == nullptr) return;

@@ -45,7 +45,7 @@ struct [[nodiscard]] DenseImages {
   std::shared_ptr<const DepthImage> depth;   ///< Null if there is a problem.
   std::shared_ptr<const LabelImage> labels;  ///< Null without labels.
   bool wrong_label_size = false;    ///< Labels of another size than the left camera's are dropped.
-  std::size_t classes_outside = 0;  ///< Pixels of classes that the label map of the network lacks,
+  std::size_t unmapped_pixels = 0;  ///< Pixels of classes that the label map of the network lacks,
                                     ///< see Segmentation.
 };
 
@@ -73,13 +73,13 @@ class DenseSensor {
 
 /// Counts of the frames that were due for the map, so far.
 struct DenseSensingProgress {
-  std::uint64_t frames = 0;            ///< Frames published with depth.
-  std::uint64_t gave_way = 0;          ///< Frames dropped because processors were too slow.
-  std::uint64_t without_depth = 0;     ///< Frames without a depth image; the next one is due.
-  std::uint64_t wrong_size = 0;        ///< Frames with DenseProblem::kWrongSize.
-  std::uint64_t without_labels = 0;    ///< Frames published without the requested labels.
-  std::uint64_t wrong_label_size = 0;  ///< Part of without_labels: labels of the wrong size.
-  std::uint64_t classes_outside = 0;   ///< Pixels of classes that the label map lacks.
+  std::uint64_t frames = 0;              ///< Frames published with depth.
+  std::uint64_t dropped_under_load = 0;  ///< Frames dropped because processors were too slow.
+  std::uint64_t without_depth = 0;       ///< Frames without a depth image; the next one is due.
+  std::uint64_t wrong_size = 0;          ///< Frames with DenseProblem::kWrongSize.
+  std::uint64_t without_labels = 0;      ///< Frames published without the requested labels.
+  std::uint64_t wrong_label_size = 0;    ///< Part of without_labels: labels of the wrong size.
+  std::uint64_t unmapped_pixels = 0;     ///< Pixels of classes that the label map lacks.
 };
 
 }  // namespace km

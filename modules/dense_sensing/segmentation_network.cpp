@@ -170,7 +170,7 @@ Segmentation SegmentationNetwork::segment(const GrayImage& image) {
       const int column = (2 * x + 1) * planes.width / (2 * image.width);
       const auto& label = labels[static_cast<std::size_t>(row * planes.width + column)];
       result.labels.ids.push_back(label.value_or(0));
-      result.classes_outside += label ? 0 : 1;
+      result.unmapped_pixels += label ? 0 : 1;
     }
   }
   return result;

@@ -13,7 +13,7 @@ namespace km {
 /// Result of a network for one image.
 struct Segmentation {
   LabelImage labels;                ///< As large as the image.
-  std::size_t classes_outside = 0;  ///< Pixels of a class that the label map lacks: unknown.
+  std::size_t unmapped_pixels = 0;  ///< Pixels of a class that the label map lacks: unknown.
 };
 
 /// A semantic segmentation network in ONNX format, run by OpenCV's dnn module. Not thread-safe.

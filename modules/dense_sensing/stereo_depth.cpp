@@ -51,7 +51,7 @@ struct Sums {
   }
 };
 
-// Sums of each single pixel of a row.
+// Fills `row` with the sums over windows of one pixel, for each pixel of an image row.
 void fill_row(const std::uint8_t* left, const std::uint8_t* right, const std::int16_t* steps,
               int width, std::vector<Sums>& row) {
   for (int x = 0; x < width; ++x) {
@@ -81,7 +81,7 @@ float spread(std::int32_t product, std::int32_t a, std::int32_t b, float n) {
 // `disparity` moved to the best agreement of the window, up to a difference in brightness common to
 // all its pixels; 0 if the images disagree there.
 float refined(float disparity, const Sums& w) {
-  if (w.n == 0) return disparity;  // too near the rim for a comparison
+  if (w.n == 0) return disparity;  // no pixel of the window can be compared
   const auto n = static_cast<float>(w.n);
   const float texture = spread(w.gg, w.g, w.g, n) / 1024.0F;
   const float match = spread(w.ge, w.g, w.e, n) / 512.0F;

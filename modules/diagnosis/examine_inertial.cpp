@@ -9,8 +9,8 @@
 #include "modules/diagnosis/figure_text.hpp"
 #include "modules/diagnosis/focal_fit.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
-#include "modules/diagnosis/seen_rotations.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
+#include "modules/diagnosis/visual_rotations.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -107,7 +107,7 @@ void examine_offset(const InertialFit& fit, Examination& result) {
                 " in the rig file, or stamp both at one instant"});
 }
 
-void examine_focal(const SensorSample& sample, const StereoRig& rig, const SeenRotations& seen,
+void examine_focal(const SensorSample& sample, const StereoRig& rig, const VisualRotations& seen,
                    const InertialFit& inertial, Examination& result) {
   constexpr double kSlack = 0.015, kSure = 2.0, kMaxSigma = 0.01;
   constexpr const char* kName = "focal length by the gyroscope";
@@ -166,7 +166,7 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   examine_gravity(sample, result);
   const bool use_depth =
       rig.depth_source == DepthSource::kRightImage && is_sound(fit_of(sample.stereo, rig));
-  const SeenRotations seen = seen_rotations(sample.steps, rig, use_depth);
+  const VisualRotations seen = visual_rotations(sample.steps, rig, use_depth);
   const auto fit = fit_inertial(seen.steps, sample.imu);
   if (!fit || fit->image_rms < kMinRate_radps) {
     result.figures.push_back({"images against the gyroscope",

@@ -12,7 +12,7 @@ namespace km {
 // there is no finding, and a figure states the reason.
 
 /// Examines rates, gaps and faults of the reader. Ids: frames.rate, frames.gap, imu.rate, imu.gap,
-/// recording.no_frames, recording.<fault>.
+/// recording.no_frames, `recording.<fault>`.
 [[nodiscard]] Examination examine_streams(const SensorSample& sample, const ReaderReport& report);
 
 /// Examines exposure, blur and corners. Ids: images.dark, images.bright, images.blurred,

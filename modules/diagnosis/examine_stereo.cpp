@@ -49,9 +49,9 @@ FaultWords words_of(StereoFault fault) {
 }
 
 std::string fit_text(const StereoFit& fit) {
-  return percent(fit.on_line) + " of " + std::to_string(fit.points) + " points within " +
-         fixed(kOnLine_px, 0) + " px of their epipolar line, median " + fixed(fit.error_px, 2) +
-         " px";
+  return percent(fit.inlier_ratio) + " of " + std::to_string(fit.points) + " points within " +
+         fixed(kEpipolarInlier_px, 0) + " px of their epipolar line, median " +
+         fixed(fit.error_px, 2) + " px";
 }
 
 void examine_pair(const StereoAlternative& found, const StereoFit& given, Examination& result) {
@@ -59,7 +59,7 @@ void examine_pair(const StereoAlternative& found, const StereoFit& given, Examin
   if (!is_named && is_sound(given)) return;
   const FaultWords words = words_of(found.fault);
   std::string what = std::string(words.what) + ": " + fit_text(given);
-  if (is_named) what += "; with that undone " + percent(found.fit.on_line);
+  if (is_named) what += "; with that undone " + percent(found.fit.inlier_ratio);
   if (found.fault == StereoFault::kFocalLength)
     what += " with the right one times " + fixed(found.focal_ratio, 3);
   result.findings.push_back({.id = words.id,

@@ -33,7 +33,7 @@ Finding fault_finding(ReaderFault fault, const ReaderReport::Entry& entry, doubl
 
 // Number of usable items of the kind that a fault counts. Images are counted per camera, lost
 // messages per topic.
-double sound_ones(ReaderFault fault, const SensorSample& sample) {
+double usable_count(ReaderFault fault, const SensorSample& sample) {
   const auto frames = static_cast<double>(sample.frames.size());
   const auto samples = static_cast<double>(sample.imu.size());
   const double images = sample.right_size.width > 0 ? 2.0 * frames : frames;
@@ -84,10 +84,10 @@ Finding image_finding(const char* id, std::string what, const char* means, const
           .to_do = to_do};
 }
 
-std::vector<double> values_of(const std::vector<ImageLook>& looks, const auto& value) {
+std::vector<double> values_of(const std::vector<ImageQuality>& qualities, const auto& value) {
   std::vector<double> values;
-  values.reserve(looks.size());
-  for (const ImageLook& look : looks) values.push_back(static_cast<double>(value(look)));
+  values.reserve(qualities.size());
+  for (const ImageQuality& image : qualities) values.push_back(static_cast<double>(value(image)));
   return values;
 }
 
@@ -102,8 +102,8 @@ Examination examine_streams(const SensorSample& sample, const ReaderReport& repo
                                .means = "there is nothing to estimate a motion from",
                                .to_do = "see the findings below for what was skipped"});
   for (const auto& [fault, entry] : report.entries())
-    result.findings.push_back(
-        fault_finding(fault, entry, sound_ones(fault, sample) + static_cast<double>(entry.count)));
+    result.findings.push_back(fault_finding(
+        fault, entry, usable_count(fault, sample) + static_cast<double>(entry.count)));
   constexpr double kFrames_hz = 8.0, kFrameGap_s = 0.25, kSamples_hz = 80.0, kSampleGap_s = 0.05;
   if (sample.frames.size() > 1)
     examine_rate("images", "frames", sample.frames, kFrames_hz, kFrameGap_s, result);
@@ -117,15 +117,15 @@ Examination examine_streams(const SensorSample& sample, const ReaderReport& repo
 
 Examination examine_images(const SensorSample& sample) {
   Examination result;
-  if (sample.looks.empty()) return result;
+  if (sample.qualities.empty()) return result;
   const auto median = [&](const auto& value) {
-    return quantile(values_of(sample.looks, value), 0.5);
+    return quantile(values_of(sample.qualities, value), 0.5);
   };
-  const double level = median([](const ImageLook& look) { return look.mean_level; });
-  const double saturated = median([](const ImageLook& look) { return look.saturated_share; });
-  const double sharpness = median([](const ImageLook& look) { return look.sharpness; });
-  const double corners =
-      quantile(values_of(sample.looks, [](const ImageLook& look) { return look.corners; }), 0.2);
+  const double level = median([](const ImageQuality& image) { return image.mean_level; });
+  const double saturated = median([](const ImageQuality& image) { return image.saturated_share; });
+  const double sharpness = median([](const ImageQuality& image) { return image.sharpness; });
+  const double corners = quantile(
+      values_of(sample.qualities, [](const ImageQuality& image) { return image.corners; }), 0.2);
   result.figures.push_back({"exposure", "mean level " + fixed(level, 0) + " of 255, " +
                                             percent(saturated) + " saturated"});
   result.figures.push_back({"sharpness", fixed(sharpness, 2) + " (0.5 blurred, 1 sharp)"});

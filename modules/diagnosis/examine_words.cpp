@@ -8,11 +8,11 @@
 
 namespace km {
 
-Examination examine_words(std::span<const std::vector<OrbDescriptor>> images,
+Examination examine_words(std::span<const std::vector<BinaryDescriptor>> images,
                           const Vocabulary& vocabulary) {
   std::map<std::uint32_t, double> counts;
   double features = 0.0;
-  for (const std::vector<OrbDescriptor>& image : images)
+  for (const std::vector<BinaryDescriptor>& image : images)
     for (const std::uint32_t word : vocabulary.words(image)) {
       ++counts[word];
       ++features;

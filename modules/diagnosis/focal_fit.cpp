@@ -48,7 +48,7 @@ std::vector<Step> steps_of(std::span<const TrackedStep> tracked, const StereoRig
   const auto has_depth = [&](const TrackedPoint& point) {
     if (!point.right) return false;
     const auto seen = stereo_point(rig, T_right_left, {point.from, *point.right});
-    return seen && seen->error_px < kOnLine_px && seen->depth_m > 0.0;
+    return seen && seen->error_px < kEpipolarInlier_px && seen->depth_m > 0.0;
   };
   constexpr std::size_t kLeastPoints = 30;
   std::vector<Step> steps;

@@ -15,7 +15,7 @@ struct BearingStep {
 /// Rotation of a camera between two images.
 struct ImageRotation {
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< R_from_to as rotation vector [rad].
-  double inlier_share = 0.0;  ///< Share of the points within 3 sigma of their epipolar line.
+  double inlier_ratio = 0.0;  ///< Share of the points within 3 sigma of their epipolar line.
 };
 
 /// The rotation from the epipolar constraint, from_i^T [t]x R to_i = 0 for all i, for an unknown

@@ -18,20 +18,20 @@ constexpr double kMaxDeviation = 4.0;  // largest residual of a trusted step, in
 
 using Rates = Eigen::Matrix3Xd;
 
-Rates image_rates(std::span<const SeenRotation> seen) {
+Rates image_rates(std::span<const VisualRotation> seen) {
   Rates rates(3, static_cast<Eigen::Index>(seen.size()));
   for (Eigen::Index k = 0; k < rates.cols(); ++k) {
-    const SeenRotation& step = seen[static_cast<std::size_t>(k)];
+    const VisualRotation& step = seen[static_cast<std::size_t>(k)];
     rates.col(k) = step.rotation / seconds_between(step.from, step.to);
   }
   return rates;
 }
 
-Rates gyro_rates(const GyroIntegral& gyro, std::span<const SeenRotation> seen, double offset_s) {
+Rates gyro_rates(const GyroIntegral& gyro, std::span<const VisualRotation> seen, double offset_s) {
   const Stamp offset = nanoseconds(offset_s);
   Rates rates(3, static_cast<Eigen::Index>(seen.size()));
   for (Eigen::Index k = 0; k < rates.cols(); ++k) {
-    const SeenRotation& step = seen[static_cast<std::size_t>(k)];
+    const VisualRotation& step = seen[static_cast<std::size_t>(k)];
     rates.col(k) = gyro.mean(step.from + offset, step.to + offset);
   }
   return rates;
@@ -53,7 +53,7 @@ double trimmed_sum(Eigen::VectorXd squares) {
   return squares.head(kept).sum();
 }
 
-double coarse_offset(const GyroIntegral& gyro, std::span<const SeenRotation> seen,
+double coarse_offset(const GyroIntegral& gyro, std::span<const VisualRotation> seen,
                      const Rates& image) {
   double best_s = 0.0, least = std::numeric_limits<double>::infinity();
   const auto most = static_cast<int>(std::lround(kMaxOffset_s / kCoarse_s));
@@ -67,13 +67,13 @@ double coarse_offset(const GyroIntegral& gyro, std::span<const SeenRotation> see
 }
 
 // The steps whose residual at `offset_s` is at most kMaxDeviation times the median.
-std::vector<SeenRotation> trusted(const GyroIntegral& gyro, std::span<const SeenRotation> seen,
-                                  double offset_s) {
+std::vector<VisualRotation> trusted(const GyroIntegral& gyro, std::span<const VisualRotation> seen,
+                                    double offset_s) {
   const Eigen::VectorXd squares = residuals(image_rates(seen), gyro_rates(gyro, seen, offset_s));
   std::vector<double> sorted(squares.data(), squares.data() + squares.size());
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
-  std::vector<SeenRotation> kept;
+  std::vector<VisualRotation> kept;
   for (std::size_t k = 0; k < seen.size(); ++k)
     if (squares[static_cast<Eigen::Index>(k)] <= kMaxDeviation * kMaxDeviation * *middle)
       kept.push_back(seen[k]);
@@ -81,8 +81,8 @@ std::vector<SeenRotation> trusted(const GyroIntegral& gyro, std::span<const Seen
 }
 
 // The offset with the smallest sum of squares near `start_s`, by a parabola through its neighbours.
-void refine_offset(const GyroIntegral& gyro, std::span<const SeenRotation> seen, const Rates& image,
-                   double start_s, InertialFit& fit) {
+void refine_offset(const GyroIntegral& gyro, std::span<const VisualRotation> seen,
+                   const Rates& image, double start_s, InertialFit& fit) {
   const auto sum_at = [&](double offset_s) {
     return residuals(image, gyro_rates(gyro, seen, offset_s)).sum();
   };
@@ -139,16 +139,16 @@ void prefer_rotation(InertialFit& fit, const Rates& image, const Rates& gyro) {
 
 }  // namespace
 
-std::optional<InertialFit> fit_inertial(std::span<const SeenRotation> seen,
+std::optional<InertialFit> fit_inertial(std::span<const VisualRotation> seen,
                                         std::span<const ImuSample> samples) {
   const GyroIntegral gyro(samples);
   const Stamp reach = nanoseconds(kMaxOffset_s + 3.0 * kCoarse_s);
-  std::vector<SeenRotation> covered;
-  for (const SeenRotation& step : seen)
+  std::vector<VisualRotation> covered;
+  for (const VisualRotation& step : seen)
     if (gyro.covers(step.from - reach, step.to + reach)) covered.push_back(step);
   if (covered.size() < kMinSteps) return std::nullopt;
   const double start_s = coarse_offset(gyro, covered, image_rates(covered));
-  const std::vector<SeenRotation> kept = trusted(gyro, covered, start_s);
+  const std::vector<VisualRotation> kept = trusted(gyro, covered, start_s);
 
   InertialFit fit{.steps = kept.size()};
   const Rates all = image_rates(kept);

@@ -9,7 +9,7 @@
 namespace km {
 
 /// Rotation of the left camera between two images.
-struct SeenRotation {
+struct VisualRotation {
   Stamp from = 0, to = 0;
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< R_from_to as rotation vector [rad].
 };
@@ -39,7 +39,7 @@ inline constexpr double kMaxOffset_s = 0.15;
 /// of the image's rates on the gyroscope's (twelve unknowns). A parabola interpolates the minimum.
 /// Steps with large residuals at the best offset are dropped. Q is the orthogonal Procrustes
 /// solution (Schoenemann, 1966). nullopt for fewer than 20 steps within the samples.
-[[nodiscard]] std::optional<InertialFit> fit_inertial(std::span<const SeenRotation> seen,
+[[nodiscard]] std::optional<InertialFit> fit_inertial(std::span<const VisualRotation> seen,
                                                       std::span<const ImuSample> samples);
 
 }  // namespace km

@@ -1,41 +1,33 @@
 #include "modules/diagnosis/sensor_sample.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
-#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "modules/evaluation/images/level_statistics.hpp"
 #include "modules/images/image_view.hpp"
+#include "modules/images/keypoint_extractor.hpp"
 
 namespace km {
 namespace {
 
 constexpr double kStereoPeriod_s = 0.5, kMinStep_s = 0.09, kMaxStep_s = 0.25;
-constexpr int kOrbFeatures = 800, kFastThreshold = 12;
+constexpr int kMaxKeypoints = 800, kFastThreshold = 12;
 constexpr float kRatio = 0.8F;
 constexpr std::size_t kCorners = 200;
 constexpr double kReturns_px = 1.0;
 constexpr double kSaturatedLevel = 250.0, kStrongest = 0.99;
 
-struct OrbImage {
+struct DescribedImage {
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
 };
 
-OrbImage orb_of(const cv::Mat& image) {
-  OrbImage orb;
-  cv::ORB::create(kOrbFeatures)->detectAndCompute(image, {}, orb.keypoints, orb.descriptors);
-  return orb;
-}
-
-std::vector<OrbDescriptor> descriptors_of(const OrbImage& orb) {
-  std::vector<OrbDescriptor> descriptors(static_cast<std::size_t>(orb.descriptors.rows));
-  for (std::size_t i = 0; i < descriptors.size(); ++i)
-    std::memcpy(descriptors[i].data(), orb.descriptors.ptr(static_cast<int>(i)),
-                descriptors[i].size());
-  return descriptors;
+DescribedImage describe(const cv::Mat& image) {
+  DescribedImage result;
+  make_keypoint_extractor(kMaxKeypoints)
+      ->detectAndCompute(image, {}, result.keypoints, result.descriptors);
+  return result;
 }
 
 // The best match of each row of `a` if it is clearly better than the second best; otherwise -1.
@@ -53,7 +45,7 @@ Eigen::Vector2d vector_of(const cv::Point2f& p) {
   return {static_cast<double>(p.x), static_cast<double>(p.y)};
 }
 
-StereoMatches match(const OrbImage& left, const OrbImage& right) {
+StereoMatches match(const DescribedImage& left, const DescribedImage& right) {
   const std::vector<int> there = best_matches(left.descriptors, right.descriptors);
   const std::vector<int> back = best_matches(right.descriptors, left.descriptors);
   StereoMatches matches;
@@ -83,7 +75,7 @@ double strong_gradient(const cv::Mat& image) {
   return static_cast<double>(first[at]);
 }
 
-ImageLook look_of(const cv::Mat& image) {
+ImageQuality quality_of(const cv::Mat& image) {
   cv::Mat half;
   cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
   const double coarse = strong_gradient(half);
@@ -125,10 +117,10 @@ void SensorSampler::add_step(const StereoFrame& frame, const cv::Mat& left) {
   KltImage image = make_klt_image(left);
   if (!is_first && step_s <= kMaxStep_s) {
     TrackedStep step{.from = last_stamp_, .to = frame.stamp, .points = {}};
-    const std::vector<RoundTrip> trips = round_trip(last_, image, corners_);
-    for (std::size_t i = 0; i < trips.size(); ++i)
-      if (trips[i].error_px < kReturns_px)
-        step.points.push_back({vector_of(corners_[i]), vector_of(trips[i].to), right_[i]});
+    const std::vector<ForwardBackward> tracks = forward_backward(last_, image, corners_);
+    for (std::size_t i = 0; i < tracks.size(); ++i)
+      if (tracks[i].error_px < kReturns_px)
+        step.points.push_back({vector_of(corners_[i]), vector_of(tracks[i].to), right_[i]});
     sample_.steps.push_back(std::move(step));
   }
   begin_step(frame, std::move(image));
@@ -144,21 +136,21 @@ void SensorSampler::begin_step(const StereoFrame& frame, KltImage image) {
   std::vector<cv::Point2f> starts;
   for (const cv::Point2f& corner : corners_)
     starts.push_back(corner + shift_near(sample_.stereo.back(), corner));
-  const std::vector<RoundTrip> trips =
-      round_trip(last_, make_klt_image(view(frame.right)), corners_, std::move(starts));
-  for (std::size_t i = 0; i < trips.size(); ++i)
-    if (trips[i].error_px < kReturns_px) right_[i] = vector_of(trips[i].to);
+  const std::vector<ForwardBackward> tracks =
+      forward_backward(last_, make_klt_image(view(frame.right)), corners_, std::move(starts));
+  for (std::size_t i = 0; i < tracks.size(); ++i)
+    if (tracks[i].error_px < kReturns_px) right_[i] = vector_of(tracks[i].to);
 }
 
 void SensorSampler::add_stereo(const StereoFrame& frame, const cv::Mat& left) {
-  const bool is_first = sample_.looks.empty();
+  const bool is_first = sample_.qualities.empty();
   if (!is_first && seconds_between(last_stereo_, frame.stamp) < kStereoPeriod_s) return;
   last_stereo_ = frame.stamp;
-  if (sample_.looks.size() >= kMaxStereo) return;
-  sample_.looks.push_back(look_of(left));
-  const OrbImage orb = orb_of(left);
-  sample_.descriptors.push_back(descriptors_of(orb));
-  if (frame.right.width > 0) sample_.stereo.push_back(match(orb, orb_of(view(frame.right))));
+  if (sample_.qualities.size() >= kMaxStereo) return;
+  sample_.qualities.push_back(quality_of(left));
+  const DescribedImage orb = describe(left);
+  sample_.descriptors.push_back(descriptors_of_rows(orb.descriptors));
+  if (frame.right.width > 0) sample_.stereo.push_back(match(orb, describe(view(frame.right))));
 }
 
 }  // namespace km

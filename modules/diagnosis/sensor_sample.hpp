@@ -7,7 +7,7 @@
 #include "modules/core/frame.hpp"
 #include "modules/core/image_size.hpp"
 #include "modules/core/keyframe.hpp"
-#include "modules/evaluation/images/round_trip.hpp"
+#include "modules/evaluation/images/forward_backward.hpp"
 
 namespace km {
 
@@ -35,7 +35,7 @@ struct TrackedStep {
 };
 
 /// Brightness, sharpness and texture of one left image.
-struct ImageLook {
+struct ImageQuality {
   double mean_level = 0.0;       ///< Mean grey level, 0 to 255.
   double saturated_share = 0.0;  ///< Share of pixels of 250 and above.
   /// 99 % quantile of the gradients, relative to that of the image at half size. The ratio is about
@@ -50,9 +50,9 @@ struct SensorSample {
   ImageSize left_size, right_size;
   std::vector<StereoMatches> stereo;
   std::vector<TrackedStep> steps;
-  std::vector<ImageLook> looks;
-  std::vector<std::vector<OrbDescriptor>>
-      descriptors;  ///< ORB descriptors of each left image in `looks`.
+  std::vector<ImageQuality> qualities;
+  std::vector<std::vector<BinaryDescriptor>>
+      descriptors;  ///< ORB descriptors of each left image in `qualities`.
   std::vector<Stamp> frames;
   std::vector<ImuSample> imu;
 };
@@ -60,10 +60,11 @@ struct SensorSample {
 /// Collects a SensorSample, deterministic for equal packets. Not thread-safe.
 ///
 /// Stereo: 800 ORB features of OpenCV are matched by brute force in both directions over the whole
-/// image, with a ratio test of 0.8. Stereo and looks use a pair every half second, kMaxStereo at
-/// most. Steps: KLT tracks the 200 strongest corners forward and back (1 px), from an image to the
-/// first image at least 90 ms later. There is no step if that image is more than 250 ms later. The
-/// corners are also tracked to the right image, starting with the shift of the nearest ORB match.
+/// image, with a ratio test of 0.8. Stereo and image qualities use a pair every half second,
+/// kMaxStereo at most. Steps: KLT tracks the 200 strongest corners forward and back (1 px), from an
+/// image to the first image at least 90 ms later. There is no step if that image is more than 250
+/// ms later. The corners are also tracked to the right image, starting with the shift of the
+/// nearest ORB match.
 class SensorSampler {
  public:
   static constexpr std::size_t kMaxStereo = 60;

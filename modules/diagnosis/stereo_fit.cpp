@@ -13,8 +13,8 @@ namespace km {
 namespace {
 
 constexpr double kMinParallax_px = 1.5;  // least parallax whose sign is certain
-constexpr double kClearGain = 0.15;      // least gain in on_line of a better calibration
-constexpr double kFair = 0.5;            // least on_line of a calibration that may be right
+constexpr double kClearGain = 0.15;      // least gain in the inlier ratio of a better calibration
+constexpr double kFair = 0.5;            // least inlier ratio of a calibration that may be right
 
 Camera with_pose_of(Camera camera, const SE3& T_body_cam) {
   camera.T_body_cam = T_body_cam;
@@ -42,7 +42,7 @@ StereoAlternative best_focal_ratio(std::span<const StereoMatches> images, const 
   for (int k = -kSteps; k <= kSteps; ++k) {
     const double ratio = 1.0 + kStep * k;
     const StereoFit fit = fit_of(images, with_focal_ratio(rig, ratio));
-    if (fit.on_line > best.fit.on_line) best = {StereoFault::kFocalLength, ratio, fit};
+    if (fit.inlier_ratio > best.fit.inlier_ratio) best = {StereoFault::kFocalLength, ratio, fit};
   }
   return best;
 }
@@ -75,19 +75,19 @@ StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig) {
   const SE3 T_right_left = rig.T_left_right().inverse();
   StereoFit fit;
   std::vector<double> errors_px, depths_m;
-  std::size_t on_line = 0, behind = 0;
+  std::size_t inliers = 0, behind = 0;
   for (const StereoMatches& image : images)
     for (const PixelPair& pair : image.pairs) {
       ++fit.points;
       const auto point = stereo_point(rig, T_right_left, pair);
       errors_px.push_back(point ? point->error_px : std::numeric_limits<double>::infinity());
-      if (!point || point->error_px > kOnLine_px) continue;
+      if (!point || point->error_px > kEpipolarInlier_px) continue;
       const bool is_behind = point->depth_m < 0.0 && point->parallax_px > kMinParallax_px;
-      ++(is_behind ? behind : on_line);
+      ++(is_behind ? behind : inliers);
       if (!is_behind && point->depth_m > 0.0) depths_m.push_back(point->depth_m);
     }
   const auto n = static_cast<double>(std::max<std::size_t>(fit.points, 1));
-  fit.on_line = static_cast<double>(on_line) / n;
+  fit.inlier_ratio = static_cast<double>(inliers) / n;
   fit.behind = static_cast<double>(behind) / n;
   fit.error_px = quantile(std::move(errors_px), 0.5);
   fit.depth_m = quantile(std::move(depths_m), 0.5);
@@ -127,7 +127,7 @@ StereoAlternative best_alternative(std::span<const StereoMatches> images, const 
   const StereoAlternative given{.fit = fit_of(images, rig)};
   StereoAlternative best = given;
   const auto consider = [&best](const StereoAlternative& alternative) {
-    if (alternative.fit.on_line > best.fit.on_line) best = alternative;
+    if (alternative.fit.inlier_ratio > best.fit.inlier_ratio) best = alternative;
   };
   consider({.fault = StereoFault::kSwappedImages, .fit = fit_of(swapped(images), rig)});
   for (const StereoFault fault :
@@ -135,9 +135,10 @@ StereoAlternative best_alternative(std::span<const StereoMatches> images, const 
         StereoFault::kInvertedRight, StereoFault::kExchangedLenses})
     consider({.fault = fault, .fit = fit_of(images, undone(rig, fault))});
   // Only without such a fault, because another focal length compensates some errors of a fault.
-  if (best.fit.on_line < given.fit.on_line + kClearGain) consider(best_focal_ratio(images, rig));
+  if (best.fit.inlier_ratio < given.fit.inlier_ratio + kClearGain)
+    consider(best_focal_ratio(images, rig));
   const bool is_clear =
-      best.fit.on_line > given.fit.on_line + kClearGain && best.fit.on_line > kFair;
+      best.fit.inlier_ratio > given.fit.inlier_ratio + kClearGain && best.fit.inlier_ratio > kFair;
   return is_clear ? best : given;
 }
 

@@ -27,15 +27,16 @@ struct StereoPoint {
 /// Agreement of points in both images of a pair, at any position, with a calibration.
 struct StereoFit {
   std::size_t points = 0;
-  /// Share of points within kOnLine_px of their epipolar line and not behind the cameras.
-  double on_line = 0.0;
-  double behind = 0.0;  ///< Share of points within kOnLine_px whose rays meet behind the cameras.
+  /// Share of points within kEpipolarInlier_px of their epipolar line and not behind the cameras.
+  double inlier_ratio = 0.0;
+  double behind =
+      0.0;  ///< Share of points within kEpipolarInlier_px whose rays meet behind the cameras.
   double error_px =
       0.0;               ///< Median distance from the line, in the right image; NaN without points.
-  double depth_m = 0.0;  ///< Median depth of the points on_line; NaN if there are none.
+  double depth_m = 0.0;  ///< Median depth of these points; NaN if there are none.
 };
 
-inline constexpr double kOnLine_px = 2.0;
+inline constexpr double kEpipolarInlier_px = 2.0;
 
 /// Least number of points for a statement.
 inline constexpr std::size_t kLeastStereoPoints = 100;
@@ -43,9 +44,9 @@ inline constexpr std::size_t kLeastStereoPoints = 100;
 [[nodiscard]] StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig);
 
 /// True if there are enough points and at least half of them are on their lines. In sound pairs
-/// on_line is 0.65 to 0.97.
+/// the ratio is 0.65 to 0.97.
 [[nodiscard]] inline bool is_sound(const StereoFit& fit) {
-  return fit.points >= kLeastStereoPoints && fit.on_line >= 0.5;
+  return fit.points >= kLeastStereoPoints && fit.inlier_ratio >= 0.5;
 }
 
 /// Possible faults of the calibration of a pair, or of the assignment of its images.

@@ -18,8 +18,8 @@ void require_usable(const StereoRig& rig) {
       throw std::invalid_argument("rectification: a camera without pixels or focal length");
 }
 
-// Axes of the virtual cameras in the left one: x along the baseline, z as near to midway between
-// the real ones as x permits.
+// Axes of the virtual cameras in the left camera: x along the baseline, and z as near as possible
+// to the middle between the two real optical axes.
 Eigen::Matrix3d rectified_axes(const StereoRig& rig) {
   constexpr double kMinAlignment = 0.87;  // cosine of 30 degrees
   const SE3 T_left_right = rig.T_left_right();
@@ -27,7 +27,8 @@ Eigen::Matrix3d rectified_axes(const StereoRig& rig) {
   const Eigen::Vector3d z_right = T_left_right.linear().col(2);
   if (!(z_right.z() > kMinAlignment) || !(x.x() > kMinAlignment))
     throw std::invalid_argument(
-        "rectification: the right camera must look the way of the left one and stand to its right");
+        "rectification: the right camera must have the direction of the left one and be to its "
+        "right");
   const Eigen::Vector3d y = (Eigen::Vector3d::UnitZ() + z_right).cross(x).normalized();
   Eigen::Matrix3d R_left_rect;
   R_left_rect << x, y, x.cross(y);

@@ -7,10 +7,14 @@
 #include <variant>
 #include <vector>
 
+#include "modules/core/closure_verdicts.hpp"
 #include "modules/core/decoded.hpp"
 #include "modules/core/keyframe.hpp"
+#include "modules/core/mesh_cells.hpp"
 #include "modules/core/odometry.hpp"
+#include "modules/core/pose_changes.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/core/robot_sample.hpp"
 
 namespace km {
 
@@ -29,16 +33,17 @@ struct JournalPeer {
   std::string name;
 };
 
-/// Results that a robot cannot compute again after its process has died. All other results follow
-/// from them.
-using JournalEntry = std::variant<JournalStart, OdometryState, KeyframeOdometry, Keyframe, Closure,
-                                  ClosureOutcome, JournalPeer>;
+/// Events of a run, see README. The first eight are results that a robot cannot compute again after
+/// its process has died; the others state what its results and viewers show.
+using JournalEntry =
+    std::variant<JournalStart, OdometryState, KeyframeOdometry, Keyframe, Closure, ClosureOutcome,
+                 JournalPeer, ClosureJudgements, PoseChanges, RobotSample, MeshCells>;
 
 /// Maximum size of an entry [bytes].
 inline constexpr std::size_t kMaxJournalEntry_bytes = std::size_t{1} << 22U;
 
-/// Encodes the kind in a byte, then the members in order of declaration, least significant byte
-/// first. Decoding restores all numbers exactly.
+/// Encodes the kind in a byte, then the members (see ArchiveWriter). Decoding restores all numbers
+/// exactly.
 [[nodiscard]] std::vector<std::uint8_t> encode_journal_entry(const JournalEntry& entry);
 
 /// Refuses bytes that encode_journal_entry() never writes, numbers that are not finite, and state

@@ -12,49 +12,72 @@
 namespace km {
 namespace {
 
-constexpr std::string_view kMagic = "KMJRNL1\n";
+constexpr std::string_view kMark = "\x7FKMJRNL2";
+constexpr std::size_t kHead_bytes = kMark.size() + 4 + 8;
+constexpr std::size_t kLeast_bytes = kHead_bytes + 8;
+// After marks without an entry whose alleged bytes add up to this, nothing is read: a hostile file
+// could have a mark in every few bytes.
+constexpr std::size_t kMostFalse_bytes = std::size_t{64} << 20U;
 
-// Updates the check sum by an entry.
-std::uint64_t mixed(std::uint64_t check_sum, std::span<const std::uint8_t> bytes) {
-  mix_fnv1a(check_sum, bytes.size());
-  mix_fnv1a(check_sum, bytes);
-  return check_sum;
+std::uint64_t check_sum(Stamp time, std::span<const std::uint8_t> bytes) {
+  std::uint64_t sum = kFnv1aBasis;
+  mix_fnv1a(sum, bytes.size());
+  mix_fnv1a(sum, static_cast<std::uint64_t>(time));
+  mix_fnv1a(sum, bytes);
+  return sum;
+}
+
+struct Frame {
+  std::span<const std::uint8_t> bytes;  // empty if there is not room for them
+  Stamp time = 0;
+  bool is_whole = false;
+};
+
+// The entry whose mark is at `offset`.
+Frame frame_at(std::string_view text, std::size_t offset) {
+  ByteReader in({reinterpret_cast<const std::uint8_t*>(text.data()) + offset + kMark.size(),
+                 text.size() - offset - kMark.size()});
+  const std::uint32_t size = in.u32();
+  const auto time = static_cast<Stamp>(in.u64());
+  if (size > kMaxJournalEntry_bytes) return {};
+  const auto bytes = in.bytes(size);
+  const std::uint64_t sum = in.u64();
+  return {bytes, time, !in.failed() && sum == check_sum(time, bytes)};
 }
 
 }  // namespace
 
+std::string to_string(const JournalDamage& damage, const std::filesystem::path& file) {
+  return file.string() + ": " + std::to_string(damage.bytes) + " bytes from byte " +
+         std::to_string(damage.offset) + " on are damaged and left out";
+}
+
 JournalExtent read_journal(const std::filesystem::path& file,
-                           const std::function<void(JournalEntry, JournalPlace)>& take) {
+                           const std::function<void(StoredEntry)>& take) {
   const std::string text = read_input_file(file);
-  JournalExtent read{.check_sum = kFnv1aBasis};
-  const std::string_view begin = std::string_view(text).substr(0, kMagic.size());
-  if (!kMagic.starts_with(begin))
-    throw InputFileError(file.string() + ": is no journal of a robot's run");
-  read.cut_bytes = text.size();
-  if (begin.size() < kMagic.size()) return read;
-  ByteReader in({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-  (void)in.bytes(kMagic.size());
-  const auto advance = [&] {
-    read.whole_bytes = text.size() - in.left();
-    read.cut_bytes = in.left();
-  };
-  advance();
-  while (in.left() > 0) {
-    const std::uint32_t size = in.u32();
-    if (size > kMaxJournalEntry_bytes) break;
-    const JournalPlace place{text.size() - in.left(), size};
-    const auto bytes = in.bytes(size);
-    const std::uint64_t check_sum = in.u64();
-    if (in.failed() || mixed(read.check_sum, bytes) != check_sum) break;
-    auto entry = decode_journal_entry(bytes);
+  JournalExtent read;
+  std::size_t false_bytes = 0;
+  for (std::size_t at = 0; (at = text.find(kMark, at)) != std::string::npos;) {
+    const Frame frame = frame_at(text, at);
+    if (!frame.is_whole) {
+      if ((false_bytes += frame.bytes.size()) > kMostFalse_bytes) break;
+      ++at;
+      continue;
+    }
+    auto entry = decode_journal_entry(frame.bytes);
     if (!entry.value)
       throw InputFileError(file.string() + ": entry " + std::to_string(read.entries + 1) + ": " +
                            entry.refusal + ": written by another version of this program");
-    read.check_sum = check_sum;
+    const bool after_damage = at > read.whole_bytes;
+    if (after_damage) read.damages.push_back({read.whole_bytes, at - read.whole_bytes});
+    const JournalPlace place{at + kHead_bytes, static_cast<std::uint32_t>(frame.bytes.size())};
+    read.whole_bytes = at = at + kLeast_bytes + frame.bytes.size();
     ++read.entries;
-    advance();
-    take(*std::move(entry.value), place);
+    take({*std::move(entry.value), place, frame.time, after_damage});
   }
+  read.cut_bytes = text.size() - read.whole_bytes;
+  if (read.entries == 0 && !kMark.starts_with(std::string_view(text).substr(0, kMark.size())))
+    throw InputFileError(file.string() + ": is no journal of a robot's run");
   return read;
 }
 
@@ -72,41 +95,37 @@ JournalEntry read_journal_entry(const std::filesystem::path& file, const Journal
 JournalFile::JournalFile(std::filesystem::path file) : JournalFile(std::move(file), {}) {}
 
 JournalFile::JournalFile(std::filesystem::path file, const JournalExtent& read)
-    : file_(std::move(file)),
-      keep_bytes_(read.whole_bytes),
-      check_sum_(read.check_sum),
-      end_bytes_(read.whole_bytes) {
-  if (read.whole_bytes > 0) return;
-  check_sum_ = kFnv1aBasis;
-  waiting_ = kMagic;
-  end_bytes_ = waiting_.size();
-}
+    : file_(std::move(file)), keep_bytes_(read.whole_bytes), end_bytes_(read.whole_bytes) {}
 
-std::optional<JournalPlace> JournalFile::add(const JournalEntry& entry) {
+std::optional<JournalPlace> JournalFile::add(const JournalEntry& entry, Stamp time) {
   const std::vector<std::uint8_t> bytes = encode_journal_entry(entry);
   full_ |=
       waiting_.size() + bytes.size() > kMaxWaiting_bytes || bytes.size() > kMaxJournalEntry_bytes;
   if (full_) return std::nullopt;
-  check_sum_ = mixed(check_sum_, bytes);
-  ByteWriter size, sum;
-  size.u32(static_cast<std::uint32_t>(bytes.size()));
-  sum.u64(check_sum_);
+  ByteWriter head, sum;
+  head.u32(static_cast<std::uint32_t>(bytes.size()));
+  head.u64(static_cast<std::uint64_t>(time));
+  sum.u64(check_sum(time, bytes));
+  const JournalPlace place{end_bytes_ + kHead_bytes, static_cast<std::uint32_t>(bytes.size())};
   const std::size_t before = waiting_.size();
   const auto append = [this](const auto& part) { waiting_.append(part.begin(), part.end()); };
-  append(size.release());
-  const JournalPlace place{end_bytes_ + (waiting_.size() - before),
-                           static_cast<std::uint32_t>(bytes.size())};
+  append(kMark);
+  append(head.release());
   append(bytes);
   append(sum.release());
   end_bytes_ += waiting_.size() - before;
   return place;
 }
 
-void JournalFile::sync() {
-  if (waiting_.empty()) return;
+bool JournalFile::collect() {
+  if (collected_.empty()) collected_.swap(waiting_);
+  return !collected_.empty();
+}
+
+void JournalFile::write() {
   if (keep_bytes_ && is_there(file_)) std::filesystem::resize_file(file_, *keep_bytes_);
   keep_bytes_.reset();
-  append_to_file(file_, waiting_, {.durable = true});
+  append_to_file(file_, collected_, {.durable = true});
 }
 
 }  // namespace km

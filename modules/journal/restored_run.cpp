@@ -1,7 +1,6 @@
 #include "modules/journal/restored_run.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -12,46 +11,43 @@
 namespace km {
 namespace {
 
+// Most keyframes in a row that are filled in; a damaged disk block has far fewer.
+constexpr std::size_t kMostLost = 1000;
+
 bool is_final(const ClosureOutcome& outcome) {
   return outcome.stage >= ClosureStage::kVerified ||
          (outcome.stage == ClosureStage::kReceived && !outcome.reason.empty());
 }
 
-// Restores a run from the entries of its journal. A resumed process continues after the last full
-// keyframe, so later entries of the former process are discarded.
-class RunRestorer {
- public:
-  // Throws std::invalid_argument for an entry that cannot follow the former ones.
-  void take(JournalEntry entry, JournalPlace place);
+// Keyframe `number` of `count` that are lost between `before` and `next`. A single one has its
+// exact pose, because `next` states the step from it.
+KeyframeOdometry between(const KeyframeOdometry* before, const KeyframeOdometry& next,
+                         std::size_t number, std::size_t count) {
+  KeyframeOdometry lost = next;
+  const SE3 T_odom_last = next.T_odom_kf * next.T_previous_kf.inverse();
+  const SE3 T_odom_before = before != nullptr ? before->T_odom_kf : T_odom_last;
+  const Stamp begin =
+      before != nullptr ? before->stamp : next.stamp - static_cast<Stamp>(count) - 1;
+  const double share = static_cast<double>(number) / static_cast<double>(count);
+  lost.id.index = next.id.index - static_cast<KeyframeIndex>(count + 1 - number);
+  lost.stamp =
+      begin + (next.stamp - begin) * static_cast<Stamp>(number) / static_cast<Stamp>(count + 1);
+  lost.T_odom_kf = make_pose(T_odom_last.linear(), (1.0 - share) * T_odom_before.translation() +
+                                                       share * T_odom_last.translation());
+  lost.vertical.reset();
+  lost.state_covariance.reset();
+  lost.calibration.reset();
+  return lost;
+}
 
-  // Call once, after the last entry.
-  [[nodiscard]] RestoredRun finish();
+}  // namespace
 
- private:
-  void add(JournalStart start);
-  void add(OdometryState state);
-  void add(KeyframeOdometry keyframe);
-  void add(Keyframe keyframe);
-  void add(Closure closure);
-  void add(ClosureOutcome outcome);
-  void add(JournalPeer peer);
-  void cut_to_full_keyframes();
-  void forget_closures(const std::function<bool(const KeyframeId&)>& with);
-
-  RestoredRun run_;
-  JournalPlace place_;  // place of the present entry
-  bool started_ = false;
-  bool first_state_ = true;                                        // the next state is the first of
-                                                                   // its process
-  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends (from, to)
-  std::map<ClosureId, ClosureOutcome> outcomes_;
-};
-
-void RunRestorer::take(JournalEntry entry, JournalPlace place) {
-  place_ = place;
-  if (!started_ && !std::holds_alternative<JournalStart>(entry))
+void RunRestorer::take(StoredEntry stored) {
+  place_ = stored.place;
+  after_damage_ |= stored.after_damage;
+  if (!started_ && !std::holds_alternative<JournalStart>(stored.entry))
     throw std::invalid_argument("the first entry does not state the robot of the run");
-  std::visit([this](auto& value) { add(std::move(value)); }, entry);
+  std::visit([this](auto& value) { add(std::move(value)); }, stored.entry);
 }
 
 void RunRestorer::add(JournalStart start) {
@@ -74,16 +70,43 @@ void RunRestorer::add(OdometryState state) {
   run_.states.push_back(std::move(state));
 }
 
+// False: only damage explains the gap before the keyframe.
+template <typename T>
+bool RunRestorer::follows(const KeyframeId& id, const std::vector<T>& before) const {
+  const std::size_t next = before.size();
+  if (id == KeyframeId{run_.robot, static_cast<KeyframeIndex>(next)}) return true;
+  const bool is_gap = id.robot == run_.robot && id.index > next && id.index - next <= kMostLost;
+  if (after_damage_ && is_gap) return false;
+  throw std::invalid_argument("keyframe " + to_string(id) + " does not follow");
+}
+
 void RunRestorer::add(KeyframeOdometry keyframe) {
-  if (keyframe.id != KeyframeId{run_.robot, static_cast<KeyframeIndex>(run_.odometry.size())})
-    throw std::invalid_argument("keyframe " + to_string(keyframe.id) + " does not follow");
+  if (!follows(keyframe.id, run_.odometry)) {
+    const std::size_t first = run_.odometry.size(), count = keyframe.id.index - first;
+    for (std::size_t k = 1; k <= count; ++k) {
+      const KeyframeOdometry* const before = first > 0 ? &run_.odometry[first - 1] : nullptr;
+      KeyframeOdometry lost = between(before, keyframe, k, count);
+      lost.T_previous_kf = run_.odometry.empty()
+                               ? lost.T_odom_kf
+                               : run_.odometry.back().T_odom_kf.inverse() * lost.T_odom_kf;
+      run_.odometry.push_back(std::move(lost));
+    }
+    run_.lost_keyframes += count;
+  }
   run_.odometry.push_back(std::move(keyframe));
 }
 
 void RunRestorer::add(Keyframe keyframe) {
-  const KeyframeId& id = keyframe.odometry.id;
-  if (id != KeyframeId{run_.robot, static_cast<KeyframeIndex>(run_.keyframes.size())})
-    throw std::invalid_argument("features of keyframe " + to_string(id) + " do not follow");
+  if (!follows(keyframe.odometry.id, run_.keyframes)) {
+    Keyframe lost = keyframe;
+    lost.features.keypoints.clear();
+    lost.features.descriptors.clear();
+    for (; run_.keyframes.size() < keyframe.odometry.id.index; ++run_.lost_keyframes) {
+      lost.odometry.id.index = static_cast<KeyframeIndex>(run_.keyframes.size());
+      run_.keyframes.push_back(lost);
+      run_.places.emplace_back();
+    }
+  }
   run_.keyframes.push_back(std::move(keyframe));
   run_.places.push_back(place_);
 }
@@ -96,27 +119,42 @@ void RunRestorer::add(ClosureOutcome outcome) {
   outcomes_[outcome.id] = std::move(outcome);
 }
 
+void RunRestorer::add(const ClosureJudgements& judgements) {
+  for (const ClosureJudgement& closure : judgements.closures) judgements_[closure.id] = closure;
+}
+
+void RunRestorer::add(const PoseChanges& changes) {
+  if (std::exchange(anchor_, changes.anchor) != changes.anchor) poses_.clear();
+  for (const PoseChanges::Pose& pose : changes.poses) poses_[pose.id] = pose;
+}
+
 void RunRestorer::cut_to_full_keyframes() {
   const std::size_t full = std::min(run_.odometry.size(), run_.keyframes.size());
   run_.odometry.resize(full);
   run_.keyframes.resize(full);
   run_.places.resize(full);
-  forget_closures([&](const KeyframeId& id) { return id.robot == run_.robot && id.index >= full; });
+  forget(run_.robot, static_cast<KeyframeIndex>(full));
 }
 
-void RunRestorer::forget_closures(const std::function<bool(const KeyframeId&)>& with) {
+// Discards results with keyframes of `robot` from an index on.
+void RunRestorer::forget(RobotId robot, KeyframeIndex from) {
+  const auto is_gone = [&](const KeyframeId& id) { return id.robot == robot && id.index >= from; };
+  const auto has_gone = [&](const auto& entry) {
+    return is_gone(entry.first.from) || is_gone(entry.first.to);
+  };
   std::erase_if(closures_, [&](const auto& entry) {
-    return with(entry.first.first) || with(entry.first.second);
+    return is_gone(entry.first.first) || is_gone(entry.first.second);
   });
-  std::erase_if(outcomes_,
-                [&](const auto& entry) { return with(entry.first.from) || with(entry.first.to); });
+  std::erase_if(outcomes_, has_gone);
+  std::erase_if(judgements_, has_gone);
+  std::erase_if(poses_, [&](const auto& entry) { return is_gone(entry.first); });
 }
 
 // A new incarnation has other keyframes, so its former closures are removed.
 void RunRestorer::add(JournalPeer peer) {
   const auto known = run_.peers.find(peer.robot);
   if (known != run_.peers.end() && !is_same_incarnation(known->second.boot, peer.boot))
-    forget_closures([&](const KeyframeId& id) { return id.robot == peer.robot; });
+    forget(peer.robot, 0);
   run_.peers[peer.robot] = std::move(peer);
 }
 
@@ -133,10 +171,41 @@ RestoredRun RunRestorer::finish() {
     if (is_final(outcome) && (!verified || has_closure))
       run_.outcomes.push_back(std::move(outcome));
   }
+  std::erase_if(judgements_, [&](const auto& entry) { return !known.contains(entry.first); });
+  finish_decisions();
+  finish_solution();
   return std::move(run_);
 }
 
-}  // namespace
+void RunRestorer::finish_decisions() {
+  std::map<std::pair<RobotId, RobotId>, InlierSet> sets;
+  for (const auto& [id, judgement] : judgements_) {
+    if (!judgement.selected) continue;
+    InlierSet& set = sets[{id.from.robot, id.to.robot}];
+    set.a = id.from.robot;
+    set.b = id.to.robot;
+    set.closures.push_back(id);
+    run_.solution.verdicts.closures.push_back({id, !judgement.overruled});
+  }
+  for (auto& [pair, set] : sets) run_.inlier_sets.push_back(std::move(set));
+}
+
+// Own poses after a missing one are left out.
+void RunRestorer::finish_solution() {
+  Trajectory& trajectory = run_.solution.trajectory;
+  trajectory.robot = run_.robot;
+  trajectory.anchor = anchor_;
+  for (const auto& [id, pose] : poses_) {
+    if (id.robot != run_.robot) {
+      trajectory.public_poses[id] = pose.T_world_kf;
+    } else if (id.index == trajectory.T_world_kf.size()) {
+      if (pose.covariance && id.index == trajectory.covariances.size())
+        trajectory.covariances.push_back(*pose.covariance);
+      trajectory.T_world_kf.push_back(pose.T_world_kf);
+    }
+  }
+  for (const auto& [robot, peer] : run_.peers) run_.solution.peers.push_back({robot, peer.boot});
+}
 
 std::size_t RestoredRun::final_states() const {
   if (odometry.empty()) return 0;
@@ -148,6 +217,8 @@ std::size_t RestoredRun::final_states() const {
 RestoredRun alone_as(RobotId robot, RestoredRun run) {
   const RobotId former = std::exchange(run.robot, robot);
   run.peers.clear();
+  run.inlier_sets.clear();
+  run.solution = {};
   const auto is_shared = [former](const KeyframeId& a, const KeyframeId& b) {
     return a.robot != former || b.robot != former;
   };
@@ -166,10 +237,10 @@ RestoredRun alone_as(RobotId robot, RestoredRun run) {
 RestoredRun restore_run(const std::filesystem::path& file) {
   RunRestorer restorer;
   std::size_t entry = 0;
-  const JournalExtent read = read_journal(file, [&](JournalEntry taken, JournalPlace place) {
+  const JournalExtent read = read_journal(file, [&](StoredEntry stored) {
     ++entry;
     try {
-      restorer.take(std::move(taken), place);
+      restorer.take(std::move(stored));
     } catch (const std::invalid_argument& error) {
       throw InputFileError(file.string() + ": entry " + std::to_string(entry) + ": " +
                            error.what());

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "modules/core/team_solution.hpp"
 #include "modules/journal/journal_entry.hpp"
 #include "modules/journal/journal_file.hpp"
 
@@ -20,7 +22,8 @@ struct RestoredRun {
 
   std::vector<KeyframeOdometry> odometry;  ///< Index i is keyframe i.
   std::vector<Keyframe> keyframes;         ///< Index i is keyframe i, as in `odometry`.
-  std::vector<JournalPlace> places;        ///< Places of the keyframes in the journal.
+  /// Places of the keyframes in the journal; size 0: not there.
+  std::vector<JournalPlace> places;
   /// States of all images. States after the last keyframe stay until they are estimated again.
   std::vector<OdometryState> states;
   std::vector<Closure> closures;  ///< Closures of this robot and of others, each once.
@@ -28,10 +31,57 @@ struct RestoredRun {
   std::vector<ClosureOutcome> outcomes;
   std::map<RobotId, JournalPeer> peers;  ///< Last known identities.
 
-  JournalExtent journal = {};  ///< Position at which writing continues.
+  std::vector<InlierSet> inlier_sets = {};  ///< Selected closures that are known, as version 0.
+  TeamSolution solution = {};               ///< Last state of results and viewers; maybe no poses.
+
+  JournalExtent journal = {};      ///< Position at which writing continues.
+  std::size_t lost_keyframes = 0;  ///< Keyframes of which damage has left only a part.
 
   /// Number of states up to the last keyframe; 0 without one.
   [[nodiscard]] std::size_t final_states() const;
+};
+
+/// Restores a run from the entries of its journal in order. A resumed process continues after the
+/// last full keyframe, so later entries of the former process are discarded. After damage, the pose
+/// of a lost keyframe follows from its neighbours, and lost features are empty.
+class RunRestorer {
+ public:
+  /// Throws std::invalid_argument for an entry that cannot follow the former ones.
+  void take(StoredEntry stored);
+
+  /// Call once, after the last entry.
+  [[nodiscard]] RestoredRun finish();
+
+ private:
+  void add(JournalStart start);
+  void add(OdometryState state);
+  void add(KeyframeOdometry keyframe);
+  void add(Keyframe keyframe);
+  void add(Closure closure);
+  void add(ClosureOutcome outcome);
+  void add(JournalPeer peer);
+  void add(const ClosureJudgements& judgements);
+  void add(const PoseChanges& changes);
+  void add(const RobotSample& /*sample*/) {}
+  void add(const MeshCells& /*cells*/) {}
+  template <typename T>
+  bool follows(const KeyframeId& id, const std::vector<T>& before) const;
+  void cut_to_full_keyframes();
+  void forget(RobotId peer, KeyframeIndex from);
+  void finish_decisions();
+  void finish_solution();
+
+  RestoredRun run_;
+  JournalPlace place_;  // place of the present entry
+  bool after_damage_ = false;
+  bool started_ = false;
+  bool first_state_ = true;                                        // the next state is the first of
+                                                                   // its process
+  std::map<std::pair<KeyframeId, KeyframeId>, Closure> closures_;  // by the ends (from, to)
+  std::map<ClosureId, ClosureOutcome> outcomes_;
+  std::map<ClosureId, ClosureJudgement> judgements_;
+  RobotId anchor_ = 0;
+  std::map<KeyframeId, PoseChanges::Pose> poses_;
 };
 
 /// The run with another robot id, without calibrations and without results with other robots.

@@ -82,17 +82,17 @@ void LinkEmulator::send_over(std::size_t from, std::size_t to, double now_s,
     state.counts.lost[static_cast<std::size_t>(why)].add(frame);
   };
   if (const auto why = cut(link, from, to, now_s)) return lose(*why);
-  double sent_off_s = now_s;
-  if (link.course.has_limit()) {
-    const double begin = std::max(state.sent_off, link.course.capacity_until(now_s));
+  double dequeued_s = now_s;
+  if (link.trace.has_limit()) {
+    const double begin = std::max(state.queue_end, link.trace.capacity_until(now_s));
     const double end = begin + static_cast<double>(frame.size());
-    if (end - link.course.capacity_until(now_s) > link.queue_bytes) return lose(LinkLoss::kQueue);
-    state.sent_off = end;
-    sent_off_s = std::max(now_s, link.course.time_of(end));
+    if (end - link.trace.capacity_until(now_s) > link.queue_bytes) return lose(LinkLoss::kQueue);
+    state.queue_end = end;
+    dequeued_s = std::max(now_s, link.trace.time_of(end));
   }
   if (chance < link.loss) return lose(LinkLoss::kChance);
-  const double due_s = sent_off_s + link.course.delay_s(sent_off_s) + jitter_s;
-  on_the_way_.emplace(due_s, LinkDelivery{from, to, now_s, due_s, frame});
+  const double due_s = dequeued_s + link.trace.delay_s(dequeued_s) + jitter_s;
+  in_flight_.emplace(due_s, LinkDelivery{from, to, now_s, due_s, frame});
 }
 
 std::optional<LinkLoss> LinkEmulator::cut(const LinkPlan& link, std::size_t from, std::size_t to,
@@ -121,8 +121,8 @@ Eigen::Vector3d LinkEmulator::position(std::size_t robot, double now_s) const {
 
 std::vector<LinkDelivery> LinkEmulator::due(double now_s) {
   std::vector<LinkDelivery> deliveries;
-  const auto end = on_the_way_.upper_bound(now_s);
-  for (auto it = on_the_way_.begin(); it != end; ++it) {
+  const auto end = in_flight_.upper_bound(now_s);
+  for (auto it = in_flight_.begin(); it != end; ++it) {
     LinkDelivery& delivery = it->second;
     LinkCounts& counts = states_[delivery.from * script_.robots + delivery.to].counts;
     const double delay_s = now_s - delivery.sent_s;
@@ -131,13 +131,13 @@ std::vector<LinkDelivery> LinkEmulator::due(double now_s) {
     counts.delay_max_s = std::max(counts.delay_max_s, delay_s);
     deliveries.push_back(std::move(delivery));
   }
-  on_the_way_.erase(on_the_way_.begin(), end);
+  in_flight_.erase(in_flight_.begin(), end);
   return deliveries;
 }
 
 std::optional<double> LinkEmulator::next_s() const {
-  if (on_the_way_.empty() || std::isinf(on_the_way_.begin()->first)) return std::nullopt;
-  return on_the_way_.begin()->first;
+  if (in_flight_.empty() || std::isinf(in_flight_.begin()->first)) return std::nullopt;
+  return in_flight_.begin()->first;
 }
 
 const LinkCounts& LinkEmulator::counts(std::size_t from, std::size_t to) const {

@@ -25,7 +25,7 @@ struct RunSpan {
 
 /// Properties of the link from one robot to another.
 struct LinkPlan {
-  LinkTrace course{{{.bytes_per_s = std::numeric_limits<double>::infinity()}}};
+  LinkTrace trace{{{.bytes_per_s = std::numeric_limits<double>::infinity()}}};
   double jitter_s = 0.0;  ///< Additional delay, uniform from 0 to this value, by which frames may
                           ///< overtake others.
   double loss = 0.0;      ///< Probability that a frame is lost.
@@ -142,8 +142,8 @@ class LinkEmulator {
  private:
   struct State {
     std::mt19937 rng;
-    double sent_off = -std::numeric_limits<double>::infinity();  // LinkTrace::capacity_until()
-                                                                 // when the queue is empty
+    /// LinkTrace::capacity_until() at the time when the last queued frame has been sent [bytes].
+    double queue_end = -std::numeric_limits<double>::infinity();
     LinkCounts counts = {};
   };
   void send_over(std::size_t from, std::size_t to, double now_s, const EthernetFrame& frame);
@@ -152,9 +152,9 @@ class LinkEmulator {
   [[nodiscard]] Eigen::Vector3d position(std::size_t robot, double now_s) const;
 
   LinkScript script_;
-  std::vector<State> states_;                       // states in the order of the script's links
-  std::multimap<double, LinkDelivery> on_the_way_;  // deliveries by time; those of equal time in
-                                                    // the order of insertion
+  std::vector<State> states_;                      // states in the order of the script's links
+  std::multimap<double, LinkDelivery> in_flight_;  // deliveries by time; those of equal time in
+                                                   // the order of insertion
 };
 
 /// A table of the frames of each ordered pair of robots, with their `names`.

@@ -2,21 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
-#include <opencv2/features2d.hpp>
 #include <optional>
 #include <stdexcept>
 
 #include "modules/core/depth_lookup.hpp"
 #include "modules/images/image_view.hpp"
+#include "modules/images/keypoint_extractor.hpp"
 
 namespace km {
 namespace {
-
-constexpr float kScale = 1.2F;
-constexpr int kLevels = 8;
-constexpr int kEdge = 31;
 
 // Candidate corners per kept corner. With more candidates the corners are more evenly spread, and
 // the extraction takes longer.
@@ -38,9 +33,9 @@ void sort_by_response(std::vector<cv::KeyPoint>& corners) {
 std::vector<cv::KeyPoint> suppressed(const std::vector<cv::KeyPoint>& corners, double radius,
                                      cv::Size size) {
   std::vector<cv::KeyPoint> kept;
-  std::vector<std::vector<std::uint8_t>> covered(kLevels);
+  std::vector<std::vector<std::uint8_t>> covered(kPyramidLevels);
   for (const cv::KeyPoint& corner : corners) {
-    const double cell = 0.5 * radius * std::pow(kScale, corner.octave);
+    const double cell = 0.5 * radius * std::pow(static_cast<float>(kPyramidScale), corner.octave);
     const int columns = static_cast<int>(size.width / cell) + 1;
     const int rows = static_cast<int>(size.height / cell) + 1;
     auto& cells = covered[static_cast<std::size_t>(corner.octave)];
@@ -101,14 +96,14 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) con
   if (!fits(frame, rig_))
     throw std::invalid_argument("KeyframeFeatureExtractor: images of another size than the rig's");
   const cv::Mat image = view(frame.left);
-  const auto orb = cv::ORB::create(kCandidatesPerKeypoint * config_.max_keypoints, kScale, kLevels,
-                                   kEdge, 0, 2, cv::ORB::HARRIS_SCORE, 31, config_.min_contrast);
+  const auto extractor =
+      make_keypoint_extractor(kCandidatesPerKeypoint * config_.max_keypoints, config_.min_contrast);
   std::vector<cv::KeyPoint> corners;
-  orb->detect(image, corners);
+  extractor->detect(image, corners);
   corners =
       spread(std::move(corners), static_cast<std::size_t>(config_.max_keypoints), image.size());
   cv::Mat descriptors;
-  orb->compute(image, corners, descriptors);  // drops keypoints that are too near the border
+  extractor->compute(image, corners, descriptors);  // drops keypoints that are too near the border
 
   KeyframeFeatures features;
   features.T_body_cam = rig_.cameras[0].T_body_cam;
@@ -125,8 +120,7 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) con
     features.keypoints.push_back({.bearing = bearings.back(),
                                   .inverse_depth = 0.0F,
                                   .octave = static_cast<std::uint8_t>(corner.octave)});
-    std::memcpy(features.descriptors.emplace_back().data(), descriptors.ptr(i),
-                sizeof(OrbDescriptor));
+    features.descriptors.push_back(descriptor_of_row(descriptors, i));
   }
   const std::vector<float> depths = inverse_depths(frame, pixels, bearings);
   for (std::size_t i = 0; i < depths.size(); ++i) features.keypoints[i].inverse_depth = depths[i];
@@ -141,7 +135,7 @@ std::vector<float> KeyframeFeatureExtractor::inverse_depths(
   if (frame.depth == nullptr) return result;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const auto inverse_depth =
-        inverse_depth_at(*frame.depth, pixels[i].cast<double>(), depth_edge(rig_));
+        inverse_depth_at(*frame.depth, pixels[i].cast<double>(), depth_edge_threshold(rig_));
     if (inverse_depth && *inverse_depth >= 1.0 / config_.max_depth_m &&
         *inverse_depth <= 1.0 / config_.min_depth_m)
       result[i] = static_cast<float>(*inverse_depth);

@@ -41,7 +41,9 @@ Steps steps_of(const KeyframeFeatures& features) {
   return {largest.bearing / kBearingSteps, largest.inverse_depth / kDepthSteps};
 }
 
-km_wire_Keypoint to_wire(const Keypoint& point, const OrbDescriptor& descriptor,
+static_assert(sizeof(km_wire_Keypoint::descriptor) == kDescriptorBytes, "see idl/loop_closure.idl");
+
+km_wire_Keypoint to_wire(const Keypoint& point, const BinaryDescriptor& descriptor,
                          const Steps& steps) {
   const auto bearing = [&](float value) {
     return static_cast<std::int16_t>(steps.bearing > 0.0F ? std::lround(value / steps.bearing)

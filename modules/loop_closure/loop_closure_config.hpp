@@ -23,9 +23,9 @@ struct LoopClosureConfig {
   double systematic_translation_m = 0.008;
   double request_timeout_s = 2.0;
   int max_outstanding_requests = 8;
-  int max_link_separation = 16;
-  int attempt_separation = 2;
-  double failure_patience = 2.0;
+  int max_closure_separation = 16;
+  int max_request_separation = 2;
+  double skips_per_failure = 2.0;
   int reply_keypoints = 200;
   int full_keyframes = 50;
   int cached_keyframes = 500;
@@ -67,16 +67,16 @@ struct LoopClosureConfig {
     visitor.field("max_outstanding_requests", max_outstanding_requests, {1, 1000},
                   "maximum number of unanswered requests to one peer; further ones wait");
     visitor.field(
-        "max_link_separation", max_link_separation, {0, 1000},
+        "max_closure_separation", max_closure_separation, {0, 1000},
         "[keyframes] a peer's keyframe is not requested if both keyframes of the candidate are "
         "this near to those of a verified closure; the distance grows up to this value with the "
-        "number of the peer's keyframes that led to closures, see RequestEconomy; 0: request all");
+        "number of the peer's keyframes that led to closures, see RequestPolicy; 0: request all");
     visitor.field(
-        "attempt_separation", attempt_separation, {0, 1000},
+        "max_request_separation", max_request_separation, {0, 1000},
         "[keyframes] a peer's keyframe is not requested if both keyframes of the candidate "
         "are this near to those of another requested candidate; the distance grows in the "
         "same way; 0: request all");
-    visitor.field("failure_patience", failure_patience, {0.0, 100.0},
+    visitor.field("skips_per_failure", skips_per_failure, {0.0, 100.0},
                   "after n failures of similar candidates beyond the first few, this value times n "
                   "such candidates are skipped before one is requested; 0: none");
     visitor.field("reply_keypoints", reply_keypoints, {50, 100000},

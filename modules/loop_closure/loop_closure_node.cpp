@@ -73,15 +73,15 @@ KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const Keypoin
 
 LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
                                  std::shared_ptr<const Vocabulary> vocabulary,
-                                 const LoopClosureTopics& topics, Recall recall)
+                                 const LoopClosureTopics& topics, ReadKeyframe read_keyframe)
     : self_(self),
       vocabulary_(std::move(vocabulary)),
       topics_(topics),
       verifier_(config),
-      recall_(std::move(recall)),
+      read_keyframe_(std::move(read_keyframe)),
       peers_(static_cast<std::size_t>(config.cached_keyframes)),
       requests_(config.request_timeout_s, config.max_outstanding_requests),
-      economy_(config),
+      policy_(config),
       reply_keypoints_(static_cast<std::size_t>(config.reply_keypoints)),
       full_keyframes_(static_cast<KeyframeIndex>(config.full_keyframes)),
       worker_(
@@ -122,17 +122,17 @@ std::exception_ptr LoopClosureNode::error() const {
 
 void LoopClosureNode::step(const std::shared_ptr<const Keyframe>& own_keyframe) {
   own_[own_keyframe->odometry.id] = own_keyframe;
-  put_away_before(own_keyframe->odometry.id.index);
+  evict_before(own_keyframe->odometry.id.index);
   arrived(own_keyframe);
 }
 
 // Removes a keyframe that is no longer among the newest from memory, if it can be read from the
 // disk. Otherwise a part of its keypoints stays in memory.
-void LoopClosureNode::put_away_before(KeyframeIndex newest) {
+void LoopClosureNode::evict_before(KeyframeIndex newest) {
   if (newest < full_keyframes_) return;
   const auto old = own_.find({self_, newest - full_keyframes_});
   if (old == own_.end()) return;
-  if (recall_ && recall_(old->first.index) != nullptr) return old->second.reset();
+  if (read_keyframe_ && read_keyframe_(old->first.index) != nullptr) return old->second.reset();
   auto thinned = std::make_shared<Keyframe>(*old->second);
   thinned->features = reduced(thinned->features, 2 * reply_keypoints_);
   thinned->features.keypoints.shrink_to_fit();
@@ -161,7 +161,7 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
     reply.found = true;
     reply.keyframe.odometry = asked->odometry;
     reply.keyframe.stamp = asked->stamp;
-    reply.keyframe.features = worth_sending(asked->features, {request->requester, request->own});
+    reply.keyframe.features = select_keypoints(asked->features, {request->requester, request->own});
   }
   topics_.own_replies.publish(Addressed<KeyframeReply>{
       request->requester, std::make_shared<const KeyframeReply>(std::move(reply))});
@@ -196,7 +196,7 @@ void LoopClosureNode::forget(RobotId peer) {
   peers_.forget(peer);
   words_.forget(peer);
   requests_.forget(peer);
-  economy_.forget(peer);
+  policy_.forget(peer);
   replies_.erase(peer);
   std::erase_if(known_, [&](const ClosureId& id) { return touches(id, peer); });
   for (auto& [keyframe, works] : waiting_)
@@ -215,7 +215,7 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeBow>& bow) {
 void LoopClosureNode::step(const std::shared_ptr<const ClosureOutcome>& restored) {
   known_.insert(restored->id);
   if (restored->stage >= ClosureStage::kVerified && restored->id.to.robot != self_)
-    economy_.link(restored->id);
+    policy_.add_closure(restored->id);
 }
 
 void LoopClosureNode::step(const LoopClosureTick& tick) {
@@ -246,15 +246,15 @@ LoopClosureNode::KeyframePtr LoopClosureNode::find(const KeyframeId& id) {
 LoopClosureNode::KeyframePtr LoopClosureNode::own(const KeyframeId& id) const {
   const auto found = own_.find(id);
   if (found == own_.end() || found->second) return found == own_.end() ? nullptr : found->second;
-  KeyframePtr keyframe = recall_(id.index);
+  KeyframePtr keyframe = read_keyframe_(id.index);
   if (!keyframe)
     log::limited(log::Level::kWarn, name(), "not read")
         << "keyframe " << to_string(id) << " cannot be read from the disk any more: not compared";
   return keyframe;
 }
 
-KeyframeFeatures LoopClosureNode::worth_sending(const KeyframeFeatures& features,
-                                                const KeyframeId& to) {
+KeyframeFeatures LoopClosureNode::select_keypoints(const KeyframeFeatures& features,
+                                                   const KeyframeId& to) {
   const bool is_first = ++replies_[to.robot] <= kFirstReplies;
   const std::size_t most = is_first ? kFirstFactor * reply_keypoints_ : reply_keypoints_;
   const std::vector<std::uint32_t>* words = words_.find(to);
@@ -271,7 +271,7 @@ bool LoopClosureNode::advance(const Work& work) {
   // The own keyframe first: without it, the peer's keyframe would only fill the cache.
   const KeyframeId& missing = from ? work.id.to : work.id.from;
   if (missing.robot != self_) {
-    ask_for(missing, work);
+    request_keyframe(missing, work);
   } else if (own_.contains(missing)) {
     report(work, ClosureStage::kCandidate, "cannot be read from the disk any more");
   } else {
@@ -280,12 +280,12 @@ bool LoopClosureNode::advance(const Work& work) {
   return false;
 }
 
-void LoopClosureNode::ask_for(const KeyframeId& missing, const Work& work) {
+void LoopClosureNode::request_keyframe(const KeyframeId& missing, const Work& work) {
   const bool under_way = waiting_.contains(missing);
   if (!under_way && !work.measured) {
-    const auto verdict = economy_.judge({work.id.to, work.id.from, work.similarity, work.support});
-    if (verdict != RequestEconomy::Verdict::kAsk)
-      return report(work, ClosureStage::kCandidate, to_string(verdict));
+    const auto decision = policy_.decide({work.id.to, work.id.from, work.similarity, work.support});
+    if (decision != RequestPolicy::Decision::kRequest)
+      return report(work, ClosureStage::kCandidate, to_string(decision));
   }
   waiting_[missing].push_back(work);
   requests_.want(missing);
@@ -298,7 +298,7 @@ void LoopClosureNode::arrived(const KeyframePtr& keyframe) {
   waiting_.erase(found);
   bool verified = false;
   for (const Work& work : works) verified |= advance(work);
-  if (keyframe->odometry.id.robot != self_) economy_.conclude(keyframe->odometry.id, verified);
+  if (keyframe->odometry.id.robot != self_) policy_.add_result(keyframe->odometry.id, verified);
 }
 
 bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Keyframe& to) {
@@ -318,7 +318,7 @@ bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Key
       report(work, ClosureStage::kReceived, to_string(numbers.status), numbers);
       return false;
     }
-    if (to.odometry.id.robot != self_) economy_.link(work.id);
+    if (to.odometry.id.robot != self_) policy_.add_closure(work.id);
     closure.T_from_to = numbers.T_from_to;
     closure.covariance = numbers.covariance;
     closure.inliers = numbers.inliers;

@@ -16,7 +16,7 @@
 #include "modules/core/pose_graph.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/loop_closure/peer_words.hpp"
-#include "modules/loop_closure/request_economy.hpp"
+#include "modules/loop_closure/request_policy.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
@@ -58,8 +58,8 @@ struct LoopClosureTick {
 /// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A). The node
 /// requests the keyframes of peers from their owners, verifies the candidates, and publishes the
 /// closures. A candidate is never dropped because a reply is missing, but not every candidate is
-/// worth a request (see RequestEconomy). Measured closures are processed in the same way, but
-/// without RequestEconomy and without verification: only the odometry of the peer's keyframe is
+/// worth a request (see RequestPolicy). Measured closures are processed in the same way, but
+/// without RequestPolicy and without verification: only the odometry of the peer's keyframe is
 /// used. The node also replies to the peers' requests for own keyframes.
 ///
 /// A closure starts at an own keyframe: `from` is the candidate's match, `to` the candidate's
@@ -71,14 +71,14 @@ struct LoopClosureTick {
 class LoopClosureNode final : public Node {
  public:
   /// Reads an own keyframe from the disk; null if it is not there. Called on any thread.
-  using Recall = std::function<std::shared_ptr<const Keyframe>(KeyframeIndex)>;
+  using ReadKeyframe = std::function<std::shared_ptr<const Keyframe>(KeyframeIndex)>;
 
-  /// If `vocabulary` is null, the choice of keypoints does not depend on words. Without `recall`,
-  /// older own keyframes stay in memory with some of their keypoints. Throws ConfigError if
-  /// `config` is out of bounds.
+  /// If `vocabulary` is null, the choice of keypoints does not depend on words. Without
+  /// `read_keyframe`, older own keyframes stay in memory with some of their keypoints. Throws
+  /// ConfigError if `config` is out of bounds.
   LoopClosureNode(const LoopClosureConfig& config, RobotId self,
                   std::shared_ptr<const Vocabulary> vocabulary, const LoopClosureTopics& topics,
-                  Recall recall = {});
+                  ReadKeyframe read_keyframe = {});
 
   std::string_view name() const override { return "loop_closure"; }
   void start() override;
@@ -117,32 +117,32 @@ class LoopClosureNode final : public Node {
     bool requested = false;                     ///< The keyframe of the peer has been requested.
   };
 
-  void put_away_before(KeyframeIndex newest);
+  void evict_before(KeyframeIndex newest);
   [[nodiscard]] KeyframePtr own(const KeyframeId& id) const;
   void forget(RobotId peer);
   void accept(const Work& work);
   bool advance(const Work& work);
-  void ask_for(const KeyframeId& missing, const Work& work);
+  void request_keyframe(const KeyframeId& missing, const Work& work);
   void arrived(const KeyframePtr& keyframe);
   KeyframePtr find(const KeyframeId& id);
   bool complete(const Work& work, const Keyframe& from, const Keyframe& to);
   void report(const Work& work, ClosureStage stage, std::string reason = {},
               const Verification& numbers = {}) const;
   void send_due_requests();
-  [[nodiscard]] KeyframeFeatures worth_sending(const KeyframeFeatures& features,
-                                               const KeyframeId& to);
+  [[nodiscard]] KeyframeFeatures select_keypoints(const KeyframeFeatures& features,
+                                                  const KeyframeId& to);
 
   const RobotId self_;
   const std::shared_ptr<const Vocabulary> vocabulary_;
   const LoopClosureTopics topics_;
   const Verifier verifier_;
-  const Recall recall_;
+  const ReadKeyframe read_keyframe_;
   std::map<KeyframeId, KeyframePtr> own_;  // own keyframes; null if stored on the disk
   std::map<RobotId, int> replies_;         // number of replies sent
   PeerWords words_;
   KeyframeCache peers_;
   KeyframeRequests requests_;
-  RequestEconomy economy_;
+  RequestPolicy policy_;
   const std::size_t reply_keypoints_;
   const KeyframeIndex full_keyframes_;
   std::map<KeyframeId, std::vector<Work>> waiting_;  // work by the keyframe that is missing

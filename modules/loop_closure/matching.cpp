@@ -17,8 +17,8 @@ struct Nearest {
   std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
 };
 
-[[gnu::always_inline]] inline std::vector<Match> match_all(const std::vector<Bits256>& a,
-                                                           const std::vector<Bits256>& b,
+[[gnu::always_inline]] inline std::vector<Match> match_all(const std::vector<DescriptorBits>& a,
+                                                           const std::vector<DescriptorBits>& b,
                                                            const MatchRules& rules) {
   std::vector<Match> matches;
   std::vector<Nearest> nearest_of_b(b.size());
@@ -39,23 +39,23 @@ struct Nearest {
   return matches;
 }
 
-std::vector<Match> match_portable(const std::vector<Bits256>& a, const std::vector<Bits256>& b,
-                                  const MatchRules& rules) {
+std::vector<Match> match_portable(const std::vector<DescriptorBits>& a,
+                                  const std::vector<DescriptorBits>& b, const MatchRules& rules) {
   return match_all(a, b, rules);
 }
 
 #if defined(__x86_64__)
-[[gnu::target("popcnt")]] std::vector<Match> match_popcount(const std::vector<Bits256>& a,
-                                                            const std::vector<Bits256>& b,
+[[gnu::target("popcnt")]] std::vector<Match> match_popcount(const std::vector<DescriptorBits>& a,
+                                                            const std::vector<DescriptorBits>& b,
                                                             const MatchRules& rules) {
   return match_all(a, b, rules);
 }
 #endif
 
-std::vector<Bits256> bits_of(std::span<const OrbDescriptor> descriptors) {
-  std::vector<Bits256> bits;
+std::vector<DescriptorBits> bits_of(std::span<const BinaryDescriptor> descriptors) {
+  std::vector<DescriptorBits> bits;
   bits.reserve(descriptors.size());
-  for (const OrbDescriptor& descriptor : descriptors) bits.push_back(to_bits(descriptor));
+  for (const BinaryDescriptor& descriptor : descriptors) bits.push_back(to_bits(descriptor));
   return bits;
 }
 
@@ -129,12 +129,12 @@ struct Candidate {
 };
 
 // The best match of one descriptor among the keypoints near its projection.
-std::optional<Candidate> best_near(const Projection& projection, const OrbDescriptor& descriptor,
+std::optional<Candidate> best_near(const Projection& projection, const BinaryDescriptor& descriptor,
                                    const KeyframeFeatures& features, const KeypointGrid& grid,
                                    const GuidedMatchRules& rules) {
   // Several octaves show one corner, so a keypoint this close to the best one is no second best.
   constexpr double kSameCorner_px = 3.0;
-  const Bits256 query = to_bits(descriptor);
+  const DescriptorBits query = to_bits(descriptor);
   const double disparity_scale = features.focal_px * features.baseline_m;
   std::vector<Candidate> near;
   grid.near(projection.pixel, [&](std::uint32_t i) {
@@ -158,8 +158,8 @@ std::optional<Candidate> best_near(const Projection& projection, const OrbDescri
 
 }  // namespace
 
-std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
-                                     std::span<const OrbDescriptor> b, const MatchRules& rules) {
+std::vector<Match> match_descriptors(std::span<const BinaryDescriptor> a,
+                                     std::span<const BinaryDescriptor> b, const MatchRules& rules) {
   if (b.size() < 2) return {};
 #if defined(__x86_64__)
   if (has_popcount()) return match_popcount(bits_of(a), bits_of(b), rules);

@@ -28,8 +28,8 @@ struct MatchRules {
 /// "Distinctive Image Features from Scale-Invariant Keypoints", IJCV 2004), in ascending order of
 /// `a`. The first of equally near descriptors counts. With fewer than two descriptors in `b` there
 /// is no ratio, and so no match. O(|a| |b|).
-[[nodiscard]] std::vector<Match> match_descriptors(std::span<const OrbDescriptor> a,
-                                                   std::span<const OrbDescriptor> b,
+[[nodiscard]] std::vector<Match> match_descriptors(std::span<const BinaryDescriptor> a,
+                                                   std::span<const BinaryDescriptor> b,
                                                    const MatchRules& rules);
 
 /// Conditions for a match when the pose is roughly known.

@@ -10,11 +10,11 @@
 #include <string>
 
 #include "modules/core/lie.hpp"
+#include "modules/images/keypoint_extractor.hpp"
 
 namespace km {
 namespace {
 
-constexpr double kPyramidScale = 1.2;
 constexpr double kLeastDepthRatio = 1e-3;  // h_z = depth in b over depth in a
 
 // d(prediction)/d(h), prediction = (h_x, h_y, rho) / h_z.
@@ -58,7 +58,7 @@ struct NormalEquations {
   Matrix6 H = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
   double chi2 = 0.0;
-  double freedom = 0.0;
+  double degrees_of_freedom = 0.0;
 };
 
 NormalEquations linearise(const SE3& T_a_b, std::span<const ImagePair> pairs,
@@ -84,7 +84,7 @@ NormalEquations linearise(const SE3& T_a_b, std::span<const ImagePair> pairs,
     sum.H += JtW * J;
     sum.g += JtW * error.r;
     sum.chi2 += weight * error.chi2;
-    sum.freedom += weight * error.dim;
+    sum.degrees_of_freedom += weight * error.dim;
   }
   return sum;
 }
@@ -263,7 +263,7 @@ std::optional<PoseFit> refine_pose(const SE3& T_a_b, std::span<const ImagePair> 
   const NormalEquations equations = linearise(fit.T_a_b, pairs, indices);
   fit.information = equations.H;
   fit.chi2 = equations.chi2;
-  fit.freedom = equations.freedom;
+  fit.degrees_of_freedom = equations.degrees_of_freedom;
   return fit;
 }
 

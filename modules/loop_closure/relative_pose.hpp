@@ -175,7 +175,7 @@ struct PoseFit {
   SE3 T_a_b = SE3::Identity();
   Matrix6 information = Matrix6::Zero();  ///< Gauss-Newton, with robust weights.
   double chi2 = 0.0;                      ///< Weighted sum of the squared errors.
-  double freedom = 0.0;                   ///< Weighted number of residuals.
+  double degrees_of_freedom = 0.0;        ///< Weighted number of residuals.
 };
 
 /// Minimises the transfer errors of `pairs[indices]` over the pose from `T_a_b` by Gauss-Newton

@@ -101,7 +101,7 @@ const char* to_string(VerificationStatus status) {
       return "matches leave the pose undetermined";
     case VerificationStatus::kTooFewInliers:
       return "too few inliers";
-    case VerificationStatus::kPoorlyHeld:
+    case VerificationStatus::kUncertainPose:
       return "pose hangs on a few inliers: without them its sigma exceeds max_position_sigma_m or "
              "max_rotation_sigma_rad";
   }
@@ -141,16 +141,16 @@ Verification Verifier::verify(const KeyframeFeatures& from, const KeyframeFeatur
   if (result.inliers < config_.min_inliers) return refused(VerificationStatus::kTooFewInliers);
 
   const PoseFit& fit = support->fit;
-  const double scale = std::max(1.0, fit.chi2 / std::max(1.0, fit.freedom - 6.0));
+  const double scale = std::max(1.0, fit.chi2 / std::max(1.0, fit.degrees_of_freedom - 6.0));
   const Matrix6 weakened =
       information_without_strongest(fit, support->pairs, support->inliers, kStrongestShare);
-  if (!holds(weakened)) return refused(VerificationStatus::kPoorlyHeld);
+  if (!holds(weakened)) return refused(VerificationStatus::kUncertainPose);
   const Matrix6 weak = scale * body_covariance(weakened, to.T_body_cam);
   result.rotation_sigma_rad = std::sqrt(weak.topLeftCorner<3, 3>().trace());
   result.position_sigma_m = std::sqrt(weak.bottomRightCorner<3, 3>().trace());
   if (!(result.rotation_sigma_rad <= config_.max_rotation_sigma_rad &&
         result.position_sigma_m <= config_.max_position_sigma_m))
-    return refused(VerificationStatus::kPoorlyHeld);
+    return refused(VerificationStatus::kUncertainPose);
 
   result.T_from_to = from.T_body_cam * fit.T_a_b * to.T_body_cam.inverse();
   result.covariance = kCommonErrors * scale * body_covariance(fit.information, to.T_body_cam);

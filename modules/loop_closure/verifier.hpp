@@ -13,7 +13,7 @@ enum class VerificationStatus {
   kNoConsensus,    ///< Too few matches agree on any pose.
   kDegenerate,     ///< The matches leave the pose undetermined (few points, on a line).
   kTooFewInliers,  ///< Too few correspondences support the refined pose.
-  kPoorlyHeld,     ///< The pose is too uncertain without the inliers that determine it most.
+  kUncertainPose,  ///< The pose is too uncertain without the inliers that determine it most.
 };
 
 /// "accepted", "too few matches", ...

@@ -33,11 +33,11 @@ struct MapMesh {
 /// visit that replaces it. Ids are those of MapMesh.
 struct SupersededVertex {
   std::uint64_t id = 0;
-  std::uint64_t heir = 0;
+  std::uint64_t replacement = 0;
 };
 
 /// Surface that a map contains twice: its mapper may drop the faces whose vertices are all listed.
-/// Each heir belongs to a face that is not dropped.
+/// Each replacement belongs to a face that is not dropped.
 struct SupersededSurface {
   std::vector<SupersededVertex> vertices;  ///< Ascending ids, each once.
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <unordered_map>
@@ -12,7 +13,7 @@
 namespace km {
 namespace {
 
-using GridPoint = std::array<std::int32_t, 3>;  // [steps]
+using GridPoint = MeshCells::Cell;  // [steps] or [cells]
 using Face = LabelledMesh::Face;
 
 constexpr double kFarthest_steps = 1U << 30U;  // so that the sum of three fits into 64 bits
@@ -233,6 +234,22 @@ MeshPieces split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
   blank.anchor = anchor;
   blank.step_m = static_cast<float>(grid.step_m);
   return Splitter(mesh, blank, grid).split();
+}
+
+std::vector<MeshCells::Cell> occupied_cells(const LabelledMesh& mesh, double cell_m) {
+  std::set<GridPoint> cells;
+  GridPoint last = {};  // neighbours in the list are usually neighbours in space
+  for (const auto& [a, b, c] : mesh.faces) {
+    const Eigen::Array3d centroid =
+        (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]).cast<double>().array() / 3.0;
+    const Eigen::Array3d cell = (centroid / cell_m).floor();
+    if (!(cell.abs() < kFarthest_steps).all()) continue;
+    const GridPoint now = {static_cast<std::int32_t>(cell.x()), static_cast<std::int32_t>(cell.y()),
+                           static_cast<std::int32_t>(cell.z())};
+    if (cells.empty() || now != last) cells.insert(now);
+    last = now;
+  }
+  return {cells.begin(), cells.end()};
 }
 
 LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks) {

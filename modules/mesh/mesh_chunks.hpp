@@ -9,6 +9,7 @@
 
 #include "modules/core/ids.hpp"
 #include "modules/core/label_palette.hpp"
+#include "modules/core/mesh_cells.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {
@@ -16,7 +17,7 @@ namespace km {
 /// Identity of a chunk: the newest chunk with a key replaces all earlier ones.
 struct MeshChunkKey {
   RobotId robot = 0;
-  std::array<std::int32_t, 3> cell = {0, 0, 0};
+  MeshCells::Cell cell = {0, 0, 0};
   std::uint16_t part = 0;
   auto operator<=>(const MeshChunkKey&) const = default;
 };
@@ -82,6 +83,10 @@ struct MeshPieces {
 /// with a vertex that does not exist. Linear except for sorting the faces of a cell.
 [[nodiscard]] MeshPieces split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
                                     const ChunkGrid& grid);
+
+/// The cells that contain the centroid of a face, ascending. Faces that are not finite, or farther
+/// away than 2^30 cells, are left out. Precondition: corners exist.
+[[nodiscard]] std::vector<MeshCells::Cell> occupied_cells(const LabelledMesh& mesh, double cell_m);
 
 /// One mesh of the chunks, which must have one step_m. Vertices with the same position and label
 /// are merged, and faces that rounding has left without area are removed. The mesh has labels if

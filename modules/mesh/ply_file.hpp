@@ -1,16 +1,10 @@
 #pragma once
 
 #include <filesystem>
-#include <stdexcept>
 
-#include "modules/mesh/labelled_mesh.hpp"
+#include "modules/mesh/mesh_file.hpp"
 
 namespace km {
-
-/// A mesh file that cannot be read or written. what() is one line with the file and the reason.
-struct MeshFileError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 /// Reads a PLY file: ascii, binary little or big endian. It uses the properties x, y, z, red,
 /// green, blue and label of `vertex`, and vertex_indices (or vertex_index) and label of `face`, all

@@ -20,14 +20,15 @@ namespace {
 // Appends `count` values from `first` to `last`, both included, evenly spread, or all of them if
 // there are fewer.
 void spread(KeyframeIndex first, KeyframeIndex last, std::size_t count, std::uint32_t node,
-            std::vector<KeyframeTie>& ties) {
+            std::vector<KeyframeEdge>& keyframe_edges) {
   const std::size_t steps = std::min<std::size_t>(count - 1, last - first);
   if (steps == 0) {
-    ties.push_back({first, node});
+    keyframe_edges.push_back({first, node});
     return;
   }
   for (std::size_t i = 0; i <= steps; ++i)
-    ties.push_back({first + static_cast<KeyframeIndex>((last - first) * i / steps), node});
+    keyframe_edges.push_back(
+        {first + static_cast<KeyframeIndex>((last - first) * i / steps), node});
 }
 
 // Motion of the surface at a keyframe from its pose `from` to its pose `to`.
@@ -35,10 +36,11 @@ SE3 correction(const SE3& to, const SE3& from) {
   return to * from.inverse();
 }
 
-// First tie of every node; ties.size() if it has none.
-std::vector<std::size_t> first_ties(const DeformationGraph& graph) {
-  std::vector<std::size_t> first(graph.nodes.size(), graph.ties.size());
-  for (std::size_t i = graph.ties.size(); i-- > 0;) first[graph.ties[i].node] = i;
+// First keyframe edge of every node; keyframe_edges.size() if it has none.
+std::vector<std::size_t> first_keyframe_edges(const DeformationGraph& graph) {
+  std::vector<std::size_t> first(graph.nodes.size(), graph.keyframe_edges.size());
+  for (std::size_t i = graph.keyframe_edges.size(); i-- > 0;)
+    first[graph.keyframe_edges[i].node] = i;
   return first;
 }
 
@@ -121,11 +123,11 @@ class MeshEdgeCost final : public ceres::SizedCostFunction<6, 7, 7> {
 
 // Rigidity between a keyframe and a node it saw, and their relative rotation. Blocks: keyframe,
 // node.
-class KeyframeTieCost final : public ceres::SizedCostFunction<6, 7, 7> {
+class KeyframeEdgeCost final : public ceres::SizedCostFunction<6, 7, 7> {
  public:
   // Weights are 1 / sigma: [1/m], [1/rad].
-  KeyframeTieCost(const SE3& T_odom_kf, const Eigen::Vector3d& g_node, double position_weight,
-                  double rotation_weight)
+  KeyframeEdgeCost(const SE3& T_odom_kf, const Eigen::Vector3d& g_node, double position_weight,
+                   double rotation_weight)
       : R_odom_kf_(T_odom_kf.linear()),
         g_kf_(T_odom_kf.inverse() * g_node),
         position_weight_(position_weight),
@@ -196,7 +198,7 @@ class GraphProblem {
       : problem_(options()) {
     for (const SE3& T : initial.T_world_kf) keyframes_.push_back(to_graph_pose(T));
     for (const SE3& T : initial.T_world_node) nodes_.push_back(to_graph_pose(T));
-    add_ties(graph, noise);
+    add_keyframe_edges(graph, noise);
     add_edges(graph, noise);
     add_anchors(anchors, noise);
   }
@@ -207,7 +209,7 @@ class GraphProblem {
   [[nodiscard]] std::shared_ptr<ceres::ParameterBlockOrdering> elimination_order() {
     auto order = std::make_shared<ceres::ParameterBlockOrdering>();
     for (std::size_t i = 0; i < keyframes_.size(); ++i)
-      if (tied_[i]) order->AddElementToGroup(keyframes_[i].data(), 0);
+      if (has_edge_[i]) order->AddElementToGroup(keyframes_[i].data(), 0);
     for (GraphPose& node : nodes_)
       if (problem_.HasParameterBlock(node.data())) order->AddElementToGroup(node.data(), 1);
     return order;
@@ -233,16 +235,18 @@ class GraphProblem {
 
   void add_pose(GraphPose& block) { problem_.AddParameterBlock(block.data(), 7, &manifold_); }
 
-  void add_ties(const DeformationGraph& graph, const DeformationNoise& noise) {
-    tied_.assign(keyframes_.size(), false);
-    for (const KeyframeTie& tie : graph.ties) {
-      ties_.emplace_back(graph.T_odom_kf[tie.keyframe], graph.nodes[tie.node],
-                         1.0 / noise.keyframe_tie_m, 1.0 / kRotationNoise_rad);
-      GraphPose& keyframe = keyframes_[tie.keyframe];
-      tied_[tie.keyframe] = true;
+  void add_keyframe_edges(const DeformationGraph& graph, const DeformationNoise& noise) {
+    has_edge_.assign(keyframes_.size(), false);
+    for (const KeyframeEdge& keyframe_edge : graph.keyframe_edges) {
+      keyframe_edges_.emplace_back(graph.T_odom_kf[keyframe_edge.keyframe],
+                                   graph.nodes[keyframe_edge.node], 1.0 / noise.keyframe_edge_m,
+                                   1.0 / kRotationNoise_rad);
+      GraphPose& keyframe = keyframes_[keyframe_edge.keyframe];
+      has_edge_[keyframe_edge.keyframe] = true;
       add_pose(keyframe);
-      add_pose(nodes_[tie.node]);
-      problem_.AddResidualBlock(&ties_.back(), nullptr, keyframe.data(), nodes_[tie.node].data());
+      add_pose(nodes_[keyframe_edge.node]);
+      problem_.AddResidualBlock(&keyframe_edges_.back(), nullptr, keyframe.data(),
+                                nodes_[keyframe_edge.node].data());
     }
   }
 
@@ -257,7 +261,7 @@ class GraphProblem {
 
   void add_anchors(std::span<const SE3> anchors, const DeformationNoise& noise) {
     for (std::size_t i = 0; i < anchors.size(); ++i) {
-      if (!tied_[i]) {
+      if (!has_edge_[i]) {
         keyframes_[i] = to_graph_pose(anchors[i]);
         continue;
       }
@@ -270,9 +274,9 @@ class GraphProblem {
   GraphPoseManifold manifold_;
   std::vector<GraphPose> keyframes_;
   std::vector<GraphPose> nodes_;
-  std::vector<bool> tied_;
+  std::vector<bool> has_edge_;
   // Costs must not move in memory.
-  std::deque<KeyframeTieCost> ties_;
+  std::deque<KeyframeEdgeCost> keyframe_edges_;
   std::deque<MeshEdgeCost> edges_;
   std::deque<AnchorCost> anchors_;
   ceres::Problem problem_;  // last member: destroyed first
@@ -343,21 +347,21 @@ AnchorTerm anchor_term(const SE3& anchor, const SE3& pose) {
   return term;
 }
 
-std::vector<KeyframeTie> choose_ties(std::span<const MeshNode> nodes,
-                                     std::size_t keyframes_per_node,
-                                     KeyframeIndex window_keyframes) {
-  std::vector<KeyframeTie> ties;
-  ties.reserve(nodes.size() * keyframes_per_node);
+std::vector<KeyframeEdge> choose_keyframe_edges(std::span<const MeshNode> nodes,
+                                                std::size_t keyframes_per_node,
+                                                KeyframeIndex window_keyframes) {
+  std::vector<KeyframeEdge> keyframe_edges;
+  keyframe_edges.reserve(nodes.size() * keyframes_per_node);
   for (std::uint32_t n = 0; n < nodes.size(); ++n) {
     const auto [first, last] = nodes[n].seen_by;
     if (last - first <= window_keyframes || keyframes_per_node == 1) {
-      spread(first, last, keyframes_per_node, n, ties);
+      spread(first, last, keyframes_per_node, n, keyframe_edges);
     } else {
-      ties.push_back({first, n});
-      ties.push_back({last, n});
+      keyframe_edges.push_back({first, n});
+      keyframe_edges.push_back({last, n});
     }
   }
-  return ties;
+  return keyframe_edges;
 }
 
 const char* to_string(DeformationStatus status) {
@@ -382,39 +386,40 @@ DeformationPoses initial_poses(const DeformationGraph& graph, std::span<const SE
 
   std::vector<Eigen::Vector3d> sums(graph.nodes.size(), Eigen::Vector3d::Zero());
   std::vector<int> counts(graph.nodes.size(), 0);
-  for (const KeyframeTie& tie : graph.ties) {
-    sums[tie.node] += T_world_odom[tie.keyframe] * graph.nodes[tie.node];
-    ++counts[tie.node];
+  for (const KeyframeEdge& keyframe_edge : graph.keyframe_edges) {
+    sums[keyframe_edge.node] +=
+        T_world_odom[keyframe_edge.keyframe] * graph.nodes[keyframe_edge.node];
+    ++counts[keyframe_edge.node];
   }
-  const std::vector<std::size_t> first = first_ties(graph);
+  const std::vector<std::size_t> first = first_keyframe_edges(graph);
   poses.T_world_node.reserve(graph.nodes.size());
   for (std::size_t n = 0; n < graph.nodes.size(); ++n) {
     if (counts[n] == 0) {
       poses.T_world_node.push_back(make_pose(Eigen::Matrix3d::Identity(), graph.nodes[n]));
       continue;
     }
-    const KeyframeIndex keyframe = graph.ties[first[n]].keyframe;
+    const KeyframeIndex keyframe = graph.keyframe_edges[first[n]].keyframe;
     poses.T_world_node.push_back(make_pose(T_world_odom[keyframe].linear(), sums[n] / counts[n]));
   }
   return poses;
 }
 
-DeformationPoses carried_over_poses(const DeformationGraph& graph, const DeformationPoses& last,
-                                    std::span<const SE3> T_world_kf_last,
-                                    std::span<const SE3> T_world_kf) {
+DeformationPoses warm_start_poses(const DeformationGraph& graph, const DeformationPoses& last,
+                                  std::span<const SE3> T_world_kf_last,
+                                  std::span<const SE3> T_world_kf) {
   DeformationPoses poses = initial_poses(graph, T_world_kf);
   std::vector<SE3> moved;  // motion of each known keyframe since the last solution
   for (std::size_t i = 0; i < std::min(T_world_kf_last.size(), T_world_kf.size()); ++i) {
     moved.push_back(correction(T_world_kf[i], T_world_kf_last[i]));
     if (i < last.T_world_kf.size()) poses.T_world_kf[i] = moved[i] * last.T_world_kf[i];
   }
-  const std::vector<std::size_t> first = first_ties(graph);
+  const std::vector<std::size_t> first = first_keyframe_edges(graph);
   for (std::size_t n = 0; n < std::min(last.T_world_node.size(), graph.nodes.size()); ++n) {
-    if (first[n] == graph.ties.size()) {
+    if (first[n] == graph.keyframe_edges.size()) {
       poses.T_world_node[n] = last.T_world_node[n];
       continue;
     }
-    const KeyframeIndex keyframe = graph.ties[first[n]].keyframe;
+    const KeyframeIndex keyframe = graph.keyframe_edges[first[n]].keyframe;
     if (keyframe < moved.size()) poses.T_world_node[n] = moved[keyframe] * last.T_world_node[n];
   }
   return poses;
@@ -424,7 +429,7 @@ DeformationSolution solve(const DeformationGraph& graph, std::span<const SE3> T_
                           const DeformationNoise& noise, const DeformationStop& stop,
                           DeformationPoses initial) {
   DeformationSolution solution;
-  if (graph.ties.empty()) {  // no node is held
+  if (graph.keyframe_edges.empty()) {  // no node is held
     solution.poses = std::move(initial);
     solution.poses.T_world_kf.assign(T_world_kf.begin(), T_world_kf.end());
     return solution;

@@ -13,8 +13,8 @@
 
 namespace km {
 
-/// A keyframe that saw a mesh node.
-struct KeyframeTie {
+/// Edge between a mesh node and a keyframe that saw it.
+struct KeyframeEdge {
   KeyframeIndex keyframe = 0;
   std::uint32_t node = 0;
 };
@@ -26,20 +26,22 @@ struct DeformationGraph {
   std::vector<Eigen::Vector3d> nodes;               ///< g_k [m].
   std::vector<SE3> T_odom_kf;                       ///< Pose of keyframe i when it saw the nodes.
   std::vector<std::array<std::uint32_t, 2>> edges;  ///< Neighbouring nodes, each pair once.
-  std::vector<KeyframeTie> ties;                    ///< Ascending nodes.
+  std::vector<KeyframeEdge> keyframe_edges;         ///< Ascending nodes.
 
   /// Number of terms in the cost: one per direction of every edge, and position and rotation of
-  /// every tie.
-  [[nodiscard]] std::size_t term_count() const { return 2 * edges.size() + 2 * ties.size(); }
+  /// every keyframe edge.
+  [[nodiscard]] std::size_t term_count() const {
+    return 2 * edges.size() + 2 * keyframe_edges.size();
+  }
 };
 
 /// At most `keyframes_per_node` keyframes for each node: the first and the last that saw it, and
 /// others spread evenly between them. If first and last are further apart than the window, only
 /// these two are used. The surface was then left and seen again, and the keyframes in between may
 /// not have seen it.
-[[nodiscard]] std::vector<KeyframeTie> choose_ties(std::span<const MeshNode> nodes,
-                                                   std::size_t keyframes_per_node,
-                                                   KeyframeIndex window_keyframes);
+[[nodiscard]] std::vector<KeyframeEdge> choose_keyframe_edges(std::span<const MeshNode> nodes,
+                                                              std::size_t keyframes_per_node,
+                                                              KeyframeIndex window_keyframes);
 
 // Residuals of the deformation graph and their derivatives by the step of a pose's retract().
 
@@ -79,7 +81,7 @@ struct DeformationNoise {
   double anchor_rotation_rad = 0.001;
   double anchor_translation_m = 0.005;
   double mesh_edge_m = 0.05;
-  double keyframe_tie_m = 0.02;
+  double keyframe_edge_m = 0.02;
 };
 
 /// Conditions under which solve() ends.
@@ -120,10 +122,10 @@ struct [[nodiscard]] DeformationSolution {
 /// First guess from the solution `last` for the anchors `T_world_kf_last`. Each keyframe and node
 /// of `last` moves like the anchor of its (first) keyframe has moved since. The others are as in
 /// initial_poses(). Precondition: the vertices of `last` are the first ones of the graph.
-[[nodiscard]] DeformationPoses carried_over_poses(const DeformationGraph& graph,
-                                                  const DeformationPoses& last,
-                                                  std::span<const SE3> T_world_kf_last,
-                                                  std::span<const SE3> T_world_kf);
+[[nodiscard]] DeformationPoses warm_start_poses(const DeformationGraph& graph,
+                                                const DeformationPoses& last,
+                                                std::span<const SE3> T_world_kf_last,
+                                                std::span<const SE3> T_world_kf);
 
 /// Minimises Eq. (1): anchors of the keyframes, rigidity between neighbouring nodes in both
 /// directions, rigidity between keyframes and the nodes they saw. The method is Levenberg-Marquardt
@@ -132,8 +134,8 @@ struct [[nodiscard]] DeformationSolution {
 ///
 /// A weak term is added to those of the paper. It rotates each node with its keyframes (see
 /// kRotationNoise_rad in the source). The minimum is then unique even if a node has few neighbours
-/// or all of them are on one line. Keyframes without a tie stay at their anchors; without any tie
-/// nodes stay as in `initial`.
+/// or all of them are on one line. Keyframes without an edge to a node stay at their anchors;
+/// without any such edge nodes stay as in `initial`.
 [[nodiscard]] DeformationSolution solve(const DeformationGraph& graph,
                                         std::span<const SE3> T_world_kf,
                                         const DeformationNoise& noise, const DeformationStop& stop,

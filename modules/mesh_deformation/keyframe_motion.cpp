@@ -59,8 +59,8 @@ KeyframeMotion keyframe_motion(std::span<const SE3> before, std::span<const SE3>
   after = after.first(count);
   motion.T_after_before = common_motion(before, after, scale);
   for (std::size_t i = 0; i < count; ++i)
-    motion.bending =
-        std::max(motion.bending, distance(motion.T_after_before * before[i], after[i], scale));
+    motion.non_rigid =
+        std::max(motion.non_rigid, distance(motion.T_after_before * before[i], after[i], scale));
   return motion;
 }
 

@@ -22,7 +22,7 @@ struct MotionScale {
 /// Motion of the keyframes from one solution to the next.
 struct KeyframeMotion {
   SE3 T_after_before = SE3::Identity();  ///< Common motion, mostly of the gauge.
-  double bending = 0.0;  ///< Largest motion of any keyframe relative to it, in units of the scale.
+  double non_rigid = 0.0;  ///< Largest motion relative to the common one, in units of the scale.
 };
 
 /// Compares two solutions of the same keyframes, as many as both have. The common motion minimises

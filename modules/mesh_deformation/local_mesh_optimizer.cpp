@@ -158,7 +158,7 @@ struct LocalMeshOptimizer::State {
                                             std::span<const SE3> T_odom_kf) const;
   [[nodiscard]] DeformationNoise noise() const {
     return {config.anchor_rotation_rad, config.anchor_translation_m, config.mesh_edge_m,
-            config.keyframe_tie_m};
+            config.keyframe_edge_m};
   }
 
   MeshDeformationConfig config;
@@ -218,8 +218,8 @@ DeformationGraph LocalMeshOptimizer::State::make_graph(const MapMesh& map,
   for (const MeshNode& node : simplified.nodes) graph.nodes.push_back(node.position);
   graph.T_odom_kf.assign(T_odom_kf.begin(), T_odom_kf.end());
   graph.edges = region_edges(simplified, map.mesh.faces, window);
-  graph.ties =
-      choose_ties(simplified.nodes, static_cast<std::size_t>(config.keyframes_per_node), window);
+  graph.keyframe_edges = choose_keyframe_edges(
+      simplified.nodes, static_cast<std::size_t>(config.keyframes_per_node), window);
   return graph;
 }
 
@@ -250,7 +250,7 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
   const std::vector<SE3> anchors = complete(T_odom_kf, T_world_kf);
   report.warm = state.solved;
   DeformationPoses initial =
-      state.solved ? carried_over_poses(graph, state.last, state.T_world_kf_last, anchors)
+      state.solved ? warm_start_poses(graph, state.last, state.T_world_kf_last, anchors)
                    : initial_poses(graph, anchors);
   DeformationSolution solution =
       solve(graph, anchors, state.noise(),
@@ -270,7 +270,7 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
   report.nodes = graph.nodes.size();
   report.keyframes = T_odom_kf.size();
   report.edges = graph.edges.size();
-  report.ties = graph.ties.size();
+  report.keyframe_edges = graph.keyframe_edges.size();
   report.status = solution.status;
   report.iterations = solution.iterations;
   report.initial_cost = solution.initial_cost;

@@ -36,7 +36,7 @@ struct MeshDeformationReport {
   std::size_t new_nodes = 0;
   std::size_t keyframes = 0;
   std::size_t edges = 0;
-  std::size_t ties = 0;
+  std::size_t keyframe_edges = 0;
   bool warm = false;  ///< Started from an earlier solution.
   DeformationStatus status = DeformationStatus::kConverged;
   int iterations = 0;

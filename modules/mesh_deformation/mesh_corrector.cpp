@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "modules/mesh_deformation/local_mesh_optimizer.hpp"
-#include "modules/mesh_deformation/surface_heirs.hpp"
+#include "modules/mesh_deformation/superseded_surface.hpp"
 
 namespace km {
 
@@ -19,7 +19,7 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   std::vector<SE3> anchors = complete(input.T_odom_kf, input.T_world_kf);
   if (input.map_version != map_version_) return deform(input, std::move(anchors));
   const KeyframeMotion motion = keyframe_motion(anchors_, anchors, scale_);
-  if (motion.bending > 1.0) return deform(input, std::move(anchors));
+  if (motion.non_rigid > 1.0) return deform(input, std::move(anchors));
   if (largest_difference(anchors_, motion.T_after_before, T_published_optimized_, scale_) <= 1.0)
     return std::nullopt;
   T_published_optimized_ = motion.T_after_before;
@@ -34,28 +34,28 @@ MeshCorrection MeshCorrector::correct_from_scratch(const CorrectionInput& input)
   return deform(input, complete(input.T_odom_kf, input.T_world_kf));
 }
 
-// Heirs of duplicate surface. All vertices stay if the map has no ids, by which the mapper drops
-// vertices, or an unknown voxel size.
-std::vector<std::uint32_t> MeshCorrector::heirs_in(const LabelledMesh& mesh,
-                                                   const MapMesh& map) const {
+// Replacements of duplicate surface. All vertices stay if the map has no ids, by which the mapper
+// drops vertices, or an unknown voxel size.
+std::vector<std::uint32_t> MeshCorrector::replacements_in(const LabelledMesh& mesh,
+                                                          const MapMesh& map) const {
   constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), plus the deformation
   if (duplicate_voxels_ <= 0.0 || mesh.faces.size() <= duplicate_faces_ || map.voxel_m <= 0.0 ||
       map.ids.empty())
     return std::vector(mesh.vertices.size(), kNoIndex);
-  return find_heirs(
+  return find_replacements(
       mesh, {map.seen_by, map.certainty},
       {duplicate_voxels_ * map.voxel_m, kLongestEdge_voxels * map.voxel_m, window_keyframes_});
 }
 
 MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<SE3> anchors) {
   const DeformedMesh deformed = optimizer_.optimize(input.map, input.T_odom_kf, input.T_world_kf);
-  const std::vector<std::uint32_t> heirs = heirs_in(deformed.mesh, input.map);
+  const std::vector<std::uint32_t> replacements = replacements_in(deformed.mesh, input.map);
   map_version_ = input.map_version;
   anchors_ = std::move(anchors);
-  optimized_ = without_superseded(deformed.mesh, heirs);
+  optimized_ = without_superseded(deformed.mesh, replacements);
   report_ = deformed.report;
   T_published_optimized_ = SE3::Identity();
-  return {optimized_, report_, true, named(heirs, input.map.ids),
+  return {optimized_, report_, true, named(replacements, input.map.ids),
           deformed.mesh.faces.size() - optimized_.faces.size()};
 }
 

@@ -37,7 +37,7 @@ struct [[nodiscard]] MeshCorrection {
 /// have moved equally, as they do when the origin of `world` changes, one rigid motion suffices.
 /// Otherwise, and for a changed map, Local Mesh Optimization deforms the mesh. This removes drift,
 /// so that copies of surface from several visits coincide. Above duplicate_faces, only the best
-/// copy stays (see find_heirs()).
+/// copy stays (see find_replacements()).
 ///
 /// Not thread-safe.
 class MeshCorrector {
@@ -55,8 +55,8 @@ class MeshCorrector {
 
  private:
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
-  [[nodiscard]] std::vector<std::uint32_t> heirs_in(const LabelledMesh& mesh,
-                                                    const MapMesh& map) const;
+  [[nodiscard]] std::vector<std::uint32_t> replacements_in(const LabelledMesh& mesh,
+                                                           const MapMesh& map) const;
 
   const double duplicate_voxels_;
   const std::size_t duplicate_faces_;

@@ -17,7 +17,7 @@ struct MeshDeformationConfig {
   double anchor_rotation_rad = 0.001;
   double anchor_translation_m = 0.005;
   double mesh_edge_m = 0.05;
-  double keyframe_tie_m = 0.02;
+  double keyframe_edge_m = 0.02;
   int max_iterations = 30;
   double energy_tolerance = 1e-7;
   double min_move_m = 0.01;
@@ -48,7 +48,7 @@ struct MeshDeformationConfig {
                   "[m] standard deviation of keyframes about their optimised poses");
     visitor.field("mesh_edge_m", mesh_edge_m, {1e-9, 100.0},
                   "[m] standard deviation of the distance vector between neighbouring nodes");
-    visitor.field("keyframe_tie_m", keyframe_tie_m, {1e-9, 100.0},
+    visitor.field("keyframe_edge_m", keyframe_edge_m, {1e-9, 100.0},
                   "[m] standard deviation of a node relative to a keyframe that saw it");
     visitor.field("max_iterations", max_iterations, {1, 1000},
                   "largest number of iterations of one solution");

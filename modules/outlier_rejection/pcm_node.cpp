@@ -32,6 +32,7 @@ PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
   topics.closures.subscribe([this](const auto& message) { worker_.post(message); });
   topics.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
   topics.restarts.subscribe([this](const auto& message) { worker_.post(message); });
+  topics.restored.subscribe([this](const auto& message) { worker_.post(message); });
 }
 
 void PcmNode::start() {
@@ -54,6 +55,7 @@ void PcmNode::handle(const Input& input) {
   if (const auto* keyframe = std::get_if<Topic<KeyframeOdometry>::Message>(&input))
     return step(**keyframe);
   if (const auto* event = std::get_if<Topic<PeerEvent>::Message>(&input)) return step(**event);
+  if (const auto* set = std::get_if<Topic<InlierSet>::Message>(&input)) return step(**set);
   publish_changes();
 }
 
@@ -65,6 +67,12 @@ void PcmNode::step(const PeerEvent& event) {
   if (event.kind != PeerEventKind::kRestarted) return;
   pairs_.erase(event.identity.robot);
   no_more_ = false;
+}
+
+void PcmNode::step(const InlierSet& restored) {
+  if (restored.a != self_) return;
+  Pair& pair = pair_with(restored.b);
+  pair.waited = pair.changed = true;
 }
 
 void PcmNode::step(const Closure& closure) {

@@ -27,6 +27,7 @@ struct PcmTopics {
   In<Closure> closures;            ///< Own and received closures, in any order, maybe repeated.
   In<KeyframeOdometry> keyframes;  ///< Keyframes of this robot; clock of witness_wait_s.
   In<PeerEvent> restarts;          ///< kRestarted, before the first closure of the new incarnation.
+  In<InlierSet> restored;          ///< Sets of a former process: their robots remain joined.
   Out<InlierSet> inlier_sets;      ///< Sets with ascending versions for each pair.
 };
 
@@ -61,6 +62,7 @@ class PcmNode final : public Node {
   void step(const Closure& closure);
   void step(const KeyframeOdometry& keyframe);
   void step(const PeerEvent& event);
+  void step(const InlierSet& restored);
 
   /// Publishes the sets that have changed since the last call, and those of pairs whose wait is
   /// over.
@@ -73,7 +75,7 @@ class PcmNode final : public Node {
  private:
   struct Tick {};
   using Input = std::variant<Tick, Topic<Closure>::Message, Topic<KeyframeOdometry>::Message,
-                             Topic<PeerEvent>::Message>;
+                             Topic<PeerEvent>::Message, Topic<InlierSet>::Message>;
 
   // Closures between this robot and another robot, or inside this robot.
   struct Pair {

@@ -5,22 +5,22 @@
 namespace km {
 namespace {
 
-[[gnu::always_inline]] inline void nearest_of_each_into(std::span<const Bits256> queries,
-                                                        std::span<const Bits256> candidates,
+[[gnu::always_inline]] inline void nearest_of_each_into(std::span<const DescriptorBits> queries,
+                                                        std::span<const DescriptorBits> candidates,
                                                         std::vector<NearestBits>& result) {
   const auto count = static_cast<std::uint32_t>(candidates.size());
   for (std::size_t i = 0; i < queries.size(); ++i)
     result[i] = nearest(queries[i], candidates.data(), count);
 }
 
-void portable(std::span<const Bits256> queries, std::span<const Bits256> candidates,
+void portable(std::span<const DescriptorBits> queries, std::span<const DescriptorBits> candidates,
               std::vector<NearestBits>& result) {
   nearest_of_each_into(queries, candidates, result);
 }
 
 #if defined(__x86_64__)
-[[gnu::target("popcnt")]] void with_popcount(std::span<const Bits256> queries,
-                                             std::span<const Bits256> candidates,
+[[gnu::target("popcnt")]] void with_popcount(std::span<const DescriptorBits> queries,
+                                             std::span<const DescriptorBits> candidates,
                                              std::vector<NearestBits>& result) {
   nearest_of_each_into(queries, candidates, result);
 }
@@ -28,14 +28,14 @@ void portable(std::span<const Bits256> queries, std::span<const Bits256> candida
 
 }  // namespace
 
-Bits256 to_bits(const OrbDescriptor& descriptor) {
-  Bits256 bits;
+DescriptorBits to_bits(const BinaryDescriptor& descriptor) {
+  DescriptorBits bits;
   std::memcpy(bits.word.data(), descriptor.data(), descriptor.size());
   return bits;
 }
 
-OrbDescriptor to_descriptor(const Bits256& bits) {
-  OrbDescriptor descriptor;
+BinaryDescriptor to_descriptor(const DescriptorBits& bits) {
+  BinaryDescriptor descriptor;
   std::memcpy(descriptor.data(), bits.word.data(), descriptor.size());
   return descriptor;
 }
@@ -49,8 +49,8 @@ bool has_popcount() {
 #endif
 }
 
-std::vector<NearestBits> nearest_of_each(std::span<const Bits256> queries,
-                                         std::span<const Bits256> candidates) {
+std::vector<NearestBits> nearest_of_each(std::span<const DescriptorBits> queries,
+                                         std::span<const DescriptorBits> candidates) {
   std::vector<NearestBits> result(queries.size());
 #if defined(__x86_64__)
   if (has_popcount()) {

@@ -9,18 +9,19 @@
 
 namespace km {
 
-/// A 256-bit descriptor as machine words.
-struct alignas(32) Bits256 {
-  std::array<std::uint64_t, 4> word{};
+/// A descriptor as machine words.
+struct alignas(32) DescriptorBits {
+  std::array<std::uint64_t, kDescriptorBytes / sizeof(std::uint64_t)> word{};
 };
 
-[[nodiscard]] Bits256 to_bits(const OrbDescriptor& descriptor);
-[[nodiscard]] OrbDescriptor to_descriptor(const Bits256& bits);
+[[nodiscard]] DescriptorBits to_bits(const BinaryDescriptor& descriptor);
+[[nodiscard]] BinaryDescriptor to_descriptor(const DescriptorBits& bits);
 
 /// Number of differing bits.
-[[gnu::always_inline]] inline unsigned hamming_distance(const Bits256& a, const Bits256& b) {
+[[gnu::always_inline]] inline unsigned hamming_distance(const DescriptorBits& a,
+                                                        const DescriptorBits& b) {
   unsigned distance = 0;
-  for (std::size_t i = 0; i < 4; ++i)
+  for (std::size_t i = 0; i < a.word.size(); ++i)
     distance += static_cast<unsigned>(__builtin_popcountll(a.word[i] ^ b.word[i]));
   return distance;
 }
@@ -33,7 +34,8 @@ struct NearestBits {
 
 /// Precondition: `count` > 0. No branch depends on the data, because the distances in quantisation
 /// are too similar for an early exit to be predicted.
-[[gnu::always_inline]] inline NearestBits nearest(const Bits256& query, const Bits256* candidates,
+[[gnu::always_inline]] inline NearestBits nearest(const DescriptorBits& query,
+                                                  const DescriptorBits* candidates,
                                                   std::uint32_t count) {
   std::uint32_t best = ~0U;  // distance in the upper, index in the lower half
   for (std::uint32_t c = 0; c < count; ++c) {
@@ -45,8 +47,8 @@ struct NearestBits {
 
 /// The nearest candidate of each query. Chooses the instructions of this processor at run time.
 /// Precondition: 0 < candidates.size() < 65536.
-[[nodiscard]] std::vector<NearestBits> nearest_of_each(std::span<const Bits256> queries,
-                                                       std::span<const Bits256> candidates);
+[[nodiscard]] std::vector<NearestBits> nearest_of_each(std::span<const DescriptorBits> queries,
+                                                       std::span<const DescriptorBits> candidates);
 
 /// True if this processor counts bits in one instruction. Important kernels exist twice, once
 /// compiled for such processors; the always_inline functions above adapt to their caller.

@@ -27,11 +27,11 @@ inline constexpr std::size_t kMaxBagWords = 1U << 16U;
 
 template <>
 struct Codec<KeyframeBow> {
-  using Wire = km_wire_WordBag;
-  static constexpr const char* kTopic = "word_bags";
+  using Wire = km_wire_BagOfWords;
+  static constexpr const char* kTopic = "bags_of_words";
   static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = 1U << 18U;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_WordBag_desc; }
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_BagOfWords_desc; }
 
   struct Encoded {
     Wire wire{};

@@ -14,7 +14,7 @@ constexpr std::size_t kQueueCapacity = 16384;
 // Standard deviation of an odometry step, per axis, above which its length is unknown.
 constexpr double kLostWay_m = 0.5;
 
-bool loses_way(const UncertainPose& before, const UncertainPose& now) {
+bool breaks_odometry(const UncertainPose& before, const UncertainPose& now) {
   const Matrix6 step = between_on_chain(before, now).Sigma;
   return step.bottomRightCorner<3, 3>().trace() > 3.0 * kLostWay_m * kLostWay_m;
 }
@@ -54,8 +54,8 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   BagOfWords words = vocabulary_->count(keyframe.features.descriptors);
   BowVector vector = vocabulary_->weigh(words);
   const UncertainPose chain{keyframe.odometry.T_odom_kf, keyframe.odometry.covariance};
-  if (const auto before = std::exchange(chain_, chain); before && loses_way(*before, chain))
-    own_.lose_way();
+  if (const auto before = std::exchange(chain_, chain); before && breaks_odometry(*before, chain))
+    own_.mark_odometry_break();
   CandidateSearch search = own_.search_own(vector, keyframe.stamp);
   // Added before it is published, so that no pair is missed: see the class comment.
   own_.add(std::move(vector), keyframe.stamp);

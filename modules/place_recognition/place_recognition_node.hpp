@@ -12,8 +12,8 @@
 #include "modules/core/keyframe.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
-#include "modules/place_recognition/candidate_filter.hpp"
 #include "modules/place_recognition/peer_history.hpp"
+#include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
@@ -80,7 +80,7 @@ class PlaceRecognitionNode final : public Node {
   const RobotId self_;
   const std::shared_ptr<const Vocabulary> vocabulary_;
   const PlaceRecognitionTopics topics_;
-  CandidateFilter own_;
+  PlaceDatabase own_;
   std::optional<UncertainPose> chain_;  // odometry of the newest own keyframe
   std::vector<KeyframeId> own_ids_;     // ids of the keyframes in own_, in the same order
   std::map<RobotId, PeerHistory> peers_;

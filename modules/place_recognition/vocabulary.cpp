@@ -125,12 +125,12 @@ std::string fingerprint_text(std::uint64_t fingerprint) {
 // The descent of many descriptors, compiled twice (see has_popcount()).
 struct Vocabulary::Descent {
   const Node* nodes;
-  const Bits256* centers;
-  std::span<const OrbDescriptor> descriptors;
+  const DescriptorBits* centers;
+  std::span<const BinaryDescriptor> descriptors;
   std::uint32_t* words;
 
   [[gnu::always_inline]] void batch(std::size_t begin, std::size_t size) const {
-    std::array<Bits256, kBatch> query;
+    std::array<DescriptorBits, kBatch> query;
     std::array<Node, kBatch> at;
     for (std::size_t i = 0; i < size; ++i) {
       query[i] = to_bits(descriptors[begin + i]);
@@ -185,7 +185,7 @@ Vocabulary::Vocabulary(VocabularyData data) : data_(std::move(data)) {
   }
 }
 
-std::vector<std::uint32_t> Vocabulary::words(std::span<const OrbDescriptor> descriptors) const {
+std::vector<std::uint32_t> Vocabulary::words(std::span<const BinaryDescriptor> descriptors) const {
   std::vector<std::uint32_t> result(descriptors.size());
   const Descent descent{nodes_.data(), centers_.data(), descriptors, result.data()};
 #if defined(__x86_64__)
@@ -198,7 +198,7 @@ std::vector<std::uint32_t> Vocabulary::words(std::span<const OrbDescriptor> desc
   return result;
 }
 
-BagOfWords Vocabulary::count(std::span<const OrbDescriptor> descriptors) const {
+BagOfWords Vocabulary::count(std::span<const BinaryDescriptor> descriptors) const {
   std::vector<std::uint32_t> sorted = words(descriptors);
   sort_words(sorted, size());
   BagOfWords bag;
@@ -227,7 +227,7 @@ BowVector Vocabulary::weigh(const BagOfWords& bag) const {
   return vector;
 }
 
-BowVector Vocabulary::transform(std::span<const OrbDescriptor> descriptors) const {
+BowVector Vocabulary::transform(std::span<const BinaryDescriptor> descriptors) const {
   return weigh(count(descriptors));
 }
 

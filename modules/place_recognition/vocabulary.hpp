@@ -16,11 +16,11 @@ namespace km {
 /// breadth-first order, so that the children of a node are consecutive and follow those of the
 /// nodes before it. The leaves are the words, numbered in this order.
 struct VocabularyData {
-  int branching = 0;                        ///< k: no node has more children.
-  int depth = 0;                            ///< L: no leaf lies deeper (the root has depth 0).
-  std::vector<std::uint8_t> children = {};  ///< Number of children per node, 0 for a leaf.
-  std::vector<OrbDescriptor> centers = {};  ///< Cluster centre per node; zero for the root.
-  std::vector<float> idf = {};              ///< Inverse document frequency per word, >= 0.
+  int branching = 0;                           ///< k: no node has more children.
+  int depth = 0;                               ///< L: no leaf lies deeper (the root has depth 0).
+  std::vector<std::uint8_t> children = {};     ///< Number of children per node, 0 for a leaf.
+  std::vector<BinaryDescriptor> centers = {};  ///< Cluster centre per node; zero for the root.
+  std::vector<float> idf = {};                 ///< Inverse document frequency per word, >= 0.
 
   bool operator==(const VocabularyData&) const = default;
 };
@@ -57,17 +57,17 @@ class Vocabulary {
   const VocabularyData& data() const { return data_; }
 
   /// The word of each descriptor, in order.
-  std::vector<std::uint32_t> words(std::span<const OrbDescriptor> descriptors) const;
+  std::vector<std::uint32_t> words(std::span<const BinaryDescriptor> descriptors) const;
 
   /// The words of an image and how often each occurs.
-  BagOfWords count(std::span<const OrbDescriptor> descriptors) const;
+  BagOfWords count(std::span<const BinaryDescriptor> descriptors) const;
 
   /// TF-IDF: weight of word i = count_i * idf_i, scaled to L1 norm 1. Words without weight (those
   /// in every training image) are omitted. Precondition: words below size(), see knows().
   BowVector weigh(const BagOfWords& bag) const;
 
   /// weigh(count(descriptors)).
-  BowVector transform(std::span<const OrbDescriptor> descriptors) const;
+  BowVector transform(std::span<const BinaryDescriptor> descriptors) const;
 
   /// True if every word of `bag` is one of this vocabulary.
   bool knows(const BagOfWords& bag) const;
@@ -81,7 +81,7 @@ class Vocabulary {
   };
   struct Descent;
   std::vector<Node> nodes_;
-  std::vector<Bits256> centers_;  // centres of nodes_, for the descent
+  std::vector<DescriptorBits> centers_;  // centres of nodes_, for the descent
 };
 
 }  // namespace km

@@ -33,7 +33,7 @@ static_assert(sizeof(FileHeader) == 40);
 
 std::uint64_t file_size(const FileHeader& header) {
   const std::uint64_t centers = header.nodes == 0 ? 0 : header.nodes - 1;
-  return sizeof(FileHeader) + std::uint64_t{header.nodes} + sizeof(OrbDescriptor) * centers +
+  return sizeof(FileHeader) + std::uint64_t{header.nodes} + sizeof(BinaryDescriptor) * centers +
          sizeof(float) * std::uint64_t{header.words};
 }
 

@@ -26,7 +26,7 @@ constexpr std::array<std::uint64_t, 256> kSpread = [] {
 // Counts how many descriptors have each bit set.
 class BitCounter {
  public:
-  void add(const Bits256& bits) {
+  void add(const DescriptorBits& bits) {
     for (std::size_t byte = 0; byte < 32; ++byte)
       small_[byte] += kSpread[(bits.word[byte / 8] >> (8 * (byte % 8))) & 0xFFU];
     ++total_;
@@ -34,9 +34,9 @@ class BitCounter {
   }
 
   // Bits set in more than half of the descriptors.
-  Bits256 majority() {
+  DescriptorBits majority() {
     flush();
-    Bits256 bits;
+    DescriptorBits bits;
     for (std::size_t i = 0; i < counts_.size(); ++i)
       if (2 * counts_[i] > total_) bits.word[i / 64] |= std::uint64_t{1} << (i % 64);
     return bits;
@@ -61,9 +61,10 @@ class BitCounter {
 // Up to k different centres. Each further centre is drawn with a probability proportional to its
 // distance from the nearest former centre. There are fewer than k if the points have fewer
 // different descriptors.
-std::vector<Bits256> spread_centers(std::span<const Bits256> points, int k, std::mt19937& rng) {
+std::vector<DescriptorBits> spread_centers(std::span<const DescriptorBits> points, int k,
+                                           std::mt19937& rng) {
   std::uniform_int_distribution<std::size_t> uniform(0, points.size() - 1);
-  std::vector<Bits256> centers{points[uniform(rng)]};
+  std::vector<DescriptorBits> centers{points[uniform(rng)]};
   std::vector<std::uint32_t> distance(points.size(), ~0U);
   while (static_cast<int>(centers.size()) < k) {
     const std::vector<NearestBits> newest = nearest_of_each(points, {&centers.back(), 1});
@@ -82,11 +83,11 @@ std::vector<Bits256> spread_centers(std::span<const Bits256> points, int k, std:
 }
 
 struct Clustering {
-  std::vector<Bits256> centers;
+  std::vector<DescriptorBits> centers;
   std::vector<NearestBits> of_point;
 };
 
-Clustering cluster(std::span<const Bits256> points, int k, std::mt19937& rng) {
+Clustering cluster(std::span<const DescriptorBits> points, int k, std::mt19937& rng) {
   Clustering result{spread_centers(points, k, rng), {}};
   for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<NearestBits> assigned = nearest_of_each(points, result.centers);
@@ -101,8 +102,8 @@ Clustering cluster(std::span<const Bits256> points, int k, std::mt19937& rng) {
     for (std::size_t c = 0; c < counters.size(); ++c)
       if (!counters[c].empty()) result.centers[c] = counters[c].majority();
   }
-  result.of_point = nearest_of_each(points, result.centers);  // assignment to the final centres,
-                                                              // also after the last allowed round
+  // The last allowed round also ends with an assignment to its centres.
+  result.of_point = nearest_of_each(points, result.centers);
   return result;
 }
 
@@ -110,15 +111,15 @@ Clustering cluster(std::span<const Bits256> points, int k, std::mt19937& rng) {
 struct Cluster {
   std::size_t begin;
   std::size_t end;
-  Bits256 center;
+  DescriptorBits center;
 };
 
 // Splits `parent` and groups its points by cluster. Empty if there is nothing to split.
-std::vector<Cluster> split(const Cluster& parent, std::vector<Bits256>& points, int k,
+std::vector<Cluster> split(const Cluster& parent, std::vector<DescriptorBits>& points, int k,
                            std::mt19937& rng) {
-  const std::span<Bits256> own(points.data() + parent.begin, parent.end - parent.begin);
+  const std::span<DescriptorBits> own(points.data() + parent.begin, parent.end - parent.begin);
   const Clustering clusters = cluster(own, k, rng);
-  std::vector<std::vector<Bits256>> members(clusters.centers.size());
+  std::vector<std::vector<DescriptorBits>> members(clusters.centers.size());
   for (std::size_t i = 0; i < own.size(); ++i)
     members[clusters.of_point[i].index].push_back(own[i]);
   std::vector<Cluster> children;
@@ -134,16 +135,16 @@ std::vector<Cluster> split(const Cluster& parent, std::vector<Bits256>& points, 
   return children;
 }
 
-std::vector<Bits256> gather(std::span<const std::vector<OrbDescriptor>> descriptors) {
-  std::vector<Bits256> points;
+std::vector<DescriptorBits> gather(std::span<const std::vector<BinaryDescriptor>> descriptors) {
+  std::vector<DescriptorBits> points;
   for (const auto& image : descriptors)
-    for (const OrbDescriptor& descriptor : image) points.push_back(to_bits(descriptor));
+    for (const BinaryDescriptor& descriptor : image) points.push_back(to_bits(descriptor));
   if (points.empty()) throw std::invalid_argument("train_vocabulary: no descriptors");
   return points;
 }
 
 std::vector<float> inverse_document_frequencies(
-    const VocabularyData& tree, std::span<const std::vector<OrbDescriptor>> descriptors) {
+    const VocabularyData& tree, std::span<const std::vector<BinaryDescriptor>> descriptors) {
   const Vocabulary vocabulary(tree);
   std::vector<std::uint32_t> images_with(vocabulary.size(), 0);
   for (const auto& image : descriptors)
@@ -159,11 +160,11 @@ std::vector<float> inverse_document_frequencies(
 
 }  // namespace
 
-VocabularyData train_vocabulary(std::span<const std::vector<OrbDescriptor>> descriptors,
+VocabularyData train_vocabulary(std::span<const std::vector<BinaryDescriptor>> descriptors,
                                 const VocabularyTrainingConfig& config,
                                 const std::function<void(int)>& progress) {
   VocabularyData data{.branching = checked(config).branching, .depth = config.depth};
-  std::vector<Bits256> points = gather(descriptors);
+  std::vector<DescriptorBits> points = gather(descriptors);
   std::mt19937 rng(config.seed);
   data.centers.push_back({});
   std::vector<Cluster> level{{0, points.size(), {}}};

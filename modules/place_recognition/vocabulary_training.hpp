@@ -44,7 +44,8 @@ struct VocabularyTrainingConfig {
 /// after each level of the tree with the number of levels done.
 /// Throws ConfigError for `config` out of bounds, std::invalid_argument if there is no descriptor.
 [[nodiscard]] VocabularyData train_vocabulary(
-    std::span<const std::vector<OrbDescriptor>> descriptors, const VocabularyTrainingConfig& config,
+    std::span<const std::vector<BinaryDescriptor>> descriptors,
+    const VocabularyTrainingConfig& config,
     const std::function<void(int levels_done)>& progress = {});
 
 }  // namespace km

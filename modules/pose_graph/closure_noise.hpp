@@ -18,11 +18,16 @@ struct NoiseCycle {
   std::array<float, 6> error = {};  ///< [sigma of the odometry]; planar cycles use three entries.
   std::array<float, 6> variance = {};  ///< Claimed by the two closures, relative to the odometry.
   float log_if_false = 0.0F;           ///< Log density if a closure is false, in these coordinates.
+  /// Derivatives of `error` with respect to the relative length of the odometry of each robot.
+  std::array<std::array<float, 6>, 2> by_length = {};
 
   /// Splits the covariance of the error `e` into odometry `Sigma_o` and closures `Sigma_c`, both
   /// positive definite (`dimension` 2: on rows 2, 3 and 4). `log_if_false`: see cycle_mixture.hpp.
+  /// `by_length`: the derivatives of `e`.
   [[nodiscard]] static NoiseCycle of(const Vector6& e, const Matrix6& Sigma_o,
-                                     const Matrix6& Sigma_c, double log_if_false, int dimension);
+                                     const Matrix6& Sigma_c, double log_if_false, int dimension,
+                                     const std::array<Vector6, 2>& by_length = {Vector6::Zero(),
+                                                                                Vector6::Zero()});
 };
 
 /// The cycles of one pair of robots (or of the closures inside one robot).
@@ -49,7 +54,15 @@ struct ClosureNoiseRecord {
 /// The two kinds of cycles are fitted separately, because an error that all closures of a place
 /// share shows only between places; the larger estimate counts. The result is `usual`, unless the
 /// odds against it are 1000 to 1 and the estimate is at least 1.3 times as large. The odds must
-/// also be so with odometry that is 1.5 times noisier. O(cycles).
+/// also be so with odometry that is 1.5 times noisier. The result is also `usual` if odometry of
+/// another length explains the errors better: then closures are not to blame. O(cycles^2).
 [[nodiscard]] double estimate_closure_noise(const PairCycles& cycles, double usual);
+
+/// True if the pair has enough places for estimate_closure_noise().
+[[nodiscard]] bool shows_noise(const PairCycles& cycles);
+
+/// True if the odds are 1000 to 1 that the noise of the closures of a pair is `factor` rather than
+/// `excluded`, by its cycles between places.
+[[nodiscard]] bool excludes_noise(const PairCycles& cycles, double excluded, double factor);
 
 }  // namespace km

@@ -9,7 +9,7 @@ namespace {
 constexpr KeyframeIndex kExtent = 10;  // keyframes of a place, at both ends
 
 bool are_near(const KeyframeId& a, const KeyframeId& b) {
-  return a.robot == b.robot && std::max(a.index, b.index) - std::min(a.index, b.index) <= kExtent;
+  return a.robot == b.robot && steps_between(a, b) <= kExtent;
 }
 
 }  // namespace

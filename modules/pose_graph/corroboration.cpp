@@ -11,6 +11,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/cycle_mixture.hpp"
+#include "modules/pose_graph/two_closure_cycle.hpp"
 
 namespace km {
 namespace {
@@ -21,11 +22,11 @@ constexpr double kLargestTurn = 0.25 * std::numbers::pi;
 // Largest number of steps of odometry in a cycle between two places. The noise of more steps would
 // hide the noise of the closures.
 constexpr std::uint32_t kStepsBetweenPlaces = 60;
+constexpr double kLonger = 0.01;  // relative step of numeric derivatives by length
+// Largest standard deviation of the rotation of odometry in a cycle between two places. Errors of
+// cycles with more are not normal.
+constexpr double kLargestTurnSigma_rad = 0.5;
 constexpr double kLeastBoxSide_m = 1.0;  // least side of the volume for false closures
-
-std::uint32_t steps_between(const KeyframeId& a, const KeyframeId& b) {
-  return std::max(a.index, b.index) - std::min(a.index, b.index);
-}
 
 }  // namespace
 
@@ -61,15 +62,16 @@ double Corroboration::cycle_length(const Upward& one, const Upward& other) const
   const auto measured = [&](const Upward& c) {
     return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
   };
-  const UncertainPose cycle = compose(
-      compose(compose(measured(one), chain(one.upper, other.upper)), inverse(measured(other))),
-      chain(other.lower, one.lower));
-  if (angle_of(cycle.T.linear()) > kLargestTurn) return std::numeric_limits<double>::infinity();
-  const Vector6 xi = se3_log(cycle.T);
-  if (dimension_ == 3) return std::sqrt(xi.dot(cycle.Sigma.ldlt().solve(xi)));
+  const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
+                              inverse(measured(other)), chain(other.lower, one.lower)};
+  const SE3 T = cycle.T();
+  if (angle_of(T.linear()) > kLargestTurn) return std::numeric_limits<double>::infinity();
+  const Vector6 xi = se3_log(T);
+  const Matrix6 covariance = cycle.covariance();
+  if (dimension_ == 3) return std::sqrt(xi.dot(covariance.ldlt().solve(xi)));
   const std::array<int, 3> planar{2, 3, 4};  // angle, x, y
   const Eigen::Vector3d in_plane = xi(planar);
-  const Eigen::Matrix3d Sigma = cycle.Sigma(planar, planar);
+  const Eigen::Matrix3d Sigma = covariance(planar, planar);
   return std::sqrt(in_plane.dot(Sigma.ldlt().solve(in_plane)));
 }
 
@@ -109,17 +111,18 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
   const auto measured = [&](const Upward& c) {
     return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
   };
-  const auto exact = [](UncertainPose pose) {
-    pose.Sigma.setZero();
-    return pose;
+  const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
+                              inverse(measured(other)), chain(other.lower, one.lower)};
+  const Vector6 error = se3_log(cycle.T());
+  // Change of the error with the length of one of the chains.
+  const auto by_length = [&](UncertainPose TwoClosureCycle::*chain_of) {
+    TwoClosureCycle longer = cycle;
+    (longer.*chain_of).T.translation() *= 1.0 + kLonger;
+    return Vector6((se3_log(longer.T()) - error) / kLonger);
   };
-  const UncertainPose above = chain(one.upper, other.upper), below = chain(other.lower, one.lower);
-  const UncertainPose up = measured(one), down = inverse(measured(other));
-  const UncertainPose odometry = compose(compose(compose(exact(up), above), exact(down)), below);
-  const UncertainPose closures = compose(compose(compose(up, exact(above)), down), exact(below));
-  const Vector6 error = se3_log(odometry.T);
-  return NoiseCycle::of(error, odometry.Sigma, closures.Sigma,
-                        log_density_if_false(error, volume, dimension_), dimension_);
+  return NoiseCycle::of(error, cycle.covariance_of_odometry(), cycle.covariance_of_closures(),
+                        log_density_if_false(error, volume, dimension_), dimension_,
+                        {by_length(&TwoClosureCycle::below), by_length(&TwoClosureCycle::above)});
 }
 
 // The volume in which a false closure may end: twice the bounding box of the poses, enlarged on
@@ -135,6 +138,17 @@ double Corroboration::volume() const {
   const Eigen::Array3d sides =
       below.sizes().array() + above.sizes().array() + 2.0 * reach_m + kLeastBoxSide_m;
   return sides.head(dimension_).prod();
+}
+
+// Standard deviation of the rotation of the odometry between two closures, on each axis.
+double Corroboration::turn_rad(const Upward& one, const Upward& other) const {
+  double variance = 0.0;
+  for (const auto& [from, to] : {std::pair(one.lower, other.lower), {one.upper, other.upper}}) {
+    const auto step = step_.find(from.robot);
+    const Precision precision = step == step_.end() ? Precision{} : step->second;
+    variance += steps_between(from, to) * covariance_in(precision, dimension_)(2, 2);
+  }
+  return std::sqrt(variance);
 }
 
 void Corroboration::count_cycles(PairCycles& cycles) const {
@@ -162,7 +176,8 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
       if (steps == 0) continue;  // no odometry between them
       const bool same = places.place_of[closures_[a].place] == places.place_of[closures_[b].place];
       if (same && steps <= kSteps) inside.push_back({steps, a, b});
-      if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces)
+      if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces &&
+          turn_rad(closures_[a], closures_[b]) <= kLargestTurnSigma_rad)
         between.push_back({steps, a, b});
     }
   const double room = volume();

@@ -60,6 +60,7 @@ class Corroboration {
 
   [[nodiscard]] double cycle_length(const Upward& one, const Upward& other) const;
   [[nodiscard]] NoiseCycle noise_cycle(const Upward& one, const Upward& other, double volume) const;
+  [[nodiscard]] double turn_rad(const Upward& one, const Upward& other) const;
   [[nodiscard]] double volume() const;
   [[nodiscard]] bool agree(const Upward& one, const Upward& other, double barc) const;
 

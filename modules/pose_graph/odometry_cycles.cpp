@@ -1,8 +1,20 @@
 #include "modules/pose_graph/odometry_cycles.hpp"
 
+#include <algorithm>
+
 #include "modules/core/lie.hpp"
+#include "modules/pose_graph/two_closure_cycle.hpp"
 
 namespace km {
+namespace {
+
+// From the lower keyframe to the upper one.
+UncertainPose upward(const PoseEdge& closure) {
+  const UncertainPose measured{closure.T_from_to, covariance_of(closure.precision)};
+  return closure.from < closure.to ? measured : inverse(measured);
+}
+
+}  // namespace
 
 OdometryChain::OdometryChain(std::span<const PoseEdge> steps) {
   for (const PoseEdge& step : steps) {
@@ -18,22 +30,39 @@ OdometryChain::OdometryChain(std::span<const PoseEdge> steps) {
   }
 }
 
+// The covariance is that of one source of noise, at the end of the steps.
+UncertainPose OdometryChain::steps(std::size_t from, std::size_t to,
+                                   OdometryCycle::Component part) const {
+  const SE3 T_from_to = T_first_kf[from].inverse() * T_first_kf[to];
+  if (from > to) return inverse(steps(to, from, part));
+  const Matrix6 Ad = adjoint(T_first_kf[to].inverse());
+  return {T_from_to, Ad * (covariance_[part][to] - covariance_[part][from]) * Ad.transpose()};
+}
+
 OdometryCycle OdometryChain::close(const PoseEdge& closure) const {
-  const bool is_up = closure.from < closure.to;
-  const std::size_t i = (is_up ? closure.from : closure.to).index;
-  const std::size_t j = (is_up ? closure.to : closure.from).index;
-  const SE3 measured = is_up ? closure.T_from_to : closure.T_from_to.inverse();
-  const Matrix6 Ad = adjoint(T_first_kf[j].inverse());
-  OdometryCycle cycle{.closure = closure, .lower = i, .upper = j};
-  // The error is small, so that both covariances refer to j.
-  cycle.error = se3_log(measured.inverse() * T_first_kf[i].inverse() * T_first_kf[j]);
-  for (const auto part : {OdometryCycle::kRotation, OdometryCycle::kTranslation})
-    cycle.covariance[part] = Ad * (covariance_[part][j] - covariance_[part][i]) * Ad.transpose();
-  cycle.covariance[OdometryCycle::kClosure] = covariance_of(closure.precision);
-  if (!is_up) {
-    const Matrix6 Ad_closure = adjoint(closure.T_from_to);
-    Matrix6& Sigma = cycle.covariance[OdometryCycle::kClosure];
-    Sigma = Ad_closure * Sigma * Ad_closure.transpose();
+  using enum OdometryCycle::Component;
+  const auto [lower, upper] = std::minmax(closure.from.index, closure.to.index);
+  OdometryCycle cycle{.closure = closure, .lower = lower, .upper = upper};
+  const UncertainPose measured = upward(closure);
+  // The error is small, so that both covariances refer to the upper keyframe.
+  cycle.error = se3_log(measured.T.inverse() * steps(lower, upper, kRotation).T);
+  for (const auto part : {kRotation, kTranslation})
+    cycle.covariance[part] = steps(lower, upper, part).Sigma;
+  cycle.covariance[kClosure] = measured.Sigma;
+  return cycle;
+}
+
+OdometryCycle OdometryChain::close(const PoseEdge& one, const PoseEdge& other) const {
+  using enum OdometryCycle::Component;
+  const auto [lower, upper] = std::minmax(one.from.index, one.to.index);
+  const auto [other_lower, other_upper] = std::minmax(other.from.index, other.to.index);
+  OdometryCycle cycle{.closure = one, .other = other, .lower = lower, .upper = upper};
+  for (const auto part : {kRotation, kTranslation}) {
+    const TwoClosureCycle around{upward(one), steps(upper, other_upper, part),
+                                 inverse(upward(other)), steps(other_lower, lower, part)};
+    cycle.error = se3_log(around.T());
+    cycle.covariance[part] = around.covariance_of_odometry();
+    cycle.covariance[kTwoClosures] = around.covariance_of_closures();
   }
   return cycle;
 }

@@ -2,29 +2,37 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "modules/core/covariance.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 
 namespace km {
 
-/// A cycle of a closure inside a robot and the steps of odometry between its ends.
+/// A cycle of the steps of odometry of one robot and one closure, or two closures near each other.
 struct OdometryCycle {
-  /// Sources of its noise: rotations and translations of the steps, and the closure.
-  enum Component : std::size_t { kRotation, kTranslation, kClosure, kComponents };
+  /// Sources of its noise: rotations and translations of the steps, its only closure, or its two
+  /// closures. An error that closures of a place share does not show in a cycle through both.
+  enum Component : std::size_t { kRotation, kTranslation, kClosure, kTwoClosures, kComponents };
 
-  PoseEdge closure;
-  std::size_t lower = 0;  ///< Keyframes at its ends.
+  PoseEdge closure;                    ///< The only closure, or the first one.
+  std::optional<PoseEdge> other = {};  ///< The second closure.
+  std::size_t lower = 0;               ///< Keyframes at its ends.
   std::size_t upper = 0;
   /// Tangent vector at the upper keyframe, from its pose by the closure to its pose by the steps.
+  /// With two closures: at the lower keyframe, the whole cycle from there.
   Vector6 error = Vector6::Zero();
-  std::array<Matrix6, kComponents> covariance = {};  ///< Claimed covariance of `error`, by source.
-  double weight = 1.0;                               ///< Number of independent observations.
+  std::array<Matrix6, kComponents> covariance = {  ///< Claimed covariance of `error`, by source.
+      Matrix6::Zero(), Matrix6::Zero(), Matrix6::Zero(), Matrix6::Zero()};
+  double weight = 1.0;  ///< Number of independent observations.
 
   [[nodiscard]] Matrix6 claimed() const {
-    return covariance[kRotation] + covariance[kTranslation] + covariance[kClosure];
+    Matrix6 Sigma = Matrix6::Zero();
+    for (const Matrix6& part : covariance) Sigma += part;
+    return Sigma;
   }
 };
 
@@ -37,10 +45,16 @@ class OdometryChain {
   /// The cycle from the lower end along the steps to the upper one, and back by the closure.
   /// Precondition: both ends are keyframes of the chain.
   [[nodiscard]] OdometryCycle close(const PoseEdge& closure) const;
+  /// The cycle along closure `one`, the steps to the upper end of closure `other`, back along it,
+  /// and the steps to the beginning. Precondition: all ends are keyframes of the chain.
+  [[nodiscard]] OdometryCycle close(const PoseEdge& one, const PoseEdge& other) const;
 
   std::vector<SE3> T_first_kf{SE3::Identity()};
 
  private:
+  [[nodiscard]] UncertainPose steps(std::size_t from, std::size_t to,
+                                    OdometryCycle::Component part) const;
+
   // Claimed covariance of the steps up to each keyframe, as perturbations of the first pose. The
   // difference of two keyframes is the covariance of the chain between them.
   std::array<std::vector<Matrix6>, 2> covariance_{std::vector{Matrix6(Matrix6::Zero())},

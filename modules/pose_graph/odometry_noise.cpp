@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <numbers>
 #include <vector>
 
@@ -15,7 +17,13 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMostCycles = 200;
+constexpr std::uint32_t kShort = 10;    // largest number of steps in a cycle of two closures
 constexpr double kPriorSigma = 1.0986;  // log 3, prior of log sqrt(v)
+// Largest standard deviation of the rotation of odometry in a cycle of one closure, on each axis.
+// Errors of cycles with more are not normal.
+constexpr double kLargestTurnSigma_rad = 0.7;
+// Weight of a cycle of two closures. Each closure is in two such cycles.
+constexpr double kShortCycleWeight = 0.5;
 constexpr double kLeastSide_m = 1.0;    // least side of the volume for false closures
 constexpr double kRatioSigma = 0.6931;  // log 2, prior of log sqrt(v_R / v_t)
 // Log of the odds from which on odometry counts as noisier than it claims: 1000 to 1.
@@ -51,10 +59,26 @@ std::vector<Cycle> cycles_of(const OdometryChain& chain, std::span<const PoseEdg
   return cycles;
 }
 
+// Cycles through two successive closures near each other.
+std::vector<Cycle> short_cycles(const OdometryChain& chain, std::span<const PoseEdge> closures) {
+  const std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
+  std::vector<Cycle> cycles;
+  for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
+    const ClosureId one = sorted[k].id(), other = sorted[k + 1].id();
+    const auto steps = steps_between(one.from, other.from) + steps_between(one.to, other.to);
+    if (steps == 0 || steps > kShort) continue;
+    cycles.push_back(chain.close(sorted[k], sorted[k + 1]));
+    cycles.back().weight = kShortCycleWeight;
+  }
+  const std::size_t stride = (cycles.size() + kMostCycles - 1) / kMostCycles;
+  for (std::size_t k = 0; k * stride < cycles.size(); ++k) cycles[k] = cycles[k * stride];
+  if (stride > 1) cycles.resize((cycles.size() + stride - 1) / stride);
+  return cycles;
+}
+
 double log_density_if_true(const Cycle& cycle, const Factors& v) {
-  const Matrix6 Sigma = v[kRotation] * cycle.covariance[kRotation] +
-                        v[kTranslation] * cycle.covariance[kTranslation] +
-                        v[kClosure] * cycle.covariance[kClosure];
+  Matrix6 Sigma = Matrix6::Zero();
+  for (std::size_t f = 0; f < kComponents; ++f) Sigma += v[f] * cycle.covariance[f];
   const Eigen::LLT<Matrix6> factor(Sigma);
   const Vector6 white = factor.matrixL().solve(cycle.error);
   const double log_root = factor.matrixLLT().diagonal().array().log().sum();
@@ -71,6 +95,12 @@ double volume_m3(const OdometryChain& chain, std::span<const PoseEdge> closures)
   for (const PoseEdge& closure : closures)
     reach_m = std::max(reach_m, closure.T_from_to.translation().norm());
   return (2.0 * box.sizes().array() + 2.0 * reach_m + kLeastSide_m).prod();
+}
+
+std::vector<double> log_if_false(const std::vector<Cycle>& cycles, double volume) {
+  std::vector<double> densities;
+  for (const Cycle& cycle : cycles) densities.push_back(log_density_if_false(cycle.error, volume));
+  return densities;
 }
 
 std::vector<double> log_ratios(const std::vector<Cycle>& cycles,
@@ -90,6 +120,7 @@ std::vector<double> weights_of(const std::vector<Cycle>& cycles) {
 // Log of the posterior density of the factors, at the likeliest share of true closures.
 double log_posterior(const std::vector<Cycle>& cycles, const std::vector<double>& if_false,
                      const Factors& v) {
+  if (v[kTwoClosures] > v[kClosure]) return -std::numeric_limits<double>::infinity();
   double log_sum =
       fit_cycle_mixture(log_ratios(cycles, if_false, v), weights_of(cycles)).log_likelihood;
   const auto prior = [](double log_root, double sigma) {
@@ -99,56 +130,121 @@ double log_posterior(const std::vector<Cycle>& cycles, const std::vector<double>
   return log_sum + prior(0.5 * std::log(v[kRotation] / v[kTranslation]), kRatioSigma);
 }
 
+struct Fit {
+  Factors factors{1.0, 1.0, 1.0, 1.0};
+  double log_odds = 0.0;  // that odometry is noisier than it claims
+};
+
+// The largest posterior density without noise of odometry: errors that noise of closures alone
+// explains are no evidence against odometry.
+double log_posterior_of_claims(const std::vector<Cycle>& cycles,
+                               const std::vector<double>& if_false) {
+  Factors best{1.0, 1.0, 1.0, 1.0};
+  double most = log_posterior(cycles, if_false, best);
+  for (const bool both : {true, false}) {
+    Factors next = best;
+    for (double v = 1.0 / 64.0; v <= 4096.0; v *= 2.0) {
+      next[kTwoClosures] = v;
+      if (both) next[kClosure] = v;
+      const double found = log_posterior(cycles, if_false, next);
+      if (found <= most) continue;
+      most = found;
+      best = next;
+    }
+  }
+  return most;
+}
+
+// A pattern search, coarse to fine: along each factor, and along both factors of odometry or of
+// closures.
+Fit fit_factors(const std::vector<Cycle>& cycles, double volume) {
+  constexpr std::array<Factors, 7> kDirections{{{1.0, 0.0, 0.0, 0.0},
+                                                {0.0, 1.0, 0.0, 0.0},
+                                                {0.0, 0.0, 1.0, 0.0},
+                                                {0.0, 0.0, 1.0, 1.0},
+                                                {0.0, 0.0, 0.0, 1.0},
+                                                {1.0, 1.0, 0.0, 0.0},
+                                                {1.0, -1.0, 0.0, 0.0}}};
+  const std::vector<double> if_false = log_if_false(cycles, volume);
+  Fit fit;
+  double most = log_posterior(cycles, if_false, fit.factors);
+  const auto try_factors = [&](const Factors& v) {
+    const double found = log_posterior(cycles, if_false, v);
+    if (found <= most) return false;
+    most = found;
+    fit.factors = v;
+    return true;
+  };
+  // If both factors of odometry are large, steps along one factor at a time do not reach them.
+  for (double root = 2.0; root <= 32.0; root *= 2.0)
+    (void)try_factors({root * root, root * root, 1.0, 1.0});
+  for (double ratio = 2.0; ratio > 1.05; ratio = std::sqrt(ratio))
+    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+      bool is_better = false;
+      for (const Factors& direction : kDirections)
+        for (const double step : {ratio * ratio, 1.0 / (ratio * ratio)}) {
+          Factors next = fit.factors;
+          for (std::size_t f = 0; f < kComponents; ++f) next[f] *= std::pow(step, direction[f]);
+          for (const Component f : {kRotation, kTranslation}) next[f] = std::max(1.0, next[f]);
+          if (next != fit.factors) is_better |= try_factors(next);
+        }
+      if (!is_better) break;
+    }
+  fit.log_odds = most - log_posterior_of_claims(cycles, if_false);
+  return fit;
+}
+
+// The cycles of which the errors are about normal with these factors.
+std::vector<Cycle> with_normal_errors(std::vector<Cycle> cycles, const Factors& v) {
+  std::erase_if(cycles, [&](const Cycle& cycle) {
+    const double variance = cycle.covariance[kRotation].topLeftCorner<3, 3>().trace() / 3.0;
+    return v[kRotation] * variance > kLargestTurnSigma_rad * kLargestTurnSigma_rad;
+  });
+  return cycles;
+}
+
+// The closures of the cycles that are more likely true than false.
+std::vector<PoseEdge> likely_closures(const std::vector<Cycle>& cycles, const Factors& v,
+                                      double volume) {
+  const std::vector<double> ratios = log_ratios(cycles, log_if_false(cycles, volume), v);
+  const CycleMixture mixture = fit_cycle_mixture(ratios, weights_of(cycles));
+  std::map<ClosureId, PoseEdge> likely;
+  for (std::size_t k = 0; k < cycles.size(); ++k) {
+    if (!(mixture.true_probability(ratios[k]) > 0.5)) continue;
+    likely.emplace(cycles[k].closure.id(), cycles[k].closure);
+    if (cycles[k].other) likely.emplace(cycles[k].other->id(), *cycles[k].other);
+  }
+  std::vector<PoseEdge> closures;
+  for (const auto& [id, closure] : likely) closures.push_back(closure);
+  return closures;
+}
+
 }  // namespace
 
 OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
                                       std::span<const PoseEdge> closures) {
   OdometryNoise noise;
   const OdometryChain chain(steps);
-  const std::vector<Cycle> cycles = cycles_of(chain, closures, noise.places);
+  std::vector<Cycle> cycles = cycles_of(chain, closures, noise.places);
   if (cycles.empty()) return noise;
-  std::vector<double> if_false;
   const double volume = volume_m3(chain, closures);
-  for (const Cycle& cycle : cycles) if_false.push_back(log_density_if_false(cycle.error, volume));
-
-  // A pattern search, coarse to fine: along each factor, and along both factors of odometry.
-  constexpr std::array<Factors, 5> kDirections{
-      {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, {1.0, 1.0, 0.0}, {1.0, -1.0, 0.0}}};
-  Factors best{1.0, 1.0, 1.0};
-  double most = log_posterior(cycles, if_false, best);
-  const auto try_factors = [&](const Factors& v) {
-    const double found = log_posterior(cycles, if_false, v);
-    if (found <= most) return false;
-    most = found;
-    best = v;
-    return true;
-  };
-  // If both factors of odometry are large, steps along one factor at a time do not reach them.
-  for (double root = 2.0; root <= 32.0; root *= 2.0)
-    (void)try_factors({root * root, root * root, 1.0});
-  for (double ratio = 2.0; ratio > 1.05; ratio = std::sqrt(ratio))
-    for (int sweep = 0; sweep < kSweeps; ++sweep) {
-      bool is_better = false;
-      for (const Factors& direction : kDirections)
-        for (const double step : {ratio * ratio, 1.0 / (ratio * ratio)}) {
-          Factors next = best;
-          for (std::size_t f = 0; f < kComponents; ++f) next[f] *= std::pow(step, direction[f]);
-          for (const Component f : {kRotation, kTranslation}) next[f] = std::max(1.0, next[f]);
-          if (next != best) is_better |= try_factors(next);
-        }
-      if (!is_better) break;
-    }
-  // Errors that noise of closures alone explains are no evidence against odometry.
-  double without = log_posterior(cycles, if_false, {1.0, 1.0, 1.0});
-  for (double v = 1.0 / 64.0; v <= 4096.0; v *= 2.0)
-    without = std::max(without, log_posterior(cycles, if_false, {1.0, 1.0, v}));
-  if (most - without < kEvidence) return noise;
-  noise.rotation = std::sqrt(best[kRotation]);
-  noise.translation = std::sqrt(best[kTranslation]);
-  const std::vector<double> ratios = log_ratios(cycles, if_false, best);
-  const CycleMixture mixture = fit_cycle_mixture(ratios, weights_of(cycles));
-  for (std::size_t k = 0; k < cycles.size(); ++k)
-    if (mixture.true_probability(ratios[k]) > 0.5) noise.likely.push_back(cycles[k].closure);
+  Fit fit = fit_factors(cycles, volume);
+  if (fit.log_odds < kEvidence) return noise;
+  const std::vector<Cycle> near = short_cycles(chain, closures);
+  std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors);
+  // Without long cycles, noise of closures alone explains the cycles of successive closures. The
+  // first estimate then remains.
+  const bool few_are_long = 2 * normal.size() < cycles.size();
+  normal.insert(normal.end(), near.begin(), near.end());
+  const Fit refined = fit_factors(normal, volume);
+  if (refined.log_odds >= kEvidence)
+    fit = refined;
+  else if (!few_are_long)
+    return noise;
+  noise.rotation = std::sqrt(fit.factors[kRotation]);
+  noise.translation = std::sqrt(fit.factors[kTranslation]);
+  cycles.insert(cycles.end(), near.begin(), near.end());
+  noise.likely = likely_closures(cycles, fit.factors, volume);
   return noise;
 }
 

@@ -36,6 +36,8 @@ double truncated_cost(std::span<const PoseEdge> edges, std::size_t steps,
 }  // namespace
 
 void OwnPoses::extend(const OwnGraph& graph) {
+  while (T_frame_kf_.size() < std::min<std::size_t>(restored_.size(), graph.keyframes()))
+    T_frame_kf_.push_back(restored_[T_frame_kf_.size()]);
   if (T_frame_kf_.empty()) T_frame_kf_.push_back(graph.T_odom_first());
   while (T_frame_kf_.size() < graph.keyframes())
     T_frame_kf_.push_back(T_frame_kf_.back() *

@@ -19,8 +19,11 @@ class OwnPoses {
   /// In the frame of the last session.
   [[nodiscard]] const std::vector<SE3>& T_frame_kf() const { return T_frame_kf_; }
   void set(std::vector<SE3> T_frame_kf) { T_frame_kf_ = std::move(T_frame_kf); }
+  /// Poses of a former process for the first keyframes.
+  void restore(std::vector<SE3> T_frame_kf) { restored_ = std::move(T_frame_kf); }
 
-  /// Adds new keyframes, by odometry. The first keyframe has its odometry pose.
+  /// Adds new keyframes: restored ones with their poses, the others by odometry. Without restored
+  /// poses, the first keyframe has its odometry pose.
   void extend(const OwnGraph& graph);
 
   /// Moves the poses after each wrong step of odometry as a whole, such that the step is corrected.
@@ -37,7 +40,7 @@ class OwnPoses {
   [[nodiscard]] std::vector<PoseEdge> likely_closures(const OwnGraph& graph, RobotId self,
                                                       std::span<const PoseEdge> inside) const;
 
-  std::vector<SE3> T_frame_kf_;
+  std::vector<SE3> T_frame_kf_, restored_;
   std::set<std::size_t> corrected_;  // steps
   std::size_t improved_with_ = 0;    // number of closures
 };

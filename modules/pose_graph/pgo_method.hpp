@@ -1,6 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+
+#include "modules/core/config.hpp"
 
 namespace km {
 
@@ -10,9 +13,13 @@ enum class PgoMethod : std::uint8_t {
   kNewton = 1,  ///< Newton's method, robust, see TreeNewton.
 };
 
-/// The name in configuration files.
-[[nodiscard]] constexpr const char* to_string(PgoMethod method) {
-  return method == PgoMethod::kNewton ? "newton" : "rbcd";
+/// All methods with their names in configuration files. solver_choice() creates the solver of each.
+inline constexpr Choice<PgoMethod> kPgoMethods[] = {{"newton", PgoMethod::kNewton},
+                                                    {"rbcd", PgoMethod::kRbcd}};
+
+/// The name in configuration files; empty for a value that is none of the methods.
+[[nodiscard]] inline std::string to_string(PgoMethod method) {
+  return Choices<PgoMethod>{kPgoMethods}.name_of(method);
 }
 
 }  // namespace km

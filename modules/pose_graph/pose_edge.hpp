@@ -29,6 +29,11 @@ struct PoseEdge {
   }
 };
 
+/// Number of steps of odometry between two keyframes of one robot.
+[[nodiscard]] constexpr KeyframeIndex steps_between(const KeyframeId& a, const KeyframeId& b) {
+  return a.index < b.index ? b.index - a.index : a.index - b.index;
+}
+
 /// nullopt for measurements beyond measurement_limits.hpp: they would corrupt the solution of the
 /// whole team.
 [[nodiscard]] std::optional<PoseEdge> pose_edge(const RelativePose& measured);

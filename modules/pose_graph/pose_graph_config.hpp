@@ -31,7 +31,7 @@ struct PoseGraphConfig {
   double status_period_s = 1.0;
 
   void visit_fields(auto& visitor) {
-    visitor.field("method", method, {{"newton", PgoMethod::kNewton}, {"rbcd", PgoMethod::kRbcd}},
+    visitor.field("method", method, kPgoMethods,
                   "solver of a session; equal on all robots; measurements are in "
                   "modules/pose_graph/README.md");
     visitor.field("robust", robust, "newton: reject closures that other closures contradict");

@@ -56,6 +56,25 @@ bool TeamAgent::add(const InlierSet& set) {
   return taken;
 }
 
+void TeamAgent::restore(const TeamSolution& solution) {
+  const Trajectory& own = solution.trajectory;
+  awaited_keyframes_ = std::max<std::size_t>(own.T_world_kf.size(), 1);
+  poses_.restore(own.T_world_kf);
+  frame_.set_world(World{own.anchor, SE3::Identity()});
+  published_anchor_ = own.anchor;
+  decisions_.decide(solution.verdicts.closures, true);
+  for (const TeamPeer& peer : solution.peers) {
+    meet(peer);
+    MemberPoses held{.sender = peer, .stage = MemberStage::kSolved, .frame = frame_.frame()};
+    for (const auto& [id, T_world_kf] : own.public_poses) {
+      if (id.robot != peer.robot) continue;
+      held.keyframes.push_back(id.index);
+      held.T_frame_kf.push_back(SinglePose::of(T_world_kf));
+    }
+    if (!held.keyframes.empty()) roster_.take(held);
+  }
+}
+
 void TeamAgent::peer_alive(TeamPeer peer) {
   if (peer.robot == self_.robot) return;
   meet(peer);
@@ -155,13 +174,14 @@ TeamOutput TeamAgent::step(double now_s, std::uint64_t sent_bytes) {
   if (part_) part_->count_sent(sent_bytes - sent_bytes_);
   sent_bytes_ = sent_bytes;
   TeamOutput output;
-  if (graph_.keyframes() > 0) {
+  const bool is_complete = graph_.keyframes() >= awaited_keyframes_;
+  if (is_complete) {
     coordinate(output);
     advance(output);
     reconsider();
   }
   send_status(output);
-  if (graph_.keyframes() > 0) publish(output);
+  if (is_complete) publish(output);
   output.verdicts = decisions_.take_verdicts();
   output.notices = notices_.take();
   return output;
@@ -220,8 +240,19 @@ void TeamAgent::publish(TeamOutput& output) {
   for (const SE3& T_frame_kf : poses()) trajectory.T_world_kf.push_back(T_world_frame * T_frame_kf);
   if (state_ == SessionState::kSolved && world->anchor == part_->session().anchor)
     trajectory.covariances = part_->covariances();
+  trajectory.public_poses = held_poses(T_world_frame);
   output.trajectory = std::move(trajectory);
   output.progress = make_progress();
+}
+
+// Public poses of the other robots in the frame of this one.
+std::map<KeyframeId, SE3> TeamAgent::held_poses(const SE3& T_world_frame) const {
+  std::map<KeyframeId, SE3> held;
+  for (const auto& [robot, poses] : roster_.public_poses())
+    for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
+      if (robot != self_.robot && poses.frame == frame_.frame())
+        held[{robot, poses.keyframes[k]}] = T_world_frame * poses.T_frame_kf[k].pose();
+  return held;
 }
 
 OptimizerProgress TeamAgent::make_progress() const {

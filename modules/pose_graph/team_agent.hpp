@@ -11,6 +11,7 @@
 
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/team_links.hpp"
+#include "modules/core/team_solution.hpp"
 #include "modules/pose_graph/closure_decisions.hpp"
 #include "modules/pose_graph/frame_ties.hpp"
 #include "modules/pose_graph/own_frame.hpp"
@@ -77,6 +78,11 @@ class TeamAgent {
   bool add(const KeyframeOdometry& keyframe);
   bool add(const Closure& closure);
   bool add(const InlierSet& set);
+
+  /// Continues from the solution of a former process, once as many keyframes are added as it has
+  /// poses. Until the other robots return, their poses are held, and decisions are provisional.
+  /// Call before all other inputs.
+  void restore(const TeamSolution& solution);
 
   /// This robot begins or ceases to receive another robot directly.
   void peer_alive(TeamPeer peer);
@@ -175,6 +181,7 @@ class TeamAgent {
   [[nodiscard]] std::optional<SE3> public_pose(const KeyframeId& id) const;
 
   // Results.
+  [[nodiscard]] std::map<KeyframeId, SE3> held_poses(const SE3& T_world_frame) const;
   [[nodiscard]] std::optional<World> world_of(RobotId anchor) const;
   [[nodiscard]] std::optional<World> tied_world() const;
   void publish(TeamOutput& output);
@@ -185,6 +192,7 @@ class TeamAgent {
   TeamPeer self_;
   MemberSolverFactory factory_;
   OwnGraph graph_;
+  std::size_t awaited_keyframes_ = 1;  // nothing is optimised before
   LinksReport links_;
   std::map<RobotId, std::uint64_t> direct_;  // boot ids of the robots that are received directly
   TeamRoster roster_;

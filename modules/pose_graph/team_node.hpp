@@ -19,15 +19,17 @@ namespace km {
 
 /// Channels of the team node; they must outlive it.
 struct TeamTopics {
-  In<KeyframeOdometry> odometry;   ///< Own keyframes, ascending.
-  In<Closure> closures;            ///< Own and received ones.
-  In<InlierSet> inlier_sets;       ///< Decided here.
-  In<InlierSet> peer_inlier_sets;  ///< Decided by other robots.
-  In<PeerEvent> peer_events;       ///< Robots that are received directly.
-  In<PeerEvent> restarts;          ///< kRestarted, before the first closure of the new incarnation.
-  In<LinksReport> links;           ///< Links of the team.
-  In<TeamMessage> peer_messages;   ///< From the other robots.
-  Out<TeamMessage> messages;       ///< To the other robots.
+  In<KeyframeOdometry> odometry;       ///< Own keyframes, ascending.
+  In<Closure> closures;                ///< Own and received ones.
+  In<InlierSet> inlier_sets;           ///< Decided here.
+  In<InlierSet> peer_inlier_sets;      ///< Decided by other robots.
+  In<InlierSet> restored_inlier_sets;  ///< Sets of a former process, older than all others.
+  In<TeamSolution> restored_solution;  ///< Before all other inputs.
+  In<PeerEvent> peer_events;           ///< Robots that are received directly.
+  In<PeerEvent> restarts;         ///< kRestarted, before the first closure of the new incarnation.
+  In<LinksReport> links;          ///< Links of the team.
+  In<TeamMessage> peer_messages;  ///< From the other robots.
+  Out<TeamMessage> messages;      ///< To the other robots.
   Out<Trajectory> trajectory;
   Out<OptimizerProgress> progress;
   Out<ClosureVerdicts> verdicts;  ///< After sessions that weigh closures.
@@ -63,8 +65,9 @@ class TeamNode final : public Node {
     TeamPeer peer;
   };
   using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
-                             Topic<InlierSet>::Message, Topic<PeerEvent>::Message, NewIncarnation,
-                             Topic<LinksReport>::Message, Topic<TeamMessage>::Message>;
+                             Topic<InlierSet>::Message, Topic<TeamSolution>::Message,
+                             Topic<PeerEvent>::Message, NewIncarnation, Topic<LinksReport>::Message,
+                             Topic<TeamMessage>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
   void step(const Input& input, double now_s);

@@ -96,6 +96,7 @@ void write(TreeWriter& w, const TreeSums& s) {
     w.f64(v.motion.spread_m);
     w.f64(v.motion.strength.kappa);
     w.f64(v.motion.strength.tau);
+    w.f32(v.noise);
   }
 }
 
@@ -110,7 +111,7 @@ TreeSums read_sums(TreeReader& r) {
     if (!s.lengths.empty() && bin <= s.lengths.rbegin()->first) r.fail();
     s.lengths[bin] = r.varint_as<std::uint32_t>();
   }
-  for (std::size_t n = r.count(kMaxElements, 87); n > 0; --n) {
+  for (std::size_t n = r.count(kMaxElements, 91); n > 0; --n) {
     PairVote v{.a = r.varint_as<RobotId>()};
     v.b = r.varint_as<RobotId>();
     if (!s.votes.empty() && !below(s.votes.back(), v)) r.fail();
@@ -121,7 +122,8 @@ TreeSums read_sums(TreeReader& r) {
     v.motion.spread_m = r.number();
     v.motion.strength.kappa = r.number();
     v.motion.strength.tau = r.number();
-    const bool in_range = v.motion.radius_m >= 0.0 && v.motion.spread_m >= 0.0 &&
+    v.noise = r.small_number();
+    const bool in_range = v.noise >= 0.0F && v.motion.radius_m >= 0.0 && v.motion.spread_m >= 0.0 &&
                           v.motion.strength.kappa >= 0.0 && v.motion.strength.tau >= 0.0;
     if (!in_range) r.fail();
     s.votes.push_back(v);
@@ -329,8 +331,8 @@ std::vector<std::uint8_t> encode(const DownMessage& message) {
   w.u8(static_cast<std::uint8_t>(v.weighing));
   w.u8(static_cast<std::uint8_t>((v.accept ? 1 : 0) + (v.full ? 2 : 0) + (v.deferred ? 4 : 0) +
                                  (v.free ? 8 : 0)));
-  for (const double x : {v.scale, v.mu, v.barc, v.noise_scale, v.usual_pair.kappa, v.usual_pair.tau,
-                         v.cost, v.gradient})
+  for (const double x : {v.scale, v.mu, v.barc, v.noise_scale, v.usual_noise, v.usual_pair.kappa,
+                         v.usual_pair.tau, v.cost, v.gradient})
     w.f64(x);
   for (const double x : v.drift) w.f64(x);
   w.varint(v.moves.size());
@@ -361,12 +363,12 @@ std::optional<DownMessage> decode_down(std::span<const std::uint8_t> bytes) {
   v.full = (flags & 2U) != 0;
   v.deferred = (flags & 4U) != 0;
   v.free = (flags & 8U) != 0;
-  for (double* x : {&v.scale, &v.mu, &v.barc, &v.noise_scale, &v.usual_pair.kappa,
+  for (double* x : {&v.scale, &v.mu, &v.barc, &v.noise_scale, &v.usual_noise, &v.usual_pair.kappa,
                     &v.usual_pair.tau, &v.cost, &v.gradient})
     *x = r.number();
   const bool in_range = v.scale > 0.0 && v.scale <= 1.0 && v.mu >= 0.0 && v.barc >= 0.0 &&
-                        v.noise_scale > 0.0 && v.usual_pair.kappa > 0.0 && v.usual_pair.tau > 0.0 &&
-                        v.gradient >= 0.0;
+                        v.noise_scale > 0.0 && v.usual_noise >= 1.0 && v.usual_pair.kappa > 0.0 &&
+                        v.usual_pair.tau > 0.0 && v.gradient >= 0.0;
   if (!in_range) r.fail();
   for (double& x : v.drift) x = r.number();
   for (std::size_t n = r.count(kMaxElements, 29); n > 0; --n) {

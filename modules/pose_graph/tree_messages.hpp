@@ -59,6 +59,7 @@ struct PairVote {
   RobotId b = 0;
   std::uint32_t used = 0;  ///< Number of closures in use.
   PairMotion motion = {};  ///< Motion of b at the start; set if `used` > 0.
+  float noise = 0.0F;      ///< PairCycles::factor; 0: not estimated yet, or from too few places.
 };
 
 /// Sums over a subtree.
@@ -119,6 +120,7 @@ struct TreeVerdict {
   double mu = 0.0;    ///< For the next weights.
   double barc = 0.0;  ///< Largest residual of an inlier [sigma].
   double noise_scale = 1.0;
+  double usual_noise = 1.0;  ///< kStart: see usual_pair_noise().
   /// kCount, kStart: first these robots are moved as a whole, see better_placement(). Ascending.
   std::vector<std::pair<RobotId, SinglePose>> moves = {};
   /// kStart: strength of the usual pair of robots, see usual_strength(). While closures are

@@ -114,13 +114,32 @@ bool TreeNewton::reports(const Known& k) const {
   return graph_.self <= std::min(k.edge.from.robot, k.edge.to.robot);
 }
 
+// The own poses by odometry alone, from the first one.
+std::vector<SE3> TreeNewton::odometry_poses() const {
+  std::vector<SE3> poses{graph_.start.front()};
+  for (std::size_t k = 0; k < graph_.odometry; ++k)
+    poses.push_back(poses.back() * graph_.own[k].T_from_to);
+  return poses;
+}
+
+// The poses for cycles through closures to `peer`. A start that closures have bent hides errors of
+// cycles, so closures inside this robot are compared with its odometry. Two robots know only the
+// starts of each other's public poses.
+std::function<SE3(const KeyframeId&)> TreeNewton::pose_before_closures(
+    RobotId peer, const std::vector<SE3>& odometry) const {
+  if (peer == graph_.self)
+    return [&odometry](const KeyframeId& id) { return odometry.at(id.index); };
+  return [this](const KeyframeId& id) { return start_of(id); };
+}
+
 // The two robots of a pair know the same closures, poses and claimed precisions, so both compute
 // the same noise. A pair with more noise than the team as a whole has less weight.
 void TreeNewton::weigh_by_noise() {
   if (!options_.robust || noise_known_) return;
   noise_known_ = true;
-  const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
+  const std::vector<SE3> odometry = odometry_poses();
   for (const auto& [peer, places] : by_peer()) {
+    const Corroboration::PoseOf pose = pose_before_closures(peer, odometry);
     std::vector<PoseEdge> closures;
     for (const std::size_t k : places)
       if (known_[k].trust == Trust::kOpen && !graph_.decided.contains(known_[k].edge.id()))
@@ -128,11 +147,27 @@ void TreeNewton::weigh_by_noise() {
     PairCycles& cycles = graph_.noise.pairs[peer];
     Corroboration(closures, pose, graph_.step_precision, options_.dimension).count_cycles(cycles);
     cycles.factor = estimate_closure_noise(cycles, verdict_.noise_scale) / verdict_.noise_scale;
-    const double weaker = 1.0 / (cycles.factor * cycles.factor);
-    for (const std::size_t k : places) {
-      known_[k].edge.precision.kappa *= weaker;
-      known_[k].edge.precision.tau *= weaker;
-    }
+    weaken(places, cycles.factor);
+  }
+}
+
+// A pair whose cycles do not show how noisy its closures are is as noisy as the usual pair.
+void TreeNewton::weigh_by_usual_noise() {
+  if (verdict_.usual_noise <= 1.0) return;
+  for (const auto& [peer, places] : by_peer()) {
+    PairCycles& cycles = graph_.noise.pairs[peer];
+    if (cycles.factor >= verdict_.usual_noise) continue;
+    const double usual = verdict_.usual_noise * verdict_.noise_scale;
+    if (excludes_noise(cycles, usual, cycles.factor * verdict_.noise_scale)) continue;
+    weaken(places, verdict_.usual_noise / cycles.factor);
+    cycles.factor = verdict_.usual_noise;
+  }
+}
+
+void TreeNewton::weaken(std::span<const std::size_t> closures, double factor) {
+  for (const std::size_t k : closures) {
+    known_[k].edge.precision.kappa /= factor * factor;
+    known_[k].edge.precision.tau /= factor * factor;
   }
 }
 
@@ -271,6 +306,9 @@ void TreeNewton::count_closures(TreeSums& sums) const {
       if (takes_part(known_[k])) closures.push_back(known_[k].edge);
     if (const auto motion = motion_of_pair(closures, graph_.self, pose))
       vote->second.motion = *motion;
+    const auto cycles = graph_.noise.pairs.find(peer);
+    if (noise_known_ && cycles != graph_.noise.pairs.end() && shows_noise(cycles->second))
+      vote->second.noise = static_cast<float>(cycles->second.factor);
     sums.votes.push_back(vote->second);
   }
 }
@@ -300,8 +338,9 @@ UpMessage TreeNewton::first_message() {
   if (!options_.robust || round_ > 0) return message;
   const std::size_t most =
       place_.members.size() < kEnoughToOutvote ? kEnoughLengths : kShareOfLengths;
-  const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
+  const std::vector<SE3> odometry = odometry_poses();
   for (const auto& [peer, places] : by_peer()) {
+    const Corroboration::PoseOf pose = pose_before_closures(peer, odometry);
     std::vector<PoseEdge> closures;
     for (const std::size_t k : places)
       if (known_[k].trust == Trust::kOpen && reports(known_[k]) &&
@@ -552,6 +591,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       find_isolated(default_threshold(options_.dimension) * v.noise_scale);
       break;
     case Next::kStart:
+      weigh_by_usual_noise();
       if (!v.deferred)
         for (Known& k : known_) k.deferred = false;
       build_front();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -81,7 +82,12 @@ class TreeNewton final : public MemberSolver {
   [[nodiscard]] RobotId peer_of(const Known& k) const;
   [[nodiscard]] const SE3& start_of(const KeyframeId& id) const;
   [[nodiscard]] std::map<RobotId, std::vector<std::size_t>> by_peer() const;
+  [[nodiscard]] std::vector<SE3> odometry_poses() const;
+  [[nodiscard]] std::function<SE3(const KeyframeId&)> pose_before_closures(
+      RobotId peer, const std::vector<SE3>& odometry) const;
   void weigh_by_noise();
+  void weigh_by_usual_noise();
+  void weaken(std::span<const std::size_t> closures, double factor);
   void find_isolated(double barc);
   [[nodiscard]] std::map<RobotId, double> shares_of_pairs() const;
   void build_front();

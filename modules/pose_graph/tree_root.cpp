@@ -35,6 +35,8 @@ constexpr std::uint32_t kFewOpen = 32;  // so few false closures do no harm
 // Closures per pose below which the deferred closures are needed from the start.
 constexpr double kClosuresPerPose = 0.25;
 
+constexpr std::size_t kEnoughPairs = 3;  // for the noise of the usual pair
+
 // True if pairs with closures in use connect all robots.
 bool joined(const std::vector<RobotId>& robots, const std::vector<PairVote>& votes) {
   std::map<RobotId, RobotId> part;
@@ -54,6 +56,16 @@ PairMotions motions_of(const std::vector<PairVote>& votes) {
   for (const PairVote& v : votes)
     if (v.used > 0) pairs[{v.a, v.b}] = v.motion;
   return pairs;
+}
+
+// The noise that most pairs reach or exceed. Pairs without an estimate count as 1.
+double usual_pair_noise(const std::vector<PairVote>& votes) {
+  if (votes.size() < kEnoughPairs) return 1.0;
+  std::vector<float> noise;
+  for (const PairVote& v : votes) noise.push_back(std::max(1.0F, v.noise));
+  const auto middle = noise.begin() + static_cast<std::ptrdiff_t>((noise.size() - 1) / 2);
+  std::ranges::nth_element(noise, middle);
+  return static_cast<double>(*middle);
 }
 
 std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>& votes) {
@@ -90,6 +102,7 @@ DownMessage TreeRoot::answer(Next next) const {
                      .mu = schedule_.mu(),
                      .barc = barc_,
                      .noise_scale = noise_scale_,
+                     .usual_noise = usual_noise_,
                      .usual_pair = usual_pair_,
                      .cost = cost_,
                      .gradient = std::sqrt(std::max(0.0, decrement_))};
@@ -110,6 +123,7 @@ DownMessage TreeRoot::retreat(std::uint32_t round) {
 DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   round_ = round;
   if (first_) {  // closures that stand alone are deferred
+    usual_noise_ = usual_pair_noise(sums.votes);
     const std::uint32_t left = sums.open;
     const bool enough = static_cast<double>(left) >= kClosuresPerPose * sums.poses;
     const bool deferred = sums.isolated > kFewOpen && enough && joined(members_, sums.votes);

@@ -64,6 +64,7 @@ class TreeRoot {
   std::uint32_t round_ = 0;
   double barc_ = 0.0;
   double noise_scale_ = 1.0;
+  double usual_noise_ = 1.0;
   Precision usual_pair_ = kUnlimited;
   double cost_ = 0.0;
   double decrement_ = 0.0;

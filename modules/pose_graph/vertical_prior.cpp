@@ -13,7 +13,7 @@ std::vector<SE3> levelled(std::vector<SE3> poses, std::span<const VerticalPrior>
   for (const VerticalPrior& prior : priors)
     up += prior.weight * (poses[static_cast<std::size_t>(prior.pose)].linear() * prior.up);
   if (up.isZero(0.0)) return poses;
-  const SE3 turn = make_pose(turn_to_z(up), Eigen::Vector3d::Zero());
+  const SE3 turn = make_pose(rotation_to_z(up), Eigen::Vector3d::Zero());
   for (SE3& pose : poses) pose = turn * pose;
   return poses;
 }

@@ -154,10 +154,10 @@ void MemberRbcd::update(std::vector<SolverMessage>& messages) {
   problem_.set_fixed(fixed_);
   const bool alone = place_.members.size() == 1;
   TruncatedNewtonResult result =
-      minimise_beyond(problem_, X,
-                      {.max_iterations = options_.max_newton_steps,
-                       .max_cg_iterations = options_.max_cg_iterations},
-                      alone ? 1.0 : growing_relaxation(round, options_.max_over_relaxation));
+      minimise_over_relaxed(problem_, X,
+                            {.max_iterations = options_.max_newton_steps,
+                             .max_cg_iterations = options_.max_cg_iterations},
+                            alone ? 1.0 : relaxation_after(round, options_.max_over_relaxation));
   if (!std::isfinite(result.cost)) throw std::runtime_error("MemberRbcd: the cost is not finite");
   history_.emplace_hint(history_.end(), round + 1, std::move(result.X));
   const auto rounded = round_public_poses();

@@ -20,7 +20,7 @@ struct RbcdOptions {
   double min_relative_decrease = 1e-7;  ///< Smallest decrease of the team cost per round.
   int max_newton_steps = 3;             ///< Newton steps per block update.
   int max_cg_iterations = 50;           ///< CG iterations per Newton step.
-  double max_over_relaxation = 1.95;    ///< 1: no over-relaxation, see minimise_beyond().
+  double max_over_relaxation = 1.95;    ///< 1: no over-relaxation, see minimise_over_relaxed().
 };
 
 /// Riemannian block-coordinate descent on the rank relaxation (Tian et al., "Distributed

@@ -118,8 +118,9 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
   return result;
 }
 
-TruncatedNewtonResult minimise_beyond(const QuadraticProblem& problem, const LiftedPoses& X,
-                                      const TruncatedNewtonOptions& options, double relaxation) {
+TruncatedNewtonResult minimise_over_relaxed(const QuadraticProblem& problem, const LiftedPoses& X,
+                                            const TruncatedNewtonOptions& options,
+                                            double relaxation) {
   TruncatedNewtonResult result = minimise(problem, X, options);
   if (relaxation <= 1.0) return result;
   const LiftedPoses step = project_tangent(result.X, result.X - X);

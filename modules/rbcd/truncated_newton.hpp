@@ -40,14 +40,14 @@ struct [[nodiscard]] TruncatedNewtonResult {
 /// every relaxation in (0, 2). This is successive over-relaxation, with which sweeps over blocks
 /// reduce their slow modes in a fraction of the rounds (Ostrowski; Young, "Iterative Solution of
 /// Large Linear Systems", 1971, Ch. 4). At most 1: plain minimise().
-[[nodiscard]] TruncatedNewtonResult minimise_beyond(const QuadraticProblem& problem,
-                                                    const LiftedPoses& X,
-                                                    const TruncatedNewtonOptions& options,
-                                                    double relaxation);
+[[nodiscard]] TruncatedNewtonResult minimise_over_relaxed(const QuadraticProblem& problem,
+                                                          const LiftedPoses& X,
+                                                          const TruncatedNewtonOptions& options,
+                                                          double relaxation);
 
-/// Relaxation of the block updates after round `round`, for minimise_beyond(): grows from 1.5 to
-/// `max`. The first rounds damp the fast modes, later ones speed up the slow modes.
-[[nodiscard]] inline double growing_relaxation(std::uint32_t round, double max) {
+/// Relaxation of the block updates after round `round`, for minimise_over_relaxed(): grows from 1.5
+/// to `max`. The first rounds damp the fast modes, later ones speed up the slow modes.
+[[nodiscard]] inline double relaxation_after(std::uint32_t round, double max) {
   return std::min(max, 2.0 - 4.0 / (8.0 + round));
 }
 

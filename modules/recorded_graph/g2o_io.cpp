@@ -20,7 +20,8 @@ namespace km {
 namespace {
 
 constexpr std::uint64_t kLetters = 26;
-constexpr double kVerticalTolerance = 1e-3;  // information, relative to its size
+// Tolerance of the information of a prior, relative to 1 / sigma^2.
+constexpr double kVerticalTolerance = 1e-3;
 
 KeyframeId read_id(TextFields& fields) {
   const std::uint64_t key = fields.integer("vertex id");
@@ -246,7 +247,7 @@ void write_vertical(std::ostream& out, const G2oVertical& prior) {
     throw std::invalid_argument("write_g2o: the vertical of " + to_string(prior.id) +
                                 " is not a unit vector with a positive sigma");
   out << "EDGE_SE3_PRIOR " << key_of_keyframe(prior.id) << " 0";
-  write_pose(out, make_pose(turn_to_z(up), Eigen::Vector3d::Zero()));
+  write_pose(out, make_pose(rotation_to_z(up), Eigen::Vector3d::Zero()));
   write_information(out, tilt_information(up.normalized()) / (sigma * sigma));
 }
 

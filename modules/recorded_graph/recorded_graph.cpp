@@ -121,7 +121,7 @@ RecordedGraph make_recorded_graph(const G2oGraph& g2o, const std::string& file) 
 SE3 RecordedGraph::T_odom_first() const {
   const auto first = verticals.find(0);
   if (first == verticals.end()) return SE3::Identity();
-  return make_pose(turn_to_z(first->second.up_body), Eigen::Vector3d::Zero());
+  return make_pose(rotation_to_z(first->second.up_body), Eigen::Vector3d::Zero());
 }
 
 std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph) {

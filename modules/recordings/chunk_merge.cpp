@@ -6,10 +6,10 @@
 
 namespace km {
 
-ChunkMerge::ChunkMerge(std::vector<ChunkPlace> places, Load load, Lost lost,
+ChunkMerge::ChunkMerge(std::vector<ChunkRange> places, Load load, Lost lost,
                        std::uint64_t held_bytes)
     : load_(std::move(load)), lost_(std::move(lost)), max_held_bytes_(held_bytes) {
-  std::sort(places.begin(), places.end(), [](const ChunkPlace& a, const ChunkPlace& b) {
+  std::sort(places.begin(), places.end(), [](const ChunkRange& a, const ChunkRange& b) {
     return std::tie(a.first, a.begin) < std::tie(b.first, b.begin);
   });
   waiting_.assign(places.begin(), places.end());
@@ -28,13 +28,13 @@ void ChunkMerge::open_due() {
       const auto top = earliest();
       if (waiting_.front().first > top->chunk.entries[top->next].log_time) return;
     }
-    const ChunkPlace place = waiting_.front();
+    const ChunkRange place = waiting_.front();
     waiting_.pop_front();
     open(place);
   }
 }
 
-void ChunkMerge::open(const ChunkPlace& place) {
+void ChunkMerge::open(const ChunkRange& place) {
   make_room();
   Open opened{.place = place, .chunk = load_(place)};
   auto& entries = opened.chunk.entries;

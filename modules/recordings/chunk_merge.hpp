@@ -10,8 +10,8 @@
 
 namespace km {
 
-/// A part of a file that is read in one piece: its position, and the time of its messages.
-struct ChunkPlace {
+/// Range of a file that is read in one piece, and the time of its messages.
+struct ChunkRange {
   std::uint64_t begin = 0;  ///< [bytes from the beginning of the file].
   std::uint64_t end = 0;    ///< Position behind the last byte that can belong to the part [bytes].
   Stamp first = 0;          ///< Lower bound on the log times of the messages [ns].
@@ -38,25 +38,25 @@ class ChunkMerge {
   static constexpr std::uint64_t kHeld_bytes = std::uint64_t{1} << 30U;
 
   /// Reads a chunk. Returns a chunk without entries if it is unusable.
-  using Load = std::function<Chunk(const ChunkPlace&)>;
+  using Load = std::function<Chunk(const ChunkRange&)>;
   /// Called for a message that is dropped, because a later message has been returned or because
   /// the file has changed.
-  using Lost = std::function<void(const ChunkPlace&, const Chunk::Entry&)>;
+  using Lost = std::function<void(const ChunkRange&, const Chunk::Entry&)>;
 
-  ChunkMerge(std::vector<ChunkPlace> places, Load load, Lost lost,
+  ChunkMerge(std::vector<ChunkRange> places, Load load, Lost lost,
              std::uint64_t held_bytes = kHeld_bytes);
 
   [[nodiscard]] std::optional<BagMessage> next();
 
  private:
   struct Open {
-    ChunkPlace place;
+    ChunkRange place;
     Chunk chunk;
     std::size_t next = 0;  // index into chunk.entries, which are in order of time
   };
 
   void open_due();
-  void open(const ChunkPlace& place);
+  void open(const ChunkRange& place);
   void make_room();
   // Bytes of a message; nullopt if the file has changed since the chunk was opened.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> bytes_of(Open& open,
@@ -68,7 +68,7 @@ class ChunkMerge {
   Lost lost_;
   std::uint64_t max_held_bytes_;
   std::uint64_t held_bytes_ = 0;
-  std::deque<ChunkPlace> waiting_;  // chunks to be opened, in order of time, then position
+  std::deque<ChunkRange> waiting_;  // chunks to be opened, in order of time, then position
   std::vector<Open> open_;
   std::optional<Stamp> last_;
 };

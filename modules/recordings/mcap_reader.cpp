@@ -55,8 +55,8 @@ McapReader::McapReader(const std::filesystem::path& path) : file_(path) {
   }
   walk(at, data_end, has_end);
   merge_ = std::make_unique<ChunkMerge>(
-      std::move(places_), [this](const ChunkPlace& place) { return load(place); },
-      [this](const ChunkPlace& place, const Chunk::Entry& entry) {
+      std::move(places_), [this](const ChunkRange& place) { return load(place); },
+      [this](const ChunkRange& place, const Chunk::Entry& entry) {
         report_.add(BagFault::kUnordered, place.begin, channels_[entry.channel].topic);
       });
 }
@@ -223,7 +223,7 @@ void McapReader::note_bare_message(std::uint64_t begin, std::uint64_t end) {
 }
 
 void McapReader::note_chunk(std::uint64_t begin, std::uint64_t end) {
-  ChunkPlace place{.begin = begin, .end = end};
+  ChunkRange place{.begin = begin, .end = end};
   const Chunk chunk = load(place);
   if (chunk.entries.empty()) return;
   place.first = chunk.entries.front().log_time;
@@ -244,7 +244,7 @@ void McapReader::check_data_crc(std::uint64_t end, std::uint32_t crc) {
     report_.add(BagFault::kChecksum, end, "the data section has another checksum than it states");
 }
 
-Chunk McapReader::load(const ChunkPlace& place) {
+Chunk McapReader::load(const ChunkRange& place) {
   report_.begin_chunk(place.begin);
   Chunk chunk{.bytes = records_of(place), .entries = {}};
   const bool is_whole = for_each_record(chunk.bytes, [&](const McapRecord& read) {
@@ -270,7 +270,7 @@ Chunk McapReader::load(const ChunkPlace& place) {
 }
 
 // The uncompressed records of a part; empty if they cannot be read.
-Bytes McapReader::records_of(const ChunkPlace& place) {
+Bytes McapReader::records_of(const ChunkRange& place) {
   const auto refuse = [&](BagFault fault, const std::string& why) {
     report_.add(fault, place.begin, why);
     return Bytes{};

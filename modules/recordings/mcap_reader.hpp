@@ -51,8 +51,8 @@ class McapReader final : public BagReader {
   void note_chunk(std::uint64_t begin, std::uint64_t end);
   void check_data_crc(std::uint64_t end, std::uint32_t crc);
 
-  [[nodiscard]] Chunk load(const ChunkPlace& place);
-  [[nodiscard]] std::vector<std::uint8_t> records_of(const ChunkPlace& place);
+  [[nodiscard]] Chunk load(const ChunkRange& place);
+  [[nodiscard]] std::vector<std::uint8_t> records_of(const ChunkRange& place);
   void add_definition(const McapRecordHeader& header, std::span<const std::uint8_t> bytes,
                       std::uint64_t place);
   void add_channel(const McapChannel& channel, std::uint64_t place);
@@ -63,7 +63,7 @@ class McapReader final : public BagReader {
   std::map<std::uint16_t, std::size_t> channel_of_;  // index into channels_
   std::vector<BagChannel> channels_;
   std::optional<Summary> summary_;
-  std::vector<ChunkPlace> places_;
+  std::vector<ChunkRange> places_;
   std::unique_ptr<ChunkMerge> merge_;
 };
 

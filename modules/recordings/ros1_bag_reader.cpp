@@ -34,8 +34,8 @@ Ros1BagReader::Ros1BagReader(const std::filesystem::path& path) : file_(path) {
     read_all(header->data_begin + header->data_size);
   }
   merge_ = std::make_unique<ChunkMerge>(
-      std::move(places_), [this](const ChunkPlace& place) { return load(place); },
-      [this](const ChunkPlace& place, const Chunk::Entry& entry) {
+      std::move(places_), [this](const ChunkRange& place) { return load(place); },
+      [this](const ChunkRange& place, const Chunk::Entry& entry) {
         report_.add(BagFault::kUnordered, place.begin, channels()[entry.channel].topic);
       });
 }
@@ -123,7 +123,7 @@ void Ros1BagReader::read_all(std::uint64_t begin) {
 }
 
 void Ros1BagReader::note_chunk(std::uint64_t begin, std::uint64_t end) {
-  ChunkPlace place{.begin = begin, .end = end};
+  ChunkRange place{.begin = begin, .end = end};
   const Chunk chunk = load(place);
   if (chunk.entries.empty()) return;
   place.first = chunk.entries.front().log_time;
@@ -134,7 +134,7 @@ void Ros1BagReader::note_chunk(std::uint64_t begin, std::uint64_t end) {
   places_.push_back(place);
 }
 
-Chunk Ros1BagReader::load(const ChunkPlace& place) {
+Chunk Ros1BagReader::load(const ChunkRange& place) {
   report_.begin_chunk(place.begin);
   Chunk chunk{.bytes = records_of(place), .entries = {}};
   for (std::uint64_t at = 0; at < chunk.bytes.size();) {
@@ -153,7 +153,7 @@ Chunk Ros1BagReader::load(const ChunkPlace& place) {
 }
 
 // The uncompressed records of a chunk; empty if they cannot be read.
-Bytes Ros1BagReader::records_of(const ChunkPlace& place) {
+Bytes Ros1BagReader::records_of(const ChunkRange& place) {
   const auto refuse = [&](BagFault fault, const std::string& why) {
     report_.add(fault, place.begin, why);
     return Bytes{};

@@ -48,8 +48,8 @@ class Ros1BagReader final : public BagReader {
   void read_all(std::uint64_t begin);
   void note_chunk(std::uint64_t begin, std::uint64_t end);
 
-  [[nodiscard]] Chunk load(const ChunkPlace& place);
-  [[nodiscard]] std::vector<std::uint8_t> records_of(const ChunkPlace& place);
+  [[nodiscard]] Chunk load(const ChunkRange& place);
+  [[nodiscard]] std::vector<std::uint8_t> records_of(const ChunkRange& place);
   void add_connection(const Ros1Record& record, std::uint64_t place);
   void add_entry(const Ros1Record& record, std::uint64_t place, Chunk& chunk);
 
@@ -57,7 +57,7 @@ class Ros1BagReader final : public BagReader {
   PlacedReport report_{file_};
   ChannelTable channels_;
   std::map<std::uint32_t, std::size_t> channel_of_;  // channel of each connection of the bag
-  std::vector<ChunkPlace> places_;
+  std::vector<ChunkRange> places_;
   std::unique_ptr<ChunkMerge> merge_;
 };
 

@@ -3,13 +3,13 @@
 #include <concepts>
 #include <type_traits>
 
-#include "modules/recordings/ros_wire.hpp"
+#include "modules/recordings/ros_serialization.hpp"
 
 namespace km {
 namespace {
 
 // The fields of each message in the order of ROS' definitions (github.com/ros2/common_interfaces).
-// RosWire reads them into a message, and RosWriter writes them from a constant message.
+// RosReader reads them into a message, and RosWriter writes them from a constant message.
 template <typename Message, typename Type>
 concept Is = std::same_as<std::remove_const_t<Message>, Type>;
 
@@ -218,7 +218,7 @@ bool is_of_type(const BagChannel& channel, std::string_view type) {
 
 template <typename Message>
 Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes) {
-  auto wire = RosWire::open(encoding, bytes);
+  auto wire = RosReader::open(encoding, bytes);
   if (!wire.value) return Decoded<Message>::refuse(wire.refusal);
   Message message;
   fields(*wire.value, message);
@@ -228,7 +228,7 @@ Decoded<Message> decode_ros(std::string_view encoding, std::span<const std::uint
 
 template <>
 Decoded<RosHeader> decode_ros(std::string_view encoding, std::span<const std::uint8_t> bytes) {
-  auto wire = RosWire::open(encoding, bytes);
+  auto wire = RosReader::open(encoding, bytes);
   if (!wire.value) return Decoded<RosHeader>::refuse(wire.refusal);
   RosHeader header;
   fields(*wire.value, header);

@@ -11,17 +11,11 @@ struct Kind {
   const char* name;
   std::array<float, 3> color;
 };
-enum { kCandidates, kVerified, kRejected, kKept };
+// By ClosureStatus.
 constexpr std::array<Kind, 4> kKinds = {{{"candidates", {0.6F, 0.6F, 0.6F}},
                                          {"verified", {1.0F, 0.8F, 0.1F}},
                                          {"rejected", {0.9F, 0.2F, 0.15F}},
                                          {"kept", {0.15F, 0.75F, 0.3F}}}};
-
-std::size_t kind_of(const PublishedClosure& closure) {
-  if (closure.stage == ClosureStage::kInlier) return kKept;
-  if (closure.stage < ClosureStage::kVerified) return kCandidates;
-  return closure.rejected ? kRejected : kVerified;
-}
 
 std::optional<SE3> pose_of(const KeyframeId& keyframe, const Trajectory& trajectory) {
   if (keyframe.robot != trajectory.robot || keyframe.index >= trajectory.T_world_kf.size())
@@ -48,7 +42,7 @@ RosMarkers closure_lines(std::span<const PublishedClosure> closures, const Traje
     if (from && !to && closure.T_from_to) to = *from * *closure.T_from_to;
     if (to && !from && closure.T_from_to) from = *to * closure.T_from_to->inverse();
     if (!from || !to) continue;
-    auto& points = message.markers[kind_of(closure)].points;
+    auto& points = message.markers[static_cast<std::size_t>(closure.status)].points;
     points.push_back(from->translation());
     points.push_back(to->translation());
   }

@@ -3,7 +3,7 @@
 #include <optional>
 #include <span>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/closure_verdicts.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {
@@ -11,8 +11,7 @@ namespace km {
 /// Present state of a closure candidate, for publication.
 struct PublishedClosure {
   ClosureId id;
-  ClosureStage stage = ClosureStage::kCandidate;
-  bool rejected = false;         ///< Verified, but rejected by the optimiser.
+  ClosureStatus status = ClosureStatus::kCandidate;
   std::optional<SE3> T_from_to;  ///< Measured transform between the keyframes of `id`, if there is
                                  ///< one.
 };

@@ -162,7 +162,7 @@ DepthViewMaker::StripSums DepthViewMaker::make_strip(int row, const DepthImage& 
   const std::size_t end = std::min(static_cast<std::size_t>(view_.height),
                                    begin + static_cast<std::size_t>(DepthView::kTileSide));
   StripSums sums;
-  sums.labels_outside = fill(begin * width, end * width, depth, labels);
+  sums.off_palette_pixels = fill(begin * width, end * width, depth, labels);
   sums.with_depth = summarise(row);
   return sums;
 }
@@ -173,10 +173,10 @@ const DepthView& DepthViewMaker::make(const DepthImage& depth, const LabelImage*
       strips_[static_cast<std::size_t>(row)] = make_strip(row, depth, labels);
   });
   view_.labelled = labels != nullptr;
-  view_.with_depth = view_.labels_outside = 0;
+  view_.with_depth = view_.off_palette_pixels = 0;
   for (const StripSums& sums : strips_) {
     view_.with_depth += sums.with_depth;
-    view_.labels_outside += sums.labels_outside;
+    view_.off_palette_pixels += sums.off_palette_pixels;
   }
   return view_;
 }

@@ -29,8 +29,8 @@ struct DepthView {
   std::vector<std::uint16_t> nearest, farthest;
   int tile_columns = 0, tile_rows = 0;
 
-  std::size_t with_depth = 0;      ///< Pixels with a depth.
-  std::size_t labels_outside = 0;  ///< Pixels whose label the palette lacks.
+  std::size_t with_depth = 0;          ///< Pixels with a depth.
+  std::size_t off_palette_pixels = 0;  ///< Pixels whose label the palette lacks.
   bool labelled = false;
 
   [[nodiscard]] std::size_t outside() const { return pixels.size() - 1; }
@@ -54,7 +54,7 @@ class DepthViewMaker {
  private:
   // Contribution of a strip of tiles to the sums of a view.
   struct StripSums {
-    std::size_t with_depth = 0, labels_outside = 0;
+    std::size_t with_depth = 0, off_palette_pixels = 0;
   };
 
   void plan_rectification(const Camera& camera);

@@ -298,34 +298,36 @@ void IncrementalMesh::finalise(VoxelBlock& block, BlockMap& map) {
   disown(block);
 }
 
-// Returns, by index of the vertex, the index of its heir; kNone for vertices that are kept.
-std::vector<std::uint32_t> IncrementalMesh::final_heirs(const SupersededSurface& superseded) const {
+// Returns, by index of the vertex, the index of its replacement; kNone for vertices that are kept.
+std::vector<std::uint32_t> IncrementalMesh::final_replacements(
+    const SupersededSurface& superseded) const {
   PlaceOfId places;
   for (std::size_t i = 0; i < vertices_.size(); ++i)
     if (vertices_[i].id != kRemoved && vertices_[i].owner == nullptr)
       places.add(vertices_[i].id, static_cast<std::uint32_t>(i));
   places.sort();
-  std::vector<std::uint32_t> heirs(vertices_.size(), BlockMesh::kNone);
+  std::vector<std::uint32_t> replacements(vertices_.size(), BlockMesh::kNone);
   for (const SupersededVertex& vertex : superseded.vertices) {
     const std::uint32_t place = places.find(vertex.id);
-    if (place != BlockMesh::kNone) heirs[place] = places.find(vertex.heir);
+    if (place != BlockMesh::kNone) replacements[place] = places.find(vertex.replacement);
   }
-  return heirs;
+  return replacements;
 }
 
 SurfaceDrop IncrementalMesh::drop(const SupersededSurface& superseded) {
-  const std::vector<std::uint32_t> heirs = final_heirs(superseded);
+  const std::vector<std::uint32_t> replacements = final_replacements(superseded);
   SurfaceDrop dropped;
   std::erase_if(final_faces_, [&](const Face& face) {
     for (const std::uint32_t v : face)
-      if (heirs[v] == BlockMesh::kNone) return false;
+      if (replacements[v] == BlockMesh::kNone) return false;
     release(face);
     ++dropped.faces;
     return true;
   });
   faces_ -= dropped.faces;
   for (const std::uint32_t place : maybe_unused_)
-    if (vertices_[place].uses == 0) vertices_[heirs[place]].labels.add(vertices_[place].labels);
+    if (vertices_[place].uses == 0)
+      vertices_[replacements[place]].labels.add(vertices_[place].labels);
   dropped.vertices = remove_unused();
   return dropped;
 }

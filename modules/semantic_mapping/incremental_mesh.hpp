@@ -47,8 +47,8 @@ class IncrementalMesh {
   MeshUpdateReport finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
 
   /// Drops the final faces whose vertices are all listed, and then the listed vertices without
-  /// other faces. The votes on labels of such a vertex are added to its heir. A vertex counts only
-  /// if it and its heir are final; unknown ids are ignored. n log n in the mesh.
+  /// other faces. The votes on labels of such a vertex are added to its replacement. A vertex
+  /// counts only if it and its replacement are final; unknown ids are ignored. n log n in the mesh.
   SurfaceDrop drop(const SupersededSurface& superseded);
 
   /// All faces and the vertices they use; no labels unless `labelled`.
@@ -86,7 +86,8 @@ class IncrementalMesh {
   void compute(Vertex& vertex, const BlockCells& cells, const Eigen::Vector3i& voxel,
                int axis) const;
   [[nodiscard]] LabelId label_of(const VoxelLabels& labels) const;
-  [[nodiscard]] std::vector<std::uint32_t> final_heirs(const SupersededSurface& superseded) const;
+  [[nodiscard]] std::vector<std::uint32_t> final_replacements(
+      const SupersededSurface& superseded) const;
   std::size_t remove_unused();
   void disown(VoxelBlock& block);
 

@@ -218,7 +218,7 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
   state.camera_at = T_odom_cam.translation();
   const DepthView& view = state.views.make(depth, labels);
   report.pixels = view.with_depth;
-  report.labels_outside = view.labels_outside;
+  report.off_palette_pixels = view.off_palette_pixels;
 
   const BlockFusion fusion(state.config, view, T_odom_cam, keyframe);
   const auto updates = state.select(view, fusion, T_odom_cam, report);

@@ -29,12 +29,12 @@ enum class IntegrationStatus {
 /// Counts of one call of integrate(). All but status are zero for a skipped frame.
 struct [[nodiscard]] IntegrationReport {
   IntegrationStatus status = IntegrationStatus::kIntegrated;
-  std::size_t pixels = 0;            ///< Pixels with a depth within range, after rectification.
-  std::size_t labels_outside = 0;    ///< Pixels whose label the palette lacks: unknown.
-  bool label_size_differs = false;   ///< Integrated without the labels, whose size is wrong.
-  std::size_t blocks_updated = 0;    ///< Blocks near an observed surface.
-  std::size_t blocks_seen_free = 0;  ///< Other blocks in view, updated for carving.
-  std::size_t blocks_allocated = 0;  ///< New blocks.
+  std::size_t pixels = 0;              ///< Pixels with a depth within range, after rectification.
+  std::size_t off_palette_pixels = 0;  ///< Pixels whose label the palette lacks: unknown.
+  bool label_size_differs = false;     ///< Integrated without the labels, whose size is wrong.
+  std::size_t blocks_updated = 0;      ///< Blocks near an observed surface.
+  std::size_t blocks_seen_free = 0;    ///< Other blocks in view, updated for carving.
+  std::size_t blocks_allocated = 0;    ///< New blocks.
   std::size_t blocks_refused = 0;    ///< Requests for new blocks that were refused, see NearBlocks.
   std::size_t blocks_removed = 0;    ///< Erased blocks: empty after carving.
   std::size_t blocks_finalised = 0;  ///< Blocks that left the window and became final mesh.
@@ -114,8 +114,8 @@ struct MappingProgress {
   std::uint64_t bad_pose = 0;    ///< Skipped frames: pose not finite or not rigid.
   std::uint64_t too_late = 0;    ///< Skipped frames: newer ones arrived while the mapper was busy.
   std::uint64_t unlabelled = 0;  ///< Frames integrated without labels.
-  std::uint64_t labels_outside = 0;  ///< Pixels whose label the palette lacks.
-  std::uint64_t blocks_refused = 0;  ///< Sum of IntegrationReport::blocks_refused.
+  std::uint64_t off_palette_pixels = 0;  ///< Pixels whose label the palette lacks.
+  std::uint64_t blocks_refused = 0;      ///< Sum of IntegrationReport::blocks_refused.
   MapSize size = {};
 };
 

@@ -42,9 +42,9 @@ void SemanticMappingNode::stop() noexcept {
   log::info(name()) << p.integrated << " frames, " << p.size.vertices << " vertices, "
                     << p.size.faces << " faces, " << p.size.dropped_faces
                     << " more seen again and dropped; too late " << p.too_late;
-  if (p.wrong_size + p.bad_pose + p.labels_outside + p.blocks_refused > 0)
+  if (p.wrong_size + p.bad_pose + p.off_palette_pixels + p.blocks_refused > 0)
     log::warn(name()) << "skipped " << p.wrong_size << " frames of the wrong size and "
-                      << p.bad_pose << " without a usable pose; " << p.labels_outside
+                      << p.bad_pose << " without a usable pose; " << p.off_palette_pixels
                       << " pixels with labels outside the palette; " << p.blocks_refused
                       << " blocks beyond max_blocks";
 }
@@ -79,7 +79,7 @@ void SemanticMappingNode::count(const DenseFrame& frame, const IntegrationReport
   progress_.bad_pose += report.status == IntegrationStatus::kPoseUnusable ? 1 : 0;
   progress_.unlabelled +=
       integrated && (frame.labels == nullptr || report.label_size_differs) ? 1 : 0;
-  progress_.labels_outside += report.labels_outside;
+  progress_.off_palette_pixels += report.off_palette_pixels;
   progress_.blocks_refused += report.blocks_refused;
   progress_.too_late = worker_.load().dropped;
 }

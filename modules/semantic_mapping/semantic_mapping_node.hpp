@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "modules/core/dense_frame.hpp"
-#include "modules/mesh/continued_map.hpp"
+#include "modules/mesh/resumed_map.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/node.hpp"
@@ -38,7 +38,7 @@ class SemanticMappingNode final : public Node {
   ~SemanticMappingNode() override { stop(); }
 
   /// The mesh is appended to the map of an earlier process. Call before start().
-  void continue_from(ContinuedMap before) { before_.emplace(std::move(before)); }
+  void continue_from(ResumedMap before) { before_.emplace(std::move(before)); }
 
   std::string_view name() const override { return SemanticMappingConfig::kSection; }
   void start() override { worker_.start(); }
@@ -63,7 +63,7 @@ class SemanticMappingNode final : public Node {
   LabelPalette palette_;
   const double mesh_interval_s_;
   const SemanticMappingTopics topics_;
-  std::optional<ContinuedMap> before_;
+  std::optional<ResumedMap> before_;
   MappingProgress progress_;
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh
   std::optional<Stamp> published_;       // stamp at the last mesh, or of the first frame

@@ -17,19 +17,16 @@ namespace {
 // A complete frame waits up to this time, by the log, for inertial samples up to its stamp.
 constexpr double kImuPatience_s = 2.0;
 
-bool is_imu(const BagChannel& channel) {
-  return is_of_type(channel, RosImu::kType);
-}
-
-bool is_odometry(const BagChannel& channel) {
-  return is_of_type(channel, RosOdometry::kType);
+std::size_t index_of(SensorRole role) {
+  return static_cast<std::size_t>(role);
 }
 
 // " /a, /b", or " none".
-std::string names_of(const std::vector<BagChannel>& channels, bool (*is_kind)(const BagChannel&)) {
+std::string names_of(const std::vector<BagChannel>& channels, const SensorKind& kind) {
   std::string names;
   for (const BagChannel& channel : channels)
-    if (is_kind(channel)) names += (names.empty() ? " " : ", ") + readable(channel.topic, 80);
+    if (is_of_kind(channel, kind))
+      names += (names.empty() ? " " : ", ") + readable(channel.topic, 80);
   return names.empty() ? " none" : names;
 }
 
@@ -65,9 +62,9 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
   message << name_ << ": no frame with "
           << (gives_poses() ? "a pose of the odometry" : "inertial samples");
   if (start_) message << " from " << window.from_s << " s to " << window.to_s << " s";
-  for (const auto& [topic, role] : wanted_topics())
-    if (!topic.empty() && taken_[static_cast<std::size_t>(role)] == 0)
-      message << "; no message on " << readable(topic, 80);
+  for (const SensorTopic& wanted : sensor_topics(rig_.topics))
+    if (taken_[index_of(wanted.kind->role)] == 0)
+      message << "; no message on " << readable(wanted.topic, 80);
   refuse(message.str());
 }
 
@@ -78,52 +75,38 @@ void BagDataset::refuse(std::string problem) const {
   throw DatasetError(problem);
 }
 
-std::vector<std::pair<std::string, BagDataset::Role>> BagDataset::wanted_topics() const {
-  const SensorTopicNames& topics = rig_.topics;
-  return {{topics.left, Role::kLeft},        {topics.right, Role::kRight},
-          {topics.depth, Role::kDepth},      {topics.imu, Role::kImu},
-          {topics.gyro, Role::kGyro},        {topics.accel, Role::kAccel},
-          {topics.odometry, Role::kOdometry}};
-}
-
 void BagDataset::find_topics() {
-  const SensorTopicNames& topics = rig_.topics;
-  role_of_.assign(bag_->channels().size(), Role::kNone);
-  for (const auto& [topic, role] : wanted_topics())
-    if (!topic.empty()) assign(topic, role);
-  const auto count = [this](Role role) {
+  kind_of_.assign(bag_->channels().size(), nullptr);
+  for (const SensorTopic& wanted : sensor_topics(rig_.topics)) assign(wanted);
+  const auto count = [this](SensorRole role) {
     std::uint64_t messages = 0;
-    for (std::size_t k = 0; k < role_of_.size(); ++k)
-      if (role_of_[k] == role) messages += bag_->channels()[k].message_count;
+    for (std::size_t k = 0; k < kind_of_.size(); ++k)
+      if (kind_of_[k] != nullptr && kind_of_[k]->role == role)
+        messages += bag_->channels()[k].message_count;
     return messages;
   };
   const bool is_whole = window_.from_s <= 0.0 && std::isinf(window_.to_s) && !window_.not_before;
-  if (is_whole) pair_count_ = count(Role::kLeft);
-  if (!topics.right.empty()) pair_count_ = std::min(pair_count_, count(Role::kRight));
+  if (is_whole) pair_count_ = count(SensorRole::kLeft);
+  if (!rig_.topics.right.empty()) pair_count_ = std::min(pair_count_, count(SensorRole::kRight));
 }
 
-void BagDataset::assign(const std::string& topic, Role role) {
-  struct Kind {
-    bool (*is_kind)(const BagChannel&);
-    const char *types, *holds;
-  };
-  const Kind kind = role == Role::kOdometry ? Kind{is_odometry, "nav_msgs/Odometry", "odometry:"}
-                    : role == Role::kLeft || role == Role::kRight || role == Role::kDepth
-                        ? Kind{has_images, "sensor_msgs/Image or CompressedImage", "images:"}
-                        : Kind{is_imu, "sensor_msgs/Imu", "inertial samples:"};
+void BagDataset::assign(const SensorTopic& wanted) {
+  const SensorKind& kind = *wanted.kind;
   const auto& channels = bag_->channels();
   bool is_there = false;
   for (std::size_t k = 0; k < channels.size(); ++k) {
-    if (channels[k].topic != topic) continue;
-    if (!kind.is_kind(channels[k]))
-      throw DatasetError(name_ + ": topic " + readable(topic, 80) + " has messages of " +
-                         readable(channels[k].type, 80) + ", not of " + kind.types);
-    role_of_[k] = role;
+    if (channels[k].topic != wanted.topic) continue;
+    if (!is_of_kind(channels[k], kind))
+      throw DatasetError(
+          name_ + ": topic " + readable(wanted.topic, 80) + " has messages of " +
+          readable(channels[k].type, 80) + ", not of " +
+          (kind.type.empty() ? "sensor_msgs/Image or CompressedImage" : std::string(kind.type)));
+    kind_of_[k] = &kind;
     is_there = true;
   }
   if (!is_there)
-    refuse(name_ + ": no topic " + readable(topic, 80) + "; topics with " + kind.holds +
-           names_of(channels, kind.is_kind));
+    refuse(name_ + ": no topic " + readable(wanted.topic, 80) + "; topics with " +
+           std::string(kind.content) + ":" + names_of(channels, kind));
 }
 
 std::string BagDataset::place_of(const BagMessage& message) const {
@@ -140,14 +123,15 @@ bool BagDataset::read_message() {
     return false;
   }
   newest_log_time_ = std::max(newest_log_time_, message->log_time);
-  role_of_.resize(bag_->channels().size(), Role::kNone);
-  const Role role = role_of_[message->channel];
-  ++taken_[static_cast<std::size_t>(role)];
-  if (role != Role::kNone) take(role, std::move(*message));
+  kind_of_.resize(bag_->channels().size(), nullptr);
+  const SensorKind* const kind = kind_of_[message->channel];
+  if (kind == nullptr) return true;
+  ++taken_[index_of(kind->role)];
+  take(kind->role, std::move(*message));
   return true;
 }
 
-void BagDataset::take(Role role, BagMessage message) {
+void BagDataset::take(SensorRole role, BagMessage message) {
   const auto header =
       decode_ros<RosHeader>(bag_->channels()[message.channel].encoding, message.bytes);
   if (!header.value) {
@@ -155,28 +139,28 @@ void BagDataset::take(Role role, BagMessage message) {
     return;
   }
   Stamp stamp = header.value->stamp;
-  const StampVerdict verdict = order_[static_cast<std::size_t>(role)].judge(stamp);
+  const StampVerdict verdict = order_[index_of(role)].judge(stamp);
   if (verdict != StampVerdict::kGood) {
     report_.add(fault_of(verdict), place_of(message) + ": stamp " + std::to_string(stamp));
     return;
   }
-  if (role == Role::kImu || role == Role::kGyro || role == Role::kAccel) {
+  if (role == SensorRole::kImu || role == SensorRole::kGyro || role == SensorRole::kAccel) {
     take_imu(role, stamp, message);
     return;
   }
-  if (role == Role::kOdometry) {
+  if (role == SensorRole::kOdometry) {
     take_pose(stamp, message);
     return;
   }
-  const ImageGap gap = missing_[static_cast<std::size_t>(role)].before(stamp);
+  const ImageGap gap = missing_[index_of(role)].before(stamp);
   if (gap.missing > 0) report_.add(ReaderFault::kMissingBetween, place_of(message), gap.missing);
   if (gap.pause_s > 0.0)
     report_.add(ReaderFault::kPause,
                 place_of(message) + ": " + fixed(gap.pause_s, 1) + " s after the one before");
   stamp += nanoseconds(rig_.camera_time_offset_s);
-  const ImageRole image = role == Role::kLeft    ? ImageRole::kLeft
-                          : role == Role::kRight ? ImageRole::kRight
-                                                 : ImageRole::kDepth;
+  const ImageRole image = role == SensorRole::kLeft    ? ImageRole::kLeft
+                          : role == SensorRole::kRight ? ImageRole::kRight
+                                                       : ImageRole::kDepth;
   joiner_.add(image, stamp, std::move(message));
 }
 
@@ -192,23 +176,23 @@ void BagDataset::take_pose(Stamp stamp, const BagMessage& message) {
                 place_of(message) + ": " + (odometry.value ? "no pose" : odometry.refusal));
 }
 
-void BagDataset::take_imu(Role role, Stamp stamp, const BagMessage& message) {
+void BagDataset::take_imu(SensorRole role, Stamp stamp, const BagMessage& message) {
   const auto imu = decode_ros<RosImu>(bag_->channels()[message.channel].encoding, message.bytes);
   if (!imu.value) {
     report_.add(ReaderFault::kMalformedMessage, place_of(message) + ": " + imu.refusal);
     return;
   }
   ImuSample sample{stamp, imu.value->angular_velocity, imu.value->linear_acceleration};
-  if (role == Role::kGyro) sample.accel.setZero();
-  if (role == Role::kAccel) sample.gyro.setZero();
+  if (role == SensorRole::kGyro) sample.accel.setZero();
+  if (role == SensorRole::kAccel) sample.gyro.setZero();
   const bool is_finite = sample.gyro.allFinite() && sample.accel.allFinite();
   if (!is_plausible(sample)) {
     report_.add(is_finite ? ReaderFault::kImplausible : ReaderFault::kNotFinite, place_of(message));
     return;
   }
-  if (role == Role::kImu) imu_.add(sample);
-  if (role == Role::kGyro) imu_joiner_.add_gyro({stamp, sample.gyro});
-  if (role == Role::kAccel) imu_joiner_.add_accel({stamp, sample.accel});
+  if (role == SensorRole::kImu) imu_.add(sample);
+  if (role == SensorRole::kGyro) imu_joiner_.add_gyro({stamp, sample.gyro});
+  if (role == SensorRole::kAccel) imu_joiner_.add_accel({stamp, sample.accel});
   while (const auto joined = imu_joiner_.next()) imu_.add(*joined);
 }
 

@@ -1,11 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "modules/recordings/bag_reader.hpp"
@@ -14,18 +14,10 @@
 #include "modules/sensors/imu_stream.hpp"
 #include "modules/sensors/missing_images.hpp"
 #include "modules/sensors/pose_stream.hpp"
+#include "modules/sensors/sensor_kind.hpp"
 #include "modules/sensors/stamp_order.hpp"
 
 namespace km {
-
-/// Topics of a robot's sensors. There is either `imu`, or `gyro` and `accel` with their own stamps
-/// (see ImuJoiner), all of type sensor_msgs/Imu. Without `right` the rig is an RGB-D rig. With
-/// `odometry`, the nav_msgs/Odometry of an external odometry, no inertial sensor is needed.
-struct SensorTopicNames {
-  std::string left, right, depth;
-  std::string imu, gyro, accel;
-  std::string odometry = {};
-};
 
 /// Topics and calibration of the sensors in a recording.
 struct Rig {
@@ -67,16 +59,12 @@ class BagDataset final : public DatasetReader {
   void stop() noexcept override { bag_->stop(); }
 
  private:
-  enum class Role { kNone, kLeft, kRight, kDepth, kImu, kGyro, kAccel, kOdometry };
-  static constexpr std::size_t kRoles = 8;
-
-  [[nodiscard]] std::vector<std::pair<std::string, Role>> wanted_topics() const;
   [[noreturn]] void refuse(std::string problem) const;
   void find_topics();
-  void assign(const std::string& topic, Role role);
+  void assign(const SensorTopic& wanted);
   [[nodiscard]] bool read_message();
-  void take(Role role, BagMessage message);
-  void take_imu(Role role, Stamp stamp, const BagMessage& message);
+  void take(SensorRole role, BagMessage message);
+  void take_imu(SensorRole role, Stamp stamp, const BagMessage& message);
   void take_pose(Stamp stamp, const BagMessage& message);
   [[nodiscard]] std::optional<JoinedFrame> next_frame();
   [[nodiscard]] bool has_imu() const;
@@ -90,10 +78,10 @@ class BagDataset final : public DatasetReader {
   std::unique_ptr<BagReader> bag_;
   Rig rig_;
   BagWindow window_;
-  std::vector<Role> role_of_;  // by channel
-  StampOrder order_[kRoles];
-  MissingImages missing_[kRoles];
-  std::size_t taken_[kRoles] = {};  // number of messages
+  std::vector<const SensorKind*> kind_of_;  // by channel; null: not read
+  std::array<StampOrder, kSensorKinds.size()> order_;
+  std::array<MissingImages, kSensorKinds.size()> missing_;
+  std::array<std::size_t, kSensorKinds.size()> taken_ = {};  // number of messages
   FrameJoiner joiner_;
   ImuStream imu_;
   ImuJoiner imu_joiner_;

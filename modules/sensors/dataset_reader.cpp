@@ -43,7 +43,7 @@ const char* to_string(ReaderFault fault) {
     case ReaderFault::kDamagedBag:
       return "damaged pieces of the recording";
     case ReaderFault::kFrameWithoutPose:
-      return "frames without a pose of the odometry from outside";
+      return "frames without a pose of the external odometry";
     case ReaderFault::kLostMessage:
       return "messages lost on the way";
     case ReaderFault::kMissingBetween:

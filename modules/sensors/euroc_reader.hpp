@@ -81,7 +81,7 @@ class EurocReader final : public DatasetReader {
   std::filesystem::path mav0_;
   ReaderReport report_;
   SensorRig rig_;
-  SideImages side_images_;
+  DepthAndLabelImages side_images_;
   StereoPairFiles files_;  // files of the window
   const bool reads_imu_;
   ImuStream imu_;  // samples of the whole recording

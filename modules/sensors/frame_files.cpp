@@ -57,7 +57,7 @@ StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
   const auto rights = list_images(mav0 / "cam1", report);
   const Synchrony synchrony = tolerance_s ? Synchrony{.tolerance_s = *tolerance_s}
                                           : find_synchrony(stamps_of(lefts), stamps_of(rights));
-  const auto lonely = [&](ReaderFault fault, const char* camera, const ListedImage& image) {
+  const auto count_unpaired = [&](ReaderFault fault, const char* camera, const ListedImage& image) {
     report.add(fault, at_line(mav0 / camera / "data.csv", image.line) + ": " +
                           image.file.filename().string());
   };
@@ -70,9 +70,9 @@ StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
     const double off_s =
         no_left || no_right ? 0.0 : seconds_between(left->stamp, right->stamp) - synchrony.offset_s;
     if (no_right || off_s > synchrony.tolerance_s) {
-      lonely(ReaderFault::kLeftWithoutRight, "cam0", *left++);
+      count_unpaired(ReaderFault::kLeftWithoutRight, "cam0", *left++);
     } else if (no_left || off_s < -synchrony.tolerance_s) {
-      lonely(ReaderFault::kRightWithoutLeft, "cam1", *right++);
+      count_unpaired(ReaderFault::kRightWithoutLeft, "cam1", *right++);
     } else {
       pairs.push_back({left->stamp, left->file, right->file, left->line, {}, {}});
       ++left, ++right;
@@ -136,25 +136,27 @@ StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& 
   return result;
 }
 
-SideImages::SideImages(const std::filesystem::path& mav0, const std::optional<DepthRange>& depth,
-                       double depth_scale_m, bool labels)
+DepthAndLabelImages::DepthAndLabelImages(const std::filesystem::path& mav0,
+                                         const std::optional<DepthRange>& depth,
+                                         double depth_scale_m, bool labels)
     : mav0_(mav0), depth_(depth), depth_scale_m_(depth_scale_m), labels_(labels) {
   if (labels_) palette_ = read_palette(mav0 / "label_palette.csv");
 }
 
-void SideImages::list(double tolerance_s, std::vector<StereoPairFile>& frames,
-                      ReaderReport& report) const {
+void DepthAndLabelImages::list(double tolerance_s, std::vector<StereoPairFile>& frames,
+                               ReaderReport& report) const {
   if (depth_) list_beside(mav0_ / "depth0", &StereoPairFile::depth, tolerance_s, frames, report);
   if (labels_) list_beside(mav0_ / "label0", &StereoPairFile::labels, tolerance_s, frames, report);
 }
 
-void SideImages::load(const StereoPairFile& files, StereoFrame& frame, ReaderReport& report) const {
+void DepthAndLabelImages::load(const StereoPairFile& files, StereoFrame& frame,
+                               ReaderReport& report) const {
   if (!files.depth.empty()) load_depth(files.depth, frame, report);
   if (!files.labels.empty()) load_labels(files.labels, frame, report);
 }
 
-void SideImages::load_depth(const std::filesystem::path& file, StereoFrame& frame,
-                            ReaderReport& report) const {
+void DepthAndLabelImages::load_depth(const std::filesystem::path& file, StereoFrame& frame,
+                                     ReaderReport& report) const {
   DepthResult loaded =
       load_depth_image(file, frame.left.width, frame.left.height, depth_scale_m_, *depth_);
   if (loaded.status == ImageStatus::kOk)
@@ -163,8 +165,8 @@ void SideImages::load_depth(const std::filesystem::path& file, StereoFrame& fram
     report.add(fault_of(loaded.status), loaded.problem);
 }
 
-void SideImages::load_labels(const std::filesystem::path& file, StereoFrame& frame,
-                             ReaderReport& report) const {
+void DepthAndLabelImages::load_labels(const std::filesystem::path& file, StereoFrame& frame,
+                                      ReaderReport& report) const {
   LabelResult loaded = load_label_image(file, frame.left.width, frame.left.height, palette_);
   if (loaded.unknown_pixels > 0)
     report.add(ReaderFault::kUnknownColor,

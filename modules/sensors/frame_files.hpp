@@ -65,12 +65,12 @@ struct StereoPairResult {
 
 /// Reads the depth and label images of a EuRoC folder: depth0, label0 and label_palette.csv.
 /// Unusable images are counted and omitted. Const members are thread-safe.
-class SideImages {
+class DepthAndLabelImages {
  public:
   /// Reads depth if there is a range, with images in units of `depth_scale_m`, and labels if
   /// `labels`. Throws DatasetError for a palette that cannot be read; ids need no palette.
-  SideImages(const std::filesystem::path& mav0, const std::optional<DepthRange>& depth,
-             double depth_scale_m, bool labels);
+  DepthAndLabelImages(const std::filesystem::path& mav0, const std::optional<DepthRange>& depth,
+                      double depth_scale_m, bool labels);
 
   /// Finds the images of `frames`; see list_beside().
   void list(double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report) const;

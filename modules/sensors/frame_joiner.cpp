@@ -9,7 +9,7 @@ namespace km {
 namespace {
 
 // Fault of an image that belongs to no frame.
-ReaderFault lonely(ImageRole role) {
+ReaderFault fault_of_unpaired(ImageRole role) {
   switch (role) {
     case ImageRole::kLeft:
       return ReaderFault::kLeftWithoutRight;
@@ -40,7 +40,7 @@ FrameJoiner::Stream& FrameJoiner::stream_of(ImageRole role) {
 
 void FrameJoiner::drop_oldest(ImageRole role) {
   auto& images = stream_of(role).images;
-  report_.add(lonely(role), "stamp " + std::to_string(images.front().stamp));
+  report_.add(fault_of_unpaired(role), "stamp " + std::to_string(images.front().stamp));
   images.pop_front();
 }
 

@@ -60,20 +60,21 @@ SE3 read_T_cam_cam0(const CalibrationMap& chain, std::size_t index) {
 }
 
 // False if the cameras were calibrated without the inertial sensor.
-bool is_placed(const CalibrationMap& chain, std::size_t index) {
+bool has_extrinsics(const CalibrationMap& chain, std::size_t index) {
   const CalibrationMap camera = chain.map(camera_name(index).c_str());
   if (camera.first_of({"T_cam_imu", "T_imu_cam"}) != nullptr) return true;
-  return index > 0 && is_placed(chain, index - 1);
+  return index > 0 && has_extrinsics(chain, index - 1);
 }
 
 Camera read_chain_camera(const CalibrationMap& chain, std::size_t index) {
   return read_camera(chain.map(camera_name(index).c_str()), "distortion_coeffs");
 }
 
-// Sets T_body_cam of the cameras. Unless `is_placed`, they are poses in the left camera's frame.
+// Sets T_body_cam of the cameras. Unless `has_extrinsics`, they are poses in the left camera's
+// frame.
 void read_poses(const CalibrationMap& chain, const RigChoice& choice, Camera& left,
-                std::optional<Camera>& right, bool is_placed) {
-  if (is_placed) {
+                std::optional<Camera>& right, bool has_extrinsics) {
+  if (has_extrinsics) {
     left.T_body_cam = read_T_cam_imu(chain, choice.left).inverse();
     if (right) right->T_body_cam = read_T_cam_imu(chain, *choice.right).inverse();
   } else if (right) {
@@ -128,7 +129,7 @@ void read_cameras(const CalibrationMap& chain, const RigChoice& choice,
   const CalibrationMap left_map = chain.map(camera_name(choice.left).c_str());
   calibration.image_topics[0] = read_topic(left_map);
   calibration.image_time_offset_s = read_time_shift(left_map);
-  calibration.is_placed = !choice.may_be_partial || is_placed(chain, choice.left);
+  calibration.has_extrinsics = !choice.may_be_partial || has_extrinsics(chain, choice.left);
   Camera left = read_chain_camera(chain, choice.left);
   std::optional<Camera> right;
   const std::string right_name = camera_name(choice.right.value_or(0));
@@ -138,7 +139,7 @@ void read_cameras(const CalibrationMap& chain, const RigChoice& choice,
                          ": one camera without depth is not supported");
     right = read_chain_camera(chain, *choice.right);
   }
-  read_poses(chain, choice, left, right, calibration.is_placed);
+  read_poses(chain, choice, left, right, calibration.has_extrinsics);
   const auto problem = join_cameras(left, right, choice, calibration.rig);
   if (!choice.right) return;
   const CalibrationMap right_map = chain.map(right_name.c_str());
@@ -160,7 +161,7 @@ RigCalibration read_kalibr(const std::vector<CalibrationMap>& maps, const RigCho
     throw DatasetError(maps.front().file().string() +
                        ": no cam0; give Kalibr's chain of cameras, too");
   if (chains.cameras) read_cameras(*chains.cameras, choice, calibration);
-  calibration.is_placed = calibration.is_placed && calibration.has_cameras;
+  calibration.has_extrinsics = calibration.has_extrinsics && calibration.has_cameras;
   if (chains.imu)
     read_imu(*chains.imu, calibration);
   else

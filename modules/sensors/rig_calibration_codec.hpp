@@ -17,7 +17,7 @@ struct RigCalibration {
   SensorRig rig;
   bool has_cameras = true;
   /// False: T_body_cam are poses in the left camera's frame, whose pose on the body is unknown.
-  bool is_placed = true;
+  bool has_extrinsics = true;
   /// Offset [s] from the stamps of images to the inertial sensor's time: t_imu = t_image + offset.
   /// nullopt: unknown.
   std::optional<double> image_time_offset_s = std::nullopt;

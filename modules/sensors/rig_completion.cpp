@@ -38,8 +38,8 @@ std::vector<RigCompletion::Source> RigCompletion::sources() const {
   }
   if (!partial_.is_complete())
     sources.push_back({kStaticTransforms, RosTransforms::kType,
-                       !partial_.is_placed && partial_.body_frame.empty()});
-  if (!partial_.is_placed) {
+                       !partial_.has_extrinsics && partial_.body_frame.empty()});
+  if (!partial_.has_extrinsics) {
     if (partial_.body_frame.empty() && !body_topic().empty())
       sources.push_back({body_topic(), body_topic() == partial_.rig.topics.odometry
                                            ? RosOdometry::kType
@@ -118,8 +118,8 @@ std::optional<SE3> RigCompletion::T_body_left() const {
   return *T_body_frame * T_frame_camera(*infos_[0], partial_.images[0]);
 }
 
-// From the stereo calibration in P, whose rectified cameras are on one line, or else from the
-// frames.
+// Relative pose of the cameras from the baseline in P, because rectified cameras differ by a
+// translation along x. Without a baseline it is that of their frames in /tf_static.
 std::optional<SE3> RigCompletion::T_left_right() const {
   if (!infos_[0] || !infos_[1]) return std::nullopt;
   std::optional<SE3> T_frames;
@@ -147,7 +147,7 @@ std::optional<Rig> RigCompletion::rig() const {
         throw DatasetError(partial_.info_topics[1] + ": " + *problem);
     }
   }
-  if (partial_.is_placed) return rig;
+  if (partial_.has_extrinsics) return rig;
   const auto T = T_body_left();
   if (!T) return std::nullopt;
   for (Camera& camera : stereo.cameras) camera.T_body_cam = *T * camera.T_body_cam;
@@ -171,7 +171,7 @@ std::string RigCompletion::missing() const {
   if (!partial_.has_cameras && has_infos && has_right() && !T_left_right())
     append(list, "where the right camera is: a baseline in P of " + partial_.info_topics[1] +
                      ", or " + missing_chain(*camera_frame(0), *camera_frame(1)));
-  if (partial_.is_placed) return list;
+  if (partial_.has_extrinsics) return list;
   const auto body = body_frame(), left = camera_frame(0);
   if (!body)
     append(list, "the body's frame: " +

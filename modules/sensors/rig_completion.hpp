@@ -21,7 +21,7 @@ namespace km {
 struct PartialRig {
   Rig rig;
   bool has_cameras = true;          ///< The rig has its cameras.
-  bool is_placed = true;            ///< False: T_body_cam are poses in the left camera's frame.
+  bool has_extrinsics = true;       ///< False: T_body_cam are poses in the left camera's frame.
   double virtual_baseline_m = 0.1;  ///< Used for an RGB-D rig, see rgbd_rig().
   /// Topics of CameraInfo of the left and the right camera. The right topic is used only if there
   /// is a topic of right images.
@@ -34,7 +34,7 @@ struct PartialRig {
   SE3 T_body_rig = SE3::Identity();
   std::filesystem::path pose_file;  ///< Poses of an external odometry, see read_pose_file().
 
-  [[nodiscard]] bool is_complete() const { return has_cameras && is_placed; }
+  [[nodiscard]] bool is_complete() const { return has_cameras && has_extrinsics; }
 };
 
 /// Completes a rig from messages in any order.

@@ -44,7 +44,7 @@ RigCalibration read_calibration(const std::filesystem::path& path, bool is_inlin
   if (is_inline) return read_inline_rig(CalibrationMap(path).map("calibration"), choice);
   if (!file.calibration.empty()) return read_rig(file.calibration, choice);
   RigCalibration calibration;
-  calibration.has_cameras = calibration.is_placed = false;
+  calibration.has_cameras = calibration.has_extrinsics = false;
   if (choice.depth) calibration.rig.depth = choice.depth->range;
   if (file.odometry.topic.empty() && !file.odometry.file)
     calibration.notes.push_back(path.string() +
@@ -115,7 +115,7 @@ PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
                       transform_of(path, "odometry.T_child_body", file.odometry.T_child_body),
                   .notes = std::move(calibration.notes)},
           .has_cameras = calibration.has_cameras,
-          .is_placed = calibration.is_placed,
+          .has_extrinsics = calibration.has_extrinsics,
           .virtual_baseline_m = file.depth.baseline_m,
           .info_topics = {info_topic(file.left), info_topic(file.right)},
           .images = {images_of(file.left), images_of(file.right)},

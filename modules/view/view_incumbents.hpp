@@ -6,7 +6,7 @@
 #include <utility>
 #include <variant>
 
-#include "modules/core/waiting_rooms.hpp"
+#include "modules/core/pending_messages.hpp"
 #include "modules/view/view_update.hpp"
 
 namespace km {
@@ -65,14 +65,14 @@ class ViewIncumbents {
 
   template <typename Take>
   void pass(ViewUpdate update, double now_s, const Take& take) {
-    const auto* const state = std::get_if<ViewState>(&update.content);
+    const auto* const state = std::get_if<RobotSample>(&update.content);
     const bool leaves = state != nullptr && state->phase == "leaving";
     incumbents_.at(update.robot).last_received_s = leaves ? std::nullopt : std::optional(now_s);
     take(std::move(update));
   }
 
   std::map<RobotId, Incumbent> incumbents_;
-  WaitingRooms<Process, ViewUpdate> waiting_{
+  PendingMessages<Process, ViewUpdate> waiting_{
       {.bytes = 4 * kMostWaiting, .bytes_of_one = kMostWaiting}};  // Each update has size 1, so
                                                                    // sizes are counts.
   std::uint64_t dropped_ = 0;

@@ -1,7 +1,6 @@
 #include "modules/view/view_node.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -17,7 +16,6 @@ namespace {
 constexpr std::size_t kQueue = 4096;  // The oldest inputs are dropped, so that no node waits for a
                                       // viewer.
 constexpr double kTick_s = 0.1;
-constexpr double kStatePeriod_s = 1.0;
 constexpr double kBurst_s = 0.5;          // Time for which unused budget is kept.
 constexpr double kRest_s = 2.0;           // Budget for the end, in seconds of its rate.
 constexpr double kMeshRest_s = 10.0;      // Budget for the mesh at the end, large enough for its
@@ -37,20 +35,15 @@ TokenBucket budget_of(double bytes_per_s) {
 // Images are sent at the configured rate and have no byte budget.
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
-double finite(double value) {
-  return std::isfinite(value) ? value : 0.0;
-}
-
 }  // namespace
 
 ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
-                   const ViewMesh& mesh, const std::optional<Camera>& camera, Describe describe,
+                   const ViewMesh& mesh, const std::optional<Camera>& camera,
                    const ViewTopics& topics)
     : config_(checked(config)),
       self_(participant.identity().robot),
       mesh_settings_(mesh),
       camera_(camera),
-      describe_(std::move(describe)),
       channels_{{{writer_on(participant, ViewChannel::kView), budget_of(config.bytes_per_s)},
                  {writer_on(participant, ViewChannel::kMesh), budget_of(config.mesh_bytes_per_s)},
                  {writer_on(participant, ViewChannel::kImages), budget_of(kUnlimited)}}},
@@ -65,16 +58,13 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics.odometry.subscribe(post);
   topics.keyframes.subscribe(post);
-  topics.trajectory.subscribe(post);
-  topics.progress.subscribe(post);
   topics.outcomes.subscribe(post);
   topics.restored_outcomes.subscribe(post);
   topics.closures.subscribe(post);
-  topics.own_inlier_sets.subscribe(post);
-  topics.peer_inlier_sets.subscribe(post);
-  topics.verdicts.subscribe(post);
+  topics.judgements.subscribe(post);
+  topics.pose_changes.subscribe(post);
+  topics.samples.subscribe(post);
   topics.restarts.subscribe(post);
-  topics.statuses.subscribe(post);
   if (!camera_ || config_.images_per_s <= 0.0) return;
   topics.images.subscribe([this, post, due_s = 0.0](const auto& image) mutable {
     const double now_s = steady_now_s();
@@ -126,10 +116,6 @@ void ViewNode::take(const Topic<PeerEvent>::Message& event) {
   if (event->kind == PeerEventKind::kRestarted) selector_.restarted(event->identity.robot);
 }
 
-void ViewNode::take(const Topic<RobotStatus>::Message& status) {
-  last_received_s_[status->robot] = steady_now_s();
-}
-
 void ViewNode::take(const Topic<TrackedImage>::Message& image) {
   write(on(ViewChannel::kImages), view_image(*image, *camera_));
 }
@@ -147,20 +133,11 @@ TokenBucket& ViewNode::view_budget() {
 // An update is sent while the budget has no debt, and may itself cause a debt.
 void ViewNode::send_view(double now_s) {
   Channel& view = on(ViewChannel::kView);
-  if (view.writer.newcomers() > 0) {
-    selector_.begin_again();
-    state_due_s_ = now_s;
-  }
+  if (view.writer.newcomers() > 0) selector_.begin_again();
   if (view.writer.readers() == 0) return;
   while (view_budget().wait_s(0.0, now_s) <= 0.0) {
     TokenBucket& budget = view_budget();  // Budget of the update that follows.
-    std::optional<ViewContent> content;
-    if (now_s >= state_due_s_) {
-      content = state(now_s);
-      state_due_s_ = now_s + kStatePeriod_s;
-    } else {
-      content = selector_.next(now_s);
-    }
+    const std::optional<ViewContent> content = selector_.next(now_s);
     const std::size_t bytes = content ? write(view, *content) : 0;
     if (bytes == 0) return;
     budget.spend(static_cast<double>(bytes), now_s);
@@ -199,24 +176,6 @@ void ViewNode::cut_mesh(double now_s) {
   cut_due_s_ = now_s + (steady_now_s() - begin_s) / kCutShare;
 }
 
-ViewState ViewNode::state(double now_s) {
-  ViewState state = describe_();
-  state.anchor = self_;
-  if (progress_ != nullptr) {
-    state.anchor = progress_->anchor;
-    state.tentative = std::ranges::binary_search(progress_->tentative, progress_->anchor);
-    state.round = progress_->round;
-    state.cost = finite(progress_->cost);
-    state.gradient_norm = finite(progress_->gradient_norm);
-  }
-  for (const auto& [robot, received_s] : last_received_s_)
-    state.links.push_back({robot, static_cast<float>(std::max(0.0, now_s - received_s))});
-  constexpr std::array kNames = {"view", "view_mesh", "view_images"};
-  for (std::size_t k = 0; k < kNames.size(); ++k)
-    state.sent_bytes.push_back({kNames[k], static_cast<double>(channels_[k].sent_bytes)});
-  return state;
-}
-
 // Returns the bytes sent, or 0 if DDS refused the update.
 std::size_t ViewNode::write(Channel& channel, const ViewContent& content) try {
   const std::size_t bytes = channel.writer.write(content);
@@ -233,7 +192,7 @@ void ViewNode::send_rest() {
   Channel& view = on(ViewChannel::kView);
   Channel& mesh = on(ViewChannel::kMesh);
   if (view.writer.readers() > 0) {
-    auto bytes = static_cast<double>(write(view, state(now_s)));
+    double bytes = 0.0;
     const double late_s = now_s + ViewSelector::kKeyframePeriod_s;  // Time at which all updates are
                                                                     // due.
     while (bytes < kRest_s * config_.past_bytes_per_s) {

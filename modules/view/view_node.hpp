@@ -4,8 +4,6 @@
 #include <atomic>
 #include <cstddef>
 #include <exception>
-#include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -21,7 +19,6 @@
 #include "modules/view/view_selector.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peer_table.hpp"
-#include "runtime/dds/robot_status.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/token_bucket.hpp"
@@ -34,14 +31,12 @@ namespace km {
 struct ViewTopics {
   In<OdometryState> odometry;
   In<KeyframeOdometry> keyframes;
-  In<Trajectory> trajectory;
-  In<OptimizerProgress> progress;
   In<ClosureOutcome> outcomes, restored_outcomes;
   In<Closure> closures;  ///< Closures of both ends.
-  In<InlierSet> own_inlier_sets, peer_inlier_sets;
-  In<ClosureVerdicts> verdicts;
+  In<ClosureJudgements> judgements;
+  In<PoseChanges> pose_changes;
+  In<RobotSample> samples;
   In<PeerEvent> restarts;
-  In<RobotStatus> statuses;
   In<TrackedImage> images;
 };
 
@@ -52,20 +47,15 @@ struct ViewMesh {
 };
 
 /// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's
-/// domain. It sends the updates of a ViewSelector, a state once a second, the mesh in chunks, and
-/// camera images on request. Images have a rate, other topics a budget. While a topic has no
-/// reader, the node only keeps the newest inputs. No node waits for a viewer; updates that DDS
-/// cannot accept are lost.
+/// domain. It sends the updates of a ViewSelector, the mesh in chunks, and camera images on
+/// request. Images have a rate, other topics a budget. While a topic has no reader, the node only
+/// keeps the newest inputs. No node waits for a viewer; updates that DDS cannot accept are lost.
 class ViewNode final : public Node {
  public:
-  /// Returns all fields of a state except for anchor, round, cost, gradient and links. Called on
-  /// the node's thread.
-  using Describe = std::function<ViewState()>;
-
   /// `participant` outlives this. Throws ConfigError if `config` is out of bounds. `camera` belongs
   /// to the images; without it no images are sent.
   ViewNode(const ViewConfig& config, const DdsParticipant& participant, const ViewMesh& mesh,
-           const std::optional<Camera>& camera, Describe describe, const ViewTopics& topics);
+           const std::optional<Camera>& camera, const ViewTopics& topics);
   ~ViewNode() override { stop(); }
 
   /// Replaces the mesh, given in the frame of the robot `anchor`. Thread-safe; does not wait.
@@ -87,11 +77,11 @@ class ViewNode final : public Node {
     RobotId anchor = 0;
     std::shared_ptr<const LabelledMesh> mesh;
   };
-  using Input = std::variant<
-      Tick, MeshOffer, Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
-      Topic<Trajectory>::Message, Topic<OptimizerProgress>::Message, Topic<ClosureOutcome>::Message,
-      Topic<Closure>::Message, Topic<InlierSet>::Message, Topic<ClosureVerdicts>::Message,
-      Topic<PeerEvent>::Message, Topic<RobotStatus>::Message, Topic<TrackedImage>::Message>;
+  using Input = std::variant<Tick, MeshOffer, Topic<OdometryState>::Message,
+                             Topic<KeyframeOdometry>::Message, Topic<ClosureOutcome>::Message,
+                             Topic<Closure>::Message, Topic<ClosureJudgements>::Message,
+                             Topic<PoseChanges>::Message, Topic<RobotSample>::Message,
+                             Topic<PeerEvent>::Message, Topic<TrackedImage>::Message>;
 
   /// Stores an input; a Tick sends the updates that are due by the steady clock. The thread calls
   /// only this.
@@ -114,10 +104,7 @@ class ViewNode final : public Node {
   // Each take() stores an input, except for a Tick, which sends.
   void take(const Tick& tick);
   void take(const MeshOffer& offer);
-  void take(const Topic<OptimizerProgress>::Message& progress) { progress_ = progress; }
-  void take(const Topic<Trajectory>::Message& trajectory) { selector_.add(trajectory); }
   void take(const Topic<PeerEvent>::Message& event);
-  void take(const Topic<RobotStatus>::Message& status);
   void take(const Topic<TrackedImage>::Message& image);
   template <typename T>
   void take(const std::shared_ptr<const T>& message) {
@@ -132,22 +119,17 @@ class ViewNode final : public Node {
   void send_mesh(double now_s);
   void cut_mesh(double now_s);
   void send_rest();
-  [[nodiscard]] ViewState state(double now_s);
   std::size_t write(Channel& channel, const ViewContent& content);
 
   const ViewConfig config_;
   const RobotId self_;
   const ViewMesh mesh_settings_;
   const std::optional<Camera> camera_;
-  const Describe describe_;
   std::array<Channel, 3> channels_;
   TokenBucket past_budget_;  // Budget of kView while earlier data are sent.
   ViewSelector selector_;
-  double state_due_s_ = 0.0;
-  Topic<OptimizerProgress>::Message progress_;
-  std::map<RobotId, double> last_received_s_;  // By robot: time of the last message.
-  MeshOffer mesh_;                             // The newest mesh.
-  bool is_cut_ = true;                         // True if `mesh_` is in the schedule.
+  MeshOffer mesh_;      // The newest mesh.
+  bool is_cut_ = true;  // True if `mesh_` is in the schedule.
   double cut_due_s_ = 0.0;
   bool sends_mesh_ = false;  // True if the mesh channel has a reader.
   ChunkSchedule schedule_;

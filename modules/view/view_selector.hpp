@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -15,37 +14,34 @@
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/odometry.hpp"
+#include "modules/core/pose_changes.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/core/robot_sample.hpp"
 #include "modules/view/view_update.hpp"
 
 namespace km {
 
-/// Chooses the next update for viewers from all that the robot knows: changes since the last
-/// update, the most important first. A pose is sent again when it differs from the last sent one by
-/// more than kMaxShift_m or kMaxTurn_rad. So when no update is left, all sent poses are within
-/// these bounds. Not thread-safe.
+/// Chooses the next update for viewers from the events of a robot (see JournalEntry), live or from
+/// its journal: changes since the last update, the most important first. Not thread-safe.
 class ViewSelector {
  public:
-  static constexpr double kMaxShift_m = 0.01;
-  static constexpr double kMaxTurn_rad = 0.5 / kDegrees;
   static constexpr double kPosePeriod_s = 0.4;
   /// Time for which keyframes are collected, so that one update has several.
   static constexpr double kKeyframePeriod_s = 1.0;
   /// Maximum size of an update, except for one closure with a long reason.
   static constexpr std::size_t kUpdateBytes = 1000;
 
-  explicit ViewSelector(RobotId self) : self_(self) {}
+  explicit ViewSelector(RobotId self) : self_(self), anchor_(self) {}
 
   // Inputs from the robot. Values that are not finite are ignored.
 
   void add(const OdometryState& state);
-  void add(const KeyframeOdometry& keyframe);              ///< Own keyframes, ascending.
-  void add(std::shared_ptr<const Trajectory> trajectory);  ///< Own trajectory; replaces the former.
+  void add(const KeyframeOdometry& keyframe);  ///< Own keyframes, ascending.
+  void add(const PoseChanges& changes);        ///< Poses of other robots are ignored.
   void add(const ClosureOutcome& outcome);
-  void add(const Closure& closure);           ///< Closure verified by one of its ends.
-  void add(const InlierSet& set);             ///< Replaces an older version for the same robot
-                                              ///< pair.
-  void add(const ClosureVerdicts& verdicts);  ///< The latest verdict of a closure counts.
+  void add(const Closure& closure);  ///< Closure verified by one of its ends.
+  void add(const ClosureJudgements& judgements);
+  void add(const RobotSample& sample) { sample_ = sample; }
   /// Rejects the closures with this robot, because its keyframe indices now mean other keyframes.
   void restarted(RobotId peer);
 
@@ -63,8 +59,10 @@ class ViewSelector {
   struct Pair {
     std::uint16_t matches = 0;
     std::uint16_t inliers = 0;
+    bool is_known = false;  // False while only a judgement has arrived.
     bool is_verified = false;
     std::string reason;  // Why verification stopped.
+    ClosureJudgement judgement = {};
     std::optional<ViewClosure> sent = {};
     std::uint64_t turn = 0;  // Order in the queue; 0 if the pair is not queued.
   };
@@ -76,7 +74,6 @@ class ViewSelector {
   [[nodiscard]] std::optional<ViewContent> next_closures(int max_rank);
   [[nodiscard]] std::optional<ViewContent> next_odometry();
   [[nodiscard]] std::optional<ViewContent> next_optimized();
-  [[nodiscard]] std::optional<ViewContent> next_moved();
 
   RobotId self_;
   std::optional<ViewPose> pose_;  // Pose that has not been sent yet.
@@ -85,13 +82,13 @@ class ViewSelector {
   std::vector<SE3> odometry_;  // Poses of the keyframes as estimated by odometry.
   std::vector<Stamp> stamps_;
   std::size_t odometry_sent_ = 0;
-  std::shared_ptr<const Trajectory> trajectory_;
-  std::vector<SE3> optimized_sent_;  // Sent optimised poses, in the frame of the anchor.
-  std::size_t cursor_ = 0;           // Index at which the search for moved poses starts.
-  bool any_moved_ = false;           // False if no pose has moved, true if poses may have.
+  RobotId anchor_;
+  std::map<KeyframeIndex, SE3> optimized_;  // In the frame of the anchor.
+  std::set<KeyframeIndex> unsent_;          // Optimised poses to send.
+  KeyframeIndex cursor_ = 0;                // Index from which the next ones are sent.
+  std::optional<RobotSample> sample_;       // Sample that has not been sent yet.
+  std::optional<RobotSample> sent_sample_;
   std::map<ClosureId, Pair> pairs_;
-  std::map<std::pair<RobotId, RobotId>, InlierSet> inlier_sets_;
-  std::set<ClosureId> overruled_;  // Closures that the optimiser rejects.
   std::set<Turn> waiting_;
   std::uint64_t turn_ = 0;
   bool sends_past_ = false;

@@ -6,49 +6,18 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <variant>
 #include <vector>
 
+#include "modules/core/closure_verdicts.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/core/robot_sample.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 
 namespace km {
-
-/// A robot that this robot receives directly, and the time since its last message [s].
-struct ViewLink {
-  RobotId robot = 0;
-  float silent_s = 0.0F;
-};
-
-/// A named number: bytes of a kind of traffic, or the load of a queue.
-struct ViewNumber {
-  std::string name;
-  double value = 0.0;
-};
-
-/// State of a robot, sent once a second; the newest counts.
-struct ViewState {
-  std::string name;
-  std::string phase;            ///< "running", "finished", "settled", "leaving"
-  double dataset_time_s = 0.0;  ///< Time since the start of its input.
-  std::uint32_t keyframes = 0;
-  std::uint32_t skipped_frames = 0;
-  RobotId anchor = 0;       ///< Robot whose odometry frame its optimised poses are in.
-  bool tentative = false;   ///< True if only closures at one place tie it to the anchor.
-  std::uint32_t round = 0;  ///< Round of the optimisation.
-  double cost = 0.0;        ///< Cost of the team's graph, see OptimizerProgress.
-  double gradient_norm = 0.0;
-  double cpu_s = 0.0;  ///< Processor time of all threads since the start.
-  double resident_MB = 0.0;
-  std::vector<ViewLink> links = {};
-  std::vector<ViewNumber> sent_bytes = {};  ///< Bytes by kind since the start.
-  std::vector<ViewNumber> loads = {};       ///< Load of each module: share of the time in which it
-                                            ///< works.
-};
 
 /// Present pose of a robot, sent a few times a second; the newest counts.
 struct ViewPose {
@@ -66,15 +35,15 @@ struct ViewKeyframes {
   std::vector<Stamp> stamps = {};  ///< Stamps of the same keyframes; empty for optimised poses.
 };
 
-/// Stage of a closure candidate as the sending robot knows it; the newest for an id counts.
-/// kVerified means that no inlier set contains the closure, or that none is known yet.
-enum class ViewVerdict : std::uint8_t { kCandidate, kVerified, kKept, kRejected };
+/// Status of a closure candidate as the sending robot knows it; the newest for an id counts.
 struct ViewClosure {
   ClosureId id;
-  ViewVerdict verdict = ViewVerdict::kCandidate;
+  ClosureStatus verdict = ClosureStatus::kCandidate;
   std::uint16_t matches = 0;
   std::uint16_t inliers = 0;
   std::string reason;  ///< Reason of a rejection.
+
+  bool operator==(const ViewClosure&) const = default;
 };
 struct ViewClosures {
   std::vector<ViewClosure> closures;
@@ -88,7 +57,7 @@ struct ViewImage {
 };
 
 using ViewContent =
-    std::variant<ViewState, ViewPose, ViewKeyframes, ViewClosures, MeshChunk, ViewImage>;
+    std::variant<RobotSample, ViewPose, ViewKeyframes, ViewClosures, MeshChunk, ViewImage>;
 
 /// Update that a robot sends to viewers; viewers send nothing to robots. Updates of one process and
 /// kind arrive in the order of sending and together contain the full state. When a viewer appears

@@ -51,7 +51,8 @@ Eigen::Vector3d gyro_at(std::span<const ImuSample> samples, Stamp instant) {
 // Largest plausible distance of the calibration from the rig's values [standard deviations].
 constexpr double kMostCalibration = 10.0;
 
-// Bounds that keep instants in order and near to their stamps.
+// Bounds on the estimated offset between images and inertial samples, so that the instants of
+// images stay in order.
 constexpr double kMostOffset_s = 0.1;
 constexpr double kMostOffsetStep = 0.25;  // largest change, as a fraction of the image interval
 
@@ -142,7 +143,7 @@ void FixedLagSmoother::start(const InertialFrame& frame, const OdometryState& st
   hold_calibration();
 }
 
-void FixedLagSmoother::recall(const UncertainCalibration& known) {
+void FixedLagSmoother::set_calibration_prior(const UncertainCalibration& known) {
   if (!window_.calibrates) return;
   calibrate(window_, known.calibration);
   calibration_covariance_ = known.covariance;
@@ -151,7 +152,7 @@ void FixedLagSmoother::recall(const UncertainCalibration& known) {
 // Keeps the estimated calibration if it is plausible.
 void FixedLagSmoother::clear() {
   const UncertainCalibration known = calibration();
-  const Vector7 moved = CameraCalibration{}.offset_to(known.calibration);
+  const Vector7 moved = CameraCalibration{}.local_coordinates_to(known.calibration);
   const bool possible =
       known.covariance.llt().info() == Eigen::Success &&
       moved.dot(calibration_prior().llt().solve(moved)) < kMostCalibration * kMostCalibration;

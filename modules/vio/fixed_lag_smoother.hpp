@@ -69,7 +69,7 @@ class FixedLagSmoother {
 
   /// Replaces the prior on the calibration by the estimate `known` of an earlier process, if the
   /// calibration is estimated and `known` is plausible. Call before start().
-  void recall(const UncertainCalibration& known);
+  void set_calibration_prior(const UncertainCalibration& known);
 
   /// Adds the next image; `rests`: the body stands still. Precondition: start() succeeded. If
   /// frame.samples do not cover the time since the image before or make no inertial factor, the

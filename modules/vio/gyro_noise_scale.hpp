@@ -12,18 +12,19 @@ namespace km {
 /// is no larger than assumed.
 class GyroNoiseScale {
  public:
-  static constexpr double kMost = 4.0;
-  static constexpr double kMemory_s = 3.0;
+  static constexpr double kMaxScale = 4.0;
+  static constexpr double kTimeConstant_s = 3.0;
 
   /// Adds an interval of `dt_s` between two images, over which the rotations of estimate and
   /// samples differ by `difference_rad`. `variance_rad2` is the variance of the samples' rotation
   /// under the assumed noise, summed over three axes.
   void add(double difference_rad, double variance_rad2, double dt_s) {
-    const double misfit = std::min(difference_rad * difference_rad / variance_rad2, kMost * kMost);
-    misfit_ += std::min(dt_s / kMemory_s, 1.0) * (misfit - misfit_);
+    const double misfit =
+        std::min(difference_rad * difference_rad / variance_rad2, kMaxScale * kMaxScale);
+    misfit_ += std::min(dt_s / kTimeConstant_s, 1.0) * (misfit - misfit_);
   }
 
-  /// Factor on the standard deviation, in [1, kMost].
+  /// Factor on the standard deviation, in [1, kMaxScale].
   [[nodiscard]] double scale() const { return std::sqrt(std::max(misfit_, 1.0)); }
 
  private:

@@ -13,8 +13,8 @@ namespace km {
 struct ImagePose {
   SE3 T_odom_body = SE3::Identity();
   Eigen::Matrix3d by_state = Eigen::Matrix3d::Identity();  ///< For rotation and translation.
-  /// By CameraCalibration::moved(). A motion of the cameras in the body has the same effect on the
-  /// images as that motion of the body.
+  /// By CameraCalibration::retracted(). A motion of the cameras in the body has the same effect on
+  /// the images as that motion of the body.
   Eigen::Matrix<double, 6, 7> by_calibration;
 
   /// `gyro`: angular rate that the gyroscope measures at the state [rad/s].

@@ -238,7 +238,7 @@ std::vector<OdometryState> states_at_rest(std::span<const InertialFrame> frames,
 
 Eigen::Matrix3d upright(const Eigen::Vector3d& accel) {
   if (!(accel.norm() > 0.0)) throw std::invalid_argument("upright: the specific force is zero");
-  return turn_to_z(accel);
+  return rotation_to_z(accel);
 }
 
 StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& rig,

@@ -57,7 +57,7 @@ double coasting_s(double lasts_s) {
   return -kCoast_s * std::expm1(-0.5 * lasts_s / kCoast_s);
 }
 
-Matrix6 restart_covariance(const UnseenWay& way) {
+Matrix6 restart_covariance(const UnmeasuredMotion& way) {
   const double heading = std::min(kUnseenHeading * std::sqrt(way.lasts_s), kMostHeading);
   const double translation =
       std::min(std::hypot(kRestartTranslation,

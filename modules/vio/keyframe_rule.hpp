@@ -17,7 +17,7 @@ namespace km {
                                           const Matrix6& Sigma);
 
 /// An interval of the motion without measurements.
-struct UnseenWay {
+struct UnmeasuredMotion {
   double lasts_s = 0.0;
   double speed_mps = 0.0;  ///< The larger speed of before and after the interval.
   Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Vertical at the end of the interval.
@@ -32,6 +32,6 @@ struct UnseenWay {
 
 /// Covariance of the relative pose across a new start. The covariance grows with the duration
 /// without measurements and with the speed. The heading is more uncertain than roll and pitch.
-[[nodiscard]] Matrix6 restart_covariance(const UnseenWay& way = {});
+[[nodiscard]] Matrix6 restart_covariance(const UnmeasuredMotion& way = {});
 
 }  // namespace km

@@ -80,7 +80,8 @@ std::optional<ImuFactor> ImuFactor::of(const ImuPreintegration& imu, double grav
 }
 
 ImuFactor ImuFactor::at_rest(const ImuNoise& noise, double dt_s) {
-  // Without samples, Eq. (45) over no time compares the states themselves.
+  // Without samples and with dt = 0, the residuals of Eq. (45) are the differences of the two
+  // states.
   const ImuPreintegration none(noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   Vector9 weight;
   weight << Eigen::Vector3d::Constant(1.0 / kRestRotation_rad),

@@ -138,7 +138,7 @@ std::vector<std::optional<StereoMatch>> StereoMatcher::match(const ImagePyramid&
 DepthMatcher::DepthMatcher(const StereoRig& rig, const TrackerConfig& config)
     : T_right_left_(rig.T_left_right().inverse()),
       max_inverse_depth_(1.0 / config.min_depth_m),
-      edge_(depth_edge(rig)) {}
+      edge_(depth_edge_threshold(rig)) {}
 
 std::vector<std::optional<StereoMatch>> DepthMatcher::match(const DepthImage* depth,
                                                             std::span<const StereoQuery> queries) {

@@ -60,7 +60,8 @@ void Vio::continue_from(const VioCheckpoint& checkpoint) {
   last_ = checkpoint.state;
   last_keyframe_ = checkpoint.keyframe;
   T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
-  if (checkpoint.keyframe.calibration) smoother_.recall(*checkpoint.keyframe.calibration);
+  if (checkpoint.keyframe.calibration)
+    smoother_.set_calibration_prior(*checkpoint.keyframe.calibration);
 }
 
 VioResult Vio::process(const SensorPacket& packet) {
@@ -95,7 +96,7 @@ VioResult Vio::process(const SensorPacket& packet) {
     held.data.samples.clear();
     restart(std::move(held));
   } else if (first && can_continue_at(held)) {
-    go_on(held, result);
+    process_image(held, result);
   } else if (running_) {
     advance(held, result);
   } else {
@@ -158,7 +159,7 @@ bool Vio::can_continue_at(const Held& held) const {
 }
 
 // Precondition: the state of this image and its keyframe have been published.
-void Vio::go_on(const Held& held, VioResult& result) {
+void Vio::process_image(const Held& held, VioResult& result) {
   start_on(held, *last_, *last_keyframe_->state_covariance);
   ++statistics_.start_attempts;
   ++statistics_.starts;
@@ -229,7 +230,7 @@ void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
   const Eigen::Matrix3d Q = last_->T_odom_body.linear() * first.linear().transpose();
   const double turn = std::atan2(Q(1, 0) - Q(0, 1), Q(0, 0) + Q(1, 1));
   const Eigen::Matrix3d R = so3_exp(turn * Eigen::Vector3d::UnitZ());
-  const double coasting = coasting_s(unseen_s(states.front().stamp));
+  const double coasting = coasting_s(unmeasured_s(states.front().stamp));
   const Eigen::Vector3d way = coasting * (last_->v_odom + R * states.front().v_odom);
   const SE3 T = make_pose(R, last_->T_odom_body.translation() + way - R * first.translation());
   for (OdometryState& state : states) {
@@ -285,7 +286,7 @@ void Vio::drop_dark(const Held& held, const OdometryState& state) {
 // An image on which a start succeeded counts as seen.
 void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
   const bool has_started = result.start && started(*result.start);
-  const int seen = has_started                   ? VisionWatch::kLeastSeen
+  const int seen = has_started                   ? VisionWatch::kMinLandmarks
                    : result.smoother && running_ ? result.smoother->seen
                                                  : 0;
   result.vision = vision_.add(stamp, features, seen);
@@ -338,7 +339,7 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
 }
 
 // Not negative, even if the clock was set back since an earlier process.
-double Vio::unseen_s(Stamp stamp) const {
+double Vio::unmeasured_s(Stamp stamp) const {
   return std::max(seconds_between(last_->stamp, stamp), 0.0);
 }
 
@@ -381,7 +382,7 @@ void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
     keyframe.covariance = restart_covariance(
-        {.lasts_s = unseen_s(state.stamp),
+        {.lasts_s = unmeasured_s(state.stamp),
          .speed_mps = std::max(last_->v_odom.norm(), state.v_odom.norm()),
          .up_body = state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ()});
   }

@@ -92,7 +92,7 @@ class Vio {
   [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,
                                      Stamp to) const;
   [[nodiscard]] bool can_continue_at(const Held& held) const;
-  void go_on(const Held& held, VioResult& result);
+  void process_image(const Held& held, VioResult& result);
   void start_on(const Held& held, const OdometryState& state, const StateCovariance& covariance);
   void try_start(VioResult& result);
   void advance(const Held& held, VioResult& result);
@@ -104,7 +104,7 @@ class Vio {
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
   void continue_or_add_first_keyframe(VioResult& result);
   [[nodiscard]] double moved_s(Stamp stamp) const;
-  [[nodiscard]] double unseen_s(Stamp stamp) const;
+  [[nodiscard]] double unmeasured_s(Stamp stamp) const;
   void add_first_keyframe(const OdometryState& state, VioResult& result);
   void add_keyframe(const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<StateCovariance> state_covariance_at(

@@ -3,7 +3,7 @@
 namespace km {
 
 std::optional<VisionEvent> VisionWatch::add(Stamp stamp, int features, int seen) {
-  const bool sees = seen >= kLeastSeen;
+  const bool sees = seen >= kMinLandmarks;
   has_seen_ = has_seen_ || sees;
   if (!has_seen_ || (sees && !since_)) return std::nullopt;
   if (!since_) since_ = stamp;

@@ -15,11 +15,11 @@ struct VisionEvent {
 };
 
 /// Detects from each image whether vision still determines the pose. An image holds the pose if it
-/// shows at least kLeastSeen located landmarks. Vision is lost when no image has held the pose for
-/// kPatience_s, and returns with the next image that holds the pose.
+/// shows at least kMinLandmarks located landmarks. Vision is lost when no image has held the pose
+/// for kPatience_s, and returns with the next image that holds the pose.
 class VisionWatch {
  public:
-  static constexpr int kLeastSeen = 8;
+  static constexpr int kMinLandmarks = 8;
   static constexpr double kPatience_s = 0.3;
 
   /// Adds an image with `features` features, `seen` of them located landmarks; `seen` is 0 while

@@ -284,7 +284,7 @@ void WindowEquations::apply(const Eigen::VectorXd& dx, Window& target) const {
       step.noalias() += couplings_[k].Y.transpose() * image_step(dx, couplings_[k].frame);
     target.landmarks[e.landmark].p_odom -= step;
   }
-  if (target.calibrates) calibrate(target, target.calibration.moved(dx.tail<7>()));
+  if (target.calibrates) calibrate(target, target.calibration.retracted(dx.tail<7>()));
   for (std::size_t k = 0; k < target.frames.size(); ++k) {
     const auto at = 15 * static_cast<Eigen::Index>(k);
     OdometryState& state = target.frames[k].state;

@@ -26,7 +26,7 @@ using MessageKey = std::uint64_t;
 }
 
 /// How messages of type T travel between robots. Specialised by the module that owns T, in its
-/// <module>_codec.hpp:
+/// `<module>_codec.hpp`:
 ///
 ///     template <>
 ///     struct Codec<InlierSet> {

@@ -21,6 +21,9 @@ constexpr std::size_t kMaxStreams = 4096;  // senders whose message numbers a to
 // Maximum time for which a message waits until its writer is known. DDS may deliver messages before
 // it announces their robot. A restarted robot is not accepted until its former process is lost.
 constexpr double kPatience_s = 8.0;
+// Maximum time for which a message waits for its key. A sender repeats its keys after a shorter
+// time (kSendKeys_s of the bridge), so a lost key loses no message.
+constexpr double kKeyPatience_s = 45.0;
 constexpr double kRetry_s = 0.1;
 constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};
@@ -269,7 +272,7 @@ void IncomingTopic::await_key(Filed filed, double now_s) {
 bool IncomingTopic::deliver_again(double now_s) {
   return sealed_.serve(now_s, [this](RobotId /*from*/, const Filed& filed, double waited_s) {
     if (deliver(filed) == Verdict::kTaken) return true;
-    if (waited_s < kPatience_s) return false;
+    if (waited_s < kKeyPatience_s) return false;
     refuse("sealed with a key that is not known");
     return true;
   }) > 0;

@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "modules/core/waiting_rooms.hpp"
+#include "modules/core/pending_messages.hpp"
 #include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/sequence_tracker.hpp"
@@ -122,8 +122,8 @@ class IncomingTopic {
   const bool addressed_;
   Handler handler_;
   WriterBook writers_;
-  WaitingRooms<Guid, Serdata> waiting_;  // receive thread only: messages of unknown writers
-  WaitingRooms<RobotId, Filed> sealed_;  // delivery only: messages whose key is missing
+  PendingMessages<Guid, Serdata> waiting_;  // receive thread only: messages of unknown writers
+  PendingMessages<RobotId, Filed> sealed_;  // delivery only: messages whose key is missing
   double started_s_ = 0.0;
 
   mutable std::mutex mutex_;  // guards the filed messages and the counts

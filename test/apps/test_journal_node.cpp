@@ -21,6 +21,7 @@ JournalTopics journal_topics(Topics& topics, Topic<PeerEvent>& peer_events) {
           .new_restarts = topics.new_closure_restarts,
           .peer_closures = topics.shared_closures.received,
           .outcomes = topics.outcomes,
+          .restored_outcomes = topics.restored_outcomes,
           .peer_events = peer_events,
           .keyframes = topics.keyframes,
           .closures = topics.own_closures,
@@ -38,8 +39,8 @@ struct Journal {
   template <typename Entry>
   [[nodiscard]] std::vector<Entry> written() const {
     std::vector<Entry> entries;
-    (void)read_journal(file, [&](const JournalEntry& entry, JournalPlace) {
-      if (const auto* found = std::get_if<Entry>(&entry)) entries.push_back(*found);
+    (void)read_journal(file, [&](const StoredEntry& stored) {
+      if (const auto* found = std::get_if<Entry>(&stored.entry)) entries.push_back(*found);
     });
     return entries;
   }
@@ -83,6 +84,21 @@ TEST_CASE("The journal knows a published keyframe as long as its file exists", "
   CHECK(journal.node.recall(1) == nullptr);
   std::filesystem::remove(journal.file);
   CHECK(journal.node.recall(0) == nullptr);
+}
+
+TEST_CASE("Events of nodes that stop later are written, with their times", "[robot]") {
+  Journal journal;
+  journal.node.stop();
+  journal.node.append(RobotSample{.name = "toy"});
+  CHECK(journal.written<RobotSample>().empty());
+  journal.node.write();
+  CHECK(journal.written<RobotSample>().size() == 1);
+  CHECK(journal.written<JournalStart>().size() == 2);  // in case that one is damaged
+  std::vector<Stamp> times;
+  (void)read_journal(journal.file,
+                     [&](const StoredEntry& stored) { times.push_back(stored.time); });
+  CHECK(std::ranges::is_sorted(times));
+  CHECK(times.front() > 1'600'000'000'000'000'000);  // after 2020
 }
 
 TEST_CASE("A journal holds the product of all corrections of the cameras", "[robot]") {

@@ -127,7 +127,7 @@ TEST_CASE("Robots that one place or no closure ties are reported as such", "[rob
 TEST_CASE("A tally counts the stages that a closure came through, and why it stopped",
           "[robot][findings]") {
   ClosureTally tally;
-  tally.add(ClosureStage::kCandidate, "not asked for");
+  tally.add(ClosureStage::kCandidate, "not requested");
   tally.add(ClosureStage::kReceived, "too few inliers");
   tally.add(ClosureStage::kVerified, kRejectedByOptimiser);
   tally.add(ClosureStage::kVerified, "inconsistent with the other closures of the robot pair");
@@ -183,10 +183,11 @@ TEST_CASE("A finding on a run is reported with its number", "[robot][findings]")
     check_finding("frames.paused", Severity::kNote, "paused for 3.2 s in all");
   }
   SECTION("a map that skipped frames") {
-    summary.mapping = MappingSummary{.frames = 75, .gave_way = 25};
-    check_finding("map.gave_way", Severity::kWarning, "25 frames were left out of the map, 25 %");
-    summary.mapping->gave_way = 1;
-    check_finding("map.gave_way", Severity::kNote, "1 frames");
+    summary.mapping = MappingSummary{.frames = 75, .dropped_under_load = 25};
+    check_finding("map.dropped_under_load", Severity::kWarning,
+                  "25 frames were left out of the map, 25 %");
+    summary.mapping->dropped_under_load = 1;
+    check_finding("map.dropped_under_load", Severity::kNote, "1 frames");
   }
   SECTION("images that are missing") {
     summary.sensor_faults = {{"images missing between others", 116}, {"pauses of a camera", 1}};

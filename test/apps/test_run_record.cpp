@@ -51,6 +51,56 @@ TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accept
   CHECK(record.inlier_closures().size() == 2);
 }
 
+TEST_CASE("changes of decisions, poses and cells become events, each once", "[robot]") {
+  const ClosureId kept{{1, 2}, {2, 3}}, doubted{{1, 4}, {2, 5}};
+  RunRecord record(1);
+  const auto judged = [&] {
+    std::vector<ClosureJudgement> all;
+    for (const JournalEntry& event : record.take_events())
+      for (const ClosureJudgement& one : std::get<ClosureJudgements>(event).closures)
+        all.push_back(one);
+    return all;
+  };
+  record.add(InlierSet{1, 2, 1, {kept, doubted}});
+  CHECK(judged() == std::vector<ClosureJudgement>{{kept, true, false}, {doubted, true, false}});
+  record.add(InlierSet{1, 2, 2, {kept, doubted}});
+  CHECK(judged().empty());
+  record.add(ClosureVerdicts{{{kept, true}, {doubted, false}}});
+  CHECK(judged() == std::vector<ClosureJudgement>{{doubted, true, true}});
+  record.add(InlierSet{1, 2, 3, {kept}});
+  CHECK(judged() == std::vector<ClosureJudgement>{{doubted, false, true}});
+
+  record.add(Trajectory{1, 0, std::vector<SE3>(3, SE3::Identity())});
+  CHECK(record.take_events().empty());  // poses are stated with the next sample
+  record.add(RobotSample{.keyframes = 3});
+  auto events = record.take_events();
+  REQUIRE(events.size() == 2);
+  CHECK(std::get<PoseChanges>(events[0]).poses.size() == 3);
+  CHECK(std::get<RobotSample>(events[1]).keyframes == 3);
+  record.add(Trajectory{1, 0, std::vector<SE3>(5001, SE3::Identity())});
+  record.state_poses();
+  events = record.take_events();
+  REQUIRE(events.size() == 3);  // because entries of a journal have a largest size
+  CHECK(std::get<PoseChanges>(events[2]).poses.back().id == KeyframeId{1, 5000});
+
+  OptimizedMesh mesh;
+  mesh.mesh.vertices = {{0.1F, 0.1F, 0.1F}, {0.2F, 0.1F, 0.1F}, {0.1F, 0.2F, 0.1F},
+                        {5.0F, 0.1F, 0.1F}, {5.1F, 0.1F, 0.1F}, {5.0F, 0.2F, 0.1F}};
+  mesh.mesh.faces = {{0, 1, 2}};
+  record.add(mesh);
+  mesh.mesh.faces.push_back({3, 4, 5});
+  record.add(mesh);
+  events = record.take_events();
+  REQUIRE(events.size() == 2);
+  CHECK(std::get<MeshCells>(events[0]).cells == std::vector<MeshCells::Cell>{{0, 0, 0}});
+  CHECK(std::get<MeshCells>(events[1]).cells == std::vector<MeshCells::Cell>{{2, 0, 0}});
+  mesh.anchor = 1;
+  record.add(mesh);
+  events = record.take_events();
+  REQUIRE(events.size() == 1);
+  CHECK(std::get<MeshCells>(events[0]).cells.size() == 2);
+}
+
 TEST_CASE("keyframes that another vocabulary keeps from being compared are counted", "[robot]") {
   RunRecord record(1);
   for (KeyframeIndex i = 0; i < 3; ++i)

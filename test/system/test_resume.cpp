@@ -327,6 +327,68 @@ TEST_CASE("A robot with keys that is killed and taken up is in its team as befor
     CHECK((T_world.at(id.from).translation() - T_world.at(id.to).translation()).norm() < kSame_m);
 }
 
+// Waits until all keyframes are optimised again.
+bool has_optimised(Process& robot) {
+  return robot
+      .wait_until([](const std::string& line) {
+        return line.find(std::to_string(kLap) + " keyframes") != std::string::npos &&
+               line.find("pgo: cost") != std::string::npos &&
+               line.find("round 0,") == std::string::npos;
+      })
+      .has_value();
+}
+
+TEST_CASE("A robot that is killed and resumed without its team keeps what the team had found",
+          "[system][resume]") {
+  const SealedTeam team;
+  {
+    const auto other = team.start(0, "--output");
+    const auto victim = team.start(1, "--output");
+    REQUIRE(SealedTeam::is_joint(*victim));
+    REQUIRE(SealedTeam::is_joint(*other));
+    REQUIRE(has_optimised(*victim));
+    REQUIRE(grows_by(team.output(1), 600));  // two samples: the solution is on the disk
+    victim->kill(SIGKILL);
+    victim->wait();
+    CHECK(SealedTeam::interrupt(*other) == 0);
+  }
+  const auto resumed = team.start(1, "--resume");
+  REQUIRE(has_optimised(*resumed));
+  CHECK(SealedTeam::interrupt(*resumed) == 0);
+  CHECK(read_summary(team.output(1) / "summary.json").pgo.anchor == RobotId{0});
+  std::map<RobotId, G2oGraph> graphs;
+  std::map<KeyframeId, SE3> T_world;
+  for (const RobotId robot : {RobotId{0}, RobotId{1}}) {
+    graphs[robot] = read_g2o(team.output(robot) / "pose_graph.g2o");
+    for (const G2oVertex& vertex : graphs[robot].vertices) T_world[vertex.id] = vertex.T_world_kf;
+  }
+  CHECK(shared_closures(graphs[1]).size() == SealedTeam::kClosures);
+  CHECK(shared_closures(graphs[0]) == shared_closures(graphs[1]));
+  constexpr double kSame_m = 0.01;  // the bound of StatedPoses; measurements are exact
+  for (const ClosureId& id : shared_closures(graphs[1]))
+    CHECK((T_world.at(id.from).translation() - T_world.at(id.to).translation()).norm() < kSame_m);
+}
+
+TEST_CASE("A journal with flipped bytes is continued, and a copy is kept", "[system][resume]") {
+  const TemporaryFolder folder;
+  const fs::path graph = write_walk({0, 0}, {1, 30}, 0, folder.path() / "walk.g2o");
+  const std::string output = (folder.path() / "run").string();
+  const std::string command = KM_BIN_DIR "/kimera_multi_robot --robot 0 --rate max --graph " +
+                              graph.string() + " --domain " + std::to_string(random_domain());
+  REQUIRE(run_command(command + " --output " + output).exit_code == 0);
+  std::string journal = folder.read("run/run.journal");
+  journal[journal.size() / 2] ^= 1;
+  folder.write("run/run.journal", journal);
+  const CommandResult again = run_command(command + " --resume " + output);
+  CAPTURE(again.output);
+  CHECK(again.exit_code == 0);
+  CHECK_THAT(again.output, Catch::Contains("run.journal: ") &&
+                               Catch::Contains(" on are damaged and left out") &&
+                               Catch::Contains("run.journal.damaged"));
+  CHECK(folder.read("run/run.journal.damaged") == journal);
+  CHECK(read_summary(fs::path(output) / "summary.json").keyframes == kLap);
+}
+
 TEST_CASE("A robot localises itself in the map of a finished run", "[system][resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;

@@ -129,7 +129,6 @@ TEST_CASE("A team grows and all its robots find each other", "[system][namespace
   REQUIRE(largest >= 2);
   for (int robots = 2; robots <= largest; robots *= 2) {
     const Growth growth = measure(robots);
-    CHECK(growth.discovery_s < 5.0);  // measured: 0.01 to 0.07 s with 2 and 4 robots
     // Discovery, headers and acknowledgements are additional: measured 1.6 to 1.9 times as much.
     CHECK(growth.wire_bytes > growth.counted_bytes);
     CHECK(growth.wire_bytes < 4.0 * growth.counted_bytes);

@@ -1,18 +1,12 @@
-#include <atomic>
 #include <catch2/catch.hpp>
-#include <map>
-#include <optional>
 #include <set>
 #include <string>
-#include <thread>
 #include <vector>
 
-#include "modules/view/view_listener_node.hpp"
-#include "modules/view/view_selector.hpp"
-#include "test/modules/view/watcher.hpp"
+#include "modules/core/pose_changes.hpp"
 #include "test/support/process.hpp"
+#include "test/system/audience.hpp"
 #include "test/system/team_run.hpp"
-#include "test/system/walk.hpp"
 
 // Robots and a viewer, over the network.
 
@@ -20,67 +14,6 @@ namespace km {
 namespace {
 
 namespace fs = std::filesystem;
-
-DdsConfig in_domain(int domain) {
-  DdsConfig config;
-  config.domain = domain;
-  return config;
-}
-
-// Listens on a thread of its own, until finish() and no more messages.
-class Audience {
- public:
-  explicit Audience(int domain)
-      : listener_(in_domain(domain)), listening_thread_([this] { listen(); }) {}
-  ~Audience() { finish(); }
-  Audience(const Audience&) = delete;
-  Audience& operator=(const Audience&) = delete;
-
-  std::map<RobotId, Watcher>& finish() {
-    is_over_ = true;
-    if (listening_thread_.joinable()) listening_thread_.join();
-    return robots_;
-  }
-  [[nodiscard]] std::uint64_t refused() const { return listener_.refused(); }
-
- private:
-  void listen() {
-    constexpr double kSilence_s = 0.5;
-    for (;;) {
-      const bool is_over = is_over_;
-      const auto update = listener_.next(kSilence_s);
-      if (update)
-        robots_[update->robot].receive(update->content);
-      else if (is_over)
-        return;
-    }
-  }
-
-  ViewListener listener_;
-  std::map<RobotId, Watcher> robots_;
-  std::atomic<bool> is_over_ = false;
-  std::thread listening_thread_;
-};
-
-std::vector<std::string> robot_on(const Walk& walk, const Walk& other, const fs::path& folder,
-                                  int domain) {
-  const std::string name = robot_name(walk.robot);
-  const fs::path graph = write_walk(walk, other, kLap, folder / (name + ".g2o"));
-  return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
-          "--robot",
-          std::to_string(walk.robot),
-          "--name",
-          name,
-          "--graph",
-          graph.string(),
-          "--rate",
-          "10",
-          "--output",
-          (folder / name).string(),
-          "--domain",
-          std::to_string(domain),
-          "--view"};
-}
 
 // The viewer's state equals the results that the robot has written.
 void check_knowledge(const Watcher& known, const fs::path& results) {
@@ -92,13 +25,13 @@ void check_knowledge(const Watcher& known, const fs::path& results) {
     const auto& sent = known.optimized.at(vertex.id.index);
     CHECK(sent.anchor == 0);
     CHECK((sent.T.translation() - vertex.T_world_kf.translation()).norm() <
-          ViewSelector::kMaxShift_m + 1e-4);
+          StatedPoses::kMaxShift_m + 1e-4);
   }
   std::set<ClosureId> edges, kept;
   for (const RelativePose& edge : graph.edges)
     if (edge.from.robot != edge.to.robot) edges.insert(closure_id(edge.from, edge.to));
   for (const auto& [id, closure] : known.closures)
-    if (closure.verdict == ViewVerdict::kKept) kept.insert(id);
+    if (closure.verdict == ClosureStatus::kKept) kept.insert(id);
   CHECK(edges.size() > 10);
   CHECK(kept == edges);
   REQUIRE_FALSE(known.states.empty());

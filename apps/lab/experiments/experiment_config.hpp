@@ -104,7 +104,7 @@ struct CosmoExperiment {
 };
 
 /// One robot without a team and without a map.
-struct AloneExperiment {
+struct SingleRobotExperiment {
   std::string world;
   std::string robot;
   std::vector<std::string> arguments;
@@ -141,7 +141,7 @@ struct ExperimentConfig {
   std::vector<WorldConfig> worlds;
   PcmExperiment pcm;
   CosmoExperiment cosmo;
-  AloneExperiment alone;                       ///< An empty world disables this experiment.
+  SingleRobotExperiment alone;                 ///< An empty world disables this experiment.
   std::vector<std::string> trajectory_worlds;  ///< Names in `worlds`, as in the lists below.
   std::vector<PgoMethodConfig> methods;
   std::vector<std::string> paper_pipeline;  ///< Options of robots that run the paper's pipeline.

@@ -75,10 +75,10 @@ class StepsRun {
            SignalWatch& signals, StepDisplay& display)
       : steps_(steps), results_(results), again_(again), signals_(signals), display_(display) {
     fs::create_directories(results / "logs");
-    std::vector<StepDisplay::Thought> thoughts;
+    std::vector<StepDisplay::ExpectedStep> expected;
     for (const Step& step : steps)
-      thoughts.push_back({step.title, step.command.front(), thought_s(step)});
-    display.expect(std::move(thoughts));
+      expected.push_back({step.title, step.command.front(), estimate_s(step)});
+    display.expect(std::move(expected));
   }
 
   StepsOutcome run() {
@@ -106,7 +106,7 @@ class StepsRun {
 
  private:
   // Time of the last run of the step, or the expected one; 0 if the step will not run.
-  double thought_s(const Step& step) {
+  double estimate_s(const Step& step) {
     const StepState state = state_of(step, results_);
     if (state == StepState::kMissing) return 0.0;
     const bool waits =
@@ -200,7 +200,8 @@ class StepsRun {
                     steady_now_s());
   }
 
-  // Empty if the program succeeded and made its outputs.
+  // Runs the program of a step. Returns the reason of its failure; empty if it succeeded and made
+  // its outputs.
   std::string run_command(const Step& step) {
     const fs::path log = results_ / "logs" / (step.name + ".log");
     if (access(step.command.front().c_str(), X_OK) != 0)
@@ -262,10 +263,10 @@ void StepDisplay::start(std::size_t index, double now_s) {
 }
 
 double StepDisplay::expected_s(std::size_t index) const {
-  const auto& [title, program, thought_s] = steps_.at(index);
+  const auto& [title, program, estimate_s] = steps_.at(index);
   const auto pace = paces_.find(program);
-  if (pace == paces_.end() || !(pace->second.thought_s > 0.0)) return thought_s;
-  return thought_s * pace->second.took_s / pace->second.thought_s;
+  if (pace == paces_.end() || !(pace->second.estimate_s > 0.0)) return estimate_s;
+  return estimate_s * pace->second.took_s / pace->second.estimate_s;
 }
 
 std::string StepDisplay::heading() const {
@@ -302,10 +303,10 @@ void StepDisplay::finish(const std::string& result, double now_s) {
   output_ << (terminal_ ? "\r\x1b[K" : "") << heading() << ": " << result << " in "
           << duration(now_s - start_s_) << std::endl;
   if (result != "done") return;  // the duration of an unfinished step predicts nothing
-  const auto& [title, program, thought_s] = steps_.at(index_);
+  const auto& [title, program, estimate_s] = steps_.at(index_);
   Pace& pace = paces_[program];
   pace.took_s += now_s - start_s_;
-  pace.thought_s += thought_s;
+  pace.estimate_s += estimate_s;
 }
 
 StepsOutcome run_steps(const std::vector<Step>& steps, const fs::path& results, bool again,

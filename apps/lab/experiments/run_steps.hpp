@@ -20,7 +20,7 @@ class StepDisplay {
  public:
   static constexpr double kPlainInterval_s = 10.0;
 
-  struct Thought {
+  struct ExpectedStep {
     std::string title, program;
     double seconds = 0.0;  ///< 0 if the step is not run.
   };
@@ -32,7 +32,7 @@ class StepDisplay {
   static StepDisplay standard_output();
 
   /// Sets the steps in order.
-  void expect(std::vector<Thought> steps) { steps_ = std::move(steps); }
+  void expect(std::vector<ExpectedStep> steps) { steps_ = std::move(steps); }
 
   /// Step `index`, from 0, begins.
   void start(std::size_t index, double now_s);
@@ -48,7 +48,7 @@ class StepDisplay {
 
  private:
   struct Pace {
-    double took_s = 0.0, thought_s = 0.0;
+    double took_s = 0.0, estimate_s = 0.0;
   };
 
   [[nodiscard]] double expected_s(std::size_t index) const;
@@ -57,7 +57,7 @@ class StepDisplay {
   std::ostream& output_;
   bool terminal_;
   int width_;
-  std::vector<Thought> steps_;
+  std::vector<ExpectedStep> steps_;
   std::map<std::string, Pace> paces_;  // pace of each program over its steps so far
   std::size_t index_ = 0;              // index of the running step
   double start_s_ = 0.0, drawn_s_ = 0.0;

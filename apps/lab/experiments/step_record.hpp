@@ -73,7 +73,8 @@ enum class StepState {
 
 [[nodiscard]] const char* to_string(StepState state);
 
-/// Examines only the files. An outdated step with all its needs is kOutdated.
+/// State of a step by its record and its files; the steps on which it depends are not examined. An
+/// outdated step whose inputs exist is kOutdated.
 [[nodiscard]] StepState state_of(const Step& step, const std::filesystem::path& results);
 
 }  // namespace km

@@ -16,7 +16,7 @@ void GraphInput::define(CLI::App& app) {
          "results")
       ->required()
       ->check(CLI::ExistingPath);
-  app.add_option("--robots", robots, "Number of robots that a single file is dealt out to")
+  app.add_option("--robots", robots, "Number of robots among which a single file is divided")
       ->check(CLI::Range(1, 65535));
   app.add_option("--partition", partition,
                  "contiguous: runs of equal length; or a file with rows \"vertex robot\"");
@@ -34,10 +34,12 @@ LabelledTeamGraph GraphInput::read(const CLI::App& app) const {
         "--partition is for a single g2o file, " + file.string() +
         (folder ? " is a folder with one file per robot" : " says which robot each pose is of"));
   LabelledTeamGraph team =
-      folder       ? LabelledTeamGraph{read_team_folder(file)}
-      : of_a_team  ? labelled_team(read_jrl(file), file.string())
-      : contiguous ? LabelledTeamGraph{deal_contiguously(read_g2o(file), robots, file.string())}
-                   : LabelledTeamGraph{deal(read_g2o(file), read_partition(partition), partition)};
+      folder      ? LabelledTeamGraph{read_team_folder(file)}
+      : of_a_team ? labelled_team(read_jrl(file), file.string())
+      : contiguous
+          ? LabelledTeamGraph{partition_contiguously(read_g2o(file), robots, file.string())}
+          : LabelledTeamGraph{
+                partition_graph(read_g2o(file), read_partition(partition), partition)};
   if (app.count("--robots") > 0 && team.graph.robots() != robots)
     throw std::runtime_error("--robots " + std::to_string(robots) + ": there are " +
                              std::to_string(team.graph.robots()) +

@@ -29,7 +29,7 @@ inline const std::vector<std::string> kRejections = {"none", "pcm", "newton", "p
 /// False closures that agree with one another within their noise, as between aisles of the same
 /// appearance. Each cluster joins successive poses of one robot to successive poses of another.
 struct Clusters {
-  std::size_t places = 0;  ///< Number of clusters, all between one pair of robots.
+  std::size_t places = 0;  ///< Number of clusters, all between the same two robots.
   std::size_t size = 5;    ///< Closures in each.
 };
 

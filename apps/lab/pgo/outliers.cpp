@@ -23,7 +23,7 @@
 namespace km {
 namespace {
 
-// Results of all seeds for one share and method.
+// Results of all seeds for one share of false closures and one method.
 struct Cell {
   std::span<const OutlierResult> results;
 

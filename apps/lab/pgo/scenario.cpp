@@ -133,7 +133,7 @@ void check(const Scenario& scenario, std::size_t robots) {
 }
 
 // The first poses of `whole`, divided among robots contiguously.
-TeamGraph dealt(const TeamGraph& whole, const Scenario& scenario) {
+TeamGraph partitioned(const TeamGraph& whole, const Scenario& scenario) {
   const bool as_it_is = scenario.robots == 0 || scenario.robots == whole.robots();
   if (!as_it_is && whole.robots() != 1)
     throw std::invalid_argument("scenario " + scenario.name + ": is of " +
@@ -149,7 +149,7 @@ TeamGraph dealt(const TeamGraph& whole, const Scenario& scenario) {
     const auto robots = static_cast<Index>(std::max<std::size_t>(scenario.robots, 1));
     if (whole.robots() != 1 || robots > poses)
       throw std::invalid_argument("scenario " + scenario.name + ": " + std::to_string(poses) +
-                                  " poses cannot be dealt to " + std::to_string(robots) +
+                                  " poses cannot be divided among " + std::to_string(robots) +
                                   " robots");
     for (Index robot = 0; robot < robots; ++robot) graph.first.push_back(robot * (poses / robots));
     graph.first.push_back(poses);
@@ -353,7 +353,8 @@ std::string scenario_list() {
 
 ScenarioGraph draw_scenario(const TeamGraph& whole, const std::vector<SE3>& optimum,
                             const Scenario& scenario, unsigned seed) {
-  ScenarioGraph drawn{.graph = dealt(whole, scenario), .truth = {}, .is_false = {}, .honest = {}};
+  ScenarioGraph drawn{
+      .graph = partitioned(whole, scenario), .truth = {}, .is_false = {}, .honest = {}};
   check(scenario, drawn.graph.robots());
   const auto poses = static_cast<std::size_t>(drawn.graph.poses());
   drawn.truth = scaled({optimum.begin(), optimum.begin() + static_cast<std::ptrdiff_t>(poses)},

@@ -44,7 +44,7 @@ struct TruthScore {
   /// ATE of the optimum of all edges that are not labelled false, all trusted. Only with labels and
   /// true poses.
   std::optional<TeamAte> optimum_of_true = {};
-  bool certified = false;  ///< That optimum is certified in every part.
+  bool certified = false;  ///< True if optimum_of_true is certified in every part.
 };
 
 /// Parts of the graph that are connected by edges not labelled false. Precondition: labels.

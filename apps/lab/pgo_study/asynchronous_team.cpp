@@ -44,7 +44,7 @@ int AsynchronousTeam::step(RoundMeter& meter) {
   ++round_;
   deliver(meter);
   const double relaxation =
-      growing_relaxation(static_cast<std::uint32_t>(round_) - 1, options_.max_over_relaxation);
+      relaxation_after(static_cast<std::uint32_t>(round_) - 1, options_.max_over_relaxation);
   for (std::size_t k = 0; k < robots_.size(); ++k) {
     if (!may_move(robots_[k])) continue;
     meter.run(k, [&] { (void)robots_[k].block.update(options_.block_update, relaxation); });

@@ -16,7 +16,7 @@ struct AsynchronousOptions {
   int max_delay = 0;
   double loss = 0.0;  ///< Probability that a message does not reach one of its receivers.
   unsigned seed = 1;  ///< Seed of the delays and losses.
-  double max_over_relaxation = 1.95;  ///< See growing_relaxation(); 1: none.
+  double max_over_relaxation = 1.95;  ///< See relaxation_after(); 1: none.
   TruncatedNewtonOptions block_update = {};
 };
 

@@ -59,7 +59,7 @@ TruncatedNewtonResult ProximalBlock::update(const TruncatedNewtonOptions& option
         (neighbour + weight_ * lift(X_.middleCols<4>(4 * e.own), T_own_fixed)) / (1.0 + weight_);
   }
   problem_.set_fixed(std::move(targets));
-  TruncatedNewtonResult result = minimise_beyond(problem_, X_, options, relaxation);
+  TruncatedNewtonResult result = minimise_over_relaxed(problem_, X_, options, relaxation);
   X_ = result.X;
   return result;
 }

@@ -26,8 +26,8 @@ class ProximalBlock {
   /// which an edge ends. Poses of robots that are not neighbours have no effect.
   bool set_neighbour(RobotId robot, const SentPoses& sent);
 
-  /// Minimises the sum above by minimise_beyond(). The sum never rises. Precondition: poses of all
-  /// neighbours are set.
+  /// Minimises the sum above by minimise_over_relaxed(). The sum never rises. Precondition: poses
+  /// of all neighbours are set.
   TruncatedNewtonResult update(const TruncatedNewtonOptions& options, double relaxation);
 
   /// Rounds the public poses to single precision, makes them feasible again, stores and returns

@@ -134,21 +134,22 @@ Precision precision_of_blocks(const Matrix6& covariance, int dimension) {
           3.0 / inverse_of<3>(information.bottomRightCorner<3, 3>()).trace()};
 }
 
-TeamGraph deal_contiguously(const G2oGraph& graph, std::size_t robots, const std::string& file) {
+TeamGraph partition_contiguously(const G2oGraph& graph, std::size_t robots,
+                                 const std::string& file) {
   const std::set<KeyframeId> poses = poses_of(graph, file);
   if (robots == 0 || robots > poses.size())
     throw std::runtime_error(file + ": has " + std::to_string(poses.size()) +
-                             " poses, which cannot be dealt out to " + std::to_string(robots) +
+                             " poses, which cannot be divided among " + std::to_string(robots) +
                              " robots");
   const std::size_t size = poses.size() / robots;
   std::map<KeyframeId, std::size_t> robot_of;
   for (const KeyframeId& id : poses)
     robot_of.emplace(id, std::min(robot_of.size() / size, robots - 1));
-  return deal(graph, robot_of, file);
+  return partition_graph(graph, robot_of, file);
 }
 
-TeamGraph deal(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& robot_of,
-               const std::string& file, EdgeWeights weights) {
+TeamGraph partition_graph(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& robot_of,
+                          const std::string& file, EdgeWeights weights) {
   TeamGraph team{.dimension = graph.dimension, .indefinite_edges = graph.indefinite_edges};
   std::map<std::size_t, std::vector<KeyframeId>> poses_of_robot;
   const std::set<KeyframeId> poses = poses_of(graph, file);
@@ -236,7 +237,7 @@ TeamGraph read_team_folder(const std::filesystem::path& folder) {
   for (const RecordedGraph& part : parts)
     for (const RelativePose& e : part.inter_closures)
       if (e.to.robot == part.robot && !from_start.contains({e.from, e.to})) all.edges.push_back(e);
-  return deal(all, robot_of, folder.string(), weights);
+  return partition_graph(all, robot_of, folder.string(), weights);
 }
 
 LabelledTeamGraph labelled_team(const JrlGraph& graph, const std::string& file) {
@@ -257,7 +258,7 @@ LabelledTeamGraph labelled_team(const JrlGraph& graph, const std::string& file) 
     if (graph.has_labels) truth.is_false.push_back(measured.is_false);
     truth.edge_stamps.push_back(measured.stamp);
   }
-  TeamGraph team = deal(all, robot_of, file, EdgeWeights::kAsTheTeam);
+  TeamGraph team = partition_graph(all, robot_of, file, EdgeWeights::kAsTheTeam);
   if (!graph.truth.empty())
     for (const KeyframeId& id : team.ids) {
       const auto pose = graph.truth.find(id);

@@ -34,16 +34,17 @@ enum class EdgeWeights {
 /// file without any vertices takes them from its edges. Throws std::runtime_error "file: what" if
 /// there are too few poses, a vertex of an edge or prior is missing, a weight is not usable, or the
 /// graph is not connected.
-[[nodiscard]] TeamGraph deal_contiguously(const G2oGraph& graph, std::size_t robots,
-                                          const std::string& file);
+[[nodiscard]] TeamGraph partition_contiguously(const G2oGraph& graph, std::size_t robots,
+                                               const std::string& file);
 
 /// Divides the poses of a graph by a given map, which has the robot of every pose and of no other.
-/// Robots are 0 to N - 1, and each has a pose. Otherwise as deal_contiguously().
-[[nodiscard]] TeamGraph deal(const G2oGraph& graph,
-                             const std::map<KeyframeId, std::size_t>& robot_of,
-                             const std::string& file, EdgeWeights weights = EdgeWeights::kAsSeSync);
+/// Robots are 0 to N - 1, and each has a pose. Otherwise as partition_contiguously().
+[[nodiscard]] TeamGraph partition_graph(const G2oGraph& graph,
+                                        const std::map<KeyframeId, std::size_t>& robot_of,
+                                        const std::string& file,
+                                        EdgeWeights weights = EdgeWeights::kAsSeSync);
 
-/// Reads rows "vertex robot" for deal(). Throws std::runtime_error "file:line: what".
+/// Reads rows "vertex robot" for partition_graph(). Throws std::runtime_error "file:line: what".
 [[nodiscard]] std::map<KeyframeId, std::size_t> read_partition(const std::filesystem::path& file);
 
 /// Reads the result of a team's run in `folder`: pose_graph.g2o in the run folder of every robot,
@@ -51,8 +52,8 @@ enum class EdgeWeights {
 /// with the weights kAsSeSync (see read_recorded_graph()). fullGraph.g2o is left out, because it
 /// repeats all edges. Robots are numbered by ascending id. The number of edges between two poses of
 /// two robots is that in the file of the robot from which they start. If that file has none, it is
-/// the number in the file of the other robot. Throws std::runtime_error as deal() does, and if the
-/// file of a robot is missing.
+/// the number in the file of the other robot. Throws std::runtime_error as partition_graph() does,
+/// and if the file of a robot is missing.
 [[nodiscard]] TeamGraph read_team_folder(const std::filesystem::path& folder);
 
 /// Ground truth of a data set on a team's graph, hidden from solvers. A member is empty if the data
@@ -73,7 +74,7 @@ struct LabelledTeamGraph {
 
 /// The team of a JRL file. Robot k is the k-th robot of the file. Edges are in the order of the
 /// measurements and have the weights of robots (kAsTheTeam). `file` names the source in errors.
-/// Throws std::runtime_error as deal() does.
+/// Throws std::runtime_error as partition_graph() does.
 [[nodiscard]] LabelledTeamGraph labelled_team(const JrlGraph& graph, const std::string& file);
 
 }  // namespace km

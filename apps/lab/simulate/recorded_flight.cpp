@@ -137,8 +137,8 @@ std::string bridging(const BridgedPoses& motion) {
   return text.data();
 }
 
-// Removes the tremble of the rotations, and describes the change.
-std::string take_tremble_out(RecordedFlight& flight) {
+// Removes the jitter of the rotations. Returns a description of the change.
+std::string remove_rotation_jitter(RecordedFlight& flight) {
   const SteadiedPoses steadied = steady_rotations(poses_of(flight.truth), flight.imu);
   for (std::size_t k = 0; k < flight.truth.size(); ++k)
     flight.truth[k].T_world_body = steadied.poses[k].T;
@@ -168,7 +168,7 @@ RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu, 
   if (flight.imu.back().stamp <= flight.truth.front().stamp ||
       flight.truth.back().stamp <= flight.imu.front().stamp)
     throw std::runtime_error(truth.string() + " and " + imu.string() + " do not overlap in time");
-  if (steady) flight.fingerprint += take_tremble_out(flight);
+  if (steady) flight.fingerprint += remove_rotation_jitter(flight);
   flight.motion = bridge_gaps(poses_of(flight.truth), flight.imu);
   flight.fingerprint += bridging(flight.motion);
   return flight;

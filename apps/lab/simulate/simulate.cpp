@@ -409,7 +409,7 @@ class Simulation {
     return figures;
   }
 
-  // The lists come last, because a recording without them is invalid.
+  // The lists of images are written last, so that an interrupted recording has none and is refused.
   void finish_robots() {
     for (std::size_t r = 0; r < robots_.size(); ++r) {
       if (is_finished_[r] || *remaining_[r] > 0) continue;

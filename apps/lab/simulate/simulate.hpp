@@ -8,9 +8,9 @@ namespace km {
 
 enum class SimulationOutcome { kComplete, kInterrupted };
 
-/// Makes the recordings of `options` (completed()), or their missing parts. A signal ends it after
-/// the present step or frames, a second one at once. For unusable input and unwritable files throws
-/// an exception with a remedy in its message.
+/// Makes the recordings of `options`, or their missing parts. The options are a result of
+/// completed(). A signal ends the function after the present step or frames, a second signal at
+/// once. Unusable input and unwritable files throw an exception with a remedy in its message.
 [[nodiscard]] SimulationOutcome simulate(const SimulationOptions& options, SignalWatch& signals,
                                          Progress& progress);
 

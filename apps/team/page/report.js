@@ -1,7 +1,7 @@
 // The report of a run: shows the JSON in #run, whose keys report_page.hpp documents. Follows
 // charts.js in one module. Text of the data is inserted as text only, never as HTML.
 
-const STAGES = ['proposed', 'asked for', 'compared', 'verified', 'kept'];  // ClosureStage
+const STAGES = ['candidate', 'requested', 'received', 'verified', 'kept'];  // ClosureStage
 const KEPT = 4, VERIFIED = 3;
 const STAGE_COLORS = ['#8b93a1', '#8b93a1', '#d8746c', '#e8a34c', '#6fdc8c'];
 const SEVERITY_BADGES = {
@@ -110,7 +110,7 @@ function showRobots() {
     {title: 'frames', text: (r) => String(r.frames ?? '–')},
     {title: 'skipped', text: (r) => String(r.frames_skipped ?? '–')},
     {title: 'keyframes', text: (r) => String(r.keyframes ?? '–')},
-    {title: 'proposed', text: closures('candidates')},
+    {title: 'candidates', text: closures('candidates')},
     {title: 'verified', text: closures('verified')},
     {title: 'kept', text: closures('inliers')},
     {title: 'sent', text: (r) => quantity(total(Object.values(r.traffic ?? {})), 'B')},
@@ -272,7 +272,7 @@ function showJudged(section) {
         {title: 'median error [m]', text: ([, s]) => decimals(s.translation_error_m?.median, 3)},
         {title: '[deg]', text: ([, s]) => decimals(s.rotation_error_deg?.median, 2)}
       ],
-      [['proposed', judged.candidates], ['verified', judged.verified], ['kept', judged.inliers]]);
+      [['candidates', judged.candidates], ['verified', judged.verified], ['kept', judged.inliers]]);
 }
 
 // Both images of each closure that has them; rejected closures come first.

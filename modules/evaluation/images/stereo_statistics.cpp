@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kOrbFeatures = 1000;
 constexpr float kRatio = 0.8F;
-constexpr double kOnLine_px = 1.5;
+constexpr double kEpipolarInlier_px = 1.5;
 constexpr double kMinDepth_m = 0.3;
 constexpr double kMaxDepth_m = 60.0;
 constexpr double kKltReturns_px = 1.0;
@@ -100,7 +100,7 @@ void StereoStatistics::add_orb(const OrbImage& left, const cv::Mat& right) {
   for (const cv::DMatch& m : matches) {
     const auto match = judge(left.keypoints[static_cast<std::size_t>(m.queryIdx)].pt,
                              keypoints[static_cast<std::size_t>(m.trainIdx)].pt);
-    if (!match || match->epipolar_error_px > kOnLine_px) continue;
+    if (!match || match->epipolar_error_px > kEpipolarInlier_px) continue;
     ++on_line;
     if (match->depth_m < kMinDepth_m || match->depth_m > kMaxDepth_m) continue;
     ++with_depth;
@@ -132,7 +132,7 @@ void StereoStatistics::add_later_views(const OrbImage& left) {
       if (from.size() < kMinMatches) break;
       cv::Mat inliers;
       cv::findEssentialMat(from, to, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, kRansacConfidence,
-                           kOnLine_px / rig_.cameras[0].fx, inliers);
+                           kEpipolarInlier_px / rig_.cameras[0].fx, inliers);
       lag.inlier_shares.push_back(cv::countNonZero(inliers) / static_cast<double>(from.size()));
       break;
     }
@@ -145,14 +145,14 @@ void StereoStatistics::add_klt(const KltImage& left, const KltImage& right,
   std::vector<cv::Point2f> starts;
   starts.reserve(corners.size());
   for (const cv::Point2f& corner : corners) starts.push_back(at_infinity(corner));
-  const auto trips = round_trip(left, right, corners, std::move(starts));
+  const auto tracks = forward_backward(left, right, corners, std::move(starts));
   int passed = 0;
   int on_line = 0;
-  for (std::size_t i = 0; i < trips.size(); ++i) {
-    if (trips[i].error_px >= kKltReturns_px) continue;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (tracks[i].error_px >= kKltReturns_px) continue;
     ++passed;
-    const auto match = judge(corners[i], trips[i].to);
-    if (!match || match->epipolar_error_px > kOnLine_px) continue;
+    const auto match = judge(corners[i], tracks[i].to);
+    if (!match || match->epipolar_error_px > kEpipolarInlier_px) continue;
     ++on_line;
     klt_errors_px_.push_back(match->epipolar_error_px);
     if (match->depth_m > 0.0) depths_m_.push_back(match->depth_m);

@@ -7,8 +7,8 @@
 
 #include "modules/core/camera.hpp"
 #include "modules/core/stamp.hpp"
+#include "modules/evaluation/images/forward_backward.hpp"
 #include "modules/evaluation/images/image_figure.hpp"
-#include "modules/evaluation/images/round_trip.hpp"
 
 namespace km {
 

@@ -46,10 +46,10 @@ void StillStatistics::add(Stamp stamp, const KltImage& image,
 
 void StillStatistics::compare(const Kept& before, const KltImage& image) {
   std::vector<double> x, y, lengths;
-  const auto trips = round_trip(before.image, image, before.corners);
-  for (std::size_t i = 0; i < trips.size(); ++i) {
-    if (trips[i].error_px >= kReturns_px) continue;
-    const cv::Point2f moved = trips[i].to - before.corners[i];
+  const auto tracks = forward_backward(before.image, image, before.corners);
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (tracks[i].error_px >= kReturns_px) continue;
+    const cv::Point2f moved = tracks[i].to - before.corners[i];
     x.push_back(moved.x);
     y.push_back(moved.y);
     lengths.push_back(std::hypot(moved.x, moved.y));

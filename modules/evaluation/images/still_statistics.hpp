@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "modules/core/stamp.hpp"
+#include "modules/evaluation/images/forward_backward.hpp"
 #include "modules/evaluation/images/image_figure.hpp"
-#include "modules/evaluation/images/round_trip.hpp"
 
 namespace km {
 

@@ -55,15 +55,15 @@ double TrackStatistics::add(Stamp stamp, const KltImage& image,
 TrackStatistics::Step TrackStatistics::one_step(const KltImage& image) const {
   Step step;
   std::vector<double> lengths;
-  const auto trips = round_trip(last_, image, last_corners_);
-  for (std::size_t i = 0; i < trips.size(); ++i) {
-    const cv::Point2f moved = trips[i].to - last_corners_[i];
-    if (trips[i].error_px < kSurvives_px && is_inside(image.image, trips[i].to))
+  const auto tracks = forward_backward(last_, image, last_corners_);
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const cv::Point2f moved = tracks[i].to - last_corners_[i];
+    if (tracks[i].error_px < kSurvives_px && is_inside(image.image, tracks[i].to))
       lengths.push_back(std::hypot(moved.x, moved.y));
-    else if (!is_inside(image.image, trips[i].to, kRim_px))
+    else if (!is_inside(image.image, tracks[i].to, kRim_px))
       ++step.left;
   }
-  step.corners = static_cast<double>(trips.size());
+  step.corners = static_cast<double>(tracks.size());
   step.survived = static_cast<double>(lengths.size());
   step.flow_px = quantile(std::move(lengths), 0.5);
   return step;
@@ -84,12 +84,12 @@ void TrackStatistics::record(const Step& step) {
 
 void TrackStatistics::follow(const KltImage& image, double flow_px) {
   for (TrackSet& set : sets_) {
-    const auto trips = round_trip(last_, image, set.points);
+    const auto tracks = forward_backward(last_, image, set.points);
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < trips.size(); ++i) {
-      if (trips[i].error_px >= kSurvives_px || !is_inside(image.image, trips[i].to)) continue;
-      set.points[kept] = trips[i].to;
-      set.strict[kept] = set.strict[i] && trips[i].error_px < kSurvivesStrictly_px;
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+      if (tracks[i].error_px >= kSurvives_px || !is_inside(image.image, tracks[i].to)) continue;
+      set.points[kept] = tracks[i].to;
+      set.strict[kept] = set.strict[i] && tracks[i].error_px < kSurvivesStrictly_px;
       ++kept;
     }
     set.points.resize(kept);

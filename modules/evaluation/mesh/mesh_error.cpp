@@ -135,7 +135,7 @@ PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
     matches.surface_m[i] = near->surface_m;
     matches.labels[i] = to.mesh.face_label(near->face);
     const Eigen::Vector3f normal = normal_of(from.mesh, from.samples.faces[i]);
-    in_front[i] = !near->past_rim && normal.dot(normal_of(to.mesh, near->face)) > 0.0F ? 1 : 0;
+    in_front[i] = !near->past_boundary && normal.dot(normal_of(to.mesh, near->face)) > 0.0F ? 1 : 0;
   };
   for (std::size_t start = 0; start < count; start += kChunk) {
     if (progress) progress(stage, static_cast<double>(start) / static_cast<double>(count));

@@ -174,7 +174,7 @@ std::uint64_t edge_key(std::uint32_t a, std::uint32_t b) {
 
 }  // namespace
 
-MeshRim::MeshRim(const LabelledMesh& mesh) : faces_(mesh.faces.size(), 0) {
+MeshBoundary::MeshBoundary(const LabelledMesh& mesh) : faces_(mesh.faces.size(), 0) {
   const std::vector<std::uint32_t> vertex = first_at_place(mesh);
   const auto corner = [&](std::size_t face, int k) {
     return vertex[mesh.faces[face][static_cast<std::size_t>(k % 3)]];
@@ -275,7 +275,7 @@ struct NearestSurface::Tree {
 
   const LabelledMesh& mesh;
   const SurfaceSamples& samples;
-  MeshRim rim;
+  MeshBoundary rim;
   Cloud cloud;
   Index index;  // refers to cloud
 };
@@ -312,8 +312,8 @@ std::optional<NearestSample> NearestSurface::find(const Eigen::Vector3f& point,
     best = other;
   }
   result.surface_m = std::min(result.distance_m, static_cast<float>(best.distance_m));
-  result.past_rim = (best.edge >= 0 && tree_->rim.has_edge(result.face, best.edge)) ||
-                    (best.corner >= 0 && tree_->rim.has_corner(result.face, best.corner));
+  result.past_boundary = (best.edge >= 0 && tree_->rim.has_edge(result.face, best.edge)) ||
+                         (best.corner >= 0 && tree_->rim.has_corner(result.face, best.corner));
   return result;
 }
 

@@ -64,17 +64,17 @@ struct SurfaceSamples {
     const NearbyCells* only_near = nullptr,
     std::size_t max_points = std::numeric_limits<std::size_t>::max());
 
-/// Rim of a mesh: edges that only one face has. Vertices at the same position count as one.
-class MeshRim {
+/// Boundary of a mesh: edges that only one face has. Vertices at the same position count as one.
+class MeshBoundary {
  public:
-  explicit MeshRim(const LabelledMesh& mesh);
+  explicit MeshBoundary(const LabelledMesh& mesh);
 
   /// The edge from corner k to corner k + 1 (of 3) of a face.
   [[nodiscard]] bool has_edge(std::size_t face, int k) const {
     return (faces_[face] >> k & 1U) != 0;
   }
 
-  /// Whether corner k of a face is on an edge of the rim, possibly of another face.
+  /// Whether corner k of a face is on an edge of the boundary, possibly of another face.
   [[nodiscard]] bool has_corner(std::size_t face, int k) const {
     return (faces_[face] >> (3 + k) & 1U) != 0;
   }
@@ -93,7 +93,7 @@ struct NearestSample {
   /// to the mesh.
   std::uint32_t face = 0;
   float surface_m = 0.0F;
-  bool past_rim = false;  ///< The nearest point of that face is on the rim of the mesh.
+  bool past_boundary = false;  ///< The nearest point of that face is on the boundary of the mesh.
 };
 
 /// Finds the nearest of a mesh's samples in a k-d tree. Mesh and samples must outlive this object.

@@ -163,7 +163,7 @@ TEST_CASE("Live topics without a publisher are not sound: the doctor's exit code
       kDoctor + " --live " + rig.string() +
       " --set ros.interface=lo --set ros.domain=" + std::to_string(std::random_device()() % 90));
   CHECK(run.exit_code == 2);
-  CHECK_THAT(run.output, Catch::Contains("live.nobody") && !Catch::Contains("sound"));
+  CHECK_THAT(run.output, Catch::Contains("live.no_publishers") && !Catch::Contains("sound"));
 }
 
 namespace {
@@ -218,7 +218,7 @@ TEST_CASE("The doctor finds that a peer is out of reach, or that no robot runs t
   VirtualNetwork network(2);
   const std::string peer = VirtualNetwork::address(2);
   const Look reached(network, {"--peers", peer});
-  CHECK(reached.ids() == "network.nobody ");
+  CHECK(reached.ids() == "network.no_peers ");
   CHECK_THAT(reached.figure("peer " + peer), Catch::Contains("0 of 20 lost"));
   network.set_link(2, false);
   const Look lost(network, {"--peers", peer});

@@ -31,8 +31,8 @@ TEST_CASE("The reason why a live topic is silent follows from the publishers", "
     return the_finding(examine_topics(wanted, publishers, 3.0, 0));
   };
   CHECK(why({{"/imu", kImu, false}}).id == "live.silent");
-  CHECK_THAT(why({{"/imu", kImu, false}}).what, Contains("nobody publishes it"));
-  CHECK_THAT(why({{"/left", kImage, true}}).what, Contains("though somebody publishes it"));
+  CHECK_THAT(why({{"/imu", kImu, false}}).what, Contains("no program publishes it"));
+  CHECK_THAT(why({{"/left", kImage, true}}).what, Contains("although a program publishes it"));
   CHECK(why({{"/left", "sensor_msgs/msg/CompressedImage", true}}).id == "live.other_type");
   CHECK(why({{"/cam/left", "sensor_msgs/Image", true}}).id == "live.similar_name");
   const auto begins_most_alike = why({{"/cam/left", kImage, true}, {"/left/image", kImage, true}});
@@ -49,7 +49,7 @@ TEST_CASE("If there is no publisher at all, one finding reports it, whatever top
   const auto result = examine_topics({{"/left", kImage, 0}, {"/imu", kImu, 0}}, {}, 3.0, 7);
   REQUIRE(result.findings.size() == 1);
   CHECK(result.figures.size() == 2);
-  CHECK(result.findings[0].id == "live.nobody");
+  CHECK(result.findings[0].id == "live.no_publishers");
   CHECK_THAT(result.findings[0].what, Catch::Contains("domain 7"));
 }
 

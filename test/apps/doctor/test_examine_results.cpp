@@ -52,7 +52,7 @@ TEST_CASE("The doctor gives the reason why robots did not join, from all files",
           "0,5,1,6,0.5,inlier,60,39,1,2,3,0,0,0,1,\"\"\n");
   results.folder.write(
       "bob/loop_closures.csv",
-      std::string(kHeader) + "0,7,1,8,0.5,candidate,0,0,,,,,,,,\"not asked for\"\n");
+      std::string(kHeader) + "0,7,1,8,0.5,candidate,0,0,,,,,,,,\"not requested\"\n");
   CHECK(are_results(results.folder.path()));
   const Examination result = examine_results(results.folder.path());
   CHECK_THAT(to_text(result.findings),
@@ -95,7 +95,7 @@ TEST_CASE("The folder of a robot that was killed is no recording, and the messag
   const Results results;
   const auto bob = results.folder.path() / "bob";
   std::filesystem::remove(bob / "summary.json");
-  results.folder.write("bob/process.csv", "seconds\n");
+  results.folder.write("bob/run.journal", "");
   for (const auto& folder : {bob, results.folder.path()}) {
     CAPTURE(folder);
     REQUIRE(are_results(folder));

@@ -14,8 +14,8 @@ namespace {
 const NetworkInterface kEthernet{
     .name = "eth0", .address = "10.0.0.1", .multicast = true, .loopback = false};
 
-Announced robot(RobotId id, const std::string& name, int domain = 42,
-                const std::string& team = "kimera-multi") {
+AnnouncedParticipant robot(RobotId id, const std::string& name, int domain = 42,
+                           const std::string& team = "kimera-multi") {
   const RobotIdentity identity{.robot = id, .name = name, .boot = 0x10000U + id};
   return {.domain = domain,
           .team = team,
@@ -138,16 +138,16 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
     CHECK(ids_of(facts) == "warning network.loss ");
     facts.echoes[0] = {.host = "10.0.0.2", .sent = 20, .received = 20, .median_s = 0.4};
     CHECK(ids_of(facts) == "warning network.slow ");
-    facts.echoes[0] = {.host = "10.0.0.2", .may_ask = false};
+    facts.echoes[0] = {.host = "10.0.0.2", .may_send_icmp = false};
     facts.received.clear();
     facts.announced.clear();
-    CHECK(ids_of(facts) == "warning network.nobody ");
+    CHECK(ids_of(facts) == "warning network.no_peers ");
   }
   SECTION("no other robot") {
     facts.announced.clear();
-    CHECK(ids_of(facts) == "note network.nobody ");
+    CHECK(ids_of(facts) == "note network.no_peers ");
     CHECK(examine_network(facts).findings[0].what ==
-          "nobody else was seen: no robot on any domain in 5.0 s");
+          "no robot announced itself on any domain in 5.0 s");
     facts.announced = {robot(7, "alice", 43)};  // the other domain is the reason
     CHECK(ids_of(facts) == "warning network.other_domain ");
   }

@@ -23,11 +23,11 @@ std::shared_ptr<const RosNetwork> network() {
   return shared;
 }
 
-std::unique_ptr<ListedBag> samples(const std::string& topic = "/imu") {
+std::unique_ptr<ListedBag> samples(const std::string& topic = "/imu", Stamp period = kPeriod) {
   auto bag = std::make_unique<ListedBag>();
   for (int k = 0; k < kMessages; ++k) {
     RosImu message;
-    message.header.stamp = kFirst + k * kPeriod;
+    message.header.stamp = kFirst + k * period;
     bag->add(topic, message);
   }
   return bag;
@@ -65,14 +65,14 @@ TEST_CASE("A recording is played in its order and pace", "[publish]") {
 }
 
 TEST_CASE("A part of a recording is played without waiting for its start", "[publish]") {
+  constexpr Stamp kMinute = 60'000'000'000;
   PlayedTopic topic;
   const auto begin = std::chrono::steady_clock::now();
-  const auto stamps =
-      played(samples("/part"), "/part", {.rate = 1e-1, .from_s = 0.15, .to_s = 0.16}, topic);
-  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(1));  // 1.5 s up to there
-  REQUIRE(stamps.size() == 10);
-  CHECK(stamps.front() == kFirst + 150 * kPeriod);
-  CHECK(stamps.back() == kFirst + 159 * kPeriod);
+  const auto stamps = played(samples("/part", kMinute), "/part",
+                             {.rate = 60.0, .from_s = 9000.0, .to_s = 9060.0}, topic);
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(150));  // that of the wait
+  REQUIRE(stamps.size() == 1);
+  CHECK(stamps.front() == kFirst + 150 * kMinute);
 }
 
 TEST_CASE("A bad driver loses and delays messages, the same ones for a seed", "[publish]") {
@@ -92,7 +92,7 @@ TEST_CASE("Unknown topics are left out and broken messages are counted", "[publi
   bag->add_bytes("/scan", "sensor_msgs/LaserScan", kFirst, {0, 1, 0, 0});
   bag->add_bytes("/c", RosImu::kType, kFirst, {0, 0, 0, 0, 1});  // big-endian, and cut
   MessagePlayer player(std::move(bag), network(), {.rate = 100.0});
-  CHECK(player.left_out() == std::vector<std::string>{"/scan (sensor_msgs/LaserScan)"});
+  CHECK(player.unsupported_topics() == std::vector<std::string>{"/scan (sensor_msgs/LaserScan)"});
   while (player.step()) {
   }
   REQUIRE(player.topics().size() == 1);

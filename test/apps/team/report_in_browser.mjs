@@ -37,7 +37,7 @@ try {
   const rows = '#closures > div:not(.scroll, #images) tbody tr';
   assert.equal(await count(rows), 2);
   await page.evaluate(`[...document.querySelectorAll('#closures .pick button')].find(
-      (button) => button.textContent === 'compared 1').click()`);
+      (button) => button.textContent === 'received 1').click()`);
   assert.equal(await count(rows), 1);
   assert.match(await textOf(rows), /r0 1.*r1 2.*no pose/);
 

@@ -39,9 +39,9 @@ struct Team {
 };
 
 // Capacity of a second and delay, at the time.
-std::pair<double, double> course(const LinkPlan& link, double time_s) {
-  return {link.course.capacity_until(time_s + 1.0) - link.course.capacity_until(time_s),
-          link.course.delay_s(time_s)};
+std::pair<double, double> trace(const LinkPlan& link, double time_s) {
+  return {link.trace.capacity_until(time_s + 1.0) - link.trace.capacity_until(time_s),
+          link.trace.delay_s(time_s)};
 }
 
 }  // namespace
@@ -50,8 +50,8 @@ TEST_CASE("An empty file of links makes perfect ones", "[links]") {
   LinkScript script = Team().script("");
   CHECK(script.robots == 3);
   REQUIRE(script.links.size() == 9);
-  CHECK_FALSE(script.link(0, 1).course.has_limit());
-  CHECK(script.link(0, 1).course.delay_s(5.0) == 0.0);
+  CHECK_FALSE(script.link(0, 1).trace.has_limit());
+  CHECK(script.link(0, 1).trace.delay_s(5.0) == 0.0);
   CHECK(script.link(0, 1).loss == 0.0);
   CHECK(script.link(0, 1).outages.empty());
   CHECK(script.partitions.empty());
@@ -69,8 +69,8 @@ TEST_CASE("Keys of a pair override keys of all links", "[links]") {
   CHECK(script.link(0, 1).loss == 0.5);
   CHECK(script.link(1, 0).loss == 0.5);
   CHECK(script.link(0, 2).loss == 0.1);
-  CHECK(course(script.link(0, 1), 3.0) == std::pair(1000.0, 0.02));
-  CHECK(course(script.link(1, 0), 3.0) == std::pair(99.0, 0.02));
+  CHECK(trace(script.link(0, 1), 3.0) == std::pair(1000.0, 0.02));
+  CHECK(trace(script.link(1, 0), 3.0) == std::pair(99.0, 0.02));
   CHECK(script.link(1, 0).jitter_s == 0.01);
   CHECK(script.link(1, 0).queue_bytes == 5000.0);
   REQUIRE(script.link(1, 0).outages.size() == 2);
@@ -85,8 +85,8 @@ TEST_CASE("A trace takes the place of rate and delay, and they of it", "[links]"
   team.folder.write("radio.csv", "0,100,0.5\n10,300,0.7\n");
   LinkScript script = team.script(
       "trace: radio.csv\ndelay_s: 0.1\npairs:\n  - {from: a, to: b, rate_bytes_per_s: 50}\n");
-  CHECK(course(script.link(0, 2), 20.0) == std::pair(300.0, 0.7));
-  CHECK(course(script.link(0, 1), 20.0) == std::pair(50.0, 0.1));
+  CHECK(trace(script.link(0, 2), 20.0) == std::pair(300.0, 0.7));
+  CHECK(trace(script.link(0, 1), 20.0) == std::pair(50.0, 0.1));
   team.folder.write("radio.csv", "0,100,0.5\n10,300\n");
   CHECK_THAT(team.problems("trace: radio.csv\n"), Catch::Contains("radio.csv:2: 2 fields"));
 }

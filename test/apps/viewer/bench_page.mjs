@@ -41,18 +41,61 @@ function writeHills(file, faces) {
   writeFileSync(file, Buffer.concat([head, body]));
 }
 
+// An entry of run.journal, see modules/journal.
+function journalEntry(time_ns, bytes) {
+  const mask = (1n << 64n) - 1n;
+  let sum = 0xcbf29ce484222325n;
+  const mix = (value) => {
+    for (let byte = 0n; byte < 64n; byte += 8n)
+      sum = ((sum ^ ((value >> byte) & 0xffn)) * 0x100000001b3n) & mask;
+  };
+  mix(BigInt(bytes.length));
+  mix(time_ns);
+  const words = Buffer.concat([bytes, Buffer.alloc(7)]);
+  for (let at = 0; at < bytes.length; at += 8) mix(words.readBigUInt64LE(at));
+  const head = Buffer.alloc(12), tail = Buffer.alloc(8);
+  head.writeUInt32LE(bytes.length);
+  head.writeBigUInt64LE(time_ns, 4);
+  tail.writeBigUInt64LE(sum);
+  return Buffer.concat([Buffer.from('\x7fKMJRNL2', 'latin1'), head, bytes, tail]);
+}
+
+function doubles(values) {
+  const bytes = Buffer.alloc(8 * values.length);
+  values.forEach((value, i) => bytes.writeDoubleLE(value, 8 * i));
+  return bytes;
+}
+
+function stateAt(time_s) {
+  const stamp = Buffer.alloc(8);
+  stamp.writeBigUInt64LE(BigInt(Math.round(1e9 * (1000 + time_s))));
+  const position = [30 + 25 * Math.sin(0.02 * time_s), 0.1 * time_s, 2];
+  const pose = [1, 0, 0, 0, 1, 0, 0, 0, 1, ...position];
+  return Buffer.concat([Buffer.from([1]), stamp, doubles([...pose, ...Array(9).fill(0)])]);
+}
+
+function sampleOf(name) {
+  return Buffer.concat([
+    Buffer.from([9, name.length]), Buffer.from(name), Buffer.from([0]), doubles([600]),
+    Buffer.from([0, 0, 0, 0, 0]), doubles([0, 0, 0, 0]), Buffer.from([0, 0, 0])
+  ]);
+}
+
 function writeRun(folder, faces) {
+  const start_ns = 1_700_000_000_000_000_000n;
   for (let robot = 0; robot < 3; ++robot) {
     const own = join(folder, `robot${robot}`);
     mkdirSync(own, {recursive: true});
     const summary =
         {robot, name: `robot${robot}`, seconds: 600, pgo: {anchor: robot, members: [robot]}};
     writeFileSync(join(own, 'summary.json'), JSON.stringify(summary));
-    let odometry = '';
-    for (let i = 0; i < 12000; ++i)
-      odometry += `${(1000 + 0.05 * i).toFixed(2)} ${(30 + 25 * Math.sin(0.001 * i)).toFixed(3)} ${
-          (0.005 * i).toFixed(3)} 2 0 0 0 1\n`;
-    writeFileSync(join(own, 'odometry.tum'), odometry);
+    const journal = [
+      journalEntry(start_ns, Buffer.from([0, robot, 1, 0])),
+      journalEntry(start_ns, sampleOf(`robot${robot}`))
+    ];
+    for (let i = 0; i < 1200; ++i)
+      journal.push(journalEntry(start_ns + 500_000_000n * BigInt(i), stateAt(0.5 * i)));
+    writeFileSync(join(own, 'run.journal'), Buffer.concat(journal));
     writeHills(join(own, 'mesh_optimized.ply'), faces / 3);
   }
 }

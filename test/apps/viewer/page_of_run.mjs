@@ -34,7 +34,8 @@ try {
   const badge = (page) => page.evaluate(`document.getElementById('link').textContent`);
   assert.equal(await badge(page), 'finished run');
   const lastUpdates = await page.evaluate(
-      `[...document.querySelectorAll('#robots dd:first-of-type')].map((d) => d.textContent)`);
+      `[...document.querySelectorAll('#robots dt')].filter((term) =>
+        term.textContent === 'Last update').map((term) => term.nextSibling.textContent)`);
   assert.ok(lastUpdates[0].startsWith('at '), lastUpdates[0]);
   await page.until(  // charts come a little later
       `/sensors|odometry|vio/.test([...document.querySelectorAll('#right > div')].at(-1).textContent)`);

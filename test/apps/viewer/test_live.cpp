@@ -42,7 +42,7 @@ TEST_CASE("Messages of the robots of a domain are shown in the page, and recorde
   while (writer.readers() == 0 && Process::TimePoint::clock::now() < deadline)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   REQUIRE(writer.readers() == 1);
-  ViewState state;
+  RobotSample state;
   state.name = "alpha";
   state.phase = "running";
   state.keyframes = 4711;

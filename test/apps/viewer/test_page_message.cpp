@@ -26,7 +26,7 @@ std::pair<json, std::string> parts_of(const PageMessage& message) {
 }
 
 TEST_CASE("A state is sent with its members' names", "[page_message]") {
-  ViewState state;
+  RobotSample state;
   state.name =
       "ro\xff"
       "bot";
@@ -61,7 +61,7 @@ TEST_CASE("Poses are position and quaternion, x first", "[page_message]") {
 }
 
 TEST_CASE("A closure is sent with its verdict and the reason", "[page_message]") {
-  const ViewClosure closure{closure_id({1, 2}, {0, 4}), ViewVerdict::kRejected, 30, 8, "too far"};
+  const ViewClosure closure{closure_id({1, 2}, {0, 4}), ClosureStatus::kRejected, 30, 8, "too far"};
   CHECK(text_of({0, 1, 0, ViewClosures{{closure}}})["closures"] ==
         json::parse(R"([[0, 4, 1, 2, "rejected", 30, 8, "too far"]])"));
 }

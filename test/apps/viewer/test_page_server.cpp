@@ -102,7 +102,7 @@ TEST_CASE("Other hosts need the token", "[page_server]") {
 }
 
 ViewUpdate state_of(const std::string& name) {
-  ViewState state;
+  RobotSample state;
   state.name = name;
   return {3, 1, 0, state};
 }

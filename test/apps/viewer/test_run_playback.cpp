@@ -19,91 +19,128 @@ std::vector<std::pair<double, T>> updates_of(const RunPlayback& run, RobotId rob
   return found;
 }
 
-TEST_CASE("The updates of a run are in the order of time, and the last ones are its end",
+TEST_CASE("The updates of a run are in the order of time, and begin when asked to",
           "[run_playback]") {
   const SmallRun files;
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   CHECK(run.notes.empty());
+  REQUIRE_FALSE(run.updates.empty());
+  CHECK(run.updates.front().sent == kBegin);
   for (std::size_t i = 1; i < run.updates.size(); ++i)
     REQUIRE(run.updates[i - 1].sent <= run.updates[i].sent);
-  const auto states = updates_of<ViewState>(run, 1);
-  REQUIRE(states.size() == 12);
-  const auto& [end_s, last] = states.back();
-  CHECK(end_s == Approx(12.0));
-  CHECK(last.phase == "settled");
-  CHECK(last.keyframes == 3);
-  CHECK(last.cost == 7.0);
-  CHECK(last.cpu_s == 6.0);
-  CHECK(last.dataset_time_s == Approx(10.0));
-  REQUIRE(last.links.size() == 1);
-  CHECK(last.links[0].silent_s == Approx(6.0F));
-  REQUIRE(last.sent_bytes.size() == 1);
-  CHECK(last.sent_bytes[0].value == 255.0);  // including 55 that were sent again
-  REQUIRE(last.loads.size() == 1);
-  CHECK(last.loads[0].value == Approx(0.25));
 }
 
-TEST_CASE("Robots join with the first closure of theirs that was kept", "[run_playback]") {
+TEST_CASE("States are shown as they were sampled", "[run_playback]") {
+  const SmallRun files;
+  const auto states = updates_of<RobotSample>(read_run(files.folder.path(), kBegin), 1);
+  REQUIRE(states.size() == 12);
+  for (int t = 1; t <= 12; ++t) {
+    const auto& [time_s, state] = states[static_cast<std::size_t>(t) - 1];
+    CHECK(time_s == Approx(t));
+    CHECK(state.cpu_s == 0.5 * t);
+    CHECK(state.anchor == (t < 4.5 ? 1 : 0));
+    CHECK(state.cost == (t < 4.5 ? 0.0 : 7.0));
+  }
+  const RobotSample& last = states.back().second;
+  CHECK(last.phase == "leaving");
+  CHECK(last.keyframes == 3);
+  CHECK(last.dataset_time_s == 10.0);
+  REQUIRE(last.links.size() == 1);
+  REQUIRE(last.sent_bytes.size() == 1);
+  CHECK(last.sent_bytes[0].value == 1200.0);
+  REQUIRE(last.loads.size() == 1);
+}
+
+TEST_CASE("Poses are shown from the time at which they were known", "[run_playback]") {
   const SmallRun files;
   const RunPlayback run = read_run(files.folder.path(), kBegin);
-  for (const auto& [time_s, state] : updates_of<ViewState>(run, 1)) {
-    CAPTURE(time_s);
-    CHECK(state.anchor == (time_s < 4.5 ? 1 : 0));
-    CHECK(state.cost == (time_s < 2.25 ? 0.0 : time_s < 5.0 ? 5.0 : 7.0));
-  }
-  std::vector<double> optimized_s;
+  std::size_t odometry = 0, optimized = 0;
   for (const auto& [time_s, keyframes] : updates_of<ViewKeyframes>(run, 1)) {
-    if (!keyframes.optimized) continue;
-    optimized_s.push_back(time_s);
-    CHECK(keyframes.anchor == 0);
-    CHECK(keyframes.first == (time_s < 7.0 ? 0 : 2));
-    CHECK(keyframes.T_world_kf.size() == (time_s < 7.0 ? 2 : 1));
-    CHECK(keyframes.T_world_kf.front().translation().y() == Approx(3.0));
+    CAPTURE(time_s, keyframes.first);
+    const double known_s = !keyframes.optimized  ? 4.0 * keyframes.first
+                           : keyframes.first < 2 ? 4.5
+                                                 : 8.1;
+    CHECK(time_s >= known_s - 1e-6);
+    CHECK(time_s <= known_s + 1.1);  // Keyframes are sent once a second.
+    CHECK(keyframes.anchor == (keyframes.optimized ? 0 : 1));
+    (keyframes.optimized ? optimized : odometry) += keyframes.T_world_kf.size();
+    CHECK(keyframes.T_world_kf.front().translation().y() == (keyframes.optimized ? 3.0 : 0.0));
   }
-  CHECK(optimized_s == std::vector<double>{4.5, 8.0});
+  CHECK(odometry == 3);
+  CHECK(optimized == 3);
+  CHECK(updates_of<ViewPose>(run, 1).size() >= 20);  // two a second at least, in 10 s
 }
 
-TEST_CASE("The mesh appears when the robot is near, and is replaced once the robot joins",
-          "[run_playback]") {
+TEST_CASE("A mesh chunk is shown in the frame and from the time of its cell", "[run_playback]") {
   const SmallRun files;
   const auto chunks = updates_of<MeshChunk>(read_run(files.folder.path(), kBegin), 1);
   REQUIRE(chunks.size() == 4);
-  CHECK(chunks[0].first == Approx(0.5).margin(0.11));
+  CHECK(chunks[0].first == Approx(0.5));
   CHECK(chunks[0].second.anchor == 1);
-  CHECK(chunks[1].first == Approx(4.5));  // the end of the former
+  CHECK(chunks[1].first == Approx(4.6));  // the end of the former
   CHECK(chunks[1].second.empty());
   CHECK(chunks[1].second.key == chunks[0].second.key);
-  CHECK(chunks[2].first == Approx(4.5));
+  CHECK(chunks[2].first == Approx(4.6));
   CHECK(chunks[2].second.anchor == 0);
-  CHECK(chunks[3].first == Approx(9.5).margin(0.11));
+  CHECK(chunks[3].first == Approx(12.0));  // no event names it
 }
 
-TEST_CASE("A closure appears when both keyframes exist, then with its outcome", "[run_playback]") {
+TEST_CASE("A closure is shown with each of its stages", "[run_playback]") {
   const SmallRun files;
-  const auto closures = updates_of<ViewClosures>(read_run(files.folder.path(), kBegin), 0);
-  REQUIRE(closures.size() == 4);
-  CHECK(closures[0].first == Approx(4.0));
-  CHECK(closures[0].second.closures[0].verdict == ViewVerdict::kCandidate);
-  CHECK(closures[1].first == Approx(4.5));
-  CHECK(closures[1].second.closures[0].verdict == ViewVerdict::kKept);
-  CHECK(closures[1].second.closures[0].inliers == 60);
-  CHECK(closures[2].first == Approx(8.0));
-  CHECK(closures[2].second.closures[0].verdict == ViewVerdict::kCandidate);
-  CHECK(closures[3].second.closures[0].verdict == ViewVerdict::kRejected);
-  CHECK(closures[3].second.closures[0].reason == "no pose");
+  std::vector<std::pair<double, ViewClosure>> closures;
+  for (const auto& [time_s, update] :
+       updates_of<ViewClosures>(read_run(files.folder.path(), kBegin), 0))
+    for (const ViewClosure& closure : update.closures) closures.emplace_back(time_s, closure);
+  REQUIRE(closures.size() == 5);
+  const std::vector<std::pair<double, ClosureStatus>> expected = {{4.0, ClosureStatus::kCandidate},
+                                                                  {4.2, ClosureStatus::kVerified},
+                                                                  {4.5, ClosureStatus::kKept},
+                                                                  {8.0, ClosureStatus::kCandidate},
+                                                                  {8.5, ClosureStatus::kRejected}};
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    CHECK(closures[k].first == Approx(expected[k].first));
+    CHECK(closures[k].second.verdict == expected[k].second);
+  }
+  CHECK(closures[2].second.inliers == 60);
+  CHECK(closures[4].second.reason == "no pose");
 }
 
-TEST_CASE("Missing parts of a run are noted, and a folder without a run is refused",
+TEST_CASE("A resumed process shows what it has restored, under its own boot id", "[run_playback]") {
+  const SmallRun files;
+  JournalFile journal(files.of(0) / kJournal,
+                      read_journal(files.of(0) / kJournal, [](const auto&) {}));
+  const Stamp later = 1'700'000'000'000'000'000 + nanoseconds(86400.0);
+  journal.add(JournalStart{0, 8, "line"}, later);
+  journal.add(RobotSample{.name = "r0", .keyframes = 3}, later + 1);
+  journal.sync();
+  const RunPlayback run = read_run(files.folder.path(), kBegin);
+  std::size_t odometry = 0, verified = 0;
+  for (const ViewUpdate& update : run.updates) {
+    if (update.boot != 8) continue;
+    CHECK(seconds_between(kBegin, update.sent) < 12.0 + kMaxPause_s + 1.0);
+    if (const auto* keyframes = std::get_if<ViewKeyframes>(&update.content))
+      odometry += keyframes->T_world_kf.size();
+    if (const auto* closures = std::get_if<ViewClosures>(&update.content))
+      for (const ViewClosure& closure : closures->closures)
+        verified += closure.verdict == ClosureStatus::kVerified ? 1 : 0;
+  }
+  CHECK(odometry == 3);
+  CHECK(verified == 1);
+}
+
+TEST_CASE("Damaged and missing files are noted, and a folder without a run is refused",
           "[run_playback]") {
   const SmallRun files;
-  std::filesystem::remove(files.folder.path() / "r0/timing.csv");
-  files.folder.write("r1/traffic.csv", "time_s\n1,out\n");
+  std::string journal = files.folder.read("r0/run.journal");
+  journal[2000] ^= 1;
+  files.folder.write("r0/run.journal", journal);
+  files.folder.write("r1/mesh_optimized.ply", "no mesh");
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   REQUIRE(run.notes.size() == 2);
-  CHECK_THAT(run.notes[0], Catch::Contains("r0/timing.csv"));
-  CHECK_THAT(run.notes[1], Catch::Contains("r1/traffic.csv line 2: fewer than 8 fields"));
-  CHECK(updates_of<ViewState>(run, 0).size() == 12);
-  CHECK(read_run(files.folder.path() / "r0", kBegin).updates.size() > 10);  // one robot's
+  CHECK_THAT(run.notes[0], Catch::Contains("r0/run.journal: ") && Catch::Contains("are damaged"));
+  CHECK_THAT(run.notes[1], Catch::Contains("r1/mesh_optimized.ply"));
+  CHECK(updates_of<RobotSample>(run, 0).size() == 12);
+  CHECK(read_run(files.of(0), kBegin).updates.size() > 10);  // one robot's
 
   const TemporaryFolder empty;
   CHECK_THROWS_WITH(read_run(empty.path(), 0), Catch::Contains("no results in it"));
@@ -112,16 +149,15 @@ TEST_CASE("Missing parts of a run are noted, and a folder without a run is refus
                     Catch::Contains("a file, not the folder of a run"));
 }
 
-TEST_CASE("Robots that were killed are named, with the way on", "[run_playback]") {
+TEST_CASE("A robot that was killed is shown up to its end, and noted with the remedy",
+          "[run_playback]") {
   const SmallRun files;
-  const std::filesystem::path killed = files.folder.path() / "r1";
-  std::filesystem::remove(killed / "summary.json");
+  std::filesystem::remove(files.of(1) / kSummary);
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   REQUIRE(run.notes.size() == 1);
   CHECK_THAT(run.notes[0], Catch::Contains("r1: no summary.json: the robot still runs, or was") &&
-                               Catch::Contains("--resume " + killed.string()));
-  CHECK_FALSE(run.updates.empty());
-  CHECK_THROWS_WITH(read_run(killed, kBegin), Catch::Contains("--resume"));
+                               Catch::Contains("--resume " + files.of(1).string()));
+  CHECK(updates_of<RobotSample>(run, 1).size() == 12);
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ std::vector<ViewUpdate> team() {
   for (const RobotId robot : {RobotId{0}, RobotId{1}}) {
     const auto add = [&](ViewContent content) { all.push_back({robot, 9, 0, std::move(content)}); };
     const Stamp begin = kBegin + robot * 10 * kSecond;
-    add(ViewState{.name = robot == 0 ? "alice" : "bob", .phase = "running"});
+    add(RobotSample{.name = robot == 0 ? "alice" : "bob", .phase = "running"});
     add(ViewKeyframes{false,
                       robot,
                       0,
@@ -53,7 +53,7 @@ std::vector<ViewUpdate> team() {
     const double y = 2.0 * robot;
     add(ViewKeyframes{true, 0, 0, {at(0, y), at(1, y), at(2, y)}});
     add(ViewPose{begin + 5 * kSecond / 2, at(2.5, 0)});
-    add(ViewClosures{{{kClosure, ViewVerdict::kKept, 80, 60, ""}}});
+    add(ViewClosures{{{kClosure, ClosureStatus::kKept, 80, 60, ""}}});
     add(ViewImage{.stamp = begin, .jpeg = {0xFF, 0xD8}, .features = {}});
     LabelledMesh sheet = wavy_sheet(4, 0.1);
     sheet.labels.assign(sheet.vertices.size(), 5);
@@ -157,7 +157,7 @@ TEST_CASE("A robot that was started again begins its path from scratch", "[viewe
   const fs::path file = folder.path() / "team.mcap";
   ViewRecorder recorder(file, {});
   for (const ViewUpdate& update : team()) recorder.add(update);
-  recorder.add({1, 10, 0, ViewState{.name = "bob", .phase = "running"}});
+  recorder.add({1, 10, 0, RobotSample{.name = "bob", .phase = "running"}});
   recorder.add({1, 10, 0, ViewKeyframes{false, 1, 0, {at(0, 0)}, {kBegin + 60 * kSecond}}});
   recorder.add({1, 10, 0, ViewKeyframes{true, 1, 0, {at(7, 0)}}});
   recorder.finish();
@@ -172,7 +172,7 @@ TEST_CASE("After a robot has left or is silent, a record has no more of its mess
   const fs::path file = folder.path() / "team.mcap";
   ViewRecorder recorder(file, {}, kGone_s);
   const auto add = [&recorder](RobotId robot, const std::string& name, const std::string& phase) {
-    recorder.add({robot, 9, 0, ViewState{.name = name, .phase = phase}});
+    recorder.add({robot, 9, 0, RobotSample{.name = name, .phase = phase}});
   };
   for (const ViewUpdate& update : team()) recorder.add(update);
   add(2, "carol", "leaving");

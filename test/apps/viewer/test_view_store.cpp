@@ -101,7 +101,7 @@ TEST_CASE("Messages of an ended process of a robot no longer count", "[view_stor
 
 TEST_CASE("A message that is repeated without a change reaches pages once", "[view_store]") {
   ViewStore store(1'000'000);
-  const auto closures = [](ViewVerdict first, ViewVerdict second) {
+  const auto closures = [](ClosureStatus first, ClosureStatus second) {
     return ViewUpdate{
         0, 1, 0,
         ViewClosures{{{{{0, 1}, {1, 1}}, first, 9, 8, {}}, {{{0, 2}, {1, 2}}, second, 9, 8, {}}}}};
@@ -114,7 +114,7 @@ TEST_CASE("A message that is repeated without a change reaches pages once", "[vi
     update.sent = 5;
     return update;
   };
-  using enum ViewVerdict;
+  using enum ClosureStatus;
   for (const ViewUpdate& update :
        {chunk(0, 10), keyframes(1.0), closures(kVerified, kCandidate), pose(0)}) {
     store.add(update);         // 0 to 3

@@ -15,12 +15,12 @@ CameraCalibration some_calibration(std::mt19937& rng) {
   return calibration;
 }
 
-TEST_CASE("The offset to a moved calibration is its motion", "[calibration]") {
+TEST_CASE("local_coordinates_to() is the inverse of retracted()", "[calibration]") {
   std::mt19937 rng(1);
   const CameraCalibration calibration = some_calibration(rng);
   const Vector7 delta = 0.1 * random_vector<7>(rng);
-  CHECK((calibration.offset_to(calibration.moved(delta)) - delta).norm() < 1e-12);
-  CHECK(calibration.offset_to(calibration).norm() < 1e-12);
+  CHECK((calibration.local_coordinates_to(calibration.retracted(delta)) - delta).norm() < 1e-12);
+  CHECK(calibration.local_coordinates_to(calibration).norm() < 1e-12);
 }
 
 TEST_CASE("A calibration on top of a correction moves cameras like both in turn", "[calibration]") {
@@ -31,15 +31,17 @@ TEST_CASE("A calibration on top of a correction moves cameras like both in turn"
     in_turn.cameras[c].T_body_cam = at_once.cameras[c].T_body_cam = random_pose(rng);
   correction.apply_to(in_turn);
   found.apply_to(in_turn);
-  const CameraCalibration both = found.on_top_of(correction);
+  const CameraCalibration both = found.composed_with(correction);
   both.apply_to(at_once);
   for (std::size_t c = 0; c < 2; ++c)
     CHECK(in_turn.cameras[c].T_body_cam.isApprox(at_once.cameras[c].T_body_cam));
   CHECK(both.offset_s == Approx(found.offset_s + correction.offset_s));
-  CHECK(found.offset_to(both.without(correction)).norm() < 1e-12);
+  CHECK(found.local_coordinates_to(both.without(correction)).norm() < 1e-12);
   // Both have the same covariance.
   const Vector7 delta = 0.1 * random_vector<7>(rng);
-  CHECK((both.offset_to(found.moved(delta).on_top_of(correction)) - delta).norm() < 1e-12);
+  CHECK(
+      (both.local_coordinates_to(found.retracted(delta).composed_with(correction)) - delta).norm() <
+      1e-12);
 }
 
 }  // namespace

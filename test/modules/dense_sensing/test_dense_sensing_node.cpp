@@ -95,7 +95,7 @@ TEST_CASE("Due frames are dropped and counted while odometry needs the processor
     if (i == 24) bench.load.publish(ShedLoad{});
     bench.node->step(bench.frame(i, true));
   }
-  CHECK(bench.last.gave_way == 4);  // at 8, 12, 16 and 20
+  CHECK(bench.last.dropped_under_load == 4);  // at 8, 12, 16 and 20
   CHECK(bench.last.frames == 7);
   CHECK(bench.published.size() == 7);
 }

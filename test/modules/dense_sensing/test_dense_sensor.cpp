@@ -79,7 +79,7 @@ TEST_CASE("A network labels the left image", "[dense_sensor]") {
   CHECK(sensor.sense(frame).labels->ids.front() == 4);
   frame.left = flat_image(rig.cameras[0], 200);
   const DenseImages images = sensor.sense(frame);
-  CHECK(images.classes_outside == images.labels->ids.size());
+  CHECK(images.unmapped_pixels == images.labels->ids.size());
 }
 
 TEST_CASE("Images that are missing or of the wrong size are reported", "[dense_sensor]") {

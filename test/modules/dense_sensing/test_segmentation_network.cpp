@@ -39,7 +39,7 @@ TEST_CASE("A network labels every pixel by the class with the best score", "[seg
   const TemporaryFolder folder;
   SegmentationNetwork network(config_of(folder.write("net.onnx", three_levels().onnx())));
   const Segmentation result = network.segment(stripes(16, 8));
-  CHECK(result.classes_outside == 0);
+  CHECK(result.unmapped_pixels == 0);
   REQUIRE(result.labels.ids.size() == 16 * 8);
   for (int y = 0; y < 8; ++y)
     for (int x = 0; x < 16; ++x) {
@@ -88,7 +88,7 @@ TEST_CASE("Classes become the labels of the map and further classes are counted"
   CHECK(int{result.labels.ids[1]} == 7);
   CHECK(int{result.labels.ids[5]} == 9);
   CHECK(int{result.labels.ids[9]} == 0);
-  CHECK(result.classes_outside == 4 * 8);
+  CHECK(result.unmapped_pixels == 4 * 8);
 }
 
 TEST_CASE("A single plane holds class numbers", "[segmentation]") {

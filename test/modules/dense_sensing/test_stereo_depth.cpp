@@ -11,8 +11,8 @@
 namespace km {
 namespace {
 
-constexpr double kMaxMedian_px = 0.12;  // disparity; the matcher's steps are a sixteenth
-constexpr double kMinShare = 0.85;      // share of the pixels that can have depth
+constexpr double kMatchedMedian_px = 0.12;  // disparity; the matcher's steps are a sixteenth
+constexpr double kMatchedShare = 0.85;      // share of the pixels that can have depth
 
 struct DepthError {
   double median_px = 0.0;  // in disparity
@@ -64,8 +64,8 @@ TEST_CASE("Planes at any distance and slant have the right depth", "[stereo_dept
   const SE3 T_world_body =
       make_pose(so3_exp(slant_rad * Eigen::Vector3d(0.6, 0.8, 0.0)), Eigen::Vector3d::Zero());
   const DepthError error = error_on(test_rig(), {}, plane, T_world_body);
-  CHECK(error.median_px < kMaxMedian_px);
-  CHECK(error.share > kMinShare);
+  CHECK(error.median_px < kMatchedMedian_px);
+  CHECK(error.share > kMatchedShare);
 }
 
 TEST_CASE("With any lens a plane has the right depth", "[stereo_depth]") {
@@ -86,8 +86,8 @@ TEST_CASE("With any lens a plane has the right depth", "[stereo_depth]") {
   rig.cameras[1].T_body_cam =
       make_pose(so3_exp(Eigen::Vector3d(0.02, -0.03, 0.025)), {0.11, 0.004, -0.003});
   const DepthError error = error_on(rig, {}, TexturedPlane{2.0, 0.1, 1}, SE3::Identity());
-  CHECK(error.median_px < kMaxMedian_px);
-  CHECK(error.share > kMinShare);
+  CHECK(error.median_px < kMatchedMedian_px);
+  CHECK(error.share > kMatchedShare);
 }
 
 TEST_CASE("A fisheye lens of 190 degrees is rectified to a view of some 120", "[stereo_depth]") {
@@ -113,8 +113,8 @@ TEST_CASE("Cameras that are rotated and have different lenses are rectified", "[
   rig.cameras[1].fx *= 1.03;
   rig.cameras[1].lens = Lens(LensModel::kRadialTangential, {-0.25, 0.05, -3e-4, 2e-4});
   const DepthError error = error_on(rig, {}, TexturedPlane{}, SE3::Identity());
-  CHECK(error.median_px < kMaxMedian_px);
-  CHECK(error.share > kMinShare);
+  CHECK(error.median_px < kMatchedMedian_px);
+  CHECK(error.share > kMatchedShare);
 }
 
 TEST_CASE("Half the resolution is as accurate in its own pixels", "[stereo_depth]") {
@@ -124,8 +124,8 @@ TEST_CASE("Half the resolution is as accurate in its own pixels", "[stereo_depth
   plane.depth_m = 1.0;
   plane.cell_m = 0.06;
   const DepthError error = error_on(test_rig(), config, plane, SE3::Identity());
-  CHECK(error.median_px < kMaxMedian_px);
-  CHECK(error.share > kMinShare);
+  CHECK(error.median_px < kMatchedMedian_px);
+  CHECK(error.share > kMatchedShare);
 }
 
 TEST_CASE("Depth out of range is dropped", "[stereo_depth]") {
@@ -150,10 +150,11 @@ TEST_CASE("Rigs and depth ranges without disparities to search are refused", "[s
   CHECK_THROWS_AS(StereoDepth(rgbd_rig(rig.cameras[0], 0.1), {}), std::invalid_argument);
   StereoRig swapped = rig;
   std::swap(swapped.cameras[0].T_body_cam, swapped.cameras[1].T_body_cam);
-  CHECK_THROWS_WITH(StereoDepth(swapped, {}), Catch::Contains("stand to its right"));
+  CHECK_THROWS_WITH(StereoDepth(swapped, {}), Catch::Contains("be to its right"));
   StereoRig crossed = rig;
   crossed.cameras[1].T_body_cam.linear() = so3_exp(Eigen::Vector3d(0.0, 1.0, 0.0));
-  CHECK_THROWS_WITH(StereoDepth(crossed, {}), Catch::Contains("look the way"));
+  CHECK_THROWS_WITH(StereoDepth(crossed, {}),
+                    Catch::Contains("must have the direction of the left one"));
   StereoDepthConfig config;
   config.min_depth_m = 20.0;
   CHECK_THROWS_AS(StereoDepth(rig, config), ConfigError);

@@ -24,13 +24,13 @@ SensorSample regular() {
   return sample;
 }
 
-ImageLook good_look() {
+ImageQuality good_look() {
   return {.mean_level = 110.0, .saturated_share = 0.05, .sharpness = 0.8, .corners = 2000};
 }
 
-std::string looks_of(const ImageLook& look) {
+std::string looks_of(const ImageQuality& look) {
   SensorSample sample;
-  sample.looks.assign(10, look);
+  sample.qualities.assign(10, look);
   return ids_of(examine_images(sample));
 }
 
@@ -88,7 +88,7 @@ TEST_CASE("Faults of a reader become findings by their share", "[diagnosis]") {
 
 TEST_CASE("Images that are dark, bright, blurred or empty are found", "[diagnosis]") {
   CHECK(looks_of(good_look()).empty());
-  ImageLook look = good_look();
+  ImageQuality look = good_look();
   SECTION("dark") {
     look.mean_level = 12.0;
     CHECK(looks_of(look) == "warning images.dark ");
@@ -126,23 +126,23 @@ TEST_CASE("A vocabulary that maps all features to few words is found", "[diagnos
   // A word for each of 256 first bytes, in two levels of 16.
   VocabularyData tree{.branching = 16, .depth = 2};
   const auto descriptor = [](int byte) {
-    OrbDescriptor center{};
+    BinaryDescriptor center{};
     center[0] = static_cast<std::uint8_t>(byte);
     for (std::size_t k = 1; k < center.size(); ++k)  // far from each other
       center[k] = static_cast<std::uint8_t>(byte * 37 + static_cast<int>(k) * byte * byte);
     return center;
   };
   tree.children = {16};
-  tree.centers = {OrbDescriptor{}};
+  tree.centers = {BinaryDescriptor{}};
   for (int k = 0; k < 16; ++k) tree.children.push_back(16), tree.centers.push_back(descriptor(k));
   for (int k = 0; k < 256; ++k) tree.children.push_back(0), tree.centers.push_back(descriptor(k));
   tree.idf.assign(256, 1.0F);
   const Vocabulary vocabulary(tree);
   std::mt19937 rng(1);
-  std::vector<std::vector<OrbDescriptor>> images(4, std::vector<OrbDescriptor>(1000));
-  const std::vector<std::vector<OrbDescriptor>> alike = images;
+  std::vector<std::vector<BinaryDescriptor>> images(4, std::vector<BinaryDescriptor>(1000));
+  const std::vector<std::vector<BinaryDescriptor>> alike = images;
   for (auto& image : images)
-    for (OrbDescriptor& one : image)
+    for (BinaryDescriptor& one : image)
       for (std::uint8_t& byte : one) byte = static_cast<std::uint8_t>(rng());
   CHECK(ids_of(examine_words(alike, vocabulary)) == "warning vocabulary.coverage ");
   CHECK(ids_of(examine_words({}, vocabulary)).empty());

@@ -38,7 +38,7 @@ TEST_CASE("The rotation between two images is found with any translation", "[dia
   CAPTURE(t.transpose());
   const auto found = rotation_between(seen_points(rotation, t, 150, rng), kSigma);
   REQUIRE(found);
-  CHECK(found->inlier_share > 0.95);
+  CHECK(found->inlier_ratio > 0.95);
   // Across the image its error is ten times that of a bearing: see the header.
   CHECK((found->rotation - rotation).norm() < 5.0 * kSigma);
 }
@@ -55,7 +55,7 @@ TEST_CASE("Points with other motions do not change the rotation between images",
   const auto found = rotation_between(steps, kSigma);
   REQUIRE(found);
   CHECK((found->rotation - rotation).norm() < 5.0 * kSigma);
-  CHECK(found->inlier_share == Approx(110.0 / 150.0).margin(0.05));
+  CHECK(found->inlier_ratio == Approx(110.0 / 150.0).margin(0.05));
 }
 
 TEST_CASE("Too few or random points give no rotation", "[diagnosis]") {

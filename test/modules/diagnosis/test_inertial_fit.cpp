@@ -31,10 +31,10 @@ std::vector<ImuSample> samples(double scale, double late_s) {
 }
 
 // Rotations that a camera mounted with R_cam_body sees, in steps of 0.1 s.
-std::vector<SeenRotation> seen(const Eigen::Matrix3d& R_cam_body) {
+std::vector<VisualRotation> seen(const Eigen::Matrix3d& R_cam_body) {
   std::mt19937 rng(3);
   std::normal_distribution<double> noise(0.0, kNoise_rad);
-  std::vector<SeenRotation> result;
+  std::vector<VisualRotation> result;
   for (int step = 5; step < 114; ++step) {
     const double t_s = 0.1 * step;
     Eigen::Vector3d turned = Eigen::Vector3d::Zero();
@@ -94,7 +94,7 @@ TEST_CASE("Rotations unrelated to the gyroscope are not explained", "[diagnosis]
 
 TEST_CASE("Steps outside the samples do not count and too few steps give no fit", "[diagnosis]") {
   auto steps = seen(kMounting);
-  for (SeenRotation& step : steps) step.from += 60'000'000'000, step.to += 60'000'000'000;
+  for (VisualRotation& step : steps) step.from += 60'000'000'000, step.to += 60'000'000'000;
   CHECK_FALSE(fit_inertial(steps, samples(1.0, 0.0)));
   steps = seen(kMounting);
   steps.resize(19);

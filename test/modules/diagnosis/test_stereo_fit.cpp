@@ -52,14 +52,14 @@ std::vector<StereoMatches> seen_by(const StereoRig& truth, double wrong_share = 
 TEST_CASE("Points of a pair lie on the lines of its own calibration", "[diagnosis]") {
   const StereoFit fit = fit_of(seen_by(rig()), rig());
   CHECK(fit.points == 400);
-  CHECK(fit.on_line == Approx(0.9).margin(0.05));
+  CHECK(fit.inlier_ratio == Approx(0.9).margin(0.05));
   CHECK(fit.behind < 0.01);
   CHECK(fit.error_px < 0.6);
   CHECK(fit.depth_m > 1.0);
   CHECK(fit.depth_m < 4.0);
   const StereoAlternative best = best_alternative(seen_by(rig()), rig());
   CHECK(best.fault == StereoFault::kNone);
-  CHECK(best.fit.on_line == fit.on_line);
+  CHECK(best.fit.inlier_ratio == fit.inlier_ratio);
 }
 
 TEST_CASE("A fault of the pair's calibration is identified", "[diagnosis]") {
@@ -68,10 +68,10 @@ TEST_CASE("A fault of the pair's calibration is identified", "[diagnosis]") {
   CAPTURE(static_cast<int>(fault));
   const auto images = seen_by(rig());
   const StereoRig wrong = undone(rig(), fault);
-  CHECK(fit_of(images, wrong).on_line < 0.4);
+  CHECK(fit_of(images, wrong).inlier_ratio < 0.4);
   const StereoAlternative best = best_alternative(images, wrong);
   CHECK(best.fault == fault);
-  CHECK(best.fit.on_line == Approx(fit_of(images, rig()).on_line));
+  CHECK(best.fit.inlier_ratio == Approx(fit_of(images, rig()).inlier_ratio));
 }
 
 TEST_CASE("Swapped images of a pair are identified", "[diagnosis]") {
@@ -93,7 +93,7 @@ TEST_CASE("A focal length of one camera that is 3 % off is found with its ratio"
 TEST_CASE("Random matches fit no calibration", "[diagnosis]") {
   const StereoAlternative best = best_alternative(seen_by(rig(), 1.0), rig());
   CHECK(best.fault == StereoFault::kNone);
-  CHECK(best.fit.on_line < 0.1);
+  CHECK(best.fit.inlier_ratio < 0.1);
   CHECK(best_alternative({}, rig()).fault == StereoFault::kNone);
 }
 

@@ -9,9 +9,9 @@
 namespace km {
 namespace {
 
-const std::vector<StampedPose> kTruth = sample(0.0, 20.0, 100, curve);
-const std::vector<TrajectoryInput> kInputs = {{"alpha", kTruth, kTruth, {}},
-                                              {"b<&>eta", kTruth, kTruth, {}}};
+const std::vector<StampedPose> kTruePoses = sample(0.0, 20.0, 100, curve);
+const std::vector<TrajectoryInput> kInputs = {{"alpha", kTruePoses, kTruePoses, {}},
+                                              {"b<&>eta", kTruePoses, kTruePoses, {}}};
 
 }  // namespace
 
@@ -57,17 +57,17 @@ TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]
   CHECK(plot.series[1].colour != plot.series[2].colour);
   constexpr double kRounding_m = 1e-9;
   for (const PlotSeries& series : plot.series) {
-    REQUIRE(series.points.size() == kTruth.size());
-    for (std::size_t i = 0; i < kTruth.size(); ++i) {
-      CHECK(series.points[i].x == Approx(kTruth[i].T.translation().x()).margin(kRounding_m));
-      CHECK(series.points[i].y == Approx(kTruth[i].T.translation().y()).margin(kRounding_m));
+    REQUIRE(series.points.size() == kTruePoses.size());
+    for (std::size_t i = 0; i < kTruePoses.size(); ++i) {
+      CHECK(series.points[i].x == Approx(kTruePoses[i].T.translation().x()).margin(kRounding_m));
+      CHECK(series.points[i].y == Approx(kTruePoses[i].T.translation().y()).margin(kRounding_m));
     }
   }
 }
 
 TEST_CASE("The plot omits the truth before and after the estimates", "[evaluation]") {
-  const std::vector<StampedPose> part(kTruth.begin() + 40, kTruth.begin() + 60);
-  const std::vector<TrajectoryInput> inputs = {{"part", kTruth, part, {}}};
+  const std::vector<StampedPose> part(kTruePoses.begin() + 40, kTruePoses.begin() + 60);
+  const std::vector<TrajectoryInput> inputs = {{"part", kTruePoses, part, {}}};
   const Plot plot = plot_from_above(inputs, trajectory_error(inputs));
   CHECK(plot.series[0].points.size() == part.size());
 }

@@ -7,6 +7,7 @@
 #include <random>
 #include <string>
 #include <system_error>
+#include <type_traits>
 #include <vector>
 
 #include "modules/core/input_file.hpp"
@@ -20,6 +21,7 @@ namespace km {
 namespace {
 
 constexpr RobotId kRobot = 7;
+constexpr Stamp kTime = 1'400'000'000'123'456'789;
 
 OdometryPose some_pose(const KeyframeId& id, std::mt19937& rng) {
   return {id, random_pose(rng), random_covariance(rng, 0.1)};
@@ -52,7 +54,7 @@ Keyframe features(KeyframeIndex index, std::mt19937& rng) {
   for (int i = 0; i < 20; ++i) {
     keyframe.features.keypoints.push_back(
         {random_vector<2>(rng).cast<float>(), 0.5F, static_cast<std::uint8_t>(i % 8)});
-    OrbDescriptor& descriptor = keyframe.features.descriptors.emplace_back();
+    BinaryDescriptor& descriptor = keyframe.features.descriptors.emplace_back();
     for (std::uint8_t& byte : descriptor) byte = static_cast<std::uint8_t>(rng());
   }
   return keyframe;
@@ -97,7 +99,7 @@ std::filesystem::path written(const TemporaryFolder& folder,
                               const std::vector<JournalEntry>& entries) {
   std::filesystem::path file = folder.path() / "run.journal";
   JournalFile journal(file);
-  for (const JournalEntry& entry : entries) journal.add(entry);
+  for (const JournalEntry& entry : entries) journal.add(entry, kTime);
   journal.sync();
   return file;
 }
@@ -110,8 +112,10 @@ std::vector<std::vector<std::uint8_t>> bytes_of(const std::vector<JournalEntry>&
 
 std::pair<JournalExtent, std::vector<JournalEntry>> read(const std::filesystem::path& file) {
   std::vector<JournalEntry> entries;
-  const JournalExtent extent = read_journal(
-      file, [&](JournalEntry entry, JournalPlace) { entries.push_back(std::move(entry)); });
+  const JournalExtent extent = read_journal(file, [&](StoredEntry stored) {
+    CHECK(stored.time == kTime);
+    entries.push_back(std::move(stored.entry));
+  });
   return {extent, std::move(entries)};
 }
 
@@ -185,26 +189,6 @@ TEST_CASE("Covariances of states that odometry cannot continue from are refused"
   CHECK_FALSE(taken(covariance));
 }
 
-TEST_CASE("A journal without covariances and calibrations of an earlier format is read",
-          "[journal]") {
-  // A step then ended with 1 or 0: whether it has a vertical.
-  std::mt19937 rng(11);
-  for (const KeyframeIndex index : {2U, 3U}) {  // with a vertical, and without
-    const KeyframeOdometry keyframe = step(index, rng);
-    REQUIRE_FALSE(keyframe.state_covariance);
-    std::vector<std::uint8_t> bytes = encode_journal_entry(keyframe);
-    constexpr std::size_t kVertical_bytes = 32;
-    CHECK(bytes.at(bytes.size() - 1 - (keyframe.vertical ? kVertical_bytes : 0)) ==
-          (keyframe.vertical ? 1 : 0));
-    const auto decoded = decode_journal_entry(bytes);
-    REQUIRE(decoded.value);
-    const auto& back = std::get<KeyframeOdometry>(*decoded.value);
-    CHECK(back.vertical.has_value() == keyframe.vertical.has_value());
-    CHECK_FALSE(back.state_covariance);
-    CHECK_FALSE(back.calibration);
-  }
-}
-
 TEST_CASE("A truncated journal is intact up to its last full entry", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
@@ -224,20 +208,169 @@ TEST_CASE("A truncated journal is intact up to its last full entry", "[journal]"
   CHECK(read(folder.write("cut", text)).second.size() == run.size());
 }
 
-TEST_CASE("A flipped bit ends the journal before its entry", "[journal]") {
+TEST_CASE("Decisions, poses, states and cells are restored", "[journal]") {
+  std::mt19937 rng(12);
+  const Matrix6 covariance = random_covariance(rng, 0.1);
+  const auto round_trip = [](const auto& event) {
+    const auto decoded = decode_journal_entry(encode_journal_entry(event));
+    REQUIRE(decoded.value);
+    return std::get<std::decay_t<decltype(event)>>(*decoded.value);
+  };
+  const ClosureJudgements judgements{
+      {{{{1, 2}, {7, 3}}, true, false}, {{{7, 2}, {7, 300}}, false, true}}};
+  CHECK(round_trip(judgements).closures == judgements.closures);
+
+  const PoseChanges changes{
+      3, {{{7, 0}, random_pose(rng), covariance}, {{3, 70000}, random_pose(rng), {}}}};
+  const PoseChanges back = round_trip(changes);
+  CHECK(back.anchor == 3);
+  REQUIRE(back.poses.size() == 2);
+  for (std::size_t k = 0; k < 2; ++k) {
+    CHECK(back.poses[k].id == changes.poses[k].id);
+    CHECK(back.poses[k].T_world_kf.matrix() == changes.poses[k].T_world_kf.matrix());
+  }
+  REQUIRE(back.poses[0].covariance);
+  CHECK(back.poses[0].covariance->triangularView<Eigen::Upper>().toDenseMatrix() ==
+        covariance.triangularView<Eigen::Upper>().toDenseMatrix());
+  CHECK_FALSE(back.poses[1].covariance);
+
+  const RobotSample sample =
+      round_trip(RobotSample{.name = "alpha", .keyframes = 5, .links = {{3, 0.5F}}});
+  CHECK(sample.name == "alpha");
+  CHECK(sample.keyframes == 5);
+  REQUIRE(sample.links.size() == 1);
+  const MeshCells cells{2, {{-1, 2, 1 << 30}}};
+  CHECK(round_trip(cells).cells == cells.cells);
+  CHECK(round_trip(cells).anchor == 2);
+}
+
+TEST_CASE("A flipped bit costs one entry, and its place is stated", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
-  const std::string text = (written(folder, run), folder.read("run.journal"));
+  const auto expected = bytes_of(run);
+  std::vector<JournalPlace> places;
+  const std::filesystem::path file = written(folder, run);
+  (void)read_journal(file, [&](const StoredEntry& stored) { places.push_back(stored.place); });
+  const std::string text = folder.read("run.journal");
   std::mt19937 rng(4);
   for (int i = 0; i < 200; ++i) {
     std::string corrupted = text;
-    const std::size_t at = 8 + rng() % (text.size() - 8);
+    const std::size_t at = rng() % text.size();
+    CAPTURE(i, at);
     corrupted[at] = static_cast<char>(corrupted[at] ^ (1 << (rng() % 8)));
     const auto [extent, entries] = read(folder.write("corrupted", corrupted));
-    CHECK(entries.size() < run.size());
-    CHECK(extent.whole_bytes <= at);
-    CHECK(extent.cut_bytes > 0);
+    REQUIRE(entries.size() == run.size() - 1);
+    std::size_t hit = 0;  // The last entry whose frame begins before the flipped byte.
+    constexpr std::size_t kHead = 8 + 4 + 8;
+    while (hit + 1 < places.size() && places[hit + 1].offset - kHead <= at) ++hit;
+    auto rest = expected;
+    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(hit));
+    CHECK(bytes_of(entries) == rest);
+    if (hit + 1 == places.size()) {
+      CHECK(extent.whole_bytes + extent.cut_bytes == text.size());
+      CHECK(extent.cut_bytes == places[hit].bytes + kHead + 8);
+      continue;
+    }
+    REQUIRE(extent.damages.size() == 1);
+    CHECK(extent.damages[0].offset == places[hit].offset - kHead);
+    CHECK(extent.damages[0].bytes == places[hit].bytes + kHead + 8);
+    CHECK(extent.cut_bytes == 0);
+    CHECK(extent.whole_bytes == text.size());
   }
+}
+
+TEST_CASE("Bytes with many false marks are read in little time", "[journal]") {
+  const TemporaryFolder folder;
+  std::string marks;
+  for (int k = 0; k < 200000; ++k) marks += std::string("\x7FKMJRNL2\x00\x00\x20\x00", 12);
+  CHECK(read(folder.write("marks", marks)).second.empty());  // otherwise 400 GB are summed up
+}
+
+// Keyframes along a line, 1 m apart, with the journal of a robot that was killed.
+std::vector<JournalEntry> line_run(KeyframeIndex count) {
+  std::mt19937 rng(13);
+  std::vector<JournalEntry> run(2, JournalStart{kRobot, 0x123450000, "line"});
+  for (KeyframeIndex i = 0; i < count; ++i) {
+    KeyframeOdometry keyframe = step(i, rng);
+    keyframe.T_previous_kf = make_pose(Eigen::Matrix3d::Identity(), {i == 0 ? 0.0 : 1.0, 0.0, 0.0});
+    keyframe.T_odom_kf = make_pose(Eigen::Matrix3d::Identity(), {1.0 * i, 0.0, 0.0});
+    run.emplace_back(state(keyframe.stamp, rng));
+    run.emplace_back(keyframe);
+    Keyframe full = features(i, rng);
+    full.odometry.T_odom_kf = keyframe.T_odom_kf;
+    run.emplace_back(std::move(full));
+    run.emplace_back(closure(i, rng));
+  }
+  return run;
+}
+
+TEST_CASE("After damage to any one entry, the run is restored with all keyframes", "[journal]") {
+  const TemporaryFolder folder;
+  const std::vector<JournalEntry> entries = line_run(6);
+  std::vector<JournalPlace> places;
+  const std::filesystem::path file = written(folder, entries);
+  (void)read_journal(file, [&](const StoredEntry& stored) { places.push_back(stored.place); });
+  const std::string text = folder.read("run.journal");
+  for (std::size_t hit = 0; hit + 5 < entries.size(); ++hit) {
+    CAPTURE(hit, entries[hit].index());
+    std::string corrupted = text;
+    corrupted[places[hit].offset + places[hit].bytes / 2] ^= 1;
+    const RestoredRun run = restore_run(folder.write("corrupted", corrupted));
+    CHECK(run.journal.damages.size() == 1);
+    CHECK(run.robot == kRobot);
+    CHECK(run.input == "line");
+    REQUIRE(run.odometry.size() == 6);
+    REQUIRE(run.keyframes.size() == 6);
+    for (KeyframeIndex i = 0; i < 6; ++i) {
+      CHECK(run.odometry[i].id == KeyframeId{kRobot, i});
+      CHECK(run.keyframes[i].odometry.id == KeyframeId{kRobot, i});
+      CHECK(run.odometry[i].T_odom_kf.translation().x() == Approx(1.0 * i).margin(1e-12));
+      CHECK(run.odometry[i].T_previous_kf.translation().x() ==
+            Approx(i == 0 ? 0.0 : 1.0).margin(1e-12));
+      CHECK((i == 0 || run.odometry[i - 1].stamp < run.odometry[i].stamp));
+    }
+    const bool is_keyframe = std::holds_alternative<KeyframeOdometry>(entries[hit]) ||
+                             std::holds_alternative<Keyframe>(entries[hit]);
+    CHECK(run.lost_keyframes == (is_keyframe ? 1 : 0));
+    const bool is_closure = std::holds_alternative<Closure>(entries[hit]);
+    CHECK(run.closures.size() == (is_closure ? 5 : 6));
+  }
+}
+
+TEST_CASE("Decisions and the solution are restored as they were last", "[journal]") {
+  const TemporaryFolder folder;
+  std::vector<JournalEntry> entries = some_run();
+  std::mt19937 rng(14);
+  const auto id = [](KeyframeIndex own) { return closure_id({kRobot, own}, {3, 9}); };
+  const SE3 T = random_pose(rng);
+  entries.emplace_back(JournalPeer{3, std::uint64_t{5} << kResumeBits, "carol"});
+  entries.emplace_back(ClosureJudgements{{{id(0), true, false}, {id(1), true, false}}});
+  entries.emplace_back(
+      ClosureJudgements{{{id(1), true, true}, {id(2), true, false}, {id(0), false, false}}});
+  entries.emplace_back(ClosureJudgements{{{closure_id({kRobot, 1}, {3, 77}), true, false}}});
+  entries.emplace_back(PoseChanges{kRobot, {{{kRobot, 4}, T, {}}}});
+  entries.emplace_back(PoseChanges{3, {{{kRobot, 0}, random_pose(rng), {}}, {{kRobot, 1}, T, {}}}});
+  entries.emplace_back(PoseChanges{3, {{{3, 9}, T, {}}, {{kRobot, 0}, T, {}}}});
+  const RestoredRun run = restore_run(written(folder, entries));
+  REQUIRE(run.inlier_sets.size() == 1);
+  CHECK(run.inlier_sets[0].a == 3);
+  CHECK(run.inlier_sets[0].b == kRobot);
+  CHECK(run.inlier_sets[0].closures == std::vector<ClosureId>{id(1), id(2)});
+  REQUIRE(run.solution.verdicts.closures.size() == 2);
+  CHECK_FALSE(run.solution.verdicts.closures[0].kept);
+  CHECK(run.solution.verdicts.closures[1].kept);
+  CHECK(run.solution.trajectory.anchor == 3);
+  REQUIRE(run.solution.trajectory.T_world_kf.size() == 2);
+  CHECK(run.solution.trajectory.T_world_kf[0].matrix() == T.matrix());
+  CHECK(run.solution.trajectory.public_poses.at({3, 9}).matrix() == T.matrix());
+  REQUIRE(run.solution.peers.size() == 1);
+  CHECK(run.solution.peers[0].boot >> kResumeBits == 5);
+
+  entries.emplace_back(JournalPeer{3, std::uint64_t{6} << kResumeBits, "carol"});
+  const RestoredRun after = restore_run(written(folder, entries));
+  CHECK(after.inlier_sets.empty());
+  CHECK(after.solution.trajectory.public_poses.empty());
+  CHECK(after.solution.trajectory.T_world_kf.size() == 2);
 }
 
 TEST_CASE("Files that are no journals are refused by name", "[journal]") {
@@ -246,7 +379,7 @@ TEST_CASE("Files that are no journals are refused by name", "[journal]") {
                     Catch::Contains("notes.txt") && Catch::Contains("no journal"));
   CHECK_THROWS_AS(restore_run(folder.path() / "missing"), InputFileError);
   CHECK(restore_run(folder.write("empty", "")).keyframes.empty());
-  CHECK(restore_run(folder.write("begun", "KMJR")).keyframes.empty());
+  CHECK(restore_run(folder.write("begun", "\x7FKMJ")).keyframes.empty());
 }
 
 TEST_CASE("A continued journal loses its incomplete end and grows", "[journal]") {
@@ -258,10 +391,10 @@ TEST_CASE("A continued journal loses its incomplete end and grows", "[journal]")
   REQUIRE(entries.size() == run.size() - 1);
   {
     JournalFile again(file, extent);
-    again.add(JournalStart{kRobot, 0x123450001, "MH_01_easy"});
+    again.add(JournalStart{kRobot, 0x123450001, "MH_01_easy"}, kTime);
     again.sync();
     std::mt19937 rng(5);
-    again.add(step(5, rng));
+    again.add(step(5, rng), kTime);
     again.sync();
   }
   const auto [whole, all] = read(file);
@@ -276,9 +409,9 @@ TEST_CASE("An entry can be read at the place that add() returned", "[journal]") 
   const std::filesystem::path file = written(folder, run);
   std::vector<JournalPlace> places;
   const JournalExtent extent =
-      read_journal(file, [&](const JournalEntry&, JournalPlace place) { places.push_back(place); });
+      read_journal(file, [&](const StoredEntry& stored) { places.push_back(stored.place); });
   JournalFile again(file, extent);
-  for (const JournalEntry& entry : run) places.push_back(again.add(entry).value());
+  for (const JournalEntry& entry : run) places.push_back(again.add(entry, kTime).value());
   CHECK_THROWS_WITH(read_journal_entry(file, places.back()), Catch::Contains("run.journal"));
   again.sync();
   for (std::size_t i = 0; i < places.size(); ++i)
@@ -303,7 +436,7 @@ TEST_CASE("A disk that is full for a while loses no entry", "[journal]") {
   const std::vector<JournalEntry> run = some_run();
   {
     JournalFile journal(file);
-    for (const JournalEntry& entry : run) journal.add(entry);
+    for (const JournalEntry& entry : run) journal.add(entry, kTime);
     const rlimit small{1000, limit.rlim_max};
     REQUIRE(setrlimit(RLIMIT_FSIZE, &small) == 0);
     CHECK_THROWS_AS(journal.sync(), std::system_error);

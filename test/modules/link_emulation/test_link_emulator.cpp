@@ -19,7 +19,7 @@ LinkScript script_of(std::size_t robots, const LinkPlan& link = {}) {
 
 LinkPlan limited(double bytes_per_s, double delay_s = 0.0) {
   LinkPlan link;
-  link.course = LinkTrace({{0.0, bytes_per_s, delay_s}});
+  link.trace = LinkTrace({{0.0, bytes_per_s, delay_s}});
   return link;
 }
 
@@ -92,7 +92,7 @@ TEST_CASE("A frame to an unknown address is dropped and not counted", "[link_emu
 
 TEST_CASE("A delay is exact, and jitter stays within its bounds", "[link_emulation]") {
   LinkPlan link;
-  link.course = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.25}});
+  link.trace = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.25}});
   LinkEmulator exact(script_of(2, link));
   exact.send(0, 3.0, frame_to(1));
   CHECK(exact.due(3.2499).empty());
@@ -175,11 +175,11 @@ TEST_CASE("A full queue drops the newest frames", "[link_emulation]") {
 TEST_CASE("A queue waits while the rate of a trace is zero and then continues",
           "[link_emulation]") {
   LinkPlan link;
-  link.course = LinkTrace({{0.0, 1000.0, 0.0},
-                           {1.0, 1000.0, 0.0},
-                           {1.1, 0.0, 0.0},
-                           {4.9, 0.0, 0.0},
-                           {5.0, 1000.0, 0.0}});
+  link.trace = LinkTrace({{0.0, 1000.0, 0.0},
+                          {1.0, 1000.0, 0.0},
+                          {1.1, 0.0, 0.0},
+                          {4.9, 0.0, 0.0},
+                          {5.0, 1000.0, 0.0}});
   LinkEmulator emulator(script_of(2, link));
   for (int i = 0; i < 2; ++i) emulator.send(0, 0.0, frame_to(1));
   const auto arrived = all_of(emulator);
@@ -219,7 +219,7 @@ TEST_CASE("An outage begins and ends as planned for its direction", "[link_emula
 
 TEST_CASE("A frame on its way arrives although the link fails", "[link_emulation]") {
   LinkPlan link;
-  link.course = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
+  link.trace = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
   link.outages = {{1.0, 2.0}};
   LinkEmulator emulator(script_of(2, link));
   emulator.send(0, 0.9, frame_to(1));
@@ -327,7 +327,7 @@ TEST_CASE("A script that lacks something is refused", "[link_emulation]") {
 
 TEST_CASE("The table of links has a row for each ordered pair", "[link_emulation]") {
   LinkScript script = script_of(2);
-  script.link(0, 1).course = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
+  script.link(0, 1).trace = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
   script.link(1, 0).loss = 1.0;
   LinkEmulator emulator(script);
   emulator.send(0, 1.0, frame_to(1));

@@ -34,8 +34,8 @@ struct KeyframePair {
   KeyframeFeatures from, to;
 };
 
-inline OrbDescriptor random_descriptor(std::mt19937& rng) {
-  OrbDescriptor descriptor;
+inline BinaryDescriptor random_descriptor(std::mt19937& rng) {
+  BinaryDescriptor descriptor;
   for (std::uint8_t& byte : descriptor) byte = static_cast<std::uint8_t>(rng());
   return descriptor;
 }

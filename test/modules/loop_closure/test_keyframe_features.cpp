@@ -4,6 +4,7 @@
 #include <memory>
 #include <random>
 
+#include "modules/images/keypoint_extractor.hpp"
 #include "modules/loop_closure/epipolar_matcher.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
 
@@ -47,6 +48,21 @@ std::shared_ptr<const DepthImage> plane_depth(const Camera& camera) {
                                        : static_cast<std::uint16_t>(std::lround(1e3 * z_m)));
     }
   return std::make_shared<const DepthImage>(std::move(image));
+}
+
+TEST_CASE("Descriptors are the rows of the extractor", "[loop_closure]") {
+  cv::Mat image(120, 160, CV_8U);
+  cv::RNG(7).fill(image, cv::RNG::UNIFORM, 0, 256);
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat rows;
+  make_keypoint_extractor(50)->detectAndCompute(image, {}, keypoints, rows);
+  REQUIRE(rows.rows > 10);
+  const std::vector<BinaryDescriptor> descriptors = descriptors_of_rows(rows);
+  REQUIRE(descriptors.size() == static_cast<std::size_t>(rows.rows));
+  for (int row = 0; row < rows.rows; ++row)
+    CHECK(std::equal(rows.ptr(row), rows.ptr(row) + kDescriptorBytes,
+                     descriptors[static_cast<std::size_t>(row)].begin()));
+  CHECK_THROWS_AS(descriptor_of_row(cv::Mat(1, 61, CV_8U), 0), cv::Exception);
 }
 
 TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel", "[loop_closure]") {

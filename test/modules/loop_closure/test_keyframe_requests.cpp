@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/loop_closure/keyframe_requests.hpp"
-#include "modules/loop_closure/request_economy.hpp"
+#include "modules/loop_closure/request_policy.hpp"
 
 namespace km {
 namespace {
@@ -101,7 +101,7 @@ TEST_CASE("the cache drops the keyframe used longest ago", "[keyframe_cache]") {
   CHECK(cache.get({7, 0}));
 }
 
-using Verdict = RequestEconomy::Verdict;
+using Decision = RequestPolicy::Decision;
 
 constexpr RobotId kSelf = 1;
 constexpr RobotId kPeer = 2;
@@ -112,96 +112,96 @@ LoopCandidate candidate(KeyframeIndex query, KeyframeIndex own, int support = 1,
 }
 
 // Asks for `query`, which then leads to a closure with `own`.
-void succeed(RequestEconomy& economy, KeyframeIndex query, KeyframeIndex own) {
-  REQUIRE(economy.judge(candidate(query, own)) == Verdict::kAsk);
-  economy.link({{kSelf, own}, {kPeer, query}});
-  economy.conclude({kPeer, query}, true);
+void succeed(RequestPolicy& policy, KeyframeIndex query, KeyframeIndex own) {
+  REQUIRE(policy.decide(candidate(query, own)) == Decision::kRequest);
+  policy.add_closure({{kSelf, own}, {kPeer, query}});
+  policy.add_result({kPeer, query}, true);
 }
 
 TEST_CASE("No keyframe near a closure is requested and the distance grows with successes",
-          "[request_economy]") {
+          "[request_policy]") {
   LoopClosureConfig config;
-  config.max_link_separation = 3;
-  config.attempt_separation = 0;
-  RequestEconomy economy(config);
+  config.max_closure_separation = 3;
+  config.max_request_separation = 0;
+  RequestPolicy policy(config);
   for (KeyframeIndex reach = 1; reach <= 5; ++reach) {
     const KeyframeIndex query = 100 * reach;
-    succeed(economy, query, 50);
+    succeed(policy, query, 50);
     const KeyframeIndex covered = std::min<KeyframeIndex>(reach, 3);
     for (const int sign : {-1, 1}) {
       const auto beside = [&](KeyframeIndex d) {
         return query + static_cast<KeyframeIndex>(sign) * d;
       };
-      CHECK(economy.judge(candidate(beside(covered), 50)) == Verdict::kLinked);
-      CHECK(economy.judge(candidate(query, 50 + static_cast<KeyframeIndex>(sign) * covered)) ==
-            Verdict::kLinked);
-      CHECK(economy.judge(candidate(beside(covered + 1), 50)) == Verdict::kAsk);
-      CHECK(economy.judge(candidate(
-                query, 50 + static_cast<KeyframeIndex>(sign) * (covered + 1))) == Verdict::kAsk);
+      CHECK(policy.decide(candidate(beside(covered), 50)) == Decision::kNearClosure);
+      CHECK(policy.decide(candidate(query, 50 + static_cast<KeyframeIndex>(sign) * covered)) ==
+            Decision::kNearClosure);
+      CHECK(policy.decide(candidate(beside(covered + 1), 50)) == Decision::kRequest);
+      CHECK(policy.decide(candidate(query, 50 + static_cast<KeyframeIndex>(sign) *
+                                                    (covered + 1))) == Decision::kRequest);
     }
   }
-  CHECK(economy.judge(candidate(100, 50, 1, kPeer + 1)) == Verdict::kAsk);  // another robot
+  CHECK(policy.decide(candidate(100, 50, 1, kPeer + 1)) == Decision::kRequest);  // another robot
 }
 
-TEST_CASE("No keyframe near a requested one is requested", "[request_economy]") {
+TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {
   LoopClosureConfig config;
-  config.attempt_separation = 2;
-  RequestEconomy economy(config);
-  REQUIRE(economy.judge(candidate(10, 20)) == Verdict::kAsk);
-  CHECK(economy.judge(candidate(12, 18)) == Verdict::kAsk);  // nothing is linked yet
+  config.max_request_separation = 2;
+  RequestPolicy policy(config);
+  REQUIRE(policy.decide(candidate(10, 20)) == Decision::kRequest);
+  CHECK(policy.decide(candidate(12, 18)) == Decision::kRequest);  // no closure yet
   for (const KeyframeIndex query : {100U, 200U}) {
-    economy.link({{kSelf, query}, {kPeer, query}});
-    REQUIRE(economy.judge(candidate(query, 300)) == Verdict::kAsk);
-    economy.conclude({kPeer, query}, true);
+    policy.add_closure({{kSelf, query}, {kPeer, query}});
+    REQUIRE(policy.decide(candidate(query, 300)) == Decision::kRequest);
+    policy.add_result({kPeer, query}, true);
   }
-  CHECK(economy.judge(candidate(12, 19)) == Verdict::kTried);
-  CHECK(economy.judge(candidate(15, 20)) == Verdict::kAsk);
-  CHECK(economy.judge(candidate(10, 30)) == Verdict::kAsk);  // another place
-  CHECK(economy.judge(candidate(0, 0)) == Verdict::kAsk);
+  CHECK(policy.decide(candidate(12, 19)) == Decision::kNearRequest);
+  CHECK(policy.decide(candidate(15, 20)) == Decision::kRequest);
+  CHECK(policy.decide(candidate(10, 30)) == Decision::kRequest);  // another place
+  CHECK(policy.decide(candidate(0, 0)) == Decision::kRequest);
 }
 
 TEST_CASE("Candidates of a kind that fails are requested less and less often, others are not",
-          "[request_economy]") {
+          "[request_policy]") {
   LoopClosureConfig config;
-  config.attempt_separation = 0;
-  config.failure_patience = 1.0;
-  RequestEconomy economy(config);
+  config.max_request_separation = 0;
+  config.skips_per_failure = 1.0;
+  RequestPolicy policy(config);
   int asked = 0;
   for (KeyframeIndex query = 0; query < 500; ++query) {
-    const Verdict verdict = economy.judge(candidate(query, 7, 2));
-    CHECK((verdict == Verdict::kAsk || verdict == Verdict::kVain));
-    if (verdict != Verdict::kAsk) continue;
+    const Decision decision = policy.decide(candidate(query, 7, 2));
+    CHECK((decision == Decision::kRequest || decision == Decision::kLowYield));
+    if (decision != Decision::kRequest) continue;
     ++asked;
-    economy.conclude({kPeer, query}, false);
+    policy.add_result({kPeer, query}, false);
   }
   // Four are forgiven; then n are passed over after n failures: n (n + 1) / 2 queries for n
   // requests.
   CHECK(asked == 4 + 31);
-  CHECK(economy.judge(candidate(500, 7, 5)) == Verdict::kAsk);
-  CHECK(economy.judge(candidate(501, 7, 9)) == Verdict::kAsk);  // as with a support of 5
+  CHECK(policy.decide(candidate(500, 7, 5)) == Decision::kRequest);
+  CHECK(policy.decide(candidate(501, 7, 9)) == Decision::kRequest);  // as with a support of 5
 }
 
-TEST_CASE("The candidates of one query count once", "[request_economy]") {
+TEST_CASE("The candidates of one query count once", "[request_policy]") {
   LoopClosureConfig config;
-  config.attempt_separation = 0;
-  RequestEconomy economy(config);
+  config.max_request_separation = 0;
+  RequestPolicy policy(config);
   for (KeyframeIndex query = 0; query < 6; ++query) {
-    while (economy.judge(candidate(query, 7)) != Verdict::kAsk) ++query;
-    economy.conclude({kPeer, query}, false);
+    while (policy.decide(candidate(query, 7)) != Decision::kRequest) ++query;
+    policy.add_result({kPeer, query}, false);
   }
   for (KeyframeIndex own = 0; own < 10; ++own)
-    CHECK(economy.judge(candidate(100, 10 * own)) == Verdict::kVain);
+    CHECK(policy.decide(candidate(100, 10 * own)) == Decision::kLowYield);
 }
 
-TEST_CASE("With all bounds at 0 everything is asked for", "[request_economy]") {
+TEST_CASE("With all bounds at 0 every candidate is requested", "[request_policy]") {
   LoopClosureConfig config;
-  config.max_link_separation = config.attempt_separation = 0;
-  config.failure_patience = 0.0;
-  RequestEconomy economy(config);
-  succeed(economy, 1, 1);
+  config.max_closure_separation = config.max_request_separation = 0;
+  config.skips_per_failure = 0.0;
+  RequestPolicy policy(config);
+  succeed(policy, 1, 1);
   for (KeyframeIndex query = 2; query < 20; ++query) {
-    CHECK(economy.judge(candidate(query, 1)) == Verdict::kAsk);
-    economy.conclude({kPeer, query}, false);
+    CHECK(policy.decide(candidate(query, 1)) == Decision::kRequest);
+    policy.add_result({kPeer, query}, false);
   }
 }
 

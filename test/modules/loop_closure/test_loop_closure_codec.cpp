@@ -29,7 +29,7 @@ KeyframeReply random_reply(std::mt19937& rng, int points) {
     point.inverse_depth = i % 4 == 0 ? 0.0F : 1.0F / depth(rng);
     point.octave = static_cast<std::uint8_t>(i % 8);
     features.keypoints.push_back(point);
-    OrbDescriptor descriptor;
+    BinaryDescriptor descriptor;
     for (auto& byte : descriptor) byte = static_cast<std::uint8_t>(rng());
     features.descriptors.push_back(descriptor);
   }

@@ -15,7 +15,7 @@ constexpr RobotId kPeer = 9;
 // A robot's node with its channels; its messages are kept.
 struct Robot {
   explicit Robot(RobotId self, const LoopClosureConfig& config = {},
-                 LoopClosureNode::Recall recall = {})
+                 LoopClosureNode::ReadKeyframe read_keyframe = {})
       : node(config, self, std::make_shared<const Vocabulary>(toy_vocabulary(200)),
              {.keyframes = keyframes,
               .candidates = candidates,
@@ -31,7 +31,7 @@ struct Robot {
               .own_closures = own_closures,
               .own_restarts = own_restarts,
               .outcomes = outcomes},
-             std::move(recall)) {
+             std::move(read_keyframe)) {
     own_requests.subscribe([this](const auto& m) { requests.push_back(*m); });
     own_replies.subscribe([this](const auto& m) { replies.push_back(*m); });
     own_closures.subscribe([this](const auto& m) { closures.push_back(*m); });
@@ -208,7 +208,7 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   CHECK(robot.requests[0].message->own == 0);
   for (std::size_t reply = 0; reply <= kFirst; ++reply) peer.node.step(robot.requests[0].message);
   REQUIRE(peer.replies.size() == kFirst + 1);
-  std::vector<OrbDescriptor> expected;  // the strongest come first, none of them without depth
+  std::vector<BinaryDescriptor> expected;  // the strongest come first, none of them without depth
   for (std::uint32_t word = words - kSent; has_bow && word + 1 < words; ++word)
     if (word != 100) expected.push_back(toy_descriptor(word));
   for (std::uint32_t word = 0; !has_bow && word < kSent; ++word)
@@ -355,7 +355,7 @@ TEST_CASE("a keyframe its owner does not have yet is asked for again", "[loop_cl
 
 TEST_CASE("a candidate that fails verification has a reason", "[loop_closure_node]") {
   Scene views(7);
-  for (OrbDescriptor& descriptor : views.peer.features.descriptors) descriptor = {};
+  for (BinaryDescriptor& descriptor : views.peer.features.descriptors) descriptor = {};
   Meeting meeting(views);
   auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
@@ -416,24 +416,24 @@ TEST_CASE("an old keyframe of the robot itself is read from the disk with all it
           "[loop_closure_node]") {
   const Scene scene = scene_of_one_robot();
   bool is_there = true;
-  int recalled = 0;
-  const auto recall = [&](KeyframeIndex index) -> std::shared_ptr<const Keyframe> {
+  int read_keyframeed = 0;
+  const auto read_keyframe = [&](KeyframeIndex index) -> std::shared_ptr<const Keyframe> {
     CHECK(index == 0);
-    ++recalled;
+    ++read_keyframeed;
     return is_there ? std::make_shared<const Keyframe>(scene.own) : nullptr;
   };
-  Robot robot(kSelf, with_full_keyframes(50), recall);
+  Robot robot(kSelf, with_full_keyframes(50), read_keyframe);
   const bool is_full = GENERATE(false, true);
   is_there = !is_full;
   robot.give(scene.own);
-  CHECK(recalled == 0);
+  CHECK(read_keyframeed == 0);
   robot.give(scene.peer);
-  CHECK(recalled == 1);
+  CHECK(read_keyframeed == 1);
   SECTION("or stays in part where the disk has not taken it") {
     robot.give(scene.candidate());
     REQUIRE(robot.closures.size() == 1);
     CHECK((robot.closures[0].inliers > 100) == !is_full);
-    CHECK(recalled == (is_full ? 1 : 2));
+    CHECK(read_keyframeed == (is_full ? 1 : 2));
   }
   SECTION("and is missed once the disk is gone") {
     is_there = false;

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-int bits_apart(const OrbDescriptor& a, const OrbDescriptor& b) {
+int bits_apart(const BinaryDescriptor& a, const BinaryDescriptor& b) {
   int bits = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
     bits += std::popcount(static_cast<unsigned>(a[i] ^ b[i]));
@@ -16,7 +16,7 @@ int bits_apart(const OrbDescriptor& a, const OrbDescriptor& b) {
 }
 
 // A copy of `descriptor` with about `flips` bits changed.
-OrbDescriptor altered(OrbDescriptor descriptor, int flips, std::mt19937& rng) {
+BinaryDescriptor altered(BinaryDescriptor descriptor, int flips, std::mt19937& rng) {
   std::uniform_int_distribution<std::size_t> bit(0, 255);
   for (int i = 0; i < flips; ++i) {
     const std::size_t k = bit(rng);
@@ -25,9 +25,9 @@ OrbDescriptor altered(OrbDescriptor descriptor, int flips, std::mt19937& rng) {
   return descriptor;
 }
 
-std::vector<Match> by_definition(const std::vector<OrbDescriptor>& a,
-                                 const std::vector<OrbDescriptor>& b, const MatchRules& rules) {
-  const auto nearest = [](const OrbDescriptor& to, const std::vector<OrbDescriptor>& among) {
+std::vector<Match> by_definition(const std::vector<BinaryDescriptor>& a,
+                                 const std::vector<BinaryDescriptor>& b, const MatchRules& rules) {
+  const auto nearest = [](const BinaryDescriptor& to, const std::vector<BinaryDescriptor>& among) {
     std::size_t best = 0;
     for (std::size_t i = 1; i < among.size(); ++i)
       if (bits_apart(to, among[i]) < bits_apart(to, among[best])) best = i;
@@ -36,7 +36,7 @@ std::vector<Match> by_definition(const std::vector<OrbDescriptor>& a,
   std::vector<Match> matches;
   for (std::size_t i = 0; i < a.size(); ++i) {
     std::vector<int> distances;
-    for (const OrbDescriptor& d : b) distances.push_back(bits_apart(a[i], d));
+    for (const BinaryDescriptor& d : b) distances.push_back(bits_apart(a[i], d));
     const std::size_t j = nearest(a[i], b);
     std::sort(distances.begin(), distances.end());
     if (distances[0] > rules.max_distance || distances[0] >= rules.max_ratio * distances[1] ||
@@ -51,7 +51,7 @@ TEST_CASE("matching agrees with its definition", "[matching]") {
   const auto seed = GENERATE(range(1U, 11U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
-  std::vector<OrbDescriptor> a, b;
+  std::vector<BinaryDescriptor> a, b;
   for (int i = 0; i < 60; ++i) a.push_back(random_descriptor(rng));
   for (int i = 0; i < 90; ++i)  // near copies of a, some of them twice
     b.push_back(altered(a[static_cast<std::size_t>(i * 7 % 60)], i, rng));
@@ -63,7 +63,7 @@ TEST_CASE("matching agrees with its definition", "[matching]") {
 
 TEST_CASE("a frame matched to itself pairs every descriptor with itself", "[matching]") {
   std::mt19937 rng(1);
-  std::vector<OrbDescriptor> a;
+  std::vector<BinaryDescriptor> a;
   for (int i = 0; i < 200; ++i) a.push_back(random_descriptor(rng));
   const std::vector<Match> matches = match_descriptors(a, a, {});
   REQUIRE(matches.size() == a.size());
@@ -71,7 +71,8 @@ TEST_CASE("a frame matched to itself pairs every descriptor with itself", "[matc
 }
 
 TEST_CASE("without a second descriptor there is no ratio and no match", "[matching]") {
-  const std::vector<OrbDescriptor> none, one(1), two = {OrbDescriptor{}, OrbDescriptor{255}};
+  const std::vector<BinaryDescriptor> none, one(1),
+      two = {BinaryDescriptor{}, BinaryDescriptor{255}};
   CHECK(match_descriptors(two, none, {}).empty());
   CHECK(match_descriptors(two, one, {}).empty());
   CHECK(match_descriptors(none, two, {}).empty());
@@ -83,7 +84,7 @@ TEST_CASE("guided matching distinguishes equal descriptors by their place", "[ma
   KeyframePair pair = make_keyframe_pair(rng, 50, {}, 0.0);
   // Descriptors alone cannot match: there is only one.
   for (auto* descriptors : {&pair.from.descriptors, &pair.to.descriptors})
-    for (OrbDescriptor& descriptor : *descriptors) descriptor = {};
+    for (BinaryDescriptor& descriptor : *descriptors) descriptor = {};
   REQUIRE(match_descriptors(pair.from.descriptors, pair.to.descriptors, {}).empty());
   // Far enough apart in the image not to compete.
   KeyframePair sparse = pair;

@@ -128,6 +128,27 @@ TEST_CASE("A file that is no mesh is refused with the file and the reason") {
   CHECK_THROWS_WITH(read_ply(folder.path() / "none.ply"), Contains("cannot be opened"));
 }
 
+TEST_CASE("The extension of a mesh file determines its format") {
+  const TemporaryFolder folder;
+  const LabelledMesh triangle{.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
+                              .labels = {},
+                              .colors = {},
+                              .faces = {{0, 1, 2}}};
+  for (const MeshFormat& format : mesh_formats()) {
+    CAPTURE(std::string(format.extension));
+    const auto file = folder.path() / ("mesh" + std::string(format.extension));
+    write_mesh(file, triangle);
+    CHECK(read_mesh(file).faces == triangle.faces);
+    CHECK(read_mesh(file).vertices == triangle.vertices);
+    CHECK(format.read(file).vertices == triangle.vertices);
+  }
+  CHECK_THROWS_WITH(write_mesh(folder.path() / "mesh.xyz", triangle),
+                    Contains("mesh.xyz: the extension is none of .ply"));
+  CHECK_FALSE(std::filesystem::exists(folder.path() / "mesh.xyz"));
+  std::filesystem::rename(folder.path() / "mesh.ply", folder.path() / "mesh.backup");
+  CHECK(read_mesh(folder.path() / "mesh.backup").vertices == triangle.vertices);
+}
+
 TEST_CASE("A mesh that cannot be written leaves no file") {
   const TemporaryFolder folder;
   CHECK_THROWS_AS(write_ply(folder.path() / "none" / "a.ply", {}), MeshFileError);

@@ -98,8 +98,9 @@ void bench(const std::string& size, std::size_t side, std::size_t keyframes, std
   };
   LocalMeshOptimizer optimizer(config);
   const MeshDeformationReport report = optimizer.optimize(scene.map, scene.T_odom_kf, a).report;
-  WARN(size << ": " << report.nodes << " nodes, " << report.edges << " edges, " << report.ties
-            << " ties, " << report.iterations << " iterations cold");
+  WARN(size << ": " << report.nodes << " nodes, " << report.edges << " edges, "
+            << report.keyframe_edges << " keyframe edges, " << report.iterations
+            << " iterations cold");
   bool second = false;
   BENCHMARK("warm, " + size) {
     second = !second;

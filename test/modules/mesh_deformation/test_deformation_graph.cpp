@@ -24,7 +24,7 @@ DeformationGraph patch(std::uint32_t width) {
       graph.nodes.emplace_back(i, j, 0.1 * ((i + 2 * j) % 3));
       if (j > 0) graph.edges.push_back({n - 1, n});
       if (i > 0) graph.edges.push_back({n - width, n});
-      graph.ties.push_back({2 * i / width + 2 * (2 * j / width), n});
+      graph.keyframe_edges.push_back({2 * i / width + 2 * (2 * j / width), n});
     }
   for (const double y : {0.0, width - 1.0})
     for (const double x : {0.0, width - 1.0})
@@ -74,14 +74,15 @@ Eigen::Vector3d rigidity(const SE3& T_a0, const Eigen::Vector3d& p_b0, const SE3
 
 }  // namespace
 
-TEST_CASE("A triangle has six directed edges and every tie two terms", "[mesh_deformation]") {
+TEST_CASE("A triangle has six directed edges and every keyframe edge two terms",
+          "[mesh_deformation]") {
   DeformationGraph graph;
   graph.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   graph.edges = {{0, 1}, {0, 2}, {1, 2}};
   CHECK(graph.term_count() == 6);
-  graph.ties = {{0, 0}};
+  graph.keyframe_edges = {{0, 0}};
   CHECK(graph.term_count() == 8);
-  graph.ties.push_back({0, 2});
+  graph.keyframe_edges.push_back({0, 2});
   CHECK(graph.term_count() == 10);
 }
 
@@ -89,8 +90,8 @@ TEST_CASE("A node is tied to keyframes spread over its time of sight", "[mesh_de
   const auto keyframes = [](SeenBy seen, std::size_t count) {
     std::vector<KeyframeIndex> result;
     const MeshNode node{Eigen::Vector3d::Zero(), seen};
-    for (const KeyframeTie& tie : choose_ties(std::span(&node, 1), count, 20))
-      result.push_back(tie.keyframe);
+    for (const KeyframeEdge& keyframe_edge : choose_keyframe_edges(std::span(&node, 1), count, 20))
+      result.push_back(keyframe_edge.keyframe);
     return result;
   };
   using List = std::vector<KeyframeIndex>;
@@ -119,7 +120,7 @@ TEST_CASE("One tied node moves a graph whose other nodes are not tied", "[mesh_d
   graph.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   graph.edges = {{0, 1}, {0, 2}, {1, 2}};
   graph.T_odom_kf = {make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0})};
-  graph.ties = {{0, 1}};
+  graph.keyframe_edges = {{0, 1}};
   const std::vector<SE3> anchors = {make_pose(Eigen::Matrix3d::Identity(), {1.5, 0, 0})};
   const auto solution = solve(graph, anchors, {}, kStop, initial_poses(graph, graph.T_odom_kf));
   CHECK(solution.status == DeformationStatus::kConverged);
@@ -137,13 +138,13 @@ TEST_CASE("A cube held at one corner moves and a cube held at two stretches",
     for (const std::uint32_t bit : {1U, 2U, 4U})
       if ((i & bit) == 0) graph.edges.push_back({i, i | bit});
   graph.T_odom_kf = {make_pose(Eigen::Matrix3d::Identity(), {0, 0, 0})};
-  graph.ties = {{0, 0}};
+  graph.keyframe_edges = {{0, 0}};
   std::vector<SE3> anchors = {make_pose(Eigen::Matrix3d::Identity(), {-0.5, 0, 0})};
   // Held stiffly compared with the edges.
   const DeformationNoise noise{.anchor_rotation_rad = 1e-5,
                                .anchor_translation_m = 1e-5,
                                .mesh_edge_m = 0.1,
-                               .keyframe_tie_m = 1e-5};
+                               .keyframe_edge_m = 1e-5};
   SECTION("one corner") {
     const auto solution =
         solve(graph, anchors, noise, kStop, initial_poses(graph, graph.T_odom_kf));
@@ -154,7 +155,7 @@ TEST_CASE("A cube held at one corner moves and a cube held at two stretches",
   }
   SECTION("two corners") {
     graph.T_odom_kf.push_back(make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0}));
-    graph.ties.push_back({1, 1});
+    graph.keyframe_edges.push_back({1, 1});
     anchors.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.5, 0, 0}));
     const auto solution =
         solve(graph, anchors, noise, kStop, initial_poses(graph, graph.T_odom_kf));
@@ -194,7 +195,7 @@ TEST_CASE("The solution does not depend on the first guess", "[mesh_deformation]
   const auto cold = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));
   const auto before = solve(graph, earlier, {}, kStop, initial_poses(graph, earlier));
   const auto warm =
-      solve(graph, anchors, {}, kStop, carried_over_poses(graph, before.poses, earlier, anchors));
+      solve(graph, anchors, {}, kStop, warm_start_poses(graph, before.poses, earlier, anchors));
   CHECK(cold.status == DeformationStatus::kConverged);
   CHECK(warm.status == DeformationStatus::kConverged);
   CHECK(distance(cold.poses, warm.poses) < kSolved);
@@ -206,12 +207,12 @@ TEST_CASE("A start from the solution itself ends at once", "[mesh_deformation]")
   const std::vector<SE3> anchors = disturbed(graph.T_odom_kf, 7, 0.1, 0.3);
   const auto cold = solve(graph, anchors, {}, kStop, initial_poses(graph, anchors));
   const auto again =
-      solve(graph, anchors, {}, kStop, carried_over_poses(graph, cold.poses, anchors, anchors));
+      solve(graph, anchors, {}, kStop, warm_start_poses(graph, cold.poses, anchors, anchors));
   CHECK(again.iterations <= 2);
   CHECK(distance(cold.poses, again.poses) < kSolved);
 }
 
-TEST_CASE("Parts without ties to each other are solved independently", "[mesh_deformation]") {
+TEST_CASE("Parts without edges to each other are solved independently", "[mesh_deformation]") {
   DeformationGraph graph = patch(4);
   const auto count = static_cast<std::uint32_t>(graph.nodes.size());
   const DeformationGraph one = graph;
@@ -219,8 +220,8 @@ TEST_CASE("Parts without ties to each other are solved independently", "[mesh_de
   for (const auto& [a, b] : one.edges) graph.edges.push_back({a + count, b + count});
   const SE3 shift = make_pose(Eigen::Matrix3d::Identity(), {100, 0, 0});
   for (const SE3& T : one.T_odom_kf) graph.T_odom_kf.push_back(shift * T);
-  for (const KeyframeTie& tie : one.ties)
-    graph.ties.push_back({tie.keyframe + 4, tie.node + count});
+  for (const KeyframeEdge& keyframe_edge : one.keyframe_edges)
+    graph.keyframe_edges.push_back({keyframe_edge.keyframe + 4, keyframe_edge.node + count});
   std::vector<SE3> anchors = disturbed(one.T_odom_kf, 3, 0.05, 0.2);
   const auto alone = solve(one, anchors, {}, kStop, initial_poses(one, anchors));
   for (const SE3& T : one.T_odom_kf) anchors.push_back(shift * T);

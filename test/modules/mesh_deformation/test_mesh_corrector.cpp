@@ -180,7 +180,7 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
     REQUIRE(first->superseded.vertices.size() == count);
     for (std::uint64_t v = 0; v < count; ++v) {
       CHECK(first->superseded.vertices[v].id == v);
-      CHECK(first->superseded.vertices[v].heir == v + count);
+      CHECK(first->superseded.vertices[v].replacement == v + count);
     }
     for (SE3& pose : visits.T_world_kf) pose.translation().y() += 1.0;
     const auto again = corrector.correct(visits.input());
@@ -246,7 +246,7 @@ TEST_CASE("The deformation graph does not grow in a place visited repeatedly",
   CHECK(most_nodes <= 2 * nodes_at_first);
 }
 
-constexpr MotionScale kScale{.translation_m = 0.01, .rotation_rad = 0.005};
+constexpr MotionScale kMotionScale{.translation_m = 0.01, .rotation_rad = 0.005};
 constexpr double kRounding = 1e-9;  // in units of the scale, for poses within 10 m
 
 std::vector<SE3> random_poses(std::mt19937& rng, std::size_t count) {
@@ -255,17 +255,17 @@ std::vector<SE3> random_poses(std::mt19937& rng, std::size_t count) {
   return poses;
 }
 
-TEST_CASE("A common motion of all keyframes is no bending", "[mesh_deformation]") {
+TEST_CASE("A common motion of all keyframes is rigid", "[mesh_deformation]") {
   const auto count = GENERATE(1U, 2U, 30U);
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(count, seed);
   std::mt19937 rng(seed);
   const std::vector<SE3> before = random_poses(rng, count);
   const SE3 T = random_pose(rng);
-  const KeyframeMotion motion = keyframe_motion(before, moved(T, before), kScale);
+  const KeyframeMotion motion = keyframe_motion(before, moved(T, before), kMotionScale);
   CHECK(motion.T_after_before.isApprox(T, 1e-9));
-  CHECK(motion.bending < kRounding);
-  CHECK(largest_difference(before, T, motion.T_after_before, kScale) < kRounding);
+  CHECK(motion.non_rigid < kRounding);
+  CHECK(largest_difference(before, T, motion.T_after_before, kMotionScale) < kRounding);
 }
 
 TEST_CASE("One keyframe that moves against many others is found", "[mesh_deformation]") {
@@ -278,11 +278,11 @@ TEST_CASE("One keyframe that moves against many others is found", "[mesh_deforma
   // The common motion contains a share of about 1 / kCount of the odd keyframe's motion.
   SECTION("by three times the scale of translation") {
     after[7].translation() += Eigen::Vector3d(0.0, 0.03, 0.0);
-    CHECK(keyframe_motion(before, after, kScale).bending == Approx(3.0).epsilon(0.02));
+    CHECK(keyframe_motion(before, after, kMotionScale).non_rigid == Approx(3.0).epsilon(0.02));
   }
   SECTION("by three times the scale of rotation") {
     after[7].linear() *= so3_exp({0.0, 0.0, 0.015});
-    CHECK(keyframe_motion(before, after, kScale).bending == Approx(3.0).epsilon(0.02));
+    CHECK(keyframe_motion(before, after, kMotionScale).non_rigid == Approx(3.0).epsilon(0.02));
   }
 }
 
@@ -298,7 +298,7 @@ TEST_CASE("The common motion weights rotations against translations", "[mesh_def
                                   make_pose(R.transpose(), R * Eigen::Vector3d(-1, 0, 0))};
   const double w_t = 1.0 / (0.01 * 0.01);
   const double w_r = 1.0 / (0.005 * 0.005);
-  const KeyframeMotion motion = keyframe_motion(before, after, kScale);
+  const KeyframeMotion motion = keyframe_motion(before, after, kMotionScale);
   const double angle = so3_log(motion.T_after_before.linear()).z();
   CHECK(angle == Approx(a * (w_t - w_r) / (w_t + w_r)).epsilon(1e-3));
 }
@@ -308,8 +308,8 @@ TEST_CASE("Solutions are compared over the keyframes both have", "[mesh_deformat
   const std::vector<SE3> before = random_poses(rng, 5);
   std::vector<SE3> after = before;
   after.push_back(random_pose(rng));
-  CHECK(keyframe_motion(before, after, kScale).bending < kRounding);
-  CHECK(keyframe_motion({}, after, kScale).bending == 0.0);
+  CHECK(keyframe_motion(before, after, kMotionScale).non_rigid < kRounding);
+  CHECK(keyframe_motion({}, after, kMotionScale).non_rigid == 0.0);
 }
 
 TEST_CASE("The difference of two motions is that at the pose where they differ most",
@@ -318,9 +318,10 @@ TEST_CASE("The difference of two motions is that at the pose where they differ m
                                   make_pose(Eigen::Matrix3d::Identity(), {20.0, 0.0, 0.0})};
   const SE3 turn = make_pose(so3_exp({0.0, 0.0, 0.002}), Eigen::Vector3d::Zero());
   const SE3 shift = make_pose(Eigen::Matrix3d::Identity(), {0.0, 0.02, 0.0});
-  CHECK(largest_difference(poses, SE3::Identity(), turn, kScale) == Approx(4.0).epsilon(1e-3));
-  CHECK(largest_difference({poses.data(), 1}, turn, SE3::Identity(), kScale) == Approx(0.4));
-  CHECK(largest_difference(poses, shift, SE3::Identity(), kScale) == Approx(2.0));
+  CHECK(largest_difference(poses, SE3::Identity(), turn, kMotionScale) ==
+        Approx(4.0).epsilon(1e-3));
+  CHECK(largest_difference({poses.data(), 1}, turn, SE3::Identity(), kMotionScale) == Approx(0.4));
+  CHECK(largest_difference(poses, shift, SE3::Identity(), kMotionScale) == Approx(2.0));
 }
 
 TEST_CASE("Keyframes without an optimised pose follow odometry from the last that has one",

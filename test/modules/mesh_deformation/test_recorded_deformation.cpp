@@ -19,7 +19,7 @@ namespace km {
 namespace {
 
 // A robot that maps, with every frame as a keyframe.
-struct Robot {
+struct RecordedRobot {
   SemanticMapper mapper;
   std::vector<SE3> T_odom_kf = {};
   std::vector<SE3> T_world_kf = {};
@@ -83,9 +83,9 @@ TEST_CASE("A recorded kitchen mapped with drift is corrected to agree with the f
   SemanticMappingConfig mapping;
   mapping.voxel_size_m = 0.05;
   const Camera& camera = kitchen.rig().cameras[0];
-  Robot first{SemanticMapper(mapping, camera)};
-  Robot given{SemanticMapper(mapping, camera)};
-  Robot drifted{SemanticMapper(mapping, camera)};
+  RecordedRobot first{SemanticMapper(mapping, camera)};
+  RecordedRobot given{SemanticMapper(mapping, camera)};
+  RecordedRobot drifted{SemanticMapper(mapping, camera)};
   const std::size_t half = kitchen.frame_count() / 4;  // half of the frames are used
   Drift drift(half);
   for (std::size_t frame = 0; const auto posed = kitchen.next(); ++frame) {

@@ -19,13 +19,14 @@ struct Team {
   Topic<Closure> closures;
   Topic<KeyframeOdometry> keyframes;
   Topic<PeerEvent> restarts;
-  Topic<InlierSet> inlier_sets;
+  Topic<InlierSet> restored, inlier_sets;
   Inbox<InlierSet> sets{inlier_sets};
 
   PcmTopics topics() {
     return {.closures = closures,
             .keyframes = keyframes,
             .restarts = restarts,
+            .restored = restored,
             .inlier_sets = inlier_sets};
   }
 
@@ -199,6 +200,22 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
   node.publish_changes();  // the wait is over permanently
   REQUIRE(team.sets.messages().size() == 2);
   CHECK(team.sets.messages()[1].closures.size() == 3);
+}
+
+TEST_CASE("Robots that a former process joined by one place remain joined", "[node]") {
+  PcmConfig config;
+  config.witness_wait_s = 30.0;
+  Team team;
+  PcmNode node(config, 2, team.topics());
+  const auto closures = team.agreeing(2, 5, 2);
+  node.step(closures[0]);
+  node.publish_changes();
+  CHECK(team.sets.messages().empty());
+  node.step(InlierSet{1, 2, 0, {}});  // decided by another robot
+  node.step(InlierSet{2, 5, 0, {closures[0].id()}});
+  node.publish_changes();
+  REQUIRE(team.sets.messages().size() == 1);
+  CHECK(team.sets.messages()[0].closures == std::vector<ClosureId>{closures[0].id()});
 }
 
 TEST_CASE("At the end of all runs no pair waits for a witness", "[node]") {

@@ -19,13 +19,13 @@ class SyntheticOrb {
  public:
   SyntheticOrb(int depth, std::uint32_t seed) : rng_(seed) {
     constexpr std::array kFlips = {70, 45, 28, 18, 12, 8};
-    OrbDescriptor root{};
+    BinaryDescriptor root{};
     for (std::uint8_t& byte : root) byte = static_cast<std::uint8_t>(rng_());
     leaves_ = {root};
     for (int level = 0; level < depth; ++level) {
-      std::vector<OrbDescriptor> next;
+      std::vector<BinaryDescriptor> next;
       next.reserve(leaves_.size() * 10);
-      for (const OrbDescriptor& parent : leaves_)
+      for (const BinaryDescriptor& parent : leaves_)
         for (int child = 0; child < 10; ++child)
           next.push_back(flipped(parent, kFlips[static_cast<std::size_t>(level)]));
       leaves_ = std::move(next);
@@ -37,9 +37,9 @@ class SyntheticOrb {
   }
 
   /// An image: `count` sightings of independently drawn leaves, `flips` bits from them.
-  std::vector<OrbDescriptor> image(std::size_t count, int flips) {
+  std::vector<BinaryDescriptor> image(std::size_t count, int flips) {
     std::uniform_real_distribution<double> uniform(0.0, cumulative_.back());
-    std::vector<OrbDescriptor> result;
+    std::vector<BinaryDescriptor> result;
     for (std::size_t i = 0; i < count; ++i) {
       const auto drawn = std::lower_bound(cumulative_.begin(), cumulative_.end(), uniform(rng_));
       result.push_back(
@@ -48,16 +48,17 @@ class SyntheticOrb {
     return result;
   }
 
-  std::vector<std::vector<OrbDescriptor>> images(std::size_t number, std::size_t count, int flips) {
-    std::vector<std::vector<OrbDescriptor>> result;
+  std::vector<std::vector<BinaryDescriptor>> images(std::size_t number, std::size_t count,
+                                                    int flips) {
+    std::vector<std::vector<BinaryDescriptor>> result;
     for (std::size_t i = 0; i < number; ++i) result.push_back(image(count, flips));
     return result;
   }
 
  private:
   // `flips` different bits, inverted.
-  OrbDescriptor flipped(OrbDescriptor descriptor, int flips) {
-    OrbDescriptor changed{};
+  BinaryDescriptor flipped(BinaryDescriptor descriptor, int flips) {
+    BinaryDescriptor changed{};
     for (int done = 0; done < flips;) {
       const auto bit = static_cast<std::size_t>(rng_() % 256U);
       const auto mask = static_cast<std::uint8_t>(1U << (bit % 8));
@@ -70,7 +71,7 @@ class SyntheticOrb {
   }
 
   std::mt19937 rng_;
-  std::vector<OrbDescriptor> leaves_;
+  std::vector<BinaryDescriptor> leaves_;
   std::vector<double> cumulative_;
 };
 

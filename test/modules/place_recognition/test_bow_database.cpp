@@ -6,7 +6,7 @@
 #include <random>
 
 #include "modules/place_recognition/bow_database.hpp"
-#include "modules/place_recognition/candidate_filter.hpp"
+#include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/place_recognition/vocabulary_training.hpp"
 #include "test/modules/place_recognition/synthetic_orb.hpp"
@@ -175,7 +175,7 @@ Stamp at_s(double seconds) {
 
 // checks.md L1.
 TEST_CASE("The same view seen by two robots is found once", "[place_recognition]") {
-  CandidateFilter robot_0({}, kWords);
+  PlaceDatabase robot_0({}, kWords);
   const BowVector view = toy_vector({1, 2, 3, 4});
   robot_0.add(view, at_s(0));
   const CandidateSearch first = robot_0.search(view, nullptr);  // robot 1, pose 0
@@ -189,7 +189,7 @@ TEST_CASE("The same view seen by two robots is found once", "[place_recognition]
 }
 
 TEST_CASE("The threshold applies to the ratio of scores", "[place_recognition]") {
-  CandidateFilter filter({.similarity_threshold = 0.5}, kWords);
+  PlaceDatabase filter({.similarity_threshold = 0.5}, kWords);
   filter.add(toy_vector({1, 2, 50, 51, 52, 53, 54, 55}), at_s(0));   // score 0.25
   filter.add(toy_vector({1, 50, 51, 52, 53, 54, 55, 56}), at_s(1));  // score 0.125
   const BowVector query = toy_vector({1, 2, 3, 4, 5, 6, 7, 8});
@@ -205,7 +205,7 @@ TEST_CASE("The threshold applies to the ratio of scores", "[place_recognition]")
 }
 
 TEST_CASE("A query unlike the keyframe before it is not used", "[place_recognition]") {
-  CandidateFilter filter({.min_normalizer = 0.3}, kWords);
+  PlaceDatabase filter({.min_normalizer = 0.3}, kWords);
   const BowVector query = toy_vector({1, 2, 3, 4});
   filter.add(query, at_s(0));
   const BowVector unlike = toy_vector({4, 5, 6, 7});  // score 0.25
@@ -218,7 +218,7 @@ TEST_CASE("A query unlike the keyframe before it is not used", "[place_recogniti
 }
 
 TEST_CASE("A normaliser of zero is refused even where no minimum is set", "[place_recognition]") {
-  CandidateFilter filter({.min_normalizer = 0.0}, kWords);
+  PlaceDatabase filter({.min_normalizer = 0.0}, kWords);
   filter.add(toy_vector({1}), at_s(0));
   const BowVector unlike = toy_vector({2});
   CHECK(filter.search(toy_vector({1}), &unlike).status == SearchStatus::kLowNormalizer);
@@ -226,7 +226,7 @@ TEST_CASE("A normaliser of zero is refused even where no minimum is set", "[plac
 }
 
 TEST_CASE("Neighbours in time inside one robot are no candidates", "[place_recognition]") {
-  CandidateFilter filter({.max_candidates = 100, .min_gap_s = 10.0}, kWords);
+  PlaceDatabase filter({.max_candidates = 100, .min_gap_s = 10.0}, kWords);
   const BowVector view = toy_vector({1, 2, 3});
   CHECK(filter.search_own(view, at_s(0)).status == SearchStatus::kNoPrevious);
   for (int i = 0; i <= 12; ++i) filter.add(view, at_s(i));
@@ -234,7 +234,7 @@ TEST_CASE("Neighbours in time inside one robot are no candidates", "[place_recog
   CHECK(filter.search_own(view, at_s(10)).candidates.size() == 1);  // the gap itself counts
   CHECK(filter.search_own(view, at_s(13)).candidates.size() == 4);
   CHECK(filter.search(view, &view).candidates.size() == 13);  // another robot: no such rule
-  filter.lose_way();
+  filter.mark_odometry_break();
   CHECK(filter.search_own(view, at_s(13)).candidates.size() == 13);
   filter.add(view, at_s(13));
   CHECK(filter.search_own(view, at_s(14)).candidates.size() == 13);
@@ -242,7 +242,7 @@ TEST_CASE("Neighbours in time inside one robot are no candidates", "[place_recog
 
 TEST_CASE("The best candidates are kept, one per place", "[place_recognition]") {
   const double separation_s = GENERATE(0.0, 2.0);
-  CandidateFilter filter({.max_candidates = 3, .candidate_separation_s = separation_s}, kWords);
+  PlaceDatabase filter({.max_candidates = 3, .candidate_separation_s = separation_s}, kWords);
   const BowVector view = toy_vector({1, 2, 3, 4});
   const BowVector part = toy_vector({1, 2, 3, 9});
   filter.add(part, at_s(0));
@@ -261,7 +261,7 @@ TEST_CASE("The best candidates are kept, one per place", "[place_recognition]") 
 }
 
 TEST_CASE("Candidates support each other when they are neighbours", "[place_recognition]") {
-  CandidateFilter filter({}, kWords);
+  PlaceDatabase filter({}, kWords);
   const BowVector view = toy_vector({1, 2, 3, 4});
   const BowVector other = toy_vector({7, 8});
   for (int i = 0; i < 12; ++i) filter.add(i == 1 || i == 7 || i == 10 ? view : other, at_s(i));
@@ -272,8 +272,8 @@ TEST_CASE("Candidates support each other when they are neighbours", "[place_reco
 }
 
 TEST_CASE("The filter refuses invalid input and is unchanged", "[place_recognition]") {
-  CHECK_THROWS_AS(CandidateFilter({.similarity_threshold = -1.0}, kWords), ConfigError);
-  CandidateFilter filter({}, kWords);
+  CHECK_THROWS_AS(PlaceDatabase({.similarity_threshold = -1.0}, kWords), ConfigError);
+  PlaceDatabase filter({}, kWords);
   filter.add(toy_vector({1}), at_s(5));
   CHECK_THROWS_AS(filter.add(toy_vector({1}), at_s(4)), std::invalid_argument);
   CHECK_THROWS_AS(filter.add(toy_vector({kWords}), at_s(6)), std::invalid_argument);

@@ -24,11 +24,11 @@ namespace {
 
 using Catch::Contains;
 
-using Images = std::vector<std::vector<OrbDescriptor>>;
+using Images = std::vector<std::vector<BinaryDescriptor>>;
 
 constexpr float kFloatTolerance = 1e-6F;  // weights are floats of order one
 
-int distance(const OrbDescriptor& a, const OrbDescriptor& b) {
+int distance(const BinaryDescriptor& a, const BinaryDescriptor& b) {
   int bits = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
     bits += std::popcount(static_cast<unsigned>(a[i] ^ b[i]));
@@ -36,8 +36,8 @@ int distance(const OrbDescriptor& a, const OrbDescriptor& b) {
 }
 
 // Descriptor whose first `bits` bits are set.
-OrbDescriptor ladder(int bits) {
-  OrbDescriptor descriptor{};
+BinaryDescriptor ladder(int bits) {
+  BinaryDescriptor descriptor{};
   for (int i = 0; i < bits; ++i)
     descriptor[static_cast<std::size_t>(i / 8)] |= static_cast<std::uint8_t>(1U << (i % 8));
   return descriptor;
@@ -55,7 +55,7 @@ std::vector<std::size_t> first_children(const VocabularyData& data) {
 }
 
 // The node a descriptor ends in, by plain comparison.
-std::size_t leaf_of(const VocabularyData& data, const OrbDescriptor& descriptor) {
+std::size_t leaf_of(const VocabularyData& data, const BinaryDescriptor& descriptor) {
   const std::vector<std::size_t> first = first_children(data);
   std::size_t node = 0;
   while (data.children[node] != 0) {
@@ -106,7 +106,7 @@ TEST_CASE("Few different descriptors become one word each", "[place_recognition]
   const Images images = {{ladder(0), ladder(100), ladder(200), ladder(100), ladder(200)}};
   const VocabularyData data = train_vocabulary(images, {.branching = 5, .depth = 4});
   CHECK(data.children == std::vector<std::uint8_t>{3, 0, 0, 0});
-  std::set<OrbDescriptor> centers(data.centers.begin() + 1, data.centers.end());
+  std::set<BinaryDescriptor> centers(data.centers.begin() + 1, data.centers.end());
   CHECK(centers == std::set{ladder(0), ladder(100), ladder(200)});
 }
 
@@ -121,18 +121,18 @@ TEST_CASE("A centre is the bitwise majority of its cluster", "[place_recognition
 }
 
 TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1", "[place_recognition]") {
-  const OrbDescriptor everywhere = ladder(0);
-  const OrbDescriptor in_two = ladder(100);
-  const OrbDescriptor in_one = ladder(200);
+  const BinaryDescriptor everywhere = ladder(0);
+  const BinaryDescriptor in_two = ladder(100);
+  const BinaryDescriptor in_one = ladder(200);
   const Images images = {{everywhere, in_two}, {everywhere, in_two, in_one}, {everywhere}};
   const Vocabulary vocabulary(train_vocabulary(images, {.branching = 3, .depth = 1}));
-  const auto word = [&](const OrbDescriptor& d) { return vocabulary.words({&d, 1})[0]; };
-  const auto idf = [&](const OrbDescriptor& d) { return vocabulary.data().idf[word(d)]; };
+  const auto word = [&](const BinaryDescriptor& d) { return vocabulary.words({&d, 1})[0]; };
+  const auto idf = [&](const BinaryDescriptor& d) { return vocabulary.data().idf[word(d)]; };
   CHECK(idf(everywhere) == 0.0F);
   CHECK(idf(in_two) == Approx(std::log(3.0 / 2.0)).epsilon(kFloatTolerance));
   CHECK(idf(in_one) == Approx(std::log(3.0)).epsilon(kFloatTolerance));
 
-  const std::vector<OrbDescriptor> image = {in_two, everywhere, in_two, in_one};
+  const std::vector<BinaryDescriptor> image = {in_two, everywhere, in_two, in_one};
   const BowVector vector = vocabulary.transform(image);
   REQUIRE(vector.words.size() == 2);  // the word of every image has no weight
   const double total = 2.0 * std::log(1.5) + std::log(3.0);
@@ -156,7 +156,7 @@ TEST_CASE("Two sightings of one place are more similar than two places", "[place
   const Vocabulary vocabulary(train_vocabulary(world.images(50, 400, 5), {.depth = 4}));
   const auto place = world.image(500, 0);
   auto again = place;
-  for (OrbDescriptor& d : again) d[7] ^= 0x11U;  // two bits of noise
+  for (BinaryDescriptor& d : again) d[7] ^= 0x11U;  // two bits of noise
   const BowVector v = vocabulary.transform(place);
   const double same = score(v, vocabulary.transform(again));
   const double other = score(v, vocabulary.transform(world.image(500, 0)));

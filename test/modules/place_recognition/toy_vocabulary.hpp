@@ -10,8 +10,8 @@
 namespace km {
 
 /// The descriptor that stands for word `word` of toy_vocabulary().
-inline OrbDescriptor toy_descriptor(std::uint32_t word) {
-  OrbDescriptor descriptor{};
+inline BinaryDescriptor toy_descriptor(std::uint32_t word) {
+  BinaryDescriptor descriptor{};
   descriptor[word / 8] = static_cast<std::uint8_t>(1U << (word % 8));
   return descriptor;
 }

@@ -50,12 +50,15 @@ PairCycles pair_of(std::vector<NoiseCycle> inside, std::vector<NoiseCycle> betwe
 
 // The cycles of a pair of robots with eight true closures far from each other. The rotation noise
 // of odometry and of closures is sqrt(2) times as large as claimed (see random_team()).
-PairCycles random_pair(unsigned seed) {
+// `length`: of the odometry of robot 1, actual over true.
+PairCycles random_pair(unsigned seed, double length = 1.0) {
   const SplitGraph graph = random_team(seed, {0, 1}, 40, {{0, 1}});
   std::map<KeyframeId, SE3> poses{{{0, 0}, SE3::Identity()}, {{1, 0}, SE3::Identity()}};
   std::map<RobotId, Precision> step;
   for (const RelativePose& e : graph.odometry) {
-    poses[e.to] = poses.at(e.from) * e.T_from_to;
+    SE3 T = e.T_from_to;
+    if (e.from.robot == 1) T.translation() *= length;
+    poses[e.to] = poses.at(e.from) * T;
     step[e.from.robot] = precision_of(e.covariance);
   }
   std::vector<PoseEdge> closures;
@@ -131,6 +134,26 @@ TEST_CASE("Few observations do not make closures noisy", "[closure_noise]") {
   cycles.places = 1.0;  // all cycles are one observation
   CHECK(estimate_closure_noise(cycles, 1.0) == 1.0);
   CHECK(estimate_closure_noise({}, 2.5) == 2.5);
+}
+
+TEST_CASE("Odometry of the wrong length is no reason to distrust closures", "[closure_noise]") {
+  int distrusted = 0;
+  for (unsigned seed = 0; seed < 100; ++seed)
+    if (estimate_closure_noise(random_pair(seed, 1.5), 1.0) != 1.0) ++distrusted;
+  CHECK(distrusted == 0);
+}
+
+TEST_CASE("Cycles between places exclude a noise factor if there are enough of them",
+          "[closure_noise]") {
+  std::mt19937 rng(1);
+  const PairCycles many = pair_of({}, draw_cycles(40, 1.0, 0.0, 3, rng));
+  const PairCycles few = pair_of({}, draw_cycles(1, 1.0, 0.0, 3, rng));
+  CHECK(excludes_noise(many, 3.0, 1.0));
+  CHECK_FALSE(excludes_noise(many, 1.0, 3.0));
+  CHECK_FALSE(excludes_noise(few, 3.0, 1.0));
+  CHECK_FALSE(excludes_noise({}, 3.0, 1.0));
+  CHECK(shows_noise(many));
+  CHECK_FALSE(shows_noise(few));
 }
 
 TEST_CASE("The estimated share of true cycles equals the share in the data", "[closure_noise]") {

@@ -88,6 +88,22 @@ TEST_CASE("The noise of odometry is estimated from cycles", "[odometry_noise]") 
   CHECK(factor(noise.translation, scale) < 2.2);
 }
 
+// A turn of 50 steps then has a rotation noise of 2.8 rad, which a cycle of one closure cannot
+// show.
+TEST_CASE("Rotation noise beyond what a turn shows is estimated from closures near each other",
+          "[odometry_noise]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  constexpr double kScale = 40.0;
+  Walk walk(seed);
+  walk.walk(kScale, kScale);
+  walk.close(1);
+  walk.add_false(walk.closures.size() / 4);
+  const OdometryNoise noise = walk.noise();
+  CAPTURE(seed, noise.rotation, noise.translation);
+  CHECK(factor(noise.rotation, kScale) < 1.7);
+  CHECK(factor(noise.translation, kScale) < 2.2);
+}
+
 TEST_CASE("Noise of rotation and of translation are distinguished", "[odometry_noise]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   Walk walk(seed);

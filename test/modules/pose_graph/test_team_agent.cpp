@@ -166,6 +166,39 @@ TEST_CASE("a resumed robot takes part again with its known closures", "[pose_gra
   check_optimal(network, problem);
 }
 
+TEST_CASE("a robot resumed without its team continues from the last solution",
+          "[pose_graph][agent]") {
+  const RobotId resumed = GENERATE(RobotId{33}, RobotId{1200});
+  CAPTURE(resumed);
+  const TeamProblem problem = ring(9);
+  const std::uint64_t boot = 1U << kResumeBits;
+  TeamNetwork network;
+  for (const RobotId id : kIds) feed(network.add({id, boot}, {}, gather()), id, problem);
+  REQUIRE(settle(network));
+  TeamSolution solution;
+  solution.trajectory = *network.robots.at(resumed).trajectory;
+  for (const RobotId id : kIds)
+    if (id != resumed) solution.peers.push_back({id, boot});
+  TeamNetwork alone;
+  TeamAgent& agent = alone.add({resumed, next_boot(boot)}, {}, gather());
+  agent.restore(solution);
+  feed(agent, resumed, problem);
+  REQUIRE(settle(alone));
+  const auto& after = alone.robots.at(resumed).trajectory;
+  REQUIRE(after);
+  CHECK(after->anchor == 7);
+  REQUIRE(after->T_world_kf.size() == solution.trajectory.T_world_kf.size());
+  constexpr double kSame = 1e-4;  // held poses are in single precision
+  for (std::size_t k = 0; k < after->T_world_kf.size(); ++k) {
+    const SE3& before = solution.trajectory.T_world_kf[k];
+    CHECK((after->T_world_kf[k].matrix() - before.matrix()).norm() < kSame);
+  }
+  REQUIRE(after->public_poses.size() == solution.trajectory.public_poses.size());
+  CHECK_FALSE(after->public_poses.empty());
+  for (const auto& [id, T] : after->public_poses)
+    CHECK((T.matrix() - solution.trajectory.public_poses.at(id).matrix()).norm() < kSame);
+}
+
 TEST_CASE("the data of a restarted robot is discarded, and it takes part again",
           "[pose_graph][agent]") {
   const RobotId restarted = GENERATE(RobotId{7}, RobotId{50});

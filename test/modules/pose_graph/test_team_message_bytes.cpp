@@ -249,7 +249,7 @@ TEST_CASE("An inconsistent status is refused", "[pose_graph]") {
     m.offers[0].edges = 0;
   }
   SECTION("a method that is not known") {
-    m.method = static_cast<PgoMethod>(2);
+    m.method = static_cast<PgoMethod>(200);
   }
   SECTION("an odometry origin that is not finite") {
     m.T_odom_first.translation().x() = std::numeric_limits<double>::quiet_NaN();
@@ -288,7 +288,7 @@ TEST_CASE("An inconsistent session is refused", "[pose_graph]") {
     std::swap(m.plan.pairs[0], m.plan.pairs[1]);
   }
   SECTION("a method that is not known") {
-    m.method = static_cast<PgoMethod>(2);
+    m.method = static_cast<PgoMethod>(200);
   }
   SECTION("a cost that is not finite") {
     m.cost = std::numeric_limits<double>::infinity();

@@ -32,6 +32,8 @@ struct Robot {
             .closures = closures,
             .inlier_sets = inlier_sets,
             .peer_inlier_sets = peer_inlier_sets,
+            .restored_inlier_sets = restored_inlier_sets,
+            .restored_solution = restored_solution,
             .peer_events = peer_events,
             .restarts = restarts,
             .links = links,
@@ -85,7 +87,8 @@ struct Robot {
   TeamPeer self;
   Topic<KeyframeOdometry> odometry;
   Topic<Closure> closures;
-  Topic<InlierSet> inlier_sets, peer_inlier_sets;
+  Topic<InlierSet> inlier_sets, peer_inlier_sets, restored_inlier_sets;
+  Topic<TeamSolution> restored_solution;
   Topic<PeerEvent> peer_events, restarts;
   Topic<LinksReport> links;
   Topic<TeamMessage> peer_messages, messages;

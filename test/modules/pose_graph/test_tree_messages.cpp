@@ -35,7 +35,8 @@ TreeSums some_sums() {
                             .centre = {4.0, 5.0, 1.0 / 3.0},
                             .radius_m = 6.0,
                             .spread_m = 0.7,
-                            .strength = {.kappa = 8.5, .tau = 1e-3}}},
+                            .strength = {.kappa = 8.5, .tau = 1e-3}},
+                 .noise = 1.75F},
                 {.a = 1, .b = 60000, .used = 0},
                 {.a = 3, .b = 9, .used = 70000}};
   return sums;
@@ -101,6 +102,7 @@ DownMessage some_down_message(TreeVerdict::Next next, TreeVerdict::Weighing weig
                      .mu = 1e30,
                      .barc = 5.28,
                      .noise_scale = 1.0 / 3.0,
+                     .usual_noise = 2.5,
                      .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
                      .usual_pair = {.kappa = 12.5, .tau = 1e-7},
                      .cost = 1687.0,
@@ -140,6 +142,7 @@ void check_same(const TreeSums& a, const TreeSums& b) {
     CHECK(a.votes[k].motion.spread_m == b.votes[k].motion.spread_m);
     CHECK(a.votes[k].motion.strength.kappa == b.votes[k].motion.strength.kappa);
     CHECK(a.votes[k].motion.strength.tau == b.votes[k].motion.strength.tau);
+    CHECK(a.votes[k].noise == b.votes[k].noise);
   }
 }
 
@@ -236,6 +239,7 @@ TEST_CASE("Decoding restores a message down the tree", "[pose_graph]") {
   CHECK(v.mu == sent.verdict.mu);
   CHECK(v.barc == sent.verdict.barc);
   CHECK(v.noise_scale == sent.verdict.noise_scale);
+  CHECK(v.usual_noise == sent.verdict.usual_noise);
   CHECK(v.usual_pair.kappa == sent.verdict.usual_pair.kappa);
   CHECK(v.usual_pair.tau == sent.verdict.usual_pair.tau);
   REQUIRE(v.moves.size() == 2);
@@ -433,6 +437,7 @@ TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
   CHECK_FALSE(with([](TreeVerdict& v) { v.barc = -1.0; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.noise_scale = 0.0; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.usual_pair.kappa = 0.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_noise = 0.5; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.usual_pair.tau = -1.0; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.gradient = -1.0; }));
   CHECK_FALSE(with([](TreeVerdict& v) { v.cost = INFINITY; }));

@@ -18,7 +18,7 @@ struct Merged {
 // A chunk for each list of times; a message's bytes are its number, counted through all chunks.
 Merged merge(const std::vector<std::vector<Stamp>>& times, const std::vector<Stamp>& firsts,
              std::uint64_t held_bytes = ChunkMerge::kHeld_bytes) {
-  std::vector<ChunkPlace> places;
+  std::vector<ChunkRange> places;
   std::vector<Chunk> chunks;
   std::uint8_t number = 0;
   for (std::size_t i = 0; i < times.size(); ++i) {
@@ -33,11 +33,11 @@ Merged merge(const std::vector<std::vector<Stamp>>& times, const std::vector<Sta
   Merged merged;
   ChunkMerge merger(
       places,
-      [&](const ChunkPlace& place) {
+      [&](const ChunkRange& place) {
         ++merged.loads;
         return chunks[place.begin];
       },
-      [&](const ChunkPlace&, const Chunk::Entry& entry) { merged.lost.push_back(entry.log_time); },
+      [&](const ChunkRange&, const Chunk::Entry& entry) { merged.lost.push_back(entry.log_time); },
       held_bytes);
   while (auto message = merger.next()) merged.messages.push_back(*std::move(message));
   return merged;

@@ -34,10 +34,10 @@ Trajectory straight(RobotId anchor) {
 const KeyframeId kOwn0{3, 0}, kOwn2{3, 2}, kOther{7, 5};
 
 std::vector<PublishedClosure> closures() {
-  return {{closure_id(kOwn0, kOwn2), ClosureStage::kInlier, false, at(2.5)},
-          {closure_id(kOwn0, kOther), ClosureStage::kVerified, true, at(10)},
-          {closure_id(kOwn2, kOther), ClosureStage::kCandidate, false, std::nullopt},
-          {closure_id(kOwn0, {3, 9}), ClosureStage::kCandidate, false, std::nullopt}};
+  return {{closure_id(kOwn0, kOwn2), ClosureStatus::kKept, at(2.5)},
+          {closure_id(kOwn0, kOther), ClosureStatus::kRejected, at(10)},
+          {closure_id(kOwn2, kOther), ClosureStatus::kCandidate, std::nullopt},
+          {closure_id(kOwn0, {3, 9}), ClosureStatus::kCandidate, std::nullopt}};
 }
 
 // The newest message of a topic.

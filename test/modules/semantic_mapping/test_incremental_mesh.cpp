@@ -349,7 +349,8 @@ TEST_CASE("Superseded final surface is dropped and its votes on labels are kept"
       for (const std::uint32_t v : face) around += plane.first.ids[v] == left_out ? 1 : 0;
     REQUIRE(around >= 4);
     CHECK(plane.mesh.drop(all_but_one).faces == faces - around);
-    // The remaining vertices got no votes: the heirs next to them know only the second visit.
+    // The remaining vertices got no votes: the replacements next to them know only the second
+    // visit.
     const MapMesh left = plane.mesh.snapshot(plane.map, true);
     std::size_t stayed = 0;
     for (std::size_t v = 0; v < left.ids.size(); ++v) {
@@ -367,7 +368,7 @@ TEST_CASE("Superseded final surface is dropped and its votes on labels are kept"
     plane.see(0.03, 2, 1);
     const MapMesh seen = plane.mesh.snapshot(plane.map, true);
     CHECK(seen.ids.size() == 2 * vertices);
-    CHECK(seen.ids[vertices] > superseded.vertices.back().heir);  // ids are not reused
+    CHECK(seen.ids[vertices] > superseded.vertices.back().replacement);  // ids are not reused
   }
 }
 

@@ -190,7 +190,7 @@ TEST_CASE("Labels of another size or outside the palette are dropped and counted
     for (std::size_t i = 0; i < images.labels.ids.size(); ++i)
       if (i % columns < half) images.labels.ids[i] = 77;
     const IntegrationReport report = mapper.integrate(images.depth, &images.labels, at(0), 0);
-    CHECK(report.labels_outside == images.labels.ids.size() / 2);
+    CHECK(report.off_palette_pixels == images.labels.ids.size() / 2);
     CHECK_FALSE(report.label_size_differs);
     mapper.update_mesh();
     const MapMesh map = mapper.mesh();

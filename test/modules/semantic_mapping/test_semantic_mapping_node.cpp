@@ -91,7 +91,7 @@ TEST_CASE("Unusable frames are counted by reason", "[semantic_mapping_node]") {
   CHECK(bench.last.unlabelled == 1);
   CHECK(bench.last.wrong_size == 1);
   CHECK(bench.last.bad_pose == 1);
-  CHECK(bench.last.labels_outside == 160 * 120);
+  CHECK(bench.last.off_palette_pixels == 160 * 120);
 }
 
 TEST_CASE("A mapper that is too slow drops the oldest frames and counts them",

@@ -74,6 +74,35 @@ std::vector<SensorPacket> packets_of(DatasetReader& reader) {
   return packets;
 }
 
+TEST_CASE("The table of sensor kinds has each role and each topic once", "[sensors]") {
+  SensorTopicNames names;
+  for (std::size_t k = 0; k < kSensorKinds.size(); ++k) {
+    CHECK(static_cast<std::size_t>(kSensorKinds[k].role) == k);
+    CHECK((names.*kSensorKinds[k].topic).empty());
+    names.*kSensorKinds[k].topic = "/topic" + std::to_string(k);
+  }
+  const auto topics = sensor_topics(names);
+  REQUIRE(topics.size() == kSensorKinds.size());
+  CHECK(topics[0].type == RosImage::kType);
+  CHECK(topics[3].type == RosImu::kType);
+  for (std::size_t k = 0; k < topics.size(); ++k) {
+    CHECK(topics[k].kind == &kSensorKinds[k]);
+    CHECK(topics[k].topic == "/topic" + std::to_string(k));
+    CHECK(is_of_kind({.topic = {}, .type = std::string(topics[k].type), .encoding = {}},
+                     kSensorKinds[k]));
+    CHECK_FALSE(
+        is_of_kind({.topic = {}, .type = "std_msgs/Header", .encoding = {}}, kSensorKinds[k]));
+  }
+  CHECK(sensor_topics({.left = "/left/compressed",
+                       .right = {},
+                       .depth = {},
+                       .imu = {},
+                       .gyro = {},
+                       .accel = {}})
+            .at(0)
+            .type == RosCompressedImage::kType);
+}
+
 TEST_CASE("Messages of a bag become packets without a hole between them", "[sensors][bag]") {
   BagDataset dataset("test.bag", recording({}), small_rig(), {});
   CHECK(dataset.pair_count() == 40);

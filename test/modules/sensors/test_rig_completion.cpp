@@ -49,7 +49,7 @@ PartialRig nothing_known() {
   PartialRig rig;
   rig.rig.topics = {
       .left = "/left", .right = "/right", .depth = {}, .imu = "/imu", .gyro = {}, .accel = {}};
-  rig.has_cameras = rig.is_placed = false;
+  rig.has_cameras = rig.has_extrinsics = false;
   rig.info_topics = {"/left_info", "/right_info"};
   return rig;
 }

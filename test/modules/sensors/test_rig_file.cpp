@@ -169,7 +169,7 @@ TEST_CASE("Parts that a rig file lacks come from topics", "[sensors]") {
            "right: {topic: /r/image_rect, info_topic: /r/info}\nimu: {topic: /imu}\n"
            "body_frame: base\n");
   CHECK(!none.has_cameras);
-  CHECK(!none.is_placed);
+  CHECK(!none.has_extrinsics);
   CHECK(none.info_topics == std::array<std::string, 2>{"/l/camera_info", "/r/info"});
   CHECK(none.images == std::array{RosImages::kRaw, RosImages::kRectified});
   CHECK(none.body_frame == "base");
@@ -184,7 +184,7 @@ TEST_CASE("Parts that a rig file lacks come from topics", "[sensors]") {
   folder.write("cameras.yaml", chain);
   const PartialRig unplaced = read(folder, kTopics + "calibration: cameras.yaml\n");
   CHECK(unplaced.has_cameras);
-  CHECK(!unplaced.is_placed);
+  CHECK(!unplaced.has_extrinsics);
   CHECK(unplaced.rig.sensors.stereo.cameras[1].T_body_cam.translation().isApprox(
       Eigen::Vector3d(0.2, 0, 0)));
 }

@@ -64,7 +64,7 @@ TEST_CASE("A resumed robot is shown from its beginning once the former process i
 TEST_CASE("After a robot has left another process with its id counts at once", "[view]") {
   Page page;
   page.send(kFirst, 0, 0.0);
-  page.send(kFirst, ViewContent(ViewState{.name = "alice", .phase = "leaving"}), 1.0);
+  page.send(kFirst, ViewContent(RobotSample{.name = "alice", .phase = "leaving"}), 1.0);
   page.send(kSecond, 0, 1.1);
   CHECK(page.shown == Shown{{kFirst, 0}, {kSecond, 0}});
 }

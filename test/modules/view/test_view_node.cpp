@@ -23,23 +23,18 @@ struct Watched {
   explicit Watched(const ViewConfig& config = {})
       : participant(domain, {.robot = kSelf, .name = "alpha", .boot = 9}),
         node(config, participant, {}, camera(),
-             [this] {
-               ++described;
-               return ViewState{.name = "alpha", .phase = "running"};
-             },
              {.odometry = odometry,
               .keyframes = keyframes,
-              .trajectory = trajectory,
-              .progress = progress,
               .outcomes = outcomes,
               .restored_outcomes = restored_outcomes,
               .closures = closures,
-              .own_inlier_sets = own_sets,
-              .peer_inlier_sets = peer_sets,
-              .verdicts = verdicts,
+              .judgements = judgements,
+              .pose_changes = pose_changes,
+              .samples = samples,
               .restarts = restarts,
-              .statuses = statuses,
-              .images = images}) {}
+              .images = images}) {
+    give(RobotSample{.name = "alpha", .phase = "running"});
+  }
 
   static Camera camera() {
     Camera result;
@@ -74,7 +69,10 @@ struct Watched {
   void give_trajectory(std::size_t count, double x_m) {
     SE3 T = SE3::Identity();
     T.translation().x() = x_m;
-    give(Trajectory{kSelf, kSelf, std::vector<SE3>(count, T)});
+    PoseChanges changes{kSelf, {}};
+    for (std::size_t k = 0; k < count; ++k)
+      changes.poses.push_back({{kSelf, static_cast<KeyframeIndex>(k)}, T, {}});
+    give(std::move(changes));
   }
   [[nodiscard]] std::size_t sent(ViewChannel channel = ViewChannel::kView) const {
     return node.sent_bytes(channel);
@@ -84,16 +82,13 @@ struct Watched {
   DdsParticipant participant;
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframes;
-  Topic<Trajectory> trajectory;
-  Topic<OptimizerProgress> progress;
   Topic<ClosureOutcome> outcomes, restored_outcomes;
   Topic<Closure> closures;
-  Topic<InlierSet> own_sets, peer_sets;
-  Topic<ClosureVerdicts> verdicts;
+  Topic<ClosureJudgements> judgements;
+  Topic<PoseChanges> pose_changes;
+  Topic<RobotSample> samples;
   Topic<PeerEvent> restarts;
-  Topic<RobotStatus> statuses;
   Topic<TrackedImage> images;
-  int described = 0;
   double now_s = 1000.0;
   ViewNode node;
 };
@@ -126,7 +121,6 @@ TEST_CASE("Without viewers nothing is sent", "[view]") {
   robot.give_keyframes(100);
   robot.give_mesh(20);
   robot.pass(60.0);
-  CHECK(robot.described == 0);
   for (const auto channel : {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages})
     CHECK(robot.sent(channel) == 0);
 }
@@ -168,28 +162,24 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   CHECK(rate > 0.9 * config.bytes_per_s);
 }
 
-TEST_CASE("A state is sent once a second", "[view]") {
+TEST_CASE("Each state is sent", "[view]") {
   Watched robot;
   Visitor visitor(robot);
-  robot.give(OptimizerProgress{.anchor = 3, .members = {3, kSelf}, .round = 12, .cost = 5.5});
-  robot.give(RobotStatus{.robot = 4, .name = "beta"});
   const std::size_t before = visitor.watcher.states.size();
-  robot.pass(10.0);
+  for (std::uint32_t k = 1; k <= 10; ++k) {
+    robot.give(RobotSample{.name = "alpha", .keyframes = k, .links = {{4, 0.5F}}});
+    robot.pass(1.0);
+  }
   REQUIRE(eventually([&] {
     visitor.receive_all();
     return visitor.watcher.states.size() >= before + 10;
   }));
-  CHECK(visitor.watcher.states.size() <= before + 11);
-  const ViewState& state = visitor.watcher.states.back();
+  CHECK(visitor.watcher.states.size() == before + 10);
+  const RobotSample& state = visitor.watcher.states.back();
   CHECK(state.name == "alpha");
-  CHECK(state.anchor == 3);
-  CHECK(state.round == 12);
-  CHECK(state.cost == 5.5);
+  CHECK(state.keyframes == 10);
   REQUIRE(state.links.size() == 1);
   CHECK(state.links[0].robot == 4);
-  REQUIRE(state.sent_bytes.size() == 3);
-  CHECK(state.sent_bytes[0].name == "view");
-  CHECK(state.sent_bytes[0].value > 0.0);
 }
 
 TEST_CASE("A late viewer receives the full state", "[view]") {

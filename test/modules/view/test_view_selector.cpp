@@ -1,8 +1,6 @@
 #include <catch2/catch.hpp>
 #include <cstdint>
-#include <limits>
 #include <map>
-#include <memory>
 #include <optional>
 #include <random>
 #include <utility>
@@ -43,15 +41,14 @@ KeyframeOdometry keyframe(KeyframeIndex index, const SE3& T) {
   return result;
 }
 
-std::shared_ptr<const Trajectory> trajectory(std::vector<SE3> poses, RobotId anchor = kSelf) {
-  return std::make_shared<const Trajectory>(Trajectory{kSelf, anchor, std::move(poses)});
-}
-
-SE3 shifted(const SE3& T, double x_m) {
-  SE3 result = T;
-  result.translation().x() += x_m;
-  return result;
-}
+// Selector of a robot whose trajectories are stated as changes.
+struct Selector : ViewSelector {
+  Selector() : ViewSelector(kSelf) {}
+  void set_trajectory(const std::vector<SE3>& poses, RobotId anchor = kSelf) {
+    if (const auto changes = stated.update(Trajectory{kSelf, anchor, poses})) add(*changes);
+  }
+  StatedPoses stated;
+};
 
 std::vector<SE3> line(std::size_t count) {
   std::vector<SE3> poses(count, SE3::Identity());
@@ -66,9 +63,9 @@ void check_within_bounds(const Watcher& watcher, const std::vector<SE3>& truth, 
     const auto& known = watcher.optimized.at(static_cast<KeyframeIndex>(k));
     CHECK(known.anchor == anchor);
     CHECK((known.T.translation() - truth[k].translation()).norm() <=
-          ViewSelector::kMaxShift_m + kRounding_m);
+          StatedPoses::kMaxShift_m + kRounding_m);
     CHECK(angle_of(known.T.linear().transpose() * truth[k].linear()) <=
-          ViewSelector::kMaxTurn_rad + kRounding_rad);
+          StatedPoses::kMaxTurn_rad + kRounding_rad);
   }
 }
 
@@ -130,59 +127,44 @@ TEST_CASE("Keyframes of odometry are sent once, several at a time", "[view]") {
   CHECK(watcher.odometry.at(0).anchor == kSelf);
 }
 
-TEST_CASE("Optimised poses are sent again when they have moved", "[view]") {
-  ViewSelector selector(kSelf);
+TEST_CASE("Changed optimised poses are sent, all of them in another frame", "[view]") {
+  Selector selector;
   Watcher watcher;
   std::vector<SE3> poses = line(100);
-  selector.add(trajectory(poses));
+  selector.set_trajectory(poses);
   receive_all(selector, watcher, 0.0);
   CHECK(watcher.optimized_received == 100);
-  SECTION("not within the bound") {
-    for (SE3& T : poses) T = shifted(T, 0.009);
-    selector.add(trajectory(poses));
-    receive_all(selector, watcher, 10.0);
-    CHECK(watcher.optimized_received == 100);
+  poses[40].translation().y() += 1.0;
+  selector.set_trajectory(poses);
+  selector.add(PoseChanges{kSelf, {{{9, 3}, SE3::Identity(), {}}}});  // held pose of another robot
+  receive_all(selector, watcher, 10.0);
+  CHECK(watcher.optimized_received == 101);
+  check_within_bounds(watcher, poses, kSelf);
+  selector.set_trajectory(poses, 9);
+  receive_all(selector, watcher, 20.0);
+  CHECK(watcher.optimized_received == 201);
+  check_within_bounds(watcher, poses, 9);
+}
+
+TEST_CASE("Each sample is sent once, the last one also to a late viewer", "[view]") {
+  ViewSelector selector(kSelf);
+  Watcher watcher, late;
+  for (std::uint32_t k = 1; k <= 3; ++k) {
+    selector.add(RobotSample{.keyframes = k});
+    receive_all(selector, watcher, 0.1 * k);
   }
-  SECTION("in small steps, once their sum is beyond the bound") {
-    for (int step = 1; step <= 12; ++step) {  // 4 mm: sent after 3, 6, 9, 12 of them.
-      poses[40] = shifted(poses[40], 0.004);
-      selector.add(trajectory(poses));
-      receive_all(selector, watcher, 10.0 * step);
-    }
-    CHECK(watcher.optimized_received == 100 + 4);
-  }
-  SECTION("turned") {
-    poses[7].linear() = so3_exp({0.0, 0.0, 0.4 / kDegrees});
-    selector.add(trajectory(poses));
-    receive_all(selector, watcher, 10.0);
-    CHECK(watcher.optimized_received == 100);
-    poses[7].linear() = so3_exp({0.0, 0.0, 0.6 / kDegrees});
-    selector.add(trajectory(poses));
-    receive_all(selector, watcher, 20.0);
-    CHECK(watcher.optimized_received == 101);
-  }
-  SECTION("all of them in another frame") {
-    selector.add(trajectory(poses, 9));
-    receive_all(selector, watcher, 10.0);
-    CHECK(watcher.optimized_received == 200);
-    check_within_bounds(watcher, poses, 9);
-  }
-  SECTION("not the poses of other robots, nor poses that are not finite") {
-    Trajectory other{9, 9, line(3)};
-    other.T_world_kf[0].translation().y() = 50.0;
-    selector.add(std::make_shared<const Trajectory>(other));
-    std::vector<SE3> broken = poses;
-    broken[0].translation().y() = std::numeric_limits<double>::quiet_NaN();
-    selector.add(trajectory(broken));
-    receive_all(selector, watcher, 10.0);
-    CHECK(watcher.optimized_received == 100);
-  }
+  REQUIRE(watcher.states.size() == 3);
+  CHECK(watcher.states.back().keyframes == 3);
+  selector.begin_again();
+  receive_all(selector, late, 0.4);
+  REQUIRE(late.states.size() == 1);
+  CHECK(late.states.back().keyframes == 3);
 }
 
 // A graph that changes faster than it can be sent: one update per round.
 TEST_CASE("Sent poses are within the bound in the end", "[view]") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
-  ViewSelector selector(kSelf);
+  Selector selector;
   Watcher watcher, late;
   std::vector<SE3> poses;
   std::normal_distribution<double> step(0.0, 0.005);
@@ -193,7 +175,7 @@ TEST_CASE("Sent poses are within the bound in the end", "[view]") {
       T.linear() = T.linear() * so3_exp({step(rng), 0.0, 0.0});
     }
     selector.add(keyframe(static_cast<KeyframeIndex>(round), poses.back()));
-    selector.add(trajectory(poses, round < 150 ? kSelf : RobotId{1}));
+    selector.set_trajectory(poses, round < 150 ? kSelf : RobotId{1});
     const auto content = selector.next(round);
     if (content) receive(*content, watcher);
   }
@@ -219,45 +201,44 @@ TEST_CASE("The stage of a pair of keyframes is sent when it changes", "[view]") 
     return watcher.closures.at(id).verdict;
   };
   selector.add(outcome(id, ClosureStage::kCandidate));
-  CHECK(verdict() == ViewVerdict::kCandidate);
+  CHECK(verdict() == ClosureStatus::kCandidate);
   selector.add(outcome(id, ClosureStage::kRequested));
-  CHECK(verdict() == ViewVerdict::kCandidate);
+  CHECK(verdict() == ClosureStatus::kCandidate);
   CHECK(watcher.order.size() == 1);  // No second update without a change.
   SECTION("verification stops") {
     selector.add(outcome(id, ClosureStage::kReceived, "too few matches"));
-    CHECK(verdict() == ViewVerdict::kRejected);
+    CHECK(verdict() == ClosureStatus::kRejected);
     CHECK(watcher.closures.at(id).reason == "too few matches");
     CHECK(watcher.closures.at(id).matches == 40);
     selector.add(closure(id, 33));  // The other robot has verified it.
-    CHECK(verdict() == ViewVerdict::kVerified);
+    CHECK(verdict() == ClosureStatus::kVerified);
     CHECK(watcher.closures.at(id).reason.empty());
     CHECK(watcher.closures.at(id).inliers == 33);
   }
   SECTION("verified, kept, and overruled") {
     selector.add(outcome(id, ClosureStage::kVerified));
-    CHECK(verdict() == ViewVerdict::kVerified);
-    selector.add(InlierSet{kSelf, 7, 2, {id, pair_of(11, 21)}});
-    CHECK(verdict() == ViewVerdict::kKept);
-    selector.add(ClosureVerdicts{{{id, false}}});
-    CHECK(verdict() == ViewVerdict::kRejected);
+    CHECK(verdict() == ClosureStatus::kVerified);
+    selector.add(ClosureJudgements{{{id, true, false}, {pair_of(11, 21), true, false}}});
+    CHECK(verdict() == ClosureStatus::kKept);
+    CHECK(watcher.closures.size() == 1);
+    selector.add(ClosureJudgements{{{id, true, true}}});
+    CHECK(verdict() == ClosureStatus::kRejected);
     CHECK(watcher.closures.at(id).reason == "the other closures contradict it");
-    selector.add(ClosureVerdicts{{{id, true}}});
-    CHECK(verdict() == ViewVerdict::kKept);
-    selector.add(InlierSet{kSelf, 7, 1, {}});  // An outdated version.
-    CHECK(verdict() == ViewVerdict::kKept);
-    selector.add(InlierSet{kSelf, 7, 3, {pair_of(11, 21)}});
-    CHECK(verdict() == ViewVerdict::kVerified);
+    selector.add(ClosureJudgements{{{id, true, false}}});
+    CHECK(verdict() == ClosureStatus::kKept);
+    selector.add(ClosureJudgements{{{id, false, false}}});
+    CHECK(verdict() == ClosureStatus::kVerified);
     selector.restarted(8);
-    CHECK(verdict() == ViewVerdict::kVerified);
+    CHECK(verdict() == ClosureStatus::kVerified);
     selector.restarted(7);
-    CHECK(verdict() == ViewVerdict::kRejected);
+    CHECK(verdict() == ClosureStatus::kRejected);
     CHECK(watcher.closures.at(id).reason == "its robot was restarted");
   }
-  SECTION("an inlier set that arrives before its closure") {
-    selector.add(InlierSet{kSelf, 7, 2, {pair_of(12, 22)}});
+  SECTION("a judgement that arrives before its closure") {
+    selector.add(ClosureJudgements{{{pair_of(12, 22), true, false}}});
     selector.add(closure(pair_of(12, 22), 50));
     receive_all(selector, watcher, 0.0);
-    CHECK(watcher.closures.at(pair_of(12, 22)).verdict == ViewVerdict::kKept);
+    CHECK(watcher.closures.at(pair_of(12, 22)).verdict == ClosureStatus::kKept);
   }
   SECTION("no closures between other robots") {
     selector.add(closure(closure_id({1, 1}, {2, 2}), 50));
@@ -271,7 +252,7 @@ TEST_CASE("The stage of a pair of keyframes is sent when it changes", "[view]") 
     selector.begin_again();
     receive_all(selector, late, 0.0);
     REQUIRE(late.closures.size() == 1);
-    CHECK(late.closures.at(id).verdict == ViewVerdict::kVerified);
+    CHECK(late.closures.at(id).verdict == ClosureStatus::kVerified);
   }
 }
 

@@ -19,7 +19,7 @@ using Bytes = std::vector<std::uint8_t>;
 // Rounding of float32 at 10 m: half a unit in the last place, and as much from the quaternion.
 constexpr double kPoseTolerance = 2e-6;
 
-ViewState some_state() {
+RobotSample some_state() {
   return {.name = "alpha",
           .phase = "running",
           .dataset_time_s = 12.5,
@@ -45,9 +45,9 @@ ViewKeyframes some_keyframes(std::size_t count) {
 }
 
 ViewClosures some_closures() {
-  return {{{{{1, 5}, {2, 900}}, ViewVerdict::kCandidate, 0, 0, ""},
-           {{{1, 5}, {2, 901}}, ViewVerdict::kRejected, 65535, 12, "too few inliers"},
-           {{{1, 70000}, {1, 70001}}, ViewVerdict::kKept, 120, 80, ""}}};
+  return {{{{{1, 5}, {2, 900}}, ClosureStatus::kCandidate, 0, 0, ""},
+           {{{1, 5}, {2, 901}}, ClosureStatus::kRejected, 65535, 12, "too few inliers"},
+           {{{1, 70000}, {1, 70001}}, ClosureStatus::kKept, 120, 80, ""}}};
 }
 
 MeshChunk some_chunk() {
@@ -94,8 +94,8 @@ bool is_understood(const ViewContent& content) {
 }
 
 TEST_CASE("A state is unchanged by encoding and decoding", "[view]") {
-  const ViewState sent = some_state();
-  const ViewState got = round_trip(sent);
+  const RobotSample sent = some_state();
+  const RobotSample got = round_trip(sent);
   CHECK(got.name == sent.name);
   CHECK(got.phase == sent.phase);
   CHECK(got.dataset_time_s == sent.dataset_time_s);
@@ -166,7 +166,7 @@ TEST_CASE("Mesh chunks and images are unchanged by encoding and decoding", "[vie
 }
 
 TEST_CASE("Texts are encoded in printable ASCII", "[view]") {
-  ViewState state;
+  RobotSample state;
   state.name = "a\nb\xC3\xA9";
   CHECK(round_trip(state).name == "a?b??");
 }
@@ -188,7 +188,7 @@ TEST_CASE("Truncated and extended updates are refused", "[view]") {
 TEST_CASE("Updates with impossible numbers are refused", "[view]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
-  ViewState state;
+  RobotSample state;
   SECTION("a cost") {
     state.cost = nan;
     CHECK_FALSE(is_understood(state));
@@ -225,7 +225,7 @@ TEST_CASE("Updates with impossible numbers are refused", "[view]") {
   }
   SECTION("a verdict") {
     ViewClosures closures = some_closures();
-    closures.closures[0].verdict = static_cast<ViewVerdict>(4);
+    closures.closures[0].verdict = static_cast<ClosureStatus>(4);
     CHECK_FALSE(is_understood(closures));
   }
   SECTION("a face outside") {

@@ -30,7 +30,7 @@ struct Watcher {
       order.push_back(closure.id);
     }
   }
-  void take(const ViewState& state) { states.push_back(state); }
+  void take(const RobotSample& state) { states.push_back(state); }
   void take(const MeshChunk& chunk) { (void)mesh.add(chunk); }
   void take(const ViewImage& image) { images.push_back(image); }
 
@@ -43,7 +43,7 @@ struct Watcher {
   std::map<ClosureId, ViewClosure> closures;
   std::vector<ClosureId> order;
   std::size_t odometry_received = 0, optimized_received = 0;
-  std::vector<ViewState> states;
+  std::vector<RobotSample> states;
   std::vector<ViewImage> images;
   TeamMesh mesh;
 };

@@ -183,7 +183,8 @@ Recording as_rgbd(const Recording& recording, std::size_t every, std::size_t fir
     DepthImage result{rig.cameras[0].width, rig.cameras[0].height, {}};
     for (const auto& ray : rays) {
       const auto inverse_depth =
-          ray ? inverse_depth_at(depth, ray->rectified_px, depth_edge(rig)) : std::nullopt;
+          ray ? inverse_depth_at(depth, ray->rectified_px, depth_edge_threshold(rig))
+              : std::nullopt;
       result.millimetres.push_back(inverse_depth ? static_cast<std::uint16_t>(std::lround(
                                                        1e3 / (*inverse_depth * ray->depth_ratio)))
                                                  : std::uint16_t{0});

@@ -64,7 +64,7 @@ TEST_CASE("Derivatives of a reprojection by the calibration agree with differenc
                                    image.T_odom_body, p_odom, term));
     const Eigen::MatrixXd numeric = numeric_jacobian<7>([&](const Vector7& d) -> Eigen::VectorXd {
       Window moved = window;
-      calibrate(moved, calibration.moved(d));
+      calibrate(moved, calibration.retracted(d));
       Eigen::Vector2d r;
       REQUIRE(reprojection_error(moved.views[c], Eigen::Vector2d::Zero(), image_poses(moved)[0],
                                  p_odom, r));

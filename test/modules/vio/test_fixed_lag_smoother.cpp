@@ -442,7 +442,7 @@ TEST_CASE("A gyroscope that is noisier than assumed has less weight", "[vio]") {
   CHECK(scale_with(1.0) == 1.0);
   const double tenfold = scale_with(10.0);
   CHECK(tenfold > 2.0);
-  CHECK(tenfold <= GyroNoiseScale::kMost);
+  CHECK(tenfold <= GyroNoiseScale::kMaxScale);
 }
 
 TEST_CASE("The errors of states agree with their covariance", "[vio]") {

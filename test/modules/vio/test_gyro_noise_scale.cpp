@@ -24,7 +24,7 @@ TEST_CASE("The scale of the gyroscope's noise follows the images within bounds",
   CHECK(noise.scale() == 1.0);
   CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
   CHECK(scale_after(noise, 2.0, 30.0) == Approx(2.0).margin(0.4));
-  CHECK(scale_after(noise, 100.0, 30.0) == Approx(GyroNoiseScale::kMost).margin(1e-3));
+  CHECK(scale_after(noise, 100.0, 30.0) == Approx(GyroNoiseScale::kMaxScale).margin(1e-3));
   CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
 }
 

@@ -47,8 +47,8 @@ TEST_CASE("A few images without landmarks and a start without vision are no loss
   run.add(100, 0);
   CHECK(run.events.empty());
   for (int k = 0; k < 20; ++k) {
-    run.add(1, VisionWatch::kLeastSeen);
-    run.add(5, VisionWatch::kLeastSeen - 1);
+    run.add(1, VisionWatch::kMinLandmarks);
+    run.add(5, VisionWatch::kMinLandmarks - 1);
   }
   CHECK(run.events.empty());
   CHECK(run.watch.lost_s() == 0.0);

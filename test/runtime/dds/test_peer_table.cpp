@@ -222,7 +222,7 @@ TEST_CASE("A robot that is started again has its id back once its former self is
 TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
   PeerTable table = with_robot();
   // That of the robot itself is no secret.
-  const std::uint64_t boot = GENERATE(kBoot, kBoot + 1, kOtherIncarnation);
+  const std::uint64_t boot = GENERATE(as<std::uint64_t>{}, kBoot, kBoot + 1, kOtherIncarnation);
   for (int i = 0; i < 3; ++i) {
     table.participant(guid(3), data_of(7, boot), "udp/10.0.0.66");
     table.alive(guid(3));

@@ -101,7 +101,7 @@ TEST_CASE("outliers reports the fault of its input", "[outliers]") {
   fails_with(graph + " --methods best", "best not in");
   fails_with(graph + " --shares -5", "--shares");
   fails_with(graph + " --pcm-sigmas 0", "--pcm-sigmas");
-  fails_with(graph + " --robots 30", "20 poses, which cannot be dealt out to 30 robots");
+  fails_with(graph + " --robots 30", "20 poses, which cannot be divided among 30 robots");
   fails_with(graph + " --json /nowhere/out.json", "there is no folder /nowhere");
   fails_with(folder.write("steps.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string() + " --robots 1",
              "no loop closure");

@@ -154,7 +154,7 @@ TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
                                     "EDGE_SE3:QUAT 1 2 1e308 0 0 0 0 0 1" + unit);
   // FILE and PLACE stand for the graph and its folder.
   const auto [pattern, message] = GENERATE(table<std::string, std::string>(
-      {{"FILE --robots 9", "8 poses, which cannot be dealt out to 9 robots"},
+      {{"FILE --robots 9", "8 poses, which cannot be divided among 9 robots"},
        {"FILE --robots 2 --method centralized --verify", "--verify is for --method rbcd only"},
        {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
        {"FILE --method dgs --verify", "--verify is for"},

@@ -164,7 +164,7 @@ TEST_CASE("Invalid delays, losses and weights are refused", "[pgo_study]") {
 TEST_CASE("With old poses the small grid still reaches its optimum", "[pgo_study]") {
   const auto file = shared_data("pose_graphs/3d/smallGrid3D.g2o");
   if (!file) return;
-  const TeamGraph graph = deal_contiguously(read_g2o(*file), 5, "smallGrid3D");
+  const TeamGraph graph = partition_contiguously(read_g2o(*file), 5, "smallGrid3D");
   AsynchronousTeam team(graph, start_of(graph), {.max_delay = 2, .loss = 0.05});
   const auto rounds = run_team(graph, team, {.max_rounds = 600}, {});
   CHECK(rounds.back().cost == Approx(1025.398056).epsilon(1e-5));  // SE-Sync, unit quaternions

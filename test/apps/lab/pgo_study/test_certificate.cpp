@@ -168,7 +168,7 @@ TEST_CASE("A direction that the first Lanczos start misses is not certified", "[
   for (double& v : start) v = normal(rng);
   std::vector<SE3> frames;
   for (Eigen::Index i = 0; i < kPoses; ++i) {
-    frames.push_back(make_pose(turn_to_z(start.segment<3>(4 * i)), Eigen::Vector3d::Zero()));
+    frames.push_back(make_pose(rotation_to_z(start.segment<3>(4 * i)), Eigen::Vector3d::Zero()));
   }
   std::vector<BlockEdge> edges = ring.graph.edges;
   std::vector<SE3> poses = ring.wound;
@@ -297,7 +297,7 @@ TEST_CASE("Recorded graphs are certified at their known optima", "[pgo_study]") 
   const auto file = shared_data(std::string("pose_graphs/") + known.file);
   if (!file) return;
   CAPTURE(known.file);
-  const TeamGraph graph = deal_contiguously(read_g2o(*file), 1, known.file);
+  const TeamGraph graph = partition_contiguously(read_g2o(*file), 1, known.file);
   CentralSolver solver(graph.edges, lift(chordal_initialisation(graph.poses(), graph.edges), 3),
                        graph.dimension);
   while (solver.step()) {

@@ -86,14 +86,14 @@ class AskedTeam {
   std::optional<MemberTeam> team_;
 };
 
-double cost_of(const TeamGraph& graph, const std::vector<SE3>& poses) {
+double cost_of_poses(const TeamGraph& graph, const std::vector<SE3>& poses) {
   return problem_of(graph, 3).cost(lift(poses, 3));
 }
 
-std::optional<TeamGraph> dealt(const std::string& name, std::size_t robots) {
+std::optional<TeamGraph> partitioned(const std::string& name, std::size_t robots) {
   const auto path = shared_data(name);
   if (!path) return std::nullopt;
-  return deal_contiguously(read_g2o(*path), robots, name);
+  return partition_contiguously(read_g2o(*path), robots, name);
 }
 
 std::vector<SE3> optimum_of(const TeamGraph& graph) {
@@ -245,7 +245,7 @@ double most_rmse_m(const std::string& name) {
 // all. Returns the number of rounds; 0 if there are no data.
 std::uint32_t check_false_closures(const std::string& name, std::size_t robots,
                                    const FalseClosures& added, unsigned seed) {
-  const auto clean = dealt(name, robots);
+  const auto clean = partitioned(name, robots);
   if (!clean) return 0;
   const std::vector<SE3> truth = optimum_of(*clean);
   const TeamGraph graph = corrupted_graph(*clean, truth, added, seed);
@@ -284,7 +284,7 @@ std::map<std::pair<std::size_t, std::size_t>, std::size_t> closures_between(
 
 TEST_CASE("False closures of the pair with most closures do not place the robots", "[pgo_study]") {
   const FalseClosures added{.share = 0.1, .places = 8, .size = 10};
-  const auto clean = dealt(kSphere, 5);
+  const auto clean = partitioned(kSphere, 5);
   if (!clean) return;
   // Most closures are between the first robot and the last, and all of these are false.
   REQUIRE_FALSE(closures_between(*clean).contains({0, 4}));
@@ -334,17 +334,17 @@ TEST_CASE("A team that trusts its closures reaches the certified optimum", "[pgo
                        Certified{kSphere, 1687.005815, 7}, Certified{kGarage, 1.26252443, 7},
                        Certified{"pose_graphs/3d/torus3D.g2o", 24227.04556, 7}}));
   CAPTURE(name);
-  const auto graph = dealt(name, 5);
+  const auto graph = partitioned(name, 5);
   if (!graph) return;
   AskedTeam asked(*graph, chordal_initialisation(graph->poses(), graph->edges), kTrusting);
   int rounds = 0;
-  while (cost_of(*graph, asked.poses()) > optimum * (1.0 + 1e-6) && rounds <= most) {
+  while (cost_of_poses(*graph, asked.poses()) > optimum * (1.0 + 1e-6) && rounds <= most) {
     REQUIRE(asked.step());
     ++rounds;
   }
   CHECK(rounds <= most);
   REQUIRE(asked.run(60));
-  const double cost = cost_of(*graph, asked.poses());
+  const double cost = cost_of_poses(*graph, asked.poses());
   WARN(name << ": 1e-6 after " << rounds << " rounds, ends after " << asked.team().rounds()
             << " with " << cost / optimum - 1.0);
   CHECK(cost == Approx(optimum).epsilon(1e-7));
@@ -353,13 +353,13 @@ TEST_CASE("A team that trusts its closures reaches the certified optimum", "[pgo
 
 void check_shapes(const std::string& name, bool robust) {
   CAPTURE(name, robust);
-  const auto graph = dealt(name, 5);
+  const auto graph = partitioned(name, 5);
   if (!graph) return;
   std::map<TeamShape, double> cost;
   for (const TeamShape shape : {TeamShape::kAll, TeamShape::kChain}) {
     AskedTeam asked(*graph, odometry_start(*graph), robust ? kExact : kTrusting, shape);
     REQUIRE(asked.run(100));
-    cost[shape] = cost_of(*graph, asked.poses());
+    cost[shape] = cost_of_poses(*graph, asked.poses());
   }
   CHECK(cost[TeamShape::kChain] == Approx(cost[TeamShape::kAll]).epsilon(1e-9));
 }
@@ -432,7 +432,7 @@ void check_decided_once(const AskedTeam& asked, const TeamGraph& graph) {
 }
 
 TEST_CASE("Every closure is decided by exactly one of its two robots", "[pgo_study]") {
-  const auto clean = dealt("pose_graphs/3d/smallGrid3D.g2o", 4);
+  const auto clean = partitioned("pose_graphs/3d/smallGrid3D.g2o", 4);
   if (!clean) return;
   const std::vector<SE3> truth = optimum_of(*clean);
   Corrupter corrupter(*clean, truth, 4);

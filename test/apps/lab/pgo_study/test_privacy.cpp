@@ -14,7 +14,7 @@ std::optional<TeamGraph> recorded(const std::string& name, std::size_t robots) {
   const auto path = shared_data(name);
   if (!path) return std::nullopt;
   if (robots == 0) return read_team_folder(*path);
-  return deal_contiguously(read_g2o(*path), robots, name);
+  return partition_contiguously(read_g2o(*path), robots, name);
 }
 
 struct Recorded {

@@ -56,7 +56,7 @@ TEST_CASE("Poses are divided in the order of their ids, and the last robot gets 
   std::string text = "VERTEX_SE2 7 0 0 0\nVERTEX_SE2 2 0 0 0\nVERTEX_SE2 3 0 0 0\n";
   text += "VERTEX_SE2 20 0 0 0\nVERTEX_SE2 9 0 0 0\n";
   text += planar_edge(20, 9) + planar_edge(2, 3) + planar_edge(9, 7) + planar_edge(3, 7);
-  const TeamGraph graph = deal_contiguously(graph_of(text), 2, "graph.g2o");
+  const TeamGraph graph = partition_contiguously(graph_of(text), 2, "graph.g2o");
   CHECK(graph.first == std::vector<Eigen::Index>{0, 2, 5});
   std::vector<std::uint32_t> indices;
   for (const KeyframeId& id : graph.ids) indices.push_back(id.index);
@@ -73,7 +73,7 @@ TEST_CASE("Every edge belongs to one robot or to two, and parallel edges all cou
           "[pgo_study]") {
   const std::string text = planar_edge(0, 1) + planar_edge(0, 1) + planar_edge(1, 2) +
                            planar_edge(2, 1) + planar_edge(2, 3);
-  const TeamGraph graph = deal_contiguously(graph_of(text), 2, "graph.g2o");
+  const TeamGraph graph = partition_contiguously(graph_of(text), 2, "graph.g2o");
   CHECK(graph.edges.size() == 5);
   const SessionGraph a = part_of(graph, 0);
   const SessionGraph b = part_of(graph, 1);
@@ -92,7 +92,7 @@ TEST_CASE("Every edge belongs to one robot or to two, and parallel edges all cou
 TEST_CASE("A robot's own odometry comes before its closures", "[pgo_study]") {
   const std::string text = planar_edge(0, 2) + planar_edge(1, 2) + planar_edge(0, 1) +
                            planar_edge(2, 1) + planar_edge(2, 3);
-  const SessionGraph part = part_of(deal_contiguously(graph_of(text), 1, "graph.g2o"), 0);
+  const SessionGraph part = part_of(partition_contiguously(graph_of(text), 1, "graph.g2o"), 0);
   REQUIRE(part.own.size() == 5);
   CHECK(part.odometry == 3);
   for (std::size_t k = 0; k < part.own.size(); ++k)
@@ -102,7 +102,7 @@ TEST_CASE("A robot's own odometry comes before its closures", "[pgo_study]") {
 
 TEST_CASE("Graphs that cannot be divided are refused with the reason", "[pgo_study]") {
   const auto deal_out = [](const std::string& text, std::size_t robots) {
-    return deal_contiguously(graph_of(text), robots, "graph.g2o");
+    return partition_contiguously(graph_of(text), robots, "graph.g2o");
   };
   CHECK_THROWS_WITH(deal_out(planar_edge(0, 1), 3), Contains("2 poses") && Contains("3 robots"));
   CHECK_THROWS_WITH(deal_out(planar_edge(0, 1), 0), Contains("0 robots"));
@@ -122,8 +122,8 @@ TEST_CASE("Graphs that cannot be divided are refused with the reason", "[pgo_stu
 TEST_CASE("A partition gives every pose its robot", "[pgo_study]") {
   const TemporaryFolder folder;
   const auto file = folder.write("parts", "# vertex robot\n0 1\n1 0\n2 1\n");
-  const TeamGraph graph =
-      deal(graph_of(planar_edge(0, 1) + planar_edge(1, 2)), read_partition(file), "parts");
+  const TeamGraph graph = partition_graph(graph_of(planar_edge(0, 1) + planar_edge(1, 2)),
+                                          read_partition(file), "parts");
   CHECK(graph.first == std::vector<Eigen::Index>{0, 1, 3});
   CHECK(graph.ids[0].index == 1);
   CHECK(graph.edges[0].i == 1);
@@ -140,8 +140,9 @@ TEST_CASE("An invalid partition is refused with its line", "[pgo_study]") {
   CAPTURE(text);
   CHECK_THROWS_WITH(read_partition(folder.write("parts", text)), Contains(message));
   const G2oGraph graph = graph_of(planar_edge(0, 1));
-  CHECK_THROWS_WITH(deal(graph, {{{0, 0}, 0}}, "parts"), Contains("pose 0:1 is given to no robot"));
-  CHECK_THROWS_WITH(deal(graph, {{{0, 0}, 0}, {{0, 1}, 2}}, "parts"),
+  CHECK_THROWS_WITH(partition_graph(graph, {{{0, 0}, 0}}, "parts"),
+                    Contains("pose 0:1 is given to no robot"));
+  CHECK_THROWS_WITH(partition_graph(graph, {{{0, 0}, 0}, {{0, 1}, 2}}, "parts"),
                     Contains("robots must be 0 to 1"));
 }
 
@@ -162,7 +163,7 @@ TEST_CASE("Each vertical goes to the robot of its pose", "[pgo_study][vertical]"
     text += "EDGE_SE3_PRIOR " + std::string(prior) + " 0" + level;
   for (const char* edge : {"0 1", "1 2", "2 3", "3 4"})
     text += "EDGE_SE3:QUAT " + std::string(edge) + unit;
-  const TeamGraph graph = deal_contiguously(graph_of(text), 2, "graph.g2o");
+  const TeamGraph graph = partition_contiguously(graph_of(text), 2, "graph.g2o");
   REQUIRE(graph.verticals.size() == 3);
   CHECK(graph.verticals[0].pose == 1);
   CHECK(graph.verticals[1].pose == 3);
@@ -174,8 +175,9 @@ TEST_CASE("Each vertical goes to the robot of its pose", "[pgo_study][vertical]"
   CHECK(part_of(graph, 1).verticals[0].pose == 1);
   CHECK(part_of(graph, 1).verticals[1].pose == 2);
   CHECK(problem_of(graph, 3).verticals().size() == 3);
-  CHECK_THROWS_WITH(deal_contiguously(graph_of(text + "EDGE_SE3_PRIOR 7 0" + level), 2, "g.g2o"),
-                    "g.g2o: the prior on 0:7 is on a vertex that the file lacks");
+  CHECK_THROWS_WITH(
+      partition_contiguously(graph_of(text + "EDGE_SE3_PRIOR 7 0" + level), 2, "g.g2o"),
+      "g.g2o: the prior on 0:7 is on a vertex that the file lacks");
 }
 
 TEST_CASE("A folder's verticals are those of all its files", "[pgo_study][vertical]") {

@@ -102,7 +102,7 @@ TEST_CASE("Block descent ends at the optimum of the small grid for any number of
   const std::size_t robots = GENERATE(1U, 3U, 5U);
   const double over_relaxation = GENERATE(1.0, 1.95);
   CAPTURE(robots, over_relaxation);
-  const TeamGraph graph = deal_contiguously(read_g2o(*file), robots, "smallGrid3D");
+  const TeamGraph graph = partition_contiguously(read_g2o(*file), robots, "smallGrid3D");
   MemberTeam team = rbcd_team(graph, chordal(graph), {.max_over_relaxation = over_relaxation});
   const auto rounds = run_team(graph, team, {.max_rounds = 300}, {});
   for (std::size_t k = 1; k < rounds.size(); ++k) {
@@ -123,9 +123,9 @@ TEST_CASE("Gauss-Seidel sweeps of a team reach the result of one robot", "[pgo_s
   TeamGraph alone = graph;
   alone.first = {0, 40};
   const GaussSeidelOptions exact{.max_sweeps = 2000, .tolerance = 1e-7};
-  const auto cost_of = [&](const TeamGraph& dealt) {
-    GaussSeidelTeam team(dealt, chordal(graph), exact);
-    return run_team(dealt, team, {.max_rounds = 20000}, {}).back().cost;
+  const auto cost_of = [&](const TeamGraph& partitioned) {
+    GaussSeidelTeam team(partitioned, chordal(graph), exact);
+    return run_team(partitioned, team, {.max_rounds = 20000}, {}).back().cost;
   };
   const double team_cost = cost_of(graph);
   // Positions of some 100 m are sent in single precision, and slow modes accumulate the rounding
@@ -190,7 +190,7 @@ TEST_CASE("A distributed verification finds nothing at an optimum", "[pgo_study]
 TEST_CASE("Distributed and central verification agree on a recorded graph", "[pgo_study]") {
   const auto file = shared_data("pose_graphs/3d/smallGrid3D.g2o");
   if (!file) return;
-  const TeamGraph graph = deal_contiguously(read_g2o(*file), 5, "smallGrid3D");
+  const TeamGraph graph = partition_contiguously(read_g2o(*file), 5, "smallGrid3D");
   CentralTeam central(graph, lift(chordal(graph), 3));
   (void)run_team(graph, central, {}, {});
   const TeamVerification found = verify_team(graph, team_poses(graph, central), {}, {});

@@ -25,7 +25,7 @@ std::unique_ptr<MemberSolver> block_descent(SessionGraph graph, const TreePlace&
                                       RbcdOptions{.min_relative_decrease = 1e-9});
 }
 
-std::vector<SE3> start_of(const TeamGraph& graph) {
+std::vector<SE3> poses_at_start(const TeamGraph& graph) {
   return levelled(chordal_initialisation(graph.poses(), graph.edges), graph.verticals);
 }
 
@@ -71,7 +71,7 @@ TEST_CASE("Newton's method, block descent and the centralised solver reach one o
   CAPTURE(seed);
   std::mt19937 rng(seed);
   const TeamGraph graph = level_drive(rng);
-  const std::vector<SE3> start = start_of(graph);
+  const std::vector<SE3> start = poses_at_start(graph);
   CentralTeam central(graph, lift(start, 3));
   const double optimum = run_team(graph, central, {}, {}).back().cost;
   REQUIRE(central.solver().certificate());
@@ -98,7 +98,7 @@ TEST_CASE("A team estimates its tilt from any start that is upright on the whole
           "[newton][vertical]") {
   std::mt19937 rng(4);
   const TeamGraph graph = level_drive(rng);
-  const std::vector<SE3> start = start_of(graph);
+  const std::vector<SE3> start = poses_at_start(graph);
   std::vector<double> costs;
   for (const double tilt : {0.0, 0.02}) {
     std::vector<SE3> tilted = start;

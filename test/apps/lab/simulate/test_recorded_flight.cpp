@@ -31,7 +31,7 @@ fs::path write_gzip(const TemporaryFolder& folder, const std::string& name,
   return path;
 }
 
-std::string refusal(const std::string& truth, const std::string& imu) {
+std::string refusal_of_flight(const std::string& truth, const std::string& imu) {
   const TemporaryFolder folder;
   const auto t = folder.write("truth.csv", truth);
   const auto i = folder.write("imu.csv", imu);
@@ -84,15 +84,15 @@ TEST_CASE("Files with other contents have other fingerprints", "[simulate]") {
 }
 
 TEST_CASE("Recordings that cannot be used are refused by file and line", "[simulate]") {
-  CHECK_THAT(refusal(kEuroc + "3000,1,2,x,1,0,0,0\n", kImu),
+  CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,x,1,0,0,0\n", kImu),
              Catch::Contains("truth.csv line 5: 'x' is not a number"));
-  CHECK_THAT(refusal(kEuroc + "3000,1,2,3,9,0,0,0\n", kImu),
+  CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,3,9,0,0,0\n", kImu),
              Catch::Contains("line 5") && Catch::Contains("norm"));
-  CHECK_THAT(refusal(kEuroc + "1500,1,2,3,1,0,0,0\n", kImu), Catch::Contains("line 5"));
-  CHECK_THAT(refusal(kEuroc, kImu + "2900,1,2\n"),
+  CHECK_THAT(refusal_of_flight(kEuroc + "1500,1,2,3,1,0,0,0\n", kImu), Catch::Contains("line 5"));
+  CHECK_THAT(refusal_of_flight(kEuroc, kImu + "2900,1,2\n"),
              Catch::Contains("imu.csv line 4: has only 3 fields"));
-  CHECK_THAT(refusal("", kImu), Catch::Contains("truth.csv: holds no data"));
-  CHECK_THAT(refusal(kEuroc, "9000,1,2,3,4,5,6\n9900,1,2,3,4,5,7\n"),
+  CHECK_THAT(refusal_of_flight("", kImu), Catch::Contains("truth.csv: holds no data"));
+  CHECK_THAT(refusal_of_flight(kEuroc, "9000,1,2,3,4,5,6\n9900,1,2,3,4,5,7\n"),
              Catch::Contains("do not overlap in time"));
 }
 

@@ -17,7 +17,7 @@ SimulationOptions parse(std::vector<std::string> arguments) {
   return completed(options);
 }
 
-std::string refusal(const std::vector<std::string>& arguments) {
+std::string refusal_of_options(const std::vector<std::string>& arguments) {
   std::vector<std::string> all = {"--world", "city", "--output", "x"};
   all.insert(all.end(), arguments.begin(), arguments.end());
   try {
@@ -51,21 +51,24 @@ TEST_CASE("An RGB-D rig has depth at the images' rate", "[simulate]") {
 }
 
 TEST_CASE("Bad arguments are refused with their name and value", "[simulate]") {
-  CHECK_THAT(refusal({"--resolution", "752"}), Catch::Contains("752 is not WIDTHxHEIGHT"));
-  CHECK_THAT(refusal({"--resolution", "8x8"}), Catch::Contains("from 16 to 8192"));
-  CHECK_THAT(refusal({"--resolution", "752x480x3"}),
+  CHECK_THAT(refusal_of_options({"--resolution", "752"}),
+             Catch::Contains("752 is not WIDTHxHEIGHT"));
+  CHECK_THAT(refusal_of_options({"--resolution", "8x8"}), Catch::Contains("from 16 to 8192"));
+  CHECK_THAT(refusal_of_options({"--resolution", "752x480x3"}),
              Catch::Contains("command line: resolution = "));
-  CHECK_THAT(refusal({"--robots", "0"}), Catch::Contains("command line: robots = "));
-  CHECK_THAT(refusal({"--rate", "nan"}), Catch::Contains("command line: rate = "));
-  CHECK_THAT(refusal({"--duration", "-5"}), Catch::Contains("command line: duration = "));
-  CHECK_THAT(refusal({"--rig", "mono"}), Catch::Contains("mono") && Catch::Contains("rgbd"));
-  CHECK_THAT(refusal({"--seed", "-1"}), Catch::Contains("command line: seed = "));
-  CHECK_THAT(refusal({"--image-format", "bmp"}), Catch::Contains("bmp"));
-  CHECK_THAT(refusal({"--depth", "--depth-rate", "7"}),
+  CHECK_THAT(refusal_of_options({"--robots", "0"}), Catch::Contains("command line: robots = "));
+  CHECK_THAT(refusal_of_options({"--rate", "nan"}), Catch::Contains("command line: rate = "));
+  CHECK_THAT(refusal_of_options({"--duration", "-5"}),
+             Catch::Contains("command line: duration = "));
+  CHECK_THAT(refusal_of_options({"--rig", "mono"}),
+             Catch::Contains("mono") && Catch::Contains("rgbd"));
+  CHECK_THAT(refusal_of_options({"--seed", "-1"}), Catch::Contains("command line: seed = "));
+  CHECK_THAT(refusal_of_options({"--image-format", "bmp"}), Catch::Contains("bmp"));
+  CHECK_THAT(refusal_of_options({"--depth", "--depth-rate", "7"}),
              Catch::Contains("--rate 20 is not a multiple of --depth-rate 7"));
-  CHECK_THAT(refusal({"--ideal-depth"}), Catch::Contains("--ideal-depth need --depth"));
-  CHECK_THAT(refusal({"--start", "3"}), Catch::Contains("need --trajectory"));
-  CHECK_THAT(refusal({"--trajectory", "/nowhere.csv"}), Catch::Contains("/nowhere.csv"));
+  CHECK_THAT(refusal_of_options({"--ideal-depth"}), Catch::Contains("--ideal-depth need --depth"));
+  CHECK_THAT(refusal_of_options({"--start", "3"}), Catch::Contains("need --trajectory"));
+  CHECK_THAT(refusal_of_options({"--trajectory", "/nowhere.csv"}), Catch::Contains("/nowhere.csv"));
 }
 
 TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") {
@@ -73,14 +76,15 @@ TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") 
   const std::string a = folder.write("V1_02_medium.csv.gz", "").string();
   const std::string b =
       folder.write("V1_03/mav0/state_groundtruth_estimate0/data.csv", "").string();
-  CHECK_THAT(refusal({"--trajectory", a, b, "--imu", a}),
+  CHECK_THAT(refusal_of_options({"--trajectory", a, b, "--imu", a}),
              Catch::Contains("--trajectory names 2 files, --imu 1"));
-  CHECK_THAT(refusal({"--trajectory", a, a, "--imu", a, a}), Catch::Contains("named V1_02_medium"));
-  CHECK_THAT(refusal({"--trajectory", a, "--imu", a, "--names", "a", "b"}),
+  CHECK_THAT(refusal_of_options({"--trajectory", a, a, "--imu", a, a}),
+             Catch::Contains("named V1_02_medium"));
+  CHECK_THAT(refusal_of_options({"--trajectory", a, "--imu", a, "--names", "a", "b"}),
              Catch::Contains("one name per --trajectory"));
-  CHECK_THAT(refusal({"--trajectory", a, "--imu", a, "--names", "../a"}),
+  CHECK_THAT(refusal_of_options({"--trajectory", a, "--imu", a, "--names", "../a"}),
              Catch::Contains("'../a'"));
-  CHECK_THAT(refusal({"--trajectory", a, "--imu", a, "--start", "9", "--end", "8"}),
+  CHECK_THAT(refusal_of_options({"--trajectory", a, "--imu", a, "--start", "9", "--end", "8"}),
              Catch::Contains("--end is not after --start"));
   const auto options =
       parse({"--world", "vicon_room", "--output", "x", "--trajectory", a, b, "--imu", a, b});
@@ -113,7 +117,8 @@ TEST_CASE("Recorded motion may come from another rig", "[simulate]") {
   CHECK(options.width == 512);
   CHECK(options.height == 510);
   CHECK_THAT(command_line(options), Catch::Contains(" --calibration camchain.yaml"));
-  CHECK_THAT(refusal({"--calibration", chain}), Catch::Contains("--calibration, --names"));
+  CHECK_THAT(refusal_of_options({"--calibration", chain}),
+             Catch::Contains("--calibration, --names"));
   words.back() = flight;
   CHECK_THROWS_WITH(parse(words), Catch::Contains("room1.csv"));
 }
@@ -137,15 +142,16 @@ TEST_CASE("All errors of a file of options are reported by line", "[simulate]") 
   const std::string file =
       folder.write("bad.yaml", "# a city\nworld: citty\nsped: 3\nrate: fast  # Hz\ndepth: maybe\n")
           .string();
-  CHECK_THAT(refusal({"--config", file, "--robots", "0"}),
+  CHECK_THAT(refusal_of_options({"--config", file, "--robots", "0"}),
              Catch::Contains(file + ":4: rate = fast is not a number, 0.1 .. 200") &&
                  Catch::Contains(file + ":5: depth = maybe is not true or false") &&
                  Catch::Contains(file + ":3: unknown key sped (did you mean seed?)") &&
                  Catch::Contains("command line: robots = 0 is outside 1 .. 99") &&
                  !Catch::Contains("citty"));  // the command line says city
-  CHECK_THAT(refusal({"--config", folder.write("c.yaml", "robots: [2\n").string()}),
+  CHECK_THAT(refusal_of_options({"--config", folder.write("c.yaml", "robots: [2\n").string()}),
              Catch::Contains("c.yaml:2: not YAML"));
-  CHECK_THAT(refusal({"--config", "nowhere.yaml"}), Catch::Contains("nowhere.yaml: cannot open"));
+  CHECK_THAT(refusal_of_options({"--config", "nowhere.yaml"}),
+             Catch::Contains("nowhere.yaml: cannot open"));
 }
 
 TEST_CASE("The files of options that come with the program can be used", "[simulate]") {

@@ -139,7 +139,7 @@ TEST_CASE("A mesh ends at an edge of one face with shared and with separate vert
     }
     mesh = soup;
   }
-  const MeshRim rim(mesh);
+  const MeshBoundary rim(mesh);
   int edges = 0;
   for (std::size_t face = 0; face < mesh.faces.size(); ++face)
     for (int k = 0; k < 3; ++k) {
@@ -151,9 +151,9 @@ TEST_CASE("A mesh ends at an edge of one face with shared and with separate vert
   CHECK(edges == 12);
   const SurfaceSamples samples = sample_surface(mesh, 1000.0, 1);
   const NearestSurface nearest(mesh, samples);
-  CHECK_FALSE(nearest.find({1.5F, 1.0F, 0.2F}, 1.0)->past_rim);
-  CHECK(nearest.find({3.1F, 1.0F, 0.2F}, 1.0)->past_rim);
-  CHECK(nearest.find({3.1F, 3.1F, 0.0F}, 1.0)->past_rim);
+  CHECK_FALSE(nearest.find({1.5F, 1.0F, 0.2F}, 1.0)->past_boundary);
+  CHECK(nearest.find({3.1F, 1.0F, 0.2F}, 1.0)->past_boundary);
+  CHECK(nearest.find({3.1F, 3.1F, 0.0F}, 1.0)->past_boundary);
 }
 
 TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {

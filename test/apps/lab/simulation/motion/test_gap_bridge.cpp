@@ -11,21 +11,21 @@
 namespace km {
 namespace {
 
-constexpr Stamp kEpoch = 1'520'530'308'000'000'000;
+constexpr Stamp kGapEpoch = 1'520'530'308'000'000'000;
 constexpr double kFrom_s = 12.0, kTo_s = 14.5;  // begin and end of the gap
 
 // A flight with the biases of a cheap inertial sensor, its poses at 120 Hz except for a gap.
-struct Flight {
+struct GapFlight {
   SplineTrajectory truth = make_flight_trajectory(
       {Eigen::Vector3d(-3, -3, 0), Eigen::Vector3d(3, 3, 3)}, {.duration_s = 30.0});
   std::vector<StampedPose> poses;
   std::vector<ImuSample> imu;
 
-  Flight() {
+  GapFlight() {
     for (int k = 0; k < 3600; ++k) {
       const double t = k / 120.0;
       if (t > kFrom_s && t < kTo_s) continue;
-      const Stamp stamp = kEpoch + std::llround(1e9 * t);
+      const Stamp stamp = kGapEpoch + std::llround(1e9 * t);
       poses.push_back({stamp, pose_at(stamp)});
     }
     ImuSimulation sensor;
@@ -34,16 +34,16 @@ struct Flight {
                     .accel_noise_density = 2.8e-3,
                     .accel_random_walk = 8.6e-4,
                     .rate_hz = 200.0};
-    for (const SimulatedImu& at : simulate_imu(truth, kEpoch, sensor)) imu.push_back(at.sample);
+    for (const SimulatedImu& at : simulate_imu(truth, kGapEpoch, sensor)) imu.push_back(at.sample);
   }
 
   [[nodiscard]] SE3 pose_at(Stamp stamp) const {
-    return truth.motion(seconds_between(kEpoch, stamp)).T_world_body;
+    return truth.motion(seconds_between(kGapEpoch, stamp)).T_world_body;
   }
 
   // The largest distance from the truth, within the gap, of a curve through the poses `some`.
   [[nodiscard]] double error_m(const std::vector<StampedPose>& some) const {
-    const RecordedTrajectory curve = fit_recording(some, kEpoch);
+    const RecordedTrajectory curve = fit_recording(some, kGapEpoch);
     double worst = 0.0;
     for (double t = kFrom_s; t <= kTo_s; t += 0.01)
       worst = std::max(worst, (curve.trajectory.motion(t).T_world_body.translation() -
@@ -54,7 +54,7 @@ struct Flight {
 };
 
 TEST_CASE("A gap in a recording is bridged by the inertial samples", "[motion]") {
-  const Flight flight;
+  const GapFlight flight;
   const BridgedPoses bridged = bridge_gaps(flight.poses, flight.imu);
   CHECK(bridged.gaps == 1);
   CHECK(bridged.open_gaps == 0);
@@ -74,10 +74,10 @@ TEST_CASE("A gap in a recording is bridged by the inertial samples", "[motion]")
 }
 
 TEST_CASE("A gap without inertial samples stays", "[motion]") {
-  Flight flight;
+  GapFlight flight;
   std::erase_if(flight.imu, [](const ImuSample& sample) {
-    return seconds_between(kEpoch, sample.stamp) > 13.0 &&
-           seconds_between(kEpoch, sample.stamp) < 13.1;
+    return seconds_between(kGapEpoch, sample.stamp) > 13.0 &&
+           seconds_between(kGapEpoch, sample.stamp) < 13.1;
   });
   const BridgedPoses bridged = bridge_gaps(flight.poses, flight.imu);
   CHECK(bridged.gaps == 0);

@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-constexpr Stamp kEpoch = 1'520'530'308'000'000'000;
+constexpr Stamp kTurnEpoch = 1'520'530'308'000'000'000;
 
 // A flight with a constant gyroscope bias, and its poses at 120 Hz.
 struct Flight {
@@ -22,8 +22,8 @@ struct Flight {
 
   explicit Flight(const Eigen::Vector3d& gyro_bias) {
     for (int k = 0; k < 2400; ++k) {
-      const Stamp stamp = kEpoch + std::llround(1e9 * k / 120.0);
-      truth.push_back({stamp, motion.motion(seconds_between(kEpoch, stamp)).T_world_body});
+      const Stamp stamp = kTurnEpoch + std::llround(1e9 * k / 120.0);
+      truth.push_back({stamp, motion.motion(seconds_between(kTurnEpoch, stamp)).T_world_body});
     }
     ImuSimulation sensor;
     sensor.initial_gyro_bias = 0.0;
@@ -32,7 +32,7 @@ struct Flight {
                     .accel_noise_density = 2.8e-3,
                     .accel_random_walk = 8.6e-4,
                     .rate_hz = 200.0};
-    for (const SimulatedImu& at : simulate_imu(motion, kEpoch, sensor)) {
+    for (const SimulatedImu& at : simulate_imu(motion, kTurnEpoch, sensor)) {
       imu.push_back(at.sample);
       imu.back().gyro += gyro_bias;
     }
@@ -86,7 +86,7 @@ TEST_CASE("Rotations that are steady stay as they are", "[motion]") {
 TEST_CASE("Rotations stay as they are without inertial samples", "[motion]") {
   Flight flight(Eigen::Vector3d::Zero());
   const auto is_missing = [](Stamp stamp) {
-    const double t_s = seconds_between(kEpoch, stamp);
+    const double t_s = seconds_between(kTurnEpoch, stamp);
     return t_s > 5.0 && t_s < 8.0;
   };
   std::erase_if(flight.imu, [&](const ImuSample& sample) { return is_missing(sample.stamp); });

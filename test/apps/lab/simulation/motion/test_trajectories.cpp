@@ -309,7 +309,7 @@ TEST_CASE("A flight refuses volumes and options without sense", "[motion]") {
   CHECK_THROWS_AS(make_flight_trajectory(kRoom, turned), std::invalid_argument);
 }
 
-const Route kBlock{{{0, 0}, {80, 0}, {80, 50}, {30, 50}, {30, 90}, {0, 90}}, 7.0};
+const Route kDriveRoute{{{0, 0}, {80, 0}, {80, 50}, {30, 50}, {30, 90}, {0, 90}}, 7.0};
 
 double hills(double x, double y) {
   return 0.8 * std::sin(x / 12.0) + 0.5 * std::cos(y / 9.0);
@@ -325,7 +325,7 @@ struct DriveSummary {
   int stops = 0;  // times it came to rest after having driven
 };
 
-double distance_to(const RoutePath& path, const Eigen::Vector2d& point) {
+double distance_to_path(const RoutePath& path, const Eigen::Vector2d& point) {
   double best = std::numeric_limits<double>::infinity();
   for (double s = 0.0; s < path.length_m(); s += 0.1)
     best = std::min(best, (path.at(s).position - point).norm());
@@ -335,16 +335,16 @@ double distance_to(const RoutePath& path, const Eigen::Vector2d& point) {
 DriveSummary summarise(const BodyTrajectory& drive, const Route& route) {
   const RoutePath path(route, VehicleOptions{}.corner_radius_m);
   DriveSummary summary;
-  constexpr double kStep_s = 0.02;
+  constexpr double kSample_s = 0.02;
   bool moving = false;
-  for (double t = 0.0; t <= drive.end_s(); t += kStep_s) {
+  for (double t = 0.0; t <= drive.end_s(); t += kSample_s) {
     const BodyMotion m = drive.motion(t);
     const Eigen::Matrix3d R = m.T_world_body.linear();
     const Eigen::Vector2d heading = R.col(0).head<2>().normalized();
     const Eigen::Vector2d left(-heading.y(), heading.x());
     const Eigen::Vector2d velocity = m.velocity_world.head<2>();
     const double speed = velocity.norm();
-    summary.length_m += speed * kStep_s;
+    summary.length_m += speed * kSample_s;
     summary.speed_max = std::max(summary.speed_max, speed);
     summary.forward_max =
         std::max(summary.forward_max, std::abs(m.acceleration_world.head<2>().dot(heading)));
@@ -356,8 +356,8 @@ DriveSummary summarise(const BodyTrajectory& drive, const Route& route) {
       summary.heading_error_max =
           std::max(summary.heading_error_max,
                    std::abs(std::atan2(velocity.dot(left), velocity.dot(heading))));
-    summary.off_route_max =
-        std::max(summary.off_route_max, distance_to(path, m.T_world_body.translation().head<2>()));
+    summary.off_route_max = std::max(
+        summary.off_route_max, distance_to_path(path, m.T_world_body.translation().head<2>()));
     if (moving && speed < 0.02) ++summary.stops;
     moving = speed > (moving ? 0.02 : 0.5);
   }
@@ -370,16 +370,16 @@ TEST_CASE("A vehicle on level ground keeps to the limits and to its route", "[mo
   CAPTURE(options.seed);
   options.rig_height_m = 0.0;  // the point on the ground, for which the limits hold
   options.start_m = 25.0 * static_cast<double>(options.seed);
-  const SplineTrajectory drive = make_vehicle_trajectory(kBlock, nullptr, options);
+  const SplineTrajectory drive = make_vehicle_trajectory(kDriveRoute, nullptr, options);
   CHECK(drive.start_s() == 0.0);
   CHECK(drive.end_s() >= 60.0);
   CHECK(drive.end_s() < 60.05);
-  const DriveSummary s = summarise(drive, kBlock);
+  const DriveSummary s = summarise(drive, kDriveRoute);
   CAPTURE(s.forward_max, s.left_max, s.off_route_max, s.heading_error_max, s.pitch_max, s.roll_max);
   CHECK(s.forward_max <= options.max_longitudinal_mps2);
   CHECK(s.left_max <= options.max_lateral_mps2);
   CHECK(s.left_max > 0.5 * options.max_lateral_mps2);  // it uses the corners
-  CHECK(s.speed_max <= kBlock.speed_mps);
+  CHECK(s.speed_max <= kDriveRoute.speed_mps);
   CHECK(s.off_route_max < 0.35);      // wander of a driver
   CHECK(s.heading_error_max < 0.01);  // a wheel rolls without slip
   CHECK(s.pitch_max < 0.04);
@@ -394,7 +394,7 @@ TEST_CASE("A vehicle stands still at the start for as long as the options state"
   VehicleOptions options;
   options.standstill_s = GENERATE(0.5, 2.0);
   options.duration_s = 10.0;
-  const SplineTrajectory drive = make_vehicle_trajectory(kBlock, hills, options);
+  const SplineTrajectory drive = make_vehicle_trajectory(kDriveRoute, hills, options);
   check_at_rest(drive, 0.0, options.standstill_s);
   CHECK(drive.motion(options.standstill_s + 3.0).velocity_world.norm() > 0.3);
 }
@@ -402,7 +402,7 @@ TEST_CASE("A vehicle stands still at the start for as long as the options state"
 TEST_CASE("A vehicle follows the ground", "[motion]") {
   VehicleOptions options;
   options.roughness = 0.0;
-  const SplineTrajectory drive = make_vehicle_trajectory(kBlock, hills, options);
+  const SplineTrajectory drive = make_vehicle_trajectory(kDriveRoute, hills, options);
   for (double t = 0.0; t <= 60.0; t += 0.05) {
     const SE3 T = drive.motion(t).T_world_body;
     const Eigen::Vector3d ground = T * Eigen::Vector3d(0, 0, -options.rig_height_m);
@@ -419,7 +419,7 @@ TEST_CASE("A vehicle follows the ground", "[motion]") {
 TEST_CASE("A braking vehicle dips its nose, in a left turn it leans to the right", "[motion]") {
   VehicleOptions options;
   options.roughness = 0.0;
-  const SplineTrajectory drive = make_vehicle_trajectory(kBlock, nullptr, options);
+  const SplineTrajectory drive = make_vehicle_trajectory(kDriveRoute, nullptr, options);
   double pitch = 0.0, roll = 0.0;  // sums of products: they correlate
   for (double t = 2.0; t <= 60.0; t += 0.02) {
     const BodyMotion m = drive.motion(t);
@@ -434,7 +434,7 @@ TEST_CASE("A braking vehicle dips its nose, in a left turn it leans to the right
 TEST_CASE("A drive states the derivatives of its own poses", "[motion]") {
   VehicleOptions options;
   options.duration_s = 30.0;
-  const SplineTrajectory drive = make_vehicle_trajectory(kBlock, hills, options);
+  const SplineTrajectory drive = make_vehicle_trajectory(kDriveRoute, hills, options);
   // h^2 / 6 times third derivatives below 1e3 m/s^3, and rounding of 1e-14 m / h.
   const DerivativeErrors errors = derivative_errors(drive, 500, 1e-4);
   CHECK(errors.velocity < 1e-5);
@@ -448,7 +448,7 @@ TEST_CASE("The road shakes a vehicle as a street shakes a car", "[motion]") {
   options.standstill_s = 0.0;
   const auto vertical_rms = [&](double roughness) {
     options.roughness = roughness;
-    const SplineTrajectory drive = make_vehicle_trajectory(kBlock, nullptr, options);
+    const SplineTrajectory drive = make_vehicle_trajectory(kDriveRoute, nullptr, options);
     double sum = 0.0;
     int count = 0;
     for (double t = 5.0; t < 60.0; t += 0.01, ++count) {
@@ -476,16 +476,16 @@ TEST_CASE("Equal options give equal flights and drives, another seed others", "[
   };
   check(FlightOptions{}, [](const FlightOptions& o) { return make_flight_trajectory(kRoom, o); });
   check(VehicleOptions{},
-        [](const VehicleOptions& o) { return make_vehicle_trajectory(kBlock, hills, o); });
+        [](const VehicleOptions& o) { return make_vehicle_trajectory(kDriveRoute, hills, o); });
 }
 
 TEST_CASE("A vehicle starts at the configured distance along the route", "[motion]") {
   VehicleOptions options;
   options.duration_s = 3.0;
-  const RoutePath path(kBlock, options.corner_radius_m);
+  const RoutePath path(kDriveRoute, options.corner_radius_m);
   for (const double start : {0.0, 30.0, 130.0, path.length_m() + 10.0}) {
     options.start_m = start;
-    const SplineTrajectory drive = make_vehicle_trajectory(kBlock, nullptr, options);
+    const SplineTrajectory drive = make_vehicle_trajectory(kDriveRoute, nullptr, options);
     const Eigen::Vector3d p = drive.motion(0.0).T_world_body.translation();
     CHECK((p.head<2>() - path.at(start).position).norm() < 0.3);
     CHECK(p.z() == Approx(1.5).margin(0.03));
@@ -496,7 +496,7 @@ TEST_CASE("A vehicle refuses options that cannot be driven", "[motion]") {
   const auto refused = [](auto change) {
     VehicleOptions options;
     change(options);
-    CHECK_THROWS_AS(make_vehicle_trajectory(kBlock, nullptr, options), ConfigError);
+    CHECK_THROWS_AS(make_vehicle_trajectory(kDriveRoute, nullptr, options), ConfigError);
   };
   refused([](VehicleOptions& o) { o.duration_s = 0.0; });
   refused([](VehicleOptions& o) { o.duration_s = std::nan(""); });
@@ -506,7 +506,7 @@ TEST_CASE("A vehicle refuses options that cannot be driven", "[motion]") {
   refused([](VehicleOptions& o) { o.max_lateral_mps2 = 0.0; });
   refused([](VehicleOptions& o) { o.max_longitudinal_mps2 = -1.0; });
   refused([](VehicleOptions& o) { o.roughness = -1.0; });
-  Route still = kBlock;
+  Route still = kDriveRoute;
   still.speed_mps = 0.0;
   CHECK_THROWS_AS(make_vehicle_trajectory(still, nullptr, {}), std::invalid_argument);
 }

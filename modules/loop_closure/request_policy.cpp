@@ -1,0 +1,84 @@
+#include "modules/loop_closure/request_policy.hpp"
+
+#include <algorithm>
+
+namespace km {
+namespace {
+
+using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
+
+// A few wrong candidates must not prevent the first closure of two robots.
+constexpr int kToleratedFailures = 4;
+
+KeyframeIndex gap(KeyframeIndex a, KeyframeIndex b) {
+  return a > b ? a - b : b - a;
+}
+
+bool any_near(const Pairs& pairs, KeyframeIndex peers, KeyframeIndex own, KeyframeIndex reach) {
+  auto pair = pairs.lower_bound({peers - std::min(peers, reach), 0});
+  for (; pair != pairs.end() && pair->first <= peers + reach; ++pair)
+    if (gap(pair->second, own) <= reach) return true;
+  return false;
+}
+
+}  // namespace
+
+RequestPolicy::RequestPolicy(const LoopClosureConfig& config) : config_(config) {}
+
+RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
+  Peer& peer = peers_[candidate.query.robot];
+  const KeyframeIndex query = candidate.query.index;
+  const KeyframeIndex own = candidate.match.index;
+  const int reach = std::min(config_.max_closure_separation, peer.successes);
+  if (reach > 0 && any_near(peer.closures, query, own, static_cast<KeyframeIndex>(reach)))
+    return Decision::kNearClosure;
+  const int beside = std::min(config_.max_request_separation, peer.successes);
+  if (beside > 0 && any_near(peer.requests, query, own, static_cast<KeyframeIndex>(beside)))
+    return Decision::kNearRequest;
+
+  const auto group_index =
+      std::min<std::size_t>(static_cast<std::size_t>(candidate.support), peer.groups.size() - 1);
+  SupportGroup& group = peer.groups[group_index];
+  if (peer.last_skipped != query) ++group.skipped;  // once per query
+  const int failures = std::max(0, group.failures - kToleratedFailures);
+  if (group.skipped <= config_.skips_per_failure * failures) {
+    peer.last_skipped = query;
+    return Decision::kLowYield;
+  }
+  group.skipped = 0;
+  peer.requests.emplace(query, own);
+  peer.group_of[query] = group_index;
+  return Decision::kRequest;
+}
+
+void RequestPolicy::add_closure(const ClosureId& closure) {
+  peers_[closure.to.robot].closures.emplace(closure.to.index, closure.from.index);
+}
+
+void RequestPolicy::add_result(const KeyframeId& keyframe, bool verified) {
+  Peer& peer = peers_[keyframe.robot];
+  const auto group = peer.group_of.find(keyframe.index);
+  if (group == peer.group_of.end()) return;
+  if (verified) {
+    ++peer.successes;
+  } else {
+    ++peer.groups[group->second].failures;
+  }
+  peer.group_of.erase(group);
+}
+
+const char* to_string(RequestPolicy::Decision decision) {
+  switch (decision) {
+    case RequestPolicy::Decision::kRequest:
+      return "requested";
+    case RequestPolicy::Decision::kNearClosure:
+      return "not requested: near a verified closure";
+    case RequestPolicy::Decision::kNearRequest:
+      return "not requested: near a requested candidate";
+    case RequestPolicy::Decision::kLowYield:
+      return "not requested: similar candidates have mostly failed";
+  }
+  return "";
+}
+
+}  // namespace km

@@ -1,0 +1,221 @@
+#include "modules/mesh_deformation/superseded_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <unordered_map>
+#include <utility>
+
+#include "modules/mesh_deformation/mesh_node.hpp"
+
+namespace km {
+namespace {
+
+// Surfaces whose normals differ by more are different: cosine of 60 degrees.
+constexpr float kMinCosine = 0.5F;
+
+// Distance from a triangle at which a point still counts as on it, relative to the distance along
+// the normal. If faces meet at an angle, a wedge between their normals belongs to neither.
+constexpr float kBeside = 0.25F;
+
+float squared_distance_to_segment(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
+                                  const Eigen::Vector3f& b) {
+  const Eigen::Vector3f ab = b - a;
+  const float length2 = ab.squaredNorm();
+  const float t = length2 > 0.0F ? std::clamp((p - a).dot(ab) / length2, 0.0F, 1.0F) : 0.0F;
+  return (p - a - t * ab).squaredNorm();
+}
+
+// Squared distance of a point of the triangle's plane from the triangle.
+float squared_distance_in_plane(const Eigen::Vector3f& p, const std::array<Eigen::Vector3f, 3>& t,
+                                const Eigen::Vector3f& normal) {
+  bool inside = true;
+  float nearest2 = std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector3f &a = t[i], &b = t[(i + 1) % 3];
+    if ((b - a).cross(p - a).dot(normal) >= 0.0F) continue;
+    inside = false;
+    nearest2 = std::min(nearest2, squared_distance_to_segment(p, a, b));
+  }
+  return inside ? 0.0F : nearest2;
+}
+
+class HeirSearch {
+ public:
+  HeirSearch(const LabelledMesh& mesh, const SurfaceViews& views, const SameSurface& same)
+      : mesh_(mesh),
+        seen_by_(views.seen_by),
+        certainty_(views.certainty),
+        window_(same.window_keyframes),
+        distance_(static_cast<float>(same.distance_m)),
+        // Bound on the distance of a vertex from the centroid of a relevant face. No corner is
+        // further from the centroid than two thirds of a median, which is shorter than the longest
+        // edge.
+        reach_(std::hypot(distance_, kBeside * distance_ +
+                                         static_cast<float>(same.longest_edge_m) * 2.0F / 3.0F)),
+        replacements_(mesh.vertices.size(), kNoIndex),
+        asked_(mesh.vertices.size(), 0) {
+    compute_normals();
+    for (const LabelledMesh::Face& face : mesh.faces) add_rank(face);
+  }
+
+  std::vector<std::uint32_t> run() {
+    std::vector<std::uint32_t> order(mesh_.faces.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::stable_sort(order.begin(), order.end(),
+                     [this](auto a, auto b) { return rank_[a] > rank_[b]; });
+    // All faces that can supersede a corner have a higher rank, so they have been judged.
+    for (const std::uint32_t f : order) {
+      const LabelledMesh::Face& face = mesh_.faces[f];
+      for (const std::uint32_t v : face)
+        if (std::exchange(asked_[v], 1) == 0) replacements_[v] = replacement_of(v);
+      if (!is_superseded(face, replacements_)) insert(f);
+    }
+    return std::move(replacements_);
+  }
+
+ private:
+  void compute_normals() {
+    normals_.assign(mesh_.vertices.size(), Eigen::Vector3f::Zero());
+    for (const auto& [a, b, c] : mesh_.faces) {
+      const Eigen::Vector3f& p = mesh_.vertices[a];
+      const Eigen::Vector3f area = (mesh_.vertices[b] - p).cross(mesh_.vertices[c] - p);
+      face_normals_.push_back(area.normalized());  // zero stays zero
+      for (const std::uint32_t v : {a, b, c}) normals_[v] += area;
+    }
+    for (Eigen::Vector3f& normal : normals_) normal.normalize();
+  }
+
+  // By certainty, then by time. The rank of a face is at most that of each of its corners.
+  static std::uint64_t rank(std::uint8_t certainty, KeyframeIndex keyframe) {
+    return std::uint64_t{certainty} << 32U | keyframe;
+  }
+  [[nodiscard]] std::uint8_t certainty_of(std::uint32_t v) const {
+    return certainty_.empty() ? std::uint8_t{0} : certainty_[v];
+  }
+  void add_rank(const LabelledMesh::Face& face) {
+    SeenBy seen = seen_by_[face[0]];
+    std::uint8_t certainty = certainty_of(face[0]);
+    for (const std::uint32_t v : {face[1], face[2]}) {
+      seen = {std::min(seen[0], seen_by_[v][0]), std::max(seen[1], seen_by_[v][1])};
+      certainty = std::min(certainty, certainty_of(v));
+    }
+    face_seen_by_.push_back(seen);
+    rank_.push_back(rank(certainty, seen[0]));
+  }
+
+  [[nodiscard]] GridCell cell_of(const Eigen::Vector3f& point) const {
+    return grid_cell(point.cast<double>(), static_cast<double>(2.0F * reach_));
+  }
+
+  void insert(std::uint32_t face) {
+    const auto& [a, b, c] = mesh_.faces[face];
+    const Eigen::Vector3f centroid =
+        (mesh_.vertices[a] + mesh_.vertices[b] + mesh_.vertices[c]) / 3.0F;
+    cells_[cell_of(centroid)].push_back(face);
+  }
+
+  [[nodiscard]] std::uint32_t replacement_of(std::uint32_t v) const {
+    const Eigen::Vector3f reach = Eigen::Vector3f::Constant(reach_);
+    const GridCell low = cell_of(mesh_.vertices[v] - reach);
+    const GridCell high = cell_of(mesh_.vertices[v] + reach);
+    const std::uint64_t own_rank = rank(certainty_of(v), seen_by_[v][1]);
+    float nearest = std::numeric_limits<float>::infinity();
+    std::uint32_t nearest_face = kNoIndex;
+    for (std::int64_t x = low[0]; x <= high[0]; ++x)
+      for (std::int64_t y = low[1]; y <= high[1]; ++y)
+        for (std::int64_t z = low[2]; z <= high[2]; ++z)
+          if (const auto cell = cells_.find({x, y, z}); cell != cells_.end())
+            for (const std::uint32_t face : cell->second) {
+              if (rank_[face] <= own_rank) break;  // and so have all following faces
+              if (keyframe_gap(face_seen_by_[face], seen_by_[v]) <= window_) continue;
+              if (const float d = distance_to(face, v); d < nearest) {
+                nearest = d;
+                nearest_face = face;
+              }
+            }
+    return nearest_face == kNoIndex ? kNoIndex : nearest_corner(nearest_face, v);
+  }
+
+  // Distance along the normal of the face. Infinite if it exceeds distance_, if the normals differ
+  // by more than 60 degrees, or if the vertex is beside the triangle.
+  [[nodiscard]] float distance_to(std::uint32_t face, std::uint32_t v) const {
+    constexpr float kNot = std::numeric_limits<float>::infinity();
+    const Eigen::Vector3f& normal = face_normals_[face];
+    const auto& [a, b, c] = mesh_.faces[face];
+    const Eigen::Vector3f& p = mesh_.vertices[v];
+    const float along = (p - mesh_.vertices[a]).dot(normal);
+    if (std::abs(along) > distance_ || normals_[v].dot(normal) < kMinCosine) return kNot;
+    const float beside2 = squared_distance_in_plane(
+        p - along * normal, {mesh_.vertices[a], mesh_.vertices[b], mesh_.vertices[c]}, normal);
+    const float most = kBeside * distance_;
+    return beside2 <= most * most ? std::abs(along) : kNot;
+  }
+
+  [[nodiscard]] std::uint32_t nearest_corner(std::uint32_t face, std::uint32_t v) const {
+    const Eigen::Vector3f& p = mesh_.vertices[v];
+    return *std::min_element(
+        mesh_.faces[face].begin(), mesh_.faces[face].end(), [&](auto a, auto b) {
+          return (mesh_.vertices[a] - p).squaredNorm() < (mesh_.vertices[b] - p).squaredNorm();
+        });
+  }
+
+  const LabelledMesh& mesh_;
+  std::span<const SeenBy> seen_by_;
+  std::span<const std::uint8_t> certainty_;
+  KeyframeIndex window_;
+  float distance_;
+  float reach_;
+  std::vector<Eigen::Vector3f> normals_, face_normals_;
+  std::vector<SeenBy> face_seen_by_;
+  std::vector<std::uint64_t> rank_;  // rank of each face
+  std::vector<std::uint32_t> replacements_;
+  std::vector<char> asked_;
+  // Remaining faces, by descending rank.
+  std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;
+};
+
+template <typename T>
+void keep(std::vector<T>& values, const std::vector<std::uint32_t>& kept) {
+  if (values.empty()) return;
+  for (std::size_t i = 0; i < kept.size(); ++i) values[i] = values[kept[i]];
+  values.resize(kept.size());
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> find_replacements(const LabelledMesh& mesh, const SurfaceViews& views,
+                                             const SameSurface& same) {
+  return HeirSearch(mesh, views, same).run();
+}
+
+LabelledMesh without_superseded(const LabelledMesh& mesh,
+                                std::span<const std::uint32_t> replacements) {
+  LabelledMesh result = mesh;
+  std::erase_if(result.faces, [&](const auto& face) { return is_superseded(face, replacements); });
+  std::vector<std::uint32_t> index(mesh.vertices.size(), kNoIndex), kept;
+  for (const auto& face : result.faces)
+    for (const std::uint32_t v : face) index[v] = 0;
+  for (std::uint32_t v = 0; v < index.size(); ++v) {
+    if (index[v] == kNoIndex && replacements[v] != kNoIndex) continue;
+    index[v] = static_cast<std::uint32_t>(kept.size());
+    kept.push_back(v);
+  }
+  for (auto& face : result.faces)
+    for (std::uint32_t& v : face) v = index[v];
+  keep(result.vertices, kept);
+  keep(result.labels, kept);
+  keep(result.colors, kept);
+  return result;
+}
+
+SupersededSurface named(std::span<const std::uint32_t> replacements,
+                        std::span<const std::uint64_t> ids) {
+  SupersededSurface surface;
+  for (std::size_t v = 0; v < replacements.size(); ++v)
+    if (replacements[v] != kNoIndex) surface.vertices.push_back({ids[v], ids[replacements[v]]});
+  return surface;
+}
+
+}  // namespace km

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "modules/mesh/labelled_mesh.hpp"
+#include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh_deformation/mesh_node.hpp"
+
+namespace km {
+
+/// Criteria for two parts of a mesh to show the same surface.
+struct SameSurface {
+  /// Largest distance of a vertex from a face of the other part, along its normal.
+  double distance_m = 0.1;
+  double longest_edge_m = 0.2;         ///< Faces with longer edges may be missed.
+  KeyframeIndex window_keyframes = 0;  ///< Largest difference of time within one visit.
+};
+
+/// MapMesh::seen_by and MapMesh::certainty of the vertices of a mesh. `certainty` may be empty.
+struct SurfaceViews {
+  std::span<const SeenBy> seen_by;
+  std::span<const std::uint8_t> certainty;
+};
+
+/// For each vertex of a corrected mesh the vertex that replaces it, or kNoIndex for a vertex that
+/// stays. The most certain of several copies of a surface stays, or the newest of equally certain
+/// ones.
+///
+/// A vertex has a replacement if a face of another visit stays, has a higher rank, and meets three
+/// conditions. It is within the distance. The normal through the vertex meets it inside its
+/// triangle, or within a quarter of the distance of the triangle. Its normal differs from that of
+/// the vertex by at most 60 degrees, because the other side of a wall is another surface. The
+/// replacement is the nearest corner of the nearest such face.
+///
+/// A face stays unless all its vertices have replacements, so that surface seen only once, with its
+/// rim, is never lost.
+///
+/// Faces are judged by descending rank, so that a superseding face stays. `mesh` [m]. n log n.
+[[nodiscard]] std::vector<std::uint32_t> find_replacements(const LabelledMesh& mesh,
+                                                           const SurfaceViews& views,
+                                                           const SameSurface& same);
+
+/// True if all corners have replacements.
+[[nodiscard]] inline bool is_superseded(const LabelledMesh::Face& face,
+                                        std::span<const std::uint32_t> replacements) {
+  return replacements[face[0]] != kNoIndex && replacements[face[1]] != kNoIndex &&
+         replacements[face[2]] != kNoIndex;
+}
+
+/// The mesh without its superseded faces and without vertices that had no other faces; the order is
+/// kept.
+[[nodiscard]] LabelledMesh without_superseded(const LabelledMesh& mesh,
+                                              std::span<const std::uint32_t> replacements);
+
+/// `replacements` with ids in place of indices. `ids` are those of the vertices, ascending.
+[[nodiscard]] SupersededSurface named(std::span<const std::uint32_t> replacements,
+                                      std::span<const std::uint64_t> ids);
+
+}  // namespace km

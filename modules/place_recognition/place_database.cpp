@@ -1,0 +1,85 @@
+#include "modules/place_recognition/place_database.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace km {
+namespace {
+
+constexpr std::size_t kBeside = 3;
+
+void count_support(std::vector<PlaceCandidate>& candidates) {
+  for (PlaceCandidate& one : candidates)
+    one.support = static_cast<int>(
+        std::count_if(candidates.begin(), candidates.end(), [&](const PlaceCandidate& other) {
+          return std::max(one.index, other.index) - std::min(one.index, other.index) <= kBeside;
+        }));
+}
+
+}  // namespace
+
+PlaceDatabase::PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words)
+    : config_(checked(config)), database_(words) {}
+
+std::size_t PlaceDatabase::add(BowVector vector, Stamp stamp) {
+  if (!stamps_.empty() && stamp < stamps_.back())
+    throw std::invalid_argument("PlaceDatabase::add: stamp " + std::to_string(stamp) +
+                                " is before " + std::to_string(stamps_.back()));
+  const std::size_t index = database_.add(vector);
+  stamps_.push_back(stamp);
+  last_ = std::move(vector);
+  return index;
+}
+
+CandidateSearch PlaceDatabase::search(const BowVector& query, const BowVector* previous) const {
+  return search_among(query, previous, stamps_.size());
+}
+
+CandidateSearch PlaceDatabase::search_own(const BowVector& query, Stamp stamp) const {
+  const Stamp newest = stamp - nanoseconds(config_.min_gap_s);
+  const auto end = std::upper_bound(stamps_.begin(), stamps_.end(), newest);
+  return search_among(query, stamps_.empty() ? nullptr : &last_,
+                      std::max(static_cast<std::size_t>(end - stamps_.begin()), known_from_));
+}
+
+CandidateSearch PlaceDatabase::search_among(const BowVector& query, const BowVector* previous,
+                                            std::size_t count) const {
+  CandidateSearch result;
+  if (previous == nullptr) {
+    result.status = SearchStatus::kNoPrevious;
+    return result;
+  }
+  result.normalizer = score(query, *previous);
+  if (result.normalizer <= 0.0 || result.normalizer < config_.min_normalizer) {
+    result.status = SearchStatus::kLowNormalizer;
+    return result;
+  }
+  const BowMatches matches = database_.query(
+      query, {.last = count, .min_score = config_.similarity_threshold * result.normalizer});
+  result.compared = matches.compared;
+  result.above = matches.above;
+  result.best_similarity = static_cast<double>(matches.best_score) / result.normalizer;
+  result.candidates = choose(matches.best, result.normalizer);
+  return result;
+}
+
+std::vector<PlaceCandidate> PlaceDatabase::choose(const std::vector<BowMatch>& matches,
+                                                  double normalizer) const {
+  std::vector<PlaceCandidate> chosen;
+  for (const BowMatch& match : matches) {
+    if (chosen.size() == static_cast<std::size_t>(config_.max_candidates)) break;
+    const bool is_new_place = std::all_of(chosen.begin(), chosen.end(), [&](const auto& other) {
+      return std::abs(seconds_between(stamps_[other.index], stamps_[match.index])) >=
+             config_.candidate_separation_s;
+    });
+    if (is_new_place)
+      chosen.push_back({match.index, static_cast<double>(match.score) / normalizer});
+  }
+  count_support(chosen);
+  return chosen;
+}
+
+}  // namespace km

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "modules/core/stamp.hpp"
+#include "modules/place_recognition/bow_database.hpp"
+#include "modules/place_recognition/place_recognition_config.hpp"
+
+namespace km {
+
+/// A keyframe that may show the same place as the query.
+struct PlaceCandidate {
+  std::size_t index = 0;    ///< In order of add().
+  double similarity = 0.0;  ///< Normalised, see PlaceDatabase.
+  int support = 1;          ///< Number of the query's candidates within 3 keyframes of this
+                            ///< candidate, including itself.
+};
+
+enum class SearchStatus {
+  kSearched,
+  kNoPrevious,     ///< The query has no predecessor, and so no normaliser.
+  kLowNormalizer,  ///< The query is too dissimilar to its predecessor.
+};
+
+/// Result of one query.
+struct CandidateSearch {
+  SearchStatus status = SearchStatus::kSearched;
+  double normalizer = 0.0;       ///< s(query, keyframe before it).
+  std::size_t compared = 0;      ///< Number of keyframes that share a word with the query.
+  std::size_t above = 0;         ///< Number of these at or above the threshold.
+  double best_similarity = 0.0;  ///< Best similarity of all compared keyframes.
+  std::vector<PlaceCandidate> candidates;  ///< By descending similarity; at most max_candidates.
+};
+
+/// The keyframes of one robot, in order of time, and the search for earlier visits of a place.
+///
+/// The score of two images depends on their amount of texture. The score is therefore divided by
+/// that of the query and the keyframe before it: eta = s(v_t, v_j) / s(v_t, v_(t-1)). One threshold
+/// then suits all places (Galvez-Lopez and Tardos, TRO 2012; threshold 0.5 in Chang et al.,
+/// "Kimera-Multi", Sec. III-A). Deviation from the first paper: candidates need no temporal
+/// consistency, because geometric verification and outlier rejection follow. Const members are
+/// thread-safe.
+class PlaceDatabase {
+ public:
+  /// For vectors of a vocabulary of `words` words. Throws ConfigError if `config` is out of bounds.
+  PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words);
+
+  /// Candidates among all keyframes for the keyframe `query` of another robot. `previous`: the
+  /// other robot's keyframe before it, or null.
+  CandidateSearch search(const BowVector& query, const BowVector* previous) const;
+
+  /// Candidates for a keyframe of this robot taken at `stamp`, not yet added. The search covers the
+  /// keyframes that are at least min_gap_s older or were added before mark_odometry_break(). The
+  /// keyframe added last normalises the score.
+  CandidateSearch search_own(const BowVector& query, Stamp stamp) const;
+
+  /// States that odometry hardly determines the pose of the next keyframe relative to the keyframe
+  /// added last. All keyframes added so far then count as other places, whatever their age.
+  void mark_odometry_break() { known_from_ = stamps_.size(); }
+
+  /// Adds a keyframe and returns its index. Throws std::invalid_argument if `stamp` is before the
+  /// last stamp, or if BowDatabase::add() does. The state is then unchanged.
+  std::size_t add(BowVector vector, Stamp stamp);
+
+  std::size_t size() const { return stamps_.size(); }
+
+ private:
+  CandidateSearch search_among(const BowVector& query, const BowVector* previous,
+                               std::size_t count) const;
+  std::vector<PlaceCandidate> choose(const std::vector<BowMatch>& matches, double normalizer) const;
+
+  PlaceRecognitionConfig config_;
+  BowDatabase database_;
+  std::vector<Stamp> stamps_;  // ascending
+  std::size_t known_from_ = 0;
+  BowVector last_;
+};
+
+/// Result of the place recognition node for one keyframe.
+enum class PlaceQueryStatus {
+  kSearched,         ///< PlaceQuery::search contains the result.
+  kOtherVocabulary,  ///< The peer uses another vocabulary, so its keyframes cannot be compared.
+  kUnknownWords,     ///< The peer states the same vocabulary but sent words outside of it.
+  kRepeated,         ///< This keyframe has arrived before.
+};
+
+/// A searched keyframe, or the reason why it was not searched, for statistics.
+struct PlaceQuery {
+  KeyframeId query;
+  PlaceQueryStatus status = PlaceQueryStatus::kSearched;
+  CandidateSearch search;  ///< Indices are those of own keyframes.
+};
+
+}  // namespace km

@@ -1,0 +1,124 @@
+#include "modules/recordings/ros_serialization.hpp"
+
+#include <bit>
+
+namespace km {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+}  // namespace
+
+Decoded<RosReader> RosReader::open(std::string_view encoding, std::span<const std::uint8_t> bytes) {
+  using Result = Decoded<RosReader>;
+  constexpr std::size_t kEncapsulation_bytes = 4;
+  if (encoding == "ros1") return Result::accept(RosReader(bytes, false, false));
+  if (encoding != "cdr") return Result::refuse("an encoding that is not known");
+  if (bytes.size() < kEncapsulation_bytes) return Result::refuse("no encapsulation header");
+  // Values of the second byte of the representation identifier.
+  constexpr std::uint8_t kBigEndian = 0, kLittleEndian = 1;
+  if (bytes[0] != 0 || (bytes[1] != kBigEndian && bytes[1] != kLittleEndian))
+    return Result::refuse("an encapsulation other than plain CDR");
+  return Result::accept(
+      RosReader(bytes.subspan(kEncapsulation_bytes), true, bytes[1] == kBigEndian));
+}
+
+std::uint64_t RosReader::number(std::size_t size) {
+  const std::size_t at = size_ - reader_.left();
+  if (is_cdr_) static_cast<void>(reader_.bytes((size - at % size) % size));
+  const auto octets = reader_.bytes(size);
+  std::uint64_t value = 0;
+  for (std::size_t k = 0; k < octets.size(); ++k)
+    value |= std::uint64_t{octets[k]} << (8U * (is_big_endian_ ? octets.size() - 1 - k : k));
+  return value;
+}
+
+void RosReader::f32(std::span<float> values) {
+  for (float& value : values) value = std::bit_cast<float>(static_cast<std::uint32_t>(number(4)));
+}
+
+void RosReader::f64(std::span<double> values) {
+  for (double& value : values) value = std::bit_cast<double>(number(8));
+}
+
+void RosReader::text(std::string& value) {
+  const auto octets = reader_.bytes(number(4));
+  // CDR ends a text with a zero, which some writers omit for an empty text.
+  const bool has_end = is_cdr_ && !octets.empty();
+  if (has_end && octets.back() != 0) reader_.fail();
+  value.assign(octets.begin(), octets.end() - (has_end ? 1 : 0));
+}
+
+void RosReader::octets(std::vector<std::uint8_t>& values) {
+  const auto octets = reader_.bytes(number(4));
+  values.assign(octets.begin(), octets.end());
+}
+
+void RosReader::doubles(std::vector<double>& values) {
+  resize(values, sizeof(double));
+  f64(values);
+}
+
+std::size_t RosReader::count(std::size_t bytes_per_element) {
+  const std::uint64_t elements = number(4);
+  return elements <= reader_.left() / bytes_per_element ? elements : reader_.fail();
+}
+
+void RosReader::skip_sequence() {
+  if (!is_cdr_) static_cast<void>(number(4));
+}
+
+void RosReader::stamp(Stamp& value) {
+  const auto seconds = static_cast<std::uint32_t>(number(4));
+  const auto rest_ns = static_cast<std::uint32_t>(number(4));
+  // Seconds are signed in ROS 2 and unsigned in ROS 1.
+  const Stamp whole = is_cdr_ ? Stamp{static_cast<std::int32_t>(seconds)} : Stamp{seconds};
+  value = whole * kSecond_ns + rest_ns;
+}
+
+const char* RosReader::problem() const {
+  constexpr std::size_t kMostPadding_bytes = 3;
+  if (reader_.failed()) return "a message that is cut or not of its type";
+  if (reader_.left() > (is_cdr_ ? kMostPadding_bytes : 0)) return "a message longer than its type";
+  return nullptr;
+}
+
+void RosWriter::number(std::uint64_t value, std::size_t size) {
+  constexpr std::size_t kEncapsulation_bytes = 4;
+  while ((bytes_.size() - kEncapsulation_bytes) % size != 0) bytes_.push_back(0);
+  for (std::size_t k = 0; k < size; ++k)
+    bytes_.push_back(static_cast<std::uint8_t>(value >> (8U * k)));
+}
+
+void RosWriter::f32(std::span<const float> values) {
+  for (const float value : values) number(std::bit_cast<std::uint32_t>(value), 4);
+}
+
+void RosWriter::f64(std::span<const double> values) {
+  for (const double value : values) number(std::bit_cast<std::uint64_t>(value), 8);
+}
+
+void RosWriter::text(const std::string& value) {
+  u32(static_cast<std::uint32_t>(value.size() + 1));
+  bytes_.insert(bytes_.end(), value.begin(), value.end());
+  u8(0);
+}
+
+void RosWriter::octets(const std::vector<std::uint8_t>& values) {
+  u32(static_cast<std::uint32_t>(values.size()));
+  bytes_.insert(bytes_.end(), values.begin(), values.end());
+}
+
+void RosWriter::doubles(const std::vector<double>& values) {
+  u32(static_cast<std::uint32_t>(values.size()));
+  f64(values);
+}
+
+void RosWriter::stamp(Stamp value) {
+  Stamp seconds = value / kSecond_ns, rest_ns = value % kSecond_ns;
+  if (rest_ns < 0) --seconds, rest_ns += kSecond_ns;
+  u32(static_cast<std::uint32_t>(seconds));
+  u32(static_cast<std::uint32_t>(rest_ns));
+}
+
+}  // namespace km

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "modules/core/bytes.hpp"
+#include "modules/core/decoded.hpp"
+#include "modules/core/stamp.hpp"
+
+namespace km {
+
+/// Reads the fields of a ROS message one after the other, in either encoding:
+///   "ros1"  ROS 1: little endian, without gaps (wiki.ros.org/msg);
+///   "cdr"   ROS 2: OMG's CDR as DDS writes it (DDS-XTypes, XCDR version 1, plain): an
+///           encapsulation header of four bytes that states the byte order; numbers lie at
+///           multiples of their size after the header.
+/// The bytes are untrusted, as for ByteReader: after a read that fails, all values are zero or
+/// empty. The bytes must outlive this object.
+class RosReader {
+ public:
+  /// Refuses other encodings, and encapsulations with parameter lists or of XCDR version 2.
+  static Decoded<RosReader> open(std::string_view encoding, std::span<const std::uint8_t> bytes);
+
+  void u8(std::uint8_t& value) { value = reader_.u8(); }
+  void flag(bool& value) { value = reader_.u8() != 0; }
+  void u32(std::uint32_t& value) { value = static_cast<std::uint32_t>(number(4)); }
+  void i32(std::int32_t& value) { value = static_cast<std::int32_t>(number(4)); }
+  void f32(std::span<float> values);
+  void f64(std::span<double> values);
+  void text(std::string& value);
+  /// uint8[].
+  void octets(std::vector<std::uint8_t>& values);
+  /// float64[].
+  void doubles(std::vector<double>& values);
+  /// Reads the number of elements, each of at least `bytes_per_element`, and resizes `elements`.
+  /// Fails if they exceed the remaining bytes.
+  template <typename Element>
+  void resize(std::vector<Element>& elements, std::size_t bytes_per_element) {
+    elements.resize(count(bytes_per_element));
+  }
+  /// Skips the sequence number of std_msgs/Header, which exists only in ROS 1.
+  void skip_sequence();
+  /// builtin_interfaces/Time [ns].
+  void stamp(Stamp& value);
+
+  /// Reason why the bytes do not fit the fields read: too short or too long; null if they fit.
+  [[nodiscard]] const char* problem() const;
+  [[nodiscard]] bool failed() const { return reader_.failed(); }
+  void fail() { reader_.fail(); }
+
+ private:
+  RosReader(std::span<const std::uint8_t> bytes, bool is_cdr, bool is_big_endian)
+      : reader_(bytes), size_(bytes.size()), is_cdr_(is_cdr), is_big_endian_(is_big_endian) {}
+
+  [[nodiscard]] std::uint64_t number(std::size_t size);
+  [[nodiscard]] std::size_t count(std::size_t bytes_per_element);
+
+  ByteReader reader_;
+  std::size_t size_;
+  bool is_cdr_;
+  bool is_big_endian_;
+};
+
+/// Writes the fields of a ROS message as little-endian CDR, with the interface of RosReader.
+class RosWriter {
+ public:
+  void u8(std::uint8_t value) { bytes_.push_back(value); }
+  void flag(bool value) { u8(value ? 1 : 0); }
+  void u32(std::uint32_t value) { number(value, 4); }
+  void i32(std::int32_t value) { number(static_cast<std::uint32_t>(value), 4); }
+  void f32(std::span<const float> values);
+  void f64(std::span<const double> values);
+  void text(const std::string& value);
+  void octets(const std::vector<std::uint8_t>& values);
+  void doubles(const std::vector<double>& values);
+  template <typename Element>
+  void resize(const std::vector<Element>& elements, std::size_t /*bytes_per_element*/) {
+    u32(static_cast<std::uint32_t>(elements.size()));
+  }
+  void skip_sequence() {}
+  void stamp(Stamp value);
+  void fail() {}
+
+  /// The bytes with the encapsulation header.
+  [[nodiscard]] std::vector<std::uint8_t> release() { return std::move(bytes_); }
+
+ private:
+  void number(std::uint64_t value, std::size_t size);
+
+  std::vector<std::uint8_t> bytes_ = {0, 1, 0, 0};
+};
+
+}  // namespace km

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "modules/recordings/ros_messages.hpp"
+
+namespace km {
+
+/// Topics of a robot's sensors. There is either `imu`, or `gyro` and `accel` with their own stamps
+/// (see ImuJoiner), all of type sensor_msgs/Imu. Without `right` the rig is an RGB-D rig. With
+/// `odometry`, the nav_msgs/Odometry of an external odometry, no inertial sensor is needed.
+struct SensorTopicNames {
+  std::string left, right, depth;
+  std::string imu, gyro, accel;
+  std::string odometry = {};
+};
+
+/// Sensor whose messages a robot reads.
+enum class SensorRole { kLeft, kRight, kDepth, kImu, kGyro, kAccel, kOdometry };
+
+/// Messages of a sensor.
+struct SensorKind {
+  SensorRole role;
+  std::string SensorTopicNames::*topic;
+  std::string_view type;     ///< Type of the messages in ROS 1; empty: images, see has_images().
+  std::string_view content;  ///< "images"
+  int queue_size;            ///< Live messages that wait to be read, before the oldest is dropped.
+};
+
+/// All kinds, in the order of SensorRole.
+inline constexpr std::array<SensorKind, 7> kSensorKinds{{
+    {SensorRole::kLeft, &SensorTopicNames::left, "", "images", 10},
+    {SensorRole::kRight, &SensorTopicNames::right, "", "images", 10},
+    {SensorRole::kDepth, &SensorTopicNames::depth, "", "images", 10},
+    {SensorRole::kImu, &SensorTopicNames::imu, RosImu::kType, "inertial samples", 4000},
+    {SensorRole::kGyro, &SensorTopicNames::gyro, RosImu::kType, "inertial samples", 4000},
+    {SensorRole::kAccel, &SensorTopicNames::accel, RosImu::kType, "inertial samples", 4000},
+    {SensorRole::kOdometry, &SensorTopicNames::odometry, RosOdometry::kType, "odometry", 4000},
+}};
+
+/// True if messages of the channel can be those of the sensor.
+[[nodiscard]] bool is_of_kind(const BagChannel& channel, const SensorKind& kind);
+
+/// A topic that is read, with the type of its messages.
+struct SensorTopic {
+  const SensorKind* kind;
+  std::string topic;
+  std::string_view type;
+};
+
+/// The topics that have a name, in the order of kSensorKinds.
+[[nodiscard]] std::vector<SensorTopic> sensor_topics(const SensorTopicNames& names);
+
+}  // namespace km

@@ -1,0 +1,115 @@
+#include "modules/vio/external_odometry.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "modules/core/covariance.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/vio/keyframe_rule.hpp"
+
+namespace km {
+namespace {
+
+// A slower motion counts as rest until it exceeds the motion of kRest_s at these speeds.
+constexpr double kLeastSpeed_mps = 0.01;
+constexpr double kLeastRate_radps = 0.01;
+constexpr double kRest_s = 1.0;
+
+// Duration that `motion` would take at the least speed and rate above.
+double slowest_s(const SE3& motion) {
+  return std::max(motion.translation().norm() / kLeastSpeed_mps,
+                  angle_of(motion.linear()) / kLeastRate_radps);
+}
+
+}  // namespace
+
+ExternalOdometry::ExternalOdometry(RobotId robot, DepthSource depth_source, const VioConfig& config)
+    : robot_(robot), depth_source_(depth_source), config_(checked(config)) {}
+
+void ExternalOdometry::continue_from(const VioCheckpoint& checkpoint) {
+  continues_ = true;
+  last_keyframe_ = checkpoint.keyframe;
+  last_ = last_kf_ = {checkpoint.keyframe.stamp, {checkpoint.state.T_odom_body}};
+  T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
+}
+
+ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
+  ExternalOdometryResult result;
+  if (packet.frame == nullptr || !packet.pose || !packet.pose->T_odom_body.matrix().allFinite())
+    return result;
+  const Fix fix{packet.frame->stamp, *packet.pose};
+  const bool is_taken_up = std::exchange(continues_, false) && fix.stamp == last_keyframe_->stamp;
+  if (last_ && fix.stamp <= last_->stamp && !is_taken_up) return result;
+  result.has_jumped = !is_taken_up && is_jump(fix);
+  if (result.has_jumped)
+    T_chain_odom_ = T_chain_odom_ * last_->pose.T_odom_body * fix.pose.T_odom_body.inverse();
+  if (last_ && !result.has_jumped && !is_taken_up)
+    count_motion(fix);
+  else
+    T_odom_rest_ = fix.pose.T_odom_body;
+  const SE3 T_odom_body = T_chain_odom_ * fix.pose.T_odom_body;
+  OdometryState state;
+  state.stamp = fix.stamp;
+  state.T_odom_body = T_odom_body;
+  if (last_ && !result.has_jumped && !is_taken_up)
+    state.v_odom =
+        (T_odom_body.translation() - (T_chain_odom_ * last_->pose.T_odom_body).translation()) /
+        seconds_between(last_->stamp, fix.stamp);
+  const bool locates_points =
+      depth_source_ == DepthSource::kRightImage || packet.frame->depth != nullptr;
+  const bool is_due =
+      !last_keyframe_ || result.has_jumped ||
+      is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
+  // A keyframe without points cannot close a loop. Only a jump makes one.
+  if (!is_taken_up && is_due && (locates_points || result.has_jumped))
+    add_keyframe(fix, T_odom_body, result.has_jumped, result);
+  if (!last_keyframe_) return result;
+  if (is_taken_up)  // the state was published earlier; the covariance was not kept
+    last_kf_ = fix;
+  else
+    result.state = state;
+  result.frame = LocatedFrame{packet.frame, last_keyframe_->id.index, T_odom_body};
+  last_ = fix;
+  return result;
+}
+
+bool ExternalOdometry::is_jump(const Fix& fix) const {
+  if (!last_) return false;
+  const double distance_m =
+      (fix.pose.T_odom_body.translation() - last_->pose.T_odom_body.translation()).norm();
+  return distance_m > config_.max_speed_mps * seconds_between(last_->stamp, fix.stamp);
+}
+
+// A slower motion counts as a motion at the least speed.
+void ExternalOdometry::count_motion(const Fix& fix) {
+  const SE3& T_odom_body = fix.pose.T_odom_body;
+  const double dt_s = seconds_between(last_->stamp, fix.stamp);
+  const double away_s = slowest_s(T_odom_rest_.inverse() * T_odom_body);
+  const bool is_fast = slowest_s(last_->pose.T_odom_body.inverse() * T_odom_body) > dt_s;
+  if (!is_fast && away_s < kRest_s) return;
+  moved_s_ += is_fast ? dt_s : away_s;
+  T_odom_rest_ = T_odom_body;
+}
+
+void ExternalOdometry::add_keyframe(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
+                                    ExternalOdometryResult& result) {
+  KeyframeOdometry keyframe;
+  keyframe.id = {robot_, 0};
+  keyframe.stamp = fix.stamp;
+  keyframe.T_odom_kf = keyframe.T_previous_kf = T_odom_body;
+  if (last_keyframe_) {
+    keyframe.id.index = last_keyframe_->id.index + 1;
+    keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * T_odom_body;
+    const UncertainPose grown =
+        between_on_chain({last_kf_->pose.T_odom_body, last_kf_->pose.covariance},
+                         {fix.pose.T_odom_body, fix.pose.covariance});
+    keyframe.covariance =
+        has_jumped ? restart_covariance() : keyframe_covariance(config_, moved_s_, grown.Sigma);
+  }
+  last_keyframe_ = keyframe;
+  moved_s_ = 0.0;
+  last_kf_ = fix;
+  result.keyframe = keyframe;
+}
+
+}  // namespace km

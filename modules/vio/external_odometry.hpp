@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/vio/vio.hpp"
+#include "modules/vio/vio_config.hpp"
+
+namespace km {
+
+/// Result of one packet.
+struct ExternalOdometryResult {
+  std::optional<OdometryState> state;        ///< nullopt: the packet has no usable pose.
+  std::optional<KeyframeOdometry> keyframe;  ///< New keyframe, if any.
+  std::optional<LocatedFrame> frame;
+  /// The pose jumped faster than VioConfig::max_speed_mps; the published pose stays.
+  bool has_jumped = false;
+};
+
+/// Publishes the poses of an external odometry (see MeasuredPose) in place of Vio, with keyframes
+/// by the rules of Vio (is_keyframe_due()). The covariance of a keyframe's relative pose is the
+/// growth of the odometry's covariance since the previous keyframe (between_on_chain()), plus the
+/// drift of VioConfig. The steps are assumed to be independent. A constant covariance, as many
+/// drivers report it, adds nothing. No verticals are published, because z of `odom` may not point
+/// up. Not thread-safe.
+class ExternalOdometry {
+ public:
+  /// Throws ConfigError if `config` is out of bounds.
+  ExternalOdometry(RobotId robot, DepthSource depth_source, const VioConfig& config);
+
+  /// Continues after the last published keyframe of an earlier process, in the same odometry.
+  void continue_from(const VioCheckpoint& checkpoint);
+
+  [[nodiscard]] ExternalOdometryResult process(const SensorPacket& packet);
+
+ private:
+  struct Fix {
+    Stamp stamp;
+    MeasuredPose pose;
+  };
+
+  [[nodiscard]] bool is_jump(const Fix& fix) const;
+  void count_motion(const Fix& fix);
+  void add_keyframe(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
+                    ExternalOdometryResult& result);
+
+  RobotId robot_;
+  DepthSource depth_source_;
+  VioConfig config_;
+  bool continues_ = false;             // from continue_from() to the first usable pose: true
+  std::optional<Fix> last_, last_kf_;  // fixes as measured
+  std::optional<KeyframeOdometry> last_keyframe_;
+  double moved_s_ = 0.0;                // time in motion since the last keyframe
+  SE3 T_odom_rest_ = SE3::Identity();   // measured pose at the last motion
+  SE3 T_chain_odom_ = SE3::Identity();  // from measured to published odometry; changed by a jump
+};
+
+}  // namespace km

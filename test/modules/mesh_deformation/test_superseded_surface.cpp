@@ -1,0 +1,183 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "modules/mesh_deformation/superseded_surface.hpp"
+#include "test/modules/mesh_deformation/corridor.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kVoxel_m = 0.25;
+constexpr KeyframeIndex kVisit = 200;  // keyframes from one visit to the next
+const SheetSize kSheet{.columns = 20, .rows = 8, .step_m = kVoxel_m, .keyframe_step_m = 0.5};
+const SameSurface kSameSurface{
+    .distance_m = kVoxel_m, .longest_edge_m = 2 * kVoxel_m, .window_keyframes = 15};
+
+// Several sheets in one mesh, each seen `later` keyframes after the one before.
+MapMesh visits(const std::vector<MapMesh>& sheets, KeyframeIndex later = kVisit) {
+  MapMesh all;
+  KeyframeIndex shift = 0;
+  for (const MapMesh& visit : sheets) {
+    all.mesh.append(visit.mesh);
+    for (const auto& [first, last] : visit.seen_by) {
+      all.seen_by.push_back({first + shift, last + shift});
+      all.ids.push_back(all.ids.size());
+    }
+    shift += later;
+  }
+  return all;
+}
+
+MapMesh sheet_at(const Eigen::Vector3d& t) {
+  MapMesh result = sheet(kSheet);
+  result.mesh.transform(make_pose(Eigen::Matrix3d::Identity(), t));
+  return result;
+}
+
+LabelledMesh cleaned(const MapMesh& map) {
+  return without_superseded(
+      map.mesh, find_replacements(map.mesh, {map.seen_by, map.certainty}, kSameSurface));
+}
+
+TEST_CASE("The newer of two copies of a surface stays in any order of the mesh",
+          "[mesh_deformation]") {
+  const double height_m = GENERATE(0.9, -0.9, 0.0) * kVoxel_m;
+  CAPTURE(height_m);
+  const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({0, 0, height_m});
+  const MapMesh map = visits({older, newer});
+  CHECK(cleaned(map).vertices == newer.mesh.vertices);
+  CHECK(cleaned(map).faces == newer.mesh.faces);
+  CHECK(cleaned(map).labels == newer.mesh.labels);
+
+  MapMesh other_order = map;
+  std::rotate(other_order.seen_by.begin(), other_order.seen_by.begin() + std::ssize(older.seen_by),
+              other_order.seen_by.end());
+  CHECK(cleaned(other_order).vertices == older.mesh.vertices);
+}
+
+TEST_CASE("The more certain of two copies stays", "[mesh_deformation]") {
+  const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({0, 0, 0.1});
+  MapMesh map = visits({older, newer});
+  map.certainty.assign(map.ids.size(), 5);
+  const std::size_t count = older.ids.size();
+  SECTION("the older everywhere") {
+    std::fill(map.certainty.begin() + std::ssize(older.ids), map.certainty.end(), 4);
+    CHECK(cleaned(map).vertices == older.mesh.vertices);
+  }
+  SECTION("the older on one side and no surface is lost in between") {
+    for (std::size_t v = 0; v < count; ++v)
+      if (older.mesh.vertices[v].x() > 2.6F) map.certainty[count + v] = 4;
+    const LabelledMesh result = cleaned(map);
+    CHECK(result.faces.size() >= older.mesh.faces.size());
+    CHECK(result.faces.size() <= older.mesh.faces.size() + 4 * 2 * kSheet.rows);  // the seam
+    for (std::size_t f = 0; f < result.faces.size(); ++f) {
+      const Eigen::Vector3f& p = result.vertices[result.faces[f][0]];
+      if (std::abs(p.x() - 2.6F) > 2.0F * float{kVoxel_m}) CHECK((p.z() > 0.05F) == (p.x() < 2.6F));
+    }
+  }
+}
+
+TEST_CASE("The replacement of a vertex is its copy by id", "[mesh_deformation]") {
+  const MapMesh map = visits({sheet_at({0, 0, 0}), sheet_at({0.05, 0.03, 0.1})});
+  const auto count = static_cast<std::uint32_t>(map.ids.size() / 2);
+  const auto replacements = find_replacements(map.mesh, {map.seen_by, map.certainty}, kSameSurface);
+  for (std::uint32_t v = 0; v < count; ++v) CHECK(replacements[v] == v + count);  // at the rim too
+  for (std::uint32_t v = count; v < 2 * count; ++v) CHECK(replacements[v] == kNoIndex);
+
+  std::vector<std::uint64_t> ids;
+  for (std::uint64_t v = 0; v < 2 * count; ++v) ids.push_back(10 * v + 3);
+  const SupersededSurface surface = named(replacements, ids);
+  REQUIRE(surface.vertices.size() == count);
+  CHECK(surface.vertices[7].id == 73);
+  CHECK(surface.vertices[7].replacement == 10 * (7 + count) + 3);
+}
+
+TEST_CASE("Two different surfaces both stay", "[mesh_deformation]") {
+  MapMesh second = sheet_at({0, 0, 0});
+  KeyframeIndex later = kVisit;
+  SECTION("more than the distance apart") {
+    second = sheet_at({0, 0, 1.05 * kVoxel_m});
+  }
+  SECTION("side by side") {
+    second = sheet_at({0, 2.5, 0});
+  }
+  SECTION("the two sides of a thin wall") {
+    for (auto& face : second.mesh.faces) std::swap(face[0], face[1]);
+  }
+  SECTION("seen on one visit") {
+    later = 15;
+  }
+  const MapMesh map = visits({sheet_at({0, 0, 0}), second}, later);
+  const LabelledMesh result = cleaned(map);
+  CHECK(result.faces == map.mesh.faces);
+  CHECK(result.vertices == map.mesh.vertices);
+}
+
+TEST_CASE("Surface that the newer visit did not see stays up to its rim", "[mesh_deformation]") {
+  // The sheet is 5 m long
+  const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({2.1, 0, 0.1});
+  const LabelledMesh result = cleaned(visits({older, newer}));
+  const float rim_m = 2.1F - 0.25F * static_cast<float>(kSameSurface.distance_m);
+  std::size_t expected = newer.mesh.faces.size();
+  for (const auto& [a, b, c] : older.mesh.faces)
+    expected += std::min({older.mesh.vertices[a].x(), older.mesh.vertices[b].x(),
+                          older.mesh.vertices[c].x()}) < rim_m
+                    ? 1
+                    : 0;
+  CHECK(result.faces.size() == expected);
+  CHECK(result.vertices.size() == result.labels.size());
+}
+
+// At the edge the normals of neither wall pass through points outside both.
+TEST_CASE("A copy of a convex edge is dropped as a whole", "[mesh_deformation]") {
+  const auto roof = [](double larger_m) {
+    MapMesh result = sheet(kSheet);
+    for (Eigen::Vector3f& p : result.mesh.vertices) {
+      const float x = p.x() - 2.5F;
+      p = Eigen::Vector3f(x, p.y(), static_cast<float>(larger_m) - std::abs(x));
+    }
+    return result;
+  };
+  const MapMesh larger = roof(0.08), smaller = roof(0.0);
+  CHECK(cleaned(visits({larger, smaller})).vertices == smaller.mesh.vertices);
+  CHECK(cleaned(visits({smaller, larger})).vertices == larger.mesh.vertices);
+}
+
+TEST_CASE("About one of many noisy copies stays and all are near it", "[mesh_deformation]") {
+  const auto seed = GENERATE(range(0U, 3U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::normal_distribution<float> noise(0.0F, 0.04F);  // distance / 6: 1.4 sigma of a difference
+  std::vector<MapMesh> copies(6, sheet_at({0, 0, 0}));
+  for (MapMesh& copy : copies)
+    for (Eigen::Vector3f& p : copy.mesh.vertices) p += Eigen::Vector3f(0, 0, noise(rng));
+  const MapMesh map = visits(copies);
+  const auto replacements = find_replacements(map.mesh, {map.seen_by, map.certainty}, kSameSurface);
+  const std::size_t one = copies[0].mesh.faces.size();
+  std::size_t left = 0;
+  for (const auto& face : map.mesh.faces) left += is_superseded(face, replacements) ? 0 : 1;
+  CHECK(left >= one);
+  CHECK(left < one + one / 20);
+  for (std::size_t v = 0; v < replacements.size(); ++v) {
+    if (replacements[v] == kNoIndex) continue;
+    CHECK(map.seen_by[replacements[v]][0] > map.seen_by[v][1]);
+    CHECK((map.mesh.vertices[replacements[v]] - map.mesh.vertices[v]).norm() <
+          1.5F * float{kVoxel_m});
+  }
+}
+
+TEST_CASE("A mesh without faces and one with a face without area have no replacements",
+          "[mesh_deformation]") {
+  CHECK(find_replacements({}, {{}, {}}, kSameSurface).empty());
+  LabelledMesh mesh;
+  mesh.vertices.assign(6, Eigen::Vector3f::Zero());
+  mesh.faces = {{0, 1, 2}, {3, 4, 5}};
+  const std::vector<SeenBy> seen_by = {{0, 0}, {0, 0}, {0, 0}, {90, 90}, {90, 90}, {90, 90}};
+  CHECK(find_replacements(mesh, {seen_by, {}}, kSameSurface) == std::vector(6, kNoIndex));
+}
+
+}  // namespace
+}  // namespace km
