@@ -212,7 +212,6 @@ class TeamAgent {
   bool reconsider_due_ = false;               // once all members have sent the solution
   std::uint32_t rounds_before_ = 0;           // rounds of earlier sessions
   double optimising_s_ = 0.0;                 // in earlier sessions
-  std::uint32_t announced_ = 0;               // number of the last message on a session
   std::uint64_t sent_bytes_ = 0;              // for sessions
 
   bool publish_due_ = false;

@@ -57,10 +57,7 @@ void TeamAgent::announce(TeamOutput& output) {
     session.gradient = state.gradient;
     part_->commit(session.round);
   }
-  if (part_->members().size() == 1) return;
-  Session message = session;
-  message.number = ++announced_;
-  output.messages.emplace_back(std::move(message));
+  if (part_->members().size() > 1) output.messages.emplace_back(session);
 }
 
 bool TeamAgent::all_upright(const SessionPlan& plan) const {

@@ -56,7 +56,6 @@ class MessageWriter {
 
   void put(const Session& m) {
     out_.varint(m.id.number);
-    out_.varint(m.number);
     put(m.plan);
     put(m.method);
     put(m.upright);
@@ -201,7 +200,6 @@ class MessageReader {
   Session session() {
     Session m;
     m.id = {sender_, u32()};
-    m.number = u32();
     m.plan = plan();
     m.method = method();
     m.upright = flag();

@@ -108,7 +108,6 @@ struct SessionPlan {
 /// A new session, its progress or its end: from the coordinator to all members.
 struct Session {
   SessionId id;
-  std::uint32_t number = 0;  ///< Counts messages on the sessions of the coordinator.
   SessionPlan plan;
   PgoMethod method = PgoMethod::kNewton;
   bool upright = false;          ///< Members use their vertical priors: the solution has z up.
@@ -163,7 +162,6 @@ struct ReliableMessage {
 /// Messages between the robots of a team. The newest status, session and poses of each robot count,
 /// and go to all robots; a reliable message goes to one.
 using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, ReliableMessage>;
-using TeamMessagePtr = std::shared_ptr<const TeamMessage>;
 
 /// The robot that sent the message first.
 [[nodiscard]] inline const TeamPeer& origin_of(const TeamMessage& message) {

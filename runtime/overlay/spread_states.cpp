@@ -82,11 +82,12 @@ bool SpreadStates::hold(std::optional<Held>& held, Held newer) {
   return true;
 }
 
-// True if the robots may soon receive each other: only one end has reported the link, or the first
-// robot does not know the second one yet.
+// True if the robots may soon receive each other: only one end has reported the link, or this robot
+// receives both, and the first does not know the second yet. If another robot has introduced the
+// origin to this robot, that robot has already waited.
 bool SpreadStates::may_be_linked(RobotId next, RobotId origin) const {
-  return robots_.awaits_introduction(next, origin) || links().receives(next, origin) ||
-         links().receives(origin, next);
+  const bool is_new = robots_.receives(origin) && robots_.awaits_introduction(next, origin);
+  return is_new || links().receives(next, origin) || links().receives(origin, next);
 }
 
 void SpreadStates::pass_on(RobotId from, const Key& key, double now_s) {

@@ -38,8 +38,9 @@ class SpreadStates {
   static constexpr std::size_t kMaxHeldFromOne = 4U << 20U;
   static constexpr double kRepairAfter_s = 1.0;
   /// Time for which a link is awaited that both ends have not reported yet. States of a robot are
-  /// not forwarded to another one meanwhile, nor is the robot introduced to it.
-  static constexpr double kMeeting_s = 0.5;
+  /// not forwarded to another one meanwhile, nor is the robot introduced to it. Robots in range of
+  /// each other discover a new robot within a tenth of a second of each other.
+  static constexpr double kMeeting_s = 0.2;
 
   /// Both outlive this object; the packets to send are appended to `packets`.
   SpreadStates(KnownRobots& robots, std::vector<OverlayPacket>& packets)

@@ -35,7 +35,7 @@ struct NetworkLink {
 /// A message of the pose graph on its way over one link, to a robot that is received directly.
 struct LinkPacket {
   RobotId next = 0;  ///< Robot at the other end of the link.
-  TeamMessagePtr message = {};
+  std::shared_ptr<const TeamMessage> message = {};
   std::uint32_t number = 0;  ///< Its number in the overlay.
 };
 

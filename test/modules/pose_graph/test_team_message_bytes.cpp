@@ -33,7 +33,6 @@ TeamStatus some_status() {
 Session some_session() {
   std::mt19937 random(2);
   return {.id = {kPeer2, 9},
-          .number = 41,
           .plan = {.frame = kPeer7,
                    .members = {{kPeer7, 1007, RobotId{2}},
                                {kPeer2, 4, {}},
@@ -121,7 +120,6 @@ TEST_CASE("Decoding restores an encoded session", "[pose_graph]") {
   Session sent = some_session();
   const Session received = round_trip(sent);
   CHECK(received.id == sent.id);
-  CHECK(received.number == sent.number);
   CHECK(received.plan == sent.plan);
   CHECK(received.method == sent.method);
   CHECK(received.upright == sent.upright);

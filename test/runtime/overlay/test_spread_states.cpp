@@ -48,9 +48,9 @@ struct Overlays {
     at(b).lost(a, now_s);
   }
   // Periods of a summary of every robot.
-  void run(int periods) {
+  void run(int periods, double period_s = kPeriod_s) {
     for (int k = 0; k < periods; ++k) {
-      now_s += kPeriod_s;
+      now_s += period_s;
       for (auto& [id, overlay] : of) overlay.step(now_s);
       carry();
       for (const auto& [a, b] : std::set(links)) at(b).update(a, at(a).summary(), now_s);
@@ -171,6 +171,31 @@ TEST_CASE("a robot with a new link receives all present states", "[overlay]") {
   overlays.up(3, 4);
   overlays.run(1);
   CHECK(overlays.poses_read(4) == 2);
+}
+
+TEST_CASE("in a line of robots that have just met, a state waits once and not at each link",
+          "[overlay]") {
+  Overlays overlays({});
+  for (RobotId id = 1; id < 6; ++id) overlays.up(id, static_cast<RobotId>(id + 1));
+  overlays.at(1).publish(kPoses, {7}, overlays.now_s);
+  overlays.run(1, 0.5 * SpreadStates::kMeeting_s);
+  CHECK(overlays.poses_read(2) == 1);
+  CHECK(overlays.poses_read(3) == 0);
+  overlays.run(1, 0.5 * SpreadStates::kMeeting_s);
+  CHECK(overlays.poses_read(6) == 1);
+}
+
+TEST_CASE("a robot that meets all others in a tenth of a second is not introduced", "[overlay]") {
+  Pairs pairs;
+  for (RobotId a = 1; a <= 5; ++a)
+    for (RobotId b = 1; b < a; ++b) pairs.emplace_back(a, b);
+  Overlays overlays(pairs);
+  for (RobotId id = 1; id <= 5; ++id) {
+    overlays.up(id, 9);
+    overlays.run(1, 0.02);
+  }
+  overlays.run(20);
+  CHECK(overlays.total_sent() == 0);
 }
 
 TEST_CASE("a lost state is sent again when the hashes show its loss", "[overlay]") {
