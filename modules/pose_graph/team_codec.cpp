@@ -1,5 +1,7 @@
 #include "modules/pose_graph/team_codec.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "modules/pose_graph/team_message_bytes.hpp"
@@ -12,21 +14,9 @@ namespace {
 constexpr std::uint32_t kReliableSlots = 64;
 constexpr std::uint32_t kReceiptSlot = 64;  // acknowledgements without bytes: the newest counts
 
+// Streams by TeamMessageKind.
 constexpr OverlayStream kStreams[] = {OverlayStream::kTeamStatus, OverlayStream::kSession,
                                       OverlayStream::kMemberPoses, OverlayStream::kSolver};
-
-TeamMessageKind kind_of_stream(OverlayStream stream) {
-  switch (stream) {
-    case OverlayStream::kTeamStatus:
-      return TeamMessageKind::kStatus;
-    case OverlayStream::kSession:
-      return TeamMessageKind::kSession;
-    case OverlayStream::kMemberPoses:
-      return TeamMessageKind::kMemberPoses;
-    default:
-      return TeamMessageKind::kReliable;
-  }
-}
 
 }  // namespace
 
@@ -43,7 +33,8 @@ OverlayMessage overlay_message(const TeamMessage& message) {
 }
 
 Decoded<TeamMessage> team_message(const OverlayMessage& message) {
-  return decode_team_message({.kind = kind_of_stream(message.stream),
+  const auto stream = std::ranges::find(kStreams, message.stream);
+  return decode_team_message({.kind = static_cast<TeamMessageKind>(stream - std::begin(kStreams)),
                               .sender = message.origin,
                               .to = message.to,
                               .bytes = message.content});

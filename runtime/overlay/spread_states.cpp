@@ -91,30 +91,26 @@ bool SpreadStates::may_be_linked(RobotId next, RobotId origin) const {
 }
 
 void SpreadStates::pass_on(RobotId from, const Key& key, double now_s) {
-  for (auto& [robot, receiver] : receivers_) {
-    if (robot == key.first || robot == from || links().linked(robot, key.first) ||
-        links().linked(robot, from))
-      continue;
-    if (may_be_linked(robot, key.first))
-      receiver.due_s.try_emplace(key, now_s + kMeeting_s);
-    else
-      send(robot, key, now_s);
-  }
+  for (const auto& [robot, receiver] : receivers_)
+    if (robot != from && !links().linked(robot, from)) offer(robot, key, now_s);
 }
 
-// A robot that links connected to this one a moment ago has its states.
+// Sends a state to a robot that does not receive its origin, later if it may soon do so. A robot
+// that links connected to the origin a moment ago has the state.
+void SpreadStates::offer(RobotId next, const Key& key, double now_s) {
+  const RobotId origin = key.first;
+  if (next == origin || links().linked(next, origin)) return;
+  if (origin != robots_.self().robot && may_be_linked(next, origin))
+    receivers_.at(next).due_s.try_emplace(key, now_s + kMeeting_s);
+  else
+    send(next, key, now_s);
+}
+
 void SpreadStates::connected(RobotId robot, double now_s) {
-  Receiver& receiver = receivers_[robot];
-  receiver = {.repair_s = now_s + kRepairAfter_s};
-  const RobotId self = robots_.self().robot;
+  receivers_[robot] = {.repair_s = now_s + kRepairAfter_s};
   for (const auto& [origin, states] : origins_)
-    for (std::size_t kind = 0; kind < kStateStreams; ++kind) {
-      if (!states[kind] || origin == robot || links().linked(robot, origin)) continue;
-      if (origin == self)
-        send(robot, {origin, kind}, now_s);
-      else
-        receiver.due_s[{origin, kind}] = now_s + kMeeting_s;
-    }
+    for (std::size_t kind = 0; kind < kStateStreams; ++kind)
+      if (states[kind]) offer(robot, {origin, kind}, now_s);
 }
 
 void SpreadStates::forget(RobotId robot) {
@@ -151,11 +147,11 @@ void SpreadStates::step(double now_s) {
     }
   for (auto& [robot, receiver] : receivers_)
     for (auto due = receiver.due_s.begin(); due != receiver.due_s.end();) {
-      if (due->second > now_s) {
+      const Key key = due->first;
+      if (due->second > now_s && may_be_linked(robot, key.first)) {
         ++due;
         continue;
       }
-      const Key key = due->first;
       due = receiver.due_s.erase(due);
       if (!links().linked(robot, key.first)) send(robot, key, now_s);
     }
@@ -179,7 +175,7 @@ void SpreadStates::repair(RobotId robot, double now_s) {
       const auto& held = states[kind];
       const bool receives_origin = origin != robots_.self().robot && links().linked(robot, origin);
       if (!held || origin == robot || receives_origin || !may_forward(*held) ||
-          now_s - held->learned_s < kRepairAfter_s)
+          receiver.due_s.contains({origin, kind}) || now_s - held->learned_s < kRepairAfter_s)
         continue;
       const auto served = receiver.served.find({origin, kind});
       if (served != receiver.served.end() && served->second.number == held->message->number &&

@@ -96,6 +96,7 @@ class SpreadStates {
   [[nodiscard]] bool may_be_linked(RobotId next, RobotId origin) const;
   void repair(RobotId robot, double now_s);
   void pass_on(RobotId from, const Key& key, double now_s);
+  void offer(RobotId next, const Key& key, double now_s);
   void send(RobotId next, const Key& key, double now_s);
   void send_to_all(const Key& key, double now_s);
 

@@ -177,11 +177,11 @@ TEST_CASE("in a line of robots that have just met, a state waits once and not at
           "[overlay]") {
   Overlays overlays({});
   for (RobotId id = 1; id < 6; ++id) overlays.up(id, static_cast<RobotId>(id + 1));
-  overlays.at(1).publish(kPoses, {7}, overlays.now_s);
+  overlays.publish(1);
   overlays.run(1, 0.5 * SpreadStates::kMeeting_s);
   CHECK(overlays.poses_read(2) == 1);
   CHECK(overlays.poses_read(3) == 0);
-  overlays.run(1, 0.5 * SpreadStates::kMeeting_s);
+  overlays.run(1, 0.6 * SpreadStates::kMeeting_s);
   CHECK(overlays.poses_read(6) == 1);
 }
 
