@@ -335,14 +335,15 @@ void Robot::add_overlay() {
   Topics& t = topics_;
   const In<PeerEvent> peer_events = bridge_->peers().events();
   forward<PeerEvent>(peer_events, t.ways);
-  overlay_ = &add<OverlayNode>(false, TeamPeer{identity_.robot, identity_.boot}, seal_.get(),
-                               bridge_->peers(),
-                               OverlayTopics{.peer_events = peer_events,
-                                             .statuses = t.status.from_peers(),
-                                             .team_packets = t.team_packets.to_peers(),
-                                             .places_packets = t.places_packets.to_peers(),
-                                             .reached = t.ways,
-                                             .links = t.links});
+  overlay_ = &add<OverlayNode>(
+      false, TeamPeer{identity_.robot, identity_.boot}, seal_.get(), bridge_->peers(),
+      OverlayTopics{.peer_events = peer_events,
+                    .statuses = t.status.from_peers(),
+                    .team_packets = t.team_packets.to_peers(),
+                    .places_packets = t.places_packets.to_peers(),
+                    .reached = t.ways,
+                    .links = t.links,
+                    .renew = [this](RobotId robot) { bridge_->renew(robot); }});
   join_team(*overlay_, t.team_messages, t.peer_team_messages);
   overlay_->join_bags<KeyframeBow>(t.bows.from_peers(), t.peer_bows);
   overlay_->join_calls(

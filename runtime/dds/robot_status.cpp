@@ -39,6 +39,9 @@ Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status
   for (const auto& [origin, bags, reliable] : status.overlay.holds)
     encoded.holds.push_back({origin.robot, origin.boot, bags, reliable});
   borrow(wire.holds, encoded.holds);
+  wire.own_states = status.overlay.own_states;
+  encoded.missed = status.overlay.missed;
+  borrow(wire.missed, encoded.missed);
   return encoded;
 }
 
@@ -51,8 +54,11 @@ Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire, const TeamPeer
   if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
   if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
   const auto holds = elements_of(wire.holds, kMaxTeam);
-  if (!holds) return Result::refuse("it names too many robots");
-  OverlaySummary overlay{.states = wire.states};
+  const auto missed = elements_of(wire.missed, kMaxTeam);
+  if (!holds || !missed) return Result::refuse("it names too many robots");
+  OverlaySummary overlay{.states = wire.states,
+                         .own_states = wire.own_states,
+                         .missed = {missed->begin(), missed->end()}};
   for (const km_wire_OverlayHeld& held : *holds)
     overlay.holds.push_back({{held.robot, held.boot}, held.bags, held.reliable});
   const auto phase = static_cast<RobotPhase>(wire.phase);

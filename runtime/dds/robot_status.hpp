@@ -51,12 +51,13 @@ struct Codec<RobotStatus> {
   using Wire = km_wire_RobotStatus;
   static constexpr const char* kTopic = "robot_status";
   static constexpr std::uint16_t kVersion = 1;
-  static constexpr std::size_t kMaxBytes = 256 + 24 * kMaxTeam;
+  static constexpr std::size_t kMaxBytes = 256 + 26 * kMaxTeam;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotStatus_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<km_wire_OverlayHeld> holds;
+    std::vector<std::uint16_t> missed;
   };
   static MessageKey key_of(const RobotStatus& status);
   static Encoded encode(const RobotStatus& status);

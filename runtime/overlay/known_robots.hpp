@@ -66,6 +66,9 @@ class KnownRobots {
   struct Neighbour {
     std::map<RobotId, OverlayHeld> holds = {};  ///< As reported last, by origin.
     std::map<RobotId, double> introduced_s = {};
+    double complete_s = 0.0;  ///< Last time when a packet of it arrived, or when none was missing.
+    bool is_missed = false;   ///< Its statuses arrive, but not its packets.
+    double renewed_s = -1e9;  ///< Last time when it missed packets of this robot.
   };
 
   KnownRobots(TeamPeer self, std::optional<OverlayKeys> keys)

@@ -46,6 +46,7 @@ std::optional<std::vector<TeamPeer>> decode_links(std::span<const std::uint8_t> 
 void Overlay::connected(const RobotIdentity& peer, double now_s) {
   if (peer.robot == robots_.self().robot || !meet(peer)) return;
   robots_.connect(peer.robot);
+  robots_.neighbours().at(peer.robot).complete_s = now_s;
   store_.connected(peer.robot);
   states_.connected(peer.robot, now_s);
   renew_routes();
@@ -144,6 +145,9 @@ OverlayArrival Overlay::keep_reply(const TeamPeer& from, std::uint32_t number,
 OverlayArrival Overlay::receive(const RobotIdentity& from, const OverlayMessagePtr& message,
                                 double now_s) {
   const TeamPeer& origin = message->origin;
+  if (const auto neighbour = robots_.neighbours().find(from.robot);
+      neighbour != robots_.neighbours().end())
+    neighbour->second.complete_s = now_s;
   if (origin.robot == robots_.self().robot)
     return is_state(message->stream) ? OverlayArrival::kRepeated : OverlayArrival::kRefused;
   if (message->stream == OverlayStream::kIntroduction) return introduce(*message, now_s);
@@ -232,8 +236,32 @@ void Overlay::update(RobotId robot, const OverlaySummary& summary, double now_s)
   if (found == robots_.neighbours().end()) return;
   found->second.holds.clear();
   for (const OverlayHeld& held : summary.holds) found->second.holds[held.origin.robot] = held;
+  if (robots_.has_keys()) watch_packets(robot, summary, now_s);
   states_.compare(robot, summary.states, now_s);
   if (robots_.links().receives(robot, robots_.self().robot)) store_.forward(robot, now_s);
+}
+
+// Detects packets of a neighbour that do not arrive, and those of this robot that do not arrive
+// there.
+void Overlay::watch_packets(RobotId robot, const OverlaySummary& summary, double now_s) {
+  KnownRobots::Neighbour& neighbour = robots_.neighbours().at(robot);
+  if (summary.own_states == states_.hash_of(robot)) neighbour.complete_s = now_s;
+  neighbour.is_missed = now_s - neighbour.complete_s >= kMissedAfter_s;
+  const bool misses_own =
+      std::ranges::find(summary.missed, robots_.self().robot) != summary.missed.end();
+  if (!misses_own || now_s - neighbour.renewed_s < kRenewEvery_s) return;
+  neighbour.renewed_s = now_s;
+  output_.renewed.push_back(robot);
+  states_.repair_soon(robot, now_s);
+}
+
+OverlaySummary Overlay::summary() const {
+  OverlaySummary summary{.states = states_.hash(),
+                         .holds = store_.holds(),
+                         .own_states = states_.hash_of(robots_.self().robot)};
+  for (const auto& [robot, neighbour] : robots_.neighbours())
+    if (neighbour.is_missed) summary.missed.push_back(robot);
+  return summary;
 }
 
 void Overlay::renew_routes() {

@@ -32,6 +32,7 @@ struct OverlayOutput {
                                                   ///< ones or new boot ids.
   std::vector<RobotId> reachable = {};            ///< Robots out of range to which a route has
                                                   ///< appeared.
+  std::vector<RobotId> renewed = {};              ///< Robots that need new DDS writers.
 };
 
 /// The part of one robot in exchanging messages over any links of a team: robots need not receive
@@ -52,10 +53,21 @@ struct OverlayOutput {
 /// and certificate before it uses, stores or forwards a message. Neighbours can therefore withhold
 /// messages, but not change or invent them.
 ///
+/// A participant that forges the protocol of DDS can make a reader ignore a writer. In a team with
+/// keys a robot therefore compares the hash of the states of each neighbour, which the neighbour's
+/// status contains, with the states that have arrived. If packets are missing for kMissedAfter_s,
+/// it reports so, and the neighbour renews its DDS writers.
+///
 /// Memory is bounded: see SpreadStates and MessageStore. Deterministic; time comes in [s], with any
 /// origin, and does not decrease. Not thread-safe.
 class Overlay {
  public:
+  /// A neighbour is asked for new DDS writers after this time in which some of its packets are
+  /// missing and none arrives. It is longer than the time between two repairs of states.
+  static constexpr double kMissedAfter_s = 20.0;
+  /// Least time between two renewals of the writers to one neighbour.
+  static constexpr double kRenewEvery_s = 60.0;
+
   /// Without `keys` nothing is signed. Messages are passed and delivered without signatures.
   explicit Overlay(TeamPeer self, std::optional<OverlayKeys> keys = {})
       : robots_(self, std::move(keys)),
@@ -106,13 +118,14 @@ class Overlay {
   /// Reason why the last message was kForged (a string literal).
   [[nodiscard]] const char* refusal() const { return robots_.refusal(); }
 
-  [[nodiscard]] OverlaySummary summary() const { return {states_.hash(), store_.holds()}; }
+  [[nodiscard]] OverlaySummary summary() const;
   [[nodiscard]] const KnownRobots& robots() const { return robots_; }
   [[nodiscard]] OverlayWays ways_to(RobotId robot) const;
   /// Output since the last call.
   [[nodiscard]] OverlayOutput take_output() {
     return {std::exchange(output_.packets, {}), std::exchange(output_.delivered, {}),
-            std::exchange(output_.met, {}), std::exchange(output_.reachable, {})};
+            std::exchange(output_.met, {}), std::exchange(output_.reachable, {}),
+            std::exchange(output_.renewed, {})};
   }
   /// Number of messages refused because the storage was full.
   [[nodiscard]] std::uint64_t given_up() const { return store_.given_up(); }
@@ -128,6 +141,7 @@ class Overlay {
   [[nodiscard]] bool is_forged(const OverlayMessage& message);
   void deliver(const OverlayMessagePtr& message);
   void renew_routes();
+  void watch_packets(RobotId robot, const OverlaySummary& summary, double now_s);
 
   KnownRobots robots_;
   OverlayOutput output_;

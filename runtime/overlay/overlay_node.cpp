@@ -161,6 +161,11 @@ std::vector<std::uint8_t> OverlayNode::signature_of(OverlayStream stream, std::u
 
 void OverlayNode::carry_out(const OverlayOutput& output, std::uint64_t given_up) {
   for (const RobotIdentity& robot : output.met) peers_.reported(robot);
+  for (const RobotId robot : output.renewed) {
+    log::limited(log::Level::kWarn, kTag, "renewed " + std::to_string(robot))
+        << "packets do not arrive at robot " << robot << ": the DDS writers to it are renewed";
+    topics_.renew(robot);
+  }
   for (const OverlayPacket& packet : output.packets) send(packet);
   for (const OverlayMessagePtr& message : output.delivered) deliver(*message);
   for (const RobotId robot : output.reachable)

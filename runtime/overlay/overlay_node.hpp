@@ -38,6 +38,7 @@ struct OverlayTopics {
   Out<PeerEvent> reached;  ///< kReturned for a robot that is not received directly, when a route to
                            ///< it appears.
   Out<LinksReport> links;  ///< When they have changed, at the next tick.
+  std::function<void(RobotId)> renew = [](RobotId) {};  ///< See DdsBridge::renew().
 };
 
 /// Channels of one message type that nodes address to single robots.

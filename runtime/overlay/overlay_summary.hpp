@@ -22,6 +22,10 @@ struct OverlaySummary {
   /// One for each known robot that is not received directly, or whose reliable messages are held;
   /// ascending by robot. Empty if all robots receive each other directly all the time.
   std::vector<OverlayHeld> holds = {};
+  std::uint64_t own_states = 0;  ///< Hash of its own states alone.
+  /// In a team with keys: robots whose statuses arrive, but not their packets. They renew their DDS
+  /// writers.
+  std::vector<RobotId> missed = {};
 
   bool operator==(const OverlaySummary&) const = default;
 };

@@ -127,11 +127,16 @@ void SpreadStates::forget(RobotId robot) {
 }
 
 void SpreadStates::links_changed(double now_s) {
-  for (auto& [robot, receiver] : receivers_) {
-    receiver.repair_s = std::min(receiver.repair_s, now_s);
-    receiver.patience_s = kRepairAfter_s;
+  for (const auto& [robot, receiver] : receivers_) {
+    repair_soon(robot, now_s);
     if (receiver.differs) repair(robot, now_s);
   }
+}
+
+void SpreadStates::repair_soon(RobotId robot, double now_s) {
+  Receiver& receiver = receivers_.at(robot);
+  receiver.repair_s = std::min(receiver.repair_s, now_s);
+  receiver.patience_s = kRepairAfter_s;
 }
 
 void SpreadStates::step(double now_s) {
@@ -191,15 +196,22 @@ void SpreadStates::repair(RobotId robot, double now_s) {
 
 std::uint64_t SpreadStates::hash() const {
   std::uint64_t hash = kFnv1aBasis;
-  for (const auto& [robot, states] : origins_)
-    for (std::size_t kind = 0; kind < kStateStreams; ++kind) {
-      if (!states[kind]) continue;
-      const OverlayMessage& message = *states[kind]->message;
-      for (const std::uint64_t value :
-           {std::uint64_t{robot}, message.origin.boot, std::uint64_t{kind},
-            2U * std::uint64_t{message.number} + (message.is_signed ? 1U : 0U)})
-        mix_fnv1a(hash, value);
-    }
+  for (const auto& [robot, states] : origins_) mix_fnv1a(hash, hash_of(robot));
+  return hash;
+}
+
+std::uint64_t SpreadStates::hash_of(RobotId robot) const {
+  std::uint64_t hash = kFnv1aBasis;
+  const auto states = origins_.find(robot);
+  if (states == origins_.end()) return hash;
+  for (std::size_t kind = 0; kind < kStateStreams; ++kind) {
+    if (!states->second[kind]) continue;
+    const OverlayMessage& message = *states->second[kind]->message;
+    for (const std::uint64_t value :
+         {std::uint64_t{robot}, message.origin.boot, std::uint64_t{kind},
+          2U * std::uint64_t{message.number} + (message.is_signed ? 1U : 0U)})
+      mix_fnv1a(hash, value);
+  }
   return hash;
 }
 

@@ -66,7 +66,12 @@ class SpreadStates {
   /// Compares the hash of a neighbour.
   void compare(RobotId robot, std::uint64_t hash, double now_s);
 
+  /// Repairs the states that a neighbour lacks as soon as its hash shows it.
+  void repair_soon(RobotId robot, double now_s);
+
+  /// Hash of all states, or of those of one robot.
   [[nodiscard]] std::uint64_t hash() const;
+  [[nodiscard]] std::uint64_t hash_of(RobotId robot) const;
 
  private:
   struct Held {

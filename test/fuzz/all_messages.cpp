@@ -173,10 +173,12 @@ std::vector<MessageReader> all_messages() {
                          .closures = {{{2, 1}, {5, 2}}, {{2, 1}, {5, 3}}}}}),
       topic<KeyframeBow>({{.id = {kWriter.robot, 4}, .words = {{3, 1}, {900, 4}, {70000, 1}}}}),
       topic<MeshChunk>({some_chunk()}),
-      topic<RobotStatus>({{.robot = kWriter.robot,
-                           .name = "beta",
-                           .settled_links = 3,
-                           .overlay = {.states = 5, .holds = {{{11, 12}, 13, 14}}}}}),
+      topic<RobotStatus>(
+          {{.robot = kWriter.robot,
+            .name = "beta",
+            .settled_links = 3,
+            .overlay =
+                {.states = 5, .holds = {{{11, 12}, 13, 14}}, .own_states = 6, .missed = {11}}}}),
       overlay_packets(),
       relayed_packets()};
   for (MessageReader& reader : all_team_messages()) all.push_back(std::move(reader));

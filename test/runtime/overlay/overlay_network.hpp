@@ -121,6 +121,11 @@ class Network {
   [[nodiscard]] std::size_t octets_sent() const { return octets_; }
   [[nodiscard]] double now_s() const { return now_s_; }
   void lose(double part) { loss_ = part; }
+  /// From now on, packets of `from` do not arrive at `to`, but its summaries do.
+  void jam(RobotId from, RobotId to) { jammed_.emplace(from, to); }
+  void clear(RobotId from, RobotId to) { jammed_.erase({from, to}); }
+  /// Robots to which a robot has renewed its DDS writers, in order.
+  [[nodiscard]] const std::vector<RobotId>& renewed(RobotId robot) { return renewed_[robot]; }
   /// Team whose keys the robots use.
   [[nodiscard]] ToyTeam& team() { return team_; }
   [[nodiscard]] ToyMember& member(RobotId robot) { return *members_.at(robot); }
@@ -161,12 +166,15 @@ class Network {
         std::ranges::move(output.delivered, std::back_inserter(read_[robot]));
         std::ranges::move(output.met, std::back_inserter(met_[robot]));
         std::ranges::move(output.reachable, std::back_inserter(reachable_[robot]));
+        std::ranges::move(output.renewed, std::back_inserter(renewed_[robot]));
         for (const OverlayPacket& packet : output.packets) {
           more = true;
           const OverlayStream stream = packet.message->stream;
           if (stream != OverlayStream::kLinks || !packet.is_own) ++packets_;
           if (!is_state(stream)) octets_ += packet.message->content.size();
-          if (!linked(robot, packet.neighbour) || uniform_(random_) < loss_) continue;
+          if (!linked(robot, packet.neighbour) || uniform_(random_) < loss_ ||
+              jammed_.contains({robot, packet.neighbour}))
+            continue;
           OverlayMessage message = *packet.message;
           if (change_) change_(message);
           Overlay& to = at(packet.neighbour);
@@ -184,10 +192,10 @@ class Network {
   std::map<RobotId, std::unique_ptr<ToyMember>> members_;
   std::map<RobotId, std::uint64_t> boots_;
   std::map<RobotId, Overlay> overlays_;
-  std::set<std::pair<RobotId, RobotId>> links_;
+  std::set<std::pair<RobotId, RobotId>> links_, jammed_;
   std::map<RobotId, std::vector<OverlayMessagePtr>> read_;
   std::map<RobotId, std::vector<RobotIdentity>> met_;
-  std::map<RobotId, std::vector<RobotId>> reachable_;
+  std::map<RobotId, std::vector<RobotId>> reachable_, renewed_;
   std::map<RobotId, std::vector<std::string>> refusals_;
   std::function<void(OverlayMessage&)> change_;
   std::mt19937 random_{5};

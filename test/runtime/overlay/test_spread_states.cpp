@@ -371,4 +371,44 @@ TEST_CASE("states in a team with keys are signed only for robots out of reach", 
   CHECK(network.refusals(kB).front() == "not signed by its origin, or changed on its way");
 }
 
+TEST_CASE("a robot with keys is asked for new DDS writers when its packets do not arrive",
+          "[overlay]") {
+  const bool has_keys = GENERATE(true, false);
+  CAPTURE(has_keys);
+  Network network(3, has_keys);
+  network.link(kA, kB);
+  network.link(kA, kC);
+  network.run(3.0 * Overlay::kMissedAfter_s);
+  CHECK(network.at(kB).summary().missed.empty());  // silence is no loss
+  network.jam(kA, kB);
+  network.run(3.0 * Overlay::kMissedAfter_s);
+  CHECK(network.at(kB).summary().missed.empty());
+  network.at(kA).publish(kPoses, octets(20), network.now_s());
+  network.run(Overlay::kMissedAfter_s - kPeriod_s);
+  CHECK(network.renewed(kA).empty());
+  network.run(3.0 * kPeriod_s);
+  CHECK(network.renewed(kA) == (has_keys ? std::vector<RobotId>{kB} : std::vector<RobotId>()));
+  CHECK(network.renewed(kB).empty());
+  CHECK(network.renewed(kC).empty());
+  network.run(Overlay::kRenewEvery_s);
+  CHECK(network.renewed(kA).size() == (has_keys ? 2 : 0));
+  network.clear(kA, kB);
+  network.run(Overlay::kMissedAfter_s);
+  CHECK(network.read(kB, kPoses).size() == 1);
+  CHECK(network.at(kB).summary().missed.empty());
+}
+
+TEST_CASE("packets that arrive show that the DDS writers work, whatever is missing", "[overlay]") {
+  Network network(2, true);
+  network.link(kA, kB);
+  network.run(1.0);
+  network.tamper([](OverlayMessage& message) {
+    if (message.stream == kPoses) message.origin.boot = 1;  // is refused
+  });
+  network.at(kA).publish(kPoses, octets(20), network.now_s());
+  network.run(5.0 * Overlay::kMissedAfter_s);
+  CHECK(network.read(kB, kPoses).empty());
+  CHECK(network.renewed(kA).empty());
+}
+
 }  // namespace km
