@@ -87,10 +87,12 @@ void Sender::catch_up_due() {
     renewals.swap(renewals_);
   }
   const Heartbeat::Step step(heartbeat_);
-  // A reader that forged packets affect acknowledges everything; a slow link does not.
+  // Messages that wait for the budget, or for acknowledgements over a slow link, are not lost. A
+  // reader that forged packets affect acknowledges everything.
   std::erase_if(renewals, [this](RobotId robot) {
-    return std::ranges::any_of(
-        topics_, [&](const auto& topic) { return !topic->is_acknowledged_by(robot); });
+    return holds_back_ || std::ranges::any_of(topics_, [&](const auto& topic) {
+             return !topic->is_acknowledged_by(robot);
+           });
   });
   for (const RobotId robot : renewals)
     for (const auto& topic : topics_) topic->renew(robot);

@@ -58,8 +58,8 @@ class Sender {
 
   /// Requests OutgoingTopic::catch_up() of every topic for `robot`. Does not wait. Thread-safe.
   void catch_up(RobotId robot);
-  /// Requests OutgoingTopic::renew() of every topic for `robot`, unless messages to it still wait
-  /// for acknowledgements. Does not wait. Thread-safe.
+  /// Requests OutgoingTopic::renew() of every topic for `robot`, unless messages still wait for the
+  /// budget or for its acknowledgement. Does not wait. Thread-safe.
   void renew(RobotId robot);
 
   /// True while messages wait for the budget. Thread-safe.

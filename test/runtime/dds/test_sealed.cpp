@@ -116,6 +116,26 @@ TEST_CASE("Renewed writers send all events again, in a team with keys", "[sealed
   CHECK(indices(late->received.wait_for(2)) == std::vector<std::uint32_t>{1, 3});
 }
 
+TEST_CASE("Writers are not renewed while messages wait for the budget", "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, member_of(team),
+              TopicKind::kEvent, TopicKind::kEvent, {.bytes_per_s = 20'000.0});
+  TestRobot b(domain, {4, robot_name(4), kProtocolVersion, random_boot_id()}, member_of(team),
+              TopicKind::kEvent, TopicKind::kEvent);
+  a.start();
+  b.start();
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  a.ping_one(4, 2);
+  REQUIRE(b.received_addressed.wait_for(1).size() == 1);
+  for (std::uint32_t k = 0; k < 1000; ++k) a.ping(k, std::vector<std::uint8_t>(1000, 1));
+  REQUIRE(eventually([&] { return a.bridge.holds_back(); }));
+  a.bridge.renew(4);
+  a.ping_one(4, 5);
+  CHECK(indices(b.received_addressed.wait_for(2)) == std::vector<std::uint32_t>{2, 5});
+}
+
 // Reads the network as any participant in reach can.
 TEST_CASE("Sealed messages cannot be read on their way", "[sealed]") {
   const ToyTeam team;
