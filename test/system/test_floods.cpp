@@ -106,7 +106,7 @@ MemberPoses many_poses(std::uint32_t number) {
 }
 
 Session large_session(std::uint32_t number) {
-  Session session{.id = {made_up(number), number + 1}, .number = number + 1, .plan = {}};
+  Session session{.id = {made_up(number), number + 1}, .plan = {}};
   session.plan.frame = session.id.coordinator;
   for (RobotId robot = 1000; robot < 1000 + kMaxTeam; ++robot)
     session.plan.members.push_back({{robot, 1}, 1, {}});
