@@ -20,6 +20,7 @@
 #include "modules/place_recognition/place_recognition_codec.hpp"
 #include "modules/place_recognition/place_recognition_node.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
+#include "modules/pose_graph/team_codec.hpp"
 #include "modules/pose_graph/team_node.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/ros_dds/live_sink_codec.hpp"
@@ -84,7 +85,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_loop_closure(config);
   add_journal(options, input, results);
   add_back_end(config);
-  add_relay();
+  add_overlay();
   if (mapping) add_mesh_correction(config, options.output, results);
   add_network(share_meshes(config.mesh_chunks));
   add_records();
@@ -148,7 +149,7 @@ void Robot::add_journal(const RobotOptions& options, const RobotInput& input,
                                              .new_keyframes = topics_.new_keyframes,
                                              .new_closures = topics_.new_closures,
                                              .new_restarts = topics_.new_closure_restarts,
-                                             .peer_closures = topics_.peer_closures,
+                                             .peer_closures = topics_.shared_closures.received,
                                              .outcomes = topics_.outcomes,
                                              .restored_outcomes = topics_.restored_outcomes,
                                              .peer_events = bridge_->peers().events(),
@@ -285,14 +286,14 @@ void Robot::add_loop_closure(const RobotConfig& config) {
                        LoopClosureTopics{.keyframes = topics_.keyframes,
                                          .candidates = topics_.candidates,
                                          .measured_closures = topics_.measured_closures,
-                                         .peer_requests = topics_.peer_requests,
-                                         .peer_replies = topics_.peer_replies,
+                                         .peer_requests = topics_.requests.received,
+                                         .peer_replies = topics_.replies.received,
                                          .peer_events = topics_.ways,
                                          .restarts = topics_.candidate_restarts,
                                          .peer_bows = topics_.peer_bows,
                                          .restored = topics_.restored_outcomes,
-                                         .own_requests = topics_.own_requests,
-                                         .own_replies = topics_.own_replies,
+                                         .own_requests = topics_.requests.own,
+                                         .own_replies = topics_.replies.own,
                                          .own_closures = topics_.new_closures,
                                          .own_restarts = topics_.new_closure_restarts,
                                          .outcomes = topics_.outcomes},
@@ -303,7 +304,7 @@ void Robot::add_loop_closure(const RobotConfig& config) {
 
 void Robot::add_back_end(const RobotConfig& config) {
   forward<Closure>(topics_.own_closures, topics_.closures);
-  forward<Closure>(topics_.peer_closures, topics_.closures);
+  forward<Closure>(topics_.shared_closures.received, topics_.closures);
   pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot,
                        PcmTopics{.closures = topics_.closures,
                                  .keyframes = topics_.keyframe_odometry,
@@ -311,46 +312,46 @@ void Robot::add_back_end(const RobotConfig& config) {
                                  .restored = topics_.restored_inlier_sets,
                                  .inlier_sets = topics_.own_inlier_sets},
                        resume_count(identity_.boot) << kResumeBits);
-  add<TeamNode>(false, config.pose_graph, TeamPeer{identity_.robot, identity_.boot},
-                solver_choice(config.pose_graph),
-                TeamTopics{.odometry = topics_.keyframe_odometry,
-                           .closures = topics_.closures,
-                           .inlier_sets = topics_.own_inlier_sets,
-                           .peer_inlier_sets = topics_.peer_inlier_sets,
-                           .restored_inlier_sets = topics_.restored_inlier_sets,
-                           .restored_solution = topics_.restored_solution,
-                           .peer_events = bridge_->peers().events(),
-                           .restarts = topics_.closure_restarts,
-                           .peer_packets = topics_.team_packets.from_peers(),
-                           .packets = topics_.team_packets.to_peers(),
-                           .trajectory = topics_.trajectory,
-                           .progress = topics_.progress,
-                           .verdicts = topics_.closure_verdicts});
+  add<TeamNode>(
+      false, config.pose_graph, TeamPeer{identity_.robot, identity_.boot},
+      solver_choice(config.pose_graph), [this] { return overlay_->session_bytes(); },
+      TeamTopics{.odometry = topics_.keyframe_odometry,
+                 .closures = topics_.closures,
+                 .inlier_sets = topics_.own_inlier_sets,
+                 .peer_inlier_sets = topics_.shared_inlier_sets.received,
+                 .restored_inlier_sets = topics_.restored_inlier_sets,
+                 .restored_solution = topics_.restored_solution,
+                 .peer_events = bridge_->peers().events(),
+                 .restarts = topics_.closure_restarts,
+                 .links = topics_.links,
+                 .peer_messages = topics_.peer_team_messages,
+                 .messages = topics_.team_messages,
+                 .trajectory = topics_.trajectory,
+                 .progress = topics_.progress,
+                 .verdicts = topics_.closure_verdicts});
 }
 
-void Robot::add_relay() {
+void Robot::add_overlay() {
   Topics& t = topics_;
   const In<PeerEvent> peer_events = bridge_->peers().events();
   forward<PeerEvent>(peer_events, t.ways);
-  relay_.emplace(TeamPeer{identity_.robot, identity_.boot}, seal_.get(), bridge_->peers(),
-                 RelayTopics{.peer_events = peer_events,
-                             .statuses = t.status.from_peers(),
-                             .own_packets = t.relay_packets.to_peers(),
-                             .reached = t.ways});
-  relay_->join_bags<KeyframeBow>(t.bows.from_peers(), t.peer_bows);
-  const auto around = []<typename T>(Topic<Addressed<T>>& own, AddressedCrossing<T>& crossing,
-                                     Topic<T>& all) {
-    return RelayedTopics<T>{own, crossing.to_peers(), crossing.from_peers(), all};
-  };
-  relay_->join_calls(
-      RelayKind::kRequest, around(t.own_requests, t.requests, t.peer_requests),
+  overlay_ = &add<OverlayNode>(
+      false, TeamPeer{identity_.robot, identity_.boot}, seal_.get(), bridge_->peers(),
+      OverlayTopics{.peer_events = peer_events,
+                    .statuses = t.status.from_peers(),
+                    .team_packets = t.team_packets.to_peers(),
+                    .places_packets = t.places_packets.to_peers(),
+                    .reached = t.ways,
+                    .links = t.links,
+                    .renew = [this](RobotId robot) { bridge_->renew(robot); }});
+  join_team(*overlay_, t.team_messages, t.peer_team_messages);
+  overlay_->join_bags<KeyframeBow>(t.bows.from_peers(), t.peer_bows);
+  overlay_->join_calls(
+      OverlayStream::kRequest, t.requests.ends(),
       [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
-  relay_->join_calls(RelayKind::kReply, around(t.own_replies, t.replies, t.peer_replies),
-                     keyframe_of);
-  relay_->join_reliable(RelayKind::kClosure,
-                        around(t.addressed_closures, t.shared_closures, t.peer_closures));
-  relay_->join_reliable(RelayKind::kInlierSet,
-                        around(t.addressed_inlier_sets, t.shared_inlier_sets, t.peer_inlier_sets));
+  overlay_->join_calls(OverlayStream::kReply, t.replies.ends(), keyframe_of);
+  overlay_->join_reliable(OverlayStream::kClosure, t.shared_closures.ends());
+  overlay_->join_reliable(OverlayStream::kInlierSet, t.shared_inlier_sets.ends());
 }
 
 void Robot::add_network(CrossingEnds meshes) {
@@ -361,21 +362,25 @@ void Robot::add_network(CrossingEnds meshes) {
   // All crossings between robots, with their kind and the category under which their bytes are
   // counted.
   dds.exchange(t.bows, kEvent, kPlaceRecognition, {}, {},
-               relay_->guard<KeyframeBow>(
-                   RelayKind::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); }));
+               overlay_->guard<KeyframeBow>(OverlayStream::kBag, [](const KeyframeBow& bow) {
+                 return std::optional(bow.id);
+               }));
   // The reply to a request of 60 bytes has up to 24 kB.
-  dds.exchange(t.requests, kRequest, kGeometricVerification, {}, {.per_second = 30, .burst = 60});
-  dds.exchange(t.replies, kRequest, kGeometricVerification, {}, {},
-               relay_->guard<KeyframeReply>(RelayKind::kReply, keyframe_of));
-  dds.exchange(t.shared_closures, kEvent, kGeometricVerification);
-  dds.exchange(t.shared_inlier_sets, kState, kPoseGraphOptimization);
-  dds.exchange(t.team_packets, kRequest, kPoseGraphOptimization);
-  dds.exchange(t.relay_packets, kRequest, kOther, {}, {}, relay_->guard_packets());
+  dds.exchange(t.requests.direct, kRequest, kGeometricVerification, {},
+               {.per_second = 30, .burst = 60});
+  dds.exchange(t.replies.direct, kRequest, kGeometricVerification, {}, {},
+               overlay_->guard<KeyframeReply>(OverlayStream::kReply, keyframe_of));
+  dds.exchange(t.shared_closures.direct, kEvent, kGeometricVerification);
+  dds.exchange(t.shared_inlier_sets.direct, kState, kPoseGraphOptimization);
+  dds.exchange(t.team_packets, kRequest, kPoseGraphOptimization, {}, {},
+               overlay_->guard_packets<OverlayLane::kTeam>());
+  dds.exchange(t.places_packets, kRequest, kOther, {}, {},
+               overlay_->guard_packets<OverlayLane::kPlaces>());
   dds.exchange(t.chunks, kState, kOther, meshes);
   dds.exchange(t.status, kStatus, kOther);
   // Closures and inlier sets are sent only to the robots that they connect.
   t.own_closures.subscribe(
-      [this, to = Out<Addressed<Closure>>(t.addressed_closures)](const auto& closure) {
+      [this, to = Out<Addressed<Closure>>(t.shared_closures.own)](const auto& closure) {
         const RobotId other = closure->to.id.robot;
         if (other != closure->from.id.robot)
           to.publish(Addressed<Closure>{other, closure, incarnations_.of(other)});
@@ -385,7 +390,7 @@ void Robot::add_network(CrossingEnds meshes) {
   };
   t.closure_restarts.subscribe(meet);
   t.own_inlier_sets.subscribe(
-      [this, to = Out<Addressed<InlierSet>>(t.addressed_inlier_sets)](const auto& set) {
+      [this, to = Out<Addressed<InlierSet>>(t.shared_inlier_sets.own)](const auto& set) {
         if (set->a != set->b)
           to.publish(Addressed<InlierSet>{set->b, set, incarnations_.of(set->b)});
       });
@@ -414,7 +419,7 @@ void Robot::add_records() {
   recorder_->record(topics_.restored_outcomes);
   recorder_->record(topics_.place_queries);
   recorder_->record(topics_.own_inlier_sets);
-  recorder_->record(topics_.peer_inlier_sets);
+  recorder_->record(topics_.shared_inlier_sets.received);
   recorder_->record(topics_.trajectory);
   recorder_->record(topics_.progress);
   recorder_->record(topics_.closure_verdicts);
@@ -589,7 +594,7 @@ void Robot::add_team(RobotSample& sample) const {
 
 RobotStatus Robot::own_status() const {
   return {identity_.robot, identity_.name, phase_,         input_time_.seconds(),
-          keyframes_,      settled_links_, identity_.boot, relay_->summary()};
+          keyframes_,      settled_links_, identity_.boot, overlay_->summary()};
 }
 
 void Robot::freeze_record() {

@@ -34,20 +34,32 @@
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
-#include "modules/pose_graph/packet_codec.hpp"
+#include "modules/pose_graph/team_messages.hpp"
 #include "modules/recorded_graph/graph_playback_node.hpp"
-#include "modules/relay/relay_node.hpp"
 #include "modules/ros_dds/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/sensors_node.hpp"
 #include "modules/view/view_node.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/robot_status.hpp"
+#include "runtime/overlay/overlay_node.hpp"
 #include "runtime/supervisor.hpp"
 
 namespace km {
 
-/// Every channel of a robot. Channels that are no Crossing stay inside the process.
+/// Messages to single robots, in range or not. OverlayNode connects the three.
+template <typename T>
+struct TeamChannel {
+  Topic<Addressed<T>> own;      ///< From the nodes of this robot.
+  AddressedCrossing<T> direct;  ///< Between robots in range.
+  Topic<T> received;            ///< From robots in range and out of range.
+
+  [[nodiscard]] RelayedTopics<T> ends() {
+    return {own, direct.to_peers(), direct.from_peers(), received};
+  }
+};
+
+/// Every channel of a robot. Only Crossing and TeamChannel leave the process.
 struct Topics {
   Topic<SensorPacket> packets;
   Topic<SensorsEnd> sensors_end;
@@ -86,25 +98,19 @@ struct Topics {
   Topic<ClosureJudgements> judgements;
   Topic<PoseChanges> pose_changes;
 
-  // Inputs and outputs of RelayNode, which connects them to the crossings below.
+  // Inputs and outputs of OverlayNode, which connects them to the crossings below.
   Topic<PeerEvent> ways;  // peer events, and peers that can be reached through other robots only
   Topic<KeyframeBow> peer_bows;
-  Topic<Addressed<KeyframeRequest>> own_requests;
-  Topic<KeyframeRequest> peer_requests;
-  Topic<Addressed<KeyframeReply>> own_replies;
-  Topic<KeyframeReply> peer_replies;
-  Topic<Addressed<Closure>> addressed_closures;
-  Topic<Closure> peer_closures;
-  Topic<Addressed<InlierSet>> addressed_inlier_sets;
-  Topic<InlierSet> peer_inlier_sets;
+  Topic<TeamMessage> team_messages, peer_team_messages;
+  Topic<LinksReport> links;
 
   Crossing<KeyframeBow> bows;
-  AddressedCrossing<KeyframeRequest> requests;
-  AddressedCrossing<KeyframeReply> replies;
-  AddressedCrossing<Closure> shared_closures;
-  AddressedCrossing<InlierSet> shared_inlier_sets;
-  AddressedCrossing<TeamPacket> team_packets;
-  AddressedCrossing<RelayPacket> relay_packets;
+  TeamChannel<KeyframeRequest> requests;
+  TeamChannel<KeyframeReply> replies;
+  TeamChannel<Closure> shared_closures;  // between this robot and others
+  TeamChannel<InlierSet> shared_inlier_sets;
+  AddressedCrossing<TeamLanePacket> team_packets;
+  AddressedCrossing<PlacesLanePacket> places_packets;
   Crossing<MeshChunk> chunks;
   Crossing<RobotStatus> status;
 };
@@ -180,7 +186,7 @@ class Robot {
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config);
-  void add_relay();
+  void add_overlay();
   void add_network(CrossingEnds meshes);
   void add_records();
   void add_view(const RobotConfig& config, const std::optional<Camera>& camera);
@@ -223,10 +229,10 @@ class Robot {
   PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   RosOutputNode* record_ = nullptr;
+  OverlayNode* overlay_ = nullptr;
   ViewNode* view_ = nullptr;
   std::optional<ModuleLoads> loads_;
   DdsBridge* bridge_ = nullptr;
-  std::optional<RelayNode> relay_;
   Supervisor
       supervisor_;  // last member: stops the nodes before the objects that they use are destroyed
 };

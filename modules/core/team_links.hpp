@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <vector>
@@ -8,6 +9,9 @@
 #include "modules/core/ids.hpp"
 
 namespace km {
+
+/// Largest number of robots in a team.
+inline constexpr std::size_t kMaxTeam = 64;
 
 /// Graph of the links in a team, from the reports of its robots. A link counts if both ends report
 /// that they receive the other one. Robots with equal reports see the same graph. Not thread-safe.
@@ -31,6 +35,12 @@ class TeamLinks {
 
  private:
   std::map<RobotId, std::set<RobotId>> received_by_;
+};
+
+/// The links of the team as one robot knows them at one time.
+struct LinksReport {
+  TeamLinks links;
+  std::uint64_t version = 0;  ///< Grows with every change.
 };
 
 }  // namespace km

@@ -75,7 +75,8 @@ struct PoseGraphConfig {
     visitor.field("publish_period_s", publish_period_s, {0.01, 60.0},
                   "[s] shortest time between published trajectories during a session");
     visitor.field("status_period_s", status_period_s, {0.01, 60.0},
-                  "[s] time between statuses to the robots that are received directly");
+                  "[s] period of the messages of a coordinator; a status is sent when it has "
+                  "changed, at most twice per period");
   }
 };
 

@@ -252,8 +252,6 @@ void SessionPart::keep(const ReliableMessage& message) {
 }
 
 bool SessionPart::follow(const Session& session) {
-  if (session.number <= session_.number && session_.number > 0) return false;
-  session_.number = session.number;
   session_.round = session.round;
   session_.cost = session.cost;
   session_.gradient = session.gradient;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 
 // Other robots, their messages and the messages of this robot. The sessions are in
@@ -16,13 +15,12 @@ TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverF
       self_(self),
       factory_(std::move(factory)),
       graph_(self.robot),
-      relay_(self, config_.status_period_s),
       roster_(self, config_.method),
       status_schedule_(config_.status_period_s),
       notices_(self.robot),
       schedule_(config_),
       frame_(self) {
-  roster_.connect(relay_.links());
+  roster_.connect(links_.links);
 }
 
 bool TeamAgent::add(const KeyframeOdometry& keyframe) {
@@ -80,14 +78,18 @@ void TeamAgent::restore(const TeamSolution& solution) {
 void TeamAgent::peer_alive(TeamPeer peer) {
   if (peer.robot == self_.robot) return;
   meet(peer);
-  relay_.link_up(peer, now_s_);
+  direct_[peer.robot] = peer.boot;
   if (!in_session()) return;
+  // Messages to the members beyond the lost link may be lost, too.
   for (const RobotId member : part_->members())
-    if (relay_.next_hop(member) == peer.robot) part_->reachable_again(member);
+    if (member == peer.robot || !direct_.contains(member)) part_->reachable_again(member);
 }
 
-void TeamAgent::peer_lost(RobotId robot) {
-  relay_.link_down(robot, now_s_);
+void TeamAgent::update_links(const LinksReport& links) {
+  if (links.version <= links_.version) return;
+  links_ = links;
+  roster_.connect(links_.links);
+  plan_outdated_ = true;
 }
 
 void TeamAgent::meet(const TeamPeer& peer) {
@@ -115,31 +117,13 @@ void TeamAgent::forget_measured(RobotId robot) {
   plan_outdated_ = true;
 }
 
-void TeamAgent::watch_links() {
-  relay_.step(now_s_);
-  if (links_seen_ == relay_.links_version()) return;
-  links_seen_ = relay_.links_version();
-  roster_.connect(relay_.links());
-  plan_outdated_ = true;
-}
-
-bool TeamAgent::receive(RobotId from, const TeamMessagePtr& message) {
-  const TeamPeer sender = origin_of(*message);
-  switch (relay_.receive(from, message, now_s_)) {
-    case Arrival::kNew:
-      return std::visit([&](const auto& m) { return take(sender, m); }, *message);
-    case Arrival::kRefused:
-      return refuse("a message of robot " + std::to_string(sender.robot) +
-                    " by another process than the one that is known");
-    case Arrival::kNoRoom:
-      return refuse("what robot " + std::to_string(from) +
-                    " hands over beyond what is held of one robot");
-    case Arrival::kRepeated:
-    case Arrival::kPassedOn:
-    case Arrival::kLost:
-      break;
-  }
-  return true;
+bool TeamAgent::receive(const TeamMessage& message) {
+  const TeamPeer sender = origin_of(message);
+  const auto direct = direct_.find(sender.robot);
+  if (sender.robot == self_.robot || (direct != direct_.end() && direct->second != sender.boot))
+    return refuse("a message of robot " + std::to_string(sender.robot) +
+                  " by another process than the one that is known");
+  return std::visit([&](const auto& m) { return take(sender, m); }, message);
 }
 
 bool TeamAgent::take(const TeamPeer& sender, const TeamStatus& status) {
@@ -185,19 +169,19 @@ bool TeamAgent::take(const TeamPeer& sender, const ReliableMessage& message) {
          refuse("a message of robot " + std::to_string(sender.robot) + " that is of no use");
 }
 
-TeamOutput TeamAgent::step(double now_s) {
+TeamOutput TeamAgent::step(double now_s, std::uint64_t sent_bytes) {
   now_s_ = now_s;
+  if (part_) part_->count_sent(sent_bytes - sent_bytes_);
+  sent_bytes_ = sent_bytes;
   TeamOutput output;
-  watch_links();
   const bool is_complete = graph_.keyframes() >= awaited_keyframes_;
   if (is_complete) {
-    coordinate();
+    coordinate(output);
     advance(output);
     reconsider();
   }
   send_status(output);
   if (is_complete) publish(output);
-  hand_out(output);
   output.verdicts = decisions_.take_verdicts();
   output.notices = notices_.take();
   return output;
@@ -208,7 +192,6 @@ TeamStatus TeamAgent::make_status() {
   for (EdgeSetOffer& offer : offers)
     decisions_.count_places(offer, *graph_.edges(offer.peer, offer.id));
   return {.sender = self_,
-          .receives = relay_.receives(),
           .frame = frame_.frame(),
           .frame_version = frame_.version(),
           .keyframes = graph_.keyframes(),
@@ -220,27 +203,12 @@ TeamStatus TeamAgent::make_status() {
 }
 
 void TeamAgent::send_status(TeamOutput& output) {
-  if (status_schedule_.rests(now_s_)) return;
-  if (!status_schedule_.may_be_due(relay_.receives(), now_s_)) return;
+  if (!status_schedule_.may_be_due(now_s_)) return;
   TeamStatus status = make_status();
   const StatusSchedule::Due due = status_schedule_.due(status, now_s_);
   if (due == StatusSchedule::Due::kNo) return;
   output.progress = make_progress();
-  if (due == StatusSchedule::Due::kRepeat) return relay_.repeat_status(now_s_);
-  relay_.publish(std::move(status), now_s_);
-}
-
-// Messages of the session of this robot count as its bytes, including forwarded ones.
-void TeamAgent::hand_out(TeamOutput& output) {
-  std::map<const TeamMessage*, std::size_t> sizes;
-  for (LinkPacket& packet : relay_.take_packets()) {
-    if (part_ && session_of(*packet.message) == part_->session().id) {
-      const auto [size, is_new] = sizes.try_emplace(packet.message.get(), 0);
-      if (is_new) size->second = encode(*packet.message).size();
-      part_->count_sent(size->second);
-    }
-    output.packets.push_back(std::move(packet));
-  }
+  if (due == StatusSchedule::Due::kStatus) output.messages.emplace_back(std::move(status));
 }
 
 std::optional<World> TeamAgent::world_of(RobotId anchor) const {

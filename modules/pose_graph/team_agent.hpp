@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "modules/core/closure_verdicts.hpp"
+#include "modules/core/team_links.hpp"
 #include "modules/core/team_solution.hpp"
 #include "modules/pose_graph/closure_decisions.hpp"
 #include "modules/pose_graph/frame_ties.hpp"
@@ -17,7 +18,6 @@
 #include "modules/pose_graph/own_graph.hpp"
 #include "modules/pose_graph/own_poses.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
-#include "modules/pose_graph/relay.hpp"
 #include "modules/pose_graph/session_part.hpp"
 #include "modules/pose_graph/session_schedule.hpp"
 #include "modules/pose_graph/status_schedule.hpp"
@@ -29,7 +29,7 @@ namespace km {
 
 /// Outputs of a step of the agent, to other robots and to its own robot.
 struct [[nodiscard]] TeamOutput {
-  std::vector<LinkPacket> packets = {};
+  std::vector<TeamMessage> messages = {};
   std::optional<Trajectory> trajectory = {};
   std::optional<OptimizerProgress> progress = {};
   std::optional<ClosureVerdicts> verdicts = {};  ///< After a session.
@@ -40,17 +40,17 @@ struct [[nodiscard]] TeamOutput {
 /// The part of one robot in the pose graph optimisation of the team, as a state machine without
 /// threads and clocks.
 ///
-/// The team of a robot is all robots that links connect to it, directly or through other robots:
-/// see Relay. Robots of a team that share inlier closures, directly or through other robots,
-/// optimise together in sessions. A session freezes the graph: its members, and for every pair of
-/// members the edge set that both hold. The member with the lowest id coordinates the session: it
-/// opens the session when the graph has changed, and ends it. A robot without partners coordinates
-/// its own sessions. SessionPart implements a session of one member; a factory supplies the solver
-/// of its graph.
+/// The team of a robot is all robots that links connect to it, directly or through other robots.
+/// Messages may arrive over any of them (see Overlay in runtime/overlay). Robots of a team that
+/// share inlier closures, directly or through other robots, optimise together in sessions. A
+/// session freezes the graph: its members, and for every pair of members the edge set that both
+/// hold. The member with the lowest id coordinates the session: it opens the session when the graph
+/// has changed, and ends it. A robot without partners coordinates its own sessions. SessionPart
+/// implements a session of one member; a factory supplies the solver of its graph.
 ///
 /// New measurements do not interrupt a session; see SessionSchedule for the time of the next one. A
-/// session ends early when links to a member no longer exist. Links that return at once (see Relay)
-/// do no harm, because messages are repeated and find other ways. The members of the interrupted
+/// session ends early when links to a member no longer exist. Links that return at once do no
+/// harm, because messages are repeated and find other ways. The members of the interrupted
 /// session return to the last round that all have completed, and the next session begins there.
 ///
 /// The other robots hold the last public poses of a robot that is out of reach, so that they keep
@@ -86,19 +86,23 @@ class TeamAgent {
 
   /// This robot begins or ceases to receive another robot directly.
   void peer_alive(TeamPeer peer);
-  void peer_lost(RobotId robot);
+  void peer_lost(RobotId robot) { direct_.erase(robot); }
+  /// The links of the team have changed. An older report than the last one is ignored.
+  void update_links(const LinksReport& links);
 
   /// The keyframe indices of `peer` have a new meaning from now on: earlier measurements of it are
   /// discarded.
   void peer_restarted(const TeamPeer& peer);
 
-  /// Processes a message that `from`, which is received directly, has forwarded. Messages may be
-  /// reordered, repeated or lost. False if the message is refused.
-  bool receive(RobotId from, const TeamMessagePtr& message);
+  /// Processes a message of another robot. Reliable messages may be reordered, repeated or lost.
+  /// Other messages are newer than all before of their origin and kind. False if the message is
+  /// refused.
+  bool receive(const TeamMessage& message);
 
   /// Does the work that is due, at most one piece of work of a solver. Call it after every input
-  /// and, for repetitions, several times per second; `now_s` [s] must not decrease.
-  TeamOutput step(double now_s);
+  /// and, for repetitions, several times per second; `now_s` [s] must not decrease. `sent_bytes`:
+  /// bytes that this robot has sent for sessions so far, per receiver, and with forwarded messages.
+  TeamOutput step(double now_s, std::uint64_t sent_bytes);
 
   /// Present own poses in frame().
   [[nodiscard]] const std::vector<SE3>& poses() const;
@@ -110,7 +114,6 @@ class TeamAgent {
     return state_ == SessionState::kRunning || state_ == SessionState::kDeserted;
   }
   [[nodiscard]] const std::map<ClosureId, bool>& decided() const { return decisions_.decided(); }
-  [[nodiscard]] const Relay& relay() const { return relay_; }
   /// Number of refusals by reason.
   [[nodiscard]] const std::map<std::string, std::size_t>& refused() const {
     return notices_.refused();
@@ -128,7 +131,6 @@ class TeamAgent {
   // Other robots and their messages.
   void meet(const TeamPeer& peer);
   void forget_measured(RobotId robot);
-  void watch_links();
   bool take(const TeamPeer& sender, const TeamStatus& status);
   bool take(const TeamPeer& sender, const Session& session);
   bool take(const TeamPeer& sender, const MemberPoses& poses);
@@ -139,18 +141,17 @@ class TeamAgent {
     return graph_.revision() + decisions_.reconsidered();
   }
   void send_status(TeamOutput& output);
-  void hand_out(TeamOutput& output);
 
   // Plans and sessions that this robot coordinates.
   void make_plan();
-  void coordinate();
+  void coordinate(TeamOutput& output);
   [[nodiscard]] bool all_upright(const SessionPlan& plan) const;
   [[nodiscard]] bool has_moved_on() const;
   [[nodiscard]] bool should_open() const;
   [[nodiscard]] std::uint64_t price_bytes() const;
   [[nodiscard]] bool is_next_due() const;
-  void open_session();
-  void announce();
+  void open_session(TeamOutput& output);
+  void announce(TeamOutput& output);
   [[nodiscard]] bool well_formed(const Session& session) const;
   [[nodiscard]] bool accepts(const Session& session) const;
   void consider(const Session& session);
@@ -163,8 +164,8 @@ class TeamAgent {
   }
   void advance(TeamOutput& output);
   void enter_stage(TeamOutput& output);
-  void publish_poses();
-  void conclude();
+  void publish_poses(TeamOutput& output);
+  void conclude(TeamOutput& output);
   void leave(bool with_solution);
   // Poses that a member has sent in the session of part_ at `stage` or later.
   [[nodiscard]] const MemberPoses* poses_of(RobotId robot, MemberStage stage) const {
@@ -192,8 +193,8 @@ class TeamAgent {
   MemberSolverFactory factory_;
   OwnGraph graph_;
   std::size_t awaited_keyframes_ = 1;  // nothing is optimised before
-  Relay relay_;
-  std::uint64_t links_seen_ = 0;
+  LinksReport links_;
+  std::map<RobotId, std::uint64_t> direct_;  // boot ids of the robots that are received directly
   TeamRoster roster_;
   StatusSchedule status_schedule_;
   TeamNotices notices_;
@@ -211,6 +212,7 @@ class TeamAgent {
   bool reconsider_due_ = false;               // once all members have sent the solution
   std::uint32_t rounds_before_ = 0;           // rounds of earlier sessions
   double optimising_s_ = 0.0;                 // in earlier sessions
+  std::uint64_t sent_bytes_ = 0;              // for sessions
 
   bool publish_due_ = false;
   std::optional<RobotId> published_anchor_;

@@ -22,7 +22,7 @@ bool same_members(const SessionPlan& x, const SessionPlan& y) {
 
 void TeamAgent::make_plan() {
   const std::map<RobotId, TeamStatus> statuses = roster_.statuses(make_status());
-  SessionPlan plan = plan_session(statuses, relay_.links(), self_.robot);
+  SessionPlan plan = plan_session(statuses, links_.links, self_.robot);
   // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
   if (frame_.world() && !plan.has_member(frame_.world()->anchor)) frame_.set_world(tied_world());
   schedule_.update(!same_graph(plan, plan_), closures_known(plan, statuses), now_s_);
@@ -35,19 +35,19 @@ void TeamAgent::make_plan() {
   if (state_ == SessionState::kSolved) notices_.ties(ties_);
 }
 
-void TeamAgent::coordinate() {
+void TeamAgent::coordinate(TeamOutput& output) {
   if (std::exchange(plan_outdated_, false)) {
     make_plan();
     for (const auto& [robot, peer] : roster_.peers())
       if (peer.session && roster_.in_reach(peer.session->id.coordinator)) consider(*peer.session);
   }
   if (coordinator_of(plan_) != self_.robot) return;
-  if (should_open()) open_session();
+  if (should_open()) open_session(output);
   const bool due = now_s_ - session_sent_s_ >= config_.status_period_s;
-  if (in_session() && part_->session().id.coordinator == self_ && due) announce();
+  if (in_session() && part_->session().id.coordinator == self_ && due) announce(output);
 }
 
-void TeamAgent::announce() {
+void TeamAgent::announce(TeamOutput& output) {
   Session& session = part_->session();
   session_sent_s_ = now_s_;
   if (!session.finished) {
@@ -57,7 +57,7 @@ void TeamAgent::announce() {
     session.gradient = state.gradient;
     part_->commit(session.round);
   }
-  if (part_->members().size() > 1) relay_.publish(session, now_s_);
+  if (part_->members().size() > 1) output.messages.emplace_back(session);
 }
 
 bool TeamAgent::all_upright(const SessionPlan& plan) const {
@@ -102,7 +102,7 @@ bool TeamAgent::should_open() const {
   return in_session() ? stalled : !session.finished || is_next_due();
 }
 
-void TeamAgent::open_session() {
+void TeamAgent::open_session(TeamOutput& output) {
   Session session{.id = {self_, schedule_.next_number()}, .plan = plan_};
   session.method = config_.method;
   session.upright = all_upright(plan_);
@@ -116,7 +116,7 @@ void TeamAgent::open_session() {
   }
   if (!join(session)) return;
   schedule_.opened();
-  announce();
+  announce(output);
 }
 
 // The session may come from a hostile robot: checks everything on which join() relies.
@@ -234,13 +234,13 @@ void TeamAgent::advance(TeamOutput& output) {
   if (!in_session()) return;
   const auto stage = part_->stage();
   for (ReliableMessage& message : part_->advance(roster_.public_poses(), now_s_))
-    relay_.publish(std::move(message), now_s_);
+    output.messages.emplace_back(std::move(message));
   for (const RobotId sender : part_->take_refused())
     refuse("a message of robot " + std::to_string(sender) + " that is of no use");
   output.more |= part_->worked();
   publish_due_ |= part_->worked() && part_->stage() == MemberStage::kEntered;
   if (part_->stage() != stage) enter_stage(output);
-  if (in_session()) conclude();
+  if (in_session()) conclude(output);
 }
 
 void TeamAgent::enter_stage(TeamOutput& output) {
@@ -254,11 +254,10 @@ void TeamAgent::enter_stage(TeamOutput& output) {
     notices_.add("session " + std::to_string(session.id.number) + " of robot " +
                  std::to_string(session.id.coordinator.robot) +
                  " cannot be solved: " + part_->failure());
-  hand_out(output);  // the bytes in the message of the poses include these
-  publish_poses();
+  publish_poses(output);
 }
 
-void TeamAgent::publish_poses() {
+void TeamAgent::publish_poses(TeamOutput& output) {
   MemberPoses message{.sender = self_, .session = part_->session().id};
   message.stage = *part_->stage();
   message.frame = frame_.frame();
@@ -269,9 +268,12 @@ void TeamAgent::publish_poses() {
   for (const WeighedClosure& verdict : part_->verdicts().closures)
     if (verdict.id.from.robot != verdict.id.to.robot) message.verdicts.push_back(verdict);
   message.sent_bytes = part_->sent_bytes();
+  for (const TeamMessage& unsent : output.messages)
+    if (const auto* reliable = std::get_if<ReliableMessage>(&unsent); reliable && reliable->bytes)
+      message.sent_bytes += reliable->bytes->size();
   roster_.take(message);
   const bool concerns_others = part_->members().size() > 1 || message.keyframes.size() > 1;
-  if (concerns_others) relay_.publish(std::move(message), now_s_);
+  if (concerns_others) output.messages.emplace_back(std::move(message));
 }
 
 void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
@@ -322,7 +324,7 @@ std::optional<SE3> TeamAgent::public_pose(const KeyframeId& id) const {
 }
 
 // Ends the session or sets `world`, if the poses received from the members allow it.
-void TeamAgent::conclude() {
+void TeamAgent::conclude(TeamOutput& output) {
   Session& session = part_->session();
   const RobotId anchor = session.anchor;
   const std::optional<World>& known = frame_.world();
@@ -342,11 +344,11 @@ void TeamAgent::conclude() {
     session.gradient = state.gradient;
     session.finished = true;
     if (const auto world = world_of(session.anchor)) session.T_frame_world = world->T_frame_world;
-    announce();
+    announce(output);
     leave(true);
   } else if (has_failed()) {
     session.finished = coordinates;
-    if (coordinates) announce();
+    if (coordinates) announce(output);
     leave(false);
   } else if (misses_member(session.plan)) {
     leave(all_solved());

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "modules/core/bytes.hpp"
+#include "modules/core/team_links.hpp"
 
 namespace km {
 namespace {
@@ -30,17 +31,12 @@ constexpr std::size_t kVerdictBytes = 4;
 class MessageWriter {
  public:
   std::vector<std::uint8_t> message(const TeamMessage& message) {
-    out_.u8(static_cast<std::uint8_t>(message.index()));
     std::visit([this](const auto& m) { put(m); }, message);
     return out_.release();
   }
 
  private:
   void put(const TeamStatus& m) {
-    put(m.sender);
-    out_.varint(m.number);
-    out_.varint(m.receives.size());
-    for (const TeamPeer& peer : m.receives) put(peer);
     put(m.frame);
     out_.varint(m.frame_version);
     out_.varint(m.keyframes);
@@ -56,12 +52,10 @@ class MessageWriter {
     put(m.method);
     put(m.T_odom_first);
     put(m.upright);
-    out_.u64(m.holds);
   }
 
   void put(const Session& m) {
-    put(m.id);
-    out_.varint(m.number);
+    out_.varint(m.id.number);
     put(m.plan);
     put(m.method);
     put(m.upright);
@@ -92,8 +86,6 @@ class MessageWriter {
   }
 
   void put(const MemberPoses& m) {
-    put(m.sender);
-    out_.varint(m.number);
     put(m.session);
     out_.varint(static_cast<std::uint32_t>(m.stage));
     put(m.frame);
@@ -121,11 +113,8 @@ class MessageWriter {
   }
 
   void put(const ReliableMessage& m) {
-    put(m.sender);
     put(m.session);
     out_.varint(m.number);
-    out_.varint(m.to);
-    out_.varint(m.copy);
     out_.varint(m.received);
     if (m.bytes) out_.bytes(*m.bytes);
   }
@@ -156,21 +145,21 @@ class MessageWriter {
 // Reads one message; the first error is the reason of the refusal.
 class MessageReader {
  public:
-  explicit MessageReader(std::span<const std::uint8_t> bytes) : in_(bytes) {}
+  explicit MessageReader(const EncodedTeamMessage& message)
+      : sender_(message.sender), to_(message.to), in_(message.bytes) {}
 
-  Decoded<TeamMessage> message() {
-    switch (in_.u8()) {
-      case 0:
+  Decoded<TeamMessage> message(TeamMessageKind kind) {
+    switch (kind) {
+      case TeamMessageKind::kStatus:
         return finished(status());
-      case 1:
+      case TeamMessageKind::kSession:
         return finished(session());
-      case 2:
+      case TeamMessageKind::kMemberPoses:
         return finished(member_poses());
-      case 3:
-        return finished(reliable());
-      default:
-        return Decoded<TeamMessage>::refuse("unknown kind of message");
+      case TeamMessageKind::kReliable:
+        break;
     }
+    return finished(reliable());
   }
 
  private:
@@ -190,15 +179,7 @@ class MessageReader {
 
   TeamStatus status() {
     TeamStatus m;
-    m.sender = peer();
-    m.number = u32();
-    m.receives.resize(in_.count(kMaxTeam, kPeerBytes));
-    for (std::size_t k = 0; k < m.receives.size(); ++k) {
-      m.receives[k] = peer();
-      require(k == 0 || m.receives[k - 1].robot < m.receives[k].robot,
-              "received robots do not ascend");
-      require(m.receives[k].robot != m.sender.robot, "a robot that receives itself");
-    }
+    m.sender = sender_;
     m.frame = peer();
     m.frame_version = u32();
     m.keyframes = u32();
@@ -213,14 +194,12 @@ class MessageReader {
     m.method = method();
     m.T_odom_first = pose();
     m.upright = flag();
-    m.holds = in_.u64();
     return m;
   }
 
   Session session() {
     Session m;
-    m.id = session_id();
-    m.number = u32();
+    m.id = {sender_, u32()};
     m.plan = plan();
     m.method = method();
     m.upright = flag();
@@ -300,8 +279,7 @@ class MessageReader {
 
   MemberPoses member_poses() {
     MemberPoses m;
-    m.sender = peer();
-    m.number = u32();
+    m.sender = sender_;
     m.session = session_id();
     const std::uint32_t stage = u32();
     require(stage <= static_cast<std::uint32_t>(MemberStage::kFailed), "an unknown stage");
@@ -339,12 +317,10 @@ class MessageReader {
 
   ReliableMessage reliable() {
     ReliableMessage m;
-    m.sender = peer();
+    m.sender = sender_;
     m.session = session_id();
     m.number = u32();
-    m.to = robot();
-    require(m.to != m.sender.robot, "a message to its own robot");
-    m.copy = u32();
+    m.to = to_;
     m.received = u32();
     const auto bytes = in_.bytes(in_.left());
     m.bytes = std::make_shared<const std::vector<std::uint8_t>>(bytes.begin(), bytes.end());
@@ -401,6 +377,8 @@ class MessageReader {
 
   static constexpr RobotId kLastRobot = std::numeric_limits<RobotId>::max();
 
+  TeamPeer sender_;
+  RobotId to_;
   ByteReader in_;
   const char* refusal_ = nullptr;
 };
@@ -411,9 +389,9 @@ std::vector<std::uint8_t> encode(const TeamMessage& message) {
   return MessageWriter().message(message);
 }
 
-Decoded<TeamMessage> decode_team_message(std::span<const std::uint8_t> bytes) {
-  if (bytes.size() > kMaxTeamMessageBytes) return Decoded<TeamMessage>::refuse("too long");
-  return MessageReader(bytes).message();
+Decoded<TeamMessage> decode_team_message(const EncodedTeamMessage& message) {
+  if (message.bytes.size() > kMaxTeamMessageBytes) return Decoded<TeamMessage>::refuse("too long");
+  return MessageReader(message).message(message.kind);
 }
 
 }  // namespace km

@@ -20,9 +20,6 @@
 
 namespace km {
 
-/// Largest number of robots in a team.
-inline constexpr std::size_t kMaxTeam = 1024;
-
 /// The frame of poses, identified by the process whose own frame it was. Robots with equal frames
 /// need no alignment to each other.
 using TeamFrame = TeamPeer;
@@ -60,15 +57,12 @@ struct EdgeSetOffer {
   bool operator==(const EdgeSetOffer&) const = default;
 };
 
-/// The contribution of one robot to distributed optimisation, and the robots that it receives
-/// directly. It goes to all robots of the team, when it changes and periodically.
+/// The contribution of one robot to distributed optimisation. It goes to all robots of the team
+/// when it changes.
 struct TeamStatus {
   TeamPeer sender;
-  std::uint32_t number = 0;  ///< Counts statuses of the sender: the highest is the newest. A
-                             ///< repetition keeps the number.
-  std::vector<TeamPeer> receives = {};  ///< Robots that it receives directly at present; ascending.
-  TeamFrame frame;                      ///< Frame of its present solution.
-  std::uint32_t frame_version = 0;      ///< Counts the changes of its frame.
+  TeamFrame frame;                  ///< Frame of its present solution.
+  std::uint32_t frame_version = 0;  ///< Counts the changes of its frame.
   std::uint32_t keyframes = 0;
   std::uint32_t revision = 0;  ///< Increases with its keyframes and the closures inside it.
   std::vector<EdgeSetOffer> offers = {};
@@ -76,9 +70,6 @@ struct TeamStatus {
   /// Odometry pose of its keyframe 0. The frame of odometry is upright, keyframe 0 need not be.
   SE3 T_odom_first = SE3::Identity();
   bool upright = false;  ///< Its keyframes have vertical priors.
-  /// Hash of the newest statuses, sessions and poses that it holds. Robots that receive it directly
-  /// forward the messages that it lacks. A change of the hash does not increase `number`.
-  std::uint64_t holds = 0;
 };
 
 /// Identity of a session. The coordinator numbers its sessions.
@@ -117,7 +108,6 @@ struct SessionPlan {
 /// A new session, its progress or its end: from the coordinator to all members.
 struct Session {
   SessionId id;
-  std::uint32_t number = 0;  ///< Counts messages of the coordinator: the highest is the newest.
   SessionPlan plan;
   PgoMethod method = PgoMethod::kNewton;
   bool upright = false;          ///< Members use their vertical priors: the solution has z up.
@@ -141,7 +131,6 @@ enum class MemberStage : std::uint8_t {
 /// Public poses of one robot, before and after a session; to all robots of the team.
 struct MemberPoses {
   TeamPeer sender;
-  std::uint32_t number = 0;  ///< Counts these messages of the sender: the highest is the newest.
   SessionId session = {};
   MemberStage stage = MemberStage::kEntered;
   TeamFrame frame = {};
@@ -167,10 +156,11 @@ struct ReliableMessage {
   std::uint32_t number = 0;  ///< Counts the messages of the sender to `to` in this session, from 0.
   RobotId to = 0;
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
-  std::uint32_t copy = 0;      ///< Counts all transmissions from sender to `to`.
   std::uint32_t received = 0;  ///< Messages of `to` that have all been taken.
 };
 
+/// Messages between the robots of a team. The newest status, session and poses of each robot count,
+/// and go to all robots; a reliable message goes to one.
 using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, ReliableMessage>;
 
 /// The robot that sent the message first.
@@ -198,12 +188,5 @@ using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, ReliableMessa
       },
       message);
 }
-
-/// A message on its way over one link, to a robot that is received directly. Its origin may be
-/// another robot than the one that forwards it, and its receiver yet another.
-struct LinkPacket {
-  RobotId next = 0;  ///< Robot at the other end of the link.
-  std::shared_ptr<const TeamMessage> message;
-};
 
 }  // namespace km

@@ -22,9 +22,10 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;  // Clang before 17 does not
 }  // namespace
 
 TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory solvers,
-                   const TeamTopics& topics)
+                   std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics)
     : self_(self),
       topics_(topics),
+      sent_bytes_(std::move(sent_bytes)),
       agent_(config, self, std::move(solvers)),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
@@ -42,7 +43,8 @@ TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFac
   topics.restarts.subscribe([this](const auto& event) {
     worker_.post(NewIncarnation{{event->identity.robot, event->identity.boot}});
   });
-  topics.peer_packets.subscribe(post);
+  topics.links.subscribe(post);
+  topics.peer_messages.subscribe(post);
 }
 
 void TeamNode::start() {
@@ -63,7 +65,7 @@ void TeamNode::step(const Input& input, double now_s) {
   take(input);
   const bool is_tick = std::holds_alternative<Tick>(input);
   for (bool more = is_tick || worker_.load().size == 0; more;) {
-    TeamOutput output = agent_.step(now_s);
+    TeamOutput output = agent_.step(now_s, sent_bytes_());
     more = output.more && worker_.load().size == 0;
     publish(std::move(output));
   }
@@ -76,7 +78,8 @@ void TeamNode::take(const Input& input) {
       [&](const NewIncarnation& incarnation) { agent_.peer_restarted(incarnation.peer); },
       [&](const Topic<TeamSolution>::Message& m) { agent_.restore(*m); },
       [&](const Topic<PeerEvent>::Message& m) { take_peer_event(*m); },
-      [&](const Topic<TeamPacket>::Message& m) { agent_.receive(m->from, m->message); },
+      [&](const Topic<LinksReport>::Message& m) { agent_.update_links(*m); },
+      [&](const Topic<TeamMessage>::Message& m) { (void)agent_.receive(*m); },
       [&](const auto& measured) { agent_.add(*measured); },
   };
   std::visit(take_in, input);
@@ -101,9 +104,7 @@ void TeamNode::take_peer_event(const PeerEvent& event) {
 }
 
 void TeamNode::publish(TeamOutput output) const {
-  for (LinkPacket& packet : output.packets)
-    topics_.packets.publish({packet.next, std::make_shared<const TeamPacket>(
-                                              TeamPacket{self_.robot, std::move(packet.message)})});
+  for (TeamMessage& message : output.messages) topics_.messages.publish(std::move(message));
   for (const std::string& notice : output.notices)
     log::limited(log::Level::kWarn, name(), notice) << notice;
   if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));

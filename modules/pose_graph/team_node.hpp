@@ -1,14 +1,15 @@
 #pragma once
 
+#include <cstdint>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <string_view>
 #include <variant>
 #include <vector>
 
-#include "modules/pose_graph/packet_codec.hpp"
 #include "modules/pose_graph/team_agent.hpp"
-#include "runtime/dds/bridge.hpp"
+#include "runtime/dds/peers.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/topic.hpp"
@@ -25,9 +26,10 @@ struct TeamTopics {
   In<InlierSet> restored_inlier_sets;  ///< Sets of a former process, older than all others.
   In<TeamSolution> restored_solution;  ///< Before all other inputs.
   In<PeerEvent> peer_events;           ///< Robots that are received directly.
-  In<PeerEvent> restarts;       ///< kRestarted, before the first closure of the new incarnation.
-  In<TeamPacket> peer_packets;  ///< From robots that are received directly.
-  Out<Addressed<TeamPacket>> packets;  ///< To robots that are received directly.
+  In<PeerEvent> restarts;         ///< kRestarted, before the first closure of the new incarnation.
+  In<LinksReport> links;          ///< Links of the team.
+  In<TeamMessage> peer_messages;  ///< From the other robots.
+  Out<TeamMessage> messages;      ///< To the other robots.
   Out<Trajectory> trajectory;
   Out<OptimizerProgress> progress;
   Out<ClosureVerdicts> verdicts;  ///< After sessions that weigh closures.
@@ -41,9 +43,9 @@ struct TeamTopics {
 class TeamNode final : public Node {
  public:
   /// `self`: as announced by the participant. `solvers`: creates the solver of each session. Throws
-  /// ConfigError if `config` is out of bounds.
+  /// ConfigError if `config` is out of bounds. `sent_bytes`: see TeamAgent::step().
   TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory solvers,
-           const TeamTopics& topics);
+           std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics);
   ~TeamNode() override { stop(); }
 
   std::string_view name() const override { return PoseGraphConfig::kSection; }
@@ -64,7 +66,8 @@ class TeamNode final : public Node {
   };
   using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
                              Topic<InlierSet>::Message, Topic<TeamSolution>::Message,
-                             Topic<PeerEvent>::Message, NewIncarnation, Topic<TeamPacket>::Message>;
+                             Topic<PeerEvent>::Message, NewIncarnation, Topic<LinksReport>::Message,
+                             Topic<TeamMessage>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
   void step(const Input& input, double now_s);
@@ -76,6 +79,7 @@ class TeamNode final : public Node {
 
   const TeamPeer self_;
   const TeamTopics topics_;
+  const std::function<std::uint64_t()> sent_bytes_;
   TeamAgent agent_;
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to

@@ -119,6 +119,10 @@ class DdsBridge final : public Node {
   /// bridge also does so when a robot appears, and at intervals. Thread-safe.
   void send_keys();
 
+  /// In a team with keys, makes new DDS writers to `robot` and sends the events and states for it
+  /// again, because packets of DDS have been forged. Does not wait. Thread-safe.
+  void renew(RobotId robot) { sender_.renew(robot); }
+
   /// Peers of this robot. Precondition: a crossing of kind kStatus is connected, because its
   /// liveliness shows which robots are present.
   [[nodiscard]] Peers& peers() { return peers_; }

@@ -31,8 +31,9 @@ bool OutgoingTopic::is_sealed() const {
   return participant_.seal() != nullptr && !spec_.carries_keys;
 }
 
-bool OutgoingTopic::is_kept() const {
-  return is_sealed() && (spec_.kind == TopicKind::kEvent || spec_.kind == TopicKind::kState);
+bool OutgoingTopic::is_kept(bool to_one) const {
+  return is_sealed() &&
+         (spec_.kind == TopicKind::kEvent || (to_one && spec_.kind == TopicKind::kState));
 }
 
 // nullopt if the addressee is unknown, or if its incarnation has ended.
@@ -55,10 +56,16 @@ OutgoingTopic::Writer& OutgoingTopic::writer_to(const std::optional<TeamPeer>& r
   const auto [entry, fresh] =
       writers_.try_emplace(receiver ? std::optional(receiver->robot) : std::nullopt);
   Writer& writer = entry->second;
-  const std::string partition = partition_for(receiver);
-  if (!fresh && writer.partition == partition) return writer;
+  if (!fresh && writer.partition == partition_for(receiver)) return writer;
 
   if (!fresh && !is_same_incarnation(writer.receiver->boot, receiver->boot)) writer.kept.clear();
+  open(writer, receiver);
+  return writer;
+}
+
+// Creates the DDS writer, in place of a former one. Precondition: mutex_ is held.
+void OutgoingTopic::open(Writer& writer, const std::optional<TeamPeer>& receiver) {
+  const std::string partition = partition_for(receiver);
   writer.due.clear();
   for (const auto& [key, content] : writer.kept) writer.due.insert(key);
   writer.receiver = receiver;
@@ -77,14 +84,13 @@ OutgoingTopic::Writer& OutgoingTopic::writer_to(const std::optional<TeamPeer>& r
       DdsEntity(dds_create_writer(writer.publisher.handle(), topic_.handle(), qos.get(), nullptr),
                 "writer of " + spec_.name);
   writer.statistics.reset(dds_create_statistics(writer.writer.handle()));
-  return writer;
 }
 
 void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key, Octets content) {
   const auto receiver = addressee ? receiver_of(*addressee) : std::nullopt;
   if (addressee && !receiver) return;
   Writer& writer = writer_to(receiver);
-  if (!addressee || !is_kept()) return send(writer, key, std::move(content));
+  if (!is_kept(addressee.has_value())) return send(writer, key, std::move(content));
   writer.kept[key] = std::move(content);
   writer.due.insert(key);
   send_due(writer);
@@ -92,12 +98,35 @@ void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key, Oc
 
 void OutgoingTopic::catch_up(RobotId robot) {
   const auto receiver = receiver_of({robot});
-  if (is_kept() && receiver && writers_.contains(robot)) send_due(writer_to(receiver));
+  if (is_kept(true) && receiver && writers_.contains(robot)) send_due(writer_to(receiver));
+}
+
+void OutgoingTopic::renew(RobotId robot) {
+  if (!is_sealed()) return;
+  const auto receiver = receiver_of({robot});
+  if (receiver && writers_.contains(robot)) renew(receiver);
+  if (is_kept(false) && writers_.contains(std::nullopt)) renew(std::nullopt);
+}
+
+void OutgoingTopic::renew(const std::optional<TeamPeer>& receiver) {
+  Writer& writer = writer_to(receiver);
+  {
+    const std::lock_guard lock(mutex_);
+    open(writer, receiver);
+  }
+  send_due(writer);
+}
+
+bool OutgoingTopic::is_acknowledged_by(RobotId robot) const {
+  const auto entry = writers_.find(robot);
+  return entry == writers_.end() || !is_reliable(spec_.kind) ||
+         dds_wait_for_acks(entry->second.writer.handle(), 0) == DDS_RETCODE_OK;
 }
 
 void OutgoingTopic::send_due(Writer& writer) {
-  const bool has_keys = participant_.seal()->with(
-      [&](const TeamSeal& team) { return team.is_admitted(*writer.receiver); });
+  const bool has_keys = !writer.receiver || participant_.seal()->with([&](const TeamSeal& team) {
+    return team.is_admitted(*writer.receiver);
+  });
   if (!has_keys) return;
   for (const MessageKey key : std::exchange(writer.due, {})) send(writer, key, writer.kept.at(key));
 }

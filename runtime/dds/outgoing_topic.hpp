@@ -50,10 +50,10 @@ struct Addressee {
 ///
 /// A resumed process also receives the messages that were sent to its robot before. In a team with
 /// keys, DDS cannot keep them, because they are sealed for the former process. So events and states
-/// for one robot are also kept here without a seal, and sealed again for the next process.
+/// for one robot are also kept here without a seal, and sealed again for the next process. Events
+/// for all robots are kept, too, for renew().
 ///
-/// write(), catch_up(), notice_readers(), take_newcomers(), readers_of() and wait_for_acks() belong
-/// to one thread; the rest is thread-safe.
+/// add_to(), sent_bytes() and spec() are thread-safe; all other functions belong to one thread.
 class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
@@ -67,6 +67,13 @@ class OutgoingTopic {
   /// In a team with keys, sends the kept messages that the present process of `robot` does not
   /// have. Call when it appears.
   void catch_up(RobotId robot);
+
+  /// In a team with keys, renews the writer to `robot` and, for events, the writer to all, and
+  /// sends the kept messages again. Readers that forged packets of DDS have made ignore a writer do
+  /// not ignore its successor.
+  void renew(RobotId robot);
+  /// True if no message to `robot` alone waits for its acknowledgement.
+  [[nodiscard]] bool is_acknowledged_by(RobotId robot) const;
 
   /// Robots that would receive a message written now. An addressee counts before its reader is
   /// matched.
@@ -110,10 +117,12 @@ class OutgoingTopic {
   };
 
   [[nodiscard]] bool is_sealed() const;
-  [[nodiscard]] bool is_kept() const;
+  [[nodiscard]] bool is_kept(bool to_one) const;
   [[nodiscard]] std::optional<TeamPeer> receiver_of(const Addressee& addressee) const;
   [[nodiscard]] std::string partition_for(const std::optional<TeamPeer>& receiver) const;
   Writer& writer_to(const std::optional<TeamPeer>& receiver);
+  void open(Writer& writer, const std::optional<TeamPeer>& receiver);
+  void renew(const std::optional<TeamPeer>& receiver);
   void send_due(Writer& writer);
   void send(Writer& writer, MessageKey key, Octets content);
   const char* seal(const Writer& writer, const km_wire_Envelope& head, Octets& content) const;

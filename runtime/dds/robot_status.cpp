@@ -35,11 +35,13 @@ Codec<RobotStatus>::Encoded Codec<RobotStatus>::encode(const RobotStatus& status
   wire.dataset_time_s = status.dataset_time_s;
   wire.keyframes = status.keyframes;
   wire.settled_links = status.settled_links;
-  encoded.received = status.relay.received;
-  for (const auto& [origin, bags, reliable] : status.relay.holds)
+  wire.states = status.overlay.states;
+  for (const auto& [origin, bags, reliable] : status.overlay.holds)
     encoded.holds.push_back({origin.robot, origin.boot, bags, reliable});
-  borrow(wire.receives, encoded.received);
   borrow(wire.holds, encoded.holds);
+  wire.own_states = status.overlay.own_states;
+  encoded.missed = status.overlay.missed;
+  borrow(wire.missed, encoded.missed);
   return encoded;
 }
 
@@ -51,15 +53,17 @@ Decoded<RobotStatus> Codec<RobotStatus>::decode(const Wire& wire, const TeamPeer
   if (!std::ranges::all_of(name, printable)) return Result::refuse("name is not printable");
   if (wire.phase > km_wire_PHASE_LEAVING) return Result::refuse("unknown phase");
   if (!std::isfinite(wire.dataset_time_s)) return Result::refuse("time is not finite");
-  const auto received = elements_of(wire.receives, kMaxNamed);
-  const auto holds = elements_of(wire.holds, kMaxNamed);
-  if (!received || !holds) return Result::refuse("it names too many robots");
-  RelaySummary relay{.received = {received->begin(), received->end()}};
-  for (const km_wire_RelayHeld& held : *holds)
-    relay.holds.push_back({{held.robot, held.boot}, held.bags, held.reliable});
+  const auto holds = elements_of(wire.holds, kMaxTeam);
+  const auto missed = elements_of(wire.missed, kMaxTeam);
+  if (!holds || !missed) return Result::refuse("it names too many robots");
+  OverlaySummary overlay{.states = wire.states,
+                         .own_states = wire.own_states,
+                         .missed = {missed->begin(), missed->end()}};
+  for (const km_wire_OverlayHeld& held : *holds)
+    overlay.holds.push_back({{held.robot, held.boot}, held.bags, held.reliable});
   const auto phase = static_cast<RobotPhase>(wire.phase);
   return Result::accept({writer.robot, name, phase, wire.dataset_time_s, wire.keyframes,
-                         wire.settled_links, writer.boot, std::move(relay)});
+                         wire.settled_links, writer.boot, std::move(overlay)});
 }
 
 RobotStatusNode::RobotStatusNode(std::function<RobotStatus()> provider,

@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "modules/core/relay_summary.hpp"
+#include "modules/core/team_links.hpp"
 #include "runtime/dds/codec.hpp"
 #include "runtime/node.hpp"
+#include "runtime/overlay/overlay_summary.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/topic.hpp"
 #include "status.h"
@@ -36,7 +37,7 @@ struct RobotStatus {
   /// robots.
   std::uint8_t settled_links = 0;
   std::uint64_t boot = 0;  ///< Boot id of the sending process.
-  RelaySummary relay = {};
+  OverlaySummary overlay = {};
 };
 
 /// Interval between statuses [s].
@@ -50,15 +51,13 @@ struct Codec<RobotStatus> {
   using Wire = km_wire_RobotStatus;
   static constexpr const char* kTopic = "robot_status";
   static constexpr std::uint16_t kVersion = 1;
-  /// Maximum number of robots that a status names as received, and as known.
-  static constexpr std::size_t kMaxNamed = 64;
-  static constexpr std::size_t kMaxBytes = 256 + (2 + 24) * kMaxNamed;
+  static constexpr std::size_t kMaxBytes = 256 + 26 * kMaxTeam;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotStatus_desc; }
 
   struct Encoded {
     Wire wire{};
-    std::vector<std::uint16_t> received;
-    std::vector<km_wire_RelayHeld> holds;
+    std::vector<km_wire_OverlayHeld> holds;
+    std::vector<std::uint16_t> missed;
   };
   static MessageKey key_of(const RobotStatus& status);
   static Encoded encode(const RobotStatus& status);

@@ -42,6 +42,11 @@ void Sender::catch_up(RobotId robot) {
   due_.insert(robot);
 }
 
+void Sender::renew(RobotId robot) {
+  const std::lock_guard lock(mutex_);
+  renewals_.insert(robot);
+}
+
 std::map<const OutgoingTopic*, HeldBack> Sender::held_back() const {
   const std::lock_guard lock(mutex_);
   return held_;
@@ -75,12 +80,22 @@ void Sender::run() try {
 
 // Bypasses the budget; settle() charges the bytes afterwards.
 void Sender::catch_up_due() {
-  std::set<RobotId> due;
+  std::set<RobotId> due, renewals;
   {
     const std::lock_guard lock(mutex_);
     due.swap(due_);
+    renewals.swap(renewals_);
   }
   const Heartbeat::Step step(heartbeat_);
+  // Messages that wait for the budget, or for acknowledgements over a slow link, are not lost. A
+  // reader that forged packets affect acknowledges everything.
+  std::erase_if(renewals, [this](RobotId robot) {
+    return holds_back_ || std::ranges::any_of(topics_, [&](const auto& topic) {
+             return !topic->is_acknowledged_by(robot);
+           });
+  });
+  for (const RobotId robot : renewals)
+    for (const auto& topic : topics_) topic->renew(robot);
   for (const RobotId robot : due)
     for (const auto& topic : topics_) topic->catch_up(robot);
 }

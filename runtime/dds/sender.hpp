@@ -58,6 +58,9 @@ class Sender {
 
   /// Requests OutgoingTopic::catch_up() of every topic for `robot`. Does not wait. Thread-safe.
   void catch_up(RobotId robot);
+  /// Requests OutgoingTopic::renew() of every topic for `robot`, unless messages still wait for the
+  /// budget or for its acknowledgement. Does not wait. Thread-safe.
+  void renew(RobotId robot);
 
   /// True while messages wait for the budget. Thread-safe.
   [[nodiscard]] bool holds_back() const { return holds_back_; }
@@ -94,9 +97,10 @@ class Sender {
   double settled_s_ = 0.0;
   bool delay_reported_ = false, loss_reported_ = false;
   std::atomic<bool> holds_back_ = false;
-  mutable std::mutex mutex_;  // guards held_ and due_
+  mutable std::mutex mutex_;  // guards held_, due_ and renewals_
   std::map<const OutgoingTopic*, HeldBack> held_;
-  std::set<RobotId> due_;  // robots that have to catch up
+  std::set<RobotId> due_;       // robots that have to catch up
+  std::set<RobotId> renewals_;  // robots whose writers have to be renewed
   Heartbeat heartbeat_;
   Timing timing_;
   std::exception_ptr error_;

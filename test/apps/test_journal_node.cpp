@@ -19,7 +19,7 @@ JournalTopics journal_topics(Topics& topics, Topic<PeerEvent>& peer_events) {
           .new_keyframes = topics.new_keyframes,
           .new_closures = topics.new_closures,
           .new_restarts = topics.new_closure_restarts,
-          .peer_closures = topics.shared_closures.from_peers(),
+          .peer_closures = topics.shared_closures.received,
           .outcomes = topics.outcomes,
           .restored_outcomes = topics.restored_outcomes,
           .peer_events = peer_events,

@@ -3,17 +3,20 @@
 #include <algorithm>
 #include <memory>
 #include <random>
+#include <string>
+#include <utility>
 
 #include "modules/loop_closure/loop_closure_codec.hpp"
 #include "modules/mesh/mesh_codec.hpp"
 #include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/place_recognition_codec.hpp"
-#include "modules/pose_graph/packet_codec.hpp"
+#include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/tree_messages.hpp"
-#include "modules/relay/relay_codec.hpp"
 #include "modules/security/credentials.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/robot_status.hpp"
+#include "runtime/overlay/overlay.hpp"
+#include "runtime/overlay/overlay_codec.hpp"
 
 namespace km {
 namespace {
@@ -68,40 +71,77 @@ MeshChunk some_chunk() {
           .faces = {{0, 1, 2}, {0, 2, 3}}};
 }
 
-TeamPacket packet(TeamMessage message) {
-  return {kWriter.robot, std::make_shared<const TeamMessage>(std::move(message))};
+template <OverlayLane kLane>
+LanePacket<kLane> packet(OverlayMessage message) {
+  const bool is_own = message.origin == kWriter;
+  return {{kReader, std::make_shared<const OverlayMessage>(std::move(message)), is_own}};
 }
 
-RelayPacket relayed(RelayMessage message) {
-  return {kWriter.robot, std::make_shared<const RelayMessage>(std::move(message))};
+MessageReader overlay_packets() {
+  const auto of = [](OverlayStream stream, TeamPeer origin, Bytes content) {
+    return packet<OverlayLane::kTeam>(
+        {.stream = stream, .origin = origin, .content = std::move(content)});
+  };
+  const std::string credentials(kCredentialsLength, 'A');
+  return topic<LanePacket<OverlayLane::kTeam>>(
+      {of(OverlayStream::kIntroduction, {9, 1}, {'c'}),
+       of(OverlayStream::kIntroduction, {9, 1}, to_octets({"c", credentials})),
+       of(OverlayStream::kLinks, kWriter, encode_links({{3, 4}, {9, 1}})),
+       of(OverlayStream::kSolver, kWriter, {1, 2})});
 }
 
-std::vector<TeamPacket> some_packets() {
-  const TeamPeer self{kWriter.robot, kWriter.boot};
+MessageReader relayed_packets() {
+  using enum OverlayStream;
+  return topic<LanePacket<OverlayLane::kPlaces>>(
+      {packet<OverlayLane::kPlaces>({.stream = kClosure,
+                                     .origin = {9, 1},
+                                     .to = kReader,
+                                     .to_boot = 70,
+                                     .number = 8,
+                                     .content = {4, 5}}),
+       packet<OverlayLane::kPlaces>({.stream = kRequest,
+                                     .origin = {9, 1},
+                                     .to = kReader,
+                                     .number = 3,
+                                     .content = {1, 2, 3}}),
+       packet<OverlayLane::kPlaces>({.stream = kBag,
+                                     .origin = {9, 1},
+                                     .number = 3,
+                                     .is_signed = true,
+                                     .content = Bytes(100, 7)})});
+}
+
+// Reader of the content of the messages of one kind.
+MessageReader team_messages(const TeamMessage& message, const char* name) {
+  const auto accepts = [kind = kind_of(message)](std::span<const std::uint8_t> bytes) {
+    return decode_team_message({.kind = kind, .sender = kWriter, .to = kReader, .bytes = bytes})
+        .value.has_value();
+  };
+  return {name, accepts, {encode(message)}};
+}
+
+std::vector<MessageReader> all_team_messages() {
   const TeamPeer far{9, 1};
-  MemberPoses poses{.sender = self,
-                    .number = 2,
-                    .session = {self, 4},
-                    .stage = MemberStage::kSolved,
-                    .frame = self};
+  MemberPoses poses{
+      .sender = kWriter, .session = {kWriter, 4}, .stage = MemberStage::kSolved, .frame = kWriter};
   poses.keyframes = {0, 3, 200};
   poses.T_frame_kf.resize(3, SinglePose::of(SE3::Identity()));
   return {
-      packet(TeamStatus{.sender = self,
-                        .number = 3,
-                        .receives = {far},
-                        .frame = self,
-                        .offers = {{9, 1, {2, 77}}}}),
-      packet(Session{.id = {self, 4},
-                     .plan = {.frame = self,
-                              .members = {{self, 4, {}}, {far, 3, kWriter.robot}},
-                              .pairs = {{2, 9, {1, 6}}}}}),
-      packet(std::move(poses)),
-      packet(ReliableMessage{.sender = self,
-                             .session = {self, 4},
-                             .number = 130,
-                             .to = kReader,
-                             .bytes = std::make_shared<const Bytes>(100, std::uint8_t{5})}),
+      team_messages(TeamStatus{.sender = kWriter, .frame = kWriter, .offers = {{9, 1, {2, 77}}}},
+                    "team statuses"),
+      team_messages(Session{.id = {kWriter, 4},
+                            .plan = {.frame = kWriter,
+                                     .members = {{kWriter, 4, {}}, {far, 3, kWriter.robot}},
+                                     .pairs = {{2, 9, {1, 6}}}}},
+                    "sessions"),
+      team_messages(poses, "poses of members"),
+      // Without bytes, which may have any length.
+      team_messages(ReliableMessage{.sender = kWriter,
+                                    .session = {kWriter, 4},
+                                    .number = 130,
+                                    .to = kReader,
+                                    .bytes = {}},
+                    "reliable messages"),
   };
 }
 
@@ -133,27 +173,15 @@ std::vector<MessageReader> all_messages() {
                          .closures = {{{2, 1}, {5, 2}}, {{2, 1}, {5, 3}}}}}),
       topic<KeyframeBow>({{.id = {kWriter.robot, 4}, .words = {{3, 1}, {900, 4}, {70000, 1}}}}),
       topic<MeshChunk>({some_chunk()}),
-      topic<RobotStatus>({{.robot = kWriter.robot,
-                           .name = "beta",
-                           .settled_links = 3,
-                           .relay = {.received = {kReader, 9}, .holds = {{{11, 12}, 13, 14}}}}}),
-      topic<RelayPacket>(
-          {relayed({.kind = RelayKind::kIntroduction, .origin = {9, 1}, .content = {'c'}}),
-           relayed({.kind = RelayKind::kIntroduction,
-                    .origin = {9, 1},
-                    .content = to_octets({"c", std::string(kCredentialsLength, 'A')})}),
-           relayed({.kind = RelayKind::kClosure,
-                    .origin = {9, 1},
-                    .to = kReader,
-                    .to_boot = 70,
-                    .number = 8,
-                    .content = {4, 5}}),
-           relayed({.kind = RelayKind::kRequest,
-                    .origin = {9, 1},
-                    .to = kReader,
-                    .number = 3,
-                    .content = {1, 2, 3}})}),
-      topic<TeamPacket>(some_packets())};
+      topic<RobotStatus>(
+          {{.robot = kWriter.robot,
+            .name = "beta",
+            .settled_links = 3,
+            .overlay =
+                {.states = 5, .holds = {{{11, 12}, 13, 14}}, .own_states = 6, .missed = {11}}}}),
+      overlay_packets(),
+      relayed_packets()};
+  for (MessageReader& reader : all_team_messages()) all.push_back(std::move(reader));
   all.push_back({"messages up",
                  [](std::span<const std::uint8_t> bytes) { return decode_up(bytes).has_value(); },
                  {encode(some_up_message(3)), encode(some_up_message(6))}});

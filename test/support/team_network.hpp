@@ -16,7 +16,9 @@
 
 #include "modules/core/precision.hpp"
 #include "modules/pose_graph/team_agent.hpp"
-#include "modules/pose_graph/team_message_bytes.hpp"
+#include "modules/pose_graph/team_codec.hpp"
+#include "runtime/overlay/overlay.hpp"
+#include "runtime/overlay/overlay_codec.hpp"
 #include "test/support/solver_team.hpp"
 
 namespace km {
@@ -30,12 +32,20 @@ struct NetworkLink {
   double duplicated = 0.0;    ///< Probability of a second copy, with a delay of its own.
 };
 
-/// Agents of a team on a network in memory with virtual time, over any links, which may fail and
-/// return. All messages cross it as bytes.
+/// A message of the pose graph on its way over one link, to a robot that is received directly.
+struct LinkPacket {
+  RobotId next = 0;  ///< Robot at the other end of the link.
+  std::shared_ptr<const TeamMessage> message = {};
+  std::uint32_t number = 0;  ///< Its number in the overlay.
+};
+
+/// Agents of a team with their overlays, on a network in memory with virtual time, over any links,
+/// which may fail and return. All messages cross it as bytes.
 class TeamNetwork {
  public:
   struct Robot {
     TeamPeer peer = {};
+    std::unique_ptr<Overlay> overlay = {};
     std::unique_ptr<TeamAgent> agent = {};
     bool dead = false;
     std::optional<Trajectory> trajectory = {};
@@ -44,7 +54,9 @@ class TeamNetwork {
     std::vector<std::string> notices = {};
     std::size_t bytes =
         0;  ///< Bytes sent, counted for every reader, including relayed and lost ones.
-    std::size_t packets = 0;  ///< Messages sent, counted in the same way.
+    std::size_t session_bytes = 0;  ///< The part of them that belongs to sessions.
+    std::size_t packets = 0;        ///< Messages sent, counted in the same way.
+    std::uint64_t links_version = 0;
     bool steps_now = true;
   };
 
@@ -58,7 +70,7 @@ class TeamNetwork {
   std::size_t lost = 0;         ///< Lost messages.
   /// After every step of a robot.
   std::function<void(const Robot&)> on_step = {};
-  /// Called with every message before it is sent.
+  /// Called with every message of the pose graph before it is sent.
   std::function<void(RobotId from, const LinkPacket&)> on_packet = {};
   /// Loses the messages for which it returns true.
   std::function<bool(RobotId from, const LinkPacket&)> loses = {};
@@ -66,6 +78,7 @@ class TeamNetwork {
   TeamAgent& add(TeamPeer peer, const PoseGraphConfig& config, const MemberSolverFactory& factory) {
     Robot& robot = robots[peer.robot];
     robot = Robot{.peer = peer};
+    robot.overlay = std::make_unique<Overlay>(peer);
     robot.agent = std::make_unique<TeamAgent>(config, peer, factory);
     for (auto& [id, other] : robots)
       if (id != peer.robot) renew(peer.robot, id);
@@ -137,6 +150,7 @@ class TeamNetwork {
       deliver();
       const bool tick = now_s_ >= next_tick_s_;
       if (tick) next_tick_s_ = now_s_ + kTick_s;
+      if (now_s_ >= next_status_s_) send_summaries();
       busy_ = false;
       for (auto& [id, robot] : robots)
         if (!robot.dead && (tick || robot.steps_now)) step(robot);
@@ -146,10 +160,35 @@ class TeamNetwork {
     return false;
   }
 
-  /// Delivers `from`'s message to `to` as if it had come over a link.
-  bool inject(RobotId from, RobotId to, const TeamMessage& message) {
-    robots.at(to).steps_now = busy_ = true;
-    return robots.at(to).agent->receive(from, std::make_shared<const TeamMessage>(message));
+  /// Delivers a message to `to` as if `from`, which has introduced its origin, had sent it over a
+  /// link. By default it is newer than all messages of its kind.
+  void inject(TeamPeer from, RobotId to, const TeamMessage& message,
+              std::optional<std::uint32_t> number = {}) {
+    OverlayMessage injected = overlay_message(message);
+    if (number || is_state(injected.stream)) injected.number = number.value_or(++injected_);
+    const auto introduction = std::make_shared<const OverlayMessage>(
+        OverlayMessage{.origin = injected.origin, .content = {'r'}});
+    Robot& robot = robots.at(to);
+    if (injected.origin.robot != from.robot)
+      (void)robot.overlay->receive(identity(from), introduction, now_s_);
+    const OverlayArrival arrival = robot.overlay->receive(
+        identity(from), std::make_shared<const OverlayMessage>(std::move(injected)), now_s_);
+    OverlayOutput output = robot.overlay->take_output();
+    output.delivered.clear();  // the message need not be one that can be decoded
+    carry_out(robot, output);
+    const auto* reliable = std::get_if<ReliableMessage>(&message);
+    if (arrival == OverlayArrival::kNew && (reliable == nullptr || reliable->to == to))
+      (void)robot.agent->receive(message);
+    robot.steps_now = busy_ = true;
+  }
+  /// As if `to` received a robot directly that is not in the network, or no longer.
+  void appear(RobotId to, TeamPeer peer) {
+    robots.at(to).overlay->connected(identity(peer), now_s_);
+    robots.at(to).agent->peer_alive(peer);
+  }
+  void disappear(RobotId to, RobotId robot) {
+    robots.at(to).overlay->lost(robot, now_s_);
+    robots.at(to).agent->peer_lost(robot);
   }
 
   /// True if all running robots are members of one settled session.
@@ -172,7 +211,7 @@ class TeamNetwork {
       for (const RobotId member : robot.progress.members) text << ' ' << member;
       text << (robot.progress.settled ? ", settled" : "") << "; reaches";
       for (const auto& [other, of_other] : robots)
-        if (other != id && robot.agent->relay().next_hop(other)) text << ' ' << other;
+        if (other != id && robot.overlay->robots().next_hop(other)) text << ' ' << other;
       if (const SessionPart* part = robot.agent->part()) {
         const Session& session = part->session();
         text << "; session " << session.id.coordinator.robot << '/' << session.id.number
@@ -203,11 +242,17 @@ class TeamNetwork {
 
  private:
   static constexpr double kTick_s = 0.02;
+  static constexpr double kSummary_s = 0.5;  // period of statuses
   struct Delivery {
     RobotId from = 0;
     RobotId to = 0;
-    TeamMessagePtr message = {};
+    OverlayMessagePtr message = {};
+    std::optional<OverlaySummary> summary = {};  // in place of a message
   };
+
+  static RobotIdentity identity(const TeamPeer& peer) {
+    return {.robot = peer.robot, .name = "r", .boot = peer.boot};
+  }
 
   [[nodiscard]] bool connected(RobotId a, RobotId b) const {
     const auto at_a = robots.find(a), at_b = robots.find(b);
@@ -233,40 +278,91 @@ class TeamNetwork {
     std::optional<TeamPeer>& reported = reported_[{to, of}];
     if (reported == peer) return;
     reported = peer;
-    robots.at(to).agent->peer_alive(peer);
+    appear(to, peer);
     robots.at(to).steps_now = busy_ = true;
   }
   void report_lost(RobotId to, RobotId of) {
     std::optional<TeamPeer>& reported = reported_[{to, of}];
     if (!reported) return;
     reported.reset();
-    if (robots.contains(to)) robots.at(to).agent->peer_lost(of);
+    if (robots.contains(to)) disappear(to, of);
   }
 
   void step(Robot& robot) {
-    TeamOutput output = robot.agent->step(now_s_);
+    robot.overlay->step(now_s_);
+    carry_out(robot);
+    TeamOutput output = robot.agent->step(now_s_, robot.session_bytes);
     robot.steps_now = output.more;
     busy_ |= output.more;
     if (output.trajectory) robot.trajectory = std::move(output.trajectory);
     if (output.progress) robot.progress = std::move(*output.progress);
     if (output.verdicts) robot.verdicts = std::move(*output.verdicts);
     for (std::string& notice : output.notices) robot.notices.push_back(std::move(notice));
-    for (const LinkPacket& packet : output.packets) send(robot, packet);
+    for (const TeamMessage& message : output.messages) {
+      OverlayMessage sent = overlay_message(message);
+      if (is_state(sent.stream))
+        robot.overlay->publish(sent.stream, std::move(sent.content), now_s_);
+      else
+        (void)robot.overlay->call(sent.stream, sent.to, sent.number, std::move(sent.content));
+    }
+    carry_out(robot);
     if (on_step) on_step(robot);
   }
 
-  void send(Robot& from, const LinkPacket& packet) {
-    if (on_packet) on_packet(from.peer.robot, packet);
-    const auto& [size, message] = across(packet.message);
-    from.bytes += size;
+  // Sends the packets of an overlay and delivers its messages to the agent.
+  void carry_out(Robot& robot) { carry_out(robot, robot.overlay->take_output()); }
+  void carry_out(Robot& robot, const OverlayOutput& output) {
+    const KnownRobots& known = robot.overlay->robots();
+    if (std::exchange(robot.links_version, known.links_version()) != known.links_version())
+      robot.agent->update_links({known.links(), known.links_version()});
+    for (const OverlayPacket& packet : output.packets) send(robot, packet);
+    for (const OverlayMessagePtr& delivered : output.delivered) {
+      const Decoded<TeamMessage> message = team_message(*delivered);
+      if (message.value)
+        (void)robot.agent->receive(*message.value);
+      else
+        ++undecodable;
+    }
+  }
+
+  void send_summaries() {
+    next_status_s_ = now_s_ + kSummary_s;
+    for (auto& [id, robot] : robots) {
+      if (robot.dead) continue;
+      for (const auto& [neighbour, state] : robot.overlay->robots().neighbours())
+        launch(robot, {id, neighbour, nullptr, robot.overlay->summary()}, false);
+    }
+  }
+
+  void send(Robot& from, const OverlayPacket& packet) {
+    const OverlayStream stream = packet.message->stream;
+    bool is_lost = false;
+    if ((on_packet || loses) && stream > OverlayStream::kLinks) {
+      const Decoded<TeamMessage> message = team_message(*packet.message);
+      if (message.value) {
+        const LinkPacket seen{packet.neighbour, std::make_shared<const TeamMessage>(*message.value),
+                              packet.message->number};
+        if (on_packet) on_packet(from.peer.robot, seen);
+        is_lost = loses && loses(from.peer.robot, seen);
+      }
+    }
+    const std::vector<std::uint8_t> bytes = encode(packet);
+    const auto across = decode_overlay_packet(bytes, from.peer, lane_of(stream));
+    if (!across.value) ++undecodable;
+    from.bytes += bytes.size();
+    if (stream > OverlayStream::kTeamStatus) from.session_bytes += bytes.size();
     ++from.packets;
-    if (!message || !connected(from.peer.robot, packet.next)) {
+    launch(from, {from.peer.robot, packet.neighbour, across.value->message, {}}, is_lost);
+  }
+
+  void launch(const Robot& from, const Delivery& delivery, bool is_lost) {
+    if (!connected(from.peer.robot, delivery.to)) {
       ++lost;
       return;
     }
-    const NetworkLink link = this->link(from.peer.robot, packet.next);
+    const NetworkLink link = this->link(from.peer.robot, delivery.to);
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
-    if (uniform(rng_) < link.lost || (loses && loses(from.peer.robot, packet))) {
+    if (uniform(rng_) < link.lost || is_lost) {
       ++lost;
       return;
     }
@@ -274,21 +370,8 @@ class TeamNetwork {
     for (int copy = 0; copy < copies; ++copy) {
       const double delay_s =
           link.min_delay_s + (link.max_delay_s - link.min_delay_s) * uniform(rng_);
-      in_flight_.emplace(now_s_ + delay_s, Delivery{from.peer.robot, packet.next, message});
+      in_flight_.emplace(now_s_ + delay_s, delivery);
     }
-  }
-
-  // The message after encoding and decoding, and its number of bytes.
-  const std::pair<std::size_t, TeamMessagePtr>& across(const TeamMessagePtr& message) {
-    if (last_sent_ == message) return last_across_;
-    const std::vector<std::uint8_t> bytes = encode(*message);
-    auto decoded = decode_team_message(bytes);
-    if (!decoded.value) ++undecodable;
-    last_sent_ = message;
-    last_across_ = {
-        bytes.size(),
-        decoded.value ? std::make_shared<const TeamMessage>(std::move(*decoded.value)) : nullptr};
-    return last_across_;
   }
 
   void deliver() {
@@ -299,7 +382,12 @@ class TeamNetwork {
         ++lost;
         continue;
       }
-      (void)to.agent->receive(delivery.from, delivery.message);
+      if (delivery.summary)
+        to.overlay->update(delivery.from, *delivery.summary, now_s_);
+      else
+        (void)to.overlay->receive(identity(robots.at(delivery.from).peer), delivery.message,
+                                  now_s_);
+      carry_out(to);
       to.steps_now = true;
     }
   }
@@ -309,10 +397,10 @@ class TeamNetwork {
   std::map<std::pair<RobotId, RobotId>, std::optional<TeamPeer>> reported_;
   std::multimap<double, Delivery> in_flight_;
   std::multimap<double, std::function<void()>> schedule_;
-  TeamMessagePtr last_sent_;
-  std::pair<std::size_t, TeamMessagePtr> last_across_;
+  std::uint32_t injected_ = 1'000'000;
   double now_s_ = 0.0;
   double next_tick_s_ = 0.0;
+  double next_status_s_ = 0.0;
   bool busy_ = false;
 };
 

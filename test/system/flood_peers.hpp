@@ -11,8 +11,8 @@
 #include "modules/mesh/mesh_codec.hpp"
 #include "modules/outlier_rejection/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/place_recognition_codec.hpp"
-#include "modules/pose_graph/packet_codec.hpp"
-#include "modules/relay/relay_endorsement.hpp"
+#include "modules/pose_graph/team_codec.hpp"
+#include "runtime/overlay/endorsement.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 
 namespace km {
@@ -61,6 +61,21 @@ struct FloodPeer {
                 })
                 .empty();
   }
+  /// Sends a message of the overlay to `to`, signed if it is of this robot and the team has keys.
+  void send(RobotId to, OverlayMessage message) {
+    const bool is_own = message.origin == self();
+    SharedSeal* seal = participant.seal();
+    if (is_own && seal != nullptr) {
+      OverlayKeys keys;
+      keys.endorse = [seal](OctetView statement) {
+        return seal->with([&](const TeamSeal& team) { return team.endorse(statement); });
+      };
+      endorse(message, keys);
+    }
+    packets.to_peers().publish(
+        {to, std::make_shared<const TeamLanePacket>(TeamLanePacket{
+                 {to, std::make_shared<const OverlayMessage>(std::move(message)), is_own}})});
+  }
   [[nodiscard]] TrafficCount sent() const {
     TrafficCount sum;
     for (const TopicTraffic& t : bridge.traffic().topics)
@@ -91,7 +106,7 @@ struct FloodPeer {
   AddressedCrossing<KeyframeReply> replies;
   AddressedCrossing<Closure> closures;
   AddressedCrossing<InlierSet> inlier_sets;
-  AddressedCrossing<TeamPacket> packets;
+  AddressedCrossing<TeamLanePacket> packets;
   Crossing<MeshChunk> chunks;
   Crossing<RobotStatus> statuses;
   DdsBridge bridge;

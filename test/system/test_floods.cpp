@@ -18,6 +18,7 @@
 #include "modules/security/team_folder.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
+#include "runtime/overlay/overlay.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/system/flood_peers.hpp"
@@ -57,11 +58,12 @@ TeamPeer made_up(std::uint32_t number) {
   return {static_cast<RobotId>(1000 + number % 2000), 1U + number % 2000U};
 }
 
-template <typename Message>
-void send(FloodPeer& from, Message message) {
-  from.packets.to_peers().publish(
-      {kVictim, std::make_shared<const TeamPacket>(TeamPacket{
-                    from.self().robot, std::make_shared<const TeamMessage>(std::move(message))})});
+// Introduces the origin of a message and forwards it.
+void forward(FloodPeer& from, const TeamMessage& message, std::uint32_t number) {
+  OverlayMessage sent = overlay_message(message);
+  if (is_state(sent.stream)) sent.number = number;
+  from.send(kVictim, {.origin = sent.origin, .content = {'r'}});
+  from.send(kVictim, std::move(sent));
 }
 
 Closure contradiction(std::uint32_t number) {
@@ -96,7 +98,7 @@ MeshChunk some_surface(std::uint32_t number) {
 }
 
 MemberPoses many_poses(std::uint32_t number) {
-  MemberPoses poses{.sender = made_up(number), .number = number + 1};
+  MemberPoses poses{.sender = made_up(number)};
   poses.session = {poses.sender, 1};
   for (KeyframeIndex k = 0; k < 5000; ++k) poses.keyframes.push_back(k);
   poses.T_frame_kf.resize(poses.keyframes.size());
@@ -104,9 +106,9 @@ MemberPoses many_poses(std::uint32_t number) {
 }
 
 Session large_session(std::uint32_t number) {
-  Session session{.id = {made_up(number), number + 1}, .number = number + 1, .plan = {}};
+  Session session{.id = {made_up(number), number + 1}, .plan = {}};
   session.plan.frame = session.id.coordinator;
-  for (RobotId robot = 1000; robot < 1200; ++robot)
+  for (RobotId robot = 1000; robot < 1000 + kMaxTeam; ++robot)
     session.plan.members.push_back({{robot, 1}, 1, {}});
   return session;
 }
@@ -139,21 +141,29 @@ std::vector<Flood> all_floods() {
        kLowFlooder},
       {"team statuses",
        [](FloodPeer& from, std::uint32_t i) {
-         TeamStatus status{.sender = made_up(i), .number = i + 1, .frame = made_up(i)};
-         for (RobotId robot = 1000; robot < 1200; ++robot) status.receives.push_back({robot, i});
-         send(from, std::move(status));
+         forward(from, TeamStatus{.sender = made_up(i), .frame = made_up(i)}, i);
        }},
-      {"sessions", [](FloodPeer& from, std::uint32_t i) { send(from, large_session(i)); }},
-      {"public poses", [](FloodPeer& from, std::uint32_t i) { send(from, many_poses(i)); }},
+      {"links",
+       [](FloodPeer& from, std::uint32_t i) {
+         std::vector<TeamPeer> links{{kVictim, 1}};
+         for (RobotId robot = 1001; robot < 1000 + kMaxTeam; ++robot) links.push_back({robot, i});
+         from.send(kVictim, {.stream = OverlayStream::kLinks,
+                             .origin = from.self(),
+                             .number = i,
+                             .content = encode_links(links)});
+       }},
+      {"sessions", [](FloodPeer& from, std::uint32_t i) { forward(from, large_session(i), i); }},
+      {"public poses", [](FloodPeer& from, std::uint32_t i) { forward(from, many_poses(i), i); }},
       {"session messages",
        [](FloodPeer& from, std::uint32_t i) {
-         send(from, ReliableMessage{.sender = made_up(i),
-                                    .session = {made_up(i), 1},
-                                    .number = i,
-                                    .to = i % 2 == 0 ? kVictim : kFar,
-                                    .bytes = std::make_shared<const std::vector<std::uint8_t>>(
-                                        10000, std::uint8_t{1}),
-                                    .copy = i});
+         forward(from,
+                 ReliableMessage{.sender = made_up(i),
+                                 .session = {made_up(i), 1},
+                                 .number = i,
+                                 .to = i % 2 == 0 ? kVictim : kFar,
+                                 .bytes = std::make_shared<const std::vector<std::uint8_t>>(
+                                     10000, std::uint8_t{1})},
+                 i);
        }},
       {"statuses",
        [](FloodPeer& from, std::uint32_t i) {
@@ -196,8 +206,9 @@ class Scene {
     friend_.replies.from_peers().subscribe(
         [this](const auto& reply) { replies.answered(reply->number); });
     far_.packets.from_peers().subscribe([this](const auto& packet) {
-      const auto* status = std::get_if<TeamStatus>(packet->message.get());
-      if (status != nullptr && status->sender == friend_.self()) relayed.answered(status->number);
+      const OverlayMessage& message = *packet->message;
+      if (message.stream == OverlayStream::kTeamStatus && message.origin == friend_.self())
+        relayed.answered(message.number);
     });
     for (FloodPeer* peer : {&flooder, &friend_, &far_}) peer->start();
     for (FloodPeer* peer : {&flooder, &friend_, &far_}) REQUIRE(peer->receives(kVictim));
@@ -213,11 +224,10 @@ class Scene {
         {kVictim, std::make_shared<const KeyframeRequest>(
                       KeyframeRequest{kFriend, number, {kVictim, 0}, 0})});
     relayed.asked(number);
-    const TeamStatus status{
-        .sender = friend_.self(), .number = number, .frame = friend_.self(), .keyframes = number};
-    friend_.packets.to_peers().publish(
-        {kVictim, std::make_shared<const TeamPacket>(
-                      TeamPacket{kFriend, std::make_shared<const TeamMessage>(status)})});
+    OverlayMessage status = overlay_message(
+        TeamStatus{.sender = friend_.self(), .frame = friend_.self(), .keyframes = number});
+    status.number = number;
+    friend_.send(kVictim, std::move(status));
   }
   [[nodiscard]] bool all_answered() const {
     return replies.all_answered() && relayed.all_answered();

@@ -35,7 +35,6 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"vio", {"images"}},
     {"pose_graph", {"outlier_rejection"}},
     {"rbcd", {"pose_graph"}},
-    {"relay", {"security"}},
     {"ros_dds", {"images", "mesh", "recordings"}},
     {"sensors", {"recordings"}},
     {"pgo_study", {"outlier_rejection", "pose_graph", "rbcd", "recorded_graph"}},

@@ -74,9 +74,14 @@ class AgentTeam {
     for (std::size_t k = 0; k < graph.robots(); ++k)
       members_.push_back({.agent = std::make_unique<TeamAgent>(options.pose_graph, peer(k),
                                                                solver_choice(options.pose_graph))});
-    for (std::size_t k = 0; k < members_.size(); ++k)
+    LinksReport links{.links = {}, .version = 1};
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      std::set<RobotId> others;
       for (std::size_t other = 0; other < members_.size(); ++other)
-        if (other != k) members_[k].agent->peer_alive(peer(other));
+        if (other != k) others.insert(static_cast<RobotId>(other));
+      links.links.report(static_cast<RobotId>(k), std::move(others));
+    }
+    for (const Member& member : members_) member.agent->update_links(links);
   }
 
   AgentTeamRun run() {
@@ -104,13 +109,13 @@ class AgentTeam {
     std::unique_ptr<TeamAgent> agent;
     std::optional<Trajectory> trajectory = {};
     OptimizerProgress progress = {};
-    std::size_t keyframes = 0;  // played
+    std::size_t keyframes = 0;      // played
+    std::size_t session_bytes = 0;  // sent
     bool due = true;
   };
   struct Delivery {
-    RobotId from = 0;
-    RobotId to = 0;
-    TeamMessagePtr message;
+    std::size_t to = 0;
+    TeamMessage message;
   };
 
   static TeamPeer peer(std::size_t robot) { return {static_cast<RobotId>(robot), 1}; }
@@ -165,7 +170,7 @@ class AgentTeam {
   // no message is in flight afterwards.
   bool exchange() {
     for (const Delivery& delivery : std::exchange(in_flight_, {})) {
-      (void)members_[delivery.to].agent->receive(delivery.from, delivery.message);
+      (void)members_[delivery.to].agent->receive(delivery.message);
       members_[delivery.to].due = true;
     }
     for (std::size_t k = 0; k < members_.size(); ++k)
@@ -176,29 +181,32 @@ class AgentTeam {
 
   void step(std::size_t robot) {
     Member& member = members_[robot];
-    TeamOutput output = member.agent->step(now_s_);
+    TeamOutput output = member.agent->step(now_s_, member.session_bytes);
     member.due = output.more;
     changed_ |= output.trajectory.has_value();
     if (output.trajectory) member.trajectory = std::move(output.trajectory);
     if (output.progress) member.progress = std::move(*output.progress);
     for (std::string& notice : output.notices)
       notices_.push_back("robot " + std::to_string(robot) + ": " + std::move(notice));
-    for (const LinkPacket& packet : output.packets)
-      in_flight_.push_back(
-          {static_cast<RobotId>(robot), packet.next, across_the_wire(packet.message)});
+    for (const TeamMessage& message : output.messages) send(robot, message);
   }
 
-  TeamMessagePtr across_the_wire(const TeamMessagePtr& message) {
-    if (sent_ != message) {
-      const std::vector<std::uint8_t> bytes = encode(*message);
-      auto decoded = decode_team_message(bytes);
+  // Sends a message to its receivers: robots that all receive each other.
+  void send(std::size_t robot, const TeamMessage& message) {
+    const std::vector<std::uint8_t> bytes = encode(message);
+    const auto* reliable = std::get_if<ReliableMessage>(&message);
+    for (std::size_t to = 0; to < members_.size(); ++to) {
+      if (to == robot || (reliable != nullptr && reliable->to != to)) continue;
+      auto decoded = decode_team_message({.kind = kind_of(message),
+                                          .sender = peer(robot),
+                                          .to = static_cast<RobotId>(to),
+                                          .bytes = bytes});
       if (!decoded.value) throw std::runtime_error("run_agent_team: a message cannot be decoded");
-      sent_ = message;
-      received_ = std::make_shared<const TeamMessage>(std::move(*decoded.value));
-      message_bytes_ = bytes.size();
+      in_flight_.push_back({to, std::move(*decoded.value)});
+      const std::size_t sent = kTeamMessageHeadBytes + bytes.size();
+      members_[robot].session_bytes += std::holds_alternative<TeamStatus>(message) ? 0 : sent;
+      bytes_ += sent;
     }
-    bytes_ += message_bytes_;
-    return received_;
   }
 
   [[nodiscard]] bool settled() const {
@@ -250,8 +258,6 @@ class AgentTeam {
   std::map<RobotPair, PlayedPair> pairs_;
   std::vector<Member> members_;
   std::vector<Delivery> in_flight_;
-  TeamMessagePtr sent_, received_;  // the last message, before encoding and after decoding
-  std::size_t message_bytes_ = 0;
   std::size_t bytes_ = 0;
   std::vector<std::string> notices_;
   double now_s_ = 0.0;

@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/pose_graph/reliable_channel.hpp"
+#include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/gather_solver.hpp"
 #include "test/support/team_network.hpp"
@@ -390,12 +391,12 @@ TEST_CASE("refused inputs are counted, with a notice", "[pose_graph][agent]") {
   InlierSet set{7, 33, 1, {closure_id({7, 0}, {50, 0})}};
   CHECK_FALSE(agent.add(set));
   CHECK(agent.refused().size() == 3);
-  const TeamOutput output = agent.step(0.0);
+  const TeamOutput output = agent.step(0.0, 0);
   CHECK(output.notices.size() == 3);
   CHECK_FALSE(agent.add(keyframe));
-  CHECK(agent.step(0.1).notices.size() == 1);
+  CHECK(agent.step(0.1, 0).notices.size() == 1);
   CHECK_FALSE(agent.add(keyframe));
-  CHECK(agent.step(0.2).notices.empty());  // third refusal
+  CHECK(agent.step(0.2, 0).notices.empty());  // third refusal
 }
 
 TEST_CASE("closures beyond the limit for one robot cause a notice, repeated ones do not",
@@ -409,9 +410,9 @@ TEST_CASE("closures beyond the limit for one robot cause a notice, repeated ones
   };
   for (std::size_t i = 0; i < OwnGraph::kMaxClosures; ++i) REQUIRE(add(i));
   CHECK_FALSE(add(0));
-  CHECK(agent.step(0.0).notices.empty());
+  CHECK(agent.step(0.0, 0).notices.empty());
   CHECK_FALSE(add(OwnGraph::kMaxClosures));
-  const TeamOutput output = agent.step(0.1);
+  const TeamOutput output = agent.step(0.1, 0);
   REQUIRE(output.notices.size() == 1);
   CHECK_THAT(output.notices.front(), Catch::Contains("closures of robots 7 and 33 beyond"));
 }
@@ -431,13 +432,11 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
   };
   const auto peer = [&] { return TeamPeer{robot(), 1 + any(rng) / 12}; };
   TeamAgent& victim = network.agent(33);
-  victim.peer_alive({666, 1});
+  network.appear(33, {666, 1});
   for (int k = 0; k < 400; ++k) {
-    TeamStatus status{.sender = {666, 1}, .number = any(rng), .frame = peer()};
-    for (std::uint32_t n = any(rng) % 6; n > 0; --n) status.receives.push_back(peer());
+    TeamStatus status{.sender = {666, 1}, .frame = peer()};
     status.offers = {{robot(), any(rng) + 1, {any(rng), any(rng)}}};
-    status.holds = any(rng);
-    (void)network.inject(666, 33, status);
+    network.inject({666, 1}, 33, status, any(rng));
 
     Session session{.id = {peer(), any(rng)},
                     .plan = {.frame = peer(), .members = {}, .pairs = {}}};
@@ -449,26 +448,25 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
     session.plan.pairs = {{33, 666, {1, any(rng)}}};
     session.finished = any(rng) > 15;
     session.round = any(rng);
-    (void)network.inject(666, 33, session);
+    network.inject({666, 1}, 33, session, any(rng));
 
-    MemberPoses poses{.sender = {666, 1}, .number = any(rng), .session = session.id};
+    MemberPoses poses{.sender = {666, 1}, .session = session.id};
     poses.stage = static_cast<MemberStage>(any(rng) % 3);
     poses.keyframes = {any(rng) % 2, any(rng)};
     poses.T_frame_kf.resize(any(rng) % 3);
     poses.verdicts = {{closure_id({7, 1}, {33, 2}), false}};
-    (void)network.inject(666, 33, poses);
+    network.inject({666, 1}, 33, poses, any(rng));
 
     ReliableMessage message{.sender = {}, .session = session.id, .number = any(rng), .bytes = {}};
     if (victim.part() != nullptr && any(rng) > 10) message.session = victim.part()->session().id;
     message.sender = {any(rng) > 10 ? RobotId{666} : RobotId{667}, 1};
     message.to = any(rng) > 5 ? RobotId{33} : robot();
-    message.copy = any(rng);
     message.received = any(rng);
     message.bytes = std::make_shared<const std::vector<std::uint8_t>>(any(rng), std::uint8_t{7});
-    (void)network.inject(666, 33, message);
+    network.inject({666, 1}, 33, message);
     (void)network.run(0.003);
   }
-  victim.peer_lost(666);
+  network.disappear(33, 666);
   (void)network.run(5.0);
   REQUIRE(settle(network, 120.0));
   check_optimal(network, problem);
@@ -491,16 +489,15 @@ TEST_CASE("verdicts on unknown closures, or from robots outside the session, dec
   REQUIRE(known != decided.end());
   for (std::uint32_t k = 1; k < 10; ++k) {
     MemberPoses poses{.sender = {666, 1},
-                      .number = 1000 + k,
                       .session = victim.part()->session().id,
                       .stage = MemberStage::kSolved,
                       .keyframes = {0}};
     poses.T_frame_kf.resize(1);
     poses.verdicts = {{closure_id({7, k}, {666, k}), false}};
-    (void)network.inject(33, 7, poses);
+    network.inject({33, 1}, 7, poses);
     poses.sender = {33, 1};
     poses.verdicts = {{known->first, known->second}, {closure_id({7, 1000 + k}, {33, k}), false}};
-    (void)network.inject(33, 7, poses);
+    network.inject({33, 1}, 7, poses);
     (void)network.run(0.1);
   }
   CHECK(victim.decided() == decided);
@@ -517,11 +514,10 @@ TEST_CASE("a session with unknown closures is refused", "[pose_graph][agent]") {
   const Session running = agent.part()->session();
   Session made_up = running;
   ++made_up.id.number;
-  made_up.number = 1000;
   made_up.finished = false;
   for (SessionPair& pair : made_up.plan.pairs) pair.edges.hash ^= 1U;
   CHECK(agent.refused().empty());
-  (void)network.inject(7, 33, made_up);
+  network.inject({7, 1}, 33, made_up);
   CHECK(agent.refused().size() == 1);
   CHECK(agent.part()->session().id == running.id);
 }
@@ -574,12 +570,12 @@ TEST_CASE("every message may arrive late, twice and in any order", "[pose_graph]
     (void)network.run(0.01);
     if (seen.empty()) continue;
     const auto& [from, packet] = seen[rng() % seen.size()];  // an old message
-    (void)network.inject(from, packet.next, *packet.message);
+    network.inject({from, 1}, packet.next, *packet.message, packet.number);
   }
   REQUIRE(settle(network));
   for (int k = 0; k < 100; ++k) {
     const auto& [from, packet] = seen[rng() % seen.size()];
-    (void)network.inject(from, packet.next, *packet.message);
+    network.inject({from, 1}, packet.next, *packet.message, packet.number);
   }
   (void)network.run(5.0);
   REQUIRE(settle(network));

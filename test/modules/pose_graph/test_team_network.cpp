@@ -301,7 +301,7 @@ TEST_CASE("an interrupted session results in an improvement or the start",
   (void)network.run(600.0, [&] { return steps >= cut_after || network.all_settled(); });
   network.wire({});
   // The result before any robot begins a session alone.
-  (void)network.run(Relay::kPatience_s + network.lease_s - 0.1);
+  (void)network.run(KnownRobots::kLinkPatience_s + network.lease_s - 0.1);
   TeamPoses left;
   for (const auto& [id, robot] : network.robots)
     left[id] =

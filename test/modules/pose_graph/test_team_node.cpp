@@ -16,7 +16,10 @@ namespace {
 // The node of one robot with its topics.
 struct Robot {
   explicit Robot(TeamPeer peer, PgoMethod method = PgoMethod::kNewton)
-      : self(peer), node({.method = method}, peer, solver_choice({.method = method}), topics()) {
+      : self(peer),
+        node(
+            {.method = method}, peer, solver_choice({.method = method}), [] { return 0U; },
+            topics()) {
     trajectory.subscribe([this](const auto& message) {
       const std::lock_guard lock(mutex);
       latest = *message;
@@ -33,8 +36,9 @@ struct Robot {
             .restored_solution = restored_solution,
             .peer_events = peer_events,
             .restarts = restarts,
-            .peer_packets = peer_packets,
-            .packets = packets,
+            .links = links,
+            .peer_messages = peer_messages,
+            .messages = messages,
             .trajectory = trajectory,
             .progress = progress,
             .verdicts = verdicts};
@@ -42,8 +46,9 @@ struct Robot {
 
   // Delivers the messages that `other` sends to this robot.
   void receives(Robot& other) {
-    other.packets.subscribe([this](const auto& packet) {
-      if (packet->to == self.robot) peer_packets.publish(packet->message);
+    other.messages.subscribe([this](const auto& message) {
+      const auto* reliable = std::get_if<ReliableMessage>(message.get());
+      if (reliable == nullptr || reliable->to == self.robot) peer_messages.publish(message);
     });
   }
 
@@ -52,6 +57,10 @@ struct Robot {
     event.identity.robot = other.self.robot;
     event.identity.boot = other.self.boot;
     peer_events.publish(event);
+    LinksReport report{.links = {}, .version = 1};
+    report.links.report(self.robot, {other.self.robot});
+    report.links.report(other.self.robot, {self.robot});
+    links.publish(report);
   }
 
   // Odometry, closures, then the inlier set, which robot 2 decides for the pair.
@@ -81,8 +90,8 @@ struct Robot {
   Topic<InlierSet> inlier_sets, peer_inlier_sets, restored_inlier_sets;
   Topic<TeamSolution> restored_solution;
   Topic<PeerEvent> peer_events, restarts;
-  Topic<TeamPacket> peer_packets;
-  Topic<Addressed<TeamPacket>> packets;
+  Topic<LinksReport> links;
+  Topic<TeamMessage> peer_messages, messages;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   Topic<ClosureVerdicts> verdicts;
@@ -137,11 +146,13 @@ TEST_CASE("Two nodes on their threads end in one frame", "[pose_graph][node]") {
   }
 }
 
-TEST_CASE("A node alone publishes its own trajectory and sends nothing", "[pose_graph][node]") {
+TEST_CASE("A node alone publishes its own trajectory and sends no session", "[pose_graph][node]") {
   const SplitGraph graph = parallel_lines();
   Robot nine({9, 12});
-  int packets = 0;
-  nine.packets.subscribe([&](const auto&) { ++packets; });
+  int other_messages = 0;
+  nine.messages.subscribe([&](const auto& message) {
+    other_messages += std::holds_alternative<TeamStatus>(*message) ? 0 : 1;
+  });
   KeyframeOdometry first;
   first.id = {9, 0};
   double now_s = 100.0;
@@ -152,31 +163,24 @@ TEST_CASE("A node alone publishes its own trajectory and sends nothing", "[pose_
   REQUIRE(nine.latest);
   CHECK(nine.latest->anchor == 9);
   CHECK(nine.latest->T_world_kf.size() == 5);
-  CHECK(packets == 0);
+  CHECK(other_messages == 0);
 }
 
-TEST_CASE("A node sends statuses to robots that it receives, until they are lost",
-          "[pose_graph][node]") {
+TEST_CASE("A node sends its status only when it has changed", "[pose_graph][node]") {
   Robot two({2, 11});
-  std::vector<RobotId> to;
-  two.packets.subscribe([&](const auto& packet) {
-    CHECK(packet->message->from == 2);
-    to.push_back(packet->to);
+  std::vector<TeamStatus> statuses;
+  two.messages.subscribe([&](const auto& message) {
+    if (const auto* status = std::get_if<TeamStatus>(message.get())) statuses.push_back(*status);
   });
-  const auto event = [](PeerEventKind kind) {
-    PeerEvent e{.kind = kind, .identity = {}, .text = {}};
-    e.identity.robot = 9;
-    e.identity.boot = 12;
-    return std::make_shared<const PeerEvent>(e);
-  };
-  two.node.step(event(PeerEventKind::kJoined), 100.0);
-  two.node.step(TeamNode::Tick(), 102.0);
-  REQUIRE_FALSE(to.empty());
-  CHECK(std::all_of(to.begin(), to.end(), [](RobotId robot) { return robot == 9; }));
-  two.node.step(event(PeerEventKind::kLost), 103.0);
-  to.clear();
+  KeyframeOdometry first;
+  first.id = {2, 0};
+  two.node.step(TeamNode::Tick(), 100.0);
+  REQUIRE(statuses.size() == 1);
   two.node.step(TeamNode::Tick(), 110.0);
-  CHECK(to.empty());
+  CHECK(statuses.size() == 1);
+  two.node.step(std::make_shared<const KeyframeOdometry>(first), 111.0);
+  REQUIRE(statuses.size() == 2);
+  CHECK(statuses.back().keyframes == 1);
 }
 
 TEST_CASE("Refusals of the agent are logged at a limited rate", "[pose_graph][node]") {

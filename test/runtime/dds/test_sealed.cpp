@@ -80,6 +80,62 @@ TEST_CASE("A robot without keys of the team is ignored and receives nothing", "[
   CHECK(b.bridge.peers().list().size() == 1);
 }
 
+TEST_CASE("Renewed writers send all events again, in a team with keys", "[sealed]") {
+  const ToyTeam team;
+  const bool has_keys = GENERATE(true, false);
+  CAPTURE(has_keys);
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  const auto robot = [&](RobotId id) {
+    return std::make_unique<TestRobot>(
+        domain, RobotIdentity{id, robot_name(id), kProtocolVersion, random_boot_id()},
+        has_keys ? member_of(team) : TestRobot::MakeSeal(), TopicKind::kEvent, TopicKind::kEvent);
+  };
+  const auto a = robot(3), b = robot(4);
+  a->start();
+  b->start();
+  REQUIRE(a->receives(PeerEventKind::kJoined, 4));
+  REQUIRE(b->receives(PeerEventKind::kJoined, 3));
+  a->ping(1);
+  a->ping_one(4, 2);
+  REQUIRE(b->received.wait_for(1).size() == 1);
+  REQUIRE(b->received_addressed.wait_for(1).size() == 1);
+  a->bridge.renew(4);
+  const std::size_t copies = has_keys ? 2 : 1;
+  CHECK(b->received.wait_for(copies).size() == copies);
+  CHECK(b->received_addressed.wait_for(copies).size() == copies);
+  a->ping(3);
+  a->ping_one(4, 5);
+  const auto all = [&](std::uint32_t first, std::uint32_t second) {
+    return has_keys ? std::vector{first, first, second} : std::vector{first, second};
+  };
+  CHECK(indices(b->received.wait_for(copies + 1)) == all(1, 3));
+  CHECK(indices(b->received_addressed.wait_for(copies + 1)) == all(2, 5));
+  CHECK(b->refused() == 0);
+  const auto late = robot(5);
+  late->start();
+  CHECK(indices(late->received.wait_for(2)) == std::vector<std::uint32_t>{1, 3});
+}
+
+TEST_CASE("Writers are not renewed while messages wait for the budget", "[sealed]") {
+  const ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, member_of(team),
+              TopicKind::kEvent, TopicKind::kEvent, {.bytes_per_s = 20'000.0});
+  TestRobot b(domain, {4, robot_name(4), kProtocolVersion, random_boot_id()}, member_of(team),
+              TopicKind::kEvent, TopicKind::kEvent);
+  a.start();
+  b.start();
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  a.ping_one(4, 2);
+  REQUIRE(b.received_addressed.wait_for(1).size() == 1);
+  for (std::uint32_t k = 0; k < 1000; ++k) a.ping(k, std::vector<std::uint8_t>(1000, 1));
+  REQUIRE(eventually([&] { return a.bridge.holds_back(); }));
+  a.bridge.renew(4);
+  a.ping_one(4, 5);
+  CHECK(indices(b.received_addressed.wait_for(2)) == std::vector<std::uint32_t>{2, 5});
+}
+
 // Reads the network as any participant in reach can.
 TEST_CASE("Sealed messages cannot be read on their way", "[sealed]") {
   const ToyTeam team;
