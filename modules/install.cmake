@@ -23,11 +23,13 @@ install(EXPORT kimera_multiTargets NAMESPACE kimera_multi:: DESTINATION ${config
 # Headers with threads or network include those of runtime/, and are not installed. The headers
 # below are those of the runtime and the programs that have a use outside robots.
 foreach(module ${modules})
-  file(GLOB module_headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} modules/${module}/*.hpp)
+  file(GLOB module_headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} modules/${module}/*.hpp
+       modules/${module}/node/*.hpp)
   foreach(header ${module_headers})
     file(STRINGS ${header} of_runtime REGEX "^#include \"runtime/")
     if(NOT of_runtime)
-      install(FILES ${header} DESTINATION include/kimera_multi/modules/${module})
+      get_filename_component(folder ${header} DIRECTORY)
+      install(FILES ${header} DESTINATION include/kimera_multi/${folder})
     endif()
   endforeach()
 endforeach()

@@ -15,7 +15,7 @@
 #include "modules/diagnosis/examine_sensors.hpp"
 #include "modules/diagnosis/examine_words.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
-#include "modules/sensors/rig_file_codec.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "runtime/clock.hpp"
 
 namespace km {

@@ -14,7 +14,7 @@
 #include "apps/output_file.hpp"
 #include "apps/program_version.hpp"
 #include "apps/stage_progress.hpp"
-#include "modules/sensors/rig_file_codec.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "runtime/log.hpp"
 
 namespace km {

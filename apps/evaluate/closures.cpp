@@ -13,7 +13,7 @@
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/recordings/mcap_attachments.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 
 namespace km {
 namespace {

@@ -12,7 +12,7 @@
 #include "apps/stage_progress.hpp"
 #include "modules/evaluation/images/image_figure.hpp"
 #include "modules/evaluation/images/image_statistics.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 
 namespace km {
 namespace {

@@ -6,7 +6,7 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "modules/vio/vio.hpp"
 #include "tum_row.hpp"
 

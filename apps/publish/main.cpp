@@ -11,7 +11,7 @@
 #include "apps/publish/pose_latency.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/open_bag.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/signal_watch.hpp"

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "modules/recordings/bag_summary.hpp"
-#include "modules/sensors/rig_file_codec.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 
 namespace km {
 

@@ -13,12 +13,12 @@
 #include "modules/mesh/map_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/live_bag_codec.hpp"
+#include "modules/ros_dds/node/live_bag.hpp"
 #include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/euroc_reader.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "modules/sensors/pose_file.hpp"
-#include "modules/sensors/rig_file_codec.hpp"
 #include "runtime/log.hpp"
 
 namespace km {

@@ -27,7 +27,7 @@
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/ply_file.hpp"
-#include "modules/sensors/rig_file_codec.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/metrics.hpp"

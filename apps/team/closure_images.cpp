@@ -14,7 +14,7 @@
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/frame_files.hpp"
-#include "modules/sensors/rig_file_codec.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "modules/sensors/ros_image.hpp"
 
 namespace km {

@@ -10,7 +10,7 @@
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/ply_file.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 
 namespace km {
 namespace {

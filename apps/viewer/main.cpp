@@ -15,7 +15,7 @@
 #include "apps/viewer/view_recorder.hpp"
 #include "apps/viewer/view_store.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/view/view_listener_node.hpp"
+#include "modules/view/node/view_listener_node.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/log.hpp"

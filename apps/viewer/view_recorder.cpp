@@ -11,7 +11,7 @@
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/recordings/ros_definitions.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
-#include "modules/ros_dds/ros_output_node.hpp"
+#include "modules/ros_dds/node/ros_output_node.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 

@@ -39,7 +39,8 @@ struct SinglePose {
 };
 
 /// Identity of the set of edges between two robots. Both robots offer the sets that they hold, and
-/// optimise one that both hold. `hash` covers the version and the ids of the closures.
+/// optimise one that both hold. `hash` covers the version, and the ids, translations and weights of
+/// the closures.
 struct EdgeSetId {
   std::uint32_t version = 0;
   std::uint64_t hash = 0;

@@ -6,10 +6,10 @@
 #include <string>
 #include <utility>
 
-#include "modules/loop_closure/loop_closure_codec.hpp"
-#include "modules/mesh/mesh_codec.hpp"
-#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
-#include "modules/place_recognition/place_recognition_codec.hpp"
+#include "modules/loop_closure/node/loop_closure_codec.hpp"
+#include "modules/mesh/node/mesh_codec.hpp"
+#include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
+#include "modules/place_recognition/node/place_recognition_codec.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/pose_graph/tree_messages.hpp"
 #include "modules/security/credentials.hpp"

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "modules/core/precision.hpp"
+#include "modules/pose_graph/node/team_codec.hpp"
 #include "modules/pose_graph/team_agent.hpp"
-#include "modules/pose_graph/team_codec.hpp"
 #include "runtime/overlay/overlay.hpp"
 #include "runtime/overlay/overlay_codec.hpp"
 #include "test/support/solver_team.hpp"

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "modules/view/view_listener_node.hpp"
+#include "modules/view/node/view_listener_node.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/system/team_run.hpp"
 #include "test/system/walk.hpp"

@@ -7,11 +7,11 @@
 #include <mutex>
 #include <vector>
 
-#include "modules/loop_closure/loop_closure_codec.hpp"
-#include "modules/mesh/mesh_codec.hpp"
-#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
-#include "modules/place_recognition/place_recognition_codec.hpp"
-#include "modules/pose_graph/team_codec.hpp"
+#include "modules/loop_closure/node/loop_closure_codec.hpp"
+#include "modules/mesh/node/mesh_codec.hpp"
+#include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
+#include "modules/place_recognition/node/place_recognition_codec.hpp"
+#include "modules/pose_graph/node/team_codec.hpp"
 #include "runtime/overlay/endorsement.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 

@@ -14,7 +14,7 @@
 //   modules/core        Eigen, nlohmann-json and the standard library
 //   modules/<m>         core, its own folder, and the modules listed below
 //   runtime             core, security
-//   modules/<m>/*_node, *_codec   their own module, core, runtime
+//   modules/<m>/node    its own module, core, runtime
 //   apps/lab/<library>  core, its own folder, and the modules listed below
 //   apps, test          everything; of apps/lab only tests and apps/lab itself
 // The laboratory links only libraries that are installed.
@@ -72,8 +72,7 @@ bool is_lab(const std::string& path) {
 }
 
 bool joins_runtime(const fs::path& file) {
-  const std::string stem = file.stem().string();
-  return stem.ends_with("_node") || stem.ends_with("_codec");
+  return file.parent_path().filename() == "node";
 }
 
 bool is_process_level(const std::string& header) {
@@ -94,7 +93,7 @@ std::string violation(const fs::path& file, const std::string& header) {
   if (in_runtime)
     return used.empty() || used == "core" || used == "security" ? "" : "runtime knows no module";
   if (header.starts_with("runtime/"))
-    return joins_runtime(file) ? "" : "only nodes and codecs use runtime";
+    return joins_runtime(file) ? "" : "only folders node use runtime";
   if (is_process_level(header))
     return joins_runtime(file) ? "" : "algorithms own no threads, DDS, YAML or command lines";
   if (used.empty() || used == "core" || used == own) return "";
@@ -175,16 +174,18 @@ TEST_CASE("No header of the programs includes all of JSON", "[layers]") {
 TEST_CASE("The layer rules refuse what they are for", "[layers]") {
   CHECK_FALSE(violation("modules/vio/vio.cpp", "runtime/node.hpp").empty());
   CHECK_FALSE(violation("modules/vio/vio.cpp", "thread").empty());
+  CHECK_FALSE(violation("modules/vio/vio_node.cpp", "runtime/node.hpp").empty());
   CHECK_FALSE(violation("modules/sensors/euroc_reader.cpp", "yaml-cpp/yaml.h").empty());
   CHECK_FALSE(violation("modules/vio/vio.cpp", "modules/loop_closure/verifier.hpp").empty());
-  CHECK_FALSE(violation("modules/vio/vio_node.cpp", "modules/sensors/sensors_node.hpp").empty());
+  CHECK_FALSE(
+      violation("modules/vio/node/vio_node.cpp", "modules/sensors/node/sensors_node.hpp").empty());
   CHECK_FALSE(violation("runtime/log.hpp", "modules/vio/vio.hpp").empty());
   CHECK_FALSE(violation("modules/vio/vio.cpp", "apps/lab/simulation/world/world.hpp").empty());
   CHECK_FALSE(violation("apps/lab/simulation/world/world.cpp", "thread").empty());
   CHECK_FALSE(violation("apps/lab/simulation/a.cpp", "apps/lab/pgo_study/b.hpp").empty());
   CHECK_FALSE(violation("apps/lab/simulation/a.cpp", "modules/vio/vio.hpp").empty());
   CHECK(violation("apps/lab/simulation/a.cpp", "apps/lab/simulation/b.hpp").empty());
-  CHECK(violation("modules/vio/vio_node.cpp", "runtime/node.hpp").empty());
+  CHECK(violation("modules/vio/node/vio_node.cpp", "runtime/node.hpp").empty());
   CHECK(violation("runtime/dds/codec.hpp", "modules/core/ids.hpp").empty());
 }
 

@@ -11,7 +11,7 @@
 #include <tuple>
 
 #include "apps/lab/simulation/dataset/number_text.hpp"
-#include "modules/sensors/rig_calibration_codec.hpp"
+#include "modules/sensors/node/rig_calibration.hpp"
 #include "runtime/yaml_config.hpp"
 
 namespace km {

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "modules/recordings/mcap_reader.hpp"
-#include "modules/view/view_channel_codec.hpp"
+#include "modules/view/node/view_channel_codec.hpp"
 #include "runtime/dds/participant.hpp"
 #include "test/apps/viewer/page_listener.hpp"
 #include "test/modules/recordings/bag_contents.hpp"

@@ -4,7 +4,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "depth_check.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/shared_data.hpp"
 
 // Time and accuracy of stereo depth on MH_01's pairs, 752 x 480, on one thread. Times are CPU time,

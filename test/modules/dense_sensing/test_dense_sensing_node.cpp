@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "modules/dense_sensing/dense_sensing_node.hpp"
+#include "modules/dense_sensing/node/dense_sensing_node.hpp"
 #include "test/modules/vio/textured_plane.hpp"
 
 namespace km {

@@ -1,8 +1,8 @@
 #include <catch2/catch.hpp>
 
 #include "depth_check.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {

@@ -12,7 +12,7 @@
 
 #include "modules/diagnosis/examine_sensors.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"

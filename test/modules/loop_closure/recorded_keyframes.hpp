@@ -8,8 +8,8 @@
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 
 namespace km {
 

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/loop_closure/keyframe_features_node.hpp"
+#include "modules/loop_closure/node/keyframe_features_node.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

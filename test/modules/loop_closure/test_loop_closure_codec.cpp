@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "modules/loop_closure/loop_closure_codec.hpp"
+#include "modules/loop_closure/node/loop_closure_codec.hpp"
 #include "test/support/corrupted_message.hpp"
 #include "test/support/random_pose.hpp"
 

@@ -2,7 +2,7 @@
 #include <deque>
 #include <memory>
 
-#include "modules/loop_closure/loop_closure_node.hpp"
+#include "modules/loop_closure/node/loop_closure_node.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
 

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <numbers>
 
-#include "modules/loop_closure/keyframe_features_node.hpp"
+#include "modules/loop_closure/node/keyframe_features_node.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "modules/sensors/image_file.hpp"
 #include "test/modules/loop_closure/recorded_keyframes.hpp"

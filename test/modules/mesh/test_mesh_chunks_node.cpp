@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "modules/mesh/mesh_chunks.hpp"
-#include "modules/mesh/mesh_chunks_node.hpp"
-#include "modules/mesh/mesh_codec.hpp"
+#include "modules/mesh/node/mesh_chunks_node.hpp"
+#include "modules/mesh/node/mesh_codec.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/corrupted_message.hpp"

@@ -21,7 +21,7 @@
 #include "modules/mesh/ply_file.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 
 namespace km {
 namespace {

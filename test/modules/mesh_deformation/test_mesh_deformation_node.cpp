@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/mesh_deformation/mesh_deformation_node.hpp"
+#include "modules/mesh_deformation/node/mesh_deformation_node.hpp"
 #include "runtime/clock.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/captured_log.hpp"

@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
-#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
-#include "modules/outlier_rejection/pcm_node.hpp"
+#include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
+#include "modules/outlier_rejection/node/pcm_node.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/corrupted_message.hpp"

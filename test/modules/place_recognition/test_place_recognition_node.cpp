@@ -9,9 +9,9 @@
 #include <set>
 #include <utility>
 
+#include "modules/place_recognition/node/place_recognition_codec.hpp"
+#include "modules/place_recognition/node/place_recognition_node.hpp"
 #include "modules/place_recognition/packed_bits.hpp"
-#include "modules/place_recognition/place_recognition_codec.hpp"
-#include "modules/place_recognition/place_recognition_node.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
 #include "test/support/corrupted_message.hpp"
 

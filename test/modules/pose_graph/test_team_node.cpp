@@ -4,7 +4,7 @@
 #include <mutex>
 #include <optional>
 
-#include "modules/pose_graph/team_node.hpp"
+#include "modules/pose_graph/node/team_node.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/patience.hpp"

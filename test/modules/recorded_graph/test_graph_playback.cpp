@@ -6,7 +6,7 @@
 #include <set>
 #include <vector>
 
-#include "modules/recorded_graph/graph_playback_node.hpp"
+#include "modules/recorded_graph/node/graph_playback_node.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"
 

@@ -11,7 +11,7 @@
 #include "modules/recordings/ros_definitions.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/ros_dds/mesh_cloud.hpp"
-#include "modules/ros_dds/ros_output_node.hpp"
+#include "modules/ros_dds/node/ros_output_node.hpp"
 #include "runtime/log.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
 #include "test/support/temporary_folder.hpp"

@@ -5,9 +5,9 @@
 #include <thread>
 
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/live_bag_codec.hpp"
-#include "modules/ros_dds/live_sink_codec.hpp"
-#include "modules/ros_dds/ros_output_node.hpp"
+#include "modules/ros_dds/node/live_bag.hpp"
+#include "modules/ros_dds/node/live_sink.hpp"
+#include "modules/ros_dds/node/ros_output_node.hpp"
 #include "runtime/dds/ros_publisher.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 #include "test/support/patience.hpp"

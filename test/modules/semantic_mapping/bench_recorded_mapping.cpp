@@ -15,7 +15,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/processor_use.hpp"
 
 namespace km {

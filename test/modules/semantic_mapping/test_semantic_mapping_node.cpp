@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "modules/semantic_mapping/semantic_mapping_node.hpp"
+#include "modules/semantic_mapping/node/semantic_mapping_node.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {

@@ -6,8 +6,8 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/sensors/bag_dataset.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "modules/sensors/ros_image.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/shared_data.hpp"

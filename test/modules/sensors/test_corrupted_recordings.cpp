@@ -4,8 +4,8 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "modules/core/imu_limits.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/image_file.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/corrupted_input.hpp"
 

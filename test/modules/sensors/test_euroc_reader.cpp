@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
-#include "modules/sensors/euroc_rig_codec.hpp"
 #include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/shared_data.hpp"
 

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "modules/core/depth_lookup.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/recorded_kitchen.hpp"
 #include "test/support/shared_data.hpp"

@@ -3,7 +3,7 @@
 #include <sstream>
 
 #include "modules/core/lie.hpp"
-#include "modules/sensors/rig_file_codec.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 
 namespace km {

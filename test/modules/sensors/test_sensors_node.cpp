@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/sensors/sensors_node.hpp"
+#include "modules/sensors/node/sensors_node.hpp"
 
 namespace km {
 namespace {

@@ -11,8 +11,8 @@
 #include <variant>
 #include <vector>
 
-#include "modules/view/view_channel_codec.hpp"
-#include "modules/view/view_listener_node.hpp"
+#include "modules/view/node/view_channel_codec.hpp"
+#include "modules/view/node/view_listener_node.hpp"
 #include "runtime/clock.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "modules/view/view_listener_node.hpp"
-#include "modules/view/view_node.hpp"
+#include "modules/view/node/view_listener_node.hpp"
+#include "modules/view/node/view_node.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"

@@ -16,7 +16,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/processor_use.hpp"
 #include "test/support/temporary_folder.hpp"
 

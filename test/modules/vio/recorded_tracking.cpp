@@ -11,7 +11,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "modules/vio/track_motion.hpp"
 
 namespace km {

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "modules/core/lie.hpp"
-#include "modules/vio/vio_node.hpp"
+#include "modules/vio/node/vio_node.hpp"
 #include "recorded_odometry.hpp"
 #include "test/support/shared_data.hpp"
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "modules/loop_closure/loop_closure_codec.hpp"
-#include "modules/outlier_rejection/outlier_rejection_codec.hpp"
-#include "modules/place_recognition/place_recognition_codec.hpp"
+#include "modules/loop_closure/node/loop_closure_codec.hpp"
+#include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
+#include "modules/place_recognition/node/place_recognition_codec.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/overlay/overlay_node.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/command.hpp"
 #include "test/support/patience.hpp"
 #include "test/support/process.hpp"

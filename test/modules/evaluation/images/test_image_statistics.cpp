@@ -5,7 +5,7 @@
 
 #include "modules/evaluation/images/image_figure.hpp"
 #include "modules/evaluation/images/image_statistics.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/modules/evaluation/images/synthetic_images.hpp"
 #include "test/support/shared_data.hpp"
 

@@ -14,7 +14,7 @@
 #include "apps/lab/simulation/dataset/recording_texts.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/text_rows.hpp"
-#include "modules/sensors/euroc_rig_codec.hpp"
+#include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {

@@ -1,0 +1,106 @@
+#include "modules/mesh/node/mesh_chunks_node.hpp"
+
+#include <string>
+#include <utility>
+
+#include "modules/mesh/mesh_chunks.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+// Larger than the number of meshes that can arrive while one is split, so that no sender waits.
+constexpr std::size_t kQueue = 4096;
+
+// Chunks are sent in small bursts, each with the budget of one tick.
+constexpr double kTick_s = 0.1;
+
+// Unused budget is kept for this time.
+constexpr double kBurst_s = 0.5;
+
+TokenBucket full_budget(double bytes_per_s) {
+  return {bytes_per_s, kBurst_s * bytes_per_s, kBurst_s * bytes_per_s};
+}
+
+}  // namespace
+
+MeshChunksNode::MeshChunksNode(const MeshChunksConfig& config, RobotId self, Out<MeshChunk> chunks)
+    : config_(checked(config)),
+      self_(self),
+      chunks_(chunks),
+      schedule_(config.min_move_m),
+      budget_bytes_(full_budget(config.max_bytes_per_s)),
+      worker_(
+          kQueue, Overflow::kBlock, [this](const Offer& offer) { step(offer, steady_now_s()); },
+          MeshChunksConfig::kSection),
+      ticks_(
+          steady_duration(kTick_s), [this] { worker_.post({}); }, "chunks tick") {}
+
+void MeshChunksNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh) {
+  worker_.post({anchor, std::move(mesh)});
+}
+
+void MeshChunksNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void MeshChunksNode::stop() noexcept {
+  worker_.stop();
+  ticks_.stop();
+}
+
+std::exception_ptr MeshChunksNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void MeshChunksNode::step(const Offer& offer, double now_s) {
+  if (offer.mesh != nullptr) take(offer);
+  send(now_s);
+  waiting_ = schedule_.waiting();
+}
+
+void MeshChunksNode::take(const Offer& offer) {
+  MeshPieces pieces =
+      split_mesh(*offer.mesh, self_, offer.anchor, {config_.cell_m, config_.position_step_m});
+  if (pieces.oversized_faces > 0)
+    log::limited(log::Level::kWarn, name(), "oversized")
+        << pieces.oversized_faces
+        << " faces are too long for mesh_chunks.position_step_m = " << config_.position_step_m
+        << " m and are not sent";
+  schedule_.update(std::move(pieces.chunks));
+}
+
+// A chunk is sent while there is no debt. It may cause a debt.
+void MeshChunksNode::send(double now_s) {
+  while (budget_bytes_.wait_s(0.0, now_s) <= 0.0) {
+    std::optional<MeshChunk> chunk = schedule_.next();
+    if (!chunk) return;
+    budget_bytes_.spend(static_cast<double>(wire_bytes(*chunk)), now_s);
+    chunks_.publish(*std::move(chunk));
+  }
+}
+
+TeamMeshNode::TeamMeshNode(In<MeshChunk> chunks)
+    : worker_(
+          kQueue, Overflow::kBlock, [this](const auto& chunk) { take(*chunk); }, "team_mesh") {
+  chunks.subscribe([this](const auto& chunk) { worker_.post(chunk); });
+}
+
+void TeamMeshNode::take(const MeshChunk& chunk) {
+  const ChunkVerdict verdict = [&] {
+    const std::lock_guard lock(mutex_);
+    return team_.add(chunk);
+  }();
+  if (verdict != ChunkVerdict::kTaken)
+    log::limited(log::Level::kWarn, name(), std::to_string(chunk.key.robot))
+        << "a chunk of robot " << chunk.key.robot << "'s mesh is ignored: " << to_string(verdict);
+}
+
+std::vector<RobotMesh> TeamMeshNode::snapshot() const {
+  const std::lock_guard lock(mutex_);
+  return team_.snapshot();
+}
+
+}  // namespace km

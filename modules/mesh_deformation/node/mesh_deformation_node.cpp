@@ -1,0 +1,167 @@
+#include "modules/mesh_deformation/node/mesh_deformation_node.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+#include "runtime/thread.hpp"
+
+namespace km {
+namespace {
+
+// Larger than the number of messages during any correction, so that publishers do not wait.
+constexpr std::size_t kQueue = 8192;
+
+// Interval of the ticks that start a due correction, as a share of MeshDeformationConfig::period_s.
+// A correction is late by at most this interval.
+constexpr double kTickShare = 0.125;
+
+// Number of keyframes that must be known for a map: one more than the last that saw a vertex.
+std::size_t keyframes_of(const MapMesh& map) {
+  KeyframeIndex last = 0;
+  for (const auto& seen : map.seen_by) last = std::max(last, seen[1]);
+  return map.seen_by.empty() ? 0 : std::size_t{last} + 1;
+}
+
+}  // namespace
+
+MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, RobotId self,
+                                         const MeshDeformationTopics& topics)
+    : config_(checked(config)),
+      self_(self),
+      optimized_(topics.optimized),
+      superseded_(topics.superseded),
+      corrector_(config),
+      worker_(
+          kQueue, Overflow::kBlock,
+          [this](const Input& input) {
+            work_in_background();
+            const double now_s = steady_now_s();
+            take_latest(now_s);
+            step(input, now_s);
+          },
+          MeshDeformationConfig::kSection),
+      ticks_(
+          steady_duration(kTickShare * config.period_s), [this] { worker_.post(Tick()); },
+          "mesh tick") {
+  topics.keyframes.subscribe([this](const auto& keyframe) { worker_.post(keyframe); });
+  topics.maps.subscribe([this](const auto& map) { latest_map_.put(map); });
+  topics.trajectory.subscribe([this](const auto& newest) { latest_trajectory_.put(newest); });
+}
+
+void MeshDeformationNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void MeshDeformationNode::finish() {
+  latest_map_.close();
+  latest_trajectory_.close();
+  worker_.post(End());  // the worker refuses it after stop()
+}
+
+void MeshDeformationNode::stop() noexcept {
+  finish();
+  worker_.stop();
+  ticks_.stop();
+}
+
+std::exception_ptr MeshDeformationNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void MeshDeformationNode::take_latest(double now_s) {
+  if (auto map = latest_map_.take()) step(std::move(map), now_s);
+  if (auto trajectory = latest_trajectory_.take()) step(std::move(trajectory), now_s);
+}
+
+void MeshDeformationNode::step(const Input& input, double now_s) {
+  if (ended_) return;
+  if (const auto* keyframe = std::get_if<Topic<KeyframeOdometry>::Message>(&input))
+    return take(**keyframe);
+  if (const auto* map = std::get_if<Topic<MapMesh>::Message>(&input)) return take(*map);
+  if (const auto* trajectory = std::get_if<Topic<Trajectory>::Message>(&input)) {
+    trajectory_ = *trajectory;
+    return;
+  }
+  ended_ = std::holds_alternative<End>(input);
+  if (ended_ || now_s >= next_s_) correct();
+}
+
+void MeshDeformationNode::take(const KeyframeOdometry& keyframe) {
+  if (keyframe.id.index != T_odom_kf_.size())
+    throw std::invalid_argument("mesh deformation: keyframe " + std::to_string(keyframe.id.index) +
+                                " after " + std::to_string(T_odom_kf_.size()) + " keyframes");
+  T_odom_kf_.push_back(keyframe.T_odom_kf);
+}
+
+void MeshDeformationNode::take(Topic<MapMesh>::Message map) {
+  keyframes_of_map_ = keyframes_of(*map);
+  map_ = std::move(map);
+  ++map_version_;
+}
+
+// A map may arrive before its keyframes, and the trajectory may be missing.
+bool MeshDeformationNode::can_correct() const {
+  return map_ != nullptr && trajectory_ != nullptr && !trajectory_->T_world_kf.empty() &&
+         !T_odom_kf_.empty() && keyframes_of_map_ <= T_odom_kf_.size();
+}
+
+CorrectionInput MeshDeformationNode::input() const {
+  const auto& T_world_kf = trajectory_->T_world_kf;
+  return {*map_, map_version_, T_odom_kf_,
+          std::span(T_world_kf).first(std::min(T_world_kf.size(), T_odom_kf_.size()))};
+}
+
+void MeshDeformationNode::correct() {
+  if (!can_correct()) {
+    if (ended_ && map_ != nullptr)
+      log::warn(name()) << "the last map is not corrected: it was made with " << keyframes_of_map_
+                        << " keyframes; " << T_odom_kf_.size() << " and "
+                        << (trajectory_ == nullptr ? 0 : trajectory_->T_world_kf.size())
+                        << " optimised ones are known";
+    return;
+  }
+  const double start_s = steady_now_s();
+  std::optional<MeshCorrection> correction =
+      ended_ ? corrector_.correct_from_scratch(input()) : corrector_.correct(input());
+  if (!correction) return;
+  const double end_s = steady_now_s();
+  next_s_ = end_s + config_.period_s;
+  timing_.add(end_s - start_s);
+  OptimizedMesh result{self_,
+                       trajectory_->anchor,
+                       std::move(correction->mesh),
+                       correction->report,
+                       correction->deformed,
+                       end_s - start_s,
+                       correction->superseded_faces};
+  if (!correction->superseded.vertices.empty())
+    superseded_.publish(std::move(correction->superseded));
+  report(result);
+  optimized_.publish(std::move(result));
+}
+
+void MeshDeformationNode::report(const OptimizedMesh& result) const {
+  const MeshDeformationReport& report = result.report;
+  if (!result.deformed) {
+    log::debug(name()) << "moved " << report.vertices << " vertices as a whole";
+    return;
+  }
+  log::debug(name()) << report.vertices << " vertices, " << report.nodes << " nodes ("
+                     << report.new_nodes << " new), " << report.keyframes
+                     << " keyframes: " << to_string(report.status) << " after " << report.iterations
+                     << " iterations, " << result.superseded_faces << " faces seen again, "
+                     << result.seconds << " s";
+  if (report.status == DeformationStatus::kFailed)
+    log::limited(log::Level::kWarn, name(), "failed")
+        << "the deformation graph of " << report.nodes
+        << " nodes could not be solved: the mesh follows its keyframes roughly";
+}
+
+}  // namespace km

@@ -1,0 +1,105 @@
+#include "modules/place_recognition/node/place_recognition_node.hpp"
+
+#include <string>
+#include <utility>
+
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+// A peer's history arrives in a burst; the queue holds an hour of keyframes at 4 Hz.
+constexpr std::size_t kQueueCapacity = 16384;
+
+// Standard deviation of an odometry step, per axis, above which its length is unknown.
+constexpr double kLostWay_m = 0.5;
+
+bool breaks_odometry(const UncertainPose& before, const UncertainPose& now) {
+  const Matrix6 step = between_on_chain(before, now).Sigma;
+  return step.bottomRightCorner<3, 3>().trace() > 3.0 * kLostWay_m * kLostWay_m;
+}
+
+}  // namespace
+
+PlaceRecognitionNode::PlaceRecognitionNode(const PlaceRecognitionConfig& config, RobotId self,
+                                           std::shared_ptr<const Vocabulary> vocabulary,
+                                           const PlaceRecognitionTopics& topics)
+    : config_(checked(config)),
+      self_(self),
+      vocabulary_(std::move(vocabulary)),
+      topics_(topics),
+      own_(config_, vocabulary_->size()),
+      worker_(kQueueCapacity, Overflow::kBlock, [this](const Input& input) { handle(input); }) {
+  topics_.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
+  topics_.peer_bows.subscribe([this](const auto& message) { worker_.post(message); });
+  topics_.peer_events.subscribe([this](const auto& message) { worker_.post(message); });
+}
+
+void PlaceRecognitionNode::handle(const Input& input) {
+  if (const auto* event = std::get_if<Topic<PeerEvent>::Message>(&input)) return step(*event);
+  if (const auto* bow = std::get_if<Topic<KeyframeBow>::Message>(&input)) return step(**bow);
+  step(*std::get<Topic<Keyframe>::Message>(input));
+}
+
+// Publishes the event itself, because messages of the robot wait until all copies of the event are
+// released.
+void PlaceRecognitionNode::step(const Topic<PeerEvent>::Message& event) {
+  if (event->kind != PeerEventKind::kRestarted) return;
+  peers_.erase(event->identity.robot);
+  topics_.restarts.publish(event);
+}
+
+void PlaceRecognitionNode::step(const Keyframe& keyframe) {
+  const KeyframeId id = keyframe.odometry.id;
+  BagOfWords words = vocabulary_->count(keyframe.features.descriptors);
+  BowVector vector = vocabulary_->weigh(words);
+  const UncertainPose chain{keyframe.odometry.T_odom_kf, keyframe.odometry.covariance};
+  if (const auto before = std::exchange(chain_, chain); before && breaks_odometry(*before, chain))
+    own_.mark_odometry_break();
+  CandidateSearch search = own_.search_own(vector, keyframe.stamp);
+  // Added before it is published, so that no pair is missed: see the class comment.
+  own_.add(std::move(vector), keyframe.stamp);
+  own_ids_.push_back(id);
+  topics_.own_bows.publish(KeyframeBow{.id = id,
+                                       .stamp = keyframe.stamp,
+                                       .vocabulary = vocabulary_->id(),
+                                       .words = std::move(words)});
+  publish(id, std::move(search));
+}
+
+void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
+  const KeyframeId id = peer_bow.id;
+  if (id.robot == self_) return;
+  if (peer_bow.vocabulary != vocabulary_->id()) {
+    log::limited(log::Level::kWarn, name(), "vocabulary of " + std::to_string(id.robot))
+        << "robot " << id.robot << " uses another vocabulary ("
+        << fingerprint_text(peer_bow.vocabulary) << ", here " << fingerprint_text(vocabulary_->id())
+        << "): its keyframes cannot be compared";
+    return publish_refusal(id, PlaceQueryStatus::kOtherVocabulary);
+  }
+  if (!vocabulary_->knows(peer_bow.words)) {
+    log::limited(log::Level::kWarn, name(), "words of " + std::to_string(id.robot))
+        << "keyframe " << to_string(id) << " has words beyond the vocabulary: not used";
+    return publish_refusal(id, PlaceQueryStatus::kUnknownWords);
+  }
+  const auto patience = static_cast<std::size_t>(config_.max_waiting_keyframes);
+  PeerHistory& history = peers_.try_emplace(id.robot, patience).first->second;
+  if (history.has(id.index)) return publish_refusal(id, PlaceQueryStatus::kRepeated);
+  for (const PeerQuery& query : history.add(id.index, vocabulary_->weigh(peer_bow.words)))
+    publish({id.robot, query.index}, own_.search(*query.vector, query.previous.get()));
+}
+
+void PlaceRecognitionNode::publish(const KeyframeId& query, CandidateSearch search) const {
+  for (const PlaceCandidate& found : search.candidates)
+    topics_.candidates.publish(LoopCandidate{.query = query,
+                                             .match = own_ids_[found.index],
+                                             .similarity = found.similarity,
+                                             .support = found.support});
+  topics_.queries.publish(PlaceQuery{query, PlaceQueryStatus::kSearched, std::move(search)});
+}
+
+void PlaceRecognitionNode::publish_refusal(const KeyframeId& query, PlaceQueryStatus status) const {
+  topics_.queries.publish(PlaceQuery{query, status, {}});
+}
+
+}  // namespace km

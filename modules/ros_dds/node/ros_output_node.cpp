@@ -1,0 +1,341 @@
+#include "modules/ros_dds/node/ros_output_node.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "modules/core/text_table.hpp"
+#include "modules/recordings/ros_definitions.hpp"
+#include "modules/ros_dds/jpeg_image.hpp"
+#include "modules/ros_dds/mesh_cloud.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/thread.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kLate_s = 2.0;
+// Maximum number of images and meshes, together, that wait for the encoder.
+constexpr std::size_t kImages = 8;
+constexpr double kPiece_bytes = 65536.0;
+
+RosPose message_of(const SE3& T) {
+  return {T.translation(), Eigen::Quaterniond(T.linear())};
+}
+
+std::uint8_t level_of(log::Level level) {
+  switch (level) {
+    case log::Level::kError:
+      return RosLog::kError;
+    case log::Level::kWarn:
+      return RosLog::kWarn;
+    case log::Level::kInfo:
+      return RosLog::kInfo;
+    case log::Level::kDebug:
+      break;
+  }
+  return RosLog::kDebug;
+}
+
+}  // namespace
+
+RosOutputNode::RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sink,
+                             RosOutputOptions options, Diagnose diagnose, Closures closures,
+                             const RosOutputTopics& topics)
+    : node_name_(name),
+      sink_(std::move(sink)),
+      options_(std::move(options)),
+      name_(ros_name(options_.robot)),
+      odom_(name_ + "/odom"),
+      base_link_(name_ + "/base_link"),
+      map_(map_of(options_.id)),
+      diagnose_(std::move(diagnose)),
+      closures_of_(std::move(closures)),
+      piece_bytes_(options_.mesh_bytes_per_s, kPiece_bytes, kPiece_bytes),
+      worker_(
+          options_.queue, Overflow::kDropOldest,
+          [this](const Input& input) {
+            std::visit([this](const auto& message) { step(message); }, input);
+          },
+          node_name_),
+      encoder_(
+          kImages, Overflow::kDropOldest,
+          [this](const Encoded& input) {
+            work_in_background();
+            std::visit([this](const auto& message) { encode(message); }, input);
+          },
+          node_name_ + "_enc"),
+      clock_(
+          std::chrono::seconds(1), [this] { worker_.post(std::make_shared<const Tick>()); },
+          "ros_tick") {
+  open_topics(topics.images.has_value());
+  const auto post = [this](const auto& message) { worker_.post(message); };
+  topics.odometry.subscribe(post);
+  topics.keyframes.subscribe(post);
+  topics.trajectory.subscribe(post);
+  if (topics.images)
+    topics.images->subscribe([this](const auto& packet) { encoder_.post(packet->frame); });
+}
+
+void RosOutputNode::open_topics(bool has_images) {
+  const std::string prefix = '/' + name_ + '/';
+  const auto state = [&](const char* name, std::string_view type) {
+    return State{.topic = sink_->open({prefix + name, type, true, 1})};
+  };
+  constexpr int kManyTransforms = 100;
+  odometry_ = sink_->open({prefix + "odometry", RosOdometry::kType});
+  pose_ = sink_->open({prefix + "pose", RosPoseWithCovarianceStamped::kType});
+  tf_ = sink_->open({"/tf", RosTransforms::kType, false, kManyTransforms});
+  path_ = state("path", RosPath::kType);
+  mesh_ = state("mesh", RosPointCloud::kType);
+  diagnostics_ = sink_->open({"/diagnostics", RosDiagnostics::kType});
+  if (options_.draws || options_.mesh_faces > 0) {
+    const std::size_t pieces = SurfacePieces::count(static_cast<std::size_t>(options_.mesh_faces));
+    faces_ = sink_->open(
+        {prefix + "mesh_faces", RosMarker::kType, true, std::max(static_cast<int>(pieces), 1)});
+  }
+  if (options_.draws) {
+    closures_ = state("closures", RosMarkers::kType);
+  }
+  if (options_.logs) log_ = sink_->open({"/rosout", RosLog::kType});
+  if (has_images)
+    image_ = sink_->open({prefix + "left/image_raw/compressed", RosCompressedImage::kType});
+}
+
+void RosOutputNode::start() {
+  worker_.start();
+  encoder_.start();
+  clock_.start();
+  if (options_.logs) log::set_listener([this](const log::Entry& entry) { listen(entry); });
+}
+
+void RosOutputNode::stop() noexcept {
+  if (options_.logs) log::set_listener({});
+  clock_.stop();
+  encoder_.stop();
+  worker_.stop();
+}
+
+std::exception_ptr RosOutputNode::error() const {
+  return worker_.error() ? worker_.error() : encoder_.error();
+}
+
+std::vector<Heartbeat*> RosOutputNode::heartbeats() {
+  return {&worker_.heartbeat(), &encoder_.heartbeat()};
+}
+
+std::size_t RosOutputNode::left_out() const {
+  return worker_.load().dropped + encoder_.load().dropped;
+}
+
+void RosOutputNode::listen(const log::Entry& entry) {
+  RosLog line;
+  line.level = level_of(entry.level);
+  line.name = name_ + '.' + entry.tag;
+  line.text = entry.text;
+  worker_.post(std::make_shared<const RosLog>(std::move(line)));
+}
+
+void RosOutputNode::encode(const Image& image) {
+  worker_.post(std::make_shared<const RosCompressedImage>(
+      jpeg_of(image->left, {image->stamp, name_ + "/left_camera"})));
+}
+
+void RosOutputNode::encode(const std::shared_ptr<const LabelledMesh>& mesh) {
+  const auto most = static_cast<std::size_t>(options_.mesh_faces);
+  worker_.post(CoarseMesh{mesh->faces.size() <= most
+                              ? mesh
+                              : std::make_shared<const LabelledMesh>(coarsened(*mesh, most))});
+}
+
+std::string RosOutputNode::map_of(RobotId anchor) const {
+  return options_.name_of ? ros_name(options_.name_of(anchor)) + "/map" : "map";
+}
+
+// Time of the sensors. After the last image it advances with the steady clock.
+std::optional<Stamp> RosOutputNode::time() const {
+  if (!stamp_) return std::nullopt;
+  return *stamp_ + nanoseconds(steady_now_s() - stamp_arrived_s_);
+}
+
+// Returns the size of the message [bytes].
+template <typename Message>
+std::size_t RosOutputNode::publish(std::size_t topic, const Message& message) {
+  const auto bytes = encode_ros(message);
+  if (const auto now = time()) latest_ = std::max(latest_.value_or(*now), *now);
+  sink_->put(topic, latest_, bytes);
+  return bytes.size();
+}
+
+void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
+  frames_.add(*state);
+  ++poses_;
+  stamp_ = state->stamp;
+  speed_mps_ = state->v_odom.norm();
+  stamp_arrived_s_ = steady_now_s();
+  RosOdometry odometry;
+  odometry.header = {state->stamp, odom_};
+  odometry.child_frame = base_link_;
+  odometry.pose = message_of(state->T_odom_body);
+  odometry.linear_velocity = state->T_odom_body.linear().transpose() * state->v_odom;
+  odometry.angular_velocity = frames_.angular_rate();
+  publish(odometry_, odometry);
+  const UncertainPose T_map_body = frames_.T_map_body(state->T_odom_body);
+  RosPoseWithCovarianceStamped pose{{state->stamp, map_}, message_of(T_map_body.T), {}};
+  Eigen::Map<Matrix6>(pose.covariance.data()) = along_fixed_axes(T_map_body);
+  publish(pose_, pose);
+  publish(tf_,
+          RosTransforms{{{{state->stamp, map_}, odom_, message_of(frames_.T_map_odom())},
+                         {{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)}}});
+  publish_pieces();
+}
+
+void RosOutputNode::step(const Topic<KeyframeOdometry>::Message& keyframe) {
+  frames_.add(*keyframe);
+  if (stamp_ && *stamp_ >= keyframe->stamp) return;
+  stamp_ = keyframe->stamp;  // the input is a pose graph without images
+  stamp_arrived_s_ = steady_now_s();
+}
+
+void RosOutputNode::step(const Topic<Trajectory>::Message& trajectory) {
+  frames_.add(*trajectory);
+  trajectory_ = trajectory;
+  path_.changed = closures_.changed = true;
+  publish_states(false);
+}
+
+void RosOutputNode::step(const std::shared_ptr<const LabelledMesh>& mesh) {
+  newest_mesh_ = mesh;
+  mesh_.changed = options_.mesh_points > 0 && !mesh->empty();
+  if (options_.mesh_faces > 0) encoder_.post(mesh);
+  publish_states(false);
+}
+
+void RosOutputNode::step(const CoarseMesh& coarse) {
+  pieces_.offer(coarse.mesh);
+  publish_pieces();
+}
+
+void RosOutputNode::step(const std::shared_ptr<const RosLog>& line) {
+  RosLog stamped = *line;
+  stamped.stamp = time().value_or(0);
+  publish(log_, stamped);
+}
+
+void RosOutputNode::step(const std::shared_ptr<const RosCompressedImage>& image) {
+  sink_->put(image_, image->header.stamp, encode_ros(*image));
+}
+
+void RosOutputNode::publish_states(bool all) {
+  const auto publish_if_due = [&](State& state, const auto& publish_it) {
+    const double now_s = steady_now_s();
+    if (!state.changed || (!all && now_s < state.due_s)) return;
+    state.changed = false;
+    state.due_s = now_s + static_cast<double>(publish_it()) / options_.state_bytes_per_s;
+  };
+  publish_if_due(path_, [this] { return publish_path(keyframe_poses()); });
+  publish_if_due(mesh_, [this] { return publish_mesh(); });
+  if (!options_.draws) return;
+  publish_if_due(closures_, [this] {
+    return publish(closures_.topic,
+                   closure_lines(newest_closures_, *trajectory_, {stamp_.value_or(0), map_}));
+  });
+}
+
+std::vector<StampedPose> RosOutputNode::keyframe_poses() const {
+  const auto& stamps = frames_.keyframe_stamps();
+  std::vector<StampedPose> poses;
+  for (std::size_t k = 0; k < std::min(stamps.size(), trajectory_->T_world_kf.size()); ++k)
+    poses.push_back({stamps[k], trajectory_->T_world_kf[k]});
+  return poses;
+}
+
+std::size_t RosOutputNode::publish_path(std::span<const StampedPose> poses) {
+  if (poses.empty()) return 0;
+  RosPath path{{stamp_.value_or(poses.back().stamp), map_}, {}};
+  for (const StampedPose& pose : poses)
+    path.poses.push_back({{pose.stamp, map_}, message_of(pose.T)});
+  return publish(path_.topic, path);
+}
+
+std::size_t RosOutputNode::publish_mesh() {
+  const RosHeader header{stamp_.value_or(0), map_};
+  std::size_t bytes = publish(
+      mesh_.topic, cloud_of(*newest_mesh_, static_cast<std::size_t>(options_.mesh_points), header));
+  if (options_.draws)
+    bytes += publish(faces_, surface_of(*newest_mesh_, newest_mesh_->faces, header));
+  return bytes;
+}
+
+// Sends as many pieces of the mesh as RosOutputOptions::mesh_bytes_per_s allows now.
+void RosOutputNode::publish_pieces() {
+  const double now_s = steady_now_s();
+  while (piece_bytes_.wait_s(0.0, now_s) <= 0.0) {
+    const auto piece = pieces_.next({stamp_.value_or(0), map_});
+    if (!piece) return;
+    piece_bytes_.spend(static_cast<double>(publish(faces_, *piece)), now_s);
+  }
+}
+
+// Before robots have joined a session, no transform between their frames is known.
+void RosOutputNode::publish_link() {
+  const std::string team = map_of(trajectory_->anchor);
+  if (trajectory_->T_world_kf.empty() || team == map_) return;
+  publish(tf_, RosTransforms{{{{stamp_.value_or(0), team}, map_, RosPose{}}}});
+}
+
+RosDiagnosticStatus RosOutputNode::odometry_status() const {
+  RosDiagnosticStatus status;
+  status.name = name_ + ": odometry";
+  status.hardware_id = name_;
+  const double age_s = steady_now_s() - stamp_arrived_s_;
+  if (poses_ == 0 || age_s > kLate_s) status.level = RosDiagnosticStatus::kWarn;
+  status.message = poses_ == 0       ? "no image has a pose yet"
+                   : age_s > kLate_s ? "no pose for " + fixed(age_s, 1) + " s"
+                                     : "ok";
+  status.values = {{"poses", std::to_string(poses_)},
+                   {"keyframes", std::to_string(frames_.keyframe_stamps().size())},
+                   {"stamp of the last [ns]", std::to_string(stamp_.value_or(0))},
+                   {"speed [m/s]", fixed(speed_mps_, 3)}};
+  return status;
+}
+
+void RosOutputNode::publish_diagnostics(std::vector<RosDiagnosticStatus> parts) {
+  for (RosDiagnosticStatus& status : parts) {
+    status.name = name_ + ": " + status.name;
+    status.hardware_id = name_;
+  }
+  parts.insert(parts.begin(), odometry_status());
+  publish(diagnostics_, RosDiagnostics{{stamp_.value_or(0), ""}, std::move(parts)});
+}
+
+void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
+  auto parts = diagnose_();
+  const bool is_silent = !parts;
+  if (parts) publish_diagnostics(*std::move(parts));
+  if (auto closures = options_.draws ? closures_of_() : std::nullopt) {
+    newest_closures_ = *std::move(closures);
+    closures_.changed = true;
+  }
+  publish_states(is_silent);
+  publish_pieces();
+  if (!is_silent) publish_link();
+  sink_->flush();
+}
+
+void RosOutputNode::finish(std::span<const StampedPose> poses,
+                           std::optional<std::vector<PublishedClosure>> closures,
+                           const std::map<std::string, std::string>& files) {
+  if (closures && options_.draws) {
+    newest_closures_ = *std::move(closures);
+    closures_.changed = true;
+  }
+  path_.changed = path_.changed && poses.empty();
+  publish_states(true);
+  if (!poses.empty()) publish_path(poses);
+  publish_link();
+  for (const auto& [name, text] : files) sink_->attach(name, text);
+  sink_->finish();
+}
+
+}  // namespace km

@@ -1,0 +1,94 @@
+#include "modules/semantic_mapping/node/semantic_mapping_node.hpp"
+
+#include <utility>
+
+#include "runtime/log.hpp"
+#include "runtime/thread.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueuedFrames = 2;
+
+}  // namespace
+
+SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config, const Camera& camera,
+                                         const LabelPalette& palette, double mesh_interval_s,
+                                         Overflow overflow, const SemanticMappingTopics& topics)
+    : mapper_(config, camera, palette),
+      palette_(palette),
+      mesh_interval_s_(mesh_interval_s),
+      topics_(topics),
+      worker_(
+          kQueuedFrames, overflow,
+          [this](const auto& frame) {
+            work_in_background();
+            step(*frame);
+          },
+          SemanticMappingConfig::kSection) {
+  topics_.frames.subscribe([this](const auto& frame) { worker_.post(frame); });
+  topics_.superseded.subscribe([this](const auto& superseded) { superseded_.put(superseded); });
+}
+
+void SemanticMappingNode::stop() noexcept {
+  worker_.stop();
+  const bool nothing = progress_.integrated == 0 && !before_;
+  if (std::exchange(stopped_, true) || nothing || error()) return;
+  progress_.too_late = worker_.load().dropped;
+  publish_mesh();
+  progress_.size = mapper_.size();
+  topics_.progress.publish(progress_);
+  const MappingProgress& p = progress_;
+  log::info(name()) << p.integrated << " frames, " << p.size.vertices << " vertices, "
+                    << p.size.faces << " faces, " << p.size.dropped_faces
+                    << " more seen again and dropped; too late " << p.too_late;
+  if (p.wrong_size + p.bad_pose + p.off_palette_pixels + p.blocks_refused > 0)
+    log::warn(name()) << "skipped " << p.wrong_size << " frames of the wrong size and "
+                      << p.bad_pose << " without a usable pose; " << p.off_palette_pixels
+                      << " pixels with labels outside the palette; " << p.blocks_refused
+                      << " blocks beyond max_blocks";
+}
+
+void SemanticMappingNode::drop_superseded() {
+  const Topic<SupersededSurface>::Message superseded = superseded_.take();
+  if (superseded == nullptr) return;
+  const SurfaceDrop dropped = mapper_.drop(before_ ? before_->drop(*superseded) : *superseded);
+  log::debug(name()) << "dropped " << dropped.faces << " faces seen again";
+}
+
+void SemanticMappingNode::step(const DenseFrame& frame) {
+  drop_superseded();
+  count(frame,
+        mapper_.integrate(*frame.depth, frame.labels.get(), frame.T_odom_cam, frame.keyframe));
+  // The mesh is updated once for each keyframe, so that a vertex gets the first one that saw it.
+  if (meshed_ != frame.keyframe) mapper_.update_mesh();
+  meshed_ = frame.keyframe;
+  if (!published_) published_ = frame.stamp;
+  if (seconds_between(*published_, frame.stamp) >= mesh_interval_s_) {
+    published_ = frame.stamp;
+    publish_mesh();
+  }
+  progress_.size = mapper_.size();
+  topics_.progress.publish(progress_);
+}
+
+void SemanticMappingNode::count(const DenseFrame& frame, const IntegrationReport& report) {
+  const bool integrated = report.status == IntegrationStatus::kIntegrated;
+  progress_.integrated += integrated ? 1 : 0;
+  progress_.wrong_size += report.status == IntegrationStatus::kDepthSizeDiffers ? 1 : 0;
+  progress_.bad_pose += report.status == IntegrationStatus::kPoseUnusable ? 1 : 0;
+  progress_.unlabelled +=
+      integrated && (frame.labels == nullptr || report.label_size_differs) ? 1 : 0;
+  progress_.off_palette_pixels += report.off_palette_pixels;
+  progress_.blocks_refused += report.blocks_refused;
+  progress_.too_late = worker_.load().dropped;
+}
+
+void SemanticMappingNode::publish_mesh() {
+  mapper_.update_mesh();
+  MapMesh map = mapper_.mesh();
+  if (!map.mesh.labels.empty()) map.mesh.colour_by(palette_);
+  topics_.maps.publish(before_ ? before_->with(map) : std::move(map));
+}
+
+}  // namespace km

@@ -1,0 +1,163 @@
+#include "modules/sensors/node/sensors_node.hpp"
+
+#include <cmath>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+
+#include "modules/core/text_table.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+void log_lines(const std::string& text, std::string_view name) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) log::warn(name) << line;
+}
+
+}  // namespace
+
+SensorsNode::SensorsNode(const SensorsConfig& config, double rate,
+                         std::unique_ptr<DatasetReader> reader, const SensorsTopics& topics)
+    : reader_(std::move(reader)),
+      listed_(reader_->pair_count()),
+      is_live_(reader_->is_live()),
+      in_real_time_(is_live_ || std::isfinite(rate)),
+      shedding_(checked(config).max_lag_s),
+      clock_(rate),
+      topics_(topics),
+      worker_(
+          static_cast<std::size_t>(config.read_ahead), Overflow::kBlock,
+          [this](const Input& input) {
+            std::visit([this](const auto& message) { step(message); }, input);
+          },
+          "sensors") {
+  topics_.processed.subscribe([this](const auto& frame) {
+    const std::lock_guard lock(shedding_mutex_);
+    shedding_.finish(*frame);
+  });
+}
+
+void SensorsNode::start() {
+  worker_.start();
+  decoder_ = std::thread(&SensorsNode::decode, this);
+}
+
+void SensorsNode::stop() noexcept {
+  stopped_ = true;
+  reader_->stop();
+  clock_.stop();
+  worker_.stop();  // further posts are refused, which ends the decoder
+  if (!decoder_.joinable()) return;
+  decoder_.join();
+  take_faults();
+}
+
+void SensorsNode::decode() {
+  bool has_remarked = false;
+  try {
+    while (!stopped_) {
+      auto packet = [this] {
+        const Heartbeat::Step step(decoding_);
+        const auto scope = reading_.measure();
+        return reader_->next(
+            [this](Stamp stamp, Stamp arrival) { return choose_use(stamp, arrival); });
+      }();
+      if (!std::exchange(has_remarked, true))
+        for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
+      count_faults();
+      if (!packet) {
+        worker_.post(EndOfData{reader_->report()});
+        return;
+      }
+      if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
+    }
+  } catch (...) {
+    worker_.post(std::current_exception());  // ends the worker with this exception
+  }
+}
+
+void SensorsNode::count_faults() {
+  constexpr double kInterval_s = 5.0;
+  const double now_s = steady_now_s();
+  if (now_s - counted_s_ < kInterval_s) return;
+  counted_s_ = now_s;
+  take_faults();
+}
+
+// Also logs new faults of a live source, because it has no end at which to log them.
+void SensorsNode::take_faults() {
+  const ReaderReport report = reader_->report();
+  {
+    const std::lock_guard lock(faults_mutex_);
+    faults_ = report;
+  }
+  if (!reader_->is_live()) return;
+  const std::string faults = to_string(report);
+  if (faults != logged_faults_) log_lines(faults, name());
+  logged_faults_ = faults;
+}
+
+FrameUse SensorsNode::choose_use(Stamp stamp, Stamp arrival) {
+  if (!in_real_time_) return FrameUse::kAll;
+  const double due_s =
+      is_live_ ? 1e-9 * static_cast<double>(arrival) : clock_.due_s(stamp).value_or(0.0);
+  return choose_use(stamp, due_s, is_live_ ? wall_now_s() : steady_now_s());
+}
+
+FrameUse SensorsNode::choose_use(Stamp stamp, double due_s, double now_s) {
+  std::unique_lock lock(shedding_mutex_);
+  if (const double pause_s = is_live_ ? 0.0 : shedding_.pause_s(due_s, now_s); pause_s > 0.0) {
+    clock_.pause(pause_s);
+    shedding_.pause(pause_s);
+    due_s += pause_s;
+    paused_s_ += pause_s;
+    log::limited(log::Level::kWarn, name(), "pause")
+        << "processors are short: the recording has been paused for " << fixed(paused_s_, 1)
+        << " s in all";
+  }
+  const ShedLoad before = shedding_.load();
+  const FrameUse use = shedding_.use_next(stamp, due_s, now_s);
+  const ShedLoad now = shedding_.load();
+  lock.unlock();
+  if (now != before) report_load(before, now);
+  if (use == FrameUse::kNone) ++skipped_;
+  return use;
+}
+
+void SensorsNode::report_load(const ShedLoad& before, const ShedLoad& now) {
+  topics_.load.publish(now);
+  const bool is_more = now.stride > before.stride || (now.map && !before.map);
+  auto line = log::limited(is_more ? log::Level::kWarn : log::Level::kInfo, name(),
+                           is_more ? "shed" : "restored");
+  line << (is_more ? "processors are short: " : "processors are free again: ");
+  if (now.stride > 1)
+    line << (now.map && !before.map ? "the map gets no new frames, " : "")
+         << "odometry gets one of " << now.stride << " images";
+  else if (before.stride > 1)
+    line << "odometry gets every image";
+  else
+    line << (now.map ? "the map gets no new frames" : "the map gets new frames");
+}
+
+void SensorsNode::step(const Packet& packet) {
+  const bool is_due = [&] {
+    if (is_live_) return !stopped_;
+    const Heartbeat::Waiting waiting;
+    return clock_.wait_until(packet->frame->stamp);
+  }();
+  if (!is_due) return;
+  topics_.packets.publish(packet);
+  ++published_;
+}
+
+void SensorsNode::step(const EndOfData& data) {
+  if (stopped_) return;
+  log_lines(to_string(data.faults), name());
+  log::info(name()) << "end of data: " << published_ << " frames, " << skipped_ << " skipped";
+  topics_.end.publish(SensorsEnd{published_, skipped_, paused_s(), data.faults});
+}
+
+}  // namespace km

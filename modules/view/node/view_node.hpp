@@ -1,0 +1,142 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/closure_verdicts.hpp"
+#include "modules/core/tracked_image.hpp"
+#include "modules/mesh/chunk_schedule.hpp"
+#include "modules/view/node/view_channel_codec.hpp"
+#include "modules/view/view_config.hpp"
+#include "modules/view/view_selector.hpp"
+#include "runtime/dds/participant.hpp"
+#include "runtime/dds/peer_table.hpp"
+#include "runtime/node.hpp"
+#include "runtime/periodic.hpp"
+#include "runtime/token_bucket.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Channels with the inputs for viewers; they must outlive the node.
+struct ViewTopics {
+  In<OdometryState> odometry;
+  In<KeyframeOdometry> keyframes;
+  In<ClosureOutcome> outcomes, restored_outcomes;
+  In<Closure> closures;  ///< Closures of both ends.
+  In<ClosureJudgements> judgements;
+  In<PoseChanges> pose_changes;
+  In<RobotSample> samples;
+  In<PeerEvent> restarts;
+  In<TrackedImage> images;
+};
+
+/// Parameters for splitting the mesh into chunks.
+struct ViewMesh {
+  ChunkGrid grid;
+  double min_move_m = 0.01;  ///< See differ().
+};
+
+/// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's
+/// domain. It sends the updates of a ViewSelector, the mesh in chunks, and camera images on
+/// request. Images have a rate, other topics a budget. While a topic has no reader, the node only
+/// keeps the newest inputs. No node waits for a viewer; updates that DDS cannot accept are lost.
+class ViewNode final : public Node {
+ public:
+  /// `participant` outlives this. Throws ConfigError if `config` is out of bounds. `camera` belongs
+  /// to the images; without it no images are sent.
+  ViewNode(const ViewConfig& config, const DdsParticipant& participant, const ViewMesh& mesh,
+           const std::optional<Camera>& camera, const ViewTopics& topics);
+  ~ViewNode() override { stop(); }
+
+  /// Replaces the mesh, given in the frame of the robot `anchor`. Thread-safe; does not wait.
+  void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
+
+  std::string_view name() const override { return ViewConfig::kSection; }
+  void start() override;
+  /// Sends the remaining updates: at most two seconds at ViewConfig::past_bytes_per_s, and ten
+  /// seconds at mesh_bytes_per_s for the mesh.
+  void stop() noexcept override;
+  std::exception_ptr error() const override;
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  DurationHistogram timing() const override { return worker_.timing(); }
+  /// Large, because a slow link may block the socket for as long.
+  double step_limit_s() const override { return 120.0; }
+
+  struct Tick {};
+  struct MeshOffer {
+    RobotId anchor = 0;
+    std::shared_ptr<const LabelledMesh> mesh;
+  };
+  using Input = std::variant<Tick, MeshOffer, Topic<OdometryState>::Message,
+                             Topic<KeyframeOdometry>::Message, Topic<ClosureOutcome>::Message,
+                             Topic<Closure>::Message, Topic<ClosureJudgements>::Message,
+                             Topic<PoseChanges>::Message, Topic<RobotSample>::Message,
+                             Topic<PeerEvent>::Message, Topic<TrackedImage>::Message>;
+
+  /// Stores an input; a Tick sends the updates that are due by the steady clock. The thread calls
+  /// only this.
+  void step(const Input& input);
+
+  /// Sends the updates that are due at `now_s`.
+  void send_due(double now_s);
+
+  /// Bytes sent on that channel since the start. Thread-safe.
+  [[nodiscard]] std::size_t sent_bytes(ViewChannel channel) const;
+
+ private:
+  /// One channel with its byte budget and the bytes it has sent.
+  struct Channel {
+    ViewWriter writer;
+    TokenBucket budget;
+    std::atomic<std::size_t> sent_bytes = 0;
+  };
+
+  // Each take() stores an input, except for a Tick, which sends.
+  void take(const Tick& tick);
+  void take(const MeshOffer& offer);
+  void take(const Topic<PeerEvent>::Message& event);
+  void take(const Topic<TrackedImage>::Message& image);
+  template <typename T>
+  void take(const std::shared_ptr<const T>& message) {
+    selector_.add(*message);
+  }
+
+  [[nodiscard]] Channel& on(ViewChannel channel) {
+    return channels_[static_cast<std::size_t>(channel)];
+  }
+  [[nodiscard]] TokenBucket& view_budget();
+  void send_view(double now_s);
+  void send_mesh(double now_s);
+  void cut_mesh(double now_s);
+  void send_rest();
+  std::size_t write(Channel& channel, const ViewContent& content);
+
+  const ViewConfig config_;
+  const RobotId self_;
+  const ViewMesh mesh_settings_;
+  const std::optional<Camera> camera_;
+  std::array<Channel, 3> channels_;
+  TokenBucket past_budget_;  // Budget of kView while earlier data are sent.
+  ViewSelector selector_;
+  MeshOffer mesh_;      // The newest mesh.
+  bool is_cut_ = true;  // True if `mesh_` is in the schedule.
+  double cut_due_s_ = 0.0;
+  bool sends_mesh_ = false;  // True if the mesh channel has a reader.
+  ChunkSchedule schedule_;
+  std::atomic<bool> are_images_asked_ = false;
+  bool stopped_ = false;
+  Worker<Input> worker_;
+  Periodic ticks_;  // Last member: it stops before the worker to which it posts.
+};
+
+}  // namespace km

@@ -1,0 +1,127 @@
+#include "modules/vio/node/vio_node.hpp"
+
+#include <optional>
+#include <utility>
+
+#include "modules/core/text_table.hpp"
+#include "runtime/log.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueuedPackets = 4;  // 0.2 s at 20 Hz
+
+const char* text(VioProblem problem) {
+  switch (problem) {
+    case VioProblem::kNone:
+      return "no problem";
+    case VioProblem::kNoImage:
+      return "packet without images of the right size, refused";
+    case VioProblem::kUnorderedImage:
+      return "image not later than the one before, refused";
+    case VioProblem::kBadSamples:
+      return "inertial samples out of order or beyond what sensors measure, refused";
+    case VioProblem::kInertialGap:
+      return "gap in the inertial samples: the motion is estimated from images alone, or odometry "
+             "starts again";
+    case VioProblem::kDiverged:
+      return "estimate diverged, starting again from the last pose";
+    case VioProblem::kStartTimeout:
+      return "cannot start, giving up the oldest images held back";
+  }
+  return "unknown problem";
+}
+
+const char* text(StartStatus status) {
+  switch (status) {
+    case StartStatus::kAtRest:
+      return "started at rest";
+    case StartStatus::kInMotion:
+      return "started in motion";
+    case StartStatus::kContinues:
+      return "continues from the last keyframe";
+    case StartStatus::kTooFewImages:
+      return "too few images to start";
+    case StartStatus::kTooFewFeatures:
+      return "too few features to start";
+    case StartStatus::kInconsistent:
+      return "stereo and inertial data disagree, no start";
+  }
+  return "unknown start";
+}
+
+// Share of the features of the previous image that are still tracked. Crowded features are not
+// counted, because they lie at features that are still tracked.
+std::optional<double> tracked_share(const TrackerStatistics& s) {
+  const int before = s.tracked + s.lost + s.backward + s.motion;
+  if (before == 0) return std::nullopt;
+  return static_cast<double>(s.tracked) / before;
+}
+
+}  // namespace
+
+VioNode::VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
+                 const VioConfig& config, const VioTopics& topics)
+    : vio_(robot, rig, tracker, config),
+      topics_(topics),
+      worker_(
+          kQueuedPackets, Overflow::kBlock, [this](const auto& packet) { step(*packet); },
+          VioConfig::kSection) {
+  topics_.packets.subscribe([this](const auto& packet) { worker_.post(packet); });
+}
+
+void VioNode::stop() noexcept {
+  worker_.stop();
+  if (stopped_) return;
+  stopped_ = true;
+  const VioStatistics& s = vio_.statistics();
+  log::info(name()) << s.images << " images, " << s.images_without_pose << " without a pose, "
+                    << s.starts << " starts in " << s.start_attempts << " attempts, "
+                    << s.divergences << " divergences, " << s.gaps << " inertial gaps, " << s.rests
+                    << " rests, vision lost " << s.vision_losses << " times, for "
+                    << fixed(s.blind_s, 1) << " s; refused " << s.refused_images << " images, "
+                    << s.refused_samples << " samples";
+}
+
+void VioNode::step(const SensorPacket& packet) {
+  VioResult result = vio_.process(packet);
+  report(result, packet.frame ? packet.frame->stamp : 0);
+  for (const OdometryState& state : result.states) topics_.odometry.publish(state);
+  for (const KeyframeOdometry& keyframe : result.keyframes) topics_.keyframes.publish(keyframe);
+  for (const LocatedFrame& frame : result.frames) topics_.frames.publish(frame);
+  if (result.problem != VioProblem::kNone || result.start || result.vision ||
+      vio_.statistics().blind_s > blind_s_)
+    topics_.statistics.publish(vio_.statistics());
+  blind_s_ = vio_.statistics().blind_s;
+  if (result.problem != VioProblem::kNoImage && result.problem != VioProblem::kUnorderedImage)
+    topics_.images.publish(TrackedImage{packet.frame, std::move(result.tracked)});
+  if (packet.frame)
+    topics_.processed.publish(ProcessedFrame{packet.frame->stamp, tracked_share(result.tracking)});
+}
+
+void VioNode::log_event(const VisionEvent& event) const {
+  const std::string since = fixed(1e-9 * static_cast<double>(event.since), 3) + " s";
+  if (event.is_lost)
+    log::warn(name()) << "vision lost since " << since << ", " << event.features
+                      << " features: the pose is by inertial sensing alone";
+  else
+    log::info(name()) << "vision lost since " << since << " is back after "
+                      << fixed(event.lasted_s, 2) << " s, " << event.features << " features";
+}
+
+void VioNode::report(const VioResult& result, Stamp stamp) const {
+  if (result.problem != VioProblem::kNone)
+    log::limited(log::Level::kWarn, name(), text(result.problem))
+        << "at " << stamp << " ns: " << text(result.problem);
+  if (result.vision) log_event(*result.vision);
+  if (!result.start) return;
+  if (*result.start == StartStatus::kContinues)
+    log::info(name()) << text(*result.start);
+  else if (started(*result.start))
+    log::info(name()) << text(*result.start) << " with " << result.states.size() << " images";
+  else
+    log::limited(log::Level::kWarn, name(), text(*result.start))
+        << "at " << stamp << " ns: " << text(*result.start);
+}
+
+}  // namespace km
