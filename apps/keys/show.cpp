@@ -23,13 +23,13 @@ Rows header() {
 }
 
 std::vector<std::string> row_of(const Certificate& certificate, const Revocations& revocations) {
-  const char* const lapse = lapse_of(certificate, revocations, now_s());
+  const char* const reason = why_invalid(certificate, revocations, now_s());
   return {certificate.name,
           std::to_string(certificate.robot),
           fingerprint_of(certificate.key),
           time_text(certificate.valid_from_s),
           time_text(certificate.valid_until_s),
-          lapse == nullptr ? "holds" : lapse};
+          reason == nullptr ? "holds" : reason};
 }
 
 // If the folder of a robot exists on this host, prints its faults, and a reminder to delete it.

@@ -40,12 +40,12 @@ RosDiagnosticStatus team_status(const OptimizerProgress& progress) {
   status.values = {{"frame of robot", std::to_string(progress.anchor)},
                    {"optimises with robots", list(progress.members)},
                    {"tentative robots", list(progress.tentative)},
-                   {"robots in another frame", list(progress.untied)}};
-  const bool is_certain = progress.tentative.empty() && progress.untied.empty();
+                   {"robots in another frame", list(progress.not_joined)}};
+  const bool is_certain = progress.tentative.empty() && progress.not_joined.empty();
   status.level = is_certain ? RosDiagnosticStatus::kOk : RosDiagnosticStatus::kWarn;
-  status.message = is_certain                ? "ok"
-                   : progress.untied.empty() ? "a single place ties robots to this one"
-                                             : "no accepted closure ties robots to this one";
+  status.message = is_certain                    ? "ok"
+                   : progress.not_joined.empty() ? "a single place ties robots to this one"
+                                                 : "no accepted closure ties robots to this one";
   return status;
 }
 

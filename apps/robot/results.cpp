@@ -236,7 +236,7 @@ RunSummary summary_of(const RunRecord& record) {
                  .settled = progress.settled,
                  .members = progress.members,
                  .tentative = progress.tentative,
-                 .untied = progress.untied,
+                 .not_joined = progress.not_joined,
                  .odometry_rotation_noise = progress.odometry_rotation_noise,
                  .odometry_translation_noise = progress.odometry_translation_noise,
                  .odometry_breaks = progress.odometry_breaks};

@@ -250,7 +250,7 @@ class Watch {
   bool leave_notice_sent(double now_s) {
     if (!leaving_since_s_) {
       leaving_since_s_ = now_s;
-      robot_.set_settled({RobotPhase::kLeaving, kManyLinks});
+      robot_.set_settled({RobotPhase::kLeaving, kMaxSettledLinks});
       sample(now_s);
       robot_.freeze_record();
     }
@@ -415,8 +415,8 @@ void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRe
   for (const char* name : {"config.yaml", "keyframes.csv", "loop_closures.csv"})
     if (is_file(options.output / name)) files[name] = read_input_file(options.output / name);
   node.finish(record.optimized(), published_closures(record), files);
-  if (node.left_out() > 0)
-    log::warn("record") << node.left_out() << " messages and images are missing in "
+  if (node.dropped() > 0)
+    log::warn("record") << node.dropped() << " messages and images are missing in "
                         << options.record->string() << ": they came faster than they were written";
 }
 

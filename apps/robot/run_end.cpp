@@ -26,7 +26,7 @@ std::string why_no_pose(const ImageCounts& images) {
 
 // settled_links of a settled robot: one more than the smallest value among its present peers.
 std::uint8_t settled_links(std::span<const Departure::Present> peers) {
-  std::uint8_t links = kManyLinks;
+  std::uint8_t links = kMaxSettledLinks;
   for (const Departure::Present& peer : peers)
     if (peer.phase != RobotPhase::kLeaving && peer.settled_links < links)
       links = static_cast<std::uint8_t>(peer.settled_links + 1);
@@ -49,7 +49,7 @@ Departure::Present Departure::update(double now_s, const Inputs& inputs) {
   // The distance in links to a robot that is not received is at most the number of such robots plus
   // one.
   const bool all_settled =
-      peers_settled && links > std::min(inputs.not_received + 1, std::size_t{kManyLinks} - 1);
+      peers_settled && links > std::min(inputs.not_received + 1, std::size_t{kMaxSettledLinks} - 1);
   if (!all_settled) all_settled_s_.reset();
   if (all_settled && !all_settled_s_) all_settled_s_ = now_s;
   // A peer that leaves has waited for all others.

@@ -105,7 +105,7 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
     const OptimizerSummary& pgo = run.summary.pgo;
     const auto is_joined = [&](RobotId robot) {
       return std::ranges::find(pgo.members, robot) != pgo.members.end() &&
-             std::ranges::find(pgo.untied, robot) == pgo.untied.end();
+             std::ranges::find(pgo.not_joined, robot) == pgo.not_joined.end();
     };
     for (const auto& [other, name] : names) {
       if (other == self || is_joined(other)) continue;

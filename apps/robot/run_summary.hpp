@@ -36,7 +36,7 @@ struct OptimizerSummary {
   std::optional<RobotId> anchor;  ///< Robot whose frame the poses are in.
   bool settled = false;
   std::vector<RobotId> members;
-  std::vector<RobotId> tentative = {}, untied = {};  ///< Members; see OptimizerProgress.
+  std::vector<RobotId> tentative = {}, not_joined = {};  ///< Members; see OptimizerProgress.
   /// Ratio of the actual noise of odometry to the stated one.
   double odometry_rotation_noise = 1.0, odometry_translation_noise = 1.0;
   std::uint64_t odometry_breaks = 0;  ///< Wrong steps of odometry that closures corrected.
@@ -50,7 +50,7 @@ struct OptimizerSummary {
     visitor.field("settled", settled);
     visitor.field("members", members);
     visitor.field("tentative", tentative);
-    visitor.field("untied", untied);
+    visitor.field("not_joined", not_joined);
     visitor.field("odometry_rotation_noise", odometry_rotation_noise);
     visitor.field("odometry_translation_noise", odometry_translation_noise);
     visitor.field("odometry_breaks", odometry_breaks);

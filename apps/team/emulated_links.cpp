@@ -66,7 +66,7 @@ void EmulatedLinks::stop() {
 void EmulatedLinks::carry() {
   while (!stopped_) {
     const double now_s = steady_now_s() - start_s_;
-    for (const LinkDelivery& delivery : emulator_.due(now_s)) deliver(delivery);
+    for (const SentFrame& delivery : emulator_.due(now_s)) deliver(delivery);
     for (std::size_t robot = 0; robot < networks_.size(); ++robot) take_frames(robot, now_s);
     const auto next_s = emulator_.next_s();
     if (next_s)
@@ -86,7 +86,7 @@ void EmulatedLinks::take_frames(std::size_t robot, double now_s) {
   }
 }
 
-void EmulatedLinks::deliver(const LinkDelivery& delivery) {
+void EmulatedLinks::deliver(const SentFrame& delivery) {
   const EthernetFrame& frame = delivery.frame;
   const ssize_t n = write(networks_[delivery.to].frames(), frame.data(), frame.size());
   // As on a wire, a robot that is too slow to take a frame, or has its interface down, loses it.

@@ -32,7 +32,7 @@ class EmulatedLinks {
  private:
   void carry();
   void take_frames(std::size_t robot, double now_s);
-  void deliver(const LinkDelivery& delivery);
+  void deliver(const SentFrame& delivery);
   void wait_for_frames(std::optional<double> due_in_s);
   void stop();
 

@@ -1,5 +1,6 @@
 #include "apps/viewer/page_server.hpp"
 
+#include <arpa/inet.h>
 #include <civetweb.h>
 #include <sodium.h>
 
@@ -27,9 +28,18 @@ namespace {
 
 constexpr std::size_t kBatchBytes = 1 << 18;
 constexpr double kWait_s = 0.2;
+// Each open connection occupies one thread of the server. A connection is closed if no request
+// arrives for kIdle_ms, or if a page does not read for so long. Otherwise idle connections would
+// keep pages waiting for the default of 30 s.
+constexpr const char* kConnections = "64";
+constexpr const char* kIdle_ms = "10000";
 
+// False for names that only begin like an address, as 127.example.com.
 bool is_loopback(const std::string& address) {
-  return address.starts_with("127.") || address == "localhost" || address == "::1";
+  in_addr ip{};
+  constexpr std::uint32_t kFirstOctet = 127;
+  return address == "localhost" || address == "::1" ||
+         (inet_pton(AF_INET, address.c_str(), &ip) == 1 && ntohl(ip.s_addr) >> 24U == kFirstOctet);
 }
 
 // 128 random bits as hexadecimal digits.
@@ -123,10 +133,12 @@ class PageServer::Impl {
                                  ? '[' + options_.address + ']'
                                  : options_.address;
     const std::string port = host + ':' + std::to_string(options_.port);
-    const std::array<const char*, 13> settings = {"listening_ports",
+    const std::array<const char*, 15> settings = {"listening_ports",
                                                   port.c_str(),
                                                   "num_threads",
-                                                  "24",
+                                                  kConnections,
+                                                  "request_timeout_ms",
+                                                  kIdle_ms,
                                                   "websocket_timeout_ms",
                                                   "10000",
                                                   "enable_websocket_ping_pong",
@@ -161,7 +173,7 @@ class PageServer::Impl {
     mg_set_websocket_handler(
         context_, (prefix() + "updates").c_str(),
         [](const mg_connection* connection, void* self) {
-          return static_cast<Impl*>(self)->is_welcome(connection) ? 0 : 1;
+          return static_cast<Impl*>(self)->is_allowed(connection) ? 0 : 1;
         },
         [](mg_connection* connection, void* self) { static_cast<Impl*>(self)->open(connection); },
         [](mg_connection* connection, int bits, char* data, size_t size, void* self) {
@@ -176,7 +188,7 @@ class PageServer::Impl {
 
   // False for requests from pages of other sites. Without a token, also false for requests under a
   // name that is not one of this host.
-  bool is_welcome(const mg_connection* connection) const {
+  bool is_allowed(const mg_connection* connection) const {
     const std::string_view host = header(connection, "Host"), origin = header(connection, "Origin");
     if (!origin.empty() && origin != "http://" + std::string(host)) return false;
     const std::string name = host_of(host);
@@ -185,7 +197,7 @@ class PageServer::Impl {
 
   int serve(mg_connection* connection) const {
     const std::string uri = mg_get_request_info(connection)->local_uri;
-    if (!is_welcome(connection) || !uri.starts_with(prefix())) return refuse(connection);
+    if (!is_allowed(connection) || !uri.starts_with(prefix())) return refuse(connection);
     std::string path = uri.substr(prefix().size());
     if (path.empty()) path = "index.html";
     for (const PageFile& file : page_files()) {
@@ -266,7 +278,7 @@ class PageServer::Impl {
     const auto page = pages_.find(connection);
     if (page == pages_.end()) return;
     std::set<RobotId>& images = page->second->images;
-    ask([&] {
+    change_requests([&] {
       if (request->on)
         images.insert(request->robot);
       else
@@ -277,14 +289,14 @@ class PageServer::Impl {
   // Applies `change` to the requests of pages. Calls on_images if the set of robots whose images
   // are requested has changed. The caller holds mutex_, so that the calls are in the order of the
   // changes.
-  void ask(const std::function<void()>& change) {
-    const std::set<RobotId> before = wanted();
+  void change_requests(const std::function<void()>& change) {
+    const std::set<RobotId> before = requested();
     change();
-    if (const std::set<RobotId> now = wanted(); options_.on_images && now != before)
+    if (const std::set<RobotId> now = requested(); options_.on_images && now != before)
       options_.on_images(now);
   }
 
-  std::set<RobotId> wanted() const {
+  std::set<RobotId> requested() const {
     std::set<RobotId> robots;
     for (const auto& [connection, page] : pages_)
       robots.insert(page->images.begin(), page->images.end());
@@ -298,7 +310,7 @@ class PageServer::Impl {
       const auto known = pages_.find(connection);
       if (known == pages_.end()) return;
       page = known->second;
-      ask([&] { pages_.erase(known); });
+      change_requests([&] { pages_.erase(known); });
     }
     page->closed = true;
     page->sender.join();

@@ -153,7 +153,7 @@ std::vector<fs::path> folders_of_robots(const fs::path& folder) {
 }
 
 // Shifts the times of all updates so that the first is `begin`, and shortens pauses to kMaxPause_s.
-void move_to(Stamp begin, std::vector<ViewUpdate>& updates) {
+void shift_and_shorten(Stamp begin, std::vector<ViewUpdate>& updates) {
   const Stamp most = nanoseconds(kMaxPause_s);
   Stamp before = updates.empty() ? 0 : updates.front().sent, now = begin;
   for (ViewUpdate& update : updates) {
@@ -186,7 +186,7 @@ RunPlayback read_run(const fs::path& folder, Stamp begin) {
     throw std::runtime_error(run.notes.empty() ? folder.string() + ": the journals are empty"
                                                : run.notes.front());
   std::ranges::stable_sort(run.updates, {}, &ViewUpdate::sent);
-  move_to(begin, run.updates);
+  shift_and_shorten(begin, run.updates);
   return run;
 }
 

@@ -21,8 +21,8 @@ namespace {
 constexpr std::size_t kQueue = 10000;         // as in the record of a robot
 constexpr double kState_bytes_per_s = 200e3;  // rate of uncompressed paths, meshes and closures
 constexpr int kMeshPoints = 200000;
-constexpr double kMeshPeriod_s = 5.0;  // because merging the chunks of a mesh takes long
-constexpr double kSteady_s = 1.0;      // poses farther apart in time give no velocity
+constexpr double kMeshPeriod_s = 5.0;           // because merging the chunks of a mesh takes long
+constexpr double kMaxVelocityInterval_s = 1.0;  // poses farther apart in time give no velocity
 
 RosDiagnosticStatus status_of(const RobotSample& state) {
   RosDiagnosticStatus status;
@@ -192,7 +192,7 @@ class ViewRecorder::Robot {
     publish_mesh(palette, steady_now_s());
     node_->stop();
     node_->finish({}, std::exchange(closures_now_, std::nullopt), {});
-    return node_->left_out();
+    return node_->dropped();
   }
 
   const std::uint64_t boot;
@@ -204,7 +204,7 @@ class ViewRecorder::Robot {
   void publish_state(Stamp stamp, const SE3& T_odom_body) {
     OdometryState state{.stamp = stamp, .T_odom_body = T_odom_body};
     const double dt_s = newest_ ? seconds_between(newest_->stamp, stamp) : 0.0;
-    if (dt_s > 0.0 && dt_s < kSteady_s)
+    if (dt_s > 0.0 && dt_s < kMaxVelocityInterval_s)
       state.v_odom = (T_odom_body.translation() - newest_->T.translation()) / dt_s;
     if (!newest_ || dt_s > 0.0) newest_ = StampedPose{stamp, T_odom_body};
     odometry_topic_.publish(std::move(state));
@@ -317,7 +317,7 @@ std::vector<PublishedClosure> ViewRecorder::closures_of(const Robot& robot) cons
 
 void ViewRecorder::finish_robot(Robot& robot) {
   if (closures_changed_) robot.publish_closures(closures_of(robot));
-  lost_ += robot.finish(palette_);
+  missing_updates_ += robot.finish(palette_);
 }
 
 void ViewRecorder::finish() {
@@ -327,10 +327,10 @@ void ViewRecorder::finish() {
   for (auto& [id, robot] : robots_) finish_robot(*robot);
   const std::lock_guard lock(file_->mutex);
   file_->sink.finish();
-  lost_ += worker_.load().dropped;
+  missing_updates_ += worker_.load().dropped;
   if (!file_->failure.empty()) throw std::runtime_error(file_->failure);
-  if (lost_ > 0)
-    throw std::runtime_error("the record lacks " + std::to_string(lost_) +
+  if (missing_updates_ > 0)
+    throw std::runtime_error("the record lacks " + std::to_string(missing_updates_) +
                              " updates: they came faster than they were written");
 }
 

@@ -54,8 +54,8 @@ class ViewRecorder {
   mutable std::mutex mutex_;  // guards names_
   std::map<RobotId, std::string> names_;
   std::map<RobotId, std::unique_ptr<Robot>> robots_;
-  bool closures_changed_ = false;  // true if closures or the poses of their keyframes changed
-  std::size_t lost_ = 0;           // number of updates that the record lacks
+  bool closures_changed_ = false;    // true if closures or the poses of their keyframes changed
+  std::size_t missing_updates_ = 0;  // number of updates that the record lacks
   Worker<Input> worker_;
   Periodic clock_;  // last member: stops first
 };

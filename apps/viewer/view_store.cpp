@@ -57,7 +57,7 @@ void ViewStore::add(ViewUpdate update) {
   messages_.push_back(std::make_shared<const PageMessage>(page_message(update, number)));
   bytes_ += messages_.back()->bytes.size();
   if (key) supersede(*key, {number, hash});
-  forget_until_it_fits();
+  drop_until_it_fits();
   added_.notify_all();
 }
 
@@ -100,7 +100,7 @@ void ViewStore::supersede(const Key& key, const Newest& newest) {
   known->second = newest;
 }
 
-void ViewStore::forget_until_it_fits() {
+void ViewStore::drop_until_it_fits() {
   for (auto& queue : superseded_)
     while (bytes_ > max_bytes_ && !queue.empty()) {
       if (messages_[queue.front()]) {  // null: the message was refused on arrival

@@ -68,7 +68,7 @@ class ViewStore {
   bool is_known(const std::optional<Key>& key, std::size_t hash) const;
   bool remove_known_closures(RobotId robot, ViewClosures& all);
   void supersede(const Key& key, const Newest& newest);
-  void forget_until_it_fits();
+  void drop_until_it_fits();
   void drop(std::uint64_t number);
 
   const std::size_t max_bytes_;

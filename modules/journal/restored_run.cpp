@@ -23,8 +23,8 @@ bool is_final(const ClosureOutcome& outcome) {
 // Keyframe `number` (from 1) of the `count` keyframes lost between `before` and `next`. The last of
 // them has its exact pose, because `next` states the step from it. The others have the rotation of
 // the last one, and interpolated positions.
-KeyframeOdometry between(const KeyframeOdometry* before, const KeyframeOdometry& next,
-                         std::size_t number, std::size_t count) {
+KeyframeOdometry lost_keyframe(const KeyframeOdometry* before, const KeyframeOdometry& next,
+                               std::size_t number, std::size_t count) {
   KeyframeOdometry lost = next;
   const SE3 T_odom_last = next.T_odom_kf * next.T_previous_kf.inverse();
   const SE3 T_odom_before = before != nullptr ? before->T_odom_kf : T_odom_last;
@@ -75,7 +75,7 @@ void RunRestorer::add(OdometryState state) {
 // True if keyframe `id` is the next one after those of `before`. False if damage of the journal can
 // explain that keyframes between them are missing. Otherwise throws.
 template <typename T>
-bool RunRestorer::follows(const KeyframeId& id, const std::vector<T>& before) const {
+bool RunRestorer::is_next(const KeyframeId& id, const std::vector<T>& before) const {
   const std::size_t next = before.size();
   if (id == KeyframeId{run_.robot, static_cast<KeyframeIndex>(next)}) return true;
   const bool is_gap = id.robot == run_.robot && id.index > next && id.index - next <= kMostLost;
@@ -84,11 +84,11 @@ bool RunRestorer::follows(const KeyframeId& id, const std::vector<T>& before) co
 }
 
 void RunRestorer::add(KeyframeOdometry keyframe) {
-  if (!follows(keyframe.id, run_.odometry)) {
+  if (!is_next(keyframe.id, run_.odometry)) {
     const std::size_t first = run_.odometry.size(), count = keyframe.id.index - first;
     for (std::size_t k = 1; k <= count; ++k) {
       const KeyframeOdometry* const before = first > 0 ? &run_.odometry[first - 1] : nullptr;
-      KeyframeOdometry lost = between(before, keyframe, k, count);
+      KeyframeOdometry lost = lost_keyframe(before, keyframe, k, count);
       lost.T_previous_kf = run_.odometry.empty()
                                ? lost.T_odom_kf
                                : run_.odometry.back().T_odom_kf.inverse() * lost.T_odom_kf;
@@ -100,7 +100,7 @@ void RunRestorer::add(KeyframeOdometry keyframe) {
 }
 
 void RunRestorer::add(Keyframe keyframe) {
-  if (!follows(keyframe.odometry.id, run_.keyframes)) {
+  if (!is_next(keyframe.odometry.id, run_.keyframes)) {
     Keyframe lost = keyframe;
     lost.features.keypoints.clear();
     lost.features.descriptors.clear();

@@ -66,9 +66,9 @@ class RunRestorer {
   void add(const RobotSample& /*sample*/) {}
   void add(const MeshCells& /*cells*/) {}
   template <typename T>
-  bool follows(const KeyframeId& id, const std::vector<T>& before) const;
+  bool is_next(const KeyframeId& id, const std::vector<T>& before) const;
   void cut_to_full_keyframes();
-  void forget(RobotId peer, KeyframeIndex from);
+  void forget(RobotId robot, KeyframeIndex from);
   void finish_decisions();
   void finish_solution();
 

@@ -81,7 +81,7 @@ void LinkEmulator::send_over(std::size_t from, std::size_t to, double now_s,
   const auto lose = [&](LinkLoss why) {
     state.counts.lost[static_cast<std::size_t>(why)].add(frame);
   };
-  if (const auto why = cut(link, from, to, now_s)) return lose(*why);
+  if (const auto why = loss_of(link, from, to, now_s)) return lose(*why);
   double dequeued_s = now_s;
   if (link.trace.has_limit()) {
     const double begin = std::max(state.queue_end, link.trace.capacity_until(now_s));
@@ -92,11 +92,11 @@ void LinkEmulator::send_over(std::size_t from, std::size_t to, double now_s,
   }
   if (chance < link.loss) return lose(LinkLoss::kChance);
   const double due_s = dequeued_s + link.trace.delay_s(dequeued_s) + jitter_s;
-  in_flight_.emplace(due_s, LinkDelivery{from, to, now_s, due_s, frame});
+  in_flight_.emplace(due_s, SentFrame{from, to, now_s, due_s, frame});
 }
 
-std::optional<LinkLoss> LinkEmulator::cut(const LinkPlan& link, std::size_t from, std::size_t to,
-                                          double now_s) const {
+std::optional<LinkLoss> LinkEmulator::loss_of(const LinkPlan& link, std::size_t from,
+                                              std::size_t to, double now_s) const {
   const auto parts = [&](const LinkPartition& partition) {
     return partition.when.contains(now_s) && partition.group_of[from] != partition.group_of[to];
   };
@@ -119,11 +119,11 @@ Eigen::Vector3d LinkEmulator::position(std::size_t robot, double now_s) const {
   return a.p_world + share * (b.p_world - a.p_world);
 }
 
-std::vector<LinkDelivery> LinkEmulator::due(double now_s) {
-  std::vector<LinkDelivery> deliveries;
+std::vector<SentFrame> LinkEmulator::due(double now_s) {
+  std::vector<SentFrame> deliveries;
   const auto end = in_flight_.upper_bound(now_s);
   for (auto it = in_flight_.begin(); it != end; ++it) {
-    LinkDelivery& delivery = it->second;
+    SentFrame& delivery = it->second;
     LinkCounts& counts = states_[delivery.from * script_.robots + delivery.to].counts;
     const double delay_s = now_s - delivery.sent_s;
     counts.delivered.add(delivery.frame);

@@ -77,7 +77,7 @@ using EthernetFrame = std::string;
 [[nodiscard]] std::array<std::uint8_t, 6> ethernet_address(std::size_t robot);
 
 /// A frame on its way, or one that has arrived.
-struct LinkDelivery {
+struct SentFrame {
   std::size_t from = 0;
   std::size_t to = 0;
   double sent_s = 0.0;
@@ -132,7 +132,7 @@ class LinkEmulator {
 
   /// The frames that are due, in the order of their times; frames due at one time are in the order
   /// of sending.
-  [[nodiscard]] std::vector<LinkDelivery> due(double now_s);
+  [[nodiscard]] std::vector<SentFrame> due(double now_s);
 
   /// Time at which the next frame is due; nullopt if no frame is on its way or none ever arrives.
   [[nodiscard]] std::optional<double> next_s() const;
@@ -148,14 +148,14 @@ class LinkEmulator {
     LinkCounts counts = {};
   };
   void send_over(std::size_t from, std::size_t to, double now_s, const EthernetFrame& frame);
-  [[nodiscard]] std::optional<LinkLoss> cut(const LinkPlan& link, std::size_t from, std::size_t to,
-                                            double now_s) const;
+  [[nodiscard]] std::optional<LinkLoss> loss_of(const LinkPlan& link, std::size_t from,
+                                                std::size_t to, double now_s) const;
   [[nodiscard]] Eigen::Vector3d position(std::size_t robot, double now_s) const;
 
   LinkScript script_;
-  std::vector<State> states_;                      // states in the order of the script's links
-  std::multimap<double, LinkDelivery> in_flight_;  // deliveries by time; those of equal time in
-                                                   // the order of insertion
+  std::vector<State> states_;                   // states in the order of the script's links
+  std::multimap<double, SentFrame> in_flight_;  // deliveries by time; those of equal time in
+                                                // the order of insertion
 };
 
 /// A table of the frames of each ordered pair of robots, with their `names`.

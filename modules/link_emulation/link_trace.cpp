@@ -30,7 +30,7 @@ std::pair<std::size_t, std::string> problem_of(const std::vector<LinkTraceRow>& 
 
 // Bytes that the link can carry in the time `dt_s` after row `a`, if its rate changes by `slope`
 // [bytes/s^2].
-double carried(const LinkTraceRow& a, double slope, double dt_s) {
+double capacity_over(const LinkTraceRow& a, double slope, double dt_s) {
   return dt_s * (a.bytes_per_s + 0.5 * slope * dt_s);
 }
 
@@ -59,9 +59,9 @@ LinkTrace::LinkTrace(std::vector<LinkTraceRow> rows) : rows_(std::move(rows)) {
     throw std::invalid_argument("link trace, row " + std::to_string(row) + ": " + problem);
   capacity_ = {0.0};
   for (std::size_t i = 1; i < rows_.size(); ++i)
-    capacity_.push_back(capacity_.back() + carried(rows_[i - 1],
-                                                   slope_between(rows_[i - 1], rows_[i]),
-                                                   rows_[i].time_s - rows_[i - 1].time_s));
+    capacity_.push_back(capacity_.back() + capacity_over(rows_[i - 1],
+                                                         slope_between(rows_[i - 1], rows_[i]),
+                                                         rows_[i].time_s - rows_[i - 1].time_s));
 }
 
 bool LinkTrace::has_limit() const {
@@ -81,7 +81,7 @@ double LinkTrace::capacity_until(double time_s) const {
   if (after == rows_.begin()) return (time_s - rows_.front().time_s) * rows_.front().bytes_per_s;
   const auto i = static_cast<std::size_t>(after - rows_.begin()) - 1;
   const double slope = after == rows_.end() ? 0.0 : slope_between(rows_[i], *after);
-  return capacity_[i] + carried(rows_[i], slope, time_s - rows_[i].time_s);
+  return capacity_[i] + capacity_over(rows_[i], slope, time_s - rows_[i].time_s);
 }
 
 double LinkTrace::time_of(double bytes) const {
@@ -96,8 +96,8 @@ double LinkTrace::time_of(double bytes) const {
   const double missing = bytes - capacity_[i];
   if (missing <= 0.0) return rows_[i].time_s;
   const double slope = i + 1 < rows_.size() ? slope_between(rows_[i], rows_[i + 1]) : 0.0;
-  // The root of carried() = missing, in the form that also holds for a slope of zero. If the rate
-  // falls to zero, rounding may make the radicand negative.
+  // The root of capacity_over() = missing, in the form that also holds for a slope of zero. If the
+  // rate falls to zero, rounding may make the radicand negative.
   const double rate = rows_[i].bytes_per_s;
   const double divisor = rate + std::sqrt(std::max(rate * rate + 2.0 * slope * missing, 0.0));
   return divisor > 0.0 ? rows_[i].time_s + 2.0 * missing / divisor : kNever;

@@ -54,7 +54,7 @@ class Splitter {
         part_of_vertex_(mesh.vertices.size(), 0),
         local_index_(mesh.vertices.size(), 0) {}
 
-  MeshPieces split() {
+  SplitMesh split() {
     sort_into_cells();
     for (auto& [cell, faces] : faces_of_cell_) {
       std::ranges::sort(faces);
@@ -161,7 +161,7 @@ class Splitter {
   std::vector<std::uint32_t> part_of_vertex_;  // the last part that contains the vertex
   std::uint32_t part_ = 0;
   std::vector<std::uint16_t> local_index_;  // index in that part
-  MeshPieces pieces_;
+  SplitMesh pieces_;
 };
 
 void check(const LabelledMesh& mesh, const ChunkGrid& grid) {
@@ -226,8 +226,8 @@ const char* fault_of(const MeshChunk& chunk) {
   return nullptr;
 }
 
-MeshPieces split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
-                      const ChunkGrid& grid) {
+SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
+                     const ChunkGrid& grid) {
   check(mesh, grid);
   MeshChunk blank;
   blank.key.robot = robot;

@@ -67,7 +67,7 @@ struct ChunkGrid {
 };
 
 /// A mesh split into chunks.
-struct MeshPieces {
+struct SplitMesh {
   std::vector<MeshChunk> chunks;  ///< Keys ascending, none empty.
   /// Dropped faces: longer along an axis than a third of the range of offsets, 21 845 steps.
   std::size_t oversized_faces = 0;
@@ -81,8 +81,8 @@ struct MeshPieces {
 /// Throws std::invalid_argument for a grid that is not positive and for cells that are no longer
 /// than a step. Also throws it for a vertex that is not finite or beyond 2^30 steps, and for a face
 /// with a vertex that does not exist. Linear except for sorting the faces of a cell.
-[[nodiscard]] MeshPieces split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
-                                    const ChunkGrid& grid);
+[[nodiscard]] SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
+                                   const ChunkGrid& grid);
 
 /// The cells that contain the centroid of a face, ascending. Faces that are not finite, or farther
 /// away than 2^30 cells, are left out. Precondition: corners exist.

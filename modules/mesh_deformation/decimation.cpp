@@ -55,10 +55,10 @@ class SpreadQuadricsT : public OpenMesh::Decimater::ModQuadricT<SurfaceT> {
   explicit SpreadQuadricsT(SurfaceT& mesh) : Quadrics(mesh) {}
 
   // `seen_by` and `merged_into` have an entry per vertex and outlive the decimation.
-  void watch(const std::vector<SeenBy>& seen_by, KeyframeIndex window_keyframes,
+  void watch(const std::vector<SeenBy>& seen_by, KeyframeIndex max_gap_keyframes,
              std::vector<double> area_m2, std::vector<std::uint32_t>& merged_into) {
     seen_by_ = &seen_by;
-    window_keyframes_ = window_keyframes;
+    max_gap_keyframes_ = max_gap_keyframes;
     area_m2_ = std::move(area_m2);
     merged_into_ = &merged_into;
   }
@@ -66,7 +66,7 @@ class SpreadQuadricsT : public OpenMesh::Decimater::ModQuadricT<SurfaceT> {
   float collapse_priority(const CollapseInfo& collapse) override {
     const SeenBy& removed = (*seen_by_)[index_of(collapse.v0)];
     const SeenBy& kept = (*seen_by_)[index_of(collapse.v1)];
-    if (keyframe_gap(removed, kept) > window_keyframes_) return float(Base::ILLEGAL_COLLAPSE);
+    if (keyframe_gap(removed, kept) > max_gap_keyframes_) return float(Base::ILLEGAL_COLLAPSE);
     const double length2 = (collapse.p1 - collapse.p0).sqrnorm();
     const double area = area_m2_[index_of(collapse.v0)] + area_m2_[index_of(collapse.v1)];
     return Quadrics::collapse_priority(collapse) + static_cast<float>(kSpread * area * length2);
@@ -80,7 +80,7 @@ class SpreadQuadricsT : public OpenMesh::Decimater::ModQuadricT<SurfaceT> {
 
  private:
   const std::vector<SeenBy>* seen_by_ = nullptr;
-  KeyframeIndex window_keyframes_ = 0;
+  KeyframeIndex max_gap_keyframes_ = 0;
   std::vector<double> area_m2_;  // area merged into each vertex
   std::vector<std::uint32_t>* merged_into_ = nullptr;
 };
@@ -143,14 +143,14 @@ void resolve(std::vector<std::uint32_t>& merged_into) {
   }
 }
 
-void decimate(ManifoldSurface& manifold, std::size_t target, KeyframeIndex window_keyframes,
+void decimate(ManifoldSurface& manifold, std::size_t target, KeyframeIndex max_gap_keyframes,
               std::vector<std::uint32_t>& merged_into) {
   const std::size_t count = vertices_with_faces(manifold.surface);
   if (count <= target) return;
   Decimater decimater(manifold.surface);
   OpenMesh::Decimater::ModHandleT<SpreadQuadricsT<Surface>> priority;
   decimater.add(priority);
-  decimater.module(priority).watch(manifold.seen_by, window_keyframes,
+  decimater.module(priority).watch(manifold.seen_by, max_gap_keyframes,
                                    vertex_areas(manifold.surface), merged_into);
   decimater.initialize();
   decimater.decimate(count - target);
@@ -159,15 +159,15 @@ void decimate(ManifoldSurface& manifold, std::size_t target, KeyframeIndex windo
 // Assigns vertices to clusters, one at a time.
 class Clustering {
  public:
-  Clustering(double width_m, KeyframeIndex window_keyframes)
-      : width_m_(width_m), window_keyframes_(window_keyframes) {}
+  Clustering(double width_m, KeyframeIndex max_gap_keyframes)
+      : width_m_(width_m), max_gap_keyframes_(max_gap_keyframes) {}
 
   std::uint32_t cluster_of(const Eigen::Vector3d& point, const SeenBy& seen_by) {
     const auto next = static_cast<std::uint32_t>(seeds_.size());
     const auto [cell, is_new] = first_in_cell_.try_emplace(grid_cell(point, width_m_), next);
     if (!is_new) {
       std::uint32_t cluster = cell->second;
-      while (keyframe_gap(seeds_[cluster].seen_by, seen_by) > window_keyframes_) {
+      while (keyframe_gap(seeds_[cluster].seen_by, seen_by) > max_gap_keyframes_) {
         if (seeds_[cluster].next_in_cell == kNoIndex) {
           seeds_[cluster].next_in_cell = next;
           cluster = next;
@@ -189,7 +189,7 @@ class Clustering {
     std::uint32_t next_in_cell;
   };
   double width_m_;
-  KeyframeIndex window_keyframes_;
+  KeyframeIndex max_gap_keyframes_;
   std::unordered_map<GridCell, std::uint32_t, GridCellHash> first_in_cell_;
   std::vector<Seed> seeds_;
 };
@@ -283,12 +283,12 @@ std::vector<std::uint32_t> nodes_of_clusters(const VertexClusters& clusters,
 }  // namespace
 
 CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t target,
-                               KeyframeIndex window_keyframes) {
+                               KeyframeIndex max_gap_keyframes) {
   ManifoldSurface manifold;
   fill(manifold, triangles);
   std::vector<std::uint32_t> merged_into(manifold.point_of_vertex.size());
   std::iota(merged_into.begin(), merged_into.end(), 0U);
-  decimate(manifold, target, window_keyframes, merged_into);
+  decimate(manifold, target, max_gap_keyframes, merged_into);
   resolve(merged_into);
 
   CollapsedPoints collapsed;
@@ -304,11 +304,11 @@ CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t targ
 }
 
 VertexClusters cluster_vertices(const MapMesh& map, std::span<const std::uint32_t> node_of_vertex,
-                                double width_m, KeyframeIndex window_keyframes) {
+                                double width_m, KeyframeIndex max_gap_keyframes) {
   const auto& vertices = map.mesh.vertices;
   VertexClusters clusters;
   clusters.cluster_of_vertex.assign(vertices.size(), kNoIndex);
-  Clustering clustering(width_m, window_keyframes);
+  Clustering clustering(width_m, max_gap_keyframes);
   for (std::size_t v = 0; v < vertices.size(); ++v)
     if (node_of_vertex[v] == kNoIndex)
       clusters.cluster_of_vertex[v] =
@@ -324,17 +324,17 @@ VertexClusters cluster_vertices(const MapMesh& map, std::span<const std::uint32_
 
 void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScale& scale) {
   simplified.node_of_vertex.resize(map.mesh.vertices.size(), kNoIndex);
-  NodeGrid grid(kNearSpacings * scale.spacing_m, scale.window_keyframes);
+  NodeGrid grid(kNearSpacings * scale.spacing_m, scale.max_gap_keyframes);
   for (std::uint32_t n = 0; n < simplified.nodes.size(); ++n) grid.insert(simplified.nodes[n], n);
   join_near_nodes(simplified, map, grid);
 
   const VertexClusters clusters =
       cluster_vertices(map, simplified.node_of_vertex, scale.spacing_m / kClustersPerSpacing,
-                       scale.window_keyframes);
+                       scale.max_gap_keyframes);
   if (clusters.vertex.empty()) return;
   const std::size_t target = lattice_points(area_of(clusters.triangles), scale.spacing_m);
   const CollapsedPoints collapsed =
-      collapse_edges(clusters.triangles, target, scale.window_keyframes);
+      collapse_edges(clusters.triangles, target, scale.max_gap_keyframes);
   const std::vector<std::uint32_t> node_of_cluster =
       nodes_of_clusters(clusters, collapsed, grid, simplified.nodes);
   for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v)
@@ -344,11 +344,11 @@ void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScal
 
 std::vector<std::array<std::uint32_t, 2>> region_edges(const SimplifiedMesh& simplified,
                                                        std::span<const LabelledMesh::Face> faces,
-                                                       KeyframeIndex window_keyframes) {
+                                                       KeyframeIndex max_gap_keyframes) {
   std::vector<std::array<std::uint32_t, 2>> edges;
   const auto add = [&](std::uint32_t a, std::uint32_t b) {
     if (a == b) return;
-    if (keyframe_gap(simplified.nodes[a].seen_by, simplified.nodes[b].seen_by) <= window_keyframes)
+    if (keyframe_gap(simplified.nodes[a].seen_by, simplified.nodes[b].seen_by) <= max_gap_keyframes)
       edges.push_back({std::min(a, b), std::max(a, b)});
   };
   for (const auto& face : faces) {

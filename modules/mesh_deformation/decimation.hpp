@@ -32,7 +32,7 @@ struct CollapsedPoints {
 /// window are not merged. Faces may meet in any way: if more than two share an edge, the
 /// surface is cut open.
 [[nodiscard]] CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t target,
-                                             KeyframeIndex window_keyframes);
+                                             KeyframeIndex max_gap_keyframes);
 
 /// Vertices of a mesh clustered by the cells of a grid, and the triangles between the clusters.
 struct VertexClusters {
@@ -47,12 +47,12 @@ struct VertexClusters {
 /// Faces with corners in three clusters remain, each once. Linear.
 [[nodiscard]] VertexClusters cluster_vertices(const MapMesh& map,
                                               std::span<const std::uint32_t> node_of_vertex,
-                                              double width_m, KeyframeIndex window_keyframes);
+                                              double width_m, KeyframeIndex max_gap_keyframes);
 
 /// Resolution of the simplified mesh, and the surfaces that it does not merge.
 struct DecimationScale {
-  double spacing_m = 0.5;               ///< Distance between neighbouring nodes.
-  KeyframeIndex window_keyframes = 50;  ///< Largest keyframe_gap() of surfaces that are merged.
+  double spacing_m = 0.5;                ///< Distance between neighbouring nodes.
+  KeyframeIndex max_gap_keyframes = 50;  ///< Largest keyframe_gap() of surfaces that are merged.
 };
 
 /// The simplified mesh of a map: nodes, and the node of each vertex. The vertices of one node are
@@ -82,6 +82,6 @@ void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScal
 /// mesh. Pairs whose keyframe_gap() exceeds the window are excluded.
 [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> region_edges(
     const SimplifiedMesh& simplified, std::span<const LabelledMesh::Face> faces,
-    KeyframeIndex window_keyframes);
+    KeyframeIndex max_gap_keyframes);
 
 }  // namespace km

@@ -19,8 +19,8 @@ namespace {
 
 // Appends edges between `node` and `count` keyframes spread evenly from `first` to `last`, both
 // included, or all of these keyframes if there are fewer. One edge is to `first`.
-void spread(KeyframeIndex first, KeyframeIndex last, std::size_t count, std::uint32_t node,
-            std::vector<KeyframeEdge>& keyframe_edges) {
+void append_edges(KeyframeIndex first, KeyframeIndex last, std::size_t count, std::uint32_t node,
+                  std::vector<KeyframeEdge>& keyframe_edges) {
   const std::size_t steps = std::min<std::size_t>(count - 1, last - first);
   if (steps == 0) {
     keyframe_edges.push_back({first, node});
@@ -33,7 +33,7 @@ void spread(KeyframeIndex first, KeyframeIndex last, std::size_t count, std::uin
 
 // Motion of surface that is rigidly attached to a keyframe, when the keyframe moves from pose
 // `from` to pose `to`.
-SE3 correction(const SE3& to, const SE3& from) {
+SE3 rigid_motion(const SE3& to, const SE3& from) {
   return to * from.inverse();
 }
 
@@ -351,13 +351,13 @@ AnchorTerm anchor_term(const SE3& anchor, const SE3& pose) {
 
 std::vector<KeyframeEdge> choose_keyframe_edges(std::span<const MeshNode> nodes,
                                                 std::size_t keyframes_per_node,
-                                                KeyframeIndex window_keyframes) {
+                                                KeyframeIndex max_gap_keyframes) {
   std::vector<KeyframeEdge> keyframe_edges;
   keyframe_edges.reserve(nodes.size() * keyframes_per_node);
   for (std::uint32_t n = 0; n < nodes.size(); ++n) {
     const auto [first, last] = nodes[n].seen_by;
-    if (last - first <= window_keyframes || keyframes_per_node == 1) {
-      spread(first, last, keyframes_per_node, n, keyframe_edges);
+    if (last - first <= max_gap_keyframes || keyframes_per_node == 1) {
+      append_edges(first, last, keyframes_per_node, n, keyframe_edges);
     } else {
       keyframe_edges.push_back({first, n});
       keyframe_edges.push_back({last, n});
@@ -384,7 +384,7 @@ DeformationPoses initial_poses(const DeformationGraph& graph, std::span<const SE
   std::vector<SE3> T_world_odom;
   T_world_odom.reserve(T_world_kf.size());
   for (std::size_t i = 0; i < T_world_kf.size(); ++i)
-    T_world_odom.push_back(correction(T_world_kf[i], graph.T_odom_kf[i]));
+    T_world_odom.push_back(rigid_motion(T_world_kf[i], graph.T_odom_kf[i]));
 
   std::vector<Eigen::Vector3d> sums(graph.nodes.size(), Eigen::Vector3d::Zero());
   std::vector<int> counts(graph.nodes.size(), 0);
@@ -412,7 +412,7 @@ DeformationPoses warm_start_poses(const DeformationGraph& graph, const Deformati
   DeformationPoses poses = initial_poses(graph, T_world_kf);
   std::vector<SE3> moved;  // motion of each known keyframe since the last solution
   for (std::size_t i = 0; i < std::min(T_world_kf_last.size(), T_world_kf.size()); ++i) {
-    moved.push_back(correction(T_world_kf[i], T_world_kf_last[i]));
+    moved.push_back(rigid_motion(T_world_kf[i], T_world_kf_last[i]));
     if (i < last.T_world_kf.size()) poses.T_world_kf[i] = moved[i] * last.T_world_kf[i];
   }
   const std::vector<std::size_t> first = first_keyframe_edges(graph);

@@ -27,12 +27,6 @@ struct DeformationGraph {
   std::vector<SE3> T_odom_kf;                       ///< Pose of keyframe i when it saw the nodes.
   std::vector<std::array<std::uint32_t, 2>> edges;  ///< Neighbouring nodes, each pair once.
   std::vector<KeyframeEdge> keyframe_edges;         ///< In ascending order of their nodes.
-
-  /// Number of terms in the cost without those of the anchors: one per direction of every edge, and
-  /// position and rotation of every keyframe edge.
-  [[nodiscard]] std::size_t term_count() const {
-    return 2 * edges.size() + 2 * keyframe_edges.size();
-  }
 };
 
 /// At most `keyframes_per_node` keyframes for each node: the first and the last that saw it, and
@@ -41,7 +35,7 @@ struct DeformationGraph {
 /// not have seen it.
 [[nodiscard]] std::vector<KeyframeEdge> choose_keyframe_edges(std::span<const MeshNode> nodes,
                                                               std::size_t keyframes_per_node,
-                                                              KeyframeIndex window_keyframes);
+                                                              KeyframeIndex max_gap_keyframes);
 
 // Residuals of the deformation graph and their derivatives by the step of a pose's retract().
 

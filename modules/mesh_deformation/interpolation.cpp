@@ -87,8 +87,8 @@ class NodeTree {
  public:
   // Copies those of `nodes` that are listed.
   NodeTree(std::span<const MeshNode> nodes, std::span<const std::uint32_t> listed,
-           KeyframeIndex window_keyframes)
-      : nodes_(chosen(nodes, listed)), window_(window_keyframes), index_(3, nodes_) {}
+           KeyframeIndex max_gap_keyframes)
+      : nodes_(chosen(nodes, listed)), window_(max_gap_keyframes), index_(3, nodes_) {}
 
   // Fills `found` with the nearest nodes whose keyframe_gap() to `seen_by` is within the window, by
   // distance, closer than the square root of `limit2`. Returns their number.
@@ -126,7 +126,7 @@ constexpr double kNoWeight = 1e-12;  // a smaller sum of weights counts as zero
 struct Binding {
   std::array<std::uint32_t, kMaxNeighbours> nodes;
   std::array<double, kMaxNeighbours> weights;
-  float reach_m = std::numeric_limits<float>::infinity();
+  float rebind_distance_m = std::numeric_limits<float>::infinity();
 };
 
 // Eq. (3) for the nearest nodes; the last of them gives d_max.
@@ -149,7 +149,8 @@ Binding weigh(std::span<const NearNode> nearest, bool all_found) {
     binding.weights[j] =
         sum > kNoWeight ? binding.weights[j] / sum : 1.0 / static_cast<double>(used);
   if (all_found)
-    binding.reach_m = std::nextafter(static_cast<float>(d_max), std::numeric_limits<float>::max());
+    binding.rebind_distance_m =
+        std::nextafter(static_cast<float>(d_max), std::numeric_limits<float>::max());
   return binding;
 }
 
@@ -171,9 +172,9 @@ struct NodeMotion {
 
 }  // namespace
 
-Interpolation::Interpolation(std::size_t neighbours, KeyframeIndex window_keyframes)
+Interpolation::Interpolation(std::size_t neighbours, KeyframeIndex max_gap_keyframes)
     : neighbours_(std::clamp<std::size_t>(neighbours, 1, kMaxNeighbours)),
-      window_keyframes_(window_keyframes) {}
+      max_gap_keyframes_(max_gap_keyframes) {}
 
 void Interpolation::bind(std::span<const Eigen::Vector3f> vertices, std::span<const SeenBy> seen_by,
                          std::span<const MeshNode> nodes) {
@@ -187,23 +188,23 @@ void Interpolation::update(std::span<const Eigen::Vector3f> vertices,
                            std::span<const std::uint32_t> changed) {
   std::vector<std::uint32_t> all(nodes.size());
   std::iota(all.begin(), all.end(), 0U);
-  const NodeTree tree(nodes, all, window_keyframes_);
-  const NodeTree changed_tree(nodes, changed, window_keyframes_);
-  Interpolation next(neighbours_, window_keyframes_);
+  const NodeTree tree(nodes, all, max_gap_keyframes_);
+  const NodeTree changed_tree(nodes, changed, max_gap_keyframes_);
+  Interpolation next(neighbours_, max_gap_keyframes_);
   next.nodes_.resize(vertices.size() * neighbours_);
   next.weights_.resize(vertices.size() * neighbours_);
-  next.reach_m_.resize(vertices.size());
+  next.rebind_distance_m_.resize(vertices.size());
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     const std::size_t to = v * neighbours_;
     const std::uint32_t old = before[v];
     if (old != kNoIndex) {
-      const double reach_m = reach_m_[old];
+      const double rebind_distance_m = rebind_distance_m_[old];
       NearNode closer;
       if (changed_tree.nearest(vertices[v].cast<double>(), seen_by[v], {&closer, 1},
-                               reach_m * reach_m) == 0) {
+                               rebind_distance_m * rebind_distance_m) == 0) {
         std::ranges::copy(nodes_of(old), next.nodes_.begin() + static_cast<std::ptrdiff_t>(to));
         std::ranges::copy(weights_of(old), next.weights_.begin() + static_cast<std::ptrdiff_t>(to));
-        next.reach_m_[v] = reach_m_[old];
+        next.rebind_distance_m_[v] = rebind_distance_m_[old];
         continue;
       }
     }
@@ -212,7 +213,7 @@ void Interpolation::update(std::span<const Eigen::Vector3f> vertices,
       next.nodes_[to + j] = binding.nodes[j];
       next.weights_[to + j] = binding.weights[j];
     }
-    next.reach_m_[v] = binding.reach_m;
+    next.rebind_distance_m_[v] = binding.rebind_distance_m;
   }
   *this = std::move(next);
 }

@@ -24,8 +24,8 @@ namespace km {
 /// Stores the nodes of each vertex, so that a new solution costs only one sum per vertex.
 class Interpolation {
  public:
-  /// `neighbours` is k, limited to 1 to 8; `window_keyframes` is the window.
-  Interpolation(std::size_t neighbours, KeyframeIndex window_keyframes);
+  /// `neighbours` is k, limited to 1 to 8; `max_gap_keyframes` is the window.
+  Interpolation(std::size_t neighbours, KeyframeIndex max_gap_keyframes);
 
   /// Binds all vertices to nodes. `vertices` [m] and `seen_by` have equal length.
   void bind(std::span<const Eigen::Vector3f> vertices, std::span<const SeenBy> seen_by,
@@ -48,7 +48,7 @@ class Interpolation {
                                                     std::span<const SE3> T_world_node,
                                                     std::span<const SE3> T_world_odom_of_kf) const;
 
-  [[nodiscard]] std::size_t vertex_count() const { return reach_m_.size(); }
+  [[nodiscard]] std::size_t vertex_count() const { return rebind_distance_m_.size(); }
   [[nodiscard]] std::size_t unbound_count() const;
 
   /// The nodes of one vertex, padded with kNoIndex, and their weights, which sum to one if the
@@ -58,10 +58,10 @@ class Interpolation {
 
  private:
   std::size_t neighbours_;
-  KeyframeIndex window_keyframes_;
-  std::vector<std::uint32_t> nodes_;  // neighbours_ per vertex
-  std::vector<double> weights_;       // neighbours_ per vertex
-  std::vector<float> reach_m_;        // a new node nearer than this changes a vertex's nodes
+  KeyframeIndex max_gap_keyframes_;
+  std::vector<std::uint32_t> nodes_;      // neighbours_ per vertex
+  std::vector<double> weights_;           // neighbours_ per vertex
+  std::vector<float> rebind_distance_m_;  // a new node nearer than this changes a vertex's nodes
 };
 
 }  // namespace km

@@ -10,7 +10,7 @@ namespace km {
 MeshCorrector::MeshCorrector(const MeshDeformationConfig& config)
     : duplicate_voxels_(config.duplicate_voxels),
       duplicate_faces_(static_cast<std::size_t>(config.duplicate_faces)),
-      window_keyframes_(static_cast<KeyframeIndex>(config.time_window_keyframes)),
+      max_gap_keyframes_(static_cast<KeyframeIndex>(config.time_window_keyframes)),
       scale_{config.min_move_m, config.min_rotation_rad},
       optimizer_(config) {}
 
@@ -20,11 +20,11 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   if (input.map_version != map_version_) return deform(input, std::move(anchors));
   const KeyframeMotion motion = keyframe_motion(anchors_, anchors, scale_);
   if (motion.non_rigid > 1.0) return deform(input, std::move(anchors));
-  if (largest_difference(anchors_, motion.T_after_before, T_published_optimized_, scale_) <= 1.0)
+  if (largest_difference(anchors_, motion.T_after_before, T_result_optimized_, scale_) <= 1.0)
     return std::nullopt;
-  T_published_optimized_ = motion.T_after_before;
+  T_result_optimized_ = motion.T_after_before;
   MeshCorrection result{optimized_, report_, false, {}, 0};
-  result.mesh.transform(T_published_optimized_);
+  result.mesh.transform(T_result_optimized_);
   return result;
 }
 
@@ -44,7 +44,7 @@ std::vector<std::uint32_t> MeshCorrector::replacements_in(const LabelledMesh& me
     return std::vector(mesh.vertices.size(), kNoIndex);
   return find_replacements(
       mesh, {map.seen_by, map.certainty},
-      {duplicate_voxels_ * map.voxel_m, kLongestEdge_voxels * map.voxel_m, window_keyframes_});
+      {duplicate_voxels_ * map.voxel_m, kLongestEdge_voxels * map.voxel_m, max_gap_keyframes_});
 }
 
 MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<SE3> anchors) {
@@ -54,7 +54,7 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   anchors_ = std::move(anchors);
   optimized_ = without_superseded(deformed.mesh, replacements);
   report_ = deformed.report;
-  T_published_optimized_ = SE3::Identity();
+  T_result_optimized_ = SE3::Identity();
   return {optimized_, report_, true, named(replacements, input.map.ids),
           deformed.mesh.faces.size() - optimized_.faces.size()};
 }

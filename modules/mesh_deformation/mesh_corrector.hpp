@@ -60,7 +60,7 @@ class MeshCorrector {
 
   const double duplicate_voxels_;
   const std::size_t duplicate_faces_;
-  const KeyframeIndex window_keyframes_;
+  const KeyframeIndex max_gap_keyframes_;
   MotionScale scale_;
   LocalMeshOptimizer optimizer_;
   // State of the last optimisation.
@@ -68,7 +68,7 @@ class MeshCorrector {
   std::vector<SE3> anchors_;  // complete() of the trajectory
   LabelledMesh optimized_;
   MeshDeformationReport report_;
-  SE3 T_published_optimized_ = SE3::Identity();  // from `optimized_` to the last result
+  SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };
 
 /// A robot's mesh, corrected to agree with its optimised trajectory.

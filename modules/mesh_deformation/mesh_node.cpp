@@ -15,7 +15,7 @@ std::uint32_t NodeGrid::nearest(const Eigen::Vector3d& point, const SeenBy& seen
     const auto cell = cells_.find({cx + i % 3 - 1, cy + i / 3 % 3 - 1, cz + i / 9 - 1});
     if (cell == cells_.end()) continue;
     for (const Entry& entry : cell->second) {
-      if (keyframe_gap(entry.seen_by, seen_by) > window_keyframes_) continue;
+      if (keyframe_gap(entry.seen_by, seen_by) > max_gap_keyframes_) continue;
       const std::pair candidate{(entry.position - point).squaredNorm(), entry.index};
       if (candidate < best) best = candidate;
     }

@@ -61,8 +61,8 @@ struct GridCellHash {
 class NodeGrid {
  public:
   /// Nodes whose keyframe_gap() exceeds the window are not near.
-  NodeGrid(double radius_m, KeyframeIndex window_keyframes)
-      : radius_m_(radius_m), window_keyframes_(window_keyframes) {}
+  NodeGrid(double radius_m, KeyframeIndex max_gap_keyframes)
+      : radius_m_(radius_m), max_gap_keyframes_(max_gap_keyframes) {}
 
   void insert(const MeshNode& node, std::uint32_t index);
 
@@ -77,7 +77,7 @@ class NodeGrid {
     std::uint32_t index;
   };
   double radius_m_;
-  KeyframeIndex window_keyframes_;
+  KeyframeIndex max_gap_keyframes_;
   std::unordered_map<GridCell, std::vector<Entry>, GridCellHash> cells_;
 };
 

@@ -18,7 +18,7 @@ constexpr float kMinCosine = 0.5F;
 // Largest distance beside a triangle at which a vertex still counts as on it, as a share of
 // SameSurface::distance_m. It exceeds zero because vertices in the wedge between the normals of two
 // faces that meet at an angle are beside both faces.
-constexpr float kBeside = 0.25F;
+constexpr float kMaxBesideShare = 0.25F;
 
 float squared_distance_to_segment(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
                                   const Eigen::Vector3f& b) {
@@ -48,15 +48,15 @@ class ReplacementSearch {
       : mesh_(mesh),
         seen_by_(views.seen_by),
         certainty_(views.certainty),
-        window_(same.window_keyframes),
+        window_(same.max_gap_keyframes),
         distance_(static_cast<float>(same.distance_m)),
         // Bound on the distance of a vertex from the centroid of a relevant face. No corner is
         // further from the centroid than two thirds of a median, which is shorter than the longest
         // edge.
-        reach_(std::hypot(distance_, kBeside * distance_ +
+        reach_(std::hypot(distance_, kMaxBesideShare * distance_ +
                                          static_cast<float>(same.longest_edge_m) * 2.0F / 3.0F)),
         replacements_(mesh.vertices.size(), kNoIndex),
-        asked_(mesh.vertices.size(), 0) {
+        is_judged_(mesh.vertices.size(), 0) {
     compute_normals();
     for (const LabelledMesh::Face& face : mesh.faces) add_rank(face);
   }
@@ -71,7 +71,7 @@ class ReplacementSearch {
     for (const std::uint32_t f : order) {
       const LabelledMesh::Face& face = mesh_.faces[f];
       for (const std::uint32_t v : face)
-        if (std::exchange(asked_[v], 1) == 0) replacements_[v] = replacement_of(v);
+        if (std::exchange(is_judged_[v], 1) == 0) replacements_[v] = replacement_of(v);
       if (!is_superseded(face, replacements_)) insert(f);
     }
     return std::move(replacements_);
@@ -151,7 +151,7 @@ class ReplacementSearch {
     if (std::abs(along) > distance_ || normals_[v].dot(normal) < kMinCosine) return kNot;
     const float beside2 = squared_distance_in_plane(
         p - along * normal, {mesh_.vertices[a], mesh_.vertices[b], mesh_.vertices[c]}, normal);
-    const float most = kBeside * distance_;
+    const float most = kMaxBesideShare * distance_;
     return beside2 <= most * most ? std::abs(along) : kNot;
   }
 
@@ -173,7 +173,7 @@ class ReplacementSearch {
   std::vector<SeenBy> face_seen_by_;
   std::vector<std::uint64_t> rank_;  // rank of each face
   std::vector<std::uint32_t> replacements_;
-  std::vector<char> asked_;
+  std::vector<char> is_judged_;
   // Faces that stay, by descending rank, in the cells of their centroids.
   std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;
 };

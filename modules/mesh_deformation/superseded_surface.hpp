@@ -16,8 +16,8 @@ struct SameSurface {
   /// Largest distance of a vertex of one part from a face of the other part, along the normal of
   /// the face.
   double distance_m = 0.1;
-  double longest_edge_m = 0.2;         ///< Faces with longer edges may be missed.
-  KeyframeIndex window_keyframes = 0;  ///< Largest keyframe_gap() within one visit.
+  double longest_edge_m = 0.2;          ///< Faces with longer edges may be missed.
+  KeyframeIndex max_gap_keyframes = 0;  ///< Largest keyframe_gap() within one visit.
 };
 
 /// MapMesh::seen_by and MapMesh::certainty of the vertices of a mesh. `certainty` may be empty.

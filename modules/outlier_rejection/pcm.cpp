@@ -39,19 +39,19 @@ Pcm::Pcm(RobotId a, RobotId b, const PcmConfig& config)
       test_(config),
       clique_(static_cast<std::uint64_t>(config.max_search_nodes), config.search) {}
 
-PcmVerdict Pcm::add(const Closure& closure) {
+PcmAddResult Pcm::add(const Closure& closure) {
   check_usable(closure, a_, b_);
-  if (known_.contains(closure.id())) return PcmVerdict::kRepeated;
-  if (known_.size() >= kMaxClosures) return PcmVerdict::kFull;
+  if (known_.contains(closure.id())) return PcmAddResult::kRepeated;
+  if (known_.size() >= kMaxClosures) return PcmAddResult::kFull;
   known_.insert(closure.id());
 
   const OrientedClosure oriented = test_.orient(closure);
   if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
-    return PcmVerdict::kAgainstOdometry;
+    return PcmAddResult::kAgainstOdometry;
   PreparedClosure added(oriented);
   const std::vector<std::size_t> consistent = test_.consistent_with(added, closures_);
   closures_.push_back(std::move(added));
-  return clique_.add(consistent) ? PcmVerdict::kGrew : PcmVerdict::kAdded;
+  return clique_.add(consistent) ? PcmAddResult::kGrew : PcmAddResult::kAdded;
 }
 
 std::vector<ClosureId> Pcm::inliers() const {

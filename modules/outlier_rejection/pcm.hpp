@@ -12,7 +12,7 @@
 namespace km {
 
 /// Result for a closure given to Pcm.
-enum class PcmVerdict {
+enum class PcmAddResult {
   kRepeated,         ///< Ignored: another measurement of this pair of keyframes came before.
   kAgainstOdometry,  ///< Refused: the closure contradicts odometry (PcmConfig::odometry_gate).
   kFull,             ///< Refused: Pcm::kMaxClosures are known.
@@ -47,7 +47,7 @@ class Pcm {
   /// Adds one closure: one cycle test per stored closure, then the clique search.
   /// Throws std::invalid_argument if the closure is not between the two robots or not is_usable();
   /// the state is then unchanged.
-  [[nodiscard]] PcmVerdict add(const Closure& closure);
+  [[nodiscard]] PcmAddResult add(const Closure& closure);
 
   /// The consistent closures, ascending. Empty while they are fewer than PcmConfig::min_inliers.
   [[nodiscard]] std::vector<ClosureId> inliers() const;

@@ -22,19 +22,19 @@ WitnessedPair::WitnessedPair(RobotId a, RobotId b, const PcmConfig& config)
       test_(config),
       clique_(static_cast<std::uint64_t>(config.max_search_nodes)) {}
 
-PcmVerdict WitnessedPair::add(const Closure& closure) {
+PcmAddResult WitnessedPair::add(const Closure& closure) {
   check_usable(closure, a_, b_);
   const ClosureId id = closure.id();
-  if (known_.contains(id)) return PcmVerdict::kRepeated;
-  if (known_.size() >= Pcm::kMaxClosures) return PcmVerdict::kFull;
+  if (known_.contains(id)) return PcmAddResult::kRepeated;
+  if (known_.size() >= Pcm::kMaxClosures) return PcmAddResult::kFull;
   known_.insert(id);
   const OrientedClosure oriented = test_.orient(closure);
   if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
-    return PcmVerdict::kAgainstOdometry;
+    return PcmAddResult::kAgainstOdometry;
   added_.insert(id);
   const std::size_t before = witnesses();
   if (!is_witnessed()) test(oriented);
-  return witnesses() > before ? PcmVerdict::kGrew : PcmVerdict::kAdded;
+  return witnesses() > before ? PcmAddResult::kGrew : PcmAddResult::kAdded;
 }
 
 void WitnessedPair::test(const OrientedClosure& closure) {

@@ -26,7 +26,7 @@ class WitnessedPair {
   /// witnesses. At most Pcm::kMaxClosures are accepted. Once there are PcmConfig::min_witnesses, no
   /// cycle is tested any more. Throws std::invalid_argument if the closure is not between the two
   /// robots or not is_usable(); the state is then unchanged.
-  [[nodiscard]] PcmVerdict add(const Closure& closure);
+  [[nodiscard]] PcmAddResult add(const Closure& closure);
 
   /// All added closures, ascending.
   [[nodiscard]] std::vector<ClosureId> closures() const { return {added_.begin(), added_.end()}; }

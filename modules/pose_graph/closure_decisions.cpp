@@ -47,8 +47,8 @@ bool ClosureDecisions::reconsider(std::span<const PoseEdge> closures, const Pose
     const ClosureId id = e.id();
     if (!is_rejected(id)) continue;
     const auto from = pose(e.from), to = pose(e.to);
-    if (!from || !to || residual_of(e, *from, *to) > kSecondChance * barc) continue;
-    if (++reopened_[id] > kChances) continue;
+    if (!from || !to || residual_of(e, *from, *to) > kReconsiderLimit * barc) continue;
+    if (++times_reconsidered_[id] > kChances) continue;
     decided_.erase(id);
     any = true;
   }
@@ -58,10 +58,10 @@ bool ClosureDecisions::reconsider(std::span<const PoseEdge> closures, const Pose
   return true;
 }
 
-void ClosureDecisions::forget(RobotId robot) {
+void ClosureDecisions::discard(RobotId robot) {
   const auto concerns = [&](const auto& entry) { return touches(entry.first, robot); };
   std::erase_if(decided_, concerns);
-  std::erase_if(reopened_, concerns);
+  std::erase_if(times_reconsidered_, concerns);
   std::erase_if(verdicts_, concerns);
   counted_.clear();
 }
@@ -82,8 +82,8 @@ void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdg
     const std::vector<std::size_t> rivals = find_places(rejected).sizes;
     EdgeSetOffer& counted = entry->second;
     counted.places = static_cast<std::uint32_t>(find_places(accepted).sizes.size());
-    counted.contested = counted.places == 1 && !rivals.empty() &&
-                        *std::ranges::max_element(rivals) >= accepted.size();
+    counted.contradicted = counted.places == 1 && !rivals.empty() &&
+                           *std::ranges::max_element(rivals) >= accepted.size();
   }
   offer = entry->second;
 }

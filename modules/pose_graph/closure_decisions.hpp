@@ -39,31 +39,32 @@ class ClosureDecisions {
   /// alone.
   void set_noise(ClosureNoiseRecord noise, bool with_team);
   /// Makes the rejected ones of `closures` undecided whose residual in a solution is at most
-  /// kSecondChance times `barc`, each at most kChances times. `pose` returns poses of the solution;
-  /// closures with an end without a pose are left out. False if no closure has become undecided.
+  /// kReconsiderLimit times `barc`, each at most kChances times. `pose` returns poses of the
+  /// solution; closures with an end without a pose are left out. False if no closure has become
+  /// undecided.
   using PoseOf = std::function<std::optional<SE3>(const KeyframeId&)>;
   bool reconsider(std::span<const PoseEdge> closures, const PoseOf& pose, double barc);
   /// Number of calls of reconsider() that made closures undecided.
   [[nodiscard]] std::uint32_t reconsidered() const { return reconsidered_; }
   /// Discards all decisions on closures with a robot whose keyframe indices have a new meaning.
-  void forget(RobotId robot);
+  void discard(RobotId robot);
 
   /// All verdicts of the present session, if there are new ones since the last call.
   [[nodiscard]] std::optional<ClosureVerdicts> take_verdicts();
 
-  /// Sets `places` and `contested` of an offer of these closures.
+  /// Sets `places` and `contradicted` of an offer of these closures.
   void count_places(EdgeSetOffer& offer, std::span<const PoseEdge> closures);
 
  private:
   std::map<ClosureId, bool> decided_;
   std::set<ClosureId> provisional_;
-  std::map<ClosureId, int> reopened_;  // number of times
+  std::map<ClosureId, int> times_reconsidered_;
   std::uint32_t reconsidered_ = 0;
   ClosureNoiseRecord noise_;
   ClosureNoiseRecord team_noise_;  // noise without the sessions of this robot alone
   std::map<ClosureId, bool> verdicts_;
   bool verdicts_due_ = false;
-  // Offers with places and contested, by the present decisions.
+  // Offers with `places` and `contradicted`, by the present decisions.
   std::map<std::pair<RobotId, EdgeSetId>, EdgeSetOffer> counted_;
 };
 

@@ -162,7 +162,7 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
   std::vector<bool> is_first;  // the closure is the first one of its place
   std::vector<bool> seen(places.sizes.size(), false);
   for (const Upward& c : closures_) {
-    const std::size_t place = places.place_of[c.place];
+    const std::size_t place = places.place_of[c.index];
     is_first.push_back(!seen[place]);
     seen[place] = true;
   }
@@ -174,7 +174,7 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
         break;
       const std::uint32_t steps = lower + steps_between(closures_[a].upper, closures_[b].upper);
       if (steps == 0) continue;  // no odometry between them
-      const bool same = places.place_of[closures_[a].place] == places.place_of[closures_[b].place];
+      const bool same = places.place_of[closures_[a].index] == places.place_of[closures_[b].index];
       if (same && steps <= kSteps) inside.push_back({steps, a, b});
       if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces &&
           turn_rad(closures_[a], closures_[b]) <= kLargestTurnSigma_rad)
@@ -223,7 +223,7 @@ std::vector<bool> Corroboration::isolated(double barc) const {
       // Either direction suffices, because the lever arms of near closures may differ.
       if (!agree(closures_[a], closures_[b], barc) && !agree(closures_[b], closures_[a], barc))
         continue;
-      isolated[closures_[a].place] = isolated[closures_[b].place] = false;
+      isolated[closures_[a].index] = isolated[closures_[b].index] = false;
     }
   return isolated;
 }

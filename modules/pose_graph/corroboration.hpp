@@ -54,7 +54,7 @@ class Corroboration {
  private:
   // A closure, directed from its lower end to its upper one.
   struct Upward {
-    std::size_t place = 0;  // index in edges_
+    std::size_t index = 0;  // index in edges_
     KeyframeId lower;
     KeyframeId upper;
     SE3 T_lower_upper;

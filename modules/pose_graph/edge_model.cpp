@@ -47,8 +47,8 @@ void set_slope(const SE3& measured, const Precision& precision, const SE3& T_i, 
 
 }  // namespace
 
-void slope_edge(const SE3& measured, const Precision& precision, const SE3& T_i, const SE3& T_j,
-                EdgeModel& model) {
+void set_cost_and_gradient(const SE3& measured, const Precision& precision, const SE3& T_i,
+                           const SE3& T_j, EdgeModel& model) {
   set_slope(measured, precision, T_i, T_j, relative(measured, T_i, T_j), model);
 }
 

@@ -32,8 +32,8 @@ struct EdgeModel {
                                    const SE3& T_j, Curvature curvature);
 
 /// Sets cost and gradient of `model` and does not touch its second derivatives.
-void slope_edge(const SE3& measured, const Precision& precision, const SE3& T_i, const SE3& T_j,
-                EdgeModel& model);
+void set_cost_and_gradient(const SE3& measured, const Precision& precision, const SE3& T_i,
+                           const SE3& T_j, EdgeModel& model);
 
 /// Cost of a vertical prior, to second order in the tangent vector w of the rotation of its pose.
 struct VerticalModel {

@@ -39,7 +39,8 @@ std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses) {
       if (ours == nullptr || theirs == nullptr) continue;
       const std::uint32_t places = std::min(ours->places, theirs->places);
       if (places > 0)
-        ties.push_back({one->first, other->first, places, ours->contested || theirs->contested});
+        ties.push_back(
+            {one->first, other->first, places, ours->contradicted || theirs->contradicted});
     }
   return ties;
 }
@@ -53,14 +54,15 @@ FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
   std::set<RobotTie> uncertain;
   for (const RobotTie& tie : ties)
     if (tie.places == 1 && is_bridge(tie)) uncertain.insert(tie);
-  const std::set<RobotId> tied = reached(
-      self, ties, [&](const RobotTie& tie) { return !tie.contested || !uncertain.contains(tie); });
+  const std::set<RobotId> tied = reached(self, ties, [&](const RobotTie& tie) {
+    return !tie.contradicted || !uncertain.contains(tie);
+  });
   const std::set<RobotId> certain =
       reached(self, ties, [&](const RobotTie& tie) { return !uncertain.contains(tie); });
   FrameTies result;
   for (const RobotId robot : members) {
     if (!tied.contains(robot))
-      result.untied.push_back(robot);
+      result.not_joined.push_back(robot);
     else if (!certain.contains(robot))
       result.tentative.push_back(robot);
   }
@@ -70,7 +72,7 @@ FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
 RobotId lowest_tied(RobotId self, const SessionPlan& plan, const FrameTies& ties) {
   RobotId lowest = self;
   for (const SessionMember& member : plan.members)
-    if (!std::ranges::binary_search(ties.untied, member.peer.robot))
+    if (!std::ranges::binary_search(ties.not_joined, member.peer.robot))
       lowest = std::min(lowest, member.peer.robot);
   return lowest;
 }

@@ -15,8 +15,8 @@ namespace km {
 struct RobotTie {
   RobotId a = 0;  ///< a < b.
   RobotId b = 0;
-  std::uint32_t places = 0;  ///< At least 1.
-  bool contested = false;    ///< `places` is 1, and a rejected place has as many closures or more.
+  std::uint32_t places = 0;   ///< At least 1.
+  bool contradicted = false;  ///< `places` is 1, and a rejected place has as many closures or more.
   auto operator<=>(const RobotTie&) const = default;
 };
 
@@ -30,9 +30,9 @@ struct FrameTies {
   /// Only a tie of a single place connects these robots to that robot. All closures of a place may
   /// be false together; then the relative pose is wrong.
   std::vector<RobotId> tentative = {};
-  /// No tie connects these robots to that robot, or only a contested one. Their relative pose is
+  /// No tie connects these robots to that robot, or only a contradicted one. Their relative pose is
   /// unknown.
-  std::vector<RobotId> untied = {};
+  std::vector<RobotId> not_joined = {};
   bool operator==(const FrameTies&) const = default;
 };
 
@@ -42,7 +42,8 @@ struct FrameTies {
 [[nodiscard]] FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
                                    std::span<const RobotTie> ties);
 
-/// The lowest robot of `plan` that is not in `ties.untied`; `self` itself if there is no lower one.
+/// The lowest robot of `plan` that is not in `ties.not_joined`; `self` itself if there is no lower
+/// one.
 [[nodiscard]] RobotId lowest_tied(RobotId self, const SessionPlan& plan, const FrameTies& ties);
 
 }  // namespace km

@@ -21,7 +21,7 @@ struct FrozenPart {
   bool in_frame = false;  ///< `start` is already in the frame of the session.
   /// Closures may be false (pose_graph.robust with Newton's method). The trajectory is then not
   /// deformed to fit closures, and claimed precisions are limited.
-  bool suspicious = true;
+  bool closures_may_be_false = true;
   std::vector<KeyframeIndex> public_keyframes = {};  ///< Ascending, 0 first.
 };
 

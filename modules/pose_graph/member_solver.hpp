@@ -21,9 +21,10 @@ struct SolverMessage {
 };
 
 /// After a session with deferred closures, its deferred and rejected closures may be weighed again
-/// in the next session, at most kChances times each. Their residual must be at most kSecondChance
-/// times barc. The limit exceeds barc because the solution was computed without these closures.
-inline constexpr double kSecondChance = 5.0;
+/// in the next session, at most kChances times each. Their residual must be at most
+/// kReconsiderLimit times barc. The limit exceeds barc because the solution was computed without
+/// these closures.
+inline constexpr double kReconsiderLimit = 5.0;
 inline constexpr int kChances = 2;
 
 /// Progress of the team, as this member knows it.
@@ -33,7 +34,8 @@ struct SolverState {
   double gradient = 0.0;     ///< Newton: sqrt(g^T H^-1 g); rbcd: norm of the Riemannian gradient.
   double noise_scale = 1.0;  ///< Noise scale of the closures, estimated by the team.
   double barc = 0.0;  ///< Largest residual of a closure that is kept [sigma]; 0: none is rejected.
-  std::uint32_t lag = 1;  ///< Every member has completed the round `round` - `lag`.
+  /// Every member has completed the round `round` - `rounds_behind`.
+  std::uint32_t rounds_behind = 1;
   bool deferred = false;  ///< Closures that stand alone were deferred: they may be true.
   bool held = false;      ///< Held poses fix the frame of the team.
   bool failed = false;    ///< The graph of the team could not be solved.

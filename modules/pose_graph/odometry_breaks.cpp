@@ -22,7 +22,7 @@ constexpr double kLeastPlaces = 3.0;
 // Factor on the limit, up to which a cycle that contains the step counts as consistent. The largest
 // errors of noisy odometry are near the limit: with a factor of 1, one of 360 random trajectories
 // without a wrong step had a break.
-constexpr double kClearly = 2.0;
+constexpr double kConsistentMargin = 2.0;
 // Share of the cycles with a wrong step that may be consistent: long cycles do not show a jump.
 constexpr double kMostConsistent = 0.1;
 constexpr std::size_t kMostErrorCycles = 200;  // bounds the time
@@ -105,7 +105,8 @@ std::optional<Suspicion> suspicion_of(const std::vector<ErrorCycle>& cycles, std
   const double limit = kConsistent * std::max(1.0, *middle / kMedian);
   double consistent = 0.0;
   for (const ErrorCycle& cycle : cycles)
-    if (cycle.contains(step) && cycle.squared <= kClearly * limit) consistent += cycle.weight;
+    if (cycle.contains(step) && cycle.squared <= kConsistentMargin * limit)
+      consistent += cycle.weight;
   if (consistent > kMostConsistent * places_with) return std::nullopt;
   return Suspicion{limit, consistent};
 }

@@ -17,7 +17,8 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMostCycles = 200;
-constexpr std::uint32_t kShort = 10;    // largest number of steps in a cycle of two closures
+// Largest number of steps in a cycle of two closures.
+constexpr std::uint32_t kMaxShortCycleSteps = 10;
 constexpr double kPriorSigma = 1.0986;  // log 3, prior of log sqrt(v)
 // Largest standard deviation of the rotation of odometry in a cycle of one closure, on each axis.
 // Errors of cycles with a larger one are not normally distributed.
@@ -27,7 +28,7 @@ constexpr double kShortCycleWeight = 0.5;
 constexpr double kLeastSide_m = 1.0;    // least side of the volume for false closures
 constexpr double kRatioSigma = 0.6931;  // log 2, prior of log sqrt(v_R / v_t)
 // Log of the odds from which on odometry counts as noisier than it claims: 1000 to 1.
-constexpr double kEvidence = 6.9;
+constexpr double kLeastLogOdds = 6.9;
 constexpr int kSweeps = 4;
 
 using Cycle = OdometryCycle;
@@ -66,7 +67,7 @@ std::vector<Cycle> short_cycles(const OdometryChain& chain, std::span<const Pose
   for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
     const ClosureId one = sorted[k].id(), other = sorted[k + 1].id();
     const auto steps = steps_between(one.from, other.from) + steps_between(one.to, other.to);
-    if (steps == 0 || steps > kShort) continue;
+    if (steps == 0 || steps > kMaxShortCycleSteps) continue;
     cycles.push_back(chain.close(sorted[k], sorted[k + 1]));
     cycles.back().weight = kShortCycleWeight;
   }
@@ -229,7 +230,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (cycles.empty()) return noise;
   const double volume = volume_m3(chain, closures);
   Fit fit = fit_factors(cycles, volume);
-  if (fit.log_odds < kEvidence) return noise;
+  if (fit.log_odds < kLeastLogOdds) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
   std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors);
   // If most cycles of one closure are left out, noise of closures alone may explain the cycles of
@@ -237,7 +238,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   const bool few_are_long = 2 * normal.size() < cycles.size();
   normal.insert(normal.end(), near.begin(), near.end());
   const Fit refined = fit_factors(normal, volume);
-  if (refined.log_odds >= kEvidence)
+  if (refined.log_odds >= kLeastLogOdds)
     fit = refined;
   else if (!few_are_long)
     return noise;

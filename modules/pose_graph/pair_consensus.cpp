@@ -16,21 +16,21 @@ constexpr std::size_t kEnoughCandidates = 200;
 // Lower limit of the spread of a pair [m].
 constexpr double kLeastSpread_m = 1e-3;
 // Misfit from which on a pair does not fit [spreads].
-constexpr double kOff = 4.0;
+constexpr double kMisfit_spreads = 4.0;
 // Least gain in the number of fitting pairs for which robots are moved.
-constexpr double kBetter = 0.5;
+constexpr double kLeastGain = 0.5;
 // Least support of a confirmed pair: the loop through a third robot closes within twice the sum of
 // the spreads of its three pairs.
 constexpr double kConfirming = 0.2;
 // Largest spread of consistent closures of a pair, relative to the radius.
-constexpr double kAgreeing = 0.25;
+constexpr double kLargestSpreadRatio = 0.25;
 // Number of places of a pair that agree on its motion, from which on only those places count.
 constexpr std::size_t kAgreeingPlaces = 3;
 
 // The pairs with a vote.
 PairMotions agreeing(PairMotions pairs) {
   std::erase_if(pairs, [](const auto& entry) {
-    return entry.second.spread_m > kAgreeing * entry.second.radius_m;
+    return entry.second.spread_m > kLargestSpreadRatio * entry.second.radius_m;
   });
   return pairs;
 }
@@ -47,7 +47,7 @@ const PairMotion* find(const PairMotions& pairs, RobotId a, RobotId b) {
 }
 
 // The motion (see PairMotion) of robot b that fits the closures of a and b if a does not move.
-SE3 along(const PairMotions& pairs, RobotId a, RobotId b) {
+SE3 motion_between(const PairMotions& pairs, RobotId a, RobotId b) {
   const SE3 T = pairs.at(std::minmax(a, b)).T.pose();
   return a < b ? T : T.inverse();
 }
@@ -70,7 +70,8 @@ double support(const PairMotions& pairs, const std::set<RobotId>& robots, RobotI
     const PairMotion* ak = find(pairs, a, k);
     const PairMotion* bk = find(pairs, b, k);
     if (ak == nullptr || bk == nullptr) continue;
-    const SE3 round = along(pairs, a, k) * along(pairs, k, b) * pair.T.pose().inverse();
+    const SE3 round =
+        motion_between(pairs, a, k) * motion_between(pairs, k, b) * pair.T.pose().inverse();
     const double ratio = length_m(round, pair) / (spread_m(pair) + spread_m(*ak) + spread_m(*bk));
     sum += 1.0 / (1.0 + ratio * ratio);
   }
@@ -88,7 +89,7 @@ std::map<RobotId, SE3> placed_by_tree(const PairMotions& pairs, const std::set<R
     for (const auto& [less, a, b] : order) {
       if (placed.contains(a) == placed.contains(b)) continue;
       const auto [from, to] = placed.contains(a) ? std::pair(a, b) : std::pair(b, a);
-      placed[to] = placed.at(from) * along(pairs, from, to);
+      placed[to] = placed.at(from) * motion_between(pairs, from, to);
       grown = true;
       break;
     }
@@ -101,19 +102,20 @@ double misfit(const PairMotions& pairs, const std::map<RobotId, SE3>& placed) {
   double sum = 0.0;
   for (const auto& [robots, pair] : pairs) {
     const SE3 left = placed.at(robots.second).inverse() * placed.at(robots.first) * pair.T.pose();
-    const double ratio = length_m(left, pair) / (kOff * spread_m(pair));
+    const double ratio = length_m(left, pair) / (kMisfit_spreads * spread_m(pair));
     sum += std::min(1.0, ratio * ratio);
   }
   return sum;
 }
 
 // Shifts all motions together so that as many robots as possible do not move.
-void hold_most(const PairMotions& pairs, std::map<RobotId, SE3>& placed) {
+void keep_most_still(const PairMotions& pairs, std::map<RobotId, SE3>& placed) {
   const auto staying = [&](const SE3& T) {
     std::set<RobotId> moving;
     for (const auto& [robots, pair] : pairs)
       for (const RobotId robot : {robots.first, robots.second})
-        if (length_m(T * placed.at(robot), pair) > kOff * spread_m(pair)) moving.insert(robot);
+        if (length_m(T * placed.at(robot), pair) > kMisfit_spreads * spread_m(pair))
+          moving.insert(robot);
     return placed.size() - moving.size();
   };
   SE3 best = SE3::Identity();
@@ -184,9 +186,9 @@ std::map<RobotId, SE3> better_placement(const PairMotions& all) {
   std::map<RobotId, SE3> still;
   for (const RobotId robot : robots) still[robot] = SE3::Identity();
   std::map<RobotId, SE3> placed = placed_by_tree(pairs, robots);
-  if (placed.size() < robots.size() || misfit(pairs, placed) > misfit(pairs, still) - kBetter)
+  if (placed.size() < robots.size() || misfit(pairs, placed) > misfit(pairs, still) - kLeastGain)
     return {};
-  hold_most(pairs, placed);
+  keep_most_still(pairs, placed);
   return placed;
 }
 

@@ -54,19 +54,20 @@ double default_threshold(int dimension) {
                                   : chi_squared_6_quantile(kInlierProbability));
 }
 
-void RobustSchedule::start(float largest, std::uint32_t open, double barc, int all_in) {
-  decided_ = open == 0;
-  open_ = open;
-  all_in_ = decided_ ? 0 : all_in;
-  mu_ = first_mu(static_cast<double>(largest) * largest, barc * barc);
+void RobustSchedule::start(float largest_residual, std::uint32_t open_edges, double barc,
+                           int unweighed_steps) {
+  decided_ = open_edges == 0;
+  open_ = open_edges;
+  unweighed_steps_ = decided_ ? 0 : unweighed_steps;
+  mu_ = first_mu(static_cast<double>(largest_residual) * largest_residual, barc * barc);
   updates_ = 1;
   hard_updates_ = mu_ >= kHardMu ? 1 : 0;
 }
 
 void RobustSchedule::next(const Tally& tally) {
   if (decided_) return;
-  if (all_in_ > 0) {
-    --all_in_;
+  if (unweighed_steps_ > 0) {
+    --unweighed_steps_;
     return;
   }
   const bool same = tally.changed == 0;

@@ -32,13 +32,13 @@ SessionPart::SessionPart(Session session, TeamPeer self, FrozenPart part,
       graph_(std::move(part.graph)),
       place_(std::move(part.place)),
       in_frame_(part.in_frame),
-      suspicious_(part.suspicious),
+      closures_may_be_false_(part.closures_may_be_false),
       public_(std::move(part.public_keyframes)),
       factory_(std::move(factory)),
       tolerance_(tolerance),
       channel_(self, session_.id, period_s),
       started_s_(now_s),
-      moved_s_(now_s) {
+      last_activity_s_(now_s) {
   for (const SessionMember& member : session_.plan.members)
     boot_of_[member.peer.robot] = member.peer.boot;
   for (const PoseEdge& e : graph_.between) between_.push_back(e.id());
@@ -78,7 +78,7 @@ std::vector<ReliableMessage> SessionPart::advance(const PublicPoses& published, 
     worked_ = true;
     solve(now_s);
   }
-  if (worked_) moved_s_ = now_s;
+  if (worked_) last_activity_s_ = now_s;
   for (ReliableMessage& message : channel_.due(now_s)) to_send_.push_back(std::move(message));
   return std::exchange(to_send_, {});
 }
@@ -127,7 +127,7 @@ bool SessionPart::align(const PublicPoses& published) {
   auto moved = moved_into_frame(graph_.start, self_.robot, kept, poses, tolerance_);
   if (!moved) moved = moved_into_frame(graph_.start, self_.robot, closures, poses, tolerance_);
   if (!moved) return false;
-  graph_.start = suspicious_
+  graph_.start = closures_may_be_false_
                      ? std::move(*moved)
                      : deformed_to_received(*moved, self_.robot, graph_.own, closures, poses);
   return true;
@@ -144,7 +144,7 @@ bool SessionPart::gather(const PublicPoses& published) {
     graph_.step_precision[robot] = poses.step_precision;
     combine_decisions(poses);
   }
-  if (suspicious_) limit_precisions(graph_);
+  if (closures_may_be_false_) limit_precisions(graph_);
   return true;
 }
 
@@ -176,9 +176,9 @@ void SessionPart::start_solver(double now_s) {
   } catch (const std::exception& e) {
     return fail(e.what());
   }
-  moved_s_ = now_s;
+  last_activity_s_ = now_s;
   for (const auto& [from, message] : std::exchange(early_, {}))
-    if (!hand_over(message, now_s)) refused_.push_back(from.first);
+    if (!pass_to_solver(message, now_s)) refused_.push_back(from.first);
 }
 
 void SessionPart::solve(double now_s) {
@@ -231,20 +231,20 @@ bool SessionPart::receive(const ReliableMessage& message, double now_s) {
     case ReliableArrival::kNew:
       break;
   }
-  if (solver_) return hand_over(message, now_s);
-  keep(message);
+  if (solver_) return pass_to_solver(message, now_s);
+  store_early(message);
   return true;
 }
 
-bool SessionPart::hand_over(const ReliableMessage& message, double now_s) {
+bool SessionPart::pass_to_solver(const ReliableMessage& message, double now_s) {
   if (!solver_->receive(message.sender.robot, *message.bytes)) return false;
   channel_.take(message);
-  moved_s_ = now_s;
+  last_activity_s_ = now_s;
   remember_round();
   return true;
 }
 
-void SessionPart::keep(const ReliableMessage& message) {
+void SessionPart::store_early(const ReliableMessage& message) {
   const std::size_t bytes = early_bytes_ + message.bytes->size();
   if (early_.size() >= kMaxEarlyMessages || bytes > kMaxEarlyBytes) return;
   if (early_.try_emplace({message.sender.robot, message.number}, message).second)

@@ -95,8 +95,8 @@ class SessionPart {
   /// Poses of the last round that is known to be completed by all members.
   [[nodiscard]] const std::vector<SE3>& committed_poses() const { return committed_; }
   /// Time of the last activity or message of the session [s].
-  [[nodiscard]] double moved_s() const { return moved_s_; }
-  void moved(double now_s) { moved_s_ = now_s; }
+  [[nodiscard]] double last_activity_s() const { return last_activity_s_; }
+  void note_activity(double now_s) { last_activity_s_ = now_s; }
   [[nodiscard]] double started_s() const { return started_s_; }
   /// Bytes of all messages of the session that this robot has sent or forwarded. A message counts
   /// once for each neighbour that receives it.
@@ -109,8 +109,8 @@ class SessionPart {
   [[nodiscard]] bool gather(const PublicPoses& published);
   void combine_decisions(const MemberPoses& received);
   void start_solver(double now_s);
-  [[nodiscard]] bool hand_over(const ReliableMessage& message, double now_s);
-  void keep(const ReliableMessage& message);
+  [[nodiscard]] bool pass_to_solver(const ReliableMessage& message, double now_s);
+  void store_early(const ReliableMessage& message);
   void solve(double now_s);
   void fail(const std::string& why);
   void remember_round();
@@ -120,7 +120,7 @@ class SessionPart {
   SessionGraph graph_;  // the solver takes it over
   TreePlace place_;
   bool in_frame_;
-  bool suspicious_;
+  bool closures_may_be_false_;
   std::vector<KeyframeIndex> public_;
   std::vector<SinglePose> entered_;  // poses of public_, when the robot entered the frame
   std::vector<ClosureId> between_;   // to other members, ascending
@@ -139,7 +139,7 @@ class SessionPart {
   std::vector<SE3> committed_;
   bool worked_ = false;
   double started_s_;
-  double moved_s_;
+  double last_activity_s_;
   std::uint64_t sent_bytes_ = 0;
 };
 

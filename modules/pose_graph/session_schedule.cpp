@@ -10,7 +10,7 @@ constexpr double kAtRest_s = 2.0;
 
 }  // namespace
 
-bool SessionSchedule::is_paid_for(std::uint64_t bytes, double ended_s, double now_s) const {
+bool SessionSchedule::is_within_budget(std::uint64_t bytes, double ended_s, double now_s) const {
   const double price_s = static_cast<double>(bytes) / (1e3 * config_.exchange_budget_kb_s);
   return now_s - ended_s >= std::min(price_s, config_.session_wait_s);
 }

@@ -7,7 +7,7 @@
 namespace km {
 
 /// When the coordinator of a team opens the next session. New measurements do not interrupt a
-/// session. The next session waits until is_paid_for() and is_worthwhile() are true. Not
+/// session. The next session waits until is_within_budget() and is_worthwhile() are true. Not
 /// thread-safe.
 class SessionSchedule {
  public:
@@ -19,13 +19,13 @@ class SessionSchedule {
     closures_ = closures;
   }
   /// Number for the next session; every call returns a new one.
-  [[nodiscard]] std::uint32_t next_number() { return ++opened_; }
+  [[nodiscard]] std::uint32_t take_number() { return ++opened_; }
   /// To be called when a session begins. It has all present closures.
   void opened() { used_ = closures_; }
 
   /// True if the mean rate of the member that has sent most, `bytes` in the session that ended at
   /// `ended_s`, is within pose_graph.exchange_budget_kb_s by now. Also true after session_wait_s.
-  [[nodiscard]] bool is_paid_for(std::uint64_t bytes, double ended_s, double now_s) const;
+  [[nodiscard]] bool is_within_budget(std::uint64_t bytes, double ended_s, double now_s) const;
   /// True if the graph of the members has changed enough since the session that ended at `ended_s`.
   [[nodiscard]] bool is_worthwhile(double ended_s, double now_s) const;
 

@@ -113,7 +113,7 @@ void TeamAgent::peer_restarted(const TeamPeer& peer) {
 
 void TeamAgent::forget_measured(RobotId robot) {
   graph_.forget(robot);
-  decisions_.forget(robot);
+  decisions_.discard(robot);
   plan_outdated_ = true;
 }
 
@@ -158,7 +158,7 @@ bool TeamAgent::take(const TeamPeer& sender, const MemberPoses& poses) {
   if (was_member && poses.session != part_->session().id && state_ == SessionState::kRunning)
     state_ = SessionState::kDeserted;
   if (!is_member()) return true;
-  if (in_session()) part_->moved(now_s_);
+  if (in_session()) part_->note_activity(now_s_);
   if (state_ == SessionState::kSolved) decide_with(poses);
   return true;
 }
@@ -219,7 +219,7 @@ std::optional<World> TeamAgent::world_of(RobotId anchor) const {
 // is the frame of the lowest robot that closures tie to it.
 std::optional<World> TeamAgent::tied_world() const {
   const std::optional<World>& world = frame_.world();
-  if (!world || !std::ranges::binary_search(ties_.untied, world->anchor)) return world;
+  if (!world || !std::ranges::binary_search(ties_.not_joined, world->anchor)) return world;
   return world_of(lowest_tied(self_.robot, plan_, ties_));
 }
 
@@ -269,12 +269,12 @@ OptimizerProgress TeamAgent::make_progress() const {
   if (in_session() || state_ == SessionState::kSolved) {
     progress.members = part_->members();
     progress.tentative = ties_.tentative;
-    progress.untied = ties_.untied;
+    progress.not_joined = ties_.not_joined;
   }
   progress.round += part_->state().round;
   progress.cost = session.finished ? session.cost : part_->state().cost;
   progress.gradient_norm = session.finished ? session.gradient : part_->state().gradient;
-  progress.seconds += part_->moved_s() - part_->started_s();
+  progress.seconds += part_->last_activity_s() - part_->started_s();
   progress.settled = !in_session() && session.finished && !publish_due_ && holds_all(session.plan);
   return progress;
 }

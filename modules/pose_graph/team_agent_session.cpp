@@ -52,7 +52,8 @@ void TeamAgent::announce(TeamOutput& output) {
   session_sent_s_ = now_s_;
   if (!session.finished) {
     const SolverState state = part_->state();
-    session.round = std::max(session.round, state.round - std::min(state.round, state.lag));
+    session.round =
+        std::max(session.round, state.round - std::min(state.round, state.rounds_behind));
     session.cost = state.cost;
     session.gradient = state.gradient;
     part_->commit(session.round);
@@ -78,9 +79,9 @@ std::uint64_t TeamAgent::price_bytes() const {
 }
 
 bool TeamAgent::is_next_due() const {
-  if (!schedule_.is_paid_for(price_bytes(), part_->moved_s(), now_s_)) return false;
+  if (!schedule_.is_within_budget(price_bytes(), part_->last_activity_s(), now_s_)) return false;
   return plan_.members.size() == 1 || !same_members(part_->session().plan, plan_) ||
-         schedule_.is_worthwhile(part_->moved_s(), now_s_);
+         schedule_.is_worthwhile(part_->last_activity_s(), now_s_);
 }
 
 // True if a member has been in another session since the last one.
@@ -94,7 +95,8 @@ bool TeamAgent::has_moved_on() const {
 bool TeamAgent::should_open() const {
   if (!part_) return true;
   const Session& session = part_->session();
-  const bool hopeless = now_s_ - part_->moved_s() > kHopelessPeriods * config_.status_period_s;
+  const bool hopeless =
+      now_s_ - part_->last_activity_s() > kHopelessPeriods * config_.status_period_s;
   const bool stalled = in_session() && (state_ == SessionState::kDeserted || hopeless);
   if (same_graph(session.plan, plan_))
     return session.finished ? has_moved_on() : !in_session() || stalled;
@@ -103,7 +105,7 @@ bool TeamAgent::should_open() const {
 }
 
 void TeamAgent::open_session(TeamOutput& output) {
-  Session session{.id = {self_, schedule_.next_number()}, .plan = plan_};
+  Session session{.id = {self_, schedule_.take_number()}, .plan = plan_};
   session.method = config_.method;
   session.upright = all_upright(plan_);
   session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);
@@ -180,7 +182,7 @@ std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
   if (!part) return std::nullopt;
   part->in_frame =
       frame_.frame() == session.plan.frame || session.plan.members.front().peer == self_;
-  part->suspicious = expects_false();
+  part->closures_may_be_false = expects_false();
   return part;
 }
 
@@ -198,7 +200,7 @@ bool TeamAgent::join(const Session& session) {
   decisions_.begin_session(!alone);
   if (part_) {
     rounds_before_ += part_->state().round;
-    optimising_s_ += part_->moved_s() - part_->started_s();
+    optimising_s_ += part_->last_activity_s() - part_->started_s();
   }
   poses_.extend(graph_);
   poses_.correct(graph_.odometry_breaks());

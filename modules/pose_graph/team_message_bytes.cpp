@@ -47,7 +47,7 @@ class MessageWriter {
       out_.varint(offer.edges);
       put(offer.id);
       out_.varint(offer.places);
-      put(offer.contested);
+      put(offer.contradicted);
     }
     put(m.method);
     put(m.T_odom_first);

@@ -54,7 +54,7 @@ struct EdgeSetOffer {
   /// Number of places (see find_places()) of the closures that the sender has not rejected.
   std::uint32_t places = 0;
   /// There is one such place, and a place with as many closures or more is rejected.
-  bool contested = false;
+  bool contradicted = false;
   bool operator==(const EdgeSetOffer&) const = default;
 };
 

@@ -66,7 +66,7 @@ NodePair ordered(int i, int j) {
   return {std::min(i, j), std::max(i, j)};
 }
 
-int place_in(const std::vector<NodePair>& pairs, const NodePair& pair) {
+int index_of(const std::vector<NodePair>& pairs, const NodePair& pair) {
   return static_cast<int>(std::lower_bound(pairs.begin(), pairs.end(), pair) - pairs.begin());
 }
 
@@ -82,7 +82,7 @@ TreeFront::TreeFront(FrontGraph graph) : graph_(std::move(graph)) {
   if (graph_.poses < 1) refuse(graph_.self, "it has no poses");
   for (Index k = 0; k < graph_.poses; ++k)
     ids_.push_back({graph_.self, static_cast<KeyframeIndex>(k)});
-  for (const PoseEdge& e : graph_.edges) places_.push_back(place_of(e));
+  for (const PoseEdge& e : graph_.edges) slots_.push_back(slot_of(e));
   for (const VerticalPrior& v : graph_.verticals)
     if (v.pose < 0 || v.pose >= graph_.poses || !v.up.allFinite() || !(v.weight > 0.0))
       refuse(graph_.self, "a vertical prior is not usable");
@@ -90,25 +90,25 @@ TreeFront::TreeFront(FrontGraph graph) : graph_(std::move(graph)) {
   weights_.assign(graph_.edges.size(), 1.0);
 }
 
-TreeFront::Place TreeFront::place_of(const PoseEdge& edge) {
+TreeFront::EdgeSlot TreeFront::slot_of(const PoseEdge& edge) {
   if (!is_usable(edge)) refuse(graph_.self, "an edge is not finite with positive precisions");
   if (edge.from == edge.to)
     refuse(graph_.self, "an edge joins pose " + to_string(edge.from) + " with itself");
-  Place place;
+  EdgeSlot slot;
   const auto node = [&](const KeyframeId& id) {
     const auto held = graph_.held.find(id);
     if (held == graph_.held.end()) return add_node(id);
-    place.T_held = held->second;
+    slot.T_held = held->second;
     return -1;
   };
-  place.i = node(edge.from);
-  place.j = node(edge.to);
-  if (place.i < 0 && place.j < 0) refuse(graph_.self, "an edge joins two held poses");
-  return place;
+  slot.i = node(edge.from);
+  slot.j = node(edge.to);
+  if (slot.i < 0 && slot.j < 0) refuse(graph_.self, "an edge joins two held poses");
+  return slot;
 }
 
-const SE3& TreeFront::pose_of(int node, const Place& place, std::span<const SE3> poses) const {
-  return node < 0 ? place.T_held : poses[at(node)];
+const SE3& TreeFront::pose_of(int node, const EdgeSlot& slot, std::span<const SE3> poses) const {
+  return node < 0 ? slot.T_held : poses[at(node)];
 }
 
 int TreeFront::add_node(const KeyframeId& id) {
@@ -143,7 +143,7 @@ void TreeFront::weigh(const std::vector<double>& weights) {
 bool TreeFront::stale() const {
   if (linearised_weights_.empty()) return true;
   for (std::size_t k = 0; k < weights_.size(); ++k)
-    if (places_[k].sent < 0 && differs(weights_[k], linearised_weights_[k])) return true;
+    if (slots_[k].sent < 0 && differs(weights_[k], linearised_weights_[k])) return true;
   return false;
 }
 
@@ -197,7 +197,7 @@ std::vector<TreeVariable> TreeFront::variables() const {
 
 void TreeFront::plan() {
   std::vector<NodePair> pairs;
-  for (const Place& p : places_)
+  for (const EdgeSlot& p : slots_)
     if (p.i >= 0 && p.j >= 0) pairs.push_back(ordered(p.i, p.j));
   for (const auto& [name, child] : children_)
     for (const auto& [i, j] : child.system.pairs)
@@ -213,9 +213,9 @@ void TreeFront::plan() {
 }
 
 void TreeFront::place_pairs(const std::vector<NodePair>& pairs) {
-  for (Place& p : places_) {
+  for (EdgeSlot& p : slots_) {
     if (p.i < 0 || p.j < 0) continue;
-    p.pair = place_in(pairs, ordered(p.i, p.j));
+    p.pair = index_of(pairs, ordered(p.i, p.j));
     p.transposed = p.i > p.j;
   }
   for (auto& [name, child] : children_) {
@@ -223,7 +223,7 @@ void TreeFront::place_pairs(const std::vector<NodePair>& pairs) {
     child.transposed.clear();
     for (const auto& [first, second] : child.system.pairs) {
       const int i = child.node[at(first)], j = child.node[at(second)];
-      child.pair.push_back(place_in(pairs, ordered(i, j)));
+      child.pair.push_back(index_of(pairs, ordered(i, j)));
       child.transposed.push_back(i > j);
     }
   }
@@ -255,8 +255,8 @@ void TreeFront::list_sent_edges() {
     sent_.push_back({child, edge});
     return static_cast<int>(sent_.size()) - 1;
   };
-  for (std::size_t k = 0; k < places_.size(); ++k)
-    places_[k].sent = send(places_[k].i, places_[k].j, graph_.self, k);
+  for (std::size_t k = 0; k < slots_.size(); ++k)
+    slots_[k].sent = send(slots_[k].i, slots_[k].j, graph_.self, k);
   for (auto& [name, child] : children_) {
     child.sent.clear();
     for (std::size_t k = 0; k < child.system.edges.size(); ++k) {
@@ -270,8 +270,8 @@ template <int kBlock>
 void TreeFront::add_own(std::span<const SE3> poses, Curvature curvature, BlockMatrix& A) const {
   constexpr Index kFirst = first_of(kBlock);
   const auto part = [](const Matrix6& H) { return H.block<kBlock, kBlock>(kFirst, kFirst); };
-  for (std::size_t k = 0; k < places_.size(); ++k) {
-    const Place& p = places_[k];
+  for (std::size_t k = 0; k < slots_.size(); ++k) {
+    const EdgeSlot& p = slots_[k];
     if (p.sent >= 0 || weights_[k] == 0.0) continue;
     const PoseEdge& e = graph_.edges[k];
     const EdgeModel model = model_edge(e.T_from_to, weighed(e.precision, weights_[k]),
@@ -359,8 +359,8 @@ SentEdge TreeFront::sent_edge(const SentWeight& sent, std::span<const SE3> poses
   int i = 0, j = 0;
   if (sent.child == graph_.self) {
     const PoseEdge& e = graph_.edges[sent.edge];
-    i = places_[sent.edge].i;
-    j = places_[sent.edge].j;
+    i = slots_[sent.edge].i;
+    j = slots_[sent.edge].j;
     edge.curvature = curvature_;
     edge.kappa = static_cast<float>(e.precision.kappa);
     edge.tau = static_cast<float>(e.precision.tau);
@@ -374,7 +374,7 @@ SentEdge TreeFront::sent_edge(const SentWeight& sent, std::span<const SE3> poses
     j = child.node[at(edge.transposed ? first : second)];
   }
   const std::vector<int>& place = plan_->place_of_kept();
-  edge.pair = place_in(pairs, ordered(place[at(i)], place[at(j)]));
+  edge.pair = index_of(pairs, ordered(place[at(i)], place[at(j)]));
   edge.transposed = place[at(i)] > place[at(j)];
   edge.weight = weight_of(sent);
   return edge;
@@ -404,12 +404,12 @@ MatrixXd TreeFront::slopes(std::span<const SE3> poses) const {
   const auto subtract = [&](int node, const Vector6& g) {
     if (node >= 0) rows.middleRows(B * node, B) -= g.segment(first_of(B), B);
   };
-  for (std::size_t k = 0; k < places_.size(); ++k) {
+  for (std::size_t k = 0; k < slots_.size(); ++k) {
     if (weights_[k] < kRejected) continue;
-    const Place& p = places_[k];
+    const EdgeSlot& p = slots_[k];
     const PoseEdge& e = graph_.edges[k];
-    slope_edge(e.T_from_to, weighed(e.precision, weights_[k]), pose_of(p.i, p, poses),
-               pose_of(p.j, p, poses), model);
+    set_cost_and_gradient(e.T_from_to, weighed(e.precision, weights_[k]), pose_of(p.i, p, poses),
+                          pose_of(p.j, p, poses), model);
     subtract(p.i, model.g_i);
     subtract(p.j, model.g_j);
   }
@@ -558,9 +558,9 @@ BlockMatrix TreeFront::inverse_from_parent(const TreeInverse& blocks) const {
 
 double TreeFront::cost(std::span<const SE3> poses) const {
   double cost = 0.0;
-  for (std::size_t k = 0; k < places_.size(); ++k) {
+  for (std::size_t k = 0; k < slots_.size(); ++k) {
     if (weights_[k] < kRejected) continue;
-    const Place& p = places_[k];
+    const EdgeSlot& p = slots_[k];
     const double r = residual_of(graph_.edges[k], pose_of(p.i, p, poses), pose_of(p.j, p, poses));
     cost += weights_[k] * r * r;
   }

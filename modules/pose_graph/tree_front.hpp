@@ -121,12 +121,12 @@ class TreeFront {
 
  private:
   // The place of an edge of the graph in the equations.
-  struct Place {
+  struct EdgeSlot {
     int i = 0;  // node of `from`; -1: a held pose
     int j = 0;  // node of `to`
     int pair = -1;
     bool transposed = false;
-    int sent = -1;  // place in sent_ if both ends are left to the parent
+    int sent = -1;  // index in sent_ if both ends are left to the parent
     SE3 T_held = SE3::Identity();
   };
   struct Child {
@@ -134,7 +134,7 @@ class TreeFront {
     std::vector<int> node = {};  // node of each of its variables
     std::vector<int> pair = {};  // pair in the plan of each of its pairs
     std::vector<bool> transposed = {};
-    std::vector<int> sent = {};  // place in sent_ of each of its edges, or -1
+    std::vector<int> sent = {};  // index in sent_ of each of its edges, or -1
   };
   struct SentWeight {
     RobotId child = 0;  // this robot for an own edge
@@ -143,9 +143,10 @@ class TreeFront {
   };
 
   int add_node(const KeyframeId& id);
-  [[nodiscard]] Place place_of(const PoseEdge& edge);
+  [[nodiscard]] EdgeSlot slot_of(const PoseEdge& edge);
   [[nodiscard]] std::optional<std::size_t> origin_node() const;
-  [[nodiscard]] const SE3& pose_of(int node, const Place& place, std::span<const SE3> poses) const;
+  [[nodiscard]] const SE3& pose_of(int node, const EdgeSlot& slot,
+                                   std::span<const SE3> poses) const;
   void plan();
   void place_pairs(const std::vector<NodePair>& pairs);
   [[nodiscard]] std::vector<bool> kept_nodes(const std::vector<NodePair>& pairs) const;
@@ -170,7 +171,7 @@ class TreeFront {
   std::vector<KeyframeId> ids_;
   std::map<KeyframeId, int> foreign_;  // nodes of poses of other robots
   std::size_t followed_ = 0;
-  std::vector<Place> places_;               // one for each edge of the graph
+  std::vector<EdgeSlot> slots_;             // one for each edge of the graph
   std::vector<double> weights_;             // one for each edge of the graph
   std::vector<double> linearised_weights_;  // weights of edges that are not in sent_
   std::map<RobotId, Child> children_;

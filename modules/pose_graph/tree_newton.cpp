@@ -22,16 +22,17 @@ using Weighing = TreeVerdict::Weighing;
 // that the system stays regular.
 constexpr double kFloor = 1e-10;
 // Weight of a rejected step of odometry, so that the trajectory stays connected.
-constexpr double kJoint = 1e-6;
+constexpr double kRejectedStepWeight = 1e-6;
 // Largest distance of a pose from the origin; beyond it, single precision overflows.
 constexpr double kMaxDistance_m = 1e15;
 // kStrongest: largest strength of a pair while closures are weighed, relative to the usual pair, so
 // that no pair overrules the others. At the end, kept closures have their own weight, except for
 // pairs that the other edges contradict. The mean error of the closures of such a pair exceeds
-// kTorn standard deviations of this mean, and kTornOfOne standard deviations of a single closure.
+// kPullOfMean standard deviations of this mean, and kPullOfOne standard deviations of a single
+// closure.
 constexpr double kStrongest = 1.25;
-constexpr double kTorn = 6.0;
-constexpr double kTornOfOne = 1.0;
+constexpr double kPullOfMean = 6.0;
+constexpr double kPullOfOne = 1.0;
 // Maximum number of cycles per robot pair in the noise estimate. With four or more robots it is
 // smaller, so that one robot cannot dominate the estimate.
 constexpr std::size_t kEnoughLengths = 300;
@@ -85,7 +86,7 @@ void TreeNewton::classify() {
       if (graph_.trusted.contains(known_[k].edge.id())) continue;
       const auto decided = graph_.decided.find(known_[k].edge.id());
       if (decided != graph_.decided.end() && !decided->second)
-        known_[k].trust = Trust::kOut;
+        known_[k].trust = Trust::kRejected;
       else if (any_new)
         known_[k].trust = Trust::kOpen;
     }
@@ -95,7 +96,7 @@ void TreeNewton::classify() {
       if (k.odometry) k.trust = Trust::kOpen;
 }
 
-// Places in known_ of closures, by the other robot of the pair; closures inside this robot by its
+// Indices in known_ of closures, by the other robot of the pair; closures inside this robot by its
 // own id.
 std::map<RobotId, std::vector<std::size_t>> TreeNewton::by_peer() const {
   std::map<RobotId, std::vector<std::size_t>> closures;
@@ -139,16 +140,16 @@ void TreeNewton::weigh_by_noise() {
   if (!options_.robust || noise_known_) return;
   noise_known_ = true;
   const std::vector<SE3> odometry = odometry_poses();
-  for (const auto& [peer, places] : by_peer()) {
+  for (const auto& [peer, indices] : by_peer()) {
     const Corroboration::PoseOf pose = pose_before_closures(peer, odometry);
     std::vector<PoseEdge> closures;
-    for (const std::size_t k : places)
+    for (const std::size_t k : indices)
       if (known_[k].trust == Trust::kOpen && !graph_.decided.contains(known_[k].edge.id()))
         closures.push_back(known_[k].edge);
     PairCycles& cycles = graph_.noise.pairs[peer];
     Corroboration(closures, pose, graph_.step_precision, options_.dimension).count_cycles(cycles);
     cycles.factor = estimate_closure_noise(cycles, verdict_.noise_scale) / verdict_.noise_scale;
-    weaken(places, cycles.factor);
+    weaken(indices, cycles.factor);
   }
 }
 
@@ -156,12 +157,12 @@ void TreeNewton::weigh_by_noise() {
 // usual pair.
 void TreeNewton::weigh_by_usual_noise() {
   if (verdict_.usual_noise <= 1.0) return;
-  for (const auto& [peer, places] : by_peer()) {
+  for (const auto& [peer, indices] : by_peer()) {
     PairCycles& cycles = graph_.noise.pairs[peer];
     if (cycles.factor >= verdict_.usual_noise) continue;
     const double usual = verdict_.usual_noise * verdict_.noise_scale;
     if (excludes_noise(cycles, usual, cycles.factor * verdict_.noise_scale)) continue;
-    weaken(places, verdict_.usual_noise / cycles.factor);
+    weaken(indices, verdict_.usual_noise / cycles.factor);
     cycles.factor = verdict_.usual_noise;
   }
 }
@@ -175,11 +176,11 @@ void TreeNewton::weaken(std::span<const std::size_t> closures, double factor) {
 
 void TreeNewton::find_isolated(double barc) {
   const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
-  for (const auto& [peer, places] : by_peer()) {
+  for (const auto& [peer, indices] : by_peer()) {
     std::vector<PoseEdge> closures;
     std::vector<std::size_t> open;
-    for (const std::size_t k : places)
-      if (known_[k].trust != Trust::kOut) {
+    for (const std::size_t k : indices)
+      if (known_[k].trust != Trust::kRejected) {
         closures.push_back(known_[k].edge);
         open.push_back(k);
       }
@@ -196,17 +197,17 @@ void TreeNewton::find_isolated(double barc) {
 }
 
 void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by) {
-  for (const auto& [peer, places] : by_peer()) {
+  for (const auto& [peer, indices] : by_peer()) {
     if (peer == graph_.self) continue;
     std::vector<ClosureId> ids;
-    for (const std::size_t k : places)
+    for (const std::size_t k : indices)
       if (takes_part(known_[k])) ids.push_back(known_[k].edge.id());
     const std::vector<KeyframeId> cover = cover_closures(ids);
     const auto covered = [&](const KeyframeId& id) {
       return std::binary_search(cover.begin(), cover.end(), id);
     };
     std::set<KeyframeIndex> theirs;
-    for (const std::size_t k : places) {
+    for (const std::size_t k : indices) {
       Known& known = known_[k];
       const KeyframeId& here = known.edge.end_on(graph_.self);
       if (!takes_part(known)) continue;
@@ -222,7 +223,7 @@ void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_
 }
 
 // All closures of a limited pair have the same factor.
-std::map<RobotId, double> TreeNewton::shares_of_pairs() const {
+std::map<RobotId, double> TreeNewton::limits_of_pairs() const {
   std::map<RobotId, Precision> sums;
   for (std::size_t k = graph_.own.size(); k < known_.size(); ++k) {
     if (!takes_part(known_[k])) continue;
@@ -230,15 +231,15 @@ std::map<RobotId, double> TreeNewton::shares_of_pairs() const {
     sum.kappa += known_[k].edge.precision.kappa;
     sum.tau += known_[k].edge.precision.tau;
   }
-  std::map<RobotId, double> shares;
+  std::map<RobotId, double> limits;
   for (const auto& [robot, sum] : sums)
-    shares[robot] = std::min(1.0, kStrongest * std::min(verdict_.usual_pair.kappa / sum.kappa,
+    limits[robot] = std::min(1.0, kStrongest * std::min(verdict_.usual_pair.kappa / sum.kappa,
                                                         verdict_.usual_pair.tau / sum.tau));
-  return shares;
+  return limits;
 }
 
 void TreeNewton::build_front() {
-  const std::map<RobotId, double> shares = shares_of_pairs();
+  const std::map<RobotId, double> limits = limits_of_pairs();
   FrontGraph front{.self = graph_.self,
                    .poses = static_cast<Index>(graph_.start.size()),
                    .dimension = options_.dimension,
@@ -252,7 +253,8 @@ void TreeNewton::build_front() {
     if (!takes_part(known_[k]) || !known_[k].own) continue;
     front.edges.push_back(known_[k].edge);
     front_edge_.push_back(k);
-    if (k >= graph_.own.size()) known_[k].limit = known_[k].share = shares.at(peer_of(known_[k]));
+    if (k >= graph_.own.size())
+      known_[k].pair_limit = known_[k].pair_factor = limits.at(peer_of(known_[k]));
   }
   for (const PoseEdge& e : graph_.to_absent) {
     const auto decided = graph_.decided.find(e.id());
@@ -267,7 +269,7 @@ void TreeNewton::build_front() {
   front_.emplace(std::move(front));
   base_.clear();
   for (std::size_t v = 0; v < front_->followed(); ++v) base_.push_back(start_of(front_->id(v)));
-  at_hand_ = base_;
+  present_ = base_;
   refresh_ = true;
 }
 
@@ -275,8 +277,8 @@ std::vector<double> TreeNewton::front_weights(bool candidate) const {
   std::vector<double> weights;
   for (const std::size_t k : front_edge_) {
     const Known& known = known_[k];
-    const double weight =
-        candidate ? known.candidate * known.candidate_share : known.weight * known.share;
+    const double weight = candidate ? known.candidate * known.candidate_pair_factor
+                                    : known.weight * known.pair_factor;
     weights.push_back(known.trust == Trust::kOpen ? std::max(weight, kFloor) : weight);
   }
   weights.resize(front_->graph().edges.size(), 1.0);  // edges to held poses
@@ -300,11 +302,11 @@ void TreeNewton::count_closures(TreeSums& sums) const {
       ++votes.try_emplace(peer, PairVote{graph_.self, peer}).first->second.used;
   }
   const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
-  for (const auto& [peer, places] : by_peer()) {
+  for (const auto& [peer, indices] : by_peer()) {
     const auto vote = votes.find(peer);
     if (vote == votes.end()) continue;
     std::vector<PoseEdge> closures;
-    for (const std::size_t k : places)
+    for (const std::size_t k : indices)
       if (takes_part(known_[k])) closures.push_back(known_[k].edge);
     if (const auto motion = motion_of_pair(closures, graph_.self, pose))
       vote->second.motion = *motion;
@@ -341,10 +343,10 @@ UpMessage TreeNewton::first_message() {
   const std::size_t most =
       place_.members.size() < kEnoughToOutvote ? kEnoughLengths : kShareOfLengths;
   const std::vector<SE3> odometry = odometry_poses();
-  for (const auto& [peer, places] : by_peer()) {
+  for (const auto& [peer, indices] : by_peer()) {
     const Corroboration::PoseOf pose = pose_before_closures(peer, odometry);
     std::vector<PoseEdge> closures;
-    for (const std::size_t k : places)
+    for (const std::size_t k : indices)
       if (known_[k].trust == Trust::kOpen && reports(known_[k]) &&
           !graph_.decided.contains(known_[k].edge.id()))
         closures.push_back(known_[k].edge);
@@ -371,9 +373,9 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
     Known& known = known_[k];
     known.candidate = known.weight;
     if (known.trust != Trust::kOpen) continue;
-    const double r = residual_of(known.edge, pose_at(known.edge.from, at_hand_),
-                                 pose_at(known.edge.to, at_hand_));
-    const double least = known.odometry ? kJoint : 0.0;
+    const double r = residual_of(known.edge, pose_at(known.edge.from, present_),
+                                 pose_at(known.edge.to, present_));
+    const double least = known.odometry ? kRejectedStepWeight : 0.0;
     const double weight =
         std::max(least, robust_weight(r * r, c2, decided ? kLargestMu : verdict_.mu));
     if (verdict_.weighing == Weighing::kWeigh) known.candidate = weight;
@@ -389,17 +391,17 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
 // no longer all pull in one direction. In earlier rounds even consistent pairs show such a pull,
 // because the poses have not converged.
 void TreeNewton::limit_candidates(bool decided) {
-  const std::set<RobotId> torn = decided ? torn_pairs() : std::set<RobotId>{};
+  const std::set<RobotId> contradicted = decided ? contradicted_pairs() : std::set<RobotId>{};
   for (const std::size_t k : front_edge_) {
     Known& known = known_[k];
-    const bool free = known.share == 1.0 || !torn.contains(peer_of(known));
-    known.candidate_share = decided && free ? 1.0 : known.limit;
+    const bool free = known.pair_factor == 1.0 || !contradicted.contains(peer_of(known));
+    known.candidate_pair_factor = decided && free ? 1.0 : known.pair_limit;
   }
 }
 
 // The limited pairs whose closures all pull in one direction at the present poses, with a mean that
 // noise does not explain.
-std::set<RobotId> TreeNewton::torn_pairs() const {
+std::set<RobotId> TreeNewton::contradicted_pairs() const {
   struct Pull {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double weight = 0.0;
@@ -409,52 +411,53 @@ std::set<RobotId> TreeNewton::torn_pairs() const {
   for (const std::size_t k : front_edge_) {
     const Known& known = known_[k];
     const PoseEdge& edge = known.edge;
-    if (known.limit == 1.0) continue;
-    const SE3& T_from = pose_at(edge.from, at_hand_);
+    if (known.pair_limit == 1.0) continue;
+    const SE3& T_from = pose_at(edge.from, present_);
     const Eigen::Vector3d off =
-        pose_at(edge.to, at_hand_).translation() - T_from * edge.T_from_to.translation();
+        pose_at(edge.to, present_).translation() - T_from * edge.T_from_to.translation();
     Pull& pull = pulls[peer_of(known)];
-    const double counts = known.candidate * known.limit;
+    const double counts = known.candidate * known.pair_limit;
     const double weight = counts * edge.precision.tau;
     pull.sum += (edge.from.robot == graph_.self ? weight : -weight) * off;
     pull.weight += weight;
     pull.closures += counts;
   }
-  std::set<RobotId> torn;
+  std::set<RobotId> contradicted;
   for (const auto& [robot, pull] : pulls) {
-    const double most = std::max(kTorn, kTornOfOne * std::sqrt(pull.closures));
-    if (pull.sum.norm() > most * verdict_.noise_scale * std::sqrt(pull.weight)) torn.insert(robot);
+    const double most = std::max(kPullOfMean, kPullOfOne * std::sqrt(pull.closures));
+    if (pull.sum.norm() > most * verdict_.noise_scale * std::sqrt(pull.weight))
+      contradicted.insert(robot);
   }
-  return torn;
+  return contradicted;
 }
 
 UpMessage TreeNewton::equations() {
   UpMessage message{.round = round_, .sums = {}};
   front_->weigh(front_weights(false));
   message.sums.base_cost = front_->cost(base_);
-  message.sums.cost = front_->cost(at_hand_);
+  message.sums.cost = front_->cost(present_);
   weigh_candidates(message.sums);
   front_->weigh(front_weights(true));
   if (refresh_ || front_->stale())
-    front_->linearise(at_hand_, verdict_.full ? Curvature::kFull : Curvature::kGaussNewton);
+    front_->linearise(present_, verdict_.full ? Curvature::kFull : Curvature::kGaussNewton);
   refresh_ = false;
   std::map<RobotId, VectorXd> reduced;
   for (auto& [child, up] : ups_) reduced[child] = std::move(up.reduced);
   if (front_->changed()) {
     bool positive = front_->factorise();
     if (!positive && verdict_.full && place_.parent) {
-      front_->linearise(at_hand_, Curvature::kGaussNewton);
+      front_->linearise(present_, Curvature::kGaussNewton);
       positive = front_->factorise();
     }
     if (!positive && (place_.parent || !verdict_.full)) positive = front_->factorise_damped();
     factorised_ = positive;
     message.failed = !positive && place_.parent.has_value();
-    if (positive && place_.parent) message.system = front_->system_for_parent(at_hand_);
+    if (positive && place_.parent) message.system = front_->system_for_parent(present_);
   } else {
     message.weights = front_->changed_weights();
   }
   if (!factorised_) return message;
-  front_->reduce(at_hand_, reduced);
+  front_->reduce(present_, reduced);
   message.reduced = front_->reduced();
   message.sums.decrement = front_->decrement();
   message.failed = !message.reduced.allFinite() || !std::isfinite(message.sums.decrement);
@@ -545,15 +548,15 @@ std::vector<SolverMessage> TreeNewton::go_up() {
   state_.failed = message.failed;
   if (message.failed) return go_down(root_->stop(round_));
   if (!front_) return go_down(root_->decide_start(message.sums, round_));
-  return go_down(root_->decide(message.sums, round_, *front_, at_hand_, factorised_));
+  return go_down(root_->decide(message.sums, round_, *front_, present_, factorised_));
 }
 
 void TreeNewton::accept() {
-  base_ = at_hand_;
+  base_ = present_;
   accepted_.assign(base_.begin(), base_.begin() + static_cast<Index>(accepted_.size()));
   for (Known& k : known_) {
     k.weight = k.candidate;
-    k.share = k.candidate_share;
+    k.pair_factor = k.candidate_pair_factor;
   }
 }
 
@@ -581,7 +584,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       const SE3 moved =
           retract(base_[k], scale * tangent_of_step(step_.col(static_cast<Index>(k))));
       // The step of a robot whose equations are singular to rounding may be arbitrarily long.
-      at_hand_[k] = is_within_limits(moved) ? moved : base_[k];
+      present_[k] = is_within_limits(moved) ? moved : base_[k];
     }
   };
   verdict_ = v;
@@ -609,7 +612,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       break;
     case Next::kRefresh:
       if (v.accept) accept();
-      at_hand_ = base_;
+      present_ = base_;
       refresh_ = true;
       break;
     case Next::kDone:

@@ -60,25 +60,25 @@ class TreeNewton final : public MemberSolver {
 
  private:
   enum class Phase { kUp, kDown, kDone };
-  /// kIn: not weighed. kOpen: may be rejected. kOut: rejected by an earlier session.
-  enum class Trust { kIn, kOpen, kOut };
+  /// kFixed: not weighed. kOpen: may be rejected. kRejected: by an earlier session.
+  enum class Trust { kFixed, kOpen, kRejected };
   /// An edge that this robot knows. The other robot of the edge may be the one that weighs it.
   struct Known {
     PoseEdge edge;
-    Trust trust = Trust::kIn;
+    Trust trust = Trust::kFixed;
     bool deferred = false;  ///< Stands alone: deferred in this session.
     bool odometry = false;
-    bool own = true;               ///< This robot weighs it.
-    double weight = 1.0;           ///< Weight at the accepted poses.
-    double candidate = 1.0;        ///< At the present poses.
-    double limit = 1.0;            ///< Factor on the weight while the pair of the edge is limited.
-    double share = 1.0;            ///< `limit` or 1: factor on the weight at the accepted poses.
-    double candidate_share = 1.0;  ///< At the present poses.
+    bool own = true;           ///< This robot weighs it.
+    double weight = 1.0;       ///< Weight at the accepted poses.
+    double candidate = 1.0;    ///< At the present poses.
+    double pair_limit = 1.0;   ///< Factor on the weight while the pair of the edge is limited.
+    double pair_factor = 1.0;  ///< `pair_limit` or 1: factor on the weight at the accepted poses.
+    double candidate_pair_factor = 1.0;  ///< At the present poses.
   };
 
   void classify();
   [[nodiscard]] bool takes_part(const Known& k) const {
-    return k.trust != Trust::kOut && !k.deferred;
+    return k.trust != Trust::kRejected && !k.deferred;
   }
   [[nodiscard]] bool reports(const Known& k) const;
   /// The other robot of the edge; this robot for an edge inside it.
@@ -92,7 +92,7 @@ class TreeNewton final : public MemberSolver {
   void weigh_by_usual_noise();
   void weaken(std::span<const std::size_t> closures, double factor);
   void find_isolated(double barc);
-  [[nodiscard]] std::map<RobotId, double> shares_of_pairs() const;
+  [[nodiscard]] std::map<RobotId, double> limits_of_pairs() const;
   void build_front();
   void share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by);
   [[nodiscard]] const SE3& pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const;
@@ -104,7 +104,7 @@ class TreeNewton final : public MemberSolver {
   [[nodiscard]] UpMessage equations();
   void weigh_candidates(TreeSums& sums);
   void limit_candidates(bool decided);
-  [[nodiscard]] std::set<RobotId> torn_pairs() const;
+  [[nodiscard]] std::set<RobotId> contradicted_pairs() const;
   [[nodiscard]] std::vector<SolverMessage> go_up();
   [[nodiscard]] bool can_follow(const DownMessage& message) const;
   [[nodiscard]] std::vector<SolverMessage> go_down(const DownMessage& message);
@@ -119,7 +119,7 @@ class TreeNewton final : public MemberSolver {
   TreeNewtonOptions options_;
   std::vector<Known> known_;  // SessionGraph::own, then ::between
   std::optional<TreeFront> front_;
-  std::vector<std::size_t> front_edge_;  // place in known_ of each edge of the front
+  std::vector<std::size_t> front_edge_;  // index in known_ of each edge of the front
 
   Phase phase_ = Phase::kUp;
   std::uint32_t round_ = 0;
@@ -128,7 +128,7 @@ class TreeNewton final : public MemberSolver {
   std::optional<DownMessage> down_;
   std::vector<SE3> accepted_;  // own poses
   std::vector<SE3> base_;      // accepted followed poses
-  std::vector<SE3> at_hand_;   // followed poses after the step
+  std::vector<SE3> present_;   // followed poses after the step
   Eigen::MatrixXd step_;       // step of the followed poses
   TreeVerdict verdict_;        // last decision of the root
   bool refresh_ = true;

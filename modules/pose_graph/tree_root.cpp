@@ -25,7 +25,7 @@ constexpr int kMaxBacktracks = 12;
 constexpr int kMaxBacktracksUndecided = 8;
 // At a start from odometry, no residual contradicts odometry. If its steps may be rejected, the
 // first steps therefore use all edges with full weight.
-constexpr int kAllInSteps = 8;
+constexpr int kUnweighedSteps = 8;
 // Margin on barc if noise is smaller than stated, because its tails are then longer: the largest
 // residual of parking-garage is 31 times the scale.
 constexpr double kMargin = 8.0;
@@ -144,11 +144,11 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
 
 DownMessage TreeRoot::start(bool deferred, const TreeSums& sums) {
   schedule_.start(sums.largest, options_.robust ? sums.open : 0, barc_,
-                  options_.reject_odometry ? kAllInSteps : 0);
+                  options_.reject_odometry ? kUnweighedSteps : 0);
   if (options_.robust) usual_pair_ = usual_strength(motions_of(sums.votes));
-  weighing_ = schedule_.decided()  ? Weighing::kDecided
-              : schedule_.all_in() ? Weighing::kAllIn
-                                   : Weighing::kWeigh;
+  weighing_ = schedule_.decided()     ? Weighing::kDecided
+              : schedule_.unweighed() ? Weighing::kUnweighed
+                                      : Weighing::kWeigh;
   DownMessage message = answer(Next::kStart);
   message.verdict.deferred = deferred;
   return message;
@@ -194,9 +194,9 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const bool decided = schedule_.decided();
   const bool newly_decided = decided && weighing_ != Weighing::kDecided;
   const bool unlimited = weighing_ == Weighing::kDecided || usual_pair_.tau >= kUnlimited.tau;
-  weighing_ = decided              ? Weighing::kDecided
-              : schedule_.all_in() ? Weighing::kAllIn
-                                   : Weighing::kWeigh;
+  weighing_ = decided                 ? Weighing::kDecided
+              : schedule_.unweighed() ? Weighing::kUnweighed
+                                      : Weighing::kWeigh;
   if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds)
     return answer(Next::kDone);
   // Gauss-Newton steps rarely lead to the minimum of the decided weights, so full second

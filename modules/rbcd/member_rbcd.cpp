@@ -79,7 +79,7 @@ QuadraticProblem MemberRbcd::make_problem() {
       const KeyframeIndex at = e.end_on(graph_.self).index;
       Neighbour& neighbour = neighbours_[other.robot];
       neighbour.absent = edges == &graph_.to_absent;
-      neighbour.before = !neighbour.absent && other.robot < graph_.self;
+      neighbour.updates_before = !neighbour.absent && other.robot < graph_.self;
       neighbour.own.push_back(at);
       const auto [slot, is_new] = neighbour.slot_of.try_emplace(other.index, slots);
       if (is_new) ++slots;
@@ -126,7 +126,7 @@ bool MemberRbcd::can_update() const {
   if (options_.max_rounds > 0 && round >= options_.max_rounds) return false;
   return std::ranges::all_of(neighbours_, [&](const auto& of_robot) {
     const Neighbour& neighbour = of_robot.second;
-    return neighbour.absent || neighbour.round >= round + (neighbour.before ? 1 : 0);
+    return neighbour.absent || neighbour.round >= round + (neighbour.updates_before ? 1 : 0);
   });
 }
 
@@ -206,7 +206,8 @@ void MemberRbcd::report_share(double squared_gradient, std::vector<SolverMessage
   Share share{problem_.cost(at), squared_gradient, !graph_.to_absent.empty()};
   for (std::size_t k = 0; k < robot_of_edge_.size(); ++k) {
     const Neighbour& neighbour = neighbours_.at(robot_of_edge_[k]);
-    if (!neighbour.absent && !neighbour.before) share.cost -= problem_.public_edge_cost(k, at);
+    if (!neighbour.absent && !neighbour.updates_before)
+      share.cost -= problem_.public_edge_cost(k, at);
   }
   if (is_root()) {
     shares_[round][graph_.self] = share;
@@ -273,7 +274,7 @@ void MemberRbcd::adopt(const Progress& progress) {
   const auto& [round, total] = progress.at;
   poses_ = round == 0 ? graph_.start : round_to_poses(history_.at(round), progress.anchor);
   state_.round = round;
-  state_.lag = kMaxAhead;
+  state_.rounds_behind = kMaxAhead;
   state_.cost = total.cost;
   state_.gradient = total.gradient;
   done_ = progress.stop;
@@ -307,7 +308,7 @@ bool MemberRbcd::take_poses(RobotId from, std::uint32_t round, ByteReader& reade
   if (round <= neighbour.round) return true;  // repeated
   // The neighbour waits for the next poses of this robot and therefore cannot be further ahead.
   const std::uint32_t own_round = history_.rbegin()->first;
-  if (round > own_round + (neighbour.before ? 1 : 0)) return false;
+  if (round > own_round + (neighbour.updates_before ? 1 : 0)) return false;
   X = restore_stiefel(std::move(X));
   Eigen::Index k = 0;
   for (const auto& [keyframe, slot] : neighbour.slot_of)

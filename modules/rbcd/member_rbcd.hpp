@@ -65,8 +65,8 @@ class MemberRbcd final : public MemberSolver {
     std::map<KeyframeIndex, Eigen::Index> slot_of;  // places in fixed_
     std::vector<KeyframeIndex> own;                 // poses sent to it, ascending
     std::uint32_t round = 0;
-    bool absent = false;  // out of reach: its poses are held
-    bool before = false;  // it updates before this robot
+    bool absent = false;          // out of reach: its poses are held
+    bool updates_before = false;  // it updates before this robot
   };
   struct Share {
     double cost = 0.0;

@@ -57,12 +57,12 @@ LabelledMesh coarsened(const LabelledMesh& mesh, std::size_t most) {
 
 std::optional<RosMarker> SurfacePieces::next(const RosHeader& header) {
   const auto pieces = [this] { return published_ ? count(published_->faces.size()) : 0; };
-  if (next_ >= std::max(pieces(), shown_) && waiting_) {
-    shown_ = pieces();
+  if (next_ >= std::max(pieces(), former_pieces_) && waiting_) {
+    former_pieces_ = pieces();
     published_ = std::exchange(waiting_, nullptr);
     next_ = 0;
   }
-  if (next_ >= std::max(pieces(), shown_)) return std::nullopt;
+  if (next_ >= std::max(pieces(), former_pieces_)) return std::nullopt;
   const std::size_t begin = std::min(next_ * kFaces, published_->faces.size());
   const std::size_t size = std::min(kFaces, published_->faces.size() - begin);
   RosMarker marker =

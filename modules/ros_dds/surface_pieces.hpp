@@ -36,7 +36,7 @@ class SurfacePieces {
  private:
   std::shared_ptr<const LabelledMesh> published_, waiting_;
   std::size_t next_ = 0;
-  std::size_t shown_ = 0;  // number of pieces of the mesh published before
+  std::size_t former_pieces_ = 0;  // number of pieces of the mesh published before
 };
 
 }  // namespace km

@@ -48,8 +48,8 @@ bool is_signed_by(const PublicKey& authority, const Revocations& revocations) {
   return verify(statement_of(revocations), revocations.signature, authority);
 }
 
-const char* lapse_of(const Certificate& certificate, const Revocations& revocations,
-                     std::int64_t now_s) {
+const char* why_invalid(const Certificate& certificate, const Revocations& revocations,
+                        std::int64_t now_s) {
   if (now_s < certificate.valid_from_s) return "certificate is not valid yet (are clocks right?)";
   if (now_s > certificate.valid_until_s) return "certificate has expired (are clocks right?)";
   if (std::ranges::any_of(revocations.revoked,
@@ -58,11 +58,11 @@ const char* lapse_of(const Certificate& certificate, const Revocations& revocati
   return nullptr;
 }
 
-const char* refusal_of(const Certificate& certificate, const PublicKey& authority,
-                       const Revocations& revocations, std::int64_t now_s) {
+const char* why_refused(const Certificate& certificate, const PublicKey& authority,
+                        const Revocations& revocations, std::int64_t now_s) {
   if (!is_signed_by(authority, certificate))
     return "certificate is not the authority's for this id, name and key";
-  return lapse_of(certificate, revocations, now_s);
+  return why_invalid(certificate, revocations, now_s);
 }
 
 }  // namespace km

@@ -46,12 +46,12 @@ void sign(Revocations& revocations, const SigningKey& authority);
 
 /// nullptr if a certificate of the authority is valid at `now_s` [s since 1970-01-01 UTC];
 /// otherwise the reason (a string literal): not valid yet, expired, or revoked.
-[[nodiscard]] const char* lapse_of(const Certificate& certificate, const Revocations& revocations,
-                                   std::int64_t now_s);
+[[nodiscard]] const char* why_invalid(const Certificate& certificate,
+                                      const Revocations& revocations, std::int64_t now_s);
 
-/// As lapse_of(), and also checks the signature of the authority on the certificate. Does not check
-/// the signature of `revocations`.
-[[nodiscard]] const char* refusal_of(const Certificate& certificate, const PublicKey& authority,
-                                     const Revocations& revocations, std::int64_t now_s);
+/// As why_invalid(), and also checks the signature of the authority on the certificate. Does not
+/// check the signature of `revocations`.
+[[nodiscard]] const char* why_refused(const Certificate& certificate, const PublicKey& authority,
+                                      const Revocations& revocations, std::int64_t now_s);
 
 }  // namespace km

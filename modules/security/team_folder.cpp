@@ -100,7 +100,7 @@ void TeamFolder::check(const std::vector<RobotName>& robots, std::int64_t now_s)
                                  ": ids and names are unique in a team");
     for (const Certificate& other : issued_)
       if ((other.robot == id || other.name == name) &&
-          lapse_of(other, revocations_, now_s) == nullptr)
+          why_invalid(other, revocations_, now_s) == nullptr)
         throw std::runtime_error(describe(id, name) + ": " + describe(other.robot, other.name) +
                                  " has a certificate until " + time_text(other.valid_until_s) +
                                  "; revoke it first");

@@ -114,7 +114,7 @@ TeamSeal::TeamSeal(RobotKeys keys, const RobotIdentity& own, std::int64_t now_s)
                                 "): use its own folder of keys, or its name and id");
   if (!is_signed_by(authority_, revocations_))
     throw std::invalid_argument("the list of revocations is not the authority's");
-  if (const char* why = refusal_of(certificate, authority_, revocations_, now_s))
+  if (const char* why = why_refused(certificate, authority_, revocations_, now_s))
     throw std::invalid_argument("the keys of " + own.name + " are of no use: " + why +
                                 "; `kimera_multi_keys add` makes new ones");
   start_sodium();
@@ -158,7 +158,7 @@ Decoded<Certificate> TeamSeal::certified(const Credentials& shown, const RobotId
   if (!is_signed_by_robot(shown, identity))
     return Result::refuse("credentials are not signed by the robot that they name");
   Certificate certificate = claimed_certificate(shown, identity, team_);
-  if (const char* why = refusal_of(certificate, authority_, revocations_, now_s))
+  if (const char* why = why_refused(certificate, authority_, revocations_, now_s))
     return Result::refuse(why);
   return Result::accept(std::move(certificate));
 }
@@ -187,9 +187,9 @@ MembershipChange TeamSeal::update(const Revocations& revocations, std::int64_t n
   revocations_ = revocations;
   MembershipChange change;
   change.forgotten = peers_.erase_if([&](const Certificate& certificate) {
-    return lapse_of(certificate, revocations, now_s) != nullptr;
+    return why_invalid(certificate, revocations, now_s) != nullptr;
   });
-  change.new_key = differs || !change.forgotten.empty() || now_s > holder_lapses_s_;
+  change.new_key = differs || !change.forgotten.empty() || now_s > newest_key_expires_s_;
   if (change.new_key) draw_team_key();
   return change;
 }
@@ -198,13 +198,13 @@ void TeamSeal::draw_team_key() {
   const std::uint32_t number = team_keys_.empty() ? 1 : team_keys_.back().number + 1;
   team_keys_.push_back({number, make_sealing_key()});
   if (team_keys_.size() > kTeamKeysKept) team_keys_.erase(team_keys_.begin());
-  holder_lapses_s_ = std::numeric_limits<std::int64_t>::max();
+  newest_key_expires_s_ = std::numeric_limits<std::int64_t>::max();
 }
 
 std::optional<Octets> TeamSeal::key_message_for(const TeamPeer& peer) {
   const AdmittedPeer* to = peers_.find(peer);
   if (to == nullptr) return std::nullopt;
-  holder_lapses_s_ = std::min(holder_lapses_s_, to->certificate.valid_until_s);
+  newest_key_expires_s_ = std::min(newest_key_expires_s_, to->certificate.valid_until_s);
   Octets keys = to_octets(team_keys_);
   Octets message;
   encrypt(to->to_peer, random_nonce(), key_message_data(self_, peer), keys, message);

@@ -111,7 +111,7 @@ class TeamSeal {
   /// nullptr, or the reason why a formerly valid certificate is no longer valid at `now_s` (a
   /// string literal).
   [[nodiscard]] const char* why_lapsed(const Certificate& certificate, std::int64_t now_s) const {
-    return lapse_of(certificate, revocations_, now_s);
+    return why_invalid(certificate, revocations_, now_s);
   }
 
   /// Credentials of an admitted process; nullopt if it is not admitted.
@@ -176,7 +176,7 @@ class TeamSeal {
   // Time [s since 1970-01-01 UTC] at which a new team key is due: the earliest end of the
   // certificates of all processes that have received the newest key. Such a process may have been
   // removed from peers_ before.
-  std::int64_t holder_lapses_s_ = std::numeric_limits<std::int64_t>::max();
+  std::int64_t newest_key_expires_s_ = std::numeric_limits<std::int64_t>::max();
 };
 
 }  // namespace km

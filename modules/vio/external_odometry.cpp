@@ -38,24 +38,25 @@ ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
   ExternalOdometryResult result;
   if (packet.frame == nullptr || !packet.pose || !packet.pose->T_odom_body.matrix().allFinite())
     return result;
-  const Fix fix{packet.frame->stamp, *packet.pose};
-  const bool is_taken_up = std::exchange(continues_, false) && fix.stamp == last_keyframe_->stamp;
-  if (last_ && fix.stamp <= last_->stamp && !is_taken_up) return result;
-  result.has_jumped = !is_taken_up && is_jump(fix);
+  const StampedMeasurement measured{packet.frame->stamp, *packet.pose};
+  const bool is_taken_up =
+      std::exchange(continues_, false) && measured.stamp == last_keyframe_->stamp;
+  if (last_ && measured.stamp <= last_->stamp && !is_taken_up) return result;
+  result.has_jumped = !is_taken_up && is_jump(measured);
   if (result.has_jumped)
-    T_chain_odom_ = T_chain_odom_ * last_->pose.T_odom_body * fix.pose.T_odom_body.inverse();
+    T_chain_odom_ = T_chain_odom_ * last_->pose.T_odom_body * measured.pose.T_odom_body.inverse();
   if (last_ && !result.has_jumped && !is_taken_up)
-    count_motion(fix);
+    count_motion(measured);
   else
-    T_odom_rest_ = fix.pose.T_odom_body;
-  const SE3 T_odom_body = T_chain_odom_ * fix.pose.T_odom_body;
+    T_odom_last_motion_ = measured.pose.T_odom_body;
+  const SE3 T_odom_body = T_chain_odom_ * measured.pose.T_odom_body;
   OdometryState state;
-  state.stamp = fix.stamp;
+  state.stamp = measured.stamp;
   state.T_odom_body = T_odom_body;
   if (last_ && !result.has_jumped && !is_taken_up)
     state.v_odom =
         (T_odom_body.translation() - (T_chain_odom_ * last_->pose.T_odom_body).translation()) /
-        seconds_between(last_->stamp, fix.stamp);
+        seconds_between(last_->stamp, measured.stamp);
   const bool locates_points =
       depth_source_ == DepthSource::kRightImage || packet.frame->depth != nullptr;
   const bool is_due =
@@ -63,54 +64,54 @@ ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
   // A keyframe without points cannot close a loop, so it is made only after a jump.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
-    add_keyframe(fix, T_odom_body, result.has_jumped, result);
+    add_keyframe(measured, T_odom_body, result.has_jumped, result);
   if (!last_keyframe_) return result;
   if (is_taken_up)  // the state was published earlier; the covariance was not kept
-    last_kf_ = fix;
+    last_kf_ = measured;
   else
     result.state = state;
   result.frame = LocatedFrame{packet.frame, last_keyframe_->id.index, T_odom_body};
-  last_ = fix;
+  last_ = measured;
   return result;
 }
 
-bool ExternalOdometry::is_jump(const Fix& fix) const {
+bool ExternalOdometry::is_jump(const StampedMeasurement& measured) const {
   if (!last_) return false;
   const double distance_m =
-      (fix.pose.T_odom_body.translation() - last_->pose.T_odom_body.translation()).norm();
-  return distance_m > config_.max_speed_mps * seconds_between(last_->stamp, fix.stamp);
+      (measured.pose.T_odom_body.translation() - last_->pose.T_odom_body.translation()).norm();
+  return distance_m > config_.max_speed_mps * seconds_between(last_->stamp, measured.stamp);
 }
 
-// Adds the time in motion since the last fix to moved_s_. A motion below the least speed and rate
-// counts with the duration that it would have at them.
-void ExternalOdometry::count_motion(const Fix& fix) {
-  const SE3& T_odom_body = fix.pose.T_odom_body;
-  const double dt_s = seconds_between(last_->stamp, fix.stamp);
-  const double away_s = slowest_s(T_odom_rest_.inverse() * T_odom_body);
+// Adds the time in motion since the last measurement to moved_s_. A motion below the least speed
+// and rate counts with the duration that it would have at them.
+void ExternalOdometry::count_motion(const StampedMeasurement& measured) {
+  const SE3& T_odom_body = measured.pose.T_odom_body;
+  const double dt_s = seconds_between(last_->stamp, measured.stamp);
+  const double away_s = slowest_s(T_odom_last_motion_.inverse() * T_odom_body);
   const bool is_fast = slowest_s(last_->pose.T_odom_body.inverse() * T_odom_body) > dt_s;
   if (!is_fast && away_s < kRest_s) return;
   moved_s_ += is_fast ? dt_s : away_s;
-  T_odom_rest_ = T_odom_body;
+  T_odom_last_motion_ = T_odom_body;
 }
 
-void ExternalOdometry::add_keyframe(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
-                                    ExternalOdometryResult& result) {
+void ExternalOdometry::add_keyframe(const StampedMeasurement& measured, const SE3& T_odom_body,
+                                    bool has_jumped, ExternalOdometryResult& result) {
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, 0};
-  keyframe.stamp = fix.stamp;
+  keyframe.stamp = measured.stamp;
   keyframe.T_odom_kf = keyframe.T_previous_kf = T_odom_body;
   if (last_keyframe_) {
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * T_odom_body;
     const UncertainPose grown =
         between_on_chain({last_kf_->pose.T_odom_body, last_kf_->pose.covariance},
-                         {fix.pose.T_odom_body, fix.pose.covariance});
+                         {measured.pose.T_odom_body, measured.pose.covariance});
     keyframe.covariance =
         has_jumped ? restart_covariance() : keyframe_covariance(config_, moved_s_, grown.Sigma);
   }
   last_keyframe_ = keyframe;
   moved_s_ = 0.0;
-  last_kf_ = fix;
+  last_kf_ = measured;
   result.keyframe = keyframe;
 }
 

@@ -37,24 +37,24 @@ class ExternalOdometry {
   [[nodiscard]] ExternalOdometryResult process(const SensorPacket& packet);
 
  private:
-  struct Fix {
+  struct StampedMeasurement {
     Stamp stamp;
     MeasuredPose pose;
   };
 
-  [[nodiscard]] bool is_jump(const Fix& fix) const;
-  void count_motion(const Fix& fix);
-  void add_keyframe(const Fix& fix, const SE3& T_odom_body, bool has_jumped,
+  [[nodiscard]] bool is_jump(const StampedMeasurement& measured) const;
+  void count_motion(const StampedMeasurement& measured);
+  void add_keyframe(const StampedMeasurement& measured, const SE3& T_odom_body, bool has_jumped,
                     ExternalOdometryResult& result);
 
   RobotId robot_;
   DepthSource depth_source_;
   VioConfig config_;
-  bool continues_ = false;             // true from continue_from() to the first usable pose
-  std::optional<Fix> last_, last_kf_;  // fixes as measured
+  bool continues_ = false;  // true from continue_from() to the first usable pose
+  std::optional<StampedMeasurement> last_, last_kf_;  // as measured
   std::optional<KeyframeOdometry> last_keyframe_;
-  double moved_s_ = 0.0;                // time in motion since the last keyframe
-  SE3 T_odom_rest_ = SE3::Identity();   // measured pose at the last counted motion
+  double moved_s_ = 0.0;                      // time in motion since the last keyframe
+  SE3 T_odom_last_motion_ = SE3::Identity();  // measured pose at the last counted motion
   SE3 T_chain_odom_ = SE3::Identity();  // from measured to published odometry; changed by a jump
 };
 

@@ -103,7 +103,7 @@ std::vector<Eigen::Vector2f> FeatureDetector::detect(const ImagePyramid& image,
   }
 
   // Cells with features follow only if the cells without features do not suffice.
-  for (int there = 0; there < kMaxInCell && static_cast<int>(result.size()) < count; ++there) {
+  for (int there = 0; there < kFullCell && static_cast<int>(result.size()) < count; ++there) {
     candidates_.clear();
     for (int row = 0; row < rows; ++row) {
       for (int column = 0; column < columns; ++column) {

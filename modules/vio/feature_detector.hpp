@@ -89,7 +89,7 @@ class FeatureDetector {
       return a.rank != b.rank ? a.rank < b.rank : better(a, b);
     }
   };
-  static constexpr int kMaxInCell = 3;  // Cells with as many features or more are not searched.
+  static constexpr int kFullCell = 3;  // Cells with as many features or more are not searched.
 
   void add_corners_of(const cv::Rect& cell, int features_there, const ImagePyramid& image);
 

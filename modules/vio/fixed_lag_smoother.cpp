@@ -116,13 +116,13 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
     window_.frames.back().keyframe = true;
     last_keyframe = stamp;
   }
-  hold_first();
+  set_first_prior();
   for (int pass = 0; pass < 2; ++pass) {
     locate_landmarks();
     if (!optimize(window_, kStartIterations).usable) return std::nullopt;
     reject_outliers();
   }
-  // The prior of hold_first() is not set again. It holds the biases near their guess, and the
+  // The prior of set_first_prior() is not set again. It holds the biases near their guess, and the
   // optimisation has not moved position and heading of the first frame.
   std::vector<OdometryState> states;
   for (const WindowFrame& frame : window_.frames) states.push_back(frame.state);
@@ -349,7 +349,7 @@ int FixedLagSmoother::reject_outliers() {
   return dropped;
 }
 
-bool FixedLagSmoother::leaving(Stamp stamp) const {
+bool FixedLagSmoother::leaves_next(Stamp stamp) const {
   const auto too_many = keyframes() > static_cast<std::size_t>(config_.window_keyframes);
   return window_.frames.empty() || stamp < window_.frames.front().state.stamp ||
          (too_many && stamp == window_.frames.front().state.stamp);
@@ -416,7 +416,7 @@ std::optional<Eigen::MatrixXd> FixedLagSmoother::covariance_of(Eigen::MatrixXd D
   return D_T.transpose() * D_T;
 }
 
-void FixedLagSmoother::hold_first() {
+void FixedLagSmoother::set_first_prior() {
   const OdometryState& first = window_.frames.front().state;
   StatePrior& prior = window_.prior;
   prior.frames = {window_.frames.front().id};
@@ -469,10 +469,10 @@ bool FixedLagSmoother::slide(bool rests) {
         k + static_cast<std::size_t>(config_.window_recent) >= window_.frames.size();
     if (recent || frame.keyframe) continue;
     if (rests && frame.rests && window_.frames[k - 1].rests)
-      rest_out(k);
+      drop_at_rest(k);
     else if (frame.imu->rests())
       frame.keyframe = true;  // the last image at rest: later poses are measured from it
-    else if (!merge_out(k))
+    else if (!drop_and_merge(k))
       return false;
   }
   while (keyframes() > static_cast<std::size_t>(config_.window_keyframes))
@@ -484,7 +484,7 @@ bool FixedLagSmoother::slide(bool rests) {
   return true;
 }
 
-bool FixedLagSmoother::merge_out(std::size_t frame) {
+bool FixedLagSmoother::drop_and_merge(std::size_t frame) {
   std::vector<ImuSample>& later = window_.frames[frame + 1].samples;
   later = joined(window_.frames[frame].samples, later, window_.frames[frame - 1].instant(),
                  window_.frames[frame + 1].instant());
@@ -493,7 +493,7 @@ bool FixedLagSmoother::merge_out(std::size_t frame) {
   return set_imu(frame);
 }
 
-void FixedLagSmoother::rest_out(std::size_t frame) {
+void FixedLagSmoother::drop_at_rest(std::size_t frame) {
   forget_frame(window_, frame);
   const auto in_keyframe = [&](const WindowObservation& o) {
     return window_.frames[o.frame].keyframe;

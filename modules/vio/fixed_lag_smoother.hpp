@@ -99,15 +99,15 @@ class FixedLagSmoother {
   [[nodiscard]] double gyro_noise_scale() const { return gyro_noise_.scale(); }
 
   /// True if the keyframe at `stamp` has left the window or leaves it in the next add().
-  [[nodiscard]] bool leaving(Stamp stamp) const;
+  [[nodiscard]] bool leaves_next(Stamp stamp) const;
 
  private:
   // append() and the functions below return false if an inertial factor cannot be made. The state
   // is passed by value because it may be a member of the window.
   [[nodiscard]] bool append(const InertialFrame& frame, OdometryState state, double offset_s);
   [[nodiscard]] bool slide(bool rests);
-  [[nodiscard]] bool merge_out(std::size_t frame);
-  void rest_out(std::size_t frame);
+  [[nodiscard]] bool drop_and_merge(std::size_t frame);
+  void drop_at_rest(std::size_t frame);
   [[nodiscard]] bool share_samples();
   [[nodiscard]] bool set_imu(std::size_t frame);
   void compare_gyro();
@@ -115,7 +115,7 @@ class FixedLagSmoother {
   int reject_outliers();
   void locate_landmarks();
   void clear();
-  void hold_first();
+  void set_first_prior();
   void hold_calibration();
   [[nodiscard]] double first_offset_s(const InertialFrame& frame) const;
   [[nodiscard]] double next_offset_s(const InertialFrame& frame) const;

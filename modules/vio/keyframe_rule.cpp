@@ -57,15 +57,15 @@ double coasting_s(double lasts_s) {
   return -kCoast_s * std::expm1(-0.5 * lasts_s / kCoast_s);
 }
 
-Matrix6 restart_covariance(const UnmeasuredMotion& way) {
-  const double heading = std::min(kUnseenHeading * std::sqrt(way.lasts_s), kMostHeading);
-  const double translation =
-      std::min(std::hypot(kRestartTranslation,
-                          kUnseenShare * std::max(way.speed_mps, kLeastSpeed_mps) * way.lasts_s),
-               kMostTranslation_m);
+Matrix6 restart_covariance(const UnmeasuredMotion& motion) {
+  const double heading = std::min(kUnseenHeading * std::sqrt(motion.lasts_s), kMostHeading);
+  const double translation = std::min(
+      std::hypot(kRestartTranslation,
+                 kUnseenShare * std::max(motion.speed_mps, kLeastSpeed_mps) * motion.lasts_s),
+      kMostTranslation_m);
   Matrix6 Sigma = Matrix6::Zero();
   Sigma.topLeftCorner<3, 3>() = kRestartRotation * kRestartRotation * Eigen::Matrix3d::Identity() +
-                                heading * heading * way.up_body * way.up_body.transpose();
+                                heading * heading * motion.up_body * motion.up_body.transpose();
   Sigma.bottomRightCorner<3, 3>().diagonal().setConstant(translation * translation);
   return Sigma;
 }

@@ -32,6 +32,6 @@ struct UnmeasuredMotion {
 
 /// Covariance of the relative pose across a new start. The covariance grows with the duration
 /// without measurements and with the speed. The heading is more uncertain than roll and pitch.
-[[nodiscard]] Matrix6 restart_covariance(const UnmeasuredMotion& way = {});
+[[nodiscard]] Matrix6 restart_covariance(const UnmeasuredMotion& motion = {});
 
 }  // namespace km

@@ -16,14 +16,14 @@ namespace {
 
 // Largest lead of a sample over its image; a wrong stamp would block all later samples.
 constexpr double kMaxAhead_s = 1.0;
-constexpr double kMaxCostPerObservation = 100.0;  // a hundred times that of a usable fit
+constexpr double kMaxCostPerLandmark = 100.0;  // a hundred times that of a usable fit
 
-// An image contradicts the estimate if it has at least kSeenFeatures features with a right
-// observation, but the window has fewer located landmarks than 1 / kFewOfSeen of these features.
-// Normally there are more landmarks than features. The estimate is wrong if more than
+// An image contradicts the estimate if it has at least kMinStereoFeatures features with a right
+// observation, but the window has fewer located landmarks than 1 / kMaxFeaturesPerLandmark of these
+// features. Normally there are more landmarks than features. The estimate is wrong if more than
 // kMostUnlocatedImages images in a row contradict it.
-constexpr std::ptrdiff_t kSeenFeatures = 40;
-constexpr std::ptrdiff_t kFewOfSeen = 4;
+constexpr std::ptrdiff_t kMinStereoFeatures = 40;
+constexpr std::ptrdiff_t kMaxFeaturesPerLandmark = 4;
 constexpr int kMostUnlocatedImages = 10;
 
 // After a loss of vision of at least kLongLoss_s the smoother discards the prior that was formed
@@ -254,8 +254,8 @@ void Vio::advance(const Held& held, VioResult& result) {
     const auto& seen = held.data.tracked.features;
     const auto locatable =
         std::ranges::count_if(seen, [](const auto& f) { return f.right.has_value(); });
-    const bool lost =
-        locatable >= kSeenFeatures && kFewOfSeen * result.smoother->landmarks < locatable;
+    const bool lost = locatable >= kMinStereoFeatures &&
+                      kMaxFeaturesPerLandmark * result.smoother->landmarks < locatable;
     unlocated_images_ = lost ? unlocated_images_ + 1 : 0;
   }
   if (!plausible(*result.smoother) || unlocated_images_ > kMostUnlocatedImages) {
@@ -266,7 +266,7 @@ void Vio::advance(const Held& held, VioResult& result) {
     return;
   }
   result.states.push_back(result.smoother->state);
-  const bool last_chance = last_keyframe_ && smoother_.leaving(last_keyframe_->stamp);
+  const bool last_chance = last_keyframe_ && smoother_.leaves_next(last_keyframe_->stamp);
   const bool recovered = has_recovered(*held.frame);
   if (recovered ||
       (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame))))
@@ -307,7 +307,7 @@ bool Vio::plausible(const SmootherUpdate& update) const {
   const OdometryState& s = update.state;
   if (!update.solution.usable || !s.T_odom_body.matrix().allFinite() || !s.v_odom.allFinite())
     return false;
-  const double allowed = kMaxCostPerObservation * (50.0 + update.landmarks);
+  const double allowed = kMaxCostPerLandmark * (50.0 + update.landmarks);
   return update.solution.final_cost < allowed && s.v_odom.norm() < config_.max_speed_mps &&
          s.gyro_bias.norm() < config_.max_gyro_bias_radps &&
          s.accel_bias.norm() < config_.max_accel_bias_mps2;

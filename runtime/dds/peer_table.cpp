@@ -209,15 +209,16 @@ void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, 
   known.peer.state = state;
   emit(kind, known.peer.identity, text);
 
-  auto heir = participants_.end();
+  auto successor = participants_.end();
   for (auto p = participants_.begin(); p != participants_.end(); ++p) {
     const Participant& claimant = p->second;
     if (!claimant.alive || !claimant.proven || !claimant.identity ||
         claimant.identity->robot != entry->first)
       continue;
-    if (heir == participants_.end() || claimant.arrival < heir->second.arrival) heir = p;
+    if (successor == participants_.end() || claimant.arrival < successor->second.arrival)
+      successor = p;
   }
-  if (heir != participants_.end()) take_over(known, heir->first, heir->second);
+  if (successor != participants_.end()) take_over(known, successor->first, successor->second);
 }
 
 // Null if there are too many.

@@ -44,7 +44,7 @@ struct RobotStatus {
 inline constexpr double kStatusPeriod_s = 0.5;
 
 /// Largest value of settled_links, which also stands for larger numbers of links.
-inline constexpr std::uint8_t kManyLinks = 255;
+inline constexpr std::uint8_t kMaxSettledLinks = 255;
 
 template <>
 struct Codec<RobotStatus> {

@@ -65,8 +65,8 @@ std::optional<double> SendBudget::wait_s(SendPriority priority, std::uint64_t by
   return wait;
 }
 
-void SendBudget::spend(SendPriority priority, std::uint64_t bytes, std::span<const RobotId> readers,
-                       double now_s) {
+void SendBudget::charge(SendPriority priority, std::uint64_t bytes,
+                        std::span<const RobotId> readers, double now_s) {
   const std::uint64_t total = bytes * readers.size();
   spent_bytes_ += total;
   if (all_) all_->spend(static_cast<double>(total), now_s);

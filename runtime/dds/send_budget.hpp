@@ -32,8 +32,8 @@ class SendBudget {
                                              std::span<const RobotId> readers, double now_s);
 
   /// Charges the budget for one copy of a message per reader: bytes * readers.size().
-  void spend(SendPriority priority, std::uint64_t bytes, std::span<const RobotId> readers,
-             double now_s);
+  void charge(SendPriority priority, std::uint64_t bytes, std::span<const RobotId> readers,
+              double now_s);
 
   /// Updates the sum of all sent bytes, which is counted elsewhere: bytes that DDS has sent by
   /// itself, or again, are charged now.

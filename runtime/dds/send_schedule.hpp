@@ -163,7 +163,7 @@ class SendSchedule {
       const auto wait = budget_.wait_s(lane.priority, first.entry.bytes, *readers, now_s);
       if (wait && now_s - first.since_s <= first.entry.useful_s) {
         if (*wait <= 0.0) {
-          budget_.spend(lane.priority, first.entry.bytes, *readers, now_s);
+          budget_.charge(lane.priority, first.entry.bytes, *readers, now_s);
           return true;
         }
         ++lane.stops;

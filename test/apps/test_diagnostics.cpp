@@ -37,7 +37,7 @@ TEST_CASE("An uncertain place of a robot is a warning that names the robot", "[r
   CHECK(status.level == RosDiagnosticStatus::kWarn);
   CHECK(status.values.at(2).value == "4 6");
   progress.tentative.clear();
-  progress.untied = {6};
+  progress.not_joined = {6};
   CHECK(team_status(progress).level == RosDiagnosticStatus::kWarn);
 }
 

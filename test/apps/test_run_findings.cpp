@@ -119,7 +119,7 @@ TEST_CASE("Robots that one place or no closure ties are reported as such", "[rob
   CHECK(tentative[0].severity == Severity::kWarning);
   runs[0].summary.pgo.tentative.clear();
   runs[1].summary.pgo.tentative.clear();
-  runs[0].summary.pgo.untied = {2};
+  runs[0].summary.pgo.not_joined = {2};
   CHECK(findings_of(runs).size() == 1);
   CHECK_THAT(findings_of(runs)[0].what, Catch::Contains("did not join"));
 }

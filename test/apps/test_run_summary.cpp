@@ -66,7 +66,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/closures/candidates /closures/verified /closures/inliers "
         "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "
         "/pgo/members/0 /pgo/members/1 /pgo/tentative/0 /pgo/tentative/1 "
-        "/pgo/untied/0 /pgo/untied/1 "
+        "/pgo/not_joined/0 /pgo/not_joined/1 "
         "/pgo/odometry_rotation_noise /pgo/odometry_translation_noise "
         "/pgo/odometry_breaks "
         "/odometry/starts /odometry/divergences /odometry/inertial_gaps /odometry/refused_images "

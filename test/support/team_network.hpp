@@ -218,7 +218,7 @@ class TeamNetwork {
              << (robot.agent->in_session() ? " running" : " over")
              << (session.finished ? " finished" : "") << " stage "
              << (part->stage() ? static_cast<int>(*part->stage()) : -1) << " round "
-             << part->state().round << " moved " << part->moved_s();
+             << part->state().round << " moved " << part->last_activity_s();
       }
       if (!robot.notices.empty()) text << "; " << robot.notices.back();
       text << '\n';

@@ -20,7 +20,7 @@ constexpr std::size_t kMostMarks = 40;  // with more rounds, marks would hide th
 // the divisor.
 double gap(const Solution& solution, const TeamRound& round) {
   constexpr double kNoCost = 1e-9;
-  const double optimum = solution.judgement->optimum;
+  const double optimum = solution.comparison->optimum;
   return (round.cost - optimum) / std::max(optimum, kNoCost);
 }
 
@@ -83,14 +83,14 @@ std::string certificate_text(const Certificate& certificate) {
   return text + ")\n";
 }
 
-std::string judged_text(const Solution& solution) {
-  const Judgement& judged = *solution.judgement;
+std::string comparison_text(const Solution& solution) {
+  const OptimumComparison& comparison = *solution.comparison;
   std::ostringstream text;
   text << table(solution) << "chordal start in " << fixed(solution.start_s, 3) << " s, "
-       << (judged.optimum_certified ? "optimum " : "least cost known ")
-       << rounded(judged.optimum, 9) << ", rounded cost " << rounded(judged.rounded_cost, 9)
-       << ", rank " << judged.rank << '\n'
-       << certificate_text(judged.certificate);
+       << (comparison.optimum_certified ? "optimum " : "least cost known ")
+       << rounded(comparison.optimum, 9) << ", rounded cost " << rounded(comparison.rounded_cost, 9)
+       << ", rank " << comparison.rank << '\n'
+       << certificate_text(comparison.certificate);
   if (solution.run.verification) text << verification_text(*solution.run.verification);
   return text.str();
 }
@@ -206,7 +206,7 @@ std::string solution_text(const TeamGraph& graph, const Solution& solution) {
   if (!graph.verticals.empty()) text << graph.verticals.size() << " verticals, ";
   text << graph.robots() << (graph.robots() == 1 ? " robot\n" : " robots\n")
        << indefinite_text(graph.indefinite_edges)
-       << (solution.judgement ? judged_text(solution) : decision_text(graph, solution));
+       << (solution.comparison ? comparison_text(solution) : decision_text(graph, solution));
   return text.str();
 }
 
@@ -275,14 +275,14 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
                {"method", solution.method},
                {"rounds", std::move(rounds)},
                {"start_cpu_s", solution.start_s}};
-  if (const auto& judged = solution.judgement) {
-    const Certificate& certificate = judged->certificate;
-    json.update({{"rounded_cost", judged->rounded_cost},
+  if (const auto& comparison = solution.comparison) {
+    const Certificate& certificate = comparison->certificate;
+    json.update({{"rounded_cost", comparison->rounded_cost},
                  {"relative_gap", certificate.relative_gap},
                  {"lambda_bound", certificate.lambda_bound},
                  {"certified", certificate.certified},
-                 {"rank", judged->rank},
-                 {"optimum", judged->optimum}});
+                 {"rank", comparison->rank},
+                 {"optimum", comparison->optimum}});
     if (certificate.lambda_min) json["lambda_min"] = *certificate.lambda_min;
   }
   if (const auto& decision = solution.run.decision) {

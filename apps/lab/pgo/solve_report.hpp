@@ -16,7 +16,7 @@ namespace km {
 /// Writes one object. rounds[0] is the start; bytes and times are sums up to the round:
 ///     {"poses", "edges", "verticals", "indefinite_edges", "robots", "method", "start_cpu_s",
 ///     "rounds": [{"cost", "gradient_norm", "bytes", "critical_path_s", "total_cpu_s"}]}.
-/// Keys in addition if the solution has a judgement; "lambda_min" only if it was estimated:
+/// Keys in addition if the solution has a comparison; "lambda_min" only if it was estimated:
 ///     "rounded_cost", "relative_gap", "lambda_bound", "lambda_min", "certified", "rank",
 ///     "optimum".
 /// Keys of newton in addition:
@@ -40,7 +40,7 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
 
 /// Plots of the relative gap of the cost to the optimum against rounds, bytes and critical-path
 /// time, on a logarithmic axis. Gaps that are zero, or negative by rounding, are at its bottom.
-/// Precondition: `solution.judgement` is not empty.
+/// Precondition: `solution.comparison` is not empty.
 [[nodiscard]] std::vector<Plot> gap_plots(const Solution& solution);
 
 }  // namespace km

@@ -168,12 +168,12 @@ Solution solve(const TeamGraph& graph, const SolverOptions& options, std::option
   if (options.rejects()) return solution;
   const CentralOptimum least =
       optimum ? CentralOptimum{{}, *optimum, true} : central_optimum(graph, start);
-  solution.judgement =
-      Judgement{.rounded_cost = problem_of(graph, 3).cost(lift(solution.T_world_kf, 3)),
-                .optimum = least.cost,
-                .optimum_certified = least.certified,
-                .certificate = certify(problem_of(graph, X.rows()), X),
-                .rank = numerical_rank(X, graph.dimension)};
+  solution.comparison =
+      OptimumComparison{.rounded_cost = problem_of(graph, 3).cost(lift(solution.T_world_kf, 3)),
+                        .optimum = least.cost,
+                        .optimum_certified = least.certified,
+                        .certificate = certify(problem_of(graph, X.rows()), X),
+                        .rank = numerical_rank(X, graph.dimension)};
   return solution;
 }
 

@@ -79,8 +79,8 @@ struct CentralOptimum {
 /// Returns a meter of the CPU time of the calling thread.
 [[nodiscard]] TeamMeter cpu_meter();
 
-/// Evaluation of poses by one computer that has the whole graph.
-struct Judgement {
+/// Comparison of poses with the optimum, by one computer that has the whole graph.
+struct OptimumComparison {
   double rounded_cost = 0.0;
   /// The certified or given optimum; otherwise the least known cost.
   double optimum = 0.0;
@@ -98,7 +98,7 @@ struct Solution {
   /// Rounded poses in the frame of the first pose; z up with verticals.
   std::vector<SE3> T_world_kf = {};
   /// nullopt if the method rejects closures: its optimum depends on its own decision.
-  std::optional<Judgement> judgement = {};
+  std::optional<OptimumComparison> comparison = {};
 };
 
 /// Runs a method from the chordal initialisation, which is computed centrally and not counted. With

@@ -38,8 +38,8 @@ class PlayedPair {
       : pair_(pair), wait_s_(config.witness_wait_s), closures_(pair.first, pair.second, config) {}
 
   void add(const Closure& closure, double now_s) {
-    const PcmVerdict verdict = closures_.add(closure);
-    changed_ |= verdict == PcmVerdict::kAdded || verdict == PcmVerdict::kGrew;
+    const PcmAddResult result = closures_.add(closure);
+    changed_ |= result == PcmAddResult::kAdded || result == PcmAddResult::kGrew;
     if (!since_s_) since_s_ = now_s;
   }
   // The inlier set, if it has changed and its closures count.

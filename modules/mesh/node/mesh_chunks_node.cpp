@@ -62,7 +62,7 @@ void MeshChunksNode::step(const Offer& offer, double now_s) {
 }
 
 void MeshChunksNode::take(const Offer& offer) {
-  MeshPieces pieces =
+  SplitMesh pieces =
       split_mesh(*offer.mesh, self_, offer.anchor, {config_.cell_m, config_.position_step_m});
   if (pieces.oversized_faces > 0)
     log::limited(log::Level::kWarn, name(), "oversized")

@@ -17,9 +17,9 @@ namespace {
 // Larger than the number of messages during any correction, so that publishers do not wait.
 constexpr std::size_t kQueue = 8192;
 
-// Interval of the ticks that start a due correction, as a share of MeshDeformationConfig::period_s.
-// A correction is late by at most this interval.
-constexpr double kTickShare = 0.125;
+// Number of ticks in MeshDeformationConfig::period_s. A tick starts a due correction, which is
+// therefore late by at most the interval of the ticks.
+constexpr double kTicksPerPeriod = 8.0;
 
 // Number of keyframes that must be known for a map: one more than the last that saw a vertex.
 std::size_t keyframes_of(const MapMesh& map) {
@@ -47,7 +47,7 @@ MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, Ro
           },
           MeshDeformationConfig::kSection),
       ticks_(
-          steady_duration(kTickShare * config.period_s), [this] { worker_.post(Tick()); },
+          steady_duration(config.period_s / kTicksPerPeriod), [this] { worker_.post(Tick()); },
           "mesh tick") {
   topics.keyframes.subscribe([this](const auto& keyframe) { worker_.post(keyframe); });
   topics.maps.subscribe([this](const auto& map) { latest_map_.put(map); });

@@ -86,10 +86,11 @@ void PcmNode::step(const Closure& closure) {
   }
   Pair& pair = pair_with(std::max(from, to));
   if (!pair.since) pair.since = newest_;
-  const PcmVerdict verdict = std::visit([&](auto& set) { return set.add(closure); }, pair.closures);
+  const PcmAddResult result =
+      std::visit([&](auto& set) { return set.add(closure); }, pair.closures);
   const bool takes_all = config_.selection == ClosureSelection::kWitness;
-  pair.changed |= verdict == PcmVerdict::kGrew || (takes_all && verdict == PcmVerdict::kAdded);
-  report(closure, verdict, pair);
+  pair.changed |= result == PcmAddResult::kGrew || (takes_all && result == PcmAddResult::kAdded);
+  report(closure, result, pair);
 }
 
 PcmNode::Pair& PcmNode::pair_with(RobotId other) {
@@ -101,12 +102,12 @@ PcmNode::Pair& PcmNode::pair_with(RobotId other) {
   return pairs_.emplace(other, std::move(pair)).first->second;
 }
 
-void PcmNode::report(const Closure& closure, PcmVerdict verdict, const Pair& pair) const {
+void PcmNode::report(const Closure& closure, PcmAddResult result, const Pair& pair) const {
   const std::string robots = text_of(self_, std::max(closure.from.id.robot, closure.to.id.robot));
-  if (verdict == PcmVerdict::kFull)
+  if (result == PcmAddResult::kFull)
     log::limited(log::Level::kWarn, name(), "full " + robots)
         << robots << Pcm::kMaxClosures << " closures are stored, more are refused";
-  if (verdict == PcmVerdict::kAgainstOdometry)
+  if (result == PcmAddResult::kAgainstOdometry)
     log::debug(name()) << robots << to_string(closure.from.id) << " -> " << to_string(closure.to.id)
                        << " disagrees with odometry";
   const auto* pcm = std::get_if<Pcm>(&pair.closures);

@@ -89,7 +89,7 @@ class PcmNode final : public Node {
   Pair& pair_with(RobotId other);
   [[nodiscard]] std::vector<ClosureId> selected(RobotId other, Pair& pair) const;
   [[nodiscard]] bool is_joined(RobotId other, Pair& pair) const;
-  void report(const Closure& closure, PcmVerdict verdict, const Pair& pair) const;
+  void report(const Closure& closure, PcmAddResult result, const Pair& pair) const;
 
   const PcmConfig config_;
   const RobotId self_;

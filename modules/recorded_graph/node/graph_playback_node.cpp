@@ -71,10 +71,11 @@ void GraphPlaybackNode::wait_until_due(std::size_t index) {
   if (std::isinf(rate_) || index < known_) return;
   const double due_s = seconds_between(stamp_of(known_), stamp_of(index)) / rate_;
   const Heartbeat::Waiting waiting;
-  std::mutex unshared;  // needed by wait_until(); no other thread locks it
-  std::condition_variable_any never;
-  std::unique_lock lock(unshared);
-  never.wait_until(lock, stop_.get_token(), begin_ + steady_duration(due_s), [] { return false; });
+  std::mutex unused_mutex;  // needed by wait_until(); no other thread locks it
+  std::condition_variable_any due_or_stopped;
+  std::unique_lock lock(unused_mutex);
+  due_or_stopped.wait_until(lock, stop_.get_token(), begin_ + steady_duration(due_s),
+                            [] { return false; });
 }
 
 Stamp GraphPlaybackNode::stamp_of(std::size_t index) const {

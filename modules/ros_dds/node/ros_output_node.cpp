@@ -79,15 +79,15 @@ RosOutputNode::RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sin
 
 void RosOutputNode::open_topics(bool has_images) {
   const std::string prefix = '/' + name_ + '/';
-  const auto state = [&](const char* name, std::string_view type) {
-    return State{.topic = sink_->open({prefix + name, type, true, 1})};
+  const auto latest = [&](const char* name, std::string_view type) {
+    return LatestTopic{.topic = sink_->open({prefix + name, type, true, 1})};
   };
   constexpr int kManyTransforms = 100;
   odometry_ = sink_->open({prefix + "odometry", RosOdometry::kType});
   pose_ = sink_->open({prefix + "pose", RosPoseWithCovarianceStamped::kType});
   tf_ = sink_->open({"/tf", RosTransforms::kType, false, kManyTransforms});
-  path_ = state("path", RosPath::kType);
-  mesh_ = state("mesh", RosPointCloud::kType);
+  path_ = latest("path", RosPath::kType);
+  mesh_ = latest("mesh", RosPointCloud::kType);
   diagnostics_ = sink_->open({"/diagnostics", RosDiagnostics::kType});
   if (options_.draws || options_.mesh_faces > 0) {
     const std::size_t pieces = SurfacePieces::count(static_cast<std::size_t>(options_.mesh_faces));
@@ -95,7 +95,7 @@ void RosOutputNode::open_topics(bool has_images) {
         {prefix + "mesh_faces", RosMarker::kType, true, std::max(static_cast<int>(pieces), 1)});
   }
   if (options_.draws) {
-    closures_ = state("closures", RosMarkers::kType);
+    closures_ = latest("closures", RosMarkers::kType);
   }
   if (options_.logs) log_ = sink_->open({"/rosout", RosLog::kType});
   if (has_images)
@@ -124,7 +124,7 @@ std::vector<Heartbeat*> RosOutputNode::heartbeats() {
   return {&worker_.heartbeat(), &encoder_.heartbeat()};
 }
 
-std::size_t RosOutputNode::left_out() const {
+std::size_t RosOutputNode::dropped() const {
   return worker_.load().dropped + encoder_.load().dropped;
 }
 
@@ -201,14 +201,14 @@ void RosOutputNode::step(const Topic<Trajectory>::Message& trajectory) {
   frames_.add(*trajectory);
   trajectory_ = trajectory;
   path_.changed = closures_.changed = true;
-  publish_states(false);
+  publish_latest(false);
 }
 
 void RosOutputNode::step(const std::shared_ptr<const LabelledMesh>& mesh) {
   newest_mesh_ = mesh;
   mesh_.changed = options_.mesh_points > 0 && !mesh->empty();
   if (options_.mesh_faces > 0) encoder_.post(mesh);
-  publish_states(false);
+  publish_latest(false);
 }
 
 void RosOutputNode::step(const CoarseMesh& coarse) {
@@ -226,12 +226,12 @@ void RosOutputNode::step(const std::shared_ptr<const RosCompressedImage>& image)
   sink_->put(image_, image->header.stamp, encode_ros(*image));
 }
 
-void RosOutputNode::publish_states(bool all) {
-  const auto publish_if_due = [&](State& state, const auto& publish_it) {
+void RosOutputNode::publish_latest(bool all) {
+  const auto publish_if_due = [&](LatestTopic& topic, const auto& publish_it) {
     const double now_s = steady_now_s();
-    if (!state.changed || (!all && now_s < state.due_s)) return;
-    state.changed = false;
-    state.due_s = now_s + static_cast<double>(publish_it()) / options_.state_bytes_per_s;
+    if (!topic.changed || (!all && now_s < topic.due_s)) return;
+    topic.changed = false;
+    topic.due_s = now_s + static_cast<double>(publish_it()) / options_.state_bytes_per_s;
   };
   publish_if_due(path_, [this] { return publish_path(keyframe_poses()); });
   publish_if_due(mesh_, [this] { return publish_mesh(); });
@@ -278,7 +278,7 @@ void RosOutputNode::publish_pieces() {
 }
 
 // Before robots have joined a session, no transform between their frames is known.
-void RosOutputNode::publish_link() {
+void RosOutputNode::publish_team_frame() {
   const std::string team = map_of(trajectory_->anchor);
   if (trajectory_->T_world_kf.empty() || team == map_) return;
   publish(tf_, RosTransforms{{{{stamp_.value_or(0), team}, map_, RosPose{}}}});
@@ -317,9 +317,9 @@ void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
     newest_closures_ = *std::move(closures);
     closures_.changed = true;
   }
-  publish_states(is_silent);
+  publish_latest(is_silent);
   publish_pieces();
-  if (!is_silent) publish_link();
+  if (!is_silent) publish_team_frame();
   sink_->flush();
 }
 
@@ -331,9 +331,9 @@ void RosOutputNode::finish(std::span<const StampedPose> poses,
     closures_.changed = true;
   }
   path_.changed = path_.changed && poses.empty();
-  publish_states(true);
+  publish_latest(true);
   if (!poses.empty()) publish_path(poses);
-  publish_link();
+  publish_team_frame();
   for (const auto& [name, text] : files) sink_->attach(name, text);
   sink_->finish();
 }

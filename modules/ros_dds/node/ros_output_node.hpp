@@ -115,7 +115,7 @@ class RosOutputNode final : public Node {
               const std::map<std::string, std::string>& files);
 
   /// Number of inputs and images that were dropped because the node was too slow.
-  [[nodiscard]] std::size_t left_out() const;
+  [[nodiscard]] std::size_t dropped() const;
 
  private:
   struct Tick {};
@@ -132,7 +132,7 @@ class RosOutputNode final : public Node {
   using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
   // Topic whose message replaces the former one: path, mesh or closures. A changed message is
   // published at `due_s`, which limits the rate (RosOutputOptions::state_bytes_per_s).
-  struct State {
+  struct LatestTopic {
     std::size_t topic = 0;
     bool changed = false;
     double due_s = 0.0;  // steady clock
@@ -157,11 +157,11 @@ class RosOutputNode final : public Node {
   [[nodiscard]] std::vector<StampedPose> keyframe_poses() const;
   template <typename Message>
   std::size_t publish(std::size_t topic, const Message& message);
-  void publish_states(bool all);
+  void publish_latest(bool all);
   std::size_t publish_path(std::span<const StampedPose> poses);
   std::size_t publish_mesh();
   void publish_pieces();
-  void publish_link();
+  void publish_team_frame();
 
   const std::string node_name_;
   const std::unique_ptr<RosSink> sink_;
@@ -170,7 +170,7 @@ class RosOutputNode final : public Node {
   const Diagnose diagnose_;
   const Closures closures_of_;
   std::size_t odometry_ = 0, pose_ = 0, tf_ = 0, diagnostics_ = 0, faces_ = 0, log_ = 0, image_ = 0;
-  State path_, mesh_, closures_;
+  LatestTopic path_, mesh_, closures_;
   LiveFrames frames_;
   std::size_t poses_ = 0;
   std::optional<Stamp> stamp_;    // stamp of the last image or keyframe

@@ -30,7 +30,7 @@ TEST_CASE("kimera_multi_keys makes a team whose robots' folders can be used", "[
   const RobotKeys beta = load_robot_keys(keys.folder.path() / "survey" / "beta");
   CHECK(beta.certificate.robot == 12);
   const auto now_s = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  CHECK(refusal_of(beta.certificate, beta.authority, beta.revocations, now_s) == nullptr);
+  CHECK(why_refused(beta.certificate, beta.authority, beta.revocations, now_s) == nullptr);
 }
 
 TEST_CASE("kimera_multi_keys names a number of robots as other programs do", "[keys]") {

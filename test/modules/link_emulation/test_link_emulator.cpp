@@ -38,10 +38,10 @@ EthernetFrame multicast() {
   return std::string("\x01\x00\x5E\x00\x00\x01", 6) + std::string(100, '.');
 }
 
-std::vector<LinkDelivery> all_of(LinkEmulator& emulator) {
-  std::vector<LinkDelivery> all;
+std::vector<SentFrame> all_of(LinkEmulator& emulator) {
+  std::vector<SentFrame> all;
   while (const auto next_s = emulator.next_s())
-    for (LinkDelivery& delivery : emulator.due(*next_s)) all.push_back(std::move(delivery));
+    for (SentFrame& delivery : emulator.due(*next_s)) all.push_back(std::move(delivery));
   return all;
 }
 
@@ -77,7 +77,7 @@ TEST_CASE("A broadcast frame goes to every other robot", "[link_emulation]") {
   LinkEmulator emulator(script_of(4));
   emulator.send(2, 0.0, frame);
   std::set<std::size_t> reached;
-  for (const LinkDelivery& delivery : all_of(emulator)) reached.insert(delivery.to);
+  for (const SentFrame& delivery : all_of(emulator)) reached.insert(delivery.to);
   CHECK(reached == std::set<std::size_t>{0, 1, 3});
 }
 
@@ -124,8 +124,8 @@ TEST_CASE("Jitter lets frames overtake others", "[link_emulation]") {
   for (int i = 0; i < 20; ++i) emulator.send(0, 1e-3 * i, frame_to(1));
   const auto arrived = all_of(emulator);
   REQUIRE(arrived.size() == 20);
-  CHECK(std::ranges::is_sorted(arrived, {}, &LinkDelivery::due_s));
-  CHECK_FALSE(std::ranges::is_sorted(arrived, {}, &LinkDelivery::sent_s));
+  CHECK(std::ranges::is_sorted(arrived, {}, &SentFrame::due_s));
+  CHECK_FALSE(std::ranges::is_sorted(arrived, {}, &SentFrame::sent_s));
 }
 
 TEST_CASE("The share of lost frames is the probability", "[link_emulation]") {
@@ -233,7 +233,7 @@ TEST_CASE("A partition separates groups while it lasts", "[link_emulation]") {
   const auto reached = [&](double time_s) {
     emulator.send(0, time_s, broadcast());
     std::set<std::size_t> to;
-    for (const LinkDelivery& delivery : emulator.due(time_s)) to.insert(delivery.to);
+    for (const SentFrame& delivery : emulator.due(time_s)) to.insert(delivery.to);
     return to;
   };
   CHECK(reached(9.0) == std::set<std::size_t>{1, 2, 3});
@@ -271,7 +271,7 @@ TEST_CASE("Equal seeds and frames give equal runs", "[link_emulation]") {
     for (int i = 0; i < 300; ++i)
       emulator.send(static_cast<std::size_t>(i % 3), 0.01 * i, broadcast());
     std::string all;
-    for (const LinkDelivery& delivery : all_of(emulator))
+    for (const SentFrame& delivery : all_of(emulator))
       all += std::to_string(delivery.from) + std::to_string(delivery.to) + ' ' +
              std::to_string(delivery.due_s) + '\n';
     return all;
@@ -293,7 +293,7 @@ TEST_CASE("The loss of a pair's frames is independent of other links", "[link_em
       if (others && i % 3 == 0) emulator.send(1, i, frame_to(0));
       emulator.send(0, i, frame_to(1));
       bool came = false;
-      for (const LinkDelivery& delivery : emulator.due(i))
+      for (const SentFrame& delivery : emulator.due(i))
         came = came || (delivery.from == 0 && delivery.to == 1);
       if (i >= 50) arrived += came ? '+' : '-';
     }

@@ -58,7 +58,7 @@ TEST_CASE("The chunks of a mesh contain the whole mesh", "[mesh]") {
   const bool labelled = GENERATE(true, false);
   LabelledMesh mesh = wavy_sheet(150, 0.1);
   if (!labelled) mesh.labels.clear();
-  const MeshPieces pieces = split_mesh(mesh, 3, 1, kGrid);
+  const SplitMesh pieces = split_mesh(mesh, 3, 1, kGrid);
   CHECK(pieces.oversized_faces == 0);
   CHECK(pieces.chunks.size() > 64);
   CHECK(std::ranges::is_sorted(pieces.chunks, {}, &MeshChunk::key));
@@ -88,7 +88,7 @@ TEST_CASE("A position errs by at most half a step per axis", "[mesh]") {
     }
     mesh.faces.push_back({3 * f, 3 * f + 1, 3 * f + 2});
   }
-  const MeshPieces pieces = split_mesh(mesh, 1, 1, kGrid);
+  const SplitMesh pieces = split_mesh(mesh, 1, 1, kGrid);
   const LabelledMesh rounded = assembled(pieces.chunks);
   double largest_m = 0.0;
   for (const Eigen::Vector3f& vertex : mesh.vertices) {
@@ -102,7 +102,7 @@ TEST_CASE("A position errs by at most half a step per axis", "[mesh]") {
 
 TEST_CASE("A cell that is too full is sent in several parts", "[mesh]") {
   const LabelledMesh mesh = wavy_sheet(180, 0.01);  // 1.8 m: four cells, 16 000 faces each
-  const MeshPieces pieces = split_mesh(mesh, 1, 1, kGrid);
+  const SplitMesh pieces = split_mesh(mesh, 1, 1, kGrid);
   std::map<std::array<std::int32_t, 3>, std::uint16_t> parts;
   for (const MeshChunk& chunk : pieces.chunks) {
     CHECK(wire_bytes(chunk) <= kMaxChunkBytes);
@@ -114,7 +114,7 @@ TEST_CASE("A cell that is too full is sent in several parts", "[mesh]") {
 
 TEST_CASE("An unchanged mesh gives the same chunks", "[mesh]") {
   const LabelledMesh mesh = wavy_sheet(100, 0.1);
-  const MeshPieces before = split_mesh(mesh, 1, 1, kGrid);
+  const SplitMesh before = split_mesh(mesh, 1, 1, kGrid);
   SECTION("in another order of faces and corners") {
     LabelledMesh shuffled = mesh;
     std::mt19937 rng(5);
@@ -127,7 +127,7 @@ TEST_CASE("An unchanged mesh gives the same chunks", "[mesh]") {
     changed.append(wavy_sheet(1, 0.1));
     for (auto& vertex : changed.vertices) vertex += Eigen::Vector3f(101.0F, 1.0F, 1.0F);
     changed.append(mesh);
-    const MeshPieces after = split_mesh(changed, 1, 1, kGrid);
+    const SplitMesh after = split_mesh(changed, 1, 1, kGrid);
     std::size_t fresh = 0;
     for (const MeshChunk& chunk : after.chunks)
       if (std::ranges::find(before.chunks, chunk) == before.chunks.end()) ++fresh;
@@ -173,7 +173,7 @@ TEST_CASE("Faces between negative and positive cells belong to one cell each", "
   mesh.vertices = {{-0.3F, 0.1F, 0.1F},   {0.1F, 0.1F, 0.1F},    {0.1F, 0.3F, 0.1F},
                    {-1.9F, -1.9F, -0.1F}, {-2.2F, -1.9F, -0.1F}, {-2.1F, -2.3F, -0.1F}};
   mesh.faces = {{0, 1, 2}, {3, 4, 5}};
-  const MeshPieces pieces = split_mesh(mesh, 1, 1, kGrid);
+  const SplitMesh pieces = split_mesh(mesh, 1, 1, kGrid);
   REQUIRE(pieces.chunks.size() == 2);
   CHECK(pieces.chunks[0].key.cell == std::array<std::int32_t, 3>{-2, -2, -1});
   CHECK(pieces.chunks[1].key.cell == std::array<std::int32_t, 3>{-1, 0, 0});
@@ -185,7 +185,7 @@ TEST_CASE("A mesh that cannot be sent is refused and a face that is too long is 
   CHECK(split_mesh({}, 1, 1, kGrid).chunks.empty());
   SECTION("a face longer than the range of offsets") {
     mesh.vertices.back().x() = 30.0F;
-    const MeshPieces pieces = split_mesh(mesh, 1, 1, kGrid);
+    const SplitMesh pieces = split_mesh(mesh, 1, 1, kGrid);
     CHECK(pieces.oversized_faces == 2);
     CHECK(assembled(pieces.chunks).faces.size() == mesh.faces.size() - 2);
   }

@@ -203,7 +203,7 @@ TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
 }
 
 TEST_CASE("The largest chunk is equal after encoding and decoding", "[codec]") {
-  const MeshPieces pieces = split_mesh(wavy_sheet(180, 0.01), 1, 1, {});
+  const SplitMesh pieces = split_mesh(wavy_sheet(180, 0.01), 1, 1, {});
   std::size_t largest = 0;
   for (const MeshChunk& chunk : pieces.chunks) {
     largest = std::max(largest, wire_bytes(chunk));

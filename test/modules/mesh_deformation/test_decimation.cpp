@@ -74,7 +74,7 @@ TEST_CASE("Every node of a connected surface has neighbours", "[mesh_deformation
   SimplifiedMesh simplified;
   extend(simplified, map, kScale);
   std::set<std::uint32_t> reached = {0};
-  const auto edges = region_edges(simplified, map.mesh.faces, kScale.window_keyframes);
+  const auto edges = region_edges(simplified, map.mesh.faces, kScale.max_gap_keyframes);
   for (std::size_t round = 0; round < simplified.nodes.size(); ++round)
     for (const auto& [a, b] : edges)
       if (reached.contains(a) != reached.contains(b)) reached.insert({a, b});
@@ -98,10 +98,10 @@ TEST_CASE("Surfaces of distant times have separate nodes and no common edge",
   check_complete(simplified, map);
   for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v)
     CHECK(keyframe_gap(simplified.nodes[simplified.node_of_vertex[v]].seen_by, map.seen_by[v]) <=
-          kScale.window_keyframes);
-  for (const auto& [a, b] : region_edges(simplified, map.mesh.faces, kScale.window_keyframes))
+          kScale.max_gap_keyframes);
+  for (const auto& [a, b] : region_edges(simplified, map.mesh.faces, kScale.max_gap_keyframes))
     CHECK(keyframe_gap(simplified.nodes[a].seen_by, simplified.nodes[b].seen_by) <=
-          kScale.window_keyframes);
+          kScale.max_gap_keyframes);
 }
 
 TEST_CASE("New surface extends the simplified mesh without changing its nodes",
@@ -122,7 +122,7 @@ TEST_CASE("New surface extends the simplified mesh without changing its nodes",
     CHECK(simplified.nodes[n].position == before[n].position);
   CHECK(
       std::equal(regions_before.begin(), regions_before.end(), simplified.node_of_vertex.begin()));
-  const auto edges = region_edges(simplified, whole.mesh.faces, kScale.window_keyframes);
+  const auto edges = region_edges(simplified, whole.mesh.faces, kScale.max_gap_keyframes);
   CHECK(std::ranges::any_of(edges, [&](const auto& edge) {
     return edge[0] < before.size() && edge[1] >= before.size();
   }));

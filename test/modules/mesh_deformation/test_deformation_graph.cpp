@@ -74,18 +74,6 @@ Eigen::Vector3d rigidity(const SE3& T_a0, const Eigen::Vector3d& p_b0, const SE3
 
 }  // namespace
 
-TEST_CASE("A triangle has six directed edges and every keyframe edge two terms",
-          "[mesh_deformation]") {
-  DeformationGraph graph;
-  graph.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  graph.edges = {{0, 1}, {0, 2}, {1, 2}};
-  CHECK(graph.term_count() == 6);
-  graph.keyframe_edges = {{0, 0}};
-  CHECK(graph.term_count() == 8);
-  graph.keyframe_edges.push_back({0, 2});
-  CHECK(graph.term_count() == 10);
-}
-
 TEST_CASE("A node is tied to keyframes spread over its time of sight", "[mesh_deformation]") {
   const auto keyframes = [](SeenBy seen, std::size_t count) {
     std::vector<KeyframeIndex> result;

@@ -14,7 +14,7 @@ constexpr double kVoxel_m = 0.25;
 constexpr KeyframeIndex kVisit = 200;  // keyframes from one visit to the next
 const SheetSize kSheet{.columns = 20, .rows = 8, .step_m = kVoxel_m, .keyframe_step_m = 0.5};
 const SameSurface kSameSurface{
-    .distance_m = kVoxel_m, .longest_edge_m = 2 * kVoxel_m, .window_keyframes = 15};
+    .distance_m = kVoxel_m, .longest_edge_m = 2 * kVoxel_m, .max_gap_keyframes = 15};
 
 // Several sheets in one mesh, each seen `later` keyframes after the one before.
 MapMesh visits(const std::vector<MapMesh>& sheets, KeyframeIndex later = kVisit) {

@@ -38,11 +38,11 @@ TEST_CASE("Pairwise bounds on translation keep the older of two equal sets", "[p
   const auto add = [&](std::size_t from, double x, double y) {
     return pcm.add(closure(chain.at(from), chain.at(0), rotz(std::numbers::pi, x, y)));
   };
-  CHECK(add(3, 0.0, 0.9) == PcmVerdict::kGrew);
-  CHECK(add(4, -0.9, 0.9) == PcmVerdict::kGrew);
-  CHECK(add(5, -1.9, 0.8) == PcmVerdict::kGrew);
+  CHECK(add(3, 0.0, 0.9) == PcmAddResult::kGrew);
+  CHECK(add(4, -0.9, 0.9) == PcmAddResult::kGrew);
+  CHECK(add(5, -1.9, 0.8) == PcmAddResult::kGrew);
   // 0.256 / 5 = 0.0512 against closure 3: inconsistent, so {4, 5, 6} only ties with {3, 4, 5}.
-  CHECK(add(6, -2.8, 0.74) == PcmVerdict::kAdded);
+  CHECK(add(6, -2.8, 0.74) == PcmAddResult::kAdded);
   CHECK(later_ends(pcm) == std::vector<std::uint32_t>{3, 4, 5});
 }
 
@@ -52,10 +52,10 @@ TEST_CASE("Pairwise bounds on rotation keep the older of two equal sets", "[pcm]
   const auto add = [&](std::size_t from, double angle, double x) {
     return pcm.add(closure(chain.at(from), chain.at(0), rotz(angle, x, 1.0)));
   };
-  CHECK(add(3, std::numbers::pi, 0.0) == PcmVerdict::kGrew);
-  CHECK(add(4, 3.141, -1.0) == PcmVerdict::kGrew);
-  CHECK(add(5, 3.13, -2.0) == PcmVerdict::kGrew);
-  CHECK(add(6, 3.12, -3.0) == PcmVerdict::kAdded);  // 0.021 / 4 = 0.00525 against closure 4
+  CHECK(add(3, std::numbers::pi, 0.0) == PcmAddResult::kGrew);
+  CHECK(add(4, 3.141, -1.0) == PcmAddResult::kGrew);
+  CHECK(add(5, 3.13, -2.0) == PcmAddResult::kGrew);
+  CHECK(add(6, 3.12, -3.0) == PcmAddResult::kAdded);  // 0.021 / 4 = 0.00525 against closure 4
   CHECK(later_ends(pcm) == std::vector<std::uint32_t>{3, 4, 5});
 }
 
@@ -85,7 +85,7 @@ TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
   std::vector<ClosureId> truth;
   for (std::size_t n = 0; n < closures.size(); ++n) {
     if (reverse_some && n % 3 == 0) closures[n] = reversed(closures[n]);
-    if (pcm.add(closures[n]) == PcmVerdict::kRepeated) continue;
+    if (pcm.add(closures[n]) == PcmAddResult::kRepeated) continue;
     if (n % 2 == 0) truth.push_back(closures[n].id());
   }
   std::sort(truth.begin(), truth.end());
@@ -121,9 +121,9 @@ TEST_CASE("A pair of keyframes counts once, from whichever side it is measured",
   config.min_inliers = 1;
   Pcm pcm(0, 1, config);
   const Closure measured = robots.measure(2, 3, 0.02, rng);
-  CHECK(pcm.add(measured) == PcmVerdict::kGrew);
-  CHECK(pcm.add(measured) == PcmVerdict::kRepeated);
-  CHECK(pcm.add(reversed(measured)) == PcmVerdict::kRepeated);
+  CHECK(pcm.add(measured) == PcmAddResult::kGrew);
+  CHECK(pcm.add(measured) == PcmAddResult::kRepeated);
+  CHECK(pcm.add(reversed(measured)) == PcmAddResult::kRepeated);
   CHECK(pcm.inliers() == std::vector<ClosureId>{measured.id()});
 }
 
@@ -152,7 +152,7 @@ TEST_CASE("Fewer closures than min_inliers are not published", "[pcm]") {
   Pcm pcm(0, 1, config);
   for (std::size_t n = 0; n < 3; ++n) {
     CHECK(pcm.inliers().empty());
-    CHECK(pcm.add(robots.measure(n, n + 1, 0.001, rng)) == PcmVerdict::kGrew);
+    CHECK(pcm.add(robots.measure(n, n + 1, 0.001, rng)) == PcmAddResult::kGrew);
   }
   CHECK(pcm.inliers().size() == 3);
 }
@@ -162,13 +162,13 @@ TEST_CASE("The odometry gate is for closures inside one robot, when asked for", 
   PcmConfig config;
   config.min_inliers = 1;
   const Closure wrong = closure(chain.at(3), chain.at(0), rotz(std::numbers::pi, 5.0, 5.0));
-  CHECK(Pcm(0, 0, config).add(wrong) == PcmVerdict::kGrew);
+  CHECK(Pcm(0, 0, config).add(wrong) == PcmAddResult::kGrew);
   config.odometry_gate = true;
   Pcm gated(0, 0, config);
-  CHECK(gated.add(wrong) == PcmVerdict::kAgainstOdometry);
-  CHECK(gated.add(wrong) == PcmVerdict::kRepeated);
+  CHECK(gated.add(wrong) == PcmAddResult::kAgainstOdometry);
+  CHECK(gated.add(wrong) == PcmAddResult::kRepeated);
   CHECK(gated.add(closure(chain.at(4), chain.at(0), rotz(std::numbers::pi, -1.0, 1.0))) ==
-        PcmVerdict::kGrew);
+        PcmAddResult::kGrew);
   CHECK(gated.size() == 1);
 }
 
@@ -198,7 +198,7 @@ TEST_CASE("PCM refuses closures it cannot weigh and keeps its state", "[pcm]") {
   }
   CHECK_THROWS_AS(pcm.add(bad), std::invalid_argument);
   CHECK(pcm.size() == 0);
-  CHECK(pcm.add(good) == PcmVerdict::kGrew);
+  CHECK(pcm.add(good) == PcmAddResult::kGrew);
 }
 
 TEST_CASE("PCM refuses a configuration out of bounds", "[pcm]") {

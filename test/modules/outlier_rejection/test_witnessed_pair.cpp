@@ -32,8 +32,8 @@ TEST_CASE("Aliased neighbours seen from both sides are one witness", "[witness]"
   WitnessedPair pair(0, 1, PcmConfig{});
   for (const std::size_t i : {10U, 11U}) {
     const Closure seen = aisles.at(i, i + 20, 7.0);
-    CHECK(pair.add(seen) != PcmVerdict::kRepeated);
-    CHECK(pair.add(reversed(seen)) == PcmVerdict::kRepeated);
+    CHECK(pair.add(seen) != PcmAddResult::kRepeated);
+    CHECK(pair.add(reversed(seen)) == PcmAddResult::kRepeated);
   }
   CHECK(pair.closures().size() == 2);
   CHECK(pair.witnesses() == 1);
@@ -48,9 +48,9 @@ TEST_CASE("A cluster of aliased keyframes does not join two robots, a second pla
     for (std::size_t j = 30; j <= 33; ++j) (void)pair.add(aisles.at(i, j));
   CHECK(pair.closures().size() == 16);
   CHECK_FALSE(pair.is_witnessed());
-  CHECK(pair.add(aisles.at(50, 5, 7.0)) == PcmVerdict::kAdded);  // another place, contradicts
+  CHECK(pair.add(aisles.at(50, 5, 7.0)) == PcmAddResult::kAdded);  // another place, contradicts
   CHECK_FALSE(pair.is_witnessed());
-  CHECK(pair.add(aisles.at(14, 40)) == PcmVerdict::kGrew);  // near on robot a alone
+  CHECK(pair.add(aisles.at(14, 40)) == PcmAddResult::kGrew);  // near on robot a alone
   CHECK(pair.is_witnessed());
   CHECK(pair.closures().size() == 18);  // the optimiser weighs the one that contradicts
 }
@@ -77,7 +77,7 @@ TEST_CASE("All true and false closures of a witnessed pair are published", "[wit
     const std::size_t j = any(rng);
     Closure closure = robots.measure(i, j, 0.02, rng);
     if (n % 2 == 1) closure.T_from_to = random_pose(rng);
-    added += pair.add(closure) == PcmVerdict::kRepeated ? 0 : 1;
+    added += pair.add(closure) == PcmAddResult::kRepeated ? 0 : 1;
   }
   CHECK(pair.is_witnessed());
   CHECK(pair.closures().size() == added);
@@ -95,7 +95,7 @@ TEST_CASE("A witnessed pair refuses closures it cannot weigh and keeps its state
   }
   CHECK_THROWS_AS(pair.add(bad), std::invalid_argument);
   CHECK(pair.closures().empty());
-  CHECK(pair.add(aisles.at(1, 2)) == PcmVerdict::kGrew);
+  CHECK(pair.add(aisles.at(1, 2)) == PcmAddResult::kGrew);
 }
 
 }  // namespace

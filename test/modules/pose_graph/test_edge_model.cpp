@@ -71,7 +71,7 @@ TEST_CASE("an edge without second derivatives has the same gradient", "[newton]"
   const EdgeModel model =
       model_edge(moved.measured, moved.precision, moved.T_i, moved.T_j, Curvature::kFull);
   EdgeModel slope;
-  slope_edge(moved.measured, moved.precision, moved.T_i, moved.T_j, slope);
+  set_cost_and_gradient(moved.measured, moved.precision, moved.T_i, moved.T_j, slope);
   CHECK(slope.cost == model.cost);
   CHECK(slope.g_i == model.g_i);
   CHECK(slope.g_j == model.g_j);

@@ -56,7 +56,7 @@ TEST_CASE("Being tentative is mutual", "[frame_ties]") {
       for (const RobotId b : kMembers) {
         const FrameTies one = frame_ties(a, kMembers, ties), other = frame_ties(b, kMembers, ties);
         CHECK(holds(one.tentative, b) == holds(other.tentative, a));
-        CHECK(holds(one.untied, b) == holds(other.untied, a));
+        CHECK(holds(one.not_joined, b) == holds(other.not_joined, a));
       }
   }
 }

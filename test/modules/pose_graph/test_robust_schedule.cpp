@@ -166,7 +166,7 @@ TEST_CASE("Without closures that may be rejected all weights are final", "[pose_
   CHECK(schedule.decided());
   schedule.start(1e3F, 0, 3.0, 4);
   CHECK(schedule.decided());
-  CHECK_FALSE(schedule.all_in());
+  CHECK_FALSE(schedule.unweighed());
   schedule.next({1, 1});
   CHECK(schedule.decided());
 }
@@ -176,12 +176,12 @@ TEST_CASE("The first steps use all closures with full weight", "[pose_graph]") {
   schedule.start(50.0F, 3, 3.0, 2);
   const double mu = schedule.mu();
   for (int step = 0; step < 2; ++step) {
-    CHECK(schedule.all_in());
+    CHECK(schedule.unweighed());
     schedule.next({});
     CHECK_FALSE(schedule.decided());
     CHECK(schedule.mu() == mu);
   }
-  CHECK_FALSE(schedule.all_in());
+  CHECK_FALSE(schedule.unweighed());
   schedule.next({1, 1});
   CHECK(schedule.mu() > mu);
 }

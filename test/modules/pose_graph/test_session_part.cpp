@@ -159,7 +159,7 @@ TEST_CASE("refused messages do not keep a session alive", "[pose_graph][session]
   impossible = c.write_number(0);
   impossible.received = 7;  // acknowledges messages that this robot has never sent
   CHECK_FALSE(c.part.receive(impossible, 5.0));
-  CHECK(c.part.moved_s() == 0.0);
+  CHECK(c.part.last_activity_s() == 0.0);
 }
 
 }  // namespace km

@@ -83,7 +83,7 @@ TEST_CASE("Robots that closures at one place join are tentative, and report it",
   CHECK(progress_of(network, 4).tentative == Robots{2});
   CHECK(progress_of(network, 6).tentative == Robots{2});
   for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
-    CHECK(progress_of(network, robot).untied.empty());
+    CHECK(progress_of(network, robot).not_joined.empty());
     CHECK(progress_of(network, robot).anchor == 2);
     CHECK(has_notice(network, robot, "joined tentatively"));
   }
@@ -135,8 +135,8 @@ TEST_CASE("Robots with two single closures that contradict each other are not jo
   add_robots(network, problem);
   REQUIRE(settle(network));
   (void)network.run(5.0);
-  CHECK(progress_of(network, 2).untied == Robots{4, 6});
-  CHECK(progress_of(network, 4).untied == Robots{2});
+  CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
+  CHECK(progress_of(network, 4).not_joined == Robots{2});
   CHECK(progress_of(network, 4).anchor == 4);
   CHECK(progress_of(network, 4).tentative.empty());
 }
@@ -156,8 +156,8 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
   add_robots(network, problem, factory);
   REQUIRE(settle(network));
   (void)network.run(5.0);
-  CHECK(progress_of(network, 2).untied == Robots{4, 6});
-  CHECK(progress_of(network, 4).untied == Robots{2});
+  CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
+  CHECK(progress_of(network, 4).not_joined == Robots{2});
   CHECK(progress_of(network, 2).anchor == 2);
   for (const RobotId robot : {RobotId{4}, RobotId{6}}) {
     CHECK(progress_of(network, robot).anchor == 4);
@@ -182,7 +182,7 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
   REQUIRE(settle(network));
   (void)network.run(5.0);
   for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
-    CHECK(progress_of(network, robot).untied.empty());
+    CHECK(progress_of(network, robot).not_joined.empty());
     CHECK(progress_of(network, robot).anchor == 2);
     CHECK(network.robots.at(robot).trajectory->anchor == 2);
   }

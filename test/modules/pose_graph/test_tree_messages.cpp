@@ -223,7 +223,7 @@ TEST_CASE("Decoding restores a message down the tree", "[pose_graph]") {
   const Next next = GENERATE(Next::kStep, Next::kShorten, Next::kRefresh, Next::kStart,
                              Next::kCount, Next::kDone, Next::kStop);
   const Weighing weighing =
-      GENERATE(Weighing::kAllIn, Weighing::kWeigh, Weighing::kHold, Weighing::kDecided);
+      GENERATE(Weighing::kUnweighed, Weighing::kWeigh, Weighing::kHold, Weighing::kDecided);
   const DownMessage sent = some_down_message(next, weighing);
   const auto received = decode_down(encode(sent));
   REQUIRE(received);

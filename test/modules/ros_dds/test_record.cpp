@@ -139,7 +139,7 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
               {{"a.csv", "1,2"}});
   CHECK(read_mcap_attachments(file) == std::map<std::string, std::string>{{"a.csv", "1,2"}});
   CHECK(lost.empty());
-  CHECK(node.left_out() == 0);
+  CHECK(node.dropped() == 0);
 
   McapReader reader(file);
   const auto messages = topic_messages_of(reader);

@@ -50,7 +50,7 @@ TEST_CASE("A robot's folder contains the keys that were made for it", "[security
   CHECK(keys.certificate.robot == 3);
   CHECK(keys.certificate.name == "alpha");
   CHECK(keys.certificate.valid_until_s == kToyNow_s + 86400);
-  CHECK(refusal_of(keys.certificate, keys.authority, keys.revocations, kToyNow_s) == nullptr);
+  CHECK(why_refused(keys.certificate, keys.authority, keys.revocations, kToyNow_s) == nullptr);
   CHECK_NOTHROW(TeamSeal(keys, toy_identity(3, "alpha"), kToyNow_s));
   CHECK(load_revocations(team.alpha()).number == 0);
 }

@@ -75,7 +75,7 @@ TEST_CASE("A robot gets new keys after the former have lapsed", "[security]") {
   REQUIRE_NOTHROW(team.issue({{0, "alpha"}}, now_s, now_s + 86400));
   const RobotKeys keys = load_robot_keys(survey / "alpha");
   CHECK(keys.certificate.key != former);
-  CHECK(refusal_of(keys.certificate, keys.authority, keys.revocations, now_s) == nullptr);
+  CHECK(why_refused(keys.certificate, keys.authority, keys.revocations, now_s) == nullptr);
   CHECK(TeamFolder(survey).issued().size() == 2);
 }
 

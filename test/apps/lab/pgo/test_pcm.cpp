@@ -98,7 +98,7 @@ TEST_CASE("A run ends with the same set as Pcm", "[pcm]") {
   Pcm pcm(0, 0, config);
   std::size_t known = 0;
   for (const auto& [closure, outlier] : closures)
-    known += pcm.add(closure) == PcmVerdict::kRepeated ? 1 : 0;
+    known += pcm.add(closure) == PcmAddResult::kRepeated ? 1 : 0;
   REQUIRE(known == 0);
   CHECK(run.additions.size() == pcm.size());
   CHECK(run.additions.back().clique == pcm.inliers().size());

@@ -96,7 +96,7 @@ TEST_CASE("A graph without noise is certified and has no gap", "[pgo]") {
 
 TEST_CASE("The plot continues to the last round when no gap is left", "[pgo]") {
   Solution solution;
-  solution.judgement = Judgement{.optimum = 1.0};
+  solution.comparison = OptimumComparison{.optimum = 1.0};
   for (const double gap : {0.02, 3e-5, 0.0, -1e-15}) {
     const int round = 5 * static_cast<int>(solution.run.rounds.size());
     solution.run.rounds.push_back({round, 1.0 + gap, 0.0, {}});
@@ -118,7 +118,7 @@ TEST_CASE("The plot continues to the last round when no gap is left", "[pgo]") {
 TEST_CASE("A method without rounds still has a plot", "[pgo]") {
   Solution solution;
   solution.run.rounds.emplace_back().cost = 1.0;
-  solution.judgement = Judgement{.optimum = 1.0};
+  solution.comparison = OptimumComparison{.optimum = 1.0};
   const PlotSeries& series = gap_plots(solution)[0].series[0];
   CHECK(series.points.size() == 1);
   CHECK(series.style == PlotSeries::Style::kMarkedLine);
