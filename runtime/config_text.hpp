@@ -38,7 +38,8 @@ template <typename T, typename Accepted>
 }
 
 /// Visitor that writes a config struct as YAML, with the description and bounds of each field
-/// beside it. Fields with values can be read back and then have the same values.
+/// beside it. Reading this YAML restores the value of every field, except for empty lists (see
+/// sections()).
 class ConfigText : public FieldVisitor<ConfigText> {
  public:
   /// `indent`: before every line.

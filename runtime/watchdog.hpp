@@ -33,11 +33,12 @@ class Watchdog {
 
   [[nodiscard]] bool has_given_up(const Node& node) const;
 
-  /// A node that was given up, the first in the order of the data flow.
+  /// A node that was given up because a step or its end took too long, and the reason.
   struct GivenUp {
     std::string node;
     std::string why;  ///< "has not finished one step for 30 s"
   };
+  /// The first such node in the order of the data flow; nullopt if there is none.
   [[nodiscard]] std::optional<GivenUp> given_up() const;
 
  private:

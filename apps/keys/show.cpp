@@ -32,7 +32,8 @@ std::vector<std::string> row_of(const Certificate& certificate, const Revocation
           reason == nullptr ? "holds" : reason};
 }
 
-// If the folder of a robot exists on this host, prints its faults, and a reminder to delete it.
+// If the folder of a robot is on this host, prints that the user must delete this folder once the
+// robot has it. Also prints if its list of revocations is old or the folder is unusable.
 void report_folder(const fs::path& folder, const Revocations& revocations) {
   if (!fs::is_directory(folder)) return;
   try {

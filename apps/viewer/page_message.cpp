@@ -38,7 +38,7 @@ Json json_of(const std::vector<NamedNumber>& numbers) {
 // By ClosureStatus.
 constexpr std::array kStatusNames = {"candidate", "verified", "rejected", "kept"};
 
-// Writes the members of a content to the object, and binary data to `data`.
+// Writes the fields of an update to `json`, and its image, mesh or other bulk data to `data`.
 struct Writer {
   Json& json;
   std::string& data;

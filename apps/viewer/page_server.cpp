@@ -29,7 +29,7 @@ namespace {
 constexpr std::size_t kBatchBytes = 1 << 18;
 constexpr double kWait_s = 0.2;
 // Each open connection occupies one thread of the server. A connection is closed if no request
-// arrives for kIdle_ms, or if a page does not read for so long. Otherwise idle connections would
+// arrives, or a page does not read, for kIdle_ms. Otherwise idle connections would
 // keep pages waiting for the default of 30 s.
 constexpr const char* kConnections = "64";
 constexpr const char* kIdle_ms = "10000";

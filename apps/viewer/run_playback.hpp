@@ -22,10 +22,13 @@ struct RunPlayback {
 ///
 /// The updates are those that a viewer would have received from the running robots, without images
 /// and without the limits of a budget. ViewSelector, which robots use, chooses them from the events
-/// of the journal. Meshes are those of the end of the run: a chunk is shown from the event that
-/// states that its cell has faces. While the robot has the final `world`, its optimised mesh is
-/// shown, and while it is alone before that, the mesh of its map. Throws std::runtime_error if the
-/// folder has no journal of a robot.
+/// of the journal. Throws std::runtime_error if the folder has no journal of a robot.
+///
+/// Meshes are those of the end of the run. A chunk is shown from the event that states that its
+/// cell has faces. The mesh depends on the anchor of the robot at that event:
+/// - the anchor at the end of the run: the optimised mesh;
+/// - otherwise, the robot itself: the mesh of its map;
+/// - otherwise, another robot: no mesh.
 [[nodiscard]] RunPlayback read_run(const std::filesystem::path& folder, Stamp begin);
 
 inline constexpr double kMaxPause_s = 10.0;

@@ -1,6 +1,7 @@
 #include "modules/core/input_file.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -15,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kChunk_bytes = std::uintmax_t{1} << 20U;
+constexpr int kPipe_ms = 10'000;  // longest wait for bytes of a pipe
 
 [[noreturn]] void fail(const fs::path& file, const std::string& why) {
   throw InputFileError(file.string() + ": " + why);
@@ -38,6 +40,15 @@ class Descriptor {
  private:
   const int number_;
 };
+
+// Waits until the pipe has bytes, or its writer has closed it.
+void await_pipe(int descriptor, const fs::path& file) {
+  pollfd pipe{.fd = descriptor, .events = POLLIN, .revents = 0};
+  int ready = 0;
+  while ((ready = poll(&pipe, 1, kPipe_ms)) < 0 && errno == EINTR) {
+  }
+  if (ready == 0) fail(file, "a pipe into which no program has written for 10 s");
+}
 
 }  // namespace
 
@@ -83,7 +94,8 @@ std::string read_input_file(const fs::path& file, std::uintmax_t max_bytes) {
 
 InputFile open_input_file(const fs::path& file, std::uintmax_t max_bytes) {
   if (const std::string problem = problem_of_file(file); !problem.empty()) fail(file, problem);
-  const Descriptor opened(open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  // Opening a pipe does not wait for its writer.
+  const Descriptor opened(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat status {};
   if (opened.number() < 0 || fstat(opened.number(), &status) != 0)
     fail(file, "cannot be opened: " + std::generic_category().message(errno));
@@ -98,11 +110,12 @@ InputFile open_input_file(const fs::path& file, std::uintmax_t max_bytes) {
                                 static_cast<fs::perms>(status.st_mode) & fs::perms::mask)};
   if (is_regular) read.bytes.reserve(static_cast<std::size_t>(status.st_size));
   for (bool more = true; more;) {
+    if (!is_regular) await_pipe(opened.number(), file);
     const std::size_t before = read.bytes.size();
     const auto room = static_cast<std::size_t>(std::min(kChunk_bytes, max_bytes + 1));
     read.bytes.resize(before + room);
     const ssize_t count = ::read(opened.number(), read.bytes.data() + before, room);
-    if (count < 0 && errno != EINTR) fail(file, "cannot be read to its end");
+    if (count < 0 && errno != EINTR && errno != EAGAIN) fail(file, "cannot be read to its end");
     read.bytes.resize(before + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
     if (read.bytes.size() > max_bytes) fail_as_too_large(file, max_bytes);
     more = count != 0;

@@ -29,7 +29,8 @@ inline constexpr std::uintmax_t kMaxInputFile_bytes = std::uintmax_t{8} << 30U;
 /// True if `path` does not exist: an optional file was omitted. False for an unreadable file.
 [[nodiscard]] bool is_absent(const std::filesystem::path& path) noexcept;
 
-/// The bytes of `file`, at most `max_bytes`. Throws InputFileError.
+/// The bytes of `file`, at most `max_bytes`. Throws InputFileError, also if nothing arrives in a
+/// pipe for ten seconds.
 [[nodiscard]] std::string read_input_file(const std::filesystem::path& file,
                                           std::uintmax_t max_bytes = kMaxInputFile_bytes);
 

@@ -21,10 +21,10 @@ struct FocalFit {
 /// The fit uses points with depths from the right image. Their motion to the next image follows
 /// from the rotation that the gyroscope measures, any translation, and the focal length. The fit
 /// minimises the sum of squares with Geman-McClure weights by Gauss-Newton from `fit`. Its
-/// variables are the translation of each step (eliminated by Schur complements), the gyroscope's
-/// mounting and constant, and the factor. If images determined rotation and translation, the
-/// translation could absorb the error of a wrong focal length. With the gyroscope's rotation it
-/// cannot.
+/// variables are the translation of each step (eliminated by Schur complements), the rotation
+/// from gyroscope to camera, the constant rate of InertialFit, and the factor. If images determined
+/// rotation and translation, the translation could absorb the error of a wrong focal length. With
+/// the gyroscope's rotation it cannot.
 ///
 /// `sigma` covers the noise and a systematic error of 0.01 px, the smallest that trackers have.
 /// nullopt for fewer than 20 steps of 30 points with depth, or if the fit does not converge.

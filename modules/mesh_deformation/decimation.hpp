@@ -13,7 +13,7 @@
 
 namespace km {
 
-/// Triangles between points, each with the keyframes that saw it.
+/// Triangles and their points. Each point has the keyframes that saw it.
 struct TimedTriangles {
   std::vector<Eigen::Vector3d> points;  ///< [m]
   std::vector<SeenBy> seen_by;          ///< Keyframes that saw each point.
@@ -28,9 +28,9 @@ struct CollapsedPoints {
 };
 
 /// Decimates by half-edge collapses in OpenMesh until `target` points with faces remain, or no
-/// collapse is possible. extend() describes their order. Points whose keyframe_gap() exceeds the
-/// window are not merged. Faces may meet in any way: if more than two share an edge, the
-/// surface is cut open.
+/// collapse is possible. extend() describes their order. Points whose keyframe_gap() exceeds
+/// `max_gap_keyframes` are not merged. If more than two faces share an edge, the surface is cut
+/// open there.
 [[nodiscard]] CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t target,
                                              KeyframeIndex max_gap_keyframes);
 
@@ -79,7 +79,7 @@ struct SimplifiedMesh {
 void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScale& scale);
 
 /// Pairs of nodes a < b, ascending, whose regions share a face: the mesh edges of the simplified
-/// mesh. Pairs whose keyframe_gap() exceeds the window are excluded.
+/// mesh. Pairs whose keyframe_gap() exceeds `max_gap_keyframes` are excluded.
 [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> region_edges(
     const SimplifiedMesh& simplified, std::span<const LabelledMesh::Face> faces,
     KeyframeIndex max_gap_keyframes);

@@ -14,7 +14,7 @@ namespace km {
 
 /// Throws std::invalid_argument with the first problem:
 /// - `seen_by`, ids or certainty not as long as the vertices, or ids not ascending;
-/// - the first keyframe of a vertex after the last one, or a keyframe of `keyframes` or more;
+/// - the first keyframe of a vertex after the last one, or an index that is not below `keyframes`;
 /// - a vertex that is not finite or beyond 10,000 km;
 /// - a face with a vertex that does not exist.
 void check_map_mesh(const MapMesh& map, std::size_t keyframes);

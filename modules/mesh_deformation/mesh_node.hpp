@@ -60,14 +60,14 @@ struct GridCellHash {
 /// Nodes by position, for searches within one radius while nodes are added.
 class NodeGrid {
  public:
-  /// Nodes whose keyframe_gap() exceeds the window are not near.
+  /// Nodes whose keyframe_gap() exceeds `max_gap_keyframes` are not near.
   NodeGrid(double radius_m, KeyframeIndex max_gap_keyframes)
       : radius_m_(radius_m), max_gap_keyframes_(max_gap_keyframes) {}
 
   void insert(const MeshNode& node, std::uint32_t index);
 
-  /// Index of the nearest node within the radius whose keyframe_gap() is within the window. At
-  /// equal distance the lowest index; kNoIndex if there is no such node.
+  /// Index of the nearest node within the radius whose keyframe_gap() to `seen_by` is at most the
+  /// limit of this index. At equal distance the lowest index; kNoIndex if there is no such node.
   [[nodiscard]] std::uint32_t nearest(const Eigen::Vector3d& point, const SeenBy& seen_by) const;
 
  private:

@@ -36,8 +36,8 @@ constexpr double kNotable = 1.3;
 // METHOD.md.
 constexpr double kDistinct = 2.0;
 
-// Standard deviation of the relative error of length of odometry, if it has one. Sensitivity:
-// METHOD.md.
+// Prior standard deviation of the relative error of length of a robot's odometry, under the
+// hypothesis that its odometry has such an error. Sensitivity: METHOD.md.
 constexpr double kLengthSigma = 0.5;
 constexpr int kLengthSteps = 5;
 

@@ -27,11 +27,11 @@ struct RobotTie {
 
 /// Robots whose pose relative to one robot is not certain.
 struct FrameTies {
-  /// Only a tie of a single place connects these robots to that robot. All closures of a place may
-  /// be false together; then the relative pose is wrong.
+  /// Only a tie of a single place connects these robots to the one robot. All closures of a place
+  /// may be false together; then the relative pose is wrong.
   std::vector<RobotId> tentative = {};
-  /// No tie connects these robots to that robot, or only a contradicted one. Their relative pose is
-  /// unknown.
+  /// No tie connects these robots to the one robot, or only a contradicted tie. Their pose relative
+  /// to the one robot is unknown.
   std::vector<RobotId> not_joined = {};
   bool operator==(const FrameTies&) const = default;
 };

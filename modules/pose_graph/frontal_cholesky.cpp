@@ -170,9 +170,10 @@ void FrontalCholesky::backward(MatrixXd& X) const {
   }
 }
 
-// The inverse at the nodes of a front that are eliminated later. These are nodes of its parent
-// front, whose inverse is `of_parent`, or kept nodes. `place`: index of each of these nodes in the
-// parent front, or in the list of kept nodes.
+// Returns the blocks of the inverse for the nodes that a front of this factorisation leaves to
+// later fronts. If the front has a parent, these nodes are in the parent, and the blocks come from
+// `of_parent`. Otherwise these nodes are kept, and the blocks come from `kept`. `place`: index of
+// each of these nodes in the parent front or in the list of kept nodes.
 MatrixXf FrontalCholesky::inverse_of_rest(const std::vector<int>& place, const MatrixXf& of_parent,
                                           const BlockMatrix& kept) const {
   const auto rest = static_cast<Index>(place.size());

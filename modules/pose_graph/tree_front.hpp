@@ -64,9 +64,11 @@ class TreeFront {
   void set_child(RobotId child, TreeSystem system);
   void reweigh_child(RobotId child, std::span<const UpMessage::NewWeight> weights);
 
-  /// Computes second derivatives of own edges at `poses` (of the followed nodes).
+  /// Computes second derivatives of own edges at `poses`, one pose for each of the followed()
+  /// nodes.
   void linearise(std::span<const SE3> poses, Curvature curvature);
-  /// Eliminates all poses of the plan. False if their block is not positive definite.
+  /// Eliminates all nodes that the EliminationPlan does not keep. False if their block is not
+  /// positive definite.
   [[nodiscard]] bool factorise();
   /// Like factorise(), with a small damping of all poses (Levenberg, Quart. Appl. Math. 1944). The
   /// result is usually positive definite even if a robot claims so little precision that its

@@ -350,8 +350,9 @@ UpMessage TreeNewton::first_message() {
       if (known_[k].trust == Trust::kOpen && reports(known_[k]) &&
           !graph_.decided.contains(known_[k].edge.id()))
         closures.push_back(known_[k].edge);
-    // Counts only cycles of undecided closures, i.e. each cycle once. In later sessions, poses that
-    // were optimised with these closures would agree with them better than odometry does.
+    // Counts only cycles of closures that no session has decided, so each cycle is counted in one
+    // session. Decided closures have changed the poses, so their cycles would show too little
+    // noise.
     Corroboration(closures, pose, graph_.step_precision, options_.dimension)
         .count_lengths(graph_.noise.lengths, most);
   }

@@ -76,9 +76,10 @@ std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>
   return moves;
 }
 
-// The rigid motion that removes the mean rotation and translation of `poses` by `steps`. To first
-// order it costs nothing. The resulting step does not depend on the pose that was held. `upright`:
-// only rotations about z cost nothing.
+// Returns a rigid motion of all poses. Added to `steps`, it makes their mean rotation and mean
+// translation zero. To first order, a rigid motion does not change the cost. The sum does not
+// depend on which pose the root keeps constant. `upright`: the motion rotates about z only, because
+// other rotations change the cost.
 std::array<double, 6> drift_against(std::span<const SE3> poses, const Eigen::MatrixXd& steps,
                                     bool upright) {
   const double share = 1.0 / static_cast<double>(poses.size());

@@ -122,7 +122,7 @@ class MemberRbcd final : public MemberSolver {
   std::vector<SE3> poses_;
   SolverState state_;
 
-  // Members that only the root uses.
+  // Only the root uses the variables from here on.
   std::map<std::uint32_t, std::map<RobotId, Share>> shares_;  // shares of incomplete rounds
   std::optional<RoundTotal> last_;                            // last complete round
   Total start_;

@@ -12,8 +12,9 @@ TreeNewtonOptions newton_options(const PoseGraphConfig& config) {
   options.barc = config.barc;
   options.share_private = config.share_private;
   options.covariances = config.covariances;
-  // Below the default of 30, so that new second derivatives are sent earlier. In a team the latency
-  // of the rounds that they save costs more than their bytes.
+  // Below the default of 30, so that new second derivatives are sent earlier and a session has
+  // fewer rounds. In a team, the latency of a round costs more than the bytes of second
+  // derivatives.
   options.patience_rounds = 8.0;
   return options;
 }

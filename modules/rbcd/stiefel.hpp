@@ -44,8 +44,8 @@ inline Eigen::Index pose_count(const LiftedPoses& X) {
 /// on all robots without an exchange. Precondition: rank >= 3.
 [[nodiscard]] Eigen::MatrixXd lifting_matrix(Eigen::Index rank);
 
-/// One pose, lifted: L [R t] for a transform `L` = [Y p] (r x 4) that carries the frame of `T`,
-/// i.e. [Y R, Y t + p].
+/// Lifts the pose `T` = [R t]: returns [Y R, Y t + p] (r x 4). `L` = [Y p] (r x 4) is the transform
+/// from the frame of `T` to the lifted frame.
 [[nodiscard]] Eigen::MatrixXd lift(const Eigen::MatrixXd& L, const SE3& T);
 
 /// The transform [lifting_matrix(rank) 0], for lift().

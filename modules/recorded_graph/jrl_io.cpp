@@ -21,7 +21,8 @@
 namespace km {
 namespace {
 
-// Asymmetry of a covariance, relative to its largest element.
+// Largest accepted difference of mirrored elements of a covariance, relative to its largest
+// element.
 constexpr double kSymmetry = 1e-6;
 
 // A value of the document and its place there, as a JSON pointer. Every failure throws

@@ -16,7 +16,7 @@ class LiveFrames {
  public:
   /// States have to be in order of time.
   void add(const OdometryState& state);
-  /// Call it after the state of the same image.
+  /// Adds a keyframe. Precondition: the state of the same image has been added.
   void add(const KeyframeOdometry& keyframe);
   /// Updates the correction from the newest keyframe that both odometry and `trajectory` contain.
   void add(const Trajectory& trajectory);

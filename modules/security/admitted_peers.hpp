@@ -14,7 +14,7 @@ namespace km {
 
 /// Maximum number of processes whose keys are kept.
 inline constexpr std::size_t kMaxAdmitted = 256;
-/// Maximum number of processes of one robot among them.
+/// Maximum number of processes of one robot whose keys are kept.
 inline constexpr std::size_t kMaxAdmittedPerRobot = 4;
 
 /// Key for messages to all robots, numbered by its owner.

@@ -130,10 +130,10 @@ class TeamSeal {
 
   /// Applies a list of revocations and the time. Pass the list in use again to apply only the time.
   /// Removes processes whose certificate is revoked or not valid at `now_s`. Draws a new key for
-  /// messages to all if the list has changed or a process was removed. Also draws one if the
-  /// certificate of a process that has received the newest key has expired. Throws
-  /// std::invalid_argument without a change if the list is not the authority's, or older than the
-  /// one in use.
+  /// messages to all if the list has changed or a process was removed. Also draws one when
+  /// the certificate of a process that has received the newest key has expired, even if this
+  /// process was removed before. Throws std::invalid_argument without a change if the list is not
+  /// the authority's, or older than the one in use.
   MembershipChange update(const Revocations& revocations, std::int64_t now_s);
 
   /// Message with the keys by which `peer` opens this process's messages to all, sealed for `peer`.

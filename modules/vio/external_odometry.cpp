@@ -62,7 +62,9 @@ ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
   const bool is_due =
       !last_keyframe_ || result.has_jumped ||
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
-  // A keyframe without points cannot close a loop, so it is made only after a jump.
+  // A keyframe without located points cannot be part of a closure and is useless. After a jump of
+  // the external pose, a keyframe is made in any case: the uncertain step to it is then in the
+  // graph.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
     add_keyframe(measured, T_odom_body, result.has_jumped, result);
   if (!last_keyframe_) return result;

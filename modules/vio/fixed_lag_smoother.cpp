@@ -389,8 +389,9 @@ std::optional<StateCovariance> FixedLagSmoother::state_covariance(Stamp stamp) c
   return StateCovariance(Sigma->selfadjointView<Eigen::Upper>());
 }
 
-// A negative offset becomes 0 if no samples cover the instant, because the next inertial factor
-// cannot start there.
+// Returns the clock offset of the first frame. The state of a frame is at the stamp of its image
+// plus the offset. An offset below 0 becomes 0 if all samples are later than that time, because the
+// next inertial factor could not start there.
 double FixedLagSmoother::first_offset_s(const InertialFrame& frame) const {
   const double offset_s = std::clamp(window_.calibration.offset_s, -kMostOffset_s, kMostOffset_s);
   const Stamp instant = frame.tracked.stamp + nanoseconds(offset_s);

@@ -282,7 +282,8 @@ bool Vio::has_recovered(const StereoFrame& frame) const {
 
 // Restarts the smoother at `state` without its prior. States during a loss of vision have large
 // errors, and so have the derivatives of the prior at them. With this prior the smoother would move
-// the pose for seconds. Without it, images correct the pose at once.
+// the pose for seconds. Without it, estimated motions are right at once, but the position error
+// from the loss remains.
 void Vio::discard_prior(const Held& held, const OdometryState& state) {
   vision_back_since_.reset();
   if (last_keyframe_->state_covariance) start_on(held, state, *last_keyframe_->state_covariance);

@@ -28,8 +28,8 @@ class WindowEquations {
   /// Call add_images() afterwards.
   void add_landmark(const WindowLandmark& landmark, bool keyframes_only = false);
 
-  /// Adds the information of landmarks on the poses at the images to the equations of states and
-  /// calibration. Call once, after the last landmark.
+  /// add_landmark() collects terms in the poses at image times. This function converts these terms
+  /// to states and calibration, and adds them to the equations. Call once, after the last landmark.
   void add_images();
 
   /// Adds the prior, all inertial factors and all landmarks of the window, and calls add_images().

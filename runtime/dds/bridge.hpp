@@ -55,7 +55,8 @@ class Crossing {
 template <typename T>
 using AddressedCrossing = Crossing<T, Addressed<T>>;
 
-/// Ends of a crossing that a robot uses: messages that it does not receive are not sent to it.
+/// Selects the ends of a Crossing that this robot uses. If `receive` is false, the other robots do
+/// not send the messages of this Crossing to this robot.
 struct CrossingEnds {
   bool send = true;
   bool receive = true;

@@ -80,7 +80,8 @@ class PeerTable {
   explicit PeerTable(const RobotIdentity& self, Admit admit = {})
       : self_(self), admit_(std::move(admit)) {}
 
-  /// A robot that this robot met in a former process: it is lost until it is received.
+  /// Adds a peer that the former process of this robot knew. The peer counts as lost until a
+  /// message from the peer arrives.
   void recall(const RobotIdentity& identity);
 
   /// Handles a report of other robots about a robot that this one does not receive directly. The

@@ -87,8 +87,9 @@ void Sender::catch_up_due() {
     renewals.swap(renewals_);
   }
   const Heartbeat::Step step(heartbeat_);
-  // Messages that wait for the budget, or for acknowledgements over a slow link, are not lost. A
-  // reader that forged packets affect acknowledges everything.
+  // A writer is renewed only if its reader has acknowledged all messages. Otherwise the messages
+  // wait for the budget or travel over a slow link. A reader that ignores the writer because of
+  // forged packets acknowledges all messages.
   std::erase_if(renewals, [this](RobotId robot) {
     return holds_back_ || std::ranges::any_of(topics_, [&](const auto& topic) {
              return !topic->is_acknowledged_by(robot);

@@ -14,8 +14,8 @@ namespace km {
 [[nodiscard]] std::string pcm_text(const PcmRun& run);
 
 /// One object for one run: {"search", "additions": [{"vertices", "check_s", "search_s", "clique",
-/// "true_members", "false_members"}]}. Members are null without labels. Several runs are an array
-/// of such objects.
+/// "true_members", "false_members"}]}. "true_members" and "false_members" count the closures of the
+/// clique by label, and are null without labels. Several runs are an array of such objects.
 void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs);
 
 /// Time of search and checks, and size of the clique, against vertices.

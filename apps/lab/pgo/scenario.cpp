@@ -229,8 +229,8 @@ SE3 moved_by(const SE3& T, const Vector6& errors, const NoiseSigma& sigma) {
                    T.translation() + sigma.translation_m * errors.tail<3>());
 }
 
-// Robot of each end of a closure, and number of its run of keyframes (kPlaceKeyframes). Closures
-// with equal places share an error.
+// For each end of a closure, the robot and the number of the group of keyframes. A group has
+// kPlaceKeyframes consecutive keyframes. Closures with equal places share an error.
 using Place = std::array<Index, 4>;
 
 Place place_of(const TeamGraph& graph, const BlockEdge& e) {

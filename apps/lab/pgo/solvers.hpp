@@ -101,9 +101,10 @@ struct Solution {
   std::optional<OptimumComparison> comparison = {};
 };
 
-/// Runs a method from the chordal initialisation, which is computed centrally and not counted. With
-/// verticals, the initialisation is levelled as a whole. A method that rejects closures starts from
-/// odometry. The optimum is computed if not given. Throws as run_solver() does.
+/// Runs a method. A method that rejects closures starts from odometry. Other methods start from the
+/// chordal initialisation. It is computed centrally; its time is Solution::start_s, and SolverRun
+/// does not count its bytes. With verticals, the initialisation is levelled as a whole. For these
+/// other methods, the optimum is computed if `optimum` is nullopt. Throws as run_solver() does.
 [[nodiscard]] Solution solve(const TeamGraph& graph, const SolverOptions& options,
                              std::optional<double> optimum, const TeamMeter& meter);
 

@@ -82,10 +82,10 @@ struct RosOutputOptions {
 /// of the inertial sensor.
 class RosOutputNode final : public Node {
  public:
-  /// Returns the diagnostics of the other parts of the robot, by name. nullopt while the robot is
-  /// silent: then no diagnostics are published, and changed paths, meshes and closures are
-  /// published without a limit on their rate.
-  /// Called on the node's thread.
+  /// Returns the diagnostics of the other parts of the robot, by name. In a viewer, nullopt if the
+  /// robot has left or no message of it has arrived for long. Then no diagnostics are published,
+  /// and the last changed paths, meshes and closures are published at once, without a limit on
+  /// their rate. Called on the node's thread.
   using Diagnose = std::function<std::optional<std::vector<RosDiagnosticStatus>>()>;
   /// Returns all closures of the robot, or nullopt if they are unchanged. Called on the node's
   /// thread.

@@ -48,6 +48,19 @@ TEST_CASE("A file beyond the limit is not read", "[core]") {
   CHECK_THROWS_WITH(read_input_file(file), Catch::Contains("larger than 8192 MiB"));
 }
 
+TEST_CASE("A pipe is read until its writer closes it, and refused without a writer", "[core]") {
+  const TemporaryFolder folder;
+  const std::filesystem::path pipe = folder.path() / "pipe";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  auto writer = std::async(std::launch::async, [&] {
+    std::ofstream out(pipe);
+    out << "first " << std::flush << "second";
+  });
+  CHECK(read_input_file(pipe) == "first second");
+  writer.get();
+  CHECK_THROWS_WITH(read_input_file(pipe), Catch::Contains("no program has written"));
+}
+
 TEST_CASE("Text in messages is printable and short", "[core]") {
   CHECK(readable("10 m, \xC3\xA4") == "10 m, \xC3\xA4");
   CHECK(readable("a\x1b[2J\n\x7f") == "a?[2J??");
