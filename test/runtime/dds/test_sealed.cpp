@@ -317,7 +317,11 @@ TEST_CASE("Messages sealed for a robot reach its resumed process and not its nex
   CAPTURE(static_cast<int>(kind), resumed);
   TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, member_of(team),
               TopicKind::kEvent, kind);
+  TestRobot c(domain, {5, robot_name(5), kProtocolVersion, random_boot_id()}, member_of(team),
+              TopicKind::kEvent, kind);
   a.start();
+  c.start();
+  REQUIRE(a.receives(PeerEventKind::kJoined, 5));
   const RobotIdentity former{4, robot_name(4), kProtocolVersion, random_boot_id()};
   {
     TestRobot first(domain, former, member_of(team), TopicKind::kEvent, kind);
@@ -330,6 +334,8 @@ TEST_CASE("Messages sealed for a robot reach its resumed process and not its nex
   }
   REQUIRE(a.receives(PeerEventKind::kLeft, 4));
   a.ping_one(4, 2);  // while it is away
+  a.ping_one(5, 0);  // arrives once the message before has been processed, too
+  REQUIRE(c.received_addressed.wait_for(1).size() == 1);
 
   TestRobot second(domain, successor_of(former, resumed), member_of(team), TopicKind::kEvent, kind);
   second.start();
