@@ -1,8 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/pose_graph/reliable_channel.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
-#include "modules/rbcd/solver_choice.hpp"
 #include "test/support/gather_solver.hpp"
 #include "test/support/team_network.hpp"
 
@@ -44,59 +42,7 @@ void check_optimal(const TeamNetwork& network, const TeamProblem& problem) {
         Approx(whole.optimum(problem.start)).epsilon(kTolerance));
 }
 
-SolverMessage solver_message(RobotId to, std::uint8_t content) {
-  return {to, std::make_shared<const std::vector<std::uint8_t>>(1, content)};
-}
-
 }  // namespace
-
-TEST_CASE("a large message is repeated more rarely than a small one", "[pose_graph][agent]") {
-  ReliableChannel channel({1, 1}, {}, 1.0);
-  const SolverMessage large{3, std::make_shared<const std::vector<std::uint8_t>>(1'000'000)};
-  (void)channel.write(solver_message(2, 10), 0.0);
-  (void)channel.write(large, 0.0);
-  std::map<RobotId, int> repeated;
-  std::size_t bytes = 0;
-  constexpr int kSeconds = 100;
-  for (int s = 1; s <= kSeconds; ++s)
-    for (const ReliableMessage& message : channel.due(s)) {
-      ++repeated[message.to];
-      bytes += message.bytes->size();
-    }
-  CHECK(repeated[2] >= kSeconds / 3);  // at least every three periods
-  CHECK(repeated[3] >= 3);
-  CHECK(bytes <= 60'000 * kSeconds);
-  channel.reachable_again(3);
-  const auto due = channel.due(kSeconds);
-  CHECK(std::ranges::any_of(due, [](const ReliableMessage& message) { return message.to == 3; }));
-}
-
-TEST_CASE("messages are repeated until they are acknowledged", "[pose_graph][agent]") {
-  ReliableChannel a({1, 1}, {}, 1.0), b({2, 1}, {}, 1.0);
-  const auto arrives = [](ReliableChannel& at, const ReliableMessage& message, double now_s) {
-    const bool is_new = at.read(message, now_s) == ReliableArrival::kNew;
-    if (is_new) at.take(message);
-    return is_new;
-  };
-  const ReliableMessage first = a.write(solver_message(2, 10), 0.0);
-  const ReliableMessage second = a.write(solver_message(2, 11), 0.0);
-  CHECK(a.due(0.9).empty());
-  CHECK(a.due(1.0).size() == 2);
-  CHECK(a.due(2.5).empty());  // increasing timeout
-  CHECK(arrives(b, second, 1.0));
-  CHECK_FALSE(arrives(b, second, 1.0));
-  CHECK(arrives(b, first, 1.0));
-  const auto acknowledgements = b.due(1.0);  // the second message arrived twice
-  REQUIRE(acknowledgements.size() == 1);
-  CHECK(acknowledgements[0].received == 2);
-  CHECK_FALSE(arrives(a, acknowledgements[0], 1.0));
-  CHECK(a.due(100.0).empty());
-  const ReliableMessage answer = b.write(solver_message(1, 12), 2.0);
-  CHECK(arrives(a, answer, 2.0));
-  (void)a.write(solver_message(2, 13), 2.0);
-  a.reachable_again(2);
-  CHECK(a.due(2.0).size() == 1);
-}
 
 TEST_CASE("one robot alone solves its own graph", "[pose_graph][agent]") {
   const TeamProblem problem = random_team_problem({.robots = {4}, .keyframes = 12}, 1);
@@ -580,124 +526,6 @@ TEST_CASE("every message may arrive late, twice and in any order", "[pose_graph]
   (void)network.run(5.0);
   REQUIRE(settle(network));
   check_optimal(network, problem);
-}
-
-namespace {
-
-// Two robots drive side by side over level ground, with closures at many places. The pitch of the
-// odometry of each robot drifts, and the estimated tilt of their first keyframes is wrong.
-struct Drive {
-  TeamPoses truth = {};
-  std::map<RobotId, std::vector<KeyframeOdometry>> odometry = {};
-  std::vector<Closure> closures = {};
-};
-
-Eigen::Vector3d up_at(const SE3& T) {
-  return T.linear().transpose() * Eigen::Vector3d::UnitZ();
-}
-
-double tilt_between(const SE3& a, const SE3& b) {
-  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  return std::acos(std::clamp((a.linear() * up_at(b)).dot(z), -1.0, 1.0));
-}
-
-Drive level_drive(double tilt_of_first) {
-  constexpr std::uint32_t kLength = 30;
-  Drive drive;
-  const SE3 drift = make_pose(so3_exp({0.0, 0.002, 0.0}), Eigen::Vector3d::Zero());
-  for (const RobotId robot : {RobotId{1}, RobotId{2}}) {
-    std::vector<SE3>& truth = drive.truth[robot];
-    for (std::uint32_t k = 0; k < kLength; ++k) {
-      truth.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.0 * k, 2.0 * robot, 0.0}));
-      KeyframeOdometry keyframe;
-      keyframe.id = {robot, k};
-      if (k == 0) {
-        const Eigen::Matrix3d tilted = so3_exp({0.0, tilt_of_first * robot, 0.0});
-        keyframe.T_odom_kf = make_pose(tilted, Eigen::Vector3d::Zero());
-      } else {
-        keyframe.T_previous_kf = truth[k - 1].inverse() * truth[k] * drift;
-      }
-      keyframe.covariance = Matrix6::Identity() * 4e-6;
-      keyframe.vertical = Vertical{up_at(truth[k]), 5e-3};
-      drive.odometry[robot].push_back(keyframe);
-    }
-  }
-  for (std::uint32_t k = 0; k < kLength; k += 5) {
-    Closure closure;
-    closure.from.id = {1, k};
-    closure.to.id = {2, k};
-    closure.T_from_to = drive.truth[1][k].inverse() * drive.truth[2][k];
-    closure.covariance = Matrix6::Identity() * 1e-4;
-    drive.closures.push_back(closure);
-  }
-  return drive;
-}
-
-TeamPoses drive_to_the_end(const Drive& drive, const PoseGraphConfig& config) {
-  TeamNetwork network;
-  for (const auto& [robot, keyframes] : drive.odometry) {
-    TeamAgent& agent = network.add({robot, 1}, config, solver_choice(config));
-    for (const KeyframeOdometry& keyframe : keyframes) (void)agent.add(keyframe);
-    InlierSet set{1, 2, 1, {}};
-    for (const Closure& closure : drive.closures) {
-      (void)agent.add(closure);
-      set.closures.push_back(closure.id());
-    }
-    (void)agent.add(set);
-  }
-  REQUIRE(settle(network));
-  for (const auto& [id, robot] : network.robots) CHECK(robot.notices.empty());
-  return network.trajectories();
-}
-
-}  // namespace
-
-TEST_CASE("the solution of a team with verticals is level", "[pose_graph][agent][vertical]") {
-  PoseGraphConfig config;
-  config.method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
-  config.robust = GENERATE(true, false);
-  CAPTURE(to_string(config.method), config.robust);
-  const Drive drive = level_drive(0.01);
-  const TeamPoses poses = drive_to_the_end(drive, config);
-  double worst = 0.0;
-  for (const auto& [robot, truth] : drive.truth)
-    for (std::size_t k = 0; k < truth.size(); ++k)
-      worst = std::max(worst, tilt_between(poses.at(robot)[k], truth[k]));
-  // Odometry alone would have a pitch of 58 mrad at the end.
-  CHECK(worst < 0.012);
-  // Keyframe 0 of the anchor has its position from odometry, and its tilt from the team.
-  const SE3& first = poses.at(1)[0];
-  CHECK(first.translation().norm() < 1e-6);
-  CHECK(std::abs(so3_log(first.linear()).z()) < 1e-6);
-}
-
-TEST_CASE("block descent and Newton's method with verticals have one optimum",
-          "[pose_graph][agent][vertical]") {
-  const Drive drive = level_drive(0.01);
-  PoseGraphConfig config;
-  config.max_rounds = 2000;
-  const TeamPoses newton = drive_to_the_end(drive, config);
-  config.method = PgoMethod::kRbcd;
-  const TeamPoses rbcd = drive_to_the_end(drive, config);
-  for (const auto& [robot, poses] : newton)
-    for (std::size_t k = 0; k < poses.size(); ++k) {
-      CAPTURE(robot, k);
-      const SE3& other = rbcd.at(robot)[k];
-      CHECK((poses[k].translation() - other.translation()).norm() < 2e-2);
-      CHECK(tilt_between(poses[k], other) < 2e-3);
-    }
-}
-
-TEST_CASE("one robot without verticals disables them for the team",
-          "[pose_graph][agent][vertical]") {
-  Drive one = level_drive(0.0), none = level_drive(0.0);
-  for (KeyframeOdometry& keyframe : one.odometry.at(2)) keyframe.vertical.reset();
-  for (auto& [robot, keyframes] : none.odometry)
-    for (KeyframeOdometry& keyframe : keyframes) keyframe.vertical.reset();
-  const TeamPoses with = drive_to_the_end(one, {}), without = drive_to_the_end(none, {});
-  for (const auto& [robot, poses] : with)
-    for (std::size_t k = 0; k < poses.size(); ++k)
-      CHECK(poses[k].isApprox(without.at(robot)[k], 1e-5));
 }
 
 }  // namespace km
