@@ -47,7 +47,9 @@ void await_pipe(int descriptor, const fs::path& file) {
   int ready = 0;
   while ((ready = poll(&pipe, 1, kPipe_ms)) < 0 && errno == EINTR) {
   }
-  if (ready == 0) fail(file, "a pipe into which no program has written for 10 s");
+  if (ready == 0)
+    fail(file,
+         "a pipe into which no program has written for " + std::to_string(kPipe_ms / 1000) + " s");
 }
 
 }  // namespace
