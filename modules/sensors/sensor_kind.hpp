@@ -26,7 +26,7 @@ struct SensorKind {
   SensorRole role;
   std::string SensorTopicNames::*topic;
   std::string_view type;     ///< Type of the messages in ROS 1; empty: images, see has_images().
-  std::string_view content;  ///< What the messages contain, for texts to users.
+  std::string_view content;  ///< Name of the content, for texts to users.
   int queue_size;            ///< Live messages that wait to be read, before the oldest is dropped.
 };
 
