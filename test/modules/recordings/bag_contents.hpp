@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <catch2/catch.hpp>
 #include <vector>
 
 #include "modules/recordings/bag_reader.hpp"
@@ -11,6 +13,10 @@ inline std::vector<BagMessage> messages_of(BagReader& reader) {
   std::vector<BagMessage> messages;
   while (auto message = reader.next()) messages.push_back(*std::move(message));
   return messages;
+}
+
+inline void check_order(const std::vector<BagMessage>& messages) {
+  CHECK(std::ranges::is_sorted(messages, {}, &BagMessage::log_time));
 }
 
 /// A message with the topic and type of its channel.

@@ -84,11 +84,6 @@ McapFile mixed_file(const McapFile::Options& options) {
   return file;
 }
 
-void check_order(const std::vector<BagMessage>& messages) {
-  CHECK(std::is_sorted(messages.begin(), messages.end(),
-                       [](const auto& a, const auto& b) { return a.log_time < b.log_time; }));
-}
-
 }  // namespace
 
 TEST_CASE("Every file of the MCAP conformance suite gives the messages that are listed",

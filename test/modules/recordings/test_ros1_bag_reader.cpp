@@ -152,11 +152,6 @@ std::string small_bag(bool has_index) {
   return file.finish(has_index);
 }
 
-void check_bag_order(const std::vector<BagMessage>& messages) {
-  CHECK(std::is_sorted(messages.begin(), messages.end(),
-                       [](const auto& a, const auto& b) { return a.log_time < b.log_time; }));
-}
-
 }  // namespace
 
 TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader", "[recordings]") {
@@ -183,7 +178,7 @@ TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader", "[recording
   Ros1BagReader reader(*file);
   CHECK(reader.channels().size() == known.topics);
   const auto messages = messages_of(reader);
-  check_bag_order(messages);
+  check_order(messages);
   std::vector<std::uint64_t> counts(reader.channels().size());
   for (const BagMessage& message : messages) ++counts[message.channel];
   for (std::size_t i = 0; i < counts.size(); ++i)
@@ -234,7 +229,7 @@ TEST_CASE("The complete chunks of a truncated bag are read", "[recordings]") {
     CAPTURE(size);
     Ros1BagReader reader(folder.write("a.bag", whole.substr(0, size)));
     const auto messages = messages_of(reader);
-    check_bag_order(messages);
+    check_order(messages);
     CHECK(messages.size() % 4 == 0);
     CHECK(messages.size() >= before);
     CHECK(reader.report().count(BagFault::kIndex) == 1);
@@ -248,7 +243,7 @@ TEST_CASE("Corrupted bags are refused or read in order", "[recordings]") {
   check_corrupted<InputFileError>(small_bag(GENERATE(true, false)), folder.path().string(),
                                   [&](const std::string& bytes) {
                                     Ros1BagReader reader(folder.write("a.bag", bytes));
-                                    check_bag_order(messages_of(reader));
+                                    check_order(messages_of(reader));
                                     const BagReport report = reader.report();
                                     for (const auto& [fault, entry] : report.entries())
                                       CHECK(entry.first.find("a.bag byte ") != entry.first.npos);
@@ -263,7 +258,7 @@ TEST_CASE("Corrupted bags with compression are refused or read in order", "[reco
   check_corrupted<InputFileError>(read_input_file(*file), folder.path().string(),
                                   [&](const std::string& bytes) {
                                     Ros1BagReader reader(folder.write("a.bag", bytes));
-                                    check_bag_order(messages_of(reader));
+                                    check_order(messages_of(reader));
                                   });
 }
 

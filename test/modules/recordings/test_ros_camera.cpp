@@ -103,52 +103,37 @@ TEST_CASE("The frame of a CameraInfo is the rectified camera's", "[recordings]")
 }
 
 TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "[recordings]") {
-  RosCameraInfo info = some_info();
-  const auto refuses = [&](const char* why) {
-    CHECK_THROWS_WITH(camera_of(info, RosImages::kRaw),
-                      Catch::Contains("frame 'left_optical': ") && Catch::Contains(why));
+  struct Case {
+    const char* why;
+    void (*spoil)(RosCameraInfo&);
   };
-  SECTION("uncalibrated") {
-    info.K.fill(0.0);
-    refuses("K is 0: the camera is not calibrated");
-  }
-  SECTION("no size") {
-    info.width = 0;
-    refuses("width and height: sides are whole numbers");
-  }
-  SECTION("focal length") {
-    info.K[4] = -457.0;
-    refuses("K: a focal length of -457 px");
-  }
-  SECTION("skew") {
-    info.K[1] = 0.5;
-    refuses("K: a skew of 0.5");
-  }
-  SECTION("unknown model") {
-    info.distortion_model = "thin_prism";
-    refuses("distortion_model 'thin_prism' is not supported, only plumb_bob");
-  }
-  SECTION("distortion without a model") {
-    info.distortion_model = "";
-    refuses("distortion_model '' is not supported");
-  }
-  SECTION("thin prism") {
-    info.distortion_model = "rational_polynomial";
-    info.D = {0, 0, 0, 0, 0, 0, 0, 0, 1e-3, 0, 0, 0};
-    refuses("D has 12 coefficients; of rational_polynomial only 8 are supported");
-  }
-  SECTION("binned") {
-    info.binning_y = 2;
-    refuses("binning_x 0, binning_y 2: binned images are not supported");
-  }
-  SECTION("a part") {
-    info.region = {.x_offset = 8, .y_offset = 0, .height = 480, .width = 632, .do_rectify = false};
-    refuses("roi: images of a part of the camera are not supported");
-  }
-  SECTION("not finite") {
-    info.D[0] = std::nan("");
-    refuses("D: nan is outside");
-  }
+  const Case c = GENERATE(
+      Case{"K is 0: the camera is not calibrated", [](auto& info) { info.K.fill(0.0); }},
+      Case{"width and height: sides are whole numbers", [](auto& info) { info.width = 0; }},
+      Case{"K: a focal length of -457 px", [](auto& info) { info.K[4] = -457.0; }},
+      Case{"K: a skew of 0.5", [](auto& info) { info.K[1] = 0.5; }},
+      Case{"distortion_model 'thin_prism' is not supported, only plumb_bob",
+           [](auto& info) { info.distortion_model = "thin_prism"; }},
+      Case{"distortion_model '' is not supported", [](auto& info) { info.distortion_model = ""; }},
+      Case{"D has 12 coefficients; of rational_polynomial only 8 are supported",
+           [](auto& info) {
+             info.distortion_model = "rational_polynomial";
+             info.D = {0, 0, 0, 0, 0, 0, 0, 0, 1e-3, 0, 0, 0};
+           }},
+      Case{"binning_x 0, binning_y 2: binned images are not supported",
+           [](auto& info) { info.binning_y = 2; }},
+      Case{"roi: images of a part of the camera are not supported",
+           [](auto& info) {
+             info.region.x_offset = 8;
+             info.region.height = 480;
+             info.region.width = 632;
+           }},
+      Case{"D: nan is outside", [](auto& info) { info.D[0] = std::nan(""); }});
+  CAPTURE(c.why);
+  RosCameraInfo info = some_info();
+  c.spoil(info);
+  CHECK_THROWS_WITH(camera_of(info, RosImages::kRaw),
+                    Catch::Contains("frame 'left_optical': ") && Catch::Contains(c.why));
 }
 
 }  // namespace

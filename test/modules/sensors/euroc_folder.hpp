@@ -140,7 +140,7 @@ class EurocFolder {
 };
 
 /// The remaining packets.
-inline std::vector<SensorPacket> packets_of(EurocReader& reader) {
+inline std::vector<SensorPacket> packets_of(DatasetReader& reader) {
   std::vector<SensorPacket> packets;
   while (auto packet = reader.next()) packets.push_back(std::move(*packet));
   return packets;

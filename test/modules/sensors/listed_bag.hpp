@@ -22,17 +22,24 @@ class ListedBag final : public BagReader {
               encode_ros(message));
   }
 
-  /// A channel, so far without a message; its index.
+  /// A channel of a topic, so far without a message; its index.
   std::size_t describe(const std::string& topic, std::string_view type) {
     std::size_t channel = 0;
     while (channel < channels_.size() && channels_[channel].topic != topic) ++channel;
-    if (channel == channels_.size()) channels_.push_back({topic, std::string(type), "cdr", 0});
-    return channel;
+    return channel < channels_.size() ? channel : add_channel(topic, type, "cdr");
+  }
+  /// One more channel, which may equal an earlier one.
+  std::size_t add_channel(const std::string& topic, std::string_view type,
+                          const std::string& encoding) {
+    channels_.push_back({topic, std::string(type), encoding, 0});
+    return channels_.size() - 1;
   }
 
   void add_bytes(const std::string& topic, std::string_view type, Stamp log_time,
                  std::vector<std::uint8_t> bytes) {
-    const std::size_t channel = describe(topic, type);
+    add_bytes(describe(topic, type), log_time, std::move(bytes));
+  }
+  void add_bytes(std::size_t channel, Stamp log_time, std::vector<std::uint8_t> bytes) {
     ++channels_[channel].message_count;
     messages_.push_back({channel, log_time, std::move(bytes)});
   }

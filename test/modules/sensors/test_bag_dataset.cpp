@@ -7,8 +7,8 @@
 #include "modules/core/input_file.hpp"
 #include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/frame_files.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
 #include "modules/sensors/ros_image.hpp"
+#include "test/modules/sensors/euroc_folder.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/shared_data.hpp"
 
@@ -66,12 +66,6 @@ std::unique_ptr<ListedBag> recording(const Plan& plan) {
       bag->add("/right", image(stamp + plan.right_late, static_cast<std::uint8_t>(100 + frame)));
   }
   return bag;
-}
-
-std::vector<SensorPacket> packets_of(DatasetReader& reader) {
-  std::vector<SensorPacket> packets;
-  while (auto packet = reader.next()) packets.push_back(*std::move(packet));
-  return packets;
 }
 
 TEST_CASE("The table of sensor kinds has each role and each topic once", "[sensors]") {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
 
 #include "modules/core/depth_lookup.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
@@ -155,36 +156,39 @@ TEST_CASE("A recording without requested depth or labels is refused", "[sensors]
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("depth0/data.csv: no such file"));
 }
 
-TEST_CASE("A depth image that cannot be used loses only itself", "[sensors]") {
+TEST_CASE("A depth or label image that cannot be used loses only itself", "[sensors]") {
+  struct Case {
+    const char* sensor;
+    ReaderFault fault;
+    const char* text;
+    std::function<void(const fs::path&)> corrupt;
+  };
+  const auto pixels = [](const cv::Mat& image) {
+    return [image](const fs::path& file) { cv::imwrite(file.string(), image); };
+  };
+  using enum ReaderFault;
+  const Case c = GENERATE_COPY(
+      Case{"depth0", kMissingImage, ".png: no such image", [](auto& f) { fs::remove(f); }},
+      Case{"depth0", kUnreadableImage, ".png: truncated image",
+           [](auto& file) { fs::resize_file(file, fs::file_size(file) - 14); }},
+      Case{"depth0", kWrongImageSize, "24x32 px, the calibration states 32x24",
+           pixels(cv::Mat(32, 24, CV_16UC1, cv::Scalar(1000)))},
+      Case{"depth0", kWrongImageFormat,
+           "8 bits and 1 channels, depth is an image of 16 bits and one channel",
+           pixels(cv::Mat(24, 32, CV_8UC1, cv::Scalar(10)))},
+      Case{"depth0", kWrongImageFormat, "16 bits and 3 channels",
+           pixels(cv::Mat(24, 32, CV_16UC3, cv::Scalar(10, 10, 10)))},
+      Case{"label0", kWrongImageFormat, "no label_palette.csv",
+           pixels(cv::Mat(24, 32, CV_8UC3, cv::Scalar(1, 2, 3)))},
+      Case{"label0", kWrongImageFormat, "labels are 8-bit ids or 8-bit colours",
+           pixels(cv::Mat(24, 32, CV_16UC1, cv::Scalar(3)))});
+  CAPTURE(c.sensor, c.text);
+  const bool labels = c.sensor == std::string("label0");
   const EurocFolder folder;
-  folder.make_rgbd();
-  const std::string name = EurocFolder::side_image("depth0", 2);
-  ReaderFault fault = ReaderFault::kWrongImageFormat;
-  std::string text;
-  SECTION("missing") {
-    fs::remove(folder.mav0() / name);
-    fault = ReaderFault::kMissingImage;
-    text = name + ": no such image";
-  }
-  SECTION("truncated") {
-    fs::resize_file(folder.mav0() / name, fs::file_size(folder.mav0() / name) - 14);
-    fault = ReaderFault::kUnreadableImage;
-    text = name + ": truncated image";
-  }
-  SECTION("another size") {
-    folder.write_pixels(name, cv::Mat(32, 24, CV_16UC1, cv::Scalar(1000)));
-    fault = ReaderFault::kWrongImageSize;
-    text = "24x32 px, the calibration states 32x24";
-  }
-  SECTION("8 bits") {
-    folder.write_pixels(name, cv::Mat(24, 32, CV_8UC1, cv::Scalar(10)));
-    text = "8 bits and 1 channels, depth is an image of 16 bits and one channel";
-  }
-  SECTION("three channels") {
-    folder.write_pixels(name, cv::Mat(24, 32, CV_16UC3, cv::Scalar(10, 10, 10)));
-    text = "16 bits and 3 channels";
-  }
-  check_image_lost(folder, {}, fault, text);
+  labels ? folder.add_labels() : folder.make_rgbd();
+  const std::string name = EurocFolder::side_image(c.sensor, 2);
+  c.corrupt(folder.mav0() / name);
+  check_image_lost(folder, {.labels = labels}, c.fault, c.text);
 }
 
 TEST_CASE("A depth image of no frame is counted", "[sensors]") {
@@ -264,22 +268,6 @@ TEST_CASE("The palette maps labels from colours to ids", "[sensors]") {
   CHECK(ids[3] == 3);
   CHECK(outcome.report.count(ReaderFault::kUnknownColor) == 1);
   CHECK_THAT(outcome.report.entries().begin()->second.first, Catch::EndsWith(".png: 1 pixels"));
-}
-
-TEST_CASE("A label image that cannot be read loses only itself", "[sensors]") {
-  const EurocFolder folder;
-  folder.add_labels();
-  const std::string name = EurocFolder::side_image("label0", 2);
-  std::string text;
-  SECTION("colours without a palette") {
-    folder.write_pixels(name, cv::Mat(24, 32, CV_8UC3, cv::Scalar(1, 2, 3)));
-    text = "no label_palette.csv";
-  }
-  SECTION("16 bits") {
-    folder.write_pixels(name, cv::Mat(24, 32, CV_16UC1, cv::Scalar(3)));
-    text = "labels are 8-bit ids or 8-bit colours";
-  }
-  check_image_lost(folder, {.labels = true}, ReaderFault::kWrongImageFormat, text);
 }
 
 TEST_CASE("The reader returns the palette and refuses an invalid one", "[sensors]") {
