@@ -158,10 +158,7 @@ void BagDataset::take(SensorRole role, BagMessage message) {
     report_.add(ReaderFault::kPause,
                 place_of(message) + ": " + fixed(gap.pause_s, 1) + " s after the one before");
   stamp += nanoseconds(rig_.camera_time_offset_s);
-  const ImageRole image = role == SensorRole::kLeft    ? ImageRole::kLeft
-                          : role == SensorRole::kRight ? ImageRole::kRight
-                                                       : ImageRole::kDepth;
-  joiner_.add(image, stamp, std::move(message));
+  joiner_.add(role, stamp, std::move(message));
 }
 
 void BagDataset::take_pose(Stamp stamp, const BagMessage& message) {
@@ -269,16 +266,11 @@ std::optional<SensorPacket> BagDataset::read_packet(const ChooseUse& choose) {
     auto frame = decode(*joined, use);
     if (!frame) continue;
     auto samples = has_imu() ? imu_.until(joined->stamp) : std::vector<ImuSample>{};
-    count_gaps(samples);
+    report_gaps(samples, rig_.sensors.imu.rate_hz, name_, report_);
     return SensorPacket{std::make_shared<const StereoFrame>(std::move(*frame)), std::move(samples),
                         pose};
   }
   return std::nullopt;
-}
-
-void BagDataset::count_gaps(const std::vector<ImuSample>& samples) {
-  for (const ImuGap& gap : imu_gaps(samples, rig_.sensors.imu.rate_hz))
-    report_.add(ReaderFault::kImuGap, name_ + ": " + to_string(gap));
 }
 
 std::optional<SensorPacket> BagDataset::next(const ChooseUse& choose) {
@@ -305,11 +297,12 @@ ReaderReport BagDataset::report() const {
 
 std::vector<std::string> BagDataset::remarks() const {
   std::vector<std::string> lines = rig_.notes;
-  const auto add_line = [&lines](const std::optional<Synchrony>& synchrony, const char* other) {
+  const auto add_line = [&](SensorRole role, const char* other) {
+    const auto synchrony = joiner_.synchrony(role);
     if (synchrony && is_remarkable(*synchrony)) lines.push_back(to_string(*synchrony, other));
   };
-  add_line(joiner_.right_synchrony(), "right");
-  add_line(joiner_.depth_synchrony(), "depth");
+  add_line(SensorRole::kRight, "right");
+  add_line(SensorRole::kDepth, "depth");
   return lines;
 }
 

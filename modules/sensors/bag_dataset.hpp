@@ -71,7 +71,6 @@ class BagDataset final : public DatasetReader {
   [[nodiscard]] bool has_motion(const JoinedFrame& frame);
   [[nodiscard]] std::optional<StereoFrame> decode(const JoinedFrame& joined, FrameUse use);
   [[nodiscard]] std::optional<SensorPacket> read_packet(const ChooseUse& choose);
-  void count_gaps(const std::vector<ImuSample>& samples);
   [[nodiscard]] std::string place_of(const BagMessage& message) const;
 
   std::string name_;

@@ -120,9 +120,7 @@ bool EurocReader::has_imu(const StereoPairFile& pair) {
 std::vector<ImuSample> EurocReader::imu_until(Stamp stamp) {
   if (!reads_imu_) return {};
   std::vector<ImuSample> samples = imu_.until(stamp);
-  for (const ImuGap& gap : imu_gaps(samples, rig_.imu.rate_hz))
-    report_.add(ReaderFault::kImuGap,
-                (mav0_ / "imu0" / "data.csv").string() + ": " + to_string(gap));
+  report_gaps(samples, rig_.imu.rate_hz, (mav0_ / "imu0" / "data.csv").string(), report_);
   return samples;
 }
 

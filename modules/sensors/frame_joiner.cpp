@@ -9,42 +9,30 @@ namespace km {
 namespace {
 
 // Fault of an image that belongs to no frame.
-ReaderFault fault_of_unpaired(ImageRole role) {
-  switch (role) {
-    case ImageRole::kLeft:
-      return ReaderFault::kLeftWithoutRight;
-    case ImageRole::kRight:
-      return ReaderFault::kRightWithoutLeft;
-    case ImageRole::kDepth:
-      return ReaderFault::kImageWithoutFrame;
-  }
-  return ReaderFault::kImageWithoutFrame;
+ReaderFault fault_of_unpaired(SensorRole role) {
+  if (role == SensorRole::kLeft) return ReaderFault::kLeftWithoutRight;
+  return role == SensorRole::kRight ? ReaderFault::kRightWithoutLeft
+                                    : ReaderFault::kImageWithoutFrame;
 }
 
 }  // namespace
 
 FrameJoiner::FrameJoiner(bool has_right, bool has_depth, std::optional<double> tolerance_s) {
-  left_.exists = true;
-  right_.exists = has_right;
-  depth_.exists = has_depth;
+  stream_of(SensorRole::kLeft).exists = true;
+  stream_of(SensorRole::kRight).exists = has_right;
+  stream_of(SensorRole::kDepth).exists = has_depth;
   if (!tolerance_s) return;
-  const Synchrony given{.tolerance_s = *tolerance_s};
-  if (has_right) right_.synchrony = given;
-  if (has_depth) depth_.synchrony = given;
+  for (const SensorRole role : {SensorRole::kRight, SensorRole::kDepth})
+    if (stream_of(role).exists) stream_of(role).synchrony = Synchrony{.tolerance_s = *tolerance_s};
 }
 
-FrameJoiner::Stream& FrameJoiner::stream_of(ImageRole role) {
-  if (role == ImageRole::kLeft) return left_;
-  return role == ImageRole::kRight ? right_ : depth_;
-}
-
-void FrameJoiner::drop_oldest(ImageRole role) {
+void FrameJoiner::drop_oldest(SensorRole role) {
   auto& images = stream_of(role).images;
   report_.add(fault_of_unpaired(role), "stamp " + std::to_string(images.front().stamp));
   images.pop_front();
 }
 
-void FrameJoiner::add(ImageRole role, Stamp stamp, BagMessage message) {
+void FrameJoiner::add(SensorRole role, Stamp stamp, BagMessage message) {
   newest_log_time_ = std::max(newest_log_time_, message.log_time);
   auto& images = stream_of(role).images;
   images.push_back({stamp, std::move(message)});
@@ -53,32 +41,33 @@ void FrameJoiner::add(ImageRole role, Stamp stamp, BagMessage message) {
 
 bool FrameJoiner::has_waited() const {
   return finished_ ||
-         seconds_between(left_.images.front().message.log_time, newest_log_time_) > kPatience_s;
+         seconds_between(left().front().message.log_time, newest_log_time_) > kPatience_s;
 }
 
 bool FrameJoiner::knows_synchrony() {
   bool knows_all = true;
-  for (Stream* stream : {&right_, &depth_}) {
-    if (!stream->exists || stream->synchrony) continue;
+  for (const SensorRole role : {SensorRole::kRight, SensorRole::kDepth}) {
+    Stream& stream = stream_of(role);
+    if (!stream.exists || stream.synchrony) continue;
     const bool suffices =
-        left_.images.size() >= kSample && (stream->images.size() >= kSample || has_waited());
+        left().size() >= kSample && (stream.images.size() >= kSample || has_waited());
     if (!suffices && !finished_) {
       knows_all = false;
       continue;
     }
-    std::vector<Stamp> left, other;
-    for (const Held& image : left_.images) left.push_back(image.stamp);
-    for (const Held& image : stream->images) other.push_back(image.stamp);
-    stream->synchrony = find_synchrony(left, other);
+    std::vector<Stamp> lefts, others;
+    for (const Held& image : left()) lefts.push_back(image.stamp);
+    for (const Held& image : stream.images) others.push_back(image.stamp);
+    stream.synchrony = find_synchrony(lefts, others);
   }
   return knows_all;
 }
 
 // Moves the partner of the left image to the front of its stream.
-FrameJoiner::Partner FrameJoiner::find_partner(ImageRole role) {
+FrameJoiner::Partner FrameJoiner::find_partner(SensorRole role) {
   Stream& stream = stream_of(role);
   if (!stream.exists) return Partner::kNone;
-  const Stamp expected = left_.images.front().stamp + nanoseconds(stream.synchrony->offset_s);
+  const Stamp expected = left().front().stamp + nanoseconds(stream.synchrony->offset_s);
   const double tolerance_s = stream.synchrony->tolerance_s;
   while (!stream.images.empty()) {
     const double late_s = seconds_between(expected, stream.images.front().stamp);
@@ -90,28 +79,29 @@ FrameJoiner::Partner FrameJoiner::find_partner(ImageRole role) {
 }
 
 std::optional<JoinedFrame> FrameJoiner::next() {
-  while (!left_.images.empty() && knows_synchrony()) {
-    const Partner right = find_partner(ImageRole::kRight);
+  while (!left().empty() && knows_synchrony()) {
+    const Partner right = find_partner(SensorRole::kRight);
     if (right == Partner::kMayCome) return std::nullopt;
-    if (right_.exists && right == Partner::kNone) {
-      drop_oldest(ImageRole::kLeft);
+    if (stream_of(SensorRole::kRight).exists && right == Partner::kNone) {
+      drop_oldest(SensorRole::kLeft);
       continue;
     }
-    const Partner depth = find_partner(ImageRole::kDepth);
+    const Partner depth = find_partner(SensorRole::kDepth);
     if (depth == Partner::kMayCome) return std::nullopt;
-    const auto take = [](Stream& stream) {
-      BagMessage message = std::move(stream.images.front().message);
-      stream.images.pop_front();
+    const auto take = [this](SensorRole role) {
+      auto& images = stream_of(role).images;
+      BagMessage message = std::move(images.front().message);
+      images.pop_front();
       return message;
     };
     JoinedFrame frame{
-        .stamp = left_.images.front().stamp, .left = take(left_), .right = {}, .depth = {}};
-    if (right == Partner::kThere) frame.right = take(right_);
-    if (depth == Partner::kThere) frame.depth = take(depth_);
+        .stamp = left().front().stamp, .left = take(SensorRole::kLeft), .right = {}, .depth = {}};
+    if (right == Partner::kThere) frame.right = take(SensorRole::kRight);
+    if (depth == Partner::kThere) frame.depth = take(SensorRole::kDepth);
     return frame;
   }
-  if (finished_ && left_.images.empty())
-    for (const ImageRole role : {ImageRole::kRight, ImageRole::kDepth})
+  if (finished_ && left().empty())
+    for (const SensorRole role : {SensorRole::kRight, SensorRole::kDepth})
       while (!stream_of(role).images.empty()) drop_oldest(role);
   return std::nullopt;
 }

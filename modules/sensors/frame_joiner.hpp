@@ -1,16 +1,16 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <deque>
 #include <optional>
 
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/sensor_kind.hpp"
 #include "modules/sensors/synchrony.hpp"
 
 namespace km {
-
-enum class ImageRole { kLeft, kRight, kDepth };
 
 /// The messages with the images of one instant.
 struct JoinedFrame {
@@ -36,8 +36,8 @@ class FrameJoiner {
   /// stamps.
   FrameJoiner(bool has_right, bool has_depth, std::optional<double> tolerance_s);
 
-  /// Adds an image. Precondition: the stamps of each role ascend.
-  void add(ImageRole role, Stamp stamp, BagMessage message);
+  /// Adds an image of a camera or a depth sensor. Precondition: the stamps of each role ascend.
+  void add(SensorRole role, Stamp stamp, BagMessage message);
 
   /// The next complete frame; nullopt if none is complete.
   [[nodiscard]] std::optional<JoinedFrame> next();
@@ -49,8 +49,9 @@ class FrameJoiner {
   [[nodiscard]] const ReaderReport& report() const { return report_; }
 
   /// Synchrony of the right and of the depth images; nullopt until known, or without the stream.
-  [[nodiscard]] std::optional<Synchrony> right_synchrony() const { return right_.synchrony; }
-  [[nodiscard]] std::optional<Synchrony> depth_synchrony() const { return depth_.synchrony; }
+  [[nodiscard]] std::optional<Synchrony> synchrony(SensorRole role) const {
+    return streams_.at(static_cast<std::size_t>(role)).synchrony;
+  }
 
  private:
   struct Held {
@@ -64,13 +65,16 @@ class FrameJoiner {
   };
   enum class Partner { kThere, kNone, kMayCome };
 
-  void drop_oldest(ImageRole role);
-  [[nodiscard]] Stream& stream_of(ImageRole role);
+  [[nodiscard]] const std::deque<Held>& left() const { return streams_[0].images; }
+  void drop_oldest(SensorRole role);
+  [[nodiscard]] Stream& stream_of(SensorRole role) {
+    return streams_.at(static_cast<std::size_t>(role));
+  }
   [[nodiscard]] bool knows_synchrony();
   [[nodiscard]] bool has_waited() const;
-  [[nodiscard]] Partner find_partner(ImageRole role);
+  [[nodiscard]] Partner find_partner(SensorRole role);
 
-  Stream left_, right_, depth_;
+  std::array<Stream, 3> streams_;  // kLeft, kRight, kDepth
   ReaderReport report_;
   Stamp newest_log_time_ = 0;
   bool finished_ = false;

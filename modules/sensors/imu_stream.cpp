@@ -26,18 +26,16 @@ void ImuStream::begin_at(Stamp stamp) {
                  std::ranges::lower_bound(samples_, first, {}, &ImuSample::stamp));
 }
 
-std::vector<ImuGap> imu_gaps(std::span<const ImuSample> samples, double rate_hz) {
+void report_gaps(std::span<const ImuSample> samples, double rate_hz, const std::string& place,
+                 ReaderReport& report) {
   constexpr double kPeriods = 2.5;
-  std::vector<ImuGap> gaps;
   for (std::size_t i = 1; i < samples.size(); ++i) {
-    const double length_s = seconds_between(samples[i - 1].stamp, samples[i].stamp);
-    if (length_s > kPeriods / rate_hz) gaps.push_back({samples[i - 1].stamp, length_s});
+    const Stamp before = samples[i - 1].stamp;
+    const double length_s = seconds_between(before, samples[i].stamp);
+    if (length_s > kPeriods / rate_hz)
+      report.add(ReaderFault::kImuGap,
+                 place + ": " + std::to_string(length_s) + " s after " + std::to_string(before));
   }
-  return gaps;
-}
-
-std::string to_string(const ImuGap& gap) {
-  return std::to_string(gap.length_s) + " s after " + std::to_string(gap.after);
 }
 
 std::optional<ImuSample> ImuJoiner::next() {

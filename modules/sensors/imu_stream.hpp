@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "modules/core/frame.hpp"
+#include "modules/sensors/dataset_reader.hpp"
 
 namespace km {
 
@@ -44,17 +45,10 @@ class ImuStream {
   bool has_begun_ = false;
 };
 
-/// A pause of an inertial sensor.
-struct ImuGap {
-  Stamp after = 0;  ///< Stamp of the last sample before the pause.
-  double length_s = 0.0;
-};
-
-/// Pauses of more than 2.5 periods, so that a single lost sample does not count.
-[[nodiscard]] std::vector<ImuGap> imu_gaps(std::span<const ImuSample> samples, double rate_hz);
-
-/// Length and start of a pause: "0.25 s after 1403636579758555392".
-[[nodiscard]] std::string to_string(const ImuGap& gap);
+/// Counts pauses of an inertial sensor in `report`, each with `place`, length and start. A pause
+/// has more than 2.5 periods, so that a single lost sample does not count.
+void report_gaps(std::span<const ImuSample> samples, double rate_hz, const std::string& place,
+                 ReaderReport& report);
 
 /// Makes inertial samples from a gyroscope and an accelerometer that have their own stamps. There
 /// is one sample for each gyroscope reading. Its acceleration is interpolated linearly between the
