@@ -1,6 +1,5 @@
 #include "modules/recordings/db3_reader.hpp"
 
-#include <algorithm>
 #include <cctype>
 #include <string_view>
 #include <utility>
@@ -48,8 +47,7 @@ Db3Reader::Db3Reader(const fs::path& path) : path_(path) {
   constexpr std::string_view kMagic{"SQLite format 3\0", 16};
   constexpr std::uint64_t kLeastRow_bytes = 4;
   const RandomAccessFile file(path);
-  const auto magic = file.read(0, std::min<std::uint64_t>(file.size(), kMagic.size()));
-  if (std::string(magic.begin(), magic.end()) != kMagic) refuse("not a SQLite database");
+  if (file.beginning(kMagic.size()) != kMagic) refuse("not a SQLite database");
   max_rows_ = file.size() / kLeastRow_bytes;
   if (is_in_use(path, "-wal")) max_rows_ += fs::file_size(path.string() + "-wal") / kLeastRow_bytes;
   open();

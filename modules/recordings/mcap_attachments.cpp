@@ -1,6 +1,5 @@
 #include "modules/recordings/mcap_attachments.hpp"
 
-#include <algorithm>
 #include <cstdint>
 
 #include "modules/core/input_file.hpp"
@@ -12,8 +11,7 @@ namespace km {
 
 std::map<std::string, std::string> read_mcap_attachments(const std::filesystem::path& path) {
   const RandomAccessFile file(path);
-  const auto magic = file.read(0, std::min<std::uint64_t>(file.size(), kMcapMagic.size()));
-  if (std::string(magic.begin(), magic.end()) != kMcapMagic)
+  if (file.beginning(kMcapMagic.size()) != kMcapMagic)
     throw InputFileError(file.place(0) + ": does not begin as MCAP files of version 0 do");
   std::map<std::string, std::string> found;
   std::uint64_t at = kMcapMagic.size();

@@ -39,9 +39,7 @@ bool for_each_record(std::span<const std::uint8_t> bytes, const Use& use) {
 }  // namespace
 
 McapReader::McapReader(const std::filesystem::path& path) : file_(path) {
-  const Bytes magic = file_.read(0, std::min<std::uint64_t>(file_.size(), kMcapMagic.size()));
-  if (!std::equal(magic.begin(), magic.end(), kMcapMagic.begin(), kMcapMagic.end(),
-                  [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); }))
+  if (file_.beginning(kMcapMagic.size()) != kMcapMagic)
     throw InputFileError(file_.place(0) + ": does not begin as MCAP files of version 0 do");
   const std::uint64_t data_end = find_data_end();
   const bool has_end = data_end < file_.size();
@@ -70,9 +68,7 @@ std::uint64_t McapReader::find_data_end() {
   }
   const std::uint64_t begin = size - tail;
   const Bytes bytes = file_.read(begin, tail);
-  const bool ends =
-      std::equal(kMcapMagic.begin(), kMcapMagic.end(), bytes.end() - 8,
-                 [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
+  const bool ends = std::string(bytes.end() - kMcapMagic.size(), bytes.end()) == kMcapMagic;
   const auto header = parse_mcap_record_header(bytes);
   const auto footer = parse_mcap<McapFooter>(
       std::span(bytes).subspan(kMcapRecordHeader_bytes, kMcapFooterFields_bytes));

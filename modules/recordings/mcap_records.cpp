@@ -16,19 +16,10 @@ class McapIn {
  public:
   explicit McapIn(std::span<const std::uint8_t> bytes) : bytes_(bytes), reader_(bytes) {}
 
-  void u8(std::uint8_t& value) { value = reader_.u8(); }
-  void u16(std::uint16_t& value) { value = reader_.u16(); }
-  void u32(std::uint32_t& value) { value = reader_.u32(); }
-  void u64(std::uint64_t& value) { value = reader_.u64(); }
-  void time(Stamp& value) {
-    const std::uint64_t time = reader_.u64();
-    value = static_cast<Stamp>(time <= kLatest ? time : reader_.fail());
+  template <typename... Fields>
+  void operator()(Fields&... fields) {
+    (get(fields), ...);
   }
-  void text(std::string& value) {
-    const auto bytes = reader_.bytes(reader_.u32());
-    value.assign(bytes.begin(), bytes.end());
-  }
-  void octets(std::span<const std::uint8_t>& value) { value = reader_.bytes(reader_.u64()); }
   // Checksum of all bytes before it; 0: no checksum.
   void crc() {
     const auto before = bytes_.first(bytes_.size() - reader_.left());
@@ -36,33 +27,42 @@ class McapIn {
     if (!reader_.failed() && crc != 0 && crc != mcap_crc(before)) reader_.fail();
   }
 
+  [[nodiscard]] bool failed() const { return reader_.failed(); }
+
+ private:
+  void get(std::uint8_t& value) { value = reader_.u8(); }
+  void get(std::uint16_t& value) { value = reader_.u16(); }
+  void get(std::uint32_t& value) { value = reader_.u32(); }
+  void get(std::uint64_t& value) { value = reader_.u64(); }
+  void get(Stamp& value) {
+    const std::uint64_t time = reader_.u64();
+    value = static_cast<Stamp>(time <= kLatest ? time : reader_.fail());
+  }
+  void get(std::string& value) {
+    const auto bytes = reader_.bytes(reader_.u32());
+    value.assign(bytes.begin(), bytes.end());
+  }
+  void get(std::span<const std::uint8_t>& value) { value = reader_.bytes(reader_.u64()); }
   // A map or list of pairs, preceded by its length in bytes.
   template <typename Key, typename Value>
-  void pairs(std::vector<std::pair<Key, Value>>& values) {
+  void get(std::vector<std::pair<Key, Value>>& values) {
     McapIn in(reader_.bytes(reader_.u32()));
     values.reserve(in.reader_.left() / (sizeof(Key) + sizeof(Value)));
     while (in.reader_.left() > 0) {
       auto& [key, value] = values.emplace_back();
-      in.number(key);
-      in.number(value);
+      in(key, value);
     }
     if (in.failed()) reader_.fail();
   }
-  void texts(std::map<std::string, std::string>& values) {
+  void get(std::map<std::string, std::string>& values) {
     McapIn in(reader_.bytes(reader_.u32()));
     while (in.reader_.left() > 0) {
       std::string key;
-      in.text(key);
-      in.text(values[key]);
+      in(key);
+      in(values[key]);
     }
     if (in.failed()) reader_.fail();
   }
-
-  [[nodiscard]] bool failed() const { return reader_.failed(); }
-
- private:
-  void number(std::uint16_t& value) { u16(value); }
-  void number(std::uint64_t& value) { u64(value); }
 
   std::span<const std::uint8_t> bytes_;
   ByteReader reader_;
@@ -71,48 +71,40 @@ class McapIn {
 // Writes the fields that McapIn reads.
 class McapOut {
  public:
-  void u8(std::uint8_t value) { writer_.u8(value); }
-  void u16(std::uint16_t value) { writer_.u16(value); }
-  void u32(std::uint32_t value) { writer_.u32(value); }
-  void u64(std::uint64_t value) { writer_.u64(value); }
-  void time(Stamp value) { writer_.u64(static_cast<std::uint64_t>(value)); }
-  void text(const std::string& value) {
-    writer_.u32(static_cast<std::uint32_t>(value.size()));
-    writer_.bytes({reinterpret_cast<const std::uint8_t*>(value.data()), value.size()});
-  }
-  void octets(std::span<const std::uint8_t> value) {
-    writer_.u64(value.size());
-    writer_.bytes(value);
+  template <typename... Fields>
+  void operator()(const Fields&... fields) {
+    (put(fields), ...);
   }
   void crc() {
     const auto bytes = writer_.release();
     writer_.bytes(bytes);
     writer_.u32(mcap_crc(bytes));
   }
-  template <typename Key, typename Value>
-  void pairs(const std::vector<std::pair<Key, Value>>& values) {
-    writer_.u32(static_cast<std::uint32_t>(values.size() * (sizeof(Key) + sizeof(Value))));
-    for (const auto& [key, value] : values) {
-      number(key);
-      number(value);
-    }
-  }
-  void texts(const std::map<std::string, std::string>& values) {
-    McapOut out;
-    for (const auto& [key, value] : values) {
-      out.text(key);
-      out.text(value);
-    }
-    const auto bytes = out.release();
-    writer_.u32(static_cast<std::uint32_t>(bytes.size()));
-    writer_.bytes(bytes);
-  }
 
   [[nodiscard]] std::vector<std::uint8_t> release() { return writer_.release(); }
 
  private:
-  void number(std::uint16_t value) { u16(value); }
-  void number(std::uint64_t value) { u64(value); }
+  void put(std::uint8_t value) { writer_.u8(value); }
+  void put(std::uint16_t value) { writer_.u16(value); }
+  void put(std::uint32_t value) { writer_.u32(value); }
+  void put(std::uint64_t value) { writer_.u64(value); }
+  void put(Stamp value) { writer_.u64(static_cast<std::uint64_t>(value)); }
+  void put(const std::string& value) {
+    writer_.u32(static_cast<std::uint32_t>(value.size()));
+    writer_.bytes({reinterpret_cast<const std::uint8_t*>(value.data()), value.size()});
+  }
+  void put(std::span<const std::uint8_t> value) {
+    writer_.u64(value.size());
+    writer_.bytes(value);
+  }
+  // A map or list of pairs.
+  void put(const auto& pairs) {
+    McapOut out;
+    for (const auto& [key, value] : pairs) out(key, value);
+    const auto bytes = out.release();
+    writer_.u32(static_cast<std::uint32_t>(bytes.size()));
+    writer_.bytes(bytes);
+  }
 
   ByteWriter writer_;
 };
@@ -122,96 +114,60 @@ template <typename Record, typename Type>
 concept RecordIs = std::same_as<std::remove_const_t<Record>, Type>;
 
 void fields(auto& wire, RecordIs<McapHeader> auto& header) {
-  wire.text(header.profile);
-  wire.text(header.library);
+  wire(header.profile, header.library);
 }
 
 void fields(auto& wire, RecordIs<McapFooter> auto& footer) {
-  wire.u64(footer.summary_start);
-  wire.u64(footer.summary_offset_start);
-  wire.u32(footer.summary_crc);
+  wire(footer.summary_start, footer.summary_offset_start, footer.summary_crc);
 }
 
 void fields(auto& wire, RecordIs<McapSchema> auto& schema) {
-  wire.u16(schema.id);
-  wire.text(schema.name);
-  wire.text(schema.encoding);
-  wire.text(schema.data);
+  wire(schema.id, schema.name, schema.encoding, schema.data);
 }
 
 void fields(auto& wire, RecordIs<McapChannel> auto& channel) {
-  wire.u16(channel.id);
-  wire.u16(channel.schema_id);
-  wire.text(channel.topic);
-  wire.text(channel.message_encoding);
-  wire.texts(channel.metadata);
+  wire(channel.id, channel.schema_id, channel.topic, channel.message_encoding, channel.metadata);
 }
 
 void fields(auto& wire, RecordIs<McapChunk> auto& chunk) {
-  wire.time(chunk.message_start_time);
-  wire.time(chunk.message_end_time);
-  wire.u64(chunk.uncompressed_size);
-  wire.u32(chunk.uncompressed_crc);
-  wire.text(chunk.compression);
-  wire.octets(chunk.records);
+  wire(chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size,
+       chunk.uncompressed_crc, chunk.compression, chunk.records);
 }
 
 void fields(auto& wire, RecordIs<McapMessageIndex> auto& index) {
-  wire.u16(index.channel_id);
-  wire.pairs(index.messages);
+  wire(index.channel_id, index.messages);
 }
 
 void fields(auto& wire, RecordIs<McapChunkIndex> auto& index) {
-  wire.time(index.message_start_time);
-  wire.time(index.message_end_time);
-  wire.u64(index.chunk_start);
-  wire.u64(index.chunk_length);
-  wire.pairs(index.message_index_offsets);
-  wire.u64(index.message_index_length);
-  wire.text(index.compression);
-  wire.u64(index.compressed_size);
-  wire.u64(index.uncompressed_size);
+  wire(index.message_start_time, index.message_end_time, index.chunk_start, index.chunk_length,
+       index.message_index_offsets, index.message_index_length, index.compression,
+       index.compressed_size, index.uncompressed_size);
 }
 
 void fields(auto& wire, RecordIs<McapAttachment> auto& attachment) {
-  wire.time(attachment.log_time);
-  wire.time(attachment.create_time);
-  wire.text(attachment.name);
-  wire.text(attachment.media_type);
-  wire.octets(attachment.data);
+  wire(attachment.log_time, attachment.create_time, attachment.name, attachment.media_type,
+       attachment.data);
   wire.crc();
 }
 
 void fields(auto& wire, RecordIs<McapAttachmentIndex> auto& index) {
-  wire.u64(index.start);
-  wire.u64(index.length);
-  wire.time(index.log_time);
-  wire.time(index.create_time);
-  wire.u64(index.data_size);
-  wire.text(index.name);
-  wire.text(index.media_type);
+  wire(index.start, index.length, index.log_time, index.create_time, index.data_size, index.name,
+       index.media_type);
 }
 
 void fields(auto& wire, RecordIs<McapStatistics> auto& statistics) {
-  wire.u64(statistics.message_count);
-  wire.u16(statistics.schema_count);
-  wire.u32(statistics.channel_count);
-  wire.u32(statistics.attachment_count);
-  wire.u32(statistics.metadata_count);
-  wire.u32(statistics.chunk_count);
-  wire.time(statistics.message_start_time);
-  wire.time(statistics.message_end_time);
-  wire.pairs(statistics.channel_message_counts);
+  wire(statistics.message_count, statistics.schema_count, statistics.channel_count,
+       statistics.attachment_count, statistics.metadata_count, statistics.chunk_count,
+       statistics.message_start_time, statistics.message_end_time,
+       statistics.channel_message_counts);
 }
 
 void fields(auto& wire, RecordIs<McapSummaryOffset> auto& offset) {
-  wire.u8(offset.group_opcode);
-  wire.u64(offset.group_start);
-  wire.u64(offset.group_length);
+  wire(offset.group_opcode, offset.group_start, offset.group_length);
 }
 
 void fields(auto& wire, RecordIs<McapDataEnd> auto& end) {
-  wire.u32(end.data_section_crc);
+  wire(end.data_section_crc);
 }
 
 }  // namespace
@@ -277,7 +233,6 @@ void put_mcap_message(ByteWriter& out, const McapMessage& message,
   out.bytes(data);
 }
 
-template std::optional<McapHeader> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapHeader&);
 template std::optional<McapFooter> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapFooter&);
@@ -293,13 +248,10 @@ template std::optional<McapChunkIndex> parse_mcap(std::span<const std::uint8_t>)
 template void put_mcap(ByteWriter&, const McapChunkIndex&);
 template std::optional<McapAttachment> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapAttachment&);
-template std::optional<McapAttachmentIndex> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapAttachmentIndex&);
 template std::optional<McapStatistics> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapStatistics&);
-template std::optional<McapSummaryOffset> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapSummaryOffset&);
-template std::optional<McapDataEnd> parse_mcap(std::span<const std::uint8_t>);
 template void put_mcap(ByteWriter&, const McapDataEnd&);
 
 }  // namespace km

@@ -172,8 +172,9 @@ struct McapDataEnd {
 [[nodiscard]] std::optional<McapRecordHeader> parse_mcap_record_header(
     std::span<const std::uint8_t> bytes);
 
-/// Parses the content after a record's header, for all record types except messages. nullopt for an
-/// invalid content, times beyond 2^63 - 1 ns, and attachments with a wrong checksum.
+/// Parses the content after a record's header, for the record types that readers use, except
+/// messages. nullopt for an invalid content, times beyond 2^63 - 1 ns, and attachments with a wrong
+/// checksum.
 template <typename Record>
 [[nodiscard]] std::optional<Record> parse_mcap(std::span<const std::uint8_t> bytes);
 

@@ -23,8 +23,7 @@ std::unique_ptr<BagReader> open_file(const fs::path& path) {
   constexpr std::uint64_t kMagic_bytes = 8;
   const RandomAccessFile file(path);
   if (file.size() == 0) throw InputFileError(path.string() + ": is empty");
-  const auto bytes = file.read(0, std::min(file.size(), kMagic_bytes));
-  const std::string magic(bytes.begin(), bytes.end());
+  const std::string magic = file.beginning(kMagic_bytes);
   if (magic == "#ROSBAG ") return std::make_unique<Ros1BagReader>(path);
   if (magic == kMcapMagic) return std::make_unique<McapReader>(path);
   if (magic == "SQLite f") return std::make_unique<Db3Reader>(path);

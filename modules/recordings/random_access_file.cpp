@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 
@@ -41,6 +42,11 @@ std::vector<std::uint8_t> RandomAccessFile::read(std::uint64_t offset, std::uint
     if (count > 0) done += static_cast<std::size_t>(count);
   }
   return bytes;
+}
+
+std::string RandomAccessFile::beginning(std::uint64_t size) const {
+  const auto bytes = read(0, std::min(size_, size));
+  return {bytes.begin(), bytes.end()};
 }
 
 std::string RandomAccessFile::place(std::uint64_t offset) const {

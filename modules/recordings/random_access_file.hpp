@@ -28,6 +28,9 @@ class RandomAccessFile {
   /// has(offset, size).
   [[nodiscard]] std::vector<std::uint8_t> read(std::uint64_t offset, std::uint64_t size) const;
 
+  /// The first `size` bytes as text; all of a shorter file.
+  [[nodiscard]] std::string beginning(std::uint64_t size) const;
+
   /// Position for messages: "FILE byte OFFSET".
   [[nodiscard]] std::string place(std::uint64_t offset) const;
 

@@ -18,8 +18,7 @@ constexpr std::uint64_t kMaxHeader_bytes = std::uint64_t{1} << 20U;
 }  // namespace
 
 Ros1BagReader::Ros1BagReader(const std::filesystem::path& path) : file_(path) {
-  const Bytes magic = file_.read(0, std::min<std::uint64_t>(file_.size(), kRos1Magic.size()));
-  if (std::string(magic.begin(), magic.end()) != kRos1Magic)
+  if (file_.beginning(kRos1Magic.size()) != kRos1Magic)
     throw InputFileError(file_.place(0) + ": does not begin as bags of version 2.0 do");
   const auto header = record_at(kRos1Magic.size(), file_.size());
   if (!header || !header->fields.is(Ros1Opcode::kBagHeader))

@@ -15,67 +15,37 @@ concept Is = std::same_as<std::remove_const_t<Message>, Type>;
 
 void fields(auto& wire, Is<RosHeader> auto& header) {
   wire.skip_sequence();
-  wire.stamp(header.stamp);
-  wire.text(header.frame);
-}
-
-void fields(auto& wire, Is<Eigen::Vector3d> auto& vector) {
-  wire.f64(std::span(vector.data(), 3));
-}
-
-// Order x, y, z, w, as in Eigen's storage.
-void fields(auto& wire, Is<Eigen::Quaterniond> auto& rotation) {
-  wire.f64(std::span(rotation.coeffs().data(), 4));
+  wire(header.stamp, header.frame);
 }
 
 void fields(auto& wire, Is<RosPose> auto& pose) {
-  fields(wire, pose.position);
-  fields(wire, pose.orientation);
+  wire(pose.position, pose.orientation.coeffs());  // x, y, z, w, as in Eigen's storage
 }
 
 void fields(auto& wire, Is<RosImage> auto& image) {
   fields(wire, image.header);
-  wire.u32(image.height);
-  wire.u32(image.width);
-  wire.text(image.encoding);
-  wire.flag(image.is_bigendian);
-  wire.u32(image.step);
-  wire.octets(image.data);
+  wire(image.height, image.width, image.encoding, image.is_bigendian, image.step, image.data);
   if (image.data.size() < std::uint64_t{image.step} * image.height) wire.fail();
 }
 
 void fields(auto& wire, Is<RosCompressedImage> auto& image) {
   fields(wire, image.header);
-  wire.text(image.format);
-  wire.octets(image.data);
+  wire(image.format, image.data);
 }
 
 void fields(auto& wire, Is<RosImu> auto& imu) {
   fields(wire, imu.header);
-  fields(wire, imu.orientation);
-  wire.f64(imu.orientation_covariance);
-  fields(wire, imu.angular_velocity);
-  wire.f64(imu.angular_velocity_covariance);
-  fields(wire, imu.linear_acceleration);
-  wire.f64(imu.linear_acceleration_covariance);
+  wire(imu.orientation.coeffs(), imu.orientation_covariance);
+  wire(imu.angular_velocity, imu.angular_velocity_covariance);
+  wire(imu.linear_acceleration, imu.linear_acceleration_covariance);
 }
 
 void fields(auto& wire, Is<RosCameraInfo> auto& camera) {
   fields(wire, camera.header);
-  wire.u32(camera.height);
-  wire.u32(camera.width);
-  wire.text(camera.distortion_model);
-  wire.doubles(camera.D);
-  wire.f64(camera.K);
-  wire.f64(camera.R);
-  wire.f64(camera.P);
-  wire.u32(camera.binning_x);
-  wire.u32(camera.binning_y);
-  wire.u32(camera.region.x_offset);
-  wire.u32(camera.region.y_offset);
-  wire.u32(camera.region.height);
-  wire.u32(camera.region.width);
-  wire.flag(camera.region.do_rectify);
+  wire(camera.height, camera.width, camera.distortion_model, camera.D, camera.K, camera.R, camera.P,
+       camera.binning_x, camera.binning_y);
+  auto& region = camera.region;
+  wire(region.x_offset, region.y_offset, region.height, region.width, region.do_rectify);
 }
 
 void fields(auto& wire, Is<RosPoseStamped> auto& pose) {
@@ -86,7 +56,7 @@ void fields(auto& wire, Is<RosPoseStamped> auto& pose) {
 void fields(auto& wire, Is<RosPoseWithCovarianceStamped> auto& pose) {
   fields(wire, pose.header);
   fields(wire, pose.pose);
-  wire.f64(pose.covariance);
+  wire(pose.covariance);
 }
 
 void fields(auto& wire, Is<RosPath> auto& path) {
@@ -98,12 +68,10 @@ void fields(auto& wire, Is<RosPath> auto& path) {
 
 void fields(auto& wire, Is<RosOdometry> auto& odometry) {
   fields(wire, odometry.header);
-  wire.text(odometry.child_frame);
+  wire(odometry.child_frame);
   fields(wire, odometry.pose);
-  wire.f64(odometry.pose_covariance);
-  fields(wire, odometry.linear_velocity);
-  fields(wire, odometry.angular_velocity);
-  wire.f64(odometry.twist_covariance);
+  wire(odometry.pose_covariance, odometry.linear_velocity, odometry.angular_velocity,
+       odometry.twist_covariance);
 }
 
 void fields(auto& wire, Is<RosTransforms> auto& message) {
@@ -111,7 +79,7 @@ void fields(auto& wire, Is<RosTransforms> auto& message) {
   wire.resize(message.transforms, kLeast_bytes);
   for (auto& transform : message.transforms) {
     fields(wire, transform.header);
-    wire.text(transform.child_frame);
+    wire(transform.child_frame);
     fields(wire, transform.pose);
   }
 }
@@ -119,33 +87,17 @@ void fields(auto& wire, Is<RosTransforms> auto& message) {
 void fields(auto& wire, Is<RosPointCloud> auto& cloud) {
   constexpr std::size_t kLeast_bytes = 4 + 4 + 1 + 4;
   fields(wire, cloud.header);
-  wire.u32(cloud.height);
-  wire.u32(cloud.width);
+  wire(cloud.height, cloud.width);
   wire.resize(cloud.fields, kLeast_bytes);
-  for (auto& field : cloud.fields) {
-    wire.text(field.name);
-    wire.u32(field.offset);
-    wire.u8(field.datatype);
-    wire.u32(field.count);
-  }
-  wire.flag(cloud.is_bigendian);
-  wire.u32(cloud.point_step);
-  wire.u32(cloud.row_step);
-  wire.octets(cloud.data);
-  wire.flag(cloud.is_dense);
+  for (auto& field : cloud.fields) wire(field.name, field.offset, field.datatype, field.count);
+  wire(cloud.is_bigendian, cloud.point_step, cloud.row_step, cloud.data, cloud.is_dense);
 }
 
 void fields(auto& wire, Is<RosDiagnosticStatus> auto& status) {
   constexpr std::size_t kLeast_bytes = 4 + 4;
-  wire.u8(status.level);
-  wire.text(status.name);
-  wire.text(status.message);
-  wire.text(status.hardware_id);
+  wire(status.level, status.name, status.message, status.hardware_id);
   wire.resize(status.values, kLeast_bytes);
-  for (auto& entry : status.values) {
-    wire.text(entry.key);
-    wire.text(entry.value);
-  }
+  for (auto& entry : status.values) wire(entry.key, entry.value);
 }
 
 void fields(auto& wire, Is<RosDiagnostics> auto& diagnostics) {
@@ -163,28 +115,18 @@ void fields(auto& wire, Is<RosMarker> auto& marker) {
   std::vector<std::uint8_t> no_file;
   bool no_materials = false;
   fields(wire, marker.header);
-  wire.text(marker.name_space);
-  wire.i32(marker.id);
-  wire.i32(marker.type);
-  wire.i32(marker.action);
+  wire(marker.name_space, marker.id, marker.type, marker.action);
   fields(wire, marker.pose);
-  fields(wire, marker.scale);
-  wire.f32(std::span(marker.color.data(), 4));
-  for (auto& part : marker.lifetime) wire.u32(part);
-  wire.flag(marker.frame_locked);
+  wire(marker.scale, marker.color, marker.lifetime, marker.frame_locked);
   wire.resize(marker.points, kPoint_bytes);
-  for (auto& point : marker.points) fields(wire, point);
+  for (auto& point : marker.points) wire(point);
   wire.resize(marker.colors, kColor_bytes);
-  for (auto& color : marker.colors) wire.f32(std::span(color.data(), 4));
-  wire.text(blank);
+  for (auto& color : marker.colors) wire(color);
+  wire(blank);
   fields(wire, no_image);
   wire.resize(none, kTexture_bytes);
-  for (auto& coordinates : none) wire.f32(std::span(coordinates.data(), 2));
-  wire.text(marker.text);
-  wire.text(blank);
-  wire.text(blank);
-  wire.octets(no_file);
-  wire.flag(no_materials);
+  for (auto& coordinates : none) wire(coordinates);
+  wire(marker.text, blank, blank, no_file, no_materials);
 }
 
 void fields(auto& wire, Is<RosMarkers> auto& message) {
@@ -194,13 +136,7 @@ void fields(auto& wire, Is<RosMarkers> auto& message) {
 }
 
 void fields(auto& wire, Is<RosLog> auto& log) {
-  wire.stamp(log.stamp);
-  wire.u8(log.level);
-  wire.text(log.name);
-  wire.text(log.text);
-  wire.text(log.file);
-  wire.text(log.function);
-  wire.u32(log.line);
+  wire(log.stamp, log.level, log.name, log.text, log.file, log.function, log.line);
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "modules/recordings/ros_serialization.hpp"
 
-#include <bit>
-
 namespace km {
 namespace {
 
@@ -33,15 +31,7 @@ std::uint64_t RosReader::number(std::size_t size) {
   return value;
 }
 
-void RosReader::f32(std::span<float> values) {
-  for (float& value : values) value = std::bit_cast<float>(static_cast<std::uint32_t>(number(4)));
-}
-
-void RosReader::f64(std::span<double> values) {
-  for (double& value : values) value = std::bit_cast<double>(number(8));
-}
-
-void RosReader::text(std::string& value) {
+void RosReader::get(std::string& value) {
   const auto octets = reader_.bytes(number(4));
   // CDR ends a text with a zero, which some writers omit for an empty text.
   const bool has_end = is_cdr_ && !octets.empty();
@@ -49,14 +39,14 @@ void RosReader::text(std::string& value) {
   value.assign(octets.begin(), octets.end() - (has_end ? 1 : 0));
 }
 
-void RosReader::octets(std::vector<std::uint8_t>& values) {
+void RosReader::get(std::vector<std::uint8_t>& values) {
   const auto octets = reader_.bytes(number(4));
   values.assign(octets.begin(), octets.end());
 }
 
-void RosReader::doubles(std::vector<double>& values) {
+void RosReader::get(std::vector<double>& values) {
   resize(values, sizeof(double));
-  f64(values);
+  for (double& value : values) get(value);
 }
 
 std::size_t RosReader::count(std::size_t bytes_per_element) {
@@ -68,7 +58,7 @@ void RosReader::skip_sequence() {
   if (!is_cdr_) static_cast<void>(number(4));
 }
 
-void RosReader::stamp(Stamp& value) {
+void RosReader::get(Stamp& value) {
   const auto seconds = static_cast<std::uint32_t>(number(4));
   const auto rest_ns = static_cast<std::uint32_t>(number(4));
   // Seconds are signed in ROS 2 and unsigned in ROS 1.
@@ -90,35 +80,26 @@ void RosWriter::number(std::uint64_t value, std::size_t size) {
     bytes_.push_back(static_cast<std::uint8_t>(value >> (8U * k)));
 }
 
-void RosWriter::f32(std::span<const float> values) {
-  for (const float value : values) number(std::bit_cast<std::uint32_t>(value), 4);
-}
-
-void RosWriter::f64(std::span<const double> values) {
-  for (const double value : values) number(std::bit_cast<std::uint64_t>(value), 8);
-}
-
-void RosWriter::text(const std::string& value) {
-  u32(static_cast<std::uint32_t>(value.size() + 1));
+void RosWriter::put(const std::string& value) {
+  number(value.size() + 1, 4);
   bytes_.insert(bytes_.end(), value.begin(), value.end());
-  u8(0);
+  bytes_.push_back(0);
 }
 
-void RosWriter::octets(const std::vector<std::uint8_t>& values) {
-  u32(static_cast<std::uint32_t>(values.size()));
+void RosWriter::put(const std::vector<std::uint8_t>& values) {
+  number(values.size(), 4);
   bytes_.insert(bytes_.end(), values.begin(), values.end());
 }
 
-void RosWriter::doubles(const std::vector<double>& values) {
-  u32(static_cast<std::uint32_t>(values.size()));
-  f64(values);
+void RosWriter::put(const std::vector<double>& values) {
+  number(values.size(), 4);
+  for (const double value : values) put(value);
 }
 
-void RosWriter::stamp(Stamp value) {
+void RosWriter::put(Stamp value) {
   Stamp seconds = value / kSecond_ns, rest_ns = value % kSecond_ns;
   if (rest_ns < 0) --seconds, rest_ns += kSecond_ns;
-  u32(static_cast<std::uint32_t>(seconds));
-  u32(static_cast<std::uint32_t>(rest_ns));
+  (*this)(static_cast<std::uint32_t>(seconds), static_cast<std::uint32_t>(rest_ns));
 }
 
 }  // namespace km

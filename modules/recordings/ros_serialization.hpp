@@ -1,5 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -26,17 +29,12 @@ class RosReader {
   /// Refuses other encodings, and encapsulations with parameter lists or of XCDR version 2.
   static Decoded<RosReader> open(std::string_view encoding, std::span<const std::uint8_t> bytes);
 
-  void u8(std::uint8_t& value) { value = reader_.u8(); }
-  void flag(bool& value) { value = reader_.u8() != 0; }
-  void u32(std::uint32_t& value) { value = static_cast<std::uint32_t>(number(4)); }
-  void i32(std::int32_t& value) { value = static_cast<std::int32_t>(number(4)); }
-  void f32(std::span<float> values);
-  void f64(std::span<double> values);
-  void text(std::string& value);
-  /// uint8[].
-  void octets(std::vector<std::uint8_t>& values);
-  /// float64[].
-  void doubles(std::vector<double>& values);
+  /// Reads fields, each by its type: numbers, bool, string, builtin_interfaces/Time [ns] (Stamp),
+  /// uint8[] and float64[] (std::vector), and arrays of constant length.
+  template <typename... Fields>
+  void operator()(Fields&... fields) {
+    (get(fields), ...);
+  }
   /// Reads the number of elements, each of at least `bytes_per_element`, and resizes `elements`.
   /// Fails if they exceed the remaining bytes.
   template <typename Element>
@@ -45,8 +43,6 @@ class RosReader {
   }
   /// Skips the sequence number of std_msgs/Header, which exists only in ROS 1.
   void skip_sequence();
-  /// builtin_interfaces/Time [ns].
-  void stamp(Stamp& value);
 
   /// Reason why the bytes do not fit the fields read: too short or too long; null if they fit.
   [[nodiscard]] const char* problem() const;
@@ -57,6 +53,24 @@ class RosReader {
   RosReader(std::span<const std::uint8_t> bytes, bool is_cdr, bool is_big_endian)
       : reader_(bytes), size_(bytes.size()), is_cdr_(is_cdr), is_big_endian_(is_big_endian) {}
 
+  void get(std::uint8_t& value) { value = reader_.u8(); }
+  void get(bool& value) { value = reader_.u8() != 0; }
+  void get(std::uint32_t& value) { value = static_cast<std::uint32_t>(number(4)); }
+  void get(std::int32_t& value) { value = static_cast<std::int32_t>(number(4)); }
+  void get(float& value) { value = std::bit_cast<float>(static_cast<std::uint32_t>(number(4))); }
+  void get(double& value) { value = std::bit_cast<double>(number(8)); }
+  void get(std::string& value);
+  void get(Stamp& value);
+  void get(std::vector<std::uint8_t>& values);
+  void get(std::vector<double>& values);
+  template <typename T, std::size_t kSize>
+  void get(std::array<T, kSize>& values) {
+    for (T& value : values) get(value);
+  }
+  template <typename T, int kSize>
+  void get(Eigen::Matrix<T, kSize, 1>& vector) {
+    for (T& value : vector) get(value);
+  }
   [[nodiscard]] std::uint64_t number(std::size_t size);
   [[nodiscard]] std::size_t count(std::size_t bytes_per_element);
 
@@ -69,27 +83,39 @@ class RosReader {
 /// Writes the fields of a ROS message as little-endian CDR, with the interface of RosReader.
 class RosWriter {
  public:
-  void u8(std::uint8_t value) { bytes_.push_back(value); }
-  void flag(bool value) { u8(value ? 1 : 0); }
-  void u32(std::uint32_t value) { number(value, 4); }
-  void i32(std::int32_t value) { number(static_cast<std::uint32_t>(value), 4); }
-  void f32(std::span<const float> values);
-  void f64(std::span<const double> values);
-  void text(const std::string& value);
-  void octets(const std::vector<std::uint8_t>& values);
-  void doubles(const std::vector<double>& values);
+  template <typename... Fields>
+  void operator()(const Fields&... fields) {
+    (put(fields), ...);
+  }
   template <typename Element>
   void resize(const std::vector<Element>& elements, std::size_t /*bytes_per_element*/) {
-    u32(static_cast<std::uint32_t>(elements.size()));
+    number(elements.size(), 4);
   }
   void skip_sequence() {}
-  void stamp(Stamp value);
   void fail() {}
 
   /// The bytes with the encapsulation header.
   [[nodiscard]] std::vector<std::uint8_t> release() { return std::move(bytes_); }
 
  private:
+  void put(std::uint8_t value) { bytes_.push_back(value); }
+  void put(bool value) { bytes_.push_back(value ? 1 : 0); }
+  void put(std::uint32_t value) { number(value, 4); }
+  void put(std::int32_t value) { number(static_cast<std::uint32_t>(value), 4); }
+  void put(float value) { number(std::bit_cast<std::uint32_t>(value), 4); }
+  void put(double value) { number(std::bit_cast<std::uint64_t>(value), 8); }
+  void put(const std::string& value);
+  void put(Stamp value);
+  void put(const std::vector<std::uint8_t>& values);
+  void put(const std::vector<double>& values);
+  template <typename T, std::size_t kSize>
+  void put(const std::array<T, kSize>& values) {
+    for (const T value : values) put(value);
+  }
+  template <typename T, int kSize>
+  void put(const Eigen::Matrix<T, kSize, 1>& vector) {
+    for (const T value : vector) put(value);
+  }
   void number(std::uint64_t value, std::size_t size);
 
   std::vector<std::uint8_t> bytes_ = {0, 1, 0, 0};
