@@ -1,10 +1,5 @@
 #pragma once
 
-#include <lz4frame.h>
-#include <zlib.h>
-#include <zstd.h>
-
-#include <algorithm>
 #include <array>
 #include <string>
 #include <utility>
@@ -12,10 +7,13 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/stamp.hpp"
+#include "modules/recordings/compress.hpp"
+#include "modules/recordings/mcap_records.hpp"
 
 namespace km {
 
-/// Writes MCAP files after the specification, in the ways in which writers differ.
+/// Writes MCAP files in the ways in which writers differ. The conformance suite checks the records
+/// themselves.
 class McapFile {
  public:
   using Bytes = std::vector<std::uint8_t>;
@@ -32,11 +30,8 @@ class McapFile {
   };
 
   explicit McapFile(Options options) : options_(std::move(options)) {
-    file_.bytes(magic());
-    put(file_, 0x01, [](ByteWriter& out) {
-      text(out, "ros2");
-      text(out, "test");
-    });
+    put_text(file_, kMcapMagic);
+    put_mcap(file_, McapHeader{.profile = "ros2", .library = "test"});
     definitions(file_);
   }
 
@@ -55,140 +50,85 @@ class McapFile {
       ++counts_[message.channel];
     }
     const Bytes plain = records.release();
-    const Bytes packed = compressed(plain);
+    const Bytes packed = compress(options_.compression, plain);
     const std::uint64_t begin = file_.size();
-    put(file_, 0x06, [&](ByteWriter& out) {
-      out.u64(static_cast<std::uint64_t>(start));
-      out.u64(static_cast<std::uint64_t>(start));
-      out.u64(plain.size());
-      out.u32(options_.has_crc ? crc_of(plain) : 0);
-      text(out, options_.compression);
-      out.u64(packed.size());
-      out.bytes(packed);
-    });
-    chunks_.push_back({start, begin, file_.size() - begin});
+    put_mcap(file_, McapChunk{.message_start_time = start,
+                              .message_end_time = start,
+                              .uncompressed_size = plain.size(),
+                              .uncompressed_crc = crc_of(plain),
+                              .compression = options_.compression,
+                              .records = packed});
+    chunks_.push_back({.message_start_time = start,
+                       .message_end_time = start,
+                       .chunk_start = begin,
+                       .chunk_length = file_.size() - begin,
+                       .compression = options_.compression});
   }
 
   [[nodiscard]] std::string finish() {
     Bytes data = file_.release();
     ByteWriter tail;
-    put(tail, 0x0F, [&](ByteWriter& out) { out.u32(options_.has_crc ? crc_of(data) : 0); });
-    Bytes end = tail.release();
-    data.insert(data.end(), end.begin(), end.end());
-    const std::uint64_t summary_start = options_.has_summary ? data.size() : 0;
+    put_mcap(tail, McapDataEnd{.data_section_crc = crc_of(data)});
+    const std::uint64_t summary_start = data.size() + tail.size();
+    file_.bytes(data);
+    file_.bytes(tail.release());
     ByteWriter summary;
     if (options_.has_summary) put_summary(summary);
-    summary.u8(0x02);
-    summary.u64(20);
-    summary.u64(summary_start);
-    summary.u64(0);
+    McapFooter footer{.summary_start = options_.has_summary ? summary_start : 0};
+    put_mcap(summary, footer);
+    // The checksum covers the summary and the footer before the checksum.
     Bytes bytes = summary.release();
-    ByteWriter last;
-    last.u32(options_.has_crc ? crc_of(bytes) : 0);
-    last.bytes(magic());
-    end = last.release();
-    data.insert(data.end(), bytes.begin(), bytes.end());
-    data.insert(data.end(), end.begin(), end.end());
+    bytes.resize(bytes.size() - sizeof(footer.summary_crc));
+    file_.bytes(bytes);
+    file_.u32(crc_of(bytes));
+    put_text(file_, kMcapMagic);
+    data = file_.release();
     return {data.begin(), data.end()};
   }
 
  private:
   static constexpr std::array<std::uint16_t, 2> kChannels = {1, 2};
 
-  struct IndexedChunk {
-    Stamp start;
-    std::uint64_t begin, size;
-  };
-
-  static Bytes magic() { return {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'}; }
-  static std::uint32_t crc_of(const Bytes& bytes) {
-    return static_cast<std::uint32_t>(crc32_z(0, bytes.data(), bytes.size()));
+  [[nodiscard]] std::uint32_t crc_of(const Bytes& bytes) const {
+    return options_.has_crc ? mcap_crc(bytes) : 0;
   }
-  static void text(ByteWriter& out, const std::string& value) {
-    out.u32(static_cast<std::uint32_t>(value.size()));
-    out.bytes(Bytes(value.begin(), value.end()));
-  }
-
-  template <typename Fields>
-  static void put(ByteWriter& out, std::uint8_t opcode, const Fields& fields) {
-    ByteWriter content;
-    fields(content);
-    out.u8(opcode);
-    out.u64(content.size());
-    out.bytes(content.release());
+  static void put_text(ByteWriter& out, std::string_view text) {
+    for (const char c : text) out.u8(static_cast<std::uint8_t>(c));
   }
 
   static void put_message(ByteWriter& out, const Message& message) {
-    put(out, 0x05, [&](ByteWriter& content) {
-      content.u16(message.channel);
-      content.u32(0);
-      content.u64(static_cast<std::uint64_t>(message.log_time));
-      content.u64(0);
-      content.bytes(message.bytes);
-    });
+    put_mcap_message(out, {.channel_id = message.channel, .log_time = message.log_time},
+                     message.bytes);
   }
 
-  // Numbers of messages of both channels.
   static void definitions(ByteWriter& out) {
-    put(out, 0x03, [](ByteWriter& content) {
-      content.u16(7);
-      text(content, "sensor_msgs/msg/Imu");
-      text(content, "ros2msg");
-      text(content, "");
-    });
+    constexpr std::uint16_t kSchema = 7;
+    put_mcap(out,
+             McapSchema{
+                 .id = kSchema, .name = "sensor_msgs/msg/Imu", .encoding = "ros2msg", .data = ""});
     for (const std::uint16_t id : kChannels)
-      put(out, 0x04, [&](ByteWriter& content) {
-        content.u16(id);
-        content.u16(7);
-        text(content, "/imu" + std::to_string(id));
-        text(content, "cdr");
-        text(content, "");
-      });
-  }
-
-  [[nodiscard]] Bytes compressed(const Bytes& plain) const {
-    if (options_.compression.empty()) return plain;
-    Bytes packed(2 * plain.size() + 1000);
-    packed.resize(
-        options_.compression == "lz4"
-            ? LZ4F_compressFrame(packed.data(), packed.size(), plain.data(), plain.size(), nullptr)
-            : ZSTD_compress(packed.data(), packed.size(), plain.data(), plain.size(), 1));
-    return packed;
+      put_mcap(out, McapChannel{.id = id,
+                                .schema_id = kSchema,
+                                .topic = "/imu" + std::to_string(id),
+                                .message_encoding = "cdr"});
   }
 
   void put_summary(ByteWriter& out) const {
     if (options_.repeats_channels) definitions(out);
-    put(out, 0x0B, [&](ByteWriter& content) {
-      content.u64(counts_[1] + counts_[2]);
-      content.u16(1);
-      content.u32(2);
-      content.u64(0);
-      content.u32(static_cast<std::uint32_t>(chunks_.size()));
-      content.u64(0);
-      content.u64(0);
-      content.u32(20);
-      for (const std::uint16_t id : kChannels) {
-        content.u16(id);
-        content.u64(counts_[id]);
-      }
-    });
-    for (const IndexedChunk& chunk : chunks_)
-      put(out, 0x08, [&](ByteWriter& content) {
-        content.u64(static_cast<std::uint64_t>(chunk.start));
-        content.u64(static_cast<std::uint64_t>(chunk.start));
-        content.u64(chunk.begin);
-        content.u64(chunk.size);
-        content.u32(0);
-        content.u64(0);
-        text(content, options_.compression);
-        content.u64(0);
-        content.u64(0);
-      });
+    McapStatistics statistics{.message_count = counts_[1] + counts_[2],
+                              .schema_count = 1,
+                              .channel_count = 2,
+                              .chunk_count = static_cast<std::uint32_t>(chunks_.size()),
+                              .channel_message_counts = {}};
+    for (const std::uint16_t id : kChannels)
+      statistics.channel_message_counts.emplace_back(id, counts_[id]);
+    put_mcap(out, statistics);
+    for (const McapChunkIndex& chunk : chunks_) put_mcap(out, chunk);
   }
 
   Options options_;
   ByteWriter file_;
-  std::vector<IndexedChunk> chunks_;
+  std::vector<McapChunkIndex> chunks_;
   std::uint64_t counts_[3] = {};
 };
 
