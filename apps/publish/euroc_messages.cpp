@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "modules/core/bytes.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {
@@ -32,10 +33,9 @@ RosImage message_of(Stamp stamp, const DepthImage& image) {
                    .is_bigendian = false,
                    .step = static_cast<std::uint32_t>(2 * image.width),
                    .data = {}};
-  for (const std::uint16_t value : image.millimetres) {
-    message.data.push_back(static_cast<std::uint8_t>(value));
-    message.data.push_back(static_cast<std::uint8_t>(value >> 8U));
-  }
+  ByteWriter data;
+  for (const std::uint16_t value : image.millimetres) data.u16(value);
+  message.data = data.release();
   return message;
 }
 
