@@ -379,11 +379,9 @@ void Vio::continue_or_add_first_keyframe(VioResult& result) {
 
 void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
   KeyframeOdometry keyframe;
-  keyframe.stamp = state.stamp;
   keyframe.T_odom_kf = T_chain_odom_ * state.T_odom_body;
   keyframe.T_previous_kf = keyframe.T_odom_kf;
   keyframe.id = {robot_, 0};
-  keyframe.vertical = vertical_at(state);
   if (last_keyframe_) {  // after a restart of the odometry
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
@@ -392,19 +390,13 @@ void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
          .speed_mps = std::max(last_->v_odom.norm(), state.v_odom.norm()),
          .up_body = state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ()});
   }
-  keyframe.state_covariance = state_covariance_at(state);
-  keyframe.calibration = known_calibration();
-  last_keyframe_ = keyframe;
-  rested_s_ = 0.0;
-  result.keyframes.push_back(keyframe);
+  publish(keyframe, state, result);
 }
 
 void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   const auto relative = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, last_keyframe_->id.index + 1};
-  keyframe.stamp = state.stamp;
-  keyframe.vertical = vertical_at(state);
   keyframe.T_previous_kf =
       relative ? relative->T
                : last_keyframe_->T_odom_kf.inverse() * T_chain_odom_ * state.T_odom_body;
@@ -412,11 +404,18 @@ void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
                             ? keyframe_covariance(config_, moved_s(state.stamp), relative->Sigma)
                             : restart_covariance();
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
+  publish(keyframe, state, result);
+}
+
+// Adds the fields that depend on the state alone.
+void Vio::publish(KeyframeOdometry keyframe, const OdometryState& state, VioResult& result) {
+  keyframe.stamp = state.stamp;
+  keyframe.vertical = vertical_at(state);
   keyframe.state_covariance = state_covariance_at(state);
   keyframe.calibration = known_calibration();
   last_keyframe_ = keyframe;
   rested_s_ = 0.0;
-  result.keyframes.push_back(keyframe);
+  result.keyframes.push_back(std::move(keyframe));
 }
 
 }  // namespace km

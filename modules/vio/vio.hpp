@@ -107,6 +107,7 @@ class Vio {
   [[nodiscard]] double unmeasured_s(Stamp stamp) const;
   void add_first_keyframe(const OdometryState& state, VioResult& result);
   void add_keyframe(const OdometryState& state, VioResult& result);
+  void publish(KeyframeOdometry keyframe, const OdometryState& state, VioResult& result);
   [[nodiscard]] std::optional<StateCovariance> state_covariance_at(
       const OdometryState& state) const;
   [[nodiscard]] std::optional<UncertainCalibration> known_calibration() const;
