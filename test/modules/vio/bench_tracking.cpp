@@ -47,7 +47,7 @@ TEST_CASE("tracking MH_01_easy 0-15 s", "[!benchmark]") {
   cv::setNumThreads(1);
   const Recording recording = read_recording(*folder, 0.0, 15.0);
   std::cout << std::fixed << std::setprecision(3);
-  const TrackingRun run = run_tracker(recording, TrackerConfig{}, RotationHint::kRawGyro);
+  const TrackingRun run = run_tracker(recording, TrackerConfig{});
   print_statistics(run);
   std::cout << "survival:";
   for (const std::size_t gap : {1, 5, 10, 20, 40}) {

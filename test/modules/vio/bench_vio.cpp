@@ -119,22 +119,10 @@ void print_piece(const char* name, const OdometryRun& run, std::size_t images) {
       run.statistics.starts - 1);
 }
 
-Recording with_black_images(Recording recording, double from_s, double to_s) {
-  const Stamp start = recording.packets.front().frame->stamp;
-  for (SensorPacket& packet : recording.packets) {
-    const double t = seconds_between(start, packet.frame->stamp);
-    if (t < from_s || t >= to_s) continue;
-    StereoFrame frame = *packet.frame;
-    std::fill(frame.left.pixels.begin(), frame.left.pixels.end(), std::uint8_t{0});
-    std::fill(frame.right.pixels.begin(), frame.right.pixels.end(), std::uint8_t{0});
-    packet.frame = std::make_shared<const StereoFrame>(std::move(frame));
-  }
-  return recording;
-}
-
 void run_black(const Recording& recording, const TrackerConfig& tracker, const VioConfig& config) {
   for (double from = 1.5; from < 13.0; from += 1.0) {
-    const Recording black = with_black_images(recording, from, from + 1.0);
+    const Recording black =
+        darkened(recording, packet_at(recording, from), packet_at(recording, from + 1.0));
     const OdometryRun run = run_odometry(black, 0, packet_at(black, 15.0), tracker, config);
     const OdometryErrors errors = errors_since(run, 0.0);
     std::printf(

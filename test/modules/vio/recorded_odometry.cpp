@@ -174,6 +174,16 @@ Recording disturbed(const Recording& recording, double late_s, double turned_rad
   return result;
 }
 
+Recording darkened(Recording recording, std::size_t first, std::size_t last) {
+  for (std::size_t k = first; k < last; ++k) {
+    auto frame = std::make_shared<StereoFrame>(*recording.packets[k].frame);
+    std::fill(frame->left.pixels.begin(), frame->left.pixels.end(), std::uint8_t{0});
+    std::fill(frame->right.pixels.begin(), frame->right.pixels.end(), std::uint8_t{0});
+    recording.packets[k].frame = frame;
+  }
+  return recording;
+}
+
 Recording as_rgbd(const Recording& recording, std::size_t every, std::size_t first) {
   const StereoRig& rig = recording.rig.stereo;
   constexpr double kMaxDepth_m = 60.0;  // below the range of 16 bits of millimetres

@@ -39,6 +39,9 @@ Recording standing_recording(const std::filesystem::path& folder, double duratio
 /// cameras is rotated by `turned_rad` about [1, 1, 1] of the body against the true one.
 Recording disturbed(const Recording& recording, double late_s, double turned_rad);
 
+/// `recording` with images `first` to `last`, not included, black.
+Recording darkened(Recording recording, std::size_t first, std::size_t last);
+
 /// Errors of a trajectory against the true poses of the same instants.
 struct OdometryErrors {
   double ate_m = 0.0;  ///< Root mean square after SE(3) alignment.

@@ -18,33 +18,16 @@ namespace km {
 namespace {
 
 // Trapezoidal rule over the samples of a packet, cut to the interval between the images.
-Eigen::Matrix3d integrate_gyro(const std::vector<ImuSample>& imu, Stamp from, Stamp to,
-                               const Eigen::Vector3d& bias) {
+Eigen::Matrix3d integrate_gyro(const std::vector<ImuSample>& imu, Stamp from, Stamp to) {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   for (std::size_t i = 1; i < imu.size(); ++i) {
     const Stamp begin = std::max(imu[i - 1].stamp, from);
     const Stamp end = std::min(imu[i].stamp, to);
     if (end <= begin) continue;
-    const Eigen::Vector3d rate = 0.5 * (imu[i - 1].gyro + imu[i].gyro) - bias;
+    const Eigen::Vector3d rate = 0.5 * (imu[i - 1].gyro + imu[i].gyro);
     R = R * so3_exp(rate * seconds_between(begin, end));
   }
   return R;
-}
-
-// Gyroscope bias under the true rotations: mean of the difference.
-Eigen::Vector3d gyro_bias(const Recording& recording) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double seconds = 0.0;
-  for (std::size_t i = 1; i < recording.packets.size(); ++i) {
-    const Stamp from = recording.packets[i - 1].frame->stamp;
-    const Stamp to = recording.packets[i].frame->stamp;
-    const Eigen::Matrix3d R =
-        integrate_gyro(recording.packets[i].imu, from, to, Eigen::Vector3d::Zero());
-    const SE3 T = recording.T_world_body[i - 1].inverse() * recording.T_world_body[i];
-    sum += so3_log(T.linear().transpose() * R);
-    seconds += seconds_between(from, to);
-  }
-  return sum / seconds;
 }
 
 std::map<std::uint64_t, const TrackedFeature*> by_id(const TrackedFrame& frame) {
@@ -124,19 +107,14 @@ Recording read_recording(const std::filesystem::path& folder, double from_s, dou
   return result;
 }
 
-TrackingRun run_tracker(const Recording& recording, const TrackerConfig& config,
-                        RotationHint hint) {
+TrackingRun run_tracker(const Recording& recording, const TrackerConfig& config) {
   FeatureTracker tracker(recording.rig.stereo, config);
-  const Eigen::Vector3d bias =
-      hint == RotationHint::kCalibratedGyro ? gyro_bias(recording) : Eigen::Vector3d::Zero();
   TrackingRun run;
   for (std::size_t i = 0; i < recording.packets.size(); ++i) {
     const SensorPacket& packet = recording.packets[i];
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-    if (i > 0 && hint != RotationHint::kNone) {
-      R = integrate_gyro(packet.imu, recording.packets[i - 1].frame->stamp, packet.frame->stamp,
-                         bias);
-    }
+    if (i > 0)
+      R = integrate_gyro(packet.imu, recording.packets[i - 1].frame->stamp, packet.frame->stamp);
     const std::clock_t start = std::clock();  // Processor time: the processor is shared.
     run.frames.push_back(tracker.track(*packet.frame, R));
     run.milliseconds.push_back(1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);

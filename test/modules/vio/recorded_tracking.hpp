@@ -19,16 +19,14 @@ struct Recording {
 /// Images of `folder` (EuRoC) from `from_s` to `to_s`, with poses of its groundtruth_tum.txt.
 Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s);
 
-/// Rotation between images that the tracker receives.
-enum class RotationHint { kNone, kRawGyro, kCalibratedGyro };
-
 struct TrackingRun {
   std::vector<TrackedFrame> frames;
   std::vector<TrackerStatistics> statistics;
   std::vector<double> milliseconds;  ///< Processor time of each track().
 };
 
-TrackingRun run_tracker(const Recording& recording, const TrackerConfig& config, RotationHint hint);
+/// The tracker receives the rotation between images that the gyroscope measures, with its bias.
+TrackingRun run_tracker(const Recording& recording, const TrackerConfig& config);
 
 /// Median, 90th percentile and share beyond 3 px.
 struct ErrorSummary {

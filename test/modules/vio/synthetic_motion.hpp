@@ -26,6 +26,16 @@ struct SyntheticMotion {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
 
+  /// A body that moves at constant velocity without turning.
+  [[nodiscard]] static SyntheticMotion straight(const Eigen::Vector3d& velocity) {
+    SyntheticMotion motion;
+    motion.velocity = velocity;
+    motion.amplitude_m.setZero();
+    motion.turn_amplitude.setZero();
+    return motion;
+  }
+  [[nodiscard]] static SyntheticMotion standing() { return straight(Eigen::Vector3d::Zero()); }
+
   [[nodiscard]] Eigen::Vector3d position(double t) const {
     return velocity * t + (amplitude_m.array() * (frequency.array() * t).sin()).matrix();
   }

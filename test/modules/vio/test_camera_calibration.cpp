@@ -136,10 +136,7 @@ TEST_CASE("A rotation of the cameras is estimated", "[vio][calibration]") {
 }
 
 TEST_CASE("The calibration of a body without motion does not change", "[vio][calibration]") {
-  SyntheticMotion motion;
-  motion.amplitude_m.setZero();
-  motion.turn_amplitude.setZero();
-  SyntheticWorld world(motion, 22);
+  SyntheticWorld world(SyntheticMotion::standing(), 22);
   const auto [calibration, covariance] =
       estimated(late_frames(world, 0), world, synthetic_rig(), true);
   CHECK(std::abs(calibration.offset_s) < 1e-3);

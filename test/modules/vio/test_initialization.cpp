@@ -8,13 +8,6 @@ namespace {
 
 constexpr int kImages = 16;  // 0.75 s
 
-SyntheticMotion at_rest() {
-  SyntheticMotion motion;
-  motion.amplitude_m.setZero();
-  motion.turn_amplitude.setZero();
-  return motion;
-}
-
 StartGuess guess(const std::vector<InertialFrame>& frames) {
   VioConfig config;
   config.gravity_mps2 = kGravity_mps2;
@@ -58,7 +51,7 @@ TEST_CASE("A start in motion finds gravity, velocities and the gyro's bias", "[v
 }
 
 TEST_CASE("A start at rest has no velocity and uses the gyro's mean as its bias", "[vio]") {
-  SyntheticMotion motion = at_rest();
+  SyntheticMotion motion = SyntheticMotion::standing();
   motion.gyro_bias = {0.02, -0.01, 0.03};
   SyntheticWorld world(motion, 1);
   const StartGuess start = guess(world.frames(kImages, 0.1));
@@ -71,8 +64,7 @@ TEST_CASE("A start at rest has no velocity and uses the gyro's mean as its bias"
 }
 
 TEST_CASE("Constant velocity is not detected as rest by a start", "[vio]") {
-  SyntheticMotion motion = at_rest();
-  motion.velocity = {0.3, 0.2, 0.0};
+  const auto motion = SyntheticMotion::straight({0.3, 0.2, 0.0});
   SyntheticWorld world(motion, 2);
   const StartGuess start = guess(world.frames(kImages, 0.1));
   REQUIRE(start.status == StartStatus::kInMotion);
@@ -80,7 +72,7 @@ TEST_CASE("Constant velocity is not detected as rest by a start", "[vio]") {
 }
 
 TEST_CASE("Images at rest with inertial data of a motion are not detected as rest", "[vio]") {
-  SyntheticWorld still(at_rest(), 3), moving(SyntheticMotion{}, 3);
+  SyntheticWorld still(SyntheticMotion::standing(), 3), moving(SyntheticMotion{}, 3);
   auto frames = still.frames(kImages, 0.1);
   const auto other = moving.frames(kImages);
   for (std::size_t k = 0; k < frames.size(); ++k) frames[k].samples = other[k].samples;

@@ -10,8 +10,7 @@ TEST_CASE("Five seconds of MH_01_easy are tracked as well as measured", "[vio]")
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
   const Recording recording = read_recording(*folder, 2.0, 7.0);
-  const TrackerConfig config;
-  const TrackingRun run = run_tracker(recording, config, RotationHint::kRawGyro);
+  const TrackingRun run = run_tracker(recording, TrackerConfig{});
 
   double stereo_share = 0.0;
   for (const TrackedFrame& frame : run.frames) {
@@ -31,27 +30,6 @@ TEST_CASE("Five seconds of MH_01_easy are tracked as well as measured", "[vio]")
   CHECK(next.fitted_left.outlier_share < 0.004);  // 0.002
   CHECK(next.left.median_px < 0.4);               // 0.29 px
   CHECK(next.left.outlier_share < 0.01);          // 0.003
-}
-
-TEST_CASE("Two runs over the same recording are identical", "[vio]") {
-  const auto folder = shared_data("euroc/MH_01_easy");
-  if (!folder) return;
-  const Recording recording = read_recording(*folder, 0.0, 0.8);
-  const TrackerConfig config;
-  const TrackingRun a = run_tracker(recording, config, RotationHint::kRawGyro);
-  const TrackingRun b = run_tracker(recording, config, RotationHint::kRawGyro);
-  REQUIRE(a.frames.size() == b.frames.size());
-  for (std::size_t i = 0; i < a.frames.size(); ++i) {
-    REQUIRE(a.frames[i].features.size() == b.frames[i].features.size());
-    bool equal = true;
-    for (std::size_t k = 0; k < a.frames[i].features.size(); ++k) {
-      const TrackedFeature& x = a.frames[i].features[k];
-      const TrackedFeature& y = b.frames[i].features[k];
-      equal =
-          equal && x.id == y.id && x.left == y.left && x.right == y.right && x.length == y.length;
-    }
-    CHECK(equal);
-  }
 }
 
 }  // namespace

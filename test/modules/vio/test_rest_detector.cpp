@@ -10,9 +10,7 @@ namespace {
 constexpr double kNoisePx = 0.1;  // noise of tracks on one patch
 
 SyntheticMotion standing() {
-  SyntheticMotion motion;
-  motion.amplitude_m.setZero();
-  motion.turn_amplitude.setZero();
+  SyntheticMotion motion = SyntheticMotion::standing();
   motion.gyro_bias = {0.02, -0.01, 0.03};
   motion.accel_bias = {0.1, 0.05, -0.1};
   return motion;
