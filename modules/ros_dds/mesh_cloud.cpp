@@ -1,18 +1,11 @@
 #include "modules/ros_dds/mesh_cloud.hpp"
 
-#include <bit>
 #include <cstdint>
 #include <utility>
 
+#include "modules/core/bytes.hpp"
+
 namespace km {
-namespace {
-
-void append(std::uint32_t bits, std::vector<std::uint8_t>& data) {
-  for (int shift = 0; shift < 32; shift += 8)
-    data.push_back(static_cast<std::uint8_t>(bits >> shift));
-}
-
-}  // namespace
 
 RosPointCloud cloud_of(const LabelledMesh& mesh, std::size_t most, RosHeader header) {
   const bool has_colors = mesh.colors.size() == mesh.vertices.size();
@@ -25,15 +18,16 @@ RosPointCloud cloud_of(const LabelledMesh& mesh, std::size_t most, RosHeader hea
     cloud.fields.push_back({name, cloud.point_step, RosPointCloud::kFloat32, 1});
     cloud.point_step += sizeof(float);
   }
+  ByteWriter data;
   for (std::size_t k = 0; k < mesh.vertices.size(); k += step) {
-    for (const float coordinate : mesh.vertices[k])
-      append(std::bit_cast<std::uint32_t>(coordinate), cloud.data);
+    for (const float coordinate : mesh.vertices[k]) data.f32(coordinate);
     if (has_colors) {
       const auto& [red, green, blue] = mesh.colors[k];
-      append(std::uint32_t{red} << 16U | std::uint32_t{green} << 8U | blue, cloud.data);
+      data.u32(std::uint32_t{red} << 16U | std::uint32_t{green} << 8U | blue);
     }
     ++cloud.width;
   }
+  cloud.data = data.release();
   cloud.row_step = cloud.width * cloud.point_step;
   cloud.is_dense = true;
   return cloud;

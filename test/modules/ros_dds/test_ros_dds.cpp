@@ -205,17 +205,6 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
   CHECK(path->poses[0].pose.position == Eigen::Vector3d(10, 2, 3));
 }
 
-TEST_CASE("A late subscriber receives a latched message", "[ros_dds]") {
-  const RosPublisher publisher(network(), "/tf_static", "tf2_msgs/msg/TFMessage", RosQos::kLatched,
-                               1);
-  publisher.publish(encode_ros(RosTransforms{{{{7, "map"}, "odom", {}}}}));
-  RosSubscription late(network(), {{"/tf_static", "tf2_msgs/msg/TFMessage", RosQos::kLatched, 10}});
-  const auto received = late.next();
-  REQUIRE(received);
-  CHECK(decode_ros<RosTransforms>("cdr", received->bytes).value->transforms[0].child_frame ==
-        "odom");
-}
-
 TEST_CASE("A late subscriber receives as many latched messages as the depth", "[ros_dds]") {
   constexpr int kKept = 5;
   const RosPublisher publisher(network(), "/pieces", "visualization_msgs/Marker", RosQos::kLatched,
