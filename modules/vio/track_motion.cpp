@@ -16,11 +16,12 @@ namespace {
 constexpr int kSamples = 48;
 constexpr double kCoarseSigmas = 6.0;  // Truncation of the cost before the rotation is refined.
 
-// Truncated quadratic cost (MSAC).
-double cost_of(std::span<const DepthPair> pairs, const SE3& T, double threshold) {
+// Truncated quadratic cost (MSAC) of the distances of all pairs.
+template <typename Pair, typename Distance>
+double cost_of(std::span<const Pair> pairs, double threshold, const Distance& distance) {
   double cost = 0.0;
-  for (const DepthPair& pair : pairs) {
-    const double ratio = reprojection_distance(pair, T) / threshold;
+  for (const Pair& pair : pairs) {
+    const double ratio = distance(pair) / threshold;
     cost += std::min(ratio * ratio, 1.0);
   }
   return cost;
@@ -78,26 +79,6 @@ SE3 refined(std::span<const DepthPair> pairs, const SE3& T, double scale) {
   return T * se3_exp(H.ldlt().solve(g));
 }
 
-std::vector<bool> inliers_of(std::span<const BearingPair> pairs, const Eigen::Matrix3d& R,
-                             const Eigen::Vector3d& direction, double threshold) {
-  std::vector<bool> inlier(pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    inlier[i] = epipolar_distance(pairs[i], R, direction) < threshold;
-  }
-  return inlier;
-}
-
-// Truncated quadratic cost (MSAC).
-double cost_of(std::span<const BearingPair> pairs, const Eigen::Matrix3d& R,
-               const Eigen::Vector3d& direction, double threshold) {
-  double cost = 0.0;
-  for (const BearingPair& pair : pairs) {
-    const double ratio = epipolar_distance(pair, R, direction) / threshold;
-    cost += std::min(ratio * ratio, 1.0);
-  }
-  return cost;
-}
-
 // Normal of the pair's epipolar plane, which contains the translation; zero without parallax.
 Eigen::Vector3d plane_normal(const BearingPair& pair, const Eigen::Matrix3d& R) {
   return pair.previous.homogeneous().cross(R * pair.current.homogeneous());
@@ -121,7 +102,10 @@ std::optional<SE3> estimate_motion(std::span<const DepthPair> pairs, const SE3& 
   if (pairs.size() < kMinMotionPairs) return std::nullopt;
   const double coarse = kCoarseSigmas * sigma;
   SE3 best = guess;
-  double best_cost = cost_of(pairs, guess, coarse);
+  const auto coarse_cost = [&](const SE3& T) {
+    return cost_of(pairs, coarse, [&](const auto& pair) { return reprojection_distance(pair, T); });
+  };
+  double best_cost = coarse_cost(guess);
   std::uniform_int_distribution<std::size_t> any(0, pairs.size() - 1);
   for (int sample = 0; sample < kSamples; ++sample) {
     const std::size_t i = any(rng);
@@ -130,7 +114,7 @@ std::optional<SE3> estimate_motion(std::span<const DepthPair> pairs, const SE3& 
     const std::optional<Eigen::Vector3d> t = translation_of(pairs[i], pairs[j], guess.linear());
     if (!t) continue;
     const SE3 T = make_pose(guess.linear(), *t);
-    const double cost = cost_of(pairs, T, coarse);
+    const double cost = coarse_cost(T);
     if (cost < best_cost) {
       best_cost = cost;
       best = T;
@@ -177,14 +161,19 @@ TwoPointResult two_point_ransac(std::span<const BearingPair> pairs,
     // Parallel planes leave the direction undetermined; without parallax any direction fits.
     const Eigen::Vector3d direction =
         axis.norm() > 1e-15 ? Eigen::Vector3d(axis.normalized()) : Eigen::Vector3d::UnitX();
-    const double cost = cost_of(pairs, R_previous_current, direction, threshold);
+    const double cost = cost_of(pairs, threshold, [&](const BearingPair& pair) {
+      return epipolar_distance(pair, R_previous_current, direction);
+    });
     if (cost < best) {
       best = cost;
       result.direction = direction;
     }
   }
-  result.inlier = inliers_of(pairs, R_previous_current, result.direction, threshold);
-  for (const bool inlier : result.inlier) result.inliers += inlier ? 1 : 0;
+  for (const BearingPair& pair : pairs) {
+    result.inlier.push_back(epipolar_distance(pair, R_previous_current, result.direction) <
+                            threshold);
+    result.inliers += result.inlier.back() ? 1 : 0;
+  }
   return result;
 }
 
