@@ -73,17 +73,8 @@ std::string time_of_day() {
 }
 
 const char* name_of(log::Level level) {
-  switch (level) {
-    case log::Level::kError:
-      return "error";
-    case log::Level::kWarn:
-      return "warn";
-    case log::Level::kInfo:
-      return "info";
-    case log::Level::kDebug:
-      break;
-  }
-  return "debug";
+  constexpr std::array kNames = {"error", "warn", "info", "debug"};  // as the enumerators
+  return kNames[static_cast<std::size_t>(level)];
 }
 
 void erase_status(Console& c) {

@@ -43,13 +43,8 @@ class PublisherList {
     while (dds_take(reader_.handle(), sample.data(), info.data(), 1, 1) == 1) {
       const auto& found = *static_cast<const dds_builtintopic_endpoint_t*>(sample[0]);
       const std::string topic = found.topic_name;
-      if (info[0].valid_data && topic.starts_with("rt/")) {
-        dds_reliability_kind_t reliability{};
-        dds_duration_t blocking{};
-        dds_qget_reliability(found.qos, &reliability, &blocking);
-        publishers.push_back(
-            {topic.substr(2), ros_type(found.type_name), reliability == DDS_RELIABILITY_RELIABLE});
-      }
+      if (info[0].valid_data && topic.starts_with("rt/"))
+        publishers.push_back({topic.substr(2), ros_type(found.type_name)});
       dds_return_loan(reader_.handle(), sample.data(), 1);
       sample = {};
     }

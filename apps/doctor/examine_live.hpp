@@ -10,7 +10,6 @@ namespace km {
 struct TopicPublisher {
   std::string topic;  ///< Name in ROS: "/imu0".
   std::string type;   ///< "sensor_msgs/msg/Imu"
-  bool is_reliable = false;
 };
 
 /// A topic that a rig file names, and the number of messages received from it.

@@ -53,8 +53,8 @@ DatagramSocket DatagramSocket::udp(std::uint16_t port) {
   const sockaddr_in any = address_with(in_addr{INADDR_ANY}, port);
   // Shared, as in DDS, because robots on one host use one port of discovery.
   const bool is_ready =
-      made.socket_ >= 0 && set_option(made.socket_, SOL_SOCKET, SO_REUSEADDR, 1) &&
-      bind(made.socket_, reinterpret_cast<const sockaddr*>(&any), sizeof any) == 0;
+      made.handle() >= 0 && set_option(made.handle(), SOL_SOCKET, SO_REUSEADDR, 1) &&
+      bind(made.handle(), reinterpret_cast<const sockaddr*>(&any), sizeof any) == 0;
   if (!is_ready)
     throw std::system_error(errno, std::generic_category(), "UDP port " + std::to_string(port));
   return made;
@@ -68,17 +68,10 @@ std::optional<DatagramSocket> DatagramSocket::icmp() {
   return std::nullopt;
 }
 
-DatagramSocket::~DatagramSocket() {
-  if (socket_ >= 0) close(socket_);
-}
-
-DatagramSocket::DatagramSocket(DatagramSocket&& other) noexcept
-    : socket_(std::exchange(other.socket_, -1)), has_ip_header_(other.has_ip_header_) {}
-
 std::uint16_t DatagramSocket::port() const {
   sockaddr_in own{};
   socklen_t size = sizeof own;
-  getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &size);
+  getsockname(handle(), reinterpret_cast<sockaddr*>(&own), &size);
   return ntohs(own.sin_port);
 }
 
@@ -87,27 +80,27 @@ std::optional<std::string> DatagramSocket::join(const std::string& group,
   ip_mreq request{};
   request.imr_multiaddr = parsed(group);
   request.imr_interface = parsed(interface_address);
-  const bool joined = set_option(socket_, IPPROTO_IP, IP_ADD_MEMBERSHIP, request) &&
-                      set_option(socket_, IPPROTO_IP, IP_MULTICAST_IF, request.imr_interface) &&
-                      set_option(socket_, IPPROTO_IP, IP_MULTICAST_LOOP, 1);
+  const bool joined = set_option(handle(), IPPROTO_IP, IP_ADD_MEMBERSHIP, request) &&
+                      set_option(handle(), IPPROTO_IP, IP_MULTICAST_IF, request.imr_interface) &&
+                      set_option(handle(), IPPROTO_IP, IP_MULTICAST_LOOP, 1);
   return joined ? std::nullopt : std::optional("cannot join " + group + ": " + last_error());
 }
 
 std::optional<std::string> DatagramSocket::send(const std::string& address, std::uint16_t port,
                                                 const std::vector<std::uint8_t>& bytes) {
   const sockaddr_in to = address_with(parsed(address), port);
-  const auto sent = sendto(socket_, bytes.data(), bytes.size(), 0,
+  const auto sent = sendto(handle(), bytes.data(), bytes.size(), 0,
                            reinterpret_cast<const sockaddr*>(&to), sizeof to);
   return sent >= 0 ? std::nullopt : std::optional("cannot send: " + last_error());
 }
 
 std::optional<Datagram> DatagramSocket::receive(std::chrono::milliseconds patience) {
-  pollfd waiting{.fd = socket_, .events = POLLIN, .revents = 0};
+  pollfd waiting{.fd = handle(), .events = POLLIN, .revents = 0};
   if (poll(&waiting, 1, static_cast<int>(patience.count())) <= 0) return std::nullopt;
   std::vector<std::uint8_t> bytes(65536);
   sockaddr_in from{};
   socklen_t size = sizeof from;
-  const auto count = recvfrom(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT,
+  const auto count = recvfrom(handle(), bytes.data(), bytes.size(), MSG_DONTWAIT,
                               reinterpret_cast<sockaddr*>(&from), &size);
   if (count < 0) return std::nullopt;
   bytes.resize(static_cast<std::size_t>(count));

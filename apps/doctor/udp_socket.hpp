@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/descriptor.hpp"
+
 namespace km {
 
 /// A received datagram.
@@ -22,11 +24,8 @@ class DatagramSocket {
   [[nodiscard]] static DatagramSocket udp(std::uint16_t port);
   /// Socket for ICMP echoes; nullopt if this user has no permission.
   [[nodiscard]] static std::optional<DatagramSocket> icmp();
-  ~DatagramSocket();
-  DatagramSocket(DatagramSocket&& other) noexcept;
-  DatagramSocket& operator=(DatagramSocket&&) = delete;
 
-  [[nodiscard]] int handle() const { return socket_; }
+  [[nodiscard]] int handle() const { return socket_.get(); }
   [[nodiscard]] std::uint16_t port() const;
 
   /// Joins `group` on the interface with this address. The socket then receives datagrams of the
@@ -45,7 +44,7 @@ class DatagramSocket {
  private:
   explicit DatagramSocket(int socket, bool has_ip_header = false)
       : socket_(socket), has_ip_header_(has_ip_header) {}
-  int socket_;
+  Descriptor socket_;
   bool has_ip_header_;  // true if received bytes begin with an IP header
 };
 

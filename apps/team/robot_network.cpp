@@ -19,7 +19,6 @@
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "modules/link_emulation/link_emulator.hpp"
 
@@ -172,17 +171,6 @@ Answer receive_answer(int socket) {
 }
 
 }  // namespace
-
-Descriptor::~Descriptor() {
-  if (fd_ >= 0) close(fd_);
-}
-
-Descriptor::Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-
-Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  return *this;
-}
 
 std::string network_address(std::size_t robot) {
   return "10.77." + std::to_string(robot / kHosts) + '.' + std::to_string(robot % kHosts + 1);

@@ -3,21 +3,9 @@
 #include <cstddef>
 #include <string>
 
+#include "apps/descriptor.hpp"
+
 namespace km {
-
-/// A file descriptor, closed by the destructor.
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor();
-  Descriptor(Descriptor&& other) noexcept;
-  Descriptor& operator=(Descriptor&& other) noexcept;
-
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 /// A network of a robot on this host: a network namespace with loopback and one Ethernet interface,
 /// eth0, whose frames this program reads and writes. It is made as root, or in a user namespace.

@@ -89,8 +89,8 @@ RobotProcess::RobotProcess(const std::vector<std::string>& command, const sigset
   if (pid_ == 0) become(arguments.data(), out[1], err[1], blocked, parent, prepare);
   close(out[1]);
   close(err[1]);
-  out_.fd = out[0];
-  err_.fd = err[0];
+  out_.fd = Descriptor(out[0]);
+  err_.fd = Descriptor(err[0]);
   if (pid_ < 0) throw system_error("fork");
 }
 
@@ -100,26 +100,25 @@ RobotProcess::~RobotProcess() {
     const double end_s = steady_now_s() + kGrace_s;
     // Full pipes might block the process, so its output is read meanwhile.
     while (!exit_ && steady_now_s() < end_s) {
-      std::array<pollfd, 2> polled{{{out_.fd, POLLIN, 0}, {err_.fd, POLLIN, 0}}};
+      const auto [out, err] = descriptors();
+      std::array<pollfd, 2> polled{{{out, POLLIN, 0}, {err, POLLIN, 0}}};
       poll(polled.data(), polled.size(), kPoll_ms);
       read();
     }
     send(SIGKILL);
     if (!exit_) waitpid(pid_, nullptr, 0);
   }
-  for (const int fd : descriptors())
-    if (fd >= 0) close(fd);
 }
 
 std::vector<std::string> RobotProcess::drain(Pipe& pipe) {
   std::vector<std::string> lines;
   std::array<char, 4096> buffer{};
-  while (pipe.fd >= 0) {
-    const ssize_t n = ::read(pipe.fd, buffer.data(), buffer.size());
+  while (pipe.fd.get() >= 0) {
+    const ssize_t n = ::read(pipe.fd.get(), buffer.data(), buffer.size());
     if (n < 0 && errno == EINTR) continue;
     if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) break;
     if (n <= 0) {
-      close(std::exchange(pipe.fd, -1));
+      pipe.fd = Descriptor();
       if (!pipe.partial.empty()) lines.push_back(std::exchange(pipe.partial, {}));
       break;
     }

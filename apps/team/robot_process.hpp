@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/descriptor.hpp"
+
 namespace km {
 
 /// Exit status of a process.
@@ -42,7 +44,7 @@ class RobotProcess {
   RobotProcess& operator=(const RobotProcess&) = delete;
 
   /// File descriptors to poll for input; -1 once closed.
-  [[nodiscard]] std::array<int, 2> descriptors() const { return {out_.fd, err_.fd}; }
+  [[nodiscard]] std::array<int, 2> descriptors() const { return {out_.fd.get(), err_.fd.get()}; }
 
   /// Reads the available output without waiting, and detects the end of the process. Returns the
   /// new lines of standard output.
@@ -62,7 +64,7 @@ class RobotProcess {
 
  private:
   struct Pipe {
-    int fd = -1;
+    Descriptor fd;
     std::string partial;  // last line, not complete yet
   };
   std::vector<std::string> drain(Pipe& pipe);

@@ -1,6 +1,7 @@
 #include "modules/diagnosis/examine_sensors.hpp"
 
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "modules/core/text_table.hpp"
@@ -17,36 +18,32 @@ struct FaultWords {
   const char* to_do;
 };
 
-FaultWords words_of(StereoFault fault) {
-  switch (fault) {
-    case StereoFault::kSwappedImages:
-      return {"stereo.swapped", "the left images are the right camera's",
-              "exchange the topics or folders of the two cameras' images"};
-    case StereoFault::kInvertedPair:
-      return {"stereo.inverted", "the pose of the right camera to the left one is inverted",
-              "write T_left_right^-1: a pose of b in a maps b to a"};
-    case StereoFault::kInvertedCameras:
-      return {"stereo.inverted_cameras", "both T_body_cam (T_BS) are inverted",
-              "write their inverses: T_BS maps the camera's points to the body's"};
-    case StereoFault::kInvertedLeft:
-      return {"stereo.inverted_left", "T_body_cam (T_BS) of the left camera is inverted",
-              "write its inverse"};
-    case StereoFault::kInvertedRight:
-      return {"stereo.inverted_right", "T_body_cam (T_BS) of the right camera is inverted",
-              "write its inverse"};
-    case StereoFault::kExchangedLenses:
-      return {"stereo.exchanged_lenses",
-              "focal lengths, centre and distortion of the two cameras are exchanged",
-              "exchange them"};
-    case StereoFault::kFocalLength:
-      return {"stereo.focal", "the focal lengths of the two cameras do not go together",
-              "calibrate them again, at the resolution of the images"};
-    case StereoFault::kNone:
-      break;
-  }
-  return {"stereo.epipolar", "points lie far from their epipolar lines",
-          "calibrate the pair again, at the resolution of the images, with its lens model"};
-}
+const std::map<StereoFault, FaultWords> kFaultWords = {
+    {StereoFault::kNone,
+     {"stereo.epipolar", "points lie far from their epipolar lines",
+      "calibrate the pair again, at the resolution of the images, with its lens model"}},
+    {StereoFault::kSwappedImages,
+     {"stereo.swapped", "the left images are the right camera's",
+      "exchange the topics or folders of the two cameras' images"}},
+    {StereoFault::kInvertedPair,
+     {"stereo.inverted", "the pose of the right camera to the left one is inverted",
+      "write T_left_right^-1: a pose of b in a maps b to a"}},
+    {StereoFault::kInvertedCameras,
+     {"stereo.inverted_cameras", "both T_body_cam (T_BS) are inverted",
+      "write their inverses: T_BS maps the camera's points to the body's"}},
+    {StereoFault::kInvertedLeft,
+     {"stereo.inverted_left", "T_body_cam (T_BS) of the left camera is inverted",
+      "write its inverse"}},
+    {StereoFault::kInvertedRight,
+     {"stereo.inverted_right", "T_body_cam (T_BS) of the right camera is inverted",
+      "write its inverse"}},
+    {StereoFault::kExchangedLenses,
+     {"stereo.exchanged_lenses",
+      "focal lengths, centre and distortion of the two cameras are exchanged", "exchange them"}},
+    {StereoFault::kFocalLength,
+     {"stereo.focal", "the focal lengths of the two cameras do not go together",
+      "calibrate them again, at the resolution of the images"}},
+};
 
 std::string fit_text(const StereoFit& fit) {
   return percent(fit.inlier_ratio) + " of " + std::to_string(fit.points) + " points within " +
@@ -57,7 +54,7 @@ std::string fit_text(const StereoFit& fit) {
 void examine_pair(const StereoAlternative& found, const StereoFit& given, Examination& result) {
   const bool is_named = found.fault != StereoFault::kNone;
   if (!is_named && is_sound(given)) return;
-  const FaultWords words = words_of(found.fault);
+  const FaultWords& words = kFaultWords.at(found.fault);
   std::string what = std::string(words.what) + ": " + fit_text(given);
   if (is_named) what += "; with that undone " + percent(found.fit.inlier_ratio);
   if (found.fault == StereoFault::kFocalLength)

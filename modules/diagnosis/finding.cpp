@@ -8,26 +8,20 @@
 namespace km {
 namespace {
 
-constexpr std::array kSeverities = {Severity::kNote, Severity::kWarning, Severity::kError};
+// In the order of the enumerators.
+constexpr std::array kSeverities = {"note", "warning", "error"};
 
 Severity severity_of(const std::string& word) {
-  for (const Severity severity : kSeverities)
-    if (word == to_string(severity)) return severity;
-  throw std::runtime_error("severity: " + word + " is neither note, warning nor error");
+  const auto found = std::ranges::find(kSeverities, word);
+  if (found == kSeverities.end())
+    throw std::runtime_error("severity: " + word + " is neither note, warning nor error");
+  return static_cast<Severity>(found - kSeverities.begin());
 }
 
 }  // namespace
 
 const char* to_string(Severity severity) {
-  switch (severity) {
-    case Severity::kNote:
-      return "note";
-    case Severity::kWarning:
-      return "warning";
-    case Severity::kError:
-      return "error";
-  }
-  return "";
+  return kSeverities[static_cast<std::size_t>(severity)];
 }
 
 int exit_code_of(std::span<const Finding> findings) {

@@ -75,20 +75,19 @@ StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig) {
   const SE3 T_right_left = rig.T_left_right().inverse();
   StereoFit fit;
   std::vector<double> errors_px, depths_m;
-  std::size_t inliers = 0, behind = 0;
+  std::size_t inliers = 0;
   for (const StereoMatches& image : images)
     for (const PixelPair& pair : image.pairs) {
       ++fit.points;
       const auto point = stereo_point(rig, T_right_left, pair);
       errors_px.push_back(point ? point->error_px : std::numeric_limits<double>::infinity());
       if (!point || point->error_px > kEpipolarInlier_px) continue;
-      const bool is_behind = point->depth_m < 0.0 && point->parallax_px > kMinParallax_px;
-      ++(is_behind ? behind : inliers);
-      if (!is_behind && point->depth_m > 0.0) depths_m.push_back(point->depth_m);
+      if (point->depth_m < 0.0 && point->parallax_px > kMinParallax_px) continue;  // behind it
+      ++inliers;
+      if (point->depth_m > 0.0) depths_m.push_back(point->depth_m);
     }
-  const auto n = static_cast<double>(std::max<std::size_t>(fit.points, 1));
-  fit.inlier_ratio = static_cast<double>(inliers) / n;
-  fit.behind = static_cast<double>(behind) / n;
+  fit.inlier_ratio =
+      static_cast<double>(inliers) / static_cast<double>(std::max<std::size_t>(fit.points, 1));
   fit.error_px = quantile(std::move(errors_px), 0.5);
   fit.depth_m = quantile(std::move(depths_m), 0.5);
   return fit;

@@ -30,8 +30,6 @@ struct StereoFit {
   std::size_t points = 0;
   /// Share of points within kEpipolarInlier_px of their epipolar line and not behind the cameras.
   double inlier_ratio = 0.0;
-  double behind =
-      0.0;  ///< Share of points within kEpipolarInlier_px whose rays meet behind the cameras.
   double error_px =
       0.0;               ///< Median distance from the line, in the right image; NaN without points.
   double depth_m = 0.0;  ///< Median depth of these points; NaN if there are none.

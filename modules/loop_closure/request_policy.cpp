@@ -68,17 +68,11 @@ void RequestPolicy::add_result(const KeyframeId& keyframe, bool verified) {
 }
 
 const char* to_string(RequestPolicy::Decision decision) {
-  switch (decision) {
-    case RequestPolicy::Decision::kRequest:
-      return "requested";
-    case RequestPolicy::Decision::kNearClosure:
-      return "not requested: near a verified closure";
-    case RequestPolicy::Decision::kNearRequest:
-      return "not requested: near a requested candidate";
-    case RequestPolicy::Decision::kLowYield:
-      return "not requested: similar candidates have mostly failed";
-  }
-  return "";
+  // In the order of the enumerators.
+  constexpr std::array kWords = {"requested", "not requested: near a verified closure",
+                                 "not requested: near a requested candidate",
+                                 "not requested: similar candidates have mostly failed"};
+  return kWords[static_cast<std::size_t>(decision)];
 }
 
 }  // namespace km

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <random>
@@ -90,22 +91,16 @@ bool holds(const Matrix6& information) {
 }  // namespace
 
 const char* to_string(VerificationStatus status) {
-  switch (status) {
-    case VerificationStatus::kAccepted:
-      return "accepted";
-    case VerificationStatus::kTooFewMatches:
-      return "too few matches";
-    case VerificationStatus::kNoConsensus:
-      return "matches do not agree on a pose";
-    case VerificationStatus::kDegenerate:
-      return "matches leave the pose undetermined";
-    case VerificationStatus::kTooFewInliers:
-      return "too few inliers";
-    case VerificationStatus::kUncertainPose:
-      return "pose hangs on a few inliers: without them its sigma exceeds max_position_sigma_m or "
-             "max_rotation_sigma_rad";
-  }
-  return "";
+  // In the order of the enumerators.
+  constexpr std::array kWords = {
+      "accepted",
+      "too few matches",
+      "matches do not agree on a pose",
+      "matches leave the pose undetermined",
+      "too few inliers",
+      "pose hangs on a few inliers: without them its sigma exceeds max_position_sigma_m or "
+      "max_rotation_sigma_rad"};
+  return kWords[static_cast<std::size_t>(status)];
 }
 
 Verifier::Verifier(const LoopClosureConfig& config) : config_(checked(config)) {}

@@ -4,10 +4,20 @@
 
 #include <array>
 #include <cstdio>
+#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace km {
+
+/// The words of a command line, separated by spaces.
+inline std::vector<std::string> words_of(const std::string& line) {
+  std::istringstream text(line);
+  std::vector<std::string> words;
+  for (std::string word; text >> word;) words.push_back(word);
+  return words;
+}
 
 /// Exit code and output of a program.
 struct CommandResult {

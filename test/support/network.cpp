@@ -7,9 +7,9 @@
 
 #include <csignal>
 #include <iostream>
-#include <sstream>
 #include <stdexcept>
 
+#include "test/support/command.hpp"
 #include "test/support/process.hpp"
 
 namespace km {
@@ -42,10 +42,7 @@ pid_t hold_namespace() {
 }
 
 bool run_ip(pid_t network_of, const std::string& arguments) {
-  std::vector<std::string> command{"ip"};
-  std::istringstream words(arguments);
-  for (std::string word; words >> word;) command.push_back(word);
-  return Process(command, network_of).wait() == 0;
+  return Process(words_of("ip " + arguments), network_of).wait() == 0;
 }
 
 void ip(pid_t network_of, const std::string& arguments) {

@@ -1,6 +1,7 @@
 #include "test/support/process.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sched.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -24,22 +25,25 @@ std::array<int, 2> make_pipe() {
 }
 
 // Between fork and exec: only async-signal-safe calls.
-[[noreturn]] void become(char* const* arguments, const std::string& network, int input,
-                         int output) {
+[[noreturn]] void become(char* const* arguments, const std::string& network, int input, int output,
+                         bool with_errors) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (with_errors) signal(SIGPIPE, SIG_DFL);
   if (!network.empty()) {
     const int descriptor = open(network.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0 || setns(descriptor, CLONE_NEWNET) != 0) _exit(126);
   }
   dup2(input, STDIN_FILENO);
   dup2(output, STDOUT_FILENO);
+  if (with_errors) dup2(output, STDERR_FILENO);
   execvp(arguments[0], arguments);
   _exit(127);
 }
 
 }  // namespace
 
-Process::Process(const std::vector<std::string>& command, pid_t network_of) {
+Process::Process(const std::vector<std::string>& command, pid_t network_of,
+                 std::optional<int> output) {
   std::signal(SIGPIPE, SIG_IGN);  // the end of the child is detected otherwise
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -51,7 +55,9 @@ Process::Process(const std::vector<std::string>& command, pid_t network_of) {
   started_ = std::chrono::steady_clock::now();
   pid_ = fork();
   if (pid_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
-  if (pid_ == 0) become(arguments.data(), network, to_child[0], from_child[1]);
+  if (pid_ == 0)
+    become(arguments.data(), network, to_child[0], output.value_or(from_child[1]),
+           output.has_value());
   close(to_child[0]);
   close(from_child[1]);
   input_ = to_child[1];
@@ -118,12 +124,26 @@ void Process::kill(int signal) const {
 }
 
 int Process::wait() {
-  if (result_) return *result_;
   int status = 0;
-  while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+  while (!result_ && waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
   }
-  result_ = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  if (!result_) keep_result(status);
   return *result_;
+}
+
+std::optional<int> Process::wait_within(std::chrono::seconds patience) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  int status = 0;
+  while (!result_ && std::chrono::steady_clock::now() < end)
+    if (waitpid(pid_, &status, WNOHANG) == pid_)
+      keep_result(status);
+    else
+      poll(nullptr, 0, 20);
+  return result_;
+}
+
+void Process::keep_result(int status) {
+  result_ = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
 
 void Process::read_lines() {

@@ -21,18 +21,21 @@ struct TimedLine {
   std::chrono::steady_clock::time_point time;
 };
 
-/// A child process whose output is read line by line. The destructor kills it if it still runs.
+/// A child process. The destructor kills it if it still runs. Its output is read line by line, or
+/// goes to a descriptor.
 class Process {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
   /// Starts `command` (program and arguments; stderr is shared), in the network namespace of
-  /// process `network_of` if that is not 0.
-  explicit Process(const std::vector<std::string>& command, pid_t network_of = 0);
+  /// process `network_of` if that is not 0. With `output`, standard output and error go there.
+  explicit Process(const std::vector<std::string>& command, pid_t network_of = 0,
+                   std::optional<int> output = {});
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
+  [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] TimePoint started() const { return started_; }
 
   /// Writes a line to its standard input.
@@ -57,7 +60,11 @@ class Process {
   /// Waits for its end: the exit code, or minus the signal that killed it.
   int wait();
 
+  /// As wait(); nullopt if it still runs after `patience`.
+  std::optional<int> wait_within(std::chrono::seconds patience);
+
  private:
+  void keep_result(int status);
   void read_lines();
 
   TimePoint started_;

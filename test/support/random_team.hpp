@@ -1,10 +1,14 @@
 #pragma once
 
+#include <map>
 #include <random>
 #include <set>
 #include <utility>
 #include <vector>
 
+#include "modules/core/lie.hpp"
+#include "modules/core/precision.hpp"
+#include "test/support/random_pose.hpp"
 #include "test/support/split_graph.hpp"
 
 namespace km {
@@ -49,15 +53,6 @@ inline SplitGraph random_team(unsigned seed, const std::vector<RobotId>& ids,
       graph.closures.push_back({from, to, T, covariance});
     }
   return graph;
-}
-
-/// A team with scattered ids, and pairs that hold it together in two ways.
-inline const std::vector<RobotId> kIds{50, 7, 1200, 33};
-inline const std::vector<std::pair<RobotId, RobotId>> kRing{
-    {7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
-
-inline double optimum_of(const SplitGraph& graph) {
-  return solve_centrally(graph.whole()).cost;
 }
 
 }  // namespace km

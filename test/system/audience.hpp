@@ -62,20 +62,9 @@ inline std::vector<std::string> robot_on(const Walk& walk, const Walk& other,
                                          const std::filesystem::path& folder, int domain) {
   const std::string name = robot_name(walk.robot);
   const std::filesystem::path graph = write_walk(walk, other, kLap, folder / (name + ".g2o"));
-  return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
-          "--robot",
-          std::to_string(walk.robot),
-          "--name",
-          name,
-          "--graph",
-          graph.string(),
-          "--rate",
-          "10",
-          "--output",
-          (folder / name).string(),
-          "--domain",
-          std::to_string(domain),
-          "--view"};
+  return words_of(KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(walk.robot) +
+                  " --name " + name + " --graph " + graph.string() + " --rate 10 --output " +
+                  (folder / name).string() + " --domain " + std::to_string(domain) + " --view");
 }
 
 /// Runs two robots that meet, watched from beginning to end.

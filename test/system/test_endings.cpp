@@ -2,9 +2,11 @@
 #include <sys/mount.h>
 
 #include <catch2/catch.hpp>
+#include <csignal>
 #include <iostream>
 
 #include "apps/robot/run_summary.hpp"
+#include "test/support/process.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/system/long_run.hpp"
 #include "test/system/team_run.hpp"
@@ -17,15 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 
 std::vector<std::string> robot_on_walk(const fs::path& walk, const fs::path& output) {
-  return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
-          "--robot",
-          "0",
-          "--graph",
-          walk.string(),
-          "--output",
-          output.string(),
-          "--domain",
-          std::to_string(random_domain())};
+  return words_of(KM_BIN_DIR "/kimera_multi_robot --robot 0 --graph " + walk.string() +
+                  " --output " + output.string() + " --domain " + std::to_string(random_domain()));
 }
 
 TEST_CASE("A robot without a reader of its output ends on a signal with its results",
@@ -33,7 +28,7 @@ TEST_CASE("A robot without a reader of its output ends on a signal with its resu
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out";
   const FullPipe blocked;
-  Child robot(robot_on_walk(long_walk(folder.path(), 0), output), blocked.writer());
+  Process robot(robot_on_walk(long_walk(folder.path(), 0), output), 0, blocked.writer());
   REQUIRE(wait_for_lines(output / "process.csv", 3));
   robot.kill(SIGTERM);
   CHECK(robot.wait() == 0);
@@ -85,12 +80,12 @@ struct RobotOnSmallDisk {
   SmallDisk disk{folder.path() / "disk", "size=256k"};
   fs::path output = folder.path() / "disk" / "out";
   int log = open((folder.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-  std::optional<Child> robot = {};
+  std::optional<Process> robot = {};
 
   ~RobotOnSmallDisk() { close(log); }
 
   void start() {
-    robot.emplace(robot_on_walk(long_walk(folder.path(), 0), output), log);
+    robot.emplace(robot_on_walk(long_walk(folder.path(), 0), output), 0, log);
     const bool running = wait_for_lines(output / "process.csv", 3);
     INFO(folder.read("log"));
     REQUIRE(running);
@@ -113,7 +108,7 @@ TEST_CASE("On a full or read-only disk a robot continues, names lost results, an
   else
     REQUIRE(run.disk.make_read_only());
   const char* const why = full ? "No space left on device" : "Read-only file system";
-  REQUIRE(run.robot->wait(std::chrono::seconds(3)) == Child::kRunsOn);
+  REQUIRE_FALSE(run.robot->wait_within(std::chrono::seconds(3)));
   run.robot->kill(SIGTERM);
   CHECK(run.robot->wait() == 4);
   for (const char* file : {"optimized.tum", "pose_graph.g2o", "keyframes.csv", "loop_closures.csv",
@@ -130,7 +125,7 @@ TEST_CASE("One result that cannot be written leaves the others whole", "[system]
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out";
   const int quiet = open("/dev/null", O_WRONLY | O_CLOEXEC);
-  Child robot(robot_on_walk(long_walk(folder.path(), 0), output), quiet);
+  Process robot(robot_on_walk(long_walk(folder.path(), 0), output), 0, quiet);
   close(quiet);
   REQUIRE(wait_for_lines(output / "process.csv", 2));
   fs::create_directory(output / "optimized.tum");  // the second of all
@@ -152,15 +147,15 @@ std::vector<std::string> team_on_walks(const TemporaryFolder& folder) {
                                      "robots:\n"
                                      "  - {id: 0, name: robot0, graph: walk0.g2o}\n"
                                      "  - {id: 1, name: robot1, graph: walk1.g2o}\n");
-  return {std::string(KM_BIN_DIR) + "/kimera_multi_team", "--config", team.string(), "--output",
-          folder.path().string()};
+  return words_of(KM_BIN_DIR "/kimera_multi_team --config " + team.string() + " --output " +
+                  folder.path().string());
 }
 
 TEST_CASE("A team without a reader of its output ends on a signal with the results of all",
           "[system][endings]") {
   const TemporaryFolder folder;
   const FullPipe blocked;
-  Child team(team_on_walks(folder), blocked.writer());
+  Process team(team_on_walks(folder), 0, blocked.writer());
   for (const char* robot : {"robot0", "robot1"})
     REQUIRE(wait_for_lines(folder.path() / robot / "process.csv", 3));
   team.kill(SIGTERM);
@@ -174,7 +169,7 @@ TEST_CASE("A hung-up terminal and a closed pipe end a robot in order", "[system]
   const fs::path output = folder.path() / "out";
   std::array<int, 2> ends{};
   REQUIRE(pipe2(ends.data(), O_CLOEXEC) == 0);
-  Child robot(robot_on_walk(long_walk(folder.path(), 0), output), ends[1]);
+  Process robot(robot_on_walk(long_walk(folder.path(), 0), output), 0, ends[1]);
   close(ends[1]);
   close(
       ends[0]);  // the reader has gone: every line that the robot prints gives SIGPIPE or an error
@@ -189,7 +184,7 @@ TEST_CASE("Robots whose team is killed end in order with their results", "[syste
   const TemporaryFolder folder;
   const int quiet = open("/dev/null", O_WRONLY | O_CLOEXEC);
   {
-    Child team(team_on_walks(folder), quiet);
+    Process team(team_on_walks(folder), 0, quiet);
     for (const char* robot : {"robot0", "robot1"})
       REQUIRE(wait_for_lines(folder.path() / robot / "process.csv", 3));
     team.kill(SIGKILL);

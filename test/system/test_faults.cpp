@@ -1,10 +1,12 @@
 #include <sys/stat.h>
 
 #include <catch2/catch.hpp>
+#include <csignal>
 #include <fstream>
 #include <list>
 
 #include "apps/robot/run_summary.hpp"
+#include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/system/long_run.hpp"
@@ -27,28 +29,23 @@ struct FaultyRobot {
   fs::path output = folder.path() / "out";
   int log = open((folder.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   int domain = random_domain();
-  std::optional<Child> process = {};
+  std::optional<Process> process = {};
 
   ~FaultyRobot() { close(log); }
 
   void start(const std::string& module, const std::string& how, const fs::path& input,
-             const std::vector<std::string>& settings = {}) {
-    std::vector<std::string> command = {KM_BIN_DIR "/test_faulty_robot",
-                                        module,
-                                        how,
-                                        output.string(),
-                                        std::to_string(domain),
-                                        input.string(),
-                                        kLittlePatience};
-    command.insert(command.end(), settings.begin(), settings.end());
-    process.emplace(command, log);
+             const std::string& settings = {}) {
+    process.emplace(words_of(KM_BIN_DIR "/test_faulty_robot " + module + ' ' + how + ' ' +
+                             output.string() + ' ' + std::to_string(domain) + ' ' + input.string() +
+                             ' ' + kLittlePatience + ' ' + settings),
+                    0, log);
   }
   [[nodiscard]] std::string log_text() const { return folder.read("log"); }
 };
 
 void check_end(FaultyRobot& robot, const std::string& module, const std::string& how) {
   CAPTURE(module, how);
-  const int exit_code = robot.process->wait(3 * kPatience);
+  const std::optional<int> exit_code = robot.process->wait_within(3 * kPatience);
   CAPTURE(robot.log_text());
   CHECK(exit_code == (how == "hang" ? 5 : 3));
   CHECK_THAT(robot.log_text(), Catch::Contains(how == "hang" ? "supervisor: " + module + " has not"
@@ -63,7 +60,7 @@ void check_end(FaultyRobot& robot, const std::string& module, const std::string&
 // For each module a robot in which it throws and one in which it hangs. `patient` are modules that
 // may take four times as long: robots in which they hang wait beside all others.
 void check_faults(const std::vector<std::string>& patient, const std::vector<std::string>& others,
-                  const fs::path& input, const std::vector<std::string>& settings = {}) {
+                  const fs::path& input, const std::string& settings = {}) {
   std::list<FaultyRobot> waiting;
   for (const std::string& module : patient)
     waiting.emplace_back().start(module, "hang", input, settings);
@@ -94,18 +91,18 @@ TEST_CASE("A module of the map that throws or hangs is named, and recorded resul
           "[system][faults][slow]") {
   if (const auto dataset = shared_data("euroc/MH_01_easy"))
     check_faults({"semantic_mapping", "mesh_deformation"}, {"dense_sensing"}, *dataset,
-                 {"mapping.mode=metric"});
+                 "mapping.mode=metric");
 }
 
 TEST_CASE("A disk that stands still under the map leaves the other results", "[system][faults]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   FaultyRobot robot;
-  robot.start("none", "hang", *dataset, {"mapping.mode=metric", "run.patience=0.1"});
+  robot.start("none", "hang", *dataset, "mapping.mode=metric run.patience=0.1");
   REQUIRE(wait_for_lines(robot.output / "process.csv", 1));
   // The opening of a pipe without a reader never returns.
   REQUIRE(mkfifo((robot.output / "mesh.ply.part").c_str(), 0600) == 0);
-  CHECK(robot.process->wait(3 * kPatience) == 5);
+  CHECK(robot.process->wait_within(3 * kPatience) == 5);
   CAPTURE(robot.log_text());
   CHECK_THAT(robot.log_text(), Catch::Contains("mesh_files has not"));
   CHECK(fs::is_regular_file(robot.output / "pose_graph.g2o"));
@@ -120,10 +117,10 @@ TEST_CASE("The team continues without a robot whose module hangs, and sees it le
   const fs::path output = faulty.folder.path() / "sound";
   const int log =
       open((faulty.folder.path() / "sound.log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-  Child sound({std::string(KM_BIN_DIR) + "/kimera_multi_robot", "--robot", "0", "--graph",
-               long_walk(faulty.folder.path(), 0).string(), "--output", output.string(), "--domain",
-               std::to_string(faulty.domain)},
-              log);
+  Process sound(words_of(KM_BIN_DIR "/kimera_multi_robot --robot 0 --graph " +
+                         long_walk(faulty.folder.path(), 0).string() + " --output " +
+                         output.string() + " --domain " + std::to_string(faulty.domain)),
+                0, log);
   close(log);
   const bool runs = wait_for_lines(output / "process.csv", 2);
   CAPTURE(faulty.folder.read("sound.log"));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -19,6 +20,8 @@
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/overlay/overlay.hpp"
+#include "test/support/command.hpp"
+#include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/system/flood_peers.hpp"
@@ -199,7 +202,7 @@ class Scene {
   Scene(const Flood& flood, const std::optional<std::filesystem::path>& images)
       : domain_(std::make_shared<const DdsDomain>(loopback_config())),
         log_(open((folder_.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600)),
-        victim_(command(flood, images), log_),
+        victim_(command(flood, images), 0, log_),
         flooder(peer(flood, flood.flooder)),
         friend_(peer(flood, kFriend)),
         far_(peer(flood, kFar)) {
@@ -264,37 +267,26 @@ class Scene {
   std::vector<std::string> command(const Flood& flood,
                                    const std::optional<std::filesystem::path>& images) {
     const DdsConfig& dds = domain_->config();
-    std::vector<std::string> words{KM_BIN_DIR "/kimera_multi_robot",
-                                   "--robot",
-                                   std::to_string(kVictim),
-                                   "--domain",
-                                   std::to_string(dds.domain),
-                                   "--output",
-                                   (folder_.path() / "out").string(),
-                                   "--set",
-                                   "dds.team=" + dds.team,
-                                   "--set",
-                                   "dds.interface=lo",
-                                   "--set",
-                                   "mesh_chunks.collect=true"};
+    std::string line = KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(kVictim) +
+                       " --domain " + std::to_string(dds.domain) + " --output " +
+                       (folder_.path() / "out").string() + " --set dds.team=" + dds.team +
+                       " --set dds.interface=lo --set mesh_chunks.collect=true";
     if (flood.sealed) {
       std::vector<RobotName> robots;
       for (const RobotId robot : kTeam) robots.push_back({robot, robot_name(robot)});
       TeamFolder::make(folder_.path() / "keys", robots, now_s(), now_s() + 3600);
-      words.insert(words.end(), {"--security", keys_of(kVictim).string()});
+      line += " --security " + keys_of(kVictim).string();
     }
-    if (images)
-      words.insert(words.end(), {"--config", "config/datasets/euroc.yaml", "--rate", "0.02",
-                                 "--dataset", images->string()});
-    else
-      words.insert(words.end(), {"--graph", long_walk(folder_.path(), kVictim).string()});
-    return words;
+    line += images
+                ? " --config config/datasets/euroc.yaml --rate 0.02 --dataset " + images->string()
+                : " --graph " + long_walk(folder_.path(), kVictim).string();
+    return words_of(line);
   }
 
   TemporaryFolder folder_;
   std::shared_ptr<const DdsDomain> domain_;
   int log_;
-  Child victim_;
+  Process victim_;
   std::uint32_t asked_ = 0;
 
  public:
@@ -358,12 +350,11 @@ Costs measure(Scene& scene, const Flood& flood, double seconds) {
   const std::uint64_t messages_before = scene.flooder.sent().messages;
   (void)waits_of(scene.replies);
   (void)waits_of(scene.relayed);
-  std::optional<Child> outsiders;
+  std::optional<Process> outsiders;
   if (flood.name == "identities")
-    outsiders.emplace(
-        std::vector<std::string>{KM_BIN_DIR "/test_outsiders", std::to_string(scene.dds().domain),
-                                 scene.dds().team, std::to_string(kOutsiders_Hz)},
-        STDOUT_FILENO);
+    outsiders.emplace(words_of(KM_BIN_DIR "/test_outsiders " + std::to_string(scene.dds().domain) +
+                               ' ' + scene.dds().team + ' ' + std::to_string(kOutsiders_Hz)),
+                      0, STDOUT_FILENO);
   Costs costs;
   const auto look = [&] {
     costs.growth_MB = std::max(costs.growth_MB, scene.memory_MB() - before_MB);

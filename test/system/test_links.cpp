@@ -70,15 +70,14 @@ class Team {
  private:
   [[nodiscard]] std::vector<std::string> command(int k, int domain) const {
     const std::string number = std::to_string(k);
-    return {std::string(KM_BIN_DIR) + "/kimera_multi_robot", "--robot", number, "--name",
-            robot_name(k), "--graph", (folder_ / ("part" + number + ".g2o")).string(), "--rate",
-            "max", "--output", (folder_ / robot_name(k)).string(), "--domain",
-            std::to_string(domain), "--interface", "eth0", "--set", "pose_graph.method=" + method_,
-            // One of the random closures has a residual of 5.6 sigma in one session, and more than
-            // the default limit of 6.2 in another. Which session contains it depends on the order
-            // of messages.
-            "--set", "pose_graph.barc=20", "--set", "run.settle_s=" + shortest_text(settle_s_),
-            "--log", "warn"};
+    // One of the random closures has a residual of 5.6 sigma in one session, and more than the
+    // default limit of 6.2 in another. Which session contains it depends on the order of messages.
+    const std::string settings = " --set pose_graph.barc=20 --set pose_graph.method=" + method_ +
+                                 " --set run.settle_s=" + shortest_text(settle_s_);
+    return words_of(KM_BIN_DIR "/kimera_multi_robot --robot " + number + " --name " +
+                    robot_name(k) + " --graph " + (folder_ / ("part" + number + ".g2o")).string() +
+                    " --rate max --output " + (folder_ / robot_name(k)).string() + " --domain " +
+                    std::to_string(domain) + " --interface eth0 --log warn" + settings);
   }
 
   VirtualNetwork network_;

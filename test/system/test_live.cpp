@@ -19,45 +19,53 @@ namespace {
 namespace fs = std::filesystem;
 
 // A recorded run's poses up to the n-th.
-std::string first_lines(const fs::path& file, std::size_t count) {
+std::string first_lines(const fs::path& file, int count) {
   std::ifstream stream(file);
   std::string lines;
   std::string line;
-  for (std::size_t k = 0; k < count && std::getline(stream, line); ++k) lines += line + '\n';
+  for (int k = 0; k < count && std::getline(stream, line); ++k) lines += line + '\n';
   return lines;
 }
 
-std::vector<std::string> robot_command(const fs::path& output,
-                                       const std::vector<std::string>& input) {
-  std::vector<std::string> command = {KM_BIN_DIR "/kimera_multi_robot",
-                                      "--config",
-                                      "config/datasets/euroc.yaml",
-                                      "--robot",
-                                      "0",
-                                      "--serve-limit",
-                                      "0",
-                                      "--domain",
-                                      std::to_string(random_domain()),
-                                      "--output",
-                                      output.string()};
-  command.insert(command.end(), input.begin(), input.end());
-  return command;
+std::vector<std::string> robot_command(const fs::path& output, const std::string& input) {
+  return words_of(KM_BIN_DIR
+                  "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --serve-limit "
+                  "0 --domain " +
+                  std::to_string(random_domain()) + " --output " + output.string() + ' ' + input);
 }
 
-// Topics with EuRoC's names, from a driver in this domain, with the calibration of `dataset`.
-std::vector<std::string> live_command(const TemporaryFolder& folder, const fs::path& dataset,
-                                      const std::string& domain) {
-  const fs::path rig =
-      folder.write("rig.yaml",
-                   "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
-                   "imu: {topic: /imu0}\ncalibration: " +
-                       fs::absolute(dataset).string() + "\n");
-  return robot_command(
-      folder.path() / "live",
-      {"--live", rig.string(), "--set", "ros.domain=" + domain, "--set", "ros.interface=lo"});
+// A robot on the live topics that a rig file names, from a driver in this domain.
+std::vector<std::string> live_command(const TemporaryFolder& folder, const std::string& rig,
+                                      int domain, const std::string& options = {}) {
+  return robot_command(folder.path() / "live", "--live " + folder.write("rig.yaml", rig).string() +
+                                                   " --set ros.domain=" + std::to_string(domain) +
+                                                   " --set ros.interface=lo " + options);
 }
 
-constexpr std::size_t kPoses = 100;
+// Plays a recording on live topics.
+std::vector<std::string> driver_command(const fs::path& recording, int domain,
+                                        const std::string& options) {
+  return words_of(KM_BIN_DIR "/kimera_multi_publish " + recording.string() + " --domain " +
+                  std::to_string(domain) + " --interface lo --wait 1 " + options);
+}
+
+// Topics with EuRoC's names, with the calibration of `dataset`.
+std::string rig_of(const fs::path& dataset) {
+  return "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
+         "imu: {topic: /imu0}\ncalibration: " +
+         fs::absolute(dataset).string() + "\n";
+}
+
+// Accepts the status lines of a robot that has more images: "5.6 s, 112 images, ...".
+auto has_more_images_than(int count) {
+  return [count](const std::string& line) {
+    double seconds = 0.0;
+    int images = 0;
+    return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && images > count;
+  };
+}
+
+constexpr int kPoses = 100;
 
 // The stamps of poses.
 std::vector<std::string> stamps_of(const std::string& poses) {
@@ -72,19 +80,10 @@ std::vector<std::string> stamps_of(const std::string& poses) {
 // robot's sensors are best effort, and a busy host loses some.
 std::optional<std::string> live_poses(const fs::path& dataset, double rate) {
   const TemporaryFolder folder;
-  const std::string domain = std::to_string(random_domain());
-  std::vector<std::string> live = live_command(folder, dataset, domain);
-  live.insert(live.end(), {"--set", "sensors.max_lag_s=30"});
-  Process robot(live);
-  Process driver({KM_BIN_DIR "/kimera_multi_publish", dataset.string(), "--domain", domain,
-                  "--interface", "lo", "--wait", "1", "--rate", std::to_string(rate)});
-  const auto has_poses = [](const std::string& line) {  // "5.6 s, 112 images, ..."
-    double seconds = 0.0;
-    int images = 0;
-    return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 &&
-           images > static_cast<int>(kPoses);
-  };
-  REQUIRE(robot.wait_until(has_poses).has_value());
+  const int domain = random_domain();
+  Process robot(live_command(folder, rig_of(dataset), domain, "--set sensors.max_lag_s=30"));
+  Process driver(driver_command(dataset, domain, "--rate " + std::to_string(rate)));
+  REQUIRE(robot.wait_until(has_more_images_than(kPoses)).has_value());
   driver.kill(SIGINT);
   CHECK(driver.wait() == 0);
   robot.kill(SIGINT);
@@ -102,10 +101,10 @@ TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are pl
   if (!dataset) return;
   const TemporaryFolder folder;
   Process replay(robot_command(folder.path() / "folder",
-                               {"--dataset", dataset->string(), "--to", "6", "--rate", "max"}));
+                               "--dataset " + dataset->string() + " --to 6 --rate max"));
   CHECK(replay.wait() == 0);
   const std::string expected = first_lines(folder.path() / "folder/odometry.tum", kPoses);
-  REQUIRE(std::ranges::count(expected, '\n') == static_cast<std::ptrdiff_t>(kPoses));
+  REQUIRE(std::ranges::count(expected, '\n') == kPoses);
 
   // Plays more slowly if the host is too busy, because this test does not measure the speed.
   std::optional<std::string> poses;
@@ -121,16 +120,10 @@ TEST_CASE("Messages that a live robot has lost are counted in its summary", "[sy
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
-  const std::string domain = std::to_string(random_domain());
-  Process robot(live_command(folder, *dataset, domain));
-  Process driver({KM_BIN_DIR "/kimera_multi_publish", dataset->string(), "--domain", domain,
-                  "--interface", "lo", "--wait", "1", "--reliable", "--drop", "0.1"});
-  const auto has_poses = [](const std::string& line) {
-    double seconds = 0.0;
-    int images = 0;
-    return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && images > 60;
-  };
-  REQUIRE(robot.wait_until(has_poses).has_value());
+  const int domain = random_domain();
+  Process robot(live_command(folder, rig_of(*dataset), domain));
+  Process driver(driver_command(*dataset, domain, "--reliable --drop 0.1"));
+  REQUIRE(robot.wait_until(has_more_images_than(60)).has_value());
   robot.kill(SIGINT);
   CHECK(robot.wait() == 0);
   driver.kill(SIGINT);
@@ -169,11 +162,7 @@ bool waits_for_calibration(const std::string& line) {
 
 TEST_CASE("A robot that waits for its calibration ends at once on a signal", "[system][live]") {
   const TemporaryFolder folder;
-  const fs::path rig = folder.write("rig.yaml", kUnplaced);
-  const std::string domain = std::to_string(random_domain());
-  Process robot(logged(robot_command(
-      folder.path() / "live",
-      {"--live", rig.string(), "--set", "ros.domain=" + domain, "--set", "ros.interface=lo"})));
+  Process robot(logged(live_command(folder, kUnplaced, random_domain())));
   REQUIRE(robot.wait_until(waits_for_calibration));
   robot.kill(GENERATE(SIGINT, SIGTERM));
   CHECK(robot.wait() == 0);  // 1 once its patience is over
@@ -183,19 +172,14 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
           "[system][live]") {
   const EurocFolder recording;
   const TemporaryFolder folder;
-  const fs::path rig = folder.write("rig.yaml", kUnplaced);
   const int domain = random_domain();
-  Process robot(
-      logged(robot_command(folder.path() / "live",
-                           {"--live", rig.string(), "--set", "ros.domain=" + std::to_string(domain),
-                            "--set", "ros.interface=lo"})));
+  Process robot(logged(live_command(folder, kUnplaced, domain)));
   const auto network =
       std::make_shared<const RosNetwork>(RosConfig{.domain = domain, .interface = "lo"});
   const RosPublisher description(network, "/tf_static", RosTransforms::kType, RosQos::kLatched, 1);
   description.publish(encode_ros(RosTransforms{{{{0, "imu0"}, "cam0", {}}}}));
   // Playing begins when every topic has a reader, so that the frames of the samples are received.
-  Process driver({KM_BIN_DIR "/kimera_multi_publish", recording.root().string(), "--domain",
-                  std::to_string(domain), "--interface", "lo", "--wait", "1", "--reliable"});
+  Process driver(driver_command(recording.root(), domain, "--reliable"));
   const auto is_complete = [](const std::string& line) {
     return line.find("domain ") != line.npos;
   };
@@ -213,11 +197,12 @@ TEST_CASE("A live robot whose topics are silent reports where it listens, and en
   const auto dataset = shared_data("euroc/MH_01_easy");  // only its calibration is used
   if (!dataset) return;
   const TemporaryFolder folder;
-  const std::string domain = std::to_string(random_domain());
-  Process robot(logged(live_command(folder, *dataset, domain)));
-  const auto states_place = [&domain](const std::string& line) {
+  const int domain = random_domain();
+  Process robot(logged(live_command(folder, rig_of(*dataset), domain)));
+  const std::string place = "0 publish it on ROS domain " + std::to_string(domain);
+  const auto states_place = [&place](const std::string& line) {
     return line.find("nothing on /cam0/image_raw") != line.npos &&
-           line.find("0 publish it on ROS domain " + domain + " (ROS_DOMAIN_ID") != line.npos &&
+           line.find(place + " (ROS_DOMAIN_ID") != line.npos &&
            line.find("--set ros.domain=") != line.npos;
   };
   REQUIRE(robot.wait_until(states_place).has_value());

@@ -24,35 +24,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> record_command(const fs::path& dataset, const fs::path& output,
-                                        const std::string& rate) {
-  return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
-          "--config",
-          "config/datasets/euroc.yaml",
-          "--robot",
-          "0",
-          "--name",
-          "alice",
-          "--dataset",
-          dataset.string(),
-          "--to",
-          "12",
-          "--rate",
-          rate,
-          "--domain",
-          std::to_string(random_domain()),
-          "--serve-limit",
-          "100",
-          "--output",
-          output.string(),
-          "--record"};
+std::string record_command(const fs::path& dataset, const std::string& options) {
+  return KM_BIN_DIR
+         "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --name alice --to 12 "
+         "--serve-limit 100 --record --domain " +
+         std::to_string(random_domain()) + " --dataset " + dataset.string() + ' ' + options;
 }
 
 // Runs a robot as fast as possible, with all records; returns its output if it failed.
 CommandResult record_all(const fs::path& dataset, const fs::path& output) {
-  std::string command;
-  for (const std::string& word : record_command(dataset, output, "max")) command += word + ' ';
-  return run_command(command + "--record-images --set mapping.mode=metric");
+  return run_command(record_command(dataset, "--rate max --output " + output.string() +
+                                                 " --record-images --set mapping.mode=metric"));
 }
 
 struct Record {
@@ -125,9 +107,9 @@ TEST_CASE(
   if (!dataset) return;
   const TemporaryFolder folder;
   const fs::path first = folder.path() / "record.mcap", second = folder.path() / "record_2.mcap";
-  auto command = record_command(*dataset, folder.path(), "1");
   {
-    Process robot(command);
+    Process robot(
+        words_of(record_command(*dataset, "--rate 1 --output " + folder.path().string())));
     const auto has_recorded = [&first](const std::string&) {
       return fs::exists(first) && fs::file_size(first) > 20000;
     };
@@ -141,9 +123,8 @@ TEST_CASE(
   CHECK(killed.reader.report().entries().size() == 1);
 
   const auto size = fs::file_size(first);
-  *std::ranges::find(command, "--output") = "--resume";
-  *std::ranges::find(command, "1") = "max";
-  Process robot(command);
+  Process robot(
+      words_of(record_command(*dataset, "--rate max --resume " + folder.path().string())));
   CHECK(robot.wait() == 0);
   CHECK(fs::file_size(first) == size);
   const Record resumed(second);

@@ -71,10 +71,10 @@ class Trial {
   std::unique_ptr<Process> start(const Walk& walk, const Walk& other, std::uint32_t last,
                                  const std::string& name) const {
     const fs::path graph = write_walk(walk, other, last, folder_.path() / (name + ".g2o"));
-    return std::make_unique<Process>(std::vector<std::string>{
-        std::string(KM_BIN_DIR) + "/kimera_multi_robot", "--robot", std::to_string(walk.robot),
-        "--name", name, "--graph", graph.string(), "--rate", "10", "--output",
-        (folder_.path() / name).string(), "--domain", std::to_string(domain_)});
+    return std::make_unique<Process>(
+        words_of(KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(walk.robot) +
+                 " --name " + name + " --graph " + graph.string() + " --rate 10 --output " +
+                 (folder_.path() / name).string() + " --domain " + std::to_string(domain_)));
   }
   [[nodiscard]] bool is_joint(const std::string& robot) const {
     const RunSummary summary = read_summary(folder_.path() / robot / "summary.json");

@@ -37,23 +37,10 @@ const Part kSecond{"1", "5", "17"};
 
 // As fast as it can: at any other rate images are skipped on a busy machine.
 std::vector<std::string> command_of(const Part& part, const fs::path& dataset, int domain) {
-  return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
-          "--config",
-          "config/datasets/euroc.yaml",
-          "--robot",
-          part.robot,
-          "--dataset",
-          dataset.string(),
-          "--from",
-          part.from_s,
-          "--to",
-          part.to_s,
-          "--rate",
-          "max",
-          "--domain",
-          std::to_string(domain),
-          "--serve-limit",
-          "100"};
+  return words_of(KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot " +
+                  part.robot + " --dataset " + dataset.string() + " --from " + part.from_s +
+                  " --to " + part.to_s + " --rate max --serve-limit 100 --domain " +
+                  std::to_string(domain));
 }
 
 std::vector<std::string> with(std::vector<std::string> command, const std::string& option,
@@ -221,28 +208,30 @@ class SealedTeam {
     const std::uint32_t last = robot == 0 ? kLap : 0;
     const fs::path graph = write_walk(kWalks.at(robot), kWalks.at(1 - robot), last,
                                       folder_.path() / (robot_name(robot) + ".g2o"));
-    return std::make_unique<Process>(std::vector<std::string>{
-        std::string(KM_BIN_DIR) + "/kimera_multi_robot",
-        "--robot",
-        std::to_string(robot),
-        "--name",
-        robot_name(robot),
-        "--security",
-        (keys() / robot_name(robot)).string(),
-        "--graph",
-        graph.string(),
-        "--rate",
-        "max",
-        output_option,
-        output(robot).string(),
-        "--domain",
-        std::to_string(domain_),
-        "--set",
-        "run.settle_s=600",
-        "--set",
-        "pcm.selection=pcm",
-        "--set",
-        "pcm.min_inliers=" + std::to_string(kClosures)});  // all of them, or they are not joined
+    // They are joined by all closures or not at all.
+    return std::make_unique<Process>(
+        words_of(KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(robot) + " --name " +
+                 robot_name(robot) + " --security " + (keys() / robot_name(robot)).string() +
+                 " --graph " + graph.string() + " --rate max " + output_option + ' ' +
+                 output(robot).string() + " --domain " + std::to_string(domain_) +
+                 " --set run.settle_s=600 --set pcm.selection=pcm --set pcm.min_inliers=" +
+                 std::to_string(kClosures)));
+  }
+
+  // Checks that both robots have found these closures, and that the places where they meet are
+  // within `bound_m` of each other. The measurements are exact.
+  void check_meetings(double bound_m) const {
+    std::map<RobotId, G2oGraph> graphs;
+    std::map<KeyframeId, SE3> T_world;
+    for (const RobotId robot : {RobotId{0}, RobotId{1}}) {
+      graphs[robot] = read_g2o(output(robot) / "pose_graph.g2o");
+      for (const G2oVertex& vertex : graphs[robot].vertices) T_world[vertex.id] = vertex.T_world_kf;
+    }
+    const std::set<ClosureId> closures = shared_closures(graphs[0]);
+    CHECK(closures.size() == kClosures);
+    CHECK(closures == shared_closures(graphs[1]));
+    for (const ClosureId& id : closures)
+      CHECK((T_world.at(id.from).translation() - T_world.at(id.to).translation()).norm() < bound_m);
   }
 
   // Waits until it reports that it optimises with the other one.
@@ -312,19 +301,10 @@ TEST_CASE("A robot with keys that is killed and taken up is in its team as befor
     check_grows(team.output(killed) / file);
   }
   CHECK(SealedTeam::interrupt(*survivor) == 0);
-  std::map<RobotId, G2oGraph> graphs;
-  std::map<KeyframeId, SE3> T_world;
-  for (const RobotId robot : {killed, other}) {
+  for (const RobotId robot : {killed, other})
     CHECK(read_summary(team.output(robot) / "summary.json").pgo.members ==
           std::vector<RobotId>{0, 1});
-    graphs[robot] = read_g2o(team.output(robot) / "pose_graph.g2o");
-    for (const G2oVertex& vertex : graphs[robot].vertices) T_world[vertex.id] = vertex.T_world_kf;
-  }
-  CHECK(shared_closures(graphs[0]).size() == SealedTeam::kClosures);
-  CHECK(shared_closures(graphs[0]) == shared_closures(graphs[1]));
-  constexpr double kSame_m = 1e-3;  // measurements are exact
-  for (const ClosureId& id : shared_closures(graphs[0]))
-    CHECK((T_world.at(id.from).translation() - T_world.at(id.to).translation()).norm() < kSame_m);
+  team.check_meetings(1e-3);
 }
 
 // Waits until all keyframes are optimised again.
@@ -356,17 +336,7 @@ TEST_CASE("A robot that is killed and resumed without its team keeps what the te
   REQUIRE(has_optimised(*resumed));
   CHECK(SealedTeam::interrupt(*resumed) == 0);
   CHECK(read_summary(team.output(1) / "summary.json").pgo.anchor == RobotId{0});
-  std::map<RobotId, G2oGraph> graphs;
-  std::map<KeyframeId, SE3> T_world;
-  for (const RobotId robot : {RobotId{0}, RobotId{1}}) {
-    graphs[robot] = read_g2o(team.output(robot) / "pose_graph.g2o");
-    for (const G2oVertex& vertex : graphs[robot].vertices) T_world[vertex.id] = vertex.T_world_kf;
-  }
-  CHECK(shared_closures(graphs[1]).size() == SealedTeam::kClosures);
-  CHECK(shared_closures(graphs[0]) == shared_closures(graphs[1]));
-  constexpr double kSame_m = 0.01;  // the bound of StatedPoses; measurements are exact
-  for (const ClosureId& id : shared_closures(graphs[1]))
-    CHECK((T_world.at(id.from).translation() - T_world.at(id.to).translation()).norm() < kSame_m);
+  team.check_meetings(0.01);  // the bound of StatedPoses
 }
 
 TEST_CASE("A journal with flipped bytes is continued, and a copy is kept", "[system][resume]") {
@@ -402,9 +372,9 @@ TEST_CASE("A robot localises itself in the map of a finished run", "[system][res
   }
   const int domain = random_domain();
   const fs::path silent_output = folder.path() / "silent";
-  Process silent({std::string(KM_BIN_DIR) + "/kimera_multi_robot", "--robot", "0", "--session",
-                  yesterday.string(), "--domain", std::to_string(domain), "--output",
-                  silent_output.string()});
+  Process silent(words_of(KM_BIN_DIR "/kimera_multi_robot --robot 0 --session " +
+                          yesterday.string() + " --domain " + std::to_string(domain) +
+                          " --output " + silent_output.string()));
   Process robot(with(command_of(kSecond, *dataset, domain), "--output", today));
   CHECK(robot.wait() == 0);
   CHECK(silent.wait() == 0);

@@ -29,13 +29,30 @@ namespace {
 namespace fs = std::filesystem;
 
 // A robot without peers: only robots of such tests are on this domain, and they also ignore others.
-CommandResult run_robot(const fs::path& dataset, const fs::path& output,
-                        const std::string& options = "") {
-  return run_command(KM_BIN_DIR
-                     "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0"
-                     " --rate max --serve-limit 0 --interface lo --domain 99 --set dds.team=" +
-                     output.parent_path().filename().string() + " --dataset " + dataset.string() +
-                     " --output " + output.string() + ' ' + options);
+std::string robot_command(const TemporaryFolder& folder, const std::string& options) {
+  return KM_BIN_DIR
+         "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --serve-limit 0"
+         " --interface lo --domain 99 --set dds.team=" +
+         folder.path().filename().string() + ' ' + options;
+}
+
+// `dataset` and `output` are in `folder`.
+CommandResult run_robot(const TemporaryFolder& folder, const std::string& dataset,
+                        const std::string& output, const std::string& options = {},
+                        const std::string& output_option = "--output") {
+  return run_command(robot_command(
+      folder, "--rate max --dataset " + (folder.path() / dataset).string() + ' ' + output_option +
+                  ' ' + (folder.path() / output).string() + ' ' + options));
+}
+
+// The cameras as a run on the recording "late" estimates them.
+CamerasSummary estimated_cameras(const TemporaryFolder& folder, const std::string& output,
+                                 const std::string& options,
+                                 const std::string& output_option = "--output") {
+  const CommandResult run = run_robot(folder, "late", output, options, output_option);
+  CAPTURE(run.output);
+  REQUIRE(run.exit_code == 0);
+  return read_summary(folder.path() / output / "summary.json").cameras.value();
 }
 
 // The first `length_s` of a recording, from its first image on.
@@ -110,7 +127,7 @@ Outcome meet(const Stage& stage, const SensorFault& fault) {
   const Stamp end = begin + nanoseconds(fault.lasts_s);
   fault.corrupt(copy, begin, end);
   copy.write(folder.path() / "recording");
-  const CommandResult run = run_robot(folder.path() / "recording", folder.path() / "results");
+  const CommandResult run = run_robot(folder, "recording", "results");
   Outcome outcome;
   outcome.exit_code = run.exit_code;
   outcome.output = run.output;
@@ -216,29 +233,10 @@ TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") 
   const Stamp first = whole.cameras[0].front().stamp;
   const Stamp silent = first + nanoseconds(5.0), again = first + nanoseconds(7.0);
   const std::string domain = std::to_string(100 + std::random_device()() % 100);
-  Process robot({KM_BIN_DIR "/kimera_multi_robot",
-                 "--config",
-                 "config/datasets/euroc.yaml",
-                 "--robot",
-                 "0",
-                 "--live",
-                 rig.string(),
-                 "--set",
-                 "ros.domain=" + domain,
-                 "--set",
-                 "ros.interface=lo",
-                 "--set",
-                 "sensors.max_lag_s=30",
-                 "--domain",
-                 "99",
-                 "--interface",
-                 "lo",
-                 "--set",
-                 "dds.team=" + folder.path().filename().string(),
-                 "--serve-limit",
-                 "0",
-                 "--output",
-                 (folder.path() / "results").string()});
+  Process robot(words_of(robot_command(
+      folder,
+      "--live " + rig.string() + " --output " + (folder.path() / "results").string() +
+          " --set ros.interface=lo --set sensors.max_lag_s=30 --set ros.domain=" + domain)));
   for (const bool is_first : {true, false}) {
     EurocCopy part = whole;
     const auto is_outside = [&](const auto& item) {
@@ -248,8 +246,8 @@ TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") 
     std::erase_if(part.samples, is_outside);
     const fs::path played = folder.path() / (is_first ? "before" : "after");
     part.write(played);
-    Process driver({KM_BIN_DIR "/kimera_multi_publish", played.string(), "--domain", domain,
-                    "--interface", "lo", "--wait", "1", "--reliable", "--rate", "0.7"});
+    Process driver(words_of(KM_BIN_DIR "/kimera_multi_publish " + played.string() + " --domain " +
+                            domain + " --interface lo --wait 1 --reliable --rate 0.7"));
     CHECK(driver.wait() == 0);
   }
   const auto continues = [](const std::string& line) {  // "10.6 s, 164 images, ..."
@@ -278,15 +276,9 @@ TEST_CASE("The next run starts from the camera calibration that a run has estima
   EurocCopy copy = first_seconds(fs::absolute(*recording), 10.0);
   for (auto& sample : copy.samples) sample.stamp += nanoseconds(kLate_s);
   copy.write(folder.path() / "late");
-  const auto found = [&](const std::string& output, const std::string& options) {
-    const CommandResult run = run_robot(folder.path() / "late", folder.path() / output, options);
-    CAPTURE(run.output);
-    REQUIRE(run.exit_code == 0);
-    return read_summary(folder.path() / output / "summary.json").cameras.value();
-  };
-  const CamerasSummary first = found("first", "");
-  const CamerasSummary second =
-      found("second", "--rig " + (folder.path() / "first/rig_estimated.yaml").string());
+  const CamerasSummary first = estimated_cameras(folder, "first", "");
+  const CamerasSummary second = estimated_cameras(
+      folder, "second", "--rig " + (folder.path() / "first/rig_estimated.yaml").string());
   std::cout << "offset found: " << 1e3 * first.offset_s << " ms, then " << 1e3 * second.offset_s
             << " ms\n";
   CHECK(first.offset_s == Approx(kLate_s).margin(0.003));
@@ -303,24 +295,10 @@ TEST_CASE("The camera calibration that a run has estimated is known when it is r
   EurocCopy copy = first_seconds(fs::absolute(*recording), 11.0);
   for (auto& sample : copy.samples) sample.stamp += nanoseconds(kLate_s);
   copy.write(folder.path() / "late");
-  const auto cameras = [&](const std::string& output, const std::string& options) {
-    const CommandResult run = run_robot(folder.path() / "late", folder.path() / output, options);
-    CAPTURE(run.output);
-    REQUIRE(run.exit_code == 0);
-    return read_summary(folder.path() / output / "summary.json").cameras.value();
-  };
-  const CamerasSummary before = cameras("run", "--to 10");
+  const CamerasSummary before = estimated_cameras(folder, "run", "--to 10");
   const auto resumed = [&](const std::string& as, const std::string& options) {
     fs::copy(folder.path() / "run", folder.path() / as);
-    const CommandResult run = run_command(
-        KM_BIN_DIR
-        "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --rate max"
-        " --serve-limit 0 --interface lo --domain 99 --set dds.team=" +
-        folder.path().filename().string() + " --dataset " + (folder.path() / "late").string() +
-        " --resume " + (folder.path() / as).string() + ' ' + options);
-    CAPTURE(run.output);
-    REQUIRE(run.exit_code == 0);
-    return read_summary(folder.path() / as / "summary.json").cameras.value();
+    return estimated_cameras(folder, as, options, "--resume");
   };
   const CamerasSummary after = resumed("taken_up", "");
   CHECK(after.offset_s == Approx(before.offset_s).margin(1e-3));
@@ -337,11 +315,10 @@ TEST_CASE("A robot without an inertial sensor uses an external odometry", "[faul
   if (!recording) return;
   const TemporaryFolder folder;
   first_seconds(fs::absolute(*recording), 3.0).write(folder.path() / "bare");
-  REQUIRE(run_robot(folder.path() / "bare", folder.path() / "own").exit_code == 0);
+  REQUIRE(run_robot(folder, "bare", "own").exit_code == 0);
   fs::remove_all(folder.path() / "bare/mav0/imu0");
   const std::string poses = (folder.path() / "own/odometry.tum").string();
-  const CommandResult run =
-      run_robot(folder.path() / "bare", folder.path() / "outside", "--odometry " + poses);
+  const CommandResult run = run_robot(folder, "bare", "outside", "--odometry " + poses);
   CAPTURE(run.output);
   CHECK(run.exit_code == 0);
   CHECK(read_trajectory(folder.path() / "outside/odometry.tum").size() ==

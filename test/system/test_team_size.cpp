@@ -91,9 +91,9 @@ Growth measure(int robots) {
   const TemporaryFolder folder;
   const fs::path team = write_team(ring_of(robots), folder);
   const VirtualNetwork network(1);
-  Process run({std::string(KM_BIN_DIR) + "/kimera_multi_team", "--config", team.string(), "--rate",
-               "max", "--output", folder.path().string(), "--domain",
-               std::to_string(random_domain()), "--", "--serve-limit", "1000"},
+  Process run(words_of(KM_BIN_DIR "/kimera_multi_team --config " + team.string() +
+                       " --rate max --output " + folder.path().string() + " --domain " +
+                       std::to_string(random_domain()) + " -- --serve-limit 1000"),
               network.host(1));
   CHECK(run.wait() == 0);
   Growth result{.robots = robots, .wire_bytes = bytes_on_the_wire(network.host(1)) / robots};

@@ -49,19 +49,9 @@ TEST_CASE("Two robots on the halves of a recording localise together", "[system]
 
 std::vector<std::string> robot_command(const std::string& id, const fs::path& dataset,
                                        const fs::path& output, int domain) {
-  return {std::string(KM_BIN_DIR) + "/kimera_multi_robot",
-          "--config",
-          "config/datasets/euroc.yaml",
-          "--robot",
-          id,
-          "--name",
-          "r" + id,
-          "--dataset",
-          dataset.string(),
-          "--output",
-          output.string(),
-          "--domain",
-          std::to_string(domain)};
+  return words_of(KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot " +
+                  id + " --name r" + id + " --dataset " + dataset.string() + " --output " +
+                  output.string() + " --domain " + std::to_string(domain));
 }
 
 // A status line from 4 s of the recording on: the first images are processed, and most are still to

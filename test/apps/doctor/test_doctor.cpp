@@ -11,6 +11,7 @@
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
+#include "test/support/euroc_copy.hpp"
 #include "test/support/network.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
@@ -23,65 +24,47 @@ namespace fs = std::filesystem;
 
 const std::string kDoctor = KM_BIN_DIR "/kimera_multi_doctor";
 
-// The first seconds of MH_01 with files of their own, except for the images, which are links.
-class SmallHall {
- public:
-  explicit SmallHall(const fs::path& recording) : mav0_(folder.path() / "mav0") {
-    const fs::path source = fs::absolute(recording) / "mav0";
-    for (const std::string sensor : {"cam0", "cam1", "imu0"}) {
-      fs::create_directories(mav0_ / sensor);
-      for (const char* file : {"sensor.yaml", "data.csv"})
-        fs::copy_file(source / sensor / file, mav0_ / sensor / file);
-      if (sensor != "imu0")
-        fs::create_directory_symlink(source / sensor / "data", mav0_ / sensor / "data");
-    }
-  }
-  // Runs the doctor on it and returns "id id " in the order of its JSON.
-  [[nodiscard]] std::string ids(int expected_exit_code) const {
-    const CommandResult run =
-        run_command(kDoctor + ' ' + folder.path().string() + " --to 5 --json " +
-                    (folder.path() / "out.json").string());
-    INFO(run.output);
-    CHECK(run.exit_code == expected_exit_code);
-    const Json result = read_json(folder.path() / "out.json");
-    std::string ids;
-    for (const auto& finding : result["findings"]) ids += finding["id"].get<std::string>() + ' ';
-    return ids;
-  }
+// "id id " of the findings, in the order of the doctor's JSON.
+std::string ids_in(const fs::path& json) {
+  const Json result = read_json(json);
+  std::string ids;
+  for (const auto& finding : result["findings"]) ids += finding["id"].get<std::string>() + ' ';
+  return ids;
+}
 
-  TemporaryFolder folder;
-  fs::path mav0_;
-};
+// Runs the doctor on the first seconds of a recording and returns the ids of its findings.
+std::string ids_of(const EurocCopy& recording, int expected_exit_code) {
+  const TemporaryFolder folder;
+  recording.write(folder.path());
+  const fs::path json = folder.path() / "out.json";
+  const CommandResult run =
+      run_command(kDoctor + ' ' + folder.path().string() + " --to 5 --json " + json.string());
+  INFO(run.output);
+  CHECK(run.exit_code == expected_exit_code);
+  return ids_in(json);
+}
 
 }  // namespace
 
 TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") {
   const auto data = shared_data("euroc/MH_01_easy");
   if (!data) return;
-  const SmallHall hall(*data);
+  EurocCopy hall(*data);
+  auto& [left, right] = hall.cameras;
   SECTION("sound") {
-    CHECK(hall.ids(0).empty());
+    CHECK(ids_of(hall, 0).empty());
   }
   SECTION("the cameras' images swapped") {
-    for (const char* file : {"data", "data.csv"}) {
-      fs::rename(hall.mav0_ / "cam0" / file, hall.mav0_ / "moved");
-      fs::rename(hall.mav0_ / "cam1" / file, hall.mav0_ / "cam0" / file);
-      fs::rename(hall.mav0_ / "moved", hall.mav0_ / "cam1" / file);
-    }
-    CHECK(hall.ids(2) == "stereo.swapped ");
+    std::swap(left, right);
+    CHECK(ids_of(hall, 2) == "stereo.swapped ");
   }
   SECTION("every tenth right image missing") {
-    std::ifstream all(hall.mav0_ / "cam1/data.csv");
-    std::string rows, row;
-    for (int k = 0; std::getline(all, row); ++k)
-      if (k % 10 != 5) rows += row + '\n';
-    std::ofstream(hall.mav0_ / "cam1/data.csv") << rows;
-    CHECK(hall.ids(1) == "recording.left_images_without_a_right_one ");
+    std::erase_if(right, [k = 0](const auto& /*image*/) mutable { return k++ % 10 == 4; });
+    CHECK(ids_of(hall, 1) == "recording.left_images_without_a_right_one ");
   }
   SECTION("no right image at all") {
-    fs::remove(hall.mav0_ / "cam1/data");
-    fs::create_directories(hall.mav0_ / "cam1/data");
-    CHECK_THAT(hall.ids(2), Catch::StartsWith("recording."));
+    for (EurocCopy::Image& image : right) image.file = "/nowhere.png";
+    CHECK_THAT(ids_of(hall, 2), Catch::StartsWith("recording."));
   }
 }
 
@@ -136,10 +119,7 @@ TEST_CASE("The doctor listens to the topics of a rig file, and examines their me
                     " --set ros.domain=" + domain + " --json " + out.string());
     INFO(run.output);
     REQUIRE(fs::exists(out));
-    const Json result = read_json(out);
-    std::string found;
-    for (const auto& finding : result["findings"]) found += finding["id"].get<std::string>() + ' ';
-    return found;
+    return ids_in(out);
   };
   CHECK(ids("/left/image_raw") == "live.similar_name ");
   // A busy host loses images, so frames.* and recording.* are allowed.

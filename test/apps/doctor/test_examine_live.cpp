@@ -16,7 +16,7 @@ Finding the_finding(const Examination& result) {
 }  // namespace
 
 TEST_CASE("Live topics that are received are sound", "[doctor]") {
-  const std::vector<TopicPublisher> publishers = {{"/left", kImage, true}, {"/imu", kImu, false}};
+  const std::vector<TopicPublisher> publishers = {{"/left", kImage}, {"/imu", kImu}};
   const auto result =
       examine_topics({{"/left", kImage, 60}, {"/imu", kImu, 600}}, publishers, 3.0, 0);
   CHECK(result.findings.empty());
@@ -30,17 +30,17 @@ TEST_CASE("The reason why a live topic is silent follows from the publishers", "
   const auto why = [&](const std::vector<TopicPublisher>& publishers) {
     return the_finding(examine_topics(wanted, publishers, 3.0, 0));
   };
-  CHECK(why({{"/imu", kImu, false}}).id == "live.silent");
-  CHECK_THAT(why({{"/imu", kImu, false}}).what, Contains("no program publishes it"));
-  CHECK_THAT(why({{"/left", kImage, true}}).what, Contains("although a program publishes it"));
-  CHECK(why({{"/left", "sensor_msgs/msg/CompressedImage", true}}).id == "live.other_type");
-  CHECK(why({{"/cam/left", "sensor_msgs/Image", true}}).id == "live.similar_name");
-  const auto begins_most_alike = why({{"/cam/left", kImage, true}, {"/left/image", kImage, true}});
+  CHECK(why({{"/imu", kImu}}).id == "live.silent");
+  CHECK_THAT(why({{"/imu", kImu}}).what, Contains("no program publishes it"));
+  CHECK_THAT(why({{"/left", kImage}}).what, Contains("although a program publishes it"));
+  CHECK(why({{"/left", "sensor_msgs/msg/CompressedImage"}}).id == "live.other_type");
+  CHECK(why({{"/cam/left", "sensor_msgs/Image"}}).id == "live.similar_name");
+  const auto begins_most_alike = why({{"/cam/left", kImage}, {"/left/image", kImage}});
   CHECK_THAT(begins_most_alike.what, Contains("but /left/image is of that type"));
-  CHECK_THAT(why({{"/cam/left", kImage, true}}).what, Contains("/cam/left is of that type"));
+  CHECK_THAT(why({{"/cam/left", kImage}}).what, Contains("/cam/left is of that type"));
   // A topic that another camera already uses is not proposed.
   const auto result = examine_topics({{"/cam0", kImage, 60}, {"/cam2", kImage, 0}},
-                                     {{"/cam0", kImage, true}, {"/other1", kImage, true}}, 3.0, 0);
+                                     {{"/cam0", kImage}, {"/other1", kImage}}, 3.0, 0);
   CHECK_THAT(the_finding(result).what, Contains("but /other1 is of that type"));
 }
 

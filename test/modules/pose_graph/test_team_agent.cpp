@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/pose_graph/team_message_bytes.hpp"
-#include "test/support/gather_solver.hpp"
+#include "test/support/scripted_solver.hpp"
 #include "test/support/team_network.hpp"
 
 namespace km {
@@ -12,11 +12,11 @@ constexpr double kTolerance = 1e-6;  // relative to the cost
 const std::vector<RobotId> kIds{7, 33, 50, 1200};
 const std::vector<std::pair<RobotId, RobotId>> kRing{{7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
 
-MemberSolverFactory gather(GatherSolver::Options options = {}) {
+MemberSolverFactory gather(ScriptedSolver::Options options = {}) {
   return [options](const Session& session, SessionGraph graph, TreePlace place) {
-    GatherSolver::Options of_session = options;
+    ScriptedSolver::Options of_session = options;
     of_session.max_rounds = session.max_rounds;
-    return std::make_unique<GatherSolver>(std::move(graph), std::move(place), of_session);
+    return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), of_session);
   };
 }
 
@@ -195,7 +195,7 @@ TEST_CASE("decisions on closures are valid for both robots and carry over", "[po
   config.exchange_budget_kb_s = 1e6;
   TeamNetwork network;
   for (const RobotId id : kIds)
-    feed(network.add({id, 1}, config, gather({.largest_residual = 100.0})), id, problem);
+    feed(network.add({id, 1}, config, gather({.rejects = {wrong.id()}})), id, problem);
   REQUIRE(settle(network));
   for (const RobotId id : {RobotId{7}, RobotId{33}}) {
     CAPTURE(id);
@@ -217,8 +217,8 @@ TEST_CASE("a graph that cannot be solved ends the session for all, with a notice
           "[pose_graph][agent]") {
   const bool throws = GENERATE(true, false);
   CAPTURE(throws);
-  const GatherSolver::Options options = throws ? GatherSolver::Options{.fails_in_round = 2}
-                                               : GatherSolver::Options{.gives_up_in_round = 2};
+  const ScriptedSolver::Options options = throws ? ScriptedSolver::Options{.fails_in_round = 2}
+                                                 : ScriptedSolver::Options{.gives_up_in_round = 2};
   const TeamProblem problem = ring(5);
   TeamNetwork network;
   for (const RobotId id : kIds)
@@ -265,8 +265,9 @@ TEST_CASE("the member that has sent most determines the wait for the next sessio
           "[pose_graph][agent]") {
   const std::vector<RobotId> ids{7, 33, 50};
   constexpr double kBudget_kb_s = 5.0;
-  TeamProblem problem =
-      random_team_problem({.robots = ids, .pairs = {{7, 33}, {33, 50}}, .keyframes = 40}, 15);
+  std::vector<std::pair<RobotId, RobotId>> pairs(8, {33, 50});
+  pairs.emplace_back(7, 33);
+  TeamProblem problem = random_team_problem({.robots = ids, .pairs = pairs, .keyframes = 40}, 15);
   PoseGraphConfig config;
   config.exchange_budget_kb_s = kBudget_kb_s;
   config.session_wait_s = 600.0;
@@ -282,14 +283,15 @@ TEST_CASE("the member that has sent most determines the wait for the next sessio
   const double first_s = network.now_s();
   const SessionId first = network.agent(7).part()->session().id;
   std::map<RobotId, double>& sent = sent_in.at(first);
-  // The robot in the middle is the root; the coordinator is a leaf.
-  REQUIRE(sent.at(33) > 3.0 * sent.at(7));
-  const double price_s = sent.at(33) / (1e3 * kBudget_kb_s);
+  // Robot 50 has many closures, the coordinator few.
+  REQUIRE(sent.at(50) > 3.0 * sent.at(7));
+  REQUIRE(sent.at(50) > sent.at(33));
+  const double price_s = sent.at(50) / (1e3 * kBudget_kb_s);
   for (const RobotId id : {RobotId{7}, RobotId{33}})
     (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
   REQUIRE(network.run(600.0, [&] { return network.agent(7).part()->session().id != first; }));
   const double waited_s = network.now_s() - first_s;
-  CAPTURE(sent.at(7), sent.at(33), waited_s);
+  CAPTURE(sent.at(7), sent.at(50), waited_s);
   CHECK(waited_s > 0.9 * price_s);
   CHECK(waited_s < 1.1 * price_s + 2.0);
 }

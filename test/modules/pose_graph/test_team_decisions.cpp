@@ -4,7 +4,7 @@
 #include "modules/pose_graph/tree_newton.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
-#include "test/support/gather_solver.hpp"
+#include "test/support/scripted_solver.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_network.hpp"
 
@@ -286,7 +286,7 @@ TEST_CASE("deferred closures that fit are weighed in up to two more sessions",
   std::map<SessionId, std::set<std::optional<bool>>> sessions;  // decision before each session
   const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
                                           TreePlace place) {
-    GatherSolver::Options options{.barc = 100.0, .deferred = true};
+    ScriptedSolver::Options options{.barc = 100.0, .deferred = true};
     if (place.members.size() == kFour.size()) {
       const auto decided = graph.decided.find(closure->id());
       if (graph.self == 5 || graph.self == 9)
@@ -294,7 +294,7 @@ TEST_CASE("deferred closures that fit are weighed in up to two more sessions",
             decided == graph.decided.end() ? std::nullopt : std::optional(decided->second));
       if (!at_last || sessions.size() <= 1) options.rejects = {closure->id()};
     }
-    return std::make_unique<GatherSolver>(std::move(graph), std::move(place), options);
+    return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
   add_all(network, problem, factory);
@@ -317,12 +317,12 @@ TEST_CASE("decisions made with held poses hold until these robots return",
   });
   REQUIRE(closure != problem.edges.end());
   const MemberSolverFactory factory = [&](const Session&, SessionGraph graph, TreePlace place) {
-    GatherSolver::Options options;
+    ScriptedSolver::Options options;
     const auto decided = graph.decided.find(closure->id());
     const bool known_false = decided != graph.decided.end() && !decided->second;
     if (place.members.size() == 3 || known_false) options.rejects = {closure->id()};
     options.held = held && place.members.size() == 3;
-    return std::make_unique<GatherSolver>(std::move(graph), std::move(place), options);
+    return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
   add_all(network, problem, factory);

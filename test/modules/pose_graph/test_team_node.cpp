@@ -4,6 +4,7 @@
 #include <mutex>
 #include <optional>
 
+#include "modules/core/precision.hpp"
 #include "modules/pose_graph/node/team_node.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/captured_log.hpp"

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/rbcd/solver_choice.hpp"
-#include "test/support/gather_solver.hpp"
+#include "test/support/scripted_solver.hpp"
 #include "test/support/team_network.hpp"
 
 namespace km {
@@ -146,11 +146,11 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
   const TeamProblem problem = team_of_three(3, {8, 9, 30, 31});
   bool rejects = true;
   const MemberSolverFactory factory = [&](const Session&, SessionGraph graph, TreePlace place) {
-    GatherSolver::Options options;
+    ScriptedSolver::Options options;
     if (rejects)
       for (const PoseEdge& e : graph.between)
         if (std::min(e.from.robot, e.to.robot) == 2) options.rejects.insert(e.id());
-    return std::make_unique<GatherSolver>(std::move(graph), std::move(place), options);
+    return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
   add_robots(network, problem, factory);

@@ -5,17 +5,6 @@
 namespace km {
 namespace {
 
-TEST_CASE("Replayed credentials of former starts do not displace the active process of a robot",
-          "[security]") {
-  AdmittedPeers peers;
-  const TeamPeer live{3, 1000};
-  peers.add(live, {});
-  peers.received(live);
-  for (std::uint64_t boot = 1; boot <= 50; ++boot) peers.add({3, boot}, {});
-  CHECK(peers.find(live) != nullptr);
-  CHECK(peers.size() == kMaxAdmittedPerRobot);
-}
-
 TEST_CASE("Among active starts of a robot the one that has been silent for longest is removed",
           "[security]") {
   AdmittedPeers peers;

@@ -55,18 +55,6 @@ TEST_CASE("A robot's folder contains the keys that were made for it", "[security
   CHECK(load_revocations(team.alpha()).number == 0);
 }
 
-TEST_CASE("Robots whose keys are on disk can open each other's messages", "[security]") {
-  const TeamOnDisk team;
-  const RobotIdentity alpha = toy_identity(3, "alpha"), beta = toy_identity(65535, "beta");
-  TeamSeal a(load_robot_keys(team.alpha()), alpha, kToyNow_s);
-  TeamSeal b(load_robot_keys(team.folder.path() / "survey" / "beta"), beta, kToyNow_s);
-  REQUIRE(a.admit(beta, b.credentials(), kToyNow_s) == nullptr);
-  REQUIRE(b.admit(alpha, a.credentials(), kToyNow_s) == nullptr);
-  const SealContext context{
-      .topic = "closures", .sender = {3, alpha.boot}, .addressee = TeamPeer{65535, beta.boot}};
-  CHECK(b.open(context, a.seal(context, toy_content()).value()).content == toy_content());
-}
-
 TEST_CASE("A secret that other users may read is refused", "[security]") {
   const TeamOnDisk team;
   const auto secret = team.alpha() / "secret_key.txt";

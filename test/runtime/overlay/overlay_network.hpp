@@ -45,8 +45,17 @@ inline OverlayKeys overlay_keys(const TeamSeal& seal) {
 /// Robots with links that can be cut and restored. Messages arrive at once or are lost.
 class Network {
  public:
+  using Links = std::vector<std::pair<RobotId, RobotId>>;
+
   explicit Network(RobotId robots, bool has_keys = false) : has_keys_(has_keys) {
     for (RobotId robot = 0; robot < robots; ++robot) start(robot, first_boot(robot));
+  }
+
+  /// Robots that have had these links for a while.
+  Network(RobotId robots, const Links& links) : Network(robots) {
+    link(links);
+    run(10 * kPeriod_s);
+    forget();
   }
 
   static std::uint64_t first_boot(RobotId robot) { return (std::uint64_t{robot} + 1) << 32U; }
@@ -66,11 +75,12 @@ class Network {
       if (a == robot || b == robot) meet(a, b);
     settle();
   }
-  void link(RobotId a, RobotId b) {
-    links_.emplace(a, b);
-    meet(a, b);
+  void link(const Links& links) {
+    links_.insert(links.begin(), links.end());
+    for (const auto& [a, b] : links) meet(a, b);
     settle();
   }
+  void link(RobotId a, RobotId b) { link({{a, b}}); }
   void cut(RobotId a, RobotId b) {
     links_.erase({a, b});
     at(a).lost(b, now_s_);
@@ -96,13 +106,34 @@ class Network {
                                             .number = index,
                                             .content = octets(9000)}));
   }
-  void run(double seconds) {
-    for (const double end_s = now_s_ + seconds; now_s_ < end_s; now_s_ += kPeriod_s) {
+  void publish(RobotId robot, OverlayStream stream, std::size_t size = 1) {
+    at(robot).publish(stream, octets(size), now_s_);
+    settle();
+  }
+  /// False if there is no way to the addressee.
+  bool call(RobotId robot, OverlayStream stream, RobotId to) {
+    const bool is_sent = at(robot).call(stream, to, 0, octets(3));
+    settle();
+    return is_sent;
+  }
+  /// Lets time pass without summaries.
+  void wait(double seconds) {
+    now_s_ += seconds;
+    settle();
+  }
+  void run(double seconds, double period_s = kPeriod_s) {
+    for (const double end_s = now_s_ + seconds; now_s_ < end_s;) {
+      now_s_ += period_s;
       for (auto& [robot, overlay] : overlays_)
         for (auto& [other, to] : overlays_)
           if (linked(robot, other)) to.update(robot, overlay.summary(), now_s_);
       settle();
     }
+  }
+  /// Discards the messages so far.
+  void forget() {
+    read_.clear();
+    packets_ = 0;
   }
   // Messages of one stream that a robot received to read, in order.
   [[nodiscard]] std::vector<std::uint32_t> read(RobotId robot, OverlayStream stream) {

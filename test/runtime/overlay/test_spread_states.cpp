@@ -1,5 +1,4 @@
 #include <catch2/catch.hpp>
-#include <deque>
 #include <map>
 #include <memory>
 #include <set>
@@ -14,92 +13,26 @@ namespace km {
 namespace {
 
 constexpr OverlayStream kPoses = OverlayStream::kMemberPoses;
-using Pairs = std::vector<std::pair<RobotId, RobotId>>;
+using Links = Network::Links;
 
-RobotIdentity robot(RobotId id, std::uint64_t boot = 1) {
-  return {.robot = id, .name = name_of(id), .boot = boot};
+RobotIdentity robot(RobotId id) {
+  return {.robot = id, .name = name_of(id), .boot = 1};
 }
 
-// Overlays whose messages arrive at once; the class records the messages that are new to a robot.
-// Own links and summaries do not count as sent.
-struct Overlays {
-  std::map<RobotId, Overlay> of = {};
-  std::set<std::pair<RobotId, RobotId>> links = {};
-  std::map<RobotId, std::vector<OverlayMessagePtr>> read = {};
-  std::map<RobotId, int> sent = {};
-  bool losing = false;
-  double now_s = 0.0;
+// All pairs of robots 1 to `count`.
+Network::Links full_mesh(RobotId count) {
+  Network::Links links;
+  for (RobotId a = 1; a <= count; ++a)
+    for (RobotId b = 1; b < a; ++b) links.emplace_back(a, b);
+  return links;
+}
 
-  explicit Overlays(const Pairs& pairs) {
-    for (const auto& [a, b] : pairs) up(a, b);
-    run(10);
-    forget();
-  }
-  Overlay& at(RobotId id) { return of.try_emplace(id, TeamPeer{id, 1}).first->second; }
-  void up(RobotId a, RobotId b) {
-    links.insert({{a, b}, {b, a}});
-    at(a).connected(robot(b), now_s);
-    at(b).connected(robot(a), now_s);
-  }
-  void down(RobotId a, RobotId b) {
-    links.erase({a, b});
-    links.erase({b, a});
-    at(a).lost(b, now_s);
-    at(b).lost(a, now_s);
-  }
-  // Periods of a summary of every robot.
-  void run(int periods, double period_s = kPeriod_s) {
-    for (int k = 0; k < periods; ++k) {
-      now_s += period_s;
-      for (auto& [id, overlay] : of) overlay.step(now_s);
-      carry();
-      for (const auto& [a, b] : std::set(links)) at(b).update(a, at(a).summary(), now_s);
-      carry();
-    }
-  }
-  void carry() {
-    std::deque<std::pair<RobotId, OverlayPacket>> on_the_way;
-    const auto collect = [&] {
-      for (auto& [id, overlay] : of) {
-        OverlayOutput output = overlay.take_output();
-        for (OverlayPacket& packet : output.packets) {
-          const bool is_link = packet.message->stream == OverlayStream::kLinks && packet.is_own;
-          sent[id] += is_link ? 0 : 1;
-          on_the_way.emplace_back(id, std::move(packet));
-        }
-        for (OverlayMessagePtr& message : output.delivered) read[id].push_back(std::move(message));
-      }
-    };
-    for (collect(); !on_the_way.empty(); collect()) {
-      const auto [from, packet] = on_the_way.front();
-      on_the_way.pop_front();
-      if (!links.contains({from, packet.neighbour}) || losing) continue;
-      (void)at(packet.neighbour).receive(robot(from), packet.message, now_s);
-    }
-  }
-  void publish(RobotId id, std::uint8_t content = 7) {
-    at(id).publish(kPoses, {content}, now_s);
-    carry();
-  }
-  bool call(RobotId from, RobotId to) {
-    const bool sends = at(from).call(OverlayStream::kSolver, to, 0, {1, 2, 3});
-    carry();
-    return sends;
-  }
-  void forget() {
-    read.clear();
-    sent.clear();
-  }
-  std::size_t poses_read(RobotId id) {
-    return static_cast<std::size_t>(std::ranges::count_if(
-        read[id], [](const auto& message) { return message->stream == kPoses; }));
-  }
-  int total_sent() {
-    int total = 0;
-    for (const auto& [id, count] : sent) total += count;
-    return total;
-  }
-};
+// Robots 1 to `count` in a line.
+Network::Links line(RobotId count) {
+  Network::Links links;
+  for (RobotId id = 1; id < count; ++id) links.emplace_back(id, static_cast<RobotId>(id + 1));
+  return links;
+}
 
 OverlayArrival receive(Overlay& overlay, const RobotIdentity& from, OverlayMessage message) {
   return overlay.receive(from, std::make_shared<const OverlayMessage>(std::move(message)), 0.0);
@@ -112,125 +45,119 @@ OverlayMessage introduction(TeamPeer origin) {
 }  // namespace
 
 TEST_CASE("all robots receive each state once, over any links", "[overlay]") {
-  const Pairs pairs = GENERATE(Pairs{{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6}},
-                               Pairs{{1, 6}, {2, 6}, {3, 6}, {4, 6}, {5, 6}},
-                               Pairs{{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6}, {1, 6}},
-                               Pairs{{1, 2}, {1, 3}, {2, 3}, {3, 4}, {4, 5}, {4, 6}, {5, 6}});
-  Overlays overlays(pairs);
-  for (const RobotId id : {RobotId{1}, RobotId{3}, RobotId{6}}) overlays.publish(id);
-  for (const auto& [id, overlay] : overlays.of) {
+  const Links links = GENERATE(line(6), Links{{1, 6}, {2, 6}, {3, 6}, {4, 6}, {5, 6}},
+                               Links{{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6}, {1, 6}},
+                               Links{{1, 2}, {1, 3}, {2, 3}, {3, 4}, {4, 5}, {4, 6}, {5, 6}});
+  Network network(7, links);
+  for (const RobotId id : {RobotId{1}, RobotId{3}, RobotId{6}}) network.publish(id, kPoses);
+  for (RobotId id = 1; id <= 6; ++id) {
     CAPTURE(id);
     const std::size_t own = id == 1 || id == 3 || id == 6 ? 1 : 0;
-    CHECK(overlays.poses_read(id) == 3 - own);
+    CHECK(network.read(id, kPoses).size() == 3 - own);
   }
 }
 
 TEST_CASE("nothing is forwarded if all robots receive each other", "[overlay]") {
-  Pairs pairs;
-  for (RobotId a = 1; a <= 6; ++a)
-    for (RobotId b = 1; b < a; ++b) pairs.emplace_back(a, b);
-  Overlays overlays(pairs);
-  overlays.publish(2);
-  CHECK(overlays.total_sent() == 5);
-  for (const RobotId id : std::vector<RobotId>{1, 3, 4, 5, 6}) CHECK(overlays.poses_read(id) == 1);
-  overlays.forget();
-  overlays.run(100);
-  CHECK(overlays.total_sent() == 0);
+  Network network(7, full_mesh(6));
+  network.publish(2, kPoses);
+  CHECK(network.packets() == 5);
+  for (const RobotId id : std::vector<RobotId>{1, 3, 4, 5, 6})
+    CHECK(network.read(id, kPoses).size() == 1);
+  network.forget();
+  network.run(50.0);
+  CHECK(network.packets() == 0);
 }
 
 TEST_CASE("a full team whose robots all appear at once forwards nothing", "[overlay]") {
-  Overlays overlays({});
-  for (RobotId a = 1; a <= kMaxTeam; ++a)
-    for (RobotId b = 1; b < a; ++b) overlays.up(a, b);
-  overlays.run(10);
-  CHECK(overlays.total_sent() == 0);
-  overlays.publish(2);
-  CHECK(overlays.total_sent() == static_cast<int>(kMaxTeam) - 1);
+  Network network(kMaxTeam + 1);
+  network.link(full_mesh(kMaxTeam));
+  network.run(5.0);
+  CHECK(network.packets() == 0);
+  network.publish(2, kPoses);
+  CHECK(network.packets() == kMaxTeam - 1);
 }
 
 TEST_CASE("the states of a full team reach all robots of a line", "[overlay]") {
-  Overlays overlays({});
-  for (RobotId id = 1; id < kMaxTeam; ++id) overlays.up(id, static_cast<RobotId>(id + 1));
-  overlays.run(200);
-  overlays.forget();
-  overlays.publish(1);
-  CHECK(overlays.poses_read(kMaxTeam) == 1);
-  CHECK(overlays.total_sent() == static_cast<int>(kMaxTeam) - 1);
+  Network network(kMaxTeam + 1);
+  network.link(line(kMaxTeam));
+  network.run(100.0);
+  network.forget();
+  network.publish(1, kPoses);
+  CHECK(network.read(kMaxTeam, kPoses).size() == 1);
+  CHECK(network.packets() == kMaxTeam - 1);
 }
 
 TEST_CASE("in a line of robots, each state passes each link once", "[overlay]") {
-  Overlays overlays({{1, 2}, {2, 3}, {3, 4}, {4, 5}});
-  overlays.publish(3);
-  CHECK(overlays.total_sent() == 4);
+  Network network(6, line(5));
+  network.publish(3, kPoses);
+  CHECK(network.packets() == 4);
 }
 
 TEST_CASE("a robot with a new link receives all present states", "[overlay]") {
-  Overlays overlays({{1, 2}, {2, 3}});
-  overlays.publish(1);
-  overlays.publish(3);
-  overlays.up(3, 4);
-  overlays.run(1);
-  CHECK(overlays.poses_read(4) == 2);
+  Network network(5, line(3));
+  network.publish(1, kPoses);
+  network.publish(3, kPoses);
+  network.link(3, 4);
+  network.run(kPeriod_s);
+  CHECK(network.read(4, kPoses).size() == 2);
 }
 
 TEST_CASE("in a line of robots that have just met, a state waits once and not at each link",
           "[overlay]") {
-  Overlays overlays({});
-  for (RobotId id = 1; id < 6; ++id) overlays.up(id, static_cast<RobotId>(id + 1));
-  overlays.publish(1);
-  overlays.run(1, 0.5 * SpreadStates::kMeeting_s);
-  CHECK(overlays.poses_read(2) == 1);
-  CHECK(overlays.poses_read(3) == 0);
-  overlays.run(1, 0.6 * SpreadStates::kMeeting_s);
-  CHECK(overlays.poses_read(6) == 1);
+  Network network(7);
+  network.link(line(6));
+  network.publish(1, kPoses);
+  network.wait(0.5 * SpreadStates::kMeeting_s);
+  CHECK(network.read(2, kPoses).size() == 1);
+  CHECK(network.read(3, kPoses).empty());
+  network.wait(0.6 * SpreadStates::kMeeting_s);
+  CHECK(network.read(6, kPoses).size() == 1);
 }
 
 TEST_CASE("a robot that meets all others in a tenth of a second is not introduced", "[overlay]") {
-  Pairs pairs;
-  for (RobotId a = 1; a <= 5; ++a)
-    for (RobotId b = 1; b < a; ++b) pairs.emplace_back(a, b);
-  Overlays overlays(pairs);
+  Network network(10, full_mesh(5));
   for (RobotId id = 1; id <= 5; ++id) {
-    overlays.up(id, 9);
-    overlays.run(1, 0.02);
+    network.link(id, 9);
+    network.run(0.02, 0.02);
   }
-  overlays.run(20);
-  CHECK(overlays.total_sent() == 0);
+  network.run(10.0);
+  CHECK(network.packets() == 0);
 }
 
 TEST_CASE("a lost state is sent again when the hashes show its loss", "[overlay]") {
-  Overlays overlays({{1, 2}, {2, 3}, {3, 4}});
-  overlays.losing = true;
-  overlays.publish(1);
-  overlays.losing = false;
-  overlays.forget();
-  overlays.run(24);
-  CHECK(overlays.poses_read(2) == 1);
-  CHECK(overlays.poses_read(4) == 1);
-  CHECK(overlays.at(1).summary().states == overlays.at(4).summary().states);
-  overlays.forget();
-  overlays.run(10);
-  CHECK(overlays.total_sent() == 0);
+  Network network(5, line(4));
+  network.lose(1.0);
+  network.publish(1, kPoses);
+  network.lose(0.0);
+  network.forget();
+  network.run(12.0);
+  CHECK(network.read(2, kPoses).size() == 1);
+  CHECK(network.read(4, kPoses).size() == 1);
+  CHECK(network.at(1).summary().states == network.at(4).summary().states);
+  network.forget();
+  network.run(5.0);
+  CHECK(network.packets() == 0);
 }
 
 TEST_CASE("calls take the shortest path, and another one after an outage", "[overlay]") {
-  Overlays overlays({{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 1}});
-  CHECK(overlays.call(1, 3));
-  CHECK(overlays.read[3].size() == 1);
-  CHECK(overlays.sent[2] == 1);
-  overlays.down(1, 2);  // no other robot knows it yet
-  overlays.forget();
-  CHECK(overlays.call(1, 3));
-  CHECK(overlays.read[3].size() == 1);
-  CHECK(overlays.sent[5] == 1);
-  overlays.down(1, 5);
-  CHECK_FALSE(overlays.call(1, 3));
+  Network network(6, {{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 1}});
+  const auto hops_to_3 = [&] {
+    network.forget();
+    REQUIRE(network.call(1, OverlayStream::kSolver, 3));
+    REQUIRE(network.read(3, OverlayStream::kSolver).size() == 1);
+    return network.all_read(3).front()->hops;
+  };
+  CHECK(hops_to_3() == 1);
+  network.cut(1, 2);
+  CHECK(hops_to_3() == 2);
+  network.cut(5, 1);
+  CHECK_FALSE(network.call(1, OverlayStream::kSolver, 3));
 }
 
 TEST_CASE("the lowest robot id decides between several shortest paths", "[overlay]") {
-  Overlays overlays({{1, 8}, {1, 3}, {8, 2}, {3, 2}});
-  const KnownRobots& of_1 = overlays.at(1).robots();
-  const KnownRobots& of_2 = overlays.at(2).robots();
+  Network network(9, {{1, 8}, {1, 3}, {8, 2}, {3, 2}});
+  const KnownRobots& of_1 = network.at(1).robots();
+  const KnownRobots& of_2 = network.at(2).robots();
   CHECK(of_1.next_hop(2) == RobotId{3});
   CHECK(of_2.next_hop(1) == RobotId{3});
   CHECK(of_2.next_hop(1, RobotId{3}) == RobotId{8});
@@ -280,13 +207,13 @@ TEST_CASE("invented robots take no more memory than a full team", "[overlay]") {
 }
 
 TEST_CASE("states that one robot sends do not use the memory for those of others", "[overlay]") {
-  Overlays team({{1, 2}, {1, 3}});
+  Network team(4, {{1, 2}, {1, 3}});
   Overlay& overlay = team.at(1);
   constexpr std::size_t kLarge = SpreadStates::kMaxHeldFromOne / 3;
   const auto arrives = [&](RobotId from, RobotId origin, std::uint32_t number, std::size_t size) {
-    (void)receive(overlay, robot(from), introduction({origin, 1}));
+    (void)receive(overlay, team.identity(from), introduction({origin, 1}));
     return receive(
-        overlay, robot(from),
+        overlay, team.identity(from),
         {.stream = kPoses, .origin = {origin, 1}, .number = number, .content = octets(size)});
   };
   CHECK(arrives(2, 100, 1, kLarge) == OverlayArrival::kNew);
@@ -300,41 +227,43 @@ TEST_CASE("states that one robot sends do not use the memory for those of others
 }
 
 TEST_CASE("a link that returns at once counts as uninterrupted", "[overlay]") {
-  Overlays overlays({{1, 2}, {2, 3}});
-  Overlay& overlay = overlays.at(2);
+  Network network(4, line(3));
+  const Overlay& overlay = network.at(2);
   const auto version = overlay.robots().links_version();
-  overlays.down(2, 3);
-  overlays.now_s += 2.0;
-  overlay.step(overlays.now_s);
+  network.cut(2, 3);
+  network.wait(2.0);
   CHECK(overlay.robots().own_links().size() == 2);
-  overlays.up(2, 3);
-  overlays.now_s += 2.0;
-  overlay.step(overlays.now_s);
+  network.link(2, 3);
+  network.wait(2.0);
   CHECK(overlay.robots().links_version() == version);
-  overlays.down(2, 3);
-  overlays.now_s += KnownRobots::kLinkPatience_s;
-  overlay.step(overlays.now_s);
-  CHECK(overlay.robots().own_links() == std::vector<TeamPeer>{{1, 1}});
+  network.cut(2, 3);
+  network.wait(KnownRobots::kLinkPatience_s);
+  CHECK(overlay.robots().own_links() == std::vector<TeamPeer>{{1, Network::first_boot(1)}});
   CHECK(overlay.robots().links().component(2) == std::set<RobotId>{1, 2});
 }
 
 TEST_CASE("after a restart of a robot only the new process counts", "[overlay]") {
-  constexpr std::uint64_t kNext = std::uint64_t{1} << 32U;
-  Overlays overlays({{1, 2}, {2, 3}});
-  const OverlayMessage old{.stream = kPoses, .origin = {3, 1}, .number = 1000, .content = {7}};
+  constexpr std::uint64_t kNext = std::uint64_t{99} << 32U;
+  Network network(4, line(3));
+  const RobotIdentity former = network.identity(3), two_itself = network.identity(2);
+  RobotIdentity next = former;
+  next.boot = kNext;
+  const OverlayMessage old{
+      .stream = kPoses, .origin = {3, former.boot}, .number = 1000, .content = {7}};
   const OverlayMessage fresh{.stream = kPoses, .origin = {3, kNext}, .number = 1, .content = {7}};
-  Overlay &one = overlays.at(1), &two = overlays.at(2);
+  Overlay &one = network.at(1), &two = network.at(2);
   // No robot receives it directly yet.
-  CHECK(receive(one, robot(2), introduction({3, kNext})) == OverlayArrival::kRefused);
+  CHECK(receive(one, two_itself, introduction({3, kNext})) == OverlayArrival::kRefused);
   two.lost(3, 0.0);
-  two.connected(robot(3, kNext), 0.0);
-  overlays.run(1);
-  CHECK(receive(two, robot(3), old) == OverlayArrival::kRefused);
-  CHECK(receive(two, robot(3, kNext), fresh) == OverlayArrival::kNew);
-  overlays.carry();  // robot 2 introduces the new process and forwards its state
+  two.connected(next, 0.0);
+  network.wait(0.0);  // robot 2 reports the link
+  network.run(kPeriod_s);
+  CHECK(receive(two, next, old) == OverlayArrival::kRefused);
+  CHECK(receive(two, next, fresh) == OverlayArrival::kNew);
+  network.wait(0.0);  // robot 2 introduces the new process and forwards its state
   CHECK(one.robots().process(3) == TeamPeer{3, kNext});
-  CHECK(overlays.poses_read(1) == 1);
-  CHECK(receive(one, robot(2), old) == OverlayArrival::kRefused);
+  CHECK(network.read(1, kPoses).size() == 1);
+  CHECK(receive(one, two_itself, old) == OverlayArrival::kRefused);
 }
 
 TEST_CASE("states in a team with keys are signed only for robots out of reach", "[overlay]") {
