@@ -46,7 +46,7 @@ RunFacts facts_in(const fs::path& folder, std::vector<Finding>& findings) {
       .summary = read_summary(folder / kSummary), .closures = {}, .names = {}, .pcm = {}};
   try {
     facts.closures = tallies_in(folder, facts.summary.robot);
-  } catch (const ClosureFileError& error) {
+  } catch (const InputFileError& error) {
     findings.push_back(missing("loop_closures", error.what()));
   }
   try {

@@ -1,7 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -19,23 +18,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Part of a recording [s since its first stereo pair].
-struct RecordingWindow {
-  double from_s = 0.0;
-  double to_s = std::numeric_limits<double>::infinity();
-};
-
 struct ImagesCommand {
   std::filesystem::path dataset;  // EuRoC/ASL folder.
   std::filesystem::path compare;  // Folder of a second recording; empty: no comparison.
-  RecordingWindow window;
-  // Window of the second recording; default: `window`.
-  std::optional<double> compare_from_s;
-  std::optional<double> compare_to_s;
-  // Further window in which the camera stands still; absent: none. It applies to the second
-  // recording only if that has no window of its own.
-  std::optional<double> still_from_s;
-  std::optional<double> still_to_s;
+  EurocOptions part;              // Part of the recording.
+  // Part of the second recording; default: `part`.
+  std::optional<double> compare_from_s, compare_to_s;
+  // Further part in which the camera stands still; absent: none. It applies to the second recording
+  // only if that has no part of its own.
+  std::optional<double> still_from_s, still_to_s;
   ImageStatisticsOptions options;
   std::filesystem::path json;  // Not written if empty.
 };
@@ -50,21 +41,24 @@ void for_each_pair(EurocReader& reader, const std::string& what, const Use& use)
   }
 }
 
-EurocOptions options_of(const RecordingWindow& window) {
-  EurocOptions options;
-  options.from_s = window.from_s;
-  options.to_s = window.to_s;
-  return options;
+// The part of a recording between the two [s since its first stereo pair]; nullopt without either.
+std::optional<EurocOptions> part_of(const std::optional<double>& from_s,
+                                    const std::optional<double>& to_s) {
+  if (!from_s && !to_s) return std::nullopt;
+  EurocOptions part;
+  part.from_s = from_s.value_or(part.from_s);
+  part.to_s = to_s.value_or(part.to_s);
+  return part;
 }
 
-std::vector<ImageFigure> figures_of(const fs::path& dataset, const RecordingWindow& window,
-                                    const std::optional<RecordingWindow>& still,
+std::vector<ImageFigure> figures_of(const fs::path& dataset, const EurocOptions& part,
+                                    const std::optional<EurocOptions>& still,
                                     const ImageStatisticsOptions& options) {
-  EurocReader reader = open_euroc(dataset, options_of(window));
+  EurocReader reader = open_euroc(dataset, part);
   ImageStatistics statistics(reader.rig().stereo, options);
   for_each_pair(reader, dataset.string(), [&](const StereoFrame& frame) { statistics.add(frame); });
   if (still) {
-    EurocReader rest = open_euroc(dataset, options_of(*still));
+    EurocReader rest = open_euroc(dataset, *still);
     for_each_pair(rest, dataset.string() + ", standing still",
                   [&](const StereoFrame& frame) { statistics.add_still(frame); });
   }
@@ -73,43 +67,19 @@ std::vector<ImageFigure> figures_of(const fs::path& dataset, const RecordingWind
   return statistics.figures();
 }
 
-std::optional<RecordingWindow> still_window(const ImagesCommand& command) {
-  if (!command.still_from_s && !command.still_to_s) return std::nullopt;
-  RecordingWindow window;
-  window.from_s = command.still_from_s.value_or(window.from_s);
-  window.to_s = command.still_to_s.value_or(window.to_s);
-  return window;
-}
-
-bool has_own_window(const ImagesCommand& command) {
-  return command.compare_from_s || command.compare_to_s;
-}
-
-RecordingWindow window_of_other(const ImagesCommand& command) {
-  if (!has_own_window(command)) return command.window;
-  RecordingWindow window;
-  window.from_s = command.compare_from_s.value_or(window.from_s);
-  window.to_s = command.compare_to_s.value_or(window.to_s);
-  return window;
-}
-
-std::vector<ImageFigure> figures_of_other(const ImagesCommand& command) {
-  const auto still = has_own_window(command) ? std::nullopt : still_window(command);
-  return figures_of(command.compare, window_of_other(command), still, command.options);
-}
-
 void run(const ImagesCommand& command) {
   check_output_folder(command.json);
+  const auto still = part_of(command.still_from_s, command.still_to_s);
+  const auto own = part_of(command.compare_from_s, command.compare_to_s);
+  const EurocOptions& other_part = own ? *own : command.part;
   // Opened only to report its errors now, instead of minutes later after the first recording.
-  if (!command.compare.empty())
-    static_cast<void>(open_euroc(command.compare, options_of(window_of_other(command))));
-  const auto figures =
-      figures_of(command.dataset, command.window, still_window(command), command.options);
+  if (!command.compare.empty()) static_cast<void>(open_euroc(command.compare, other_part));
+  const auto figures = figures_of(command.dataset, command.part, still, command.options);
   std::vector<ImageFigure> other;
   if (command.compare.empty()) {
     std::cout << to_table(figures);
   } else {
-    other = figures_of_other(command);
+    other = figures_of(command.compare, other_part, own ? std::nullopt : still, command.options);
     std::cout << to_comparison(figures, other, command.dataset.string(), command.compare.string());
   }
   write_output(command.json, [&](std::ostream& out) {
@@ -125,9 +95,7 @@ void run(const ImagesCommand& command) {
 
 constexpr const char* kImagesDetails =
     "Statistics of the images of a recording: corners, how long they can be tracked, how well "
-    "they\nare found in the other camera, gradients, grey levels, exposure, blur and "
-    "noise\n\nTracking depends on motion most of all: compare two recordings by the rows \"flow "
-    "A-B px\",\n"
+    "they\nare found in the other camera, gradients, grey levels, exposure, blur and noise\n\n"
     "Tracking depends on motion most of all: compare two recordings by the rows \"flow A-B px\",\n"
     "frames of like median flow. Rows that differ by more than 25 % are marked. Noise over time\n"
     "needs the camera to stand still for a second; --still-from and --still-to state when.\n\n"
@@ -138,10 +106,9 @@ constexpr const char* kImagesDetails =
 void define(CLI::App& app, ImagesCommand& command) {
   app.add_option("--dataset", command.dataset, "EuRoC/ASL folder with stereo images")->required();
   app.add_option("--compare", command.compare, "Another one: its figures beside, and the ratios");
-  app.add_option("--from", command.window.from_s,
-                 "Look from here on [s since the first stereo pair]")
+  app.add_option("--from", command.part.from_s, "Look from here on [s since the first stereo pair]")
       ->capture_default_str();
-  app.add_option("--to", command.window.to_s, "Look up to here [s]; default: the end");
+  app.add_option("--to", command.part.to_s, "Look up to here [s]; default: the end");
   app.add_option("--compare-from", command.compare_from_s,
                  "Look at the other from here on [s]; default: the window of --from and --to");
   app.add_option("--compare-to", command.compare_to_s,

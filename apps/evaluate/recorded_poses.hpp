@@ -28,8 +28,7 @@ struct RecordTopic {
 
 /// Poses in order of time, from a topic of a record, from the only trajectory of a record, or as
 /// read_trajectory() reads them. The last nav_msgs/Path counts; nav_msgs/Odometry and
-/// geometry_msgs/PoseStamped give one pose each. Throws InputFileError and TrajectoryFileError, in
-/// one line.
+/// geometry_msgs/PoseStamped give one pose each. Throws InputFileError.
 [[nodiscard]] std::vector<StampedPose> read_estimate(const std::filesystem::path& input);
 
 }  // namespace km

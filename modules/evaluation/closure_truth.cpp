@@ -9,9 +9,9 @@
 
 #include "modules/core/config.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/association.hpp"
+#include "modules/evaluation/input_row.hpp"
 
 namespace km {
 namespace {
@@ -20,10 +20,11 @@ constexpr int kGridColumns = 8;
 constexpr int kGridRows = 6;
 constexpr double kMaxDepthRatio = 2.0;
 
-using Pair = std::pair<KeyframeId, KeyframeId>;  // the smaller first
-
-Pair pair_of(const KeyframeId& a, const KeyframeId& b) {
-  return a < b ? Pair{a, b} : Pair{b, a};
+// Number of keyframes in the pairs.
+std::size_t frames_in(const std::set<ClosureId>& pairs) {
+  std::set<KeyframeId> frames;
+  for (const auto& [from, to] : pairs) frames.insert({from, to});
+  return frames.size();
 }
 
 double share(std::size_t part, std::size_t whole) {
@@ -91,12 +92,12 @@ class Places {
   }
 
   // Pairs of keyframes of two robots that see the same place.
-  std::set<Pair> true_pairs() const {
-    std::set<Pair> pairs;
+  std::set<ClosureId> true_pairs() const {
+    std::set<ClosureId> pairs;
     for (auto a = keyframes_.begin(); a != keyframes_.end(); ++a)
       for (auto b = std::next(a); b != keyframes_.end(); ++b)
         if (a->first.robot != b->first.robot && see_the_same(*a->second, *b->second))
-          pairs.insert({a->first, b->first});
+          pairs.insert(closure_id(a->first, b->first));
     return pairs;
   }
 
@@ -114,13 +115,13 @@ class Places {
 // Counts for a StageScore.
 class StageCounter {
  public:
-  explicit StageCounter(const std::set<Pair>& true_pairs) : true_pairs_(true_pairs) {}
+  explicit StageCounter(const std::set<ClosureId>& true_pairs) : true_pairs_(true_pairs) {}
 
   void count(const ClosureId& id, bool is_true) {
     ++score_.judged;
     if (!is_true) return;
     ++score_.correct;
-    const Pair pair = pair_of(id.from, id.to);
+    const ClosureId pair = closure_id(id.from, id.to);
     if (true_pairs_.contains(pair)) found_.insert(pair);
   }
 
@@ -130,19 +131,17 @@ class StageCounter {
   }
 
   StageScore score() && {
-    std::set<KeyframeId> frames;
-    for (const auto& [a, b] : found_) frames.insert({a, b});
     score_.pairs_found = found_.size();
-    score_.frames_found = frames.size();
+    score_.frames_found = frames_in(found_);
     score_.translation_error_m = statistics_of(std::move(translations_m_));
     score_.rotation_error_deg = statistics_of(std::move(rotations_deg_));
     return score_;
   }
 
  private:
-  const std::set<Pair>& true_pairs_;
+  const std::set<ClosureId>& true_pairs_;
   StageScore score_;
-  std::set<Pair> found_;
+  std::set<ClosureId> found_;
   std::vector<double> translations_m_, rotations_deg_;
 };
 
@@ -169,7 +168,7 @@ ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
                              const ClosureTruthOptions& options) {
   check(options);
   const Places places(keyframes, camera, options);
-  const std::set<Pair> true_pairs = places.true_pairs();
+  const std::set<ClosureId> true_pairs = places.true_pairs();
   StageCounter candidates(true_pairs), verified(true_pairs), inliers(true_pairs);
   ClosureScores scores;
   for (const ClosureRecord& closure : closures) {
@@ -197,10 +196,8 @@ ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
       stage->add_error(error_m, error_deg);
     }
   }
-  std::set<KeyframeId> frames;
-  for (const auto& [a, b] : true_pairs) frames.insert({a, b});
   scores.true_pairs = true_pairs.size();
-  scores.true_frames = frames.size();
+  scores.true_frames = frames_in(true_pairs);
   scores.candidates = std::move(candidates).score();
   scores.verified = std::move(verified).score();
   scores.inliers = std::move(inliers).score();
@@ -213,11 +210,9 @@ namespace fs = std::filesystem;
 
 constexpr double kMaxTruthGap_s = 0.1;  // longest interpolated gap, as for trajectories
 constexpr double kMaxTruthDifference_s = 0.01;
-constexpr double kMaxClosureNormError = 0.01;  // norm of a quaternion
 constexpr std::size_t kPoseColumn = 8;
 // Largest stamp for which differences of stamps cannot overflow.
 constexpr Stamp kMaxKeyframeStamp = std::numeric_limits<Stamp>::max() / 2;
-constexpr double kMaxNumber = 1e9;  // larger than any number in a run's results
 
 constexpr std::array<std::pair<const char*, ClosureStage>, 5> kStages = {
     {{"candidate", ClosureStage::kCandidate},
@@ -226,125 +221,81 @@ constexpr std::array<std::pair<const char*, ClosureStage>, 5> kStages = {
      {"verified", ClosureStage::kVerified},
      {"inlier", ClosureStage::kInlier}}};
 
-std::string content_of(const fs::path& file) {
-  try {
-    return read_input_file(file);
-  } catch (const InputFileError& error) {
-    throw ClosureFileError(error.what());
-  }
+KeyframeId keyframe_of(const InputRow& row, std::size_t i) {
+  return {
+      static_cast<RobotId>(row.integer(i, std::numeric_limits<RobotId>::max())),
+      static_cast<std::uint32_t>(row.integer(i + 1, std::numeric_limits<std::uint32_t>::max()))};
 }
 
-std::string quoted(std::string_view text) {
-  std::string result(1, '\'');
-  return result.append(text).append(1, '\'');
+double depth_of(const InputRow& row, std::size_t i) {
+  const double depth_m = row.number(i);
+  if (std::abs(depth_m) > kMaxInput_m)
+    row.fail("a depth of " + shortest_text(depth_m) + " m is beyond " + shortest_text(kMaxInput_m));
+  return depth_m;
 }
 
-// The fields of one row, by number.
-class Fields {
- public:
-  Fields(const std::string& file, const TextRow& row, std::size_t expected)
-      : file_(file), row_(row) {
-    if (row.fields.size() < expected)
-      fail(std::to_string(row.fields.size()) + " fields, expected " + std::to_string(expected));
-  }
+// Text of field `i` and all fields after it, joined by commas, without quotes. The last field may
+// contain commas.
+std::string rest_of(const InputRow& row, std::size_t i) {
+  std::string all;
+  for (; i < row.size(); ++i) all.append(all.empty() ? "" : ", ").append(row.text(i));
+  std::erase(all, '"');
+  return all;
+}
 
-  [[noreturn]] void fail(const std::string& why) const {
-    throw ClosureFileError(file_ + " line " + std::to_string(row_.line) + ": " + readable(why));
-  }
-
-  [[nodiscard]] std::string_view text(std::size_t i) const { return row_.fields[i]; }
-
-  // Text of field `i` and all fields after it, joined by commas, without quotes. The last field may
-  // contain commas.
-  [[nodiscard]] std::string rest(std::size_t i) const {
-    std::string all;
-    for (; i < row_.fields.size(); ++i) all.append(all.empty() ? "" : ", ").append(row_.fields[i]);
-    std::erase(all, '"');
-    return all;
-  }
-
-  [[nodiscard]] double number(std::size_t i) const {
-    const auto value = parse_double(text(i));
-    if (!value || !(std::abs(*value) <= kMaxNumber))
-      fail(quoted(text(i)) + " is not a number up to " + shortest_text(kMaxNumber));
-    return *value;
-  }
-
-  [[nodiscard]] std::int64_t integer(std::size_t i, std::int64_t max) const {
-    const auto value = parse_int64(text(i));
-    if (!value || *value < 0 || *value > max)
-      fail(quoted(text(i)) + " is not a number from 0 to " + std::to_string(max));
-    return *value;
-  }
-
-  [[nodiscard]] KeyframeId keyframe(std::size_t i) const {
-    return {static_cast<RobotId>(integer(i, std::numeric_limits<RobotId>::max())),
-            static_cast<std::uint32_t>(integer(i + 1, std::numeric_limits<std::uint32_t>::max()))};
-  }
-
-  [[nodiscard]] SE3 pose(std::size_t i) const {
-    const Eigen::Vector3d t(number(i), number(i + 1), number(i + 2));
-    const Eigen::Quaterniond q(number(i + 6), number(i + 3), number(i + 4), number(i + 5));
-    if (std::abs(q.norm() - 1.0) > kMaxClosureNormError) fail("a quaternion is not of unit length");
-    return make_pose(q.normalized().toRotationMatrix(), t);
-  }
-
- private:
-  const std::string& file_;
-  const TextRow& row_;
-};
-
-// Calls use(fields) for every row below the header.
-template <typename Use>
+// Calls use(row) for every row below the header.
 void for_each_row(std::string_view text, const std::string& file, std::size_t expected,
-                  const Use& use) {
+                  const auto& use) {
   bool header = true;
-  for (const TextRow& row : split_rows(text)) {
-    if (!std::exchange(header, false)) use(Fields(file, row, expected));
+  for (const TextRow& fields : split_rows(text)) {
+    if (std::exchange(header, false)) continue;
+    const InputRow row(file, fields);
+    if (row.size() < expected)
+      row.fail(std::to_string(row.size()) + " fields, expected " + std::to_string(expected));
+    use(row);
   }
 }
 
-ClosureStage stage_of(const Fields& fields, std::size_t i) {
+ClosureStage stage_of(const InputRow& row, std::size_t i) {
   for (const auto& [name, stage] : kStages)
-    if (fields.text(i) == name) return stage;
-  fields.fail(quoted(fields.text(i)) + " is no stage of a closure");
+    if (row.text(i) == name) return stage;
+  row.fail(std::string(row.text(i)) + " is no stage of a closure");
 }
 
 }  // namespace
 
 std::vector<KeyframeRecord> parse_keyframes(std::string_view text, const std::string& name) {
   std::vector<KeyframeRecord> keyframes;
-  for_each_row(text, name, 4, [&](const Fields& fields) {
-    keyframes.push_back(
-        {fields.keyframe(0), fields.integer(2, kMaxKeyframeStamp), fields.number(3)});
+  for_each_row(text, name, 4, [&](const InputRow& row) {
+    keyframes.push_back({keyframe_of(row, 0), row.integer(2, kMaxKeyframeStamp), depth_of(row, 3)});
   });
   return keyframes;
 }
 
 std::vector<ClosureRecord> parse_closures(std::string_view text, const std::string& name) {
   std::vector<ClosureRecord> closures;
-  for_each_row(text, name, kPoseColumn + 7, [&](const Fields& fields) {
+  for_each_row(text, name, kPoseColumn + 7, [&](const InputRow& row) {
     ClosureRecord closure;
-    closure.id = {fields.keyframe(0), fields.keyframe(2)};
-    closure.stage = stage_of(fields, 5);
-    closure.matches = static_cast<int>(fields.integer(6, std::numeric_limits<int>::max()));
-    closure.inliers = static_cast<int>(fields.integer(7, std::numeric_limits<int>::max()));
-    closure.reason = fields.rest(kPoseColumn + 7);
-    if (!fields.text(kPoseColumn).empty())
-      closure.T_from_to = fields.pose(kPoseColumn);
+    closure.id = {keyframe_of(row, 0), keyframe_of(row, 2)};
+    closure.stage = stage_of(row, 5);
+    closure.matches = static_cast<int>(row.integer(6, std::numeric_limits<int>::max()));
+    closure.inliers = static_cast<int>(row.integer(7, std::numeric_limits<int>::max()));
+    closure.reason = rest_of(row, kPoseColumn + 7);
+    if (!row.text(kPoseColumn).empty())
+      closure.T_from_to = row.pose(kPoseColumn, false);
     else if (closure.stage >= ClosureStage::kVerified)
-      fields.fail("a verified closure without a pose");
+      row.fail("a verified closure without a pose");
     closures.push_back(std::move(closure));
   });
   return closures;
 }
 
 std::vector<KeyframeRecord> read_keyframes(const fs::path& file) {
-  return parse_keyframes(content_of(file), file.string());
+  return parse_keyframes(read_input_file(file), file.string());
 }
 
 std::vector<ClosureRecord> read_closures(const fs::path& file) {
-  return parse_closures(content_of(file), file.string());
+  return parse_closures(read_input_file(file), file.string());
 }
 
 std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,

@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -108,11 +107,6 @@ struct ClosureScores {
                                            const Camera& camera,
                                            const ClosureTruthOptions& options = {});
 
-/// A file with a robot's closures that cannot be used. what() is one line with file and line.
-struct ClosureFileError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
 /// A keyframe as recorded by its robot.
 struct KeyframeRecord {
   KeyframeId id;
@@ -121,12 +115,12 @@ struct KeyframeRecord {
 };
 
 /// Reads a robot's keyframes.csv: `robot, keyframe, stamp [ns], median depth [m]` below a header.
-/// Throws ClosureFileError.
+/// Throws InputFileError.
 [[nodiscard]] std::vector<KeyframeRecord> read_keyframes(const std::filesystem::path& file);
 
 /// Reads a robot's loop_closures.csv: `from_robot, from_keyframe, to_robot, to_keyframe,
 /// similarity, stage, matches, inliers, tx, ty, tz, qx, qy, qz, qw, reason` below a header. The
-/// pose [m] is empty if there is none, and the reason may be empty. Throws ClosureFileError, also
+/// pose [m] is empty if there is none, and the reason may be empty. Throws InputFileError, also
 /// for a verified closure without a pose.
 [[nodiscard]] std::vector<ClosureRecord> read_closures(const std::filesystem::path& file);
 

@@ -2,18 +2,12 @@
 
 #include <filesystem>
 #include <optional>
-#include <stdexcept>
 #include <string_view>
 #include <vector>
 
 #include "modules/core/stamped_pose.hpp"
 
 namespace km {
-
-/// A trajectory file that cannot be used. what() is one line with file and line.
-struct TrajectoryFileError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 /// The trajectory file at `place`: the file itself, or data.csv (EuRoC) or groundtruth_tum.txt in a
 /// folder. nullopt if there is none.
@@ -25,7 +19,7 @@ struct TrajectoryFileError : std::runtime_error {
 /// ...` has commas, TUM's `t[s] px py pz qx qy qz qw` has blanks. Comments and one header row are
 /// skipped. Published truths contain rows with equal stamps, of which the first counts.
 ///
-/// Throws TrajectoryFileError for a file that is missing or empty, and for a row with one of these
+/// Throws InputFileError for a file that is missing or empty, and for a row with one of these
 /// faults:
 /// - too few fields, or a field that is not a finite number;
 /// - a quaternion whose norm errs by more than 1 %;
@@ -40,7 +34,7 @@ struct UncertainTrajectory {
 };
 
 /// A TUM file as read_trajectory() reads it, whose rows also have the 36 numbers of
-/// geometry_msgs/PoseWithCovariance. Throws TrajectoryFileError also for a row without them.
+/// geometry_msgs/PoseWithCovariance. Throws InputFileError also for a row without them.
 [[nodiscard]] UncertainTrajectory read_uncertain_trajectory(const std::filesystem::path& file);
 
 /// Parses the text of a file; `name` replaces the file name in messages.

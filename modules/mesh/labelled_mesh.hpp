@@ -30,11 +30,35 @@ struct LabelledMesh {
   /// Appends `other`. An array that only one of the two meshes has is filled with zeros.
   void append(const LabelledMesh& other);
 
+  /// Removes all vertices except for `kept`, which are ascending indices. Precondition: the faces
+  /// have only vertices of `kept`.
+  void keep_vertices(const std::vector<std::uint32_t>& kept);
+
   /// Moves every vertex: p_a = T_a_b * p_b.
   void transform(const SE3& T_a_b);
 
   /// Colours every vertex by its label's class; labels outside the palette become black.
   void colour_by(const LabelPalette& palette);
 };
+
+/// Appends `from` to `to`, two arrays with an element per vertex of two meshes. `to_size` and
+/// `from_size` are the numbers of vertices. If only one of the arrays is empty, zeros replace it.
+template <typename T>
+void append_elements(std::vector<T>& to, std::size_t to_size, const std::vector<T>& from,
+                     std::size_t from_size) {
+  if (to.empty() && from.empty()) return;
+  to.resize(to_size);
+  to.insert(to.end(), from.begin(), from.end());
+  to.resize(to_size + from_size);
+}
+
+/// Removes all elements of an array except for `kept`, which are ascending indices. An empty array
+/// stays empty.
+template <typename T>
+void keep_elements(std::vector<T>& values, const std::vector<std::uint32_t>& kept) {
+  if (values.empty()) return;
+  for (std::size_t i = 0; i < kept.size(); ++i) values[i] = values[kept[i]];
+  values.resize(kept.size());
+}
 
 }  // namespace km

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
 #include <string>
 
 #include "modules/mesh/ply_file.hpp"
@@ -32,7 +33,7 @@ void write_mesh(const std::filesystem::path& file, const LabelledMesh& mesh) {
   if (format != nullptr) return format->write(file, mesh);
   std::string known;
   for (const MeshFormat& each : kFormats) known.append(" ").append(each.extension);
-  throw MeshFileError(file.string() + ": the extension is none of" + known);
+  throw std::invalid_argument(file.string() + ": the extension is none of" + known);
 }
 
 }  // namespace km

@@ -12,7 +12,6 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "modules/core/config.hpp"
@@ -343,21 +342,17 @@ LabelledMesh read_ply(const std::filesystem::path& file) {
   const std::string problem = problem_of_file(file);
   std::ifstream stream(file, std::ios::binary);
   if (!stream || !problem.empty())
-    throw MeshFileError(file.string() + ": cannot be opened" +
-                        (problem.empty() ? "" : ": " + problem));
+    throw InputFileError(file.string() + ": cannot be opened" +
+                         (problem.empty() ? "" : ": " + problem));
   try {
     return read(stream);
   } catch (const std::runtime_error& error) {
-    throw MeshFileError(file.string() + ": " + readable(error.what()));
+    throw InputFileError(file.string() + ": " + readable(error.what()));
   }
 }
 
 void write_ply(const std::filesystem::path& file, const LabelledMesh& mesh) {
-  try {
-    write_file(file, encode(mesh));
-  } catch (const std::system_error& error) {
-    throw MeshFileError(error.what());
-  }
+  write_file(file, encode(mesh));
 }
 
 }  // namespace km

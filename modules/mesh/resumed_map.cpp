@@ -8,44 +8,18 @@
 namespace km {
 namespace {
 
-// Appends one array of vertex properties to another. A missing part becomes zeros, as in
-// LabelledMesh.
-template <typename T>
-void append(std::vector<T>& to, std::size_t before, const std::vector<T>& other, std::size_t now) {
-  if (to.empty() && other.empty()) return;
-  to.resize(before);
-  to.insert(to.end(), other.begin(), other.end());
-  to.resize(before + now);
-}
-
-template <typename T>
-void keep(std::vector<T>& array, const std::vector<std::uint32_t>& kept) {
-  if (array.empty()) return;
-  std::vector<T> result;
-  result.reserve(kept.size());
-  for (const std::uint32_t place : kept) result.push_back(array[place]);
-  array = std::move(result);
-}
-
 // Removes the vertices that no face has.
 void drop_unused(MapMesh& map) {
-  std::vector<std::uint32_t> place(map.mesh.vertices.size(), 0);
+  std::vector<bool> used(map.mesh.vertices.size(), false);
   for (const LabelledMesh::Face& face : map.mesh.faces)
-    for (const std::uint32_t vertex : face) place[vertex] = 1;
+    for (const std::uint32_t vertex : face) used[vertex] = true;
   std::vector<std::uint32_t> kept;
-  for (std::uint32_t vertex = 0; vertex < place.size(); ++vertex) {
-    if (place[vertex] == 0) continue;
-    place[vertex] = static_cast<std::uint32_t>(kept.size());
-    kept.push_back(vertex);
-  }
-  keep(map.mesh.vertices, kept);
-  keep(map.mesh.labels, kept);
-  keep(map.mesh.colors, kept);
-  keep(map.seen_by, kept);
-  keep(map.ids, kept);
-  keep(map.certainty, kept);
-  for (LabelledMesh::Face& face : map.mesh.faces)
-    for (std::uint32_t& vertex : face) vertex = place[vertex];
+  for (std::uint32_t vertex = 0; vertex < used.size(); ++vertex)
+    if (used[vertex]) kept.push_back(vertex);
+  map.mesh.keep_vertices(kept);
+  keep_elements(map.seen_by, kept);
+  keep_elements(map.ids, kept);
+  keep_elements(map.certainty, kept);
 }
 
 }  // namespace
@@ -60,8 +34,8 @@ MapMesh ResumedMap::with(const MapMesh& now) const {
   MapMesh both = before_;
   const std::size_t first = both.mesh.vertices.size(), added = now.mesh.vertices.size();
   both.mesh.append(now.mesh);
-  append(both.seen_by, first, now.seen_by, added);
-  append(both.certainty, first, now.certainty, added);
+  append_elements(both.seen_by, first, now.seen_by, added);
+  append_elements(both.certainty, first, now.certainty, added);
   for (const std::uint64_t id : now.ids) both.ids.push_back(next_id_ + id);
   if (now.voxel_m > 0.0) both.voxel_m = now.voxel_m;
   return both;

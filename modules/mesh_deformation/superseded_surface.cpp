@@ -178,13 +178,6 @@ class ReplacementSearch {
   std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;
 };
 
-template <typename T>
-void keep(std::vector<T>& values, const std::vector<std::uint32_t>& kept) {
-  if (values.empty()) return;
-  for (std::size_t i = 0; i < kept.size(); ++i) values[i] = values[kept[i]];
-  values.resize(kept.size());
-}
-
 }  // namespace
 
 std::vector<std::uint32_t> find_replacements(const LabelledMesh& mesh, const SurfaceViews& views,
@@ -196,19 +189,13 @@ LabelledMesh without_superseded(const LabelledMesh& mesh,
                                 std::span<const std::uint32_t> replacements) {
   LabelledMesh result = mesh;
   std::erase_if(result.faces, [&](const auto& face) { return is_superseded(face, replacements); });
-  std::vector<std::uint32_t> index(mesh.vertices.size(), kNoIndex), kept;
+  std::vector<bool> used(mesh.vertices.size(), false);
   for (const auto& face : result.faces)
-    for (const std::uint32_t v : face) index[v] = 0;
-  for (std::uint32_t v = 0; v < index.size(); ++v) {
-    if (index[v] == kNoIndex && replacements[v] != kNoIndex) continue;
-    index[v] = static_cast<std::uint32_t>(kept.size());
-    kept.push_back(v);
-  }
-  for (auto& face : result.faces)
-    for (std::uint32_t& v : face) v = index[v];
-  keep(result.vertices, kept);
-  keep(result.labels, kept);
-  keep(result.colors, kept);
+    for (const std::uint32_t v : face) used[v] = true;
+  std::vector<std::uint32_t> kept;
+  for (std::uint32_t v = 0; v < used.size(); ++v)
+    if (used[v] || replacements[v] == kNoIndex) kept.push_back(v);
+  result.keep_vertices(kept);
   return result;
 }
 

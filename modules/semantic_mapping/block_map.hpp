@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -66,9 +67,8 @@ struct VoxelBlock {
   bool changed = false;             ///< Changed since the block was last meshed.
 };
 
-/// The blocks of a map, hashed by their position (open addressing, linear probing). References to
-/// blocks stay valid until they are erased. The order of blocks() depends only on the sequence of
-/// calls.
+/// The blocks of a map, hashed by their position. References to blocks stay valid until they are
+/// erased. The order of blocks() depends only on the sequence of calls.
 class BlockMap {
  public:
   /// Positions are representable from -kReach to kReach - 1 along every axis.
@@ -77,8 +77,6 @@ class BlockMap {
   [[nodiscard]] static bool in_reach(const Eigen::Vector3i& position) {
     return (position.array() >= -kReach).all() && (position.array() < kReach).all();
   }
-
-  BlockMap();
 
   /// The block at `position`, or nullptr.
   [[nodiscard]] VoxelBlock* find(const Eigen::Vector3i& position) {
@@ -96,20 +94,12 @@ class BlockMap {
   [[nodiscard]] const std::vector<std::unique_ptr<VoxelBlock>>& blocks() const { return blocks_; }
 
  private:
-  struct Slot {
-    std::uint64_t key = kFree;
-    std::uint32_t block = 0;  // index in blocks_
+  struct PositionHash {
+    std::size_t operator()(const Eigen::Vector3i& position) const noexcept;
   };
-  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
-
-  [[nodiscard]] static std::uint64_t key_of(const Eigen::Vector3i& position);
-  [[nodiscard]] std::size_t home_of(std::uint64_t key) const;
-  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const;  // slot of `key`, or the free slot
-                                                               // for it
-  void grow();
 
   std::vector<std::unique_ptr<VoxelBlock>> blocks_;
-  std::vector<Slot> slots_;  // hash table: size a power of two, at most half full
+  std::unordered_map<Eigen::Vector3i, std::size_t, PositionHash> index_;  // index in blocks_
 };
 
 }  // namespace km

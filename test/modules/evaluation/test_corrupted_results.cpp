@@ -2,6 +2,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "modules/core/input_file.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/evaluation/closure_truth.hpp"
@@ -33,7 +34,7 @@ std::string euroc() {
 TEST_CASE("A corrupted trajectory is refused with its line or has finite errors", "[evaluation]") {
   const std::string good = GENERATE(tum(), euroc());
   const auto truth = parse_trajectory(tum(), "truth");
-  check_corrupted<TrajectoryFileError>(good, "corrupted.tum", [&](const std::string& text) {
+  check_corrupted<InputFileError>(good, "corrupted.tum", [&](const std::string& text) {
     const auto poses = parse_trajectory(text, "corrupted.tum");
     for (std::size_t i = 0; i < poses.size(); ++i) {
       CHECK(poses[i].T.matrix().allFinite());
@@ -59,7 +60,7 @@ TEST_CASE("A pose beyond the earth is refused with line and value", "[evaluation
 TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluation]") {
   const TemporaryFolder folder;
   SECTION("keyframes.csv") {
-    check_corrupted<ClosureFileError>(
+    check_corrupted<InputFileError>(
         "robot,index,stamp_ns,scene_depth_m\n0,0,1403636580838555392,2.5\n0,1,1403636581838555392,"
         "3\n"
         "0,2,1403636582838555392,0\n",
@@ -69,7 +70,7 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
         });
   }
   SECTION("loop_closures.csv") {
-    check_corrupted<ClosureFileError>(
+    check_corrupted<InputFileError>(
         "robot_a,index_a,robot_b,index_b,similarity,stage,matches,inliers,x,y,z,qx,qy,qz,qw,"
         "reason\n"
         "0,1,1,7,0.5,inlier,40,30,1.5,2.5,3.5,0,0,0.6,0.8,\n"
@@ -96,9 +97,8 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
 }
 
 TEST_CASE("A path that is no file of results is refused by name", "[evaluation]") {
-  check_no_files<TrajectoryFileError>(".tum",
-                                      [](const auto& place) { (void)read_trajectory(place); });
-  check_no_files<ClosureFileError>(".csv", [](const auto& place) { (void)read_keyframes(place); });
+  check_no_files<InputFileError>(".tum", [](const auto& place) { (void)read_trajectory(place); });
+  check_no_files<InputFileError>(".csv", [](const auto& place) { (void)read_keyframes(place); });
   check_no_files<std::runtime_error>(".json", [](const auto& place) { (void)read_json(place); });
 }
 

@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 
+#include "modules/core/input_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "test/support/corrupted_input.hpp"
 
@@ -31,7 +32,7 @@ std::string binary() {
 
 TEST_CASE("A corrupted PLY file is refused by name or is a mesh of finite numbers") {
   const TemporaryFolder folder;
-  check_corrupted<MeshFileError>(
+  check_corrupted<InputFileError>(
       GENERATE(values<std::string>({kAscii, binary()})), "corrupted.ply",
       [&](const std::string& bytes) {
         const LabelledMesh mesh = read_ply(folder.write("corrupted.ply", bytes));
@@ -52,7 +53,7 @@ TEST_CASE("A vertex beyond the range of float is refused") {
 }
 
 TEST_CASE("A path that is no mesh file is refused by name") {
-  check_no_files<MeshFileError>(".ply", [](const auto& place) { (void)read_ply(place); });
+  check_no_files<InputFileError>(".ply", [](const auto& place) { (void)read_ply(place); });
 }
 
 }  // namespace km
