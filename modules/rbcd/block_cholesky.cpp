@@ -26,7 +26,12 @@ bool is_panel(const Factor& L, int first) {
 
 }  // namespace
 
-BlockCholesky::BlockCholesky(const Eigen::SimplicialLLT<Factor>& llt) : P_(llt.permutationP()) {
+BlockCholesky::BlockCholesky(const Eigen::SparseMatrix<double>& A) {
+  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt(A);
+  if (llt.info() != Eigen::Success)
+    throw std::runtime_error("BlockCholesky: matrix of " + std::to_string(A.rows()) +
+                             " rows is not positive definite");
+  P_ = llt.permutationP();
   const Factor L = llt.matrixL();
   const int* begin = L.outerIndexPtr();
   values_.reserve(static_cast<std::size_t>(L.nonZeros()));
@@ -82,19 +87,6 @@ void BlockCholesky::backward(const Panel& panel, Eigen::MatrixXd& B) const {
     sum.col(k) /= *diagonal;
   }
   X = sum;
-}
-
-BlockCholesky::BlockCholesky(const Eigen::SparseMatrix<double>& A) {
-  auto factor = try_factorise(A);
-  if (!factor)
-    throw std::runtime_error("BlockCholesky: matrix of " + std::to_string(A.rows()) +
-                             " rows is not positive definite");
-  *this = std::move(*factor);
-}
-
-std::optional<BlockCholesky> BlockCholesky::try_factorise(const Eigen::SparseMatrix<double>& A) {
-  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt(A);
-  return llt.info() == Eigen::Success ? std::optional(BlockCholesky(llt)) : std::nullopt;
 }
 
 Eigen::MatrixXd BlockCholesky::solve_rows(const Eigen::MatrixXd& B) const {

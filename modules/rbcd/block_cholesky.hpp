@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/SparseCholesky>
-#include <optional>
 #include <vector>
 
 namespace km {
@@ -16,10 +15,6 @@ class BlockCholesky {
   /// positive definite.
   explicit BlockCholesky(const Eigen::SparseMatrix<double>& A);
 
-  /// nullopt if `A` is not positive definite.
-  [[nodiscard]] static std::optional<BlockCholesky> try_factorise(
-      const Eigen::SparseMatrix<double>& A);
-
   /// B A^-1 for B of r rows: each row is one right-hand side.
   [[nodiscard]] Eigen::MatrixXd solve_rows(const Eigen::MatrixXd& B) const;
 
@@ -33,8 +28,6 @@ class BlockCholesky {
     std::size_t below = 0;    // number of rows below
     std::size_t entries = 0;  // place in values_: the triangle by columns, then the rest by rows
   };
-
-  explicit BlockCholesky(const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>& llt);
 
   template <int kRank, int kCols>
   void forward(const Panel& panel, Eigen::MatrixXd& B) const;

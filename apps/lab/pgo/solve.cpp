@@ -26,24 +26,22 @@ constexpr const char* kSolveDetails =
     "results of a team and for JRL files they are those of the robots:\n"
     "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
     "A vertical in a g2o file (EDGE_SE3_PRIOR with information on the tilt alone, as\n"
-    "kimera_multi_robot writes it) adds |R_i up_i - z|^2 / sigma_i^2. dgs and rbcd-asynchronous\n"
-    "do not support verticals. Other priors are refused.\n"
+    "kimera_multi_robot writes it) adds |R_i up_i - z|^2 / sigma_i^2. dgs does not support\n"
+    "verticals. Other priors are refused.\n"
     "\n"
     "Methods:\n"
-    "  local             every robot alone; their frames joined by one closure each\n"
-    "  dgs               two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)\n"
-    "  rbcd              Riemannian block-coordinate descent (Tian et al., TRO 2021) as robots "
+    "  local        every robot alone; their frames joined by one closure each\n"
+    "  dgs          two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)\n"
+    "  rbcd         Riemannian block-coordinate descent (Tian et al., TRO 2021) as robots "
     "run\n"
-    "                    it: in a round all robots update, in turn, over-relaxed unless\n"
-    "                    --over-relaxation is 1; ends when the cost hardly decreases any more\n"
-    "  rbcd-asynchronous all robots at once, on poses up to --max-delay rounds old; the cost\n"
-    "                    still descends\n"
-    "  centralized       the whole graph on one computer: Newton, certified; otherwise the\n"
-    "                    staircase of SE-Sync\n"
-    "  newton            default of the robots: Newton steps of the whole team up and down a tree\n"
-    "                    of robots. It estimates how noisy closures are and rejects false ones\n"
-    "                    (graduated non-convexity: weights and a step, in turn). It ends with the\n"
-    "                    optimum of the closures that it keeps. --trust-all keeps all closures\n"
+    "               it: in a round all robots update, in turn, over-relaxed unless\n"
+    "               --over-relaxation is 1; ends when the cost hardly decreases any more\n"
+    "  centralized  the whole graph on one computer: Newton, certified; otherwise the\n"
+    "               staircase of SE-Sync\n"
+    "  newton       default of the robots: Newton steps of the whole team up and down a tree\n"
+    "               of robots. It estimates how noisy closures are and rejects false ones\n"
+    "               (graduated non-convexity: weights and a step, in turn). It ends with the\n"
+    "               optimum of the closures that it keeps. --trust-all keeps all closures\n"
     "newton starts from odometry. newton --trust-all and the other methods start from the chordal\n"
     "initialisation of the whole graph, whose time is shown separately (local: of each robot's\n"
     "own graph).\n"
@@ -93,19 +91,14 @@ struct Takers {
 };
 
 std::vector<Takers> takers() {
-  const std::vector<std::string> lifted{"rbcd", "rbcd-asynchronous"};
   const std::vector<std::string> newton{"newton", "newton --trust-all"};
-  std::vector<std::string> judged = lifted;
-  judged.insert(judged.end(), {"local", "dgs", "centralized", "newton --trust-all"});
-  return {{"--rank", lifted},
+  const std::vector<std::string> judged{"rbcd", "local", "dgs", "centralized",
+                                        "newton --trust-all"};
+  return {{"--rank", {"rbcd"}},
           {"--gradient", judged},
           {"--optimum", judged},
           {"--plot", judged},
-          {"--over-relaxation", lifted},
-          {"--verify", {"rbcd"}},
-          {"--max-delay", {"rbcd-asynchronous"}},
-          {"--loss", {"rbcd-asynchronous"}},
-          {"--seed", {"rbcd-asynchronous"}},
+          {"--over-relaxation", {"rbcd"}},
           {"--barc", {"newton"}},
           {"--reject-odometry", {"newton"}},
           {"--share-private", newton},
@@ -122,8 +115,10 @@ void define_method(CLI::App& app, SolveCommand& command) {
   app.add_option("--gradient", solver.run.gradient_tolerance,
                  "Stop once the norm of the Riemannian gradient is at most this")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--rank", solver.rank, "rbcd, rbcd-asynchronous: rank of the relaxation")
-      ->check(CLI::Range(3, 10));
+  app.add_option("--rank", solver.rank, "rbcd: rank of the relaxation")->check(CLI::Range(3, 10));
+  app.add_option("--over-relaxation", solver.over_relaxation,
+                 "rbcd: largest step of a robot, relative to that to the minimum of its block")
+      ->check(CLI::Range(1.0, 1.99));
   app.add_option_function<std::string>(
          "--links",
          [&solver](const std::string& shape) {
@@ -137,24 +132,6 @@ void define_method(CLI::App& app, SolveCommand& command) {
       ->check(CLI::Range(1, 10000));
   app.add_option("--optimum", command.optimum, "The optimum, if known, so that it is not computed")
       ->check(CLI::PositiveNumber);
-}
-
-void define_descent(CLI::App& app, SolveCommand& command) {
-  SolverOptions& solver = command.solver;
-  app.option_defaults()->group("Block descent");
-  app.add_option("--over-relaxation", solver.over_relaxation,
-                 "Largest step of a robot, relative to that to the minimum of its block")
-      ->check(CLI::Range(1.0, 1.99));
-  app.add_flag("--verify", solver.verify,
-               "rbcd: the team verifies its result itself by a search for a direction of descent");
-  app.add_option(
-         "--max-delay", solver.max_delay,
-         "rbcd-asynchronous: largest random delay of messages [rounds]; a robot with older\n"
-         "poses of a neighbour waits")
-      ->check(CLI::Range(0, 1000));
-  app.add_option("--loss", solver.loss, "rbcd-asynchronous: probability that a message is lost")
-      ->check(CLI::Range(0.0, 0.99));
-  app.add_option("--seed", solver.seed, "rbcd-asynchronous: seed of delays and losses");
 }
 
 void define_newton(CLI::App& app, SolveCommand& command) {
@@ -250,7 +227,6 @@ void add_solve(CLI::App& parent) {
   const auto command = std::make_shared<SolveCommand>();
   command->input.define(app);
   define_method(app, *command);
-  define_descent(app, *command);
   define_newton(app, *command);
   app.option_defaults()->group("Output");
   command->files.define(app, "every round",

@@ -63,16 +63,6 @@ std::string table(const Solution& solution) {
   return align_columns(rows);
 }
 
-std::string verification_text(const TeamVerification& verification) {
-  const std::string verdict = verification.negative    ? "found a direction that leads down"
-                              : verification.converged ? "found no direction that leads down"
-                                                       : "came to no end";
-  return "the team's own verification " + verdict + " (" + std::to_string(verification.rounds) +
-         " rounds, " + work_bytes(verification.work) + ", critical " +
-         fixed(verification.work.critical_path_s, 3) + " s, least curvature beyond the kernel " +
-         rounded(verification.lambda_min, 3) + ")\n";
-}
-
 std::string certificate_text(const Certificate& certificate) {
   std::string text = certificate.certified ? "certified" : "not certified";
   text += ": proven that the cost lies above that of any poses by at most " +
@@ -91,7 +81,6 @@ std::string comparison_text(const Solution& solution) {
        << rounded(comparison.optimum, 9) << ", rounded cost " << rounded(comparison.rounded_cost, 9)
        << ", rank " << comparison.rank << '\n'
        << certificate_text(comparison.certificate);
-  if (solution.run.verification) text << verification_text(*solution.run.verification);
   return text.str();
 }
 

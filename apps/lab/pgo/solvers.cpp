@@ -5,7 +5,6 @@
 #include <memory>
 #include <stdexcept>
 
-#include "apps/lab/pgo_study/asynchronous_team.hpp"
 #include "apps/lab/pgo_study/central_solver.hpp"
 #include "apps/lab/pgo_study/central_team.hpp"
 #include "apps/lab/pgo_study/gauss_seidel_team.hpp"
@@ -51,13 +50,6 @@ std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<
   if (method == "local") return std::make_unique<LocalTeam>(graph);
   if (method == "dgs") return std::make_unique<GaussSeidelTeam>(graph, start);
   if (method == "rbcd") return rbcd_team(graph, start, options);
-  if (method == "rbcd-asynchronous")
-    return std::make_unique<AsynchronousTeam>(
-        graph, lift(start, options.rank),
-        AsynchronousOptions{.max_delay = options.max_delay,
-                            .loss = options.loss,
-                            .seed = options.seed,
-                            .max_over_relaxation = options.over_relaxation});
   if (method == "centralized") return std::make_unique<CentralTeam>(graph, lift(start, kRigidRank));
   throw std::invalid_argument("unknown method " + method);
 }
@@ -91,29 +83,19 @@ SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const Solve
   return run;
 }
 
-// Refuses verticals for methods that support only edges.
-void check_verticals(const TeamGraph& graph, const SolverOptions& options) {
-  const std::string who = options.verify ? "the team's own verification (--verify)"
-                          : options.method == "dgs" || options.method == "rbcd-asynchronous"
-                              ? "method " + options.method
-                              : "";
-  if (!graph.verticals.empty() && !who.empty())
-    throw std::invalid_argument(who + " does not know verticals, and the graph has " +
-                                std::to_string(graph.verticals.size()) +
-                                ": leave them out by --no-vertical");
-}
-
 }  // namespace
 
 SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                      const SolverOptions& options, const TeamMeter& meter) {
-  check_verticals(graph, options);
+  if (options.method == "dgs" && !graph.verticals.empty())
+    throw std::invalid_argument("method dgs does not know verticals, and the graph has " +
+                                std::to_string(graph.verticals.size()) +
+                                ": leave them out by --no-vertical");
   if (options.method == "newton") return run_newton(graph, start, options, meter);
   const auto team = make_team(graph, start, options);
   SolverRun run;
   run.rounds = run_team(graph, *team, options.run, meter);
   run.X = team_poses(graph, *team);
-  if (options.verify) run.verification = verify_team(graph, run.X, {}, meter);
   return run;
 }
 

@@ -8,7 +8,6 @@
 #include "apps/lab/pgo_study/certificate.hpp"
 #include "apps/lab/pgo_study/member_team.hpp"
 #include "apps/lab/pgo_study/team_solver.hpp"
-#include "apps/lab/pgo_study/team_verification.hpp"
 
 namespace km {
 
@@ -22,17 +21,13 @@ namespace km {
 /// A method, by its name in kMethods, and its parameters.
 struct SolverOptions {
   std::string method = "newton";
-  Eigen::Index rank = 5;  ///< Only for rbcd, rbcd-asynchronous: rank of the relaxation.
+  Eigen::Index rank = 5;  ///< Only for rbcd: rank of the relaxation.
   TeamRunOptions run = {.max_rounds = 100};
-  bool verify = false;            ///< rbcd: the team searches for a direction of descent.
-  double over_relaxation = 1.95;  ///< rbcd, rbcd-asynchronous: largest value; 1: as published.
-  int max_delay = 0;              ///< rbcd-asynchronous, as loss and seed: see AsynchronousOptions.
-  double loss = 0.0;
-  unsigned seed = 1;
-  bool trust_all = false;        ///< newton: all closures are treated as true.
-  double barc = 0.0;             ///< newton: largest residual of an inlier [sigma]; 0: estimated.
-  bool reject_odometry = false;  ///< newton: false steps of odometry are rejected too.
-  bool share_private = false;    ///< newton: see TreeNewtonOptions.
+  double over_relaxation = 1.95;  ///< rbcd: largest value; 1: as published.
+  bool trust_all = false;         ///< newton: all closures are treated as true.
+  double barc = 0.0;              ///< newton: largest residual of an inlier [sigma]; 0: estimated.
+  bool reject_odometry = false;   ///< newton: false steps of odometry are rejected too.
+  bool share_private = false;     ///< newton: see TreeNewtonOptions.
   TeamShape shape = TeamShape::kAll;  ///< newton, rbcd: links between the robots.
 
   [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }
@@ -40,8 +35,7 @@ struct SolverOptions {
   [[nodiscard]] std::string name() const { return method + (trust_all ? " --trust-all" : ""); }
 };
 
-inline const std::vector<std::string> kMethods = {
-    "local", "dgs", "rbcd", "rbcd-asynchronous", "centralized", "newton"};
+inline const std::vector<std::string> kMethods = {"local", "dgs", "rbcd", "centralized", "newton"};
 
 /// The edges that a method has kept, and the estimates behind this decision.
 struct Decision {
@@ -56,8 +50,7 @@ struct Decision {
 struct SolverRun {
   std::vector<TeamRound> rounds;  ///< [0]: the start. Costs of all edges, at weight 1.
   LiftedPoses X;
-  std::optional<TeamVerification> verification;  ///< The team's own, if requested.
-  std::optional<Decision> decision;              ///< Only of newton.
+  std::optional<Decision> decision;  ///< Only of newton.
 };
 
 /// Solves `graph` from `start`. If `start` is empty, newton begins at odometry. Throws

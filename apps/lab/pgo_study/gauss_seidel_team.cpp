@@ -1,6 +1,7 @@
 #include "apps/lab/pgo_study/gauss_seidel_team.hpp"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -46,6 +47,13 @@ EdgeForm reversed(const EdgeForm& form) {
   return {form.H_jj, form.H_ij.transpose(), form.H_ii, form.g_j, form.g_i};
 }
 
+// Keyframes of the robot on which edges to other robots end, ascending.
+std::vector<KeyframeIndex> separators_of(const SessionGraph& part) {
+  std::set<KeyframeIndex> ends;
+  for (const PoseEdge& e : part.between) ends.insert(e.end_on(part.self).index);
+  return {ends.begin(), ends.end()};
+}
+
 LeastSquaresBlock first_stage(const SessionGraph& part, Eigen::Index poses) {
   LeastSquaresBlock block(poses, 3, Eigen::Matrix3d::Identity().replicate(poses, 1),
                           part.self == 0);
@@ -75,7 +83,7 @@ GaussSeidelTeam::GaussSeidelTeam(const TeamGraph& graph, const std::vector<SE3>&
     for (Eigen::Index i = 0; i < poses; ++i)
       X.middleCols<4>(4 * i) =
           start[static_cast<std::size_t>(graph.first[k] + i)].matrix().topRows<3>();
-    std::vector<KeyframeIndex> separators = border_of(part).own;
+    std::vector<KeyframeIndex> separators = separators_of(part);
     LeastSquaresBlock unknowns = first_stage(part, poses);
     robots_.push_back({std::move(part), std::move(separators), std::move(unknowns), {}, {}, X});
   }

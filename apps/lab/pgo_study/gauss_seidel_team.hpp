@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "apps/lab/pgo_study/least_squares_block.hpp"
-#include "apps/lab/pgo_study/sent_poses.hpp"
 #include "apps/lab/pgo_study/team_schedule.hpp"
 #include "apps/lab/pgo_study/team_solver.hpp"
 
@@ -45,6 +44,11 @@ class GaussSeidelTeam : public TeamSolver {
     LeastSquaresBlock unknowns;
     std::vector<Eigen::Matrix3d> R;  // after the first stage
     std::map<KeyframeId, Eigen::Matrix3d> R_other;
+    LiftedPoses X;
+  };
+  // Poses that one robot sends to the others.
+  struct SentPoses {
+    std::vector<KeyframeIndex> keyframes;
     LiftedPoses X;
   };
 

@@ -4,7 +4,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "apps/lab/pgo_study/block_border.hpp"
 #include "apps/lab/pgo_study/message_sizes.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/rbcd/truncated_newton.hpp"

@@ -18,8 +18,8 @@ struct TeamGraph {
   std::vector<Eigen::Index> first = {};  ///< N + 1 entries, ascending, from 0.
   std::vector<BlockEdge> edges = {};     ///< Each edge once. Parallel edges all count.
   std::vector<KeyframeId> ids = {};      ///< Ids of the poses in the file.
-  /// Vertical priors, ascending by pose. If there are any, solutions have z up. GaussSeidelTeam,
-  /// AsynchronousTeam and verify_team() do not support them.
+  /// Vertical priors, ascending by pose. If there are any, solutions have z up. GaussSeidelTeam
+  /// does not support them.
   std::vector<VerticalPrior> verticals = {};
   std::size_t indefinite_edges = 0;  ///< Number in the files, see G2oGraph.
 

@@ -37,9 +37,8 @@ TEST_CASE("Every method runs from the command line and prints its result", "[pgo
   const auto graph = folder.write("square.g2o", square_g2o());
   const auto json = folder.path() / "out.json";
   const std::string method =
-      GENERATE("local", "dgs", "rbcd --verify", "rbcd --links chain", "newton --trust-all",
-               "newton --trust-all --links chain", "centralized", "rbcd --over-relaxation 1",
-               "rbcd-asynchronous --max-delay 2 --loss 0.1 --seed 4");
+      GENERATE("local", "dgs", "rbcd", "rbcd --links chain", "newton --trust-all",
+               "newton --trust-all --links chain", "centralized", "rbcd --over-relaxation 1");
   CAPTURE(method);
   const CommandResult result = run_command(kSolveTool + graph.string() + " --robots 2 --method " +
                                            method + " --json " + json.string());
@@ -155,16 +154,12 @@ TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
   // FILE and PLACE stand for the graph and its folder.
   const auto [pattern, message] = GENERATE(table<std::string, std::string>(
       {{"FILE --robots 9", "8 poses, which cannot be divided among 9 robots"},
-       {"FILE --robots 2 --method centralized --verify", "--verify is for --method rbcd only"},
        {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
-       {"FILE --method dgs --verify", "--verify is for"},
        {"FILE --method newton --plot gap.html", "only, not for newton"},
        {"FILE --links ring", "ring not in {all,chain}"},
        {"FILE --method newton --trust-all --barc 5", "--barc is for --method newton only, not"},
        {"FILE --method rbcd --barc 5", "--barc is for --method newton only, not for rbcd"},
        {"FILE --method rbcd --trust-all", "--trust-all is for --method newton only"},
-       {"FILE --max-delay 2", "--max-delay is for --method rbcd-asynchronous only"},
-       {"FILE --method rbcd-asynchronous --loss 1", "--loss"},
        {"FILE --json /nowhere/out.json", "there is no folder /nowhere"},
        {"FILE --json PLACE", "it is a folder"},
        {"FILE --partition PLACE", "a folder, not a file"},
@@ -255,20 +250,15 @@ TEST_CASE("Verticals of the file are used, reported and written", "[pgo][vertica
   CHECK_THAT(folder.read("out.json"), Contains("\"verticals\": 0"));
 }
 
-TEST_CASE("Methods without verticals refuse them and name the option that drops them",
-          "[pgo][vertical]") {
+TEST_CASE("dgs refuses verticals and names the option that drops them", "[pgo][vertical]") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", upright_square_g2o());
-  const auto [options, who] = GENERATE(table<std::string, std::string>(
-      {{"--method dgs", "method dgs does"},
-       {"--method rbcd-asynchronous", "method rbcd-asynchronous does"},
-       {"--method rbcd --verify", "(--verify) does"}}));
-  CAPTURE(options);
-  const std::string command = kSolveTool + graph.string() + " --robots 2 --rounds 20 " + options;
+  const std::string command = kSolveTool + graph.string() + " --robots 2 --rounds 20 --method dgs";
   const CommandResult refused = run_command(command);
   CHECK(refused.exit_code == 1);
-  CHECK_THAT(refused.output, Contains(who + " not know verticals, and the graph has 7: leave them "
-                                            "out by --no-vertical"));
+  CHECK_THAT(refused.output,
+             Contains("method dgs does not know verticals, and the graph has 7: leave "
+                      "them out by --no-vertical"));
   CHECK(run_command(command + " --no-vertical").exit_code == 0);
 }
 

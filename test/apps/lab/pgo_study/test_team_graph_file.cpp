@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 #include <sstream>
 
-#include "apps/lab/pgo_study/block_border.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -65,8 +64,9 @@ TEST_CASE("Poses are divided in the order of their ids, and the last robot gets 
   CHECK(graph.edges[0].j == 3);
   CHECK(graph.robot_of(1) == 0);
   CHECK(graph.robot_of(2) == 1);
-  CHECK(border_of(part_of(graph, 0)).own == std::vector<KeyframeIndex>{1});
-  CHECK(border_of(part_of(graph, 1)).own == std::vector<KeyframeIndex>{0});
+  const PoseEdge between = part_of(graph, 0).between.at(0);
+  CHECK(between.end_on(0).index == 1);
+  CHECK(between.end_on(1).index == 0);
 }
 
 TEST_CASE("Every edge belongs to one robot or to two, and parallel edges all count",
