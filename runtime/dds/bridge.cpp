@@ -44,19 +44,15 @@ constexpr dds_attach_t kFirstTopic = 1;
 
 }  // namespace
 
-DdsBridge::DdsBridge(const DdsParticipant& participant, const BudgetConfig& budget)
+DdsBridge::DdsBridge(DdsParticipant& participant, const BudgetConfig& budget)
     : participant_(participant),
       peers_(participant),
       keys_(make_key_topic(participant, peers_)),
-      waitset_(dds_create_waitset(participant.handle()), "wait set"),
-      stop_request_(dds_create_guardcondition(participant.handle()), "guard condition"),
       key_sender_(
           kMaxAdmitted, Overflow::kDropOldest, [this](const TeamPeer& peer) { send_key(peer); },
           "dds_keys"),
-      sender_(budget, participant.config().lease_s, outgoing_, keys_.get()) {
-  for (const dds_entity_t condition :
-       {stop_request_.handle(), peers_.discovery_condition(), peers_.liveliness_condition()})
-    check_dds(dds_waitset_attach(waitset_.handle(), condition, kOther), "cannot wait");
+      sender_(budget, participant, outgoing_, keys_.get()) {
+  open_waitset();
   if (keys_ == nullptr) return;
   receive_keys();
   peers_.events().subscribe([this](const auto& event) { catch_up(*event); });
@@ -64,6 +60,39 @@ DdsBridge::DdsBridge(const DdsParticipant& participant, const BudgetConfig& budg
 
 DdsBridge::~DdsBridge() {
   stop();
+}
+
+void DdsBridge::attach(dds_entity_t condition, dds_attach_t number) {
+  check_dds(dds_waitset_attach(waitset_.handle(), condition, number), "cannot wait");
+}
+
+void DdsBridge::open_waitset() {
+  waitset_ = DdsEntity(dds_create_waitset(participant_.handle()), "wait set");
+  stop_request_ = DdsEntity(dds_create_guardcondition(participant_.handle()), "guard condition");
+  for (const dds_entity_t condition :
+       {stop_request_.handle(), peers_.discovery_condition(), peers_.liveliness_condition()})
+    attach(condition, kOther);
+  dds_attach_t number = kFirstTopic;
+  for (const auto& topic : incoming_) attach(topic->condition(), number++);
+}
+
+void DdsBridge::move_to(const NetworkInterface& interface) {
+  const auto alone = participant_.use_alone();
+  const auto for_each_outgoing = [this](const auto& action) {
+    if (keys_ != nullptr) action(*keys_);
+    for (const auto& topic : outgoing_) action(*topic);
+  };
+  {
+    const auto domain = static_cast<dds_domainid_t>(participant_.config().domain);
+    const DdsEntity reader(dds_create_participant(domain, nullptr, nullptr),
+                           "participant to copy messages");
+    for_each_outgoing([&](OutgoingTopic& topic) { topic.save(reader.handle()); });
+  }
+  participant_.move_to(interface);
+  peers_.open();
+  for (const auto& topic : incoming_) topic->open();
+  open_waitset();
+  for_each_outgoing([](OutgoingTopic& topic) { topic.open(); });
 }
 
 void DdsBridge::receive_keys() {
@@ -75,6 +104,7 @@ void DdsBridge::receive_keys() {
 }
 
 void DdsBridge::send_key(const TeamPeer& peer) {
+  const auto use = participant_.use();
   auto message =
       participant_.seal()->with([&](TeamSeal& team) { return team.key_message_for(peer); });
   if (message) keys_->write(Addressee{peer.robot}, message_key({peer.boot}), *std::move(message));
@@ -103,13 +133,13 @@ void DdsBridge::add_incoming(TopicSpec spec, bool addressed, Pace pace,
   incoming_.push_back(std::make_unique<IncomingTopic>(participant_, peers_, std::move(spec),
                                                       addressed, quota, std::move(handler)));
   const auto number = kFirstTopic + static_cast<dds_attach_t>(incoming_.size() - 1);
-  check_dds(dds_waitset_attach(waitset_.handle(), incoming_.back()->condition(), number),
-            "cannot wait");
+  attach(incoming_.back()->condition(), number);
 }
 
 TrafficSnapshot DdsBridge::traffic() const {
   TrafficSnapshot snapshot;
   const auto held = sender_.held_back();
+  const auto use = participant_.use();
   if (keys_ != nullptr) keys_->add_to(snapshot);
   for (const auto& topic : outgoing_) {
     topic->add_to(snapshot);
@@ -133,8 +163,7 @@ void DdsBridge::stop() noexcept {
   sender_.stop();
   key_sender_.stop();
   if (!receiver_.joinable()) return;
-  await_acknowledgements();
-  dds_set_guardcondition(stop_request_.handle(), true);
+  finish_receiving();
   receiver_.join();
   for (const auto& topic : incoming_) topic->stop();
   peers_.stop();
@@ -158,13 +187,11 @@ std::vector<Heartbeat*> DdsBridge::heartbeats() {
 void DdsBridge::receive_until_stopped() try {
   name_this_thread("dds_receive");
   std::vector<dds_attach_t> triggered(incoming_.size() + 3);
-  bool stop = false;
-  while (!stop) {
+  while (!stopping_) {
     const dds_return_t count =
         check_dds(dds_waitset_wait(waitset_.handle(), triggered.data(), triggered.size(), kWakeUp),
                   "cannot wait for messages");
     const Heartbeat::Step step(receiving_);
-    dds_read_guardcondition(stop_request_.handle(), &stop);
     // Peers are updated before their messages are read.
     const double now_s = steady_now_s();
     peers_.poll();
@@ -178,13 +205,15 @@ void DdsBridge::receive_until_stopped() try {
       if (triggered[i] >= kFirstTopic)
         incoming_[static_cast<std::size_t>(triggered[i] - kFirstTopic)]->take(now_s);
     for (const auto& topic : incoming_) topic->recall(now_s);
+    if (const auto interface = participant_.new_interface(now_s)) move_to(*interface);
   }
 } catch (...) {
   receive_error_ = std::current_exception();
   receive_failed_ = true;  // set after receive_error_, so that readers of the flag see the error
 }
 
-void DdsBridge::await_acknowledgements() noexcept {
+void DdsBridge::finish_receiving() noexcept {
+  const auto use = participant_.use();
   const auto deadline = std::chrono::steady_clock::now() + kAcknowledgementTime;
   bool complete = true;
   const auto await = [&](OutgoingTopic& topic) {
@@ -194,6 +223,8 @@ void DdsBridge::await_acknowledgements() noexcept {
   if (keys_ != nullptr) await(*keys_);
   for (const auto& topic : outgoing_) await(*topic);
   if (!complete) log::warn("dds") << "closing before every peer has acknowledged every message";
+  stopping_ = true;
+  dds_set_guardcondition(stop_request_.handle(), true);
 }
 
 }  // namespace km

@@ -97,6 +97,10 @@ struct ContentGuard {
 /// In a team with keys (DdsParticipant::seal()), all messages are sealed, and only robots of the
 /// team are received.
 ///
+/// When the network interface or its address changes, the receive thread makes all DDS entities
+/// anew (see DdsParticipant). The messages that DDS keeps for late readers are written again.
+/// Received messages are not lost, because the other robots send to the new readers again.
+///
 /// The bridge is the last of the nodes to stop. It then sends the queued messages, with a budget as
 /// much as the budget permits in two seconds. It waits equally long until the peers have
 /// acknowledged them.
@@ -106,7 +110,7 @@ class DdsBridge final : public Node {
   static constexpr std::size_t kSendQueue = Sender::kQueue;
 
   /// `participant` outlives the bridge. Throws ConfigError if `budget` is out of bounds.
-  explicit DdsBridge(const DdsParticipant& participant, const BudgetConfig& budget = {});
+  explicit DdsBridge(DdsParticipant& participant, const BudgetConfig& budget = {});
   ~DdsBridge() override;
 
   /// Connects `crossing`, which outlives the bridge, to those of the other robots. Each message
@@ -149,10 +153,13 @@ class DdsBridge final : public Node {
   void receive_keys();
   void send_key(const TeamPeer& peer);
   void catch_up(const PeerEvent& event);
+  void attach(dds_entity_t condition, dds_attach_t number);
+  void open_waitset();
+  void move_to(const NetworkInterface& interface);
   void receive_until_stopped();
-  void await_acknowledgements() noexcept;
+  void finish_receiving() noexcept;
 
-  const DdsParticipant& participant_;
+  DdsParticipant& participant_;
   Peers peers_;
   std::vector<std::unique_ptr<OutgoingTopic>> outgoing_;  // written by sender_
   std::vector<std::unique_ptr<IncomingTopic>> incoming_;
@@ -161,6 +168,7 @@ class DdsBridge final : public Node {
   DdsEntity waitset_;
   DdsEntity stop_request_;  // guard condition
   bool stopped_ = false;
+  std::atomic<bool> stopping_ = false;
   Heartbeat receiving_;
   std::exception_ptr receive_error_;
   std::atomic<bool> receive_failed_ = false;

@@ -1,5 +1,7 @@
 #include "runtime/dds/incoming_topic.hpp"
 
+#include <dds/ddsi/ddsi_serdata.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -28,26 +30,9 @@ constexpr int kMaxInFlight = 16;
 constexpr std::chrono::milliseconds kMaxStay{100};
 constexpr std::size_t kFilingBytes = 256;  // bytes of bookkeeping per message
 
-// A deserialised envelope; the destructor frees it.
-class ReceivedEnvelope {
- public:
-  explicit ReceivedEnvelope(const ddsi_serdata& serialized)
-      : usable_(ddsi_serdata_to_sample(&serialized, &envelope_, nullptr, nullptr)) {}
-  ~ReceivedEnvelope() { dds_sample_free(&envelope_, &km_wire_Envelope_desc, DDS_FREE_CONTENTS); }
-  ReceivedEnvelope(const ReceivedEnvelope&) = delete;
-  ReceivedEnvelope& operator=(const ReceivedEnvelope&) = delete;
-
-  [[nodiscard]] bool usable() const { return usable_; }
-  [[nodiscard]] const km_wire_Envelope& get() const { return envelope_; }
-
- private:
-  km_wire_Envelope envelope_{};
-  bool usable_;
-};
-
 // Bytes that a stored message takes.
-std::size_t kept_bytes(const ddsi_serdata& serialized) {
-  return ddsi_serdata_size(&serialized) + kFilingBytes;
+std::size_t kept_bytes(const km_wire_Envelope& envelope) {
+  return envelope_bytes(envelope.content._length) + kFilingBytes;
 }
 
 }  // namespace
@@ -72,15 +57,21 @@ IncomingTopic::IncomingTopic(const DdsParticipant& participant, Peers& peers, To
       spec_(std::move(spec)),
       addressed_(addressed),
       handler_(std::move(handler)),
-      filed_(quota),
-      topic_(dds_create_topic(participant.handle(), &km_wire_Envelope_desc, spec_.name.c_str(),
-                              nullptr, nullptr),
-             "topic " + spec_.name),
-      reader_(make_reader()),
-      condition_(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition") {}
+      filed_(quota) {
+  open();
+}
 
 IncomingTopic::~IncomingTopic() {
   stop();
+}
+
+void IncomingTopic::open() {
+  topic_ = DdsEntity(dds_create_topic(participant_.handle(), &km_wire_Envelope_desc,
+                                      spec_.name.c_str(), nullptr, nullptr),
+                     "topic " + spec_.name);
+  reader_ = make_reader();
+  condition_ =
+      DdsEntity(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition");
 }
 
 DdsEntity IncomingTopic::make_reader() {
@@ -115,34 +106,39 @@ void IncomingTopic::take(double now_s) {
         check_dds(dds_takecdr(reader_.handle(), taken.data(), kBatch, infos.data(), DDS_ANY_STATE),
                   "cannot take " + spec_.name));
     if (count == 0) return;
-    std::array<Serdata, kBatch> owners;
-    for (std::size_t i = 0; i < count; ++i) owners[i].reset(taken[i]);
-    for (std::size_t i = 0; i < count; ++i)
-      if (infos[i].valid_data) arrive(std::move(owners[i]), infos[i].publication_handle, now_s);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (infos[i].valid_data) arrive(*taken[i], infos[i].publication_handle, now_s);
+      ddsi_serdata_unref(taken[i]);
+    }
   }
 }
 
-void IncomingTopic::arrive(Serdata serialized, dds_instance_handle_t writer, double now_s) {
+void IncomingTopic::arrive(const ddsi_serdata& serialized, dds_instance_handle_t writer,
+                           double now_s) {
   const std::size_t seal_bytes = participant_.seal() == nullptr ? 0 : kTeamSealBytes;
-  if (ddsi_serdata_size(serialized.get()) > envelope_bytes(spec_.max_bytes + seal_bytes))
+  if (ddsi_serdata_size(&serialized) > envelope_bytes(spec_.max_bytes + seal_bytes))
     return refuse("larger than its topic allows");
   const auto guid = writers_.participant_of(writer);
   if (!guid) return refuse("from no known writer");
+  Received envelope(static_cast<km_wire_Envelope*>(dds_alloc(sizeof(km_wire_Envelope))));
+  *envelope = {};
+  if (!ddsi_serdata_to_sample(&serialized, envelope.get(), nullptr, nullptr))
+    return refuse("not deserializable");
   // Messages of a writer stay in order behind its waiting messages.
   const Peers::Claim claim = peers_.claim_of(*guid);
   if (!waiting_.contains(*guid) && is_settled(claim.standing))
-    return admit(std::move(serialized), *guid, claim, now_s);
-  receive_claim(*serialized, *guid, claim, now_s);
-  const std::size_t bytes = kept_bytes(*serialized);
-  if (!waiting_.push(*guid, std::move(serialized), bytes, now_s))
+    return admit(std::move(envelope), *guid, claim, now_s);
+  receive_claim(*envelope, *guid, claim, now_s);
+  const std::size_t bytes = kept_bytes(*envelope);
+  if (!waiting_.push(*guid, std::move(envelope), bytes, now_s))
     refuse("one too many from a robot that is not known yet");
 }
 
 void IncomingTopic::recall(double now_s) {
-  const auto take = [&](const Guid& writer, Serdata& serialized, double waited_s) {
+  const auto take = [&](const Guid& writer, Received& envelope, double waited_s) {
     const Peers::Claim claim = peers_.claim_of(writer);
     if (is_settled(claim.standing)) {
-      admit(std::move(serialized), writer, claim, now_s);
+      admit(std::move(envelope), writer, claim, now_s);
       return true;
     }
     if (claim.standing == Standing::kArriving || waited_s < kPatience_s) return false;
@@ -162,23 +158,23 @@ bool IncomingTopic::is_settled(Standing standing) const {
   return !is_open || (spec_.carries_keys && standing != Standing::kUnknown);
 }
 
-void IncomingTopic::admit(Serdata serialized, const Guid& writer, const Peers::Claim& claim,
+void IncomingTopic::admit(Received envelope, const Guid& writer, const Peers::Claim& claim,
                           double now_s) {
   if (claim.standing == Standing::kOutsider) return refuse("from no known robot");
   if (claim.standing == Standing::kTwin && !spec_.carries_keys) {
-    receive_claim(*serialized, writer, claim, now_s);
+    receive_claim(*envelope, writer, claim, now_s);
     return refuse("claims this robot's id");
   }
-  file(std::move(serialized), claim.sender, writer, now_s);
+  file(std::move(envelope), claim.sender, writer, now_s);
 }
 
-void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid& writer,
+void IncomingTopic::file(Received envelope, const TeamPeer& sender, const Guid& writer,
                          double now_s) {
-  const std::size_t bytes = kept_bytes(*serialized);
+  const std::size_t bytes = kept_bytes(*envelope);
   bool fits = true;
   {
     const std::lock_guard lock(mutex_);
-    fits = filed_.push(sender.robot, {std::move(serialized), sender, writer}, bytes, now_s);
+    fits = filed_.push(sender.robot, {std::move(envelope), sender, writer}, bytes, now_s);
     filed_changed_.notify_one();
   }
   if (!fits) refuse("for want of room");
@@ -186,13 +182,10 @@ void IncomingTopic::file(Serdata serialized, const TeamPeer& sender, const Guid&
 
 // Handles a status of a participant that is not (yet) the robot it claims to be. The status of a
 // twin states how long the twin has been running. In a team with keys the seal proves the sender.
-void IncomingTopic::receive_claim(const ddsi_serdata& serialized, const Guid& writer,
+void IncomingTopic::receive_claim(const km_wire_Envelope& envelope, const Guid& writer,
                                   const Peers::Claim& claim, double now_s) {
   if (spec_.kind != TopicKind::kStatus) return;
   if (claim.standing != Standing::kRival && claim.standing != Standing::kTwin) return;
-  const ReceivedEnvelope received(serialized);
-  if (!received.usable()) return;
-  const km_wire_Envelope& envelope = received.get();
   if (TeamPeer{envelope.robot, envelope.boot} != claim.sender) return;
   if (open(envelope, writer).how.status != Opened::Status::kOpened) return;
   if (claim.standing == Standing::kTwin) {
@@ -261,7 +254,7 @@ void IncomingTopic::deliver_until_stopped() try {
 
 void IncomingTopic::await_key(Filed filed, double now_s) {
   const RobotId sender = filed.sender.robot;
-  const std::size_t bytes = kept_bytes(*filed.serialized);
+  const std::size_t bytes = kept_bytes(*filed.envelope);
   if (!sealed_.push(sender, std::move(filed), bytes, now_s))
     refuse("one too many under a key that is not known yet");
 }
@@ -278,26 +271,19 @@ bool IncomingTopic::deliver_again(double now_s) {
 }
 
 IncomingTopic::Verdict IncomingTopic::deliver(const Filed& filed) {
-  const ReceivedEnvelope received(*filed.serialized);
-  if (received.usable()) return accept(received.get(), filed);
-  refuse("not deserializable");
-  return Verdict::kTaken;
-}
-
-IncomingTopic::Verdict IncomingTopic::accept(const km_wire_Envelope& envelope, const Filed& filed) {
-  const Readable readable = open(envelope, filed.writer);
+  const Readable readable = open(*filed.envelope, filed.writer);
   const Opened::Status status = readable.how.status;
   if (status == Opened::Status::kNotYet) return Verdict::kNotYet;
-  const char* reason = status == Opened::Status::kOpened
-                           ? pass_to_handler(envelope, filed, readable.content)
-                           : readable.how.reason;
+  const char* reason = status == Opened::Status::kOpened ? pass_to_handler(filed, readable.content)
+                                                         : readable.how.reason;
   if (reason != nullptr) refuse(reason);
   return Verdict::kTaken;
 }
 
 // Returns the reason of a refusal, otherwise null. A duplicate is dropped without a reason.
-const char* IncomingTopic::pass_to_handler(const km_wire_Envelope& envelope, const Filed& filed,
+const char* IncomingTopic::pass_to_handler(const Filed& filed,
                                            std::span<const std::uint8_t> content) {
+  const km_wire_Envelope& envelope = *filed.envelope;
   std::shared_ptr<void> token = in_flight_->enter();  // before is_current(), because it may wait
   if (TeamPeer{envelope.robot, envelope.boot} != filed.sender) return "claims another robot's id";
   if (!spec_.carries_keys && !peers_.is_current(filed.sender))
@@ -310,7 +296,7 @@ const char* IncomingTopic::pass_to_handler(const km_wire_Envelope& envelope, con
       ++duplicates_;
       return nullptr;
     }
-    from_[filed.sender.robot].add(ddsi_serdata_size(filed.serialized.get()));
+    from_[filed.sender.robot].add(envelope_bytes(envelope.content._length));
   }
   try {
     return handler_(filed.sender, content, std::move(token));

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <dds/ddsi/ddsi_serdata.h>
 #include <envelope.h>
+
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
@@ -65,6 +65,9 @@ class IncomingTopic {
 
   // The gate, called by the receive thread.
 
+  /// Creates the DDS entities, again after DdsParticipant::move_to().
+  void open();
+
   /// DDS condition that triggers while take() has messages to read.
   [[nodiscard]] dds_entity_t condition() const { return condition_.handle(); }
   /// Files all received messages.
@@ -85,12 +88,15 @@ class IncomingTopic {
   void add_to(TrafficSnapshot& snapshot) const;
 
  private:
-  struct SerdataDeleter {
-    void operator()(ddsi_serdata* data) const { ddsi_serdata_unref(data); }
+  // Deserialised envelope. It outlives the DDS entities, which may be made anew.
+  struct EnvelopeDeleter {
+    void operator()(km_wire_Envelope* envelope) const {
+      dds_sample_free(envelope, &km_wire_Envelope_desc, DDS_FREE_ALL);
+    }
   };
-  using Serdata = std::unique_ptr<ddsi_serdata, SerdataDeleter>;
+  using Received = std::unique_ptr<km_wire_Envelope, EnvelopeDeleter>;
   struct Filed {
-    Serdata serialized;
+    Received envelope;
     TeamPeer sender;
     Guid writer{};
   };
@@ -103,20 +109,18 @@ class IncomingTopic {
   enum class Verdict { kTaken, kNotYet };
 
   DdsEntity make_reader();
-  void arrive(Serdata serialized, dds_instance_handle_t writer, double now_s);
+  void arrive(const ddsi_serdata& serialized, dds_instance_handle_t writer, double now_s);
   bool is_settled(Standing standing) const;
-  void admit(Serdata serialized, const Guid& writer, const Peers::Claim& claim, double now_s);
-  void file(Serdata serialized, const TeamPeer& sender, const Guid& writer, double now_s);
-  void receive_claim(const ddsi_serdata& serialized, const Guid& writer, const Peers::Claim& claim,
-                     double now_s);
+  void admit(Received envelope, const Guid& writer, const Peers::Claim& claim, double now_s);
+  void file(Received envelope, const TeamPeer& sender, const Guid& writer, double now_s);
+  void receive_claim(const km_wire_Envelope& envelope, const Guid& writer,
+                     const Peers::Claim& claim, double now_s);
   [[nodiscard]] Readable open(const km_wire_Envelope& envelope, const Guid& writer) const;
   void deliver_until_stopped();
   void await_key(Filed filed, double now_s);
   bool deliver_again(double now_s);
   Verdict deliver(const Filed& filed);
-  Verdict accept(const km_wire_Envelope& envelope, const Filed& filed);
-  const char* pass_to_handler(const km_wire_Envelope& envelope, const Filed& filed,
-                              std::span<const std::uint8_t> content);
+  const char* pass_to_handler(const Filed& filed, std::span<const std::uint8_t> content);
   bool is_new(const TeamPeer& sender, std::uint32_t number);
   void refuse(const char* reason);
 
@@ -126,8 +130,8 @@ class IncomingTopic {
   const bool addressed_;
   Handler handler_;
   WriterBook writers_;
-  PendingMessages<Guid, Serdata> waiting_;  // receive thread only: messages of unknown writers
-  PendingMessages<RobotId, Filed> sealed_;  // delivery only: messages whose key is missing
+  PendingMessages<Guid, Received> waiting_;  // receive thread only: messages of unknown writers
+  PendingMessages<RobotId, Filed> sealed_;   // delivery only: messages whose key is missing
   double started_s_ = 0.0;
 
   mutable std::mutex mutex_;  // guards the filed messages and the counts

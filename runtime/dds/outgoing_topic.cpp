@@ -9,6 +9,16 @@
 #include "runtime/log.hpp"
 
 namespace km {
+namespace {
+
+// Settings of a publisher or subscriber; an empty partition is the default one.
+DdsQos partition_qos(const std::string& partition) {
+  DdsQos qos = make_dds_qos();
+  if (!partition.empty()) dds_qset_partition1(qos.get(), partition.c_str());
+  return qos;
+}
+
+}  // namespace
 
 std::string partition_of(RobotId robot) {
   return "robot" + std::to_string(robot);
@@ -20,20 +30,67 @@ std::string partition_of(const TeamPeer& peer, bool is_sealed) {
 }
 
 OutgoingTopic::OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec)
-    : participant_(participant),
-      peers_(peers),
-      spec_(std::move(spec)),
-      topic_(dds_create_topic(participant.handle(), &km_wire_Envelope_desc, spec_.name.c_str(),
-                              nullptr, nullptr),
-             "topic " + spec_.name) {}
+    : participant_(participant), peers_(peers), spec_(std::move(spec)) {
+  open();
+}
+
+void OutgoingTopic::save(dds_entity_t reader) {
+  // Sealed messages name the former participant. Those that are kept are sealed again.
+  if (spec_.kind == TopicKind::kStatus || is_sealed()) return;
+  for (auto& [to, writer] : writers_) writer.saved = saved(reader, writer);
+}
+
+std::vector<OutgoingTopic::Saved> OutgoingTopic::saved(dds_entity_t reader,
+                                                       const Writer& writer) const {
+  const DdsEntity topic(
+      dds_create_topic(reader, &km_wire_Envelope_desc, spec_.name.c_str(), nullptr, nullptr),
+      "topic " + spec_.name);
+  const DdsQos group = partition_qos(writer.partition);
+  const DdsEntity subscriber(dds_create_subscriber(reader, group.get(), nullptr),
+                             "subscriber of " + spec_.name);
+  const DdsQos qos = make_reader_qos(spec_.kind, participant_.config());
+  const DdsEntity history(
+      dds_create_reader(subscriber.handle(), topic.handle(), qos.get(), nullptr),
+      "reader of " + spec_.name);
+  std::vector<Saved> result;
+  void* sample = nullptr;
+  dds_sample_info_t info;
+  while (check_dds(dds_take(history.handle(), &sample, &info, 1, 1), "cannot copy") > 0) {
+    const auto& envelope = *static_cast<const km_wire_Envelope*>(sample);
+    const auto bytes = elements_of(envelope.content, envelope.content._length);
+    if (info.valid_data && bytes && envelope.robot == participant_.identity().robot &&
+        envelope.boot == participant_.identity().boot)
+      result.push_back({envelope, {bytes->begin(), bytes->end()}});
+    dds_return_loan(history.handle(), &sample, 1);
+  }
+  std::ranges::sort(result, {}, [](const Saved& message) { return message.head.number; });
+  return result;
+}
+
+void OutgoingTopic::open() {
+  topic_ = DdsEntity(dds_create_topic(participant_.handle(), &km_wire_Envelope_desc,
+                                      spec_.name.c_str(), nullptr, nullptr),
+                     "topic " + spec_.name);
+  for (auto& [to, writer] : writers_) {
+    {
+      const std::lock_guard lock(mutex_);
+      open(writer, writer.receiver);
+    }
+    for (Saved& message : std::exchange(writer.saved, {})) {
+      borrow(message.head.content, message.content);
+      check_dds(dds_write(writer.writer.handle(), &message.head), "cannot write " + spec_.name);
+      add_to_history(writer, message.head.key, envelope_bytes(message.content.size()));
+    }
+    send_due(writer);
+  }
+}
 
 bool OutgoingTopic::is_sealed() const {
   return participant_.seal() != nullptr && !spec_.carries_keys;
 }
 
-bool OutgoingTopic::is_kept(bool to_one) const {
-  return is_sealed() &&
-         (spec_.kind == TopicKind::kEvent || (to_one && spec_.kind == TopicKind::kState));
+bool OutgoingTopic::is_kept() const {
+  return is_sealed() && (spec_.kind == TopicKind::kEvent || spec_.kind == TopicKind::kState);
 }
 
 // nullopt if the addressee is unknown, or if its incarnation has ended.
@@ -75,8 +132,7 @@ void OutgoingTopic::open(Writer& writer, const std::optional<TeamPeer>& receiver
   writer.newest.clear();
   writer.statistics.reset();
   writer.writer = DdsEntity();
-  const DdsQos group = make_dds_qos();
-  if (!partition.empty()) dds_qset_partition1(group.get(), partition.c_str());
+  const DdsQos group = partition_qos(partition);
   writer.publisher = DdsEntity(dds_create_publisher(participant_.handle(), group.get(), nullptr),
                                "publisher of " + spec_.name);
   const DdsQos qos = make_writer_qos(spec_.kind, participant_.config());
@@ -90,7 +146,7 @@ void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key, Oc
   const auto receiver = addressee ? receiver_of(*addressee) : std::nullopt;
   if (addressee && !receiver) return;
   Writer& writer = writer_to(receiver);
-  if (!is_kept(addressee.has_value())) return send(writer, key, std::move(content));
+  if (!is_kept()) return send(writer, key, std::move(content));
   writer.kept[key] = std::move(content);
   writer.due.insert(key);
   send_due(writer);
@@ -98,14 +154,14 @@ void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key, Oc
 
 void OutgoingTopic::catch_up(RobotId robot) {
   const auto receiver = receiver_of({robot});
-  if (is_kept(true) && receiver && writers_.contains(robot)) send_due(writer_to(receiver));
+  if (is_kept() && receiver && writers_.contains(robot)) send_due(writer_to(receiver));
 }
 
 void OutgoingTopic::renew(RobotId robot) {
   if (!is_sealed()) return;
   const auto receiver = receiver_of({robot});
   if (receiver && writers_.contains(robot)) renew(receiver);
-  if (is_kept(false) && writers_.contains(std::nullopt)) renew(std::nullopt);
+  if (is_kept() && writers_.contains(std::nullopt)) renew(std::nullopt);
 }
 
 void OutgoingTopic::renew(const std::optional<TeamPeer>& receiver) {
@@ -124,6 +180,7 @@ bool OutgoingTopic::is_acknowledged_by(RobotId robot) const {
 }
 
 void OutgoingTopic::send_due(Writer& writer) {
+  if (writer.due.empty()) return;
   const bool has_keys = !writer.receiver || participant_.seal()->with([&](const TeamSeal& team) {
     return team.is_admitted(*writer.receiver);
   });

@@ -53,7 +53,8 @@ struct Addressee {
 /// for one robot are also kept here without a seal, and sealed again for the next process. Events
 /// for all robots are kept, too, for renew().
 ///
-/// add_to(), sent_bytes() and spec() are thread-safe; all other functions belong to one thread.
+/// add_to(), sent_bytes() and spec() are thread-safe; all other functions belong to one thread. All
+/// threads hold DdsParticipant::use().
 class OutgoingTopic {
  public:
   OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
@@ -72,6 +73,13 @@ class OutgoingTopic {
   /// sends the kept messages again. Readers that forged packets of DDS have made ignore a writer do
   /// not ignore its successor.
   void renew(RobotId robot);
+  /// Copies the messages that DDS keeps for late readers, before DdsParticipant::move_to().
+  /// `reader` is another participant in the domain.
+  void save(dds_entity_t reader);
+  /// Creates the DDS entities, again after move_to(). Then it writes the copied messages, with
+  /// their numbers, so that robots that have received them drop them.
+  void open();
+
   /// True if no message to `robot` alone waits for its acknowledgement.
   [[nodiscard]] bool is_acknowledged_by(RobotId robot) const;
 
@@ -99,12 +107,17 @@ class OutgoingTopic {
   struct StatisticsDeleter {
     void operator()(dds_statistics* statistics) const { dds_delete_statistics(statistics); }
   };
+  struct Saved {
+    km_wire_Envelope head{};
+    Octets content;
+  };
   struct Writer {
     DdsEntity publisher;
     DdsEntity writer;
     std::unique_ptr<dds_statistics, StatisticsDeleter> statistics;
     std::optional<TeamPeer> receiver;  // empty: all robots
     std::string partition;
+    std::vector<Saved> saved;                          // between save() and open()
     std::map<std::string, std::uint32_t> next_number;  // by partition, because a process may return
     std::vector<Guid> readers;                         // participants of the matched readers
     std::map<MessageKey, Octets> kept;                 // messages to be sealed for the next process
@@ -117,12 +130,13 @@ class OutgoingTopic {
   };
 
   [[nodiscard]] bool is_sealed() const;
-  [[nodiscard]] bool is_kept(bool to_one) const;
+  [[nodiscard]] bool is_kept() const;
   [[nodiscard]] std::optional<TeamPeer> receiver_of(const Addressee& addressee) const;
   [[nodiscard]] std::string partition_for(const std::optional<TeamPeer>& receiver) const;
   Writer& writer_to(const std::optional<TeamPeer>& receiver);
   void open(Writer& writer, const std::optional<TeamPeer>& receiver);
   void renew(const std::optional<TeamPeer>& receiver);
+  [[nodiscard]] std::vector<Saved> saved(dds_entity_t reader, const Writer& writer) const;
   void send_due(Writer& writer);
   void send(Writer& writer, MessageKey key, Octets content);
   const char* seal(const Writer& writer, const km_wire_Envelope& head, Octets& content) const;

@@ -5,10 +5,13 @@
 #include <net/if.h>
 #include <netdb.h>
 #include <sys/socket.h>
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
+#include <future>
 #include <memory>
 #include <sstream>
 #include <string_view>
@@ -17,6 +20,7 @@
 #include "modules/core/config.hpp"
 #include "modules/core/xml_text.hpp"
 #include "runtime/log.hpp"
+#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -99,7 +103,11 @@ void write_internal(std::ostream& xml, const DdsConfig& config) {
   if (config.max_init_transmit_percent >= 0)
     xml << "<MaxInitTransmit>" << config.max_init_transmit_percent << "</MaxInitTransmit>";
   xml << "</BurstSize><MaxSampleSize>" << kMaxSampleBytes << "B</MaxSampleSize><NackDelay>"
-      << milliseconds(config.nack_delay_ms * 1e-3) << "</NackDelay>"
+      << milliseconds(config.nack_delay_ms * 1e-3)
+      << "</NackDelay>"
+      // Several receive threads end only when they receive a packet, which a robot cannot send to
+      // itself once its address has gone.
+      << "<MultipleReceiveThreads>false</MultipleReceiveThreads>"
       << "<Watermarks><WhcHigh>64MB</WhcHigh><WhcHighInit>64MB</WhcHighInit>"
          "<WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>";
 }
@@ -110,18 +118,32 @@ void log_line(void* /*argument*/, const dds_log_data_t* data) {
   while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
   const bool severe = (data->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
   const auto level = severe ? log::Level::kError : log::Level::kWarn;
-  // A dead link fails every packet in the same way, so the limit applies to the kind of message.
-  log::limited(level, "dds", std::string(text.substr(0, 24))) << text;
+  // A dead link fails every packet in the same way, so the limit applies to the kind of message: it
+  // does not see addresses.
+  std::string kind(text);
+  std::erase_if(kind, [](char c) { return c >= '.' && c <= ':'; });
+  log::limited(level, "dds", kind.substr(0, 24)) << text;
 }
 
-NetworkInterface choose_interface(const DdsConfig& config) {
-  const auto interfaces = network_interfaces();
+NetworkInterface choose_interface(const DdsConfig& config,
+                                  const std::vector<NetworkInterface>& interfaces) {
   NetworkInterface chosen = select_interface(interfaces, config.interface);
   const auto outward = std::ranges::count(interfaces, false, &NetworkInterface::loopback);
   if (config.interface.empty() && outward > 1)
     log::warn("dds") << "several network interfaces are up: using " << chosen.name << " ("
                      << chosen.address << "); set dds.interface to choose";
+  // Without a network, names of hosts cannot be looked up yet.
+  if (!chosen.loopback || chosen.name == config.interface) check_hosts(config.peers);
   return chosen;
+}
+
+// Loopback stands in for an interface that is not up.
+std::shared_ptr<const DdsDomain> make_domain(const DdsConfig& config) {
+  const auto up = network_interfaces();
+  const bool is_up = config.interface.empty() ||
+                     std::ranges::count(up, config.interface, &NetworkInterface::name) > 0;
+  return std::make_shared<const DdsDomain>(
+      config, is_up ? choose_interface(checked(config), up) : select_interface(up, "lo"));
 }
 
 dds_entity_t create_participant(const DdsConfig& config, const RobotIdentity& identity,
@@ -152,27 +174,10 @@ std::vector<NetworkInterface> network_interfaces() {
     interfaces.push_back({.name = entry->ifa_name,
                           .address = text.data(),
                           .multicast = (entry->ifa_flags & IFF_MULTICAST) != 0,
-                          .loopback = (entry->ifa_flags & IFF_LOOPBACK) != 0});
+                          .loopback = (entry->ifa_flags & IFF_LOOPBACK) != 0,
+                          .index = if_nametoindex(entry->ifa_name)});
   }
   return interfaces;
-}
-
-NetworkInterface select_interface(const std::vector<NetworkInterface>& interfaces,
-                                  const std::string& name) {
-  const auto rank = [](const NetworkInterface& i) { return i.loopback ? 0 : i.multicast ? 2 : 1; };
-  const NetworkInterface* best = nullptr;
-  for (const NetworkInterface& candidate : interfaces) {
-    if (!name.empty() && candidate.name != name) continue;
-    if (best == nullptr || rank(candidate) > rank(*best)) best = &candidate;
-  }
-  if (best != nullptr) return *best;
-
-  std::string known;
-  for (const NetworkInterface& i : interfaces)
-    known += (known.empty() ? "" : ", ") + i.name + " (" + i.address + ")";
-  throw ConfigError(
-      "dds.interface = " + (name.empty() ? "(any)" : name) +
-      ": no such IPv4 interface is up; those up: " + (known.empty() ? "none" : known));
 }
 
 void check_hosts(const std::vector<std::string>& hosts) {
@@ -194,8 +199,10 @@ std::string cyclone_xml(const DdsConfig& config, const NetworkInterface& interfa
 }
 
 DdsDomain::DdsDomain(const DdsConfig& config)
-    : config_(checked(config)), interface_(choose_interface(config_)) {
-  check_hosts(config_.peers);
+    : DdsDomain(checked(config), choose_interface(checked(config), network_interfaces())) {}
+
+DdsDomain::DdsDomain(const DdsConfig& config, NetworkInterface interface)
+    : config_(checked(config)), interface_(std::move(interface)) {
   dds_set_log_mask(DDS_LC_FATAL | DDS_LC_ERROR | DDS_LC_WARNING);
   dds_set_log_sink(&log_line, nullptr);
   domain_ = DdsEntity(
@@ -208,21 +215,88 @@ DdsDomain::DdsDomain(const DdsConfig& config)
                : ""));
 }
 
+DdsDomain::~DdsDomain() {
+  constexpr std::chrono::seconds kLongest{5};
+  std::packaged_task<void()> remove([domain = std::move(domain_)]() mutable { domain.reset(); });
+  const auto removed = remove.get_future();
+  start_without_signals(std::move(remove)).detach();
+  if (removed.wait_for(kLongest) != std::future_status::ready)
+    log::warn("dds") << "DDS does not end on interface " << interface_.name << " ("
+                     << interface_.address << "): it is left as it is";
+}
+
 DdsParticipant::DdsParticipant(const DdsConfig& config, const RobotIdentity& identity,
                                std::shared_ptr<SharedSeal> seal)
-    : DdsParticipant(std::make_shared<const DdsDomain>(config), identity, std::move(seal)) {}
+    : DdsParticipant(make_domain(config), identity, std::move(seal)) {
+  choice_.emplace(config.interface, interface());
+  if (choice_->waits())
+    log::warn("dds") << (config.interface.empty() ? "no network interface is up"
+                                                  : "interface " + config.interface + " is not up")
+                     << ": waiting for it, until then only robots on this host are met";
+}
 
 DdsParticipant::DdsParticipant(std::shared_ptr<const DdsDomain> domain,
                                const RobotIdentity& identity, std::shared_ptr<SharedSeal> seal)
-    : domain_(std::move(domain)),
-      identity_(identity),
-      seal_(std::move(seal)),
-      participant_(create_participant(domain_->config(), identity, seal_.get()),
-                   "DDS participant (are there more than dds.max_participant_index robots on this "
-                   "host?)") {
+    : domain_(std::move(domain)), identity_(identity), seal_(std::move(seal)) {
+  join();
+}
+
+void DdsParticipant::join() {
+  participant_ = DdsEntity(create_participant(domain_->config(), identity_, seal_.get()),
+                           "DDS participant (are there more than dds.max_participant_index robots "
+                           "on this host?)");
   dds_guid_t guid{};
   check_dds(dds_get_guid(participant_.handle(), &guid), "cannot read the participant's identity");
   guid_ = to_guid(guid);
+}
+
+std::shared_lock<std::shared_mutex> DdsParticipant::use() const {
+  const std::lock_guard turn(queue_);
+  return std::shared_lock(users_);
+}
+
+std::unique_lock<std::shared_mutex> DdsParticipant::use_alone() const {
+  const std::lock_guard turn(queue_);
+  return std::unique_lock(users_);
+}
+
+std::optional<NetworkInterface> DdsParticipant::new_interface(double now_s) {
+  constexpr double kPeriod_s = 0.5;
+  if (!choice_ || now_s - looked_s_ < kPeriod_s) return std::nullopt;
+  looked_s_ = now_s;
+  const bool waited = choice_->waits();
+  const auto next = choice_->update(network_interfaces(), now_s);
+  const NetworkInterface& used = interface();
+  if (choice_->waits() && !waited)
+    log::warn("dds") << "interface " << used.name << " (" << used.address
+                     << ") has gone: waiting for it";
+  if (waited && !choice_->waits() && !next)
+    log::info("dds") << "interface " << used.name << " (" << used.address << ") is back";
+  return next;
+}
+
+void DdsParticipant::move_to(const NetworkInterface& interface) {
+  const DdsConfig config = domain_->config();
+  ++moves_;
+  participant_ = {};
+  domain_.reset();
+  try {
+    check_hosts(config.peers);
+  } catch (const ConfigError& error) {
+    log::warn("dds") << error.what();
+  }
+  try {
+    domain_ = std::make_shared<const DdsDomain>(config, interface);
+    join();
+    log::info("dds") << "moved to interface " << interface.name << " (" << interface.address << ')';
+  } catch (const DdsError& error) {
+    log::warn("dds") << error.what() << ": trying again";
+    domain_.reset();
+    domain_ =
+        std::make_shared<const DdsDomain>(config, select_interface(network_interfaces(), "lo"));
+    join();
+  }
+  choice_->moved_to(this->interface());
 }
 
 }  // namespace km

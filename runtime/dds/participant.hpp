@@ -1,32 +1,21 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <shared_mutex>
 #include <string>
 #include <vector>
 
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/entity.hpp"
+#include "runtime/dds/interface_choice.hpp"
 #include "runtime/dds/robot_identity.hpp"
 #include "runtime/dds/shared_seal.hpp"
 
 namespace km {
 
-/// An IPv4 interface that is up.
-struct NetworkInterface {
-  std::string name;
-  std::string address;  ///< Dotted.
-  bool multicast = false;
-  bool loopback = false;
-};
-
-/// Network interfaces of this host, in the kernel's order.
+/// IPv4 interfaces of this host that are up, in the kernel's order.
 std::vector<NetworkInterface> network_interfaces();
-
-/// The interface called `name`. With an empty name: the first one that is not loopback,
-/// multicast-capable ones first, or otherwise loopback. Throws ConfigError that lists the existing
-/// ones if there is none.
-NetworkInterface select_interface(const std::vector<NetworkInterface>& interfaces,
-                                  const std::string& name);
 
 /// Looks up addresses or names of hosts, each with or without ":port". Throws ConfigError that
 /// names all unknown ones. May query a name server, and wait for it.
@@ -41,6 +30,11 @@ class DdsDomain {
  public:
   /// Throws ConfigError for an unusable `config`, DdsError if DDS refuses it.
   explicit DdsDomain(const DdsConfig& config);
+  DdsDomain(const DdsConfig& config, NetworkInterface interface);
+  /// Removes all entities of the domain. Waits for a bounded time: if DDS hangs, they are left.
+  ~DdsDomain();
+  DdsDomain(const DdsDomain&) = delete;
+  DdsDomain& operator=(const DdsDomain&) = delete;
 
   [[nodiscard]] const DdsConfig& config() const { return config_; }
   [[nodiscard]] const NetworkInterface& interface() const { return interface_; }
@@ -52,14 +46,35 @@ class DdsDomain {
 };
 
 /// A robot's presence on the network: one per robot, whatever the number of its topics.
+///
+/// DDS uses the address that its interface has when the domain is created. So domain, participant
+/// and all entities of the participant are made anew when the interface or its address changes. The
+/// receive thread of DdsBridge does so, and it owns all entities for receiving. Any other thread
+/// holds use() while it uses entities.
 class DdsParticipant {
  public:
-  /// Creates the domain as well: the case of one robot per process.
+  /// Creates the domain as well: the case of one robot per process. While the interface of `config`
+  /// is not up, the participant is on loopback.
   DdsParticipant(const DdsConfig& config, const RobotIdentity& identity,
                  std::shared_ptr<SharedSeal> seal = nullptr);
   /// Joins a domain that several robots of one process share (tests).
   DdsParticipant(std::shared_ptr<const DdsDomain> domain, const RobotIdentity& identity,
                  std::shared_ptr<SharedSeal> seal = nullptr);
+
+  /// While the result exists, the entities stay. Waits while they are made anew. A thread must not
+  /// hold two of them.
+  [[nodiscard]] std::shared_lock<std::shared_mutex> use() const;
+  /// As use(), for the thread that makes them anew: waits until no other thread uses them.
+  [[nodiscard]] std::unique_lock<std::shared_mutex> use_alone() const;
+
+  /// The interface to which DDS has to move, if any. Logs when the interface goes and returns.
+  [[nodiscard]] std::optional<NetworkInterface> new_interface(double now_s);
+  /// Makes domain and participant anew on `interface`, or on loopback if that fails. All entities
+  /// of the former participant are gone then. Precondition: the caller has use_alone(). Throws
+  /// DdsError.
+  void move_to(const NetworkInterface& interface);
+  /// Number of calls of move_to(). Call with use().
+  [[nodiscard]] std::uint64_t moves() const { return moves_; }
 
   [[nodiscard]] const RobotIdentity& identity() const { return identity_; }
   [[nodiscard]] const DdsConfig& config() const { return domain_->config(); }
@@ -70,11 +85,18 @@ class DdsParticipant {
   [[nodiscard]] SharedSeal* seal() const { return seal_.get(); }
 
  private:
+  void join();
+
+  mutable std::mutex queue_;                 // lets use_alone() wait for a bounded time
+  mutable std::shared_mutex users_;          // guards the entities
   std::shared_ptr<const DdsDomain> domain_;  // outlives the participant
   RobotIdentity identity_;
   std::shared_ptr<SharedSeal> seal_;
   DdsEntity participant_;
   Guid guid_{};
+  std::uint64_t moves_ = 0;
+  std::optional<InterfaceChoice> choice_;  // empty if robots share the domain
+  double looked_s_ = 0.0;
 };
 
 }  // namespace km

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace km {
 namespace {
@@ -66,6 +67,22 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
   participant.identity = identity;
   participant.proven = !admit_;
   appear_if_there(guid, participant);
+}
+
+void PeerTable::network_changed() {
+  const auto is_known = [this](const auto& entry) {
+    const auto& identity = entry.second.identity;
+    const auto peer = identity ? peers_.find(identity->robot) : peers_.end();
+    return peer != peers_.end() && peer->second.guid == entry.first;
+  };
+  std::erase_if(participants_, std::not_fn(is_known));  // robots are remembered
+  for (auto& [guid, participant] : participants_)
+    participant.announced = participant.alive = participant.proven = false;
+  for (auto& [robot, known] : peers_)
+    if (known.peer.state == PeerState::kAlive) {
+      known.peer.state = PeerState::kLost;
+      emit(PeerEventKind::kLost, known.peer.identity, "lost: this robot's network has changed");
+    }
 }
 
 void PeerTable::prove(const Guid& guid) {

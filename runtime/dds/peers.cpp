@@ -103,7 +103,7 @@ std::vector<TeamPeer> EventReceipts::take() {
 }
 
 Peers::Peers(const DdsParticipant& participant)
-    : self_(participant.guid()),
+    : participant_(participant),
       seal_(participant.seal()),
       table_(
           participant.identity(),
@@ -111,14 +111,27 @@ Peers::Peers(const DdsParticipant& participant)
               ? PeerTable::Admit()
               : [this](const auto& identity,
                        std::string_view credentials) { return admit(identity, credentials); }),
-      liveliness_changed_(dds_create_guardcondition(participant.handle()), "guard condition"),
-      reader_(dds_create_reader(participant.handle(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr,
-                                nullptr),
-              "reader of the participants"),
-      discovered_(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition"),
       announcer_(
           kMaxEvents, Overflow::kDropOldest, [this](const auto& event) { events_.publish(event); },
-          "peer_events") {}
+          "peer_events") {
+  open();
+}
+
+void Peers::open() {
+  const dds_entity_t participant = participant_.handle();
+  {
+    const std::lock_guard lock(mutex_);
+    changes_.clear();
+    table_.network_changed();
+  }
+  publish_events();
+  liveliness_changed_ = DdsEntity(dds_create_guardcondition(participant), "guard condition");
+  reader_ =
+      DdsEntity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
+                "reader of the participants");
+  discovered_ =
+      DdsEntity(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition");
+}
 
 // PeerTable calls this function, while the calling member function of Peers holds the mutex.
 const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
@@ -236,7 +249,7 @@ void Peers::take_discovered() {
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
       const auto& sample = *static_cast<const dds_builtintopic_participant_t*>(samples[i]);
       const Guid guid = to_guid(sample.key);
-      if (guid == self_) continue;
+      if (guid == participant_.guid()) continue;
       const std::lock_guard lock(mutex_);
       if (infos[i].instance_state != DDS_IST_ALIVE) {
         table_.participant_gone(guid);

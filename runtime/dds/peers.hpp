@@ -97,6 +97,10 @@ class Peers {
 
   // For the bridge.
 
+  /// Creates the DDS entities, again after DdsParticipant::move_to(): all robots count as lost
+  /// until they are received again.
+  void open();
+
   /// Prepares the listener of the status reader, and stores the writers of the status topic.
   void listen(dds_listener_t* listener);
   void watch(const WriterBook& status_writers) { status_writers_ = &status_writers; }
@@ -126,7 +130,7 @@ class Peers {
   void publish_events();
 
   Topic<PeerEvent> events_;
-  const Guid self_;
+  const DdsParticipant& participant_;
   SharedSeal* const seal_;    // may be null
   mutable std::mutex mutex_;  // guards the members below, up to changes_
   PeerTable table_;

@@ -17,10 +17,10 @@ constexpr std::size_t kHeldForNobody = 4096;
 
 }  // namespace
 
-Sender::Sender(const BudgetConfig& budget, double lease_s,
+Sender::Sender(const BudgetConfig& budget, const DdsParticipant& participant,
                const std::vector<std::unique_ptr<OutgoingTopic>>& topics,
                const OutgoingTopic* beside)
-    : lease_s_(lease_s),
+    : participant_(participant),
       topics_(topics),
       beside_(beside),
       posted_(kQueue, Overflow::kBlock),
@@ -56,9 +56,7 @@ void Sender::run() try {
   name_this_thread("dds_send");
   std::optional<double> end_s;
   while (true) {
-    catch_up_due();
-    file_posted();
-    if (send_next()) continue;
+    if (work()) continue;
     const double now_s = steady_now_s();
     if (posted_.is_over()) {
       if (!end_s) end_s = now_s + kLast_s;
@@ -76,6 +74,14 @@ void Sender::run() try {
   error_ = std::current_exception();
   failed_ = true;  // set after error_, so that readers of the flag see the error
   posted_.close();
+}
+
+// False if no message may be sent now.
+bool Sender::work() {
+  const auto use = participant_.use();
+  catch_up_due();
+  file_posted();
+  return send_next();
 }
 
 // Bypasses the budget; settle() charges the bytes afterwards.
@@ -140,7 +146,7 @@ void Sender::file(const Outgoing& message) {
                         .message = {message.to, message.encode()}};
   if (message.to) entry.to = message.to->robot;
   entry.bytes = envelope_bytes(entry.message.content.size());
-  if (kind == TopicKind::kRequest) entry.useful_s = lease_s_;
+  if (kind == TopicKind::kRequest) entry.useful_s = participant_.config().lease_s;
   schedule_.push(std::move(entry), steady_now_s());
 }
 

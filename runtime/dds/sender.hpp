@@ -37,10 +37,11 @@ class Sender {
   /// Number of messages that may wait to be encoded; then post() waits.
   static constexpr std::size_t kQueue = 8192;
 
-  /// `topics` are all topics of its messages, and outlive it; the list may grow until start().
+  /// `topics` are all topics of its messages, of `participant`, and outlive it; the list may grow
+  /// until start().
   /// Another thread writes `beside`, whose bytes also count against the budget; null: there is no
-  /// such topic. Requests wait no longer than `lease_s`. Throws ConfigError.
-  Sender(const BudgetConfig& budget, double lease_s,
+  /// such topic. Requests wait no longer than dds.lease_s. Throws ConfigError.
+  Sender(const BudgetConfig& budget, const DdsParticipant& participant,
          const std::vector<std::unique_ptr<OutgoingTopic>>& topics,
          const OutgoingTopic* beside = nullptr);
   ~Sender() { stop(); }
@@ -81,6 +82,7 @@ class Sender {
   using Schedule = SendSchedule<OutgoingTopic*, Encoded>;
 
   void run();
+  bool work();
   void catch_up_due();
   void file_posted();
   bool send_next();
@@ -89,7 +91,7 @@ class Sender {
   void report();
   [[nodiscard]] std::optional<std::vector<RobotId>> readers_of(const Schedule::Entry& entry) const;
 
-  const double lease_s_;
+  const DdsParticipant& participant_;
   const std::vector<std::unique_ptr<OutgoingTopic>>& topics_;
   const OutgoingTopic* beside_;
   BoundedQueue<Outgoing> posted_;

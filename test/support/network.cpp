@@ -74,13 +74,9 @@ VirtualNetwork::VirtualNetwork(int count) : switch_(hold_namespace()) {
   for (int n = 1; n <= count; ++n) {
     const pid_t host = hold_namespace();
     hosts_.push_back(host);
-    const std::string port = "port" + std::to_string(n);
-    ip(switch_, "link add " + port + " type veth peer name eth0 netns " + std::to_string(host));
-    ip(switch_, "link set " + port + " master br0 up");
-    ip(host, "addr add " + address(n) + "/24 dev eth0");
     ip(host, "link set lo up");
-    ip(host, "link set eth0 up");
-    drop_what_cannot_be_answered(host);
+    add_interface(n);
+    ip(host, "addr add " + address(n) + "/24 dev eth0");
   }
 }
 
@@ -99,8 +95,25 @@ void VirtualNetwork::set_link_between(int a, int b, bool up) {
   ip(host(b), command + address(a));
 }
 
+// Both subnets that tests use are on the same switch.
+void VirtualNetwork::set_address(int n, const std::string& address) {
+  ip(host(n), "addr flush dev eth0");
+  if (address.empty()) return;
+  ip(host(n), "addr add " + address + " dev eth0");
+  for (const char* subnet : {"10.77.0.0/24", "10.78.0.0/24"})
+    ip(host(n), std::string("route replace ") + subnet + " dev eth0");
+}
+
 void VirtualNetwork::remove_interface(int n) {
   ip(host(n), "link del eth0");
+}
+
+void VirtualNetwork::add_interface(int n) {
+  const std::string port = "port" + std::to_string(n);
+  ip(switch_, "link add " + port + " type veth peer name eth0 netns " + std::to_string(host(n)));
+  ip(switch_, "link set " + port + " master br0 up");
+  ip(host(n), "link set eth0 up");
+  drop_what_cannot_be_answered(host(n));
 }
 
 void VirtualNetwork::add_dead_interface(int n) {

@@ -32,8 +32,13 @@ class VirtualNetwork {
   /// models robots on one radio channel of which some are out of reach.
   void set_link_between(int a, int b, bool up);
 
+  /// Gives eth0 of `host` another address, for instance "10.77.0.102/24", or none.
+  void set_address(int host, const std::string& address);
+
   /// Leaves `host` with only the loopback interface.
   void remove_interface(int host);
+  /// Connects `host` again after remove_interface(); eth0 is another device now, without address.
+  void add_interface(int host);
 
   /// Gives `host` a second interface, "eth1", that leads nowhere.
   void add_dead_interface(int host);

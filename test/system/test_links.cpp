@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <csignal>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -60,6 +61,16 @@ class Team {
   // Disconnects robot k from all others.
   void cut_off(int k) { network_.set_link(k + 1, false); }
 
+  // Gives all robots addresses in another subnet, or takes their addresses.
+  void move(bool has_address) {
+    for (int host = 1; host <= static_cast<int>(robots_.size()); ++host)
+      network_.set_address(host, has_address ? "10.78.0." + std::to_string(host) + "/24" : "");
+  }
+
+  void interrupt() {
+    for (const auto& robot : robots_) robot->kill(SIGTERM);
+  }
+
   // Exit codes of all robots.
   std::vector<int> wait() {
     std::vector<int> codes;
@@ -102,6 +113,8 @@ class Solution {
            double settle_s = 3.0)
       : robots_(static_cast<int>(graph.keyframes.size())),
         team_(graph, links, folder_.path(), method, settle_s) {}
+
+  Team& team() { return team_; }
 
   // Waits for the end of all robots.
   Solved get() {
@@ -190,6 +203,31 @@ TEST_CASE("Robots with a budget come to one frame and send no more than that", "
               << " s\n";
     CHECK(bytes < 1.05 * kRate * summary.seconds);
   }
+}
+
+TEST_CASE("Robots whose addresses change reach the cost of those whose addresses stay",
+          "[system][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const SplitGraph graph = random_team(24, {0, 1, 2}, 40, {{0, 1}, {1, 2}, {0, 2}});
+  constexpr double kSettle_s = 20.0;  // they have their new addresses before
+  Solution moved(graph, all_links(3), "newton", kSettle_s), stayed(graph, all_links(3));
+  moved.team().move(false);
+  moved.team().move(true);
+  check_alike(moved.get(), stayed.get(), "new addresses");
+}
+
+TEST_CASE("Robots whose addresses have gone end on a signal", "[system][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const SplitGraph graph = random_team(24, {0, 1}, 40, {{0, 1}});
+  const TemporaryFolder folder;
+  constexpr double kSettle_s = 600.0;  // the signal ends them
+  Team team(graph, all_links(2), folder.path(), "newton", kSettle_s);
+  REQUIRE(team.is_joint());
+  team.move(false);
+  team.interrupt();
+  CHECK(team.wait() == std::vector<int>{0, 0});
+  for (const int robot : {0, 1})
+    CHECK(read_summary(folder.path() / robot_name(robot) / "summary.json").keyframes == 40);
 }
 
 TEST_CASE("A team that splits in two ends, and both sides report the robots they waited for",

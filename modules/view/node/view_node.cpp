@@ -41,6 +41,7 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
                    const ViewMesh& mesh, const std::optional<Camera>& camera,
                    const ViewTopics& topics)
     : config_(checked(config)),
+      participant_(participant),
       self_(participant.identity().robot),
       mesh_settings_(mesh),
       camera_(camera),
@@ -99,7 +100,16 @@ std::size_t ViewNode::sent_bytes(ViewChannel channel) const {
   return channels_[static_cast<std::size_t>(channel)].sent_bytes;
 }
 
+// Makes the writers anew with the participant. Their readers are newcomers then, which receive all.
+void ViewNode::follow_participant() {
+  if (std::exchange(moves_, participant_.moves()) == participant_.moves()) return;
+  for (const ViewChannel channel : {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages})
+    on(channel).writer = writer_on(participant_, channel);
+}
+
 void ViewNode::step(const Input& input) {
+  const auto use = participant_.use();
+  follow_participant();
   std::visit([this](const auto& message) { take(message); }, input);
 }
 
@@ -188,6 +198,8 @@ std::size_t ViewNode::write(Channel& channel, const ViewContent& content) try {
 
 // Sends the final state to the viewers that are still present.
 void ViewNode::send_rest() {
+  const auto use = participant_.use();
+  follow_participant();
   const double now_s = steady_now_s();
   Channel& view = on(ViewChannel::kView);
   Channel& mesh = on(ViewChannel::kMesh);

@@ -119,13 +119,16 @@ class ViewNode final : public Node {
   void send_mesh(double now_s);
   void cut_mesh(double now_s);
   void send_rest();
+  void follow_participant();
   std::size_t write(Channel& channel, const ViewContent& content);
 
   const ViewConfig config_;
+  const DdsParticipant& participant_;
   const RobotId self_;
   const ViewMesh mesh_settings_;
   const std::optional<Camera> camera_;
   std::array<Channel, 3> channels_;
+  std::uint64_t moves_ = 0;  // Moves of the participant to which the writers belong.
   TokenBucket past_budget_;  // Budget of kView while earlier data are sent.
   ViewSelector selector_;
   MeshOffer mesh_;      // The newest mesh.

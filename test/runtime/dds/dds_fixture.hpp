@@ -127,10 +127,12 @@ struct TestRobot {
   TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id, const MakeSeal& make_seal)
       : TestRobot(std::move(domain), {id, robot_name(id), kProtocolVersion, random_boot_id()},
                   make_seal) {}
-  TestRobot(std::shared_ptr<const DdsDomain> domain, const RobotIdentity& identity,
-            const MakeSeal& make_seal, TopicKind ping_kind = TopicKind::kEvent,
-            TopicKind addressed_kind = TopicKind::kRequest, const BudgetConfig& budget = {})
-      : participant(std::move(domain), identity, make_seal ? make_seal(identity) : nullptr),
+  /// `network`: a domain that robots share, or a configuration.
+  template <typename Network>
+  TestRobot(Network network, const RobotIdentity& identity, const MakeSeal& make_seal,
+            TopicKind ping_kind = TopicKind::kEvent, TopicKind addressed_kind = TopicKind::kRequest,
+            const BudgetConfig& budget = {})
+      : participant(std::move(network), identity, make_seal ? make_seal(identity) : nullptr),
         bridge(participant, budget),
         status([identity] { return RobotStatus{.robot = identity.robot, .name = identity.name}; },
                {.own = statuses.to_peers(), .peers = statuses.from_peers()}),

@@ -81,8 +81,8 @@ int run(int argc, char** argv) {
   const auto config = layers.load<DdsConfig>();
   layers.finish();
 
-  TestRobot robot(std::make_shared<const DdsDomain>(config),
-                  static_cast<RobotId>(std::stoi(argv[1])));
+  const auto id = static_cast<RobotId>(std::stoi(argv[1]));
+  TestRobot robot(config, {id, robot_name(id), kProtocolVersion, random_boot_id()}, nullptr);
   report(robot);
   robot.start();
   obey(robot);

@@ -1,11 +1,15 @@
 #include <catch2/catch.hpp>
 #include <iostream>
+#include <sstream>
 
 #include "test/runtime/dds/peer_process.hpp"
 #include "test/support/network.hpp"
 
 namespace km {
 namespace {
+
+// Time from a usable address until both robots receive each other again.
+constexpr double kReturnBound_s = 10.0;
 
 std::vector<std::string> discovery_settings(const std::string& discovery) {
   auto settings = own_team() + std::vector<std::string>{"discovery=" + discovery};
@@ -124,6 +128,100 @@ TEST_CASE("A link that fails and returns loses no event", "[dds][namespaces]") {
             << " s after it was plugged in\n";
   // The lease outlasted the outage: nothing is sent twice.
   CHECK(summary(*robots.b) == std::vector<int>{150, 0, 0});
+}
+
+// Both robots send `first` to `last` to all and the last number to each other.
+void exchange(const Pair& robots, int first, int last) {
+  const std::string range = std::to_string(first) + ' ' + std::to_string(last);
+  robots.a->send_line("ping " + range);
+  robots.b->send_line("ping " + range);
+  robots.a->send_line("one 4 " + std::to_string(last));
+  robots.b->send_line("one 3 " + std::to_string(last));
+}
+
+void check_received(const Pair& robots, int last) {
+  for (const char* what : {"ping ", "one "}) {
+    CHECK(robots.a->wait_for(what + std::string("4 ") + std::to_string(last)));
+    CHECK(robots.b->wait_for(what + std::string("3 ") + std::to_string(last)));
+  }
+}
+
+TEST_CASE("A robot whose own address changes returns to its team, and nothing is lost",
+          "[dds][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const std::string discovery = GENERATE("multicast", "peers");
+  const std::string address = GENERATE("10.77.0.102/24", "10.78.0.2/24");
+  CAPTURE(discovery, address);
+  VirtualNetwork network(2);
+  network.set_address(1, VirtualNetwork::address(1) + "/24");
+  const Pair robots(network, discovery_settings(discovery));
+  REQUIRE(robots.a->wait_for("joined 4"));
+  REQUIRE(robots.b->wait_for("joined 3"));
+  exchange(robots, 0, 49);
+  check_received(robots, 49);
+
+  network.set_address(2, "");
+  exchange(robots, 50, 99);
+  network.set_address(2, address);
+  const auto changed = std::chrono::steady_clock::now();
+  const auto a_sees = robots.a->wait_for("returned 4");
+  const auto b_sees = robots.b->wait_for("returned 3");
+  REQUIRE(a_sees);
+  REQUIRE(b_sees);
+  const double seconds = seconds_between(changed, std::max(a_sees->time, b_sees->time));
+  std::cout << "new address, by " << discovery << ": back after " << seconds << " s\n";
+  CHECK(seconds < kReturnBound_s);
+  check_received(robots, 99);
+  exchange(robots, 100, 149);
+  check_received(robots, 149);
+  for (Process* robot : {robots.a.get(), robots.b.get()}) {
+    const auto numbers = summary(*robot);
+    CHECK(numbers[0] == 150);
+    CHECK(numbers[2] == 0);
+    CHECK(robot->wait() == 0);
+  }
+}
+
+TEST_CASE("A robot waits for an interface that is not up, and for one that has gone",
+          "[dds][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const std::vector<std::string> interface =
+      GENERATE(std::vector<std::string>{"interface=eth0"}, std::vector<std::string>());
+  const bool is_removed = GENERATE(true, false);  // or only without an address
+  CAPTURE(interface, is_removed);
+  VirtualNetwork network(2);
+  const auto take_away = [&] {
+    if (is_removed) return network.remove_interface(2);
+    network.set_address(2, "");
+  };
+  const auto give_back = [&] {
+    if (is_removed) network.add_interface(2);
+    network.set_address(2, VirtualNetwork::address(2) + "/24");
+    return std::chrono::steady_clock::now();
+  };
+  take_away();
+  const Pair robots(network, own_team() + interface);
+  robots.b->send_line("ping 0 49");
+  CHECK(robots.b->lines("joined").empty());
+  const auto up = give_back();
+  const auto joined = robots.a->wait_for("joined 4");
+  REQUIRE(joined);
+  REQUIRE(robots.b->wait_for("joined 3"));
+  CHECK(robots.a->wait_for("ping 4 49"));
+  take_away();
+  REQUIRE(robots.a->wait_for("lost 4"));
+  exchange(robots, 50, 99);
+  const auto up_again = give_back();
+  const auto returned = robots.a->wait_for("returned 4");
+  REQUIRE(returned);
+  REQUIRE(robots.b->wait_for("returned 3"));
+  std::cout << "interface: joined after " << seconds_between(up, joined->time) << " s, back after "
+            << seconds_between(up_again, returned->time) << " s\n";
+  CHECK(seconds_between(up, joined->time) < kReturnBound_s);
+  CHECK(seconds_between(up_again, returned->time) < kReturnBound_s);
+  check_received(robots, 99);
+  CHECK(summary(*robots.a) == std::vector<int>{100, 0, 0});
+  CHECK(summary(*robots.b)[0] == 50);
 }
 
 TEST_CASE("An outage longer than the lease repeats the history, and duplicates are dropped",
