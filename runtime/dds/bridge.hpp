@@ -98,7 +98,7 @@ struct ContentGuard {
 /// team are received.
 ///
 /// When the network interface or its address changes, the receive thread makes all DDS entities
-/// anew (see DdsParticipant). The messages that DDS keeps for late readers are written again.
+/// again (see DdsParticipant). The messages that DDS keeps for late readers are written again.
 /// Received messages are not lost, because the other robots send to the new readers again.
 ///
 /// The bridge is the last of the nodes to stop. It then sends the queued messages, with a budget as

@@ -88,7 +88,7 @@ class IncomingTopic {
   void add_to(TrafficSnapshot& snapshot) const;
 
  private:
-  // Deserialised envelope. It outlives the DDS entities, which may be made anew.
+  // Deserialised envelope. It outlives the DDS entities, which may be made again.
   struct EnvelopeDeleter {
     void operator()(km_wire_Envelope* envelope) const {
       dds_sample_free(envelope, &km_wire_Envelope_desc, DDS_FREE_ALL);

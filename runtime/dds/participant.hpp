@@ -48,9 +48,9 @@ class DdsDomain {
 /// A robot's presence on the network: one per robot, whatever the number of its topics.
 ///
 /// DDS uses the address that its interface has when the domain is created. So domain, participant
-/// and all entities of the participant are made anew when the interface or its address changes. The
-/// receive thread of DdsBridge does so, and it owns all entities for receiving. Any other thread
-/// holds use() while it uses entities.
+/// and all entities of the participant are made again when the interface or its address changes.
+/// The receive thread of DdsBridge does so, and it owns all entities for receiving. Any other
+/// thread holds use() while it uses entities.
 class DdsParticipant {
  public:
   /// Creates the domain as well: the case of one robot per process. While the interface of `config`
@@ -61,15 +61,15 @@ class DdsParticipant {
   DdsParticipant(std::shared_ptr<const DdsDomain> domain, const RobotIdentity& identity,
                  std::shared_ptr<SharedSeal> seal = nullptr);
 
-  /// While the result exists, the entities stay. Waits while they are made anew. A thread must not
+  /// While the result exists, the entities stay. Waits while they are made again. A thread must not
   /// hold two of them.
   [[nodiscard]] std::shared_lock<std::shared_mutex> use() const;
-  /// As use(), for the thread that makes them anew: waits until no other thread uses them.
+  /// As use(), for the thread that makes them again: waits until no other thread uses them.
   [[nodiscard]] std::unique_lock<std::shared_mutex> use_alone() const;
 
   /// The interface to which DDS has to move, if any. Logs when the interface goes and returns.
   [[nodiscard]] std::optional<NetworkInterface> new_interface(double now_s);
-  /// Makes domain and participant anew on `interface`, or on loopback if that fails. All entities
+  /// Makes domain and participant again, on `interface`, or on loopback if that fails. All entities
   /// of the former participant are gone then. Precondition: the caller has use_alone(). Throws
   /// DdsError.
   void move_to(const NetworkInterface& interface);

@@ -93,7 +93,7 @@ class PeerTable {
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
 
-  /// Forgets what DDS has reported: this robot now has another network, or another address.
+  /// Discards what DDS has reported: this robot now has another network, or another address.
   void network_changed();
 
   /// Notes that a message has proven the identity of the participant.
