@@ -41,9 +41,11 @@ RosDiagnosticStatus team_status(const OptimizerProgress& progress) {
                    {"optimises with robots", list(progress.members)},
                    {"tentative robots", list(progress.tentative)},
                    {"robots in another frame", list(progress.not_joined)}};
-  const bool is_certain = progress.tentative.empty() && progress.not_joined.empty();
+  const bool is_certain =
+      progress.located && progress.tentative.empty() && progress.not_joined.empty();
   status.level = is_certain ? RosDiagnosticStatus::kOk : RosDiagnosticStatus::kWarn;
   status.message = is_certain                    ? "ok"
+                   : !progress.located           ? "not yet localised in the finished map"
                    : progress.not_joined.empty() ? "a single place ties robots to this one"
                                                  : "no accepted closure ties robots to this one";
   return status;

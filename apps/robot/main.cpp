@@ -28,9 +28,10 @@ Examples
   Without multicast:   --peers 10.0.0.2,10.0.0.3 --interface wlan0 --link wifi
   After a crash or an empty battery, continue the same run (same command, --resume in place of --output):
     kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_01_easy --resume results/a
-  A robot that localises itself in the map of an earlier run, which takes part as robot 0:
+  A robot that localises itself in the map of an earlier run, which stays as it is:
+    kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_02_easy --localize results/a --output results/b
+  The robot of an earlier run, as a member of the team:
     kimera_multi_robot --robot 0 --session results/a --output results/yesterday
-    kimera_multi_robot --config config/datasets/euroc.yaml --robot 1 --dataset MH_02_easy --output results/b
   Topics of a recording and the regularity of their stamps; then a robot on the topics that rig.yaml names:
     kimera_multi_robot --inspect recording.bag rig.yaml
     kimera_multi_robot --robot 0 --dataset recording.bag --rig rig.yaml --output results/a
@@ -105,6 +106,14 @@ void add_input(CLI::App& app, RobotOptions& options) {
                    "themselves in its map")
       ->check(CLI::ExistingDirectory);
   group->require_option(1);
+  app.add_option("--localize", options.localize,
+                 "Results of a finished run: this run localises itself in its map, which stays as "
+                 "it is, and all poses are in its frame")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--extend", options.extend,
+                 "Results of a finished run of this robot: the results of this run hold both, and "
+                 "all poses are optimised together")
+      ->check(CLI::ExistingDirectory);
   app.add_option(
          "--rig", options.rig,
          "For a bag: file that states which topics are the sensors, and their calibration; for a "
@@ -133,6 +142,17 @@ void check_window(const RobotOptions& options) {
   std::ostringstream message;
   message << "--from " << *options.from_s << " s is not before --to " << *options.to_s << " s";
   throw CLI::ValidationError(message.str());
+}
+
+void check_localize(const RobotOptions& options) {
+  if (options.localize.empty() && options.extend.empty()) return;
+  if (!options.localize.empty() && !options.extend.empty())
+    throw CLI::ValidationError(
+        "--localize leaves the map as it is, and --extend does not: give one of them");
+  if (!options.graph.empty() || !options.session.empty())
+    throw CLI::ValidationError(
+        "--localize and --extend compare images: give --dataset or --live, not --graph or "
+        "--session");
 }
 
 void add_network(CLI::App& app, RobotOptions& options) {
@@ -219,6 +239,7 @@ RobotOptions parse_options(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     check_window(options);
+    check_localize(options);
   } catch (const CLI::ParseError& error) {
     std::exit(app.exit(error) == 0 ? 0 : kBadCommandLine);
   }

@@ -43,6 +43,8 @@ struct RobotOptions {
   bool is_live = false;            ///< True if drivers that run now publish the topics of `rig`.
   std::filesystem::path graph;     ///< Recorded pose graph: g2o, CSV or JRL.
   std::filesystem::path session;   ///< Results of a finished run; exclusive with dataset and graph.
+  std::filesystem::path localize;  ///< Results of a finished run: this run localises in its map.
+  std::filesystem::path extend;    ///< Results of a finished run that this run extends.
   std::optional<double> from_s;    ///< Part of the recording [s since its first image].
   std::optional<double> to_s;
   double rate = 1.0;  ///< Times real time; infinity for as fast as possible.

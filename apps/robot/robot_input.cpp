@@ -26,6 +26,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// True if this process begins to extend a run; false if it continues to do so.
+bool extends(const RobotOptions& options) {
+  return !options.extend.empty() && !options.resume;
+}
+
 // True for messages of ROS, recorded or live; false for a EuRoC folder.
 bool has_messages(const RobotOptions& options) {
   return options.is_live || (!options.dataset.empty() && may_be_bag(options.dataset));
@@ -71,8 +76,8 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
 }
 
 // The map of the former process; nullopt if the file is missing or damaged.
-std::optional<ResumedMap> restore_map(const RobotOptions& options, const RestoredRun& run) try {
-  const fs::path file = options.output / kMap;
+std::optional<ResumedMap> restore_map(const fs::path& folder, const RestoredRun& run) try {
+  const fs::path file = folder / kMap;
   if (is_absent(file)) return std::nullopt;
   return ResumedMap(read_map_file(file), static_cast<KeyframeIndex>(run.keyframes.size()));
 } catch (const InputFileError& error) {
@@ -86,6 +91,57 @@ RestoredRun open_session(const RobotOptions& options) {
   if (run.keyframes.empty())
     throw std::invalid_argument(file.string() + ": that run has no keyframe");
   return alone_as(options.robot, std::move(run));
+}
+
+// Keyframes without an optimised pose follow the last one with such a pose by odometry.
+FinishedMap open_finished_map(const RobotOptions& options) {
+  const fs::path file = options.localize / kJournal;
+  RestoredRun run = restore_run(file);
+  if (run.keyframes.empty())
+    throw std::invalid_argument(file.string() + ": that run has no keyframe to localise at");
+  FinishedMap map{std::move(run.keyframes), std::move(run.solution.trajectory.T_world_kf)};
+  map.T_map_kf.resize(std::min(map.T_map_kf.size(), map.keyframes.size()));
+  while (map.T_map_kf.size() < map.keyframes.size()) {
+    const KeyframeOdometry& next = run.odometry[map.T_map_kf.size()];
+    map.T_map_kf.push_back(map.T_map_kf.empty() ? next.T_odom_kf
+                                                : map.T_map_kf.back() * next.T_previous_kf);
+  }
+  log::info("localization") << map.keyframes.size() << " keyframes of " << options.localize.string()
+                            << ": not yet localised";
+  return map;
+}
+
+// Images up to the end of the run are left out, because its journal goes on in order of time.
+RestoredRun open_run_to_extend(const RobotOptions& options) {
+  const fs::path file = options.extend / kJournal;
+  std::error_code none;
+  if (fs::equivalent(options.extend, options.output, none))
+    throw std::invalid_argument(file.string() + ": is in the folder of --output: give another one");
+  RestoredRun run = restore_run(file);
+  report_damage(file, run);
+  if (run.keyframes.empty())
+    throw std::invalid_argument(file.string() + ": that run has no keyframe to go on from");
+  if (run.robot != options.robot)
+    throw std::invalid_argument(file.string() + ": is of robot " + std::to_string(run.robot) +
+                                ": give --robot " + std::to_string(run.robot));
+  log::info("journal") << options.extend.string() << " has images up to "
+                       << run.odometry.back().stamp << " ns: earlier images are left out";
+  return run;
+}
+
+// The first keyframe of the map as keyframe 0 of this run. It has no time of this run, and no
+// vertical: the map's z is that of the frame.
+RestoredRun first_keyframe_of(const FinishedMap& map, RobotId robot) {
+  RestoredRun run;
+  run.robot = robot;
+  KeyframeOdometry odometry{.id = {robot, 0}};
+  odometry.T_odom_kf = odometry.T_previous_kf = map.T_map_kf.front();
+  Keyframe keyframe = map.keyframes.front();
+  keyframe.odometry = {odometry.id, odometry.T_odom_kf, Matrix6::Zero()};
+  keyframe.stamp = odometry.stamp;
+  run.odometry.push_back(odometry);
+  run.keyframes.push_back(std::move(keyframe));
+  return run;
 }
 
 std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
@@ -275,19 +331,33 @@ std::optional<RobotInput> open_robot_input(const RobotOptions& options, const Ro
                          : is_dataset    ? options.dataset
                                          : options.graph;
   const std::string name = (path / "").parent_path().filename();  // independent of the mount point
-  std::optional<RestoredRun> restored = restore(options, name);
+  std::optional<RestoredRun> restored =
+      extends(options) ? open_run_to_extend(options) : restore(options, name);
   std::shared_ptr<const RosNetwork> ros;
   if (options.is_live || config.ros.publish.value_or(false))
     ros = std::make_shared<const RosNetwork>(config.ros);
   if (!is_dataset)
-    return RobotInput{open_graph(options), name, std::move(restored), std::nullopt, std::move(ros)};
+    return RobotInput{.source = open_graph(options),
+                      .name = name,
+                      .restored = std::move(restored),
+                      .ros = std::move(ros)};
   auto reader = open_dataset(options, config, mapping, rig, ros, restored, signals);
   if (reader == nullptr) return std::nullopt;
   reader = with_poses(options, rig, std::move(reader));
-  auto map = restored && mapping ? restore_map(options, *restored) : std::nullopt;
+  RobotInput input{.source = std::move(reader), .name = name};
+  if (restored && mapping)
+    input.map = restore_map(extends(options) ? options.extend : options.output, *restored);
   if (restored) find_beyond(rig.correction, *restored);
-  return RobotInput{std::move(reader), name,           std::move(restored),
-                    std::move(map),    std::move(ros), rig.correction};
+  input.restored = std::move(restored);
+  input.ros = std::move(ros);
+  input.rig_correction = rig.correction;
+  if (!options.localize.empty()) input.localize_in = open_finished_map(options);
+  if (extends(options)) input.restored_from = RestoredFrom::kFormerRun;
+  if (input.localize_in && !input.restored) {
+    input.restored_from = RestoredFrom::kFinishedMap;
+    input.restored = first_keyframe_of(*input.localize_in, options.robot);
+  }
+  return input;
 }
 
 }  // namespace km

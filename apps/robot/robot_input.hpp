@@ -10,6 +10,7 @@
 #include "apps/robot/robot_config.hpp"
 #include "modules/core/camera_calibration.hpp"
 #include "modules/journal/restored_run.hpp"
+#include "modules/localization/map_matcher.hpp"
 #include "modules/mesh/resumed_map.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 #include "modules/sensors/dataset_reader.hpp"
@@ -23,12 +24,21 @@ namespace km {
 /// No input: the robot of a finished run stands still and serves the others.
 struct PastRun {};
 
+/// Origin of the restored run.
+enum class RestoredFrom {
+  kFormerProcess,  ///< This run, which a former process began.
+  kFormerRun,      ///< A run that this run extends. The robot was moved in between.
+  kFinishedMap,    ///< Keyframe 0 of the map in which this run localises itself.
+};
+
 /// Input of the robot: a recording of sensors or a recorded pose graph, and the restored run if
 /// there is one.
 struct RobotInput {
   std::variant<std::unique_ptr<DatasetReader>, RecordedGraph, PastRun> source;
   std::string name;  ///< For the journal.
   std::optional<RestoredRun> restored = {};
+  RestoredFrom restored_from = RestoredFrom::kFormerProcess;
+  std::optional<FinishedMap> localize_in = {};
   std::optional<ResumedMap> map = {};  ///< Map of the restored run; absent without mapping.
   std::shared_ptr<const RosNetwork> ros =
       nullptr;  ///< Null unless the robot reads or publishes topics of ROS.
@@ -48,7 +58,9 @@ struct RigInput {
 /// Throws ConfigError and DatasetError, see read_rig_file() and read_rig_correction().
 [[nodiscard]] RigInput read_rig_input(const RobotOptions& options);
 
-/// Opens the input that the options name, and with --resume the journal of the run to continue.
+/// Opens the input that the options name, with --resume the journal of the run to continue, and
+/// with
+/// --localize that of the finished run.
 /// nullopt: one of `signals` arrived during the wait for the calibration from live topics. Throws
 /// DatasetError, DdsError, InputFileError and std::invalid_argument with one line that names the
 /// file and a remedy.

@@ -70,6 +70,14 @@ void remove_former(const fs::path& folder, bool continues, bool resume) {
   for (const char* file : {kJournal, kMap}) fs::remove(folder / file);
 }
 
+// The journal and the map of the run to extend, if this process begins to do so, as the beginning
+// of this run.
+void copy_extended(const RobotOptions& options) {
+  if (options.extend.empty() || options.resume) return;
+  for (const char* file : {kJournal, kMap})
+    if (is_file(options.extend / file)) fs::copy_file(options.extend / file, options.output / file);
+}
+
 void log_network(const RobotConfig& config, const NetworkInterface& interface) {
   const char* const discovery =
       config.dds.discovery == Discovery::kMulticast ? "multicast" : "address";
@@ -120,7 +128,8 @@ std::string optimizer_text(const OptimizerProgress& progress) {
          ", with " + std::to_string(progress.members.empty() ? 0 : progress.members.size() - 1) +
          (progress.tentative.empty()
               ? ""
-              : " (" + std::to_string(progress.tentative.size()) + " tentatively)");
+              : " (" + std::to_string(progress.tentative.size()) + " tentatively)") +
+         (progress.located ? "" : ", not yet localised");
 }
 
 std::string count_text(std::size_t count) {
@@ -469,6 +478,9 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
       summary.sensor_faults[to_string(fault)] = entry.count;
   }
   summary.traffic = robot.sent_bytes();
+  if (const LocalizationNode* localization = robot.localization())
+    summary.localization = {options.localize.string(), record.progress().located,
+                            localization->compared(), localization->matched()};
   if (config.budget.is_limited()) summary.held_back = held_back(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();
@@ -566,7 +578,8 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   log::info("robot") << "kimera_multi_robot " << built_version() << ", commit " << built_commit();
   const std::optional<double> rate = chosen_rate(options, config, mapping, rig, signals);
   options.rate = rate.value_or(options.rate);
-  const bool continues = options.resume && input->restored;
+  const bool continues =
+      options.resume && input->restored_from == RestoredFrom::kFormerProcess && input->restored;
   options.record = record_file(options, continues);
   Robot robot(options, config, *std::move(input), mapping, results, signals);
   if (listen) listen(robot.topics());
@@ -575,8 +588,10 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
       !config.segmentation.palette.empty())
     log::warn("robot") << "segmentation.palette is not used: labels are recorded, and with them "
                           "their label_palette.csv";
-  change_output(options, results,
-                [&](const fs::path& folder) { remove_former(folder, continues, options.resume); });
+  change_output(options, results, [&](const fs::path& folder) {
+    remove_former(folder, continues, options.resume);
+    copy_extended(options);
+  });
   const auto write = [&](const char* name, const std::string& text) {
     results.write(options.output / name, [&text](const auto& file) { write_file(file, text); });
   };

@@ -139,6 +139,18 @@ void add_tentative(std::span<const RunFacts> runs, const Names& names,
     }
 }
 
+void add_localization(const RunSummary& run, std::vector<Finding>& findings) {
+  if (!run.localization || run.localization->localised) return;
+  findings.push_back(
+      {.id = "localization.not",
+       .severity = Severity::kWarning,
+       .what = run.name + ": not localised in " + run.localization->map + ": " +
+               std::to_string(run.localization->matched) + " of " +
+               std::to_string(run.localization->compared) + " keyframes match it",
+       .means = "there are no optimised poses: odometry.tum has the poses in the frame of odometry",
+       .to_do = "let the robot see two places of the map from where the former run saw them"});
+}
+
 void add_unseen(const RunSummary& run, std::vector<Finding>& findings) {
   if (run.frames + run.frames_skipped + run.keyframes > 0) return;
   findings.push_back({.id = "frames.none",
@@ -424,6 +436,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
     add_vocabularies(run.summary, findings);
     add_lost(run.summary, findings);
     add_unseen(run.summary, findings);
+    add_localization(run.summary, findings);
     add_skipped(run.summary, findings);
     add_slowed(run.summary, findings);
     add_paused(run.summary, findings);

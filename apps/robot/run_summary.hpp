@@ -189,6 +189,22 @@ struct OdometrySummary {
   bool operator==(const OdometrySummary&) const = default;
 };
 
+/// Result of --localize.
+struct LocalizationSummary {
+  std::string map;             ///< Folder of the finished run.
+  bool localised = false;      ///< Closures at two places or more tie this run to the map.
+  std::uint64_t compared = 0;  ///< Number of keyframes that were compared with the map.
+  std::uint64_t matched = 0;   ///< Number of these that match a keyframe of the map.
+
+  void visit_fields(auto& visitor) {
+    visitor.field("map", map);
+    visitor.field("localised", localised);
+    visitor.field("compared", compared);
+    visitor.field("matched", matched);
+  }
+  bool operator==(const LocalizationSummary&) const = default;
+};
+
 /// Times without a pose: see pose_holes().
 struct HolesSummary {
   std::uint64_t count = 0;
@@ -223,10 +239,11 @@ struct RunSummary {
   std::map<std::string, std::uint64_t> sensor_faults;
   ClosureCounts closures;  ///< Closures found by this robot.
   OptimizerSummary pgo;
-  std::optional<OdometrySummary> odometry;  ///< Absent with an external odometry.
-  std::optional<HolesSummary> holes;        ///< Holes of the live trajectory; absent without any.
-  std::optional<CamerasSummary> cameras;    ///< Absent without vio.calibrate.
-  std::optional<MappingSummary> mapping;    ///< Absent if mapping is off.
+  std::optional<OdometrySummary> odometry;          ///< Absent with an external odometry.
+  std::optional<LocalizationSummary> localization;  ///< Absent without --localize.
+  std::optional<HolesSummary> holes;      ///< Holes of the live trajectory; absent without any.
+  std::optional<CamerasSummary> cameras;  ///< Absent without vio.calibrate.
+  std::optional<MappingSummary> mapping;  ///< Absent if mapping is off.
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
   std::optional<HeldBackSums> held_back;         ///< Absent without a budget.
   ProcessSummary process;
@@ -257,6 +274,7 @@ struct RunSummary {
     visitor.field("closures", closures);
     visitor.field("pgo", pgo);
     visitor.field("odometry", odometry);
+    visitor.field("localization", localization);
     visitor.field("holes", holes);
     visitor.field("cameras", cameras);
     visitor.field("mapping", mapping);

@@ -40,10 +40,15 @@ void forward(In<T> from, Out<T> to) {
   from.subscribe([to](const auto& message) { to.publish(message); });
 }
 
+// True if this process continues the run of a former one.
+bool is_resumed(const RobotInput& input) {
+  return input.restored && input.restored_from != RestoredFrom::kFinishedMap &&
+         !std::holds_alternative<PastRun>(input.source);
+}
+
 // A resumed run continues its incarnation.
 std::uint64_t boot_of(const RobotInput& input) {
-  const bool continues = input.restored && !std::holds_alternative<PastRun>(input.source);
-  return continues ? next_boot(input.restored->boot) : random_boot_id();
+  return is_resumed(input) ? next_boot(input.restored->boot) : random_boot_id();
 }
 
 std::optional<Camera> left_camera_of(const RobotInput& input) {
@@ -70,6 +75,8 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     : identity_{.robot = options.robot, .name = options.name, .boot = boot_of(input)},
       seal_(make_team_seal(options.security, identity_)),
       participant_(config.dds, identity_, seal_),
+      is_resumed_(is_resumed(input)),
+      restored_from_(input.restored_from),
       restored_(std::move(input.restored)),
       supervisor_(signals, config.run.patience) {
   auto bridge = std::make_unique<DdsBridge>(participant_, config.budget);
@@ -82,6 +89,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   else
     add_past();
   if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
+  if (input.localize_in) add_localization(config, *std::move(input.localize_in));
   add_loop_closure(config);
   add_journal(options, input, results);
   add_back_end(config);
@@ -126,24 +134,26 @@ void Robot::add_restore() {
     bridge_->peers().recall({.robot = robot, .name = peer.name, .boot = peer.boot});
     incarnations_.meet({robot, peer.boot});
   }
-  restore_ = &add<RestoreNode>(false, RestoreTopics{.states = topics_.restored_odometry,
-                                                    .odometry = topics_.keyframe_odometry,
-                                                    .keyframes = topics_.keyframes,
-                                                    .own_closures = topics_.own_closures,
-                                                    .peer_closures = topics_.closures,
-                                                    .outcomes = topics_.restored_outcomes,
-                                                    .inlier_sets = topics_.restored_inlier_sets,
-                                                    .solution = topics_.restored_solution});
+  restore_ = &add<RestoreNode>(
+      false, RestoreTopics{.states = topics_.restored_odometry,
+                           .odometry = topics_.keyframe_odometry,
+                           .keyframes = restored_from_ == RestoredFrom::kFinishedMap
+                                            ? topics_.new_keyframes
+                                            : topics_.keyframes,
+                           .own_closures = topics_.own_closures,
+                           .peer_closures = topics_.closures,
+                           .outcomes = topics_.restored_outcomes,
+                           .inlier_sets = topics_.restored_inlier_sets,
+                           .solution = topics_.restored_solution});
 }
 
 // Call after the nodes that find closures and before those that read them, so that none is lost at
 // the end.
 void Robot::add_journal(const RobotOptions& options, const RobotInput& input,
                         ResultWriter& results) {
-  const bool is_past = std::holds_alternative<PastRun>(input.source);
   journal_ = &add<JournalNode>(false, options.output / kJournal, results,
                                JournalStart{identity_.robot, identity_.boot, input.name},
-                               restored_ && !is_past ? &*restored_ : nullptr, input.rig_correction,
+                               is_resumed_ ? &*restored_ : nullptr, input.rig_correction,
                                JournalTopics{.states = topics_.odometry,
                                              .odometry = topics_.keyframe_odometry,
                                              .new_keyframes = topics_.new_keyframes,
@@ -161,9 +171,12 @@ void Robot::add_journal(const RobotOptions& options, const RobotInput& input,
 template <typename OdometryNode, typename... Arguments>
 void Robot::add_odometry(Arguments&&... arguments) {
   auto& node = add<OdometryNode>(true, identity_.robot, std::forward<Arguments>(arguments)...);
-  if (restored_)
-    node.continue_from(
-        {restored_->states[restored_->final_states() - 1], restored_->odometry.back()});
+  if (!restored_) return;
+  VioCheckpoint checkpoint{.state = {}, .keyframe = restored_->odometry.back()};
+  const std::size_t states = restored_->final_states();
+  if (restored_from_ == RestoredFrom::kFormerProcess && states > 0)
+    checkpoint.state = restored_->states[states - 1];
+  node.continue_from(checkpoint);
 }
 
 void Robot::add_sensing(const RobotConfig& config, double rate,
@@ -209,6 +222,14 @@ void Robot::add_place_recognition(const RobotConfig& config) {
                                                    .candidates = topics_.candidates,
                                                    .restarts = topics_.candidate_restarts,
                                                    .queries = topics_.place_queries});
+}
+
+void Robot::add_localization(const RobotConfig& config, FinishedMap map) {
+  localization_ = &add<LocalizationNode>(
+      false, MapMatcher(config.place_recognition, config.loop_closure, vocabulary_, std::move(map)),
+      LocalizationTopics{.keyframes = topics_.keyframes,
+                         .closures = topics_.new_closures,
+                         .outcomes = topics_.outcomes});
 }
 
 // A mapper that is too slow skips frames. At --rate max no frame is late, and the mapper holds the
@@ -438,7 +459,9 @@ void Robot::add_records() {
     received_s_[status->robot] = steady_now_s();
   });
   topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
-    input_time_.reach(keyframe->stamp);  // a pose graph and a former process have no packets
+    const bool is_of_map = restored_from_ == RestoredFrom::kFinishedMap && keyframe->id.index == 0;
+    // A pose graph and a former process have no packets.
+    if (!is_of_map) input_time_.reach(keyframe->stamp);
     ++keyframes_;
   });
   status_ = &add<RobotStatusNode>(
@@ -450,6 +473,7 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
                            RosOutputOptions options, std::optional<In<SensorPacket>> images) {
   options.robot = identity_.name;
   options.id = identity_.robot;
+  options.awaits_trajectory = localization_ != nullptr;
   auto& output = add<RosOutputNode>(
       false, node, std::move(sink), std::move(options),
       [this, loads = ModuleLoads(nodes_)]() mutable {

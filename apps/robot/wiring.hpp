@@ -26,6 +26,7 @@
 #include "modules/core/processing_load.hpp"
 #include "modules/core/tracked_image.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
+#include "modules/localization/node/localization_node.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
@@ -147,6 +148,8 @@ class Robot {
   [[nodiscard]] const TeamMeshNode* peer_meshes() const { return peer_meshes_; }
   /// True if another running robot had this robot's id first.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
+  /// Null without --localize.
+  [[nodiscard]] const LocalizationNode* localization() const { return localization_; }
   /// Null without --record.
   [[nodiscard]] RosOutputNode* record() { return record_; }
   [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
@@ -173,6 +176,7 @@ class Robot {
   template <typename OdometryNode, typename... Arguments>
   void add_odometry(Arguments&&... arguments);
   void add_place_recognition(const RobotConfig& config);
+  void add_localization(const RobotConfig& config, FinishedMap map);
   void add_past();
   void publish(JournalEntry event);
   void add_team(RobotSample& sample) const;
@@ -204,6 +208,8 @@ class Robot {
   std::shared_ptr<SharedSeal> seal_;  // null without keys
   DdsParticipant participant_;
   Topics topics_;
+  const bool is_resumed_;  // continues the run of a former process
+  const RestoredFrom restored_from_;
   std::optional<RestoredRun> restored_;           // empty once the robot is built
   std::shared_ptr<const Vocabulary> vocabulary_;  // null if the robot has no images
   std::atomic<bool> source_ended_ = false;
@@ -221,6 +227,7 @@ class Robot {
   SensorsNode* sensors_ = nullptr;
   std::size_t restored_images_ = 0;
   RestoreNode* restore_ = nullptr;
+  LocalizationNode* localization_ = nullptr;
   JournalNode* journal_ = nullptr;
   RecorderNode* recorder_ = nullptr;
   MeshDeformationNode* mesh_deformation_ = nullptr;

@@ -21,6 +21,10 @@ inline constexpr Bounds<double> kVariance{1e-12, 1e12};
 /// Variance on one axis in a graph file [rad^2], [m^2], also of graphs for modules/pgo_study only.
 inline constexpr Bounds<double> kAxisVariance{1e-15, 1e12};
 
+/// Standard deviation on each axis of the step between two runs of a robot [m]: it was carried, so
+/// that the length of the step is unknown. No step inside a run has a tenth of it.
+inline constexpr double kUnknownStep_m = 1e4;
+
 /// Standard deviation of the tilt of a vertical [rad].
 inline constexpr Bounds<double> kTiltSigma_rad{1e-4, 1.6};
 

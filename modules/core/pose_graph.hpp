@@ -105,6 +105,8 @@ struct OptimizerProgress {
   std::vector<RobotId> tentative = {};
   /// Members that no accepted closure ties to this robot. They are in another frame. Ascending.
   std::vector<RobotId> not_joined = {};
+  /// False while no closures at two places tie this run of the robot to the runs before it.
+  bool located = true;
   std::uint32_t round = 0;  ///< Number of rounds; every member sends once per round.
   double cost = 0.0;        ///< Chordal cost of the team, without factor 1/2.
   /// Norm of the team's Riemannian gradient, or (newton) its Newton decrement.

@@ -53,6 +53,7 @@ bool OwnGraph::add(const KeyframeOdometry& keyframe) {
       throw std::invalid_argument("OwnGraph: odometry to keyframe " + to_string(keyframe.id) +
                                   " is not finite with a usable covariance");
     odometry_.push_back(*step);
+    if (is_unknown_step(*step)) later_runs_.push_back(keyframe.id.index);
   } else {
     if (!keyframe.T_odom_kf.matrix().allFinite())
       throw std::invalid_argument("OwnGraph: the first keyframe's pose is not finite");
@@ -182,6 +183,17 @@ std::vector<PoseEdge> OwnGraph::own_edges() const {
   if (const std::vector<PoseEdge>* inside = newest_edges(self_))
     edges.insert(edges.end(), inside->begin(), inside->end());
   return edges;
+}
+
+std::vector<PoseEdge> OwnGraph::closures_across(KeyframeIndex run, KeyframeIndex end) const {
+  std::vector<PoseEdge> across;
+  const std::vector<PoseEdge>* inside = newest_edges(self_);
+  if (inside == nullptr) return across;
+  for (const PoseEdge& e : *inside) {
+    const auto [first, second] = std::minmax(e.from.index, e.to.index);
+    if (first < run && run <= second && second < end) across.push_back(e);
+  }
+  return across;
 }
 
 Precision OwnGraph::mean_step_precision() const {

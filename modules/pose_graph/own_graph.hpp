@@ -80,6 +80,11 @@ class OwnGraph {
   [[nodiscard]] bool upright() const { return !verticals_.empty() && verticals_[0].pose == 0; }
   /// Odometry step from keyframe i - 1 to i, as measured. Precondition: 0 < i < keyframes().
   [[nodiscard]] const SE3& step_to(std::uint32_t i) const { return odometry_[i - 1].T_from_to; }
+  /// First keyframe of every run after the first one, ascending: see is_unknown_step().
+  [[nodiscard]] const std::vector<KeyframeIndex>& later_runs() const { return later_runs_; }
+  /// Closures inside this robot between keyframes before `run` and keyframes from `run` to before
+  /// `end`, by the newest edge set.
+  [[nodiscard]] std::vector<PoseEdge> closures_across(KeyframeIndex run, KeyframeIndex end) const;
   /// Mean weights of a step of odometry, corrected by odometry_noise(); the default weights while
   /// there is no step.
   [[nodiscard]] Precision mean_step_precision() const;
@@ -106,6 +111,7 @@ class OwnGraph {
   std::uint32_t revision_ = 0;
   std::vector<PoseEdge> odometry_;  // with claimed precision
   OdometryJudgement odometry_judgement_;
+  std::vector<KeyframeIndex> later_runs_;
   std::vector<VerticalPrior> verticals_;
   std::map<ClosureId, PoseEdge> closures_;
   std::map<RobotId, std::size_t> closures_to_;  // number of `closures_` by peer

@@ -55,6 +55,34 @@ void OwnPoses::correct(std::span<const OdometryBreak> breaks) {
   }
 }
 
+void OwnPoses::place_runs(const OwnGraph& graph, RobotId self,
+                          const AlignmentTolerance& tolerance) {
+  const std::vector<KeyframeIndex>& runs = graph.later_runs();
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const KeyframeIndex begin = runs[k];
+    const KeyframeIndex end = k + 1 < runs.size() ? runs[k + 1] : graph.keyframes();
+    std::vector<PoseEdge> across = graph.closures_across(begin, end);
+    // The runs before count as another robot, into whose frame this run moves.
+    const RobotId before = self + 1;
+    std::map<KeyframeId, SE3> received;
+    for (PoseEdge& e : across)
+      for (KeyframeId* const id : {&e.from, &e.to}) {
+        if (id->index >= begin) continue;
+        received[{before, id->index}] = T_frame_kf_[id->index];
+        id->robot = before;
+      }
+    const auto moved = moved_into_frame(T_frame_kf_, self, across, received, tolerance);
+    if (!moved) continue;
+    const SE3 T_new_old = (*moved)[begin] * T_frame_kf_[begin].inverse();
+    const SE3 shift = T_frame_kf_[begin].inverse() * (*moved)[begin];
+    if (angle_of(shift.linear()) <= tolerance.rotation_rad &&
+        shift.translation().norm() <= tolerance.translation_m)
+      continue;
+    for (std::size_t i = begin; i < T_frame_kf_.size(); ++i)
+      T_frame_kf_[i] = T_new_old * T_frame_kf_[i];
+  }
+}
+
 // Returns the closures inside this robot that are likely true before anything is solved. If
 // odometry is noisy, these are the closures that its noise explains. Otherwise, these are the
 // closures that agree with a closure a few keyframes away.

@@ -8,6 +8,7 @@
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
+#include "modules/pose_graph/frame_alignment.hpp"
 #include "modules/pose_graph/own_graph.hpp"
 
 namespace km {
@@ -29,6 +30,10 @@ class OwnPoses {
   /// Moves the poses after each wrong step of odometry as a whole, such that the step is corrected.
   /// Each step is corrected only once.
   void correct(std::span<const OdometryBreak> breaks);
+
+  /// Moves every later run (OwnGraph::later_runs()) as a whole to where most of its closures to the
+  /// runs before it agree, unless it is there already, up to `tolerance`. Precondition: extend().
+  void place_runs(const OwnGraph& graph, RobotId self, const AlignmentTolerance& tolerance);
 
   /// Improves the start of a session of this robot alone: the chordal initialisation replaces the
   /// poses if its cost is lower. If closures are `trusted`, all of them count. Otherwise, the

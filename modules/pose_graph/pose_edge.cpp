@@ -17,6 +17,11 @@ auto rank_of(const PoseEdge& e) {
 
 }  // namespace
 
+bool is_unknown_step(const PoseEdge& step) {
+  constexpr double kThird = kUnknownStep_m / 3.0;
+  return step.precision.tau * kThird * kThird < 1.0;
+}
+
 std::optional<PoseEdge> pose_edge(const RelativePose& measured) {
   const double rotation = measured.covariance.topLeftCorner<3, 3>().trace();
   const double translation = measured.covariance.bottomRightCorner<3, 3>().trace();

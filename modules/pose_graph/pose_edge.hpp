@@ -34,6 +34,9 @@ struct PoseEdge {
   return a.index < b.index ? b.index - a.index : a.index - b.index;
 }
 
+/// True for the step between two runs of a robot, see kUnknownStep_m.
+[[nodiscard]] bool is_unknown_step(const PoseEdge& step);
+
 /// nullopt for measurements beyond measurement_limits.hpp: they would corrupt the solution of the
 /// whole team.
 [[nodiscard]] std::optional<PoseEdge> pose_edge(const RelativePose& measured);

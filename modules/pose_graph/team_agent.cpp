@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 
 // Other robots, their messages and the messages of this robot. The sessions are in
@@ -223,6 +224,18 @@ std::optional<World> TeamAgent::tied_world() const {
   return world_of(lowest_tied(self_.robot, plan_, ties_));
 }
 
+bool TeamAgent::is_located() const {
+  constexpr std::size_t kLeastPlaces = 2;  // one place may be mistaken for another
+  if (graph_.later_runs().empty()) return true;
+  std::vector<PoseEdge> across =
+      graph_.closures_across(graph_.later_runs().back(), graph_.keyframes());
+  std::erase_if(across, [this](const PoseEdge& e) {
+    const auto decided = decisions_.decided().find(e.id());
+    return decided == decisions_.decided().end() || !decided->second;
+  });
+  return find_places(across).sizes.size() >= kLeastPlaces;
+}
+
 const std::vector<SE3>& TeamAgent::poses() const {
   return in_session() && part_->stage() ? part_->poses() : poses_.T_frame_kf();
 }
@@ -235,6 +248,8 @@ void TeamAgent::publish(TeamOutput& output) {
   publish_due_ = false;
   published_s_ = now_s_;
   published_anchor_ = world->anchor;
+  output.progress = make_progress();
+  if (!output.progress->located) return;
   Trajectory trajectory{self_.robot, world->anchor, {}};
   const SE3 T_world_frame = world->T_frame_world.inverse();
   for (const SE3& T_frame_kf : poses()) trajectory.T_world_kf.push_back(T_world_frame * T_frame_kf);
@@ -242,7 +257,6 @@ void TeamAgent::publish(TeamOutput& output) {
     trajectory.covariances = part_->covariances();
   trajectory.public_poses = held_poses(T_world_frame);
   output.trajectory = std::move(trajectory);
-  output.progress = make_progress();
 }
 
 // Public poses of the other robots in the frame of this one.
@@ -259,6 +273,7 @@ OptimizerProgress TeamAgent::make_progress() const {
   const auto world = tied_world();
   OptimizerProgress progress{.anchor = world ? world->anchor : self_.robot,
                              .members = {self_.robot}};
+  progress.located = is_located();
   progress.odometry_rotation_noise = graph_.odometry_noise().rotation;
   progress.odometry_translation_noise = graph_.odometry_noise().translation;
   progress.odometry_breaks = static_cast<std::uint32_t>(graph_.odometry_breaks().size());

@@ -66,6 +66,10 @@ struct [[nodiscard]] TeamOutput {
 /// If the team rejects all closures that tie some members, the robots on each side publish their
 /// poses in the frame of their lowest robot. Later closures join them again.
 ///
+/// The keyframes after a step of unknown length (another run of the robot) are located once kept
+/// closures at two places tie them to the runs before. Until then, no trajectory is published,
+/// because the poses of these keyframes are unknown.
+///
 /// If all members have verticals, these are part of the cost, and `world` has z up. Deterministic:
 /// equal inputs in equal order give equal outputs. Not thread-safe.
 class TeamAgent {
@@ -159,6 +163,9 @@ class TeamAgent {
   // The session that this robot is in.
   bool join(const Session& session);
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
+  [[nodiscard]] AlignmentTolerance tolerance() const {
+    return {config_.alignment_rotation_rad, config_.alignment_translation_m};
+  }
   [[nodiscard]] bool expects_false() const {
     return config_.robust && config_.method == PgoMethod::kNewton;
   }
@@ -184,6 +191,7 @@ class TeamAgent {
   [[nodiscard]] std::map<KeyframeId, SE3> held_poses(const SE3& T_world_frame) const;
   [[nodiscard]] std::optional<World> world_of(RobotId anchor) const;
   [[nodiscard]] std::optional<World> tied_world() const;
+  [[nodiscard]] bool is_located() const;
   void publish(TeamOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
   [[nodiscard]] bool holds_all(const SessionPlan& plan) const;

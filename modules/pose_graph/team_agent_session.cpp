@@ -204,14 +204,14 @@ bool TeamAgent::join(const Session& session) {
   }
   poses_.extend(graph_);
   poses_.correct(graph_.odometry_breaks());
+  poses_.place_runs(graph_, self_.robot, tolerance());
   if (alone && part->graph.to_absent.empty())
     poses_.improve_alone(graph_, self_.robot, !expects_false());
   part->graph.start = poses_.T_frame_kf();
   part->graph.decided = decisions_.decided();
   part->graph.noise = decisions_.noise();
-  part_.emplace(session, self_, std::move(*part), factory_,
-                AlignmentTolerance{config_.alignment_rotation_rad, config_.alignment_translation_m},
-                config_.status_period_s, now_s_);
+  part_.emplace(session, self_, std::move(*part), factory_, tolerance(), config_.status_period_s,
+                now_s_);
   if (roster_.find(session.id.coordinator.robot) != nullptr)
     roster_.at(session.id.coordinator.robot).joined = session.id.number;
   state_ = SessionState::kRunning;

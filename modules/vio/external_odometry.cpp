@@ -28,10 +28,12 @@ ExternalOdometry::ExternalOdometry(RobotId robot, DepthSource depth_source, cons
     : robot_(robot), depth_source_(depth_source), config_(checked(config)) {}
 
 void ExternalOdometry::continue_from(const VioCheckpoint& checkpoint) {
-  continues_ = true;
   last_keyframe_ = checkpoint.keyframe;
-  last_ = last_kf_ = {checkpoint.keyframe.stamp, {checkpoint.state.T_odom_body}};
-  T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
+  continues_ = checkpoint.state.has_value();
+  T_chain_odom_ = chain_of_next_run(checkpoint.keyframe);
+  if (!continues_) return;
+  last_ = last_kf_ = {checkpoint.keyframe.stamp, {checkpoint.state->T_odom_body}};
+  T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state->T_odom_body.inverse();
 }
 
 ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
@@ -60,14 +62,14 @@ ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
   const bool locates_points =
       depth_source_ == DepthSource::kRightImage || packet.frame->depth != nullptr;
   const bool is_due =
-      !last_keyframe_ || result.has_jumped ||
+      !last_kf_ || result.has_jumped ||
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
   // A keyframe without located points cannot be part of a closure and is useless. After a jump of
   // the external pose, a keyframe is made in any case: the uncertain step to it is then in the
   // graph.
   if (!is_taken_up && is_due && (locates_points || result.has_jumped))
     add_keyframe(measured, T_odom_body, result.has_jumped, result);
-  if (!last_keyframe_) return result;
+  if (!last_kf_) return result;
   if (is_taken_up)  // the state was published earlier; the covariance was not kept
     last_kf_ = measured;
   else
@@ -96,6 +98,17 @@ void ExternalOdometry::count_motion(const StampedMeasurement& measured) {
   T_odom_last_motion_ = T_odom_body;
 }
 
+// Covariance of the motion since the last keyframe.
+Matrix6 ExternalOdometry::step_covariance(const StampedMeasurement& measured) const {
+  if (!last_kf_)
+    return unknown_step_covariance(measured.pose.T_odom_body.linear().transpose() *
+                                   Eigen::Vector3d::UnitZ());
+  const UncertainPose grown =
+      between_on_chain({last_kf_->pose.T_odom_body, last_kf_->pose.covariance},
+                       {measured.pose.T_odom_body, measured.pose.covariance});
+  return keyframe_covariance(config_, moved_s_, grown.Sigma);
+}
+
 void ExternalOdometry::add_keyframe(const StampedMeasurement& measured, const SE3& T_odom_body,
                                     bool has_jumped, ExternalOdometryResult& result) {
   KeyframeOdometry keyframe;
@@ -105,11 +118,7 @@ void ExternalOdometry::add_keyframe(const StampedMeasurement& measured, const SE
   if (last_keyframe_) {
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * T_odom_body;
-    const UncertainPose grown =
-        between_on_chain({last_kf_->pose.T_odom_body, last_kf_->pose.covariance},
-                         {measured.pose.T_odom_body, measured.pose.covariance});
-    keyframe.covariance =
-        has_jumped ? restart_covariance() : keyframe_covariance(config_, moved_s_, grown.Sigma);
+    keyframe.covariance = has_jumped ? restart_covariance() : step_covariance(measured);
   }
   last_keyframe_ = keyframe;
   moved_s_ = 0.0;

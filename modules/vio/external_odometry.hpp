@@ -31,7 +31,8 @@ class ExternalOdometry {
   /// Throws ConfigError if `config` is out of bounds.
   ExternalOdometry(RobotId robot, DepthSource depth_source, const VioConfig& config);
 
-  /// Continues after the last published keyframe of an earlier process, in the same odometry.
+  /// Continues after the last published keyframe of an earlier process, in the same odometry. If
+  /// the state is unknown, the next keyframe has unknown_step_covariance().
   void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] ExternalOdometryResult process(const SensorPacket& packet);
@@ -44,6 +45,7 @@ class ExternalOdometry {
 
   [[nodiscard]] bool is_jump(const StampedMeasurement& measured) const;
   void count_motion(const StampedMeasurement& measured);
+  [[nodiscard]] Matrix6 step_covariance(const StampedMeasurement& measured) const;
   void add_keyframe(const StampedMeasurement& measured, const SE3& T_odom_body, bool has_jumped,
                     ExternalOdometryResult& result);
 

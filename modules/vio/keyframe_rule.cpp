@@ -6,6 +6,7 @@
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/core/measurement_limits.hpp"
 
 namespace km {
 namespace {
@@ -32,6 +33,15 @@ constexpr double kCoast_s = 1.0;  // time for which a speed persists
 // shows that there is no estimate.
 constexpr double kLeastVariance = 1e-12;
 constexpr double kMostVariance = 1e6;
+
+// Covariance of a relative pose [rad], [m] of which gravity determines roll and pitch.
+Matrix6 upright_covariance(double heading, double translation, const Eigen::Vector3d& up_body) {
+  Matrix6 Sigma = Matrix6::Zero();
+  Sigma.topLeftCorner<3, 3>() = kRestartRotation * kRestartRotation * Eigen::Matrix3d::Identity() +
+                                heading * heading * up_body * up_body.transpose();
+  Sigma.bottomRightCorner<3, 3>().diagonal().setConstant(translation * translation);
+  return Sigma;
+}
 
 }  // namespace
 
@@ -63,11 +73,18 @@ Matrix6 restart_covariance(const UnmeasuredMotion& motion) {
       std::hypot(kRestartTranslation,
                  kUnseenShare * std::max(motion.speed_mps, kLeastSpeed_mps) * motion.lasts_s),
       kMostTranslation_m);
-  Matrix6 Sigma = Matrix6::Zero();
-  Sigma.topLeftCorner<3, 3>() = kRestartRotation * kRestartRotation * Eigen::Matrix3d::Identity() +
-                                heading * heading * motion.up_body * motion.up_body.transpose();
-  Sigma.bottomRightCorner<3, 3>().diagonal().setConstant(translation * translation);
-  return Sigma;
+  return upright_covariance(heading, translation, motion.up_body);
+}
+
+SE3 chain_of_next_run(const KeyframeOdometry& last) {
+  constexpr double kApart_m = 1000.0;  // a float still resolves a tenth of a millimetre there
+  if (last.id.index == 0) return SE3::Identity();  // a keyframe alone has no surfaces
+  return SE3(
+      Eigen::Translation3d(last.T_odom_kf.translation() + kApart_m * Eigen::Vector3d::UnitX()));
+}
+
+Matrix6 unknown_step_covariance(const Eigen::Vector3d& up_body) {
+  return upright_covariance(kMostHeading, kUnknownStep_m, up_body);
 }
 
 }  // namespace km

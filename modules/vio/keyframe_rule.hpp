@@ -1,6 +1,7 @@
 #pragma once
 
 #include "modules/core/geometry.hpp"
+#include "modules/core/odometry.hpp"
 #include "modules/vio/vio_config.hpp"
 
 namespace km {
@@ -33,5 +34,14 @@ struct UnmeasuredMotion {
 /// Covariance of the relative pose across a new start. The covariance grows with the duration
 /// without measurements and with the speed. The heading is more uncertain than roll and pitch.
 [[nodiscard]] Matrix6 restart_covariance(const UnmeasuredMotion& motion = {});
+
+/// Where odometry begins again after the last keyframe of another run, in the frame of the
+/// published keyframes. It is far from that run, so that no map fuses surfaces of the two, whose
+/// relative pose is unknown.
+[[nodiscard]] SE3 chain_of_next_run(const KeyframeOdometry& last);
+
+/// Covariance of the relative pose between two runs: only the tilt is known. `up_body`: vertical at
+/// the second pose.
+[[nodiscard]] Matrix6 unknown_step_covariance(const Eigen::Vector3d& up_body);
 
 }  // namespace km

@@ -62,7 +62,8 @@ Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, cons
 void Vio::continue_from(const VioCheckpoint& checkpoint) {
   last_ = checkpoint.state;
   last_keyframe_ = checkpoint.keyframe;
-  T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state.T_odom_body.inverse();
+  T_chain_odom_ = last_ ? checkpoint.keyframe.T_odom_kf * last_->T_odom_body.inverse()
+                        : chain_of_next_run(checkpoint.keyframe);
   if (checkpoint.keyframe.calibration)
     smoother_.set_calibration_prior(*checkpoint.keyframe.calibration);
 }
@@ -158,7 +159,7 @@ Eigen::Matrix3d Vio::turn(const std::vector<ImuSample>& samples, Stamp from, Sta
 
 bool Vio::can_continue_at(const Held& held) const {
   const Stamp stamp = held.frame->stamp;
-  return last_keyframe_ && last_keyframe_->state_covariance && last_keyframe_->stamp == stamp &&
+  return last_ && last_keyframe_->state_covariance && last_keyframe_->stamp == stamp &&
          last_->stamp == stamp;
 }
 
@@ -385,10 +386,14 @@ void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
   if (last_keyframe_) {  // after a restart of the odometry
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
-    keyframe.covariance = restart_covariance(
-        {.lasts_s = unmeasured_s(state.stamp),
-         .speed_mps = std::max(last_->v_odom.norm(), state.v_odom.norm()),
-         .up_body = state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ()});
+    const Eigen::Vector3d up_body =
+        state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ();
+    keyframe.covariance =
+        last_
+            ? restart_covariance({.lasts_s = unmeasured_s(state.stamp),
+                                  .speed_mps = std::max(last_->v_odom.norm(), state.v_odom.norm()),
+                                  .up_body = up_body})
+            : unknown_step_covariance(up_body);
   }
   publish(keyframe, state, result);
 }

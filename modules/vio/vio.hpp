@@ -45,10 +45,12 @@ struct VioResult {
   std::optional<VisionEvent> vision;       ///< Loss or return of vision.
 };
 
-/// Last keyframe of an earlier process of the robot, and the state there. The new process begins
-/// with the image of this keyframe.
+/// Last keyframe before the odometry begins, and the state there. A resumed process begins with the
+/// image of this keyframe.
 struct VioCheckpoint {
-  OdometryState state;        ///< State at the image of the keyframe.
+  /// State at the image of the keyframe. nullopt: the keyframe is of another run, so that the
+  /// motion since is unknown.
+  std::optional<OdometryState> state;
   KeyframeOdometry keyframe;  ///< The last published keyframe.
 };
 
@@ -68,7 +70,8 @@ class Vio {
   /// keyframe. If odometry starts on the image of this keyframe, the next keyframe is measured from
   /// it. If this image comes first and the covariance of the state is known, odometry starts at
   /// once from that state. Otherwise odometry starts as usual, with the images of
-  /// VioConfig::start_s. The estimated calibration is kept. Call before the first process().
+  /// VioConfig::start_s. The estimated calibration is kept. If the state is unknown, the next
+  /// keyframe has unknown_step_covariance(). Call before the first process().
   void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] VioResult process(const SensorPacket& packet);

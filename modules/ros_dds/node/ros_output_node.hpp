@@ -50,6 +50,8 @@ struct RosOutputOptions {
                         ///< not blocked.
   double mesh_bytes_per_s = std::numeric_limits<double>::infinity();  ///< Maximum rate of the
                                                                       ///< pieces of faces.
+  /// Publish nothing in `map` before the first trajectory: the robot does not know where it is.
+  bool awaits_trajectory = false;
   bool draws = false;  ///< Publish faces of the mesh and closures as markers.
   bool logs = false;   ///< Publish the log of this process.
   /// Maximum rate of each of the topics `path`, `mesh` and `closures`.

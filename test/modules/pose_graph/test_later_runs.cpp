@@ -1,0 +1,125 @@
+#include <catch2/catch.hpp>
+
+#include "modules/core/measurement_limits.hpp"
+#include "modules/rbcd/solver_choice.hpp"
+#include "test/support/random_pose.hpp"
+#include "test/support/team_network.hpp"
+
+// A run that localises itself in the map of a former run: keyframe 0 is of the map, and the step to
+// keyframe 1 is unknown.
+
+namespace km {
+namespace {
+
+constexpr RobotId kRobot = 4;
+constexpr KeyframeIndex kKeyframes = 60;
+
+Matrix6 isotropic(double rotation_rad, double translation_m) {
+  Matrix6 Sigma = Matrix6::Zero();
+  Sigma.diagonal().head<3>().setConstant(rotation_rad * rotation_rad);
+  Sigma.diagonal().tail<3>().setConstant(translation_m * translation_m);
+  return Sigma;
+}
+
+class LaterRun {
+ public:
+  explicit LaterRun(unsigned seed)
+      : rng_(seed), agent_(network_.add({kRobot, 1}, {}, solver_choice({}))) {
+    truth_.push_back(random_pose(rng_, 20.0));  // pose of the map's keyframe
+    add({.id = {kRobot, 0}}, truth_.front(), Matrix6::Zero());
+    truth_.push_back(random_pose(rng_, 100.0));
+    add({.id = {kRobot, 1}}, random_pose(rng_, 5.0), isotropic(2.0, kUnknownStep_m));
+    for (KeyframeIndex i = 2; i < kKeyframes; ++i) {
+      const SE3 step = se3_exp(Vector6{0.01, 0.0, 0.1, 0.5, 0.1, 0.0});
+      truth_.push_back(truth_.back() * step);
+      add({.id = {kRobot, i}}, step * noise(0.002, 0.01), isotropic(0.002, 0.01));
+    }
+  }
+
+  // A closure from keyframe 0, off by `error`.
+  void close(KeyframeIndex to, const SE3& error = SE3::Identity()) {
+    Closure closure;
+    closure.from.id = {kRobot, 0};
+    closure.to.id = {kRobot, to};
+    closure.T_from_to = truth_[0].inverse() * truth_[to] * error * noise(0.005, 0.02);
+    closure.covariance = isotropic(0.005, 0.02);
+    closures_.push_back(closure.id());
+    CHECK(agent_.add(closure));
+    std::ranges::sort(closures_);
+    CHECK(agent_.add(InlierSet{kRobot, kRobot, ++version_, closures_}));
+  }
+
+  [[nodiscard]] bool settle() {
+    (void)network_.run(1.0);  // progress is reported once per status
+    return km::settle(network_, 60.0);
+  }
+  [[nodiscard]] bool is_located() const {
+    const auto& robot = network_.robots.at(kRobot);
+    CHECK(robot.trajectory.has_value() == robot.progress.located);
+    return robot.progress.located;
+  }
+  // Largest distance of an optimised keyframe from its true place in the map.
+  [[nodiscard]] double error_m() const {
+    const Trajectory& found = *network_.robots.at(kRobot).trajectory;
+    double largest = 0.0;
+    for (KeyframeIndex i = 0; i < kKeyframes; ++i)
+      largest =
+          std::max(largest, (found.T_world_kf[i].translation() - truth_[i].translation()).norm());
+    return largest;
+  }
+  [[nodiscard]] SE3 random_error() { return random_pose(rng_, 30.0); }
+
+ private:
+  SE3 noise(double rotation_rad, double translation_m) {
+    Vector6 xi = random_vector<6>(rng_);
+    xi.head<3>() *= rotation_rad;
+    xi.tail<3>() *= translation_m;
+    return se3_exp(xi);
+  }
+  void add(KeyframeOdometry keyframe, const SE3& T_previous_kf, const Matrix6& covariance) {
+    keyframe.T_previous_kf = T_previous_kf;
+    keyframe.T_odom_kf = T_odom_kf_ = T_odom_kf_ * T_previous_kf;
+    keyframe.covariance = covariance;
+    CHECK(agent_.add(keyframe));
+  }
+
+  std::mt19937 rng_;
+  TeamNetwork network_;
+  TeamAgent& agent_;
+  std::vector<SE3> truth_;  // T_map_kf
+  SE3 T_odom_kf_ = SE3::Identity();
+  std::vector<ClosureId> closures_;
+  std::uint32_t version_ = 0;
+};
+
+TEST_CASE("a run is located once closures at two places tie it to the map",
+          "[pose_graph][later_runs]") {
+  LaterRun run(GENERATE(1U, 2U, 3U, 4U, 5U, 6U));
+  REQUIRE(run.settle());
+  CHECK_FALSE(run.is_located());
+  for (const KeyframeIndex i : {5U, 6U, 7U}) run.close(i);
+  REQUIRE(run.settle());
+  CHECK_FALSE(run.is_located());
+  for (const KeyframeIndex i : {30U, 31U, 32U}) run.close(i);
+  REQUIRE(run.settle());
+  REQUIRE(run.is_located());
+  CHECK(run.error_m() < 0.3);
+  for (const KeyframeIndex i : {45U, 46U, 47U, 55U, 56U, 57U}) run.close(i);
+  REQUIRE(run.settle());
+  CHECK(run.error_m() < 0.15);
+}
+
+TEST_CASE("a place that looks like another does not locate a run", "[pose_graph][later_runs]") {
+  LaterRun run(GENERATE(11U, 12U, 13U, 14U, 15U, 16U));
+  const SE3 error = run.random_error();
+  for (const KeyframeIndex i : {3U, 4U, 5U, 6U}) run.close(i, error);
+  REQUIRE(run.settle());
+  CHECK_FALSE(run.is_located());
+  for (const KeyframeIndex i : {20U, 21U, 22U, 37U, 38U, 39U, 54U, 55U, 56U}) run.close(i);
+  REQUIRE(run.settle());
+  REQUIRE(run.is_located());
+  CHECK(run.error_m() < 0.15);
+}
+
+}  // namespace
+}  // namespace km
