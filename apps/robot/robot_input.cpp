@@ -111,7 +111,8 @@ FinishedMap open_finished_map(const RobotOptions& options) {
   return map;
 }
 
-// Images up to the end of the run are left out, because its journal goes on in order of time.
+// Images up to the end of the run are left out, because the entries of its journal are in order of
+// time.
 RestoredRun open_run_to_extend(const RobotOptions& options) {
   const fs::path file = options.extend / kJournal;
   std::error_code none;
@@ -129,18 +130,18 @@ RestoredRun open_run_to_extend(const RobotOptions& options) {
   return run;
 }
 
-// The first keyframe of the map as keyframe 0 of this run. It has no time of this run, and no
-// vertical: the map's z is that of the frame.
+// The first keyframe of the map as keyframe 0 of this run. It has no time of this run, no vertical,
+// because the map's z is that of the frame, and no features, because MapMatcher has those of the
+// whole map.
 RestoredRun first_keyframe_of(const FinishedMap& map, RobotId robot) {
   RestoredRun run;
   run.robot = robot;
   KeyframeOdometry odometry{.id = {robot, 0}};
   odometry.T_odom_kf = odometry.T_previous_kf = map.T_map_kf.front();
-  Keyframe keyframe = map.keyframes.front();
-  keyframe.odometry = {odometry.id, odometry.T_odom_kf, Matrix6::Zero()};
-  keyframe.stamp = odometry.stamp;
   run.odometry.push_back(odometry);
-  run.keyframes.push_back(std::move(keyframe));
+  run.keyframes.push_back({.odometry = {odometry.id, odometry.T_odom_kf, Matrix6::Zero()},
+                           .stamp = odometry.stamp,
+                           .features = {}});
   return run;
 }
 

@@ -480,7 +480,8 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
   summary.traffic = robot.sent_bytes();
   if (const LocalizationNode* localization = robot.localization())
     summary.localization = {options.localize.string(), record.progress().located,
-                            localization->compared(), localization->matched()};
+                            robot.located_after_s(), localization->compared(),
+                            localization->matched()};
   if (config.budget.is_limited()) summary.held_back = held_back(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();

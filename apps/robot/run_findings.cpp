@@ -147,7 +147,7 @@ void add_localization(const RunSummary& run, std::vector<Finding>& findings) {
        .what = run.name + ": not localised in " + run.localization->map + ": " +
                std::to_string(run.localization->matched) + " of " +
                std::to_string(run.localization->compared) + " keyframes match it",
-       .means = "there are no optimised poses: odometry.tum has the poses in the frame of odometry",
+       .means = "the poses in optimized.tum are those of odometry, not in the frame of the map",
        .to_do = "let the robot see two places of the map from where the former run saw them"});
 }
 

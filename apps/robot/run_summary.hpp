@@ -191,14 +191,16 @@ struct OdometrySummary {
 
 /// Result of --localize.
 struct LocalizationSummary {
-  std::string map;             ///< Folder of the finished run.
-  bool localised = false;      ///< Closures at two places or more tie this run to the map.
-  std::uint64_t compared = 0;  ///< Number of keyframes that were compared with the map.
-  std::uint64_t matched = 0;   ///< Number of these that match a keyframe of the map.
+  std::string map;                ///< Folder of the finished run.
+  bool localised = false;         ///< Closures at two places or more tie this run to the map.
+  std::optional<double> after_s;  ///< Time in the input until then; absent if it never was.
+  std::uint64_t compared = 0;     ///< Number of keyframes that were compared with the map.
+  std::uint64_t matched = 0;      ///< Number of these that match a keyframe of the map.
 
   void visit_fields(auto& visitor) {
     visitor.field("map", map);
     visitor.field("localised", localised);
+    visitor.field("after_s", after_s);
     visitor.field("compared", compared);
     visitor.field("matched", matched);
   }

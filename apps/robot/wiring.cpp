@@ -9,6 +9,7 @@
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/team_keys_node.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/dense_sensing/node/dense_sensing_node.hpp"
 #include "modules/loop_closure/node/keyframe_features_node.hpp"
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
@@ -453,6 +454,10 @@ void Robot::add_records() {
   topics_.progress.subscribe([this](const auto& progress) {
     const std::lock_guard lock(progress_mutex_);
     progress_ = progress;
+    const bool was_apart = std::exchange(is_apart_, !progress->located);
+    if (localization_ == nullptr || is_apart_ || !was_apart || located_after_s_) return;
+    located_after_s_ = input_time_.seconds();
+    log::info(localization_->name()) << "localised after " << fixed(*located_after_s_, 1) << " s";
   });
   topics_.status.from_peers().subscribe([this](const auto& status) {
     const std::lock_guard lock(progress_mutex_);

@@ -150,6 +150,11 @@ class Robot {
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   /// Null without --localize.
   [[nodiscard]] const LocalizationNode* localization() const { return localization_; }
+  /// Time in the input at which closures tied this run to the map; absent before.
+  [[nodiscard]] std::optional<double> located_after_s() const {
+    const std::lock_guard lock(progress_mutex_);
+    return located_after_s_;
+  }
   /// Null without --record.
   [[nodiscard]] RosOutputNode* record() { return record_; }
   [[nodiscard]] const NetworkInterface& interface() const { return participant_.interface(); }
@@ -215,9 +220,11 @@ class Robot {
   std::atomic<bool> source_ended_ = false;
   std::atomic<bool> id_taken_ = false;
   InputTime input_time_;
-  mutable std::mutex progress_mutex_;           // guards progress_ and received_s_
+  mutable std::mutex progress_mutex_;           // guards the next four members
   Topic<OptimizerProgress>::Message progress_;  // the newest
-  std::map<RobotId, double> received_s_;        // time of the last status, by the steady clock
+  bool is_apart_ = false;                       // not yet localised
+  std::optional<double> located_after_s_;
+  std::map<RobotId, double> received_s_;  // time of the last status, by the steady clock
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<RobotPhase> phase_ = RobotPhase::kRunning;
   std::atomic<std::uint8_t> settled_links_ = 0;

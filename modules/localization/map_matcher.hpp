@@ -22,7 +22,7 @@ struct FinishedMap {
 /// Result of one keyframe.
 struct MapMatch {
   std::size_t candidates = 0;  ///< Number of keyframes of the map that look similar.
-  double similarity = 0.0;     ///< Of the most similar one, or of the one in `closure`.
+  double similarity = 0.0;     ///< Similarity of the most similar one, or of the one in `closure`.
   /// The most similar keyframe of the map that passed verification; nullopt: none.
   std::optional<Closure> closure = {};
   /// Verification of the most similar keyframe, or of the one in `closure`.
@@ -53,7 +53,7 @@ class MapMatcher {
   std::shared_ptr<const Vocabulary> vocabulary_;
   PlaceDatabase places_;
   Verifier verifier_;
-  std::optional<BowVector> previous_;  // of the keyframe before
+  std::optional<BowVector> previous_;  // words of the keyframe before
 };
 
 }  // namespace km

@@ -21,6 +21,16 @@ namespace {
 // chordal start.
 constexpr std::size_t kEnoughForChordal = 20;
 
+// The edges for the chordal initialisation. Without a closure across an unknown step, the weight of
+// this step is too small for a factorisation.
+std::vector<PoseEdge> weighed_to_start(std::vector<PoseEdge> edges) {
+  constexpr Precision kLeast{0.1, 1e-3};
+  for (PoseEdge& e : edges)
+    e.precision = {std::max(e.precision.kappa, kLeast.kappa),
+                   std::max(e.precision.tau, kLeast.tau)};
+  return edges;
+}
+
 // The cost of `edges`, of which the first `steps` are odometry and the others closures. The cost of
 // each closure is truncated.
 double truncated_cost(std::span<const PoseEdge> edges, std::size_t steps,
@@ -106,14 +116,14 @@ void OwnPoses::improve_alone(const OwnGraph& graph, RobotId self, bool trusted) 
   improved_with_ = inside->size();
   const std::vector<PoseEdge> all = graph.own_edges();
   if (trusted) {
-    T_frame_kf_ = better_of_chordal(std::move(T_frame_kf_), all);
+    T_frame_kf_ = better_of_chordal(std::move(T_frame_kf_), weighed_to_start(all));
     return;
   }
   const std::size_t steps = graph.keyframes() - 1;
   std::vector<PoseEdge> likely(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(steps));
   for (const PoseEdge& closure : likely_closures(graph, self, *inside)) likely.push_back(closure);
   if (likely.size() < steps + kEnoughForChordal) return;
-  std::vector<SE3> chordal = better_of_chordal(T_frame_kf_, likely);
+  std::vector<SE3> chordal = better_of_chordal(T_frame_kf_, weighed_to_start(std::move(likely)));
   if (truncated_cost(all, steps, chordal) < truncated_cost(all, steps, T_frame_kf_))
     T_frame_kf_ = std::move(chordal);
 }

@@ -216,10 +216,26 @@ std::optional<World> TeamAgent::world_of(RobotId anchor) const {
   return frame_.world_of(anchor, roster_, graph_.T_odom_first(), part_ && part_->session().upright);
 }
 
+// True if keyframe 0 of this robot and keyframe 0 of the other are the same keyframe of a finished
+// map. Odometries of two robots do not begin at poses that are equal to the last digits.
+bool TeamAgent::shares_map_with(RobotId robot) const {
+  constexpr double kSame = 1e-9;
+  if (robot == self_.robot) return true;
+  const TeamRoster::Peer* peer = roster_.find(robot);
+  return peer != nullptr && peer->status &&
+         (peer->status->T_odom_first.matrix() - graph_.T_odom_first().matrix()).norm() < kSame;
+}
+
 // The frame in which this robot publishes. If no closure ties it to the anchor of the session, this
-// is the frame of the lowest robot that closures tie to it.
+// is the frame of the lowest robot that closures tie to it. A robot that localises itself publishes
+// in the frame of the map, in which its keyframe 0 is, whether or not the anchor is localised.
 std::optional<World> TeamAgent::tied_world() const {
   const std::optional<World>& world = frame_.world();
+  if (world && graph_.begins_in_map()) {
+    auto own = world_of(self_.robot);
+    if (own && shares_map_with(world->anchor)) own->anchor = world->anchor;
+    return own;
+  }
   if (!world || !std::ranges::binary_search(ties_.not_joined, world->anchor)) return world;
   return world_of(lowest_tied(self_.robot, plan_, ties_));
 }

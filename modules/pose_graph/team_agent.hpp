@@ -192,6 +192,7 @@ class TeamAgent {
   [[nodiscard]] std::optional<World> world_of(RobotId anchor) const;
   [[nodiscard]] std::optional<World> tied_world() const;
   [[nodiscard]] bool is_located() const;
+  [[nodiscard]] bool shares_map_with(RobotId robot) const;
   void publish(TeamOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
   [[nodiscard]] bool holds_all(const SessionPlan& plan) const;

@@ -35,8 +35,8 @@ struct UnmeasuredMotion {
 /// without measurements and with the speed. The heading is more uncertain than roll and pitch.
 [[nodiscard]] Matrix6 restart_covariance(const UnmeasuredMotion& motion = {});
 
-/// Where odometry begins again after the last keyframe of another run, in the frame of the
-/// published keyframes. It is far from that run, so that no map fuses surfaces of the two, whose
+/// Origin of the odometry of a run in the frame of the published keyframes, if `last` is the last
+/// keyframe of another run. It is far from that run: no map may fuse surfaces of the two, whose
 /// relative pose is unknown.
 [[nodiscard]] SE3 chain_of_next_run(const KeyframeOdometry& last);
 

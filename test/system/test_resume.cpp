@@ -127,6 +127,35 @@ TEST_CASE("A robot that is killed again and again loses no image", "[system][res
   }
 }
 
+TEST_CASE("A run localises itself in a finished map, and another one extends it",
+          "[system][resume]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const fs::path map = folder.path() / "map", localized = folder.path() / "localized",
+                 extended = folder.path() / "extended";
+  const int domain = random_domain();
+  const auto later = command_of({"0", "7", "13"}, *dataset, domain);
+  REQUIRE(Process(with(command_of({"0", "0", "6"}, *dataset, domain), "--output", map)).wait() ==
+          0);
+  const std::uintmax_t before = size_of(map / "run.journal");
+  REQUIRE(Process(with(with(later, "--localize", map), "--output", localized)).wait() == 0);
+  const RunSummary summary = read_summary(localized / "summary.json");
+  REQUIRE(summary.localization);
+  CHECK(summary.localization->localised);
+  CHECK(2 * summary.localization->matched > summary.localization->compared);
+  CHECK(size_of(map / "run.journal") == before);
+  // Both are in one frame: 4 mm here.
+  constexpr double kLargest_m = 0.015;
+  CHECK(error_m(*dataset, {map / "optimized.tum", localized / "optimized.tum"}, folder) <
+        kLargest_m);
+
+  REQUIRE(Process(with(with(later, "--extend", map), "--output", extended)).wait() == 0);
+  CHECK(line_count(extended / "optimized.tum") ==
+        line_count(map / "optimized.tum") + line_count(localized / "optimized.tum"));
+  CHECK(error_m(*dataset, {extended / "optimized.tum"}, folder) < kLargest_m);
+}
+
 TEST_CASE("A robot that is killed keeps its map, and continues it", "[system][resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
