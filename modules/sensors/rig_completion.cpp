@@ -23,6 +23,13 @@ void append(std::string& list, const std::string& item) {
 
 }  // namespace
 
+RigCompletion::RigCompletion(PartialRig rig) : partial_(std::move(rig)) {
+  const SensorTopicNames& topics = partial_.rig.topics;
+  if (partial_.checks_depth())
+    alignment_.emplace(CameraTopics{topics.left, partial_.info_topics[0]},
+                       CameraTopics{topics.depth, partial_.depth_info_topic}, partial_.images[0]);
+}
+
 // Topic whose messages contain the name of the body frame.
 const std::string& RigCompletion::body_topic() const {
   const SensorTopicNames& topics = partial_.rig.topics;
@@ -44,9 +51,15 @@ std::vector<RigCompletion::Source> RigCompletion::sources() const {
       sources.push_back({body_topic(), body_topic() == partial_.rig.topics.odometry
                                            ? RosOdometry::kType
                                            : RosImu::kType});
-    if (partial_.has_cameras)
-      sources.push_back({partial_.rig.topics.left, type_of_images(partial_.rig.topics.left)});
   }
+  const SensorTopicNames& topics = partial_.rig.topics;
+  if (alignment_ || (!partial_.has_extrinsics && partial_.has_cameras))
+    sources.push_back({topics.left, type_of_images(topics.left)});
+  if (!alignment_) return sources;
+  sources.push_back({topics.depth, type_of_images(topics.depth)});
+  sources.push_back({partial_.depth_info_topic, RosCameraInfo::kType, false});
+  if (partial_.has_cameras)
+    sources.push_back({partial_.info_topics[0], RosCameraInfo::kType, false});
   return sources;
 }
 
@@ -74,6 +87,15 @@ bool RigCompletion::take_info(std::size_t camera, const BagChannel& channel,
 }
 
 bool RigCompletion::add(const BagChannel& channel, const BagMessage& message) {
+  const bool is_new = take_part(channel, message);
+  return (alignment_ && alignment_->add(channel, message)) || is_new;
+}
+
+void RigCompletion::end_depth() {
+  if (alignment_) alignment_->end();
+}
+
+bool RigCompletion::take_part(const BagChannel& channel, const BagMessage& message) {
   const auto take_frame = [&](std::optional<std::string>& frame) {
     if (frame) return false;
     if (is_of_type(channel, RosOdometry::kType)) {
@@ -133,6 +155,10 @@ std::optional<SE3> RigCompletion::T_left_right() const {
 }
 
 std::optional<Rig> RigCompletion::rig() const {
+  const auto misalignment =
+      alignment_ ? alignment_->problem(transforms_) : std::optional<std::string>("");
+  if (!misalignment) return std::nullopt;
+  if (!misalignment->empty()) throw DatasetError(*misalignment);
   Rig rig = partial_.rig;
   StereoRig& stereo = rig.sensors.stereo;
   if (!partial_.has_cameras) {
@@ -187,6 +213,12 @@ std::string RigCompletion::missing() const {
 }
 
 Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
+  const auto is_absent = [&bag](const std::string& topic) {
+    return !bag.is_live() && std::ranges::count(bag.channels(), topic, &BagChannel::topic) == 0;
+  };
+  // BagDataset names absent topics of images.
+  if (is_absent(rig.rig.topics.left) || is_absent(rig.rig.topics.depth))
+    rig.is_depth_aligned = true;
   RigCompletion completion(std::move(rig));
   const auto fail = [&] {
     throw DatasetError(name +
@@ -194,14 +226,17 @@ Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
   };
   // A recorded bag without a needed topic cannot complete the rig, so no message is read.
   for (const auto& source : completion.sources())
-    if (!bag.is_live() && source.is_needed &&
-        std::ranges::count(bag.channels(), source.topic, &BagChannel::topic) == 0)
-      fail();
+    if (source.is_needed && is_absent(source.topic)) fail();
   auto complete = completion.rig();
   while (!complete) {
     const auto message = bag.next();
-    if (!message) fail();
-    if (completion.add(bag.channels()[message->channel], *message)) complete = completion.rig();
+    if (!message) {
+      completion.end_depth();
+      complete = completion.rig();
+      if (!complete) fail();
+    } else if (completion.add(bag.channels()[message->channel], *message)) {
+      complete = completion.rig();
+    }
   }
   return *std::move(complete);
 }

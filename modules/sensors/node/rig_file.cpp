@@ -116,9 +116,11 @@ PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
                   .notes = std::move(calibration.notes)},
           .has_cameras = calibration.has_cameras,
           .has_extrinsics = calibration.has_extrinsics,
+          .is_depth_aligned = file.depth.aligned,
           .virtual_baseline_m = file.depth.baseline_m,
           .info_topics = {info_topic(file.left), info_topic(file.right)},
           .images = {images_of(file.left), images_of(file.right)},
+          .depth_info_topic = camera_info_beside(file.depth.topic),
           .body_frame = file.body_frame,
           .T_body_rig = transform_of(path, "T_body_rig", file.correction.T_body_rig),
           .pose_file = file.odometry.file.value_or("")};
