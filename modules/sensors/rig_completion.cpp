@@ -143,6 +143,7 @@ std::optional<SE3> RigCompletion::T_body_left() const {
 // Relative pose of the cameras from the baseline in P, because rectified cameras differ by a
 // translation along x. Without a baseline it is that of their frames in /tf_static.
 std::optional<SE3> RigCompletion::T_left_right() const {
+  if (partial_.has_pair) return partial_.rig.sensors.stereo.T_left_right();
   if (!infos_[0] || !infos_[1]) return std::nullopt;
   std::optional<SE3> T_frames;
   if (const auto baseline = baseline_m(*infos_[1]))
@@ -163,7 +164,8 @@ std::optional<Rig> RigCompletion::rig() const {
   StereoRig& stereo = rig.sensors.stereo;
   if (!partial_.has_cameras) {
     const auto T = T_left_right();
-    if (!infos_[0] || (has_right() && !T)) return std::nullopt;
+    if (!infos_[0] || (has_right() && (!infos_[1] || !T))) return std::nullopt;
+    const SE3 T_body_left = stereo.cameras[0].T_body_cam;
     const Camera left = camera_of(*infos_[0], partial_.images[0]);
     stereo = rgbd_rig(left, partial_.virtual_baseline_m);
     if (has_right()) {
@@ -172,6 +174,8 @@ std::optional<Rig> RigCompletion::rig() const {
       if (const auto problem = pair_problem(stereo))
         throw DatasetError(partial_.info_topics[1] + ": " + *problem);
     }
+    if (partial_.has_extrinsics)
+      for (Camera& camera : stereo.cameras) camera.T_body_cam = T_body_left * camera.T_body_cam;
   }
   if (partial_.has_extrinsics) return rig;
   const auto T = T_body_left();

@@ -23,6 +23,7 @@ struct PartialRig {
   Rig rig;
   bool has_cameras = true;          ///< The rig has its cameras.
   bool has_extrinsics = true;       ///< False: T_body_cam are poses in the left camera's frame.
+  bool has_pair = true;             ///< The relative pose of the cameras is known.
   bool is_depth_aligned = false;    ///< Messages need not show that depth is aligned.
   double virtual_baseline_m = 0.1;  ///< Used for an RGB-D rig, see rgbd_rig().
   /// Topics of CameraInfo of the left and the right camera. The right topic is used only if there

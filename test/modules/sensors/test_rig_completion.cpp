@@ -49,7 +49,7 @@ PartialRig nothing_known() {
   PartialRig rig;
   rig.rig.topics = {
       .left = "/left", .right = "/right", .depth = {}, .imu = "/imu", .gyro = {}, .accel = {}};
-  rig.has_cameras = rig.has_extrinsics = false;
+  rig.has_cameras = rig.has_extrinsics = rig.has_pair = false;
   rig.info_topics = {"/left_info", "/right_info"};
   return rig;
 }
@@ -113,6 +113,23 @@ TEST_CASE("Without a stereo calibration the frames give the pose of the right ca
   CHECK(stereo.T_left_right().linear().isApprox(so3_exp({0, 0.01, 0}), 1e-12));
 }
 
+TEST_CASE("Poses in the rig file and CameraInfo complete a rig", "[sensors][calibration]") {
+  PartialRig partial = nothing_known();
+  partial.has_extrinsics = true;
+  partial.has_pair = GENERATE(true, false);
+  CAPTURE(partial.has_pair);
+  auto& cameras = partial.rig.sensors.stereo.cameras;
+  cameras[0].T_body_cam = make_pose(so3_exp(kQuarter), {0, 0, 0.5});
+  cameras[1].T_body_cam = cameras[0].T_body_cam * make_pose(so3_exp({0, 0, 0}), {0.12, 0, 0});
+  ListedBag bag;
+  bag.add("/left_info", info("left_optical", 0.0));
+  bag.add("/right_info", info("left_optical", -43.0));  // a baseline of 0.1 m
+  const StereoRig stereo = complete_rig("a.bag", bag, partial).sensors.stereo;
+  CHECK(stereo.cameras[0].fx == 458.0);
+  CHECK(stereo.cameras[0].T_body_cam.isApprox(cameras[0].T_body_cam));
+  CHECK(stereo.baseline_m() == Approx(partial.has_pair ? 0.12 : 0.1));
+}
+
 TEST_CASE("One CameraInfo completes an RGB-D rig", "[sensors][calibration]") {
   PartialRig partial = nothing_known();
   partial.rig.topics.right.clear();
@@ -154,7 +171,7 @@ RosImage tiny_image(const std::string& frame, std::uint32_t width) {
 // Completes a rig whose calibration is known from colour images and `depth`. "" if it is complete.
 std::string refusal_of_depth(const DepthMessages& depth, bool is_accepted = false) {
   PartialRig partial = nothing_known();
-  partial.has_cameras = partial.has_extrinsics = true;
+  partial.has_cameras = partial.has_extrinsics = partial.has_pair = true;
   partial.rig.topics.right.clear();
   partial.rig.topics.depth = "/depth";
   partial.depth_info_topic = "/depth_info";
@@ -228,7 +245,7 @@ TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
 
 TEST_CASE("Calibrated cameras get the pose of their images' frame", "[sensors][calibration]") {
   PartialRig partial = nothing_known();
-  partial.has_cameras = true;
+  partial.has_cameras = partial.has_pair = true;
   for (Camera& camera : partial.rig.sensors.stereo.cameras) camera.fx = 300.0;
   partial.rig.sensors.stereo.cameras[1].T_body_cam.translation().x() = 0.11;
   ListedBag bag;
