@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "modules/recordings/ros_messages.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "runtime/dds/ros_publisher.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/process.hpp"
@@ -211,6 +212,24 @@ TEST_CASE("A live robot whose topics are silent reports where it listens, and en
   const RunSummary summary = read_summary(folder.path() / "live/summary.json");
   CHECK_THAT(summary.exit_reason, Catch::StartsWith("no image came"));
   CHECK(std::ranges::count(summary.findings, "frames.none", &Finding::id) == 1);
+}
+
+TEST_CASE("A rig file is proposed from the topics that drivers publish now", "[system][live]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  Process driver(driver_command(*dataset, domain, ""));
+  const auto rig = folder.path() / "rig.yaml";
+  Process inspect(logged(words_of(KM_BIN_DIR "/kimera_multi_robot --set ros.interface=lo --set "
+                                             "ros.domain=" +
+                                  std::to_string(domain) + " --inspect --live " + rig.string())));
+  CHECK(inspect.wait() == 0);
+  CHECK_FALSE(inspect.lines("/cam0/image_raw ").empty());
+  const PartialRig proposal = read_rig_file(rig);
+  CHECK(proposal.rig.topics.left == "/cam0/image_raw");
+  CHECK(proposal.rig.topics.right == "/cam1/image_raw");
+  CHECK(proposal.rig.topics.imu == "/imu0");
 }
 
 }  // namespace km
