@@ -17,10 +17,6 @@ constexpr double kMaxTurn_rad = 1e-3;
 // none.
 constexpr std::size_t kImagesWithoutInfo = 10;
 
-std::string plain(const std::string& frame) {
-  return frame.starts_with('/') ? frame.substr(1) : frame;
-}
-
 // Focal lengths and principal point, of raw or rectified images.
 Eigen::Vector4d intrinsics(const RosCameraInfo& info, RosImages images) {
   const auto& P = info.P;
@@ -106,8 +102,8 @@ std::string different_size(const TopicImage& left, const TopicImage& depth) {
 }
 
 std::string different_frame(const TopicImage& left, const TopicImage& depth) {
-  if (left.frame.empty() || depth.frame.empty() || plain(left.frame) == plain(depth.frame))
-    return "";
+  const bool is_same = StaticTransforms().find(left.frame, depth.frame).has_value();
+  if (left.frame.empty() || depth.frame.empty() || is_same) return "";
   return "its frame is " + readable(depth.frame, 80) + ", not " + readable(left.frame, 80);
 }
 

@@ -193,6 +193,41 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
   CHECK(exit_code == (has_poses ? 0 : 1));
 }
 
+TEST_CASE("A live robot refuses depth that its driver has not aligned with colour",
+          "[system][live]") {
+  const EurocFolder recording;  // only its calibration is used
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  Process robot(logged(live_command(folder,
+                                    "left: {topic: /color}\ndepth: {topic: /depth}\n"
+                                    "imu: {topic: /imu0}\ncalibration: " +
+                                        recording.root().string() + "\n",
+                                    domain)));
+  const auto network =
+      std::make_shared<const RosNetwork>(RosConfig{.domain = domain, .interface = "lo"});
+  const RosPublisher color(network, "/color", RosImage::kType, RosQos::kReliable, 1);
+  const RosPublisher depth(network, "/depth", RosImage::kType, RosQos::kReliable, 1);
+  RosImage image;
+  image.height = 24;
+  image.width = image.step = 32;
+  image.encoding = "mono8";
+  image.data.resize(24 * 32);
+  std::optional<int> exit_code;
+  while (!exit_code) {
+    image.header.frame = "color_optical";
+    color.publish(encode_ros(image));
+    image.header.frame = "depth_optical";
+    depth.publish(encode_ros(image));
+    exit_code = robot.wait_within(std::chrono::seconds(1));
+  }
+  CHECK(*exit_code == 1);
+  const auto names_remedy = [](const std::string& line) {
+    return line.find("/depth: depth is not aligned with the images of /color") != line.npos &&
+           line.find("align_depth.enable:=true") != line.npos;
+  };
+  CHECK(robot.wait_until(names_remedy));
+}
+
 TEST_CASE("A live robot whose topics are silent reports where it listens, and ends as failed",
           "[system][live]") {
   const auto dataset = shared_data("euroc/MH_01_easy");  // only its calibration is used
