@@ -19,7 +19,7 @@ constexpr double kDiscovery_s = 10.0;  // longest time until a program publishes
 constexpr double kQuiet_s = 1.0;       // discovery is complete after this time without news
 constexpr double kListen_s = 10.0;     // longest time to listen
 constexpr std::size_t kEnough = 30;    // messages of each sensor
-constexpr int kKept = 4000;
+constexpr int kLiveMessages = 4000;    // kept messages of a topic
 
 bool is_sensor(const BagChannel& channel) {
   return has_images(channel) || is_of_type(channel, RosImu::kType) ||
@@ -58,7 +58,7 @@ std::vector<RosTopic> topics_of(const std::vector<TopicPublisher>& publishers) {
   for (const TopicPublisher& publisher : publishers) {
     const bool is_new = std::ranges::count(topics, publisher.topic, &RosTopic::topic) == 0;
     if (is_new && std::ranges::count(known, publisher.type) > 0)
-      topics.push_back({publisher.topic, publisher.type, RosQos::kSensorData, kKept});
+      topics.push_back({publisher.topic, publisher.type, RosQos::kSensorData, kLiveMessages});
   }
   return topics;
 }
