@@ -19,8 +19,8 @@ namespace km {
 [[nodiscard]] std::string inspect_recording(const std::filesystem::path& path,
                                             const std::filesystem::path& rig);
 
-/// The same for the topics that programs publish on ROS 2 now. If `rig` is not empty, also writes
-/// the rig file. Further errors as for summarise_live_topics().
+/// Description of the topics that programs publish on ROS 2 now, as above. If `rig` is not empty,
+/// also writes the rig file. Further errors as for summarise_live_topics().
 [[nodiscard]] std::string inspect_live(const RosConfig& config, const std::filesystem::path& rig);
 
 }  // namespace km

@@ -101,6 +101,9 @@ void add_input(CLI::App& app, RobotOptions& options) {
       ->add_option_function<std::vector<std::string>>(
           "--live",
           [&options](const std::vector<std::string>& rig) {
+            if (rig[0].empty())
+              throw CLI::ValidationError(
+                  "--live", "a rig file is needed; --inspect --live rig.yaml writes one");
             options.rig = rig[0];
             options.is_live = true;
           },
@@ -108,10 +111,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
           "config/robot.yaml); until Ctrl-C")
       ->expected(0, 1)  // --inspect --live needs none
       ->type_name("RIG")
-      ->check([](const std::string& rig) {
-        return rig.empty() ? "a rig file is needed; --inspect --live rig.yaml writes one"
-                           : CLI::ExistingFile(rig);
-      });
+      ->check(CLI::ExistingFile);
   group
       ->add_option("--graph", options.graph,
                    "Recorded pose graph of one robot (.g2o or .csv), or of a team (.jrl)")

@@ -214,10 +214,12 @@ TEST_CASE("A live robot refuses depth that its driver has not aligned with colou
   image.data.resize(24 * 32);
   std::optional<int> exit_code;
   while (!exit_code) {
-    image.header.frame = "color_optical";
-    color.publish(encode_ros(image));
-    image.header.frame = "depth_optical";
-    depth.publish(encode_ros(image));
+    for (int k = 0; k < 20; ++k) {  // after ten images without CameraInfo there is none
+      image.header.frame = "color_optical";
+      color.publish(encode_ros(image));
+      image.header.frame = "depth_optical";
+      depth.publish(encode_ros(image));
+    }
     exit_code = robot.wait_within(std::chrono::seconds(1));
   }
   CHECK(*exit_code == 1);

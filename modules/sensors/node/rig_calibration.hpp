@@ -15,7 +15,7 @@ namespace km {
 /// Calibration of a robot's sensors. The body frame is the inertial sensor's.
 struct RigCalibration {
   SensorRig rig;
-  bool has_cameras = true;  ///< False: of the cameras, only poses may be known.
+  bool has_cameras = true;  ///< False: at most the poses of the cameras are known.
   /// False: T_body_cam are poses in the left camera's frame, whose pose on the body is unknown.
   bool has_extrinsics = true;
   bool has_pair = true;  ///< False: the relative pose of the cameras is unknown.
