@@ -88,6 +88,23 @@ YAML::Node parse_yaml(const std::string& text, const std::string& origin) try {
                     ": not YAML: " + error.msg);
 }
 
+std::string replace_dataset(std::string& text, const ConfigContext& context) {
+  const std::size_t variable = text.find(kDataset);
+  if (variable == std::string::npos) return "";
+  if (context.dataset.empty()) return "needs --dataset";
+  text.replace(variable, kDataset.size(), fs::absolute(context.dataset).string());
+  return "";
+}
+
+std::string resolve_input(std::string name, const ConfigContext& context, Input input,
+                          fs::path& path) {
+  if (std::string problem = replace_dataset(name, context); !problem.empty()) return problem;
+  path = name.empty() ? fs::path() : (context.folder / name).lexically_normal();
+  return path.empty() || is_there(path) || !input.must_exist
+             ? ""
+             : "is no file or folder: there is no " + path.string();
+}
+
 std::string place_of(const YAML::Node& node, const std::string& file) {
   const std::string line = std::to_string(node.Mark().line + 1);
   return file.empty() ? "line " + line : file + ':' + line;
@@ -147,16 +164,7 @@ std::string YamlFields::decode(const YAML::Node& node, fs::path& value, AnyValue
 }
 
 std::string YamlFields::decode(const YAML::Node& node, fs::path& value, Input input) const {
-  if (!node.IsScalar()) return "is not a path";
-  std::string name = node.Scalar();
-  if (const std::size_t variable = name.find(kDataset); variable != std::string::npos) {
-    if (context_.dataset.empty()) return "needs --dataset";
-    name.replace(variable, kDataset.size(), fs::absolute(context_.dataset).string());
-  }
-  value = name.empty() ? fs::path() : (context_.folder / name).lexically_normal();
-  return value.empty() || is_there(value) || !input.must_exist
-             ? ""
-             : "is no file or folder: there is no " + value.string();
+  return node.IsScalar() ? resolve_input(node.Scalar(), context_, input, value) : "is not a path";
 }
 
 void YamlFields::required(std::initializer_list<const char*> keys) {

@@ -1,7 +1,6 @@
 #include "apps/doctor/examine_live.hpp"
 
 #include <algorithm>
-#include <array>
 #include <memory>
 
 #include "apps/robot/robot_input.hpp"
@@ -13,46 +12,9 @@
 namespace km {
 namespace {
 
-// Name in ROS of a type in DDS: "sensor_msgs/msg/Imu" for "sensor_msgs::msg::dds_::Imu_".
-std::string ros_type(std::string name) {
-  const auto replace = [&name](const std::string& from, const std::string& to) {
-    for (std::size_t at = name.find(from); at != name.npos; at = name.find(from, at + to.size()))
-      name.replace(at, from.size(), to);
-  };
-  replace("::dds_::", "/");
-  replace("::", "/");
-  if (name.ends_with('_')) name.pop_back();
-  return name;
-}
-
 std::string last_name(const std::string& topic) {
   return topic.substr(topic.rfind('/') + 1);
 }
-
-// Publishers of ROS topics that DDS has discovered so far.
-class PublisherList {
- public:
-  explicit PublisherList(const RosNetwork& network)
-      : reader_(dds_create_reader(network.participant(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr,
-                                  nullptr),
-                "reader of the publications") {}
-
-  void take(std::vector<TopicPublisher>& publishers) {
-    std::array<void*, 1> sample{};
-    std::array<dds_sample_info_t, 1> info{};
-    while (dds_take(reader_.handle(), sample.data(), info.data(), 1, 1) == 1) {
-      const auto& found = *static_cast<const dds_builtintopic_endpoint_t*>(sample[0]);
-      const std::string topic = found.topic_name;
-      if (info[0].valid_data && topic.starts_with("rt/"))
-        publishers.push_back({topic.substr(2), ros_type(found.type_name)});
-      dds_return_loan(reader_.handle(), sample.data(), 1);
-      sample = {};
-    }
-  }
-
- private:
-  DdsEntity reader_;
-};
 
 // Name of a type in ROS 1: "sensor_msgs/Imu" for "sensor_msgs/msg/Imu" too.
 std::string plain(const std::string& type) {
@@ -120,7 +82,7 @@ Examination examine_topics(const std::vector<ListenedTopic>& topics,
 Examination examine_live_topics(const SensorTopicNames& names, const RosConfig& config,
                                 double listen_s, const ReportProgress& report_progress) {
   const auto network = std::make_shared<const RosNetwork>(config);
-  PublisherList list(*network);
+  RosDiscovery discovery(*network);
   RosSubscription subscription(network, live_topics(names));
   std::vector<ListenedTopic> topics;
   for (const RosTopic& topic : subscription.topics()) topics.push_back({topic.topic, topic.type});
@@ -130,9 +92,7 @@ Examination examine_live_topics(const SensorTopicNames& names, const RosConfig& 
     report_progress("listening", (steady_now_s() - start_s) / listen_s);
     ++topics[message->topic].messages;
   }
-  std::vector<TopicPublisher> publishers;
-  list.take(publishers);
-  return examine_topics(topics, publishers, listen_s, config.domain);
+  return examine_topics(topics, discovery.publishers(), listen_s, config.domain);
 }
 
 }  // namespace km

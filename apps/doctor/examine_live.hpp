@@ -3,14 +3,9 @@
 #include "apps/doctor/examine_recording.hpp"
 #include "modules/sensors/rig_completion.hpp"
 #include "runtime/dds/ros_config.hpp"
+#include "runtime/dds/ros_discovery.hpp"
 
 namespace km {
-
-/// A publisher of a ROS 2 topic.
-struct TopicPublisher {
-  std::string topic;  ///< Name in ROS: "/imu0".
-  std::string type;   ///< "sensor_msgs/msg/Imu"
-};
 
 /// A topic that a rig file names, and the number of messages received from it.
 struct ListenedTopic {

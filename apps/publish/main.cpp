@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <stdexcept>
 #include <thread>
 
 #include "apps/program_version.hpp"
@@ -38,13 +39,14 @@ Examples
   The same with a bad driver: up to 20 ms late, one message in ten lost:
     kimera_multi_publish recording.bag --jitter 0.02 --drop 0.1
 
-Exit codes: 0 done, also after Ctrl-C; 1 bad input; 2 bad command line.)";
+Exit codes: 0 done, also after Ctrl-C; 1 bad input, or too few readers; 2 bad command line.)";
 
 struct Options {
   std::filesystem::path recording;
   RosConfig ros;
   PlayOptions play;
   std::size_t wait = 0;
+  double patience_s = 300.0;
   std::string latency;
 };
 
@@ -64,7 +66,12 @@ Options parse_options(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber);
   app.add_option("--topics", options.play.topics, "Topics to play; by default all")->delimiter(',');
   app.add_option("--wait", options.wait,
-                 "Number of readers of each topic to wait for before playing")
+                 "Number of readers of each topic of images and inertial samples to wait for "
+                 "before playing")
+      ->capture_default_str();
+  app.add_option("--patience", options.patience_s,
+                 "Longest wait for these readers [s]; then the program ends")
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option(
       "--latency", options.latency,
@@ -133,18 +140,22 @@ class Progress {
 };
 
 // True once there are enough readers and they had time to discover the topics; false after a
-// signal.
-bool wait_for_readers(const MessagePlayer& player, std::size_t wanted, SignalWatch& signals) {
+// signal. Throws after the patience.
+bool wait_for_readers(const MessagePlayer& player, const Options& options, SignalWatch& signals) {
   Progress progress;
+  const double end_s = steady_now_s() + options.patience_s;
   while (true) {
-    const std::vector<std::string> topics = player.topics_short_of(wanted);
+    const std::vector<std::string> topics = player.topics_short_of(options.wait);
     if (topics.empty()) return !signals.wait(0.3);
-    if (progress.is_due()) {
-      std::string names;
-      for (const std::string& topic : topics) names += (names.empty() ? "" : ", ") + topic;
-      log::info("publish") << "waiting for readers of " << names << ": " << wanted
-                           << " of each (--topics plays only those that are read)";
-    }
+    std::string names;
+    for (const std::string& topic : topics) names += (names.empty() ? "" : ", ") + topic;
+    names +=
+        ": " + std::to_string(options.wait) + " of each (--topics plays only those that are read)";
+    if (steady_now_s() > end_s)
+      throw std::runtime_error("after " + fixed(options.patience_s, 0) +
+                               " s still too few readers on ROS domain " +
+                               std::to_string(options.ros.domain) + " of " + names);
+    if (progress.is_due()) log::info("publish") << "waiting for readers of " << names;
     if (signals.wait(0.05)) return false;
   }
 }
@@ -160,7 +171,7 @@ void play(const Options& options, SignalWatch& signals) {
   for (const std::string& topic : player.unsupported_topics())
     log::warn("publish") << "left out, its type is not known: " << topic;
   if (player.topics().empty()) throw std::invalid_argument("there is no topic to play");
-  if (!wait_for_readers(player, options.wait, signals)) return;
+  if (!wait_for_readers(player, options, signals)) return;
   std::atomic<bool> ended = false;
   std::jthread stopper([&] {
     while (!ended && !signals.wait(0.2)) {

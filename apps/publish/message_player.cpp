@@ -6,6 +6,7 @@
 
 #include "modules/core/text_rows.hpp"
 #include "modules/recordings/ros_messages.hpp"
+#include "modules/sensors/ros_image.hpp"
 
 namespace km {
 namespace {
@@ -83,8 +84,11 @@ MessagePlayer::MessagePlayer(std::unique_ptr<BagReader> recording,
 
 std::vector<std::string> MessagePlayer::topics_short_of(std::size_t readers) const {
   std::vector<std::string> topics;
-  for (std::size_t k = 0; k < publishers_.size(); ++k)
-    if (publishers_[k]->reader_count() < readers) topics.push_back(topics_[k].topic);
+  for (std::size_t k = 0; k < publishers_.size(); ++k) {
+    const BagChannel channel{topics_[k].topic, topics_[k].type, "cdr", 0};
+    const bool is_sensor = has_images(channel) || is_of_type(channel, RosImu::kType);
+    if (is_sensor && publishers_[k]->reader_count() < readers) topics.push_back(channel.topic);
+  }
   return topics;
 }
 

@@ -47,7 +47,8 @@ class MessagePlayer {
   MessagePlayer(std::unique_ptr<BagReader> recording,
                 const std::shared_ptr<const RosNetwork>& network, const PlayOptions& options);
 
-  /// The topics with fewer than `readers` readers.
+  /// The topics of images and inertial samples with fewer than `readers` readers. Not every robot
+  /// reads the other topics of a recording.
   [[nodiscard]] std::vector<std::string> topics_short_of(std::size_t readers) const;
 
   /// Publishes the next message when it is due; false after the last one, and after stop().

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <vector>
 
+#include "apps/robot/live_summary.hpp"
 #include "apps/robot/rig_proposal.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
@@ -106,6 +107,27 @@ std::vector<TopicSummary> euroc_topics(const fs::path& folder) {
   return topics;
 }
 
+// Writes the rig file that fits the topics best. Returns text on its content. `source`: the
+// recording, or the live topics.
+std::string write_rig(const std::vector<TopicSummary>& topics, const std::string& source,
+                      const fs::path& rig) {
+  const RigFile proposal = propose_rig(topics);
+  write_file(rig, "# The sensors in " + source + ": see that they are the right ones.\n" +
+                      rig_file_text(proposal));
+  const bool has_infos = !proposal.left.info_topic.empty() &&
+                         (proposal.right.topic.empty() || !proposal.right.info_topic.empty());
+  const std::string problem = depth_problem(topics, proposal);
+  return (problem.empty() ? "" : "\nwarning: " + problem + '\n') + "\nwritten: " + rig.string() +
+         ": look at its topics, and name the calibration" +
+         (has_infos ? "; without it, the calibration comes from topics of CameraInfo and from "
+                      "/tf_static\n"
+                    : "\n");
+}
+
+void refuse_existing(const fs::path& rig) {
+  if (!is_absent(rig)) throw InputFileError(rig.string() + ": is there already: name another file");
+}
+
 }  // namespace
 
 std::string inspect_recording(const fs::path& path) {
@@ -121,7 +143,7 @@ std::string inspect_recording(const fs::path& path) {
 }
 
 std::string inspect_recording(const fs::path& path, const fs::path& rig) {
-  if (!is_absent(rig)) throw InputFileError(rig.string() + ": is there already: name another file");
+  refuse_existing(rig);
   if (is_folder(path / "mav0") || is_folder(path / "cam0"))
     throw InputFileError(rig.string() + ": not written: " + path.string() +
                          " is a EuRoC folder, whose calibration is its own sensor.yaml files; play "
@@ -129,16 +151,14 @@ std::string inspect_recording(const fs::path& path, const fs::path& rig) {
                          path.string() + ", without --rig");
   const auto reader = open_bag(path);
   const auto topics = summarise_topics(*reader);
-  const RigFile proposal = propose_rig(topics);
-  write_file(rig, "# The sensors in " + path.string() + ": see that they are the right ones.\n" +
-                      rig_file_text(proposal));
-  const bool has_infos = !proposal.left.info_topic.empty() &&
-                         (proposal.right.topic.empty() || !proposal.right.info_topic.empty());
-  return text_of(topics) + to_string(reader->report()) + "\nwritten: " + rig.string() +
-         ": look at its topics, and name the calibration" +
-         (has_infos ? "; without it, the calibration comes from topics of CameraInfo and from "
-                      "/tf_static\n"
-                    : "\n");
+  return text_of(topics) + to_string(reader->report()) + write_rig(topics, path.string(), rig);
+}
+
+std::string inspect_live(const RosConfig& config, const fs::path& rig) {
+  if (rig.empty()) return text_of(summarise_live_topics(config));
+  refuse_existing(rig);
+  const auto topics = summarise_live_topics(config);
+  return text_of(topics) + write_rig(topics, "ROS domain " + std::to_string(config.domain), rig);
 }
 
 }  // namespace km

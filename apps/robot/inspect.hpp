@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <string>
 
+#include "runtime/dds/ros_config.hpp"
+
 namespace km {
 
 /// Description of a recording for people: a bag of ROS 1 or 2, an MCAP file, or a EuRoC folder. One
@@ -16,5 +18,9 @@ namespace km {
 /// the exceptions of write_file().
 [[nodiscard]] std::string inspect_recording(const std::filesystem::path& path,
                                             const std::filesystem::path& rig);
+
+/// Description of the topics that programs publish on ROS 2 now, as above. If `rig` is not empty,
+/// also writes the rig file. Further errors as for summarise_live_topics().
+[[nodiscard]] std::string inspect_live(const RosConfig& config, const std::filesystem::path& rig);
 
 }  // namespace km

@@ -35,7 +35,8 @@ Examples
   Topics of a recording and the regularity of their stamps; then a robot on the topics that rig.yaml names:
     kimera_multi_robot --inspect recording.bag rig.yaml
     kimera_multi_robot --robot 0 --dataset recording.bag --rig rig.yaml --output results/a
-  On the sensors of this robot, whose drivers run on ROS 2:
+  On the sensors of this robot, whose drivers run on ROS 2; --inspect finds their topics:
+    kimera_multi_robot --set ros.domain=0 --inspect --live rig.yaml
     kimera_multi_robot --robot 0 --live rig.yaml --output results/a
   With a record that Foxglove, Lichtblick, Rerun and PlotJuggler open:
     kimera_multi_robot --robot 0 --dataset MH_01_easy --output results/a --record
@@ -73,9 +74,20 @@ void print_config(const RobotOptions& options) {
   throw CLI::Success();
 }
 
-void print_recording(const std::vector<std::string>& paths) {
-  std::cout << (paths.size() == 1 ? inspect_recording(paths[0])
-                                  : inspect_recording(paths[0], paths[1]));
+// Prints the topics of --inspect RECORDING [RIG], or of --inspect --live [RIG], and writes the rig
+// file.
+void print_topics(const RobotOptions& options, const CLI::App& app,
+                  const std::vector<std::string>& paths) {
+  const CLI::Option& live = *app.get_option("--live");
+  if (live.count() > 0) {
+    if (!paths[0].empty()) throw CLI::ValidationError("--inspect", "name a recording or --live");
+    std::cout << inspect_live(load_robot_config(options).ros, live.results()[0]);
+  } else if (paths[0].empty()) {
+    throw CLI::ValidationError("--inspect", "a recording or --live is needed");
+  } else {
+    std::cout << (paths.size() == 1 ? inspect_recording(paths[0])
+                                    : inspect_recording(paths[0], paths[1]));
+  }
   throw CLI::Success();
 }
 
@@ -87,14 +99,19 @@ void add_input(CLI::App& app, RobotOptions& options) {
                    "of ROS 1 (.bag) or ROS 2 (folder, .db3, .mcap)")
       ->check(CLI::ExistingPath);
   group
-      ->add_option_function<std::string>(
+      ->add_option_function<std::vector<std::string>>(
           "--live",
-          [&options](const std::string& rig) {
-            options.rig = rig;
+          [&options](const std::vector<std::string>& rig) {
+            if (rig[0].empty())
+              throw CLI::ValidationError(
+                  "--live", "a rig file is needed; --inspect --live rig.yaml writes one");
+            options.rig = rig[0];
             options.is_live = true;
           },
           "Rig file: its topics are those of drivers that run now, on ROS 2 (see ros: in "
           "config/robot.yaml); until Ctrl-C")
+      ->expected(0, 1)  // --inspect --live needs none
+      ->type_name("RIG")
       ->check(CLI::ExistingFile);
   group
       ->add_option("--graph", options.graph,
@@ -227,12 +244,13 @@ RobotOptions parse_options(int argc, char** argv) {
       "--print-config", [&options] { print_config(options); },
       "Print the configuration that the options before this one make, with bounds, and exit");
   app.add_option_function<std::vector<std::string>>(
-         "--inspect", print_recording,
+         "--inspect",
+         [&](const std::vector<std::string>& paths) { print_topics(options, app, paths); },
          "Print what is in a recording and exit: a bag of ROS 1 (.bag), one of ROS 2 (folder or "
          ".db3), an MCAP file (.mcap), or a EuRoC folder; with a second file, write a rig file "
-         "to it")
-      ->expected(1, 2)
-      ->type_name("RECORDING [RIG]");
+         "to it. --inspect --live [RIG]: the same for the topics that drivers publish now")
+      ->expected(0, 2)
+      ->type_name("[RECORDING] [RIG]");
   app.add_option("--log", options.log_level, "error, warn, info or debug")
       ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
       ->capture_default_str();

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "modules/recordings/ros_messages.hpp"
+#include "modules/sensors/depth_alignment.hpp"
 
 namespace km {
 namespace {
@@ -55,13 +56,26 @@ void propose_stereo(const std::vector<TopicSummary>& topics, RigFile& rig) {
   }
 }
 
+// True if the images may show the same pixels, see DepthAlignment.
+bool may_be_aligned(const TopicSummary& camera, const TopicSummary& depth) {
+  return !camera.image || !depth.image ||
+         (different_size(*camera.image, *depth.image) +
+          different_frame(*camera.image, *depth.image))
+             .empty();
+}
+
+// Prefers a camera and depth that are aligned.
 void propose_depth(const std::vector<TopicSummary>& topics, RigFile& rig) {
-  const auto depth = std::ranges::find_if(topics, is_depth);
-  if (depth == topics.end()) return;
-  const auto camera = std::ranges::find_if(
-      topics, [](const TopicSummary& topic) { return topic.is_image && !is_depth(topic); });
-  if (rig.left.topic.empty() && camera != topics.end()) rig.left.topic = camera->topic;
-  rig.depth.topic = depth->topic;
+  for (const bool aligned : {true, false})
+    for (const TopicSummary& depth : topics)
+      for (const TopicSummary& camera : topics) {
+        const bool is_camera = camera.is_image && !is_depth(camera) &&
+                               (rig.left.topic.empty() || camera.topic == rig.left.topic);
+        if (!rig.depth.topic.empty() || !is_depth(depth) || !is_camera) continue;
+        if (aligned && !may_be_aligned(camera, depth)) continue;
+        rig.left.topic = camera.topic;
+        rig.depth.topic = depth.topic;
+      }
 }
 
 // Among several topics, takes the one that shares the longest prefix with the topic of the left
@@ -103,6 +117,15 @@ RigFile propose_rig(const std::vector<TopicSummary>& topics) {
   propose_info(topics, rig.left);
   propose_info(topics, rig.right);
   return rig;
+}
+
+std::string depth_problem(const std::vector<TopicSummary>& topics, const RigFile& rig) {
+  if (rig.depth.topic.empty() || !rig.right.topic.empty()) return "";
+  const TopicSummary &left = named(topics, rig.left.topic), &depth = named(topics, rig.depth.topic);
+  if (may_be_aligned(left, depth)) return "";
+  const std::string size = different_size(*left.image, *depth.image);
+  return misaligned_text(left.topic, depth.topic,
+                         size.empty() ? different_frame(*left.image, *depth.image) : size);
 }
 
 }  // namespace km

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "modules/recordings/bag_summary.hpp"
@@ -12,5 +13,10 @@ namespace km {
 /// taken. Topics that are not found are empty. The calibration is unknown, except for topics of
 /// CameraInfo.
 [[nodiscard]] RigFile propose_rig(const std::vector<TopicSummary>& topics);
+
+/// Reason why depth of a proposed RGB-D rig is not aligned with its camera, and the remedy; "" if
+/// sizes and frames of the images are equal.
+[[nodiscard]] std::string depth_problem(const std::vector<TopicSummary>& topics,
+                                        const RigFile& rig);
 
 }  // namespace km

@@ -186,7 +186,8 @@ std::optional<Rig> receive_calibration(const PartialRig& rig,
   topics.give_up_after(kPatience_s);
   const SignalStop stop(signals, topics);
   try {
-    return complete_rig("live", topics, rig);
+    Rig complete = complete_rig("live", topics, rig);
+    return stop.came() ? std::nullopt : std::optional(std::move(complete));
   } catch (const DatasetError&) {
     if (stop.came()) return std::nullopt;
     throw;
@@ -223,8 +224,9 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
                                              std::shared_ptr<const RosNetwork> ros,
                                              std::optional<Stamp> not_before,
                                              SignalWatch& signals) {
-  const PartialRig& partial = *input.messages;
+  PartialRig partial = *input.messages;
   const SensorTopicNames topics = used_topics(options, config, mapping, partial);
+  partial.rig.topics.depth = topics.depth;
   auto messages = options.is_live ? subscribe(ros, topics) : open_bag(options.dataset);
   std::optional<Rig> rig = complete(options, partial, ros, signals);
   if (!rig) return nullptr;

@@ -1,6 +1,9 @@
 #include "apps/team/team_file.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <string_view>
 
 #include "modules/evaluation/trajectory_file.hpp"
 #include "runtime/config_text.hpp"
@@ -21,6 +24,47 @@ fs::path find_truth(const fs::path& place, std::vector<std::string>& notes) {
   return file.value_or(fs::path());
 }
 
+// Options of kimera_multi_robot that name inputs.
+constexpr std::array<std::string_view, 4> kInputOptions = {"--config", "--odometry", "--rig",
+                                                           "--security"};
+
+bool names_input(std::string_view option) {
+  return std::ranges::find(kInputOptions, option) != kInputOptions.end();
+}
+
+// Makes the inputs in a list of arguments ("--rig", "rig.yaml" or "--rig=rig.yaml") independent of
+// the working directory, and replaces ${DATASET}.
+void resolve_arguments(YAML::Node arguments, const std::string& file,
+                       const ConfigContext& context) {
+  std::string option;
+  for (std::size_t k = 0; arguments.IsSequence() && k < arguments.size(); ++k) {
+    if (!arguments[k].IsScalar()) return;
+    const std::string word = arguments[k].Scalar();
+    const std::size_t equal = word.starts_with("--") ? word.find('=') : word.npos;
+    if (equal != word.npos) option = word.substr(0, equal);
+    std::string value = equal == word.npos ? word : word.substr(equal + 1);
+    fs::path path;
+    const std::string problem = names_input(option) ? resolve_input(value, context, Input{}, path)
+                                                    : replace_dataset(value, context);
+    if (!problem.empty())
+      context.problems.others +=
+          place_of(arguments[k], file) + ": arguments: " + word + ' ' + problem + '\n';
+    if (names_input(option)) value = path.string();
+    arguments[k] = equal == word.npos ? value : option + '=' + value;
+    option = equal == word.npos ? word : "";
+  }
+}
+
+void resolve_all_arguments(const YAML::Node& root, const std::string& file,
+                           const ConfigContext& context) {
+  if (!root.IsMap()) return;
+  if (const YAML::Node arguments = root["arguments"]) resolve_arguments(arguments, file, context);
+  const YAML::Node robots = root["robots"];
+  if (!robots || !robots.IsSequence()) return;
+  for (const YAML::Node& robot : robots)
+    if (robot.IsMap() && robot["arguments"]) resolve_arguments(robot["arguments"], file, context);
+}
+
 }  // namespace
 
 bool is_rate(const std::string& text) {
@@ -35,7 +79,9 @@ TeamPlan read_team_file(const fs::path& file, const fs::path& dataset) {
   ConfigProblems problems;
   const ConfigContext context{problems, fs::absolute(file).parent_path(), dataset};
   TeamPlan plan;
-  fill_config(read_section(load_yaml(file), "", file.string(), context), "", context, plan);
+  const YAML::Node root = load_yaml(file);
+  resolve_all_arguments(root, file.string(), context);
+  fill_config(read_section(root, "", file.string(), context), "", context, plan);
   problems.finish();
   if (plan.output.empty()) plan.output = "results" / file.stem();
   plan.truth = find_truth(plan.truth, plan.notes);

@@ -40,7 +40,9 @@ struct RobotPlan {
     visitor.field("to", to_s, {0.0, 1e9}, "[s since the first image]");
     visitor.field("truth", truth, Input{.must_exist = false},
                   "true poses of this robot; default: the team's");
-    visitor.field("arguments", arguments, "further options of its command line");
+    visitor.field("arguments", arguments,
+                  "further options of its command line; their inputs (--rig, --odometry, ...) are "
+                  "relative to this file");
     visitor.required({"id"});
     visitor.check(name.empty() || is_folder_name(name), "name",
                   "is not made of letters, digits, _, - and .");
@@ -94,9 +96,9 @@ struct TeamPlan {
   }
 };
 
-/// Reads a team file. Relative paths of inputs are relative to the file's folder; ${DATASET} in
-/// them is replaced by `dataset`. A truth may be a folder that contains the file. A missing truth
-/// adds a note. Throws ConfigError with every problem by file and line.
+/// Reads a team file. Relative paths of inputs, also in arguments, are relative to the file's
+/// folder; ${DATASET} in them is replaced by `dataset`. A truth may be a folder that contains the
+/// file. A missing truth adds a note. Throws ConfigError with every problem by file and line.
 [[nodiscard]] TeamPlan read_team_file(const std::filesystem::path& file,
                                       const std::filesystem::path& dataset);
 

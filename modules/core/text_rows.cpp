@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <utility>
 
 namespace km {
 namespace {
@@ -15,19 +16,20 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
-std::vector<std::string_view> split_at_commas(std::string_view line) {
+std::vector<std::string_view> split_at_commas(std::string_view line, std::size_t max_fields) {
   std::vector<std::string_view> fields;
-  for (std::size_t comma = line.find(','); comma != line.npos; comma = line.find(',')) {
+  while (fields.size() < max_fields) {
+    const std::size_t comma = line.find(',');
     fields.push_back(trimmed(line.substr(0, comma)));
+    if (comma == line.npos) break;
     line.remove_prefix(comma + 1);
   }
-  fields.push_back(trimmed(line));
   return fields;
 }
 
-std::vector<std::string_view> split_at_blanks(std::string_view line) {
+std::vector<std::string_view> split_at_blanks(std::string_view line, std::size_t max_fields) {
   std::vector<std::string_view> fields;
-  while (!line.empty()) {
+  while (!line.empty() && fields.size() < max_fields) {
     const std::size_t end = std::min(line.find_first_of(kBlanks), line.size());
     fields.push_back(line.substr(0, end));
     line = trimmed(line.substr(end));
@@ -47,18 +49,29 @@ std::optional<T> parse_whole(std::string_view field) {
 
 }  // namespace
 
-std::vector<TextRow> split_rows(std::string_view text) {
-  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  std::vector<TextRow> rows;
-  for (int number = 1; !text.empty(); ++number) {
-    const std::size_t end = text.find('\n');
-    std::string_view line = text.substr(0, end);
-    text.remove_prefix(end == text.npos ? text.size() : end + 1);
+RowReader::RowReader(std::string_view text, std::size_t max_fields)
+    : text_(text), max_fields_(max_fields) {
+  if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
+}
+
+std::optional<TextRow> RowReader::next() {
+  while (!text_.empty()) {
+    ++line_;
+    const std::size_t end = text_.find('\n');
+    std::string_view line = text_.substr(0, end);
+    text_.remove_prefix(end == text_.npos ? text_.size() : end + 1);
     line = trimmed(line.substr(0, line.find('#')));
     if (line.empty()) continue;
-    rows.push_back(
-        {number, line.find(',') == line.npos ? split_at_blanks(line) : split_at_commas(line)});
+    return TextRow{line_, line.find(',') == line.npos ? split_at_blanks(line, max_fields_)
+                                                      : split_at_commas(line, max_fields_)};
   }
+  return std::nullopt;
+}
+
+std::vector<TextRow> split_rows(std::string_view text) {
+  std::vector<TextRow> rows;
+  RowReader reader(text);
+  while (auto row = reader.next()) rows.push_back(*std::move(row));
   return rows;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +17,23 @@ inline constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 struct TextRow {
   int line = 0;                          ///< Counted from 1.
   std::vector<std::string_view> fields;  ///< Views of the text, without surrounding blanks.
+};
+
+/// Reads the rows of split_rows() one by one. `text` must outlive the rows.
+class RowReader {
+ public:
+  /// A row has at most `max_fields` fields, and further ones are not read. So a file of one endless
+  /// line takes little memory, if `max_fields` is more than any valid row has.
+  explicit RowReader(std::string_view text,
+                     std::size_t max_fields = std::numeric_limits<std::size_t>::max());
+
+  /// nullopt after the last row.
+  [[nodiscard]] std::optional<TextRow> next();
+
+ private:
+  std::string_view text_;
+  std::size_t max_fields_;
+  int line_ = 0;
 };
 
 /// Rows of a CSV or blank-separated table. A line with a comma is divided at its commas, any other

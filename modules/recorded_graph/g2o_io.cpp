@@ -281,9 +281,11 @@ std::uint64_t key_of_keyframe(const KeyframeId& id) {
 namespace {
 
 G2oGraph parse_g2o(const std::string& text, const std::string& file) {
+  constexpr std::size_t kMaxFields = 64;  // a valid line has at most 31
   Reader reader;
-  for (const TextRow& row : split_rows(text)) {
-    TextFields fields(row, file);
+  RowReader rows(text, kMaxFields);
+  while (const auto row = rows.next()) {
+    TextFields fields(*row, file);
     reader.read_line(fields);
   }
   if (reader.graph.dimension == 0) throw std::runtime_error(file + ": no vertex and no edge");

@@ -167,10 +167,12 @@ std::vector<RelativePose> parse_measurements(const std::string& text, const std:
   if (!content.starts_with(kColumns))
     throw std::runtime_error(file + ":1: the first line must name the columns " +
                              std::string(kColumns));
-  const std::vector<TextRow> table = split_rows(text);
+  constexpr std::size_t kMaxFields = 256;
+  RowReader table(text, kMaxFields);
+  static_cast<void>(table.next());
   std::vector<RelativePose> rows;
-  for (const TextRow& row : std::span(table).subspan(1)) {
-    TextFields fields(row, file);
+  while (const auto row = table.next()) {
+    TextFields fields(*row, file);
     rows.push_back(read_row(fields));
   }
   return rows;

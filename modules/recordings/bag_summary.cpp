@@ -41,19 +41,6 @@ bool has_header(const BagChannel& channel) {
                      [&](std::string_view type) { return is_of_type(channel, type); });
 }
 
-std::optional<TopicImage> image_in(const BagChannel& channel, const BagMessage& message) {
-  if (is_of_type(channel, RosImage::kType)) {
-    const auto image = decode_ros<RosImage>(channel.encoding, message.bytes);
-    if (!image.value) return std::nullopt;
-    return TopicImage{{image.value->width, image.value->height}, image.value->encoding};
-  }
-  const auto image = decode_ros<RosCompressedImage>(channel.encoding, message.bytes);
-  if (!image.value) return std::nullopt;
-  const auto& data = image.value->data;
-  const auto size = stated_image_size({reinterpret_cast<const char*>(data.data()), data.size()});
-  return TopicImage{size.value_or(ImageSize{}), image.value->format};
-}
-
 // Stamp of a message; nullopt if the message is not of its type.
 std::optional<Stamp> stamp_in(const BagChannel& channel, const BagMessage& message) {
   if (is_of_type(channel, RosTransforms::kType)) {
@@ -87,10 +74,25 @@ void add_message(TopicSummary& topic, const BagChannel& channel, const BagMessag
     return;
   }
   topic.stamps.push_back(*stamp);
-  if (topic.is_image && !topic.image) topic.image = image_in(channel, message);
+  if (topic.is_image && !topic.image) topic.image = topic_image(channel, message);
 }
 
 }  // namespace
+
+std::optional<TopicImage> topic_image(const BagChannel& channel, const BagMessage& message) {
+  if (is_of_type(channel, RosImage::kType)) {
+    const auto image = decode_ros<RosImage>(channel.encoding, message.bytes);
+    if (!image.value) return std::nullopt;
+    return TopicImage{{image.value->width, image.value->height},
+                      image.value->encoding,
+                      image.value->header.frame};
+  }
+  const auto image = decode_ros<RosCompressedImage>(channel.encoding, message.bytes);
+  if (!image.value) return std::nullopt;
+  const auto& data = image.value->data;
+  const auto size = stated_image_size({reinterpret_cast<const char*>(data.data()), data.size()});
+  return TopicImage{size.value_or(ImageSize{}), image.value->format, image.value->header.frame};
+}
 
 std::vector<TopicSummary> summarise_topics(BagReader& reader) {
   ChannelTable table;

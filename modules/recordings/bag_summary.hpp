@@ -11,11 +11,16 @@
 
 namespace km {
 
-/// Size and encoding of the first image of a topic.
+/// The first image of a topic.
 struct TopicImage {
   ImageSize size;
-  std::string encoding;  ///< "mono8", "jpeg", ...
+  std::string encoding;    ///< "mono8", "jpeg", ...
+  std::string frame = {};  ///< Frame in the header.
 };
+
+/// nullopt if the message is not an image of its channel's type.
+[[nodiscard]] std::optional<TopicImage> topic_image(const BagChannel& channel,
+                                                    const BagMessage& message);
 
 /// A topic of a recording.
 struct TopicSummary {

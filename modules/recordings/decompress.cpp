@@ -144,4 +144,12 @@ Output decompress(std::string_view compression, std::span<const std::uint8_t> by
   return Output::refuse("a compression that is not known");
 }
 
+bool UnpackLimit::accept(std::uint64_t begin, std::uint64_t size) {
+  if (accepted_.contains(begin)) return true;
+  if (size > left_bytes_) return false;
+  left_bytes_ -= size;
+  accepted_.insert(begin);
+  return true;
+}
+
 }  // namespace km

@@ -5,7 +5,6 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/decompress.hpp"
 
 namespace km {
 namespace {
@@ -281,6 +280,9 @@ Bytes McapReader::records_of(const ChunkRange& place) {
     return refuse(BagFault::kIndex, "no chunk at the position in the index");
   const auto chunk = parse_mcap<McapChunk>(std::span(bytes).subspan(kMcapRecordHeader_bytes));
   if (!chunk) return refuse(BagFault::kMalformed, "a chunk that ends within its fields");
+  if (!unpack_limit_.accept(place.begin, chunk->uncompressed_size))
+    return refuse(BagFault::kCompression, "a chunk of " + std::to_string(chunk->uncompressed_size) +
+                                              " bytes: " + UnpackLimit::kRefusal);
   auto records = decompress(chunk->compression, chunk->records, chunk->uncompressed_size);
   if (!records.value)
     return refuse(BagFault::kCompression,

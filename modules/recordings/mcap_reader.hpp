@@ -11,6 +11,7 @@
 
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/chunk_merge.hpp"
+#include "modules/recordings/decompress.hpp"
 #include "modules/recordings/mcap_records.hpp"
 #include "modules/recordings/placed_report.hpp"
 #include "modules/recordings/random_access_file.hpp"
@@ -59,6 +60,7 @@ class McapReader final : public BagReader {
 
   RandomAccessFile file_;
   PlacedReport report_{file_};
+  UnpackLimit unpack_limit_{file_.size()};
   std::map<std::uint16_t, std::string> schemas_;
   std::map<std::uint16_t, std::size_t> channel_of_;  // index into channels_
   std::vector<BagChannel> channels_;

@@ -6,7 +6,6 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/decompress.hpp"
 
 namespace km {
 namespace {
@@ -164,6 +163,9 @@ Bytes Ros1BagReader::records_of(const ChunkRange& place) {
   const auto size = record->fields.u32("size");
   if (!compression || !size || record->data_size > kMaxDecompressed_bytes)
     return refuse(BagFault::kMalformed, "a chunk that lacks fields, or of more than 512 MiB");
+  if (!unpack_limit_.accept(place.begin, *size))
+    return refuse(BagFault::kCompression,
+                  "a chunk of " + std::to_string(*size) + " bytes: " + UnpackLimit::kRefusal);
   auto records = decompress(*compression, file_.read(record->data_begin, record->data_size), *size);
   if (!records.value)
     return refuse(BagFault::kCompression,

@@ -10,6 +10,7 @@
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/channel_table.hpp"
 #include "modules/recordings/chunk_merge.hpp"
+#include "modules/recordings/decompress.hpp"
 #include "modules/recordings/placed_report.hpp"
 #include "modules/recordings/random_access_file.hpp"
 #include "modules/recordings/ros1_records.hpp"
@@ -55,6 +56,7 @@ class Ros1BagReader final : public BagReader {
 
   RandomAccessFile file_;
   PlacedReport report_{file_};
+  UnpackLimit unpack_limit_{file_.size()};
   ChannelTable channels_;
   std::map<std::uint32_t, std::size_t> channel_of_;  // channel of each connection of the bag
   std::vector<ChunkRange> places_;

@@ -61,7 +61,7 @@ std::optional<Ros1Record> next_ros1_record(std::span<const std::uint8_t> bytes, 
   ByteReader reader(bytes.subspan(at));
   auto fields = Ros1Fields::parse(reader.bytes(reader.u32()));
   const auto data = reader.bytes(reader.u32());
-  if (reader.failed() || !fields) return std::nullopt;
+  if (reader.failed() || !fields || !fields->text("op")) return std::nullopt;
   at = bytes.size() - reader.left();
   return Ros1Record{.fields = *std::move(fields), .data = data, .data_begin = at - data.size()};
 }

@@ -23,6 +23,13 @@ void append(std::string& list, const std::string& item) {
 
 }  // namespace
 
+RigCompletion::RigCompletion(PartialRig rig) : partial_(std::move(rig)) {
+  const SensorTopicNames& topics = partial_.rig.topics;
+  if (partial_.checks_depth())
+    alignment_.emplace(CameraTopics{topics.left, partial_.info_topics[0]},
+                       CameraTopics{topics.depth, partial_.depth_info_topic}, partial_.images[0]);
+}
+
 // Topic whose messages contain the name of the body frame.
 const std::string& RigCompletion::body_topic() const {
   const SensorTopicNames& topics = partial_.rig.topics;
@@ -44,9 +51,15 @@ std::vector<RigCompletion::Source> RigCompletion::sources() const {
       sources.push_back({body_topic(), body_topic() == partial_.rig.topics.odometry
                                            ? RosOdometry::kType
                                            : RosImu::kType});
-    if (partial_.has_cameras)
-      sources.push_back({partial_.rig.topics.left, type_of_images(partial_.rig.topics.left)});
   }
+  const SensorTopicNames& topics = partial_.rig.topics;
+  if (alignment_ || (!partial_.has_extrinsics && partial_.has_cameras))
+    sources.push_back({topics.left, type_of_images(topics.left)});
+  if (!alignment_) return sources;
+  sources.push_back({topics.depth, type_of_images(topics.depth)});
+  sources.push_back({partial_.depth_info_topic, RosCameraInfo::kType, false});
+  if (partial_.has_cameras)
+    sources.push_back({partial_.info_topics[0], RosCameraInfo::kType, false});
   return sources;
 }
 
@@ -74,6 +87,15 @@ bool RigCompletion::take_info(std::size_t camera, const BagChannel& channel,
 }
 
 bool RigCompletion::add(const BagChannel& channel, const BagMessage& message) {
+  const bool is_new = take_part(channel, message);
+  return (alignment_ && alignment_->add(channel, message)) || is_new;
+}
+
+void RigCompletion::end_depth() {
+  if (alignment_) alignment_->end();
+}
+
+bool RigCompletion::take_part(const BagChannel& channel, const BagMessage& message) {
   const auto take_frame = [&](std::optional<std::string>& frame) {
     if (frame) return false;
     if (is_of_type(channel, RosOdometry::kType)) {
@@ -121,6 +143,7 @@ std::optional<SE3> RigCompletion::T_body_left() const {
 // Relative pose of the cameras from the baseline in P, because rectified cameras differ by a
 // translation along x. Without a baseline it is that of their frames in /tf_static.
 std::optional<SE3> RigCompletion::T_left_right() const {
+  if (partial_.has_pair) return partial_.rig.sensors.stereo.T_left_right();
   if (!infos_[0] || !infos_[1]) return std::nullopt;
   std::optional<SE3> T_frames;
   if (const auto baseline = baseline_m(*infos_[1]))
@@ -133,11 +156,16 @@ std::optional<SE3> RigCompletion::T_left_right() const {
 }
 
 std::optional<Rig> RigCompletion::rig() const {
+  const auto misalignment =
+      alignment_ ? alignment_->problem(transforms_) : std::optional<std::string>("");
+  if (!misalignment) return std::nullopt;
+  if (!misalignment->empty()) throw DatasetError(*misalignment);
   Rig rig = partial_.rig;
   StereoRig& stereo = rig.sensors.stereo;
   if (!partial_.has_cameras) {
     const auto T = T_left_right();
-    if (!infos_[0] || (has_right() && !T)) return std::nullopt;
+    if (!infos_[0] || (has_right() && (!infos_[1] || !T))) return std::nullopt;
+    const SE3 T_body_left = stereo.cameras[0].T_body_cam;
     const Camera left = camera_of(*infos_[0], partial_.images[0]);
     stereo = rgbd_rig(left, partial_.virtual_baseline_m);
     if (has_right()) {
@@ -146,6 +174,8 @@ std::optional<Rig> RigCompletion::rig() const {
       if (const auto problem = pair_problem(stereo))
         throw DatasetError(partial_.info_topics[1] + ": " + *problem);
     }
+    if (partial_.has_extrinsics)
+      for (Camera& camera : stereo.cameras) camera.T_body_cam = T_body_left * camera.T_body_cam;
   }
   if (partial_.has_extrinsics) return rig;
   const auto T = T_body_left();
@@ -187,6 +217,12 @@ std::string RigCompletion::missing() const {
 }
 
 Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
+  const auto is_absent = [&bag](const std::string& topic) {
+    return !bag.is_live() && std::ranges::count(bag.channels(), topic, &BagChannel::topic) == 0;
+  };
+  // BagDataset names absent topics of images.
+  if (is_absent(rig.rig.topics.left) || is_absent(rig.rig.topics.depth))
+    rig.is_depth_aligned = true;
   RigCompletion completion(std::move(rig));
   const auto fail = [&] {
     throw DatasetError(name +
@@ -194,14 +230,17 @@ Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
   };
   // A recorded bag without a needed topic cannot complete the rig, so no message is read.
   for (const auto& source : completion.sources())
-    if (!bag.is_live() && source.is_needed &&
-        std::ranges::count(bag.channels(), source.topic, &BagChannel::topic) == 0)
-      fail();
+    if (source.is_needed && is_absent(source.topic)) fail();
   auto complete = completion.rig();
   while (!complete) {
     const auto message = bag.next();
-    if (!message) fail();
-    if (completion.add(bag.channels()[message->channel], *message)) complete = completion.rig();
+    if (!message) {
+      completion.end_depth();
+      complete = completion.rig();
+      if (!complete) fail();
+    } else if (completion.add(bag.channels()[message->channel], *message)) {
+      complete = completion.rig();
+    }
   }
   return *std::move(complete);
 }

@@ -56,6 +56,26 @@ TEST_CASE("A rig is proposed by types, rates and names", "[robot]") {
   CHECK(rig.depth.topic == "/camera/depth/image");
 }
 
+TEST_CASE("Aligned depth is proposed, or depth is reported as not aligned", "[robot]") {
+  const auto framed = [](const std::string& name, const std::string& encoding,
+                         const std::string& frame) {
+    TopicSummary summary = topic(name, RosImage::kType, 30.0, encoding);
+    summary.image->frame = frame;
+    return summary;
+  };
+  std::vector<TopicSummary> topics = {framed("/camera/depth/image_rect_raw", "16UC1", "depth"),
+                                      framed("/camera/color/image_raw", "rgb8", "color"),
+                                      topic("/imu", RosImu::kType, 200.0)};
+  CHECK_THAT(depth_problem(topics, propose_rig(topics)),
+             Catch::Contains("its frame is depth, not color") &&
+                 Catch::Contains("align_depth.enable:=true"));
+  topics.push_back(framed("/camera/aligned_depth_to_color/image_raw", "16UC1", "color"));
+  const RigFile rig = propose_rig(topics);
+  CHECK(rig.left.topic == "/camera/color/image_raw");
+  CHECK(rig.depth.topic == "/camera/aligned_depth_to_color/image_raw");
+  CHECK(depth_problem(topics, rig).empty());
+}
+
 TEST_CASE("Topics with the calibration of cameras are proposed if they exist", "[robot]") {
   const auto image = RosImage::kType;
   std::vector<TopicSummary> topics = {topic("/left/image_raw", image, 20.0, "mono8"),

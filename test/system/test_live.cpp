@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "modules/recordings/ros_messages.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "runtime/dds/ros_publisher.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/process.hpp"
@@ -192,6 +193,43 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
   CHECK(exit_code == (has_poses ? 0 : 1));
 }
 
+TEST_CASE("A live robot refuses depth that its driver has not aligned with colour",
+          "[system][live]") {
+  const EurocFolder recording;  // only its calibration is used
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  Process robot(logged(live_command(folder,
+                                    "left: {topic: /color}\ndepth: {topic: /depth}\n"
+                                    "imu: {topic: /imu0}\ncalibration: " +
+                                        recording.root().string() + "\n",
+                                    domain)));
+  const auto network =
+      std::make_shared<const RosNetwork>(RosConfig{.domain = domain, .interface = "lo"});
+  const RosPublisher color(network, "/color", RosImage::kType, RosQos::kReliable, 1);
+  const RosPublisher depth(network, "/depth", RosImage::kType, RosQos::kReliable, 1);
+  RosImage image;
+  image.height = 24;
+  image.width = image.step = 32;
+  image.encoding = "mono8";
+  image.data.resize(24 * 32);
+  std::optional<int> exit_code;
+  while (!exit_code) {
+    for (int k = 0; k < 20; ++k) {  // after ten images without CameraInfo there is none
+      image.header.frame = "color_optical";
+      color.publish(encode_ros(image));
+      image.header.frame = "depth_optical";
+      depth.publish(encode_ros(image));
+    }
+    exit_code = robot.wait_within(std::chrono::seconds(1));
+  }
+  CHECK(*exit_code == 1);
+  const auto names_remedy = [](const std::string& line) {
+    return line.find("/depth: depth is not aligned with the images of /color") != line.npos &&
+           line.find("align_depth.enable:=true") != line.npos;
+  };
+  CHECK(robot.wait_until(names_remedy));
+}
+
 TEST_CASE("A live robot whose topics are silent reports where it listens, and ends as failed",
           "[system][live]") {
   const auto dataset = shared_data("euroc/MH_01_easy");  // only its calibration is used
@@ -211,6 +249,24 @@ TEST_CASE("A live robot whose topics are silent reports where it listens, and en
   const RunSummary summary = read_summary(folder.path() / "live/summary.json");
   CHECK_THAT(summary.exit_reason, Catch::StartsWith("no image came"));
   CHECK(std::ranges::count(summary.findings, "frames.none", &Finding::id) == 1);
+}
+
+TEST_CASE("A rig file is proposed from the topics that drivers publish now", "[system][live]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  Process driver(driver_command(*dataset, domain, ""));
+  const auto rig = folder.path() / "rig.yaml";
+  Process inspect(logged(words_of(KM_BIN_DIR "/kimera_multi_robot --set ros.interface=lo --set "
+                                             "ros.domain=" +
+                                  std::to_string(domain) + " --inspect --live " + rig.string())));
+  CHECK(inspect.wait() == 0);
+  CHECK_FALSE(inspect.lines("/cam0/image_raw ").empty());
+  const PartialRig proposal = read_rig_file(rig);
+  CHECK(proposal.rig.topics.left == "/cam0/image_raw");
+  CHECK(proposal.rig.topics.right == "/cam1/image_raw");
+  CHECK(proposal.rig.topics.imu == "/imu0");
 }
 
 }  // namespace km

@@ -174,6 +174,12 @@ function toggleCamera(robot) {
 }
 $('camera').querySelector('button').onclick = () => toggleCamera(camera);
 
+function noImageText(robot) {
+  if (source !== 'live') return 'results keep no images';
+  return robot?.state && robot.state.phase !== 'running' ? 'no image was kept: its input has ended' :
+                                                           'no image yet';
+}
+
 let drawnImage;
 async function drawCamera() {
   $('camera').hidden = camera === null;
@@ -184,8 +190,7 @@ async function drawCamera() {
   const caption = $('camera').querySelector('span');
   caption.textContent = image ?
       `${model.name(camera)}: ${image.features} features` :
-      `${model.name(camera)}: ${
-          source === 'live' ? 'no image yet' : 'results keep no images'}`;
+      `${model.name(camera)}: ${noImageText(model.robots.get(camera))}`;
   if (!image?.jpeg) return;
   const bitmap = await createImageBitmap(new Blob([image.jpeg], {type: 'image/jpeg'}));
   const canvas = $('camera').querySelector('canvas');
@@ -278,6 +283,12 @@ $('canvas').addEventListener('pointerleave', () => {
   showClosure(null);
 });
 
+// A closure of a recorded graph, or of a robot that is not shown, comes without its matches.
+function supportOf({matches, inliers}) {
+  return matches || !inliers ? `${matches} matches, ${inliers} inliers` :
+                               `${inliers} inliers, matches not known`;
+}
+
 function showClosure(found, x, y) {
   scene.setHovered(found);
   const tip = $('closure-tip');
@@ -287,7 +298,7 @@ function showClosure(found, x, y) {
   const of = ([robot, keyframe]) => `${model.name(robot)} keyframe ${keyframe}`;
   const lines = [
     ['b', closure.verdict, ''], ['p', `${of(closure.from)} – ${of(closure.to)}`, ''],
-    ['p', `${closure.matches} matches, ${closure.inliers} inliers`, '']
+    ['p', supportOf(closure), '']
   ];
   if (closure.reason) lines.push(['p', closure.reason, 'reason']);
   tip.replaceChildren(...lines.map(

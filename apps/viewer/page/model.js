@@ -172,13 +172,16 @@ export class Model {
     for (const robot of this.robots.values()) robot.seek(time);
   }
 
-  /** Every pair of keyframes once, with its newest verdict. */
+  /** Every pair of keyframes once, with its newest verdict. Only the robot that has verified a
+   * closure knows its number of matches. */
   closures() {
     const all = new Map();
     for (const robot of this.robots.values())
       for (const [id, closure] of robot.closures) {
         const known = all.get(id);
-        if (!known || known.t <= closure.t) all.set(id, closure);
+        const newest = !known || known.t <= closure.t ? closure : known;
+        const matches = Math.max(closure.matches, known?.matches ?? 0);
+        all.set(id, matches === newest.matches ? newest : {...newest, matches});
       }
     return all;
   }

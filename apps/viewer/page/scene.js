@@ -269,17 +269,20 @@ export class Scene {
     return box;
   }
 
-  // A floor with squares of 1 m (larger for a large map), below all objects of the frame.
+  // A floor below all objects of the frame. Its squares have 1 m; they are larger for a large map,
+  // and smaller on a desk.
   drawGrid(frame) {
     const {min, max} = frame.box;
     const size = Math.max(max.x - min.x, max.y - min.y);
-    const step = size > 200 ? 10 : size > 60 ? 5 : 1;
+    const step = size > 200 ? 10 : size > 60 ? 5 : size > 2 ? 1 : size > 0.5 ? 0.2 : 0.05;
     const snap = (x, f) => f(x / step) * step;
     const [x0, x1, y0, y1] = [
       snap(min.x - step, Math.floor), snap(max.x + step, Math.ceil), snap(min.y - step, Math.floor),
       snap(max.y + step, Math.ceil)
     ];
-    const z = Math.round((min.z - 0.1) * 2) / 2;
+    const rise = Math.min(step, 1) / 2;
+    const z = Math.round((min.z - 0.2 * rise) / rise) * rise;
+    frame.figureSize = Math.min(1, step);
     frame.floor = new THREE.Box3(new THREE.Vector3(x0, y0, z), new THREE.Vector3(x1, y1, max.z));
     const drawn = [x0, x1, y0, y1, z, step].join();
     frame.grid.position.copy(frame.group.position);
@@ -333,6 +336,7 @@ export class Scene {
     figure.keyframes.geometry.setAttribute(
         'position', new THREE.Float32BufferAttribute(keyframes, 3));
     if (robot.pose) figure.body.matrix.copy(T).multiply(matrixOf(robot.pose));
+    for (const part of figure.body.children) part.scale.setScalar(frame.figureSize);
     figure.body.visible = !!robot.pose;
     figure.label.textContent = this.model.name(robot.id);
     this.showLayers(figure);
@@ -396,7 +400,7 @@ export class Scene {
     const up = new THREE.Vector3().crossVectors(away, right);
     const high = Math.tan((this.camera.fov / 2) * (Math.PI / 180)) * 0.9;  // leaves room for the tools
     const wide = high * this.camera.aspect;
-    let distance = 2;
+    let distance = 0.2;
     for (let i = 0; i < 8; ++i) {
       const corner = new THREE
                          .Vector3(

@@ -66,6 +66,12 @@ bool has_extrinsics(const CalibrationMap& chain, std::size_t index) {
   return index > 0 && has_extrinsics(chain, index - 1);
 }
 
+// False if the map states only poses of the camera.
+bool has_lens(const CalibrationMap& camera) {
+  return camera.first_of({"camera_model", "intrinsics", "resolution", "distortion_model",
+                          "distortion_coeffs"}) != nullptr;
+}
+
 Camera read_chain_camera(const CalibrationMap& chain, std::size_t index) {
   return read_camera(chain.map(camera_name(index).c_str()), "distortion_coeffs");
 }
@@ -124,17 +130,37 @@ void read_imu(const CalibrationMap& imu, RigCalibration& calibration) {
       calibration.notes.push_back(imu.place_of(key) + ": " + key + " is not applied to samples");
 }
 
+// Sets the poses of cameras that topics describe.
+void read_poses_alone(const CalibrationMap& chain, const RigChoice& choice,
+                      RigCalibration& calibration) {
+  auto& cameras = calibration.rig.stereo.cameras;
+  std::optional<Camera> right;
+  calibration.has_pair = false;
+  if (choice.right && chain.has(camera_name(*choice.right).c_str())) {
+    const CalibrationMap map = chain.map(camera_name(*choice.right).c_str());
+    calibration.has_pair = map.first_of({"T_cam_imu", "T_imu_cam", "T_cn_cnm1"}) != nullptr;
+    if (calibration.has_pair) right.emplace();
+  }
+  read_poses(chain, choice, cameras[0], right, calibration.has_extrinsics);
+  if (right) cameras[1].T_body_cam = right->T_body_cam;
+}
+
 void read_cameras(const CalibrationMap& chain, const RigChoice& choice,
                   RigCalibration& calibration) {
   const CalibrationMap left_map = chain.map(camera_name(choice.left).c_str());
   calibration.image_topics[0] = read_topic(left_map);
   calibration.image_time_offset_s = read_time_shift(left_map);
   calibration.has_extrinsics = !choice.may_be_partial || has_extrinsics(chain, choice.left);
+  const std::string right_name = camera_name(choice.right.value_or(0));
+  const bool has_right = choice.right && chain.has(right_name.c_str());
+  calibration.has_cameras = !choice.may_be_partial || has_lens(left_map) ||
+                            (has_right && has_lens(chain.map(right_name.c_str())));
+  if (!calibration.has_cameras) return read_poses_alone(chain, choice, calibration);
+  calibration.has_pair = true;
   Camera left = read_chain_camera(chain, choice.left);
   std::optional<Camera> right;
-  const std::string right_name = camera_name(choice.right.value_or(0));
   if (choice.right) {
-    if (!chain.has(right_name.c_str()))
+    if (!has_right)
       throw DatasetError(chain.file().string() + ": no " + right_name +
                          ": one camera without depth is not supported");
     right = read_chain_camera(chain, *choice.right);
@@ -156,12 +182,12 @@ RigCalibration read_kalibr(const std::vector<CalibrationMap>& maps, const RigCho
   Chains chains;
   for (const CalibrationMap& map : maps) chains.add(map);
   RigCalibration calibration;
-  calibration.has_cameras = chains.cameras.has_value();
+  calibration.has_cameras = calibration.has_extrinsics = calibration.has_pair = false;
+  if (choice.depth) calibration.rig.depth = choice.depth->range;
   if (!chains.cameras && !choice.may_be_partial)
     throw DatasetError(maps.front().file().string() +
                        ": no cam0; give Kalibr's chain of cameras, too");
   if (chains.cameras) read_cameras(*chains.cameras, choice, calibration);
-  calibration.has_extrinsics = calibration.has_extrinsics && calibration.has_cameras;
   if (chains.imu)
     read_imu(*chains.imu, calibration);
   else

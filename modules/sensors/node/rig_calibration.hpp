@@ -15,9 +15,10 @@ namespace km {
 /// Calibration of a robot's sensors. The body frame is the inertial sensor's.
 struct RigCalibration {
   SensorRig rig;
-  bool has_cameras = true;
+  bool has_cameras = true;  ///< False: at most the poses of the cameras are known.
   /// False: T_body_cam are poses in the left camera's frame, whose pose on the body is unknown.
   bool has_extrinsics = true;
+  bool has_pair = true;  ///< False: the relative pose of the cameras is unknown.
   /// Offset [s] from the stamps of images to the inertial sensor's time: t_imu = t_image + offset.
   /// nullopt: unknown.
   std::optional<double> image_time_offset_s = std::nullopt;
@@ -41,7 +42,7 @@ struct RigChoice {
   std::size_t left = 0;
   std::optional<std::size_t> right = 1;
   std::optional<DepthChoice> depth = std::nullopt;
-  /// Topics may supply the cameras or their poses, so both may be missing.
+  /// Topics may supply the cameras or their poses, so either or both may be missing.
   bool may_be_partial = false;
 };
 

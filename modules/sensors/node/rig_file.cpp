@@ -44,7 +44,7 @@ RigCalibration read_calibration(const std::filesystem::path& path, bool is_inlin
   if (is_inline) return read_inline_rig(CalibrationMap(path).map("calibration"), choice);
   if (!file.calibration.empty()) return read_rig(file.calibration, choice);
   RigCalibration calibration;
-  calibration.has_cameras = calibration.has_extrinsics = false;
+  calibration.has_cameras = calibration.has_extrinsics = calibration.has_pair = false;
   if (choice.depth) calibration.rig.depth = choice.depth->range;
   if (file.odometry.topic.empty() && !file.odometry.file)
     calibration.notes.push_back(path.string() +
@@ -116,9 +116,12 @@ PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
                   .notes = std::move(calibration.notes)},
           .has_cameras = calibration.has_cameras,
           .has_extrinsics = calibration.has_extrinsics,
+          .has_pair = calibration.has_pair,
+          .is_depth_aligned = file.depth.aligned,
           .virtual_baseline_m = file.depth.baseline_m,
           .info_topics = {info_topic(file.left), info_topic(file.right)},
           .images = {images_of(file.left), images_of(file.right)},
+          .depth_info_topic = camera_info_beside(file.depth.topic),
           .body_frame = file.body_frame,
           .T_body_rig = transform_of(path, "T_body_rig", file.correction.T_body_rig),
           .pose_file = file.odometry.file.value_or("")};

@@ -55,11 +55,14 @@ struct RigFile {
     double scale_m = 1e-3;
     double min_range_m = 0.0, max_range_m = 65.0;
     double baseline_m = 0.1;
+    bool aligned = false;
 
     void visit_fields(auto& visitor) {
       visitor.field("topic", topic,
                     "images of depth, aligned with the left ones; without a right camera the rig "
                     "is an RGB-D one; empty: none");
+      visitor.field("aligned", aligned,
+                    "true: accept depth whose frame or CameraInfo is not that of the left images");
       visitor.field("scale_m", scale_m, kDepthScale_m,
                     "[m] depth of one unit in images of 16 bits; images of 32 bits are in metres");
       visitor.field("min_range_m", min_range_m, {0.0, kDepthRange_m.max},

@@ -10,6 +10,7 @@
 #include "runtime/dds/ros_subscription.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
+#include "test/support/command.hpp"
 
 namespace km {
 namespace {
@@ -100,6 +101,29 @@ TEST_CASE("Unknown topics are left out and broken messages are counted", "[publi
   CHECK(player.topics()[0].refused == 1);
   CHECK_THROWS_WITH(MessagePlayer(samples("/d"), network(), {.topics = {"/e"}}),
                     "the recording has no topic /e");
+}
+
+TEST_CASE("Playing waits for readers of images and inertial samples alone", "[publish]") {
+  auto bag = samples("/f");
+  for (const auto& [topic, type] : {std::pair("/left", RosCompressedImage::kType),
+                                    std::pair("/left_info", RosCameraInfo::kType),
+                                    std::pair("/tf_static", RosTransforms::kType)})
+    bag->describe(topic, type);
+  const MessagePlayer player(std::move(bag), network(), {});
+  CHECK(player.topics().size() == 4);
+  CHECK(player.topics_short_of(1) == std::vector<std::string>{"/f", "/left"});
+  CHECK(player.topics_short_of(0).empty());
+}
+
+TEST_CASE("Waiting for readers ends with the topics that have too few", "[publish]") {
+  const EurocFolder folder;
+  const CommandResult result =
+      run_command(KM_BIN_DIR "/kimera_multi_publish " + folder.root().string() +
+                  " --interface lo --wait 1 --patience 0.1 --domain " +
+                  std::to_string(std::random_device()() % 100));
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.output, Catch::Contains("still too few readers on ROS domain") &&
+                                Catch::Contains("of /imu0, /cam0/image_raw, /cam1/image_raw: 1"));
 }
 
 TEST_CASE("A EuRoC folder becomes the messages of its drivers", "[publish]") {

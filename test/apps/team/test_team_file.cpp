@@ -1,6 +1,7 @@
 #include "apps/team/team_file.hpp"
 
 #include <catch2/catch.hpp>
+#include <sstream>
 
 #include "apps/team/run_team.hpp"
 #include "test/support/corrupted_input.hpp"
@@ -191,6 +192,40 @@ TEST_CASE("A team file without robots or dataset is refused", "[team]") {
   CHECK_THAT(problems_of("/no/team.yaml", {}), Catch::Contains("no such file"));
   CHECK_THAT(problems_of(inputs.team("just text\n"), {}),
              Catch::Contains("is not a map of keys and values"));
+}
+
+TEST_CASE("Arguments name inputs relative to the team file, and ${DATASET}", "[team]") {
+  const Inputs inputs;
+  const fs::path file = inputs.team(
+      "arguments: [--config, common.yaml, --link, wifi]\n"
+      "robots:\n"
+      "  - {id: 1, graph: recording/g.csv, arguments: [\"--rig=${DATASET}/g.csv\", --set,\n"
+      "    \"segmentation.model=${DATASET}/a.onnx\", --rig, recording/g.csv]}\n");
+  const std::string dataset = inputs.dataset.string();
+  CHECK(read_team_file(file, inputs.dataset).robots[0].arguments ==
+        std::vector<std::string>{"--config", (inputs.folder.path() / "common.yaml").string(),
+                                 "--link", "wifi", "--rig=" + dataset + "/g.csv", "--set",
+                                 "segmentation.model=" + dataset + "/a.onnx", "--rig",
+                                 dataset + "/g.csv"});
+  const std::string problems = problems_of(
+      inputs.team("robots:\n  - id: 1\n    graph: recording/g.csv\n    arguments:\n      - --rig\n"
+                  "      - none.yaml\n      - --set=x.y=${DATASET}\n"),
+      {});
+  CHECK_THAT(problems, Catch::Contains("team.yaml:6: arguments: none.yaml is no file or folder") &&
+                           Catch::Contains("team.yaml:7: arguments: --set=x.y=${DATASET} needs"));
+}
+
+TEST_CASE("The team files that are shipped lack only recordings", "[team]") {
+  const TemporaryFolder dataset;
+  std::size_t files = 0;
+  for (const auto& entry : fs::directory_iterator("config/teams")) {
+    if (entry.path().extension() != ".yaml") continue;
+    ++files;
+    std::istringstream problems(problems_of(entry.path(), dataset.path()));
+    for (std::string line; std::getline(problems, line);)
+      CHECK_THAT(line, Catch::Contains("there is no " + dataset.path().string()));
+  }
+  CHECK(files == 8);
 }
 
 TEST_CASE("The team files that are shipped can be read", "[team]") {

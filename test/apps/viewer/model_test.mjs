@@ -43,6 +43,14 @@ test('any time can be gone to, forth and back', (model) => {
   assert.equal(model.robots.get(0).odometry.length, 2);
 });
 
+test('a closure has the matches of the robot that verified it, and the newest verdict', (model) => {
+  add(model, 0, 0, closures([0, 1, 1, 2, 'verified', 150, 118, '']));
+  add(model, 1, 1, closures([0, 1, 1, 2, 'kept', 0, 118, '']));
+  model.seek(1);
+  const [closure] = model.closures().values();
+  assert.deepEqual([closure.verdict, closure.matches, closure.inliers], ['kept', 150, 118]);
+});
+
 test('robots are in the frame of their optimised keyframes, else in their own', (model) => {
   add(model, 1, 0, keyframes(0, [0]));
   add(model, 0, 0, keyframes(0, [0]));

@@ -31,6 +31,15 @@ TEST_CASE("Empty fields between commas are kept", "[core]") {
   CHECK(split_rows("").empty());
 }
 
+TEST_CASE("An endless line gives no more fields than its reader asks for", "[core]") {
+  for (const char* text : {"1 2 3 4 5 6\n7", "1,2,3,4,5,6\n7"}) {
+    RowReader rows(text, 4);
+    CHECK(rows.next()->fields == Fields{"1", "2", "3", "4"});
+    CHECK(rows.next()->line == 2);
+    CHECK_FALSE(rows.next());
+  }
+}
+
 TEST_CASE("A field is a number only if all of it is", "[core]") {
   CHECK(parse_int64("1403636584763555584") == 1403636584763555584);
   CHECK(parse_double("+1.5e-3") == 1.5e-3);

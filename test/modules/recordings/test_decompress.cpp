@@ -67,6 +67,17 @@ TEST_CASE("Compressed bytes of another size than they state are refused", "[reco
   CHECK_FALSE(decompress(compression, longer, 3'000'000).value);
 }
 
+TEST_CASE("The decompressed chunks of a file are bounded together, each counted once",
+          "[recordings]") {
+  constexpr std::uint64_t kMiB = std::uint64_t{1} << 20U;
+  UnpackLimit limit(4 * kMiB);  // 64 MiB + 1000 MiB
+  CHECK(limit.accept(0, 500 * kMiB));
+  CHECK(limit.accept(0, 500 * kMiB));
+  CHECK_FALSE(limit.accept(1, 565 * kMiB));
+  CHECK(limit.accept(2, 564 * kMiB));
+  CHECK_FALSE(limit.accept(3, 1));
+}
+
 TEST_CASE("A compression that is not known is refused", "[recordings]") {
   const Bytes bytes(10);
   CHECK_FALSE(decompress("gzip", bytes, 10).value);

@@ -213,6 +213,23 @@ TEST_CASE("Messages are dropped if the index states too late a time for their ch
   CHECK(messages.size() == 11);
 }
 
+TEST_CASE("Chunks that decompress to far more than the file are left out and reported",
+          "[recordings]") {
+  McapFile file({.compression = "zstd", .has_crc = false});
+  const McapFile::Bytes zeros(std::size_t{40} << 20U);
+  for (const Stamp stamp : {1, 2})
+    file.add_chunk({{.channel = 1, .log_time = stamp, .bytes = zeros}}, stamp);
+  const TemporaryFolder folder;
+  const fs::path path = folder.write("a.mcap", file.finish());
+  REQUIRE(fs::file_size(path) < 20000);
+  McapReader reader(path);
+  CHECK(messages_of(reader).size() == 1);
+  REQUIRE(reader.report().count(BagFault::kCompression) == 1);
+  CHECK_THAT(reader.report().entries().at(BagFault::kCompression).first,
+             Catch::StartsWith(path.string() + " byte ") &&
+                 Catch::Contains("more than 64 MiB and 250 times the file"));
+}
+
 TEST_CASE("Corrupted MCAP files are refused or read in order", "[recordings]") {
   McapFile::Options options;
   options.compression = GENERATE("", "lz4", "zstd");

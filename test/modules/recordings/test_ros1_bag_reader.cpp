@@ -5,6 +5,7 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/ros1_bag_reader.hpp"
+#include "modules/recordings/ros1_records.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/recordings/listed_sum.hpp"
 #include "test/support/corrupted_input.hpp"
@@ -236,6 +237,11 @@ TEST_CASE("The complete chunks of a truncated bag are read", "[recordings]") {
     before = messages.size();
   }
   CHECK(before >= 8);
+}
+
+TEST_CASE("Zeros are no records of a bag", "[recordings]") {
+  std::uint64_t at = 0;
+  CHECK_FALSE(next_ros1_record(Bytes(100), at));
 }
 
 TEST_CASE("Corrupted bags are refused or read in order", "[recordings]") {

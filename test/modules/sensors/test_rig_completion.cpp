@@ -49,7 +49,7 @@ PartialRig nothing_known() {
   PartialRig rig;
   rig.rig.topics = {
       .left = "/left", .right = "/right", .depth = {}, .imu = "/imu", .gyro = {}, .accel = {}};
-  rig.has_cameras = rig.has_extrinsics = false;
+  rig.has_cameras = rig.has_extrinsics = rig.has_pair = false;
   rig.info_topics = {"/left_info", "/right_info"};
   return rig;
 }
@@ -113,10 +113,28 @@ TEST_CASE("Without a stereo calibration the frames give the pose of the right ca
   CHECK(stereo.T_left_right().linear().isApprox(so3_exp({0, 0.01, 0}), 1e-12));
 }
 
+TEST_CASE("Poses in the rig file and CameraInfo complete a rig", "[sensors][calibration]") {
+  PartialRig partial = nothing_known();
+  partial.has_extrinsics = true;
+  partial.has_pair = GENERATE(true, false);
+  CAPTURE(partial.has_pair);
+  auto& cameras = partial.rig.sensors.stereo.cameras;
+  cameras[0].T_body_cam = make_pose(so3_exp(kQuarter), {0, 0, 0.5});
+  cameras[1].T_body_cam = cameras[0].T_body_cam * make_pose(so3_exp({0, 0, 0}), {0.12, 0, 0});
+  ListedBag bag;
+  bag.add("/left_info", info("left_optical", 0.0));
+  bag.add("/right_info", info("left_optical", -43.0));  // a baseline of 0.1 m
+  const StereoRig stereo = complete_rig("a.bag", bag, partial).sensors.stereo;
+  CHECK(stereo.cameras[0].fx == 458.0);
+  CHECK(stereo.cameras[0].T_body_cam.isApprox(cameras[0].T_body_cam));
+  CHECK(stereo.baseline_m() == Approx(partial.has_pair ? 0.12 : 0.1));
+}
+
 TEST_CASE("One CameraInfo completes an RGB-D rig", "[sensors][calibration]") {
   PartialRig partial = nothing_known();
   partial.rig.topics.right.clear();
   partial.rig.topics.depth = "/depth";
+  partial.is_depth_aligned = true;
   partial.rig.sensors.depth = DepthRange{0.3, 8.0};
   partial.virtual_baseline_m = 0.07;
   partial.body_frame = "base";
@@ -128,6 +146,84 @@ TEST_CASE("One CameraInfo completes an RGB-D rig", "[sensors][calibration]") {
   CHECK(rig.stereo.baseline_m() == Approx(0.07));
   CHECK(rig.depth->max_m == 8.0);
   CHECK(rig.stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
+}
+
+// Colour and depth as a RealSense's driver publishes them.
+struct DepthMessages {
+  std::string frame = "color_optical";
+  std::uint32_t width = 640;
+  std::optional<double> info_fx = 458.0;
+  std::optional<double> offset_m = std::nullopt;  // position of the depth frame
+  int images = 12;
+};
+
+RosImage tiny_image(const std::string& frame, std::uint32_t width) {
+  RosImage image;
+  image.header.frame = frame;
+  image.width = width;
+  image.height = 1;
+  image.step = width;
+  image.encoding = "mono8";
+  image.data.resize(width);
+  return image;
+}
+
+// Completes a rig whose calibration is known from colour images and `depth`. "" if it is complete.
+std::string refusal_of_depth(const DepthMessages& depth, bool is_accepted = false) {
+  PartialRig partial = nothing_known();
+  partial.has_cameras = partial.has_extrinsics = partial.has_pair = true;
+  partial.rig.topics.right.clear();
+  partial.rig.topics.depth = "/depth";
+  partial.depth_info_topic = "/depth_info";
+  partial.is_depth_aligned = is_accepted;
+  ListedBag bag;
+  if (depth.offset_m)
+    add_transforms(bag, {transform("base", "color_optical", {0, 0, 0}, {0, 0, 0}),
+                         transform("base", depth.frame, {*depth.offset_m, 0, 0}, {0, 0, 0})});
+  for (int k = 0; k < depth.images; ++k) {
+    bag.add("/left", tiny_image("color_optical", 640));
+    bag.add("/depth", tiny_image(depth.frame, depth.width));
+  }
+  bag.add("/left_info", info("color_optical", 0.0));
+  RosCameraInfo depth_info = info(depth.frame, 0.0);
+  depth_info.K[0] = depth.info_fx.value_or(0.0);
+  if (depth.info_fx) bag.add("/depth_info", depth_info);
+  try {
+    static_cast<void>(complete_rig("a.bag", bag, partial));
+    return "";
+  } catch (const DatasetError& error) {
+    return error.what();
+  }
+}
+
+TEST_CASE("Depth that is not aligned with colour is refused, with the remedy",
+          "[sensors][calibration]") {
+  struct Case {
+    DepthMessages depth;
+    const char* message;
+  };
+  const Case c = GENERATE(
+      Case{{.width = 848}, "it has 848x1 px in place of 640x1"},
+      Case{{.info_fx = 385.0, .images = 5}, "fx, fy, cx, cy of   385   457 320.5 240.5 in place"},
+      Case{{.frame = "depth_optical", .info_fx = std::nullopt},
+           "its frame is depth_optical, not color_optical"},
+      Case{{.frame = "depth_optical", .info_fx = std::nullopt, .images = 2},
+           "its frame is depth_optical, not color_optical"},
+      Case{{.frame = "depth_optical", .offset_m = 0.015}, "color_optical, 15.0 mm away"});
+  CHECK_THAT(refusal_of_depth(c.depth),
+             Contains("/depth: depth is not aligned with the images of /left") &&
+                 Contains(c.message) && Contains("align_depth.enable:=true"));
+  CHECK(refusal_of_depth(c.depth, true).empty());
+}
+
+TEST_CASE("Depth is aligned if its frame, or its place and CameraInfo, are those of the images",
+          "[sensors][calibration]") {
+  const DepthMessages depth = GENERATE(
+      DepthMessages{}, DepthMessages{.frame = "/color_optical", .info_fx = std::nullopt},
+      DepthMessages{.info_fx = std::nullopt, .images = 1},
+      DepthMessages{.frame = "depth_optical", .offset_m = 0.0}, DepthMessages{.images = 0},
+      DepthMessages{.frame = "depth_optical", .images = 5});  // no /tf_static, but equal CameraInfo
+  CHECK(refusal_of_depth(depth).empty());
 }
 
 TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
@@ -149,7 +245,7 @@ TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
 
 TEST_CASE("Calibrated cameras get the pose of their images' frame", "[sensors][calibration]") {
   PartialRig partial = nothing_known();
-  partial.has_cameras = true;
+  partial.has_cameras = partial.has_pair = true;
   for (Camera& camera : partial.rig.sensors.stereo.cameras) camera.fx = 300.0;
   partial.rig.sensors.stereo.cameras[1].T_body_cam.translation().x() = 0.11;
   ListedBag bag;

@@ -96,7 +96,8 @@ TEST_CASE("A rig file for depth needs no calibration of depth", "[sensors]") {
       read(folder,
            "left: {topic: /color}\ndepth: {topic: /depth, min_range_m: 0.4, max_range_m: 6, "
            "baseline_m: 0.05}\nimu: {topic: /imu}\ncalibration: recording\n");
-  CHECK(rig.is_complete());
+  CHECK(rig.has_cameras);
+  CHECK_FALSE(rig.is_complete());  // messages show whether depth is aligned
   CHECK(rig.rig.sensors.stereo.depth_source == DepthSource::kDepthImage);
   CHECK(rig.rig.sensors.stereo.baseline_m() == Approx(0.05));
   REQUIRE(rig.rig.sensors.depth);
@@ -187,6 +188,36 @@ TEST_CASE("Parts that a rig file lacks come from topics", "[sensors]") {
   CHECK(!unplaced.has_extrinsics);
   CHECK(unplaced.rig.sensors.stereo.cameras[1].T_body_cam.translation().isApprox(
       Eigen::Vector3d(0.2, 0, 0)));
+}
+
+TEST_CASE("A rig file may state poses of cameras that CameraInfo describes", "[sensors]") {
+  const TemporaryFolder folder;
+  const std::string poses =
+      "calibration:\n  cam0: {T_cam_imu: [[1,0,0,0.5], [0,1,0,0], [0,0,1,0], [0,0,0,1]]}\n";
+  const std::string right =
+      "  cam1: {T_cn_cnm1: [[1,0,0,-0.2], [0,1,0,0], [0,0,1,0], [0,0,0,1]]}\n";
+  const PartialRig both = read(folder, kTopics + poses + right);
+  CHECK_FALSE(both.has_cameras);
+  CHECK(both.has_extrinsics);
+  CHECK(both.has_pair);
+  CHECK(both.rig.sensors.stereo.cameras[0].T_body_cam.translation().x() == -0.5);
+  CHECK(both.rig.sensors.stereo.baseline_m() == Approx(0.2));
+  const PartialRig left = read(folder, kTopics + poses);
+  CHECK(left.has_extrinsics);
+  CHECK_FALSE(left.has_pair);
+  const PartialRig pair =
+      read(folder, kTopics + "calibration:\n  cam0: {rostopic: /cam0}\n" + right);
+  CHECK_FALSE(pair.has_extrinsics);
+  CHECK(pair.has_pair);
+  const PartialRig depth = read(folder,
+                                "left: {topic: /cam0}\ndepth: {topic: /depth, max_range_m: 6}\n"
+                                "imu: {topic: /imu0}\n" +
+                                    poses);
+  CHECK(depth.has_extrinsics);
+  CHECK(depth.rig.sensors.depth->max_m == 6.0);
+  // A camera with a part of its intrinsics is refused.
+  CHECK_THROWS_WITH(read(folder, kTopics + poses + "  cam1: {intrinsics: [300,300,320,240]}\n"),
+                    Contains("rig.yaml line"));
 }
 
 TEST_CASE("A robot without an inertial sensor names its odometry", "[sensors]") {

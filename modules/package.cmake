@@ -1,0 +1,33 @@
+# cpack -G DEB: one Debian package with the programs and their configuration (component `programs`),
+# and the files below, which only a package can place (component `package`).
+set(package_dir ${PROJECT_BINARY_DIR}/package)
+set(system_unit "config/systemd/kimera_multi_robot@.service")
+foreach(file ${system_unit} config/systemd/alice.env)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+  file(READ ${file} text)
+  string(REPLACE /usr/local/ /usr/ text "${text}")
+  get_filename_component(name ${file} NAME)
+  file(CONFIGURE OUTPUT ${package_dir}/${name} CONTENT "${text}" @ONLY)
+endforeach()
+set(placed COMPONENT package EXCLUDE_FROM_ALL)
+install(FILES "${package_dir}/kimera_multi_robot@.service" DESTINATION lib/systemd/system ${placed})
+install(FILES ${package_dir}/alice.env DESTINATION share/doc/kimera-multi/examples ${placed})
+install(FILES LICENSE DESTINATION share/doc/kimera-multi RENAME copyright ${placed})
+foreach(program ${programs})  # bash-completion loads the file that is named like the command
+  install(FILES config/completion/kimera_multi.bash RENAME ${program}
+          DESTINATION share/bash-completion/completions ${placed})
+endforeach()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_COMPONENTS_ALL programs package)
+set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PACKAGE_NAME kimera-multi)
+set(CPACK_PACKAGE_CONTACT "the kimera_multi authors <kimera_multi@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Distributed metric-semantic SLAM of a team of robots")
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+include(CPack)
