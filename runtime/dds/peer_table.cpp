@@ -58,6 +58,11 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
     return;
   }
   const auto& [identity, credentials] = *decoded.value;
+  // Any program can send an announcement in the name of a participant, but only a robot can prove
+  // its identity.
+  if (admit_ && participant.proven && identity != *participant.identity)
+    return emit(PeerEventKind::kRefused, identity,
+                "refused: announced as the participant of " + to_string(*participant.identity));
   if (identity.protocol != self_.protocol)
     return emit(PeerEventKind::kRefused, identity,
                 "refused: uses protocol version " + std::to_string(identity.protocol) +
@@ -65,7 +70,7 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
   if (const char* reason = admit_ ? admit_(identity, credentials) : nullptr)
     return emit(PeerEventKind::kRefused, identity, std::string("refused: ") + reason);
   participant.identity = identity;
-  participant.proven = !admit_;
+  participant.proven |= !admit_;
   appear_if_there(guid, participant);
 }
 
@@ -76,8 +81,7 @@ void PeerTable::network_changed() {
     return peer != peers_.end() && peer->second.guid == entry.first;
   };
   std::erase_if(participants_, std::not_fn(is_known));  // robots are remembered
-  for (auto& [guid, participant] : participants_)
-    participant.announced = participant.alive = participant.proven = false;
+  for (auto& [guid, participant] : participants_) participant.announced = participant.alive = false;
   for (auto& [robot, known] : peers_)
     if (known.peer.state == PeerState::kAlive) {
       known.peer.state = PeerState::kLost;
@@ -87,7 +91,8 @@ void PeerTable::network_changed() {
 
 void PeerTable::prove(const Guid& guid) {
   const auto found = participants_.find(guid);
-  if (found == participants_.end() || std::exchange(found->second.proven, true)) return;
+  if (found == participants_.end() || !found->second.identity) return;
+  if (std::exchange(found->second.proven, true)) return;
   appear_if_there(guid, found->second);
 }
 

@@ -76,7 +76,8 @@ class PeerTable {
       std::function<const char*(const RobotIdentity& identity, std::string_view credentials)>;
 
   /// With `admit`, a robot is present only after prove() is also called for it, because its
-  /// credentials could be replayed.
+  /// credentials could be replayed. A participant that has proven its identity keeps it, even if
+  /// DDS reports that it has gone and announces it again.
   explicit PeerTable(const RobotIdentity& self, Admit admit = {})
       : self_(self), admit_(std::move(admit)) {}
 
@@ -93,7 +94,7 @@ class PeerTable {
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
 
-  /// Forgets what DDS has reported: this robot now has another network, or another address.
+  /// Discards the reports of DDS: this robot now has another network, or another address.
   void network_changed();
 
   /// Notes that a message has proven the identity of the participant.
@@ -136,7 +137,7 @@ class PeerTable {
     std::optional<RobotIdentity> identity;  // identity; nullopt until accepted
     std::string addresses;
     bool announced = false;
-    bool proven = false;
+    bool proven = false;  // also after DDS reports its end, which any program can forge
     bool alive = false;
     bool warned = false;        // a twin or rival was logged once
     std::uint64_t arrival = 0;  // order in which participants became alive

@@ -163,6 +163,53 @@ TEST_CASE("An orderly end is not a loss", "[peers]") {
   CHECK(table.identity_of(guid(2)).has_value());  // its messages may still be on their way
 }
 
+const char* admit_all(const RobotIdentity& /*identity*/, std::string_view /*credentials*/) {
+  return nullptr;
+}
+
+TEST_CASE("A robot that has proven its identity returns without another proof", "[peers]") {
+  PeerTable table(kSelf, admit_all);
+  table.participant(guid(2), data_of(7, 70), "");
+  table.alive(guid(2));
+  CHECK(kinds(table).empty());
+  CHECK(table.standing(guid(2)) == Standing::kRival);
+  table.prove(guid(2));
+  CHECK(kinds(table) == Kinds{PeerEventKind::kJoined});
+  std::string announced = data_of(7, 70);
+  SECTION("after its lease has ended, or a forged packet has ended it") {
+    table.participant_gone(guid(2));
+    CHECK(kinds(table) == Kinds{PeerEventKind::kLeft});
+  }
+  SECTION("after the address of this robot has changed") {
+    table.network_changed();
+    CHECK(kinds(table) == Kinds{PeerEventKind::kLost});
+  }
+  SECTION("although an announcement in its name is forged") {
+    table.participant_gone(guid(2));
+    CHECK(kinds(table) == Kinds{PeerEventKind::kLeft});
+    announced = GENERATE(data_of(9, 90), data_of(7, 71), std::string("robot=x"), std::string());
+    CAPTURE(announced);
+    table.participant(guid(2), announced, "");
+    CHECK(kinds(table) == Kinds(announced.empty() ? 0 : 1, PeerEventKind::kRefused));
+    CHECK(table.identity_of(guid(2))->boot == 70);
+  }
+  table.participant(guid(2), announced, "");
+  table.alive(guid(2));
+  CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
+  CHECK(table.standing(guid(2)) == Standing::kAdmitted);
+}
+
+TEST_CASE("An identity under the GUID of a gone participant needs a proof of its own", "[peers]") {
+  PeerTable table(kSelf, admit_all);
+  table.participant(guid(2), data_of(7, 70), "");
+  table.alive(guid(2));
+  table.participant_gone(guid(2));
+  table.participant(guid(2), data_of(9, 90), "");
+  table.alive(guid(2));
+  CHECK(kinds(table).empty());
+  CHECK(table.standing(guid(2)) == Standing::kRival);
+}
+
 constexpr std::uint64_t kBoot = 70U << kResumeBits;
 constexpr std::uint64_t kOtherIncarnation = 71U << kResumeBits;
 
