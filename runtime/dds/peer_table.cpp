@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <tuple>
 
 namespace km {
 namespace {
@@ -43,9 +43,7 @@ bool PeerTable::is_arriving(RobotId robot) const {
 
 void PeerTable::participant(const Guid& guid, std::string_view user_data,
                             const std::string& addresses) {
-  Participant* found = remember(guid);
-  if (found == nullptr) return;
-  Participant& participant = *found;
+  Participant& participant = remember(guid);
   participant.addresses = addresses;
   if (std::exchange(participant.announced, true)) return;
   if (!claims_to_be_a_robot(user_data)) return;
@@ -75,12 +73,9 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
 }
 
 void PeerTable::network_changed() {
-  const auto is_known = [this](const auto& entry) {
-    const auto& identity = entry.second.identity;
-    const auto peer = identity ? peers_.find(identity->robot) : peers_.end();
-    return peer != peers_.end() && peer->second.guid == entry.first;
-  };
-  std::erase_if(participants_, std::not_fn(is_known));  // robots are remembered
+  std::erase_if(participants_, [this](const auto& entry) {
+    return !is_robot(entry.first, entry.second);  // robots are remembered
+  });
   for (auto& [guid, participant] : participants_) participant.announced = participant.alive = false;
   for (auto& [robot, known] : peers_)
     if (known.peer.state == PeerState::kAlive) {
@@ -105,17 +100,14 @@ void PeerTable::participant_gone(const Guid& guid) {
   const auto found = participants_.find(guid);
   if (found == participants_.end()) return;
   found->second.announced = false;
-  const auto& identity = found->second.identity;
-  const auto peer = identity ? peers_.find(identity->robot) : peers_.end();
-  const bool is_known = peer != peers_.end() && peer->second.guid == guid;
-  if (!is_known) participants_.erase(found);  // robots are remembered
+  if (!is_robot(guid, found->second)) participants_.erase(found);  // robots are remembered
 }
 
 void PeerTable::alive(const Guid& guid) {
-  Participant* participant = remember(guid);
-  if (participant == nullptr || std::exchange(participant->alive, true)) return;
-  participant->arrival = ++arrivals_;
-  appear_if_there(guid, *participant);
+  Participant& participant = remember(guid);
+  if (std::exchange(participant.alive, true)) return;
+  participant.arrival = ++arrivals_;
+  appear_if_there(guid, participant);
 }
 
 void PeerTable::silent(const Guid& guid) {
@@ -152,6 +144,11 @@ std::optional<RobotIdentity> PeerTable::identity_of(const Guid& guid) const {
   return found == participants_.end() ? std::nullopt : found->second.identity;
 }
 
+bool PeerTable::is_announced(const Guid& guid) const {
+  const auto found = participants_.find(guid);
+  return found != participants_.end() && found->second.announced;
+}
+
 Standing PeerTable::standing(const Guid& guid) const {
   const auto found = participants_.find(guid);
   if (found == participants_.end()) return Standing::kUnknown;
@@ -172,6 +169,13 @@ std::optional<TeamPeer> PeerTable::current(RobotId robot) const {
 
 bool PeerTable::is_current(const TeamPeer& sender) const {
   return current(sender.robot) == sender;
+}
+
+// True if the participant has its id, or had it last.
+bool PeerTable::is_robot(const Guid& guid, const Participant& participant) const {
+  if (!participant.identity) return false;
+  const auto peer = peers_.find(participant.identity->robot);
+  return peer != peers_.end() && peer->second.guid == guid;
 }
 
 void PeerTable::appear_if_there(const Guid& guid, Participant& participant) {
@@ -243,12 +247,18 @@ void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, 
   if (successor != participants_.end()) take_over(known, successor->first, successor->second);
 }
 
-// Null if there are too many.
-PeerTable::Participant* PeerTable::remember(const Guid& guid) {
-  const auto found = participants_.find(guid);
-  if (found != participants_.end()) return &found->second;
-  if (participants_.size() >= kMaxParticipants) return nullptr;
-  return &participants_[guid];
+// Makes room for a new participant if there are too many.
+PeerTable::Participant& PeerTable::remember(const Guid& guid) {
+  if (const auto found = participants_.find(guid); found != participants_.end())
+    return found->second;
+  if (participants_.size() >= kMaxParticipants)
+    participants_.erase(std::ranges::min_element(participants_, {}, [this](const auto& entry) {
+      return std::tuple(is_robot(entry.first, entry.second), entry.second.alive,
+                        entry.second.arrival);
+    }));
+  Participant& participant = participants_[guid];
+  participant.arrival = ++arrivals_;
+  return participant;
 }
 
 void PeerTable::emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text,

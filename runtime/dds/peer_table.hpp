@@ -63,12 +63,15 @@ struct PeerEvent {
 ///
 /// A robot is present while its participant's user data is accepted and its status writer alive;
 /// the expiry of the participant (dds.lease_s) changes nothing. An id belongs to the first process
-/// that is received with it, as long as this process is received; then to the next process. Not
+/// that is received with it, as long as this process is received; then to the next process.
+///
+/// Any program can announce participants, so only kMaxParticipants are remembered. A further one
+/// takes the place of the oldest participant that is neither alive nor a robot of the team. Not
 /// thread-safe.
 class PeerTable {
  public:
   static constexpr std::size_t kMaxRobots = 64;
-  static constexpr std::size_t kMaxParticipants = 1024;
+  static constexpr std::size_t kMaxParticipants = 256;
 
   /// Decides by the credentials whether a robot is accepted. Returns null, or the reason of a
   /// refusal (a string literal).
@@ -93,6 +96,9 @@ class PeerTable {
   /// A participant announced itself (again) with this user data.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
+  /// False if its announcement was not received, or forgotten in favour of others. Once the
+  /// participant is alive, pass its announcement again.
+  [[nodiscard]] bool is_announced(const Guid& guid) const;
 
   /// Discards the reports of DDS: this robot now has another network, or another address.
   void network_changed();
@@ -140,7 +146,7 @@ class PeerTable {
     bool proven = false;  // also after DDS reports its end, which any program can forge
     bool alive = false;
     bool warned = false;        // a twin or rival was logged once
-    std::uint64_t arrival = 0;  // order in which participants became alive
+    std::uint64_t arrival = 0;  // order of first reports, or of becoming alive
   };
   struct KnownPeer {
     Peer peer;
@@ -152,7 +158,8 @@ class PeerTable {
   void appear(const Guid& guid, Participant& participant);
   void take_over(KnownPeer& known, const Guid& guid, const Participant& participant);
   void give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text);
-  Participant* remember(const Guid& guid);
+  [[nodiscard]] bool is_robot(const Guid& guid, const Participant& participant) const;
+  Participant& remember(const Guid& guid);
   void emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text,
             bool direct = true);
 

@@ -125,6 +125,9 @@ class Peers {
                                     void* self);
   const char* admit(const RobotIdentity& identity, std::string_view credentials);
   void take_discovered();
+  void take(const dds_builtintopic_participant_t& sample, const dds_sample_info_t& info);
+  void remove_gone();
+  void announce(const Guid& guid);
   void take_liveliness();
   bool apply(const LivelinessChange& change);
   void publish_events();

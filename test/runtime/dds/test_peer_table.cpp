@@ -331,13 +331,63 @@ TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
   CHECK(table.peers().empty());
 }
 
-TEST_CASE("Many unknown participants do not exhaust the memory", "[peers]") {
-  PeerTable table(kSelf);
-  const auto wide_guid = [](std::size_t n) {
-    Guid result{};
-    for (std::size_t k = 0; k < 4; ++k) result[k] = static_cast<std::uint8_t>(n >> (8 * k));
-    return result;
+Guid wide_guid(std::size_t n) {
+  Guid result{};
+  for (std::size_t k = 0; k < 4; ++k) result[k + 1] = static_cast<std::uint8_t>(n >> (8 * k));
+  return result;
+}
+
+// Announces more participants than a table remembers. Their number and whether they are alive is
+// free to choose for any program.
+void announce_strangers(PeerTable& table, const std::string& data, bool alive) {
+  for (std::size_t n = 0; n < 3 * PeerTable::kMaxParticipants; ++n) {
+    table.participant(wide_guid(n), data, "");
+    if (alive) table.alive(wide_guid(n));
+  }
+  (void)table.take_events();
+}
+
+TEST_CASE("Strangers do not take the place of a robot, however many they are", "[peers]") {
+  const bool has_keys = GENERATE(true, false);
+  const bool alive = GENERATE(true, false);
+  // A program, a robot without a status writer, and the recorded announcement of a robot.
+  const std::string strangers = GENERATE(std::string("some tool"), data_of(9, 90), data_of(7, 70));
+  if (alive && strangers == data_of(7, 70) && !has_keys) return;  // owner of the id
+  CAPTURE(has_keys, alive, strangers);
+  PeerTable table(kSelf, has_keys ? admit_all : PeerTable::Admit());
+  const auto announce = [&] { table.participant(guid(2), data_of(7, 70), ""); };
+  const auto be_alive = [&] {
+    table.alive(guid(2));
+    if (!table.is_announced(guid(2))) announce();
+    table.prove(guid(2));
   };
+  SECTION("before it comes") {
+    announce_strangers(table, strangers, alive);
+    announce();
+    be_alive();
+  }
+  SECTION("after it is announced") {
+    announce();
+    announce_strangers(table, strangers, alive);
+    be_alive();
+  }
+  SECTION("before it returns") {
+    announce();
+    be_alive();
+    table.silent(guid(2));
+    table.participant_gone(guid(2));
+    announce_strangers(table, strangers, has_keys && alive);
+    CHECK(table.identity_of(guid(2)).has_value());
+    announce();
+    be_alive();
+  }
+  CHECK(table.standing(guid(2)) == Standing::kAdmitted);
+  CHECK(table.is_current({7, 70}));
+  CHECK(table.peers().front().state == PeerState::kAlive);
+}
+
+TEST_CASE("Many robots do not exhaust the memory", "[peers]") {
+  PeerTable table(kSelf);
   std::size_t admitted = 0;
   for (std::size_t n = 0; n < 3 * PeerTable::kMaxParticipants; ++n) {
     table.participant(wide_guid(n), data_of(static_cast<RobotId>(n + 2), n + 1), "");
@@ -346,12 +396,6 @@ TEST_CASE("Many unknown participants do not exhaust the memory", "[peers]") {
   }
   CHECK(admitted == PeerTable::kMaxRobots);
   CHECK(table.peers().size() == PeerTable::kMaxRobots);
-  CHECK(table.standing(wide_guid(2 * PeerTable::kMaxParticipants)) == Standing::kUnknown);
-  // Participants that leave make room for others.
-  for (std::size_t n = 0; n < PeerTable::kMaxParticipants; ++n)
-    table.participant_gone(wide_guid(n));
-  table.participant(wide_guid(9999), "some tool", "");
-  CHECK(table.standing(wide_guid(9999)) == Standing::kOutsider);
 }
 
 TEST_CASE("Another protocol version and unreadable user data are refused, once", "[peers]") {

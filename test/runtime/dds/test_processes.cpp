@@ -78,6 +78,25 @@ TEST_CASE("Robots with keys return after a forged packet has declared that they 
   CHECK(a->wait_for("one 4 7"));
 }
 
+TEST_CASE("Robots meet although a program has announced more participants than they remember",
+          "[dds][processes]") {
+  const auto settings =
+      own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
+  const TeamOfTwo keys;
+  const auto a = start_peer(3, settings, 0, keys.of(3));
+  ForgedDiscovery stranger(loopback_config().domain);
+  stranger.record(3);
+  // Packets are lost if the robot is busy. It refuses each participant that copies its own keys.
+  for (std::size_t refused = 0; refused < PeerTable::kMaxParticipants;) {
+    stranger.invent(3, 50);
+    REQUIRE(a->wait_for("refused 3", refused + 1));
+    refused = a->lines("refused 3").size();
+  }
+  const auto b = start_peer(4, settings, 0, keys.of(4));
+  CHECK(a->wait_for("joined 4"));
+  CHECK(b->wait_for("joined 3"));
+}
+
 TEST_CASE("A dozen robots on one host all meet, with either discovery", "[dds][processes]") {
   const std::string discovery = GENERATE("multicast", "peers");
   constexpr RobotId kRobots = 12;
