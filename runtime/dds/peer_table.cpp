@@ -30,8 +30,9 @@ void PeerTable::reported(const RobotIdentity& identity) {
   KnownPeer& known = found->second;
   const std::uint64_t former_boot = known.peer.identity.boot;
   if (known.peer.state == PeerState::kAlive || former_boot == identity.boot) return;
+  if (is_former(known, identity)) return;
   const bool resumed = is_same_incarnation(former_boot, identity.boot);
-  known = {{identity, PeerState::kReported, "unknown"}, Guid{}, known.arriving || !resumed};
+  become(known, {identity, PeerState::kReported, "unknown"}, Guid{}, known.arriving || !resumed);
   emit(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, identity,
        resumed ? "resumed, as other robots report" : "restarted, as other robots report", false);
 }
@@ -195,12 +196,33 @@ void PeerTable::appear(const Guid& guid, Participant& participant) {
     return emit(PeerEventKind::kJoined, identity, "joined from " + participant.addresses);
   }
   KnownPeer& known = found->second;
-  if (known.guid == guid || known.peer.state != PeerState::kAlive)
+  const bool former = is_former(known, identity);
+  if (!former && (known.guid == guid || known.peer.state != PeerState::kAlive))
     return take_over(known, guid, participant);
   if (!std::exchange(participant.warned, true))
     emit(PeerEventKind::kRefused, identity,
          "at " + participant.addresses + " ignored: another process, at " + known.peer.addresses +
-             ", has that id, until it falls silent");
+             (former ? ", has taken over that id: if this one is the robot, start it again"
+                     : ", has that id, until it falls silent"));
+}
+
+// Only in a team with keys, where no other program can take over an id.
+bool PeerTable::is_former(const KnownPeer& known, const RobotIdentity& identity) const {
+  const std::uint64_t present = known.peer.identity.boot;
+  return admit_ && ((is_same_incarnation(present, identity.boot) && identity.boot < present) ||
+                    std::ranges::find(known.former, identity.boot) != known.former.end());
+}
+
+// Assigns the id to a process.
+void PeerTable::become(KnownPeer& known, Peer peer, const Guid& guid, bool arriving) {
+  const std::uint64_t former_boot = known.peer.identity.boot;
+  if (former_boot != peer.identity.boot) {
+    if (known.former.size() == kMaxFormer) known.former.erase(known.former.begin());
+    known.former.push_back(former_boot);
+  }
+  known.peer = std::move(peer);
+  known.guid = guid;
+  known.arriving = arriving;
 }
 
 void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant& participant) {
@@ -210,7 +232,7 @@ void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant&
   const bool arriving = former_boot == identity.boot
                             ? known.arriving
                             : !is_same_incarnation(former_boot, identity.boot);
-  known = {{identity, PeerState::kAlive, participant.addresses}, guid, arriving};
+  become(known, {identity, PeerState::kAlive, participant.addresses}, guid, arriving);
   const auto predecessor = participants_.find(former);
   if (former != guid && predecessor != participants_.end() && !predecessor->second.announced)
     participants_.erase(predecessor);
@@ -239,7 +261,7 @@ void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, 
   for (auto p = participants_.begin(); p != participants_.end(); ++p) {
     const Participant& claimant = p->second;
     if (!claimant.alive || !claimant.proven || !claimant.identity ||
-        claimant.identity->robot != entry->first)
+        claimant.identity->robot != entry->first || is_former(known, *claimant.identity))
       continue;
     if (successor == participants_.end() || claimant.arrival < successor->second.arrival)
       successor = p;

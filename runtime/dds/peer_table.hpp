@@ -72,6 +72,7 @@ class PeerTable {
  public:
   static constexpr std::size_t kMaxRobots = 64;
   static constexpr std::size_t kMaxParticipants = 256;
+  static constexpr std::size_t kMaxFormer = 64;
 
   /// Decides by the credentials whether a robot is accepted. Returns null, or the reason of a
   /// refusal (a string literal).
@@ -80,7 +81,8 @@ class PeerTable {
 
   /// With `admit`, a robot is present only after prove() is also called for it, because its
   /// credentials could be replayed. A participant that has proven its identity keeps it, even if
-  /// DDS reports that it has gone and announces it again.
+  /// DDS reports that it has gone and announces it again. A process whose id another process has
+  /// taken over does not get it back, because its messages could be replayed.
   explicit PeerTable(const RobotIdentity& self, Admit admit = {})
       : self_(self), admit_(std::move(admit)) {}
 
@@ -96,7 +98,7 @@ class PeerTable {
   /// A participant announced itself (again) with this user data.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
-  /// False if its announcement was not received, or forgotten in favour of others. Once the
+  /// False if its announcement was not received, or discarded in favour of others. Once the
   /// participant is alive, pass its announcement again.
   [[nodiscard]] bool is_announced(const Guid& guid) const;
 
@@ -151,11 +153,14 @@ class PeerTable {
   struct KnownPeer {
     Peer peer;
     Guid guid{};
-    bool arriving = false;  // true until all nodes know of the new incarnation
+    bool arriving = false;                   // true until all nodes know of the new incarnation
+    std::vector<std::uint64_t> former = {};  // boot ids of former processes, oldest first
   };
 
   void appear_if_there(const Guid& guid, Participant& participant);
   void appear(const Guid& guid, Participant& participant);
+  [[nodiscard]] bool is_former(const KnownPeer& known, const RobotIdentity& identity) const;
+  void become(KnownPeer& known, Peer peer, const Guid& guid, bool arriving);
   void take_over(KnownPeer& known, const Guid& guid, const Participant& participant);
   void give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text);
   [[nodiscard]] bool is_robot(const Guid& guid, const Participant& participant) const;

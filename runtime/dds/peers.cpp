@@ -285,7 +285,7 @@ void Peers::remove_gone() {
   } while (count > 0);
 }
 
-// Reads the announcement of a participant again that the table has forgotten in favour of others.
+// Reads the announcement of a participant again that the table has discarded in favour of others.
 void Peers::announce(const Guid& guid) {
   dds_builtintopic_participant_t key{};
   std::ranges::copy(guid, key.key.v);

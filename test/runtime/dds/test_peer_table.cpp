@@ -303,6 +303,39 @@ TEST_CASE("An id passes to the participant that has claimed it for longest", "[p
   CHECK(table.standing(guid(3)) == Standing::kAdmitted);
 }
 
+TEST_CASE("With keys a former process does not get its id back", "[peers]") {
+  PeerTable table(kSelf, admit_all);
+  const auto receive = [&](const Guid& from, std::uint64_t boot) {
+    table.participant(from, data_of(7, boot), "udp/10.0.0.66");
+    table.alive(from);
+    table.prove(from);
+  };
+  const std::uint64_t former = GENERATE(kBoot, kOtherIncarnation);
+  receive(guid(2), former);
+  table.silent(guid(2));
+  receive(guid(3), kBoot + 1);
+  CHECK(table.is_current({7, kBoot + 1}));
+  (void)table.take_events();
+  const bool was_silent = GENERATE(true, false);
+  const Guid other = GENERATE(guid(2), guid(4));
+  if (was_silent) table.silent(guid(3));
+  receive(other, former);
+  const std::vector<PeerEvent> events = table.take_events();
+  REQUIRE_FALSE(events.empty());
+  CHECK(events.back().kind == PeerEventKind::kRefused);
+  CHECK_THAT(events.back().text, Catch::Contains("start it again"));
+  if (!was_silent) table.silent(guid(3));
+  CHECK(table.is_current({7, kBoot + 1}));
+  table.reported({7, "peer", kProtocolVersion, former});
+  CHECK(table.is_current({7, kBoot + 1}));
+  CHECK(table.peers()[0].state == PeerState::kLost);
+  table.alive(guid(3));
+  CHECK(table.peers()[0].state == PeerState::kAlive);
+  table.silent(guid(3));
+  receive(guid(5), kBoot + 2);
+  CHECK(table.is_current({7, kBoot + 2}));
+}
+
 TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
   struct Case {
     const char* what;
@@ -347,7 +380,8 @@ void announce_strangers(PeerTable& table, const std::string& data, bool alive) {
   (void)table.take_events();
 }
 
-TEST_CASE("Strangers do not take the place of a robot, however many they are", "[peers]") {
+TEST_CASE("Participants outside the team do not take the place of a robot, however many they are",
+          "[peers]") {
   const bool has_keys = GENERATE(true, false);
   const bool alive = GENERATE(true, false);
   // A program, a robot without a status writer, and the recorded announcement of a robot.
