@@ -85,6 +85,24 @@ void PeerTable::network_changed() {
     }
 }
 
+void PeerTable::expel(const std::vector<TeamPeer>& processes) {
+  std::vector<Guid> expelled;
+  for (auto& [guid, participant] : participants_) {
+    const auto& identity = participant.identity;
+    if (!identity ||
+        std::ranges::find(processes, TeamPeer{identity->robot, identity->boot}) == processes.end())
+      continue;
+    participant.proven = false;  // no successor of another process
+    expelled.push_back(guid);
+  }
+  for (const Guid& guid : expelled) {
+    give_way(guid, PeerState::kLost, PeerEventKind::kLost,
+             "lost: it is no member of the team any more");
+    if (const auto found = participants_.find(guid); found != participants_.end())
+      found->second.identity.reset();
+  }
+}
+
 void PeerTable::prove(const Guid& guid) {
   const auto found = participants_.find(guid);
   if (found == participants_.end() || !found->second.identity) return;

@@ -105,6 +105,10 @@ class PeerTable {
   /// Discards the reports of DDS: this robot now has another network, or another address.
   void network_changed();
 
+  /// These processes are no members of the team any more. They are lost, and later messages are
+  /// refused.
+  void expel(const std::vector<TeamPeer>& processes);
+
   /// Notes that a message has proven the identity of the participant.
   void prove(const Guid& guid);
 

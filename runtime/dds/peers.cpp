@@ -145,6 +145,14 @@ const char* Peers::admit(const RobotIdentity& identity, std::string_view credent
   return nullptr;
 }
 
+void Peers::expel(const std::vector<TeamPeer>& processes) {
+  {
+    const std::lock_guard lock(mutex_);
+    table_.expel(processes);
+  }
+  publish_events();
+}
+
 void Peers::prove(const Guid& guid) {
   {
     const std::lock_guard lock(mutex_);

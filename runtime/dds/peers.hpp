@@ -92,6 +92,7 @@ class Peers {
   [[nodiscard]] std::vector<TeamPeer> take_admitted();
 
   /// See PeerTable.
+  void expel(const std::vector<TeamPeer>& processes);
   void prove(const Guid& guid);
   void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 

@@ -88,6 +88,7 @@ std::optional<OverlayMessage> KnownRobots::introduction(RobotId neighbour, Robot
 void KnownRobots::forget(RobotId robot) {
   robots_.erase(robot);
   forget_report(robot);
+  if (gone_.erase(robot) > 0) renew_own_links();
 }
 
 std::optional<RobotId> KnownRobots::stranger() const {
@@ -138,6 +139,12 @@ void KnownRobots::connect(RobotId robot) {
   gone_.erase(robot);
   neighbours_[robot] = {};
   renew_own_links();
+}
+
+bool KnownRobots::has_lapsed(RobotId robot) const {
+  const auto known = robots_.find(robot);
+  return keys_ && known != robots_.end() && known->second.certificate &&
+         keys_->why_lapsed(*known->second.certificate) != nullptr;
 }
 
 bool KnownRobots::disconnect(RobotId robot, double now_s) {

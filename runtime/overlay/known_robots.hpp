@@ -117,6 +117,8 @@ class KnownRobots {
   // Links.
 
   void connect(RobotId robot);
+  /// True if the certificate of a known robot is not valid any more.
+  [[nodiscard]] bool has_lapsed(RobotId robot) const;
   /// False if it was not received.
   bool disconnect(RobotId robot, double now_s);
   /// Removes lost links from the report of this robot when their time is over.

@@ -56,6 +56,7 @@ void Overlay::lost(RobotId robot, double now_s) {
   if (!robots_.disconnect(robot, now_s)) return;
   states_.disconnected(robot);
   store_.disconnected(robot, now_s);
+  if (robots_.has_lapsed(robot)) return forget(robot);
   renew_routes();
 }
 
