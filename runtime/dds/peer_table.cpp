@@ -9,8 +9,13 @@ namespace {
 
 // A robot that has been running for longer is not new: it keeps its id.
 constexpr double kNew_s = 10.0;
-// Uptimes closer than the interval of two statuses do not show which process was first.
-constexpr double kSameUptime_s = 1.0;
+// Two processes measure the difference of their uptimes with an error: the other uptime comes in
+// steps of kStatusPeriod_s, and late if its computer is busy. A process yields at once if it is
+// younger by more than kYounger_s. Unless it is older by more than kOlder_s, it yields to the lower
+// boot id if the other one has not yielded after kDecided_s.
+constexpr double kYounger_s = 1.0;
+constexpr double kOlder_s = 5.0;
+constexpr double kDecided_s = 10.0;
 
 }  // namespace
 
@@ -141,15 +146,20 @@ void PeerTable::twin_received(const Guid& guid, double its_uptime_s, double own_
   const auto found = participants_.find(guid);
   if (found == participants_.end() || !found->second.identity) return;
   Participant& twin = found->second;
-  if (std::exchange(twin.warned, true)) return;
-  const double younger_by_s = its_uptime_s - own_uptime_s;
-  const bool tie = std::abs(younger_by_s) < kSameUptime_s;
-  const bool was_first = tie ? self_.boot < twin.identity->boot : younger_by_s < 0.0;
   const std::string claim = "at " + twin.addresses + " also claims this robot's id " +
                             std::to_string(self_.robot) + ": give every robot its own --robot";
-  if (was_first || own_uptime_s > kNew_s)
-    return emit(PeerEventKind::kRefused, *twin.identity, claim + "; this one keeps it");
-  emit(PeerEventKind::kConflict, *twin.identity, claim + "; it had it first");
+  if (!twin.twin) {
+    const double older_by_s = its_uptime_s - own_uptime_s;
+    const bool is_new = own_uptime_s <= kNew_s;
+    const bool yields = is_new && older_by_s > kYounger_s;
+    twin.twin = {.met_s = own_uptime_s, .decided = yields || !is_new || older_by_s < -kOlder_s};
+    return emit(yields ? PeerEventKind::kConflict : PeerEventKind::kRefused, *twin.identity,
+                claim + (yields ? "; it had it first" : "; this one keeps it"));
+  }
+  if (twin.twin->decided || own_uptime_s - twin.twin->met_s < kDecided_s) return;
+  twin.twin->decided = true;
+  if (twin.identity->boot < self_.boot)
+    emit(PeerEventKind::kConflict, *twin.identity, claim + "; both began at the same time");
 }
 
 std::vector<Peer> PeerTable::peers() const {

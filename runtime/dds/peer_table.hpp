@@ -123,7 +123,8 @@ class PeerTable {
 
   /// Handles a status of a process with this robot's own id. The arguments state how long that
   /// process and this one have been running, both [s]. The younger process yields if it is new
-  /// itself, so no process can take the id of an older one.
+  /// itself, so no process can take the id of an older one. If both began at nearly the same time
+  /// and both stay, the one with the higher boot id yields.
   void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   /// Events since the last call, in order.
@@ -145,13 +146,19 @@ class PeerTable {
   [[nodiscard]] bool is_arriving(RobotId robot) const;
 
  private:
+  // Another process with this robot's id, at its first status.
+  struct Twin {
+    double met_s = 0.0;    // uptime of this process
+    bool decided = false;  // which of the two keeps the id
+  };
   struct Participant {
     std::optional<RobotIdentity> identity;  // identity; nullopt until accepted
     std::string addresses;
     bool announced = false;
     bool proven = false;  // also after DDS reports its end, which any program can forge
     bool alive = false;
-    bool warned = false;        // a twin or rival was logged once
+    bool warned = false;  // a rival was logged once
+    std::optional<Twin> twin;
     std::uint64_t arrival = 0;  // order of first reports, or of becoming alive
   };
   struct KnownPeer {

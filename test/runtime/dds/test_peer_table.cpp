@@ -355,32 +355,58 @@ TEST_CASE("With keys a former process does not get its id back", "[peers]") {
   CHECK(table.is_current({7, kBoot + 2}));
 }
 
+// Events of a process that receives another one with its id every half second.
+std::vector<PeerEvent> meet_twin(const RobotIdentity& self, const RobotIdentity& twin, double own_s,
+                                 double its_s, double seconds) {
+  PeerTable table(self);
+  table.participant(guid(2), to_user_data(twin), "udp/10.0.0.66");
+  table.alive(guid(2));
+  CHECK(table.standing(guid(2)) == Standing::kTwin);
+  for (double s = 0.0; s <= seconds; s += 0.5) table.twin_received(guid(2), its_s + s, own_s + s);
+  CHECK(table.peers().empty());
+  return table.take_events();
+}
+
 TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
   struct Case {
     const char* what;
     double its_s, own_s;
-    std::uint64_t its_boot;
     PeerEventKind expected;
   };
-  const auto [what, its_s, own_s, its_boot, expected] = GENERATE(
-      values({Case{"it is older", 100.0, 2.0, 70, PeerEventKind::kConflict},
-              Case{"it is younger", 2.0, 5.0, 70, PeerEventKind::kRefused},
-              Case{"both are new, and its boot is lower", 2.0, 2.5, 70, PeerEventKind::kConflict},
-              Case{"both are new, and its boot is higher", 2.0, 2.5, 7000, PeerEventKind::kRefused},
-              Case{"it reports that it is older, to one that is not new", 1e6, 11.0, 70,
-                   PeerEventKind::kRefused}}));
+  const auto [what, its_s, own_s, expected] =
+      GENERATE(values({Case{"it is older", 100.0, 2.0, PeerEventKind::kConflict},
+                       Case{"it is younger", 2.0, 8.0, PeerEventKind::kRefused},
+                       Case{"it reports that it is older, to one that is not new", 1e6, 11.0,
+                            PeerEventKind::kRefused}}));
   CAPTURE(what);
-  PeerTable table(kSelf);
-  table.participant(guid(2), data_of(kSelf.robot, its_boot), "udp/10.0.0.66");
-  table.alive(guid(2));
-  CHECK(kinds(table).empty());
-  CHECK(table.standing(guid(2)) == Standing::kTwin);
-  for (int i = 0; i < 3; ++i) table.twin_received(guid(2), its_s + i, own_s + i);
-  const auto events = table.take_events();
+  const std::uint64_t its_boot = GENERATE(70, 7000);
+  const auto events = meet_twin(kSelf, {1, "twin", kProtocolVersion, its_boot}, own_s, its_s, 30.0);
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == expected);
   CHECK_THAT(events[0].text, Catch::Contains("give every robot its own --robot"));
-  CHECK(table.peers().empty());
+}
+
+TEST_CASE("One of two processes with one id ends, whichever errors they measure with", "[peers]") {
+  // Each measures the other uptime too small by up to a second.
+  const double late_s = GENERATE(0.0, 0.4, 0.9);
+  const double later_s = GENERATE(0.0, 0.4, 0.9);
+  const RobotIdentity low{1, "a", kProtocolVersion, 70}, high{1, "b", kProtocolVersion, 7000};
+  for (double lead_s = -8.0; lead_s <= 8.0; lead_s += 0.25) {  // lead of `low`
+    const double low_s = 1.0 + std::max(lead_s, 0.0), high_s = 1.0 + std::max(-lead_s, 0.0);
+    CAPTURE(late_s, later_s, lead_s);
+    const auto yields = [&](const RobotIdentity& self, const RobotIdentity& twin, double own_s,
+                            double its_s, double seconds) {
+      const auto events = meet_twin(self, twin, own_s, its_s, seconds);
+      REQUIRE_FALSE(events.empty());
+      return events.back().kind == PeerEventKind::kConflict;
+    };
+    const bool low_ends_first = yields(low, high, low_s, high_s - late_s, 2.0);
+    const bool high_ends_first = yields(high, low, high_s, low_s - later_s, 2.0);
+    CHECK_FALSE((low_ends_first && high_ends_first));
+    if (low_ends_first || high_ends_first) continue;
+    CHECK_FALSE(yields(low, high, low_s, high_s - late_s, 30.0));
+    CHECK(yields(high, low, high_s, low_s - later_s, 30.0));
+  }
 }
 
 Guid wide_guid(std::size_t n) {

@@ -229,12 +229,12 @@ TEST_CASE("The later of two processes with one robot's keys is notified and igno
   twin.start();
   CHECK(twin.receives(PeerEventKind::kConflict, 3));
   CHECK(a.receives(PeerEventKind::kRefused, 3));
+  CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
   twin.ping(1);
   CHECK(eventually([&] { return a.refused() == 1 && b.refused() == 1; }));
   a.ping(2);
   REQUIRE(b.received.wait_for(1).size() == 1);
   CHECK(b.received.messages()[0].index == 2);
-  CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
 }
 
 TEST_CASE("Messages under a new key wait for it, however many they are", "[sealed]") {
