@@ -86,6 +86,7 @@ void PeerTable::network_changed() {
   for (auto& [robot, known] : peers_)
     if (known.peer.state == PeerState::kAlive) {
       known.peer.state = PeerState::kLost;
+      known.lost = ++arrivals_;
       emit(PeerEventKind::kLost, known.peer.identity, "lost: this robot's network has changed");
     }
 }
@@ -216,9 +217,12 @@ void PeerTable::appear(const Guid& guid, Participant& participant) {
   if (identity.robot == self_.robot) return;  // twin_received() decides by uptime
   const auto found = peers_.find(identity.robot);
   if (found == peers_.end()) {
-    if (peers_.size() >= kMaxRobots)
-      return emit(PeerEventKind::kRefused, identity,
-                  "refused: there are " + std::to_string(kMaxRobots) + " robots already");
+    if (peers_.size() >= kMaxRobots && !make_place(identity)) {
+      if (!std::exchange(participant.warned, true))
+        emit(PeerEventKind::kRefused, identity,
+             "waits: there are " + std::to_string(kMaxRobots) + " robots, until one is lost");
+      return;
+    }
     peers_.emplace(identity.robot,
                    KnownPeer{{identity, PeerState::kAlive, participant.addresses}, guid});
     return emit(PeerEventKind::kJoined, identity, "joined from " + participant.addresses);
@@ -232,6 +236,37 @@ void PeerTable::appear(const Guid& guid, Participant& participant) {
          "at " + participant.addresses + " ignored: another process, at " + known.peer.addresses +
              (former ? ", has taken over that id: if this one is the robot, start it again"
                      : ", has that id, until it falls silent"));
+}
+
+// Gives the place of the robot that has been lost for longest. False if all are present.
+bool PeerTable::make_place(const RobotIdentity& newcomer) {
+  const auto rank = [](const auto& entry) {
+    const KnownPeer& known = entry.second;
+    return std::tuple(known.peer.state == PeerState::kAlive,
+                      known.peer.state == PeerState::kReported, known.lost);
+  };
+  const auto longest_lost = std::ranges::min_element(peers_, {}, rank);
+  if (longest_lost->second.peer.state == PeerState::kAlive) return false;
+  RobotIdentity identity = longest_lost->second.peer.identity;
+  identity.boot = 0;
+  peers_.erase(longest_lost);
+  emit(PeerEventKind::kRestarted, identity,
+       "was lost for longest: its place is taken by " + to_string(newcomer), false);
+  return true;
+}
+
+// Lets the robot appear that has waited for a place for longest.
+void PeerTable::fill_place() {
+  if (peers_.size() < kMaxRobots) return;
+  const auto waits = [this](const Participant& p) {
+    return p.alive && p.proven && p.identity && p.identity->robot != self_.robot &&
+           !peers_.contains(p.identity->robot);
+  };
+  const auto rank = [&](const auto& entry) {
+    return std::pair(!waits(entry.second), entry.second.arrival);
+  };
+  const auto next = std::ranges::min_element(participants_, {}, rank);
+  if (next != participants_.end() && waits(next->second)) appear(next->first, next->second);
 }
 
 // Only in a team with keys, where no other program can take over an id.
@@ -283,6 +318,7 @@ void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, 
   if (entry == peers_.end() || entry->second.guid != guid) return;
   KnownPeer& known = entry->second;
   known.peer.state = state;
+  known.lost = ++arrivals_;
   emit(kind, known.peer.identity, text);
 
   auto successor = participants_.end();
@@ -294,7 +330,9 @@ void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, 
     if (successor == participants_.end() || claimant.arrival < successor->second.arrival)
       successor = p;
   }
-  if (successor != participants_.end()) take_over(known, successor->first, successor->second);
+  if (successor != participants_.end())
+    return take_over(known, successor->first, successor->second);
+  fill_place();
 }
 
 // Makes room for a new participant if there are too many.

@@ -33,7 +33,7 @@ enum class PeerEventKind {
                ///< unchanged.
   kLeft,       ///< Ended regularly.
   kRestarted,  ///< Same robot id, another incarnation: its keyframe indices now mean other
-               ///< keyframes.
+               ///< keyframes. With boot id 0: another robot has taken the place of this one.
   kRefused,    ///< Ignored because of another protocol version, unreadable user data, refused
                ///< keys, too many robots, or the id of a present robot.
   kConflict,   ///< This robot's id belongs to a robot that had it first: this one must end.
@@ -63,7 +63,9 @@ struct PeerEvent {
 ///
 /// A robot is present while its participant's user data is accepted and its status writer alive;
 /// the expiry of the participant (dds.lease_s) changes nothing. An id belongs to the first process
-/// that is received with it, as long as this process is received; then to the next process.
+/// that is received with it, as long as this process is received; then to the next process. If
+/// there are kMaxRobots, a new robot takes the place of the one that has been lost for longest, and
+/// waits if all are present. A robot that has lost its place joins again like a new one.
 ///
 /// Any program can announce participants, so only kMaxParticipants are remembered. A further one
 /// takes the place of the oldest participant that is neither alive nor a robot of the team. Not
@@ -157,7 +159,7 @@ class PeerTable {
     bool announced = false;
     bool proven = false;  // also after DDS reports its end, which any program can forge
     bool alive = false;
-    bool warned = false;  // a rival was logged once
+    bool warned = false;  // it was logged that it has to wait for its id or a place
     std::optional<Twin> twin;
     std::uint64_t arrival = 0;  // order of first reports, or of becoming alive
   };
@@ -165,6 +167,7 @@ class PeerTable {
     Peer peer;
     Guid guid{};
     bool arriving = false;                   // true until all nodes know of the new incarnation
+    std::uint64_t lost = 0;                  // order in which robots were lost
     std::vector<std::uint64_t> former = {};  // boot ids of former processes, oldest first
   };
 
@@ -173,6 +176,8 @@ class PeerTable {
   [[nodiscard]] bool is_former(const KnownPeer& known, const RobotIdentity& identity) const;
   void become(KnownPeer& known, Peer peer, const Guid& guid, bool arriving);
   void take_over(KnownPeer& known, const Guid& guid, const Participant& participant);
+  bool make_place(const RobotIdentity& newcomer);
+  void fill_place();
   void give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text);
   [[nodiscard]] bool is_robot(const Guid& guid, const Participant& participant) const;
   Participant& remember(const Guid& guid);

@@ -477,6 +477,41 @@ TEST_CASE("Many robots do not exhaust the memory", "[peers]") {
   CHECK(table.peers().size() == PeerTable::kMaxRobots);
 }
 
+TEST_CASE("A new robot takes the place of the one that has been lost for longest", "[peers]") {
+  PeerTable table(kSelf);
+  const auto receive = [&](std::size_t n, std::uint64_t boot) {
+    table.participant(wide_guid(n), data_of(static_cast<RobotId>(n), boot), "");
+    table.alive(wide_guid(n));
+  };
+  const std::size_t end = 100 + PeerTable::kMaxRobots;
+  for (std::size_t n = 100; n < end; ++n) receive(n, n);
+  receive(7, 70);
+  CHECK(table.standing(wide_guid(7)) == Standing::kRival);
+  (void)table.take_events();
+  table.silent(wide_guid(120));
+  auto events = table.take_events();
+  REQUIRE(events.size() == 3);
+  CHECK(events[0].kind == PeerEventKind::kLost);
+  CHECK(events[1].kind == PeerEventKind::kRestarted);
+  CHECK(events[1].identity.robot == 120);
+  CHECK(events[1].identity.boot == 0);
+  CHECK_FALSE(events[1].direct);
+  CHECK(events[2].kind == PeerEventKind::kJoined);
+  CHECK(table.is_current({7, 70}));
+
+  table.silent(wide_guid(140));
+  table.silent(wide_guid(130));
+  table.alive(wide_guid(120));
+  events = table.take_events();
+  REQUIRE(events.size() == 4);
+  CHECK(events[2].identity.robot == 140);
+  CHECK(events[3].kind == PeerEventKind::kJoined);
+  CHECK(table.is_current({120, 120}));
+  table.alive(wide_guid(130));
+  CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
+  CHECK(table.peers().size() == PeerTable::kMaxRobots);
+}
+
 TEST_CASE("Another protocol version and unreadable user data are refused, once", "[peers]") {
   PeerTable table(kSelf);
   const std::string data = GENERATE(data_of(7, 70, kProtocolVersion + 1), std::string("robot=x"));
