@@ -25,11 +25,10 @@ std::shared_ptr<SharedSeal> make_team_seal(const std::filesystem::path& folder,
   return std::make_shared<SharedSeal>(load_robot_keys(folder), own, now_s());
 }
 
-TeamKeysNode::TeamKeysNode(std::filesystem::path folder, SharedSeal& seal,
-                           std::function<void()> send_keys)
+TeamKeysNode::TeamKeysNode(std::filesystem::path folder, SharedSeal& seal, Apply apply)
     : folder_(std::move(folder)),
       seal_(seal),
-      send_keys_(std::move(send_keys)),
+      apply_(std::move(apply)),
       periodic_(
           kPeriod, [this] { step(); }, "team_keys") {}
 
@@ -39,7 +38,7 @@ void TeamKeysNode::step() try {
       seal_.with([&](TeamSeal& seal) { return seal.update(list, now_s()); });
   for (const TeamPeer& peer : change.forgotten)
     log::warn("keys") << "robot " << peer.robot << " is a member no more: revoked or expired";
-  if (change.new_key) send_keys_();
+  apply_(change);
 } catch (const std::exception& error) {
   // A list may be incomplete while it is copied; the old one stays in use.
   log::limited(log::Level::kWarn, "keys", "revocations") << error.what();

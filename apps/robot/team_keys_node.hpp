@@ -18,11 +18,13 @@ namespace km {
                                                          const RobotIdentity& own);
 
 /// Checks periodically whether certificates of members have expired or the folder's list of
-/// revocations has changed. If so, sends new keys to the members.
+/// revocations has changed.
 class TeamKeysNode final : public Node {
  public:
-  /// `send_keys` sends this process's new key to the others. `seal` outlives this.
-  TeamKeysNode(std::filesystem::path folder, SharedSeal& seal, std::function<void()> send_keys);
+  using Apply = std::function<void(const MembershipChange& change)>;
+
+  /// `apply` removes the former members and sends new keys. `seal` outlives this.
+  TeamKeysNode(std::filesystem::path folder, SharedSeal& seal, Apply apply);
 
   void step();
 
@@ -34,7 +36,7 @@ class TeamKeysNode final : public Node {
  private:
   const std::filesystem::path folder_;
   SharedSeal& seal_;
-  const std::function<void()> send_keys_;
+  const Apply apply_;
   Periodic periodic_;  // last member: stops first
 };
 

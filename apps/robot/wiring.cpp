@@ -107,7 +107,8 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
                    std::nullopt);
   if (options.record) add_record(options, config.ros, results);
   if (seal_ != nullptr)
-    add<TeamKeysNode>(false, options.security, *seal_, [this] { bridge_->send_keys(); });
+    add<TeamKeysNode>(false, options.security, *seal_,
+                      [this](const MembershipChange& change) { bridge_->apply(change); });
   nodes_.push_back(bridge_);
   supervisor_.add(std::move(bridge));
   loads_.emplace(nodes_);

@@ -117,6 +117,11 @@ void DdsBridge::send_keys() {
       key_sender_.post({peer.identity.robot, peer.identity.boot});
 }
 
+void DdsBridge::apply(const MembershipChange& change) {
+  peers_.expel(change.forgotten);
+  if (change.new_key) send_keys();
+}
+
 void DdsBridge::catch_up(const PeerEvent& event) {
   if (event.kind != PeerEventKind::kReturned && event.kind != PeerEventKind::kResumed) return;
   sender_.catch_up(event.identity.robot);

@@ -124,6 +124,10 @@ class DdsBridge final : public Node {
   /// bridge also does so when a robot appears, and at intervals. Thread-safe.
   void send_keys();
 
+  /// In a team with keys, removes processes whose certificates are no longer valid, and sends a new
+  /// key to the other robots. Call it with each change of TeamSeal::update(). Thread-safe.
+  void apply(const MembershipChange& change);
+
   /// In a team with keys, makes new DDS writers to `robot` and sends the events and states for it
   /// again, because packets of DDS have been forged. Does not wait. Thread-safe.
   void renew(RobotId robot) { sender_.renew(robot); }

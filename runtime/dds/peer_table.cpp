@@ -2,15 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <tuple>
 
 namespace km {
 namespace {
 
 // A robot that has been running for longer is not new: it keeps its id.
 constexpr double kNew_s = 10.0;
-// Uptimes closer than the interval of two statuses do not show which process was first.
-constexpr double kSameUptime_s = 1.0;
+// Two processes measure the difference of their uptimes with an error: the other uptime comes in
+// steps of kStatusPeriod_s, and late if its computer is busy. A process yields at once if it is
+// younger by more than kYounger_s. Unless it is older by more than kOlder_s, it yields to the lower
+// boot id if the other one has not yielded after kDecided_s.
+constexpr double kYounger_s = 1.0;
+constexpr double kOlder_s = 5.0;
+constexpr double kDecided_s = 10.0;
 
 }  // namespace
 
@@ -30,8 +35,9 @@ void PeerTable::reported(const RobotIdentity& identity) {
   KnownPeer& known = found->second;
   const std::uint64_t former_boot = known.peer.identity.boot;
   if (known.peer.state == PeerState::kAlive || former_boot == identity.boot) return;
+  if (is_former(known, identity)) return;
   const bool resumed = is_same_incarnation(former_boot, identity.boot);
-  known = {{identity, PeerState::kReported, "unknown"}, Guid{}, known.arriving || !resumed};
+  become(known, {identity, PeerState::kReported, "unknown"}, Guid{}, known.arriving || !resumed);
   emit(resumed ? PeerEventKind::kResumed : PeerEventKind::kRestarted, identity,
        resumed ? "resumed, as other robots report" : "restarted, as other robots report", false);
 }
@@ -43,9 +49,7 @@ bool PeerTable::is_arriving(RobotId robot) const {
 
 void PeerTable::participant(const Guid& guid, std::string_view user_data,
                             const std::string& addresses) {
-  Participant* found = remember(guid);
-  if (found == nullptr) return;
-  Participant& participant = *found;
+  Participant& participant = remember(guid);
   participant.addresses = addresses;
   if (std::exchange(participant.announced, true)) return;
   if (!claims_to_be_a_robot(user_data)) return;
@@ -58,6 +62,11 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
     return;
   }
   const auto& [identity, credentials] = *decoded.value;
+  // Any program can send an announcement in the name of a participant, but only a robot can prove
+  // its identity.
+  if (admit_ && participant.proven && identity != *participant.identity)
+    return emit(PeerEventKind::kRefused, identity,
+                "refused: announced as the participant of " + to_string(*participant.identity));
   if (identity.protocol != self_.protocol)
     return emit(PeerEventKind::kRefused, identity,
                 "refused: uses protocol version " + std::to_string(identity.protocol) +
@@ -65,29 +74,45 @@ void PeerTable::participant(const Guid& guid, std::string_view user_data,
   if (const char* reason = admit_ ? admit_(identity, credentials) : nullptr)
     return emit(PeerEventKind::kRefused, identity, std::string("refused: ") + reason);
   participant.identity = identity;
-  participant.proven = !admit_;
+  participant.proven |= !admit_;
   appear_if_there(guid, participant);
 }
 
 void PeerTable::network_changed() {
-  const auto is_known = [this](const auto& entry) {
-    const auto& identity = entry.second.identity;
-    const auto peer = identity ? peers_.find(identity->robot) : peers_.end();
-    return peer != peers_.end() && peer->second.guid == entry.first;
-  };
-  std::erase_if(participants_, std::not_fn(is_known));  // robots are remembered
-  for (auto& [guid, participant] : participants_)
-    participant.announced = participant.alive = participant.proven = false;
+  std::erase_if(participants_, [this](const auto& entry) {
+    return !is_robot(entry.first, entry.second);  // robots are remembered
+  });
+  for (auto& [guid, participant] : participants_) participant.announced = participant.alive = false;
   for (auto& [robot, known] : peers_)
     if (known.peer.state == PeerState::kAlive) {
       known.peer.state = PeerState::kLost;
+      known.lost = ++arrivals_;
       emit(PeerEventKind::kLost, known.peer.identity, "lost: this robot's network has changed");
     }
 }
 
+void PeerTable::expel(const std::vector<TeamPeer>& processes) {
+  std::vector<Guid> expelled;
+  for (auto& [guid, participant] : participants_) {
+    const auto& identity = participant.identity;
+    if (!identity ||
+        std::ranges::find(processes, TeamPeer{identity->robot, identity->boot}) == processes.end())
+      continue;
+    participant.proven = false;  // no successor of another process
+    expelled.push_back(guid);
+  }
+  for (const Guid& guid : expelled) {
+    give_way(guid, PeerState::kLost, PeerEventKind::kLost,
+             "lost: it is no member of the team any more");
+    if (const auto found = participants_.find(guid); found != participants_.end())
+      found->second.identity.reset();
+  }
+}
+
 void PeerTable::prove(const Guid& guid) {
   const auto found = participants_.find(guid);
-  if (found == participants_.end() || std::exchange(found->second.proven, true)) return;
+  if (found == participants_.end() || !found->second.identity) return;
+  if (std::exchange(found->second.proven, true)) return;
   appear_if_there(guid, found->second);
 }
 
@@ -100,17 +125,14 @@ void PeerTable::participant_gone(const Guid& guid) {
   const auto found = participants_.find(guid);
   if (found == participants_.end()) return;
   found->second.announced = false;
-  const auto& identity = found->second.identity;
-  const auto peer = identity ? peers_.find(identity->robot) : peers_.end();
-  const bool is_known = peer != peers_.end() && peer->second.guid == guid;
-  if (!is_known) participants_.erase(found);  // robots are remembered
+  if (!is_robot(guid, found->second)) participants_.erase(found);  // robots are remembered
 }
 
 void PeerTable::alive(const Guid& guid) {
-  Participant* participant = remember(guid);
-  if (participant == nullptr || std::exchange(participant->alive, true)) return;
-  participant->arrival = ++arrivals_;
-  appear_if_there(guid, *participant);
+  Participant& participant = remember(guid);
+  if (std::exchange(participant.alive, true)) return;
+  participant.arrival = ++arrivals_;
+  appear_if_there(guid, participant);
 }
 
 void PeerTable::silent(const Guid& guid) {
@@ -125,15 +147,20 @@ void PeerTable::twin_received(const Guid& guid, double its_uptime_s, double own_
   const auto found = participants_.find(guid);
   if (found == participants_.end() || !found->second.identity) return;
   Participant& twin = found->second;
-  if (std::exchange(twin.warned, true)) return;
-  const double younger_by_s = its_uptime_s - own_uptime_s;
-  const bool tie = std::abs(younger_by_s) < kSameUptime_s;
-  const bool was_first = tie ? self_.boot < twin.identity->boot : younger_by_s < 0.0;
   const std::string claim = "at " + twin.addresses + " also claims this robot's id " +
                             std::to_string(self_.robot) + ": give every robot its own --robot";
-  if (was_first || own_uptime_s > kNew_s)
-    return emit(PeerEventKind::kRefused, *twin.identity, claim + "; this one keeps it");
-  emit(PeerEventKind::kConflict, *twin.identity, claim + "; it had it first");
+  if (!twin.twin) {
+    const double older_by_s = its_uptime_s - own_uptime_s;
+    const bool is_new = own_uptime_s <= kNew_s;
+    const bool yields = is_new && older_by_s > kYounger_s;
+    twin.twin = {.met_s = own_uptime_s, .decided = yields || !is_new || older_by_s < -kOlder_s};
+    return emit(yields ? PeerEventKind::kConflict : PeerEventKind::kRefused, *twin.identity,
+                claim + (yields ? "; it had it first" : "; this one keeps it"));
+  }
+  if (twin.twin->decided || own_uptime_s - twin.twin->met_s < kDecided_s) return;
+  twin.twin->decided = true;
+  if (twin.identity->boot < self_.boot)
+    emit(PeerEventKind::kConflict, *twin.identity, claim + "; both began at the same time");
 }
 
 std::vector<Peer> PeerTable::peers() const {
@@ -145,6 +172,11 @@ std::vector<Peer> PeerTable::peers() const {
 std::optional<RobotIdentity> PeerTable::identity_of(const Guid& guid) const {
   const auto found = participants_.find(guid);
   return found == participants_.end() ? std::nullopt : found->second.identity;
+}
+
+bool PeerTable::is_announced(const Guid& guid) const {
+  const auto found = participants_.find(guid);
+  return found != participants_.end() && found->second.announced;
 }
 
 Standing PeerTable::standing(const Guid& guid) const {
@@ -169,6 +201,13 @@ bool PeerTable::is_current(const TeamPeer& sender) const {
   return current(sender.robot) == sender;
 }
 
+// True if the participant has its id, or had it last.
+bool PeerTable::is_robot(const Guid& guid, const Participant& participant) const {
+  if (!participant.identity) return false;
+  const auto peer = peers_.find(participant.identity->robot);
+  return peer != peers_.end() && peer->second.guid == guid;
+}
+
 void PeerTable::appear_if_there(const Guid& guid, Participant& participant) {
   if (participant.identity && participant.proven && participant.alive) appear(guid, participant);
 }
@@ -178,20 +217,75 @@ void PeerTable::appear(const Guid& guid, Participant& participant) {
   if (identity.robot == self_.robot) return;  // twin_received() decides by uptime
   const auto found = peers_.find(identity.robot);
   if (found == peers_.end()) {
-    if (peers_.size() >= kMaxRobots)
-      return emit(PeerEventKind::kRefused, identity,
-                  "refused: there are " + std::to_string(kMaxRobots) + " robots already");
+    if (peers_.size() >= kMaxRobots && !make_place(identity)) {
+      if (!std::exchange(participant.warned, true))
+        emit(PeerEventKind::kRefused, identity,
+             "waits: there are " + std::to_string(kMaxRobots) + " robots, until one is lost");
+      return;
+    }
     peers_.emplace(identity.robot,
                    KnownPeer{{identity, PeerState::kAlive, participant.addresses}, guid});
     return emit(PeerEventKind::kJoined, identity, "joined from " + participant.addresses);
   }
   KnownPeer& known = found->second;
-  if (known.guid == guid || known.peer.state != PeerState::kAlive)
+  const bool former = is_former(known, identity);
+  if (!former && (known.guid == guid || known.peer.state != PeerState::kAlive))
     return take_over(known, guid, participant);
   if (!std::exchange(participant.warned, true))
     emit(PeerEventKind::kRefused, identity,
          "at " + participant.addresses + " ignored: another process, at " + known.peer.addresses +
-             ", has that id, until it falls silent");
+             (former ? ", has taken over that id: if this one is the robot, start it again"
+                     : ", has that id, until it falls silent"));
+}
+
+// Gives the place of the robot that has been lost for longest. False if all are present.
+bool PeerTable::make_place(const RobotIdentity& newcomer) {
+  const auto rank = [](const auto& entry) {
+    const KnownPeer& known = entry.second;
+    return std::tuple(known.peer.state == PeerState::kAlive,
+                      known.peer.state == PeerState::kReported, known.lost);
+  };
+  const auto longest_lost = std::ranges::min_element(peers_, {}, rank);
+  if (longest_lost->second.peer.state == PeerState::kAlive) return false;
+  RobotIdentity identity = longest_lost->second.peer.identity;
+  identity.boot = 0;
+  peers_.erase(longest_lost);
+  emit(PeerEventKind::kRestarted, identity,
+       "was lost for longest: its place is taken by " + to_string(newcomer), false);
+  return true;
+}
+
+// Lets the robot appear that has waited for a place for longest.
+void PeerTable::fill_place() {
+  if (peers_.size() < kMaxRobots) return;
+  const auto waits = [this](const Participant& p) {
+    return p.alive && p.proven && p.identity && p.identity->robot != self_.robot &&
+           !peers_.contains(p.identity->robot);
+  };
+  const auto rank = [&](const auto& entry) {
+    return std::pair(!waits(entry.second), entry.second.arrival);
+  };
+  const auto next = std::ranges::min_element(participants_, {}, rank);
+  if (next != participants_.end() && waits(next->second)) appear(next->first, next->second);
+}
+
+// Only in a team with keys, where no other program can take over an id.
+bool PeerTable::is_former(const KnownPeer& known, const RobotIdentity& identity) const {
+  const std::uint64_t present = known.peer.identity.boot;
+  return admit_ && ((is_same_incarnation(present, identity.boot) && identity.boot < present) ||
+                    std::ranges::find(known.former, identity.boot) != known.former.end());
+}
+
+// Assigns the id to a process.
+void PeerTable::become(KnownPeer& known, Peer peer, const Guid& guid, bool arriving) {
+  const std::uint64_t former_boot = known.peer.identity.boot;
+  if (former_boot != peer.identity.boot) {
+    if (known.former.size() == kMaxFormer) known.former.erase(known.former.begin());
+    known.former.push_back(former_boot);
+  }
+  known.peer = std::move(peer);
+  known.guid = guid;
+  known.arriving = arriving;
 }
 
 void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant& participant) {
@@ -201,7 +295,7 @@ void PeerTable::take_over(KnownPeer& known, const Guid& guid, const Participant&
   const bool arriving = former_boot == identity.boot
                             ? known.arriving
                             : !is_same_incarnation(former_boot, identity.boot);
-  known = {{identity, PeerState::kAlive, participant.addresses}, guid, arriving};
+  become(known, {identity, PeerState::kAlive, participant.addresses}, guid, arriving);
   const auto predecessor = participants_.find(former);
   if (former != guid && predecessor != participants_.end() && !predecessor->second.announced)
     participants_.erase(predecessor);
@@ -224,26 +318,35 @@ void PeerTable::give_way(const Guid& guid, PeerState state, PeerEventKind kind, 
   if (entry == peers_.end() || entry->second.guid != guid) return;
   KnownPeer& known = entry->second;
   known.peer.state = state;
+  known.lost = ++arrivals_;
   emit(kind, known.peer.identity, text);
 
   auto successor = participants_.end();
   for (auto p = participants_.begin(); p != participants_.end(); ++p) {
     const Participant& claimant = p->second;
     if (!claimant.alive || !claimant.proven || !claimant.identity ||
-        claimant.identity->robot != entry->first)
+        claimant.identity->robot != entry->first || is_former(known, *claimant.identity))
       continue;
     if (successor == participants_.end() || claimant.arrival < successor->second.arrival)
       successor = p;
   }
-  if (successor != participants_.end()) take_over(known, successor->first, successor->second);
+  if (successor != participants_.end())
+    return take_over(known, successor->first, successor->second);
+  fill_place();
 }
 
-// Null if there are too many.
-PeerTable::Participant* PeerTable::remember(const Guid& guid) {
-  const auto found = participants_.find(guid);
-  if (found != participants_.end()) return &found->second;
-  if (participants_.size() >= kMaxParticipants) return nullptr;
-  return &participants_[guid];
+// Makes room for a new participant if there are too many.
+PeerTable::Participant& PeerTable::remember(const Guid& guid) {
+  if (const auto found = participants_.find(guid); found != participants_.end())
+    return found->second;
+  if (participants_.size() >= kMaxParticipants)
+    participants_.erase(std::ranges::min_element(participants_, {}, [this](const auto& entry) {
+      return std::tuple(is_robot(entry.first, entry.second), entry.second.alive,
+                        entry.second.arrival);
+    }));
+  Participant& participant = participants_[guid];
+  participant.arrival = ++arrivals_;
+  return participant;
 }
 
 void PeerTable::emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text,

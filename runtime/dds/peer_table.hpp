@@ -33,7 +33,7 @@ enum class PeerEventKind {
                ///< unchanged.
   kLeft,       ///< Ended regularly.
   kRestarted,  ///< Same robot id, another incarnation: its keyframe indices now mean other
-               ///< keyframes.
+               ///< keyframes. With boot id 0: another robot has taken the place of this one.
   kRefused,    ///< Ignored because of another protocol version, unreadable user data, refused
                ///< keys, too many robots, or the id of a present robot.
   kConflict,   ///< This robot's id belongs to a robot that had it first: this one must end.
@@ -63,12 +63,18 @@ struct PeerEvent {
 ///
 /// A robot is present while its participant's user data is accepted and its status writer alive;
 /// the expiry of the participant (dds.lease_s) changes nothing. An id belongs to the first process
-/// that is received with it, as long as this process is received; then to the next process. Not
+/// that is received with it, as long as this process is received; then to the next process. If
+/// there are kMaxRobots, a new robot takes the place of the one that has been lost for longest, and
+/// waits if all are present. A robot that has lost its place joins again like a new one.
+///
+/// Any program can announce participants, so only kMaxParticipants are remembered. A further one
+/// takes the place of the oldest participant that is neither alive nor a robot of the team. Not
 /// thread-safe.
 class PeerTable {
  public:
   static constexpr std::size_t kMaxRobots = 64;
-  static constexpr std::size_t kMaxParticipants = 1024;
+  static constexpr std::size_t kMaxParticipants = 256;
+  static constexpr std::size_t kMaxFormer = 64;
 
   /// Decides by the credentials whether a robot is accepted. Returns null, or the reason of a
   /// refusal (a string literal).
@@ -76,7 +82,9 @@ class PeerTable {
       std::function<const char*(const RobotIdentity& identity, std::string_view credentials)>;
 
   /// With `admit`, a robot is present only after prove() is also called for it, because its
-  /// credentials could be replayed.
+  /// credentials could be replayed. A participant that has proven its identity keeps it, even if
+  /// DDS reports that it has gone and announces it again. A process whose id another process has
+  /// taken over does not get it back, because its messages could be replayed.
   explicit PeerTable(const RobotIdentity& self, Admit admit = {})
       : self_(self), admit_(std::move(admit)) {}
 
@@ -92,9 +100,16 @@ class PeerTable {
   /// A participant announced itself (again) with this user data.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
+  /// False if its announcement was not received, or discarded in favour of others. Once the
+  /// participant is alive, pass its announcement again.
+  [[nodiscard]] bool is_announced(const Guid& guid) const;
 
-  /// Discards what DDS has reported: this robot now has another network, or another address.
+  /// Discards the reports of DDS: this robot now has another network, or another address.
   void network_changed();
+
+  /// These processes are no members of the team any more. They are lost, and later messages are
+  /// refused.
+  void expel(const std::vector<TeamPeer>& processes);
 
   /// Notes that a message has proven the identity of the participant.
   void prove(const Guid& guid);
@@ -110,7 +125,8 @@ class PeerTable {
 
   /// Handles a status of a process with this robot's own id. The arguments state how long that
   /// process and this one have been running, both [s]. The younger process yields if it is new
-  /// itself, so no process can take the id of an older one.
+  /// itself, so no process can take the id of an older one. If both began at nearly the same time
+  /// and both stay, the one with the higher boot id yields.
   void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   /// Events since the last call, in order.
@@ -132,26 +148,39 @@ class PeerTable {
   [[nodiscard]] bool is_arriving(RobotId robot) const;
 
  private:
+  // Another process with this robot's id, at its first status.
+  struct Twin {
+    double met_s = 0.0;    // uptime of this process
+    bool decided = false;  // which of the two keeps the id
+  };
   struct Participant {
     std::optional<RobotIdentity> identity;  // identity; nullopt until accepted
     std::string addresses;
     bool announced = false;
-    bool proven = false;
+    bool proven = false;  // also after DDS reports its end, which any program can forge
     bool alive = false;
-    bool warned = false;        // a twin or rival was logged once
-    std::uint64_t arrival = 0;  // order in which participants became alive
+    bool warned = false;  // it was logged that it has to wait for its id or a place
+    std::optional<Twin> twin;
+    std::uint64_t arrival = 0;  // order of first reports, or of becoming alive
   };
   struct KnownPeer {
     Peer peer;
     Guid guid{};
-    bool arriving = false;  // true until all nodes know of the new incarnation
+    bool arriving = false;                   // true until all nodes know of the new incarnation
+    std::uint64_t lost = 0;                  // order in which robots were lost
+    std::vector<std::uint64_t> former = {};  // boot ids of former processes, oldest first
   };
 
   void appear_if_there(const Guid& guid, Participant& participant);
   void appear(const Guid& guid, Participant& participant);
+  [[nodiscard]] bool is_former(const KnownPeer& known, const RobotIdentity& identity) const;
+  void become(KnownPeer& known, Peer peer, const Guid& guid, bool arriving);
   void take_over(KnownPeer& known, const Guid& guid, const Participant& participant);
+  bool make_place(const RobotIdentity& newcomer);
+  void fill_place();
   void give_way(const Guid& guid, PeerState state, PeerEventKind kind, const char* text);
-  Participant* remember(const Guid& guid);
+  [[nodiscard]] bool is_robot(const Guid& guid, const Participant& participant) const;
+  Participant& remember(const Guid& guid);
   void emit(PeerEventKind kind, const RobotIdentity& identity, const std::string& text,
             bool direct = true);
 

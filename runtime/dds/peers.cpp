@@ -14,6 +14,8 @@
 namespace km {
 namespace {
 
+constexpr std::uint32_t kNews =
+    DDS_NOT_READ_SAMPLE_STATE | DDS_ANY_VIEW_STATE | DDS_ANY_INSTANCE_STATE;
 constexpr std::size_t kMaxEvents = 1024;  // maximum number of waiting events, because any
                                           // participant can cause them
 
@@ -129,8 +131,7 @@ void Peers::open() {
   reader_ =
       DdsEntity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
                 "reader of the participants");
-  discovered_ =
-      DdsEntity(dds_create_readcondition(reader_.handle(), DDS_ANY_STATE), "read condition");
+  discovered_ = DdsEntity(dds_create_readcondition(reader_.handle(), kNews), "read condition");
 }
 
 // PeerTable calls this function, while the calling member function of Peers holds the mutex.
@@ -142,6 +143,14 @@ const char* Peers::admit(const RobotIdentity& identity, std::string_view credent
     return reason;
   admitted_.push_back({identity.robot, identity.boot});
   return nullptr;
+}
+
+void Peers::expel(const std::vector<TeamPeer>& processes) {
+  {
+    const std::lock_guard lock(mutex_);
+    table_.expel(processes);
+  }
+  publish_events();
 }
 
 void Peers::prove(const Guid& guid) {
@@ -237,28 +246,65 @@ void Peers::poll() {
   publish_events();
 }
 
+// Announcements stay in the reader: see announce().
 void Peers::take_discovered() {
   constexpr std::uint32_t kBatch = 16;
+  bool has_gone = false;
   while (true) {
     std::array<void*, kBatch> samples{};
     std::array<dds_sample_info_t, kBatch> infos{};
-    const dds_return_t count =
-        check_dds(dds_take(reader_.handle(), samples.data(), infos.data(), kBatch, kBatch),
-                  "cannot discover");
-    if (count == 0) return;
+    const dds_return_t count = check_dds(
+        dds_read_mask(reader_.handle(), samples.data(), infos.data(), kBatch, kBatch,
+                      DDS_NOT_READ_SAMPLE_STATE | DDS_ANY_VIEW_STATE | DDS_ANY_INSTANCE_STATE),
+        "cannot discover");
+    if (count == 0) break;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
       const auto& sample = *static_cast<const dds_builtintopic_participant_t*>(samples[i]);
-      const Guid guid = to_guid(sample.key);
-      if (guid == participant_.guid()) continue;
-      const std::lock_guard lock(mutex_);
-      if (infos[i].instance_state != DDS_IST_ALIVE) {
-        table_.participant_gone(guid);
-      } else if (infos[i].valid_data) {
-        table_.participant(guid, user_data_of(sample.qos), addresses_of(sample.qos));
-      }
+      if (to_guid(sample.key) == participant_.guid()) continue;
+      has_gone |= infos[i].instance_state != DDS_IST_ALIVE;
+      take(sample, infos[i]);
     }
     dds_return_loan(reader_.handle(), samples.data(), count);
   }
+  if (has_gone) remove_gone();
+}
+
+void Peers::take(const dds_builtintopic_participant_t& sample, const dds_sample_info_t& info) {
+  const std::lock_guard lock(mutex_);
+  if (info.instance_state != DDS_IST_ALIVE)
+    table_.participant_gone(to_guid(sample.key));
+  else if (info.valid_data)
+    table_.participant(to_guid(sample.key), user_data_of(sample.qos), addresses_of(sample.qos));
+}
+
+// Removes the announcements of participants that have gone from the reader.
+void Peers::remove_gone() {
+  constexpr std::uint32_t kBatch = 16;
+  std::array<void*, kBatch> samples{};
+  std::array<dds_sample_info_t, kBatch> infos{};
+  dds_return_t count = 0;
+  do {
+    count = check_dds(dds_take_mask(reader_.handle(), samples.data(), infos.data(), kBatch, kBatch,
+                                    DDS_READ_SAMPLE_STATE | DDS_ANY_VIEW_STATE |
+                                        DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE |
+                                        DDS_NOT_ALIVE_NO_WRITERS_INSTANCE_STATE),
+                      "cannot discover");
+    dds_return_loan(reader_.handle(), samples.data(), count);
+  } while (count > 0);
+}
+
+// Reads the announcement of a participant again that the table has discarded in favour of others.
+void Peers::announce(const Guid& guid) {
+  dds_builtintopic_participant_t key{};
+  std::ranges::copy(guid, key.key.v);
+  const dds_instance_handle_t instance = dds_lookup_instance(reader_.handle(), &key);
+  void* loan = nullptr;
+  dds_sample_info_t info{};
+  if (instance == DDS_HANDLE_NIL ||
+      dds_read_instance(reader_.handle(), &loan, &info, 1, 1, instance) <= 0)
+    return;
+  take(*static_cast<const dds_builtintopic_participant_t*>(loan), info);
+  dds_return_loan(reader_.handle(), &loan, 1);
 }
 
 void Peers::take_liveliness() {
@@ -282,12 +328,15 @@ void Peers::take_liveliness() {
 bool Peers::apply(const LivelinessChange& change) {
   const auto guid = status_writers_->participant_of(change.writer);
   if (!guid) return false;
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
   if (change.alive + change.not_alive < 0) {
     // A silent writer that is closed by DDS has expired: its robot stays lost.
     if (change.alive < 0) table_.closed(*guid);
   } else if (change.alive > 0) {
     table_.alive(*guid);
+    if (table_.is_announced(*guid)) return true;
+    lock.unlock();
+    announce(*guid);
   } else if (change.alive < 0) {
     table_.silent(*guid);
   }

@@ -92,6 +92,7 @@ class Peers {
   [[nodiscard]] std::vector<TeamPeer> take_admitted();
 
   /// See PeerTable.
+  void expel(const std::vector<TeamPeer>& processes);
   void prove(const Guid& guid);
   void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
@@ -125,6 +126,9 @@ class Peers {
                                     void* self);
   const char* admit(const RobotIdentity& identity, std::string_view credentials);
   void take_discovered();
+  void take(const dds_builtintopic_participant_t& sample, const dds_sample_info_t& info);
+  void remove_gone();
+  void announce(const Guid& guid);
   void take_liveliness();
   bool apply(const LivelinessChange& change);
   void publish_events();

@@ -1,6 +1,7 @@
 #include "runtime/overlay/known_robots.hpp"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 namespace km {
@@ -40,6 +41,7 @@ Meeting KnownRobots::become(Robot robot) {
   const std::uint64_t former = known->second.identity.boot;
   const bool other_key = key_of(known->second) != key_of(robot);
   robot.was_direct |= known->second.was_direct;
+  robot.lost_s = known->second.lost_s;
   known->second = std::move(robot);
   const std::uint64_t boot = known->second.identity.boot;
   if (former == boot) return Meeting::kKnown;
@@ -88,12 +90,16 @@ std::optional<OverlayMessage> KnownRobots::introduction(RobotId neighbour, Robot
 void KnownRobots::forget(RobotId robot) {
   robots_.erase(robot);
   forget_report(robot);
+  if (gone_.erase(robot) > 0) renew_own_links();
 }
 
-std::optional<RobotId> KnownRobots::stranger() const {
-  for (const auto& [robot, known] : robots_)
-    if (!known.was_direct) return robot;
-  return std::nullopt;
+std::optional<RobotId> KnownRobots::replaceable() const {
+  const auto rank = [this](const auto& entry) {
+    return std::tuple(receives(entry.first), entry.second.was_direct, entry.second.lost_s);
+  };
+  const auto first = std::ranges::min_element(robots_, {}, rank);
+  if (first == robots_.end() || receives(first->first)) return std::nullopt;
+  return first->first;
 }
 
 std::optional<TeamPeer> KnownRobots::process(RobotId robot) const {
@@ -140,9 +146,17 @@ void KnownRobots::connect(RobotId robot) {
   renew_own_links();
 }
 
+bool KnownRobots::has_lapsed(RobotId robot) const {
+  const auto known = robots_.find(robot);
+  return keys_ && known != robots_.end() && known->second.certificate &&
+         keys_->why_lapsed(*known->second.certificate) != nullptr;
+}
+
 bool KnownRobots::disconnect(RobotId robot, double now_s) {
   if (neighbours_.erase(robot) == 0) return false;
-  gone_[robot] = {robots_.at(robot).identity.boot, now_s};
+  Robot& known = robots_.at(robot);
+  known.lost_s = now_s;
+  gone_[robot] = {known.identity.boot, now_s};
   return true;
 }
 

@@ -61,6 +61,7 @@ class KnownRobots {
     std::string credentials = {};                 ///< Empty without keys.
     std::optional<Certificate> certificate = {};  ///< Proof of its membership.
     bool was_direct = false;                      ///< It has been received directly.
+    double lost_s = -1e9;                         ///< Last time when it was lost.
   };
   /// A robot that this robot receives directly.
   struct Neighbour {
@@ -95,8 +96,9 @@ class KnownRobots {
   [[nodiscard]] std::optional<OverlayMessage> introduction(RobotId neighbour, RobotId robot,
                                                            double now_s);
   void forget(RobotId robot);
-  /// A robot that has never been received directly; nullopt if there is none.
-  [[nodiscard]] std::optional<RobotId> stranger() const;
+  /// The robot whose place another one may take: one that has never been received directly, or the
+  /// one that has been lost for longest. nullopt if all are received directly.
+  [[nodiscard]] std::optional<RobotId> replaceable() const;
 
   [[nodiscard]] const std::map<RobotId, Robot>& all() const { return robots_; }
   /// Present process of a known robot.
@@ -117,6 +119,8 @@ class KnownRobots {
   // Links.
 
   void connect(RobotId robot);
+  /// True if the certificate of a known robot is not valid any more.
+  [[nodiscard]] bool has_lapsed(RobotId robot) const;
   /// False if it was not received.
   bool disconnect(RobotId robot, double now_s);
   /// Removes lost links from the report of this robot when their time is over.

@@ -56,17 +56,18 @@ void Overlay::lost(RobotId robot, double now_s) {
   if (!robots_.disconnect(robot, now_s)) return;
   states_.disconnected(robot);
   store_.disconnected(robot, now_s);
+  if (robots_.has_lapsed(robot)) return forget(robot);
   renew_routes();
 }
 
 // Registers a process that is received directly. If there is no room, it takes the place of a robot
-// that neighbours have introduced: they could have invented that robot.
+// that neighbours have introduced, because they could have invented that robot, or of a lost one.
 bool Overlay::meet(const RobotIdentity& peer) {
   const TeamPeer process{peer.robot, peer.boot};
   if (take_in(robots_.meet(peer), process)) return true;
-  const auto stranger = robots_.stranger();
-  if (!stranger) return false;
-  forget(*stranger);
+  const auto replaced = robots_.replaceable();
+  if (!replaced) return false;
+  forget(*replaced);
   return take_in(robots_.meet(peer), process);
 }
 

@@ -1,4 +1,5 @@
-// A robot that only talks, as a process of its own, driven by lines on standard input:
+// A robot that only talks, as a process of its own: test_dds_peer ROBOT KEYS [SETTING...], where
+// KEYS is its folder of keys or empty. Lines on standard input drive it:
 //   ping FIRST LAST    events with these indices, to all
 //   one ROBOT INDEX    to one robot
 //   quit
@@ -9,6 +10,8 @@
 #include <sstream>
 #include <string>
 
+#include "modules/security/key_folder.hpp"
+#include "runtime/clock.hpp"
 #include "runtime/config_layers.hpp"
 #include "runtime/log.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
@@ -77,12 +80,18 @@ void obey(TestRobot& robot) {
 int run(int argc, char** argv) {
   log::set_level(log::Level::kWarn);
   ConfigLayers layers;
-  for (int i = 2; i < argc; ++i) layers.add_override(argv[i]);
+  for (int i = 3; i < argc; ++i) layers.add_override(argv[i]);
   const auto config = layers.load<DdsConfig>();
   layers.finish();
 
   const auto id = static_cast<RobotId>(std::stoi(argv[1]));
-  TestRobot robot(config, {id, robot_name(id), kProtocolVersion, random_boot_id()}, nullptr);
+  const std::string keys = argv[2];
+  const TestRobot::MakeSeal seal_of = [&keys](const RobotIdentity& own) {
+    return std::make_shared<SharedSeal>(load_robot_keys(keys), own,
+                                        static_cast<std::int64_t>(wall_now_s()));
+  };
+  TestRobot robot(config, {id, robot_name(id), kProtocolVersion, random_boot_id()},
+                  keys.empty() ? TestRobot::MakeSeal() : seal_of);
   report(robot);
   robot.start();
   obey(robot);
@@ -97,7 +106,7 @@ int run(int argc, char** argv) {
 }  // namespace km
 
 int main(int argc, char** argv) try {
-  return argc < 2 ? 2 : km::run(argc, argv);
+  return argc < 3 ? 2 : km::run(argc, argv);
 } catch (const std::exception& error) {
   std::cerr << "test_dds_peer: " << error.what() << std::endl;
   return 1;

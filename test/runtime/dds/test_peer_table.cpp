@@ -163,6 +163,53 @@ TEST_CASE("An orderly end is not a loss", "[peers]") {
   CHECK(table.identity_of(guid(2)).has_value());  // its messages may still be on their way
 }
 
+const char* admit_all(const RobotIdentity& /*identity*/, std::string_view /*credentials*/) {
+  return nullptr;
+}
+
+TEST_CASE("A robot that has proven its identity returns without another proof", "[peers]") {
+  PeerTable table(kSelf, admit_all);
+  table.participant(guid(2), data_of(7, 70), "");
+  table.alive(guid(2));
+  CHECK(kinds(table).empty());
+  CHECK(table.standing(guid(2)) == Standing::kRival);
+  table.prove(guid(2));
+  CHECK(kinds(table) == Kinds{PeerEventKind::kJoined});
+  std::string announced = data_of(7, 70);
+  SECTION("after its lease has ended, or a forged packet has ended it") {
+    table.participant_gone(guid(2));
+    CHECK(kinds(table) == Kinds{PeerEventKind::kLeft});
+  }
+  SECTION("after the address of this robot has changed") {
+    table.network_changed();
+    CHECK(kinds(table) == Kinds{PeerEventKind::kLost});
+  }
+  SECTION("although an announcement in its name is forged") {
+    table.participant_gone(guid(2));
+    CHECK(kinds(table) == Kinds{PeerEventKind::kLeft});
+    announced = GENERATE(data_of(9, 90), data_of(7, 71), std::string("robot=x"), std::string());
+    CAPTURE(announced);
+    table.participant(guid(2), announced, "");
+    CHECK(kinds(table) == Kinds(announced.empty() ? 0 : 1, PeerEventKind::kRefused));
+    CHECK(table.identity_of(guid(2))->boot == 70);
+  }
+  table.participant(guid(2), announced, "");
+  table.alive(guid(2));
+  CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
+  CHECK(table.standing(guid(2)) == Standing::kAdmitted);
+}
+
+TEST_CASE("An identity under the GUID of a gone participant needs a proof of its own", "[peers]") {
+  PeerTable table(kSelf, admit_all);
+  table.participant(guid(2), data_of(7, 70), "");
+  table.alive(guid(2));
+  table.participant_gone(guid(2));
+  table.participant(guid(2), data_of(9, 90), "");
+  table.alive(guid(2));
+  CHECK(kinds(table).empty());
+  CHECK(table.standing(guid(2)) == Standing::kRival);
+}
+
 constexpr std::uint64_t kBoot = 70U << kResumeBits;
 constexpr std::uint64_t kOtherIncarnation = 71U << kResumeBits;
 
@@ -256,41 +303,170 @@ TEST_CASE("An id passes to the participant that has claimed it for longest", "[p
   CHECK(table.standing(guid(3)) == Standing::kAdmitted);
 }
 
+TEST_CASE("A robot that is a member no longer is lost, and its certificate no proof", "[peers]") {
+  PeerTable table(kSelf, admit_all);
+  for (const std::uint8_t n : std::vector<std::uint8_t>{2, 3}) {
+    table.participant(guid(n), data_of(7, kBoot + n), "");
+    table.alive(guid(n));
+    table.prove(guid(n));
+  }
+  (void)table.take_events();
+  table.expel({{7, kBoot + 2}, {7, kBoot + 3}, {9, 90}});
+  CHECK(kinds(table) == Kinds{PeerEventKind::kLost});
+  CHECK(table.peers()[0].state == PeerState::kLost);
+  for (const std::uint8_t n : std::vector<std::uint8_t>{2, 3}) {
+    table.prove(guid(n));
+    table.alive(guid(n));
+    CHECK(table.standing(guid(n)) == Standing::kOutsider);
+  }
+  CHECK(kinds(table).empty());
+}
+
+TEST_CASE("With keys a former process does not get its id back", "[peers]") {
+  PeerTable table(kSelf, admit_all);
+  const auto receive = [&](const Guid& from, std::uint64_t boot) {
+    table.participant(from, data_of(7, boot), "udp/10.0.0.66");
+    table.alive(from);
+    table.prove(from);
+  };
+  const std::uint64_t former = GENERATE(kBoot, kOtherIncarnation);
+  receive(guid(2), former);
+  table.silent(guid(2));
+  receive(guid(3), kBoot + 1);
+  CHECK(table.is_current({7, kBoot + 1}));
+  (void)table.take_events();
+  const bool was_silent = GENERATE(true, false);
+  const Guid other = GENERATE(guid(2), guid(4));
+  if (was_silent) table.silent(guid(3));
+  receive(other, former);
+  const std::vector<PeerEvent> events = table.take_events();
+  REQUIRE_FALSE(events.empty());
+  CHECK(events.back().kind == PeerEventKind::kRefused);
+  CHECK_THAT(events.back().text, Catch::Contains("start it again"));
+  if (!was_silent) table.silent(guid(3));
+  CHECK(table.is_current({7, kBoot + 1}));
+  table.reported({7, "peer", kProtocolVersion, former});
+  CHECK(table.is_current({7, kBoot + 1}));
+  CHECK(table.peers()[0].state == PeerState::kLost);
+  table.alive(guid(3));
+  CHECK(table.peers()[0].state == PeerState::kAlive);
+  table.silent(guid(3));
+  receive(guid(5), kBoot + 2);
+  CHECK(table.is_current({7, kBoot + 2}));
+}
+
+// Events of a process that receives another one with its id every half second.
+std::vector<PeerEvent> meet_twin(const RobotIdentity& self, const RobotIdentity& twin, double own_s,
+                                 double its_s, double seconds) {
+  PeerTable table(self);
+  table.participant(guid(2), to_user_data(twin), "udp/10.0.0.66");
+  table.alive(guid(2));
+  CHECK(table.standing(guid(2)) == Standing::kTwin);
+  for (double s = 0.0; s <= seconds; s += 0.5) table.twin_received(guid(2), its_s + s, own_s + s);
+  CHECK(table.peers().empty());
+  return table.take_events();
+}
+
 TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
   struct Case {
     const char* what;
     double its_s, own_s;
-    std::uint64_t its_boot;
     PeerEventKind expected;
   };
-  const auto [what, its_s, own_s, its_boot, expected] = GENERATE(
-      values({Case{"it is older", 100.0, 2.0, 70, PeerEventKind::kConflict},
-              Case{"it is younger", 2.0, 5.0, 70, PeerEventKind::kRefused},
-              Case{"both are new, and its boot is lower", 2.0, 2.5, 70, PeerEventKind::kConflict},
-              Case{"both are new, and its boot is higher", 2.0, 2.5, 7000, PeerEventKind::kRefused},
-              Case{"it reports that it is older, to one that is not new", 1e6, 11.0, 70,
-                   PeerEventKind::kRefused}}));
+  const auto [what, its_s, own_s, expected] =
+      GENERATE(values({Case{"it is older", 100.0, 2.0, PeerEventKind::kConflict},
+                       Case{"it is younger", 2.0, 8.0, PeerEventKind::kRefused},
+                       Case{"it reports that it is older, to one that is not new", 1e6, 11.0,
+                            PeerEventKind::kRefused}}));
   CAPTURE(what);
-  PeerTable table(kSelf);
-  table.participant(guid(2), data_of(kSelf.robot, its_boot), "udp/10.0.0.66");
-  table.alive(guid(2));
-  CHECK(kinds(table).empty());
-  CHECK(table.standing(guid(2)) == Standing::kTwin);
-  for (int i = 0; i < 3; ++i) table.twin_received(guid(2), its_s + i, own_s + i);
-  const auto events = table.take_events();
+  const std::uint64_t its_boot = GENERATE(70, 7000);
+  const auto events = meet_twin(kSelf, {1, "twin", kProtocolVersion, its_boot}, own_s, its_s, 30.0);
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == expected);
   CHECK_THAT(events[0].text, Catch::Contains("give every robot its own --robot"));
-  CHECK(table.peers().empty());
 }
 
-TEST_CASE("Many unknown participants do not exhaust the memory", "[peers]") {
-  PeerTable table(kSelf);
-  const auto wide_guid = [](std::size_t n) {
-    Guid result{};
-    for (std::size_t k = 0; k < 4; ++k) result[k] = static_cast<std::uint8_t>(n >> (8 * k));
-    return result;
+TEST_CASE("One of two processes with one id ends, whichever errors they measure with", "[peers]") {
+  // Each measures the other uptime too small by up to a second.
+  const double late_s = GENERATE(0.0, 0.4, 0.9);
+  const double later_s = GENERATE(0.0, 0.4, 0.9);
+  const RobotIdentity low{1, "a", kProtocolVersion, 70}, high{1, "b", kProtocolVersion, 7000};
+  for (double lead_s = -8.0; lead_s <= 8.0; lead_s += 0.25) {  // lead of `low`
+    const double low_s = 1.0 + std::max(lead_s, 0.0), high_s = 1.0 + std::max(-lead_s, 0.0);
+    CAPTURE(late_s, later_s, lead_s);
+    const auto yields = [&](const RobotIdentity& self, const RobotIdentity& twin, double own_s,
+                            double its_s, double seconds) {
+      const auto events = meet_twin(self, twin, own_s, its_s, seconds);
+      REQUIRE_FALSE(events.empty());
+      return events.back().kind == PeerEventKind::kConflict;
+    };
+    const bool low_ends_first = yields(low, high, low_s, high_s - late_s, 2.0);
+    const bool high_ends_first = yields(high, low, high_s, low_s - later_s, 2.0);
+    CHECK_FALSE((low_ends_first && high_ends_first));
+    if (low_ends_first || high_ends_first) continue;
+    CHECK_FALSE(yields(low, high, low_s, high_s - late_s, 30.0));
+    CHECK(yields(high, low, high_s, low_s - later_s, 30.0));
+  }
+}
+
+Guid wide_guid(std::size_t n) {
+  Guid result{};
+  for (std::size_t k = 0; k < 4; ++k) result[k + 1] = static_cast<std::uint8_t>(n >> (8 * k));
+  return result;
+}
+
+// Announces more participants than a table remembers. Their number and whether they are alive is
+// free to choose for any program.
+void announce_strangers(PeerTable& table, const std::string& data, bool alive) {
+  for (std::size_t n = 0; n < 3 * PeerTable::kMaxParticipants; ++n) {
+    table.participant(wide_guid(n), data, "");
+    if (alive) table.alive(wide_guid(n));
+  }
+  (void)table.take_events();
+}
+
+TEST_CASE("Participants outside the team do not take the place of a robot, however many they are",
+          "[peers]") {
+  const bool has_keys = GENERATE(true, false);
+  const bool alive = GENERATE(true, false);
+  // A program, a robot without a status writer, and the recorded announcement of a robot.
+  const std::string strangers = GENERATE(std::string("some tool"), data_of(9, 90), data_of(7, 70));
+  if (alive && strangers == data_of(7, 70) && !has_keys) return;  // owner of the id
+  CAPTURE(has_keys, alive, strangers);
+  PeerTable table(kSelf, has_keys ? admit_all : PeerTable::Admit());
+  const auto announce = [&] { table.participant(guid(2), data_of(7, 70), ""); };
+  const auto be_alive = [&] {
+    table.alive(guid(2));
+    if (!table.is_announced(guid(2))) announce();
+    table.prove(guid(2));
   };
+  SECTION("before it comes") {
+    announce_strangers(table, strangers, alive);
+    announce();
+    be_alive();
+  }
+  SECTION("after it is announced") {
+    announce();
+    announce_strangers(table, strangers, alive);
+    be_alive();
+  }
+  SECTION("before it returns") {
+    announce();
+    be_alive();
+    table.silent(guid(2));
+    table.participant_gone(guid(2));
+    announce_strangers(table, strangers, has_keys && alive);
+    CHECK(table.identity_of(guid(2)).has_value());
+    announce();
+    be_alive();
+  }
+  CHECK(table.standing(guid(2)) == Standing::kAdmitted);
+  CHECK(table.is_current({7, 70}));
+  CHECK(table.peers().front().state == PeerState::kAlive);
+}
+
+TEST_CASE("Many robots do not exhaust the memory", "[peers]") {
+  PeerTable table(kSelf);
   std::size_t admitted = 0;
   for (std::size_t n = 0; n < 3 * PeerTable::kMaxParticipants; ++n) {
     table.participant(wide_guid(n), data_of(static_cast<RobotId>(n + 2), n + 1), "");
@@ -299,12 +475,41 @@ TEST_CASE("Many unknown participants do not exhaust the memory", "[peers]") {
   }
   CHECK(admitted == PeerTable::kMaxRobots);
   CHECK(table.peers().size() == PeerTable::kMaxRobots);
-  CHECK(table.standing(wide_guid(2 * PeerTable::kMaxParticipants)) == Standing::kUnknown);
-  // Participants that leave make room for others.
-  for (std::size_t n = 0; n < PeerTable::kMaxParticipants; ++n)
-    table.participant_gone(wide_guid(n));
-  table.participant(wide_guid(9999), "some tool", "");
-  CHECK(table.standing(wide_guid(9999)) == Standing::kOutsider);
+}
+
+TEST_CASE("A new robot takes the place of the one that has been lost for longest", "[peers]") {
+  PeerTable table(kSelf);
+  const auto receive = [&](std::size_t n, std::uint64_t boot) {
+    table.participant(wide_guid(n), data_of(static_cast<RobotId>(n), boot), "");
+    table.alive(wide_guid(n));
+  };
+  const std::size_t end = 100 + PeerTable::kMaxRobots;
+  for (std::size_t n = 100; n < end; ++n) receive(n, n);
+  receive(7, 70);
+  CHECK(table.standing(wide_guid(7)) == Standing::kRival);
+  (void)table.take_events();
+  table.silent(wide_guid(120));
+  auto events = table.take_events();
+  REQUIRE(events.size() == 3);
+  CHECK(events[0].kind == PeerEventKind::kLost);
+  CHECK(events[1].kind == PeerEventKind::kRestarted);
+  CHECK(events[1].identity.robot == 120);
+  CHECK(events[1].identity.boot == 0);
+  CHECK_FALSE(events[1].direct);
+  CHECK(events[2].kind == PeerEventKind::kJoined);
+  CHECK(table.is_current({7, 70}));
+
+  table.silent(wide_guid(140));
+  table.silent(wide_guid(130));
+  table.alive(wide_guid(120));
+  events = table.take_events();
+  REQUIRE(events.size() == 4);
+  CHECK(events[2].identity.robot == 140);
+  CHECK(events[3].kind == PeerEventKind::kJoined);
+  CHECK(table.is_current({120, 120}));
+  table.alive(wide_guid(130));
+  CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
+  CHECK(table.peers().size() == PeerTable::kMaxRobots);
 }
 
 TEST_CASE("Another protocol version and unreadable user data are refused, once", "[peers]") {

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "test/runtime/dds/peer_process.hpp"
+#include "test/support/forged_discovery.hpp"
 
 namespace km {
 namespace {
@@ -54,6 +55,46 @@ TEST_CASE("A killed robot is lost within the liveliness time, and restarts as an
   CHECK(b->wait_for("ping 3 9"));  // events of before it was born
   b->send_line("ping 0 0");
   CHECK(a->wait_for("ping 4 0"));
+}
+
+TEST_CASE("Robots with keys return after a forged packet has declared that they are gone",
+          "[dds][processes]") {
+  const auto settings =
+      own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
+  const TeamOfTwo keys;
+  const auto a = start_peer(3, settings, 0, keys.of(3));
+  const auto b = start_peer(4, settings, 0, keys.of(4));
+  REQUIRE(a->wait_for("joined 4"));
+  REQUIRE(b->wait_for("joined 3"));
+  a->send_line("ping 0 49");
+  ForgedDiscovery stranger(loopback_config().domain);
+  stranger.record(3);
+  stranger.dispose(3);
+  REQUIRE(b->wait_for("left 3"));
+  a->send_line("ping 50 99");
+  CHECK(b->wait_for("returned 3"));
+  CHECK(b->wait_for("ping 3 99"));
+  b->send_line("one 3 7");
+  CHECK(a->wait_for("one 4 7"));
+}
+
+TEST_CASE("Robots meet although a program has announced more participants than they remember",
+          "[dds][processes]") {
+  const auto settings =
+      own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
+  const TeamOfTwo keys;
+  const auto a = start_peer(3, settings, 0, keys.of(3));
+  ForgedDiscovery stranger(loopback_config().domain);
+  stranger.record(3);
+  // Packets are lost if the robot is busy. It refuses each participant that copies its own keys.
+  for (std::size_t refused = 0; refused < PeerTable::kMaxParticipants;) {
+    stranger.invent(3, 50);
+    REQUIRE(a->wait_for("refused 3", refused + 1));
+    refused = a->lines("refused 3").size();
+  }
+  const auto b = start_peer(4, settings, 0, keys.of(4));
+  CHECK(a->wait_for("joined 4"));
+  CHECK(b->wait_for("joined 3"));
 }
 
 TEST_CASE("A dozen robots on one host all meet, with either discovery", "[dds][processes]") {

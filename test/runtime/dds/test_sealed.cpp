@@ -229,12 +229,12 @@ TEST_CASE("The later of two processes with one robot's keys is notified and igno
   twin.start();
   CHECK(twin.receives(PeerEventKind::kConflict, 3));
   CHECK(a.receives(PeerEventKind::kRefused, 3));
+  CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
   twin.ping(1);
   CHECK(eventually([&] { return a.refused() == 1 && b.refused() == 1; }));
   a.ping(2);
   REQUIRE(b.received.wait_for(1).size() == 1);
   CHECK(b.received.messages()[0].index == 2);
-  CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
 }
 
 TEST_CASE("Messages under a new key wait for it, however many they are", "[sealed]") {
@@ -259,6 +259,33 @@ TEST_CASE("Messages under a new key wait for it, however many they are", "[seale
   a.bridge.send_keys();
   CHECK(b.received.wait_for(3 * kCount).size() == 3 * kCount);
   CHECK(b.refused() == 0);
+}
+
+TEST_CASE("A revoked robot is lost at once, and the others continue under a new key", "[sealed]") {
+  ToyTeam team;
+  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
+  TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
+  const RobotKeys revoked = team.keys_of(5, "robot5", today_s() - 3600);
+  TestRobot c(domain, 5, [&](const RobotIdentity& own) {
+    return std::make_shared<SharedSeal>(revoked, own, today_s());
+  });
+  for (TestRobot* robot : {&a, &b, &c}) robot->start();
+  for (const RobotId robot : std::vector<RobotId>{3, 5})
+    REQUIRE(b.receives(PeerEventKind::kJoined, robot));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  REQUIRE(a.receives(PeerEventKind::kJoined, 5));
+  const Revocations list = team.revoking({revoked.certificate});
+  for (TestRobot* robot : {&a, &b})
+    robot->bridge.apply(robot->participant.seal()->with(
+        [&](TeamSeal& seal) { return seal.update(list, today_s()); }));
+  CHECK(a.receives(PeerEventKind::kLost, 5));
+  CHECK(b.receives(PeerEventKind::kLost, 5));
+  c.ping(1);
+  CHECK(eventually([&] { return a.refused() == 1 && b.refused() == 1; }));
+  a.ping(2);
+  REQUIRE(b.received.wait_for(1).size() == 1);
+  CHECK(b.received.messages()[0].index == 2);
+  CHECK(c.received.messages().empty());
 }
 
 TEST_CASE("Robots appear and are received while sending is blocked", "[sealed]") {

@@ -225,6 +225,24 @@ TEST_CASE("Messages of a revoked robot are refused and the robot is removed", "[
   CHECK(receiver.introduce(receiver.a) == OverlayArrival::kForged);
 }
 
+TEST_CASE("A revoked robot leaves the links at once, although another robot still receives it",
+          "[overlay]") {
+  Network network(3, true);
+  network.link({{kA, kB}, {kB, kC}, {kA, kC}});
+  network.run(5.0);
+  const Revocations list = network.team().revoking({network.member(kA).keys.certificate});
+  (void)network.member(kB).seal.update(list, kToyNow_s);
+  network.cut(kA, kB);
+  network.run(kPeriod_s);
+  CHECK(network.at(kB).robots().links().component(kB) == std::set<RobotId>{kB, kC});
+  CHECK_FALSE(network.at(kB).robots().process(kA));
+  CHECK(network.at(kC).robots().links().component(kC).contains(kA));
+  (void)network.member(kC).seal.update(list, kToyNow_s);
+  network.cut(kA, kC);
+  network.run(kPeriod_s);
+  CHECK(network.at(kC).robots().links().component(kC) == std::set<RobotId>{kB, kC});
+}
+
 TEST_CASE("A directly received message is stored for other robots only with its signature",
           "[overlay]") {
   Receiver receiver;

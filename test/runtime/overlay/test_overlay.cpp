@@ -399,6 +399,22 @@ TEST_CASE("Robots that a neighbour invents cannot exceed the common storage", "[
   CHECK(overlay.summary().holds.front().bags == 1);
 }
 
+TEST_CASE("A new robot takes the place of the one that has been lost for longest", "[overlay]") {
+  Overlay overlay({kA, 1});
+  const auto connect = [&](RobotId robot, double now_s) {
+    overlay.connected({.robot = robot, .name = name_of(robot), .boot = 1}, now_s);
+    return overlay.robots().receives(robot);
+  };
+  for (RobotId robot = 1; robot <= kMaxTeam; ++robot) REQUIRE(connect(robot, 0.0));
+  CHECK_FALSE(connect(100, 1.0));
+  overlay.lost(20, 2.0);
+  overlay.lost(10, 3.0);
+  CHECK(connect(100, 4.0));
+  CHECK_FALSE(overlay.robots().process(20));
+  CHECK(connect(10, 5.0));
+  CHECK_FALSE(connect(20, 6.0));
+}
+
 TEST_CASE("A full store refuses the newest messages and counts them", "[overlay]") {
   Network network(2);
   network.link(kA, kC - 1);
