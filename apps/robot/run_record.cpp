@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "modules/core/median_depth.hpp"
 #include "modules/core/odometry_correction.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/pose_graph/own_graph.hpp"
@@ -50,13 +51,8 @@ void RunRecord::add(const KeyframeOdometry& keyframe) {
 
 void RunRecord::add(const Keyframe& keyframe) {
   keypoints_ += keyframe.features.keypoints.size();
-  std::vector<double> depths_m;
-  for (const Keypoint& keypoint : keyframe.features.keypoints)
-    if (keypoint.has_depth()) depths_m.push_back(1.0 / static_cast<double>(keypoint.inverse_depth));
-  if (depths_m.empty()) return;
-  const auto middle = depths_m.begin() + static_cast<std::ptrdiff_t>(depths_m.size() / 2);
-  std::nth_element(depths_m.begin(), middle, depths_m.end());
-  median_depths_m_[keyframe.odometry.id.index] = *middle;
+  if (const auto depth_m = km::median_depth_m(keyframe.features))
+    median_depths_m_[keyframe.odometry.id.index] = *depth_m;
 }
 
 void RunRecord::add(const Closure& closure) {

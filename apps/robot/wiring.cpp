@@ -219,6 +219,7 @@ void Robot::add_place_recognition(const RobotConfig& config) {
   add<PlaceRecognitionNode>(false, config.place_recognition, identity_.robot, vocabulary_,
                             PlaceRecognitionTopics{.keyframes = topics_.keyframes,
                                                    .peer_bows = topics_.peer_bows,
+                                                   .closures = topics_.own_closures,
                                                    .peer_events = bridge_->peers().events(),
                                                    .own_bows = topics_.bows.to_peers(),
                                                    .candidates = topics_.candidates,

@@ -31,6 +31,8 @@ LinkKeys merged(LinkKeys usual, const LinkKeys& own) {
   take(usual.queue_bytes, own.queue_bytes);
   take(usual.range_m, own.range_m);
   if (!own.trace.empty() || own.delay_s || own.rate_bytes_per_s) usual.trace = own.trace;
+  if (!own.packets.empty() || !own.trace.empty() || own.rate_bytes_per_s)
+    usual.packets = own.packets;
   usual.outages.insert(usual.outages.end(), own.outages.begin(), own.outages.end());
   return usual;
 }
@@ -42,12 +44,36 @@ LinkPlan plan_of(const LinkKeys& keys) {
                              .delay_s = keys.delay_s.value_or(0.0)}});
   else
     link.trace = read_link_trace(keys.trace);
+  if (!keys.packets.empty()) link.packets = read_packet_schedule(keys.packets);
   link.jitter_s = keys.jitter_s.value_or(link.jitter_s);
   link.loss = keys.loss.value_or(link.loss);
   link.queue_bytes = keys.queue_bytes.value_or(link.queue_bytes);
   link.range_m = keys.range_m.value_or(link.range_m);
   for (const SpanKeys& outage : keys.outages) link.outages.push_back(outage.span());
   return link;
+}
+
+// True for a recording of Mahimahi, of either direction.
+bool is_recording(const fs::path& file) {
+  return file.extension() == ".up" || file.extension() == ".down";
+}
+
+// Every robot sends to those after it over the recorded uplink, and receives from them over the
+// downlink.
+std::vector<PairKeys> recorded_pairs(const std::vector<std::string>& team, fs::path recording) {
+  const fs::path up = recording.replace_extension(".up"),
+                 down = recording.replace_extension(".down");
+  std::vector<PairKeys> pairs;
+  const auto add = [&](const std::string& from, const std::string& to, const fs::path& packets) {
+    pairs.push_back({.from = from, .to = to, .one_way = true, .link = {}});
+    pairs.back().link.packets = packets;
+  };
+  for (std::size_t a = 0; a < team.size(); ++a)
+    for (std::size_t b = a + 1; b < team.size(); ++b) {
+      add(team[a], team[b], up);
+      add(team[b], team[a], down);
+    }
+  return pairs;
 }
 
 LinkPartition partition_of(const LinksFile& file, const PartitionKeys& keys) {
@@ -122,6 +148,10 @@ std::string LinksFile::problem_of(const std::vector<std::vector<std::string>>& g
 LinkScript read_links_file(const fs::path& file, const TeamPlan& plan) {
   LinksFile keys;
   for (const RobotPlan& robot : plan.robots) keys.team.push_back(robot.name);
+  if (is_recording(file)) {
+    keys.pairs = recorded_pairs(keys.team, file);
+    return make_script(keys, plan, file.string());
+  }
   ConfigProblems problems;
   const ConfigContext context{problems, fs::absolute(file).parent_path()};
   fill_config(read_section(load_yaml(file), "", file.string(), context), "", context, keys);

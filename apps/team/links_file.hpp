@@ -31,7 +31,7 @@ struct SpanKeys {
 /// Properties of a link that a file may give.
 struct LinkKeys {
   std::optional<double> delay_s, jitter_s, loss, rate_bytes_per_s, queue_bytes, range_m;
-  std::filesystem::path trace;
+  std::filesystem::path trace, packets;
   std::vector<SpanKeys> outages;
 
   void visit_fields(auto& visitor) {
@@ -50,6 +50,9 @@ struct LinkKeys {
     visitor.field("trace", trace, Input{},
                   "recorded link: CSV with columns time_s, bytes_per_s, delay_s, interpolated "
                   "linearly; replaces delay_s and rate_bytes_per_s");
+    visitor.field("packets", packets, Input{},
+                  "recorded link: file of Mahimahi, a line for each time [ms] at which 1500 bytes "
+                  "can be sent, repeated at its end; replaces rate_bytes_per_s");
     visitor.sections(
         "outages", outages,
         "times in which every frame is lost; those of a pair are added to those of all");
@@ -94,6 +97,7 @@ struct LinksFile {
                .queue_bytes = LinkPlan{}.queue_bytes,
                .range_m = {},
                .trace = {},
+               .packets = {},
                .outages = {}};
   std::vector<PairKeys> pairs;
   std::vector<PartitionKeys> partitions;
@@ -127,7 +131,9 @@ struct LinksFile {
 };
 
 /// Reads a file of links for the robots of `plan`, in its order. Relative paths are relative to the
-/// file's folder. Throws ConfigError with every problem by file and line, or an exception that
+/// file's folder. `file` may also be a recording of Mahimahi, of either direction (.up, .down).
+/// Each robot then sends to the robots after it over the uplink, and receives over the downlink.
+/// Throws ConfigError with every problem by file and line, or an exception that
 /// names a trace or a trajectory and its line.
 [[nodiscard]] LinkScript read_links_file(const std::filesystem::path& file, const TeamPlan& plan);
 

@@ -78,9 +78,10 @@ void define(CLI::App& app, TeamOptions& options) {
   app.add_option("--security", options.security,
                  "Team folder of kimera_multi_keys: each robot uses the keys in its folder there")
       ->check(CLI::ExistingDirectory);
-  app.add_option(
-         "--links", options.links,
-         "File of bad links, see below and config/links: each robot gets a network of its own")
+  app.add_option("--links", options.links,
+                 "File of bad links, see below and config/links, or a link recorded by Mahimahi "
+                 "(.up, .down): "
+                 "each robot gets a network of its own")
       ->check(CLI::ExistingFile);
   app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's")
       ->check(CLI::ExistingPath);

@@ -39,6 +39,29 @@ void check_script(const LinkScript& script) {
     require(partition.group_of.size() == n, "a partition needs the group of every robot");
 }
 
+// Time at which a frame of `bytes` has left the queue, if it is sent now; nullopt if it does not
+// fit into the queue. `queue_end`: capacity_until() the end of the queue, which the frame moves.
+template <typename Capacity>
+std::optional<double> leave_queue(const Capacity& link, double bytes, double queue_bytes,
+                                  double now_s, double& queue_end) {
+  const double carried = link.capacity_until(now_s);
+  const double end = std::max(queue_end, carried) + bytes;
+  if (end - carried > queue_bytes) return std::nullopt;
+  queue_end = end;
+  return std::max(now_s, link.time_of(end));
+}
+
+// The same for the link of a plan.
+std::optional<double> leave_queue(const LinkPlan& link, std::size_t frame_bytes, double now_s,
+                                  double& queue_end) {
+  if (link.packets)
+    return leave_queue(*link.packets, static_cast<double>(frame_bytes - kHeader_bytes),
+                       link.queue_bytes, now_s, queue_end);
+  if (!link.trace.has_limit()) return now_s;
+  return leave_queue(link.trace, static_cast<double>(frame_bytes), link.queue_bytes, now_s,
+                     queue_end);
+}
+
 }  // namespace
 
 std::array<std::uint8_t, 6> ethernet_address(std::size_t robot) {
@@ -82,16 +105,10 @@ void LinkEmulator::send_over(std::size_t from, std::size_t to, double now_s,
     state.counts.lost[static_cast<std::size_t>(why)].add(frame);
   };
   if (const auto why = loss_of(link, from, to, now_s)) return lose(*why);
-  double dequeued_s = now_s;
-  if (link.trace.has_limit()) {
-    const double begin = std::max(state.queue_end, link.trace.capacity_until(now_s));
-    const double end = begin + static_cast<double>(frame.size());
-    if (end - link.trace.capacity_until(now_s) > link.queue_bytes) return lose(LinkLoss::kQueue);
-    state.queue_end = end;
-    dequeued_s = std::max(now_s, link.trace.time_of(end));
-  }
+  const auto dequeued_s = leave_queue(link, frame.size(), now_s, state.queue_end);
+  if (!dequeued_s) return lose(LinkLoss::kQueue);
   if (chance < link.loss) return lose(LinkLoss::kChance);
-  const double due_s = dequeued_s + link.trace.delay_s(dequeued_s) + jitter_s;
+  const double due_s = *dequeued_s + link.trace.delay_s(*dequeued_s) + jitter_s;
   in_flight_.emplace(due_s, SentFrame{from, to, now_s, due_s, frame});
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "modules/link_emulation/link_trace.hpp"
+#include "modules/link_emulation/packet_schedule.hpp"
 
 namespace km {
 
@@ -26,6 +27,8 @@ struct RunSpan {
 /// Properties of the link from one robot to another.
 struct LinkPlan {
   LinkTrace trace{{{.bytes_per_s = std::numeric_limits<double>::infinity()}}};
+  /// Replaces the rate of `trace`; frames count without their Ethernet header.
+  std::optional<PacketSchedule> packets = {};
   double jitter_s = 0.0;  ///< Additional delay, uniform from 0 to this value, by which frames may
                           ///< overtake others.
   double loss = 0.0;      ///< Probability that a frame is lost.
@@ -143,7 +146,7 @@ class LinkEmulator {
  private:
   struct State {
     std::mt19937 rng;
-    /// LinkTrace::capacity_until() at the time when the last queued frame has been sent [bytes].
+    /// capacity_until() of the link at the time when the last queued frame has been sent [bytes].
     double queue_end = -std::numeric_limits<double>::infinity();
     LinkCounts counts = {};
   };

@@ -29,8 +29,7 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   Peer& peer = peers_[candidate.query.robot];
   const KeyframeIndex query = candidate.query.index;
   const KeyframeIndex own = candidate.match.index;
-  const int reach = std::min(config_.max_closure_separation, peer.successes);
-  if (reach > 0 && any_near(peer.closures, query, own, static_cast<KeyframeIndex>(reach)))
+  if (is_near_closure({candidate.match, candidate.query}, config_.max_closure_separation))
     return Decision::kNearClosure;
   const int beside = std::min(config_.max_request_separation, peer.successes);
   if (beside > 0 && any_near(peer.requests, query, own, static_cast<KeyframeIndex>(beside)))
@@ -51,19 +50,29 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   return Decision::kRequest;
 }
 
+// True if both keyframes are near those of a closure: as many keyframes as the peer's successes, at
+// most `most`.
+bool RequestPolicy::is_near_closure(const ClosureId& candidate, int most) const {
+  const auto found = peers_.find(candidate.to.robot);
+  if (found == peers_.end()) return false;
+  const Peer& peer = found->second;
+  const int reach = std::min(most, peer.successes);
+  return reach > 0 && any_near(peer.closures, candidate.to.index, candidate.from.index,
+                               static_cast<KeyframeIndex>(reach));
+}
+
 void RequestPolicy::add_closure(const ClosureId& closure) {
-  peers_[closure.to.robot].closures.emplace(closure.to.index, closure.from.index);
+  Peer& peer = peers_[closure.to.robot];
+  const auto next = peer.closures.lower_bound({closure.to.index, 0});
+  if (next == peer.closures.end() || next->first != closure.to.index) ++peer.successes;
+  peer.closures.emplace(closure.to.index, closure.from.index);
 }
 
 void RequestPolicy::add_result(const KeyframeId& keyframe, bool verified) {
   Peer& peer = peers_[keyframe.robot];
   const auto group = peer.group_of.find(keyframe.index);
   if (group == peer.group_of.end()) return;
-  if (verified) {
-    ++peer.successes;
-  } else {
-    ++peer.groups[group->second].failures;
-  }
+  if (!verified) ++peer.groups[group->second].failures;
   peer.group_of.erase(group);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
@@ -23,6 +24,10 @@ namespace km {
 /// max_request_separation in place of max_closure_separation. Before the first closure with a peer,
 /// neither rule skips a candidate.
 ///
+/// A candidate inside this robot costs no bytes, but time, and memory if it is verified. It is
+/// skipped within kOwnSeparation keyframes of a verified closure, because its error is mostly that
+/// of this closure: both see the same points.
+///
 /// In an environment with similar places most candidates are wrong. Right candidates come in
 /// groups, because the views around the match resemble the query too. Candidates are grouped by
 /// peer and by their support. After n + 4 failures in a group, n times skips_per_failure queries
@@ -31,6 +36,8 @@ namespace km {
 /// Deterministic, no randomness. Not thread-safe.
 class RequestPolicy {
  public:
+  static constexpr int kOwnSeparation = 4;  ///< [keyframes]
+
   enum class Decision {
     kRequest,
     kNearClosure,  ///< Near a verified closure.
@@ -44,7 +51,13 @@ class RequestPolicy {
   /// After kRequest the candidate counts as requested.
   [[nodiscard]] Decision decide(const LoopCandidate& candidate);
 
-  /// Notes that a closure from an own keyframe to a keyframe of a peer was verified.
+  /// True if a candidate inside this robot adds little to a verified closure near it.
+  [[nodiscard]] bool is_covered(const ClosureId& own_candidate) const {
+    return is_near_closure(own_candidate, std::min(config_.max_closure_separation, kOwnSeparation));
+  }
+
+  /// Notes that a closure from an own keyframe to a keyframe of a peer, or to another own keyframe,
+  /// was verified.
   void add_closure(const ClosureId& closure);
 
   /// Discards all about a peer, because its keyframe indices now mean other keyframes.
@@ -64,13 +77,15 @@ class RequestPolicy {
                                                                  ///< own keyframe).
     std::set<std::pair<KeyframeIndex, KeyframeIndex>>
         requests;                        ///< Such pairs that were requested.
-    int successes = 0;                   ///< Number of keyframes of the peer that led to closures.
+    int successes = 0;                   ///< Number of different peer keyframes in `closures`.
     std::array<SupportGroup, 6> groups;  ///< Indexed by support; supports of 5 and more
                                          ///< share a group.
     std::map<KeyframeIndex, std::size_t> group_of;  ///< Index into `groups` of requested keyframes.
     std::optional<KeyframeIndex> last_skipped;      ///< Query of the last candidate with decision
                                                     ///< kLowYield.
   };
+
+  [[nodiscard]] bool is_near_closure(const ClosureId& candidate, int most) const;
 
   LoopClosureConfig config_;
   std::map<RobotId, Peer> peers_;

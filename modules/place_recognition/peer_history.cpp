@@ -22,7 +22,9 @@ std::vector<PeerQuery> PeerHistory::add(std::uint32_t index, BowVector vector) {
       continue;
     }
     waiting = deadlines_.erase(waiting);
-    released.push_back(release(keyframe));
+    const bool has_words = !is_empty(keyframe);
+    PeerQuery query = release(keyframe);
+    if (has_words) released.push_back(std::move(query));
   }
   forget_oldest_gaps();
   return released;
@@ -30,7 +32,10 @@ std::vector<PeerQuery> PeerHistory::add(std::uint32_t index, BowVector vector) {
 
 bool PeerHistory::follows_its_predecessor(Keyframes::const_iterator keyframe) const {
   if (keyframe->first == 0) return true;  // nothing to wait for
-  return keyframe != keyframes_.begin() && std::prev(keyframe)->first + 1 == keyframe->first;
+  if (keyframe == keyframes_.begin()) return false;
+  const auto before = std::prev(keyframe);
+  const bool has_normalizer = !is_empty(before) || !deadlines_.contains(before->first);
+  return before->first + 1 == keyframe->first && has_normalizer;
 }
 
 PeerQuery PeerHistory::release(Keyframes::iterator keyframe) {
@@ -40,6 +45,7 @@ PeerQuery PeerHistory::release(Keyframes::iterator keyframe) {
     // only its successor releases the vector.
     const auto before = std::prev(keyframe);
     query.previous = before->second;
+    if (is_empty(keyframe)) keyframe->second = before->second;
     forget_if_done(before);
   }
   forget_if_done(keyframe);

@@ -25,9 +25,10 @@ struct PeerQuery {
 /// out of reach delivers its history in a burst. A keyframe whose predecessor is missing waits
 /// until `max_waiting` further keyframes have arrived. Then the nearest earlier keyframe replaces
 /// the predecessor. Keyframe 0 has no normaliser, nor has a keyframe without an earlier keyframe at
-/// the end of its wait, nor one after a gap that has been removed. Memory holds the vectors that
-/// may still be needed: of the waiting keyframes, of the newest keyframe, and of the keyframe
-/// before each of the kMaxGaps newest gaps.
+/// the end of its wait, nor one after a gap that has been removed. A keyframe without words shows a
+/// known place: it is no query, and the keyframe before it normalises the one after it. Memory
+/// holds the vectors that may still be needed: of the waiting keyframes, of the newest keyframe,
+/// and of the keyframe before each of the kMaxGaps newest gaps.
 class PeerHistory {
  public:
   static constexpr std::size_t kMaxGaps = 1000;
@@ -50,6 +51,9 @@ class PeerHistory {
   PeerQuery release(Keyframes::iterator keyframe);
   void forget_if_done(Keyframes::iterator keyframe);
   void forget_oldest_gaps();
+  bool is_empty(Keyframes::const_iterator keyframe) const {
+    return keyframe->second != nullptr && keyframe->second->words.empty();
+  }
   bool follows_its_predecessor(Keyframes::const_iterator keyframe) const;
 
   std::size_t max_waiting_;

@@ -64,6 +64,9 @@ class PlaceDatabase {
   /// last stamp, or if BowDatabase::add() does. The state is then unchanged.
   std::size_t add(BowVector vector, Stamp stamp);
 
+  /// Takes a keyframe that is not added: it only normalises the score of the next one.
+  void pass(BowVector vector) { last_ = std::move(vector); }
+
   std::size_t size() const { return stamps_.size(); }
 
  private:

@@ -14,6 +14,7 @@ struct PlaceRecognitionConfig {
   double min_gap_s = 10.0;
   double candidate_separation_s = 0.0;
   int max_waiting_keyframes = 10;
+  bool known_places = true;
 
   void visit_fields(auto& visitor) {
     visitor.field("similarity_threshold", similarity_threshold, {0.0, 10.0},
@@ -31,6 +32,11 @@ struct PlaceRecognitionConfig {
     visitor.field("max_waiting_keyframes", max_waiting_keyframes, {0, 10000},
                   "maximum number of keyframes of a peer that wait for their predecessor; beyond "
                   "it the nearest earlier keyframe replaces the predecessor");
+    visitor.field(
+        "known_places", known_places,
+        "neither send nor search the words of keyframes at places that earlier keyframes "
+        "of this robot show from nearly the same pose; false: a robot that moves at known "
+        "places sends and keeps as much as at new ones");
   }
 };
 

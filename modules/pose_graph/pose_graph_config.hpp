@@ -56,7 +56,8 @@ struct PoseGraphConfig {
                   "new member, or two seconds without new measurements, also end the wait");
     visitor.field("session_wait_s", session_wait_s, {0.0, 3600.0},
                   "[s] longest wait for the next session, whatever exchange_budget_kb_s and "
-                  "session_growth demand");
+                  "session_growth demand; twice as long after a session without a new closure "
+                  "between robots, and four times after two");
     visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
                   "rbcd: relative decrease of the team cost in a round below which the session has "
                   "converged");

@@ -19,9 +19,9 @@ bool SessionSchedule::is_within_budget(std::uint64_t bytes, double ended_s, doub
 // changes nothing, so new odometry can wait until the team is at rest.
 bool SessionSchedule::is_worthwhile(double ended_s, double now_s) const {
   const bool grown =
-      closures_ != used_ &&
-      static_cast<double>(closures_) >= (1.0 + config_.session_growth) * static_cast<double>(used_);
-  return grown || now_s - changed_s_ >= kAtRest_s || now_s - ended_s >= config_.session_wait_s;
+      closures_ != used_ && static_cast<double>(closures_.all()) >=
+                                (1.0 + config_.session_growth) * static_cast<double>(used_.all());
+  return grown || now_s - changed_s_ >= kAtRest_s || now_s - ended_s >= longest_wait_s();
 }
 
 }  // namespace km

@@ -253,15 +253,15 @@ bool has_lost_member(const SessionPlan& session, const SessionPlan& now) {
   });
 }
 
-std::uint64_t closures_known(const SessionPlan& plan,
+KnownClosures closures_known(const SessionPlan& plan,
                              const std::map<RobotId, TeamStatus>& statuses) {
-  std::uint64_t known = 0;
+  KnownClosures known;
   for (const SessionPair& pair : plan.pairs)
     for (const EdgeSetOffer& offer : statuses.at(pair.a).offers)
-      if (offer.peer == pair.b && offer.id == pair.edges) known += offer.edges;
+      if (offer.peer == pair.b && offer.id == pair.edges) known.between += offer.edges;
   for (const SessionMember& member : plan.members) {
     const TeamStatus& status = statuses.at(member.peer.robot);
-    known += status.revision - std::min(status.revision, status.keyframes);
+    known.inside += status.revision - std::min(status.revision, status.keyframes);
   }
   return known;
 }

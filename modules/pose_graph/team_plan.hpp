@@ -40,10 +40,17 @@ namespace km {
 /// True if a process of `session` is not in the plan `now`.
 [[nodiscard]] bool has_lost_member(const SessionPlan& session, const SessionPlan& now);
 
-/// Number of measurements in the session of `plan`, made from `statuses`, except for odometry:
-/// closures between its robots, and changes of the closures inside robots. Statuses report closures
-/// inside robots only by the number of changes.
-[[nodiscard]] std::uint64_t closures_known(const SessionPlan& plan,
+/// Numbers of measurements in a session except for odometry.
+struct KnownClosures {
+  std::uint64_t between = 0;  ///< Closures between its robots.
+  std::uint64_t inside = 0;   ///< Changes of the closures inside robots: statuses report no more.
+
+  [[nodiscard]] std::uint64_t all() const { return between + inside; }
+  bool operator==(const KnownClosures&) const = default;
+};
+
+/// Measurements in the session of `plan`, made from `statuses`.
+[[nodiscard]] KnownClosures closures_known(const SessionPlan& plan,
                                            const std::map<RobotId, TeamStatus>& statuses);
 
 /// Lowest robot id of the members. Precondition: there is a member.

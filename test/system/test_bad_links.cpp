@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "modules/core/config.hpp"
@@ -249,22 +250,38 @@ std::vector<BadLinks> all_pairs() {
   return all;
 }
 
-// Two robots of the tunnels that trust all closures, so that the kept closures do not depend on the
-// order of events.
-class TunnelsRun {
+// Team file of two robots of the tunnels. They trust all closures, so that the kept closures do not
+// depend on the order of events.
+std::string tunnels_team(double settle_s) {
+  std::string team =
+      "arguments: [--link, wifi, --set, pose_graph.robust=false, --set, run.settle_s=" +
+      shortest_text(settle_s) + "]\nrate: max\nrobots:\n";
+  for (const char* number : {"0", "1"})
+    team += std::string("  - {id: ") + number + ", name: robot" + number +
+            ", graph: \"${DATASET}/robot" + number + ".csv\"}\n";
+  return team;
+}
+
+// Team file of two robots that play the halves of the flight MH_01 in real time.
+std::string halves_team(double settle_s) {
+  return "config: " + fs::absolute("config/datasets/euroc.yaml").string() +
+         "\narguments: [--link, wifi, --set, run.settle_s=" + shortest_text(settle_s) +
+         "]\nrobots:\n"
+         "  - {id: 0, name: robot0, dataset: \"${DATASET}\", to: 7.5}\n"
+         "  - {id: 1, name: robot1, dataset: \"${DATASET}\", from: 7.5, to: 15.0}\n";
+}
+
+// A run of two robots with the status lines that they printed.
+class PrintedRun {
  public:
-  TunnelsRun(const fs::path& dataset, const std::string& script, double settle_s) {
-    std::string team =
-        "arguments: [--link, wifi, --set, pose_graph.robust=false, --set, "
-        "run.settle_s=" +
-        shortest_text(settle_s) + "]\nrobots:\n";
-    for (const char* number : {"0", "1"})
-      team += std::string("  - {id: ") + number + ", name: robot" + number +
-              ", graph: \"${DATASET}/robot" + number + ".csv\"}\n";
+  // `links`: the text of a file of links, or a recorded link.
+  PrintedRun(const std::string& team, const fs::path& dataset,
+             const std::variant<std::string, fs::path>& links) {
+    const auto* text = std::get_if<std::string>(&links);
+    const fs::path file = text ? folder_.write("links.yaml", *text) : std::get<fs::path>(links);
     const std::string command = std::string("exec " KM_BIN_DIR "/kimera_multi_team --config ") +
                                 folder_.write("team.yaml", team).string() + " --links " +
-                                folder_.write("links.yaml", script).string() + " --dataset " +
-                                dataset.string() + " --rate max --output " +
+                                file.string() + " --dataset " + dataset.string() + " --output " +
                                 folder_.path().string() + " -- --serve-limit 1000 2>&1";
     Process process({"sh", "-c", command});
     exit_code_ = process.wait();
@@ -280,7 +297,12 @@ class TunnelsRun {
     return all;
   }
   [[nodiscard]] TeamResult team() const { return read_team(folder_.path(), 2); }
-  [[nodiscard]] LinksTable links() const { return read_links_table(folder_); }
+  // Bytes of all frames that either robot sent, whether or not they arrived.
+  [[nodiscard]] double sent_bytes() const {
+    double bytes = 0.0;
+    for (const auto& [pair, link] : read_links_table(folder_)) bytes += link.at("bytes_in");
+    return bytes;
+  }
   [[nodiscard]] RunSummary summary(int robot) const {
     return read_summary(folder_.path() / robot_name(robot) / "summary.json");
   }
@@ -328,14 +350,15 @@ TEST_CASE("Whatever links two robots have, no closure is lost or doubled", "[sys
   }
   const auto dataset = shared_data("multi_robot/tunnels_8robots");
   if (!dataset) return;
-  const TunnelsRun perfect(*dataset, "", 3.0);
+  const PrintedRun perfect(tunnels_team(3.0), *dataset, std::string());
   if (!had_own_networks(perfect.output())) return;
   REQUIRE(perfect.exit_code() == 0);
   const TeamResult expected = perfect.team();
   const double best = cost_of(expected.graph, expected.poses);
   for (const BadLinks& links : all_pairs()) {
     CAPTURE(links);
-    const TunnelsRun run(*dataset, links.script(), links.outage_s + 10.0);  // they stay on for it
+    const PrintedRun run(tunnels_team(links.outage_s + 10.0), *dataset,  // they stay on for it
+                         links.script());
     REQUIRE(run.exit_code() == 0);
     const auto closures = run.closures();
     int lost = 0, doubled = 0;
@@ -347,16 +370,47 @@ TEST_CASE("Whatever links two robots have, no closure is lost or doubled", "[sys
     }
     const TeamResult team = run.team();
     const double cost = cost_of(team.graph, team.poses);
-    double sent_bytes = 0.0;
-    for (const auto& [pair, link] : run.links()) sent_bytes += link.at("bytes_in");
     std::cout << links << ": closures lost " << lost << ", doubled " << doubled
               << ", cost apart by " << std::abs(cost - best) / best
               << " of it, link-up to agreement "
               << run.agreed_s() - BadLinks::kOutage_s - links.outage_s << " s, frames of "
-              << 1e-6 * sent_bytes << " MB, " << run.summary(0).exit_reason << std::endl;
+              << 1e-6 * run.sent_bytes() << " MB, " << run.summary(0).exit_reason << std::endl;
     CHECK(closures == perfect.closures());
     CHECK(cost == Approx(best).epsilon(1e-6).margin(0.0));
   }
+}
+
+TEST_CASE("Two robots join over every recorded radio link", "[system][radio_links]") {
+  if (std::getenv("KM_LINKS") == nullptr) {
+    std::cout << "SKIPPED: takes minutes, see test/endure radios\n";
+    return;
+  }
+  const auto recordings = shared_data("radio_links");
+  const auto tunnels = shared_data("multi_robot/tunnels_8robots");
+  const auto flight = shared_data("euroc/MH_01_easy");
+  if (!recordings || !tunnels || !flight) return;
+  constexpr double kSettle_s = 30.0;  // longer than any pause of the links
+  std::vector<std::variant<std::string, fs::path>> links = {std::string()};
+  for (const char* name :
+       {"ATT-LTE-driving-2016.up", "TMobile-UMTS-driving.up", "Verizon-EVDO-driving.up"})
+    links.emplace_back(*recordings / name);
+  for (const auto& [team, dataset] :
+       {std::pair(halves_team(kSettle_s), *flight), {tunnels_team(kSettle_s), *tunnels}})
+    for (const auto& link : links) {
+      const auto* file = std::get_if<fs::path>(&link);
+      const std::string name = file ? file->stem().string() : "no limit";
+      CAPTURE(dataset, name);
+      const PrintedRun run(team, dataset, link);
+      if (!had_own_networks(run.output())) return;
+      REQUIRE(run.exit_code() == 0);
+      const auto members = run.summary(0).pgo.members;
+      std::cout << dataset.filename().string() << " over " << name << ": "
+                << (members.size() == 2 ? "joined" : "apart") << ", " << run.closures().size()
+                << " edges, frames of " << 1e-6 * run.sent_bytes() << " MB, agreement after "
+                << run.agreed_s() << " s" << std::endl;
+      CHECK(members == std::vector<RobotId>{0, 1});
+      CHECK(run.summary(1).pgo.members == members);
+    }
 }
 
 }  // namespace km

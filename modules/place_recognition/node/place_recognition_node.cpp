@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "modules/core/median_depth.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -32,13 +33,19 @@ PlaceRecognitionNode::PlaceRecognitionNode(const PlaceRecognitionConfig& config,
       worker_(kQueueCapacity, Overflow::kBlock, [this](const Input& input) { handle(input); }) {
   topics_.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
   topics_.peer_bows.subscribe([this](const auto& message) { worker_.post(message); });
+  topics_.closures.subscribe([this](const auto& message) { worker_.post(message); });
   topics_.peer_events.subscribe([this](const auto& message) { worker_.post(message); });
 }
 
 void PlaceRecognitionNode::handle(const Input& input) {
   if (const auto* event = std::get_if<Topic<PeerEvent>::Message>(&input)) return step(*event);
   if (const auto* bow = std::get_if<Topic<KeyframeBow>::Message>(&input)) return step(**bow);
+  if (const auto* closure = std::get_if<Topic<Closure>::Message>(&input)) return step(**closure);
   step(*std::get<Topic<Keyframe>::Message>(input));
+}
+
+void PlaceRecognitionNode::step(const Closure& closure) {
+  if (closure.from.id.robot == self_ && closure.to.id.robot == self_) known_.add_closure(closure);
 }
 
 // Publishes the event itself, because messages of the robot wait until all copies of the event are
@@ -57,9 +64,17 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   if (const auto before = std::exchange(chain_, chain); before && breaks_odometry(*before, chain))
     own_.mark_odometry_break();
   CandidateSearch search = own_.search_own(vector, keyframe.stamp);
-  // Added before it is published, so that no pair is missed: see the class comment.
-  own_.add(std::move(vector), keyframe.stamp);
-  own_ids_.push_back(id);
+  const PlaceNovelty novelty = novelty_of(keyframe.odometry, search);
+  if (novelty == PlaceNovelty::kCovered) search.candidates.clear();
+  if (novelty == PlaceNovelty::kNew) {
+    // Added before it is published, so that no pair is missed: see the class comment.
+    own_.add(std::move(vector), keyframe.stamp);
+    own_ids_.push_back(id);
+    known_.add_view(keyframe.odometry, median_depth_m(keyframe.features).value_or(0.0));
+  } else {
+    own_.pass(std::move(vector));
+    words.clear();
+  }
   topics_.own_bows.publish(KeyframeBow{.id = id,
                                        .stamp = keyframe.stamp,
                                        .vocabulary = vocabulary_->id(),
@@ -85,8 +100,18 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
   const auto patience = static_cast<std::size_t>(config_.max_waiting_keyframes);
   PeerHistory& history = peers_.try_emplace(id.robot, patience).first->second;
   if (history.has(id.index)) return publish_refusal(id, PlaceQueryStatus::kRepeated);
+  if (peer_bow.words.empty()) publish(id, {});
   for (const PeerQuery& query : history.add(id.index, vocabulary_->weigh(peer_bow.words)))
     publish({id.robot, query.index}, own_.search(*query.vector, query.previous.get()));
+}
+
+PlaceNovelty PlaceRecognitionNode::novelty_of(const OdometryPose& keyframe,
+                                              const CandidateSearch& search) const {
+  if (!config_.known_places) return PlaceNovelty::kNew;
+  std::vector<KeyframeIndex> similar;
+  for (const PlaceCandidate& found : search.candidates)
+    similar.push_back(own_ids_[found.index].index);
+  return known_.novelty_of(keyframe, similar);
 }
 
 void PlaceRecognitionNode::publish(const KeyframeId& query, CandidateSearch search) const {

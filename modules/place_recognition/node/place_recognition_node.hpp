@@ -12,6 +12,7 @@
 #include "modules/core/keyframe.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
+#include "modules/place_recognition/known_places.hpp"
 #include "modules/place_recognition/peer_history.hpp"
 #include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
@@ -26,8 +27,11 @@ namespace km {
 struct PlaceRecognitionTopics {
   In<Keyframe> keyframes;     ///< Keyframes of this robot, ascending.
   In<KeyframeBow> peer_bows;  ///< Words of peers' keyframes; those of this robot are ignored.
+  In<Closure> closures;       ///< Verified closures of this robot; only those between own keyframes
+                              ///< are used.
   In<PeerEvent> peer_events;  ///< Only kRestarted is used: the peer's indices begin again at 0.
-  Out<KeyframeBow> own_bows;  ///< Words of every own keyframe, for the peers.
+  Out<KeyframeBow> own_bows;  ///< Words of every own keyframe, for the peers; none if it shows a
+                              ///< known place.
   Out<LoopCandidate> candidates;
   Out<PeerEvent> restarts;  ///< kRestarted, after the last candidate with a keyframe from before
                             ///< the restart.
@@ -44,6 +48,10 @@ struct PlaceRecognitionTopics {
 /// This happens for keyframes of the same instant, and for all earlier ones when robots meet again.
 /// Receivers of candidates must therefore accept a pair from either side. Keyframe 0 of a robot has
 /// no normaliser, so it occurs only as the match of a candidate.
+///
+/// An own keyframe that shows a known place (KnownPlaces) is published without words and not
+/// searched by peers: the earlier keyframe of the place stands for it. Its own candidates are
+/// published only while a closure to that place is due.
 ///
 /// A keyframe index means one keyframe during an incarnation of its robot. After a restart the
 /// history of the robot begins again.
@@ -65,14 +73,17 @@ class PlaceRecognitionNode final : public Node {
   /// call them too.
   void step(const Keyframe& keyframe);
   void step(const KeyframeBow& peer_bow);
+  void step(const Closure& closure);
   void step(const Topic<PeerEvent>::Message& event);
 
  private:
   using Input = std::variant<Topic<Keyframe>::Message, Topic<KeyframeBow>::Message,
-                             Topic<PeerEvent>::Message>;
+                             Topic<Closure>::Message, Topic<PeerEvent>::Message>;
 
   void handle(const Input& input);
 
+  [[nodiscard]] PlaceNovelty novelty_of(const OdometryPose& keyframe,
+                                        const CandidateSearch& search) const;
   void publish(const KeyframeId& query, CandidateSearch search) const;
   void publish_refusal(const KeyframeId& query, PlaceQueryStatus status) const;
 
@@ -81,6 +92,7 @@ class PlaceRecognitionNode final : public Node {
   const std::shared_ptr<const Vocabulary> vocabulary_;
   const PlaceRecognitionTopics topics_;
   PlaceDatabase own_;
+  KnownPlaces known_;
   std::optional<UncertainPose> chain_;  // odometry of the newest own keyframe
   std::vector<KeyframeId> own_ids_;     // ids of the keyframes in own_, in the same order
   std::map<RobotId, PeerHistory> peers_;

@@ -91,6 +91,26 @@ TEST_CASE("A trace takes the place of rate and delay, and they of it", "[links]"
   CHECK_THAT(team.problems("trace: radio.csv\n"), Catch::Contains("radio.csv:2: 2 fields"));
 }
 
+TEST_CASE("A recording takes the place of the rate, and the rate of a pair takes its place",
+          "[links]") {
+  const Team team;
+  const fs::path up = team.folder.write("radio.up", "10\n20\n");
+  LinkScript script = team.script(
+      "packets: radio.up\ndelay_s: 0.1\npairs:\n  - {from: a, to: b, rate_bytes_per_s: 50}\n");
+  REQUIRE(script.link(0, 2).packets);
+  CHECK(script.link(0, 2).packets->capacity_until(0.02) == 3000.0);
+  CHECK(script.link(0, 2).trace.delay_s(0.0) == 0.1);
+  CHECK_FALSE(script.link(0, 1).packets);
+
+  CHECK_THROWS_WITH(read_links_file(up, team.plan), Catch::Contains("radio.down"));
+  team.folder.write("radio.down", "10\n10\n20\n");
+  LinkScript recorded = read_links_file(up, team.plan);
+  for (const auto& [from, to] : {std::pair(0, 1), {0, 2}, {1, 2}}) {
+    CHECK(recorded.link(from, to).packets->capacity_until(0.02) == 3000.0);
+    CHECK(recorded.link(to, from).packets->capacity_until(0.02) == 4500.0);
+  }
+}
+
 TEST_CASE("Robots that no group of a partition names are a group", "[links]") {
   const LinkScript script = Team().script(
       "partitions:\n  - {from_s: 3, to_s: 4, groups: [[b]]}\n  - {from_s: 9, groups: [[a, c], "

@@ -189,6 +189,25 @@ TEST_CASE("A queue waits while the rate of a trace is zero and then continues",
   CHECK(arrived[1].due_s == Approx(5.9));
 }
 
+TEST_CASE("A recorded link carries a packet at each of its instants", "[link_emulation]") {
+  LinkPlan link = limited(1.0, 0.5);  // the rate does not count
+  link.packets = PacketSchedule({0, 20, 20, 50});
+  link.queue_bytes = 5500.0;
+  LinkEmulator emulator(script_of(2, link));
+  emulator.send(0, 0.010, frame_to(1, 1514));  // the instant at 0 is lost; 1500 bytes in the packet
+  emulator.send(0, 0.010, frame_to(1, 764));
+  emulator.send(0, 0.010, frame_to(1, 764));  // shares an instant with the one before
+  emulator.send(0, 0.010, frame_to(1, 1015));
+  emulator.send(0, 0.010, frame_to(1, 1014));  // begins at 50 ms and ends at 0 ms of the next round
+  emulator.send(0, 0.010, frame_to(1, 1014));
+  CHECK(lost(emulator, LinkLoss::kQueue) == 1);
+  std::vector<double> due_s;
+  for (const SentFrame& delivery : all_of(emulator)) due_s.push_back(delivery.due_s);
+  REQUIRE(due_s.size() == 5);
+  const double expected_s[] = {0.520, 0.520, 0.520, 0.550, 0.550};
+  for (std::size_t i = 0; i < due_s.size(); ++i) CHECK(due_s[i] == Approx(expected_s[i]));
+}
+
 TEST_CASE("A frame that a trace never sends stays on its way", "[link_emulation]") {
   LinkPlan link = limited(0.0);
   LinkEmulator emulator(script_of(2, link));

@@ -36,6 +36,19 @@ TEST_CASE("Keyframes in order are searched for at once", "[place_recognition]") 
   CHECK(history.waiting() == 0);
 }
 
+TEST_CASE("A keyframe without words is no query, and the one before it normalises the next",
+          "[place_recognition]") {
+  const std::vector<std::uint32_t> order = GENERATE(
+      values<std::vector<std::uint32_t>>({{0, 1, 2, 3, 4}, {0, 1, 3, 4, 2}, {0, 3, 2, 1, 4}}));
+  PeerHistory history(10);
+  std::map<std::uint32_t, std::uint32_t> previous;
+  for (const std::uint32_t i : order)
+    for (const PeerQuery& query : history.add(i, i == 2 || i == 3 ? BowVector() : vector_of(i)))
+      if (query.previous) previous[query.index] = index_in(*query.previous);
+  CHECK(previous == std::map<std::uint32_t, std::uint32_t>{{1, 0}, {4, 1}});
+  CHECK(history.waiting() == 0);
+}
+
 TEST_CASE("In any order each keyframe is searched for once, with its predecessor",
           "[place_recognition]") {
   const auto seed = GENERATE(range(0U, 20U));

@@ -34,6 +34,7 @@ struct Recorder {
 struct Robot {
   Topic<Keyframe> keyframes;
   Topic<KeyframeBow> peer_bows;
+  Topic<Closure> closures;
   Topic<PeerEvent> peer_events;
   Recorder<KeyframeBow> own_bows;
   Recorder<LoopCandidate> candidates;
@@ -46,6 +47,7 @@ struct Robot {
       : node(config, self, std::make_shared<const Vocabulary>(vocabulary),
              {.keyframes = keyframes,
               .peer_bows = peer_bows,
+              .closures = closures,
               .peer_events = peer_events,
               .own_bows = own_bows.topic,
               .candidates = candidates.topic,
@@ -125,6 +127,37 @@ TEST_CASE("A return to a place after the gap is a candidate inside one robot",
   REQUIRE(robot.candidates.received.size() == 1);
   CHECK(robot.candidates.received[0].query == KeyframeId{kSelf, 20});
   CHECK(robot.candidates.received[0].match == KeyframeId{kSelf, 0});
+}
+
+TEST_CASE("A keyframe at a known place has no words for the peers and is no match",
+          "[place_recognition][node]") {
+  const bool known_places = GENERATE(true, false);
+  Robot robot(kSelf, {.min_gap_s = 0.0, .known_places = known_places});
+  const auto view = [](std::uint32_t index) {
+    Keyframe result = keyframe({kSelf, index}, {1, 2, 3, 4});
+    result.features.keypoints.assign(4, {.inverse_depth = 0.25F});
+    return result;
+  };
+  robot.node.step(view(0));
+  robot.node.step(view(1));
+  REQUIRE(robot.candidates.received.size() == 1);
+  const Closure verified{
+      .from = view(0).odometry, .to = view(1).odometry, .covariance = Matrix6::Zero()};
+  Closure foreign = verified;
+  foreign.from.id.robot = kPeer;
+  robot.node.step(foreign);
+  robot.node.step(view(2));
+  REQUIRE(robot.candidates.received.size() == 3);
+  robot.node.step(verified);
+  robot.node.step(view(3));
+  CHECK(robot.candidates.received.size() == (known_places ? 3 : 6));
+  CHECK(robot.own_bows.received[2].words.size() == 4);
+  REQUIRE(robot.own_bows.received.size() == 4);
+  CHECK(robot.own_bows.received[3].words.empty() == known_places);
+  robot.candidates.received.clear();
+  robot.node.step(bow({kPeer, 0}, {1, 2, 3, 4}));
+  robot.node.step(bow({kPeer, 1}, {1, 2, 3, 4}));
+  CHECK(robot.candidates.received.size() == (known_places ? 3 : 4));
 }
 
 TEST_CASE("Keyframes before a loss of odometry are candidates at once",
