@@ -79,6 +79,10 @@ inline constexpr const char* kRecord = "record.mcap";
 /// Folder of the meshes that other robots sent, robot<id>.ply each.
 inline constexpr const char* kPeerMeshes = "peer_meshes";
 
+/// Reserve room for results that are written at the end; removed then.
+inline constexpr const char* kTrajectoryRoom = ".room_for_trajectories";
+inline constexpr const char* kSummaryRoom = ".room_for_summary";
+
 /// Removes a robot's results from `folder`, except for its journal and map, so that those of an
 /// earlier run are not mistaken for those of one that fails. If the run continues (`continues`),
 /// its growing files stay, too. Throws std::filesystem::filesystem_error naming the file.

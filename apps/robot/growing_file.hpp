@@ -13,7 +13,8 @@ namespace km {
 
 /// A result file that grows during the run, so that recorded rows survive a crash. While the disk
 /// is full, rows wait in memory and are written once there is room. No row is lost or cut in two
-/// unless more than kMaxWaiting_bytes wait. Not thread-safe.
+/// unless more than kMaxWaiting_bytes wait. They also wait while the folder is gone. If the folder
+/// is there but the file has been deleted, the file begins again with its header. Not thread-safe.
 class GrowingFile {
  public:
   static constexpr std::size_t kMaxWaiting_bytes = std::size_t{4} << 20;
@@ -39,8 +40,11 @@ class GrowingFile {
   ResultWriter& results_;
   std::ostringstream rows_;
   std::optional<std::uintmax_t> keep_bytes_ =
-      {};  // length of the earlier file without its incomplete last row
+      {};               // length of the earlier file without its incomplete last row
+  std::string header_;  // first row
   std::string waiting_;
+  bool is_begun_ = false;   // the file has its header
+  bool rows_gone_ = false;  // earlier rows have been deleted
   bool rows_lost_ = false;
 };
 

@@ -107,7 +107,7 @@ std::shared_ptr<const Keyframe> JournalNode::recall(KeyframeIndex keyframe) cons
 
 void JournalNode::step(Tick /*tick*/) {
   if (collect())
-    results_.write(file_, [this](const auto& file) {
+    results_.append(file_, [this](const auto& file) {
       do journal_.write();
       while (collect());
       const std::lock_guard lock(mutex_);

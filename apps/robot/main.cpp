@@ -210,6 +210,8 @@ void add_output(CLI::App& app, RobotOptions& options) {
                          folder + " begins one there";
       });
   group->require_option(1);
+  app.add_option("--fallback", options.fallback,
+                 "Folder, on another disk, for results that cannot be written to --output");
   app.add_option_function<std::vector<std::string>>(
          "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
          "Also write what happens to an MCAP file, for Foxglove, Lichtblick, Rerun, PlotJuggler "

@@ -36,9 +36,14 @@ bool has_messages(const RobotOptions& options) {
   return options.is_live || (!options.dataset.empty() && may_be_bag(options.dataset));
 }
 
-// States the damaged parts of the journal, and keeps a copy from the first time. The damaged bytes
-// stay in the journal, so a later resume finds them again.
+// States the damaged parts and the incomplete end of the journal. Keeps a copy of a damaged journal
+// from the first time. The damaged bytes stay in a resumed journal, so a later resume finds them
+// again.
 void report_damage(const fs::path& file, const RestoredRun& run) {
+  if (run.journal.cut_bytes > 0)
+    log::warn("journal") << file.string() << ": the last " << run.journal.cut_bytes
+                         << " bytes are torn: cut after entry " << run.journal.entries << ", byte "
+                         << run.journal.whole_bytes;
   for (const JournalDamage& damage : run.journal.damages)
     log::warn("journal") << to_string(damage, file);
   if (run.journal.damages.empty()) return;
@@ -58,10 +63,6 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
     return std::nullopt;
   }
   RestoredRun run = restore_run(file);
-  if (run.journal.cut_bytes > 0)
-    log::warn("journal") << file.string() << ": the last " << run.journal.cut_bytes
-                         << " bytes are torn: cut after entry " << run.journal.entries << ", byte "
-                         << run.journal.whole_bytes;
   report_damage(file, run);
   if (run.journal.entries == 0) return std::nullopt;
   if (run.robot != options.robot || run.input != input)
@@ -88,6 +89,7 @@ std::optional<ResumedMap> restore_map(const fs::path& folder, const RestoredRun&
 RestoredRun open_session(const RobotOptions& options) {
   const fs::path file = options.session / kJournal;
   RestoredRun run = restore_run(file);
+  report_damage(file, run);  // results of the session may replace the journal
   if (run.keyframes.empty())
     throw std::invalid_argument(file.string() + ": that run has no keyframe");
   return alone_as(options.robot, std::move(run));
@@ -97,6 +99,7 @@ RestoredRun open_session(const RobotOptions& options) {
 FinishedMap open_finished_map(const RobotOptions& options) {
   const fs::path file = options.localize / kJournal;
   RestoredRun run = restore_run(file);
+  report_damage(file, run);
   if (run.keyframes.empty())
     throw std::invalid_argument(file.string() + ": that run has no keyframe to localise at");
   FinishedMap map{std::move(run.keyframes), std::move(run.solution.trajectory.T_world_kf)};

@@ -18,6 +18,7 @@
 #include "apps/robot/growing_file.hpp"
 #include "apps/robot/playing_speed.hpp"
 #include "apps/robot/process_usage.hpp"
+#include "apps/robot/reserved_room.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/rounds_csv.hpp"
 #include "apps/robot/run_end.hpp"
@@ -429,6 +430,32 @@ void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRe
                         << options.record->string() << ": they came faster than they were written";
 }
 
+// Room for the results that matter most: trajectories and summary.
+class FinalRoom {
+ public:
+  /// `images`: number of images of the recording, 0 if unknown.
+  FinalRoom(const fs::path& output, std::size_t images)
+      : trajectories_(output / kTrajectoryRoom), summary_(output / kSummaryRoom) {
+    summary_.reserve(kSummary_bytes);
+    grow(images, 0);
+  }
+
+  /// Reserves room for the poses of these numbers of images and keyframes.
+  void grow(std::size_t images, std::size_t keyframes) {
+    trajectories_.reserve(kImage_bytes * images + kKeyframe_bytes * keyframes);
+  }
+  void release_trajectories() { trajectories_.release(); }
+  void release_summary() { summary_.release(); }
+
+ private:
+  // Rows of odometry.tum and optimized.tum, which has a row for each keyframe if there are no
+  // images; and of optimized_keyframes.tum with its 36 numbers.
+  static constexpr std::size_t kImage_bytes = 240, kKeyframe_bytes = 700;
+  static constexpr std::size_t kSummary_bytes = 32768;
+
+  ReservedRoom trajectories_, summary_;
+};
+
 // Writes all results except for the summary. The state of a hung module cannot be read.
 void write_all(const RobotOptions& options, Robot& robot, const RunRecord& record,
                const RunResult& result, ResultWriter& results) {
@@ -460,7 +487,7 @@ std::vector<Finding> what_stands_out(const RunFacts& facts, const Verdict& verdi
 // Writes the results of the run and returns the exit code.
 int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robot,
              std::optional<Watch>& watch, const RunResult& result, const RunRecord& record,
-             ResultWriter& results) {
+             FinalRoom& room, ResultWriter& results) {
   watch->finish(record);
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
   end.missed = watch->missed();
@@ -493,11 +520,13 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
     summary.other_vocabulary[names.contains(peer) ? names.at(peer) : std::to_string(peer)] =
         keyframes;
   watch.reset();  // ends the status line before the last log lines
+  room.release_trajectories();
   write_all(options, robot, record, result, results);
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;
   summary.findings =
       what_stands_out({summary, record.closure_tallies(), names, config.pcm}, verdict_of(end));
+  room.release_summary();
   results.write(
       options.output / "summary.json",  // last, because it lists the results that were lost
       [&summary](const auto& file) { write_summary(file, summary); });
@@ -574,7 +603,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
     log::info("robot") << "interrupted before the calibration was complete: no results";
     return 0;
   }
-  ResultWriter results;
+  ResultWriter results(options.fallback);
   change_output(options, results, make_output);
   log::info("robot") << "kimera_multi_robot " << built_version() << ", commit " << built_commit();
   const std::optional<double> rate = chosen_rate(options, config, mapping, rig, signals);
@@ -596,16 +625,26 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   const auto write = [&](const char* name, const std::string& text) {
     results.write(options.output / name, [&text](const auto& file) { write_file(file, text); });
   };
-  write("config.yaml", config.effective);
-  if (mapping && !mapping->palette.classes().empty())
-    write(kLabelPalette, to_csv(mapping->palette));
+  const auto write_settings = [&] {
+    write("config.yaml", config.effective);
+    if (mapping && !mapping->palette.classes().empty())
+      write(kLabelPalette, to_csv(mapping->palette));
+  };
+  write_settings();
+  FinalRoom room(options.output, robot.sensors() != nullptr ? robot.sensors()->listed() : 0);
 
   std::optional<Watch> watch;
   watch.emplace(options, config, continues, robot, results);
-  const RunResult result = robot.run([&watch] { return watch->poll(); });
+  const RunResult result = robot.run([&] {
+    (void)robot.recorder().try_with_record([&](const RunRecord& record) {
+      room.grow(record.odometry().size(), record.keyframes().size());
+    });
+    return watch->poll();
+  });
   const auto end = [&](const RunRecord& record) {
+    if (!fs::exists(options.output / "config.yaml")) write_settings();  // deleted during the run
     write_estimated_rig(options, rig, record, results);
-    return conclude(options, config, robot, watch, result, record, results);
+    return conclude(options, config, robot, watch, result, record, room, results);
   };
   if (result.is_left_behind("recorder"))
     results.note(options.output, "what was recorded is lost with the recorder, which hangs");

@@ -125,7 +125,10 @@ bool JournalFile::collect() {
 void JournalFile::write() {
   if (keep_bytes_ && is_there(file_)) std::filesystem::resize_file(file_, *keep_bytes_);
   keep_bytes_.reset();
+  if (is_begun_ && !is_there(file_))
+    throw std::runtime_error(file_.string() + ": cannot be written: it was deleted or moved");
   append_to_file(file_, collected_, {.durable = true});
+  is_begun_ = true;
 }
 
 }  // namespace km

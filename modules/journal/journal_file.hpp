@@ -79,7 +79,9 @@ class JournalFile {
   bool collect();
   /// Writes the collected entries to the disk, so that they survive a power failure, and closes the
   /// file, so that the disk can be unmounted. Throws std::system_error with one line that names the
-  /// file and the reason; entries that are not written wait for the next call.
+  /// file and the reason; entries that are not written wait for the next call. Throws
+  /// std::runtime_error if the file is gone, because a journal without its beginning is useless;
+  /// entries wait for its return.
   void write();
   /// Collects and writes all entries.
   void sync() {
@@ -95,6 +97,7 @@ class JournalFile {
   std::uint64_t end_bytes_;  // size of the file after all waiting entries are written
   std::string waiting_, collected_;
   bool full_ = false;
+  bool is_begun_ = false;  // the file has entries of this process
 };
 
 }  // namespace km

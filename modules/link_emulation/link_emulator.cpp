@@ -51,7 +51,7 @@ std::optional<double> leave_queue(const Capacity& link, double bytes, double que
   return std::max(now_s, link.time_of(end));
 }
 
-// The same for the link of a plan.
+// That time for the link of a plan.
 std::optional<double> leave_queue(const LinkPlan& link, std::size_t frame_bytes, double now_s,
                                   double& queue_end) {
   if (link.packets)

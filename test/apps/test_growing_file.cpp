@@ -45,6 +45,34 @@ TEST_CASE("Rows for which there was no room are written once there is room", "[r
   CHECK(results.lost().empty());
 }
 
+TEST_CASE("Rows wait while the folder is gone, and a deleted file begins again with its header",
+          "[robot]") {
+  const CapturedLog log;
+  const TemporaryFolder folder;
+  const fs::path out = folder.path() / "out", moved = folder.path() / "moved";
+  fs::create_directory(out);
+  ResultWriter results;
+  GrowingFile file(out / "a.csv", results);
+  file.rows() << "time\n0\n";
+  file.flush();
+  fs::rename(out, moved);
+  file.rows() << "1\n";
+  file.flush();
+  CHECK(results.lost().size() == 1);
+  fs::rename(moved, out);
+  file.flush();
+  CHECK(results.lost().empty());
+  CHECK(folder.read("out/a.csv") == "time\n0\n1\n");
+
+  fs::remove(out / "a.csv");
+  file.rows() << "2\n";
+  file.flush();
+  file.rows() << "3\n";
+  file.flush();
+  CHECK(folder.read("out/a.csv") == "time\n2\n3\n");
+  CHECK_THAT(results.lost().at((out / "a.csv").string()), Catch::Contains("rows are missing"));
+}
+
 TEST_CASE("A disk that is full for too long costs rows, and the file is reported as incomplete",
           "[robot]") {
   const CapturedLog log;

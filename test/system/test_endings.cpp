@@ -84,8 +84,10 @@ struct RobotOnSmallDisk {
 
   ~RobotOnSmallDisk() { close(log); }
 
-  void start() {
-    robot.emplace(robot_on_walk(long_walk(folder.path(), 0), output), 0, log);
+  void start(const std::string& options = {}) {
+    std::vector<std::string> command = robot_on_walk(long_walk(folder.path(), 0), output);
+    for (const std::string& word : words_of(options)) command.push_back(word);
+    robot.emplace(command, 0, log);
     const bool running = wait_for_lines(output / "process.csv", 3);
     INFO(folder.read("log"));
     REQUIRE(running);
@@ -111,14 +113,57 @@ TEST_CASE("On a full or read-only disk a robot continues, names lost results, an
   REQUIRE_FALSE(run.robot->wait_within(std::chrono::seconds(3)));
   run.robot->kill(SIGTERM);
   CHECK(run.robot->wait() == 4);
-  for (const char* file : {"optimized.tum", "pose_graph.g2o", "keyframes.csv", "loop_closures.csv",
-                           "timing.csv", "summary.json"}) {
+  for (const char* file : {"optimized.tum", "summary.json"}) {
     CAPTURE(file);
-    CHECK(run.reports(file, why));
-    CHECK_FALSE(fs::exists(run.output / file));
+    CHECK(fs::exists(run.output / file) == full);  // on a full disk they have reserved room
+    if (!full) CHECK(run.reports(file, why));
   }
-  for (const auto& entry : fs::directory_iterator(run.output))
+  CHECK(run.reports("run.journal", why));
+  if (full) CHECK(line_count(run.output / "optimized.tum") > 2);
+  for (const auto& entry : fs::directory_iterator(run.output)) {
     CHECK(entry.path().extension() != ".part");
+    if (full) CHECK_THAT(entry.path().filename().string(), !Catch::StartsWith("."));
+  }
+}
+
+TEST_CASE("Results that a disk cannot take go to the fallback folder", "[system][endings]") {
+  RobotOnSmallDisk run;
+  if (!run.disk.mounted()) return;
+  const fs::path fallback = run.folder.path() / "fallback";
+  run.start("--fallback " + fallback.string());
+  REQUIRE(run.disk.make_read_only());
+  run.robot->kill(SIGTERM);
+  CHECK(run.robot->wait() == 4);
+  for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "keyframes.csv",
+                           "loop_closures.csv", "timing.csv", "summary.json"})
+    CHECK(fs::exists(fallback / file));
+  const std::string reason = read_summary(fallback / "summary.json").exit_reason;
+  CHECK_THAT(reason, Catch::StartsWith("interrupted; ") && Catch::Contains("run.journal") &&
+                         !Catch::Contains(".tum") && !Catch::Contains("summary"));
+}
+
+TEST_CASE(
+    "A results folder that is moved during the run is continued when it is back, or made again",
+    "[system][endings]") {
+  const bool is_back = GENERATE(true, false);
+  CAPTURE(is_back);
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "out", moved = folder.path() / "moved";
+  Process robot(robot_on_walk(long_walk(folder.path(), 0), output));
+  REQUIRE(wait_for_lines(output / "process.csv", 3));
+  fs::rename(output, moved);
+  REQUIRE(robot.wait_until([&](const std::string& line) {
+    return line.find((output / "run.journal").string() + ": cannot be written") != line.npos;
+  }));
+  if (is_back) fs::rename(moved, output);
+  robot.kill(SIGTERM);
+  CHECK(robot.wait() == (is_back ? 0 : 4));
+  for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "keyframes.csv",
+                           "loop_closures.csv", "timing.csv", "config.yaml"})
+    CHECK(fs::exists(output / file));
+  const std::string reason = read_summary(output / "summary.json").exit_reason;
+  CHECK_THAT(reason, Catch::StartsWith(is_back ? "interrupted" : "interrupted; "));
+  CHECK(fs::exists(output / "run.journal") == is_back);
 }
 
 TEST_CASE("One result that cannot be written leaves the others whole", "[system][endings]") {

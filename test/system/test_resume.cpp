@@ -368,7 +368,10 @@ TEST_CASE("A robot that is killed and resumed without its team keeps what the te
   team.check_meetings(0.01);  // the bound of StatedPoses
 }
 
-TEST_CASE("A journal with flipped bytes is continued, and a copy is kept", "[system][resume]") {
+TEST_CASE("A journal with flipped bytes is continued or replaced, and a copy is kept",
+          "[system][resume]") {
+  const bool is_session = GENERATE(false, true);
+  CAPTURE(is_session);
   const TemporaryFolder folder;
   const fs::path graph = write_walk({0, 0}, {1, 30}, 0, folder.path() / "walk.g2o");
   const std::string output = (folder.path() / "run").string();
@@ -378,7 +381,12 @@ TEST_CASE("A journal with flipped bytes is continued, and a copy is kept", "[sys
   std::string journal = folder.read("run/run.journal");
   journal[journal.size() / 2] ^= 1;
   folder.write("run/run.journal", journal);
-  const CommandResult again = run_command(command + " --resume " + output);
+  const CommandResult again =
+      is_session
+          ? run_command(KM_BIN_DIR "/kimera_multi_robot --robot 0 --serve-limit 0 --session " +
+                        output + " --output " + output + " --domain " +
+                        std::to_string(random_domain()))
+          : run_command(command + " --resume " + output);
   CAPTURE(again.output);
   CHECK(again.exit_code == 0);
   CHECK_THAT(again.output, Catch::Contains("run.journal: ") &&
