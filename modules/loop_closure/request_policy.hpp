@@ -36,7 +36,7 @@ namespace km {
 /// Deterministic, no randomness. Not thread-safe.
 class RequestPolicy {
  public:
-  static constexpr int kOwnSeparation = 4;  ///< [keyframes]
+  static constexpr int kOwnSeparation = 2;  ///< [keyframes]
 
   enum class Decision {
     kRequest,
