@@ -35,8 +35,9 @@ void RosDiscovery::take() {
   std::array<dds_sample_info_t, 1> info{};
   while (dds_take(reader_.handle(), sample.data(), info.data(), 1, 1) == 1) {
     const auto& found = *static_cast<const dds_builtintopic_endpoint_t*>(sample[0]);
-    const std::string topic = found.topic_name;
-    if (info[0].valid_data && topic.starts_with("rt/"))
+    // The sample of a publisher that has ended has no names.
+    const std::string topic = info[0].valid_data ? found.topic_name : "";
+    if (topic.starts_with("rt/"))
       publishers_.push_back({topic.substr(2), ros_type(found.type_name)});
     dds_return_loan(reader_.handle(), sample.data(), 1);
     sample = {};

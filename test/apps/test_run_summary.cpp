@@ -72,6 +72,8 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/odometry/starts /odometry/divergences /odometry/inertial_gaps /odometry/refused_images "
         "/odometry/refused_samples /odometry/images_without_pose /odometry/vision_losses "
         "/odometry/blind_seconds "
+        "/localization/map /localization/localised /localization/after_s /localization/compared "
+        "/localization/matched "
         "/holes/count /holes/seconds /holes/longest_s /holes/longest_from_s "
         "/cameras/offset_s /cameras/offset_sigma_s /cameras/rotation_x_rad /cameras/rotation_y_rad "
         "/cameras/rotation_z_rad /cameras/rotation_sigma_rad /cameras/translation_x_m "

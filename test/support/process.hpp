@@ -21,6 +21,13 @@ struct TimedLine {
   std::chrono::steady_clock::time_point time;
 };
 
+/// The command with its log, which is on standard error, among the lines of its standard output.
+inline std::vector<std::string> logged(const std::vector<std::string>& command) {
+  std::vector<std::string> shell = {"sh", "-c", R"(exec "$0" "$@" 2>&1)"};
+  shell.insert(shell.end(), command.begin(), command.end());
+  return shell;
+}
+
 /// A child process. The destructor kills it if it still runs. Its output is read line by line, or
 /// goes to a descriptor.
 class Process {

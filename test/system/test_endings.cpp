@@ -149,7 +149,7 @@ TEST_CASE(
   CAPTURE(is_back);
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out", moved = folder.path() / "moved";
-  Process robot(robot_on_walk(long_walk(folder.path(), 0), output));
+  Process robot(logged(robot_on_walk(long_walk(folder.path(), 0), output)));
   REQUIRE(wait_for_lines(output / "process.csv", 3));
   fs::rename(output, moved);
   REQUIRE(robot.wait_until([&](const std::string& line) {

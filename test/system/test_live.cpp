@@ -148,13 +148,6 @@ calibration:
     T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
 )";
 
-// With its log, which is on stderr.
-std::vector<std::string> logged(const std::vector<std::string>& command) {
-  std::vector<std::string> shell = {"sh", "-c", R"(exec "$0" "$@" 2>&1)"};
-  shell.insert(shell.end(), command.begin(), command.end());
-  return shell;
-}
-
 bool waits_for_calibration(const std::string& line) {
   return line.find("waiting for messages with the calibration") != line.npos;
 }

@@ -180,7 +180,7 @@ void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
   odometry.linear_velocity = state->T_odom_body.linear().transpose() * state->v_odom;
   odometry.angular_velocity = frames_.angular_rate();
   publish(odometry_, odometry);
-  RosTransforms transforms{{{{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)}}};
+  RosTransforms transforms;
   if (!trajectory_->T_world_kf.empty() || !options_.awaits_trajectory) {
     const UncertainPose T_map_body = frames_.T_map_body(state->T_odom_body);
     RosPoseWithCovarianceStamped pose{{state->stamp, map_}, message_of(T_map_body.T), {}};
@@ -189,6 +189,8 @@ void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
     transforms.transforms.push_back(
         {{state->stamp, map_}, odom_, message_of(frames_.T_map_odom())});
   }
+  transforms.transforms.push_back(
+      {{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)});
   publish(tf_, transforms);
   publish_pieces();
 }

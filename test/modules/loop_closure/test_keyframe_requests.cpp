@@ -151,9 +151,9 @@ TEST_CASE("Candidates inside one robot are skipped near a closure by the same ru
   };
   CHECK_FALSE(policy.is_covered(id(10, 110)));
   for (const KeyframeIndex later : {110U, 210U, 310U}) policy.add_closure(id(10, later));
-  CHECK(policy.is_covered(id(13, 107)));
-  CHECK_FALSE(policy.is_covered(id(14, 110)));
-  CHECK_FALSE(policy.is_covered(id(10, 114)));
+  CHECK(policy.is_covered(id(12, 108)));
+  CHECK_FALSE(policy.is_covered(id(13, 110)));
+  CHECK_FALSE(policy.is_covered(id(10, 113)));
 }
 
 TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {

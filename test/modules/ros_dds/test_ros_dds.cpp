@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include <chrono>
+#include <map>
 #include <random>
 #include <thread>
 
@@ -203,6 +204,42 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
   CHECK(diagnostics->status[1].hardware_id == "robot_3");
   CHECK(diagnostics->status[1].values[0].value == "3");
   CHECK(path->poses[0].pose.position == Eigen::Vector3d(10, 2, 3));
+}
+
+TEST_CASE("A robot that is not localised publishes no pose in the map", "[ros_dds]") {
+  class CountingSink final : public RosSink {
+   public:
+    explicit CountingSink(std::map<std::string, int>& counts) : counts_(counts) {}
+    std::size_t open(const PublishedTopic& topic) override {
+      names_.push_back(topic.name);
+      return names_.size() - 1;
+    }
+    void put(std::size_t topic, std::optional<Stamp> /*time*/,
+             std::span<const std::uint8_t> /*message*/) override {
+      ++counts_[names_[topic]];
+    }
+
+   private:
+    std::map<std::string, int>& counts_;
+    std::vector<std::string> names_;
+  };
+  Topic<OdometryState> odometry;
+  Topic<KeyframeOdometry> keyframes;
+  Topic<Trajectory> trajectories;
+  const bool is_localised = GENERATE(false, true);
+  std::map<std::string, int> counts;
+  RosOutputNode node("ros_output", std::make_unique<CountingSink>(counts),
+                     {.robot = "a", .awaits_trajectory = true},
+                     [] { return std::vector<RosDiagnosticStatus>(); }, {},
+                     {odometry, keyframes, trajectories, {}});
+  node.start();
+  if (is_localised) trajectories.publish(Trajectory{0, 0, {SE3::Identity()}});
+  OdometryState state;
+  for (state.stamp = 1; state.stamp <= 3; ++state.stamp) odometry.publish(state);
+  node.stop();
+  CHECK(counts["/a/odometry"] == 3);
+  CHECK(counts["/tf"] == 3);
+  CHECK(counts["/a/pose"] == (is_localised ? 3 : 0));
 }
 
 TEST_CASE("A late subscriber receives as many latched messages as the depth", "[ros_dds]") {
