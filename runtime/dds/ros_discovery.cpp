@@ -2,6 +2,9 @@
 
 #include <array>
 
+#include "modules/core/stamp.hpp"
+#include "runtime/clock.hpp"
+
 namespace km {
 namespace {
 
@@ -46,11 +49,15 @@ void RosDiscovery::take() {
 
 bool RosDiscovery::wait(double patience_s) {
   const std::size_t before = publishers_.size();
-  const auto timeout_ns = static_cast<dds_duration_t>(patience_s * 1e9);
-  check_dds(dds_waitset_wait(waitset_.handle(), nullptr, 0, timeout_ns),
-            "cannot wait for publications");
-  take();
-  return publishers_.size() > before;
+  const double end_s = steady_now_s() + patience_s;
+  // Writers without a topic of ROS end the wait of DDS, too.
+  for (double left_s = patience_s; left_s > 0.0; left_s = end_s - steady_now_s()) {
+    check_dds(dds_waitset_wait(waitset_.handle(), nullptr, 0, nanoseconds(left_s)),
+              "cannot wait for publications");
+    take();
+    if (publishers_.size() > before) return true;
+  }
+  return false;
 }
 
 const std::vector<TopicPublisher>& RosDiscovery::publishers() {

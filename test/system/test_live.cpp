@@ -254,7 +254,9 @@ TEST_CASE("A rig file is proposed from the topics that drivers publish now", "[s
   Process inspect(logged(words_of(KM_BIN_DIR "/kimera_multi_robot --set ros.interface=lo --set "
                                              "ros.domain=" +
                                   std::to_string(domain) + " --inspect --live " + rig.string())));
-  CHECK(inspect.wait() == 0);
+  const int code = inspect.wait();
+  for (const TimedLine& line : inspect.lines()) UNSCOPED_INFO(line.text);
+  REQUIRE(code == 0);
   CHECK_FALSE(inspect.lines("/cam0/image_raw ").empty());
   const PartialRig proposal = read_rig_file(rig);
   CHECK(proposal.rig.topics.left == "/cam0/image_raw");

@@ -12,8 +12,9 @@ namespace km {
 namespace {
 
 constexpr KeyframeIndex kKeyframes = 60;
-// 20 steps before the first closure have a standard deviation of 0.07 m on each axis: 0.01 m times
-// the root of 20, and 0.002 rad over 0.5 m a step, times the root of 20^3 / 3.
+// 20 steps before the first closure have a standard deviation of 0.07 m on each axis. The noise of
+// translation gives 0.01 m times the root of 20, that of rotation 0.001 m times the root of 20^3
+// / 3.
 constexpr double kDrift_m = 0.3;
 
 Matrix6 isotropic(double rotation_rad, double translation_m) {

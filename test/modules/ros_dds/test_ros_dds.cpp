@@ -9,6 +9,7 @@
 #include "modules/ros_dds/node/live_bag.hpp"
 #include "modules/ros_dds/node/live_sink.hpp"
 #include "modules/ros_dds/node/ros_output_node.hpp"
+#include "runtime/dds/ros_discovery.hpp"
 #include "runtime/dds/ros_publisher.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 #include "test/support/patience.hpp"
@@ -240,6 +241,16 @@ TEST_CASE("A robot that is not localised publishes no pose in the map", "[ros_dd
   CHECK(counts["/a/odometry"] == 3);
   CHECK(counts["/tf"] == 3);
   CHECK(counts["/a/pose"] == (is_localised ? 3 : 0));
+}
+
+TEST_CASE("A publisher that has ended does no harm to those who discover it", "[ros_dds]") {
+  const auto shared = network();
+  RosDiscovery discovery(*shared);
+  const RosPublisher stays(shared, "/stays", "visualization_msgs/Marker", RosQos::kReliable, 1);
+  for (int k = 0; k < 3; ++k)
+    RosPublisher(shared, "/ends", "visualization_msgs/Marker", RosQos::kReliable, 1);
+  while (discovery.wait(0.2)) continue;
+  CHECK(std::ranges::count(discovery.publishers(), "/stays", &TopicPublisher::topic) == 1);
 }
 
 TEST_CASE("A late subscriber receives as many latched messages as the depth", "[ros_dds]") {
