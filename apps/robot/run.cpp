@@ -520,6 +520,9 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
     summary.other_vocabulary[names.contains(peer) ? names.at(peer) : std::to_string(peer)] =
         keyframes;
   watch.reset();  // ends the status line before the last log lines
+  if (!options.extend.empty() && !record.progress().located)
+    log::warn("robot") << "not localised in " << options.extend.string()
+                       << ": the poses of this run are those of odometry, apart from those before";
   room.release_trajectories();
   write_all(options, robot, record, result, results);
   end.lost_results = results.lost();

@@ -249,6 +249,8 @@ bool TeamAgent::is_located() const {
     const auto decided = decisions_.decided().find(e.id());
     return decided == decisions_.decided().end() || !decided->second;
   });
+  // Places of the present run: a short run before it may have a single place.
+  for (PoseEdge& e : across) (e.from.index < e.to.index ? e.from : e.to).index = 0;
   return find_places(across).sizes.size() >= kLeastPlaces;
 }
 

@@ -396,7 +396,7 @@ TEST_CASE("A journal with flipped bytes is continued or replaced, and a copy is 
   CHECK(read_summary(fs::path(output) / "summary.json").keyframes == kLap);
 }
 
-TEST_CASE("A robot localises itself in the map of a finished run", "[system][resume]") {
+TEST_CASE("A robot joins the robot of a finished run", "[system][resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
