@@ -369,8 +369,9 @@ RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& 
   RunEnd end{options.robot, result, robot.id_taken(), departure};
   end.is_live = options.is_live;
   if (const SensorsNode* sensors = robot.sensors()) {
-    // The last image of the earlier processes is played once more.
-    const std::size_t before = std::max<std::size_t>(robot.restored_images(), 1) - 1;
+    // The last image of former processes of this run is played once more.
+    const bool is_repeated = options.resume && robot.restored_images() > 0;
+    const std::size_t before = robot.restored_images() - (is_repeated ? 1 : 0);
     end.images = ImageCounts{before + sensors->listed(), before + sensors->published(),
                              sensors->skipped(), record.odometry().size()};
   }

@@ -100,7 +100,8 @@ std::size_t ViewNode::sent_bytes(ViewChannel channel) const {
   return channels_[static_cast<std::size_t>(channel)].sent_bytes;
 }
 
-// Makes the writers again with the participant. Their readers are newcomers then, which receive all.
+// Makes the writers again with the participant. Their readers are newcomers then, which receive
+// all.
 void ViewNode::follow_participant() {
   if (std::exchange(moves_, participant_.moves()) == participant_.moves()) return;
   for (const ViewChannel channel : {ViewChannel::kView, ViewChannel::kMesh, ViewChannel::kImages})
