@@ -40,7 +40,9 @@ class KnownPlaces {
   /// unknown; its place is then never known.
   void add_view(const OdometryPose& keyframe, double median_depth_m);
 
-  /// Notes a verified closure between two keyframes of this robot.
+  /// Notes a verified closure between two keyframes of this robot. A closure with a keyframe that
+  /// has no depth is ignored: it is that with a finished map, whose keyframe is no view of this
+  /// run.
   void add_closure(const Closure& closure);
 
   /// Whether the place of `keyframe` is known. `similar`: earlier keyframes with similar words.

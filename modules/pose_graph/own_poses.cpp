@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/corroboration.hpp"
 #include "modules/pose_graph/frame_entry.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
@@ -29,6 +30,23 @@ std::vector<PoseEdge> weighed_to_start(std::vector<PoseEdge> edges) {
     e.precision = {std::max(e.precision.kappa, kLeast.kappa),
                    std::max(e.precision.tau, kLeast.tau)};
   return edges;
+}
+
+// True if more than half of the places of `closures` agree with the poses. O(n log n), unlike the
+// search for the transform on which most of them agree.
+bool fits(std::span<const PoseEdge> closures, const std::vector<SE3>& poses,
+          const AlignmentTolerance& tolerance) {
+  const ClosurePlaces places = find_places(closures);
+  const std::vector<double> weights = places.weights();
+  double agreeing = 0.0;
+  for (std::size_t k = 0; k < closures.size(); ++k) {
+    const PoseEdge& e = closures[k];
+    const SE3 error = poses[e.to.index].inverse() * poses[e.from.index] * e.T_from_to;
+    if (angle_of(error.linear()) <= tolerance.rotation_rad &&
+        error.translation().norm() <= tolerance.translation_m)
+      agreeing += weights[k];
+  }
+  return 2.0 * agreeing > static_cast<double>(places.sizes.size());
 }
 
 // The cost of `edges`, of which the first `steps` are odometry and the others closures. The cost of
@@ -72,6 +90,7 @@ void OwnPoses::place_runs(const OwnGraph& graph, RobotId self,
     const KeyframeIndex begin = runs[k];
     const KeyframeIndex end = k + 1 < runs.size() ? runs[k + 1] : graph.keyframes();
     std::vector<PoseEdge> across = graph.closures_across(begin, end);
+    if (fits(across, T_frame_kf_, tolerance)) continue;
     // The runs before count as another robot, into whose frame this run moves.
     const RobotId before = self + 1;
     std::map<KeyframeId, SE3> received;
@@ -84,10 +103,6 @@ void OwnPoses::place_runs(const OwnGraph& graph, RobotId self,
     const auto moved = moved_into_frame(T_frame_kf_, self, across, received, tolerance);
     if (!moved) continue;
     const SE3 T_new_old = (*moved)[begin] * T_frame_kf_[begin].inverse();
-    const SE3 shift = T_frame_kf_[begin].inverse() * (*moved)[begin];
-    if (angle_of(shift.linear()) <= tolerance.rotation_rad &&
-        shift.translation().norm() <= tolerance.translation_m)
-      continue;
     for (std::size_t i = begin; i < T_frame_kf_.size(); ++i)
       T_frame_kf_[i] = T_new_old * T_frame_kf_[i];
   }

@@ -32,7 +32,8 @@ class OwnPoses {
   void correct(std::span<const OdometryBreak> breaks);
 
   /// Moves every later run (OwnGraph::later_runs()) as a whole to where most of its closures to the
-  /// runs before it agree, unless it is there already, up to `tolerance`. Precondition: extend().
+  /// runs before it agree. A run stays if most of them agree with its place already, up to
+  /// `tolerance`. Precondition: extend().
   void place_runs(const OwnGraph& graph, RobotId self, const AlignmentTolerance& tolerance);
 
   /// Improves the start of a session of this robot alone: the chordal initialisation replaces the

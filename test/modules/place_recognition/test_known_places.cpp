@@ -40,6 +40,15 @@ PlaceNovelty novelty(const KnownPlaces& places, KeyframeIndex index,
 
 }  // namespace
 
+TEST_CASE("A closure with a finished map does not replace one inside the run",
+          "[place_recognition]") {
+  KnownPlaces places = first_lap();
+  places.add_view(keyframe(0), 0.0);  // keyframe 0 is that of the map
+  places.add_closure(closure(2, 22));
+  places.add_closure(closure(0, 23));
+  CHECK(novelty(places, 23, {3}) == PlaceNovelty::kCovered);
+}
+
 TEST_CASE("A lap flown again is known from the first closure on, while closures are repeated",
           "[place_recognition]") {
   KnownPlaces places = first_lap();

@@ -1,0 +1,102 @@
+#include <catch2/catch.hpp>
+#include <random>
+#include <set>
+#include <string>
+
+#include "runtime/dds/robot_identity.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("An identity survives its user data", "[identity]") {
+  const RobotIdentity identity{65535, "Alpha 1", 7, 0x0123456789ABCDEFULL};
+  const std::string data = to_user_data(identity);
+  CHECK(data == "robot=65535;name=Alpha 1;proto=7;boot=0123456789abcdef");
+  const auto parsed = parse_user_data(data);
+  REQUIRE(parsed.value.has_value());
+  CHECK(parsed.value->identity == identity);
+  CHECK(parsed.value->credentials.empty());
+  const auto with_keys = parse_user_data(to_user_data(identity, "AbC-_9"));
+  REQUIRE(with_keys.value.has_value());
+  CHECK(with_keys.value->identity == identity);
+  CHECK(with_keys.value->credentials == "AbC-_9");
+}
+
+TEST_CASE("Keys of a later protocol are ignored", "[identity]") {
+  CHECK(parse_user_data("robot=1;name=a;proto=1;boot=1;colour=red;=;;").value.has_value());
+}
+
+TEST_CASE("User data that is not an identity is refused with the reason", "[identity]") {
+  const auto refusal = [](const std::string& data) {
+    const auto parsed = parse_user_data(data);
+    return std::string(parsed.value ? "accepted" : parsed.refusal);
+  };
+  CHECK(refusal("") == "user data lacks a field");
+  CHECK(refusal("robot=1;name=a;proto=1") == "user data lacks a field");
+  CHECK(refusal("robot=1;robot=2;name=a;proto=1;boot=1") == "user data names a field twice");
+  CHECK(refusal("robot=65536;name=a;proto=1;boot=1") == "robot id is not a 16-bit number");
+  CHECK(refusal("robot=-1;name=a;proto=1;boot=1") == "robot id is not a 16-bit number");
+  CHECK(refusal("robot=1 ;name=a;proto=1;boot=1") == "robot id is not a 16-bit number");
+  CHECK(refusal("robot=1;name=;proto=1;boot=1") == "robot name is not printable");
+  CHECK(refusal("robot=1;name=a\033[2J;proto=1;boot=1") == "robot name is not printable");
+  CHECK(refusal("robot=1;name=" + std::string(65, 'a') + ";proto=1;boot=1") ==
+        "robot name is not printable");
+  CHECK(refusal("robot=1;name=a;proto=x;boot=1") == "protocol version is not a 16-bit number");
+  CHECK(refusal("robot=1;name=a;proto=1;boot=0") == "boot id is not a nonzero 64-bit number");
+  CHECK(refusal("robot=1;name=a;proto=1;boot=10123456789abcdef") ==
+        "boot id is not a nonzero 64-bit number");
+  CHECK(refusal("robot=1;name=a;proto=1;boot=1;x=" + std::string(2000, 'x')) ==
+        "user data too long");
+}
+
+TEST_CASE("Random bytes are never accepted as a robot's user data", "[identity]") {
+  const auto seed = GENERATE(range(0U, 20U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  std::uniform_int_distribution<int> byte(0, 255), length(0, 100);
+  std::uniform_int_distribution<std::size_t> position(0, 40);
+  for (int i = 0; i < 500; ++i) {
+    std::string data(static_cast<std::size_t>(length(rng)), '\0');
+    for (char& c : data) c = static_cast<char>(byte(rng));
+    CHECK_FALSE(parse_user_data(data).value.has_value());
+
+    std::string damaged = to_user_data({7, "alpha", 1, 99});
+    damaged[position(rng)] = static_cast<char>(byte(rng));
+    const auto parsed = parse_user_data(damaged);
+    CHECK((parsed.value.has_value() || parsed.refusal != nullptr));
+  }
+}
+
+TEST_CASE("A name that cannot be sent is refused at home", "[identity]") {
+  CHECK_THROWS_AS(to_user_data({1, "", 1, 1}), std::invalid_argument);
+  CHECK_THROWS_AS(to_user_data({1, "a;b", 1, 1}), std::invalid_argument);
+  CHECK_THROWS_AS(to_user_data({1, "tab\t", 1, 1}), std::invalid_argument);
+}
+
+TEST_CASE("The boot id of a new incarnation is unique and not resumed", "[identity]") {
+  std::set<std::uint64_t> incarnations;
+  for (int i = 0; i < 100; ++i) {
+    const std::uint64_t boot = random_boot_id();
+    CHECK(resume_count(boot) == 0);
+    CHECK_FALSE(is_same_incarnation(boot, 0));
+    incarnations.insert(boot >> kResumeBits);
+  }
+  CHECK(incarnations.size() == 100);
+}
+
+TEST_CASE("An incarnation can be resumed as often as its counter permits", "[identity]") {
+  const std::uint64_t first = random_boot_id();
+  std::uint64_t boot = first;
+  constexpr std::uint32_t kMost = 65535;
+  for (std::uint32_t count = 1; count <= kMost; ++count) {
+    boot = next_boot(boot);
+    REQUIRE(resume_count(boot) == count);
+  }
+  CHECK(boot != first);
+  CHECK(is_same_incarnation(boot, first));
+  CHECK_FALSE(is_same_incarnation(boot + 1, first));
+  CHECK_THROWS_AS(next_boot(boot), std::overflow_error);
+}
+
+}  // namespace
+}  // namespace km

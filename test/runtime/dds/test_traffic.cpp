@@ -1,0 +1,106 @@
+#include <catch2/catch.hpp>
+#include <sstream>
+#include <string>
+
+#include "runtime/dds/traffic.hpp"
+
+namespace km {
+namespace {
+
+PeerTraffic row(Direction direction, std::optional<RobotId> peer, TrafficCount count,
+                std::uint64_t retransmitted) {
+  return {.topic = "bow",
+          .category = TrafficCategory::kPlaceRecognition,
+          .direction = direction,
+          .peer = peer,
+          .count = count,
+          .retransmitted_bytes = retransmitted};
+}
+
+TEST_CASE("Traffic is written when it changes, cumulatively", "[traffic]") {
+  std::ostringstream csv;
+  TrafficCsv writer(csv);
+  TrafficSnapshot snapshot;
+  snapshot.peers = {row(Direction::kOut, 7, {1, 100}, 0), row(Direction::kIn, 7, {0, 0}, 0)};
+  writer.append(1.0, snapshot);
+  writer.append(2.0, snapshot);
+  snapshot.peers[1].count = {2, 50};
+  snapshot.peers.push_back(row(Direction::kOut, std::nullopt, {0, 0}, 30));
+  writer.append(3.5, snapshot);
+  CHECK(csv.str() ==
+        "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
+        "1,out,bow,place_recognition,7,1,100,0\n"
+        "3.5,in,bow,place_recognition,7,2,50,0\n"
+        "3.5,out,bow,place_recognition,*,0,0,30\n");
+}
+
+TEST_CASE("Traffic of a resumed run is added to the former traffic", "[traffic]") {
+  const std::string former =
+      "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
+      "1,out,bow,place_recognition,7,1,100,0\n"
+      "3.5,in,bow,place_recognition,7,2,50,0\n"
+      "3.5,out,bow,place_recognition,*,0,0,30\n"
+      "4,waiting,bow,place_recognition,*,9,900,0\n"
+      "4,out,bow,place_recognition,7,2,200,10\n";
+  std::ostringstream csv;
+  TrafficCsv writer(csv, former);
+  TrafficSnapshot snapshot;
+  snapshot.peers = {row(Direction::kOut, 7, {0, 0}, 0), row(Direction::kIn, 7, {0, 0}, 0)};
+  writer.append(5.0, snapshot);
+  CHECK(csv.str().empty());
+  snapshot.peers = {row(Direction::kOut, 7, {1, 40}, 0), row(Direction::kOut, 8, {1, 40}, 0),
+                    row(Direction::kOut, std::nullopt, {0, 0}, 5)};
+  writer.append(6.0, snapshot);
+  CHECK(csv.str() ==
+        "6,out,bow,place_recognition,7,3,240,10\n"
+        "6,out,bow,place_recognition,8,1,40,0\n"
+        "6,out,bow,place_recognition,*,0,0,35\n");
+
+  snapshot = {};
+  snapshot.topics = {{.topic = "bow",
+                      .category = TrafficCategory::kPlaceRecognition,
+                      .count = {},
+                      .held = {.delayed = {}, .waiting = {1, 10}, .superseded = {}, .dropped = {}},
+                      .refused = {}}};
+  csv.str({});
+  writer.append(7.0, snapshot);
+  CHECK(csv.str() == "7,waiting,bow,place_recognition,*,1,10,0\n");
+}
+
+TEST_CASE("Messages that a budget delays or drops are in the table beside those sent",
+          "[traffic]") {
+  std::ostringstream csv;
+  TrafficCsv writer(csv);
+  const HeldBack held{
+      .delayed = {1, 10}, .waiting = {2, 20}, .superseded = {3, 30}, .dropped = {4, 40}};
+  TrafficSnapshot snapshot;
+  snapshot.topics = {
+      {.topic = "bow",
+       .category = TrafficCategory::kPlaceRecognition,
+       .count = {},
+       .held = held,
+       .refused = {}},
+      {.topic = "bow", .direction = Direction::kIn, .count = {}, .held = held, .refused = {}}};
+  writer.append(1.0, snapshot);
+  snapshot.topics[0].held.waiting = {};
+  writer.append(2.0, snapshot);
+  CHECK(csv.str() ==
+        "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
+        "1,delayed,bow,place_recognition,*,1,10,0\n"
+        "1,waiting,bow,place_recognition,*,2,20,0\n"
+        "1,superseded,bow,place_recognition,*,3,30,0\n"
+        "1,dropped,bow,place_recognition,*,4,40,0\n"
+        "2,waiting,bow,place_recognition,*,0,0,0\n");
+}
+
+TEST_CASE("Bytes add up per direction and category", "[traffic]") {
+  TrafficSnapshot snapshot;
+  snapshot.peers = {row(Direction::kOut, 7, {1, 100}, 5), row(Direction::kOut, 8, {1, 100}, 0),
+                    row(Direction::kIn, 7, {1, 40}, 0)};
+  CHECK(snapshot.bytes(Direction::kOut, TrafficCategory::kPlaceRecognition) == 205);
+  CHECK(snapshot.bytes(Direction::kIn, TrafficCategory::kPlaceRecognition) == 40);
+  CHECK(snapshot.bytes(Direction::kOut, TrafficCategory::kOther) == 0);
+}
+
+}  // namespace
+}  // namespace km
