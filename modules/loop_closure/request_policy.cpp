@@ -29,7 +29,8 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   Peer& peer = peers_[candidate.query.robot];
   const KeyframeIndex query = candidate.query.index;
   const KeyframeIndex own = candidate.match.index;
-  if (is_near_closure({candidate.match, candidate.query}, config_.max_closure_separation))
+  const int reach = std::min(config_.max_closure_separation, peer.successes);
+  if (reach > 0 && any_near(peer.closures, query, own, static_cast<KeyframeIndex>(reach)))
     return Decision::kNearClosure;
   const int beside = std::min(config_.max_request_separation, peer.successes);
   if (beside > 0 && any_near(peer.requests, query, own, static_cast<KeyframeIndex>(beside)))
@@ -48,17 +49,6 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   peer.requests.emplace(query, own);
   peer.group_of[query] = group_index;
   return Decision::kRequest;
-}
-
-// True if both keyframes are near those of a closure: as many keyframes as the peer's successes, at
-// most `most`.
-bool RequestPolicy::is_near_closure(const ClosureId& candidate, int most) const {
-  const auto found = peers_.find(candidate.to.robot);
-  if (found == peers_.end()) return false;
-  const Peer& peer = found->second;
-  const int reach = std::min(most, peer.successes);
-  return reach > 0 && any_near(peer.closures, candidate.to.index, candidate.from.index,
-                               static_cast<KeyframeIndex>(reach));
 }
 
 void RequestPolicy::add_closure(const ClosureId& closure) {

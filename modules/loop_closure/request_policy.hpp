@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
@@ -24,10 +23,6 @@ namespace km {
 /// max_request_separation in place of max_closure_separation. Before the first closure with a peer,
 /// neither rule skips a candidate.
 ///
-/// A candidate inside this robot costs no bytes, but time, and memory if it is verified. It is
-/// skipped within kOwnSeparation keyframes of a verified closure, because its error is mostly that
-/// of this closure: both see the same points.
-///
 /// In an environment with similar places most candidates are wrong. Right candidates come in
 /// groups, because the views around the match resemble the query too. Candidates are grouped by
 /// peer and by their support. After n + 4 failures in a group, n times skips_per_failure queries
@@ -36,8 +31,6 @@ namespace km {
 /// Deterministic, no randomness. Not thread-safe.
 class RequestPolicy {
  public:
-  static constexpr int kOwnSeparation = 2;  ///< [keyframes]
-
   enum class Decision {
     kRequest,
     kNearClosure,  ///< Near a verified closure.
@@ -51,13 +44,7 @@ class RequestPolicy {
   /// After kRequest the candidate counts as requested.
   [[nodiscard]] Decision decide(const LoopCandidate& candidate);
 
-  /// True if a candidate inside this robot adds little to a verified closure near it.
-  [[nodiscard]] bool is_covered(const ClosureId& own_candidate) const {
-    return is_near_closure(own_candidate, std::min(config_.max_closure_separation, kOwnSeparation));
-  }
-
-  /// Notes that a closure from an own keyframe to a keyframe of a peer, or to another own keyframe,
-  /// was verified.
+  /// Notes that a closure from an own keyframe to a keyframe of a peer was verified.
   void add_closure(const ClosureId& closure);
 
   /// Discards all about a peer, because its keyframe indices now mean other keyframes.
@@ -84,8 +71,6 @@ class RequestPolicy {
     std::optional<KeyframeIndex> last_skipped;      ///< Query of the last candidate with decision
                                                     ///< kLowYield.
   };
-
-  [[nodiscard]] bool is_near_closure(const ClosureId& candidate, int most) const;
 
   LoopClosureConfig config_;
   std::map<RobotId, Peer> peers_;

@@ -214,7 +214,8 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeBow>& bow) {
 
 void LoopClosureNode::step(const std::shared_ptr<const ClosureOutcome>& restored) {
   known_.insert(restored->id);
-  if (restored->stage >= ClosureStage::kVerified) policy_.add_closure(restored->id);
+  if (restored->stage >= ClosureStage::kVerified && restored->id.to.robot != self_)
+    policy_.add_closure(restored->id);
 }
 
 void LoopClosureNode::step(const LoopClosureTick& tick) {
@@ -264,11 +265,6 @@ KeyframeFeatures LoopClosureNode::select_keypoints(const KeyframeFeatures& featu
 // Completes the work if both keyframes are available; otherwise waits for a keyframe or requests
 // it. True if the work led to a closure.
 bool LoopClosureNode::advance(const Work& work) {
-  const bool is_own_candidate = work.id.to.robot == self_ && !work.measured;
-  if (is_own_candidate && policy_.is_covered(work.id)) {
-    report(work, ClosureStage::kCandidate, "not compared: near a verified closure");
-    return false;
-  }
   const KeyframePtr from = find(work.id.from);
   const KeyframePtr to = find(work.id.to);
   if (from && to) return complete(work, *from, *to);
@@ -322,7 +318,7 @@ bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Key
       report(work, ClosureStage::kReceived, to_string(numbers.status), numbers);
       return false;
     }
-    policy_.add_closure(work.id);
+    if (to.odometry.id.robot != self_) policy_.add_closure(work.id);
     closure.T_from_to = numbers.T_from_to;
     closure.covariance = numbers.covariance;
     closure.inliers = numbers.inliers;

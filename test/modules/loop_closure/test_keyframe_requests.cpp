@@ -143,19 +143,6 @@ TEST_CASE("No keyframe near a closure is requested and the distance grows with s
   CHECK(policy.decide(candidate(100, 50, 1, kPeer + 1)) == Decision::kRequest);  // another robot
 }
 
-TEST_CASE("Candidates inside one robot are skipped near a closure by the same rule",
-          "[request_policy]") {
-  RequestPolicy policy({.max_closure_separation = 3});
-  const auto id = [](KeyframeIndex earlier, KeyframeIndex later) {
-    return ClosureId{{kSelf, earlier}, {kSelf, later}};
-  };
-  CHECK_FALSE(policy.is_covered(id(10, 110)));
-  for (const KeyframeIndex later : {110U, 210U, 310U}) policy.add_closure(id(10, later));
-  CHECK(policy.is_covered(id(12, 108)));
-  CHECK_FALSE(policy.is_covered(id(13, 110)));
-  CHECK_FALSE(policy.is_covered(id(10, 113)));
-}
-
 TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {
   LoopClosureConfig config;
   config.max_request_separation = 2;
