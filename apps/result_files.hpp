@@ -16,13 +16,17 @@ inline constexpr const char* kLabelPalette = "label_palette.csv";
 /// Written at the end of a run.
 inline constexpr const char* kSummary = "summary.json";
 
+/// The fused mesh of a team, in its folder, and with `map.team` in that of each robot.
+inline constexpr const char* kTeamMesh = "team_mesh.ply";
+
 /// Results of a robot in its output folder.
 inline constexpr std::array kResultFiles = {
     "odometry.tum",   "optimized.tum",      "optimized_keyframes.tum",
     "pose_graph.g2o", "keyframes.csv",      "loop_closures.csv",
     "optimizer.csv",  "traffic.csv",        "process.csv",
     "timing.csv",     "config.yaml",        kSummary,
-    "mesh.ply",       "mesh_optimized.ply", kLabelPalette};
+    "mesh.ply",       "mesh_optimized.ply", kLabelPalette,
+    kTeamMesh};
 
 /// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};
@@ -76,9 +80,6 @@ inline constexpr const char* kRecord = "record.mcap";
   return file.parent_path() / (name + file.extension().string());
 }
 
-/// Folder of the meshes that other robots sent, robot<id>.ply each.
-inline constexpr const char* kPeerMeshes = "peer_meshes";
-
 /// Reserve room for results that are written at the end; removed then.
 inline constexpr const char* kTrajectoryRoom = ".room_for_trajectories";
 inline constexpr const char* kSummaryRoom = ".room_for_summary";
@@ -92,7 +93,6 @@ inline void remove_results(const std::filesystem::path& folder, bool continues =
     for (const char* ending : {"", ".part"})  // file cut short by the end of the process
       std::filesystem::remove(folder / (file + ending));
   }
-  std::filesystem::remove_all(folder / kPeerMeshes);
   if (continues) return;
   std::filesystem::remove(folder / kRecord);
   for (int number = 2; std::filesystem::remove(numbered(folder / kRecord, number));) ++number;

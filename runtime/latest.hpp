@@ -25,6 +25,11 @@ class Latest {
     return std::exchange(message_, nullptr);
   }
 
+  [[nodiscard]] bool is_empty() const {
+    const std::lock_guard lock(mutex_);
+    return message_ == nullptr;
+  }
+
   /// Closes the channel; the last value can still be taken.
   void close() {
     const std::lock_guard lock(mutex_);
@@ -32,7 +37,7 @@ class Latest {
   }
 
  private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   Message message_;
   bool closed_ = false;
 };

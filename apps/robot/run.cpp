@@ -215,7 +215,8 @@ class Watch {
         return member != record.robot() && !peers.contains(member);
       });
       // Messages that wait for the budget may change the graphs of other robots.
-      const bool settled = record.settled() && !robot_.bridge().holds_back();
+      const bool settled =
+          record.settled() && !robot_.bridge().holds_back() && robot_.has_shared_map();
       const auto reported =
           departure_.update(now_s, {.input_ended = ended,
                                     .graph_settled = settled,
@@ -404,17 +405,13 @@ HeldBackSums held_back(Robot& robot) {
   return sums;
 }
 
-// Writes the meshes of the other robots as far as they were received.
-void write_peer_meshes(const fs::path& folder, const TeamMeshNode& peers, ResultWriter& results) {
-  for (const RobotMesh& peer : peers.snapshot()) {
-    if (peer.mesh.faces.empty()) continue;
-    results.write(folder / ("robot" + std::to_string(peer.robot) + ".ply"), [&](const auto& file) {
-      fs::create_directories(folder);
-      write_ply(file, peer.mesh);
-    });
-    log::info("robot") << "mesh of robot " << peer.robot << ": " << peer.mesh.faces.size()
-                       << " faces, in the frame of robot " << peer.anchor;
-  }
+// Writes the fused mesh of the team, of the chunks that were received until now.
+void write_team_map(const fs::path& folder, TeamMapNode& map, ResultWriter& results) {
+  log::info("robot") << "fusing the map of the team";
+  const FusedMesh fused = map.mesh();
+  results.write(folder / kTeamMesh, [&](const auto& file) { write_ply(file, fused.mesh); });
+  log::info("robot") << "map of the team: " << fused.mesh.faces.size()
+                     << " faces, in the frame of robot " << fused.anchor;
 }
 
 // Completes the MCAP record with the other results as attachments, among them the closures.
@@ -465,8 +462,8 @@ void write_all(const RobotOptions& options, Robot& robot, const RunRecord& recor
     results.note(options.output / "mesh.ply", "not as at the end of the run: mesh_files hangs");
   else if (robot.mesh_files() != nullptr)
     robot.mesh_files()->finish(record.trajectory());
-  if (robot.peer_meshes() != nullptr && !result.is_left_behind("team_mesh"))
-    write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes(), results);
+  if (robot.team_map() != nullptr && !result.is_left_behind(robot.team_map()->name()))
+    write_team_map(options.output, *robot.team_map(), results);
   if (robot.record() != nullptr) finish_record(options, *robot.record(), record, result, results);
   results.write(options.output / "timing.csv",
                 [&robot](const auto& file) { write_file(file, timings(robot)); });

@@ -96,7 +96,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_back_end(config);
   add_overlay();
   if (mapping) add_mesh_correction(config, options.output, results);
-  add_network(share_meshes(config.mesh_chunks));
+  add_network(share_meshes(config, mapping ? mapping->palette : LabelPalette()));
   add_records();
   add_view(config, camera);
   if (input.ros != nullptr && config.ros.publish.value_or(true))
@@ -276,18 +276,25 @@ void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem
                                                     .optimized = topics_.optimized_meshes});
 }
 
-// A robot may send its mesh without collecting others, and the other way round.
-CrossingEnds Robot::share_meshes(const MeshChunksConfig& config) {
-  const CrossingEnds ends{.send = config.publish && mesh_deformation_ != nullptr,
-                          .receive = config.collect};
-  if (ends.send) {
-    auto& chunks = add<MeshChunksNode>(false, config, identity_.robot, topics_.chunks.to_peers());
-    topics_.optimized_meshes.subscribe([&chunks](const auto& optimized) {
-      chunks.offer(optimized->anchor, {optimized, &optimized->mesh});
-    });
-  }
-  if (ends.receive) peer_meshes_ = &add<TeamMeshNode>(false, topics_.chunks.from_peers());
-  return ends;
+// A robot without a map only receives the meshes of the others.
+CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& palette) {
+  const MapSharingConfig& config = robot.map;
+  if (config.team == TeamMapMode::kOff) return {.send = false, .receive = false};
+  const bool coarse = config.team == TeamMapMode::kCoarse;
+  const double voxel_m = coarse ? config.coarse_voxel_m : robot.semantic_mapping.voxel_size_m;
+  team_map_ =
+      &add<TeamMapNode>(false, voxel_m, palette, topics_.sent_chunks, topics_.chunks.from_peers());
+  if (mesh_deformation_ == nullptr) return {.send = false, .receive = true};
+  topics_.sent_chunks.subscribe(
+      [to_peers = topics_.chunks.to_peers()](const auto& chunk) { to_peers.publish(chunk); });
+  MeshChunksNode::Reduction reduction;
+  if (coarse) reduction = [voxel_m](const LabelledMesh& mesh) { return resampled(mesh, voxel_m); };
+  chunks_ = &add<MeshChunksNode>(false, config, identity_.robot, topics_.sent_chunks,
+                                 std::move(reduction));
+  topics_.optimized_meshes.subscribe([this](const auto& optimized) {
+    chunks_->offer(optimized->anchor, {optimized, &optimized->mesh});
+  });
+  return {};
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {
@@ -545,7 +552,7 @@ void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& cam
                                        "without encryption (view.in_clear)";
     return;
   }
-  const MeshChunksConfig& mesh = config.mesh_chunks;
+  const MapSharingConfig& mesh = config.map;
   Topics& t = topics_;
   view_ = &add<ViewNode>(false, config.view, participant_,
                          ViewMesh{{mesh.cell_m, mesh.position_step_m}, mesh.min_move_m}, camera,

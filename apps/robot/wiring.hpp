@@ -40,6 +40,7 @@
 #include "modules/ros_dds/node/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/node/sensors_node.hpp"
+#include "modules/team_map/node/team_map_node.hpp"
 #include "modules/view/node/view_node.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/robot_status.hpp"
@@ -112,6 +113,7 @@ struct Topics {
   TeamChannel<InlierSet> shared_inlier_sets;
   AddressedCrossing<TeamLanePacket> team_packets;
   AddressedCrossing<PlacesLanePacket> places_packets;
+  Topic<MeshChunk> sent_chunks;  // to the other robots and to the map of the team
   Crossing<MeshChunk> chunks;
   Crossing<RobotStatus> status;
 };
@@ -144,8 +146,12 @@ class Robot {
   [[nodiscard]] std::size_t restored_images() const { return restored_images_; }
   /// Null without mapping.
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
-  /// Null unless meshes of the other robots are collected.
-  [[nodiscard]] const TeamMeshNode* peer_meshes() const { return peer_meshes_; }
+  /// Null unless the robots share their map.
+  [[nodiscard]] TeamMapNode* team_map() { return team_map_; }
+  /// True unless the robot has yet to send a part of its mesh. Thread-safe.
+  [[nodiscard]] bool has_shared_map() const {
+    return chunks_ == nullptr || (mesh_deformation_->is_current() && chunks_->is_done());
+  }
   /// True if another running robot had this robot's id first.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   /// Null without --localize.
@@ -191,7 +197,7 @@ class Robot {
                    const MappingPlan& plan, std::optional<ResumedMap> before);
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
                            ResultWriter& results);
-  [[nodiscard]] CrossingEnds share_meshes(const MeshChunksConfig& config);
+  [[nodiscard]] CrossingEnds share_meshes(const RobotConfig& robot, const LabelPalette& palette);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config);
@@ -239,7 +245,8 @@ class Robot {
   RecorderNode* recorder_ = nullptr;
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;
-  TeamMeshNode* peer_meshes_ = nullptr;
+  MeshChunksNode* chunks_ = nullptr;
+  TeamMapNode* team_map_ = nullptr;
   PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   RosOutputNode* record_ = nullptr;

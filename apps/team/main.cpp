@@ -213,7 +213,7 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
                     out << "\nThe record of all robots: " << file.string() << '\n';
                   });
   if (!team.meshes.merged.empty())
-    results.write(plan.output / "team_mesh.ply", [&](const fs::path& file) {
+    results.write(plan.output / km::kTeamMesh, [&](const fs::path& file) {
       km::write_ply(file, team.meshes.merged);
       copy_palette(plan);
       out << "The mesh of all robots" << (team.optimized ? ", in the frame of the truth: " : ": ")

@@ -31,7 +31,7 @@ void remove_earlier_run(const TeamPlan& plan) {
     remove_results(folder);
     fs::remove(folder / "exit_code");
   }
-  for (const char* file : {"team_mesh.ply", kReportPage, kTeamRecord, kLinksTable, kLabelPalette})
+  for (const char* file : {kTeamMesh, kReportPage, kTeamRecord, kLinksTable, kLabelPalette})
     fs::remove(plan.output / file);
 }
 

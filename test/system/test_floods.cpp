@@ -270,7 +270,7 @@ class Scene {
     std::string line = KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(kVictim) +
                        " --domain " + std::to_string(dds.domain) + " --output " +
                        (folder_.path() / "out").string() + " --set dds.team=" + dds.team +
-                       " --set dds.interface=lo --set mesh_chunks.collect=true";
+                       " --set dds.interface=lo --set map.team=full";
     if (flood.sealed) {
       std::vector<RobotName> robots;
       for (const RobotId robot : kTeam) robots.push_back({robot, robot_name(robot)});

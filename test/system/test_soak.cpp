@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/lie.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/core/text_rows.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/system/laps.hpp"
 #include "test/system/team_run.hpp"
 
 // Robots that stand still for long, or fly the same lap for long.
@@ -28,18 +28,6 @@ namespace fs = std::filesystem;
 constexpr int kStanding = 3;
 constexpr Stamp kPiece = 4'800'000'000;  // ns of EuRoC V1_01 before it takes off: 24 pairs at 5 Hz
 
-// Rows of a CSV file without its header, with their stamps.
-std::vector<std::pair<Stamp, std::string>> stamped_rows(const fs::path& csv) {
-  std::vector<std::pair<Stamp, std::string>> rows;
-  std::ifstream in(csv);
-  for (std::string line; std::getline(in, line);) {
-    const std::size_t comma = line.find(',');
-    if (line.empty() || line[0] == '#' || comma == line.npos) continue;
-    rows.emplace_back(std::stoll(line.substr(0, comma)), line.substr(comma));
-  }
-  return rows;
-}
-
 // Images whose names are their stamps.
 std::vector<std::pair<Stamp, std::string>> images_in(const fs::path& folder) {
   std::vector<std::pair<Stamp, std::string>> images;
@@ -48,16 +36,6 @@ std::vector<std::pair<Stamp, std::string>> images_in(const fs::path& folder) {
                         ',' + image.path().filename().string());
   std::sort(images.begin(), images.end());
   return images;
-}
-
-// The rows of the first piece, repeated.
-void repeat(const std::vector<std::pair<Stamp, std::string>>& rows, Stamp piece, int times,
-            const fs::path& csv) {
-  std::ofstream out(csv);
-  out << "#stamp\n";
-  for (int k = 0; k < times; ++k)
-    for (const auto& [stamp, rest] : rows)
-      if (stamp - rows.front().first < piece) out << stamp + k * piece << rest << '\n';
 }
 
 // The start of the recording, repeated for the wanted duration, in `folder`.
@@ -116,90 +94,6 @@ TEST_CASE("Robots that stand still keep their place and take no more memory", "[
   }
 }
 
-constexpr double kLap_s = 24.0;
-constexpr double kFlight_s = 2.0 * kLap_s;  // the second lap is up to 0.1 m beside the first
-constexpr Stamp kTakeOff = 1'400'000'000'000'000'000;
-
-// Pose of a body with EuRoC's axes (x up, z forward) in the Vicon room, periodic in kFlight_s.
-SE3 pose_on_lap(int robot, double time_s) {
-  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s, beside = 0.5 * lap, r = robot;
-  const double yaw = lap + 0.5 * r + 0.5 * std::numbers::pi + 0.05 * std::sin(3.0 * beside + r);
-  const double pitch = 0.05 * std::sin(3.0 * lap + r);
-  const Eigen::Vector3d forward(std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch),
-                                std::sin(pitch));
-  const Eigen::Vector3d right(std::sin(yaw), -std::cos(yaw), 0.0);
-  SE3 T = SE3::Identity();
-  T.linear() << right.cross(forward), right, forward;
-  T.translation() << 1.5 * std::cos(lap + 0.5 * r) + 0.05 * std::cos(3.0 * beside + r),
-      0.4 + 1.8 * std::sin(lap + 0.5 * r) + 0.05 * std::sin(5.0 * beside + 2.0 * r),
-      1.4 + 0.2 * std::sin(2.0 * lap + r) + 0.04 * std::sin(3.0 * beside + r);
-  return T;
-}
-
-// True poses for the renderer.
-void write_truth(int robot, const fs::path& file) {
-  std::ofstream out(file);
-  for (int k = -50; k < 100 * static_cast<int>(kFlight_s + 1.0); ++k) {
-    const SE3 T = pose_on_lap(robot, 0.01 * k);
-    const Eigen::Quaterniond q(T.linear());
-    const Stamp stamp = kTakeOff + 10'000'000 * k;
-    out << stamp / 1'000'000'000 << '.' << std::setw(9) << std::setfill('0')
-        << stamp % 1'000'000'000 << std::setprecision(12);
-    for (const double x : T.translation()) out << ' ' << x;
-    out << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
-  }
-}
-
-// Samples of EuRoC's inertial sensor, 200 Hz.
-void write_inertial(int robot, double seconds, const fs::path& file) {
-  std::mt19937 rng(static_cast<unsigned>(robot));
-  std::normal_distribution<double> gyro_noise(0.0, 2.4e-3), accel_noise(0.0, 2.8e-2);
-  std::ofstream out(file);
-  out << "#stamp,wx,wy,wz,ax,ay,az\n" << std::setprecision(12);
-  for (int k = -200; k < static_cast<int>(200.0 * (seconds + 1.0)); ++k) {
-    const double t = 0.005 * k, h = 1e-3;
-    const SE3 before = pose_on_lap(robot, t - h), now = pose_on_lap(robot, t),
-              after = pose_on_lap(robot, t + h);
-    const Eigen::Vector3d gyro = so3_log(before.linear().transpose() * after.linear()) / (2.0 * h);
-    const Eigen::Vector3d accel_world =
-        (before.translation() - 2.0 * now.translation() + after.translation()) / (h * h);
-    const Eigen::Vector3d accel =
-        now.linear().transpose() * (accel_world + Eigen::Vector3d(0.0, 0.0, 9.81));
-    out << kTakeOff + 5'000'000 * k;
-    for (const double w : gyro) out << ',' << w + gyro_noise(rng);
-    for (const double a : accel) out << ',' << a + accel_noise(rng);
-    out << '\n';
-  }
-}
-
-// Recordings of two robots that fly laps for `seconds`, in the folders a and b of `folder`.
-void make_laps(double seconds, const TemporaryFolder& folder) {
-  std::string truths, inertial;
-  for (const int robot : {0, 1}) {
-    const std::string number = std::to_string(robot);
-    write_truth(robot, folder.path() / ("truth" + number + ".tum"));
-    write_inertial(robot, seconds, folder.path() / ("imu" + number + ".csv"));
-    truths += ' ' + (folder.path() / ("truth" + number + ".tum")).string();
-    inertial += ' ' + (folder.path() / ("imu" + number + ".csv")).string();
-  }
-  const fs::path world = folder.path() / "world";
-  const CommandResult made = run_command(
-      KM_BIN_DIR "/kimera_multi_simulate --world vicon_room --trajectory" + truths + " --imu" +
-      inertial + " --names a b --resolution 376x240 --rate 10 --end 48 --output " + world.string());
-  CAPTURE(made.output);
-  REQUIRE(made.exit_code == 0);
-  const auto piece = static_cast<Stamp>(1e9 * kFlight_s);
-  for (const int robot : {0, 1}) {
-    const fs::path sensors = world / (robot == 0 ? "a" : "b") / "mav0";
-    for (const char* camera : {"cam0", "cam1"}) {
-      const fs::path csv = sensors / camera / "data.csv";
-      repeat(stamped_rows(csv), piece, static_cast<int>(std::ceil(seconds / kFlight_s)), csv);
-    }
-    fs::copy_file(folder.path() / ("imu" + std::to_string(robot) + ".csv"),
-                  sensors / "imu0" / "data.csv", fs::copy_options::overwrite_existing);
-  }
-}
-
 // Bytes that the robot whose results are in `folder` has sent until `time_s`.
 double sent_until(const fs::path& folder, double time_s) {
   std::ifstream in(folder / "traffic.csv");
@@ -223,11 +117,11 @@ TEST_CASE("A lap that is flown again costs a tenth of the bytes, and little memo
   }
   const double seconds = std::atof(wanted);
   const TemporaryFolder folder;
-  make_laps(seconds, folder);
+  make_laps(2, seconds, folder);
   const std::string team = folder
                                .write("team.yaml",
-                                      "robots:\n  - {id: 0, name: robot0, dataset: world/a}\n"
-                                      "  - {id: 1, name: robot1, dataset: world/b}\n")
+                                      "robots:\n  - {id: 0, name: robot0, dataset: world/robot0}\n"
+                                      "  - {id: 1, name: robot1, dataset: world/robot1}\n")
                                .string();
   const CommandResult run =
       run_command(KM_BIN_DIR "/kimera_multi_team --config " + team + " --output " +

@@ -1,9 +1,14 @@
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstdio>
+#include <memory>
 
 #include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/mesh/ply_file.hpp"
 #include "test/support/eavesdropper.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
@@ -52,6 +57,36 @@ std::vector<std::string> robot_command(const std::string& id, const fs::path& da
   return words_of(KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot " +
                   id + " --name r" + id + " --dataset " + dataset.string() + " --output " +
                   output.string() + " --domain " + std::to_string(domain));
+}
+
+TEST_CASE("Two robots end with the same map of their team", "[system]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  const auto start = [&](const std::string& id, const std::string& part) {
+    auto command = robot_command(id, *dataset, folder.path() / id, domain);
+    for (const std::string& word :
+         words_of(part + " --rate max --serve-limit 200 --set mapping.mode=metric "
+                         "--set map.team=full --set map.max_bytes_per_s=1e7"))
+      command.push_back(word);
+    return std::make_unique<Process>(command);
+  };
+  const auto a = start("0", "--from 0 --to 6"), b = start("1", "--from 2 --to 8");
+  CHECK(a->wait() == 0);
+  CHECK(b->wait() == 0);
+  std::array<std::size_t, 2> faces{};
+  for (const int robot : {0, 1}) {
+    const fs::path results = folder.path() / std::to_string(robot);
+    REQUIRE(read_summary(results / "summary.json").pgo.members.size() == 2);
+    faces[static_cast<std::size_t>(robot)] = read_ply(results / "mesh_optimized.ply").faces.size();
+  }
+  const std::string map = read_input_file(folder.path() / "0/team_mesh.ply");
+  CHECK(map == read_input_file(folder.path() / "1/team_mesh.ply"));
+  // Each place is there once: fewer faces than both have, and more than one has.
+  const std::size_t fused = read_ply(folder.path() / "0/team_mesh.ply").faces.size();
+  CHECK(5 * fused < 4 * (faces[0] + faces[1]));
+  CHECK(fused > std::max(faces[0], faces[1]));
 }
 
 // A status line from 4 s of the recording on: the first images are processed, and most are still to

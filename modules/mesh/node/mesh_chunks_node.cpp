@@ -25,19 +25,22 @@ TokenBucket full_budget(double bytes_per_s) {
 
 }  // namespace
 
-MeshChunksNode::MeshChunksNode(const MeshChunksConfig& config, RobotId self, Out<MeshChunk> chunks)
+MeshChunksNode::MeshChunksNode(const MapSharingConfig& config, RobotId self, Out<MeshChunk> chunks,
+                               Reduction reduction)
     : config_(checked(config)),
       self_(self),
       chunks_(chunks),
+      reduction_(std::move(reduction)),
       schedule_(config.min_move_m),
       budget_bytes_(full_budget(config.max_bytes_per_s)),
       worker_(
           kQueue, Overflow::kBlock, [this](const Offer& offer) { step(offer, steady_now_s()); },
-          MeshChunksConfig::kSection),
+          "mesh_chunks"),
       ticks_(
           steady_duration(kTick_s), [this] { worker_.post({}); }, "chunks tick") {}
 
 void MeshChunksNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh) {
+  ++offers_;
   worker_.post({anchor, std::move(mesh)});
 }
 
@@ -59,15 +62,16 @@ void MeshChunksNode::step(const Offer& offer, double now_s) {
   if (offer.mesh != nullptr) take(offer);
   send(now_s);
   waiting_ = schedule_.waiting();
+  if (offer.mesh != nullptr) --offers_;
 }
 
 void MeshChunksNode::take(const Offer& offer) {
-  SplitMesh pieces =
-      split_mesh(*offer.mesh, self_, offer.anchor, {config_.cell_m, config_.position_step_m});
+  SplitMesh pieces = split_mesh(reduction_ ? reduction_(*offer.mesh) : *offer.mesh, self_,
+                                offer.anchor, {config_.cell_m, config_.position_step_m});
   if (pieces.oversized_faces > 0)
     log::limited(log::Level::kWarn, name(), "oversized")
         << pieces.oversized_faces
-        << " faces are too long for mesh_chunks.position_step_m = " << config_.position_step_m
+        << " faces are too long for map.position_step_m = " << config_.position_step_m
         << " m and are not sent";
   schedule_.update(std::move(pieces.chunks));
 }
@@ -80,27 +84,6 @@ void MeshChunksNode::send(double now_s) {
     budget_bytes_.spend(static_cast<double>(wire_bytes(*chunk)), now_s);
     chunks_.publish(*std::move(chunk));
   }
-}
-
-TeamMeshNode::TeamMeshNode(In<MeshChunk> chunks)
-    : worker_(
-          kQueue, Overflow::kBlock, [this](const auto& chunk) { take(*chunk); }, "team_mesh") {
-  chunks.subscribe([this](const auto& chunk) { worker_.post(chunk); });
-}
-
-void TeamMeshNode::take(const MeshChunk& chunk) {
-  const ChunkVerdict verdict = [&] {
-    const std::lock_guard lock(mutex_);
-    return team_.add(chunk);
-  }();
-  if (verdict != ChunkVerdict::kTaken)
-    log::limited(log::Level::kWarn, name(), std::to_string(chunk.key.robot))
-        << "a chunk of robot " << chunk.key.robot << "'s mesh is ignored: " << to_string(verdict);
-}
-
-std::vector<RobotMesh> TeamMeshNode::snapshot() const {
-  const std::lock_guard lock(mutex_);
-  return team_.snapshot();
 }
 
 }  // namespace km

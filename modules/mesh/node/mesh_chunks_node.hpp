@@ -2,15 +2,14 @@
 
 #include <atomic>
 #include <exception>
+#include <functional>
 #include <memory>
-#include <mutex>
 #include <string_view>
 #include <vector>
 
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
-#include "modules/mesh/mesh_chunks_config.hpp"
-#include "modules/mesh/team_mesh.hpp"
+#include "modules/mesh/map_sharing_config.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/token_bucket.hpp"
@@ -30,14 +29,19 @@ class MeshChunksNode final : public Node {
     std::shared_ptr<const LabelledMesh> mesh;
   };
 
-  /// Throws ConfigError if `config` is out of bounds. `chunks` are published to the peers.
-  MeshChunksNode(const MeshChunksConfig& config, RobotId self, Out<MeshChunk> chunks);
+  /// Reduces a mesh before it is sent.
+  using Reduction = std::function<LabelledMesh(const LabelledMesh&)>;
+
+  /// Throws ConfigError if `config` is out of bounds. `chunks` are published to the peers. Without
+  /// a reduction the whole mesh is sent.
+  MeshChunksNode(const MapSharingConfig& config, RobotId self, Out<MeshChunk> chunks,
+                 Reduction reduction = {});
   ~MeshChunksNode() override { stop(); }
 
   /// Only the newest mesh counts. Thread-safe; returns at once.
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
 
-  std::string_view name() const override { return MeshChunksConfig::kSection; }
+  std::string_view name() const override { return "mesh_chunks"; }
   void start() override;
   void stop() noexcept override;  ///< Drops the chunks that have not been sent.
   std::exception_ptr error() const override;
@@ -46,6 +50,8 @@ class MeshChunksNode final : public Node {
 
   /// Number of waiting chunks. Thread-safe.
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
+  /// True once all chunks of the offered meshes are sent. Thread-safe.
+  [[nodiscard]] bool is_done() const { return waiting_ == 0 && offers_ == 0; }
 
   /// Handles one offer synchronously at time `now_s`. The thread calls only this function; tests
   /// can call it too.
@@ -55,39 +61,16 @@ class MeshChunksNode final : public Node {
   void take(const Offer& offer);
   void send(double now_s);
 
-  const MeshChunksConfig config_;
+  const MapSharingConfig config_;
   const RobotId self_;
   const Out<MeshChunk> chunks_;
+  const Reduction reduction_;
   ChunkSchedule schedule_;
   TokenBucket budget_bytes_;
-  std::atomic<std::size_t> waiting_ = 0;
+  std::atomic<std::size_t> waiting_ = 0;  // chunks
+  std::atomic<int> offers_ = 0;           // meshes in the queue
   Worker<Offer> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
-};
-
-/// Stores the meshes that other robots send.
-class TeamMeshNode final : public Node {
- public:
-  /// `chunks`: received chunks.
-  explicit TeamMeshNode(In<MeshChunk> chunks);
-  ~TeamMeshNode() override { stop(); }
-
-  /// The received parts of all meshes, by robot. Time proportional to their size. Thread-safe.
-  [[nodiscard]] std::vector<RobotMesh> snapshot() const;
-
-  std::string_view name() const override { return "team_mesh"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
- private:
-  void take(const MeshChunk& chunk);
-
-  mutable std::mutex mutex_;  // guards team_
-  TeamMesh team_;
-  Worker<Topic<MeshChunk>::Message> worker_;  // last member: stops first
 };
 
 }  // namespace km

@@ -87,6 +87,7 @@ void MeshDeformationNode::step(const Input& input, double now_s) {
   if (const auto* map = std::get_if<Topic<MapMesh>::Message>(&input)) return take(*map);
   if (const auto* trajectory = std::get_if<Topic<Trajectory>::Message>(&input)) {
     trajectory_ = *trajectory;
+    is_corrected_ = false;
     return;
   }
   ended_ = std::holds_alternative<End>(input);
@@ -104,6 +105,7 @@ void MeshDeformationNode::take(Topic<MapMesh>::Message map) {
   keyframes_of_map_ = keyframes_of(*map);
   map_ = std::move(map);
   ++map_version_;
+  is_corrected_ = false;
 }
 
 // A map may arrive before its keyframes, and the trajectory may be missing.
@@ -130,6 +132,7 @@ void MeshDeformationNode::correct() {
   const double start_s = steady_now_s();
   std::optional<MeshCorrection> correction =
       ended_ ? corrector_.correct_from_scratch(input()) : corrector_.correct(input());
+  is_corrected_ = true;
   if (!correction) return;
   const double end_s = steady_now_s();
   next_s_ = end_s + config_.period_s;

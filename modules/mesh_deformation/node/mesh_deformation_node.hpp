@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <memory>
@@ -55,6 +56,11 @@ class MeshDeformationNode final : public Node {
   /// once. Idempotent, thread-safe.
   void finish();
 
+  /// True once the mesh agrees with the newest map and the newest trajectory. Thread-safe.
+  [[nodiscard]] bool is_current() const {
+    return is_corrected_ && latest_map_.is_empty() && latest_trajectory_.is_empty();
+  }
+
   /// Inputs without content: a tick of the clock, and the call of finish(). They are null pointers
   /// and not structs, because GCC 12 reports a false warning for a variant of structs and pointers.
   using Tick = std::shared_ptr<const struct MeshTickTag>;
@@ -88,6 +94,7 @@ class MeshDeformationNode final : public Node {
   Topic<Trajectory>::Message trajectory_;
   double next_s_ = 0.0;
   bool ended_ = false;
+  std::atomic<bool> is_corrected_ = true;  // with all input that has been handled
   Timing timing_;
   Latest<MapMesh> latest_map_;  // newest map, until it is handled
   Latest<Trajectory> latest_trajectory_;

@@ -32,8 +32,8 @@ std::size_t bytes_of(const std::vector<MeshChunk>& chunks) {
   return bytes;
 }
 
-MeshChunksConfig slow() {
-  MeshChunksConfig config;
+MapSharingConfig slow() {
+  MapSharingConfig config;
   config.max_bytes_per_s = 20000.0;
   return config;
 }
@@ -88,7 +88,7 @@ TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[nod
 
 TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
   Topic<MeshChunk> topic;
-  MeshChunksConfig config;
+  MapSharingConfig config;
   config.cell_m = GENERATE(0.1, 20.0);
   config.position_step_m = GENERATE(0.001, 0.05);
   MeshChunksNode node(config, 7, topic);
@@ -102,35 +102,39 @@ struct MeshRobot {
   MeshRobot(std::shared_ptr<const DdsDomain> domain, RobotId id)
       : basis(std::move(domain), id),
         sender(fast(), id, chunks.to_peers()),
-        team(chunks.from_peers()) {
+        received(chunks.from_peers()) {
     basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kOther);
   }
   ~MeshRobot() { stop(); }
-  static MeshChunksConfig fast() {
-    MeshChunksConfig config;
+  static MapSharingConfig fast() {
+    MapSharingConfig config;
     config.max_bytes_per_s = 2e6;
     return config;
   }
   void start() {
-    team.start();
     basis.start();
     sender.start();
   }
   void stop() {
     sender.stop();
     basis.stop();
-    team.stop();
   }
   TopicTraffic traffic(Direction direction) {
     for (const TopicTraffic& row : basis.bridge.traffic().topics)
       if (row.topic == Codec<MeshChunk>::kTopic && row.direction == direction) return row;
     return {};
   }
+  TeamMesh team() {
+    TeamMesh meshes;
+    for (const MeshChunk& chunk : received.messages())
+      CHECK(meshes.add(chunk) == ChunkVerdict::kTaken);
+    return meshes;
+  }
   // True once the whole mesh of that robot has arrived.
   bool receives(RobotId robot, const LabelledMesh& mesh) {
     return eventually([&] {
-      for (const RobotMesh& received : team.snapshot())
-        if (received.robot == robot) return received.mesh.faces.size() == mesh.faces.size();
+      for (const RobotMesh& peer : team().snapshot())
+        if (peer.robot == robot) return peer.mesh.faces.size() == mesh.faces.size();
       return false;
     });
   }
@@ -138,7 +142,7 @@ struct MeshRobot {
   Crossing<MeshChunk> chunks;
   TestRobot basis;
   MeshChunksNode sender;
-  TeamMeshNode team;
+  Inbox<MeshChunk> received;
 };
 
 TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that join later",
@@ -152,8 +156,8 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   const auto mesh = sheet(150);
   a->sender.offer(kAnchor, mesh);
   REQUIRE(b.receives(3, *mesh));
-  CHECK(b.team.snapshot()[0].mesh.vertices.size() == mesh->vertices.size());
-  CHECK(b.team.snapshot()[0].anchor == kAnchor);
+  CHECK(b.team().snapshot()[0].mesh.vertices.size() == mesh->vertices.size());
+  CHECK(b.team().snapshot()[0].anchor == kAnchor);
 
   const std::vector<MeshChunk> chunks = split_mesh(*mesh, 3, kAnchor, {}).chunks;
   const TopicTraffic out = a->traffic(Direction::kOut);

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <exception>
+#include <mutex>
+#include <string_view>
+
+#include "modules/core/label_palette.hpp"
+#include "modules/mesh/mesh_chunks.hpp"
+#include "modules/team_map/team_map.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// The fused mesh of the team.
+struct FusedMesh {
+  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
+  LabelledMesh mesh;   ///< In `world`.
+};
+
+/// Stores the chunks of all robots, and fuses them into one mesh when it is asked for.
+class TeamMapNode final : public Node {
+ public:
+  /// `palette` colours the mesh, if it has classes. `own`: chunks that this robot has sent;
+  /// `received`: those of the other robots. Throws std::invalid_argument for a size of voxels that
+  /// is not positive.
+  TeamMapNode(double voxel_m, LabelPalette palette, In<MeshChunk> own, In<MeshChunk> received);
+  ~TeamMapNode() override { stop(); }
+
+  std::string_view name() const override { return "team_map"; }
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }  ///< Takes the chunks that have arrived.
+  std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+  /// The mesh of all chunks so far. Fuses first what has changed since the last call, about 200,000
+  /// faces a second. Thread-safe.
+  [[nodiscard]] FusedMesh mesh();
+
+ private:
+  void take(const MeshChunk& chunk);
+
+  std::mutex mutex_;  // guards map_
+  TeamMap map_;
+  const LabelPalette palette_;
+  Worker<Topic<MeshChunk>::Message> worker_;  // last member: stops first
+};
+
+}  // namespace km
