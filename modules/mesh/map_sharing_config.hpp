@@ -4,7 +4,7 @@
 
 namespace km {
 
-/// What robots tell each other of their meshes.
+/// Part of their meshes that robots send each other.
 enum class TeamMapMode {
   kOff,     ///< Nothing.
   kCoarse,  ///< Their surface in coarse voxels.
