@@ -291,7 +291,10 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   if (coarse) reduction = [voxel_m](const LabelledMesh& mesh) { return resampled(mesh, voxel_m); };
   chunks_ = &add<MeshChunksNode>(false, config, identity_.robot, topics_.sent_chunks,
                                  std::move(reduction));
+  // A leaving robot corrects its mesh once more, from scratch. Other robots may have left before,
+  // so all keep the chunks that they have.
   topics_.optimized_meshes.subscribe([this](const auto& optimized) {
+    if (phase_ == RobotPhase::kLeaving) return;
     chunks_->offer(optimized->anchor, {optimized, &optimized->mesh});
   });
   return {};

@@ -28,7 +28,7 @@ constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 constexpr const char* kAbout =
     "Shows a team in a browser, while it runs or afterwards. It prints the address to "
-    "open.\\n\\nThe page has the map, trajectories and loop closures in 3D, and the state of the "
+    "open.\n\nThe page has the map, trajectories and loop closures in 3D, and the state of the "
     "robots:\nwhich robots receive each other, cost, bytes, loads, memory. Its time slider goes "
     "back to any moment "
     "while the run\ncontinues.";
