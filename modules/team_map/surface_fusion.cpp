@@ -72,9 +72,9 @@ FusedBox SurfaceFusion::fuse(const std::array<std::int32_t, 3>& box,
   return extract();
 }
 
-// Enters the triangle into the voxels of the box to which it is nearest. Of triangles at the same
-// distance, which share an edge or a corner, that counts which faces the voxel most: the sign of
-// another may be wrong.
+// Enters the triangle into the voxels of the box to which it is nearest. Several triangles that
+// share an edge or a corner may be at the same distance. The one that faces the voxel most counts,
+// because the sign of another may be wrong.
 void SurfaceFusion::observe(const RobotSurface::Triangle& triangle,
                             std::vector<Observation>& observations) const {
   const auto& [a, b, c] = triangle.corners;

@@ -24,7 +24,7 @@ struct RobotSurface {
 };
 
 /// An edge of the grid: it begins at a voxel and runs along an axis. The fused mesh has at most one
-/// vertex on it, which all boxes that share the edge compute alike.
+/// vertex on it. All boxes that share the edge compute the same vertex.
 struct GridEdge {
   std::array<std::int32_t, 3> voxel = {0, 0, 0};
   std::uint8_t axis = 0;
@@ -47,10 +47,10 @@ struct FusedBox {
 /// Complex Models from Range Images", SIGGRAPH 1996, eq. (1)), with one vote per robot. Marching
 /// cubes extract the surface of the averages.
 ///
-/// A wall that is seen from both sides has two surfaces. Only surfaces that face alike are
-/// averaged: those whose normals are within 60 degrees of that of the nearest surface. A voxel
-/// beside the border of a surface, seen from which the nearest point is more than 60 degrees from
-/// the normal, has no distance: surfaces do not grow beyond their borders.
+/// A wall that is seen from both sides has two surfaces. Only surfaces with similar normals are
+/// averaged: those within 60 degrees of the normal of the nearest surface. A voxel beside the
+/// border of a surface has no distance if its direction from the nearest point is more than 60
+/// degrees from the normal. A surface therefore grows by at most a voxel at its border.
 ///
 /// The result depends on the triangles and their order alone, bit by bit.
 class SurfaceFusion {
@@ -77,7 +77,7 @@ class SurfaceFusion {
  private:
   static constexpr int kCorners = kSide + 1;
 
-  // What a robot's surface says of a voxel.
+  // Measurement of a voxel by the surface of one robot.
   struct Observation {
     float distance_m = 0.0F;  // signed
     float cosine = -1.0F;     // between the normal and the direction to the voxel; below 0: none

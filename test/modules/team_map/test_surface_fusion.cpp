@@ -95,7 +95,7 @@ TEST_CASE("Labels of robots are voted", "[surface_fusion]") {
   CHECK(labels(0, 0, 0) == 0);
 }
 
-TEST_CASE("Boxes compute the vertices on their common side alike", "[surface_fusion]") {
+TEST_CASE("Boxes compute the same vertices on their common side", "[surface_fusion]") {
   const Eigen::Vector3f shift(0.8F, 0.0F, 0.0F);  // half of it in each box
   RobotSurface surface = square(0, Eigen::Vector3f(0.1F, 0.2F, 1.0F).normalized(), 0.6F);
   for (Triangle& triangle : surface.triangles)

@@ -70,7 +70,7 @@ TEST_CASE("Robots with the same chunks have the same map, in whatever order they
     second.update();
   }
   add_all(second, chunks);
-  // What `first` had of robot 1 beyond its second mesh is taken back by its sender.
+  // Robot 1 takes back the chunks that only its first mesh had.
   std::vector<MeshChunk> gone = chunks_of(floor_from(0.3F, 0.3F), 1);
   for (MeshChunk& chunk : gone) {
     const bool stays =
