@@ -25,11 +25,6 @@ class Latest {
     return std::exchange(message_, nullptr);
   }
 
-  [[nodiscard]] bool is_empty() const {
-    const std::lock_guard lock(mutex_);
-    return message_ == nullptr;
-  }
-
   /// Closes the channel; the last value can still be taken.
   void close() {
     const std::lock_guard lock(mutex_);
@@ -37,7 +32,7 @@ class Latest {
   }
 
  private:
-  mutable std::mutex mutex_;
+  std::mutex mutex_;
   Message message_;
   bool closed_ = false;
 };

@@ -406,12 +406,18 @@ HeldBackSums held_back(Robot& robot) {
 }
 
 // Writes the fused mesh of the team, of the chunks that were received until now.
-void write_team_map(const fs::path& folder, TeamMapNode& map, ResultWriter& results) {
+void write_team_map(const fs::path& folder, const TeamMapNode& node, ResultWriter& results) {
   log::info("robot") << "fusing the map of the team";
-  const FusedMesh fused = map.mesh();
-  results.write(folder / kTeamMesh, [&](const auto& file) { write_ply(file, fused.mesh); });
-  log::info("robot") << "map of the team: " << fused.mesh.faces.size()
-                     << " faces, in the frame of robot " << fused.anchor;
+  const TeamMap map = node.fuse();
+  results.write(folder / kTeamMesh, [&](const auto& file) { write_ply(file, map.mesh); });
+  log::info("robot") << "map of the team: " << map.mesh.faces.size()
+                     << " faces, in the frame of robot " << map.anchor;
+  if (map.other_frames > 0)
+    log::warn("robot") << "the map of the team lacks " << map.other_frames
+                       << " chunks in frames of robots that have not joined";
+  if (map.left_out > 0)
+    log::warn("robot") << "the map of the team lacks " << map.left_out << " boxes of "
+                       << kMaxMapBoxes + map.left_out << ": its voxels are too small";
 }
 
 // Completes the MCAP record with the other results as attachments, among them the closures.

@@ -147,7 +147,7 @@ class Robot {
   /// Null without mapping.
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// Null unless the robots share their map.
-  [[nodiscard]] TeamMapNode* team_map() { return team_map_; }
+  [[nodiscard]] const TeamMapNode* team_map() const { return team_map_; }
   /// True unless the robot has yet to send a part of its mesh. Thread-safe.
   [[nodiscard]] bool has_shared_map() const {
     return chunks_ == nullptr || (mesh_deformation_->is_current() && chunks_->is_done());

@@ -44,6 +44,13 @@ ChunkVerdict TeamMesh::add(MeshChunk chunk) {
   return ChunkVerdict::kTaken;
 }
 
+std::vector<const MeshChunk*> TeamMesh::chunks() const {
+  std::vector<const MeshChunk*> all;
+  for (const auto& [id, robot] : robots_)
+    for (const auto& [key, chunk] : robot.chunks) all.push_back(&chunk);
+  return all;
+}
+
 std::vector<RobotMesh> TeamMesh::snapshot() const {
   std::vector<RobotMesh> result;
   for (const auto& [id, robot] : robots_) {

@@ -43,11 +43,8 @@ class TeamMesh {
 
   ChunkVerdict add(MeshChunk chunk);
 
-  /// The chunks of a robot; null if it has sent none.
-  [[nodiscard]] const std::map<MeshChunkKey, MeshChunk>* chunks_of(RobotId robot) const {
-    const auto found = robots_.find(robot);
-    return found == robots_.end() ? nullptr : &found->second.chunks;
-  }
+  /// All chunks, by their keys.
+  [[nodiscard]] std::vector<const MeshChunk*> chunks() const;
 
   /// One mesh per robot, by ascending id.
   [[nodiscard]] std::vector<RobotMesh> snapshot() const;

@@ -2,7 +2,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cstdint>
+#include <map>
 #include <utility>
+
+#include "modules/team_map/surface_fusion.hpp"
 
 namespace km {
 namespace {
@@ -38,131 +43,114 @@ bool is_oversized(const Eigen::AlignedBox3f& bounds, const SurfaceFusion& fusion
   return bounds.sizes().maxCoeff() > fusion.side_m() + 2.0F * fusion.reach_m();
 }
 
-// The boxes near the faces of the chunk.
-std::set<Box> boxes_of(const MeshChunk& chunk, const SurfaceFusion& fusion) {
-  std::set<Box> boxes;
-  std::pair<Box, Box> last;  // neighbours in the list are usually neighbours in space
+// Chunks by the boxes that their faces may change, in ascending order of their keys.
+using ChunksOfBoxes = std::map<Box, std::vector<const MeshChunk*>>;
+
+void enter(const MeshChunk& chunk, const SurfaceFusion& fusion, ChunksOfBoxes& boxes) {
+  std::pair<Box, Box> last;
+  bool is_first = true;
   for (const MeshChunk::Triple& face : chunk.faces) {
     const Eigen::AlignedBox3f bounds = bounds_of(corners_of(chunk, face), fusion.reach_m());
     if (is_oversized(bounds, fusion)) continue;
     const std::pair<Box, Box> range{fusion.box_of(bounds.min()), fusion.box_of(bounds.max())};
-    if (!boxes.empty() && range == last) continue;
+    // Neighbours in the list are usually neighbours in space.
+    if (!std::exchange(is_first, false) && range == last) continue;
     last = range;
     const auto& [low, high] = range;
     for (std::int32_t x = low[0]; x <= high[0]; ++x)
       for (std::int32_t y = low[1]; y <= high[1]; ++y)
-        for (std::int32_t z = low[2]; z <= high[2]; ++z) boxes.insert({x, y, z});
-  }
-  return boxes;
-}
-
-}  // namespace
-
-ChunkVerdict TeamMap::add(MeshChunk chunk) {
-  std::vector<MeshChunk> replaced;
-  if (const auto* own = chunks_.chunks_of(chunk.key.robot); own != nullptr && !own->empty()) {
-    if (own->begin()->second.boot != chunk.boot) {  // the robot has restarted
-      for (const auto& [key, former] : *own) replaced.push_back(former);
-    } else if (const auto former = own->find(chunk.key); former != own->end()) {
-      replaced.push_back(former->second);
-    }
-  }
-  const ChunkVerdict verdict = chunks_.add(chunk);
-  if (verdict != ChunkVerdict::kTaken) return verdict;
-  for (const MeshChunk& former : replaced) note(former, Presence::kRemoved);
-  if (!chunk.empty()) note(chunk, Presence::kAdded);
-  choose_anchor();
-  return verdict;
-}
-
-void TeamMap::note(const MeshChunk& chunk, Presence presence) {
-  const bool added = presence == Presence::kAdded;
-  chunks_with_anchor_[chunk.anchor] += added ? 1 : -1;
-  for (const Box& box : boxes_of(chunk, fusion_)) {
-    const auto near = chunks_near_.find(box);
-    if (near == chunks_near_.end() && (!added || chunks_near_.size() >= kMaxBoxes)) continue;
-    changed_.insert(box);
-    if (added) {
-      chunks_near_[box].insert(chunk.key);
-    } else if (near->second.erase(chunk.key); near->second.empty()) {
-      chunks_near_.erase(near);
-    }
+        for (std::int32_t z = low[2]; z <= high[2]; ++z) {
+          std::vector<const MeshChunk*>& near = boxes[{x, y, z}];
+          if (near.empty() || near.back() != &chunk) near.push_back(&chunk);
+        }
   }
 }
 
-void TeamMap::choose_anchor() {
-  const auto most = std::ranges::max_element(
-      chunks_with_anchor_, [](const auto& a, const auto& b) { return a.second < b.second; });
-  if (most == chunks_with_anchor_.end() || most->first == anchor_) return;
-  anchor_ = most->first;
-  for (const auto& [box, keys] : chunks_near_) changed_.insert(box);
-}
-
-std::vector<RobotSurface> TeamMap::surfaces_near(const Box& box) const {
+std::vector<RobotSurface> surfaces_near(const Box& box, const std::vector<const MeshChunk*>& chunks,
+                                        const SurfaceFusion& fusion) {
   std::vector<RobotSurface> surfaces;
-  const auto keys = chunks_near_.find(box);
-  if (keys == chunks_near_.end()) return surfaces;
   const Eigen::Vector3f low =
-      fusion_.side_m() * Eigen::Vector3i(box[0], box[1], box[2]).cast<float>();
-  const Eigen::AlignedBox3f space(low, low + Eigen::Vector3f::Constant(fusion_.side_m()));
-  for (const MeshChunkKey& key : keys->second) {
-    const MeshChunk& chunk = chunks_.chunks_of(key.robot)->at(key);
-    if (chunk.anchor != anchor_) continue;
-    if (surfaces.empty() || surfaces.back().robot != key.robot)
-      surfaces.push_back({.robot = key.robot, .triangles = {}});
-    for (const MeshChunk::Triple& face : chunk.faces) {
-      const auto corners = corners_of(chunk, face);
-      const Eigen::AlignedBox3f bounds = bounds_of(corners, fusion_.reach_m());
-      if (space.intersects(bounds) && !is_oversized(bounds, fusion_))
-        surfaces.back().triangles.push_back({corners, label_of(chunk, face)});
+      fusion.side_m() * Eigen::Vector3i(box[0], box[1], box[2]).cast<float>();
+  const Eigen::AlignedBox3f space(low, low + Eigen::Vector3f::Constant(fusion.side_m()));
+  for (const MeshChunk* chunk : chunks) {
+    if (surfaces.empty() || surfaces.back().robot != chunk->key.robot)
+      surfaces.push_back({.robot = chunk->key.robot, .triangles = {}});
+    for (const MeshChunk::Triple& face : chunk->faces) {
+      const auto corners = corners_of(*chunk, face);
+      const Eigen::AlignedBox3f bounds = bounds_of(corners, fusion.reach_m());
+      if (space.intersects(bounds) && !is_oversized(bounds, fusion))
+        surfaces.back().triangles.push_back({corners, label_of(*chunk, face)});
     }
   }
   return surfaces;
 }
 
-void TeamMap::update() {
-  for (const Box& box : changed_) {
-    const std::vector<RobotSurface> surfaces = surfaces_near(box);
-    FusedBox fused;
-    if (!surfaces.empty()) fused = fusion_.fuse(box, surfaces);
-    if (fused.faces.empty()) {
-      boxes_.erase(box);
-    } else {
-      boxes_.insert_or_assign(box, std::move(fused));
-    }
-  }
-  changed_.clear();
-}
+// Appends boxes to a mesh. Boxes share the vertices on their sides.
+class BoxJoiner {
+ public:
+  explicit BoxJoiner(LabelledMesh& mesh) : mesh_(mesh) {}
 
-LabelledMesh TeamMap::mesh() const {
-  LabelledMesh mesh;
-  std::map<GridEdge, std::uint32_t> shared;  // vertices on the sides of boxes
-  bool labelled = false;
-  for (const auto& [box, fused] : boxes_) {
+  void append(const FusedBox& box) {
     std::vector<std::uint32_t> index;
-    for (std::size_t v = 0; v < fused.vertices.size(); ++v) {
-      const auto next = static_cast<std::uint32_t>(mesh.vertices.size());
-      const GridEdge& edge = fused.edges[v];
-      const bool inside = std::ranges::all_of(
-          edge.voxel, [](std::int32_t c) { return c % SurfaceFusion::kSide != 0; });
-      const std::uint32_t place = inside ? next : shared.try_emplace(edge, next).first->second;
+    for (std::size_t v = 0; v < box.vertices.size(); ++v) {
+      const auto next = static_cast<std::uint32_t>(mesh_.vertices.size());
+      const bool is_inside = std::ranges::all_of(
+          box.edges[v].voxel, [](std::int32_t c) { return c % SurfaceFusion::kSide != 0; });
+      const std::uint32_t place =
+          is_inside ? next : shared_.try_emplace(box.edges[v], next).first->second;
       index.push_back(place);
       if (place != next) continue;
-      mesh.vertices.push_back(fused.vertices[v]);
-      mesh.labels.push_back(fused.labels[v]);
-      labelled = labelled || fused.labels[v] != 0;
+      mesh_.vertices.push_back(box.vertices[v]);
+      mesh_.labels.push_back(box.labels[v]);
     }
-    for (const auto& [a, b, c] : fused.faces) mesh.faces.push_back({index[a], index[b], index[c]});
+    for (const auto& [a, b, c] : box.faces) mesh_.faces.push_back({index[a], index[b], index[c]});
   }
-  if (!labelled) mesh.labels.clear();
-  return mesh;
+
+ private:
+  LabelledMesh& mesh_;
+  std::map<GridEdge, std::uint32_t> shared_;
+};
+
+// The anchor of most chunks; the lowest of several.
+RobotId anchor_of(const std::vector<const MeshChunk*>& chunks) {
+  std::map<RobotId, std::size_t> counts;
+  for (const MeshChunk* chunk : chunks) ++counts[chunk->anchor];
+  const auto most = std::ranges::max_element(
+      counts, [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most == counts.end() ? RobotId{0} : most->first;
+}
+
+}  // namespace
+
+TeamMap fuse_chunks(const std::vector<const MeshChunk*>& chunks, double voxel_m) {
+  SurfaceFusion fusion(voxel_m);
+  TeamMap map{.anchor = anchor_of(chunks), .mesh = {}};
+  ChunksOfBoxes boxes;
+  bool is_labelled = false;
+  for (const MeshChunk* chunk : chunks) {
+    if (chunk->anchor != map.anchor) {
+      ++map.other_frames;
+      continue;
+    }
+    enter(*chunk, fusion, boxes);
+    is_labelled = is_labelled || !chunk->labels.empty();
+  }
+  BoxJoiner joiner(map.mesh);
+  std::size_t fused = 0;
+  for (const auto& [box, near] : boxes) {
+    if (++fused > kMaxMapBoxes) break;
+    joiner.append(fusion.fuse(box, surfaces_near(box, near, fusion)));
+  }
+  map.left_out = boxes.size() - std::min(boxes.size(), kMaxMapBoxes);
+  if (!is_labelled) map.mesh.labels.clear();
+  return map;
 }
 
 LabelledMesh resampled(const LabelledMesh& mesh, double voxel_m) {
-  TeamMap map(voxel_m);
-  for (MeshChunk& chunk : split_mesh(mesh, 0, 0, {}).chunks) map.add(std::move(chunk));
-  map.update();
-  return map.mesh();
+  const SplitMesh pieces = split_mesh(mesh, 0, 0, {});
+  std::vector<const MeshChunk*> chunks;
+  for (const MeshChunk& chunk : pieces.chunks) chunks.push_back(&chunk);
+  return fuse_chunks(chunks, voxel_m).mesh;
 }
 
 }  // namespace km

@@ -1,67 +1,38 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <cstdint>
-#include <map>
-#include <set>
 #include <vector>
 
+#include "modules/core/ids.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
-#include "modules/mesh/team_mesh.hpp"
-#include "modules/team_map/surface_fusion.hpp"
 
 namespace km {
 
-/// The map of a team: the fused surface of all robots whose chunks have one frame. Each robot has
-/// one of its own, of its own chunks as it has sent them and of those that it has received. Two
-/// robots with the same chunks and the same voxels have the same mesh, bit by bit, in whatever
-/// order the chunks came (on processors with the same arithmetic).
-///
-/// Chunks replace each other; only boxes that they touch are fused again. Not thread-safe.
-class TeamMap {
- public:
-  /// Boxes near surface; surface in others is left out. A bound for misbehaving peers.
-  static constexpr std::size_t kMaxBoxes = std::size_t{1} << 19U;
-
-  explicit TeamMap(double voxel_m) : fusion_(voxel_m) {}
-
-  /// Takes a chunk of any robot, as TeamMesh::add().
-  ChunkVerdict add(MeshChunk chunk);
-
-  /// Fuses the boxes that have changed.
-  void update();
-
-  /// The fused mesh of the last update(), without colours, and with labels if any robot
-  /// has sent labels. Vertices and faces are ordered by boxes.
-  [[nodiscard]] LabelledMesh mesh() const;
-
-  /// Robot in whose odometry frame the mesh is: the anchor of most chunks, the lowest id if several
-  /// have as many. Chunks with another anchor are left out.
-  [[nodiscard]] RobotId anchor() const { return anchor_; }
-
-  /// Number of boxes that update() has to fuse.
-  [[nodiscard]] std::size_t waiting() const { return changed_.size(); }
-
- private:
-  using Box = std::array<std::int32_t, 3>;
-  enum class Presence { kAdded, kRemoved };
-
-  void choose_anchor();
-  void note(const MeshChunk& chunk, Presence presence);
-  [[nodiscard]] std::vector<RobotSurface> surfaces_near(const Box& box) const;
-
-  SurfaceFusion fusion_;
-  TeamMesh chunks_;
-  RobotId anchor_ = 0;
-  std::map<RobotId, std::size_t> chunks_with_anchor_;
-  std::map<Box, std::set<MeshChunkKey>> chunks_near_;  // those that may change the box
-  std::set<Box> changed_;
-  std::map<Box, FusedBox> boxes_;  // none empty
+/// The fused mesh of a team.
+struct TeamMap {
+  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
+  LabelledMesh mesh;   ///< In `world`, without colours; with labels if any chunk has some.
+  std::size_t other_frames =
+      0;                     ///< Chunks that were left out, because their anchor is another one.
+  std::size_t left_out = 0;  ///< Boxes with surface that were left out (kMaxMapBoxes).
 };
 
-/// A mesh as the only one of a TeamMap: with fewer faces if the voxels are larger than its own.
+/// Largest number of boxes (SurfaceFusion) with surface: a bound for misbehaving peers.
+inline constexpr std::size_t kMaxMapBoxes = std::size_t{1} << 17U;
+
+/// Fuses chunks of any robots, sorted by their keys, each key once. The frame is that of most
+/// chunks; of several such frames it is that of the robot with the lowest id. Faces that are longer
+/// than a box are left out, because no mapper makes them.
+///
+/// The result depends on the chunks and the voxels alone, bit by bit (on processors with the same
+/// arithmetic). Two robots with the same chunks therefore have the same map.
+///
+/// Throws std::invalid_argument for a size of voxels that is not positive.
+[[nodiscard]] TeamMap fuse_chunks(const std::vector<const MeshChunk*>& chunks, double voxel_m);
+
+/// A mesh on its own in voxels of another size. Throws under the conditions of split_mesh() and
+/// fuse_chunks().
 [[nodiscard]] LabelledMesh resampled(const LabelledMesh& mesh, double voxel_m);
 
 }  // namespace km

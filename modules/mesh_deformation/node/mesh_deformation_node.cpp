@@ -50,8 +50,14 @@ MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, Ro
           steady_duration(config.period_s / kTicksPerPeriod), [this] { worker_.post(Tick()); },
           "mesh tick") {
   topics.keyframes.subscribe([this](const auto& keyframe) { worker_.post(keyframe); });
-  topics.maps.subscribe([this](const auto& map) { latest_map_.put(map); });
-  topics.trajectory.subscribe([this](const auto& newest) { latest_trajectory_.put(newest); });
+  topics.maps.subscribe([this](const auto& map) {
+    latest_map_.put(map);
+    ++arrived_;
+  });
+  topics.trajectory.subscribe([this](const auto& newest) {
+    latest_trajectory_.put(newest);
+    ++arrived_;
+  });
 }
 
 void MeshDeformationNode::start() {
@@ -76,6 +82,7 @@ std::exception_ptr MeshDeformationNode::error() const {
 }
 
 void MeshDeformationNode::take_latest(double now_s) {
+  handled_ = arrived_;  // before take(): what is counted is there
   if (auto map = latest_map_.take()) step(std::move(map), now_s);
   if (auto trajectory = latest_trajectory_.take()) step(std::move(trajectory), now_s);
 }
@@ -87,7 +94,6 @@ void MeshDeformationNode::step(const Input& input, double now_s) {
   if (const auto* map = std::get_if<Topic<MapMesh>::Message>(&input)) return take(*map);
   if (const auto* trajectory = std::get_if<Topic<Trajectory>::Message>(&input)) {
     trajectory_ = *trajectory;
-    is_corrected_ = false;
     return;
   }
   ended_ = std::holds_alternative<End>(input);
@@ -105,7 +111,6 @@ void MeshDeformationNode::take(Topic<MapMesh>::Message map) {
   keyframes_of_map_ = keyframes_of(*map);
   map_ = std::move(map);
   ++map_version_;
-  is_corrected_ = false;
 }
 
 // A map may arrive before its keyframes, and the trajectory may be missing.
@@ -121,6 +126,9 @@ CorrectionInput MeshDeformationNode::input() const {
 }
 
 void MeshDeformationNode::correct() {
+  const bool has_mesh =
+      map_ != nullptr && trajectory_ != nullptr && !trajectory_->T_world_kf.empty();
+  if (!has_mesh) corrected_ = handled_;
   if (!can_correct()) {
     if (ended_ && map_ != nullptr)
       log::warn(name()) << "the last map is not corrected: it was made with " << keyframes_of_map_
@@ -132,7 +140,7 @@ void MeshDeformationNode::correct() {
   const double start_s = steady_now_s();
   std::optional<MeshCorrection> correction =
       ended_ ? corrector_.correct_from_scratch(input()) : corrector_.correct(input());
-  is_corrected_ = true;
+  corrected_ = handled_;
   if (!correction) return;
   const double end_s = steady_now_s();
   next_s_ = end_s + config_.period_s;

@@ -56,10 +56,9 @@ class MeshDeformationNode final : public Node {
   /// once. Idempotent, thread-safe.
   void finish();
 
-  /// True once the mesh agrees with the newest map and the newest trajectory. Thread-safe.
-  [[nodiscard]] bool is_current() const {
-    return is_corrected_ && latest_map_.is_empty() && latest_trajectory_.is_empty();
-  }
+  /// True once the mesh agrees with the newest map and the newest trajectory, or if there is none.
+  /// Thread-safe.
+  [[nodiscard]] bool is_current() const { return corrected_ == arrived_; }
 
   /// Inputs without content: a tick of the clock, and the call of finish(). They are null pointers
   /// and not structs, because GCC 12 reports a false warning for a variant of structs and pointers.
@@ -94,7 +93,10 @@ class MeshDeformationNode final : public Node {
   Topic<Trajectory>::Message trajectory_;
   double next_s_ = 0.0;
   bool ended_ = false;
-  std::atomic<bool> is_corrected_ = true;  // with all input that has been handled
+  // Numbers of maps and trajectories: that have arrived, of which the newest are handled, and with
+  // which the mesh is corrected.
+  std::atomic<std::uint64_t> arrived_ = 0, corrected_ = 0;
+  std::uint64_t handled_ = 0;
   Timing timing_;
   Latest<MapMesh> latest_map_;  // newest map, until it is handled
   Latest<Trajectory> latest_trajectory_;

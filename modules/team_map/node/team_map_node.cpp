@@ -15,7 +15,7 @@ constexpr std::size_t kQueue = 4096;
 
 TeamMapNode::TeamMapNode(double voxel_m, LabelPalette palette, In<MeshChunk> own,
                          In<MeshChunk> received)
-    : map_(voxel_m),
+    : voxel_m_(voxel_m),
       palette_(std::move(palette)),
       worker_(
           kQueue, Overflow::kBlock, [this](const auto& chunk) { take(*chunk); }, "team_map") {
@@ -25,18 +25,17 @@ TeamMapNode::TeamMapNode(double voxel_m, LabelPalette palette, In<MeshChunk> own
 
 void TeamMapNode::take(const MeshChunk& chunk) {
   const std::lock_guard lock(mutex_);
-  const ChunkVerdict verdict = map_.add(chunk);
+  const ChunkVerdict verdict = chunks_.add(chunk);
   if (verdict != ChunkVerdict::kTaken)
     log::limited(log::Level::kWarn, name(), std::to_string(chunk.key.robot))
         << "a chunk of robot " << chunk.key.robot << "'s mesh is ignored: " << to_string(verdict);
 }
 
-FusedMesh TeamMapNode::mesh() {
+TeamMap TeamMapNode::fuse() const {
   const std::lock_guard lock(mutex_);
-  map_.update();
-  FusedMesh fused{map_.anchor(), map_.mesh()};
-  if (!palette_.classes().empty() && !fused.mesh.labels.empty()) fused.mesh.colour_by(palette_);
-  return fused;
+  TeamMap map = fuse_chunks(chunks_.chunks(), voxel_m_);
+  if (!palette_.classes().empty() && !map.mesh.labels.empty()) map.mesh.colour_by(palette_);
+  return map;
 }
 
 }  // namespace km

@@ -6,6 +6,7 @@
 
 #include "modules/core/label_palette.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
+#include "modules/mesh/team_mesh.hpp"
 #include "modules/team_map/team_map.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
@@ -13,18 +14,11 @@
 
 namespace km {
 
-/// The fused mesh of the team.
-struct FusedMesh {
-  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
-  LabelledMesh mesh;   ///< In `world`.
-};
-
 /// Stores the chunks of all robots, and fuses them into one mesh when it is asked for.
 class TeamMapNode final : public Node {
  public:
   /// `palette` colours the mesh, if it has classes. `own`: chunks that this robot has sent;
-  /// `received`: those of the other robots. Throws std::invalid_argument for a size of voxels that
-  /// is not positive.
+  /// `received`: those of the other robots.
   TeamMapNode(double voxel_m, LabelPalette palette, In<MeshChunk> own, In<MeshChunk> received);
   ~TeamMapNode() override { stop(); }
 
@@ -35,16 +29,17 @@ class TeamMapNode final : public Node {
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// The mesh of all chunks so far. Fuses first what has changed since the last call, about 200,000
-  /// faces a second. Thread-safe.
-  [[nodiscard]] FusedMesh mesh();
+  /// Fuses all chunks so far; takes seconds for a large map. With the colours of the palette.
+  /// Thread-safe.
+  [[nodiscard]] TeamMap fuse() const;
 
  private:
   void take(const MeshChunk& chunk);
 
-  std::mutex mutex_;  // guards map_
-  TeamMap map_;
+  const double voxel_m_;
   const LabelPalette palette_;
+  mutable std::mutex mutex_;  // guards chunks_
+  TeamMesh chunks_;
   Worker<Topic<MeshChunk>::Message> worker_;  // last member: stops first
 };
 

@@ -1,7 +1,9 @@
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "modules/mesh_deformation/node/mesh_deformation_node.hpp"
@@ -207,6 +209,30 @@ TEST_CASE("The mesh deformation node works as a thread", "[node]") {
   REQUIRE(robot.results().size() >= 2);  // the last result, and possibly an earlier one
   CHECK(robot.results().back().mesh.vertices.back().x() ==
         Approx(last_vertex_x(10.0)).margin(0.05));
+}
+
+TEST_CASE("A mesh is current once it is corrected, also if there is none", "[node]") {
+  Robot robot;
+  MeshDeformationConfig config;
+  config.period_s = 0.01;
+  MeshDeformationNode node(config, kSelf, robot.topics());
+  const auto becomes_current = [&] {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (!node.is_current() && std::chrono::steady_clock::now() < end)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return node.is_current();
+  };
+  CHECK(node.is_current());
+  robot.trajectory.publish(robot.solution(20.0));
+  CHECK_FALSE(node.is_current());
+  node.start();
+  CHECK(becomes_current());  // there is no map
+  for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i)
+    robot.keyframes.publish(robot.keyframe(i));
+  robot.maps.publish(robot.map);
+  CHECK(becomes_current());
+  CHECK_FALSE(robot.results().empty());
+  node.stop();
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "modules/mesh/team_mesh.hpp"
 #include "modules/team_map/team_map.hpp"
 
 namespace km {
@@ -38,13 +39,12 @@ std::vector<MeshChunk> chunks_of(const LabelledMesh& mesh, RobotId robot, std::u
   return chunks;
 }
 
-void add_all(TeamMap& map, const std::vector<MeshChunk>& chunks) {
-  for (const MeshChunk& chunk : chunks) CHECK(map.add(chunk) == ChunkVerdict::kTaken);
+LabelledMesh fused(const TeamMesh& team) {
+  return fuse_chunks(team.chunks(), kMapVoxel_m).mesh;
 }
 
-LabelledMesh fused(TeamMap& map) {
-  map.update();
-  return map.mesh();
+void add_all(TeamMesh& team, const std::vector<MeshChunk>& chunks) {
+  for (const MeshChunk& chunk : chunks) CHECK(team.add(chunk) == ChunkVerdict::kTaken);
 }
 
 bool are_equal(const LabelledMesh& a, const LabelledMesh& b) {
@@ -59,35 +59,24 @@ TEST_CASE("Robots with the same chunks have the same map, in whatever order they
   for (const RobotId robot : {RobotId{0}, RobotId{1}, RobotId{2}})
     for (MeshChunk& chunk : chunks_of(floor_from(robot, 0.01F * robot), robot))
       chunks.push_back(std::move(chunk));
-  TeamMap first(kMapVoxel_m), second(kVoxel_m);
-  add_all(first, chunks_of(floor_from(0.3F, 0.3F), 1));  // replaced later
+  TeamMesh first, second;
   add_all(first, chunks);
-  const LabelledMesh expected = fused(first);
   std::mt19937 rng(3);
-  for (std::size_t k = 0; k < chunks.size(); k += 10) {
-    std::shuffle(chunks.begin(), chunks.end(), rng);
-    second.add(chunks.front());
-    second.update();
-  }
+  std::shuffle(chunks.begin(), chunks.end(), rng);
+  // Former chunks of the first key are replaced.
+  for (MeshChunk former : chunks_of(floor_from(0.0F, 0.3F), 0))
+    if (former.key == first.chunks().front()->key)
+      CHECK(second.add(former) == ChunkVerdict::kTaken);
   add_all(second, chunks);
-  // Robot 1 takes back the chunks that only its first mesh had.
-  std::vector<MeshChunk> gone = chunks_of(floor_from(0.3F, 0.3F), 1);
-  for (MeshChunk& chunk : gone) {
-    const bool stays =
-        std::ranges::any_of(chunks, [&](const MeshChunk& other) { return other.key == chunk.key; });
-    if (stays) continue;
-    chunk.offsets.clear(), chunk.labels.clear(), chunk.faces.clear();
-    CHECK(first.add(chunk) == ChunkVerdict::kTaken);
-  }
   CHECK(are_equal(fused(first), fused(second)));
-  CHECK(expected.faces.size() > 1000);
+  CHECK(fused(first).faces.size() > 1000);
 }
 
 TEST_CASE("Copies of a floor are fused between them, and every part is there once", "[team_map]") {
-  TeamMap map(kMapVoxel_m);
-  add_all(map, chunks_of(floor_from(0.0F, 0.0F), 0));
-  add_all(map, chunks_of(floor_from(2.0F, 0.04F), 1));
-  const LabelledMesh mesh = fused(map);
+  TeamMesh team;
+  add_all(team, chunks_of(floor_from(0.0F, 0.0F), 0));
+  add_all(team, chunks_of(floor_from(2.0F, 0.04F), 1));
+  const LabelledMesh mesh = fused(team);
   double area = 0.0;
   for (const auto& [a, b, c] : mesh.faces)
     area +=
@@ -104,43 +93,36 @@ TEST_CASE("Copies of a floor are fused between them, and every part is there onc
   }
 }
 
-TEST_CASE("A robot that restarts loses its former surface, and others keep theirs", "[team_map]") {
-  TeamMap map(kMapVoxel_m);
-  const std::vector<MeshChunk> former = chunks_of(floor_from(0.0F, 0.5F), 1, 1);
-  add_all(map, chunks_of(floor_from(0.0F, 0.0F), 0));
-  add_all(map, former);
-  fused(map);
-  add_all(map, chunks_of(floor_from(2.0F, 0.5F), 1, 2));
-  CHECK(map.add(former.front()) == ChunkVerdict::kEarlierBoot);
-  TeamMap expected(kMapVoxel_m);
-  add_all(expected, chunks_of(floor_from(0.0F, 0.0F), 0));
-  add_all(expected, chunks_of(floor_from(2.0F, 0.5F), 1, 2));
-  CHECK(are_equal(fused(map), fused(expected)));
-}
-
-TEST_CASE("Chunks in another frame are left out until they are of the team's", "[team_map]") {
-  TeamMap map(kMapVoxel_m), expected(kVoxel_m);
-  add_all(map, chunks_of(floor_from(0.0F, 0.0F), 0));
-  add_all(expected, chunks_of(floor_from(0.0F, 0.0F), 0));
-  const std::vector<MeshChunk> apart = chunks_of(floor_from(0.0F, 1.0F), 1, 1, 1);
-  CHECK(map.add(apart.front()) == ChunkVerdict::kTaken);
-  CHECK(map.anchor() == 0);
-  CHECK(are_equal(fused(map), fused(expected)));
-  add_all(map, chunks_of(floor_from(0.0F, 1.0F), 1, 1, 0));
-  CHECK(fused(map).faces.size() > fused(expected).faces.size());
+TEST_CASE("Chunks in another frame than most are left out and counted", "[team_map]") {
+  TeamMesh alone, team;
+  for (TeamMesh* both : {&alone, &team}) add_all(*both, chunks_of(floor_from(0.0F, 0.0F), 1, 1, 1));
+  const std::vector<MeshChunk> apart = chunks_of(floor_from(0.0F, 1.0F), 2, 1, 0);
+  CHECK(team.add(apart.front()) == ChunkVerdict::kTaken);
+  const TeamMap map = fuse_chunks(team.chunks(), kMapVoxel_m);
+  CHECK(map.anchor == 1);
+  CHECK(map.other_frames == 1);
+  CHECK(are_equal(map.mesh, fused(alone)));
+  add_all(team, chunks_of(floor_from(0.0F, 1.0F), 2, 1, 1));
+  CHECK(fused(team).faces.size() > map.mesh.faces.size());
 }
 
 TEST_CASE("A face of a size that no mapper makes is left out", "[team_map]") {
   MeshChunk chunk;
   chunk.key = {1, {0, 0, 0}, 0};
-  chunk.boot = 1;
   chunk.step_m = 0.01F;
   chunk.offsets = {{0, 0, 0}, {65535, 0, 0}, {0, 65535, 65535}};
   chunk.faces = {{0, 1, 2}};
-  TeamMap map(kMapVoxel_m);
-  CHECK(map.add(chunk) == ChunkVerdict::kTaken);
-  CHECK(map.waiting() == 0);
-  CHECK(fused(map).empty());
+  CHECK(fuse_chunks({&chunk}, kMapVoxel_m).mesh.empty());
+  CHECK(fuse_chunks({}, kMapVoxel_m).mesh.empty());
+}
+
+TEST_CASE("A mesh in larger voxels has the same shape with fewer faces", "[team_map]") {
+  const LabelledMesh fine = floor_from(0.0F, 0.0F), coarse = resampled(fine, 0.2);
+  CHECK(10 * coarse.faces.size() < fine.faces.size());
+  REQUIRE_FALSE(coarse.empty());
+  for (const Eigen::Vector3f& p : coarse.vertices)
+    if (p.x() > 0.3F && p.x() < 3.7F && p.y() > 0.3F && p.y() < 2.7F)
+      CHECK(p.z() == Approx(0.2F * std::sin(p.x()) * std::cos(p.y())).margin(5e-3));
 }
 
 }  // namespace km

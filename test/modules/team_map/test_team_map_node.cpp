@@ -51,7 +51,7 @@ struct Mapper {
 
 bool have_one_map(Mapper& a, Mapper& b) {
   return eventually([&] {
-    const LabelledMesh of_a = a.map.mesh().mesh, of_b = b.map.mesh().mesh;
+    const LabelledMesh of_a = a.map.fuse().mesh, of_b = b.map.fuse().mesh;
     return !of_a.empty() && of_a.vertices == of_b.vertices && of_a.faces == of_b.faces &&
            of_a.labels == of_b.labels;
   });
@@ -67,13 +67,13 @@ TEST_CASE("Robots have the same map of their team, also those that join later", 
   b.offer(0.05F);
   REQUIRE(eventually([&] { return a.sender.is_done() && b.sender.is_done(); }));
   CHECK(have_one_map(a, b));
-  const std::size_t faces = a.map.mesh().mesh.faces.size();
+  const std::size_t faces = a.map.fuse().mesh.faces.size();
   a.offer(0.02F);  // bent
   b.offer(0.03F);
   Mapper late(domain, 5);
   CHECK(have_one_map(a, b));
   CHECK(have_one_map(a, late));
-  CHECK(late.map.mesh().mesh.faces.size() == Approx(static_cast<double>(faces)).epsilon(0.05));
+  CHECK(late.map.fuse().mesh.faces.size() == Approx(static_cast<double>(faces)).epsilon(0.05));
 }
 
 }  // namespace km
