@@ -16,6 +16,10 @@ constexpr std::size_t kQueue = 4096;
 // Chunks are sent in small bursts, each with the budget of one tick.
 constexpr double kTick_s = 0.1;
 
+// Pause after a mesh is reduced and split, as a multiple of the time that takes: it then takes less
+// than a tenth of a processor, whatever the size of the mesh.
+constexpr double kPauses = 10.0;
+
 // Unused budget is kept for this time.
 constexpr double kBurst_s = 0.5;
 
@@ -59,10 +63,20 @@ std::exception_ptr MeshChunksNode::error() const {
 }
 
 void MeshChunksNode::step(const Offer& offer, double now_s) {
-  if (offer.mesh != nullptr) take(offer);
+  if (offer.mesh != nullptr) {
+    if (newest_.mesh != nullptr) --offers_;
+    newest_ = offer;
+  }
+  const bool is_due = newest_.mesh != nullptr && now_s >= next_take_s_;
+  if (is_due) {
+    const double start_s = steady_now_s();
+    take(newest_);
+    newest_ = {};
+    next_take_s_ = now_s + kPauses * (steady_now_s() - start_s);
+  }
   send(now_s);
   waiting_ = schedule_.waiting();
-  if (offer.mesh != nullptr) --offers_;
+  if (is_due) --offers_;
 }
 
 void MeshChunksNode::take(const Offer& offer) {

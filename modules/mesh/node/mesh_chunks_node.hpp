@@ -68,7 +68,9 @@ class MeshChunksNode final : public Node {
   ChunkSchedule schedule_;
   TokenBucket budget_bytes_;
   std::atomic<std::size_t> waiting_ = 0;  // chunks
-  std::atomic<int> offers_ = 0;           // meshes in the queue
+  std::atomic<int> offers_ = 0;           // meshes that are neither split nor replaced
+  Offer newest_;                          // the mesh to be split next, if any
+  double next_take_s_ = 0.0;
   Worker<Offer> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };

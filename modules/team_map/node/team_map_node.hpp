@@ -29,7 +29,7 @@ class TeamMapNode final : public Node {
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Fuses all chunks so far; takes seconds for a large map. With the colours of the palette.
+  /// Fuses all chunks so far and colours the mesh; takes seconds for a large map.
   /// Thread-safe.
   [[nodiscard]] TeamMap fuse() const;
 
