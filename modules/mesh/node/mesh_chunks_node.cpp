@@ -16,8 +16,8 @@ constexpr std::size_t kQueue = 4096;
 // Chunks are sent in small bursts, each with the budget of one tick.
 constexpr double kTick_s = 0.1;
 
-// Pause after a mesh is reduced and split, as a multiple of the time that takes: it then takes less
-// than a tenth of a processor, whatever the size of the mesh.
+// Pause after a mesh is reduced and split, as a multiple of the time that this takes. Whatever the
+// size of the mesh, the work takes less than a tenth of a processor.
 constexpr double kPauses = 10.0;
 
 // Unused budget is kept for this time.
