@@ -60,21 +60,26 @@ class LiveTeam {
     for (const auto& driver : drivers_) CHECK(driver->wait() == 0);
   }
 
-  // True once the newest status line of every robot says that it optimises with all others.
+  // Waits until the newest status line of every robot says that it optimises with all others;
+  // otherwise prints these lines.
   bool is_joint() {
-    const auto is_with_all = [](const auto& robot) {
-      const auto lines = robot->lines();
-      const auto status = std::find_if(lines.rbegin(), lines.rend(), [](const TimedLine& line) {
-        return line.text.find(" | pgo: ") != std::string::npos;
+    const auto status_of = [](const Process& robot) -> std::string {
+      const auto lines = robot.lines();
+      const auto newest = std::find_if(lines.rbegin(), lines.rend(), [](const TimedLine& line) {
+        return line.text.find("| pgo: ") != std::string::npos;
       });
-      return status != lines.rend() && status->text.find(", with 2") != std::string::npos;
+      return newest == lines.rend() ? "no status" : newest->text;
+    };
+    const auto is_with_all = [&](const auto& robot) {
+      return status_of(*robot).find(", with 2") != std::string::npos;
     };
     const auto end = Clock::now() + kPatience;
-    while (!std::ranges::all_of(robots_, is_with_all)) {
-      if (Clock::now() > end) return false;
+    while (Clock::now() < end) {
+      if (std::ranges::all_of(robots_, is_with_all)) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(200));
     }
-    return true;
+    for (const auto& robot : robots_) std::cout << status_of(*robot) << '\n';
+    return false;
   }
 
   void end() {
@@ -129,7 +134,7 @@ TEST_CASE("A team of live robots survives its day", "[system][day]") {
   }
   sleep_until(0.6);
   team.network().set_address(2, "");
-  team.network().set_address(2, "10.78.0.2/24");
+  team.network().set_address(2, "10.77.0.102/24");
   sleep_until(0.7);
   team.network().set_link(3, false);
   sleep_until(0.7 + 120.0 / 1800.0);
