@@ -44,9 +44,10 @@ RosDiagnosticStatus team_status(const OptimizerProgress& progress) {
   const bool is_certain =
       progress.located && progress.tentative.empty() && progress.not_joined.empty();
   status.level = is_certain ? RosDiagnosticStatus::kOk : RosDiagnosticStatus::kWarn;
-  status.message = is_certain                    ? "ok"
-                   : !progress.located           ? "not yet localised in the finished map"
-                   : progress.not_joined.empty() ? "a single place ties robots to this one"
+  status.message = is_certain                            ? "ok"
+                   : progress.fixes && !progress.located ? "not yet located by its fixes"
+                   : !progress.located                   ? "not yet localised in the finished map"
+                   : progress.not_joined.empty()         ? "a single place ties robots to this one"
                                                  : "no accepted closure ties robots to this one";
   return status;
 }

@@ -8,6 +8,7 @@
 
 #include "apps/robot/live_summary.hpp"
 #include "apps/robot/rig_proposal.hpp"
+#include "modules/absolute_fixes/fix_reader.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/core/text_table.hpp"
@@ -70,6 +71,18 @@ std::string pair_table(const std::vector<TopicPair>& pairs) {
   return align_columns(rows);
 }
 
+// Settings with which a robot uses the fixes of these topics.
+std::string fixes_text(const std::vector<TopicSummary>& topics) {
+  std::string text;
+  for (const TopicSummary& topic : topics)
+    for (const auto& [name, source] : kFixSources)
+      if (has_fixes({topic.topic, topic.type, topic.encoding, 0}, source))
+        text += readable(topic.topic) + ": positions; --set absolute_fixes.source=" + name +
+                " absolute_fixes.topic=" + readable(topic.topic) +
+                " if they are those of the robot\n";
+  return text;
+}
+
 std::string text_of(const std::vector<TopicSummary>& topics) {
   std::string text = topic_table(topics);
   if (const auto pairs = pairs_of_images(topics); !pairs.empty()) text += '\n' + pair_table(pairs);
@@ -77,7 +90,7 @@ std::string text_of(const std::vector<TopicSummary>& topics) {
     if (topic.undecoded > 0)
       text += readable(topic.topic) + ": " + std::to_string(topic.undecoded) +
               " messages that are not of their type\n";
-  return text;
+  return text + fixes_text(topics);
 }
 
 // Topics of a EuRoC folder: folders with a data.csv whose rows begin with a stamp.

@@ -8,6 +8,7 @@
 
 #include "apps/robot/mapping_config.hpp"
 #include "apps/robot/run_config.hpp"
+#include "modules/absolute_fixes/absolute_fixes_config.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/dense_sensing/segmentation_config.hpp"
 #include "modules/dense_sensing/stereo_depth_config.hpp"
@@ -82,6 +83,7 @@ struct RobotConfig {
   LoopClosureConfig loop_closure;
   PcmConfig pcm;
   PoseGraphConfig pose_graph;
+  AbsoluteFixesConfig absolute_fixes;
   GraphPlaybackConfig graph_playback;
   MappingConfig mapping;
   StereoDepthConfig stereo_depth;
@@ -97,8 +99,8 @@ struct RobotConfig {
   void visit_sections(const auto& visit) {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
-              loop_closure, pcm, pose_graph, graph_playback, mapping, stereo_depth, segmentation,
-              semantic_mapping, mesh_deformation, map, view);
+              loop_closure, pcm, pose_graph, absolute_fixes, graph_playback, mapping, stereo_depth,
+              segmentation, semantic_mapping, mesh_deformation, map, view);
   }
 };
 

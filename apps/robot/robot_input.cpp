@@ -148,6 +148,50 @@ RestoredRun first_keyframe_of(const FinishedMap& map, RobotId robot) {
   return run;
 }
 
+// The origin of the absolute frame as keyframe 0. Its z is up.
+RestoredRun datum_keyframe(const AbsoluteFixesConfig& config, RobotId robot) {
+  // Verticals deflect from the normal of the ellipsoid by less than 0.5 mrad in most places. A
+  // motion capture is levelled by hand.
+  const double sigma_rad = config.source == FixSource::kGnss ? 5e-4 : 0.01;
+  RestoredRun run;
+  run.robot = robot;
+  KeyframeOdometry odometry{.id = {robot, 0}};
+  odometry.vertical = Vertical{Eigen::Vector3d::UnitZ(), sigma_rad};
+  run.odometry.push_back(odometry);
+  run.keyframes.push_back({.odometry = {odometry.id, odometry.T_odom_kf, Matrix6::Zero()},
+                           .stamp = odometry.stamp,
+                           .features = {}});
+  return run;
+}
+
+FixInput open_fixes(const RobotOptions& options, const AbsoluteFixesConfig& config,
+                    std::shared_ptr<const RosNetwork> ros) {
+  if (!options.localize.empty() || extends(options))
+    throw std::invalid_argument(
+        "absolute_fixes and --localize or --extend: a run has either the frame of fixes or that of "
+        "a former run; give absolute_fixes.source=none or leave the option out");
+  FixInput input{FixReader(config)};
+  if (!config.file.empty()) {
+    input.recorded = input.reader.read(config.file);
+  } else if (options.is_live) {
+    const bool is_gnss = config.source == FixSource::kGnss;
+    if (!is_gnss && config.live_type.empty())
+      throw std::invalid_argument("absolute_fixes.live_type: name the type of " + config.topic +
+                                  ", for example geometry_msgs/msg/PoseStamped");
+    constexpr int kKept = 100;
+    const std::string type = is_gnss ? "sensor_msgs/msg/NavSatFix" : config.live_type;
+    input.live = std::make_unique<LiveBag>(
+        std::move(ros), std::vector<RosTopic>{{config.topic, type, RosQos::kSensorData, kKept}});
+  } else if (may_be_bag(options.dataset)) {
+    input.recorded = input.reader.read(*open_bag(options.dataset));
+  } else {
+    throw std::invalid_argument("absolute_fixes.topic: " + options.dataset.string() +
+                                " is a folder of files without topics: give absolute_fixes.file");
+  }
+  log::info(AbsoluteFixesConfig::kSection) << "not yet located";
+  return input;
+}
+
 std::unique_ptr<BagReader> subscribe(std::shared_ptr<const RosNetwork> network,
                                      const SensorTopicNames& topics) {
   return std::make_unique<LiveBag>(std::move(network), live_topics(topics));
@@ -342,11 +386,18 @@ std::optional<RobotInput> open_robot_input(const RobotOptions& options, const Ro
   std::shared_ptr<const RosNetwork> ros;
   if (options.is_live || config.ros.publish.value_or(false))
     ros = std::make_shared<const RosNetwork>(config.ros);
+  const AbsoluteFixesConfig& absolute = config.absolute_fixes;
+  if (!is_dataset && absolute.is_on())
+    throw std::invalid_argument(
+        "absolute_fixes and --graph: fixes need the odometry of a recording or of --live; give "
+        "absolute_fixes.source=none");
   if (!is_dataset)
     return RobotInput{.source = open_graph(options),
                       .name = name,
                       .restored = std::move(restored),
                       .ros = std::move(ros)};
+  std::optional<FixInput> fixes;
+  if (absolute.is_on()) fixes = open_fixes(options, absolute, ros);
   auto reader = open_dataset(options, config, mapping, rig, ros, restored, signals);
   if (reader == nullptr) return std::nullopt;
   reader = with_poses(options, rig, std::move(reader));
@@ -362,6 +413,16 @@ std::optional<RobotInput> open_robot_input(const RobotOptions& options, const Ro
   if (input.localize_in && !input.restored) {
     input.restored_from = RestoredFrom::kFinishedMap;
     input.restored = first_keyframe_of(*input.localize_in, options.robot);
+  }
+  // Keyframe 0 of a run with an absolute frame is its origin, without a time of the run.
+  if (fixes && input.restored && input.restored->odometry.front().stamp != 0)
+    throw std::invalid_argument(
+        options.output.string() +
+        ": that run began without absolute_fixes: resume it with absolute_fixes.source=none");
+  input.fixes = std::move(fixes);
+  if (input.fixes && !input.restored) {
+    input.restored_from = RestoredFrom::kDatum;
+    input.restored = datum_keyframe(absolute, options.robot);
   }
   return input;
 }

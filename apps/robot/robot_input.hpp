@@ -8,6 +8,7 @@
 
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/robot_config.hpp"
+#include "modules/absolute_fixes/node/fixes_node.hpp"
 #include "modules/core/camera_calibration.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "modules/localization/map_matcher.hpp"
@@ -29,6 +30,7 @@ enum class RestoredFrom {
   kFormerProcess,  ///< This run, which a former process began.
   kFormerRun,      ///< A run that this run extends. The robot was moved in between.
   kFinishedMap,    ///< Keyframe 0 of the map in which this run localises itself.
+  kDatum,          ///< Keyframe 0 is the origin of the absolute frame of fixes.
 };
 
 /// Input of the robot: a recording of sensors or a recorded pose graph, and the restored run if
@@ -39,6 +41,7 @@ struct RobotInput {
   std::optional<RestoredRun> restored = {};
   RestoredFrom restored_from = RestoredFrom::kFormerProcess;
   std::optional<FinishedMap> localize_in = {};
+  std::optional<FixInput> fixes = {};
   std::optional<ResumedMap> map = {};  ///< Map of the restored run; absent without mapping.
   std::shared_ptr<const RosNetwork> ros =
       nullptr;  ///< Null unless the robot reads or publishes topics of ROS.

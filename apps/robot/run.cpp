@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <optional>
@@ -475,6 +476,36 @@ void write_all(const RobotOptions& options, Robot& robot, const RunRecord& recor
                 [&robot](const auto& file) { write_file(file, timings(robot)); });
 }
 
+FixesSummary fixes_summary(const Robot& robot, const RunRecord& record) {
+  const FixCounts counts = robot.fixes()->counts();
+  const FixesState state = record.progress().fixes.value_or(FixesState{});
+  FixesSummary summary{.located = record.progress().located && record.trajectory().has_value(),
+                       .after_s = robot.located_after_s(),
+                       .used = state.used,
+                       .rejected = state.rejected,
+                       .residual_m = state.residual_m,
+                       .rotation_sigma_rad = state.rotation_sigma_rad,
+                       .received = counts.received,
+                       .not_used = {{"without a position", counts.without_position},
+                                    {"not finite", counts.not_finite},
+                                    {"too uncertain", counts.too_uncertain},
+                                    {"out of order", counts.out_of_order},
+                                    {"malformed", counts.malformed},
+                                    {"not nearest to a keyframe", counts.far_from_keyframe}},
+                       .datum = {},
+                       .odometry_frame = {}};
+  std::erase_if(summary.not_used, [](const auto& reason) { return reason.second == 0; });
+  if (const auto datum = robot.fixes()->datum())
+    summary.datum = {datum->latitude_deg, datum->longitude_deg, datum->altitude_m};
+  const auto& trajectory = record.trajectory();
+  if (!summary.located || trajectory->T_world_kf.size() > record.keyframes().size()) return summary;
+  const std::size_t last = trajectory->T_world_kf.size() - 1;
+  const SE3 T = trajectory->T_world_kf[last] * record.keyframes()[last].T_odom_kf.inverse();
+  summary.odometry_frame = {T.translation().x(), T.translation().y(), T.translation().z(),
+                            std::atan2(T(1, 0), T(0, 0))};
+  return summary;
+}
+
 std::map<RobotId, std::string> peer_names(Robot& robot) {
   std::map<RobotId, std::string> names;
   for (const Peer& peer : robot.bridge().peers().list())
@@ -513,6 +544,7 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
     summary.localization = {options.localize.string(), record.progress().located,
                             robot.located_after_s(), localization->compared(),
                             localization->matched()};
+  if (robot.fixes() != nullptr) summary.fixes = fixes_summary(robot, record);
   if (config.budget.is_limited()) summary.held_back = held_back(robot);
   summary.process = watch->process();
   summary.seconds = watch->seconds();
@@ -524,6 +556,11 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
     summary.other_vocabulary[names.contains(peer) ? names.at(peer) : std::to_string(peer)] =
         keyframes;
   watch.reset();  // ends the status line before the last log lines
+  if (summary.fixes && !summary.fixes->located)
+    log::warn("robot") << "not located in the frame of absolute_fixes: the poses are those of "
+                          "odometry ("
+                       << summary.fixes->used << " fixes used, " << summary.fixes->rejected
+                       << " rejected)";
   if (!options.extend.empty() && !record.progress().located)
     log::warn("robot") << "not localised in " << options.extend.string()
                        << ": the poses of this run are those of odometry, apart from those before";

@@ -207,6 +207,37 @@ struct LocalizationSummary {
   bool operator==(const LocalizationSummary&) const = default;
 };
 
+/// Result of absolute_fixes.
+struct FixesSummary {
+  bool located = false;           ///< The poses are in the absolute frame.
+  std::optional<double> after_s;  ///< Time in the input until then; absent if they never were.
+  std::uint64_t used = 0;      ///< Keyframes with a fix that agrees with odometry and other fixes.
+  std::uint64_t rejected = 0;  ///< Keyframes with a fix that contradicts them.
+  double residual_m = 0.0;     ///< Root mean square distance of used fixes from the trajectory.
+  double rotation_sigma_rad = 0.0;  ///< Rotation of the trajectory to the absolute frame.
+  /// Fixes from the input, and those that were not used by reason: see FixCounts.
+  std::uint64_t received = 0;
+  std::map<std::string, std::uint64_t> not_used;
+  std::vector<double> datum;  ///< Latitude, longitude [deg], altitude [m]; empty: motion capture.
+  /// Pose of the odometry frame in the absolute one at the last keyframe: x, y, z [m], heading
+  /// [rad].
+  std::vector<double> odometry_frame;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("located", located);
+    visitor.field("after_s", after_s);
+    visitor.field("used", used);
+    visitor.field("rejected", rejected);
+    visitor.field("residual_m", residual_m);
+    visitor.field("rotation_sigma_rad", rotation_sigma_rad);
+    visitor.field("received", received);
+    visitor.field("not_used", not_used);
+    visitor.field("datum", datum);
+    visitor.field("odometry_frame", odometry_frame);
+  }
+  bool operator==(const FixesSummary&) const = default;
+};
+
 /// Times without a pose: see pose_holes().
 struct HolesSummary {
   std::uint64_t count = 0;
@@ -243,6 +274,7 @@ struct RunSummary {
   OptimizerSummary pgo;
   std::optional<OdometrySummary> odometry;          ///< Absent with an external odometry.
   std::optional<LocalizationSummary> localization;  ///< Absent without --localize.
+  std::optional<FixesSummary> fixes;                ///< Absent without absolute fixes.
   std::optional<HolesSummary> holes;      ///< Holes of the live trajectory; absent without any.
   std::optional<CamerasSummary> cameras;  ///< Absent without vio.calibrate.
   std::optional<MappingSummary> mapping;  ///< Absent if mapping is off.
@@ -277,6 +309,7 @@ struct RunSummary {
     visitor.field("pgo", pgo);
     visitor.field("odometry", odometry);
     visitor.field("localization", localization);
+    visitor.field("absolute_fixes", fixes);
     visitor.field("holes", holes);
     visitor.field("cameras", cameras);
     visitor.field("mapping", mapping);

@@ -41,9 +41,14 @@ void forward(In<T> from, Out<T> to) {
   from.subscribe([to](const auto& message) { to.publish(message); });
 }
 
+// True if keyframe 0 is the origin of the frame of a map or of fixes, and not of this run.
+bool begins_at_origin(RestoredFrom from) {
+  return from == RestoredFrom::kFinishedMap || from == RestoredFrom::kDatum;
+}
+
 // True if this process continues the run of a former one.
 bool is_resumed(const RobotInput& input) {
-  return input.restored && input.restored_from != RestoredFrom::kFinishedMap &&
+  return input.restored && !begins_at_origin(input.restored_from) &&
          !std::holds_alternative<PastRun>(input.source);
 }
 
@@ -91,6 +96,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_past();
   if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
   if (input.localize_in) add_localization(config, *std::move(input.localize_in));
+  if (input.fixes) add_fixes(*std::move(input.fixes));
   add_loop_closure(config);
   add_journal(options, input, results);
   add_back_end(config);
@@ -139,9 +145,8 @@ void Robot::add_restore() {
   restore_ = &add<RestoreNode>(
       false, RestoreTopics{.states = topics_.restored_odometry,
                            .odometry = topics_.keyframe_odometry,
-                           .keyframes = restored_from_ == RestoredFrom::kFinishedMap
-                                            ? topics_.new_keyframes
-                                            : topics_.keyframes,
+                           .keyframes = begins_at_origin(restored_from_) ? topics_.new_keyframes
+                                                                         : topics_.keyframes,
                            .own_closures = topics_.own_closures,
                            .peer_closures = topics_.closures,
                            .outcomes = topics_.restored_outcomes,
@@ -233,6 +238,15 @@ void Robot::add_localization(const RobotConfig& config, FinishedMap map) {
       LocalizationTopics{.keyframes = topics_.keyframes,
                          .closures = topics_.new_closures,
                          .outcomes = topics_.outcomes});
+}
+
+// Keyframe 0 of a resumed run is the origin, too.
+void Robot::add_fixes(FixInput input) {
+  fixes_ = &add<FixesNode>(true, std::move(input),
+                           FixesTopics{.states = topics_.odometry,
+                                       .restored_states = topics_.restored_odometry,
+                                       .keyframes = topics_.keyframe_odometry,
+                                       .fixes = topics_.fixes});
 }
 
 // A mapper that is too slow skips frames. At --rate max no frame is late, and the mapper holds the
@@ -351,6 +365,7 @@ void Robot::add_back_end(const RobotConfig& config) {
       solver_choice(config.pose_graph), [this] { return overlay_->session_bytes(); },
       TeamTopics{.odometry = topics_.keyframe_odometry,
                  .closures = topics_.closures,
+                 .fixes = topics_.fixes,
                  .inlier_sets = topics_.own_inlier_sets,
                  .peer_inlier_sets = topics_.shared_inlier_sets.received,
                  .restored_inlier_sets = topics_.restored_inlier_sets,
@@ -467,16 +482,19 @@ void Robot::add_records() {
     const std::lock_guard lock(progress_mutex_);
     progress_ = progress;
     const bool was_apart = std::exchange(is_apart_, !progress->located);
-    if (localization_ == nullptr || is_apart_ || !was_apart || located_after_s_) return;
+    if (is_apart_ || !was_apart || located_after_s_) return;
+    if (localization_ == nullptr && fixes_ == nullptr) return;
     located_after_s_ = input_time_.seconds();
-    log::info(localization_->name()) << "localised after " << fixed(*located_after_s_, 1) << " s";
+    log::info(fixes_ != nullptr ? fixes_->name() : localization_->name())
+        << (fixes_ != nullptr ? "located after " : "localised after ")
+        << fixed(*located_after_s_, 1) << " s";
   });
   topics_.status.from_peers().subscribe([this](const auto& status) {
     const std::lock_guard lock(progress_mutex_);
     received_s_[status->robot] = steady_now_s();
   });
   topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
-    const bool is_of_map = restored_from_ == RestoredFrom::kFinishedMap && keyframe->id.index == 0;
+    const bool is_of_map = begins_at_origin(restored_from_) && keyframe->id.index == 0;
     // A pose graph and a former process have no packets.
     if (!is_of_map) input_time_.reach(keyframe->stamp);
     ++keyframes_;
@@ -490,7 +508,7 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
                            RosOutputOptions options, std::optional<In<SensorPacket>> images) {
   options.robot = identity_.name;
   options.id = identity_.robot;
-  options.awaits_trajectory = localization_ != nullptr;
+  options.awaits_trajectory = localization_ != nullptr || fixes_ != nullptr;
   auto& output = add<RosOutputNode>(
       false, node, std::move(sink), std::move(options),
       [this, loads = ModuleLoads(nodes_)]() mutable {

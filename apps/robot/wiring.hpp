@@ -20,6 +20,7 @@
 #include "apps/robot/robot_input.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/run_record.hpp"
+#include "modules/absolute_fixes/node/fixes_node.hpp"
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/frame.hpp"
@@ -89,6 +90,7 @@ struct Topics {
   // new_closures: found by this robot; own_closures: those on the disk; closures: own_closures and
   // received ones.
   Topic<Closure> new_closures, own_closures, closures;
+  Topic<PositionFix> fixes;
   Topic<InlierSet> own_inlier_sets;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
@@ -156,7 +158,10 @@ class Robot {
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   /// Null without --localize.
   [[nodiscard]] const LocalizationNode* localization() const { return localization_; }
-  /// Time in the input at which closures tied this run to the map; absent before.
+  /// Null without absolute fixes.
+  [[nodiscard]] const FixesNode* fixes() const { return fixes_; }
+  /// Time in the input at which closures tied this run to the map, or fixes determined the absolute
+  /// frame; absent before.
   [[nodiscard]] std::optional<double> located_after_s() const {
     const std::lock_guard lock(progress_mutex_);
     return located_after_s_;
@@ -188,6 +193,7 @@ class Robot {
   void add_odometry(Arguments&&... arguments);
   void add_place_recognition(const RobotConfig& config);
   void add_localization(const RobotConfig& config, FinishedMap map);
+  void add_fixes(FixInput input);
   void add_past();
   void publish(JournalEntry event);
   void add_team(RobotSample& sample) const;
@@ -241,6 +247,7 @@ class Robot {
   std::size_t restored_images_ = 0;
   RestoreNode* restore_ = nullptr;
   LocalizationNode* localization_ = nullptr;
+  FixesNode* fixes_ = nullptr;
   JournalNode* journal_ = nullptr;
   RecorderNode* recorder_ = nullptr;
   MeshDeformationNode* mesh_deformation_ = nullptr;

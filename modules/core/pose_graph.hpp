@@ -3,12 +3,14 @@
 #include <compare>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/keyframe.hpp"
+#include "modules/core/position_fix.hpp"
 
 namespace km {
 
@@ -116,7 +118,8 @@ struct OptimizerProgress {
   /// Noise of this robot's odometry as a multiple of the stated noise, see OdometryNoise.
   double odometry_rotation_noise = 1.0;
   double odometry_translation_noise = 1.0;
-  std::uint32_t odometry_breaks = 0;  ///< Number of wrong steps of odometry, see OdometryBreak.
+  std::uint32_t odometry_breaks = 0;     ///< Number of wrong steps of odometry, see OdometryBreak.
+  std::optional<FixesState> fixes = {};  ///< Absent without fixes.
 };
 
 }  // namespace km

@@ -87,6 +87,21 @@ bool OwnGraph::add(const Closure& closure) {
   return true;
 }
 
+bool OwnGraph::add(const PositionFix& fix) {
+  const KeyframeIndex index = fix.keyframe.index;
+  const bool is_next =
+      fixes_.empty() || (fixes_.back().keyframe.index < index && fixes_.back().datum == fix.datum);
+  const double variance = 3.0 * fix.sigma_m * fix.sigma_m;
+  if (fix.keyframe.robot != self_ || index == 0 || index >= keyframes_ || !is_next ||
+      fix.datum == 0 || !fix.p_datum.allFinite() || !fix.p_kf.allFinite() ||
+      !kStep_m.contains(fix.p_datum.minCoeff()) || !kStep_m.contains(fix.p_datum.maxCoeff()) ||
+      !kVariance.contains(variance))
+    return false;
+  fixes_.push_back(fix);
+  ++revision_;
+  return true;
+}
+
 RobotId OwnGraph::peer_of(const ClosureId& id) const {
   return id.from.robot == self_ ? id.to.robot : id.from.robot;
 }

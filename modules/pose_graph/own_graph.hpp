@@ -6,6 +6,7 @@
 
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/core/position_fix.hpp"
 #include "modules/pose_graph/odometry_judgement.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/team_messages.hpp"
@@ -42,6 +43,9 @@ class OwnGraph {
   /// False, without effect, if the set does not concern this robot, is not newer than the known
   /// one, or names closures that are not between its robots.
   bool add(const InlierSet& set);
+  /// False, without effect, unless it is a usable fix of a known keyframe after that of the last
+  /// fix, in the same absolute frame. Keyframe 0 is the origin of that frame and has no fix.
+  bool add(const PositionFix& fix);
   /// True if there is no room for this closure: it is unknown, and kMaxClosures other closures to
   /// its peer are known.
   [[nodiscard]] bool is_full(const ClosureId& id) const;
@@ -76,6 +80,8 @@ class OwnGraph {
   [[nodiscard]] const SE3& T_odom_first() const { return T_odom_first_; }
   /// Priors of all keyframes with a vertical.
   [[nodiscard]] const std::vector<VerticalPrior>& verticals() const { return verticals_; }
+  /// Ascending by keyframe.
+  [[nodiscard]] const std::vector<PositionFix>& fixes() const { return fixes_; }
   /// True if keyframe 0 has a vertical: the frame of odometry then has z up.
   [[nodiscard]] bool upright() const { return !verticals_.empty() && verticals_[0].pose == 0; }
   /// Odometry step from keyframe i - 1 to i, as measured. Precondition: 0 < i < keyframes().
@@ -117,6 +123,7 @@ class OwnGraph {
   OdometryJudgement odometry_judgement_;
   std::vector<KeyframeIndex> later_runs_;
   std::vector<VerticalPrior> verticals_;
+  std::vector<PositionFix> fixes_;
   std::map<ClosureId, PoseEdge> closures_;
   std::map<RobotId, std::size_t> closures_to_;  // number of `closures_` by peer
   std::map<RobotId, Sets> sets_;                // by peer; `self_`: inside this robot

@@ -36,6 +36,9 @@ class OwnPoses {
   /// `tolerance`. Precondition: extend().
   void place_runs(const OwnGraph& graph, RobotId self, const AlignmentTolerance& tolerance);
 
+  /// Moves keyframe 0, the origin of an absolute frame.
+  void place_first(const SE3& T_frame_first) { T_frame_kf_.front() = T_frame_first; }
+
   /// Improves the start of a session of this robot alone: the chordal initialisation replaces the
   /// poses if its cost is lower. If closures are `trusted`, all of them count. Otherwise, the
   /// initialisation contains closures that are likely true, and the cost of a closure is truncated.

@@ -27,10 +27,11 @@ void limit_precisions(SessionGraph& graph) {
     return Precision{std::min(p.kappa, kMostPrecise * usual.kappa),
                      std::min(p.tau, kMostPrecise * usual.tau)};
   };
-  for (PoseEdge& e : graph.own) {
-    e.precision.kappa *= std::min(1.0, kBestOdometry * usual.kappa / own.kappa);
-    e.precision.tau *= std::min(1.0, kBestOdometry * usual.tau / own.tau);
-  }
+  for (auto* edges : {&graph.own, &graph.fixes})
+    for (PoseEdge& e : *edges) {
+      e.precision.kappa *= std::min(1.0, kBestOdometry * usual.kappa / own.kappa);
+      e.precision.tau *= std::min(1.0, kBestOdometry * usual.tau / own.tau);
+    }
   for (auto* edges : {&graph.between, &graph.to_absent})
     for (PoseEdge& e : *edges) e.precision = limited(e.precision);
   for (auto& [robot, step] : graph.step_precision) step = limited(step);

@@ -35,6 +35,8 @@ struct SessionGraph {
   std::map<KeyframeId, SE3> public_poses = {};
   /// Mean weights of one step of odometry, as reported by each robot.
   std::map<RobotId, Precision> step_precision = {};
+  /// Positions of own keyframes relative to keyframe 0, never weighed: see fix_edges().
+  std::vector<PoseEdge> fixes = {};
   std::vector<VerticalPrior> verticals = {};  ///< Priors of own poses; empty unless `upright`.
   bool upright = false;                       ///< All members have verticals: the frame has z up.
   KeyframeId origin = {};                     ///< Covariances are relative to this keyframe.

@@ -10,7 +10,7 @@ constexpr double kEarly = 0.5;  // earliest time of a changed status [periods]
 bool same_content(const TeamStatus& a, const TeamStatus& b) {
   const auto rest = [](const TeamStatus& s) {
     return std::tie(s.sender, s.frame, s.frame_version, s.keyframes, s.revision, s.offers, s.method,
-                    s.upright);
+                    s.upright, s.datum);
   };
   return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
 }

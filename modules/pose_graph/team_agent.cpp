@@ -1,6 +1,7 @@
 #include "modules/pose_graph/team_agent.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "modules/pose_graph/closure_places.hpp"
@@ -55,6 +56,12 @@ bool TeamAgent::add(const InlierSet& set) {
       (set.a > set.b || !std::all_of(set.closures.begin(), set.closures.end(), between)))
     return refuse("an inlier set with closures of other robots than it is about");
   return taken;
+}
+
+bool TeamAgent::add(const PositionFix& fix) {
+  const bool taken = graph_.add(fix);
+  plan_outdated_ |= taken;
+  return taken || refuse("a fix that is not usable, or not after the last one");
 }
 
 void TeamAgent::restore(const TeamSolution& solution) {
@@ -200,7 +207,8 @@ TeamStatus TeamAgent::make_status() {
           .offers = std::move(offers),
           .method = config_.method,
           .T_odom_first = graph_.T_odom_first(),
-          .upright = graph_.upright()};
+          .upright = graph_.upright(),
+          .datum = datum_of(self_.robot)};
 }
 
 void TeamAgent::send_status(TeamOutput& output) {
@@ -226,11 +234,43 @@ bool TeamAgent::shares_map_with(RobotId robot) const {
          (peer->status->T_odom_first.matrix() - graph_.T_odom_first().matrix()).norm() < kSame;
 }
 
+// Identity of the absolute frame in which the fixes of a robot locate it; 0 if they do not.
+std::uint64_t TeamAgent::datum_of(RobotId robot) const {
+  if (robot == self_.robot) return placement_.state.located ? graph_.fixes().back().datum : 0;
+  const TeamRoster::Peer* peer = roster_.find(robot);
+  return peer != nullptr && peer->status ? peer->status->datum : 0;
+}
+
+// This robot if its fixes locate it. Otherwise the lowest robot with this property that closures
+// tie to it.
+std::optional<RobotId> TeamAgent::robot_in_datum() const {
+  if (datum_of(self_.robot) != 0) return self_.robot;
+  std::optional<RobotId> lowest;
+  for (const SessionMember& member : plan_.members) {
+    const RobotId robot = member.peer.robot;
+    if (datum_of(robot) != 0 && !std::ranges::binary_search(ties_.not_joined, robot))
+      lowest = std::min(lowest.value_or(robot), robot);
+  }
+  return lowest;
+}
+
+// The absolute frame. Its name is the lowest known robot whose fixes are in it, tied to this robot
+// or not.
+std::optional<World> TeamAgent::absolute_world() const {
+  const auto located = robot_in_datum();
+  auto world = located ? world_of(*located) : std::nullopt;
+  if (!world) return std::nullopt;
+  for (const auto& [robot, peer] : roster_.peers())
+    if (datum_of(robot) == datum_of(*located)) world->anchor = std::min(world->anchor, robot);
+  return world;
+}
+
 // The frame in which this robot publishes. If no closure ties it to the anchor of the session, this
 // is the frame of the lowest robot that closures tie to it. A robot that localises itself publishes
 // in the frame of the map, in which its keyframe 0 is, whether or not the anchor is localised.
 std::optional<World> TeamAgent::tied_world() const {
   const std::optional<World>& world = frame_.world();
+  if (auto absolute = world ? absolute_world() : std::nullopt) return absolute;
   if (world && graph_.begins_in_map()) {
     auto own = world_of(self_.robot);
     if (own && shares_map_with(world->anchor)) own->anchor = world->anchor;
@@ -242,7 +282,7 @@ std::optional<World> TeamAgent::tied_world() const {
 
 bool TeamAgent::is_located() const {
   constexpr std::size_t kLeastPlaces = 2;  // one place may be mistaken for another
-  if (graph_.later_runs().empty()) return true;
+  if (graph_.later_runs().empty() || robot_in_datum()) return true;
   std::vector<PoseEdge> across =
       graph_.closures_across(graph_.later_runs().back(), graph_.keyframes());
   std::erase_if(across, [this](const PoseEdge& e) {
@@ -252,6 +292,19 @@ bool TeamAgent::is_located() const {
   // Places of the present run: a short run before it may have a single place.
   for (PoseEdge& e : across) (e.from.index < e.to.index ? e.from : e.to).index = 0;
   return find_places(across).sizes.size() >= kLeastPlaces;
+}
+
+std::optional<FixesState> TeamAgent::fixes_state() const {
+  if (graph_.fixes().empty()) return std::nullopt;
+  FixesState state = placement_.state;
+  double sum = 0.0;
+  for (std::size_t k = 0; k < placement_.kept.size(); ++k) {
+    const PositionFix& fix = graph_.fixes()[k];
+    if (placement_.kept[k])
+      sum += (poses()[fix.keyframe.index] * fix.p_kf - poses().front() * fix.p_datum).squaredNorm();
+  }
+  if (state.used > 0) state.residual_m = std::sqrt(sum / state.used);
+  return state;
 }
 
 const std::vector<SE3>& TeamAgent::poses() const {
@@ -294,6 +347,7 @@ OptimizerProgress TeamAgent::make_progress() const {
   progress.located = is_located();
   progress.odometry_rotation_noise = graph_.odometry_noise().rotation;
   progress.odometry_translation_noise = graph_.odometry_noise().translation;
+  progress.fixes = fixes_state();
   progress.odometry_breaks = static_cast<std::uint32_t>(graph_.odometry_breaks().size());
   progress.round = rounds_before_;
   progress.seconds = optimising_s_;

@@ -13,6 +13,7 @@
 #include "modules/core/team_links.hpp"
 #include "modules/core/team_solution.hpp"
 #include "modules/pose_graph/closure_decisions.hpp"
+#include "modules/pose_graph/fix_placement.hpp"
 #include "modules/pose_graph/frame_ties.hpp"
 #include "modules/pose_graph/own_frame.hpp"
 #include "modules/pose_graph/own_graph.hpp"
@@ -70,6 +71,10 @@ struct [[nodiscard]] TeamOutput {
 /// closures at two places tie them to the runs before. Until then, no trajectory is published,
 /// because the poses of these keyframes are unknown.
 ///
+/// Fixes place keyframe 0, the origin of an absolute frame, relative to the other keyframes (see
+/// place_fixes()). Once they determine it, the robot and all members that closures tie to it
+/// publish in that frame. Robots with fixes in one absolute frame share it also without closures.
+///
 /// If all members have verticals, these are part of the cost, and `world` has z up. Deterministic:
 /// equal inputs in equal order give equal outputs. Not thread-safe.
 class TeamAgent {
@@ -82,6 +87,7 @@ class TeamAgent {
   bool add(const KeyframeOdometry& keyframe);
   bool add(const Closure& closure);
   bool add(const InlierSet& set);
+  bool add(const PositionFix& fix);
 
   /// Continues from the solution of a former process, once as many keyframes are added as it has
   /// poses. Until the other robots return, their poses are held, and decisions are provisional.
@@ -192,6 +198,11 @@ class TeamAgent {
   [[nodiscard]] std::optional<World> world_of(RobotId anchor) const;
   [[nodiscard]] std::optional<World> tied_world() const;
   [[nodiscard]] bool is_located() const;
+  void place_first_by_fixes(bool upright);
+  [[nodiscard]] std::uint64_t datum_of(RobotId robot) const;
+  [[nodiscard]] std::optional<RobotId> robot_in_datum() const;
+  [[nodiscard]] std::optional<World> absolute_world() const;
+  [[nodiscard]] std::optional<FixesState> fixes_state() const;
   [[nodiscard]] bool shares_map_with(RobotId robot) const;
   void publish(TeamOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
@@ -215,6 +226,7 @@ class TeamAgent {
 
   OwnFrame frame_;
   OwnPoses poses_;
+  FixPlacement placement_;  // in the present or last session
   ClosureDecisions decisions_;
   std::optional<SessionPart> part_;
   SessionState state_ = SessionState::kNone;  // state of the session of part_

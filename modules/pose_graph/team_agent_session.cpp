@@ -27,6 +27,10 @@ void TeamAgent::make_plan() {
   if (frame_.world() && !plan.has_member(frame_.world()->anchor)) frame_.set_world(tied_world());
   schedule_.update(!same_graph(plan, plan_), closures_known(plan, statuses), now_s_);
   plan_ = std::move(plan);
+  for (const auto& [robot, status] : statuses)
+    if (const auto own = datum_of(self_.robot);
+        own != 0 && status.datum != 0 && status.datum != own)
+      notices_.other_datum(robot);
   std::vector<RobotId> members;
   for (const SessionMember& member : plan_.members) members.push_back(member.peer.robot);
   std::ranges::sort(members);
@@ -207,6 +211,9 @@ bool TeamAgent::join(const Session& session) {
   poses_.place_runs(graph_, self_.robot, tolerance());
   if (alone && part->graph.to_absent.empty())
     poses_.improve_alone(graph_, self_.robot, !expects_false());
+  place_first_by_fixes(session.upright);
+  if (placement_.state.located)
+    part->graph.fixes = fix_edges(graph_.fixes(), placement_.kept, poses_.T_frame_kf());
   part->graph.start = poses_.T_frame_kf();
   part->graph.decided = decisions_.decided();
   part->graph.noise = decisions_.noise();
@@ -217,6 +224,14 @@ bool TeamAgent::join(const Session& session) {
   state_ = SessionState::kRunning;
   reconsider_due_ = false;
   return true;
+}
+
+// Until the fixes determine the absolute frame, keyframe 0 stays, and no fix is an edge.
+void TeamAgent::place_first_by_fixes(bool upright) {
+  if (graph_.fixes().empty()) return;
+  placement_ = place_fixes(graph_.fixes(), poses_.T_frame_kf(), poses_.T_frame_kf().front(),
+                           graph_.mean_step_precision(), upright && graph_.verticals().size() > 1);
+  if (placement_.state.located) poses_.place_first(placement_.T_frame_datum);
 }
 
 bool TeamAgent::misses_member(const SessionPlan& plan) const {

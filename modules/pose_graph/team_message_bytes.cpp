@@ -52,6 +52,7 @@ class MessageWriter {
     put(m.method);
     put(m.T_odom_first);
     put(m.upright);
+    out_.u64(m.datum);
   }
 
   void put(const Session& m) {
@@ -194,6 +195,7 @@ class MessageReader {
     m.method = method();
     m.T_odom_first = pose();
     m.upright = flag();
+    m.datum = in_.u64();
     return m;
   }
 

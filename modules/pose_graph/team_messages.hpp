@@ -71,6 +71,8 @@ struct TeamStatus {
   /// Odometry pose of its keyframe 0. The frame of odometry is upright, keyframe 0 need not be.
   SE3 T_odom_first = SE3::Identity();
   bool upright = false;  ///< Its keyframes have vertical priors.
+  /// Identity of the absolute frame in which its fixes locate it; 0 if they do not.
+  std::uint64_t datum = 0;
 };
 
 /// Identity of a session. The coordinator numbers its sessions.

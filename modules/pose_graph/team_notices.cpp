@@ -73,6 +73,13 @@ void TeamNotices::closures(const ClosureNoiseRecord& noise) {
   }
 }
 
+void TeamNotices::other_datum(RobotId robot) {
+  if (!other_datum_.insert(robot).second) return;
+  add("fixes of robot " + std::to_string(robot) +
+      " are in another absolute frame: give all robots the same absolute_fixes.source and "
+      "absolute_fixes.datum");
+}
+
 void TeamNotices::ties(const FrameTies& ties) {
   if (ties == ties_) return;
   if (const std::string robots = added(ties.tentative, ties_.tentative); !robots.empty())

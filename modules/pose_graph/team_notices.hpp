@@ -32,6 +32,8 @@ class TeamNotices {
   void breaks(std::span<const OdometryBreak> breaks);
   /// Reports pairs of robots whose closures are noisier than those of the team.
   void closures(const ClosureNoiseRecord& noise);
+  /// Reports a robot whose fixes are in another absolute frame than those of this robot.
+  void other_datum(RobotId robot);
   /// Reports robots whose pose relative to this robot is uncertain, or certain again.
   void ties(const FrameTies& ties);
 
@@ -47,6 +49,7 @@ class TeamNotices {
   std::set<std::size_t> breaks_;               // steps in a notice
   std::map<RobotId, double> closure_factors_;  // in the last notice, by peer
   FrameTies ties_;                             // in the last notice
+  std::set<RobotId> other_datum_;              // in a notice
 };
 
 }  // namespace km

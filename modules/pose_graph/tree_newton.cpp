@@ -256,6 +256,7 @@ void TreeNewton::build_front() {
     if (k >= graph_.own.size())
       known_[k].pair_limit = known_[k].pair_factor = limits.at(peer_of(known_[k]));
   }
+  front.edges.insert(front.edges.end(), graph_.fixes.begin(), graph_.fixes.end());
   for (const PoseEdge& e : graph_.to_absent) {
     const auto decided = graph_.decided.find(e.id());
     const bool rejected = decided != graph_.decided.end() && !decided->second;
@@ -281,7 +282,7 @@ std::vector<double> TreeNewton::front_weights(bool candidate) const {
                                     : known.weight * known.pair_factor;
     weights.push_back(known.trust == Trust::kOpen ? std::max(weight, kFloor) : weight);
   }
-  weights.resize(front_->graph().edges.size(), 1.0);  // edges to held poses
+  weights.resize(front_->graph().edges.size(), 1.0);  // fixes, and edges to held poses
   return weights;
 }
 

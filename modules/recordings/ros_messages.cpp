@@ -74,14 +74,22 @@ void fields(auto& wire, Is<RosOdometry> auto& odometry) {
        odometry.twist_covariance);
 }
 
+void fields(auto& wire, Is<RosTransform> auto& transform) {
+  fields(wire, transform.header);
+  wire(transform.child_frame);
+  fields(wire, transform.pose);
+}
+
+void fields(auto& wire, Is<RosNavSatFix> auto& fix) {
+  fields(wire, fix.header);
+  wire(fix.status, fix.service, fix.latitude, fix.longitude, fix.altitude, fix.position_covariance,
+       fix.covariance_type);
+}
+
 void fields(auto& wire, Is<RosTransforms> auto& message) {
   constexpr std::size_t kLeast_bytes = 7 * sizeof(double);
   wire.resize(message.transforms, kLeast_bytes);
-  for (auto& transform : message.transforms) {
-    fields(wire, transform.header);
-    wire(transform.child_frame);
-    fields(wire, transform.pose);
-  }
+  for (auto& transform : message.transforms) fields(wire, transform);
 }
 
 void fields(auto& wire, Is<RosPointCloud> auto& cloud) {
@@ -196,6 +204,10 @@ template Decoded<RosPath> decode_ros(std::string_view, std::span<const std::uint
 template std::vector<std::uint8_t> encode_ros(const RosPath&);
 template Decoded<RosOdometry> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosOdometry&);
+template Decoded<RosTransform> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosTransform&);
+template Decoded<RosNavSatFix> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosNavSatFix&);
 template Decoded<RosTransforms> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosTransforms&);
 template Decoded<RosPointCloud> decode_ros(std::string_view, std::span<const std::uint8_t>);

@@ -109,11 +109,24 @@ struct RosOdometry {
   std::array<double, 36> twist_covariance{};
 };
 
-/// geometry_msgs/TransformStamped.
 struct RosTransform {
+  static constexpr std::string_view kType = "geometry_msgs/TransformStamped";
   RosHeader header;
   std::string child_frame;
   RosPose pose;  ///< Pose of the child frame in the header's frame.
+};
+
+struct RosNavSatFix {
+  static constexpr std::string_view kType = "sensor_msgs/NavSatFix";
+  static constexpr std::uint8_t kUnknown = 0;  ///< Value of covariance_type.
+  RosHeader header;
+  std::int8_t status = 0;                       ///< Negative: no position.
+  std::uint16_t service = 0;                    ///< Bits of the satellite systems.
+  double latitude = 0.0;                        ///< [deg]
+  double longitude = 0.0;                       ///< [deg]
+  double altitude = 0.0;                        ///< Above the ellipsoid of WGS 84 [m].
+  std::array<double, 9> position_covariance{};  ///< 3x3, of east, north, up [m^2].
+  std::uint8_t covariance_type = kUnknown;
 };
 
 struct RosTransforms {

@@ -54,6 +54,8 @@ class RosReader {
       : reader_(bytes), size_(bytes.size()), is_cdr_(is_cdr), is_big_endian_(is_big_endian) {}
 
   void get(std::uint8_t& value) { value = reader_.u8(); }
+  void get(std::int8_t& value) { value = static_cast<std::int8_t>(reader_.u8()); }
+  void get(std::uint16_t& value) { value = static_cast<std::uint16_t>(number(2)); }
   void get(bool& value) { value = reader_.u8() != 0; }
   void get(std::uint32_t& value) { value = static_cast<std::uint32_t>(number(4)); }
   void get(std::int32_t& value) { value = static_cast<std::int32_t>(number(4)); }
@@ -99,6 +101,8 @@ class RosWriter {
 
  private:
   void put(std::uint8_t value) { bytes_.push_back(value); }
+  void put(std::int8_t value) { bytes_.push_back(static_cast<std::uint8_t>(value)); }
+  void put(std::uint16_t value) { number(value, 2); }
   void put(bool value) { bytes_.push_back(value ? 1 : 0); }
   void put(std::uint32_t value) { number(value, 4); }
   void put(std::int32_t value) { number(static_cast<std::uint32_t>(value), 4); }

@@ -20,11 +20,13 @@ struct KnownType {
   const dds_topic_descriptor_t* descriptor;
 };
 
-constexpr std::array<KnownType, 12> kTypes = {{
+constexpr std::array<KnownType, 14> kTypes = {{
     {"sensor_msgs", "Image", &sensor_msgs_msg_dds__Image__desc},
     {"sensor_msgs", "CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
     {"sensor_msgs", "Imu", &sensor_msgs_msg_dds__Imu__desc},
     {"sensor_msgs", "CameraInfo", &sensor_msgs_msg_dds__CameraInfo__desc},
+    {"sensor_msgs", "NavSatFix", &sensor_msgs_msg_dds__NavSatFix__desc},
+    {"geometry_msgs", "TransformStamped", &geometry_msgs_msg_dds__TransformStamped__desc},
     {"geometry_msgs", "PoseStamped", &geometry_msgs_msg_dds__PoseStamped__desc},
     {"geometry_msgs", "PoseWithCovarianceStamped",
      &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc},

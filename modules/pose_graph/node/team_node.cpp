@@ -35,6 +35,7 @@ TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFac
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics.odometry.subscribe(post);
   topics.closures.subscribe(post);
+  topics.fixes.subscribe(post);
   topics.inlier_sets.subscribe(post);
   topics.peer_inlier_sets.subscribe(post);
   topics.restored_inlier_sets.subscribe(post);

@@ -21,6 +21,7 @@ namespace km {
 struct TeamTopics {
   In<KeyframeOdometry> odometry;       ///< Own keyframes, ascending.
   In<Closure> closures;                ///< Own and received ones.
+  In<PositionFix> fixes;               ///< Own ones, ascending by keyframe.
   In<InlierSet> inlier_sets;           ///< Decided here.
   In<InlierSet> peer_inlier_sets;      ///< Decided by other robots.
   In<InlierSet> restored_inlier_sets;  ///< Sets of a former process, older than all others.
@@ -64,10 +65,11 @@ class TeamNode final : public Node {
   struct NewIncarnation {
     TeamPeer peer;
   };
-  using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
-                             Topic<InlierSet>::Message, Topic<TeamSolution>::Message,
-                             Topic<PeerEvent>::Message, NewIncarnation, Topic<LinksReport>::Message,
-                             Topic<TeamMessage>::Message>;
+  using Input =
+      std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
+                   Topic<PositionFix>::Message, Topic<InlierSet>::Message,
+                   Topic<TeamSolution>::Message, Topic<PeerEvent>::Message, NewIncarnation,
+                   Topic<LinksReport>::Message, Topic<TeamMessage>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
   void step(const Input& input, double now_s);

@@ -31,6 +31,7 @@ struct Robot {
   TeamTopics topics() {
     return {.odometry = odometry,
             .closures = closures,
+            .fixes = fixes,
             .inlier_sets = inlier_sets,
             .peer_inlier_sets = peer_inlier_sets,
             .restored_inlier_sets = restored_inlier_sets,
@@ -88,6 +89,7 @@ struct Robot {
   TeamPeer self;
   Topic<KeyframeOdometry> odometry;
   Topic<Closure> closures;
+  Topic<PositionFix> fixes;
   Topic<InlierSet> inlier_sets, peer_inlier_sets, restored_inlier_sets;
   Topic<TeamSolution> restored_solution;
   Topic<PeerEvent> peer_events, restarts;

@@ -1,0 +1,75 @@
+#include "modules/absolute_fixes/node/fixes_node.hpp"
+
+#include <utility>
+
+#include "runtime/thread.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kQueue = 4096;  // minutes of images
+
+}  // namespace
+
+FixesNode::FixesNode(FixInput input, const FixesTopics& topics)
+    : reader_(std::move(input.reader)),
+      association_(Eigen::Vector3d(reader_.config().lever_arm_m.data())),
+      live_(std::move(input.live)),
+      topics_(topics),
+      worker_(
+          kQueue, Overflow::kBlock, [this](const Input& received) { step(received); },
+          AbsoluteFixesConfig::kSection) {
+  for (const TimedPosition& fix : input.recorded) association_.add(fix);
+  const auto post = [this](const auto& message) { worker_.post(message); };
+  topics_.states.subscribe(post);
+  topics_.restored_states.subscribe(post);
+  topics_.keyframes.subscribe(post);
+}
+
+void FixesNode::start() {
+  worker_.start();
+  if (live_ != nullptr) receiver_ = start_without_signals([this] { receive(); });
+}
+
+void FixesNode::stop() noexcept {
+  if (live_ != nullptr) live_->stop();
+  if (receiver_.joinable()) receiver_.join();
+  worker_.stop();
+}
+
+void FixesNode::receive() {
+  while (auto message = live_->next())
+    worker_.post(std::make_shared<const BagMessage>(*std::move(message)));
+}
+
+void FixesNode::step(const Input& input) {
+  std::vector<PositionFix> fixes;
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto* state = std::get_if<Topic<OdometryState>::Message>(&input)) {
+      association_.add(**state);
+    } else if (const auto* keyframe = std::get_if<Topic<KeyframeOdometry>::Message>(&input)) {
+      if ((*keyframe)->id.index > 0) association_.add(**keyframe);
+    } else {
+      const BagMessage& message = *std::get<std::shared_ptr<const BagMessage>>(input);
+      if (const auto fix = reader_.read(live_->channels()[message.channel], message))
+        association_.add(*fix);
+    }
+    fixes = association_.take(reader_.datum_id());
+  }
+  for (PositionFix& fix : fixes) topics_.fixes.publish(std::move(fix));
+}
+
+FixCounts FixesNode::counts() const {
+  const std::lock_guard lock(mutex_);
+  FixCounts counts = reader_.counts();
+  counts.far_from_keyframe = association_.unused();
+  return counts;
+}
+
+std::optional<GeodeticPoint> FixesNode::datum() const {
+  const std::lock_guard lock(mutex_);
+  return reader_.datum();
+}
+
+}  // namespace km

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <atomic>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string_view>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "modules/absolute_fixes/fix_association.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// Fixes of a recording, or the live topic of them.
+struct FixInput {
+  FixReader reader;
+  std::vector<TimedPosition> recorded = {};
+  std::unique_ptr<BagReader> live = nullptr;  ///< Null for a recording.
+};
+
+/// Channels of the node; they must outlive it.
+struct FixesTopics {
+  In<OdometryState> states;
+  In<OdometryState> restored_states;
+  In<KeyframeOdometry> keyframes;  ///< Keyframe 0 is the origin of the absolute frame.
+  Out<PositionFix> fixes;
+};
+
+/// Measures keyframes by absolute fixes (FixAssociation), in a thread. A second thread waits for
+/// live fixes.
+class FixesNode final : public Node {
+ public:
+  FixesNode(FixInput input, const FixesTopics& topics);
+  ~FixesNode() override { stop(); }
+
+  std::string_view name() const override { return AbsoluteFixesConfig::kSection; }
+  void start() override;
+  void stop() noexcept override;
+  std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  DurationHistogram timing() const override { return worker_.timing(); }
+
+  using Input = std::variant<Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
+                             std::shared_ptr<const BagMessage>>;
+  /// Handles one input synchronously. The thread calls only this function.
+  void step(const Input& input);
+
+  /// Thread-safe.
+  [[nodiscard]] FixCounts counts() const;
+  [[nodiscard]] std::optional<GeodeticPoint> datum() const;
+
+ private:
+  void receive();
+
+  mutable std::mutex mutex_;  // guards reader_ and association_
+  FixReader reader_;
+  FixAssociation association_;
+  std::unique_ptr<BagReader> live_;
+  const FixesTopics topics_;
+  std::thread receiver_;
+  Worker<Input> worker_;  // last member: stops first
+};
+
+}  // namespace km

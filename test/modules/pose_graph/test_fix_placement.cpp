@@ -1,0 +1,208 @@
+#include <catch2/catch.hpp>
+
+#include "modules/core/measurement_limits.hpp"
+#include "modules/rbcd/solver_choice.hpp"
+#include "test/support/random_pose.hpp"
+#include "test/support/team_network.hpp"
+
+// Robots with absolute fixes: keyframe 0 is the origin of the absolute frame, and the step to
+// keyframe 1 is unknown.
+
+namespace km {
+namespace {
+
+constexpr KeyframeIndex kKeyframes = 60;
+constexpr double kSigma_m = 0.3;
+const Eigen::Vector3d kAntenna(0.3, -0.2, 0.4);
+// 30 fixes along 30 m determine the position to 0.06 m on each axis. They determine the heading to
+// 7 mrad, 0.3 m / (8 m * sqrt(30)), which is 0.1 m at the ends. The rotation noise of odometry
+// bends the ends by 0.27 m, 0.5 m * 2 mrad * sqrt(60^3 / 3). Three sigmas of the sum.
+constexpr double kLargest_m = 0.9;
+
+Matrix6 isotropic(double rotation_rad, double translation_m) {
+  Matrix6 Sigma = Matrix6::Zero();
+  Sigma.diagonal().head<3>().setConstant(rotation_rad * rotation_rad);
+  Sigma.diagonal().tail<3>().setConstant(translation_m * translation_m);
+  return Sigma;
+}
+
+SE3 level_pose(std::mt19937& rng) {
+  const double heading = 3.0 * random_vector<1>(rng).x();
+  return make_pose(Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
+                   30.0 * random_vector<3>(rng));
+}
+
+class Run {
+ public:
+  Run(TeamNetwork& network, RobotId robot, unsigned seed, bool has_fixes, PgoMethod method,
+      double step_m = 0.5)
+      : rng_(seed),
+        network_(network),
+        robot_(robot),
+        agent_(network.add({robot, 1}, {.method = method}, solver_choice({.method = method}))) {
+    truth_.push_back(has_fixes ? SE3::Identity() : level_pose(rng_));
+    add(has_fixes ? SE3::Identity() : level_pose(rng_), Matrix6::Zero());
+    if (has_fixes) {
+      truth_.push_back(level_pose(rng_));
+      add(level_pose(rng_), isotropic(2.0, kUnknownStep_m));
+    }
+    while (truth_.size() < kKeyframes) {
+      const SE3 step = se3_exp(Vector6{0.0, 0.0, 0.03, step_m, 0.0, 0.1 * step_m});
+      truth_.push_back(truth_.back() * step);
+      Vector6 noise = random_vector<6>(rng_);
+      noise.head<3>() *= 0.002;
+      noise.tail<3>() *= 0.01;
+      add(step * se3_exp(noise), isotropic(0.002, 0.01));
+    }
+  }
+
+  void fix(KeyframeIndex at, const Eigen::Vector3d& error = Eigen::Vector3d::Zero(),
+           double sigma_m = kSigma_m) {
+    const SE3& T_datum_kf = truth_[at];
+    CHECK(agent_.add(
+        PositionFix{.keyframe = {robot_, at},
+                    .p_datum = T_datum_kf * kAntenna + sigma_m * random_vector<3>(rng_) + error,
+                    .p_kf = kAntenna,
+                    .sigma_m = sigma_m,
+                    .datum = datum}));
+  }
+  void fix_all() {
+    for (KeyframeIndex i = 1; i < kKeyframes; ++i) fix(i);
+  }
+  [[nodiscard]] const TeamNetwork::Robot& state() const { return network_.robots.at(robot_); }
+  [[nodiscard]] TeamAgent& agent() { return agent_; }
+  [[nodiscard]] const SE3& truth(KeyframeIndex i) const { return truth_[i]; }
+  // Largest distance of a keyframe from its true position in the absolute frame.
+  [[nodiscard]] double error_m() const {
+    double largest = 0.0;
+    for (KeyframeIndex i = 0; i < kKeyframes; ++i)
+      largest = std::max(
+          largest,
+          (state().trajectory->T_world_kf[i].translation() - truth_[i].translation()).norm());
+    return largest;
+  }
+  [[nodiscard]] Eigen::Vector3d random_outlier() {
+    return 10.0 * random_vector<3>(rng_).normalized();
+  }
+
+  std::uint64_t datum = 77;
+
+ private:
+  void add(const SE3& T_previous_kf, const Matrix6& covariance) {
+    KeyframeOdometry keyframe{.id = {robot_, static_cast<KeyframeIndex>(next_++)}};
+    keyframe.T_previous_kf = T_previous_kf;
+    keyframe.T_odom_kf = T_odom_kf_ = T_odom_kf_ * T_previous_kf;
+    keyframe.covariance = covariance;
+    keyframe.vertical = Vertical{truth_[keyframe.id.index].linear().row(2).transpose(), 0.01};
+    CHECK(agent_.add(keyframe));
+  }
+
+  std::mt19937 rng_;
+  TeamNetwork& network_;
+  RobotId robot_;
+  TeamAgent& agent_;
+  std::vector<SE3> truth_;  // T_datum_kf
+  SE3 T_odom_kf_ = SE3::Identity();
+  std::size_t next_ = 0;
+};
+
+bool settle_again(TeamNetwork& network) {
+  (void)network.run(1.0);  // progress is reported once per status
+  return network.run(60.0, [&] {
+    return std::ranges::all_of(network.robots,
+                               [](const auto& robot) { return robot.second.progress.settled; });
+  });
+}
+
+TEST_CASE("fixes with 30 % outliers and a biased block place a run in the absolute frame",
+          "[pose_graph][fixes]") {
+  TeamNetwork network;
+  const auto method = GENERATE(PgoMethod::kNewton, PgoMethod::kRbcd);
+  Run run(network, 4, GENERATE(1U, 2U, 3U, 4U, 5U), true, method);
+  std::uint32_t outliers = 0;
+  for (KeyframeIndex i = 1; i < kKeyframes; ++i) {
+    const bool is_in_block = i >= 20 && i < 32;
+    const bool is_outlier = is_in_block || i % 10 < 3;
+    outliers += is_outlier ? 1 : 0;
+    run.fix(i, is_in_block  ? Eigen::Vector3d(8.0, -6.0, 3.0)
+               : is_outlier ? run.random_outlier()
+                            : Eigen::Vector3d::Zero());
+  }
+  REQUIRE(settle_again(network));
+  REQUIRE(run.state().progress.located);
+  REQUIRE(run.state().trajectory);
+  CHECK(run.error_m() < kLargest_m);
+  const FixesState& fixes = *run.state().progress.fixes;
+  CHECK(fixes.rejected >= outliers);
+  CHECK(fixes.rejected <= outliers + 1);  // one of 1000 true fixes is farther than four sigmas
+  CHECK(fixes.used + fixes.rejected == kKeyframes - 1);
+  CHECK(fixes.residual_m < 2.0 * kSigma_m);  // 1.7 sigmas are the root mean square in three axes
+}
+
+TEST_CASE("fixes do not locate a robot before it has moved", "[pose_graph][fixes]") {
+  TeamNetwork network;
+  Run still(network, 4, 11, true, PgoMethod::kNewton, 0.003),
+      moving(network, 5, 12, true, PgoMethod::kNewton);
+  still.fix_all();
+  for (KeyframeIndex i = 1; i < 8; ++i) moving.fix(i, Eigen::Vector3d::Zero(), 1.0);
+  REQUIRE(settle_again(network));
+  for (const Run* const run : {&still, &moving}) {
+    CHECK_FALSE(run->state().progress.located);
+    CHECK_FALSE(run->state().trajectory);
+  }
+  for (KeyframeIndex i = 8; i < kKeyframes; ++i) moving.fix(i, Eigen::Vector3d::Zero(), 1.0);
+  REQUIRE(settle_again(network));
+  CHECK_FALSE(still.state().progress.located);
+  CHECK(moving.state().progress.located);
+  REQUIRE(moving.state().trajectory);
+  CHECK(moving.error_m() < kLargest_m / kSigma_m);
+}
+
+TEST_CASE("closures bring a robot without fixes into the absolute frame", "[pose_graph][fixes]") {
+  TeamNetwork network;
+  Run without(network, 2, 21, false, PgoMethod::kNewton);
+  Run with(network, 5, 22, true, PgoMethod::kNewton);
+  std::vector<ClosureId> between;
+  for (const KeyframeIndex i : {10U, 11U, 12U, 40U, 41U, 42U}) {
+    Closure closure;
+    closure.from.id = {2, i};
+    closure.to.id = {5, i};
+    closure.T_from_to = without.truth(i).inverse() * with.truth(i);
+    closure.covariance = isotropic(0.005, 0.02);
+    between.push_back(closure.id());
+    for (Run* const run : {&without, &with}) CHECK(run->agent().add(closure));
+  }
+  for (Run* const run : {&without, &with}) CHECK(run->agent().add(InlierSet{2, 5, 1, between}));
+  REQUIRE(settle_again(network));
+  CHECK(without.state().trajectory->anchor == 2);
+  with.fix_all();
+  REQUIRE(settle_again(network));
+  for (const Run* const run : {&without, &with}) {
+    REQUIRE(run->state().trajectory);
+    CHECK(run->state().trajectory->anchor == 5);
+    // The poses of the other robot are up to 100 m from the fixes, with 10 mrad of heading.
+    CHECK(run->error_m() < kLargest_m + (run == &without ? 1.0 : 0.0));
+  }
+}
+
+TEST_CASE("robots share an absolute frame without closures if they have one datum",
+          "[pose_graph][fixes]") {
+  TeamNetwork network;
+  Run low(network, 3, 31, true, PgoMethod::kNewton), high(network, 6, 32, true, PgoMethod::kNewton);
+  const bool is_one_datum = GENERATE(true, false);
+  if (!is_one_datum) high.datum = 78;
+  for (Run* const run : {&low, &high}) run->fix_all();
+  REQUIRE(settle_again(network));
+  REQUIRE(low.state().trajectory);
+  REQUIRE(high.state().trajectory);
+  CHECK(low.state().trajectory->anchor == 3);
+  CHECK(high.state().trajectory->anchor == (is_one_datum ? 3 : 6));
+  const auto names_datum = [](const std::string& notice) {
+    return notice.find("absolute_fixes.datum") != std::string::npos;
+  };
+  CHECK(std::ranges::any_of(high.state().notices, names_datum) == !is_one_datum);
+  for (const Run* const run : {&low, &high}) CHECK(run->error_m() < kLargest_m);
+}
+
+}  // namespace
+}  // namespace km
