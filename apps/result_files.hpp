@@ -16,13 +16,17 @@ inline constexpr const char* kLabelPalette = "label_palette.csv";
 /// Written at the end of a run.
 inline constexpr const char* kSummary = "summary.json";
 
+/// Objects of the map, with labels only.
+inline constexpr const char* kObjectsFile = "objects.json";
+
 /// Results of a robot in its output folder.
 inline constexpr std::array kResultFiles = {
     "odometry.tum",   "optimized.tum",      "optimized_keyframes.tum",
     "pose_graph.g2o", "keyframes.csv",      "loop_closures.csv",
     "optimizer.csv",  "traffic.csv",        "process.csv",
     "timing.csv",     "config.yaml",        kSummary,
-    "mesh.ply",       "mesh_optimized.ply", kLabelPalette};
+    "mesh.ply",       "mesh_optimized.ply", kLabelPalette,
+    kObjectsFile};
 
 /// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};

@@ -15,6 +15,7 @@
 #include "modules/loop_closure/loop_closure_config.hpp"
 #include "modules/mesh/mesh_chunks_config.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
+#include "modules/objects/objects_config.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 #include "modules/place_recognition/place_recognition_config.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
@@ -89,6 +90,7 @@ struct RobotConfig {
   SemanticMappingConfig semantic_mapping;
   MeshDeformationConfig mesh_deformation;
   MeshChunksConfig mesh_chunks;
+  ObjectsConfig objects;
   ViewConfig view;
 
   std::string effective;  ///< YAML text of a file with this configuration.
@@ -98,7 +100,7 @@ struct RobotConfig {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, graph_playback, mapping, stereo_depth, segmentation,
-              semantic_mapping, mesh_deformation, mesh_chunks, view);
+              semantic_mapping, mesh_deformation, mesh_chunks, objects, view);
   }
 };
 

@@ -465,6 +465,9 @@ void write_all(const RobotOptions& options, Robot& robot, const RunRecord& recor
     results.note(options.output / "mesh.ply", "not as at the end of the run: mesh_files hangs");
   else if (robot.mesh_files() != nullptr)
     robot.mesh_files()->finish(record.trajectory());
+  if (robot.objects() != nullptr && !result.is_left_behind(robot.objects()->name()))
+    if (const auto objects = robot.objects()->finish(record.trajectory()))
+      write_objects(options.output, *objects, robot.objects()->palette(), results);
   if (robot.peer_meshes() != nullptr && !result.is_left_behind("team_mesh"))
     write_peer_meshes(options.output / kPeerMeshes, *robot.peer_meshes(), results);
   if (robot.record() != nullptr) finish_record(options, *robot.record(), record, result, results);

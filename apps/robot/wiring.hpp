@@ -31,6 +31,7 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh_deformation/node/mesh_deformation_node.hpp"
+#include "modules/objects/node/objects_node.hpp"
 #include "modules/outlier_rejection/node/pcm_node.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/place_database.hpp"
@@ -78,6 +79,7 @@ struct Topics {
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized_meshes;
   Topic<SupersededSurface> superseded_surface;
+  Topic<ObjectList> joint_objects;
   Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;
   Topic<PlaceQuery> place_queries;
@@ -113,6 +115,7 @@ struct Topics {
   AddressedCrossing<TeamLanePacket> team_packets;
   AddressedCrossing<PlacesLanePacket> places_packets;
   Crossing<MeshChunk> chunks;
+  Crossing<RobotObjects> objects;
   Crossing<RobotStatus> status;
 };
 
@@ -146,6 +149,8 @@ class Robot {
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// Null unless meshes of the other robots are collected.
   [[nodiscard]] const TeamMeshNode* peer_meshes() const { return peer_meshes_; }
+  /// Null without labels.
+  [[nodiscard]] ObjectsNode* objects() { return objects_; }
   /// True if another running robot had this robot's id first.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   /// Null without --localize.
@@ -191,6 +196,8 @@ class Robot {
                    const MappingPlan& plan, std::optional<ResumedMap> before);
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
                            ResultWriter& results);
+  void add_objects(const ObjectsConfig& config, const LabelPalette& palette,
+                   const std::filesystem::path& folder, ResultWriter& results);
   [[nodiscard]] CrossingEnds share_meshes(const MeshChunksConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
@@ -240,6 +247,7 @@ class Robot {
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;
   TeamMeshNode* peer_meshes_ = nullptr;
+  ObjectsNode* objects_ = nullptr;
   PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   RosOutputNode* record_ = nullptr;
