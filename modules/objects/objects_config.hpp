@@ -13,8 +13,8 @@ struct ObjectsConfig {
 
   bool on = true;
   std::vector<std::string> background = {
-      "unknown", "sky",  "building", "road",    "ground", "sidewalk", "terrain", "vegetation", "tree",
-      "wall",    "floor", "ceiling",  "window", "door",   "curtain",  "fence"};
+      "unknown", "sky",  "building", "road",    "ground", "sidewalk", "terrain", "vegetation",
+      "tree",    "wall", "floor",    "ceiling", "window", "door",     "curtain", "fence"};
   double gap_m = 0.15;
   double min_surface_m2 = 0.1;
   int min_views = 2;

@@ -133,17 +133,16 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
                       .mesh_points = 2,
                       .mesh_faces = 10,
                       .objects = LabelPalette({{7, "chair", {255, 0, 0}}})},
-                     diagnose, {},
-                     {odometry, keyframes, trajectories, {}});
-  RosSubscription viewer(network(),
-                         {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
-                          {"/robot_3/pose", "geometry_msgs/PoseWithCovarianceStamped"},
-                          {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
-                          {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched},
-                          {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
-                          {"/diagnostics", "diagnostic_msgs/DiagnosticArray"},
-                          {"/robot_3/mesh_faces", "visualization_msgs/Marker", RosQos::kLatched},
-                          {"/robot_3/objects", "visualization_msgs/MarkerArray", RosQos::kLatched}});
+                     diagnose, {}, {odometry, keyframes, trajectories, {}});
+  RosSubscription viewer(
+      network(), {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
+                  {"/robot_3/pose", "geometry_msgs/PoseWithCovarianceStamped"},
+                  {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
+                  {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched},
+                  {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
+                  {"/diagnostics", "diagnostic_msgs/DiagnosticArray"},
+                  {"/robot_3/mesh_faces", "visualization_msgs/Marker", RosQos::kLatched},
+                  {"/robot_3/objects", "visualization_msgs/MarkerArray", RosQos::kLatched}});
   OdometryState state;
   state.stamp = 5;
   state.T_odom_body.translation() = Eigen::Vector3d(1, 2, 3);

@@ -70,8 +70,7 @@ TEST_CASE("A mesh is read back from glTF with its classes as materials", "[expor
   CHECK((rotation * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitY()));
 }
 
-TEST_CASE("A mesh without labels has one material and the colours of its vertices",
-          "[exports]") {
+TEST_CASE("A mesh without labels has one material and the colours of its vertices", "[exports]") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "room.glb";
   LabelledMesh mesh = room();
