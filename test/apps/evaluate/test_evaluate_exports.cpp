@@ -29,16 +29,16 @@ TEST_CASE("objects compares objects in the frame of the truth", "[evaluate]") {
       folder.write("m.tum", "1 50 0 1 0 0 0 1\n2 52 0 1 0 0 0 1\n3 52 2 1 0 0 0 1\n");
   const std::string command =
       kExportTool + "objects --truth " + truth.string() + " --estimate " + estimate.string();
-  CHECK_THAT(run_command(command).output, Catch::Contains("all         1      0    0.00"));
+  CHECK_THAT(run_command(command).output, Catch::Contains("all       1      0    0.00"));
   const auto placed = run_command(command + " --trajectory " + moved.string() +
                                   " --trajectory-truth " + poses.string());
   CAPTURE(placed.output);
   CHECK(placed.exit_code == 0);
-  CHECK_THAT(placed.output, Catch::Contains("all         1      1    1.00"));
+  CHECK_THAT(placed.output, Catch::Contains("all       1      1    1.00"));
   const auto mesh = folder.path() / "far.ply";  // the chair is not in it
   write_ply(mesh, room());
   CHECK_THAT(run_command(command + " --mesh " + mesh.string()).output,
-             Catch::Contains("all         0      0    0.00"));
+             Catch::Contains("all       0      0    0.00"));
   folder.write("true.json", "{}");
   CHECK_THAT(run_command(command).output, Catch::Contains("true.json"));
 }
