@@ -19,6 +19,9 @@ inline constexpr const char* kSummary = "summary.json";
 /// The fused mesh of a team, in its folder, and with `map.team` in that of each robot.
 inline constexpr const char* kTeamMesh = "team_mesh.ply";
 
+/// Objects of the map, with labels only.
+inline constexpr const char* kObjectsFile = "objects.json";
+
 /// Results of a robot in its output folder.
 inline constexpr std::array kResultFiles = {
     "odometry.tum",   "optimized.tum",      "optimized_keyframes.tum",
@@ -26,7 +29,7 @@ inline constexpr std::array kResultFiles = {
     "optimizer.csv",  "traffic.csv",        "process.csv",
     "timing.csv",     "config.yaml",        kSummary,
     "mesh.ply",       "mesh_optimized.ply", kLabelPalette,
-    kTeamMesh};
+    kTeamMesh, kObjectsFile};
 
 /// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};

@@ -7,10 +7,13 @@
 #include <cstdio>
 
 #include "apps/output_file.hpp"
+#include "apps/result_files.hpp"
 #include "apps/robot/pose_holes.hpp"
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/core/write_file.hpp"
+#include "modules/objects/object_file.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
@@ -206,6 +209,12 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
                 [&](const fs::path& file) { write_g2o(file, graph_of(record)); });
   write("keyframes.csv", write_keyframes, record);
   write("loop_closures.csv", write_closures, record);
+}
+
+void write_objects(const fs::path& folder, const ObjectList& objects, const LabelPalette& palette,
+                   ResultWriter& results) {
+  results.write(folder / kObjectsFile,
+                [&](const auto& file) { write_file(file, objects_json(objects, palette)); });
 }
 
 std::vector<PublishedClosure> published_closures(const RunRecord& record) {

@@ -4,6 +4,7 @@
 
 #include "apps/result_writer.hpp"
 #include "apps/robot/run_record.hpp"
+#include "modules/objects/map_object.hpp"
 #include "modules/ros_dds/closure_lines.hpp"
 
 namespace km {
@@ -12,6 +13,10 @@ namespace km {
 /// loop_closures.csv to `folder`.
 void write_results(const std::filesystem::path& folder, const RunRecord& record,
                    ResultWriter& results);
+
+/// Writes objects.json to `folder`.
+void write_objects(const std::filesystem::path& folder, const ObjectList& objects,
+                   const LabelPalette& palette, ResultWriter& results);
 
 /// Every candidate of the robot, in the form in which viewers receive it.
 [[nodiscard]] std::vector<PublishedClosure> published_closures(const RunRecord& record);

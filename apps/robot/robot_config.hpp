@@ -16,6 +16,7 @@
 #include "modules/loop_closure/loop_closure_config.hpp"
 #include "modules/mesh/map_sharing_config.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
+#include "modules/objects/objects_config.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 #include "modules/place_recognition/place_recognition_config.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
@@ -91,6 +92,7 @@ struct RobotConfig {
   SemanticMappingConfig semantic_mapping;
   MeshDeformationConfig mesh_deformation;
   MapSharingConfig map;
+  ObjectsConfig objects;
   ViewConfig view;
 
   std::string effective;  ///< YAML text of a file with this configuration.
@@ -100,7 +102,7 @@ struct RobotConfig {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, absolute_fixes, graph_playback, mapping, stereo_depth,
-              segmentation, semantic_mapping, mesh_deformation, map, view);
+              segmentation, semantic_mapping, mesh_deformation, map, objects, view);
   }
 };
 

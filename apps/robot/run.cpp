@@ -471,6 +471,9 @@ void write_all(const RobotOptions& options, Robot& robot, const RunRecord& recor
     robot.mesh_files()->finish(record.trajectory());
   if (robot.team_map() != nullptr && !result.is_left_behind(robot.team_map()->name()))
     write_team_map(options.output, *robot.team_map(), results);
+  if (robot.objects() != nullptr && !result.is_left_behind(robot.objects()->name()))
+    if (const auto objects = robot.objects()->finish(record.trajectory()))
+      write_objects(options.output, *objects, robot.objects()->palette(), results);
   if (robot.record() != nullptr) finish_record(options, *robot.record(), record, result, results);
   results.write(options.output / "timing.csv",
                 [&robot](const auto& file) { write_file(file, timings(robot)); });

@@ -16,6 +16,7 @@
 #include "modules/loop_closure/node/loop_closure_node.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
+#include "modules/objects/node/objects_codec.hpp"
 #include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
 #include "modules/outlier_rejection/node/pcm_node.hpp"
 #include "modules/place_recognition/node/place_recognition_codec.hpp"
@@ -102,6 +103,8 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_back_end(config);
   add_overlay();
   if (mapping) add_mesh_correction(config, options.output, results);
+  if (mapping && !mapping->palette.classes().empty() && config.objects.on)
+    add_objects(config.objects, mapping->palette, options.output, results);
   add_network(share_meshes(config, mapping ? mapping->palette : LabelPalette()));
   add_records();
   add_view(config, camera);
@@ -314,6 +317,19 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   return {};
 }
 
+void Robot::add_objects(const ObjectsConfig& config, const LabelPalette& palette,
+                        const std::filesystem::path& folder, ResultWriter& results) {
+  objects_ = &add<ObjectsNode>(false, config, identity_.robot, palette,
+                               ObjectsTopics{.meshes = topics_.optimized_meshes,
+                                             .trajectory = topics_.trajectory,
+                                             .received = topics_.objects.from_peers(),
+                                             .own = topics_.objects.to_peers(),
+                                             .joint = topics_.joint_objects});
+  topics_.joint_objects.subscribe([this, folder, &results](const auto& objects) {
+    write_objects(folder, *objects, objects_->palette(), results);
+  });
+}
+
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {
   auto& playback = add<GraphPlaybackNode>(true, config.graph_playback, rate, std::move(graph),
                                           GraphPlaybackTopics{.odometry = topics_.keyframe_odometry,
@@ -426,6 +442,8 @@ void Robot::add_network(CrossingEnds meshes) {
   dds.exchange(t.places_packets, kRequest, kOther, {}, {},
                overlay_->guard_packets<OverlayLane::kPlaces>());
   dds.exchange(t.chunks, kState, kOther, meshes);
+  const bool has_objects = objects_ != nullptr;
+  dds.exchange(t.objects, kState, kOther, {.send = has_objects, .receive = has_objects});
   dds.exchange(t.status, kStatus, kOther);
   // Closures and inlier sets are sent only to the robots that they connect.
   t.own_closures.subscribe(
@@ -509,6 +527,7 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
   options.robot = identity_.name;
   options.id = identity_.robot;
   options.awaits_trajectory = localization_ != nullptr || fixes_ != nullptr;
+  if (objects_ != nullptr) options.objects = objects_->palette();
   auto& output = add<RosOutputNode>(
       false, node, std::move(sink), std::move(options),
       [this, loads = ModuleLoads(nodes_)]() mutable {
@@ -535,6 +554,7 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
   topics_.optimized_meshes.subscribe([&output](const auto& optimized) {
     output.offer({optimized, &optimized->mesh});
   });
+  topics_.joint_objects.subscribe([&output](const auto& objects) { output.offer(objects); });
   if (node == kRecordNode) record_ = &output;
 }
 

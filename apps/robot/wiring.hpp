@@ -32,6 +32,7 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh_deformation/node/mesh_deformation_node.hpp"
+#include "modules/objects/node/objects_node.hpp"
 #include "modules/outlier_rejection/node/pcm_node.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/place_database.hpp"
@@ -80,6 +81,7 @@ struct Topics {
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized_meshes;
   Topic<SupersededSurface> superseded_surface;
+  Topic<ObjectList> joint_objects;
   Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;
   Topic<PlaceQuery> place_queries;
@@ -117,6 +119,7 @@ struct Topics {
   AddressedCrossing<PlacesLanePacket> places_packets;
   Topic<MeshChunk> sent_chunks;  // to the other robots and to the map of the team
   Crossing<MeshChunk> chunks;
+  Crossing<RobotObjects> objects;
   Crossing<RobotStatus> status;
 };
 
@@ -154,6 +157,8 @@ class Robot {
   [[nodiscard]] bool has_shared_map() const {
     return chunks_ == nullptr || (mesh_deformation_->is_current() && chunks_->is_done());
   }
+  /// Null without labels.
+  [[nodiscard]] ObjectsNode* objects() { return objects_; }
   /// True if another running robot had this robot's id first.
   [[nodiscard]] bool id_taken() const { return id_taken_; }
   /// Null without --localize.
@@ -204,6 +209,8 @@ class Robot {
   void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
                            ResultWriter& results);
   [[nodiscard]] CrossingEnds share_meshes(const RobotConfig& robot, const LabelPalette& palette);
+  void add_objects(const ObjectsConfig& config, const LabelPalette& palette,
+                   const std::filesystem::path& folder, ResultWriter& results);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config);
@@ -254,6 +261,7 @@ class Robot {
   MeshFilesNode* mesh_files_ = nullptr;
   MeshChunksNode* chunks_ = nullptr;
   TeamMapNode* team_map_ = nullptr;
+  ObjectsNode* objects_ = nullptr;
   PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   RosOutputNode* record_ = nullptr;

@@ -23,7 +23,7 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   if (largest_difference(anchors_, motion.T_after_before, T_result_optimized_, scale_) <= 1.0)
     return std::nullopt;
   T_result_optimized_ = motion.T_after_before;
-  MeshCorrection result{optimized_, report_, false, {}, 0};
+  MeshCorrection result{optimized_, seen_by_, report_, false, {}, 0};
   result.mesh.transform(T_result_optimized_);
   return result;
 }
@@ -53,9 +53,15 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   map_version_ = input.map_version;
   anchors_ = std::move(anchors);
   optimized_ = without_superseded(deformed.mesh, replacements);
+  seen_by_ = input.map.seen_by;
+  keep_elements(seen_by_, remaining_vertices(deformed.mesh, replacements));
   report_ = deformed.report;
   T_result_optimized_ = SE3::Identity();
-  return {optimized_, report_, true, named(replacements, input.map.ids),
+  return {optimized_,
+          seen_by_,
+          report_,
+          true,
+          named(replacements, input.map.ids),
           deformed.mesh.faces.size() - optimized_.faces.size()};
 }
 

@@ -1,17 +1,20 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
+#include "modules/core/pose_graph.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/keyframe_motion.hpp"
 #include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
+#include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
 
@@ -25,6 +28,7 @@ struct CorrectionInput {
 
 struct [[nodiscard]] MeshCorrection {
   LabelledMesh mesh;  ///< In the frame of the optimised poses, without superseded surface.
+  std::vector<SeenBy> seen_by;   ///< First and last keyframe that saw each vertex of `mesh`.
   MeshDeformationReport report;  ///< Report of the last optimisation.
   /// False: the result of the last optimisation, moved as a whole.
   bool deformed = true;
@@ -67,6 +71,7 @@ class MeshCorrector {
   std::optional<std::uint64_t> map_version_;
   std::vector<SE3> anchors_;  // complete() of the trajectory
   LabelledMesh optimized_;
+  std::vector<SeenBy> seen_by_;  // keyframes of the vertices of optimized_
   MeshDeformationReport report_;
   SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };
@@ -76,6 +81,8 @@ struct OptimizedMesh {
   RobotId robot = 0;
   RobotId anchor = 0;            ///< Robot whose odometry frame is `world`.
   LabelledMesh mesh;             ///< In `world`.
+  std::vector<SeenBy> seen_by;   ///< First and last keyframe that saw each vertex of `mesh`.
+  std::shared_ptr<const Trajectory> trajectory;  ///< Poses to which the mesh was corrected.
   MeshDeformationReport report;  ///< Report of the last optimisation.
   /// False: no optimisation was due, and the former mesh was moved as a whole.
   bool deformed = true;

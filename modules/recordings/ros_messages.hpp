@@ -174,17 +174,20 @@ struct RosDiagnostics {
 /// visualization_msgs/Marker, as of ROS 2 Humble, without textures and mesh files.
 struct RosMarker {
   static constexpr std::string_view kType = "visualization_msgs/Marker";
-  /// Types of markers: line segments of 2 points each, and triangles of 3 points each.
-  static constexpr std::int32_t kLineList = 5, kTriangleList = 11;
+  /// Types of markers: boxes, line segments of 2 points each, text that faces the viewer, and
+  /// triangles of 3 points each.
+  static constexpr std::int32_t kCube = 1, kLineList = 5, kText = 9, kTriangleList = 11;
   static constexpr std::int32_t kDelete = 2;  ///< Deletes the marker with this name space and id.
+  static constexpr std::int32_t kDeleteAll = 3;  ///< Deletes all markers of the topic.
   RosHeader header;
   std::string name_space;  ///< Name space of `id`. A marker replaces that with equal name space and
                            ///< id.
   std::int32_t id = 0;
   std::int32_t type = 0;
-  std::int32_t action = 0;                          ///< 0: add or replace, or kDelete.
+  std::int32_t action = 0;                          ///< 0: add or replace, kDelete or kDeleteAll.
   RosPose pose;                                     ///< Pose of the points in the header's frame.
-  Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< x: width of lines [m].
+  Eigen::Vector3d scale =
+      Eigen::Vector3d::Ones();  ///< Sides of a cube, width x of lines, height z of text [m].
   Eigen::Vector4f color = {1, 1, 1, 1};             ///< Red, green, blue, alpha: 0 to 1.
   std::array<std::uint32_t, 2> lifetime{};          ///< [s], [ns]; 0: no limit.
   bool frame_locked = false;

@@ -20,7 +20,7 @@ struct KnownType {
   const dds_topic_descriptor_t* descriptor;
 };
 
-constexpr std::array<KnownType, 14> kTypes = {{
+constexpr std::array<KnownType, 15> kTypes = {{
     {"sensor_msgs", "Image", &sensor_msgs_msg_dds__Image__desc},
     {"sensor_msgs", "CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
     {"sensor_msgs", "Imu", &sensor_msgs_msg_dds__Imu__desc},
@@ -36,6 +36,7 @@ constexpr std::array<KnownType, 14> kTypes = {{
     {"diagnostic_msgs", "DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc},
     {"tf2_msgs", "TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},
     {"visualization_msgs", "Marker", &visualization_msgs_msg_dds__Marker__desc},
+    {"visualization_msgs", "MarkerArray", &visualization_msgs_msg_dds__MarkerArray__desc},
 }};
 
 // DDS has one configuration per domain number and process. So ROS' domain gets another number

@@ -37,6 +37,11 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
   CHECK(mesh["truth_to_estimate"]["point"]["median_m"].as<double>() < 0.1);
   CHECK(mesh["truth_to_estimate"]["labels"]["accuracy"].as<double>() > 0.7);
   CHECK(team["optimized"]["joint"]["position_m"]["rmse"].as<double>() < kMaxError_m);
+  // Objects arrive from the other robots, and copies of an object are one.
+  std::size_t shared = 0;
+  for (const YAML::Node& object : YAML::Load(folder.read("robot0/objects.json"))["objects"])
+    shared += object["robots"].size() > 1 ? 1 : 0;
+  CHECK(shared > 0);
   for (const char* file : {"report.html", "team_mesh.ply", "team_mesh.png", "robot0/mesh.ply",
                            "robot0/mesh_optimized.ply", "robot0/label_palette.csv",
                            "robot0/optimized.tum", "robot0/loop_closures.csv", "robot0/traffic.csv",

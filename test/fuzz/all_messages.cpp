@@ -8,6 +8,7 @@
 
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
+#include "modules/objects/node/objects_codec.hpp"
 #include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/node/place_recognition_codec.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
@@ -173,6 +174,10 @@ std::vector<MessageReader> all_messages() {
                          .closures = {{{2, 1}, {5, 2}}, {{2, 1}, {5, 3}}}}}),
       topic<KeyframeBow>({{.id = {kWriter.robot, 4}, .words = {{3, 1}, {900, 4}, {70000, 1}}}}),
       topic<MeshChunk>({some_chunk()}),
+      topic<RobotObjects>({{.robot = kWriter.robot,
+                            .anchor = kReader,
+                            .objects = {{.label = 7, .keyframe = 3, .size_m = {2, 1, 1}},
+                                        {.label = 8, .keyframe = 4, .size_m = {1, 1, 2}}}}}),
       topic<RobotStatus>(
           {{.robot = kWriter.robot,
             .name = "beta",

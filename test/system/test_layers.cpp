@@ -37,14 +37,15 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"vio", {"images"}},
     {"pose_graph", {"outlier_rejection"}},
     {"rbcd", {"pose_graph"}},
-    {"ros_dds", {"images", "mesh", "recordings"}},
+    {"ros_dds", {"images", "mesh", "objects", "recordings"}},
     {"sensors", {"recordings"}},
     {"pgo_study", {"outlier_rejection", "pose_graph", "rbcd", "recorded_graph"}},
-    {"evaluation", {"charts", "images", "mesh"}},
+    {"evaluation", {"charts", "images", "mesh", "objects"}},
     {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},
     {"team_map", {"mesh", "semantic_mapping"}},
     {"mesh_deformation", {"mesh"}},
+    {"objects", {"mesh", "mesh_deformation"}},
     {"view", {"images", "mesh"}},
 };
 

@@ -102,7 +102,9 @@ std::string dataset_readme(const SimulationOptions& options, const DatasetRecord
   describe_robots(text, options, robots);
   text << "## World\n\n`world.ply` is its true mesh: " << world.mesh.triangles.size()
        << " triangles with their class as `label`, in the frame of the true poses (metres, z "
-          "up).\n\n| id | class | red, green, blue |\n|---|---|---|\n";
+          "up). `objects.json` has the true objects of the classes vehicle, pole, tent, person,\n"
+          "furniture and object: their upright boxes in this frame.\n\n| id | class | red, green, "
+          "blue |\n|---|---|---|\n";
   for (const LabelClass& label : simulation_palette().classes())
     text << "| " << static_cast<int>(label.id) << " | " << label.name << " | "
          << static_cast<int>(label.color[0]) << ", " << static_cast<int>(label.color[1]) << ", "

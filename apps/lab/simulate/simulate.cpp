@@ -129,8 +129,9 @@ std::size_t missing_images(const RecordingLayout& layout, ImageChannel channel) 
 // names them.
 std::size_t missing_files(const SimulationOptions& options) {
   const fs::path& folder = options.output;
-  std::size_t missing = missing_of({folder / "README.md", folder / "team.yaml",
-                                    folder / "label_palette.csv", folder / "world.ply"});
+  std::size_t missing =
+      missing_of({folder / "README.md", folder / "team.yaml", folder / "label_palette.csv",
+                  folder / "world.ply", folder / "objects.json"});
   for (const std::string& name : options.names) {
     const RecordingLayout layout(folder / name, options.format);
     missing += missing_of({layout.mav0() / "label_palette.csv", layout.imu() / "data.csv",
@@ -338,6 +339,8 @@ class Simulation {
     const std::string palette = to_csv(simulation_palette());
     write_whole_file(folder_.path() / "label_palette.csv", palette);
     write_whole_file(folder_.path() / "world.ply", world_ply(*world_, simulation_palette()));
+    write_whole_file(folder_.path() / "objects.json",
+                     true_objects_json(*world_, simulation_palette()));
     for (std::size_t r = 0; r < robots_.size(); ++r) {
       const RecordingLayout& layout = cameras_[r]->layout();
       write_calibration(r);

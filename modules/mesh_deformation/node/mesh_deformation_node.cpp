@@ -148,6 +148,8 @@ void MeshDeformationNode::correct() {
   OptimizedMesh result{self_,
                        trajectory_->anchor,
                        std::move(correction->mesh),
+                       std::move(correction->seen_by),
+                       trajectory_,
                        correction->report,
                        correction->deformed,
                        end_s - start_s,

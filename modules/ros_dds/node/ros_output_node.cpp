@@ -8,6 +8,7 @@
 #include "modules/recordings/ros_definitions.hpp"
 #include "modules/ros_dds/jpeg_image.hpp"
 #include "modules/ros_dds/mesh_cloud.hpp"
+#include "modules/ros_dds/object_markers.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/thread.hpp"
 
@@ -97,6 +98,7 @@ void RosOutputNode::open_topics(bool has_images) {
   if (options_.draws) {
     closures_ = latest("closures", RosMarkers::kType);
   }
+  if (options_.objects) objects_ = latest("objects", RosMarkers::kType);
   if (options_.logs) log_ = sink_->open({"/rosout", RosLog::kType});
   if (has_images)
     image_ = sink_->open({prefix + "left/image_raw/compressed", RosCompressedImage::kType});
@@ -221,6 +223,12 @@ void RosOutputNode::step(const CoarseMesh& coarse) {
   publish_pieces();
 }
 
+void RosOutputNode::step(const Topic<ObjectList>::Message& objects) {
+  newest_objects_ = objects;
+  objects_.changed = options_.objects.has_value();
+  publish_latest(false);
+}
+
 void RosOutputNode::step(const std::shared_ptr<const RosLog>& line) {
   RosLog stamped = *line;
   stamped.stamp = time().value_or(0);
@@ -240,6 +248,10 @@ void RosOutputNode::publish_latest(bool all) {
   };
   publish_if_due(path_, [this] { return publish_path(keyframe_poses()); });
   publish_if_due(mesh_, [this] { return publish_mesh(); });
+  publish_if_due(objects_, [this] {
+    return publish(objects_.topic, object_markers(newest_objects_->objects, *options_.objects,
+                                                  {stamp_.value_or(0), map_}));
+  });
   if (!options_.draws) return;
   publish_if_due(closures_, [this] {
     return publish(closures_.topic,

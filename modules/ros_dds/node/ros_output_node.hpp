@@ -16,6 +16,7 @@
 
 #include "modules/core/stamped_pose.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
+#include "modules/objects/map_object.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/closure_lines.hpp"
 #include "modules/ros_dds/live_frames.hpp"
@@ -52,9 +53,11 @@ struct RosOutputOptions {
                                                                       ///< pieces of faces.
   /// Publish nothing in `map` before the first trajectory: the robot does not know where it is.
   bool awaits_trajectory = false;
+  /// Classes of the objects that are published; nullopt: no objects are published.
+  std::optional<LabelPalette> objects = std::nullopt;
   bool draws = false;  ///< Publish faces of the mesh and closures as markers.
   bool logs = false;   ///< Publish the log of this process.
-  /// Maximum rate of each of the topics `path`, `mesh` and `closures`.
+  /// Maximum rate of each of the topics `path`, `mesh`, `closures` and `objects`.
   double state_bytes_per_s = std::numeric_limits<double>::infinity();
   /// Maximum number of waiting inputs; beyond it the oldest are dropped, so that no node waits for
   /// viewers.
@@ -76,6 +79,7 @@ struct RosOutputOptions {
 ///   /NAME/mesh_faces   visualization_msgs/Marker in `map`: the mesh's faces, in pieces (see
 ///                      SurfacePieces) or at once
 ///   /NAME/closures     visualization_msgs/MarkerArray in `map`, see closure_lines()
+///   /NAME/objects      visualization_msgs/MarkerArray in `map`, see object_markers()
 ///   /rosout            rcl_interfaces/Log
 ///   /NAME/left/image_raw/compressed  sensor_msgs/CompressedImage
 /// `map` is the frame of the team, or of the robot before it joins others. In files that are merged
@@ -100,6 +104,8 @@ class RosOutputNode final : public Node {
   std::string_view name() const override { return node_name_; }
   /// Replaces the mesh by `mesh`, whose frame is `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const LabelledMesh> mesh) { worker_.post(std::move(mesh)); }
+  /// Replaces the objects by `objects`, whose frame is `map`. Thread-safe; does not wait.
+  void offer(std::shared_ptr<const ObjectList> objects) { worker_.post(std::move(objects)); }
 
   void start() override;
   void stop() noexcept override;
@@ -128,12 +134,12 @@ class RosOutputNode final : public Node {
   using Input =
       std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
                    Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
-                   std::shared_ptr<const LabelledMesh>, CoarseMesh, std::shared_ptr<const RosLog>,
-                   std::shared_ptr<const RosCompressedImage>>;
+                   std::shared_ptr<const LabelledMesh>, CoarseMesh, Topic<ObjectList>::Message,
+                   std::shared_ptr<const RosLog>, std::shared_ptr<const RosCompressedImage>>;
   using Image = std::shared_ptr<const StereoFrame>;
   using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
-  // Topic whose message replaces the former one: path, mesh or closures. A changed message is
-  // published at `due_s`, which limits the rate (RosOutputOptions::state_bytes_per_s).
+  // Topic whose message replaces the former one: path, mesh, closures or objects. A changed message
+  // is published at `due_s`, which limits the rate (RosOutputOptions::state_bytes_per_s).
   struct LatestTopic {
     std::size_t topic = 0;
     bool changed = false;
@@ -148,6 +154,7 @@ class RosOutputNode final : public Node {
   void step(const Topic<Trajectory>::Message& trajectory);
   void step(const std::shared_ptr<const LabelledMesh>& mesh);
   void step(const CoarseMesh& coarse);
+  void step(const Topic<ObjectList>::Message& objects);
   void step(const std::shared_ptr<const RosLog>& line);
   void step(const std::shared_ptr<const RosCompressedImage>& image);
   void encode(const Image& image);
@@ -172,7 +179,7 @@ class RosOutputNode final : public Node {
   const Diagnose diagnose_;
   const Closures closures_of_;
   std::size_t odometry_ = 0, pose_ = 0, tf_ = 0, diagnostics_ = 0, faces_ = 0, log_ = 0, image_ = 0;
-  LatestTopic path_, mesh_, closures_;
+  LatestTopic path_, mesh_, closures_, objects_;
   LiveFrames frames_;
   std::size_t poses_ = 0;
   std::optional<Stamp> stamp_;    // stamp of the last image or keyframe
@@ -182,6 +189,7 @@ class RosOutputNode final : public Node {
   double stamp_arrived_s_ = 0.0;  // time of arrival of `stamp_`, by the steady clock
   Topic<Trajectory>::Message trajectory_ = std::make_shared<const Trajectory>();
   std::shared_ptr<const LabelledMesh> newest_mesh_;
+  Topic<ObjectList>::Message newest_objects_;
   SurfacePieces pieces_;
   TokenBucket piece_bytes_;
   std::vector<PublishedClosure> newest_closures_;

@@ -129,16 +129,20 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
     return std::vector<RosDiagnosticStatus>{{1, "sensors", "faulty", "", {{"gaps", "3"}}}};
   };
   RosOutputNode node("ros_output", std::make_unique<LiveSink>(network()),
-                     {.robot = "robot 3", .mesh_points = 2, .mesh_faces = 10}, diagnose, {},
-                     {odometry, keyframes, trajectories, {}});
-  RosSubscription viewer(network(),
-                         {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
-                          {"/robot_3/pose", "geometry_msgs/PoseWithCovarianceStamped"},
-                          {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
-                          {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched},
-                          {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
-                          {"/diagnostics", "diagnostic_msgs/DiagnosticArray"},
-                          {"/robot_3/mesh_faces", "visualization_msgs/Marker", RosQos::kLatched}});
+                     {.robot = "robot 3",
+                      .mesh_points = 2,
+                      .mesh_faces = 10,
+                      .objects = LabelPalette({{7, "chair", {255, 0, 0}}})},
+                     diagnose, {}, {odometry, keyframes, trajectories, {}});
+  RosSubscription viewer(
+      network(), {{"/robot_3/odometry", "nav_msgs/Odometry", RosQos::kReliable},
+                  {"/robot_3/pose", "geometry_msgs/PoseWithCovarianceStamped"},
+                  {"/tf", "tf2_msgs/TFMessage", RosQos::kReliable},
+                  {"/robot_3/path", "nav_msgs/Path", RosQos::kLatched},
+                  {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
+                  {"/diagnostics", "diagnostic_msgs/DiagnosticArray"},
+                  {"/robot_3/mesh_faces", "visualization_msgs/Marker", RosQos::kLatched},
+                  {"/robot_3/objects", "visualization_msgs/MarkerArray", RosQos::kLatched}});
   OdometryState state;
   state.stamp = 5;
   state.T_odom_body.translation() = Eigen::Vector3d(1, 2, 3);
@@ -155,6 +159,8 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
   mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   mesh.faces = {{0, 1, 2}};
   node.offer(std::make_shared<const LabelledMesh>(mesh));
+  const MapObject chair{.label = 7, .box = {{1, 2, 3}, 0.5, {2, 1, 4}}};
+  node.offer(std::make_shared<const ObjectList>(ObjectList{0, {chair}}));
   std::optional<RosPath> path;
   std::optional<RosPoseWithCovarianceStamped> pose;
   std::optional<RosOdometry> received;
@@ -162,9 +168,10 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
   std::optional<RosPointCloud> cloud;
   std::optional<RosDiagnostics> diagnostics;
   std::optional<RosMarker> faces;
+  std::optional<RosMarkers> objects;
   // Publishes until the viewer has received all messages, because it may have subscribed late.
   std::size_t messages = 0;
-  while (!(path && pose && received && transforms && cloud && diagnostics && faces)) {
+  while (!(path && pose && received && transforms && cloud && diagnostics && faces && objects)) {
     const auto message = [&] {
       state.stamp += 10;
       odometry.publish(state);
@@ -180,6 +187,7 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
     if (message->topic == 4) cloud = decode_ros<RosPointCloud>("cdr", bytes).value;
     if (message->topic == 5) diagnostics = decode_ros<RosDiagnostics>("cdr", bytes).value;
     if (message->topic == 6) faces = decode_ros<RosMarker>("cdr", bytes).value;
+    if (message->topic == 7) objects = decode_ros<RosMarkers>("cdr", bytes).value;
     if (diagnostics && diagnostics->header.stamp == 0) diagnostics.reset();  // before a pose
     if (pose && pose->pose.position.x() != 10.0) pose.reset();  // before the correction
     if (transforms && transforms->transforms[0].pose.position.x() != 9.0) transforms.reset();
@@ -198,6 +206,18 @@ TEST_CASE("Viewers receive the pose of the robot", "[ros_dds]") {
   CHECK(cloud->width == 2);  // at most two of three vertices
   CHECK(faces->header.frame == "map");
   CHECK(faces->points.size() == 3);
+  REQUIRE(objects->markers.size() == 3);
+  CHECK(objects->markers[0].action == RosMarker::kDeleteAll);
+  const RosMarker &box = objects->markers[1], &name = objects->markers[2];
+  CHECK(box.type == RosMarker::kCube);
+  CHECK(box.header.frame == "map");
+  CHECK(box.pose.position == chair.box.center);
+  CHECK(box.pose.orientation.angularDistance(Eigen::Quaterniond(chair.box.pose().linear())) < 1e-9);
+  CHECK(box.scale == chair.box.size_m);
+  CHECK(box.color.head<3>() == Eigen::Vector3f(1, 0, 0));
+  CHECK(name.type == RosMarker::kText);
+  CHECK(name.text == "chair");
+  CHECK(name.pose.position.z() > 3.0 + 0.5 * 4.0);
   REQUIRE(diagnostics->status.size() == 2);
   CHECK(diagnostics->status[0].name == "robot_3: odometry");
   CHECK(diagnostics->status[0].level == RosDiagnosticStatus::kOk);

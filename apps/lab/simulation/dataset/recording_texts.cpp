@@ -2,11 +2,14 @@
 
 #include <array>
 #include <bit>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <span>
 #include <sstream>
 #include <vector>
 
 #include "apps/lab/simulation/dataset/number_text.hpp"
+#include "modules/core/json.hpp"
 
 namespace km {
 namespace {
@@ -98,6 +101,41 @@ std::string ply_header(const SurfaceMesh& mesh) {
          std::to_string(mesh.triangles.size()) +
          "\nproperty list uchar int vertex_indices\nproperty uchar label\nproperty uchar red\n"
          "property uchar green\nproperty uchar blue\nend_header\n";
+}
+
+// Classes of things. Surfaces of the others are parts of the surroundings.
+bool is_thing(SurfaceClass label) {
+  using enum SurfaceClass;
+  return label == kVehicle || label == kPole || label == kTent || label == kPerson ||
+         label == kFurniture || label == kObject;
+}
+
+Eigen::Isometry3d turned(double yaw_rad) {
+  return Eigen::Isometry3d(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()));
+}
+
+// Bounds of an object along its own axes, for each of its classes.
+std::map<SurfaceClass, Eigen::AlignedBox3d> boxes_of(const World& world,
+                                                     const WorldObject& object) {
+  const Eigen::Isometry3d T_object_world = turned(-object.yaw_rad);
+  std::map<SurfaceClass, Eigen::AlignedBox3d> boxes;
+  for (std::size_t t = object.first_triangle; t < object.end_triangle; ++t) {
+    Eigen::AlignedBox3d& box = boxes[world.materials.at(world.mesh.materials[t]).label];
+    for (const std::uint32_t v : world.mesh.triangles[t])
+      box.extend(T_object_world * world.mesh.vertices[v].cast<double>());
+  }
+  return boxes;
+}
+
+Json json_of(SurfaceClass label, const Eigen::AlignedBox3d& box, double yaw_rad,
+             const LabelPalette& palette) {
+  const Eigen::Vector3d center = turned(yaw_rad) * box.center(), size = box.sizes();
+  return {{"layer", "object"},
+          {"class", palette.find(static_cast<LabelId>(label))->name},
+          {"label", static_cast<LabelId>(label)},
+          {"center_m", {center.x(), center.y(), center.z()}},
+          {"yaw_rad", yaw_rad},
+          {"size_m", {size.x(), size.y(), size.z()}}};
 }
 
 }  // namespace
@@ -197,6 +235,14 @@ std::vector<std::uint8_t> world_ply(const World& world, const LabelPalette& pale
     add(color.data(), 3);
   }
   return bytes;
+}
+
+std::string true_objects_json(const World& world, const LabelPalette& palette) {
+  Json objects = Json::array();
+  for (const WorldObject& object : world.objects)
+    for (const auto& [label, box] : boxes_of(world, object))
+      if (is_thing(label)) objects.push_back(json_of(label, box, object.yaw_rad, palette));
+  return json_text({{"objects", std::move(objects)}});
 }
 
 }  // namespace km

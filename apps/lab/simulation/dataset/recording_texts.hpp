@@ -49,6 +49,10 @@ struct DepthCameraFigures {
 /// The inertial sensor, which is the body frame.
 [[nodiscard]] std::string imu_yaml(const ImuNoise& noise, const std::string& comment);
 
+/// The world's true objects, as read_objects() of modules/objects reads them: class and upright box
+/// of each object. An object of two classes has an entry for each.
+[[nodiscard]] std::string true_objects_json(const World& world, const LabelPalette& palette);
+
 /// The world's true mesh as binary little-endian PLY: vertices x, y, z [m], faces with their class
 /// as `label` and its colour as red, green, blue.
 [[nodiscard]] std::vector<std::uint8_t> world_ply(const World& world, const LabelPalette& palette);

@@ -63,6 +63,7 @@ void add_corrugated_wall(Scene& scene, float half_x, float y, float side, float 
 }  // namespace
 
 void add_watch_tower(Scene& scene) {
+  const Scene::Object object(scene);
   const auto beam = wood(scene);
   const auto roof = scene.paint(kLabel, kCorrugatedMetal, {0.5F, 0.5F, 0.48F});
   for (const float x : {-1.2F, 1.2F}) {
@@ -90,6 +91,7 @@ void add_watch_tower(Scene& scene) {
 }
 
 void add_floodlight(Scene& scene) {
+  const Scene::Object object(scene);
   const auto steel = scene.paint(kPole, kPaintedMetal, {0.35F, 0.36F, 0.36F});
   const auto lens = scene.plain(kPole, {0.8F, 0.8F, 0.75F}, 0.2F);
   scene.box({-0.3F, -0.3F, -0.3F}, {0.3F, 0.3F, 0.25F}, scene.paint(kPole, kConcrete));
@@ -102,6 +104,7 @@ void add_floodlight(Scene& scene) {
 }
 
 void add_flag_pole(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto white = scene.plain(kPole, {0.7F, 0.7F, 0.7F});
   const std::array<MaterialId, 3> stripes = {scene.paint(kPole, kCanvas, {0.5F, 0.06F, 0.05F}),
                                              scene.paint(kPole, kCanvas, {0.75F, 0.75F, 0.72F}),
@@ -124,6 +127,7 @@ void add_flag_pole(Scene& scene, SeededRandom& random) {
 }
 
 void add_notice_board(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto post = wood(scene, kPole);
   for (const float x : {-0.9F, 0.8F}) scene.box({x, 0.0F, -0.3F}, {x + 0.1F, 0.1F, 2.1F}, post);
   add_sign_board(scene, -1.1F, 1.5F, 2.2F, 0.5F, kPole, random);
@@ -131,6 +135,7 @@ void add_notice_board(Scene& scene, SeededRandom& random) {
 }
 
 void add_container(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const Vector3f tints[] = {{0.2F, 0.22F, 0.12F},  {0.42F, 0.1F, 0.06F}, {0.06F, 0.15F, 0.3F},
                             {0.55F, 0.53F, 0.48F}, {0.5F, 0.42F, 0.26F}, {0.1F, 0.24F, 0.16F}};
   const Vector3f tint = random.pick(tints);
@@ -166,6 +171,7 @@ void add_container(Scene& scene, SeededRandom& random) {
 }
 
 void add_crates(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto boards =
       random.chance(0.5) ? wood(scene) : scene.paint(kLabel, kWoodPlanks, {0.38F, 0.42F, 0.26F});
   const auto batten = wood(scene);
@@ -189,6 +195,7 @@ void add_crates(Scene& scene, SeededRandom& random) {
 }
 
 void add_barrels(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const Vector3f tints[] = {
       {0.06F, 0.16F, 0.36F}, {0.22F, 0.24F, 0.13F}, {0.45F, 0.1F, 0.05F}, {0.3F, 0.3F, 0.3F}};
   const int count = 2 + random.below(5);
@@ -207,6 +214,7 @@ void add_barrels(Scene& scene, SeededRandom& random) {
 }
 
 void add_sandbags(Scene& scene, float length_m, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto cloth = scene.paint(kLabel, kCanvas, {0.5F, 0.42F, 0.28F}, 0.3F);
   const int bags = std::max(1, static_cast<int>(length_m / 0.5F));
   for (int layer = 0; layer < 5; ++layer) {
@@ -221,6 +229,7 @@ void add_sandbags(Scene& scene, float length_m, SeededRandom& random) {
 }
 
 void add_rock(Scene& scene, float size_m, SeededRandom& random) {
+  const Scene::Object object(scene);
   const float shade = random.uniform(0.6F, 1.0F);
   const auto stone = scene.paint(
       SurfaceClass::kTerrain, kConcrete,
@@ -244,6 +253,7 @@ void add_rock(Scene& scene, float size_m, SeededRandom& random) {
 }
 
 void add_barrier(Scene& scene) {
+  const Scene::Object object(scene);
   const auto concrete = scene.paint(kLabel, kConcrete, Vector3f::Ones(), 0.6F);
   const Vector2f outline[] = {{-0.3F, -0.2F}, {0.3F, -0.2F},   {0.3F, 0.1F},   {0.1F, 0.35F},
                               {0.08F, 0.82F}, {-0.08F, 0.82F}, {-0.1F, 0.35F}, {-0.3F, 0.1F}};
@@ -255,6 +265,7 @@ void add_barrier(Scene& scene) {
 }
 
 void add_generator(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto skin = random.chance(0.5) ? scene.paint(kLabel, kPaintedMetal, {0.6F, 0.42F, 0.05F})
                                        : scene.paint(kLabel, kPaintedMetal, {0.2F, 0.22F, 0.12F});
   const auto dark = scene.plain(kLabel, {0.03F, 0.03F, 0.03F});
@@ -269,6 +280,7 @@ void add_generator(Scene& scene, SeededRandom& random) {
 }
 
 void add_toilet_cabin(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto skin = random.chance(0.6) ? scene.plain(kLabel, {0.06F, 0.2F, 0.36F})
                                        : scene.plain(kLabel, {0.1F, 0.28F, 0.14F});
   const auto light = scene.plain(kLabel, {0.72F, 0.72F, 0.7F});
@@ -282,6 +294,7 @@ void add_toilet_cabin(Scene& scene, SeededRandom& random) {
 }
 
 void add_water_tank(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto skin =
       scene.paint(kLabel, kPaintedMetal,
                   random.chance(0.5) ? Vector3f(0.22F, 0.24F, 0.14F) : Vector3f(0.5F, 0.5F, 0.48F));
@@ -296,6 +309,7 @@ void add_water_tank(Scene& scene, SeededRandom& random) {
 }
 
 void add_log_pile(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto bark = scene.paint(kLabel, kBark);
   constexpr float kRadius = 0.16F;
   for (int layer = 0; layer < 4; ++layer) {

@@ -53,6 +53,7 @@ void add_path(Scene& scene, float length, MaterialId gravel) {
 
 /// A basin with a pillar and a figure.
 void add_monument(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto stone = scene.paint(SurfaceClass::kObject, kConcrete, {0.95F, 0.92F, 0.85F});
   const auto water = scene.plain(SurfaceClass::kObject, {0.03F, 0.06F, 0.06F}, 0.5F);
   const Vector2f rim[] = {{2.6F, -0.1F}, {2.5F, 0.5F}, {2.6F, 0.55F}, {2.6F, 0.65F}, {2.3F, 0.65F}};

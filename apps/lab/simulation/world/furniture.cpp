@@ -105,6 +105,7 @@ void add_small_thing(Scene& scene, float max_height, SeededRandom& random) {
 
 void add_leaning_mattress(Scene& scene, const Vector3f& size_m, float lean_m,
                           SeededRandom& random) {
+  const Scene::Object object(scene);
   const float angle = std::asin(lean_m / size_m.z());
   // It stands on its lower back edge; the upper one touches the wall.
   const Isometry3f frame = Eigen::Translation3f(0.0F, -lean_m, 0.0F) * leaning(angle) *
@@ -113,6 +114,7 @@ void add_leaning_mattress(Scene& scene, const Vector3f& size_m, float lean_m,
 }
 
 void add_mattress_stack(Scene& scene, int count, SeededRandom& random) {
+  const Scene::Object object(scene);
   constexpr float kThickness_m = 0.165F;
   Eigen::Matrix3f lying;  // width along y, thickness up, length along x
   lying << 0, 0, 1, 1, 0, 0, 0, 1, 0;
@@ -131,6 +133,7 @@ void add_mattress_stack(Scene& scene, int count, SeededRandom& random) {
 
 void add_board(Scene& scene, float width_m, float height_m, float lean_rad, MaterialId front,
                MaterialId body) {
+  const Scene::Object object(scene);
   constexpr float kThickness_m = 0.012F;
   const auto scope = scene.at(leaning(lean_rad));
   scene.box({0, 0, 0}, {width_m, kThickness_m, height_m}, body, kSidesAll & ~kSideFront);
@@ -138,6 +141,7 @@ void add_board(Scene& scene, float width_m, float height_m, float lean_rad, Mate
 }
 
 void add_table(Scene& scene, float width_m, float depth_m, int clutter, SeededRandom& random) {
+  const Scene::Object object(scene);
   constexpr float kHeight_m = 0.74F;
   const auto wood = scene.paint(SurfaceClass::kFurniture, kWoodPlanks, {1.6F, 1.6F, 1.6F}, 0.8F);
   const auto metal = scene.plain(SurfaceClass::kFurniture, {0.2F, 0.2F, 0.22F}, 0.05F);
@@ -157,6 +161,7 @@ void add_table(Scene& scene, float width_m, float depth_m, int clutter, SeededRa
 }
 
 void add_chair(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const float shade = random.uniform(0.08F, 0.35F);
   const auto seat = scene.paint(SurfaceClass::kFurniture, kCarpet, {shade, shade, 1.2F * shade});
   const auto metal = scene.plain(SurfaceClass::kFurniture, {0.25F, 0.25F, 0.25F}, 0.1F);
@@ -169,6 +174,7 @@ void add_chair(Scene& scene, SeededRandom& random) {
 }
 
 void add_shelf(Scene& scene, float width_m, float height_m, SeededRandom& random) {
+  const Scene::Object object(scene);
   constexpr float kDepth_m = 0.35F;
   constexpr float kBoard_m = 0.025F;
   constexpr float kPitch_m = 0.38F;
@@ -192,6 +198,7 @@ void add_shelf(Scene& scene, float width_m, float height_m, SeededRandom& random
 }
 
 void add_desk(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   add_table(scene, 1.4F, 0.54F, 3, random);
   const auto black = scene.plain(SurfaceClass::kObject, {0.065F, 0.065F, 0.067F}, 0.06F);
   const auto picture = scene.paint(SurfaceClass::kObject, kNewsprint, {1.2F, 1.2F, 1.2F}, 0.6F);
@@ -204,6 +211,7 @@ void add_desk(Scene& scene, SeededRandom& random) {
 }
 
 void add_radiator(Scene& scene, float width_m) {
+  const Scene::Object object(scene);
   const auto paint = scene.plain(SurfaceClass::kFurniture, {0.75F, 0.74F, 0.7F}, 0.04F);
   constexpr float kPitch_m = 0.065F;
   const int ribs = static_cast<int>(width_m / kPitch_m);
@@ -219,6 +227,7 @@ void add_radiator(Scene& scene, float width_m) {
 }
 
 void add_ladder(Scene& scene, float height_m) {
+  const Scene::Object object(scene);
   const auto metal =
       scene.paint(SurfaceClass::kObject, kPaintedMetal, {0.9F, 0.9F, 0.92F}, 0.5F, 0.08F);
   constexpr float kFoot_m = 0.5F;
@@ -235,6 +244,7 @@ void add_ladder(Scene& scene, float height_m) {
 }
 
 void add_stand(Scene& scene, float height_m, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto black = scene.plain(SurfaceClass::kObject, {0.07F, 0.07F, 0.07F}, 0.05F);
   constexpr float kReach_m = 0.22F;
   for (float leg = 0; leg < 3; ++leg) {
@@ -251,6 +261,7 @@ void add_stand(Scene& scene, float height_m, SeededRandom& random) {
 }
 
 void add_carton(Scene& scene, const Vector3f& size_m, SeededRandom& random) {
+  const Scene::Object object(scene);
   const bool white = random.chance(0.5);
   const Vector3f tint = white ? Vector3f(0.95F, 0.94F, 0.92F) : Vector3f(0.48F, 0.36F, 0.24F);
   const auto board = scene.plain(SurfaceClass::kObject, {tint.x(), tint.y(), tint.z()});
@@ -267,6 +278,7 @@ void add_carton(Scene& scene, const Vector3f& size_m, SeededRandom& random) {
 }
 
 void add_bucket(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const Vector3f color = paint_color(random);
   const auto plastic = scene.plain(SurfaceClass::kObject, {color.x(), color.y(), color.z()}, 0.05F);
   const auto inside = scene.plain(SurfaceClass::kObject, {0.1F, 0.1F, 0.1F});

@@ -58,6 +58,7 @@ void add_arm(Scene& scene, float side, float swing, const Clothes& clothes) {
 }  // namespace
 
 void add_person(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const Clothes clothes = random_clothes(scene, random);
   const bool strides = random.chance(0.5);
   const float stride = strides ? random.uniform(0.12F, 0.25F) : 0.02F;

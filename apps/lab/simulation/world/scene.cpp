@@ -115,8 +115,21 @@ MaterialId Scene::paint(SurfaceClass label, Recipe recipe, const Vector3f& tint,
   return static_cast<std::uint16_t>(index);
 }
 
+Scene::Object::Object(Scene& scene) : scene_(scene) {
+  if (scene_.object_depth_++ > 0) return;
+  const Vector3f x = scene_.T_world_local_.linear().col(0);
+  const std::size_t first = scene_.mesh_.triangles.size();
+  scene_.objects_.push_back({first, first, std::atan2(x.y(), x.x())});
+}
+
+Scene::Object::~Object() {
+  if (--scene_.object_depth_ == 0)
+    scene_.objects_.back().end_triangle = scene_.mesh_.triangles.size();
+}
+
 void Scene::move_to(World& world) {
   world.mesh = std::exchange(mesh_, {});
+  world.objects = std::exchange(objects_, {});
   world.materials = std::exchange(materials_, {});
   world.textures = std::exchange(textures_, {});
   made_.clear();

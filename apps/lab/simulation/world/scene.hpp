@@ -88,6 +88,19 @@ class Scene {
     return {*this, standing_at(position, yaw_rad)};
   }
 
+  /// All shapes that are added during its lifetime are one object, with the heading of the frame in
+  /// which it begins. Objects inside an object are parts of it.
+  class Object {
+   public:
+    explicit Object(Scene& scene);
+    ~Object();
+    Object(const Object&) = delete;
+    Object& operator=(const Object&) = delete;
+
+   private:
+    Scene& scene_;
+  };
+
   /// Shift of the texture of the following shapes [m], so that equal objects differ in their grain.
   void set_uv_offset(const Eigen::Vector2f& offset_m) { uv_offset_ = offset_m; }
 
@@ -145,7 +158,7 @@ class Scene {
                     float leaf_m, MaterialId material, SeededRandom& random);
 
   [[nodiscard]] const SurfaceMesh& mesh() const { return mesh_; }
-  /// Hands mesh, materials and textures to a world. The scene is empty afterwards.
+  /// Hands mesh, objects, materials and textures to a world. The scene is empty afterwards.
   void move_to(World& world);
 
  private:
@@ -162,6 +175,8 @@ class Scene {
   std::uint64_t seed_;
   std::vector<Material> materials_;
   std::vector<Texture> textures_;
+  std::vector<WorldObject> objects_;
+  int object_depth_ = 0;      // number of present Objects
   std::vector<Recipe> made_;  // recipes of textures_, by index
 };
 

@@ -52,6 +52,7 @@ void add_bars(Scene& scene, float x0, float x1, float pitch, float half, float z
 }  // namespace
 
 void add_street_lamp(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto post = iron(scene, SurfaceClass::kPole);
   const auto lens = scene.plain(SurfaceClass::kPole, {0.85F, 0.84F, 0.78F}, 0.1F);
   const float height = 5.5F;
@@ -75,6 +76,7 @@ void add_street_lamp(Scene& scene, SeededRandom& random) {
 }
 
 void add_traffic_sign(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   constexpr SurfaceClass kLabel = SurfaceClass::kPole;
   const auto pole = scene.plain(kLabel, {0.4F, 0.41F, 0.42F}, 0.1F);
   const auto red = scene.plain(kLabel, {0.55F, 0.03F, 0.03F});
@@ -112,6 +114,7 @@ void add_traffic_sign(Scene& scene, SeededRandom& random) {
 }
 
 void add_traffic_light(Scene& scene) {
+  const Scene::Object object(scene);
   constexpr SurfaceClass kLabel = SurfaceClass::kPole;
   const auto post = iron(scene, kLabel);
   scene.cylinder({0, 0, -0.1F}, {0, 0, 3.3F}, 0.06F, 0.055F, 10, post);
@@ -127,6 +130,7 @@ void add_traffic_light(Scene& scene) {
 }
 
 void add_bench(Scene& scene) {
+  const Scene::Object object(scene);
   constexpr SurfaceClass kLabel = SurfaceClass::kObject;
   const auto wood = scene.paint(kLabel, kWoodPlanks, {0.9F, 0.75F, 0.55F});
   const auto metal = iron(scene, kLabel);
@@ -146,6 +150,7 @@ void add_bench(Scene& scene) {
 }
 
 void add_bin(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   constexpr SurfaceClass kLabel = SurfaceClass::kObject;
   if (random.chance(0.5)) {  // a wheeled bin
     const Vector3f tints[] = {{0.05F, 0.06F, 0.06F}, {0.05F, 0.16F, 0.07F}, {0.35F, 0.28F, 0.04F}};
@@ -163,6 +168,7 @@ void add_bin(Scene& scene, SeededRandom& random) {
 }
 
 void add_bollard(Scene& scene) {
+  const Scene::Object object(scene);
   const auto post = iron(scene, SurfaceClass::kPole);
   const auto band = scene.plain(SurfaceClass::kPole, {0.8F, 0.8F, 0.78F});
   scene.cylinder({0, 0, -0.1F}, {0, 0, 0.9F}, 0.06F, 0.055F, 10, post);
@@ -171,6 +177,7 @@ void add_bollard(Scene& scene) {
 }
 
 void add_hydrant(Scene& scene) {
+  const Scene::Object object(scene);
   const auto red = scene.paint(SurfaceClass::kObject, kPaintedMetal, {0.6F, 0.07F, 0.05F});
   const Vector2f profile[] = {{0.16F, -0.05F}, {0.16F, 0.06F}, {0.11F, 0.08F},
                               {0.11F, 0.55F},  {0.15F, 0.58F}, {0.0F, 0.78F}};
@@ -179,6 +186,7 @@ void add_hydrant(Scene& scene) {
 }
 
 void add_mail_box(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   constexpr SurfaceClass kLabel = SurfaceClass::kObject;
   const auto body = random.chance(0.5) ? scene.plain(kLabel, {0.65F, 0.5F, 0.04F})
                                        : scene.plain(kLabel, {0.5F, 0.04F, 0.04F});
@@ -192,6 +200,7 @@ void add_mail_box(Scene& scene, SeededRandom& random) {
 }
 
 void add_advertising_column(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   constexpr SurfaceClass kLabel = SurfaceClass::kObject;
   const auto prints = scene.paint(kLabel, kPosters);
   const auto rim = scene.paint(kLabel, kPaintedMetal, {0.1F, 0.18F, 0.12F});
@@ -204,6 +213,7 @@ void add_advertising_column(Scene& scene, SeededRandom& random) {
 }
 
 void add_planter(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const auto stone = scene.paint(SurfaceClass::kObject, kConcrete, {0.9F, 0.9F, 0.86F});
   const auto soil = scene.paint(SurfaceClass::kTerrain, kSoil);
   const auto leaves = scene.paint(SurfaceClass::kVegetation, kLeaves, {1.1F, 1.1F, 0.9F});

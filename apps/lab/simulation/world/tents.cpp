@@ -92,6 +92,7 @@ void add_wall_window(Scene& scene, float x, float y, float z, const TentPaints& 
 }  // namespace
 
 void add_ridge_tent(Scene& scene, const Vector3f& cloth, SeededRandom& random) {
+  const Scene::Object object(scene);
   const TentPaints paints = tent_paints(scene, cloth);
   const float ridge = random.uniform(1.95F, 2.1F);
   const std::vector<Vector2f> profile = {{1.6F, -0.4F},
@@ -115,6 +116,7 @@ void add_ridge_tent(Scene& scene, const Vector3f& cloth, SeededRandom& random) {
 }
 
 void add_house_tent(Scene& scene, float length_m, const Vector3f& cloth, SeededRandom& random) {
+  const Scene::Object object(scene);
   const TentPaints paints = tent_paints(scene, cloth);
   const float eave = 1.75F;
   const float ridge = random.uniform(2.9F, 3.1F);
@@ -146,6 +148,7 @@ void add_house_tent(Scene& scene, float length_m, const Vector3f& cloth, SeededR
 }
 
 void add_tunnel_shelter(Scene& scene, float length_m, const Vector3f& cloth) {
+  const Scene::Object object(scene);
   const TentPaints paints = tent_paints(scene, cloth);
   std::vector<Vector2f> profile = {{3.0F, -0.5F}};
   constexpr int kPieces = 14;
@@ -172,6 +175,7 @@ void add_tunnel_shelter(Scene& scene, float length_m, const Vector3f& cloth) {
 }
 
 void add_dome_tent(Scene& scene, float radius_m, const Vector3f& cloth) {
+  const Scene::Object object(scene);
   const TentPaints paints = tent_paints(scene, cloth);
   const auto second = scene.paint(kLabel, kCanvas, 0.72F * cloth);
   constexpr int kPanels = 10;
@@ -195,6 +199,7 @@ void add_dome_tent(Scene& scene, float radius_m, const Vector3f& cloth) {
 }
 
 void add_awning_roof(Scene& scene, const Vector3f& cloth) {
+  const Scene::Object object(scene);
   const TentPaints paints = tent_paints(scene, cloth);
   const auto height = [](float u, float v) {
     return 2.55F - 0.35F * (1.0F - std::abs(2.0F * u - 1.0F)) * (1.0F - std::abs(2.0F * v - 1.0F));

@@ -364,6 +364,7 @@ void add_canvas_cover(Scene& scene, float x0, float x1, float half, float bed, f
 }  // namespace
 
 void add_vehicle(Scene& scene, VehicleKind kind, SeededRandom& random) {
+  const Scene::Object object(scene);
   const CarModel& model = kModels[static_cast<std::size_t>(kind)];
   const VehiclePaints paints = vehicle_paints(scene, car_paint(scene, random));
   add_body(scene, model.stations, paints);
@@ -374,6 +375,7 @@ void add_vehicle(Scene& scene, VehicleKind kind, SeededRandom& random) {
 }
 
 void add_army_truck(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const VehiclePaints paints = army_paints(scene, random);
   static constexpr BodyStation kCab[] = {
       {3.28F, 0.75F, 1.20F, 1.26F, 0.70F, 0.62F},
@@ -411,6 +413,7 @@ void add_army_truck(Scene& scene, SeededRandom& random) {
 }
 
 void add_army_jeep(Scene& scene, SeededRandom& random) {
+  const Scene::Object object(scene);
   const VehiclePaints paints = army_paints(scene, random);
   static constexpr BodyStation kBody[] = {
       {1.95F, 0.48F, 0.92F, 0.98F, 0.60F, 0.52F},

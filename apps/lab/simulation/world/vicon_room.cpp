@@ -252,6 +252,7 @@ void add_truss(Scene& scene, const Vector3f& from, const Vector3f& to, MaterialI
 }
 
 void add_camera(Scene& scene, const Vector3f& position, float yaw) {
+  const Scene::Object object(scene);
   const auto black = scene.plain(SurfaceClass::kObject, {0.05F, 0.05F, 0.05F}, 0.06F);
   const auto glow =
       scene.paint(SurfaceClass::kObject, kPlain, {0.9F, 0.2F, 0.15F}, 1.0F, 0.0F, 1.0F);
@@ -302,6 +303,7 @@ void add_plank_sheet(Scene& scene, float width_m, float top_m) {
 }
 
 void add_foam_panel(Scene& scene, float width_m, float height_m) {
+  const Scene::Object object(scene);
   const auto foam =
       scene.paint(SurfaceClass::kFurniture, kCorrugatedMetal, {0.13F, 0.13F, 0.135F}, 0.7F);
   Eigen::Isometry3f frame = Eigen::Isometry3f(Eigen::Translation3f(0.0F, -0.22F, 0.0F));

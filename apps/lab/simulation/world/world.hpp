@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -48,6 +49,12 @@ struct SurfaceMesh {
   std::vector<std::uint16_t> materials;  ///< Per triangle: index into World::materials.
 };
 
+/// Part of a mesh that is one thing, like a vehicle or a chair.
+struct WorldObject {
+  std::size_t first_triangle = 0, end_triangle = 0;  ///< Range of SurfaceMesh::triangles.
+  float yaw_rad = 0.0F;                              ///< Heading of its x axis about z.
+};
+
 /// How a surface looks: albedo = tint * base(uv / base_period) * detail(uv / detail_period), where
 /// the two periods are incommensurate, so that the pattern of the base is not seen to repeat.
 /// Textures are indices into World::textures; a detail is mid-grey on average and scaled by two.
@@ -88,6 +95,7 @@ struct Route {
 struct World {
   std::string name;
   SurfaceMesh mesh;
+  std::vector<WorldObject> objects;  ///< Ascending, without overlap.
   std::vector<Material> materials;
   std::vector<Texture> textures;
   Lighting lighting;

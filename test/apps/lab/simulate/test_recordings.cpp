@@ -86,7 +86,8 @@ TEST_CASE("The ordinary reader reads a recording, and files that went missing ar
   CHECK(file_count(mav0 / "depth0/data") == kFrames / 2);
   CHECK(file_count(mav0 / "label0/data") == kFrames);
   CHECK(file_count(mav0 / "color0/data") == kFrames);
-  for (const char* file : {"world.ply", "team.yaml", "README.md", "label_palette.csv"})
+  for (const char* file :
+       {"world.ply", "objects.json", "team.yaml", "README.md", "label_palette.csv"})
     CHECK(fs::exists(output / file));
 
   const auto whole = contents(folder, "r");

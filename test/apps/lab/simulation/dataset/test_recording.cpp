@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <string>
@@ -12,6 +13,8 @@
 #include "apps/lab/simulation/dataset/number_text.hpp"
 #include "apps/lab/simulation/dataset/recording_files.hpp"
 #include "apps/lab/simulation/dataset/recording_texts.hpp"
+#include "apps/lab/simulation/world/scene.hpp"
+#include "modules/core/json.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
@@ -336,6 +339,35 @@ TEST_CASE("The world's mesh is written with classes and their colours", "[simula
   for (std::size_t i = 0; i < 3; ++i)
     CHECK(value_at<std::uint8_t>(bytes, face + 14 + i) == palette.find(building)->color[i]);
   CHECK(value_at<std::uint8_t>(bytes, face + 17 + 13) == static_cast<LabelId>(SurfaceClass::kRoad));
+}
+
+TEST_CASE("The world's objects are written with their classes and boxes", "[simulation][dataset]") {
+  Scene scene;
+  const auto paint = scene.plain(SurfaceClass::kVehicle, {1, 1, 1});
+  const auto ground = scene.plain(SurfaceClass::kRoad, {1, 1, 1});
+  scene.box({-9, -9, -1}, {9, 9, 0}, ground);
+  {
+    const auto frame = scene.at({3, 4, 0}, 0.5F);
+    const Scene::Object object(scene);
+    scene.box({-2, -1, 0}, {2, 1, 1}, paint);
+    const auto roof = scene.at({0, 0, 1}, 1.0F);
+    const Scene::Object part(scene);
+    scene.box({-0.1F, -0.1F, 0}, {0.1F, 0.1F, 1}, paint);
+    scene.box({-0.1F, -0.1F, 1}, {0.1F, 0.1F, 2}, ground);
+  }
+  World world;
+  scene.move_to(world);
+  const Json json = Json::parse(true_objects_json(world, simulation_palette()));
+  REQUIRE(json["objects"].size() == 1);
+  const Json& object = json["objects"][0];
+  CHECK(object["class"] == "vehicle");
+  CHECK(object["yaw_rad"].get<double>() == Approx(0.5));
+  const auto is_near = [](const Json& values, const std::vector<double>& wanted) {
+    for (std::size_t i = 0; i < 3; ++i)
+      CHECK(values[i].get<double>() == Approx(wanted[i]).margin(1e-5));
+  };
+  is_near(object["center_m"], {3, 4, 1});
+  is_near(object["size_m"], {4, 2, 2});
 }
 
 const DatasetRecord kRecord = {

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <objects.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "modules/objects/map_object.hpp"
+#include "runtime/dds/codec.hpp"
+
+namespace km {
+
+/// A robot sends only its own objects. A message is refused if it has more than kMaxObjects of
+/// them, or if a pose, a size or a surface is not finite, negative or too large. Entries of unknown
+/// layers are left out.
+template <>
+struct Codec<RobotObjects> {
+  using Wire = km_wire_RobotObjects;
+  static constexpr const char* kTopic = "objects";
+  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 160 * kMaxObjects;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotObjects_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<km_wire_SceneObject> objects;
+  };
+  static MessageKey key_of(const RobotObjects& /*objects*/) { return message_key({}); }
+  static Encoded encode(const RobotObjects& objects);
+  static Decoded<RobotObjects> decode(const Wire& wire, const TeamPeer& writer);
+};
+
+}  // namespace km

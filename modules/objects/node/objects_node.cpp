@@ -1,0 +1,108 @@
+#include "modules/objects/node/objects_node.hpp"
+
+#include <chrono>
+#include <string>
+#include <utility>
+
+#include "modules/objects/object_merging.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+#include "runtime/thread.hpp"
+
+namespace km {
+namespace {
+
+// Larger than the number of messages during an extraction, so that no sender waits.
+constexpr std::size_t kQueue = 4096;
+
+// Change of a box or of its keyframe that other robots are sent [m].
+constexpr double kMinChange_m = 0.05;
+
+}  // namespace
+
+ObjectsNode::ObjectsNode(const ObjectsConfig& config, RobotId self, const LabelPalette& palette,
+                         const ObjectsTopics& topics)
+    : config_(checked(config)),
+      self_(self),
+      palette_(palette),
+      labels_(object_labels(palette, config_.background)),
+      own_(topics.own),
+      joint_(topics.joint),
+      team_(self, config_),
+      worker_(
+          kQueue, Overflow::kBlock,
+          [this](const Input& input) {
+            work_in_background();
+            step(input, steady_now_s());
+          },
+          ObjectsConfig::kSection),
+      ticks_(
+          std::chrono::seconds(1), [this] { worker_.post({}); }, "objects_tick") {
+  topics.meshes.subscribe([this](const auto& mesh) { latest_mesh_.put(mesh); });
+  topics.trajectory.subscribe([this](const auto& newest) { latest_trajectory_.put(newest); });
+  topics.received.subscribe([this](const auto& objects) { worker_.post(objects); });
+}
+
+void ObjectsNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void ObjectsNode::stop() noexcept {
+  ticks_.stop();
+  worker_.stop();
+}
+
+std::exception_ptr ObjectsNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void ObjectsNode::step(const Input& input, double now_s) {
+  if (input != nullptr) take(*input);
+  if (auto trajectory = latest_trajectory_.take()) {
+    trajectory_ = std::move(trajectory);
+    changed_ = true;
+  }
+  if (const auto mesh = latest_mesh_.take()) take(*mesh);
+  send(now_s);
+  if (input != nullptr || !changed_ || trajectory_ == nullptr)
+    return;  // published at the next tick
+  changed_ = false;
+  joint_.publish(team_.joint(*trajectory_));
+}
+
+void ObjectsNode::take(const OptimizedMesh& mesh) {
+  const auto objects =
+      merge_objects(extract_objects(mesh.mesh, mesh.seen_by, self_, labels_, config_), config_);
+  RobotObjects message = anchored(objects, *mesh.trajectory);
+  if (objects.size() > kMaxObjects)
+    log::limited(log::Level::kWarn, name(), "too many")
+        << "the map has " << objects.size() << " objects; the smallest "
+        << objects.size() - kMaxObjects << " are left out. objects.min_surface_m2 or "
+        << "objects.background exclude more";
+  (void)team_.add(message);
+  changed_ = true;
+  if (!last_sent_ || differ(message, *last_sent_, kMinChange_m)) to_send_ = std::move(message);
+}
+
+void ObjectsNode::take(const RobotObjects& received) {
+  if (received.robot == self_ || !team_.add(received))
+    log::limited(log::Level::kWarn, name(), std::to_string(received.robot))
+        << "objects of robot " << received.robot << " are ignored: of an earlier boot";
+  changed_ = true;
+}
+
+void ObjectsNode::send(double now_s) {
+  if (!to_send_ || now_s < next_s_) return;
+  next_s_ = now_s + config_.period_s;
+  last_sent_ = std::exchange(to_send_, std::nullopt);
+  own_.publish(*last_sent_);
+}
+
+std::optional<ObjectList> ObjectsNode::finish(const std::optional<Trajectory>& trajectory) {
+  if (const auto mesh = latest_mesh_.take()) take(*mesh);
+  if (trajectory && !trajectory->T_world_kf.empty()) return team_.joint(*trajectory);
+  return trajectory_ != nullptr ? std::optional(team_.joint(*trajectory_)) : std::nullopt;
+}
+
+}  // namespace km

@@ -1,0 +1,41 @@
+#include <catch2/catch.hpp>
+
+#include "modules/core/write_file.hpp"
+#include "modules/objects/object_file.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+TEST_CASE("Objects are read as they were written", "[objects]") {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "objects.json";
+  const LabelPalette palette({{7, "chair", {1, 2, 3}}});
+  const ObjectBox box{{1.0, 2.0, 0.5}, 0.3, {0.8, 0.5, 1.0}};
+  write_file(file, objects_json({.anchor = 0,
+                                 .objects = {{.label = 7, .box = box, .robots = {0, 3}},
+                                             {.label = 9, .box = box}}},
+                                palette));
+  const auto objects = read_objects(file);
+  REQUIRE(objects.size() == 2);
+  CHECK(objects[0].name == "chair");
+  CHECK(objects[1].name == "label 9");
+  CHECK(objects[0].box.center == box.center);
+  CHECK(objects[0].box.yaw_rad == box.yaw_rad);
+  CHECK(objects[0].box.size_m == box.size_m);
+}
+
+TEST_CASE("A file of objects with an unusable entry is refused with its place", "[objects]") {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "objects.json";
+  const char* const text = GENERATE(
+      R"({"objects": [{"layer": "room"}, {"class": "chair", "center_m": [0, 0], "yaw_rad": 0}]})",
+      R"({"objects": [{"layer": "room"}, {"class": 5}]})");
+  write_file(file, text);
+  CHECK_THROWS_WITH(read_objects(file), Catch::Contains(file.string() + ": entry 1 of"));
+  write_file(file, "[]");
+  CHECK_THROWS_WITH(read_objects(file), Catch::Contains(file.string()));
+}
+
+}  // namespace
+}  // namespace km
