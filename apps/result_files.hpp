@@ -13,16 +13,31 @@ namespace km {
 /// Names and colours of the labels, beside a labelled mesh.
 inline constexpr const char* kLabelPalette = "label_palette.csv";
 
+/// The 2D map, and its image.
+inline constexpr const char* kMap2d = "map.yaml";
+inline constexpr const char* kMap2dImage = "map.pgm";
+
 /// Written at the end of a run.
 inline constexpr const char* kSummary = "summary.json";
 
 /// Results of a robot in its output folder.
-inline constexpr std::array kResultFiles = {
-    "odometry.tum",   "optimized.tum",      "optimized_keyframes.tum",
-    "pose_graph.g2o", "keyframes.csv",      "loop_closures.csv",
-    "optimizer.csv",  "traffic.csv",        "process.csv",
-    "timing.csv",     "config.yaml",        kSummary,
-    "mesh.ply",       "mesh_optimized.ply", kLabelPalette};
+inline constexpr std::array kResultFiles = {"odometry.tum",
+                                            "optimized.tum",
+                                            "optimized_keyframes.tum",
+                                            "pose_graph.g2o",
+                                            "keyframes.csv",
+                                            "loop_closures.csv",
+                                            "optimizer.csv",
+                                            "traffic.csv",
+                                            "process.csv",
+                                            "timing.csv",
+                                            "config.yaml",
+                                            kSummary,
+                                            "mesh.ply",
+                                            "mesh_optimized.ply",
+                                            kLabelPalette,
+                                            kMap2dImage,
+                                            kMap2d};
 
 /// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};

@@ -3,6 +3,8 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
+#include "modules/core/write_file.hpp"
+#include "modules/map_2d/map_server_files.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "runtime/thread.hpp"
@@ -32,6 +34,7 @@ MeshFilesNode::MeshFilesNode(std::filesystem::path folder, ResultWriter& results
   topics.trajectory.subscribe([this](const auto& trajectory) { trajectory_.put(trajectory); });
   follow(topics.maps, latest_map_);
   follow(topics.optimized, optimized_);
+  follow(topics.maps_2d, map_2d_);
 }
 
 void MeshFilesNode::take_latest() {
@@ -42,6 +45,7 @@ void MeshFilesNode::take_latest() {
     map_ = map;
   }
   if (const auto optimized = optimized_.take()) step(*optimized);
+  if (const auto map = map_2d_.take()) step(*map);
 }
 
 void MeshFilesNode::step(const KeyframeOdometry& keyframe) {
@@ -60,6 +64,14 @@ void MeshFilesNode::step(const MapMesh& map) {
 void MeshFilesNode::step(const OptimizedMesh& mesh) {
   results_.write(folder_ / "mesh_optimized.ply",
                  [&mesh](const auto& file) { write_ply(file, mesh.mesh); });
+}
+
+void MeshFilesNode::step(const OccupancyGrid& map) {
+  const auto write = [this](const char* name, const std::string& text) {
+    results_.write(folder_ / name, [&text](const auto& file) { write_file(file, text); });
+  };
+  write(kMap2dImage, map_image(map));
+  write(kMap2d, map_yaml(map, kMap2dImage));
 }
 
 void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {

@@ -13,6 +13,7 @@
 #include "modules/dense_sensing/stereo_depth_config.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
 #include "modules/loop_closure/loop_closure_config.hpp"
+#include "modules/map_2d/map_2d_config.hpp"
 #include "modules/mesh/mesh_chunks_config.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
@@ -88,6 +89,7 @@ struct RobotConfig {
   SegmentationConfig segmentation;
   SemanticMappingConfig semantic_mapping;
   MeshDeformationConfig mesh_deformation;
+  Map2dConfig map_2d;
   MeshChunksConfig mesh_chunks;
   ViewConfig view;
 
@@ -98,7 +100,7 @@ struct RobotConfig {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, graph_playback, mapping, stereo_depth, segmentation,
-              semantic_mapping, mesh_deformation, mesh_chunks, view);
+              semantic_mapping, mesh_deformation, map_2d, mesh_chunks, view);
   }
 };
 

@@ -28,6 +28,7 @@
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/localization/node/localization_node.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/map_2d/node/map_2d_node.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh_deformation/node/mesh_deformation_node.hpp"
@@ -78,6 +79,7 @@ struct Topics {
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized_meshes;
   Topic<SupersededSurface> superseded_surface;
+  Topic<OccupancyGrid> maps_2d;
   Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;
   Topic<PlaceQuery> place_queries;
@@ -189,8 +191,9 @@ class Robot {
   void add_journal(const RobotOptions& options, const RobotInput& input, ResultWriter& results);
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                    const MappingPlan& plan, std::optional<ResumedMap> before);
-  void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
-                           ResultWriter& results);
+  void add_mesh_correction(const RobotConfig& config);
+  void add_mesh_files(const std::filesystem::path& folder, ResultWriter& results);
+  void add_map_2d(const Map2dConfig& config, const LabelPalette& palette);
   [[nodiscard]] CrossingEnds share_meshes(const MeshChunksConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
@@ -237,6 +240,7 @@ class Robot {
   LocalizationNode* localization_ = nullptr;
   JournalNode* journal_ = nullptr;
   RecorderNode* recorder_ = nullptr;
+  std::optional<RayThinner> ray_thinner_;  // empty without images, or once map_2d is built
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;
   TeamMeshNode* peer_meshes_ = nullptr;

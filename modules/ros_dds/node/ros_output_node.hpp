@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "modules/core/occupancy_grid.hpp"
 #include "modules/core/stamped_pose.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/recordings/ros_messages.hpp"
@@ -54,7 +55,7 @@ struct RosOutputOptions {
   bool awaits_trajectory = false;
   bool draws = false;  ///< Publish faces of the mesh and closures as markers.
   bool logs = false;   ///< Publish the log of this process.
-  /// Maximum rate of each of the topics `path`, `mesh` and `closures`.
+  /// Maximum rate of each of the topics `path`, `mesh`, `map_2d` and `closures`.
   double state_bytes_per_s = std::numeric_limits<double>::infinity();
   /// Maximum number of waiting inputs; beyond it the oldest are dropped, so that no node waits for
   /// viewers.
@@ -70,6 +71,7 @@ struct RosOutputOptions {
 ///   /tf                map -> NAME/odom -> NAME/base_link, for every image
 ///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised
 ///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected
+///   /NAME/map_2d       nav_msgs/OccupancyGrid in `map`, whenever it is made
 ///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: odometry, and what
 ///                      Diagnose returns
 /// and on request:
@@ -100,6 +102,8 @@ class RosOutputNode final : public Node {
   std::string_view name() const override { return node_name_; }
   /// Replaces the mesh by `mesh`, whose frame is `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const LabelledMesh> mesh) { worker_.post(std::move(mesh)); }
+  /// Replaces the 2D map, whose frame is `map`. Thread-safe; does not wait.
+  void offer(std::shared_ptr<const OccupancyGrid> grid) { worker_.post(std::move(grid)); }
 
   void start() override;
   void stop() noexcept override;
@@ -125,15 +129,15 @@ class RosOutputNode final : public Node {
   struct CoarseMesh {
     std::shared_ptr<const LabelledMesh> mesh;
   };
-  using Input =
-      std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
-                   Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
-                   std::shared_ptr<const LabelledMesh>, CoarseMesh, std::shared_ptr<const RosLog>,
-                   std::shared_ptr<const RosCompressedImage>>;
+  using Input = std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
+                             Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
+                             std::shared_ptr<const LabelledMesh>, CoarseMesh,
+                             std::shared_ptr<const OccupancyGrid>, std::shared_ptr<const RosLog>,
+                             std::shared_ptr<const RosCompressedImage>>;
   using Image = std::shared_ptr<const StereoFrame>;
   using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
-  // Topic whose message replaces the former one: path, mesh or closures. A changed message is
-  // published at `due_s`, which limits the rate (RosOutputOptions::state_bytes_per_s).
+  // Topic whose message replaces the former one: path, mesh, 2D map or closures. A changed message
+  // is published at `due_s`, which limits the rate (RosOutputOptions::state_bytes_per_s).
   struct LatestTopic {
     std::size_t topic = 0;
     bool changed = false;
@@ -148,6 +152,7 @@ class RosOutputNode final : public Node {
   void step(const Topic<Trajectory>::Message& trajectory);
   void step(const std::shared_ptr<const LabelledMesh>& mesh);
   void step(const CoarseMesh& coarse);
+  void step(const std::shared_ptr<const OccupancyGrid>& grid);
   void step(const std::shared_ptr<const RosLog>& line);
   void step(const std::shared_ptr<const RosCompressedImage>& image);
   void encode(const Image& image);
@@ -172,7 +177,7 @@ class RosOutputNode final : public Node {
   const Diagnose diagnose_;
   const Closures closures_of_;
   std::size_t odometry_ = 0, pose_ = 0, tf_ = 0, diagnostics_ = 0, faces_ = 0, log_ = 0, image_ = 0;
-  LatestTopic path_, mesh_, closures_;
+  LatestTopic path_, mesh_, map_2d_, closures_;
   LiveFrames frames_;
   std::size_t poses_ = 0;
   std::optional<Stamp> stamp_;    // stamp of the last image or keyframe
@@ -182,6 +187,7 @@ class RosOutputNode final : public Node {
   double stamp_arrived_s_ = 0.0;  // time of arrival of `stamp_`, by the steady clock
   Topic<Trajectory>::Message trajectory_ = std::make_shared<const Trajectory>();
   std::shared_ptr<const LabelledMesh> newest_mesh_;
+  std::shared_ptr<const OccupancyGrid> newest_map_2d_;
   SurfacePieces pieces_;
   TokenBucket piece_bytes_;
   std::vector<PublishedClosure> newest_closures_;
