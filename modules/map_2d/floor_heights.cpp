@@ -13,7 +13,7 @@ namespace km {
 namespace {
 
 constexpr double kTile_m = 2.0;
-constexpr double kBin_m = 0.1;        // of the histogram of a tile
+constexpr double kBin_m = 0.1;        // side of a bin in the histogram of a tile
 constexpr double kSignificant = 0.2;  // least share of the area of the highest peak
 constexpr double kFloor_m2 = 0.04;    // least area of the floor in a tile
 constexpr double kWide_m2 = 2.0;      // area from which a raised tile is no table

@@ -25,13 +25,14 @@ struct FloorHeights {
 ///
 /// Seeds: cells with surface labelled as floor. If the mesh has none, tiles of 2 m are searched for
 /// level surface instead. The height with the most level surface, or the lowest one with at least a
-/// fifth as much, is the height of the tile. A tile that is more than `max_step_m` higher than one
-/// beside it, and has less than 2 m^2 of surface at that height, has no seeds: it may be a table.
+/// fifth as much, is the height of the tile. A raised tile with less than 2 m^2 of surface at its
+/// height has no seeds, because it may be a table. Raised means more than `max_step_m` higher than
+/// a tile beside it.
 ///
 /// Growth: level surface that continues the floor of the next cell, with a slope up to 45 degrees,
 /// is floor. So ramps without labels are floor too, up to the slope of SurfaceKind::kLevel.
 ///
-/// A grid has one floor. Where storeys lie above each other in one map, the lowest one counts.
+/// A grid has one floor. If storeys lie above each other, the lowest one counts.
 [[nodiscard]] FloorHeights find_floor(const SurfaceColumns& columns, double max_step_m);
 
 }  // namespace km

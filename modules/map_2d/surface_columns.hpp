@@ -58,7 +58,7 @@ class SurfaceColumns {
  public:
   static constexpr double kStep_m = 0.025;
 
-  /// `is_floor` tells for each label whether it is floor. Faces are sampled at distances below the
+  /// `is_floor` is true for the labels of floor. Faces are sampled at distances below the
   /// resolution. Vertices that are not finite or more than 800 m above or below the origin are left
   /// out.
   SurfaceColumns(const LabelledMesh& mesh, const CellGrid& grid,

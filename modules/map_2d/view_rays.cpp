@@ -6,7 +6,9 @@
 namespace km {
 namespace {
 
-constexpr int kColumns = 36, kRows = 28;
+// Cells at 3 m must not lie between two columns. Rows need less, because rays of all heights in the
+// band free the same cells.
+constexpr double kColumns = 80, kRows = 14;
 constexpr double kMotion_m = 0.3, kMotion_rad = 0.26;  // 15 degrees
 
 }  // namespace
@@ -14,10 +16,10 @@ constexpr double kMotion_m = 0.3, kMotion_rad = 0.26;  // 15 degrees
 RayThinner::RayThinner(const Camera& camera, double max_range_m)
     : pixels_(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height)),
       max_range_m_(max_range_m) {
-  const double step = std::max({1.0, static_cast<double>(camera.width) / kColumns,
-                                static_cast<double>(camera.height) / kRows});
-  for (double v = step / 2; v < camera.height; v += step)
-    for (double u = step / 2; u < camera.width; u += step) {
+  const double step_u = std::max(1.0, camera.width / kColumns);
+  const double step_v = std::max(1.0, camera.height / kRows);
+  for (double v = step_v / 2; v < camera.height; v += step_v)
+    for (double u = step_u / 2; u < camera.width; u += step_u) {
       const Eigen::Vector2d pixel(std::floor(u), std::floor(v));
       if (const auto bearing = camera.unproject(pixel))
         bearings_.push_back(

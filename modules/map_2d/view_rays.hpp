@@ -20,8 +20,8 @@ struct ViewRays {
   std::vector<Eigen::Vector3f> ends;                 ///< In the odometry frame [m].
 };
 
-/// Thins depth images to about 1000 rays each, and keeps only images from a new place or in a new
-/// direction: 12 kB for each 0.3 m or 15 degrees of motion. Not thread-safe.
+/// Thins each depth image to about 1100 rays. Only images from a new place or in a new direction
+/// are kept: 13 kB for each 0.3 m or 15 degrees of motion. Not thread-safe.
 class RayThinner {
  public:
   /// Depths beyond `max_range_m` become rays of that length. `camera` takes the images.

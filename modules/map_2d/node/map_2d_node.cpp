@@ -31,7 +31,7 @@ Map2dNode::Map2dNode(const Map2dConfig& config, const LabelPalette& palette, Ray
           [this](const auto& input) {
             work_in_background();
             if (const auto* views = std::get_if<Views>(&input)) step(*views);
-            if (steady_now_s() >= next_s_) make_map();
+            if (steady_now_s() >= next_s_ && take_surface()) make_map();
           },
           Map2dConfig::kSection) {
   // Thinning takes less than 0.1 ms, so that no image has to wait for a map.
@@ -42,29 +42,37 @@ Map2dNode::Map2dNode(const Map2dConfig& config, const LabelPalette& palette, Ray
 }
 
 void Map2dNode::offer(CorrectedSurface surface) {
-  surface_.put(std::make_shared<const CorrectedSurface>(std::move(surface)));
+  newest_surface_.put(std::make_shared<const CorrectedSurface>(std::move(surface)));
   worker_.post(News());
 }
 
 void Map2dNode::stop() noexcept {
   worker_.stop();
-  if (!std::exchange(stopped_, true) && !error()) make_map();
+  if (!std::exchange(stopped_, true) && !error() && (take_surface() || has_new_views_)) make_map();
 }
 
 void Map2dNode::step(const Views& views) {
   views_.push_back(*views);
+  has_new_views_ = true;
   if (views_.size() < kViews) return;
   std::size_t kept = 0;
   for (std::size_t k = 0; k < views_.size(); k += 2) views_[kept++] = std::move(views_[k]);
   views_.resize(kept);
 }
 
+bool Map2dNode::take_surface() {
+  auto newest = newest_surface_.take();
+  if (newest == nullptr) return false;
+  surface_ = std::move(newest);
+  return true;
+}
+
 void Map2dNode::make_map() {
-  const auto surface = surface_.take();
-  if (surface == nullptr) return;
+  if (surface_ == nullptr) return;
+  has_new_views_ = false;
   const double start_s = steady_now_s();
   Map2dResult result =
-      make_map_2d(config_, {*surface->mesh, palette_, views_, surface->T_world_odom});
+      make_map_2d(config_, {*surface_->mesh, palette_, views_, surface_->T_world_odom});
   const double end_s = steady_now_s();
   timing_.add(end_s - start_s);
   next_s_ = end_s + std::max(config_.period_s, (end_s - start_s) * (1.0 - kShare) / kShare);

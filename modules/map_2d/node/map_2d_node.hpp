@@ -36,8 +36,8 @@ struct Map2dTopics {
 /// Makes the 2D map of a robot's whole run from its corrected mesh and the rays of its images.
 ///
 /// The mesh and the rays are kept in 3D, and each map is made from scratch. So a map agrees with
-/// the poses of its mesh, also after loop closures. Of long runs at most kViews images are kept: at
-/// that number every second one is dropped.
+/// the poses of its mesh, also after loop closures. At most kViews images are kept:
+/// at that number every second one is dropped.
 class Map2dNode final : public Node {
  public:
   static constexpr std::size_t kViews = 4096;
@@ -50,7 +50,7 @@ class Map2dNode final : public Node {
 
   std::string_view name() const override { return Map2dConfig::kSection; }
   void start() override { worker_.start(); }
-  /// Publishes the map of the last mesh.
+  /// Publishes the map of the last mesh and all images.
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
@@ -68,6 +68,7 @@ class Map2dNode final : public Node {
   using Views = std::shared_ptr<const ViewRays>;
 
   void step(const Views& views);
+  bool take_surface();
   void make_map();
 
   const Map2dConfig config_;
@@ -75,10 +76,12 @@ class Map2dNode final : public Node {
   const Out<OccupancyGrid> maps_;
   RayThinner thinner_;
   std::vector<ViewRays> views_;
-  double next_s_ = 0.0;  // time of the next map, by the steady clock
+  double next_s_ = 0.0;         // time of the next map, by the steady clock
+  bool has_new_views_ = false;  // since the last map
   bool stopped_ = false;
   Timing timing_;
-  Latest<CorrectedSurface> surface_;
+  std::shared_ptr<const CorrectedSurface> surface_;
+  Latest<CorrectedSurface> newest_surface_;
   Worker<std::variant<News, Views>> worker_;  // last member: stops first
 };
 

@@ -75,7 +75,7 @@ TEST_CASE("A table is an obstacle only for robots that do not fit under it", "[m
   CHECK(values(map_of(surfaces), 2.05, 2.05, 3.45, 2.95) == Values{kOccupied});
 }
 
-TEST_CASE("A table over floor that nobody saw is no floor", "[map_2d]") {
+TEST_CASE("A table over unseen floor is an obstacle", "[map_2d]") {
   Surfaces surfaces;
   // The table fills most of its tile of 2 m, and no floor is seen below it.
   surfaces.level(0, 0, 6, 2, 0, 0).level(0, 4, 6, 6, 0, 0).level(2.1F, 2.1F, 3.9F, 3.1F, 0.75F, 0);
