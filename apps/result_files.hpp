@@ -17,6 +17,9 @@ inline constexpr const char* kLabelPalette = "label_palette.csv";
 inline constexpr const char* kMap2d = "map.yaml";
 inline constexpr const char* kMap2dImage = "map.pgm";
 
+/// Slice of the distance field.
+inline constexpr const char* kDistanceSlice = "distance_field.ply";
+
 /// Written at the end of a run.
 inline constexpr const char* kSummary = "summary.json";
 
@@ -37,7 +40,8 @@ inline constexpr std::array kResultFiles = {"odometry.tum",
                                             "mesh_optimized.ply",
                                             kLabelPalette,
                                             kMap2dImage,
-                                            kMap2d};
+                                            kMap2d,
+                                            kDistanceSlice};
 
 /// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};

@@ -35,6 +35,7 @@ MeshFilesNode::MeshFilesNode(std::filesystem::path folder, ResultWriter& results
   follow(topics.maps, latest_map_);
   follow(topics.optimized, optimized_);
   follow(topics.maps_2d, map_2d_);
+  follow(topics.slices, slice_);
 }
 
 void MeshFilesNode::take_latest() {
@@ -46,6 +47,7 @@ void MeshFilesNode::take_latest() {
   }
   if (const auto optimized = optimized_.take()) step(*optimized);
   if (const auto map = map_2d_.take()) step(*map);
+  if (const auto slice = slice_.take()) step(*slice);
 }
 
 void MeshFilesNode::step(const KeyframeOdometry& keyframe) {
@@ -72,6 +74,11 @@ void MeshFilesNode::step(const OccupancyGrid& map) {
   };
   write(kMap2dImage, map_image(map));
   write(kMap2d, map_yaml(map, kMap2dImage));
+}
+
+void MeshFilesNode::step(const DistanceSlice& slice) {
+  results_.write(folder_ / kDistanceSlice,
+                 [&slice](const auto& file) { write_ply(file, slice.points); });
 }
 
 void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {

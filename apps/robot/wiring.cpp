@@ -260,9 +260,16 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
       SemanticMappingTopics{.frames = topics_.dense_frames,
                             .superseded = topics_.superseded_surface,
                             .maps = topics_.maps,
-                            .progress = topics_.mapping_progress});
+                            .progress = topics_.mapping_progress,
+                            .space = config.distance_field.enabled
+                                         ? std::optional<Out<SpaceUpdate>>(topics_.space_updates)
+                                         : std::nullopt});
   if (before) mapper.continue_from(*std::move(before));
   ray_thinner_.emplace(camera, map.max_range_m);
+  if (config.distance_field.enabled)
+    add<DistanceFieldNode>(
+        true, config.distance_field, map.voxel_size_m,
+        DistanceFieldTopics{.space = topics_.space_updates, .slices = topics_.distance_slices});
 }
 
 void Robot::add_mesh_correction(const RobotConfig& config) {
@@ -290,7 +297,8 @@ void Robot::add_mesh_files(const std::filesystem::path& folder, ResultWriter& re
                                                     .trajectory = topics_.trajectory,
                                                     .maps = topics_.maps,
                                                     .optimized = topics_.optimized_meshes,
-                                                    .maps_2d = topics_.maps_2d});
+                                                    .maps_2d = topics_.maps_2d,
+                                                    .slices = topics_.distance_slices});
 }
 
 // A robot may send its mesh without collecting others, and the other way round.
@@ -525,6 +533,9 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
     output.offer({optimized, &optimized->mesh});
   });
   topics_.maps_2d.subscribe([&output](const auto& map) { output.offer(map); });
+  topics_.distance_slices.subscribe([&output](const auto& slice) {
+    output.offer_slice({slice, &slice->points}, slice->stamp);
+  });
   if (node == kRecordNode) record_ = &output;
 }
 

@@ -42,6 +42,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"evaluation", {"charts", "images", "mesh"}},
     {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},
+    {"distance_field", {"mesh", "semantic_mapping"}},
     {"map_2d", {"mesh"}},
     {"mesh_deformation", {"mesh"}},
     {"view", {"images", "mesh"}},

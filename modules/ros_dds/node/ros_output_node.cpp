@@ -234,6 +234,13 @@ void RosOutputNode::step(const CoarseMesh& coarse) {
   publish_pieces();
 }
 
+void RosOutputNode::step(const Slice& slice) {
+  if (!slice_)
+    slice_ = sink_->open({'/' + name_ + "/distance_slice", RosPointCloud::kType, true, 1});
+  const std::size_t most = std::max<std::size_t>(slice.points->vertices.size(), 1);
+  publish(*slice_, cloud_of(*slice.points, most, {slice.stamp, odom_}));
+}
+
 void RosOutputNode::step(const std::shared_ptr<const OccupancyGrid>& grid) {
   newest_map_2d_ = grid;
   map_2d_.changed = true;

@@ -72,6 +72,8 @@ struct RosOutputOptions {
 ///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised
 ///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected
 ///   /NAME/map_2d       nav_msgs/OccupancyGrid in `map`, whenever it is made
+///   /NAME/distance_slice  sensor_msgs/PointCloud2 in NAME/odom, see DistanceSlice; only with a
+///                      distance field
 ///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: odometry, and what
 ///                      Diagnose returns
 /// and on request:
@@ -102,6 +104,11 @@ class RosOutputNode final : public Node {
   std::string_view name() const override { return node_name_; }
   /// Replaces the mesh by `mesh`, whose frame is `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const LabelledMesh> mesh) { worker_.post(std::move(mesh)); }
+  /// Publishes a slice of the distance field: points in the frame NAME/odom. Thread-safe; does not
+  /// wait.
+  void offer_slice(std::shared_ptr<const LabelledMesh> points, Stamp stamp) {
+    worker_.post(Slice{std::move(points), stamp});
+  }
   /// Replaces the 2D map, whose frame is `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const OccupancyGrid> grid) { worker_.post(std::move(grid)); }
 
@@ -129,11 +136,17 @@ class RosOutputNode final : public Node {
   struct CoarseMesh {
     std::shared_ptr<const LabelledMesh> mesh;
   };
-  using Input = std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
-                             Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
-                             std::shared_ptr<const LabelledMesh>, CoarseMesh,
-                             std::shared_ptr<const OccupancyGrid>, std::shared_ptr<const RosLog>,
-                             std::shared_ptr<const RosCompressedImage>>;
+  // A slice of the distance field.
+  struct Slice {
+    std::shared_ptr<const LabelledMesh> points;
+    Stamp stamp = 0;
+  };
+  using Input =
+      std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
+                   Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
+                   std::shared_ptr<const LabelledMesh>, CoarseMesh,
+                   std::shared_ptr<const OccupancyGrid>, Slice, std::shared_ptr<const RosLog>,
+                   std::shared_ptr<const RosCompressedImage>>;
   using Image = std::shared_ptr<const StereoFrame>;
   using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
   // Topic whose message replaces the former one: path, mesh, 2D map or closures. A changed message
@@ -152,6 +165,7 @@ class RosOutputNode final : public Node {
   void step(const Topic<Trajectory>::Message& trajectory);
   void step(const std::shared_ptr<const LabelledMesh>& mesh);
   void step(const CoarseMesh& coarse);
+  void step(const Slice& slice);
   void step(const std::shared_ptr<const OccupancyGrid>& grid);
   void step(const std::shared_ptr<const RosLog>& line);
   void step(const std::shared_ptr<const RosCompressedImage>& image);
@@ -177,6 +191,7 @@ class RosOutputNode final : public Node {
   const Diagnose diagnose_;
   const Closures closures_of_;
   std::size_t odometry_ = 0, pose_ = 0, tf_ = 0, diagnostics_ = 0, faces_ = 0, log_ = 0, image_ = 0;
+  std::optional<std::size_t> slice_;  // opened with the first slice
   LatestTopic path_, mesh_, map_2d_, closures_;
   LiveFrames frames_;
   std::size_t poses_ = 0;
