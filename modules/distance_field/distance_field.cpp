@@ -10,9 +10,10 @@
 namespace km {
 namespace {
 
-constexpr int kMaxReach = 100;   // its square is below DistanceField::kFar
-constexpr int kNone = 1 << 28;   // squared distance without surface
-constexpr int kPartBlocks = 12;  // regions with longer sides are divided
+constexpr int kMaxReach = 100;     // its square is below DistanceField::kFar
+constexpr int kNone = 1 << 28;     // squared distance without surface
+constexpr int kFarAway = 1 << 20;  // [voxels]
+constexpr int kPartBlocks = 12;    // regions with longer sides are divided
 constexpr std::uint64_t kColumnX0 = 0x0101010101010101, kColumnX7 = kColumnX0 << 7U;
 
 bool less(const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
@@ -41,21 +42,25 @@ double checked_voxel(double voxel_m, double max_m) {
 }
 
 // Lower envelope of the parabolas f(q) + (p - q)^2, evaluated at p = first .. first + count - 1
-// (Felzenszwalb and Huttenlocher, Sec. 2.1). Values of kNone have no parabola.
+// (Felzenszwalb and Huttenlocher, Sec. 2.1). Values above a bound have no parabola.
 class Envelope {
  public:
   explicit Envelope(int size)
-      : at_(static_cast<std::size_t>(size)), from_(static_cast<std::size_t>(size) + 1) {}
+      : at_(static_cast<std::size_t>(size)),
+        from_(static_cast<std::size_t>(size) + 1),
+        half_inverse_(static_cast<std::size_t>(size)) {
+    for (int k = 1; k < size; ++k) half_inverse_[static_cast<std::size_t>(k)] = 0.5 / k;
+  }
 
   // False if there is no parabola.
-  bool build(const int* f, int size) {
+  bool build(const int* f, int size, int most) {
     count_ = 0;
     for (int q = 0; q < size; ++q) {
-      if (f[q] >= kNone) continue;
+      if (f[q] > most) continue;
       double begin = -std::numeric_limits<double>::infinity();
       while (count_ > 0) {
         const int r = at_[count_ - 1];
-        begin = ((f[q] + q * q) - (f[r] + r * r)) / (2.0 * (q - r));
+        begin = ((f[q] + q * q) - (f[r] + r * r)) * half_inverse_[static_cast<std::size_t>(q - r)];
         if (begin > from_[count_ - 1]) break;
         --count_;
       }
@@ -80,23 +85,25 @@ class Envelope {
  private:
   std::vector<int> at_;
   std::vector<double> from_;
+  std::vector<double> half_inverse_;  // 1 / (2 k)
   std::size_t count_ = 0;
 };
 
-// Distances along a row to the next voxel of `marks`, squared, for p = first .. first + count - 1.
+// Squared distances along a row to the nearest of `marks`, for p = first .. first + count - 1. The
+// row need not contain these positions.
 void row_distances(const std::vector<char>& marks, int first, int count, int* out) {
   const int size = static_cast<int>(marks.size());
-  int last = -kNone;
-  for (int p = 0; p < first + count; ++p) {
-    if (marks[static_cast<std::size_t>(p)] != 0) last = p;
+  int last = -kFarAway;
+  for (int p = std::min(first, 0); p < first + count; ++p) {
+    if (p >= 0 && p < size && marks[static_cast<std::size_t>(p)] != 0) last = p;
     if (p >= first) out[p - first] = p - last;
   }
-  last = kNone;
-  for (int p = size - 1; p >= first; --p) {
-    if (marks[static_cast<std::size_t>(p)] != 0) last = p;
+  last = kFarAway;
+  for (int p = std::max(first + count, size) - 1; p >= first; --p) {
+    if (p >= 0 && p < size && marks[static_cast<std::size_t>(p)] != 0) last = p;
     if (p >= first + count) continue;
     const int distance = std::min(out[p - first], last - p);
-    out[p - first] = distance >= size ? kNone : distance * distance;
+    out[p - first] = distance > kMaxReach + kBlockSide ? kNone : distance * distance;
   }
 }
 
@@ -242,21 +249,42 @@ void DistanceField::compute_parts(const Box& box, std::vector<Eigen::Vector3i> t
   compute_parts(low, std::move(targets));
 }
 
-// Exact distances of the targets in `box`. Surface within reach_ of it counts. One transform per
-// axis: rows along x of all input, then columns along y and z of the output.
+// The blocks with surface within reach of `box`.
+DistanceField::Box DistanceField::surface_near(const Box& box) const {
+  Box found{Eigen::Vector3i::Constant(BlockMap::kReach),
+            Eigen::Vector3i::Constant(-BlockMap::kReach)};
+  for (const auto& entry : blocks_) {
+    const auto at = entry.first.array();
+    if (!any(entry.second->surface) || (at < box.low.array() - reach_blocks_).any() ||
+        (at >= box.high.array() + reach_blocks_).any())
+      continue;
+    found = {found.low.cwiseMin(entry.first),
+             found.high.cwiseMax(at.matrix() + Eigen::Vector3i::Ones())};
+  }
+  return found;
+}
+
+// Exact distances of the targets in `box`. One transform per axis: rows along x of all surface,
+// then columns along y and z of the output.
 void DistanceField::compute(const Box& box, const std::vector<Eigen::Vector3i>& targets) {
-  const Eigen::Vector3i low = box.low.array() - reach_blocks_;
-  const Eigen::Vector3i blocks = (box.high - box.low).array() + 2 * reach_blocks_;
+  const Box input = surface_near(box);
+  if ((input.high.array() <= input.low.array()).any()) {
+    for (const Eigen::Vector3i& target : targets) blocks_.at(target)->squared.fill(kFar);
+    return;
+  }
+  const Eigen::Vector3i& low = input.low;
+  const Eigen::Vector3i blocks = input.high - input.low;
   const Eigen::Vector3i in = blocks * kBlockSide, out = (box.high - box.low) * kBlockSide;
-  const int first = reach_blocks_ * kBlockSide;
+  const Eigen::Vector3i first = (box.low - low) * kBlockSide;  // output in the input
   const auto size = [](int a, int b, int c) {
     return static_cast<std::size_t>(a) * static_cast<std::size_t>(b) * static_cast<std::size_t>(c);
   };
 
+  const int farthest = std::min(reach_ * reach_, kFar - 1);
   std::vector<const Block*> row(static_cast<std::size_t>(blocks.x()));
   std::vector<char> marks(static_cast<std::size_t>(in.x()));
-  std::vector<int> columns(static_cast<std::size_t>(std::max(in.y(), in.z())));
-  Envelope envelope(static_cast<int>(columns.size()));
+  std::vector<int> columns(size(1, kBlockSide, std::max(in.y(), in.z())));
+  Envelope envelope(std::max(in.y(), in.z()));
   // by_x: in.y rows of out.x values, for one z of the input. by_xy: [in.z][out.y][out.x].
   std::vector<int> by_x(size(1, in.y(), out.x()));
   std::vector<int> by_xy(size(in.z(), out.y(), out.x()), kNone);
@@ -281,39 +309,44 @@ void DistanceField::compute(const Box& box, const std::vector<Eigen::Vector3i>& 
       }
       if (!has_surface) continue;
       layer_has_surface = true;
-      row_distances(marks, first, out.x(), &by_x[size(1, y, out.x())]);
+      row_distances(marks, first.x(), out.x(), &by_x[size(1, y, out.x())]);
     }
     if (!layer_has_surface) continue;
     for (int x = 0; x < out.x(); ++x) {
       for (int y = 0; y < in.y(); ++y)
         columns[static_cast<std::size_t>(y)] =
             by_x[size(1, y, out.x()) + static_cast<std::size_t>(x)];
-      if (envelope.build(columns.data(), in.y()))
-        envelope.evaluate(columns.data(), first, out.y(), out.x(),
+      if (envelope.build(columns.data(), in.y(), farthest))
+        envelope.evaluate(columns.data(), first.y(), out.y(), out.x(),
                           &by_xy[size(z, out.y(), out.x()) + static_cast<std::size_t>(x)]);
     }
   }
 
-  const int farthest = std::min(reach_ * reach_, kFar - 1);
   for (const Eigen::Vector3i& target : targets) {
     Block& block = *blocks_.at(target);
     const Eigen::Vector3i corner = (target - box.low) * kBlockSide;
-    for (int y = 0; y < kBlockSide; ++y)
+    // Columns of eight voxels along x are read together, because they are neighbours in memory.
+    for (int y = 0; y < kBlockSide; ++y) {
+      const std::size_t at =
+          size(1, corner.y() + y, out.x()) + static_cast<std::size_t>(corner.x());
+      for (int z = 0; z < in.z(); ++z) {
+        const int* values = &by_xy[size(z, out.y(), out.x()) + at];
+        for (int x = 0; x < kBlockSide; ++x)
+          columns[size(1, x, in.z()) + static_cast<std::size_t>(z)] = values[x];
+      }
       for (int x = 0; x < kBlockSide; ++x) {
-        const std::size_t at =
-            size(1, corner.y() + y, out.x()) + static_cast<std::size_t>(corner.x() + x);
-        for (int z = 0; z < in.z(); ++z)
-          columns[static_cast<std::size_t>(z)] = by_xy[size(z, out.y(), out.x()) + at];
+        const int* column = &columns[size(1, x, in.z())];
         std::array<int, kBlockSide> squared;
         squared.fill(kNone);
-        if (envelope.build(columns.data(), in.z()))
-          envelope.evaluate(columns.data(), first + corner.z(), kBlockSide, 1, squared.data());
+        if (envelope.build(column, in.z(), farthest))
+          envelope.evaluate(column, first.z() + corner.z(), kBlockSide, 1, squared.data());
         for (int z = 0; z < kBlockSide; ++z) {
           const int value = squared[static_cast<std::size_t>(z)];
           block.squared[voxel_index(x, y, z)] =
               value > farthest ? kFar : static_cast<std::uint16_t>(value);
         }
       }
+    }
   }
 }
 

@@ -34,11 +34,11 @@ struct [[nodiscard]] DistanceUpdate {
 /// Euclidean signed distances to the nearest surface, on the voxels of the mapper's TSDF.
 ///
 /// Surface voxels are voxels behind a surface with an observed voxel in front of it beside them
-/// along an axis. A voxel whose nearest surface voxel is d voxels away has the distance d - 1/2 in
-/// front of the surface and -(d + 1/2) behind it, because the surface lies between two voxels.
-/// Distances are known in observed voxels only, but surface voxels count from anywhere. In the map
-/// d is exact, so that the field differs from the true distance to the surface of the TSDF by less
-/// than half a voxel along an axis.
+/// along an axis. Let d be the distance of a voxel to the nearest surface voxel [voxels]. The
+/// signed distance is d - 1/2 in front of the surface and -(d + 1/2) behind it, because the surface
+/// lies between two voxels. Distances are known in observed voxels only, but surface voxels count
+/// from anywhere. In the map d is exact, so that the field differs from the true distance to the
+/// surface of the TSDF by less than half a voxel along an axis.
 ///
 /// Incremental as Voxblox (Oleynikova et al., "Voxblox: Incremental 3D Euclidean Signed Distance
 /// Fields for On-Board MAV Planning", 2017, Sec. IV): only blocks within max_distance of a changed
@@ -101,6 +101,7 @@ class DistanceField {
   [[nodiscard]] const Block* find(const Eigen::Vector3i& position) const;
   [[nodiscard]] BlockBits surface_of(const Eigen::Vector3i& position, const Block& block) const;
   std::vector<Eigen::Vector3i> find_changed_surface();
+  [[nodiscard]] Box surface_near(const Box& box) const;
   void compute(const Box& box, const std::vector<Eigen::Vector3i>& targets);
   void compute_parts(const Box& box, std::vector<Eigen::Vector3i> targets);
   [[nodiscard]] double signed_distance(const Block& block, int x, int y, int z) const;

@@ -15,10 +15,9 @@ struct DistanceFieldConfig {
     visitor.field(
         "enabled", enabled,
         "computes distances to the nearest surface in the window of the map, for planners");
-    visitor.field(
-        "max_distance_m", max_distance_m, {0.1, 10.0},
-        "[m] larger distances are not computed; must not exceed 100 voxels; the time of an "
-        "update grows with its cube");
+    visitor.field("max_distance_m", max_distance_m, {0.1, 10.0},
+                  "[m] larger distances are not computed; must not exceed 100 voxels; "
+                  "larger values take longer");
   }
 };
 

@@ -1,5 +1,7 @@
 #include "modules/map_2d/map_server_files.hpp"
 
+#include <cmath>
+
 #include "modules/core/config.hpp"
 
 namespace km {
@@ -10,6 +12,11 @@ char shade(std::int8_t cell) {
   return static_cast<char>(cell == OccupancyGrid::kUnknown ? kUnknown
                            : cell == OccupancyGrid::kFree  ? kFree
                                                            : kOccupied);
+}
+
+// Coordinate [m] as text, without the rounding errors of multiples of the resolution.
+std::string coordinate(double value_m) {
+  return shortest_text(std::round(value_m * 1e6) / 1e6);
 }
 
 }  // namespace
@@ -26,7 +33,7 @@ std::string map_image(const OccupancyGrid& grid) {
 std::string map_yaml(const OccupancyGrid& grid, std::string_view image_name) {
   return "image: " + std::string(image_name) +
          "\nmode: trinary\nresolution: " + shortest_text(grid.resolution_m) + "\norigin: [" +
-         shortest_text(grid.origin.x()) + ", " + shortest_text(grid.origin.y()) +
+         coordinate(grid.origin.x()) + ", " + coordinate(grid.origin.y()) +
          ", 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.19\n";
 }
 

@@ -13,10 +13,10 @@ namespace km {
 /// A bit per voxel of a block: bit x + 8 y of word z.
 using BlockBits = std::array<std::uint64_t, kBlockSide>;
 
-/// What the mapper knows of the space in one block of voxels.
+/// Observed and occupied voxels of one block.
 struct BlockSpace {
   Eigen::Vector3i position = Eigen::Vector3i::Zero();  ///< [blocks], as VoxelBlock::position
-  BlockBits observed = {};  ///< Voxels with a distance. None: the block is forgotten.
+  BlockBits observed = {};  ///< Voxels with a distance. None: the block was removed.
   BlockBits inside = {};    ///< Those of them behind a surface or on it: distance <= 0.
 };
 

@@ -31,7 +31,7 @@ class SpaceTracker {
   void note_left(const Eigen::Vector3i& position);
 
   /// Finds voxels outside the blocks of the map that a view shows as free. Free blocks that were
-  /// not seen for window_m are forgotten. `way_m`: distance travelled by the camera.
+  /// not seen for window_m are removed. `way_m`: distance travelled by the camera.
   void see_free(const DepthView& view, const BlockFusion& fusion, const SE3& T_odom_cam,
                 const BlockMap& map, double way_m);
 

@@ -95,11 +95,12 @@ int main(int argc, char** argv) {
   const km::Times without = km::run(*folder, voxel_m, max_m, false);
   const km::Times with = km::run(*folder, voxel_m, max_m, true);
   const auto updates = static_cast<double>(with.updates);
-  std::printf("CPU: fusion %.3f s; with the field: fusion and free space %.3f s, changes %.3f s, "
-              "field %.3f s (%zu updates, mean %.1f ms, largest %.1f ms), %zu blocks, %.1f MB\n",
-              without.fusion_s, with.fusion_s, with.space_s, with.field_s, with.updates,
-              1e3 * with.field_s / updates, 1e3 * with.largest_s, with.blocks,
-              1.2e-3 * static_cast<double>(with.blocks));
+  std::printf(
+      "CPU: fusion %.3f s; with the field: fusion and free space %.3f s, changes %.3f s, "
+      "field %.3f s (%zu updates, mean %.1f ms, largest %.1f ms), %zu blocks, %.1f MB\n",
+      without.fusion_s, with.fusion_s, with.space_s, with.field_s, with.updates,
+      1e3 * with.field_s / updates, 1e3 * with.largest_s, with.blocks,
+      1.2e-3 * static_cast<double>(with.blocks));
   std::printf("one block: %.1f ms\n", 1e3 * km::one_block_s(voxel_m, max_m));
   return 0;
 }

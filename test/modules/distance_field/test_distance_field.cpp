@@ -8,6 +8,8 @@
 #include <set>
 #include <tuple>
 
+#include "modules/semantic_mapping/semantic_mapper.hpp"
+
 namespace km {
 namespace {
 
@@ -139,7 +141,7 @@ TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_
   }
 }
 
-TEST_CASE("A forgotten block is unknown, and its surface does not count any more",
+TEST_CASE("A removed block is unknown, and its surface does not count any more",
           "[distance_field]") {
   World world(3);
   world.inside.insert({4, 4, 4});
@@ -191,6 +193,49 @@ TEST_CASE("An unchanged block costs nothing, and a distance of too many voxels i
   field.set({world.block({0, 0, 0})});
   CHECK(field.update().computed_blocks == 0);
   CHECK_THROWS_AS(DistanceField({.max_distance_m = 2.0}, 0.01), ConfigError);
+}
+
+// A camera in the origin of the odometry frame, whose z axis is that of the camera.
+DepthImage wall_at(std::uint16_t millimetres) {
+  return {160, 120, std::vector<std::uint16_t>(160 * 120, millimetres)};
+}
+
+TEST_CASE("The mapper reports space from which distances to a wall follow", "[distance_field]") {
+  const Camera camera{.width = 160, .height = 120, .fx = 80, .fy = 80, .cx = 79.5, .cy = 59.5};
+  SemanticMappingConfig config;
+  config.voxel_size_m = kVoxel_m;
+  config.window_m = 3.0;
+  SemanticMapper mapper(config, camera);
+  mapper.track_space();
+  DistanceField field({.max_distance_m = 1.0}, kVoxel_m);
+  const auto look = [&](const SE3& T_odom_cam, std::uint16_t millimetres, KeyframeIndex keyframe) {
+    (void)mapper.integrate(wall_at(millimetres), nullptr, T_odom_cam, keyframe);
+    field.set(mapper.take_space_changes());
+    (void)field.update();
+  };
+  look(SE3::Identity(), 2050, 0);
+  for (const double z_m : {0.9, 1.33, 1.5, 1.9}) {
+    const auto found = field.at({0.03, -0.02, z_m});
+    CAPTURE(z_m);
+    REQUIRE(found);
+    CHECK(std::abs(found->distance_m - std::min(1.0, 2.05 - z_m)) <= 0.5 * kVoxel_m);
+  }
+  CHECK(field.at({0.03, -0.02, 2.15})->distance_m < 0.0);
+  CHECK_FALSE(field.at({0, 0, 3}));     // behind the wall
+  CHECK_FALSE(field.at({3, 0, 0.5}));   // beside the image
+  CHECK_FALSE(field.at({0, 0, -0.5}));  // behind the camera
+
+  // The wall has moved away: the mapper removes the old one, and the space becomes free.
+  for (KeyframeIndex k = 1; k < 200; ++k) look(SE3::Identity(), 3050, k);
+  CHECK(field.at({0.03, -0.02, 1.9})->distance_m == Approx(1.0));
+  CHECK(std::abs(field.at({0.03, -0.02, 2.45})->distance_m - 0.6) <= 0.5 * kVoxel_m);
+
+  // The camera travels farther than the window, and looks elsewhere.
+  SE3 away = SE3::Identity();
+  away.translation() = Eigen::Vector3d(0, 0, -20);
+  look(away, 2050, 200);
+  CHECK_FALSE(field.at({0.03, -0.02, 1.9}));
+  CHECK(std::abs(field.at({0.03, -0.02, -18.45})->distance_m - 0.5) <= 0.5 * kVoxel_m);
 }
 
 }  // namespace
