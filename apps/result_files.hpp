@@ -13,11 +13,21 @@ namespace km {
 /// Names and colours of the labels, beside a labelled mesh.
 inline constexpr const char* kLabelPalette = "label_palette.csv";
 
+/// The 2D map, and its image.
+inline constexpr const char* kMap2d = "map.yaml";
+inline constexpr const char* kMap2dImage = "map.pgm";
+
+/// Slice of the distance field.
+inline constexpr const char* kDistanceSlice = "distance_field.ply";
+
 /// Written at the end of a run.
 inline constexpr const char* kSummary = "summary.json";
 
 /// The fused mesh of a team, in its folder, and with `map.team` in that of each robot.
 inline constexpr const char* kTeamMesh = "team_mesh.ply";
+/// The 2D map of that mesh, in the folder of each robot.
+inline constexpr const char* kTeamMap2d = "team_map.yaml";
+inline constexpr const char* kTeamMap2dImage = "team_map.pgm";
 
 /// Objects of the map, with labels only.
 inline constexpr const char* kObjectsFile = "objects.json";
@@ -29,7 +39,9 @@ inline constexpr std::array kResultFiles = {
     "optimizer.csv",  "traffic.csv",        "process.csv",
     "timing.csv",     "config.yaml",        kSummary,
     "mesh.ply",       "mesh_optimized.ply", kLabelPalette,
-    kTeamMesh, kObjectsFile};
+    kTeamMesh,        kObjectsFile,         kMap2dImage,
+    kMap2d,           kDistanceSlice,       kTeamMap2d,
+    kTeamMap2dImage};
 
 /// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};

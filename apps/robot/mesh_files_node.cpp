@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
+#include "apps/robot/results.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "runtime/thread.hpp"
@@ -32,6 +33,8 @@ MeshFilesNode::MeshFilesNode(std::filesystem::path folder, ResultWriter& results
   topics.trajectory.subscribe([this](const auto& trajectory) { trajectory_.put(trajectory); });
   follow(topics.maps, latest_map_);
   follow(topics.optimized, optimized_);
+  follow(topics.maps_2d, map_2d_);
+  follow(topics.slices, slice_);
 }
 
 void MeshFilesNode::take_latest() {
@@ -42,6 +45,8 @@ void MeshFilesNode::take_latest() {
     map_ = map;
   }
   if (const auto optimized = optimized_.take()) step(*optimized);
+  if (const auto map = map_2d_.take()) step(*map);
+  if (const auto slice = slice_.take()) step(*slice);
 }
 
 void MeshFilesNode::step(const KeyframeOdometry& keyframe) {
@@ -60,6 +65,15 @@ void MeshFilesNode::step(const MapMesh& map) {
 void MeshFilesNode::step(const OptimizedMesh& mesh) {
   results_.write(folder_ / "mesh_optimized.ply",
                  [&mesh](const auto& file) { write_ply(file, mesh.mesh); });
+}
+
+void MeshFilesNode::step(const OccupancyGrid& map) {
+  write_map_2d(folder_, kMap2d, kMap2dImage, map, results_);
+}
+
+void MeshFilesNode::step(const DistanceSlice& slice) {
+  results_.write(folder_ / kDistanceSlice,
+                 [&slice](const auto& file) { write_ply(file, slice.points); });
 }
 
 void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {

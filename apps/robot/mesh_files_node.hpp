@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "apps/result_writer.hpp"
+#include "modules/core/occupancy_grid.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/distance_field/distance_slice.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "runtime/latest.hpp"
@@ -25,14 +27,17 @@ struct MeshFilesTopics {
   In<Trajectory> trajectory;  ///< Trajectory of this robot.
   In<MapMesh> maps;
   In<OptimizedMesh> optimized;
+  In<OccupancyGrid> maps_2d;
+  In<DistanceSlice> slices;
 };
 
-/// Keeps a robot's meshes on disk while it runs, each file whole at any time.
+/// Keeps a robot's meshes and 2D map on disk while it runs, each file whole at any time.
 ///
 /// mesh.ply is the mapper's mesh, as odometry built it. It is moved rigidly so that its first
 /// keyframe has its optimised pose in the team's frame. mesh_optimized.ply is the mesh deformed to
-/// the optimised keyframes, in the team's frame. run.map is the mapper's mesh for a process that
-/// resumes the run.
+/// the optimised keyframes, in the team's frame. map.pgm and map.yaml are the 2D map for map_server
+/// of Nav2, in the team's frame. distance_field.ply is the last slice of the distance field, in the
+/// odometry frame. run.map is the mapper's mesh for a process that resumes the run.
 class MeshFilesNode final : public Node {
  public:
   /// `results` outlives this and records meshes that could not be written. Such a failure does not
@@ -53,6 +58,8 @@ class MeshFilesNode final : public Node {
   void step(const Trajectory& trajectory);
   void step(const MapMesh& map);
   void step(const OptimizedMesh& mesh);
+  void step(const OccupancyGrid& map);
+  void step(const DistanceSlice& slice);
 
   /// Writes mesh.ply again, with the last trajectory of the robot. Call after stop().
   void finish(const std::optional<Trajectory>& trajectory);
@@ -79,6 +86,8 @@ class MeshFilesNode final : public Node {
   Latest<Trajectory> trajectory_;
   Latest<MapMesh> latest_map_;
   Latest<OptimizedMesh> optimized_;
+  Latest<OccupancyGrid> map_2d_;
+  Latest<DistanceSlice> slice_;
   Worker<News> worker_;  // last member: stops first
 };
 

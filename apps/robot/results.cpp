@@ -13,6 +13,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
+#include "modules/map_2d/map_server_files.hpp"
 #include "modules/objects/object_file.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
@@ -215,6 +216,12 @@ void write_objects(const fs::path& folder, const ObjectList& objects, const Labe
                    ResultWriter& results) {
   results.write(folder / kObjectsFile,
                 [&](const auto& file) { write_file(file, objects_json(objects, palette)); });
+}
+
+void write_map_2d(const fs::path& folder, const char* name, const char* image,
+                  const OccupancyGrid& map, ResultWriter& results) {
+  results.write(folder / image, [&](const auto& file) { write_file(file, map_image(map)); });
+  results.write(folder / name, [&](const auto& file) { write_file(file, map_yaml(map, image)); });
 }
 
 std::vector<PublishedClosure> published_closures(const RunRecord& record) {

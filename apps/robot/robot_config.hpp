@@ -12,8 +12,10 @@
 #include "modules/core/ids.hpp"
 #include "modules/dense_sensing/segmentation_config.hpp"
 #include "modules/dense_sensing/stereo_depth_config.hpp"
+#include "modules/distance_field/distance_field_config.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
 #include "modules/loop_closure/loop_closure_config.hpp"
+#include "modules/map_2d/map_2d_config.hpp"
 #include "modules/mesh/map_sharing_config.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
 #include "modules/objects/objects_config.hpp"
@@ -91,6 +93,8 @@ struct RobotConfig {
   SegmentationConfig segmentation;
   SemanticMappingConfig semantic_mapping;
   MeshDeformationConfig mesh_deformation;
+  Map2dConfig map_2d;
+  DistanceFieldConfig distance_field;
   MapSharingConfig map;
   ObjectsConfig objects;
   ViewConfig view;
@@ -102,7 +106,8 @@ struct RobotConfig {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, absolute_fixes, graph_playback, mapping, stereo_depth,
-              segmentation, semantic_mapping, mesh_deformation, map, objects, view);
+              segmentation, semantic_mapping, mesh_deformation, map_2d, distance_field, map,
+              objects, view);
   }
 };
 

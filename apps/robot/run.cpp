@@ -406,11 +406,24 @@ HeldBackSums held_back(Robot& robot) {
   return sums;
 }
 
+// The 2D map of the team is made of the fused mesh alone, so that all robots have the same.
+void write_team_map_2d(const fs::path& folder, const Map2dConfig& config, const Map2dInput& input,
+                       ResultWriter& results) {
+  const Map2dResult map = make_map_2d(config, input);
+  if (map.status == Map2dStatus::kMade)
+    return write_map_2d(folder, kTeamMap2d, kTeamMap2dImage, map.grid, results);
+  log::warn("robot") << "no 2D map of the team: its mesh "
+                     << (map.status == Map2dStatus::kEmpty ? "has no floor"
+                                                           : "needs more than map_2d.max_cells");
+}
+
 // Writes the fused mesh of the team, of the chunks that were received until now.
-void write_team_map(const fs::path& folder, const TeamMapNode& node, ResultWriter& results) {
+void write_team_map(const fs::path& folder, const Map2dConfig& config, const TeamMapNode& node,
+                    ResultWriter& results) {
   log::info("robot") << "fusing the map of the team";
   const TeamMap map = node.fuse();
   results.write(folder / kTeamMesh, [&](const auto& file) { write_ply(file, map.mesh); });
+  if (config.enabled) write_team_map_2d(folder, config, {map.mesh, node.palette()}, results);
   log::info("robot") << "map of the team: " << map.mesh.faces.size()
                      << " faces, in the frame of robot " << map.anchor;
   if (map.other_frames > 0)
@@ -462,15 +475,15 @@ class FinalRoom {
 };
 
 // Writes all results except for the summary. The state of a hung module cannot be read.
-void write_all(const RobotOptions& options, Robot& robot, const RunRecord& record,
-               const RunResult& result, ResultWriter& results) {
+void write_all(const RobotOptions& options, const RobotConfig& config, Robot& robot,
+               const RunRecord& record, const RunResult& result, ResultWriter& results) {
   write_results(options.output, record, results);
   if (result.is_left_behind("mesh_files"))
     results.note(options.output / "mesh.ply", "not as at the end of the run: mesh_files hangs");
   else if (robot.mesh_files() != nullptr)
     robot.mesh_files()->finish(record.trajectory());
   if (robot.team_map() != nullptr && !result.is_left_behind(robot.team_map()->name()))
-    write_team_map(options.output, *robot.team_map(), results);
+    write_team_map(options.output, config.map_2d, *robot.team_map(), results);
   if (robot.objects() != nullptr && !result.is_left_behind(robot.objects()->name()))
     if (const auto objects = robot.objects()->finish(record.trajectory()))
       write_objects(options.output, *objects, robot.objects()->palette(), results);
@@ -568,7 +581,7 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
     log::warn("robot") << "not localised in " << options.extend.string()
                        << ": the poses of this run are those of odometry, apart from those before";
   room.release_trajectories();
-  write_all(options, robot, record, result, results);
+  write_all(options, config, robot, record, result, results);
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;
   summary.findings =

@@ -102,7 +102,11 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_journal(options, input, results);
   add_back_end(config);
   add_overlay();
-  if (mapping) add_mesh_correction(config, options.output, results);
+  if (mapping) {
+    add_mesh_correction(config);
+    if (config.map_2d.enabled && ray_thinner_) add_map_2d(config.map_2d, mapping->palette);
+    add_mesh_files(options.output, results);
+  }
   if (mapping && !mapping->palette.classes().empty() && config.objects.on)
     add_objects(config.objects, mapping->palette, options.output, results);
   add_network(share_meshes(config, mapping ? mapping->palette : LabelPalette()));
@@ -273,12 +277,19 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
       SemanticMappingTopics{.frames = topics_.dense_frames,
                             .superseded = topics_.superseded_surface,
                             .maps = topics_.maps,
-                            .progress = topics_.mapping_progress});
+                            .progress = topics_.mapping_progress,
+                            .space = config.distance_field.enabled
+                                         ? std::optional<Out<SpaceUpdate>>(topics_.space_updates)
+                                         : std::nullopt});
   if (before) mapper.continue_from(*std::move(before));
+  ray_thinner_.emplace(camera, map.max_range_m);
+  if (config.distance_field.enabled)
+    add<DistanceFieldNode>(
+        true, config.distance_field, map.voxel_size_m,
+        DistanceFieldTopics{.space = topics_.space_updates, .slices = topics_.distance_slices});
 }
 
-void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
-                                ResultWriter& results) {
+void Robot::add_mesh_correction(const RobotConfig& config) {
   mesh_deformation_ =
       &add<MeshDeformationNode>(false, config.mesh_deformation, identity_.robot,
                                 MeshDeformationTopics{.maps = topics_.maps,
@@ -286,11 +297,25 @@ void Robot::add_mesh_correction(const RobotConfig& config, const std::filesystem
                                                       .trajectory = topics_.trajectory,
                                                       .optimized = topics_.optimized_meshes,
                                                       .superseded = topics_.superseded_surface});
+}
+
+void Robot::add_map_2d(const Map2dConfig& config, const LabelPalette& palette) {
+  auto& map = add<Map2dNode>(false, config, palette, *std::exchange(ray_thinner_, std::nullopt),
+                             Map2dTopics{.frames = topics_.dense_frames, .maps = topics_.maps_2d});
+  topics_.optimized_meshes.subscribe([&map](const auto& optimized) {
+    map.offer({{optimized, &optimized->mesh}, optimized->T_world_odom});
+  });
+}
+
+// Call after the nodes that it writes for: nodes stop in the order in which they are added.
+void Robot::add_mesh_files(const std::filesystem::path& folder, ResultWriter& results) {
   mesh_files_ = &add<MeshFilesNode>(false, folder, results,
                                     MeshFilesTopics{.keyframes = topics_.keyframe_odometry,
                                                     .trajectory = topics_.trajectory,
                                                     .maps = topics_.maps,
-                                                    .optimized = topics_.optimized_meshes});
+                                                    .optimized = topics_.optimized_meshes,
+                                                    .maps_2d = topics_.maps_2d,
+                                                    .slices = topics_.distance_slices});
 }
 
 // A robot without a map only receives the meshes of the others.
@@ -555,6 +580,10 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
     output.offer({optimized, &optimized->mesh});
   });
   topics_.joint_objects.subscribe([&output](const auto& objects) { output.offer(objects); });
+  topics_.maps_2d.subscribe([&output](const auto& map) { output.offer(map); });
+  topics_.distance_slices.subscribe([&output](const auto& slice) {
+    output.offer_slice({slice, &slice->points}, slice->stamp);
+  });
   if (node == kRecordNode) record_ = &output;
 }
 

@@ -27,8 +27,10 @@
 #include "modules/core/processing_load.hpp"
 #include "modules/core/tracked_image.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
+#include "modules/distance_field/node/distance_field_node.hpp"
 #include "modules/localization/node/localization_node.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/map_2d/node/map_2d_node.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh_deformation/node/mesh_deformation_node.hpp"
@@ -82,6 +84,9 @@ struct Topics {
   Topic<OptimizedMesh> optimized_meshes;
   Topic<SupersededSurface> superseded_surface;
   Topic<ObjectList> joint_objects;
+  Topic<OccupancyGrid> maps_2d;
+  Topic<SpaceUpdate> space_updates;
+  Topic<DistanceSlice> distance_slices;
   Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;
   Topic<PlaceQuery> place_queries;
@@ -206,8 +211,9 @@ class Robot {
   void add_journal(const RobotOptions& options, const RobotInput& input, ResultWriter& results);
   void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
                    const MappingPlan& plan, std::optional<ResumedMap> before);
-  void add_mesh_correction(const RobotConfig& config, const std::filesystem::path& folder,
-                           ResultWriter& results);
+  void add_mesh_correction(const RobotConfig& config);
+  void add_mesh_files(const std::filesystem::path& folder, ResultWriter& results);
+  void add_map_2d(const Map2dConfig& config, const LabelPalette& palette);
   [[nodiscard]] CrossingEnds share_meshes(const RobotConfig& robot, const LabelPalette& palette);
   void add_objects(const ObjectsConfig& config, const LabelPalette& palette,
                    const std::filesystem::path& folder, ResultWriter& results);
@@ -257,6 +263,7 @@ class Robot {
   FixesNode* fixes_ = nullptr;
   JournalNode* journal_ = nullptr;
   RecorderNode* recorder_ = nullptr;
+  std::optional<RayThinner> ray_thinner_;  // empty without images, or once map_2d is built
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;
   MeshChunksNode* chunks_ = nullptr;

@@ -89,6 +89,8 @@ struct OptimizedMesh {
   double seconds = 0.0;  ///< Duration of the correction.
   /// Faces of the map that are missing because another visit saw them better.
   std::size_t superseded_faces = 0;
+  /// T_world_kf * T_odom_kf^-1 of all keyframes: where the correction moved what they saw.
+  std::vector<SE3> T_world_odom = {};
 };
 
 }  // namespace km

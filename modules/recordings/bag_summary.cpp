@@ -19,7 +19,7 @@ constexpr std::array<std::string_view, 20> kTypesWithHeader = {
     RosCameraInfo::kType,
     RosOdometry::kType,
     "nav_msgs/Path",
-    "nav_msgs/OccupancyGrid",
+    RosOccupancyGrid::kType,
     "sensor_msgs/PointCloud",
     "sensor_msgs/PointCloud2",
     "sensor_msgs/LaserScan",

@@ -48,6 +48,16 @@ constexpr std::array kDefinitions = std::to_array<Definition>({
      "geometry_msgs/PoseWithCovariance pose\n"
      "geometry_msgs/TwistWithCovariance twist\n"},
     {"nav_msgs/Path", "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n"},
+    {"nav_msgs/MapMetaData",
+     "builtin_interfaces/Time map_load_time\n"
+     "float32 resolution\n"
+     "uint32 width\n"
+     "uint32 height\n"
+     "geometry_msgs/Pose origin\n"},
+    {"nav_msgs/OccupancyGrid",
+     "std_msgs/Header header\n"
+     "nav_msgs/MapMetaData info\n"
+     "int8[] data\n"},
     {"sensor_msgs/PointField",
      "string name\n"
      "uint32 offset\n"

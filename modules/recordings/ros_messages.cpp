@@ -66,6 +66,13 @@ void fields(auto& wire, Is<RosPath> auto& path) {
   for (auto& pose : path.poses) fields(wire, pose);
 }
 
+void fields(auto& wire, Is<RosOccupancyGrid> auto& grid) {
+  fields(wire, grid.header);
+  wire(grid.map_load_time, grid.resolution, grid.width, grid.height);
+  fields(wire, grid.origin);
+  wire(grid.data);
+}
+
 void fields(auto& wire, Is<RosOdometry> auto& odometry) {
   fields(wire, odometry.header);
   wire(odometry.child_frame);
@@ -202,6 +209,8 @@ template std::vector<std::uint8_t> encode_ros(const RosPoseStamped&);
 template std::vector<std::uint8_t> encode_ros(const RosPoseWithCovarianceStamped&);
 template Decoded<RosPath> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosPath&);
+template Decoded<RosOccupancyGrid> decode_ros(std::string_view, std::span<const std::uint8_t>);
+template std::vector<std::uint8_t> encode_ros(const RosOccupancyGrid&);
 template Decoded<RosOdometry> decode_ros(std::string_view, std::span<const std::uint8_t>);
 template std::vector<std::uint8_t> encode_ros(const RosOdometry&);
 template Decoded<RosTransform> decode_ros(std::string_view, std::span<const std::uint8_t>);

@@ -98,6 +98,18 @@ struct RosPath {
   std::vector<RosPoseStamped> poses;
 };
 
+struct RosOccupancyGrid {
+  static constexpr std::string_view kType = "nav_msgs/OccupancyGrid";
+  RosHeader header;
+  Stamp map_load_time = 0;
+  float resolution = 0.0F;   ///< Side of a cell [m].
+  std::uint32_t width = 0;   ///< Number of cells along x.
+  std::uint32_t height = 0;  ///< Number of cells along y.
+  RosPose origin;            ///< Pose of the corner of cell (0, 0).
+  /// Row-major from cell (0, 0), x first. The bits of int8: 0 free to 100 occupied, -1 unknown.
+  std::vector<std::uint8_t> data;
+};
+
 struct RosOdometry {
   static constexpr std::string_view kType = "nav_msgs/Odometry";
   RosHeader header;

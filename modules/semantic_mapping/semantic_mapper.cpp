@@ -10,6 +10,7 @@
 #include "modules/semantic_mapping/block_fusion.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 #include "modules/semantic_mapping/depth_view.hpp"
+#include "modules/semantic_mapping/space_tracker.hpp"
 
 namespace km {
 namespace {
@@ -89,6 +90,7 @@ struct SemanticMapper::State {
   KeyframeIndex keyframe = 0;
   std::optional<Eigen::Vector3d> camera_at;  // last position
   double way_m = 0.0;                        // distance travelled by the camera
+  std::optional<SpaceTracker> space;
   bool labelled = false;
   std::size_t dropped_faces = 0;
 };
@@ -139,6 +141,7 @@ void SemanticMapper::State::remove_empty(const BlockFusion& fusion,
   for (const Update& update : updates) {
     if (update.near || !fusion.is_empty(*update.block)) continue;
     mesh.forget(*update.block, map, keyframe);
+    if (space) space->note_empty(update.block->position, way_m);
     map.erase(Eigen::Vector3i(update.block->position));
     ++report.blocks_removed;
   }
@@ -149,7 +152,10 @@ void SemanticMapper::State::finalise(const std::vector<VoxelBlock*>& blocks) {
   unreported.blocks += done.blocks;
   unreported.vertices_added += done.vertices_added;
   unreported.vertices_removed += done.vertices_removed;
-  for (VoxelBlock* block : blocks) map.erase(Eigen::Vector3i(block->position));
+  for (VoxelBlock* block : blocks) {
+    if (space) space->note_left(block->position);
+    map.erase(Eigen::Vector3i(block->position));
+  }
 }
 
 void SemanticMapper::State::leave_window(IntegrationReport& report) {
@@ -223,6 +229,11 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
   const BlockFusion fusion(state.config, view, T_odom_cam, keyframe);
   const auto updates = state.select(view, fusion, T_odom_cam, report);
   State::fuse(fusion, updates);
+  if (state.space) {
+    for (const State::Update& update : updates) state.space->note(update.block->position);
+    if (new_keyframe || state.frame == 1)
+      state.space->see_free(view, fusion, T_odom_cam, state.map, state.way_m);
+  }
   state.remove_empty(fusion, updates, report);
   if (new_keyframe) state.leave_window(report);
   state.make_room(report);
@@ -237,6 +248,14 @@ SurfaceDrop SemanticMapper::drop(const SupersededSurface& superseded) {
   const SurfaceDrop dropped = state_->mesh.drop(superseded);
   state_->dropped_faces += dropped.faces;
   return dropped;
+}
+
+void SemanticMapper::track_space() {
+  state_->space.emplace(state_->config);
+}
+
+SpaceChanges SemanticMapper::take_space_changes() {
+  return state_->space->take(state_->map);
 }
 
 MapMesh SemanticMapper::mesh() const {

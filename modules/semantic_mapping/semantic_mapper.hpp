@@ -12,6 +12,7 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/semantic_mapping/incremental_mesh.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"
+#include "modules/semantic_mapping/space_changes.hpp"
 
 namespace km {
 
@@ -101,6 +102,15 @@ class SemanticMapper {
   [[nodiscard]] MapMesh mesh() const;
 
   [[nodiscard]] MapSize size() const;
+
+  /// Begins to follow the free and occupied space for take_space_changes(). Call before the first
+  /// frame.
+  void track_space();
+
+  /// Free and occupied space of the blocks that changed since the last call, for a distance field.
+  /// Free space away from surface is updated with the first frame of each keyframe. Voxels up to
+  /// min_weight are unknown. Precondition: track_space().
+  [[nodiscard]] SpaceChanges take_space_changes();
 
  private:
   struct State;

@@ -20,7 +20,7 @@ struct KnownType {
   const dds_topic_descriptor_t* descriptor;
 };
 
-constexpr std::array<KnownType, 15> kTypes = {{
+constexpr std::array<KnownType, 16> kTypes = {{
     {"sensor_msgs", "Image", &sensor_msgs_msg_dds__Image__desc},
     {"sensor_msgs", "CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc},
     {"sensor_msgs", "Imu", &sensor_msgs_msg_dds__Imu__desc},
@@ -32,6 +32,7 @@ constexpr std::array<KnownType, 15> kTypes = {{
      &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc},
     {"nav_msgs", "Odometry", &nav_msgs_msg_dds__Odometry__desc},
     {"nav_msgs", "Path", &nav_msgs_msg_dds__Path__desc},
+    {"nav_msgs", "OccupancyGrid", &nav_msgs_msg_dds__OccupancyGrid__desc},
     {"sensor_msgs", "PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc},
     {"diagnostic_msgs", "DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc},
     {"tf2_msgs", "TFMessage", &tf2_msgs_msg_dds__TFMessage__desc},

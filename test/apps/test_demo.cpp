@@ -4,13 +4,70 @@
 #include <filesystem>
 #include <string>
 
+#include "modules/evaluation/association.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
+#include "modules/map_2d/map_2d.hpp"
+#include "modules/mesh/ply_file.hpp"
+#include "modules/sensors/text_file.hpp"
 #include "test/support/command.hpp"
+#include "test/support/nav2_map.hpp"
 #include "test/support/temporary_folder.hpp"
 
 // apps/demo from end to end: a world is rendered, and three robots localise themselves in it over
 // DDS.
 
 namespace km {
+namespace {
+
+// Cells of the truth that are `value` within `reach` cells of a point.
+bool is_near(const OccupancyGrid& truth, const Eigen::Vector2d& point, std::int8_t value,
+             int reach) {
+  for (int y = -reach; y <= reach; ++y)
+    for (int x = -reach; x <= reach; ++x)
+      if (truth.at(point + truth.resolution_m * Eigen::Vector2d(x, y)) == value) return true;
+  return false;
+}
+
+// Compares the 2D map of robot 0 with that of the true room, moved to the frame of the team, whose
+// anchor is robot 0.
+void check_map_2d(const std::filesystem::path& robot, const std::filesystem::path& world) {
+  const StampedPose first = read_trajectory(robot / "optimized.tum").front();
+  const auto truth_poses =
+      read_trajectory(world / "robot0/mav0/state_groundtruth_estimate0/data.csv");
+  const auto T_truth_body = pose_at(truth_poses, first.stamp, 0.1, 0.05);
+  REQUIRE(T_truth_body);
+  LabelledMesh room = read_ply(world / "world.ply");
+  room.transform(first.T * T_truth_body->inverse());
+  const LabelPalette palette =
+      parse_label_palette(read_file(world / "label_palette.csv"), "label_palette.csv");
+  const Map2dResult truth = make_map_2d({}, {room, palette});
+  REQUIRE(truth.status == Map2dStatus::kMade);
+
+  const OccupancyGrid map =
+      load_nav2_map(read_file(robot / "map.yaml"), read_file(robot / "map.pgm"));
+  constexpr int kReach = 4;  // cells of 5 cm: errors of pose and mesh, and a voxel
+  double occupied = 0, wrong_occupied = 0, free = 0, wrong_free = 0;
+  for (int y = 0; y < map.height; ++y)
+    for (int x = 0; x < map.width; ++x) {
+      const Eigen::Vector2d point =
+          map.origin + map.resolution_m * Eigen::Vector2d(x + 0.5, y + 0.5);
+      const std::int8_t cell = map.cells[map.index(x, y)];
+      if (cell == OccupancyGrid::kOccupied) {
+        ++occupied;
+        wrong_occupied += is_near(truth.grid, point, OccupancyGrid::kOccupied, kReach) ? 0 : 1;
+      } else if (cell == OccupancyGrid::kFree) {
+        ++free;
+        wrong_free += is_near(truth.grid, point, OccupancyGrid::kFree, kReach) ? 0 : 1;
+      }
+    }
+  CAPTURE(occupied, wrong_occupied, free, wrong_free);
+  CHECK(occupied > 500);
+  CHECK(free > 5000);
+  CHECK(wrong_occupied < 0.05 * occupied);
+  CHECK(wrong_free < 0.02 * free);
+}
+
+}  // namespace
 
 TEST_CASE("The demo joins three robots of a simulated world into one frame", "[demo][slow]") {
   constexpr std::size_t kFrames = 80;  // 8 s at 10 Hz
@@ -42,6 +99,7 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
   for (const YAML::Node& object : YAML::Load(folder.read("robot0/objects.json"))["objects"])
     shared += object["robots"].size() > 1 ? 1 : 0;
   CHECK(shared > 0);
+  check_map_2d(folder.path() / "robot0", folder.path() / "world_short");
   for (const char* file : {"report.html", "team_mesh.ply", "team_mesh.png", "robot0/mesh.ply",
                            "robot0/mesh_optimized.ply", "robot0/label_palette.csv",
                            "robot0/optimized.tum", "robot0/loop_closures.csv", "robot0/traffic.csv",

@@ -4,6 +4,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "test/support/captured_log.hpp"
+#include "test/support/nav2_map.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -24,11 +25,17 @@ struct Bench {
   Topic<Trajectory> trajectory;
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized;
+  Topic<OccupancyGrid> maps_2d;
+  Topic<DistanceSlice> slices;
   ResultWriter results;
-  MeshFilesNode node{
-      folder.path(),
-      results,
-      {.keyframes = keyframes, .trajectory = trajectory, .maps = maps, .optimized = optimized}};
+  MeshFilesNode node{folder.path(),
+                     results,
+                     {.keyframes = keyframes,
+                      .trajectory = trajectory,
+                      .maps = maps,
+                      .optimized = optimized,
+                      .maps_2d = maps_2d,
+                      .slices = slices}};
 
   [[nodiscard]] LabelledMesh written(const char* file) const {
     return read_ply(folder.path() / file);
@@ -63,6 +70,19 @@ TEST_CASE("A mesh is moved to the optimised pose of its first keyframe", "[robot
     CHECK((mesh.vertices[i].cast<double>() - p).norm() < 1e-5);  // stored as floats
   }
   CHECK(bench.written("mesh_optimized.ply").vertices == triangle().mesh.vertices);
+}
+
+TEST_CASE("The 2D map and the slice of the distance field are written", "[robot][mapping]") {
+  Bench bench;
+  bench.node.start();
+  bench.maps_2d.publish(OccupancyGrid{0.5, {-1, 2}, 2, 1, {100, -1}});
+  bench.slices.publish(DistanceSlice{.points = triangle().mesh});
+  bench.node.stop();
+  const OccupancyGrid map =
+      load_nav2_map(bench.folder.read("map.yaml"), bench.folder.read("map.pgm"));
+  CHECK(map.origin == Eigen::Vector2d(-1, 2));
+  CHECK(map.cells == std::vector<std::int8_t>{100, -1});
+  CHECK(bench.written("distance_field.ply").vertices == triangle().mesh.vertices);
 }
 
 TEST_CASE("A mesh that cannot be written is named, and no end of the run", "[robot][mapping]") {

@@ -34,7 +34,7 @@ struct Filler {
       value["x"] = static_cast<typename T::mapped_type>(std::numeric_limits<std::uint64_t>::max() -
                                                         static_cast<std::uint64_t>(number));
     else
-      value = {static_cast<RobotId>(number), 65535};
+      value = {static_cast<typename T::value_type>(number), 65535};
   }
 };
 

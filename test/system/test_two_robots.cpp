@@ -81,8 +81,9 @@ TEST_CASE("Two robots end with the same map of their team", "[system]") {
     REQUIRE(read_summary(results / "summary.json").pgo.members.size() == 2);
     faces[static_cast<std::size_t>(robot)] = read_ply(results / "mesh_optimized.ply").faces.size();
   }
-  const std::string map = read_input_file(folder.path() / "0/team_mesh.ply");
-  CHECK(map == read_input_file(folder.path() / "1/team_mesh.ply"));
+  for (const char* file : {"team_mesh.ply", "team_map.pgm"})
+    CHECK(read_input_file(folder.path() / "0" / file) ==
+          read_input_file(folder.path() / "1" / file));
   // Each place is there once: fewer faces than both have, and more than one has.
   const std::size_t fused = read_ply(folder.path() / "0/team_mesh.ply").faces.size();
   CHECK(5 * fused < 4 * (faces[0] + faces[1]));

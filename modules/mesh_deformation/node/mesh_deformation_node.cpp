@@ -153,7 +153,10 @@ void MeshDeformationNode::correct() {
                        correction->report,
                        correction->deformed,
                        end_s - start_s,
-                       correction->superseded_faces};
+                       correction->superseded_faces,
+                       complete(T_odom_kf_, input().T_world_kf)};
+  for (std::size_t k = 0; k < T_odom_kf_.size(); ++k)
+    result.T_world_odom[k] = result.T_world_odom[k] * T_odom_kf_[k].inverse();
   if (!correction->superseded.vertices.empty())
     superseded_.publish(std::move(correction->superseded));
   report(result);

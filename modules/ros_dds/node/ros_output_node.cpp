@@ -24,6 +24,18 @@ RosPose message_of(const SE3& T) {
   return {T.translation(), Eigen::Quaterniond(T.linear())};
 }
 
+RosOccupancyGrid message_of(const OccupancyGrid& grid, const RosHeader& header) {
+  RosOccupancyGrid message{.header = header,
+                           .map_load_time = header.stamp,
+                           .resolution = static_cast<float>(grid.resolution_m),
+                           .width = static_cast<std::uint32_t>(grid.width),
+                           .height = static_cast<std::uint32_t>(grid.height),
+                           .origin = {},
+                           .data = {grid.cells.begin(), grid.cells.end()}};
+  message.origin.position.head<2>() = grid.origin;
+  return message;
+}
+
 std::uint8_t level_of(log::Level level) {
   switch (level) {
     case log::Level::kError:
@@ -89,6 +101,7 @@ void RosOutputNode::open_topics(bool has_images) {
   tf_ = sink_->open({"/tf", RosTransforms::kType, false, kManyTransforms});
   path_ = latest("path", RosPath::kType);
   mesh_ = latest("mesh", RosPointCloud::kType);
+  map_2d_ = latest("map_2d", RosOccupancyGrid::kType);
   diagnostics_ = sink_->open({"/diagnostics", RosDiagnostics::kType});
   if (options_.draws || options_.mesh_faces > 0) {
     const std::size_t pieces = SurfacePieces::count(static_cast<std::size_t>(options_.mesh_faces));
@@ -229,6 +242,19 @@ void RosOutputNode::step(const Topic<ObjectList>::Message& objects) {
   publish_latest(false);
 }
 
+void RosOutputNode::step(const Slice& slice) {
+  if (!slice_)
+    slice_ = sink_->open({'/' + name_ + "/distance_slice", RosPointCloud::kType, true, 1});
+  const std::size_t most = std::max<std::size_t>(slice.points->vertices.size(), 1);
+  publish(*slice_, cloud_of(*slice.points, most, {slice.stamp, odom_}));
+}
+
+void RosOutputNode::step(const std::shared_ptr<const OccupancyGrid>& grid) {
+  newest_map_2d_ = grid;
+  map_2d_.changed = true;
+  publish_latest(false);
+}
+
 void RosOutputNode::step(const std::shared_ptr<const RosLog>& line) {
   RosLog stamped = *line;
   stamped.stamp = time().value_or(0);
@@ -251,6 +277,9 @@ void RosOutputNode::publish_latest(bool all) {
   publish_if_due(objects_, [this] {
     return publish(objects_.topic, object_markers(newest_objects_->objects, *options_.objects,
                                                   {stamp_.value_or(0), map_}));
+  });
+  publish_if_due(map_2d_, [this] {
+    return publish(map_2d_.topic, message_of(*newest_map_2d_, {stamp_.value_or(0), map_}));
   });
   if (!options_.draws) return;
   publish_if_due(closures_, [this] {

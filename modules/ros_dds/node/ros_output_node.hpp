@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "modules/core/occupancy_grid.hpp"
 #include "modules/core/stamped_pose.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/objects/map_object.hpp"
@@ -57,7 +58,7 @@ struct RosOutputOptions {
   std::optional<LabelPalette> objects = std::nullopt;
   bool draws = false;  ///< Publish faces of the mesh and closures as markers.
   bool logs = false;   ///< Publish the log of this process.
-  /// Maximum rate of each of the topics `path`, `mesh`, `closures` and `objects`.
+  /// Maximum rate of each of the topics `path`, `mesh`, `map_2d`, `closures` and `objects`.
   double state_bytes_per_s = std::numeric_limits<double>::infinity();
   /// Maximum number of waiting inputs; beyond it the oldest are dropped, so that no node waits for
   /// viewers.
@@ -73,6 +74,9 @@ struct RosOutputOptions {
 ///   /tf                map -> NAME/odom -> NAME/base_link, for every image
 ///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised
 ///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected
+///   /NAME/map_2d       nav_msgs/OccupancyGrid in `map`, whenever it is made
+///   /NAME/distance_slice  sensor_msgs/PointCloud2 in NAME/odom, see DistanceSlice; only with a
+///                      distance field
 ///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: odometry, and what
 ///                      Diagnose returns
 /// and on request:
@@ -106,6 +110,13 @@ class RosOutputNode final : public Node {
   void offer(std::shared_ptr<const LabelledMesh> mesh) { worker_.post(std::move(mesh)); }
   /// Replaces the objects by `objects`, whose frame is `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const ObjectList> objects) { worker_.post(std::move(objects)); }
+  /// Publishes a slice of the distance field: points in the frame NAME/odom. Thread-safe; does not
+  /// wait.
+  void offer_slice(std::shared_ptr<const LabelledMesh> points, Stamp stamp) {
+    worker_.post(Slice{std::move(points), stamp});
+  }
+  /// Replaces the 2D map, whose frame is `map`. Thread-safe; does not wait.
+  void offer(std::shared_ptr<const OccupancyGrid> grid) { worker_.post(std::move(grid)); }
 
   void start() override;
   void stop() noexcept override;
@@ -131,15 +142,21 @@ class RosOutputNode final : public Node {
   struct CoarseMesh {
     std::shared_ptr<const LabelledMesh> mesh;
   };
+  // A slice of the distance field.
+  struct Slice {
+    std::shared_ptr<const LabelledMesh> points;
+    Stamp stamp = 0;
+  };
   using Input =
       std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
                    Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
                    std::shared_ptr<const LabelledMesh>, CoarseMesh, Topic<ObjectList>::Message,
-                   std::shared_ptr<const RosLog>, std::shared_ptr<const RosCompressedImage>>;
+                   std::shared_ptr<const OccupancyGrid>, Slice, std::shared_ptr<const RosLog>,
+                   std::shared_ptr<const RosCompressedImage>>;
   using Image = std::shared_ptr<const StereoFrame>;
   using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
-  // Topic whose message replaces the former one: path, mesh, closures or objects. A changed message
-  // is published at `due_s`, which limits the rate (RosOutputOptions::state_bytes_per_s).
+  // Topic whose message replaces the former one: path, mesh, 2D map, closures or objects. A changed
+  // message is published at `due_s`, which limits the rate (RosOutputOptions::state_bytes_per_s).
   struct LatestTopic {
     std::size_t topic = 0;
     bool changed = false;
@@ -155,6 +172,8 @@ class RosOutputNode final : public Node {
   void step(const std::shared_ptr<const LabelledMesh>& mesh);
   void step(const CoarseMesh& coarse);
   void step(const Topic<ObjectList>::Message& objects);
+  void step(const Slice& slice);
+  void step(const std::shared_ptr<const OccupancyGrid>& grid);
   void step(const std::shared_ptr<const RosLog>& line);
   void step(const std::shared_ptr<const RosCompressedImage>& image);
   void encode(const Image& image);
@@ -179,7 +198,8 @@ class RosOutputNode final : public Node {
   const Diagnose diagnose_;
   const Closures closures_of_;
   std::size_t odometry_ = 0, pose_ = 0, tf_ = 0, diagnostics_ = 0, faces_ = 0, log_ = 0, image_ = 0;
-  LatestTopic path_, mesh_, closures_, objects_;
+  std::optional<std::size_t> slice_;  // opened with the first slice
+  LatestTopic path_, mesh_, map_2d_, closures_, objects_;
   LiveFrames frames_;
   std::size_t poses_ = 0;
   std::optional<Stamp> stamp_;    // stamp of the last image or keyframe
@@ -190,6 +210,7 @@ class RosOutputNode final : public Node {
   Topic<Trajectory>::Message trajectory_ = std::make_shared<const Trajectory>();
   std::shared_ptr<const LabelledMesh> newest_mesh_;
   Topic<ObjectList>::Message newest_objects_;
+  std::shared_ptr<const OccupancyGrid> newest_map_2d_;
   SurfacePieces pieces_;
   TokenBucket piece_bytes_;
   std::vector<PublishedClosure> newest_closures_;

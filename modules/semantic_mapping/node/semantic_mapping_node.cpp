@@ -26,6 +26,7 @@ SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config, co
             step(*frame);
           },
           SemanticMappingConfig::kSection) {
+  if (topics_.space) mapper_.track_space();
   topics_.frames.subscribe([this](const auto& frame) { worker_.post(frame); });
   topics_.superseded.subscribe([this](const auto& superseded) { superseded_.put(superseded); });
 }
@@ -61,7 +62,12 @@ void SemanticMappingNode::step(const DenseFrame& frame) {
   count(frame,
         mapper_.integrate(*frame.depth, frame.labels.get(), frame.T_odom_cam, frame.keyframe));
   // The mesh is updated once for each keyframe, so that a vertex gets the first one that saw it.
-  if (meshed_ != frame.keyframe) mapper_.update_mesh();
+  if (meshed_ != frame.keyframe) {
+    mapper_.update_mesh();
+    if (topics_.space)
+      topics_.space->publish(SpaceUpdate{frame.stamp, frame.T_odom_cam.translation().z(),
+                                         mapper_.take_space_changes()});
+  }
   meshed_ = frame.keyframe;
   if (!published_) published_ = frame.stamp;
   if (seconds_between(*published_, frame.stamp) >= mesh_interval_s_) {

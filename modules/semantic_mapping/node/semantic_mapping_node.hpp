@@ -23,6 +23,7 @@ struct SemanticMappingTopics {
                                      ///< newest message counts.
   Out<MapMesh> maps;                 ///< The whole map.
   Out<MappingProgress> progress;     ///< With every frame.
+  std::optional<Out<SpaceUpdate>> space = {};  ///< With every keyframe, if there is a reader.
 };
 
 /// Builds a robot's map as a thread with one SemanticMapper. The mesh is published every few

@@ -29,6 +29,8 @@ class TeamMapNode final : public Node {
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
+  [[nodiscard]] const LabelPalette& palette() const { return palette_; }
+
   /// Fuses all chunks so far and colours the mesh; takes seconds for a large map.
   /// Thread-safe.
   [[nodiscard]] TeamMap fuse() const;

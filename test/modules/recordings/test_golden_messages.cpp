@@ -107,6 +107,16 @@ RosPath path() {
   return path;
 }
 
+RosOccupancyGrid occupancy() {
+  return {.header = header("map"),
+          .map_load_time = 1700000001123456789,
+          .resolution = 0.25F,
+          .width = 3,
+          .height = 1,
+          .origin = Doubles{}.pose(),
+          .data = {255, 0, 100}};
+}
+
 RosTransforms transforms() {
   Doubles doubles;
   RosTransforms message;
@@ -188,7 +198,7 @@ RosImage image(bool is_empty) {
 TEST_CASE("Messages are to the byte those of another CDR library, in both directions",
           "[recordings]") {
   const std::vector<Golden> golden = goldens();
-  REQUIRE(golden.size() == 18);
+  REQUIRE(golden.size() == 19);
   std::size_t next = 0;
   const auto check = [&]<typename Message>(const Message& message) {
     const Golden& known = golden[next++];
@@ -224,6 +234,7 @@ TEST_CASE("Messages are to the byte those of another CDR library, in both direct
   Doubles doubles;
   check(marker(doubles, "mesh", 3));
   check(markers());
+  check(occupancy());
   check(RosLog{1700000001123456789, RosLog::kWarn, "vio", "slow", "", "f", 7});
 }
 

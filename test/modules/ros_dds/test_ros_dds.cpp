@@ -106,6 +106,10 @@ TEST_CASE("Every known type can be sent and received", "[ros_dds]") {
   odometry.child_frame = "body";
   crosses(odometry);
   crosses(RosPath{{7, "map"}, {{{8, "map"}, {}}, {{9, "map"}, {}}}});
+  RosOccupancyGrid grid;
+  grid.width = 3;
+  grid.data = {255, 0, 100};
+  crosses(grid);
   RosPointCloud cloud;
   cloud.fields = {{"x", 0, RosPointCloud::kFloat32, 1}};
   cloud.data = {1, 2, 3, 4};

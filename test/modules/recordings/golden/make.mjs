@@ -107,6 +107,11 @@ const messages = [
       { level: 0, name: "b", message: "", hardware_id: "", values: [] }] })],
   ["visualization_msgs/Marker", () => marker("mesh", 3)],
   ["visualization_msgs/MarkerArray", () => ({ markers: [marker("kept", 0), marker("a", 2)] })],
+  ["nav_msgs/OccupancyGrid", () => ({
+    header: header("map"),
+    info: { map_load_time: { sec: 1700000001, nanosec: 123456789 }, resolution: 0.25, width: 3,
+            height: 1, origin: pose() },
+    data: Int8Array.from([-1, 0, 100]) })],
   ["rcl_interfaces/Log", () => ({
     stamp: { sec: 1700000001, nanosec: 123456789 }, level: 30, name: "vio", msg: "slow",
     file: "", function: "f", line: 7 })],

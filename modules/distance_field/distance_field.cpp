@@ -1,0 +1,287 @@
+#include "modules/distance_field/distance_field.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string>
+#include <tuple>
+
+namespace km {
+namespace {
+
+constexpr int kMaxReach = 100;   // its square is below kBeyondReach
+constexpr int kPartBlocks = 12;  // regions with longer sides are divided
+constexpr std::uint64_t kColumnX0 = 0x0101010101010101, kColumnX7 = kColumnX0 << 7U;
+
+bool less(const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
+  return std::tie(a.z(), a.y(), a.x()) < std::tie(b.z(), b.y(), b.x());
+}
+
+void sort_unique(std::vector<Eigen::Vector3i>& positions) {
+  std::ranges::sort(positions, less);
+  positions.erase(std::unique(positions.begin(), positions.end()), positions.end());
+}
+
+bool any(const BlockBits& bits) {
+  return std::ranges::any_of(bits, [](std::uint64_t word) { return word != 0; });
+}
+
+bool bit(const BlockBits& bits, int x, int y, int z) {
+  return (bits[static_cast<std::size_t>(z)] >> (x + kBlockSide * y) & 1U) != 0;
+}
+
+double checked_voxel(double voxel_m, double max_m) {
+  if (!(voxel_m > 0.0) || max_m > kMaxReach * voxel_m)
+    throw ConfigError("distance_field.max_distance_m: " + shortest_text(max_m) + " exceeds " +
+                      std::to_string(kMaxReach) + " voxels of " + shortest_text(voxel_m) +
+                      " m; reduce it or raise semantic_mapping.voxel_size_m");
+  return voxel_m;
+}
+
+// Squared distance between the nearest voxels of two blocks.
+int gap_squared(const Eigen::Vector3i& between) {
+  return between.unaryExpr([](int d) { return d == 0 ? 0 : (std::abs(d) - 1) * kBlockSide + 1; })
+      .squaredNorm();
+}
+
+}  // namespace
+
+std::size_t DistanceField::PositionHash::operator()(
+    const Eigen::Vector3i& position) const noexcept {
+  const auto mix = [](int value, std::uint64_t prime) {
+    return static_cast<std::uint64_t>(static_cast<std::uint32_t>(value)) * prime;
+  };
+  return mix(position.x(), 0x9E3779B97F4A7C15) ^ mix(position.y(), 0xC2B2AE3D27D4EB4F) ^
+         mix(position.z(), 0x165667B19E3779F9);
+}
+
+DistanceField::DistanceField(const DistanceFieldConfig& config, double voxel_size_m)
+    : voxel_m_(checked_voxel(voxel_size_m, checked(config).max_distance_m)),
+      max_m_(config.max_distance_m),
+      reach_(static_cast<int>(std::ceil(max_m_ / voxel_m_)) + 1),
+      reach_blocks_((reach_ + kBlockSide - 1) / kBlockSide) {}
+
+const DistanceField::Block* DistanceField::find(const Eigen::Vector3i& position) const {
+  const auto found = blocks_.find(position);
+  return found == blocks_.end() ? nullptr : found->second.get();
+}
+
+void DistanceField::set(const SpaceChanges& changes) {
+  for (const BlockSpace& change : changes) {
+    touched_.push_back(change.position);
+    if (!any(change.observed)) {
+      const auto found = blocks_.find(change.position);
+      if (found == blocks_.end()) continue;
+      if (any(found->second->surface)) lost_surface_.push_back(change.position);
+      blocks_.erase(found);
+      continue;
+    }
+    auto& block = blocks_[change.position];
+    if (block == nullptr) {
+      block = std::make_unique<Block>();
+      new_blocks_.push_back(change.position);
+    }
+    block->observed = change.observed;
+    for (std::size_t z = 0; z < change.inside.size(); ++z)
+      block->inside[z] = change.inside[z] & change.observed[z];
+  }
+}
+
+// Voxels behind a surface beside an observed voxel in front of it, by shifted copies of the bits.
+BlockBits DistanceField::surface_of(const Eigen::Vector3i& position, const Block& block) const {
+  const auto front = [](const Block* other, int z) {
+    return other == nullptr ? 0
+                            : other->observed[static_cast<std::size_t>(z)] &
+                                  ~other->inside[static_cast<std::size_t>(z)];
+  };
+  const auto beside = [&](int axis, int step) {
+    Eigen::Vector3i next = position;
+    next[axis] += step;
+    return find(next);
+  };
+  const std::array<const Block*, 6> around = {beside(0, -1), beside(0, 1),  beside(1, -1),
+                                              beside(1, 1),  beside(2, -1), beside(2, 1)};
+  BlockBits surface = {};
+  for (int z = 0; z < kBlockSide; ++z) {
+    const std::uint64_t own = front(&block, z);
+    const std::uint64_t near =
+        ((own & ~kColumnX7) << 1U) | ((front(around[0], z) & kColumnX7) >> 7U) |
+        ((own & ~kColumnX0) >> 1U) | ((front(around[1], z) & kColumnX0) << 7U) | (own << 8U) |
+        (front(around[2], z) >> 56U) | (own >> 8U) | (front(around[3], z) << 56U) |
+        (z > 0 ? front(&block, z - 1) : front(around[4], kBlockSide - 1)) |
+        (z < kBlockSide - 1 ? front(&block, z + 1) : front(around[5], 0));
+    surface[static_cast<std::size_t>(z)] = block.inside[static_cast<std::size_t>(z)] & near;
+  }
+  return surface;
+}
+
+// Derives the surface voxels of touched blocks and those beside them. Returns the blocks in which
+// they have changed.
+std::vector<Eigen::Vector3i> DistanceField::find_changed_surface() {
+  std::vector<Eigen::Vector3i> candidates;
+  for (const Eigen::Vector3i& position : touched_) {
+    candidates.push_back(position);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int step : {-1, 1}) {
+        candidates.push_back(position);
+        candidates.back()[axis] += step;
+      }
+  }
+  sort_unique(candidates);
+  std::vector<Eigen::Vector3i> changed = std::move(lost_surface_);
+  lost_surface_.clear();
+  for (const Eigen::Vector3i& position : candidates) {
+    const auto found = blocks_.find(position);
+    if (found == blocks_.end()) continue;
+    const BlockBits surface = surface_of(position, *found->second);
+    if (surface == found->second->surface) continue;
+    found->second->surface = surface;
+    changed.push_back(position);
+  }
+  sort_unique(changed);
+  return changed;
+}
+
+DistanceUpdate DistanceField::update() {
+  DistanceUpdate report;
+  const std::vector<Eigen::Vector3i> changed = find_changed_surface();
+  report.changed_blocks = changed.size();
+  // A new block needs distances, too, and so do the blocks within reach of changed surface. Changed
+  // surface that is farther than the largest distance in a block was and is the nearest nowhere.
+  std::vector<Eigen::Vector3i> targets;
+  for (const Eigen::Vector3i& position : new_blocks_)
+    if (find(position) != nullptr) targets.push_back(position);
+  for (const Eigen::Vector3i& position : changed)
+    for (int z = -reach_blocks_; z <= reach_blocks_; ++z)
+      for (int y = -reach_blocks_; y <= reach_blocks_; ++y)
+        for (int x = -reach_blocks_; x <= reach_blocks_; ++x)
+          if (const Block* block = find(position + Eigen::Vector3i(x, y, z));
+              block != nullptr && block->largest >= gap_squared({x, y, z}))
+            targets.push_back(position + Eigen::Vector3i(x, y, z));
+  touched_.clear();
+  new_blocks_.clear();
+  sort_unique(targets);
+  report.computed_blocks = targets.size();
+  if (targets.empty()) return report;
+  Box box{targets.front(), targets.front()};
+  for (const Eigen::Vector3i& target : targets)
+    box = {box.low.cwiseMin(target), box.high.cwiseMax(target)};
+  compute_parts({box.low, box.high.array() + 1}, std::move(targets));
+  return report;
+}
+
+// Divides long regions, so that little time and memory goes to the space between distant targets.
+void DistanceField::compute_parts(const Box& box, std::vector<Eigen::Vector3i> targets) {
+  if (targets.empty()) return;
+  const Eigen::Vector3i side = box.high - box.low;
+  Eigen::Index axis = 0;
+  if (side.maxCoeff(&axis) <= kPartBlocks) return compute(box, targets);
+  const int middle = (box.low[axis] + box.high[axis]) / 2;
+  const auto split =
+      std::stable_partition(targets.begin(), targets.end(),
+                            [&](const Eigen::Vector3i& target) { return target[axis] < middle; });
+  Box low = box, high = box;
+  low.high[axis] = high.low[axis] = middle;
+  compute_parts(high, {split, targets.end()});
+  targets.erase(split, targets.end());
+  compute_parts(low, std::move(targets));
+}
+
+// The surface within reach of `box`.
+SurfaceBox DistanceField::surface_near(const Box& box) const {
+  std::vector<std::pair<Eigen::Vector3i, const Block*>> found;
+  Eigen::Vector3i low = box.high, high = box.low;
+  for (const auto& [position, block] : blocks_) {
+    const auto at = position.array();
+    if (!any(block->surface) || (at < box.low.array() - reach_blocks_).any() ||
+        (at >= box.high.array() + reach_blocks_).any())
+      continue;
+    low = found.empty() ? position : low.cwiseMin(position);
+    high = found.empty() ? position : high.cwiseMax(position);
+    found.emplace_back(position, block.get());
+  }
+  if (found.empty()) return {};
+  const Eigen::Vector3i blocks = high - low + Eigen::Vector3i::Ones();
+  SurfaceBox surface{low, blocks, std::vector<BlockBits>(static_cast<std::size_t>(blocks.prod()))};
+  for (const auto& [position, block] : found) {
+    const Eigen::Vector3i at = position - low;
+    surface
+        .surface[static_cast<std::size_t>(at.x() + blocks.x() * (at.y() + blocks.y() * at.z()))] =
+        block->surface;
+  }
+  return surface;
+}
+
+void DistanceField::compute(const Box& box, const std::vector<Eigen::Vector3i>& positions) {
+  std::vector<DistanceTarget> targets;
+  for (const Eigen::Vector3i& position : positions)
+    targets.push_back({position, &blocks_.at(position)->squared});
+  find_surface_distances(surface_near(box), reach_, targets);
+  for (const Eigen::Vector3i& position : positions) {
+    Block& block = *blocks_.at(position);
+    block.largest = *std::ranges::max_element(block.squared);
+  }
+}
+
+double DistanceField::signed_distance(const Block& block, int x, int y, int z) const {
+  const std::uint16_t squared = block.squared[voxel_index(x, y, z)];
+  const bool is_inside = bit(block.inside, x, y, z);
+  if (squared == kBeyondReach) return is_inside ? -max_m_ : max_m_;
+  const double d = std::sqrt(static_cast<double>(squared));
+  return std::clamp((is_inside ? -(d + 0.5) : d - 0.5) * voxel_m_, -max_m_, max_m_);
+}
+
+std::optional<double> DistanceField::at_voxel(const Eigen::Vector3i& voxel) const {
+  const Eigen::Vector3i position = voxel.unaryExpr([](int v) { return v >> 3; });
+  const Block* block = find(position);
+  if (block == nullptr) return std::nullopt;
+  const Eigen::Vector3i in = voxel - position * kBlockSide;
+  if (!bit(block->observed, in.x(), in.y(), in.z())) return std::nullopt;
+  return signed_distance(*block, in.x(), in.y(), in.z());
+}
+
+std::optional<PointDistance> DistanceField::at(const Eigen::Vector3d& point) const {
+  const Eigen::Vector3d scaled = point / voxel_m_;
+  constexpr double kFarthest = BlockMap::kReach * static_cast<double>(kBlockSide);
+  if (!(scaled.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
+  const Eigen::Vector3d low = scaled.array().floor();
+  const Eigen::Vector3d t = scaled - low;
+  PointDistance result;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3i offset(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
+    const auto distance = at_voxel(low.cast<int>() + offset);
+    if (!distance) return std::nullopt;
+    // Weight of the corner along each axis, and its derivative.
+    Eigen::Vector3d weight, slope;
+    for (int k = 0; k < 3; ++k) {
+      weight[k] = offset[k] == 1 ? t[k] : 1.0 - t[k];
+      slope[k] = (offset[k] == 1 ? 1.0 : -1.0) / voxel_m_;
+    }
+    result.distance_m += weight.prod() * *distance;
+    result.gradient += *distance * Eigen::Vector3d(slope.x() * weight.y() * weight.z(),
+                                                   weight.x() * slope.y() * weight.z(),
+                                                   weight.x() * weight.y() * slope.z());
+  }
+  return result;
+}
+
+std::vector<DistanceField::SlicePoint> DistanceField::slice(double z_m) const {
+  const int voxel_z = static_cast<int>(std::lround(z_m / voxel_m_));
+  std::vector<Eigen::Vector3i> positions;
+  for (const auto& entry : blocks_)
+    if (entry.first.z() == voxel_z >> 3) positions.push_back(entry.first);
+  std::ranges::sort(positions, less);
+  std::vector<SlicePoint> points;
+  for (const Eigen::Vector3i& position : positions)
+    for (int y = 0; y < kBlockSide; ++y)
+      for (int x = 0; x < kBlockSide; ++x) {
+        Eigen::Vector3i voxel = position * kBlockSide + Eigen::Vector3i(x, y, 0);
+        voxel.z() = voxel_z;
+        if (const auto distance = at_voxel(voxel))
+          points.push_back(
+              {voxel.cast<float>() * static_cast<float>(voxel_m_), static_cast<float>(*distance)});
+      }
+  return points;
+}
+
+}  // namespace km

@@ -1,0 +1,115 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "modules/core/ids.hpp"
+#include "modules/distance_field/distance_field_config.hpp"
+#include "modules/distance_field/surface_distances.hpp"
+#include "modules/semantic_mapping/block_map.hpp"
+#include "modules/semantic_mapping/space_changes.hpp"
+
+namespace km {
+
+/// Distance at a point, see DistanceField::at().
+struct PointDistance {
+  /// Signed distance to the nearest surface [m], negative behind it. At most max_distance_m, which
+  /// stands for this distance or more.
+  double distance_m = 0.0;
+  /// Derivative of the distance with respect to the point; zero where it has its maximum.
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+};
+
+/// Result of DistanceField::update().
+struct [[nodiscard]] DistanceUpdate {
+  std::size_t changed_blocks = 0;   ///< Blocks with changed surface voxels.
+  std::size_t computed_blocks = 0;  ///< Blocks whose distances were computed again.
+};
+
+/// Euclidean signed distances to the nearest surface, on the voxels of the mapper's TSDF.
+///
+/// Surface voxels are voxels behind a surface with an observed voxel in front of it beside them
+/// along an axis. Let d be the distance of a voxel to the nearest surface voxel [voxels]. The
+/// signed distance is d - 1/2 in front of the surface and -(d + 1/2) behind it, because the surface
+/// lies between two voxels. Distances are known in observed voxels only, but surface voxels count
+/// from anywhere. In the map d is exact, so that the field differs from the true distance to the
+/// surface of the TSDF by less than half a voxel along an axis.
+///
+/// Incremental as Voxblox (Oleynikova et al., "Voxblox: Incremental 3D Euclidean Signed Distance
+/// Fields for On-Board MAV Planning", 2017, Sec. IV): only blocks within max_distance of a changed
+/// surface voxel are computed again, and of them only those with a distance that may change.
+/// Voxblox and FIESTA (Han et al., 2019) propagate distances from voxel to voxel in a queue. Here
+/// whole blocks are computed exactly, see find_surface_distances(). So the result equals that of a
+/// computation from scratch, bit by bit, and no voxel stores its nearest obstacle.
+///
+/// Memory: 1.2 kB per observed block of 8^3 voxels. Not thread-safe.
+class DistanceField {
+ public:
+  /// Throws ConfigError if `config` is out of bounds, or for more than 100 voxels in
+  /// max_distance_m.
+  DistanceField(const DistanceFieldConfig& config, double voxel_size_m);
+
+  /// Replaces what is known of these blocks. Distances follow with the next update().
+  void set(const SpaceChanges& changes);
+
+  /// Computes the distances affected by set() since the last call.
+  DistanceUpdate update();
+
+  /// Distance and gradient at a point of the map's frame, by trilinear interpolation of the eight
+  /// voxels around it. nullopt if one of them was never observed: the distance is unknown.
+  [[nodiscard]] std::optional<PointDistance> at(const Eigen::Vector3d& point) const;
+
+  /// Signed distance of a voxel [m], as of the last update(); nullopt if it was never observed.
+  [[nodiscard]] std::optional<double> at_voxel(const Eigen::Vector3i& voxel) const;
+
+  /// Centres of the observed voxels nearest to the height `z_m`, with their distances: a slice for
+  /// viewers. In the order of their positions.
+  struct SlicePoint {
+    Eigen::Vector3f point;
+    float distance_m;
+  };
+  [[nodiscard]] std::vector<SlicePoint> slice(double z_m) const;
+
+  [[nodiscard]] std::size_t blocks() const { return blocks_.size(); }
+  [[nodiscard]] double voxel_size_m() const { return voxel_m_; }
+  [[nodiscard]] double max_distance_m() const { return max_m_; }
+
+ private:
+  struct Block {
+    BlockBits observed = {}, inside = {};
+    BlockBits surface = {};  // surface voxels, derived from the other two
+    SquaredDistances squared;
+    std::uint16_t largest = kBeyondReach;  // The largest of `squared`.
+
+    Block() { squared.fill(kBeyondReach); }
+  };
+  struct PositionHash {
+    std::size_t operator()(const Eigen::Vector3i& position) const noexcept;
+  };
+  // Blocks from `low` to before `high`.
+  struct Box {
+    Eigen::Vector3i low, high;
+  };
+
+  [[nodiscard]] const Block* find(const Eigen::Vector3i& position) const;
+  [[nodiscard]] BlockBits surface_of(const Eigen::Vector3i& position, const Block& block) const;
+  std::vector<Eigen::Vector3i> find_changed_surface();
+  [[nodiscard]] SurfaceBox surface_near(const Box& box) const;
+  void compute(const Box& box, const std::vector<Eigen::Vector3i>& positions);
+  void compute_parts(const Box& box, std::vector<Eigen::Vector3i> targets);
+  [[nodiscard]] double signed_distance(const Block& block, int x, int y, int z) const;
+
+  const double voxel_m_, max_m_;
+  const int reach_;         // max_distance in voxels, rounded up
+  const int reach_blocks_;  // and in blocks
+  std::unordered_map<Eigen::Vector3i, std::unique_ptr<Block>, PositionHash> blocks_;
+  // By set() since the last update(): all blocks, new ones, and erased ones with surface voxels.
+  std::vector<Eigen::Vector3i> touched_, new_blocks_, lost_surface_;
+};
+
+}  // namespace km

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <exception>
+#include <memory>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "modules/core/dense_frame.hpp"
+#include "modules/core/label_palette.hpp"
+#include "modules/core/occupancy_grid.hpp"
+#include "modules/map_2d/map_2d.hpp"
+#include "modules/map_2d/map_2d_config.hpp"
+#include "modules/map_2d/view_rays.hpp"
+#include "modules/mesh/labelled_mesh.hpp"
+#include "runtime/latest.hpp"
+#include "runtime/metrics.hpp"
+#include "runtime/node.hpp"
+#include "runtime/topic.hpp"
+#include "runtime/worker.hpp"
+
+namespace km {
+
+/// A corrected mesh, and the motion of its keyframes from odometry to it.
+struct CorrectedSurface {
+  std::shared_ptr<const LabelledMesh> mesh;  ///< In `world`.
+  std::vector<SE3> T_world_odom;             ///< See Map2dInput.
+};
+
+/// Channels of the node of the 2D map; they must outlive it.
+struct Map2dTopics {
+  In<DenseFrame> frames;
+  Out<OccupancyGrid> maps;  ///< In `world`.
+};
+
+/// Makes the 2D map of a robot's whole run from its corrected mesh and the rays of its images.
+///
+/// The mesh and the rays are kept in 3D, and each map is made from scratch. So a map agrees with
+/// the poses of its mesh, also after loop closures. At most kViews images are kept:
+/// at that number every second one is dropped.
+class Map2dNode final : public Node {
+ public:
+  static constexpr std::size_t kViews = 4096;
+
+  /// `thinner` is used on the thread that publishes the frames. Throws ConfigError if `config` is
+  /// out of bounds.
+  Map2dNode(const Map2dConfig& config, const LabelPalette& palette, RayThinner thinner,
+            const Map2dTopics& topics);
+  ~Map2dNode() override { stop(); }
+
+  std::string_view name() const override { return Map2dConfig::kSection; }
+  void start() override { worker_.start(); }
+  /// Publishes the map of the last mesh and all images.
+  void stop() noexcept override;
+  std::exception_ptr error() const override { return worker_.error(); }
+  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  /// Large, because the time of a map is proportional to the size of the mesh.
+  double step_limit_s() const override { return 120.0; }
+
+  /// Durations of making maps.
+  DurationHistogram timing() const override { return timing_.histogram(); }
+
+  /// Replaces the mesh. Thread-safe; does not wait for a map.
+  void offer(CorrectedSurface surface);
+
+ private:
+  using News = std::shared_ptr<const struct Map2dNewsTag>;  // the mesh has changed; always null
+  using Views = std::shared_ptr<const ViewRays>;
+
+  void step(const Views& views);
+  bool take_surface();
+  void make_map();
+
+  const Map2dConfig config_;
+  const LabelPalette palette_;
+  const Out<OccupancyGrid> maps_;
+  RayThinner thinner_;
+  std::vector<ViewRays> views_;
+  double next_s_ = 0.0;         // time of the next map, by the steady clock
+  bool has_new_views_ = false;  // since the last map
+  bool stopped_ = false;
+  Timing timing_;
+  std::shared_ptr<const CorrectedSurface> surface_;
+  Latest<CorrectedSurface> newest_surface_;
+  Worker<std::variant<News, Views>> worker_;  // last member: stops first
+};
+
+}  // namespace km

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "modules/core/geometry.hpp"
+#include "modules/semantic_mapping/block_fusion.hpp"
+#include "modules/semantic_mapping/block_map.hpp"
+#include "modules/semantic_mapping/depth_view.hpp"
+#include "modules/semantic_mapping/semantic_mapping_config.hpp"
+#include "modules/semantic_mapping/space_changes.hpp"
+
+namespace km {
+
+/// Follows what a mapper knows of the space in its window. A map has blocks only near surface. This
+/// class also keeps which voxels of other blocks were seen free, within kFreeRange_m of the camera.
+class SpaceTracker {
+ public:
+  static constexpr double kFreeRange_m = 5.0;
+
+  explicit SpaceTracker(const SemanticMappingConfig& config) : config_(config) {}
+
+  /// The block of the map has changed.
+  void note(const Eigen::Vector3i& position) { changed_.insert(key_of(position)); }
+
+  /// The block was erased from the map because it is empty: its voxels are free.
+  void note_empty(const Eigen::Vector3i& position, double way_m);
+
+  /// The block was erased from the map because it has left the window.
+  void note_left(const Eigen::Vector3i& position);
+
+  /// Finds voxels outside the blocks of the map that a view shows as free. Free blocks that were
+  /// not seen for window_m are removed. `way_m`: distance travelled by the camera.
+  void see_free(const DepthView& view, const BlockFusion& fusion, const SE3& T_odom_cam,
+                const BlockMap& map, double way_m);
+
+  /// The changes since the last call, in the order of their positions.
+  [[nodiscard]] SpaceChanges take(const BlockMap& map);
+
+ private:
+  using Key = std::uint64_t;
+  struct FreeBlock {
+    BlockBits observed = {};
+    double last_seen_m = 0.0;
+  };
+
+  [[nodiscard]] static Key key_of(const Eigen::Vector3i& position);
+  [[nodiscard]] static Eigen::Vector3i position_of(Key key);
+  [[nodiscard]] BlockSpace space_of(const VoxelBlock& block) const;
+  void add_free(const BlockFusion& fusion, double way_m);
+
+  SemanticMappingConfig config_;
+  std::unordered_map<Key, FreeBlock> free_;
+  std::unordered_set<Key> changed_;
+  VoxelBlock scratch_;
+};
+
+}  // namespace km
