@@ -24,7 +24,7 @@ template <typename T, typename Accepted>
 [[nodiscard]] std::string yaml_text(const std::string& value, AnyValue accepted);
 template <typename Accepted>
 [[nodiscard]] std::string yaml_text(const std::filesystem::path& value, const Accepted&) {
-  return value.empty() ? "" : yaml_text(value.string(), AnyValue{});
+  return yaml_text(value.string(), AnyValue{});
 }
 template <typename T, typename Accepted>
 [[nodiscard]] std::string yaml_text(const std::optional<T>& value, const Accepted& accepted) {
