@@ -12,6 +12,6 @@ constexpr const char* kAbout =
 int main(int argc, char** argv) {
   return km::run_subcommands("kimera_multi_evaluate", kAbout,
                              {km::add_trajectory, km::add_consistency, km::add_closures,
-                              km::add_images, km::add_mesh, km::add_render},
+                              km::add_images, km::add_mesh, km::add_copies, km::add_render},
                              argc, argv);
 }

@@ -44,6 +44,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"semantic_mapping", {"mesh"}},
     {"team_map", {"mesh", "semantic_mapping"}},
     {"mesh_deformation", {"mesh"}},
+    {"surface_ties", {"mesh"}},
     {"view", {"images", "mesh"}},
 };
 
