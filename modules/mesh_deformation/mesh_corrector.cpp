@@ -23,8 +23,9 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   if (largest_difference(anchors_, motion.T_after_before, T_result_optimized_, scale_) <= 1.0)
     return std::nullopt;
   T_result_optimized_ = motion.T_after_before;
-  MeshCorrection result{optimized_, report_, false, {}, 0};
+  MeshCorrection result{optimized_, report_, false, {}, 0, {keyframe_of_vertex_, anchors_}};
   result.mesh.transform(T_result_optimized_);
+  for (SE3& pose : result.origin.T_world_kf) pose = T_result_optimized_ * pose;
   return result;
 }
 
@@ -53,10 +54,14 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   map_version_ = input.map_version;
   anchors_ = std::move(anchors);
   optimized_ = without_superseded(deformed.mesh, replacements);
+  keyframe_of_vertex_.clear();
+  for (const auto& [first, last] : input.map.seen_by)
+    keyframe_of_vertex_.push_back(first + (last - first) / 2);
+  keep_elements(keyframe_of_vertex_, remaining_vertices(deformed.mesh, replacements));
   report_ = deformed.report;
   T_result_optimized_ = SE3::Identity();
   return {optimized_, report_, true, named(replacements, input.map.ids),
-          deformed.mesh.faces.size() - optimized_.faces.size()};
+          deformed.mesh.faces.size() - optimized_.faces.size(), {keyframe_of_vertex_, anchors_}};
 }
 
 }  // namespace km

@@ -9,6 +9,7 @@
 #include "modules/core/ids.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh/mesh_origin.hpp"
 #include "modules/mesh_deformation/keyframe_motion.hpp"
 #include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
@@ -30,6 +31,7 @@ struct [[nodiscard]] MeshCorrection {
   bool deformed = true;
   SupersededSurface superseded;      ///< Superseded surface of the map; empty unless deformed.
   std::size_t superseded_faces = 0;  ///< Number of faces of the map that `mesh` lacks.
+  MeshOrigin origin = {};            ///< Keyframes that saw `mesh`.
 };
 
 /// Keeps a mesh consistent with map and trajectory at the lowest cost. While the map is unchanged,
@@ -67,6 +69,7 @@ class MeshCorrector {
   std::optional<std::uint64_t> map_version_;
   std::vector<SE3> anchors_;  // complete() of the trajectory
   LabelledMesh optimized_;
+  std::vector<KeyframeIndex> keyframe_of_vertex_;  // of optimized_
   MeshDeformationReport report_;
   SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };
@@ -82,6 +85,7 @@ struct OptimizedMesh {
   double seconds = 0.0;  ///< Duration of the correction.
   /// Faces of the map that are missing because another visit saw them better.
   std::size_t superseded_faces = 0;
+  MeshOrigin origin = {};  ///< Keyframes that saw the mesh.
 };
 
 }  // namespace km

@@ -185,17 +185,23 @@ std::vector<std::uint32_t> find_replacements(const LabelledMesh& mesh, const Sur
   return ReplacementSearch(mesh, views, same).run();
 }
 
+std::vector<std::uint32_t> remaining_vertices(const LabelledMesh& mesh,
+                                              std::span<const std::uint32_t> replacements) {
+  std::vector<bool> used(mesh.vertices.size(), false);
+  for (const auto& face : mesh.faces)
+    if (!is_superseded(face, replacements))
+      for (const std::uint32_t v : face) used[v] = true;
+  std::vector<std::uint32_t> kept;
+  for (std::uint32_t v = 0; v < used.size(); ++v)
+    if (used[v] || replacements[v] == kNoIndex) kept.push_back(v);
+  return kept;
+}
+
 LabelledMesh without_superseded(const LabelledMesh& mesh,
                                 std::span<const std::uint32_t> replacements) {
   LabelledMesh result = mesh;
   std::erase_if(result.faces, [&](const auto& face) { return is_superseded(face, replacements); });
-  std::vector<bool> used(mesh.vertices.size(), false);
-  for (const auto& face : result.faces)
-    for (const std::uint32_t v : face) used[v] = true;
-  std::vector<std::uint32_t> kept;
-  for (std::uint32_t v = 0; v < used.size(); ++v)
-    if (used[v] || replacements[v] == kNoIndex) kept.push_back(v);
-  result.keep_vertices(kept);
+  result.keep_vertices(remaining_vertices(mesh, replacements));
   return result;
 }
 

@@ -52,6 +52,10 @@ struct SurfaceViews {
          replacements[face[2]] != kNoIndex;
 }
 
+/// Vertices that without_superseded() keeps, ascending.
+[[nodiscard]] std::vector<std::uint32_t> remaining_vertices(
+    const LabelledMesh& mesh, std::span<const std::uint32_t> replacements);
+
 /// The mesh without its superseded faces and without vertices that had no other faces; the order is
 /// kept.
 [[nodiscard]] LabelledMesh without_superseded(const LabelledMesh& mesh,

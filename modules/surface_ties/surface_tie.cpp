@@ -17,7 +17,7 @@ namespace {
 constexpr double kLeastCosine = 0.5;       // between the normals of a pair: 60 degrees
 constexpr std::size_t kNeighbours = 8;     // candidates for the partner of a sample
 constexpr std::size_t kLeastPairs = 60;    // 1.35 m^2 at the default spacing
-constexpr double kLeastFitting = 0.7;      // share of the common samples
+constexpr double kLeastFitting = 0.6;      // share of the common samples
 constexpr double kShrink = 0.8;            // factor on the gate from one iteration to the next
 constexpr double kGate_sigmas = 3.0;       // final gate
 constexpr double kPerMad = 1.4826;         // standard deviation over median absolute residual

@@ -18,7 +18,7 @@ struct SurfaceTieOptions {
   /// Smallest standard deviation of that distance, whatever the residuals are.
   double min_noise_m = 0.005;
   /// Length along a surface over which its errors are equal.
-  double correlation_m = 0.5;
+  double correlation_m = 1.5;
   /// Standard deviation of an offset along the normals that all samples share, for example by a
   /// bias of depth.
   double bias_m = 0.005;

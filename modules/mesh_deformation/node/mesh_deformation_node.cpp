@@ -151,7 +151,8 @@ void MeshDeformationNode::correct() {
                        correction->report,
                        correction->deformed,
                        end_s - start_s,
-                       correction->superseded_faces};
+                       correction->superseded_faces,
+                       std::move(correction->origin)};
   if (!correction->superseded.vertices.empty())
     superseded_.publish(std::move(correction->superseded));
   report(result);

@@ -10,28 +10,10 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/surface_ties/surface_tie.hpp"
-#include "test/modules/evaluation/mesh/shapes.hpp"
+#include "test/modules/surface_ties/rooms.hpp"
 
 namespace km {
 namespace {
-
-constexpr float kFace_m = 0.06F;  // side of the faces of all meshes
-
-LabelledMesh wall(const Eigen::Vector3f& corner, const Eigen::Vector3f& u, const Eigen::Vector3f& v,
-                  LabelId label) {
-  const int cells = static_cast<int>(std::max(u.norm(), v.norm()) / kFace_m);
-  return rectangle(corner, u, v, cells, label);
-}
-
-// Floor and four walls of a room, seen from inside; `x_m` is its length.
-LabelledMesh inside_of_room(float x_m = 4.0F) {
-  LabelledMesh mesh = wall({0, 0, 0}, {x_m, 0, 0}, {0, 3, 0}, 1);
-  mesh.append(wall({0, 0, 0}, {0, 3, 0}, {0, 0, 2}, 2));
-  mesh.append(wall({x_m, 0, 0}, {0, 0, 2}, {0, 3, 0}, 3));
-  mesh.append(wall({0, 0, 0}, {0, 0, 2}, {x_m, 0, 0}, 4));
-  mesh.append(wall({0, 3, 0}, {x_m, 0, 0}, {0, 0, 2}, 5));
-  return mesh;
-}
 
 // Floor and two walls along x.
 LabelledMesh corridor() {
@@ -118,7 +100,8 @@ TEST_CASE("Two robots 5 cm and 1 degree apart in one room are tied to 5 mm", "[s
 TEST_CASE("The covariance of a tie is as large as its error", "[surface_tie]") {
   constexpr int kRuns = 40;
   SurfaceTieOptions options;
-  options.bias_m = 1e-6;  // the meshes have none
+  options.correlation_m = 0.5;  // length of the patches of add_noise()
+  options.bias_m = 1e-6;        // the meshes have none
   double sum = 0.0;
   for (unsigned seed = 0; seed < kRuns; ++seed) {
     std::mt19937 random(seed);
