@@ -22,7 +22,8 @@ struct CopiesCommand {
 };
 
 void run(const CopiesCommand& command) {
-  if (command.meshes.size() < 2) throw std::invalid_argument("give the meshes of two robots or more");
+  if (command.meshes.size() < 2)
+    throw std::invalid_argument("give the meshes of two robots or more");
   std::deque<LabelledMesh> meshes;
   for (const auto& file : command.meshes) meshes.push_back(read_mesh(file));
   std::vector<std::vector<std::string>> rows = {
@@ -40,9 +41,12 @@ void run(const CopiesCommand& command) {
 
 constexpr const char* kCopiesDetails =
     "Distances between the copies of a surface that two robots have mapped (double walls)\n\n"
-    "The meshes lie in one frame. Each is sampled evenly. A sample has a copy if the other mesh has a\n"
-    "face within --reach whose normal is within 60 degrees, and does not end there. The distance is\n"
-    "along the normal of that face. \"median aligned\" is the median after one rigid motion by ICP:\n"
+    "The meshes lie in one frame. Each is sampled evenly. A sample has a copy if the other mesh "
+    "has a\n"
+    "face within --reach whose normal is within 60 degrees, and does not end there. The distance "
+    "is\n"
+    "along the normal of that face. \"median aligned\" is the median after one rigid motion by "
+    "ICP:\n"
     "the part that is not an error of the robots' relative pose.\n\n"
     "Example:\n"
     "  kimera_multi_evaluate copies --mesh results/robot*/mesh_optimized.ply";

@@ -298,8 +298,9 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   topics_.optimized_meshes.subscribe([this](const auto& optimized) {
     if (phase_ == RobotPhase::kLeaving) return;
     chunks_->offer(optimized->anchor, {optimized, &optimized->mesh},
-                   ties_ != nullptr ? std::shared_ptr<const MeshOrigin>(optimized, &optimized->origin)
-                                    : nullptr);
+                   ties_ != nullptr
+                       ? std::shared_ptr<const MeshOrigin>(optimized, &optimized->origin)
+                       : nullptr);
   });
   return {};
 }

@@ -21,7 +21,7 @@ struct MapSharingConfig {
   double position_step_m = 0.001;
   double min_move_m = 0.01;
   double max_bytes_per_s = 50000.0;
-  bool surface_ties = true;
+  bool surface_ties = false;
 
   void visit_fields(auto& visitor) {
     visitor.field("team", team,

@@ -290,8 +290,9 @@ LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks) {
 }
 
 bool differ(const MeshChunk& a, const MeshChunk& b, double min_move_m) {
-  if (a.anchor != b.anchor || a.step_m != b.step_m || a.labels != b.labels || a.faces != b.faces ||
-      a.offsets.size() != b.offsets.size())
+  if (a.anchor != b.anchor || a.step_m != b.step_m ||
+      a.keyframe.has_value() != b.keyframe.has_value() || a.labels != b.labels ||
+      a.faces != b.faces || a.offsets.size() != b.offsets.size())
     return true;
   const double limit_steps = min_move_m / static_cast<double>(a.step_m);
   for (std::size_t v = 0; v < a.offsets.size(); ++v)

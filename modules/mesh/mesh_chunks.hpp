@@ -89,10 +89,10 @@ struct SplitMesh {
   std::size_t oversized_faces = 0;
 };
 
-/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes, also with a keyframe. Positions err by up to half a
-/// step per axis. Colours, and vertices without faces, are dropped. A face belongs to the cell of
-/// its centroid. An unchanged part of the mesh gives the same chunk if its vertices are in the same
-/// order; the order of faces does not matter.
+/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes, also with a keyframe. Positions
+/// err by up to half a step per axis. Colours, and vertices without faces, are dropped. A face
+/// belongs to the cell of its centroid. An unchanged part of the mesh gives the same chunk if its
+/// vertices are in the same order; the order of faces does not matter.
 ///
 /// Throws std::invalid_argument for a grid that is not positive and for cells that are no longer
 /// than a step. Also throws it for a vertex that is not finite or beyond 2^30 steps, and for a face

@@ -17,8 +17,8 @@ struct MeshOrigin {
   std::vector<SE3> T_world_kf;  ///< Poses with which the mesh was placed; all of these keyframes.
 };
 
-/// The median keyframe of the vertices in each cell of a grid. Precondition: `keyframe_of_vertex` is
-/// as long as the vertices, which are finite and nearer than 2^31 cells.
+/// The median keyframe of the vertices in each cell of a grid. Precondition: `keyframe_of_vertex`
+/// is as long as the vertices, which are finite and nearer than 2^31 cells.
 [[nodiscard]] std::map<MeshCells::Cell, KeyframeIndex> keyframes_of_cells(
     const LabelledMesh& mesh, const std::vector<KeyframeIndex>& keyframe_of_vertex, double cell_m);
 

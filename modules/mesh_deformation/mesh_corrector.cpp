@@ -60,8 +60,12 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   keep_elements(keyframe_of_vertex_, remaining_vertices(deformed.mesh, replacements));
   report_ = deformed.report;
   T_result_optimized_ = SE3::Identity();
-  return {optimized_, report_, true, named(replacements, input.map.ids),
-          deformed.mesh.faces.size() - optimized_.faces.size(), {keyframe_of_vertex_, anchors_}};
+  return {optimized_,
+          report_,
+          true,
+          named(replacements, input.map.ids),
+          deformed.mesh.faces.size() - optimized_.faces.size(),
+          {keyframe_of_vertex_, anchors_}};
 }
 
 }  // namespace km

@@ -69,7 +69,7 @@ class MeshCorrector {
   std::optional<std::uint64_t> map_version_;
   std::vector<SE3> anchors_;  // complete() of the trajectory
   LabelledMesh optimized_;
-  std::vector<KeyframeIndex> keyframe_of_vertex_;  // of optimized_
+  std::vector<KeyframeIndex> keyframe_of_vertex_;  // see MeshOrigin, for optimized_
   MeshDeformationReport report_;
   SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-constexpr double kLeastArea = 0.25;       // of a full cell
+constexpr double kLeastArea = 0.25;       // share of the area of a full cell
 constexpr double kLeastCoherence = 0.85;  // length of the mean normal; 1: all are equal
 
 // Cell, and the main direction of the normal.

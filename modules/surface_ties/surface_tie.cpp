@@ -14,16 +14,16 @@
 namespace km {
 namespace {
 
-constexpr double kLeastCosine = 0.5;       // between the normals of a pair: 60 degrees
-constexpr std::size_t kNeighbours = 8;     // candidates for the partner of a sample
-constexpr std::size_t kLeastPairs = 60;    // 1.35 m^2 at the default spacing
-constexpr double kLeastFitting = 0.6;      // share of the common samples
-constexpr double kShrink = 0.8;            // factor on the gate from one iteration to the next
-constexpr double kGate_sigmas = 3.0;       // final gate
-constexpr double kPerMad = 1.4826;         // standard deviation over median absolute residual
+constexpr double kLeastCosine = 0.5;     // between the normals of a pair: 60 degrees
+constexpr std::size_t kNeighbours = 8;   // candidates for the partner of a sample
+constexpr std::size_t kLeastPairs = 60;  // 1.35 m^2 at the default spacing
+constexpr double kLeastFitting = 0.6;    // share of the common samples
+constexpr double kShrink = 0.8;          // factor on the gate from one iteration to the next
+constexpr double kGate_sigmas = 3.0;     // final gate
+constexpr double kPerMad = 1.4826;       // standard deviation over median absolute residual
 constexpr int kMaxIterations = 40;
-constexpr double kStop_m = 1e-5;           // step that ends the iterations
-constexpr double kFreeVariance_m2 = 1e4;   // variance of a direction in which surfaces slide
+constexpr double kStop_m = 1e-5;          // step that ends the iterations
+constexpr double kFreeVariance_m2 = 1e4;  // variance of a direction in which surfaces slide
 // Share of the pairs' weight below which a direction is free. Normals that err by 8 degrees give
 // the direction along a corridor a share of 0.02.
 constexpr double kOpen = 0.03;
@@ -40,8 +40,9 @@ struct SampleCloud {
   }
 };
 
-using SampleTree = nanoflann::KDTreeSingleIndexAdaptor<
-    nanoflann::L2_Simple_Adaptor<double, SampleCloud>, SampleCloud, 3, std::uint32_t>;
+using SampleTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, SampleCloud>,
+                                        SampleCloud, 3, std::uint32_t>;
 
 // Pairs at one guess: all samples of b with a copy in a within reach.
 struct Pairing {
@@ -58,8 +59,8 @@ class Matcher {
   [[nodiscard]] Pairing match(const SE3& T_a_b) const {
     Pairing result;
     for (const SurfaceSample& sample : b_) {
-      const auto partner = partner_of({T_a_b * sample.point, T_a_b.linear() * sample.normal,
-                                       sample.label});
+      const auto partner =
+          partner_of({T_a_b * sample.point, T_a_b.linear() * sample.normal, sample.label});
       if (!partner) continue;
       const bool differ =
           partner->label != 0 && sample.label != 0 && partner->label != sample.label;
@@ -240,10 +241,14 @@ void judge(SurfaceTie& tie, const Pairing& pairing, double gate_m,
 
 const char* to_string(SurfaceTieStatus status) {
   switch (status) {
-    case SurfaceTieStatus::kTied: return "tied";
-    case SurfaceTieStatus::kSlides: return "slides";
-    case SurfaceTieStatus::kTooLittle: return "too little";
-    case SurfaceTieStatus::kMisfit: return "misfit";
+    case SurfaceTieStatus::kTied:
+      return "tied";
+    case SurfaceTieStatus::kSlides:
+      return "slides";
+    case SurfaceTieStatus::kTooLittle:
+      return "too little";
+    case SurfaceTieStatus::kMisfit:
+      return "misfit";
   }
   return "unknown";
 }

@@ -25,10 +25,10 @@ struct SurfaceTieOptions {
 };
 
 enum class SurfaceTieStatus {
-  kTied,      ///< The surfaces determine all six directions.
-  kSlides,    ///< They fit, but slide along themselves in one direction or more.
-  kTooLittle, ///< Too few samples lie on the other surface.
-  kMisfit,    ///< The surfaces do not fit: they are different, or the guess is wrong.
+  kTied,       ///< The surfaces determine all six directions.
+  kSlides,     ///< They fit, but slide along themselves in one direction or more.
+  kTooLittle,  ///< Too few samples lie on the other surface.
+  kMisfit,     ///< The surfaces do not fit: they are different, or the guess is wrong.
 };
 
 /// "tied", "slides", "too little", "misfit"
@@ -40,7 +40,7 @@ struct [[nodiscard]] SurfaceTie {
   /// Covariance of T_a_b, see modules/core/covariance.hpp. Along directions in which the surfaces
   /// slide, it is 1e4 m^2.
   Matrix6 covariance = Matrix6::Identity();
-  std::size_t pairs = 0;    ///< Samples of b with a copy in a that fit after the tie.
+  std::size_t pairs = 0;  ///< Samples of b with a copy in a that fit after the tie.
   /// Their share in the samples of b that have a copy within reach, in the direction in which this
   /// share is smallest.
   double fitting = 0.0;
@@ -69,7 +69,7 @@ struct [[nodiscard]] SurfaceTie {
 /// A sample of b and the plane of a on which it should lie.
 struct SurfacePair {
   Eigen::Vector3d point_b = Eigen::Vector3d::Zero();
-  Eigen::Vector3d plane_a = Eigen::Vector3d::Zero();   ///< A point of the plane.
+  Eigen::Vector3d plane_a = Eigen::Vector3d::Zero();  ///< A point of the plane.
   Eigen::Vector3d normal_a = Eigen::Vector3d::UnitZ();
 };
 

@@ -10,10 +10,6 @@ bool are_within(const KeyframeId& a, const KeyframeId& b, KeyframeIndex keyframe
   return (a.index < b.index ? b.index - a.index : a.index - b.index) <= keyframes;
 }
 
-bool have_same_robots(const ClosureId& a, const ClosureId& b) {
-  return a.from.robot == b.from.robot && a.to.robot == b.to.robot;
-}
-
 // Total variance of the position, by which ties are compared.
 double position_variance(const Closure& tie) {
   return tie.covariance.bottomRightCorner<3, 3>().trace();
@@ -32,9 +28,10 @@ void TieSearch::add(const MeshChunk& chunk, double now_s) {
     forget(robot);
     boots_[robot] = chunk.boot;
   }
-  SurfacePieces& pieces = pieces_.try_emplace(robot, options_.spacing_m).first->second;
+  RigidPieces& pieces = pieces_.try_emplace(robot, options_.spacing_m).first->second;
   for (const KeyframeIndex number : pieces.add(chunk))
     versions_[{robot, number}] = {++changes_, now_s};
+  is_done_ = false;
 }
 
 void TieSearch::add(const ClosureId& closure) {
@@ -51,16 +48,24 @@ void TieSearch::forget(RobotId robot) {
     std::erase_if(*ids, [&](const ClosureId& id) { return touches(id, robot); });
 }
 
-std::vector<TieSearch::Pair> TieSearch::pairs() const {
+// Pairs of pieces near each other that are to be registered now or later.
+std::vector<TieSearch::Pair> TieSearch::open_pairs() const {
   std::vector<Pair> pairs;
   const auto own = pieces_.find(self_);
   if (own == pieces_.end()) return pairs;
   for (const auto& [robot, pieces] : pieces_) {
     if (robot == self_ || std::ranges::find(joined_, robot) == joined_.end()) continue;
-    for (const KeyframeIndex a : own->second.numbers())
-      for (const KeyframeIndex b : pieces.numbers()) pairs.push_back({robot, a, b});
+    for (const auto& [a, box_a] : own->second.boxes())
+      for (const auto& [b, box_b] : pieces.boxes())
+        if (box_a.exteriorDistance(box_b) < options_.reach_m && is_open({robot, a, b}))
+          pairs.push_back({robot, a, b});
   }
   return pairs;
+}
+
+void TieSearch::set_joined(std::vector<RobotId> robots) {
+  is_done_ &= robots == joined_;
+  joined_ = std::move(robots);
 }
 
 std::uint64_t TieSearch::version_of(const Pair& pair) const {
@@ -72,9 +77,9 @@ std::uint64_t TieSearch::version_of(const Pair& pair) const {
 bool TieSearch::is_open(const Pair& pair) const {
   const auto tried = tried_.find(pair);
   if (tried != tried_.end() && tried->second >= version_of(pair)) return false;
-  const KeyframeIndex middle = SurfacePieces::kLength / 2;
-  return !is_tied({{self_, pair.own * SurfacePieces::kLength + middle},
-                   {pair.other, pair.peer * SurfacePieces::kLength + middle}});
+  const KeyframeIndex middle = RigidPieces::kLength / 2;
+  return !is_tied({{self_, pair.own * RigidPieces::kLength + middle},
+                   {pair.other, pair.peer * RigidPieces::kLength + middle}});
 }
 
 bool TieSearch::is_calm(const Pair& pair, double now_s) const {
@@ -83,20 +88,21 @@ bool TieSearch::is_calm(const Pair& pair, double now_s) const {
 }
 
 bool TieSearch::is_tied(const ClosureId& tie) const {
-  const auto near_both = [&](const ClosureId& known) {
-    return are_within(known.from, tie.from, kNear) && are_within(known.to, tie.to, kNear);
-  };
-  const auto near_one = [&](const ClosureId& known) {
-    return have_same_robots(known, tie) &&
-           (are_within(known.from, tie.from, kApart - 1) || are_within(known.to, tie.to, kApart - 1));
-  };
-  return std::ranges::any_of(closures_, near_both) || std::ranges::any_of(ties_, near_one);
+  const KeyframeIndex first = tie.from.index > kNear ? tie.from.index - kNear : 0;
+  const KeyframeId last{tie.from.robot, tie.from.index + kNear};
+  for (auto known = closures_.lower_bound({{tie.from.robot, first}, {0, 0}});
+       known != closures_.end() && known->from <= last; ++known)
+    if (are_within(known->to, tie.to, kNear)) return true;
+  return std::ranges::any_of(ties_, [&](const ClosureId& known) {
+    return known.to.robot == tie.to.robot && (are_within(known.from, tie.from, kApart - 1) ||
+                                              are_within(known.to, tie.to, kApart - 1));
+  });
 }
 
 std::optional<Closure> TieSearch::lay(const Pair& pair) {
   tried_[pair] = version_of(pair);
-  const SurfacePiece own = pieces_.at(self_).piece(pair.own);
-  const SurfacePiece peer = pieces_.at(pair.other).piece(pair.peer);
+  const RigidPiece own = pieces_.at(self_).piece(pair.own);
+  const RigidPiece peer = pieces_.at(pair.other).piece(pair.peer);
   if (own.anchor != peer.anchor) return std::nullopt;
   const SE3 guess = own.keyframe.T_world_kf.inverse() * peer.keyframe.T_world_kf;
   const SurfaceTie tie = tie_surfaces(own.samples, peer.samples, guess, options_);
@@ -113,7 +119,10 @@ std::optional<Closure> TieSearch::lay(const Pair& pair) {
 
 // The best tie comes first, so that a small overlap does not exclude a large one.
 std::optional<Closure> TieSearch::take_best() {
-  std::erase_if(found_, [&](const auto& entry) { return is_tied(entry.second.id()); });
+  std::erase_if(found_, [&](const auto& entry) {
+    return is_tied(entry.second.id()) ||
+           std::ranges::find(joined_, entry.first.other) == joined_.end();
+  });
   if (found_.empty()) return std::nullopt;
   const auto best = std::ranges::min_element(
       found_, {}, [](const auto& entry) { return position_variance(entry.second); });
@@ -124,18 +133,16 @@ std::optional<Closure> TieSearch::take_best() {
 }
 
 std::optional<Closure> TieSearch::step(double now_s) {
-  for (const Pair& pair : pairs()) {
-    if (!is_open(pair) || !is_calm(pair, now_s)) continue;
+  if (is_done_) return std::nullopt;
+  const std::vector<Pair> open = open_pairs();
+  for (const Pair& pair : open) {
+    if (!is_calm(pair, now_s)) continue;
     if (auto tie = lay(pair)) found_.insert_or_assign(pair, *std::move(tie));
     return std::nullopt;
   }
-  return take_best();
-}
-
-bool TieSearch::is_done() const {
-  const auto all = pairs();
-  return found_.empty() &&
-         std::ranges::none_of(all, [this](const Pair& pair) { return is_open(pair); });
+  std::optional<Closure> tie = take_best();
+  is_done_ = open.empty() && found_.empty();
+  return tie;
 }
 
 }  // namespace km

@@ -9,7 +9,7 @@
 
 #include "modules/core/pose_graph.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
-#include "modules/surface_ties/surface_pieces.hpp"
+#include "modules/surface_ties/rigid_pieces.hpp"
 #include "modules/surface_ties/surface_tie.hpp"
 
 namespace km {
@@ -25,8 +25,8 @@ namespace km {
 /// Not thread-safe. The result depends on the order of the calls.
 class TieSearch {
  public:
-  static constexpr KeyframeIndex kNear = 10;                      ///< As in ClosurePlaces.
-  static constexpr KeyframeIndex kApart = SurfacePieces::kLength;
+  static constexpr KeyframeIndex kNear = 10;  ///< As in ClosurePlaces.
+  static constexpr KeyframeIndex kApart = RigidPieces::kLength;
   static constexpr double kCalm_s = 2.0;  ///< Time without changes after which a piece is used.
 
   /// Largest standard deviation of the position of a tie. Smaller than the errors of most closures,
@@ -42,13 +42,14 @@ class TieSearch {
   /// Discards everything about a restarted robot.
   void forget(RobotId robot);
   /// Robots whose pose relative to this one is known, and not tentative.
-  void set_joined(std::vector<RobotId> robots) { joined_ = std::move(robots); }
+  void set_joined(std::vector<RobotId> robots);
 
   /// At most one registration, and the tie to which the registrations so far lead, if any.
   [[nodiscard]] std::optional<Closure> step(double now_s);
 
-  /// True if step() has nothing to do with the present chunks and closures, whatever the time is.
-  [[nodiscard]] bool is_done() const;
+  /// True if step() has nothing left to do with the present chunks, also later. After a change, it
+  /// is false until the next step().
+  [[nodiscard]] bool is_done() const { return is_done_; }
 
   /// Number of registrations so far, by status.
   [[nodiscard]] const std::map<SurfaceTieStatus, std::size_t>& results() const { return results_; }
@@ -66,7 +67,7 @@ class TieSearch {
   };
   using PieceId = std::pair<RobotId, KeyframeIndex>;
 
-  [[nodiscard]] std::vector<Pair> pairs() const;
+  [[nodiscard]] std::vector<Pair> open_pairs() const;
   [[nodiscard]] bool is_open(const Pair& pair) const;
   [[nodiscard]] bool is_calm(const Pair& pair, double now_s) const;
   [[nodiscard]] std::uint64_t version_of(const Pair& pair) const;
@@ -76,7 +77,7 @@ class TieSearch {
 
   const RobotId self_;
   const SurfaceTieOptions options_;
-  std::map<RobotId, SurfacePieces> pieces_;
+  std::map<RobotId, RigidPieces> pieces_;
   std::map<RobotId, std::uint64_t> boots_;
   std::map<PieceId, Version> versions_;
   std::uint64_t changes_ = 0;
@@ -84,6 +85,7 @@ class TieSearch {
   std::map<Pair, Closure> found_;        // not yet taken
   std::set<ClosureId> closures_, ties_;
   std::vector<RobotId> joined_;
+  bool is_done_ = true;
   std::map<SurfaceTieStatus, std::size_t> results_;
 };
 

@@ -29,9 +29,9 @@ struct SurfaceCopies {
 };
 
 /// Compares the meshes of two robots in one frame. Each sample of a mesh is paired with the nearest
-/// face of the other one within reach. The pair counts if the normals are within 60 degrees, so that
-/// the two sides of a wall are two surfaces, and if the nearest point is not on a border of the other
-/// mesh, where only one robot saw the surface.
+/// face of the other one within reach. The pair counts if the normals are within 60 degrees. The
+/// two sides of a wall are therefore two surfaces. A pair does not count if the nearest point is on
+/// a border of the other mesh, because only one robot saw the surface beyond it.
 ///
 /// nullopt if a mesh has no faces. Equal arguments give equal results.
 [[nodiscard]] std::optional<SurfaceCopies> compare_copies(const LabelledMesh& a,

@@ -11,9 +11,8 @@
 namespace km {
 
 /// A robot sends only its own mesh. A chunk is refused if it is larger than kMaxChunkBytes, if its
-/// offsets, labels and faces do not match, or if a face names a missing vertex,
-/// or for more than one keyframe. It is also refused
-/// if positions are not finite or too far away.
+/// offsets, labels and faces do not match, or if a face names a missing vertex. It is also refused
+/// if positions are not finite or too far away, and for a keyframe that is not one of its robot.
 template <>
 struct Codec<MeshChunk> {
   using Wire = km_wire_MeshChunk;

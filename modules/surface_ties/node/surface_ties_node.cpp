@@ -72,6 +72,7 @@ void SurfaceTiesNode::step(const Input& input, double now_s) {
   else if (const auto& event = std::get<Topic<PeerEvent>::Message>(input);
            event->kind == PeerEventKind::kRestarted)
     search_.forget(event->identity.robot);
+  // A tick searches again.
   search_done_ = search_.is_done();
   ++handled_;
 }

@@ -21,15 +21,15 @@ namespace km {
 struct SurfaceTiesTopics {
   In<MeshChunk> own_chunks;
   In<MeshChunk> peer_chunks;
-  In<Closure> closures;            ///< Of this robot and received ones.
+  In<Closure> closures;            ///< Own and received ones.
   In<OptimizerProgress> progress;  ///< States which robots have joined.
   In<PeerEvent> restarts;          ///< kRestarted, as for PcmNode.
   Out<Closure> ties;
   Out<ClosureOutcome> outcomes;
 };
 
-/// Ties this robot to robots with higher ids by the surfaces in their mesh chunks: runs a TieSearch
-/// on a thread of its own, in less than a tenth of a processor.
+/// Ties this robot to robots with higher ids by the surfaces in their mesh chunks. Runs a TieSearch
+/// on a thread of its own, which takes less than a tenth of a processor.
 class SurfaceTiesNode final : public Node {
  public:
   SurfaceTiesNode(RobotId self, const SurfaceTiesTopics& topics);
@@ -61,7 +61,7 @@ class SurfaceTiesNode final : public Node {
   const Out<Closure> ties_;
   const Out<ClosureOutcome> outcomes_;
   TieSearch search_;
-  double next_s_ = 0.0;  // time of the next registration
+  double next_s_ = 0.0;                                 // time of the next registration
   std::atomic<std::size_t> arrived_ = 0, handled_ = 0;  // inputs, without ticks
   std::atomic<bool> search_done_ = true;
   Worker<Input> worker_;

@@ -72,15 +72,15 @@ double translation_error(const SurfaceTie& tie) {
 }  // namespace
 
 TEST_CASE("The derivative of a pair's distance equals its numeric derivative", "[surface_tie]") {
-  const SurfacePair pair{{1.0, -2.0, 0.5}, {0.2, 0.1, 3.0},
-                         Eigen::Vector3d(0.3, -0.5, 0.8).normalized()};
+  const SurfacePair pair{
+      {1.0, -2.0, 0.5}, {0.2, 0.1, 3.0}, Eigen::Vector3d(0.3, -0.5, 0.8).normalized()};
   const Vector6 J = jacobian_of(pair, kT_a_b);
   constexpr double kStep = 1e-6;
   for (int i = 0; i < 6; ++i) {
     const Vector6 delta = kStep * Vector6::Unit(i);
-    const double numeric = (residual_of(pair, kT_a_b * se3_exp(delta)) -
-                            residual_of(pair, kT_a_b * se3_exp(-delta))) /
-                           (2.0 * kStep);
+    const double numeric =
+        (residual_of(pair, kT_a_b * se3_exp(delta)) - residual_of(pair, kT_a_b * se3_exp(-delta))) /
+        (2.0 * kStep);
     CHECK(J[i] == Approx(numeric).margin(1e-7));
   }
 }
@@ -123,7 +123,7 @@ TEST_CASE("A corridor is not tied along itself", "[surface_tie]") {
   LabelledMesh a = corridor(), b = corridor();
   add_noise(a, 0.01, random);
   add_noise(b, 0.01, random);
-  const Eigen::Vector3d shift(0.06, 0.03, -0.02);  // of b in `world`
+  const Eigen::Vector3d shift(0.06, 0.03, -0.02);  // motion of b in `world`
   const SE3 guess = kT_world_a.inverse() * Eigen::Translation3d(shift) * kT_world_b;
   const SurfaceTie tie = tie_surfaces(seen_from(a, kT_world_a), seen_from(b, kT_world_b), guess);
   REQUIRE(tie.status == SurfaceTieStatus::kSlides);

@@ -6,40 +6,20 @@
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/surface_ties/tie_search.hpp"
-#include "test/modules/surface_ties/rooms.hpp"
+#include "test/modules/surface_ties/chunks.hpp"
 
 namespace km {
 namespace {
 
 constexpr RobotId kOwn = 1, kPeer = 2;
 
-// Pose of keyframe `index` of a robot in the room.
-SE3 pose_of(RobotId robot, KeyframeIndex index) {
-  return make_pose(so3_exp({0, 0, 0.3 * robot}), {1.0 + 0.05 * index, 1.0 + 0.3 * robot, 1.0});
-}
-
-// Chunks of a room that `robot` has mapped near keyframe `index`. Its estimate of this pose in
-// `world` errs by `T_error`; odometry begins elsewhere.
-std::vector<MeshChunk> chunks_of(RobotId robot, KeyframeIndex index, const SE3& T_error) {
-  LabelledMesh mesh = inside_of_room();
-  mesh.transform(T_error);
-  std::vector<MeshChunk> chunks = split_mesh(mesh, robot, 0, {}).chunks;
-  for (MeshChunk& chunk : chunks) {
-    const SE3 T_world_odom = make_pose(so3_exp({0, 0, 1.0}), {5, 6, 7});
-    chunk.keyframe = {{{robot, index}, T_world_odom.inverse() * pose_of(robot, index),
-                       Matrix6::Identity()},
-                      T_error * pose_of(robot, index)};
-  }
-  return chunks;
-}
-
 const SE3 kError = make_pose(so3_exp({0.0, 0.01, -0.01}), {0.03, -0.03, 0.03});
 
 struct Search {
   Search() {
     search.set_joined({kOwn, kPeer});
-    add(chunks_of(kOwn, 12, SE3::Identity()), 0.0);
-    add(chunks_of(kPeer, 35, kError), 0.0);
+    add(room_chunks(kOwn, 12, SE3::Identity()), 0.0);
+    add(room_chunks(kPeer, 35, kError), 0.0);
   }
   void add(const std::vector<MeshChunk>& chunks, double now_s) {
     for (const MeshChunk& chunk : chunks) search.add(chunk, now_s);
@@ -67,7 +47,7 @@ TEST_CASE("A tie corrects the estimated pose of two robots in one room", "[tie_s
   CHECK(robots.search.is_done());
   CHECK(ties[0].from.id == KeyframeId{kOwn, 12});
   CHECK(ties[0].to.id == KeyframeId{kPeer, 35});
-  const SE3 expected = pose_of(kOwn, 12).inverse() * pose_of(kPeer, 35);
+  const SE3 expected = pose_in_room(kOwn, 12).inverse() * pose_in_room(kPeer, 35);
   CHECK((ties[0].T_from_to.translation() - expected.translation()).norm() < 0.005);
   CHECK(is_covariance(ties[0].covariance));
 }
@@ -84,7 +64,7 @@ TEST_CASE("No tie counts twice or beside a closure", "[tie_search]") {
   }
   SECTION("chunks that change after the tie") {
     CHECK(robots.ties(kLater_s).size() == 1);
-    robots.add(chunks_of(kPeer, 36, SE3::Identity()), kLater_s);
+    robots.add(room_chunks(kPeer, 36, SE3::Identity()), kLater_s);
     CHECK(robots.ties(2 * kLater_s).empty());
   }
   CHECK(robots.search.is_done());
@@ -103,9 +83,9 @@ TEST_CASE("The robot with the lower id makes the ties of a pair", "[tie_search]"
   TieSearch search(kPeer);
   search.set_joined({kOwn, kPeer});
   for (const RobotId robot : {kOwn, kPeer})
-    for (const MeshChunk& chunk : chunks_of(robot, 12, SE3::Identity())) search.add(chunk, 0.0);
-  CHECK(search.is_done());
+    for (const MeshChunk& chunk : room_chunks(robot, 12, SE3::Identity())) search.add(chunk, 0.0);
   CHECK_FALSE(search.step(kLater_s));
+  CHECK(search.is_done());
 }
 
 TEST_CASE("The surface of a restarted robot is discarded", "[tie_search]") {
