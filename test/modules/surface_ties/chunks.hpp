@@ -21,10 +21,9 @@ inline std::vector<MeshChunk> room_chunks(RobotId robot, KeyframeIndex index, co
   std::vector<MeshChunk> chunks = split_mesh(mesh, robot, 0, {}).chunks;
   const SE3 T_world_odom = make_pose(so3_exp({0, 0, 1.0}), {5, 6, 7});
   for (MeshChunk& chunk : chunks)
-    chunk.keyframe = {{{robot, index},
-                       T_world_odom.inverse() * pose_in_room(robot, index),
-                       Matrix6::Identity()},
-                      T_error * pose_in_room(robot, index)};
+    chunk.keyframe = {
+        {{robot, index}, T_world_odom.inverse() * pose_in_room(robot, index), Matrix6::Identity()},
+        T_error * pose_in_room(robot, index)};
   return chunks;
 }
 
