@@ -14,6 +14,7 @@ void add_closures(CLI::App& app);
 void add_consistency(CLI::App& app);
 void add_images(CLI::App& app);
 void add_mesh(CLI::App& app);
+void add_copies(CLI::App& app);
 void add_render(CLI::App& app);
 void add_objects(CLI::App& app);
 void add_colmap(CLI::App& app);

@@ -28,6 +28,7 @@
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/ros_dds/node/live_sink.hpp"
 #include "modules/semantic_mapping/node/semantic_mapping_node.hpp"
+#include "modules/surface_ties/node/surface_ties_node.hpp"
 #include "modules/vio/node/external_odometry_node.hpp"
 #include "modules/vio/node/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
@@ -333,11 +334,15 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   if (coarse) reduction = [voxel_m](const LabelledMesh& mesh) { return resampled(mesh, voxel_m); };
   chunks_ = &add<MeshChunksNode>(false, config, identity_.robot, topics_.sent_chunks,
                                  std::move(reduction));
+  if (config.surface_ties) add_surface_ties();
   // A leaving robot corrects its mesh once more, from scratch. Other robots may have left before,
   // so all keep the chunks that they have.
   topics_.optimized_meshes.subscribe([this](const auto& optimized) {
     if (phase_ == RobotPhase::kLeaving) return;
-    chunks_->offer(optimized->anchor, {optimized, &optimized->mesh});
+    chunks_->offer(optimized->anchor, {optimized, &optimized->mesh},
+                   ties_ != nullptr
+                       ? std::shared_ptr<const MeshOrigin>(optimized, &optimized->origin)
+                       : nullptr);
   });
   return {};
 }
@@ -353,6 +358,18 @@ void Robot::add_objects(const ObjectsConfig& config, const LabelPalette& palette
   topics_.joint_objects.subscribe([this, folder, &results](const auto& objects) {
     write_objects(folder, *objects, objects_->palette(), results);
   });
+}
+
+void Robot::add_surface_ties() {
+  topics_.keyframes.subscribe([this](const auto& keyframe) { chunks_->learn(keyframe->odometry); });
+  ties_ = &add<SurfaceTiesNode>(false, identity_.robot,
+                                SurfaceTiesTopics{.own_chunks = topics_.sent_chunks,
+                                                  .peer_chunks = topics_.chunks.from_peers(),
+                                                  .closures = topics_.closures,
+                                                  .progress = topics_.progress,
+                                                  .restarts = topics_.closure_restarts,
+                                                  .ties = topics_.new_closures,
+                                                  .outcomes = topics_.outcomes});
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {

@@ -44,6 +44,7 @@
 #include "modules/ros_dds/node/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/node/sensors_node.hpp"
+#include "modules/surface_ties/node/surface_ties_node.hpp"
 #include "modules/team_map/node/team_map_node.hpp"
 #include "modules/view/node/view_node.hpp"
 #include "runtime/dds/bridge.hpp"
@@ -158,9 +159,11 @@ class Robot {
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// Null unless the robots share their map.
   [[nodiscard]] const TeamMapNode* team_map() const { return team_map_; }
-  /// True unless the robot has yet to send a part of its mesh. Thread-safe.
+  /// True unless the robot has yet to send a part of its mesh, or to lay received ones on its own.
+  /// Thread-safe.
   [[nodiscard]] bool has_shared_map() const {
-    return chunks_ == nullptr || (mesh_deformation_->is_current() && chunks_->is_done());
+    return chunks_ == nullptr || (mesh_deformation_->is_current() && chunks_->is_done() &&
+                                  (ties_ == nullptr || ties_->is_done()));
   }
   /// Null without labels.
   [[nodiscard]] ObjectsNode* objects() { return objects_; }
@@ -217,6 +220,7 @@ class Robot {
   [[nodiscard]] CrossingEnds share_meshes(const RobotConfig& robot, const LabelPalette& palette);
   void add_objects(const ObjectsConfig& config, const LabelPalette& palette,
                    const std::filesystem::path& folder, ResultWriter& results);
+  void add_surface_ties();
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config);
@@ -267,6 +271,7 @@ class Robot {
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;
   MeshChunksNode* chunks_ = nullptr;
+  SurfaceTiesNode* ties_ = nullptr;
   TeamMapNode* team_map_ = nullptr;
   ObjectsNode* objects_ = nullptr;
   PcmNode* pcm_ = nullptr;

@@ -122,7 +122,8 @@ class Splitter {
     for (; end < faces.size(); ++end) {
       std::size_t fresh = 0;
       for (const std::uint32_t v : faces[end]) fresh += part_of_vertex_[v] != part_ ? 1 : 0;
-      if (wire_bytes(vertices.size() + fresh, end + 1 - begin, !mesh_.labels.empty()) >
+      if (wire_bytes(vertices.size() + fresh, end + 1 - begin, !mesh_.labels.empty()) +
+              kSurfaceKeyframeBytes >
           kMaxChunkBytes)
         break;
       for (const std::uint32_t v : faces[end])
@@ -214,6 +215,13 @@ std::int64_t position(const MeshChunk& chunk, std::size_t vertex, std::size_t ax
 
 }  // namespace
 
+bool SurfaceKeyframe::operator==(const SurfaceKeyframe& other) const {
+  return odometry.id == other.odometry.id &&
+         odometry.T_odom_kf.matrix() == other.odometry.T_odom_kf.matrix() &&
+         odometry.covariance == other.odometry.covariance &&
+         T_world_kf.matrix() == other.T_world_kf.matrix();
+}
+
 const char* fault_of(const MeshChunk& chunk) {
   const std::size_t vertices = chunk.offsets.size();
   if (!chunk.labels.empty() && chunk.labels.size() != vertices)
@@ -222,6 +230,8 @@ const char* fault_of(const MeshChunk& chunk) {
   for (const MeshChunk::Triple& face : chunk.faces)
     if (std::ranges::max(face) >= vertices) return "a face names a vertex which does not exist";
   if (chunk.faces.empty() != chunk.offsets.empty()) return "vertices without faces";
+  if (chunk.keyframe && chunk.keyframe->odometry.id.robot != chunk.key.robot)
+    return "a keyframe of another robot";
   if (!are_positions_usable(chunk)) return "positions are not finite or too far away";
   return nullptr;
 }
@@ -280,8 +290,9 @@ LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks) {
 }
 
 bool differ(const MeshChunk& a, const MeshChunk& b, double min_move_m) {
-  if (a.anchor != b.anchor || a.step_m != b.step_m || a.labels != b.labels || a.faces != b.faces ||
-      a.offsets.size() != b.offsets.size())
+  if (a.anchor != b.anchor || a.step_m != b.step_m ||
+      a.keyframe.has_value() != b.keyframe.has_value() || a.labels != b.labels ||
+      a.faces != b.faces || a.offsets.size() != b.offsets.size())
     return true;
   const double limit_steps = min_move_m / static_cast<double>(a.step_m);
   for (std::size_t v = 0; v < a.offsets.size(); ++v)

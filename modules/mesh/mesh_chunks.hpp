@@ -4,10 +4,12 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "modules/core/keyframe.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/core/mesh_cells.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
@@ -20,6 +22,14 @@ struct MeshChunkKey {
   MeshCells::Cell cell = {0, 0, 0};
   std::uint16_t part = 0;
   auto operator<=>(const MeshChunkKey&) const = default;
+};
+
+/// A keyframe from which a part of a mesh was seen, and its pose when this part was placed in
+/// `world`. Relative to the keyframe, the part stays where it is when poses are optimised again.
+struct SurfaceKeyframe {
+  OdometryPose odometry;
+  SE3 T_world_kf = SE3::Identity();
+  bool operator==(const SurfaceKeyframe& other) const;
 };
 
 /// A self-contained part of a robot's mesh: a chunk has all vertices of its faces. Their positions
@@ -38,6 +48,8 @@ struct MeshChunk {
   std::vector<Triple> offsets = {};                ///< Offset of each vertex [step_m].
   std::vector<LabelId> labels = {};                ///< Label of each vertex, or empty.
   std::vector<Triple> faces = {};                  ///< Counter-clockwise seen from free space.
+  /// Keyframe in the middle of those that saw the chunk; absent without `map.surface_ties`.
+  std::optional<SurfaceKeyframe> keyframe = {};
 
   [[nodiscard]] bool empty() const { return faces.empty(); }
   bool operator==(const MeshChunk&) const = default;
@@ -46,14 +58,18 @@ struct MeshChunk {
 /// Largest size of a chunk on the wire, with its envelope.
 inline constexpr std::size_t kMaxChunkBytes = 32000;
 
-/// Upper bound on the bytes of a chunk on the wire.
+/// Bytes of MeshChunk::keyframe on the wire, with padding.
+inline constexpr std::size_t kSurfaceKeyframeBytes = 296;
+
+/// Upper bound on the bytes of a chunk on the wire, without a keyframe.
 [[nodiscard]] constexpr std::size_t wire_bytes(std::size_t vertices, std::size_t faces,
                                                bool labelled) {
-  constexpr std::size_t kFixed = 96;  // bytes of all fields that are not sequences, and padding
+  constexpr std::size_t kFixed = 104;  // bytes of all fields that are not sequences, and padding
   return kFixed + (labelled ? 7 : 6) * vertices + 6 * faces;
 }
 [[nodiscard]] inline std::size_t wire_bytes(const MeshChunk& chunk) {
-  return wire_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty());
+  return wire_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
+         (chunk.keyframe ? kSurfaceKeyframeBytes : 0);
 }
 
 /// The reason why `chunk` cannot be from split_mesh() (a string literal), or null. Received chunks
@@ -73,10 +89,10 @@ struct SplitMesh {
   std::size_t oversized_faces = 0;
 };
 
-/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes. Positions err by up to half a
-/// step per axis. Colours, and vertices without faces, are dropped. A face belongs to the cell of
-/// its centroid. An unchanged part of the mesh gives the same chunk if its vertices are in the same
-/// order; the order of faces does not matter.
+/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes, also with a keyframe. Positions
+/// err by up to half a step per axis. Colours, and vertices without faces, are dropped. A face
+/// belongs to the cell of its centroid. An unchanged part of the mesh gives the same chunk if its
+/// vertices are in the same order; the order of faces does not matter.
 ///
 /// Throws std::invalid_argument for a grid that is not positive and for cells that are no longer
 /// than a step. Also throws it for a vertex that is not finite or beyond 2^30 steps, and for a face

@@ -11,6 +11,7 @@
 #include "modules/core/pose_graph.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_mesh.hpp"
+#include "modules/mesh/mesh_origin.hpp"
 #include "modules/mesh_deformation/keyframe_motion.hpp"
 #include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
@@ -34,6 +35,7 @@ struct [[nodiscard]] MeshCorrection {
   bool deformed = true;
   SupersededSurface superseded;      ///< Superseded surface of the map; empty unless deformed.
   std::size_t superseded_faces = 0;  ///< Number of faces of the map that `mesh` lacks.
+  MeshOrigin origin = {};            ///< Keyframes that saw `mesh`.
 };
 
 /// Keeps a mesh consistent with map and trajectory at the lowest cost. While the map is unchanged,
@@ -61,6 +63,7 @@ class MeshCorrector {
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
   [[nodiscard]] std::vector<std::uint32_t> replacements_in(const LabelledMesh& mesh,
                                                            const MapMesh& map) const;
+  [[nodiscard]] MeshOrigin origin() const;  // of optimized_
 
   const double duplicate_voxels_;
   const std::size_t duplicate_faces_;
@@ -79,11 +82,11 @@ class MeshCorrector {
 /// A robot's mesh, corrected to agree with its optimised trajectory.
 struct OptimizedMesh {
   RobotId robot = 0;
-  RobotId anchor = 0;            ///< Robot whose odometry frame is `world`.
-  LabelledMesh mesh;             ///< In `world`.
-  std::vector<SeenBy> seen_by;   ///< First and last keyframe that saw each vertex of `mesh`.
+  RobotId anchor = 0;           ///< Robot whose odometry frame is `world`.
+  LabelledMesh mesh;            ///< In `world`.
+  std::vector<SeenBy> seen_by;  ///< First and last keyframe that saw each vertex of `mesh`.
   std::shared_ptr<const Trajectory> trajectory;  ///< Poses to which the mesh was corrected.
-  MeshDeformationReport report;  ///< Report of the last optimisation.
+  MeshDeformationReport report;                  ///< Report of the last optimisation.
   /// False: no optimisation was due, and the former mesh was moved as a whole.
   bool deformed = true;
   double seconds = 0.0;  ///< Duration of the correction.
@@ -91,6 +94,7 @@ struct OptimizedMesh {
   std::size_t superseded_faces = 0;
   /// T_world_kf * T_odom_kf^-1 of all keyframes: where the correction moved what they saw.
   std::vector<SE3> T_world_odom = {};
+  MeshOrigin origin = {};  ///< Keyframes that saw the mesh.
 };
 
 }  // namespace km

@@ -69,7 +69,9 @@ MeshChunk some_chunk() {
   return {.key = {kWriter.robot, {1, -2, 3}, 0},
           .offsets = {{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {0, 0, 9}},
           .labels = {1, 2, 3, 4},
-          .faces = {{0, 1, 2}, {0, 2, 3}}};
+          .faces = {{0, 1, 2}, {0, 2, 3}},
+          .keyframe = SurfaceKeyframe{{{kWriter.robot, 3}, SE3::Identity(), Matrix6::Identity()},
+                                      SE3::Identity()}};
 }
 
 template <OverlayLane kLane>

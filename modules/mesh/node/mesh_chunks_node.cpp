@@ -43,9 +43,14 @@ MeshChunksNode::MeshChunksNode(const MapSharingConfig& config, RobotId self, Out
       ticks_(
           steady_duration(kTick_s), [this] { worker_.post({}); }, "chunks tick") {}
 
-void MeshChunksNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh) {
+void MeshChunksNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh,
+                           std::shared_ptr<const MeshOrigin> origin) {
   ++offers_;
-  worker_.post({anchor, std::move(mesh)});
+  worker_.post({anchor, std::move(mesh), std::move(origin)});
+}
+
+void MeshChunksNode::learn(const OdometryPose& keyframe) {
+  worker_.post({.mesh = nullptr, .keyframe = keyframe});
 }
 
 void MeshChunksNode::start() {
@@ -63,6 +68,7 @@ std::exception_ptr MeshChunksNode::error() const {
 }
 
 void MeshChunksNode::step(const Offer& offer, double now_s) {
+  if (offer.keyframe) keyframes_.insert_or_assign(offer.keyframe->id.index, *offer.keyframe);
   if (offer.mesh != nullptr) {
     if (newest_.mesh != nullptr) --offers_;
     newest_ = offer;
@@ -87,7 +93,20 @@ void MeshChunksNode::take(const Offer& offer) {
         << pieces.oversized_faces
         << " faces are too long for map.position_step_m = " << config_.position_step_m
         << " m and are not sent";
+  if (offer.origin != nullptr) state_keyframes(pieces.chunks, offer);
   schedule_.update(std::move(pieces.chunks));
+}
+
+void MeshChunksNode::state_keyframes(std::vector<MeshChunk>& chunks, const Offer& offer) const {
+  const MeshOrigin& origin = *offer.origin;
+  const auto of_cell = keyframes_of_cells(*offer.mesh, origin.keyframe_of_vertex, config_.cell_m);
+  for (MeshChunk& chunk : chunks) {
+    const auto index = of_cell.find(chunk.key.cell);
+    if (index == of_cell.end() || index->second >= origin.T_world_kf.size()) continue;
+    const auto keyframe = keyframes_.find(index->second);
+    if (keyframe == keyframes_.end()) continue;
+    chunk.keyframe = {keyframe->second, origin.T_world_kf[index->second]};
+  }
 }
 
 // A chunk is sent while there is no debt. It may cause a debt.

@@ -3,13 +3,16 @@
 #include <atomic>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_sharing_config.hpp"
+#include "modules/mesh/mesh_origin.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/token_bucket.hpp"
@@ -23,10 +26,13 @@ namespace km {
 /// robot's best mesh passes it to offer().
 class MeshChunksNode final : public Node {
  public:
-  /// A mesh in the frame `world` of the robot `anchor`; a null mesh is a tick of the clock.
+  /// A mesh in the frame `world` of the robot `anchor`, with the keyframes that saw it, if known. A
+  /// null mesh is a tick of the clock, or an own keyframe.
   struct Offer {
     RobotId anchor = 0;
     std::shared_ptr<const LabelledMesh> mesh;
+    std::shared_ptr<const MeshOrigin> origin = {};
+    std::optional<OdometryPose> keyframe = {};
   };
 
   /// Reduces a mesh before it is sent.
@@ -39,7 +45,11 @@ class MeshChunksNode final : public Node {
   ~MeshChunksNode() override { stop(); }
 
   /// Only the newest mesh counts. Thread-safe; returns at once.
-  void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
+  void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh,
+             std::shared_ptr<const MeshOrigin> origin = {});
+  /// An own keyframe. Chunks of meshes with an origin state the keyframe that saw them, if it is
+  /// known. Thread-safe; returns at once.
+  void learn(const OdometryPose& keyframe);
 
   std::string_view name() const override { return "mesh_chunks"; }
   void start() override;
@@ -59,12 +69,14 @@ class MeshChunksNode final : public Node {
 
  private:
   void take(const Offer& offer);
+  void state_keyframes(std::vector<MeshChunk>& chunks, const Offer& offer) const;
   void send(double now_s);
 
   const MapSharingConfig config_;
   const RobotId self_;
   const Out<MeshChunk> chunks_;
   const Reduction reduction_;
+  std::map<KeyframeIndex, OdometryPose> keyframes_;
   ChunkSchedule schedule_;
   TokenBucket budget_bytes_;
   std::atomic<std::size_t> waiting_ = 0;  // chunks

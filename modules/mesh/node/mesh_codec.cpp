@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "runtime/dds/codec.hpp"
+#include "runtime/dds/wire_pose.hpp"
 
 namespace km {
 namespace {
@@ -44,6 +45,10 @@ Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
   wire.anchor = chunk.anchor;
   wire.step_m = chunk.step_m;
   wire.origin = {.x = chunk.origin[0], .y = chunk.origin[1], .z = chunk.origin[2]};
+  if (chunk.keyframe)
+    encoded.keyframe.push_back({.odometry = to_wire(chunk.keyframe->odometry),
+                                .T_world_kf = to_wire(chunk.keyframe->T_world_kf)});
+  borrow(wire.keyframe, encoded.keyframe);
   borrow(wire.offsets, encoded.offsets);
   borrow(wire.labels, encoded.labels);
   borrow(wire.faces, encoded.faces);
@@ -55,7 +60,9 @@ Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& wr
   const auto offsets = elements_of(wire.offsets, kMaxChunkBytes);
   const auto labels = elements_of(wire.labels, kMaxChunkBytes);
   const auto faces = elements_of(wire.faces, kMaxChunkBytes);
-  if (!offsets || !labels || !faces) return Result::refuse("elements are missing or too many");
+  const auto keyframes = elements_of(wire.keyframe, 1);
+  if (!offsets || !labels || !faces || !keyframes)
+    return Result::refuse("elements are missing or too many");
   if (offsets->size() % 3 != 0 || faces->size() % 3 != 0)
     return Result::refuse("offsets or faces are not triples");
   MeshChunk chunk{.key = {writer.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
@@ -66,6 +73,12 @@ Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& wr
                   .offsets = triples(*offsets),
                   .labels = {labels->begin(), labels->end()},
                   .faces = triples(*faces)};
+  if (!keyframes->empty()) {
+    const auto odometry = from_wire(keyframes->front().odometry);
+    const auto T_world_kf = from_wire(keyframes->front().T_world_kf);
+    if (!odometry || !T_world_kf) return Result::refuse("a keyframe without a pose");
+    chunk.keyframe = {*odometry, *T_world_kf};
+  }
   if (const char* fault = fault_of(chunk)) return Result::refuse(fault);
   return Result::accept(std::move(chunk));
 }

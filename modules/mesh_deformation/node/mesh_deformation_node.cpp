@@ -154,7 +154,8 @@ void MeshDeformationNode::correct() {
                        correction->deformed,
                        end_s - start_s,
                        correction->superseded_faces,
-                       complete(T_odom_kf_, input().T_world_kf)};
+                       complete(T_odom_kf_, input().T_world_kf),
+                       std::move(correction->origin)};
   for (std::size_t k = 0; k < T_odom_kf_.size(); ++k)
     result.T_world_odom[k] = result.T_world_odom[k] * T_odom_kf_[k].inverse();
   if (!correction->superseded.vertices.empty())

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/lie.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
@@ -97,6 +98,30 @@ TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
   CHECK_THROWS_AS(MeshChunksNode(config, 7, topic), ConfigError);
 }
 
+TEST_CASE("A chunk states the keyframe in the middle of those that saw it", "[node]") {
+  Topic<MeshChunk> topic;
+  Inbox<MeshChunk> sent(topic);
+  MeshChunksNode node(MapSharingConfig(), 7, topic);
+  const auto mesh = sheet(30);
+  MeshOrigin origin;
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    const SE3 T = make_pose(Eigen::Matrix3d::Identity(), {1.0 * i, 0, 0});
+    node.step({.mesh = nullptr, .keyframe = OdometryPose{{7, i}, T, Matrix6::Identity()}}, 0.0);
+    origin.T_world_kf.push_back(T * T);
+  }
+  for (const auto& vertex : mesh->vertices)
+    origin.keyframe_of_vertex.push_back(vertex.x() < 0.0F ? 1 : 3);
+  node.step({kAnchor, mesh, std::make_shared<const MeshOrigin>(origin)}, 0.0);
+  REQUIRE(sent.messages().size() > 1);
+  for (const MeshChunk& chunk : sent.messages()) {
+    REQUIRE(chunk.keyframe);
+    const KeyframeIndex expected = chunk.key.cell[0] < 0 ? 1 : 3;
+    CHECK(chunk.keyframe->odometry.id == KeyframeId{7, expected});
+    CHECK(chunk.keyframe->odometry.T_odom_kf.translation().x() == Approx(expected));
+    CHECK(chunk.keyframe->T_world_kf.translation().x() == Approx(2.0 * expected));
+  }
+}
+
 // A robot with the modules that exchange meshes.
 struct MeshRobot {
   MeshRobot(std::shared_ptr<const DdsDomain> domain, RobotId id)
@@ -183,6 +208,11 @@ MeshChunk some_chunk() {
   return split_mesh(wavy_sheet(20, 0.1), 700, 3, {}).chunks.at(1);
 }
 
+SurfaceKeyframe some_keyframe(RobotId robot) {
+  return {{{robot, 8}, make_pose(so3_exp({0.1, 0.2, 0.3}), {1, 2, 3}), Matrix6::Identity()},
+          make_pose(Eigen::Matrix3d::Identity(), {4, 5, 6})};
+}
+
 Arrived<MeshChunk> received(const MeshChunk& chunk) {
   return encoded_by(TeamPeer{chunk.key.robot, 12345}, chunk);
 }
@@ -195,6 +225,9 @@ TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
   }
   SECTION("empty because the piece has vanished") {
     chunk = {.key = chunk.key};
+  }
+  SECTION("with a keyframe") {
+    chunk.keyframe = some_keyframe(chunk.key.robot);
   }
   SECTION("far away") {
     chunk.origin = {-(1 << 30), 1 << 30, 0};
@@ -209,15 +242,18 @@ TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
 TEST_CASE("The largest chunk is equal after encoding and decoding", "[codec]") {
   const SplitMesh pieces = split_mesh(wavy_sheet(180, 0.01), 1, 1, {});
   std::size_t largest = 0;
-  for (const MeshChunk& chunk : pieces.chunks) {
+  for (MeshChunk chunk : pieces.chunks) {
+    chunk.keyframe = some_keyframe(1);
     largest = std::max(largest, wire_bytes(chunk));
     CHECK(decoded(received(chunk)).value);
   }
   CHECK(largest > kMaxChunkBytes - 50);
+  CHECK(largest <= kMaxChunkBytes);
 }
 
 TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
-  const MeshChunk chunk = some_chunk();
+  MeshChunk chunk = some_chunk();
+  chunk.keyframe = some_keyframe(chunk.key.robot);
   const char* const missing = "elements are missing or too many";
   const char* const no_triples = "offsets or faces are not triples";
   const char* const far = "positions are not finite or too far away";
@@ -239,6 +275,11 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
           large.faces.resize(6000, {0, 1, 2});
           m = received(large);
         }},
+       {"two keyframes", missing, [](auto& m) { m.wire.keyframe._length = 2; }},
+       {"a keyframe of another robot", "a keyframe of another robot",
+        [](auto& m) { ++m.keyframe.front().odometry.keyframe.robot; }},
+       {"a keyframe without a pose", "a keyframe without a pose",
+        [](auto& m) { m.keyframe.front().T_world_kf.q[0] = 7.0; }},
        {"a face outside", "a face names a vertex which does not exist",
         [&](auto& m) { m.faces.back() = static_cast<std::uint16_t>(chunk.offsets.size()); }},
        {"vertices for nothing", "vertices without faces",

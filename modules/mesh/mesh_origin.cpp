@@ -1,0 +1,26 @@
+#include "modules/mesh/mesh_origin.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace km {
+
+std::map<MeshCells::Cell, KeyframeIndex> keyframes_of_cells(
+    const LabelledMesh& mesh, const std::vector<KeyframeIndex>& keyframe_of_vertex, double cell_m) {
+  std::map<MeshCells::Cell, std::vector<KeyframeIndex>> seen;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const Eigen::Array3d cell = (mesh.vertices[v].cast<double>().array() / cell_m).floor();
+    seen[{static_cast<std::int32_t>(cell.x()), static_cast<std::int32_t>(cell.y()),
+          static_cast<std::int32_t>(cell.z())}]
+        .push_back(keyframe_of_vertex[v]);
+  }
+  std::map<MeshCells::Cell, KeyframeIndex> medians;
+  for (auto& [cell, keyframes] : seen) {
+    const auto middle = keyframes.begin() + static_cast<std::ptrdiff_t>(keyframes.size() / 2);
+    std::ranges::nth_element(keyframes, middle);
+    medians.emplace(cell, *middle);
+  }
+  return medians;
+}
+
+}  // namespace km

@@ -1,0 +1,148 @@
+#include "modules/surface_ties/tie_search.hpp"
+
+#include <algorithm>
+
+namespace km {
+namespace {
+
+bool are_within(const KeyframeId& a, const KeyframeId& b, KeyframeIndex keyframes) {
+  if (a.robot != b.robot) return false;
+  return (a.index < b.index ? b.index - a.index : a.index - b.index) <= keyframes;
+}
+
+// Total variance of the position, by which ties are compared.
+double position_variance(const Closure& tie) {
+  return tie.covariance.bottomRightCorner<3, 3>().trace();
+}
+
+}  // namespace
+
+TieSearch::TieSearch(RobotId self, const SurfaceTieOptions& options)
+    : self_(self), options_(options) {}
+
+void TieSearch::add(const MeshChunk& chunk, double now_s) {
+  const RobotId robot = chunk.key.robot;
+  if (robot < self_) return;  // that robot makes the ties
+  const auto [boot, is_new] = boots_.try_emplace(robot, chunk.boot);
+  if (boot->second != chunk.boot) {
+    forget(robot);
+    boots_[robot] = chunk.boot;
+  }
+  RigidPieces& pieces = pieces_.try_emplace(robot, options_.spacing_m).first->second;
+  for (const KeyframeIndex number : pieces.add(chunk))
+    versions_[{robot, number}] = {++changes_, now_s};
+  is_done_ = false;
+}
+
+void TieSearch::add(const ClosureId& closure) {
+  if (closure.from.robot == self_ && closure.to.robot != self_) closures_.insert(closure);
+}
+
+void TieSearch::forget(RobotId robot) {
+  pieces_.erase(robot);
+  boots_.erase(robot);
+  std::erase_if(versions_, [&](const auto& entry) { return entry.first.first == robot; });
+  std::erase_if(tried_, [&](const auto& entry) { return entry.first.other == robot; });
+  std::erase_if(found_, [&](const auto& entry) { return entry.first.other == robot; });
+  for (auto* ids : {&closures_, &ties_})
+    std::erase_if(*ids, [&](const ClosureId& id) { return touches(id, robot); });
+}
+
+// Pairs of pieces near each other that are to be registered now or later.
+std::vector<TieSearch::Pair> TieSearch::open_pairs() const {
+  std::vector<Pair> pairs;
+  const auto own = pieces_.find(self_);
+  if (own == pieces_.end()) return pairs;
+  for (const auto& [robot, pieces] : pieces_) {
+    if (robot == self_ || std::ranges::find(joined_, robot) == joined_.end()) continue;
+    for (const auto& [a, box_a] : own->second.boxes())
+      for (const auto& [b, box_b] : pieces.boxes())
+        if (box_a.exteriorDistance(box_b) < options_.reach_m && is_open({robot, a, b}))
+          pairs.push_back({robot, a, b});
+  }
+  return pairs;
+}
+
+void TieSearch::set_joined(std::vector<RobotId> robots) {
+  is_done_ &= robots == joined_;
+  joined_ = std::move(robots);
+}
+
+std::uint64_t TieSearch::version_of(const Pair& pair) const {
+  return std::max(versions_.at({self_, pair.own}).number,
+                  versions_.at({pair.other, pair.peer}).number);
+}
+
+// True if the pair is to be registered: it has changed since, and no closure or tie excludes it.
+bool TieSearch::is_open(const Pair& pair) const {
+  const auto tried = tried_.find(pair);
+  if (tried != tried_.end() && tried->second >= version_of(pair)) return false;
+  const KeyframeIndex middle = RigidPieces::kLength / 2;
+  return !is_tied({{self_, pair.own * RigidPieces::kLength + middle},
+                   {pair.other, pair.peer * RigidPieces::kLength + middle}});
+}
+
+bool TieSearch::is_calm(const Pair& pair, double now_s) const {
+  return now_s - versions_.at({self_, pair.own}).changed_s >= kCalm_s &&
+         now_s - versions_.at({pair.other, pair.peer}).changed_s >= kCalm_s;
+}
+
+bool TieSearch::is_tied(const ClosureId& tie) const {
+  const KeyframeIndex first = tie.from.index > kNear ? tie.from.index - kNear : 0;
+  const KeyframeId last{tie.from.robot, tie.from.index + kNear};
+  for (auto known = closures_.lower_bound({{tie.from.robot, first}, {0, 0}});
+       known != closures_.end() && known->from <= last; ++known)
+    if (are_within(known->to, tie.to, kNear)) return true;
+  return std::ranges::any_of(ties_, [&](const ClosureId& known) {
+    return known.to.robot == tie.to.robot && (are_within(known.from, tie.from, kApart - 1) ||
+                                              are_within(known.to, tie.to, kApart - 1));
+  });
+}
+
+std::optional<Closure> TieSearch::lay(const Pair& pair) {
+  tried_[pair] = version_of(pair);
+  const RigidPiece own = pieces_.at(self_).piece(pair.own);
+  const RigidPiece peer = pieces_.at(pair.other).piece(pair.peer);
+  if (own.anchor != peer.anchor) return std::nullopt;
+  const SE3 guess = own.keyframe.T_world_kf.inverse() * peer.keyframe.T_world_kf;
+  const SurfaceTie tie = tie_surfaces(own.samples, peer.samples, guess, options_);
+  ++results_[tie.status];
+  if (tie.status != SurfaceTieStatus::kTied) return std::nullopt;
+  if (tie.covariance.bottomRightCorner<3, 3>().trace() > 3.0 * kMaxSigma_m * kMaxSigma_m)
+    return std::nullopt;
+  return Closure{.from = own.keyframe.odometry,
+                 .to = peer.keyframe.odometry,
+                 .T_from_to = tie.T_a_b,
+                 .covariance = tie.covariance,
+                 .inliers = static_cast<int>(tie.pairs)};
+}
+
+// The best tie comes first, so that a small overlap does not exclude a large one.
+std::optional<Closure> TieSearch::take_best() {
+  std::erase_if(found_, [&](const auto& entry) {
+    return is_tied(entry.second.id()) ||
+           std::ranges::find(joined_, entry.first.other) == joined_.end();
+  });
+  if (found_.empty()) return std::nullopt;
+  const auto best = std::ranges::min_element(
+      found_, {}, [](const auto& entry) { return position_variance(entry.second); });
+  const Closure tie = best->second;
+  found_.erase(best);
+  ties_.insert(tie.id());
+  return tie;
+}
+
+std::optional<Closure> TieSearch::step(double now_s) {
+  if (is_done_) return std::nullopt;
+  const std::vector<Pair> open = open_pairs();
+  for (const Pair& pair : open) {
+    if (!is_calm(pair, now_s)) continue;
+    if (auto tie = lay(pair)) found_.insert_or_assign(pair, *std::move(tie));
+    return std::nullopt;
+  }
+  std::optional<Closure> tie = take_best();
+  is_done_ = open.empty() && found_.empty();
+  return tie;
+}
+
+}  // namespace km
