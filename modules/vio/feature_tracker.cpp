@@ -63,10 +63,14 @@ KltResult track_klt(const ImagePyramid& from, const ImagePyramid& to,
   return result;
 }
 
-// Without a gyroscope features may move by half a window on the coarsest level.
-TrackerConfig with_reach(TrackerConfig config, bool has_gyro) {
-  constexpr int kFreeLevels = 4;
-  if (!has_gyro) config.pyramid_levels = std::max(config.pyramid_levels, kFreeLevels);
+// Without a gyroscope features may move by half a window on the coarsest level. Outliers are
+// rejected earlier, because no inertial sensor contradicts them later.
+TrackerConfig without_gyro(TrackerConfig config) {
+  constexpr int kLevels = 4;
+  constexpr double kEpipolarShare = 0.5, kReprojectionShare = 2.0 / 3.0;
+  config.pyramid_levels = std::max(config.pyramid_levels, kLevels);
+  config.max_epipolar_px *= kEpipolarShare;
+  config.max_reprojection_px *= kReprojectionShare;
   return config;
 }
 
@@ -106,7 +110,7 @@ std::unique_ptr<const AlignmentPatch> cut_patch(const ImagePyramid& image,
 
 FeatureTracker::FeatureTracker(const StereoRig& rig, const TrackerConfig& config, bool has_gyro)
     : rig_(rig),
-      config_(with_reach(checked(config), has_gyro)),
+      config_(has_gyro ? checked(config) : without_gyro(checked(config))),
       has_gyro_(has_gyro),
       focal_px_(rig.cameras[0].fx),
       detector_(config_),

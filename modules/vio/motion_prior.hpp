@@ -28,7 +28,8 @@ namespace km {
 /// Smoother, marginalisation, rest and resume are therefore those of stereo-inertial odometry.
 
 /// Checked `config` for odometry with `rig`. Without an inertial sensor there is no gravity, no
-/// calibration of the cameras against it, no vertical, and no bound on the "gyro bias".
+/// calibration of the cameras against it, no vertical, and no bound on the "gyro bias". The loss on
+/// reprojection errors then has a third of the scale.
 /// Throws ConfigError if `config` is out of bounds.
 [[nodiscard]] VioConfig config_for(const SensorRig& rig, const VioConfig& config);
 
@@ -42,6 +43,10 @@ namespace km {
 /// which the features agree (TrackedFrame::T_previous_current). Precondition: `tracked` has one.
 [[nodiscard]] OdometryState moved_by_images(const OdometryState& before,
                                             const TrackedFrame& tracked, const SE3& T_body_left);
+
+/// Covariance that a motion by images alone gets in addition to that of the window, for errors of
+/// the calibration: they scale distances and angles.
+[[nodiscard]] Matrix6 scale_covariance(const SE3& T_previous_kf);
 
 /// Attitude R_odom_body at a start without gravity: x of odom is the viewing direction of the left
 /// camera, z its upward direction.
