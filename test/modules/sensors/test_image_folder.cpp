@@ -6,6 +6,7 @@
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 
+#include "euroc_folder.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -45,12 +46,6 @@ void write_tum(const fs::path& root) {
     write_image(root / "rgb" / name, CV_8UC3, 10 * k);
     write_image(root / "depth" / name, CV_16UC1, 10000);
   }
-}
-
-std::vector<SensorPacket> packets_of(DatasetReader& reader) {
-  std::vector<SensorPacket> packets;
-  while (auto packet = reader.next()) packets.push_back(std::move(*packet));
-  return packets;
 }
 
 TEST_CASE("A folder in KITTI's layout is read with its calibration", "[sensors][folder]") {
