@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "modules/core/calibration_limits.hpp"
-#include "modules/core/camera_axes.hpp"
 #include "modules/core/image_size.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/sensors/text_file.hpp"
@@ -131,7 +130,7 @@ Camera camera_of(const fs::path& file, const ListedProjection& listed, const fs:
       K.row(2).head<2>().norm() > kRounding || std::abs(K(1, 0)) > kRounding)
     refuse(file, listed.line, "not the projection of a rectified camera");
   const Eigen::Vector3d t = K.inverse() * P.col(3);
-  camera.T_body_cam = make_pose(body_axes_of_camera(), -(body_axes_of_camera() * t));
+  camera.T_body_cam = make_pose(Eigen::Matrix3d::Identity(), -t);
   return camera;
 }
 
@@ -148,9 +147,7 @@ fs::path image_file(const fs::path& folder, const std::string& stem) {
 
 SensorRig rgbd_sensors(const DepthCamera& depth) {
   SensorRig rig;
-  Camera camera = depth.camera;
-  camera.T_body_cam = make_pose(body_axes_of_camera(), Eigen::Vector3d::Zero());
-  rig.stereo = rgbd_rig(camera, depth.baseline_m);
+  rig.stereo = rgbd_rig(depth.camera, depth.baseline_m);
   rig.depth = depth.range;
   rig.has_imu = false;
   return rig;

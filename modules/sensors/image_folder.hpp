@@ -34,8 +34,8 @@ struct DepthCamera {
   double baseline_m = 0.1;  ///< Virtual baseline, see rgbd_rig().
 };
 
-/// A recording of cameras without an inertial sensor. The body is at the left camera, with the axes
-/// of body_axes_of_camera().
+/// A recording of cameras without an inertial sensor. The body is the left camera, to which the
+/// true poses of these layouts refer.
 struct ImageFolder {
   std::filesystem::path list;  ///< The file that lists the frames, for messages.
   SensorRig rig;

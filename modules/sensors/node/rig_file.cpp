@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "modules/core/camera_axes.hpp"
 #include "modules/sensors/node/calibration_map.hpp"
 #include "modules/sensors/node/rig_calibration.hpp"
 #include "runtime/config_text.hpp"
@@ -65,14 +64,12 @@ void note_topics(const RigFile& file, const std::string& path, RigCalibration& c
       calibration.notes.push_back(path + ": " + used + " is calibrated as " + calibrated);
 }
 
-// If nothing names a body, it is the left camera with the axes of a body.
+// If nothing names a body, it is the left camera.
 void choose_body(const RigFile& file, RigCalibration& calibration) {
   if (calibration.has_extrinsics || file.has_imu() || file.has_odometry() ||
       !file.body_frame.empty())
     return;
   calibration.has_extrinsics = true;
-  for (Camera& camera : calibration.rig.stereo.cameras)
-    camera.T_body_cam.prerotate(body_axes_of_camera());
 }
 
 // Transform from 16 numbers of a 4x4 matrix, row by row; the identity from none.

@@ -135,7 +135,7 @@ struct RigFile {
     visitor.field("body_frame", body_frame,
                   "frame of the inertial sensor in /tf_static; empty: the frame in its messages, "
                   "or without an inertial sensor the child frame of the odometry; without "
-                  "either the body is the left camera, with x forward and z up");
+                  "either the body is the left camera");
     correction.visit_fields(visitor);
     visitor.required({"left"});
     visitor.check(

@@ -58,9 +58,8 @@ TEST_CASE("A folder in KITTI's layout is read with its calibration", "[sensors][
   CHECK(rig.baseline_m() == Approx(0.5));
   CHECK(rig.cameras[0].width == 32);
   CHECK(rig.cameras[1].fx == 30.0);
-  // Ahead of the camera is ahead of the body, and right of it is -y.
-  CHECK((rig.cameras[0].T_body_cam * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitX()));
-  CHECK(rig.cameras[1].T_body_cam.translation().y() == Approx(-0.5));
+  CHECK(rig.cameras[0].T_body_cam.isApprox(SE3::Identity()));  // the body is the left camera
+  CHECK(rig.cameras[1].T_body_cam.translation().x() == Approx(0.5));
   const auto packets = packets_of(*reader);
   REQUIRE(packets.size() == kFrames);
   CHECK(packets[3].frame->stamp == 300'000'000);
@@ -95,7 +94,7 @@ TEST_CASE("A bad row of KITTI's calibration is refused with file, line and value
              Contains("calib.txt line 2: 6 numbers, expected 12"));
   CHECK_THAT(complaint("P0: 0 0 16 0 0 0 12 0 0 0 1 0\n" + kP1), Contains("calib.txt line 1: "));
   CHECK_THAT(complaint(kP0 + "P1: 30 0 16 15 0 30 12 0 0 0 1 0\n"),
-             Contains("calib.txt line 2: P1 ") && Contains("exchanged"));
+             Contains("calib.txt line 2: P1 ") && Contains("exchange them"));
   fs::remove(folder.path() / "calib.txt");
   CHECK_THROWS_WITH(open_folder(folder.path()), Contains("calib.txt: no such file"));
   fs::remove_all(folder.path() / "image_1");
