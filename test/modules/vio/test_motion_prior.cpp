@@ -129,7 +129,7 @@ TEST_CASE("KITTI: images alone give every image a pose, within a percent of the 
   REQUIRE(run.states.size() == data->packets.size());
   CHECK(run.results[0].start == StartStatus::kByImages);
   CHECK(run.statistics.starts == 1);
-  const SE3& first = run.states.front().T_odom_body;  // of the camera; x of odom is ahead
+  const SE3& first = run.states.front().T_odom_body;  // x of odom is the viewing direction
   CHECK((first * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitX()));
   const SE3 T = run.states.front().T_odom_body.inverse() * run.states.back().T_odom_body;
   const SE3 truth = run.truth.front().inverse() * run.truth.back();
