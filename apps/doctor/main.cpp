@@ -29,7 +29,7 @@ constexpr const char* kAbout =
     "before hours are spent on them: each finding has its number, its meaning and a remedy.";
 
 constexpr const char* kFooter = R"(
-PATH is a recording (EuRoC/ASL folder; a bag of ROS 1 or 2 or an MCAP file, with --rig), or the results of
+PATH is a recording (folder of EuRoC/ASL, KITTI odometry, TUM RGB-D or 7-Scenes; a bag of ROS 1 or 2 or an MCAP file, with --rig), or the results of
 a robot or of a team.
 
 Examples

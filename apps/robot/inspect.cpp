@@ -15,6 +15,7 @@
 #include "modules/core/write_file.hpp"
 #include "modules/recordings/bag_summary.hpp"
 #include "modules/recordings/open_bag.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 
 namespace km {
 namespace {
@@ -120,6 +121,34 @@ std::vector<TopicSummary> euroc_topics(const fs::path& folder) {
   return topics;
 }
 
+TopicSummary image_topic(const std::string& name, const std::string& type) {
+  return {.topic = name,
+          .type = type,
+          .encoding = {},
+          .has_sensor_stamps = true,
+          .stamps = {},
+          .is_image = true,
+          .image = {}};
+}
+
+// The streams of a folder in another layout than EuRoC's. The camera does not matter here.
+std::vector<TopicSummary> folder_topics(const fs::path& folder, FolderLayout layout) {
+  const bool is_stereo = layout == FolderLayout::kKitti;
+  const ImageFolder found =
+      layout == FolderLayout::kTum ? read_tum_folder(folder, {}) : read_image_folder(folder);
+  std::vector<TopicSummary> topics = {
+      image_topic(is_stereo ? "left" : "color", to_string(layout)),
+      image_topic(is_stereo ? "right" : "depth", to_string(layout))};
+  for (const StereoPairFile& frame : found.frames) {
+    const auto add = [&](const fs::path& file, TopicSummary& topic) {
+      if (is_file(file)) topic.stamps.push_back(frame.stamp);
+    };
+    add(frame.left, topics[0]);
+    add(is_stereo ? frame.right : frame.depth, topics[1]);
+  }
+  return topics;
+}
+
 // Writes the rig file that fits the topics best. Returns text on its content. `source`: the
 // recording, or the live topics.
 std::string write_rig(const std::vector<TopicSummary>& topics, const std::string& source,
@@ -145,9 +174,13 @@ void refuse_existing(const fs::path& rig) {
 
 std::string inspect_recording(const fs::path& path) {
   if (is_folder(path) && !may_be_bag(path)) {
+    if (const FolderLayout layout = layout_of(path); layout != FolderLayout::kEuroc)
+      return text_of(folder_topics(path, layout));
     const auto topics = euroc_topics(is_folder(path / "mav0") ? path / "mav0" : path);
     if (topics.empty())
-      throw InputFileError(path.string() + ": neither .db3 or .mcap files nor a EuRoC recording");
+      throw InputFileError(path.string() +
+                           ": neither .db3 or .mcap files nor a recording in the layout of EuRoC, "
+                           "KITTI, TUM RGB-D or 7-Scenes");
     return text_of(topics);
   }
   const auto reader = open_bag(path);
@@ -157,6 +190,12 @@ std::string inspect_recording(const fs::path& path) {
 
 std::string inspect_recording(const fs::path& path, const fs::path& rig) {
   refuse_existing(rig);
+  if (is_folder(path) && !may_be_bag(path) && layout_of(path) != FolderLayout::kEuroc)
+    throw InputFileError(rig.string() + ": not written: " + path.string() + " is " +
+                         to_string(layout_of(path)) +
+                         ", which needs no topics; play it with "
+                         "--dataset " +
+                         path.string());
   if (is_folder(path / "mav0") || is_folder(path / "cam0"))
     throw InputFileError(rig.string() + ": not written: " + path.string() +
                          " is a EuRoC folder, whose calibration is its own sensor.yaml files; play "

@@ -22,6 +22,9 @@ constexpr const char* kFooter = R"(
 Examples
   One robot on a whole recording, in real time:
     kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_01_easy --output results/a
+  Cameras without an inertial sensor: a sequence of KITTI odometry, and one of TUM RGB-D:
+    kimera_multi_robot --robot 0 --dataset dataset/sequences/07 --rate max --output results/a
+    kimera_multi_robot --robot 0 --dataset rgbd_dataset_freiburg1_desk --rate max --output results/b
   Two robots on two hosts of one network (any ids, they find each other):
     hostA$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 7  --name alice --dataset A --output results/a
     hostB$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 12 --name bob   --dataset B --output results/b
@@ -95,8 +98,9 @@ void add_input(CLI::App& app, RobotOptions& options) {
   auto* group = app.add_option_group("Input", "What the robot perceives");
   group
       ->add_option("--dataset", options.dataset,
-                   "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/; or with --rig a bag "
-                   "of ROS 1 (.bag) or ROS 2 (folder, .db3, .mcap)")
+                   "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/; a folder of KITTI "
+                   "odometry, TUM RGB-D or 7-Scenes; or with --rig a bag of ROS 1 (.bag) or ROS 2 "
+                   "(folder, .db3, .mcap)")
       ->check(CLI::ExistingPath);
   group
       ->add_option_function<std::vector<std::string>>(
@@ -134,7 +138,8 @@ void add_input(CLI::App& app, RobotOptions& options) {
   app.add_option(
          "--rig", options.rig,
          "For a bag: file that states which topics are the sensors, and their calibration; for a "
-         "EuRoC folder, what its calibration is off by (rig_estimated.yaml of a run)")
+         "EuRoC folder, what its calibration is off by (rig_estimated.yaml of a run); for a TUM "
+         "RGB-D folder, its camera")
       ->check(CLI::ExistingFile);
   app.add_option("--odometry", options.odometry,
                  "Poses of the body by another odometry (TUM: t[s] x y z qx qy qz qw), in place of "
@@ -249,7 +254,7 @@ RobotOptions parse_options(int argc, char** argv) {
          "--inspect",
          [&](const std::vector<std::string>& paths) { print_topics(options, app, paths); },
          "Print what is in a recording and exit: a bag of ROS 1 (.bag), one of ROS 2 (folder or "
-         ".db3), an MCAP file (.mcap), or a EuRoC folder; with a second file, write a rig file "
+         ".db3), an MCAP file (.mcap), or a folder of images; with a second file, write a rig file "
          "to it. --inspect --live [RIG]: the same for the topics that drivers publish now")
       ->expected(0, 2)
       ->type_name("[RECORDING] [RIG]");

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "modules/core/input_file.hpp"
+#include "modules/sensors/image_folder.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {
@@ -51,6 +52,12 @@ LabelPalette read_palette(const fs::path& file) {
 }  // namespace
 
 ImageSources image_sources(const fs::path& dataset) {
+  if (const FolderLayout layout = layout_of(dataset); layout != FolderLayout::kEuroc)
+    return {.place = dataset.string(),
+            .right = layout == FolderLayout::kKitti,
+            .depth = layout != FolderLayout::kKitti,
+            .labels = false,
+            .palette = dataset / "label_palette.csv"};
   const fs::path sensors = is_folder(dataset / "mav0") ? dataset / "mav0" : dataset;
   return {.place = sensors.string() + " (cam1, depth0, label0)",
           .right = is_folder(sensors / "cam1"),

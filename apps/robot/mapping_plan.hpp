@@ -30,7 +30,7 @@ struct ImageSources {
   std::filesystem::path palette;  ///< File of the label classes, used also for computed labels.
 };
 
-/// Image sources of a EuRoC folder, by its contents.
+/// Image sources of a folder, by its layout and its contents.
 [[nodiscard]] ImageSources image_sources(const std::filesystem::path& dataset);
 
 /// Image sources of a bag or of live sensors: no labels.

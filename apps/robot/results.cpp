@@ -139,7 +139,8 @@ CamerasSummary cameras_of(const UncertainCalibration& known) {
 
 OdometrySummary odometry_of(const VioStatistics& met) {
   const auto count = [](int value) { return static_cast<std::uint64_t>(value); };
-  return {.starts = count(met.starts),
+  return {.inertial_sensor = met.has_imu,
+          .starts = count(met.starts),
           .divergences = count(met.divergences),
           .inertial_gaps = count(met.gaps),
           .refused_images = count(met.refused_images),

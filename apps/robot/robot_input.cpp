@@ -16,7 +16,7 @@
 #include "modules/ros_dds/node/live_bag.hpp"
 #include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/euroc_reader.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "modules/sensors/pose_file.hpp"
 #include "runtime/log.hpp"
@@ -31,7 +31,7 @@ bool extends(const RobotOptions& options) {
   return !options.extend.empty() && !options.resume;
 }
 
-// True for messages of ROS, recorded or live; false for a EuRoC folder.
+// True for messages of ROS, recorded or live; false for a folder of images.
 bool has_messages(const RobotOptions& options) {
   return options.is_live || (!options.dataset.empty() && may_be_bag(options.dataset));
 }
@@ -255,7 +255,7 @@ SensorTopicNames used_topics(const RobotOptions& options, const RobotConfig& con
   SensorTopicNames topics = rig.rig.topics;
   const bool has_poses =
       !topics.odometry.empty() || !rig.pose_file.empty() || !options.odometry.empty();
-  if (has_poses) topics.imu = topics.gyro = topics.accel = "";
+  if (has_poses || !config.sensors.imu) topics.imu = topics.gyro = topics.accel = "";
   if (!options.odometry.empty()) topics.odometry.clear();
   const bool needs_depth =
       topics.right.empty() || config.sensors.depth || (mapping && mapping->reads_depth());
@@ -278,6 +278,7 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
   std::optional<Rig> rig = complete(options, partial, ros, signals);
   if (!rig) return nullptr;
   rig->topics = topics;
+  rig->sensors.has_imu = !topics.imu.empty() || !topics.gyro.empty();
   input.correction.apply_to(rig->sensors.stereo);
   const BagWindow window{.from_s = options.from_s.value_or(0.0),
                          .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
@@ -318,10 +319,11 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
                      .not_before = not_before,
                      .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
                      .correction = rig.correction,
-                     .imu = options.odometry.empty(),
+                     .imu = config.sensors.imu && options.odometry.empty(),
                      .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
                      .labels = config.sensors.labels || (mapping && mapping->reads_labels())};
-  return std::make_unique<EurocReader>(open_euroc(options.dataset, euroc));
+  const bool has_correction = layout_of(options.dataset) == FolderLayout::kEuroc;
+  return open_folder(options.dataset, euroc, has_correction ? fs::path() : options.rig);
 }
 
 // Adds the odometry poses of a file if one is named.
@@ -366,8 +368,11 @@ std::vector<RosTopic> live_topics(const SensorTopicNames& names) {
 
 RigInput read_rig_input(const RobotOptions& options) {
   if (options.rig.empty()) return {};
-  if (!has_messages(options)) return {std::nullopt, read_rig_correction(options.rig)};
-  PartialRig rig = read_rig_file(options.rig, !options.odometry.empty());
+  if (!has_messages(options)) {  // in other layouts the file is that of the camera
+    const bool has_correction = layout_of(options.dataset) == FolderLayout::kEuroc;
+    return {std::nullopt, has_correction ? read_rig_correction(options.rig) : CameraCalibration()};
+  }
+  PartialRig rig = read_rig_file(options.rig);
   const CameraCalibration correction{rig.rig.camera_time_offset_s, rig.T_body_rig};
   return {std::move(rig), correction};
 }

@@ -243,6 +243,17 @@ void add_broken_odometry(const RunSummary& run, std::vector<Finding>& findings) 
                       .to_do = "see the log for the keyframes, and odometry in summary.json"});
 }
 
+void add_images_alone(const RunSummary& run, std::vector<Finding>& findings) {
+  if (!run.odometry || run.odometry->inertial_sensor) return;
+  findings.push_back({.id = "odometry.images_alone",
+                      .severity = Severity::kNote,
+                      .what = run.name + ": odometry by images alone, without an inertial sensor",
+                      .means = "gravity is unknown: z of poses and maps is the upward direction of "
+                               "the camera at the first image, not the vertical, and no pose is "
+                               "known while vision is lost for more than a second",
+                      .to_do = ""});
+}
+
 // There are more samples and messages than frames. A share of the frames keeps their faults
 // visible.
 void add_sensor_faults(const RunSummary& run, std::vector<Finding>& findings) {
@@ -443,6 +454,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
     add_map_gave_way(run.summary, findings);
     add_noisy_odometry(run.summary, findings);
     add_broken_odometry(run.summary, findings);
+    add_images_alone(run.summary, findings);
     add_sensor_faults(run.summary, findings);
     add_holes(run.summary, findings);
     add_rejected(run, findings);

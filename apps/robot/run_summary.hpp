@@ -166,8 +166,9 @@ struct CamerasSummary {
   bool operator==(const CamerasSummary&) const = default;
 };
 
-/// Events of the odometry by cameras and inertial sensor.
+/// Events of the odometry by cameras and, if there is one, inertial sensor.
 struct OdometrySummary {
+  bool inertial_sensor = true;      ///< False: z of all poses and maps is not the vertical.
   std::uint64_t starts = 0;         ///< Larger than one if odometry restarted during the run.
   std::uint64_t divergences = 0;    ///< New starts because the estimate was impossible.
   std::uint64_t inertial_gaps = 0;  ///< Times without samples for more than vio.max_imu_gap_s.
@@ -177,6 +178,7 @@ struct OdometrySummary {
   double blind_seconds = 0.0;       ///< Total time of these periods.
 
   void visit_fields(auto& visitor) {
+    visitor.field("inertial_sensor", inertial_sensor);
     visitor.field("starts", starts);
     visitor.field("divergences", divergences);
     visitor.field("inertial_gaps", inertial_gaps);

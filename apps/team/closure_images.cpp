@@ -14,6 +14,7 @@
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "modules/sensors/ros_image.hpp"
 
@@ -62,34 +63,26 @@ std::set<KeyframeId> keyframes_to_show(const Kinds& kinds, std::size_t max_closu
   return keyframes;
 }
 
-// The value of `option` on the command line of the robot.
-fs::path argument(const RobotPlan& plan, const std::string& option) {
-  const auto found = std::ranges::find(plan.arguments, option);
-  if (found != plan.arguments.end() && std::next(found) != plan.arguments.end())
-    return *std::next(found);
-  for (const std::string& word : plan.arguments)
-    if (word.starts_with(option + "=")) return word.substr(option.size() + 1);
-  return {};
-}
-
 // Wanted: keyframes whose left images are requested, by stamp. Take: function called with each of
 // these images.
 using Wanted = std::map<Stamp, KeyframeId>;
 using Take = std::function<void(const KeyframeId&, const cv::Mat&)>;
 
 void read_folder(const RobotPlan& plan, const Wanted& wanted, const Take& take) {
-  const fs::path rig = argument(plan, "--rig");
-  const double offset_s = rig.empty() ? 0.0 : read_rig_correction(rig).offset_s;
+  const fs::path rig = argument_of(plan, "--rig");
+  const bool is_euroc = layout_of(plan.dataset) == FolderLayout::kEuroc;
+  const double offset_s = rig.empty() || !is_euroc ? 0.0 : read_rig_correction(rig).offset_s;
   ReaderReport report;
-  for (const StereoPairFile& file : list_euroc_lefts(find_mav0(plan.dataset), report))
+  for (const StereoPairFile& file : is_euroc ? list_euroc_lefts(find_mav0(plan.dataset), report)
+                                             : read_image_folder(plan.dataset, rig).frames)
     if (const auto at = wanted.find(file.stamp + nanoseconds(offset_s)); at != wanted.end())
       take(at->second, cv::imread(file.left.string(), cv::IMREAD_ANYCOLOR));
 }
 
 void read_bag(const RobotPlan& plan, const Wanted& wanted, const Take& take) {
-  const fs::path file = argument(plan, "--rig");
+  const fs::path file = argument_of(plan, "--rig");
   if (file.empty()) throw std::runtime_error(plan.dataset.string() + ": no --rig");
-  const PartialRig partial = read_rig_file(file, !argument(plan, "--odometry").empty());
+  const PartialRig partial = read_rig_file(file);
   const Rig rig = partial.is_complete()
                       ? partial.rig
                       : complete_rig(plan.dataset.string(), *open_bag(plan.dataset), partial);

@@ -34,7 +34,7 @@ struct RobotPlan {
   void visit_fields(auto& visitor) {
     visitor.field("id", id, {0, 65535}, "unique in the team");
     visitor.field("name", name, "unique; also the name of its results folder; default: robot<id>");
-    visitor.field("dataset", dataset, Input{}, "EuRoC/ASL folder; or");
+    visitor.field("dataset", dataset, Input{}, "folder of images, or a bag (--rig); or");
     visitor.field("graph", graph, Input{}, "recorded pose graph: g2o, CSV or JRL");
     visitor.field("from", from_s, {0.0, 1e9}, "[s since the first image] part of the recording");
     visitor.field("to", to_s, {0.0, 1e9}, "[s since the first image]");

@@ -11,6 +11,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 
 namespace km {
 namespace {
@@ -71,7 +72,8 @@ void note_uncorrected(const Meshes& before, const Meshes& after, std::vector<std
 // Left camera of the team: that of the first robot with a camera.
 std::optional<Camera> camera_of(const TeamPlan& plan) {
   for (const RobotPlan& robot : plan.robots)
-    if (!robot.dataset.empty()) return open_euroc(robot.dataset).rig().stereo.cameras[0];
+    if (!robot.dataset.empty())
+      return open_folder(robot.dataset, {}, argument_of(robot, "--rig"))->rig().stereo.cameras[0];
   return std::nullopt;
 }
 
@@ -200,6 +202,15 @@ std::optional<ClosureScores> judge_closures(const TeamPlan& plan,
 
 }  // namespace
 
+fs::path argument_of(const RobotPlan& plan, const std::string& option) {
+  const auto found = std::ranges::find(plan.arguments, option);
+  if (found != plan.arguments.end() && std::next(found) != plan.arguments.end())
+    return *std::next(found);
+  for (const std::string& word : plan.arguments)
+    if (word.starts_with(option + "=")) return word.substr(option.size() + 1);
+  return {};
+}
+
 std::optional<RobotId> frame_of(const RobotResult& robot) {
   if (!robot.summary) return std::nullopt;
   const OptimizerSummary& pgo = robot.summary->pgo;
@@ -211,6 +222,11 @@ std::optional<TimeWindow> recorded_window(const RobotPlan& plan) {
   EurocOptions options;
   options.from_s = plan.from_s.value_or(options.from_s);
   options.to_s = plan.to_s.value_or(options.to_s);
+  if (layout_of(plan.dataset) != FolderLayout::kEuroc) {
+    ImageFolder folder = read_image_folder(plan.dataset, argument_of(plan, "--rig"));
+    keep_part({options.from_s, options.to_s, {}}, folder.list, folder.frames);
+    return TimeWindow{folder.frames.front().stamp, folder.frames.back().stamp};
+  }
   const EurocReader reader = open_euroc(plan.dataset, options);
   return TimeWindow{reader.first_stamp(), reader.last_stamp()};
 }

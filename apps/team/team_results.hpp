@@ -57,8 +57,11 @@ struct TeamResult {
   std::vector<std::string> notes;  ///< Reasons why results of the team are absent.
 };
 
+/// The value of `option` on the command line of the robot; empty if it is not there.
+[[nodiscard]] std::filesystem::path argument_of(const RobotPlan& plan, const std::string& option);
+
 /// Part of the recording that the robot plays; nullopt for pose graphs. Throws the exceptions of
-/// EurocReader.
+/// open_folder().
 [[nodiscard]] std::optional<TimeWindow> recorded_window(const RobotPlan& plan);
 
 /// Robot whose odometry frame the optimised poses of `robot` are in: itself if it optimised alone;

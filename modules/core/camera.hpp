@@ -79,6 +79,7 @@ struct SensorRig {
   StereoRig stereo;
   ImuNoise imu;
   std::optional<DepthRange> depth;  ///< Absent: no frame has a depth image.
+  bool has_imu = true;              ///< False: there are no inertial samples; `imu` is not used.
 };
 
 }  // namespace km

@@ -60,7 +60,9 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
   if (first_) return;
   std::ostringstream message;
   message << name_ << ": no frame with "
-          << (gives_poses() ? "a pose of the odometry" : "inertial samples");
+          << (gives_poses() ? "a pose of the odometry"
+              : has_imu()   ? "inertial samples"
+                            : "images of all cameras");
   if (start_) message << " from " << window.from_s << " s to " << window.to_s << " s";
   for (const SensorTopic& wanted : sensor_topics(rig_.topics))
     if (taken_[index_of(wanted.kind->role)] == 0)

@@ -81,30 +81,13 @@ EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration c
       side_images_(mav0_, rig_.depth, calibration.depth_scale_m, options.labels),
       files_(is_rgbd(rig_) ? StereoPairFiles{list_euroc_lefts(mav0_, report_), {}}
                            : list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
-      reads_imu_(options.imu),
+      reads_imu_(options.imu && rig_.has_imu),
       imu_(reads_imu_ ? read_imu(mav0_ / "imu0" / "data.csv", report_) : ImuStream()) {
-  if (!(options.from_s < options.to_s))
-    throw std::invalid_argument("EurocReader: the window from " + std::to_string(options.from_s) +
-                                " s to " + std::to_string(options.to_s) + " s is empty");
   side_images_.list(options.stereo_tolerance_s.value_or(Synchrony().tolerance_s), files_.pairs,
                     report_);
   for (StereoPairFile& pair : files_.pairs) pair.stamp += nanoseconds(options.correction.offset_s);
   recording_start_ = files_.pairs.front().stamp;
-  select(options);
-}
-
-void EurocReader::select(const EurocOptions& options) {
-  const double end_s = seconds_between(recording_start_, files_.pairs.back().stamp);
-  std::erase_if(files_.pairs, [&](const StereoPairFile& pair) {
-    const double t_s = seconds_between(recording_start_, pair.stamp);
-    return t_s < options.from_s || t_s >= options.to_s ||
-           (options.not_before && pair.stamp < *options.not_before);
-  });
-  if (!files_.pairs.empty()) return;
-  std::ostringstream message;
-  message << mav0_.string() << ": no stereo pair from " << options.from_s << " s to "
-          << options.to_s << " s; the recording has them from 0 s to " << end_s << " s";
-  throw DatasetError(message.str());
+  keep_part({options.from_s, options.to_s, options.not_before}, mav0_, files_.pairs);
 }
 
 bool EurocReader::has_imu(const StereoPairFile& pair) {

@@ -30,7 +30,7 @@ struct EurocOptions {
   std::optional<double> stereo_tolerance_s = {};
   /// EurocReader corrects the stamps, open_euroc() the cameras.
   CameraCalibration correction = {};
-  bool imu = true;      ///< False: no inertial sensor is needed, and packets have no samples.
+  bool imu = true;      ///< False: packets have no samples, even if there is an inertial sensor.
   bool depth = false;   ///< Read depth images although there is a right camera (open_euroc()).
   bool labels = false;  ///< Read label images.
 };
@@ -40,9 +40,10 @@ struct EurocOptions {
 [[nodiscard]] std::filesystem::path find_mav0(const std::filesystem::path& folder);
 
 /// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv, and images that the csv names, in
-/// any format OpenCV decodes. An RGB-D rig has depth0 in place of cam1: 16-bit images of one
-/// channel. Labels are in label0, as 8-bit ids or as colours of label_palette.csv beside label0. If
-/// depth or labels have a lower rate than images, some frames have none.
+/// any format OpenCV decodes. Without SensorRig::has_imu it does not read imu0. An RGB-D rig has
+/// depth0 in place of cam1: 16-bit images of one channel. Labels are in label0, as 8-bit ids or as
+/// colours of label_palette.csv beside label0. If depth or labels have a lower rate than images,
+/// some frames have none.
 ///
 /// The first packet starts up to ImuStream::kLeadIn_s before its frame, even if that is before
 /// `from_s`.
@@ -74,7 +75,6 @@ class EurocReader final : public DatasetReader {
   [[nodiscard]] Stamp last_stamp() const { return files_.pairs.back().stamp; }
 
  private:
-  void select(const EurocOptions& options);
   [[nodiscard]] bool has_imu(const StereoPairFile& pair);
   [[nodiscard]] std::vector<ImuSample> imu_until(Stamp stamp);
 

@@ -1,6 +1,7 @@
 #include "modules/sensors/frame_files.hpp"
 
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -50,6 +51,26 @@ LabelPalette read_palette(const std::filesystem::path& file) {
 }
 
 }  // namespace
+
+void keep_part(const RecordingPart& part, const std::filesystem::path& recording,
+               std::vector<StereoPairFile>& frames) {
+  if (!(part.from_s < part.to_s))
+    throw std::invalid_argument(recording.string() + ": the window from " +
+                                std::to_string(part.from_s) + " s to " + std::to_string(part.to_s) +
+                                " s is empty");
+  const Stamp start = frames.front().stamp;
+  const double end_s = seconds_between(start, frames.back().stamp);
+  std::erase_if(frames, [&](const StereoPairFile& frame) {
+    const double t_s = seconds_between(start, frame.stamp);
+    return t_s < part.from_s || t_s >= part.to_s ||
+           (part.not_before && frame.stamp < *part.not_before);
+  });
+  if (!frames.empty()) return;
+  std::ostringstream message;
+  message << recording.string() << ": no stereo pair from " << part.from_s << " s to " << part.to_s
+          << " s; the recording has them from 0 s to " << end_s << " s";
+  throw DatasetError(message.str());
+}
 
 StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
                                  std::optional<double> tolerance_s, ReaderReport& report) {

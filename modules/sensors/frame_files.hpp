@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -28,6 +29,19 @@ struct StereoPairFiles {
   std::vector<StereoPairFile> pairs;
   Synchrony synchrony;
 };
+
+/// Part of a recording, in seconds since its first frame.
+struct RecordingPart {
+  double from_s = 0.0;                                    ///< First instant of the part.
+  double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the part.
+  std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
+};
+
+/// Keeps the frames of `part`. `recording`: path for messages. Precondition: `frames` is not empty.
+/// Throws DatasetError if no frame is left, and std::invalid_argument for a part that is empty or
+/// not a number.
+void keep_part(const RecordingPart& part, const std::filesystem::path& recording,
+               std::vector<StereoPairFile>& frames);
 
 /// The stereo pairs of a EuRoC folder: rows `stamp [ns], file` of cam0/data.csv and cam1/data.csv,
 /// matched by stamps at most `tolerance_s` apart. Without a tolerance find_synchrony() determines

@@ -13,6 +13,7 @@ struct SensorsConfig {
   std::optional<double> stereo_tolerance_s;
   int read_ahead = 8;
   double max_lag_s = 0.5;
+  bool imu = true;
   bool depth = false;
   bool labels = false;
 
@@ -27,6 +28,8 @@ struct SensorsConfig {
         "[s] bound on the delay of odometry. At half of it the map gets no new frames. At this "
         "delay odometry gets every second image, then every third and fourth. At twice this delay "
         "a recording's clock waits, and live images are dropped. Inertial samples are kept");
+    visitor.field("imu", imu,
+                  "use the inertial sensor; false, or without one: odometry by images alone");
     visitor.field(
         "depth", depth,
         "read depth images although there is a right camera; an RGB-D rig always reads them");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <opencv2/video/tracking.hpp>
 #include <stdexcept>
 #include <string>
@@ -62,6 +63,17 @@ KltResult track_klt(const ImagePyramid& from, const ImagePyramid& to,
   return result;
 }
 
+// Without a gyroscope features may move by half a window on the coarsest level. Outliers are
+// rejected earlier, because no inertial sensor contradicts them later.
+TrackerConfig without_gyro(TrackerConfig config) {
+  constexpr int kLevels = 4;
+  constexpr double kEpipolarShare = 0.5, kReprojectionShare = 2.0 / 3.0;
+  config.pyramid_levels = std::max(config.pyramid_levels, kLevels);
+  config.max_epipolar_px *= kEpipolarShare;
+  config.max_reprojection_px *= kReprojectionShare;
+  return config;
+}
+
 void check_rig(const StereoRig& rig) {
   for (const Camera& camera : rig.cameras) {
     if (camera.width > 0 && camera.height > 0 && camera.fx > 0.0 && camera.fy > 0.0) continue;
@@ -96,9 +108,10 @@ std::unique_ptr<const AlignmentPatch> cut_patch(const ImagePyramid& image,
 
 }  // namespace
 
-FeatureTracker::FeatureTracker(const StereoRig& rig, const TrackerConfig& config)
+FeatureTracker::FeatureTracker(const StereoRig& rig, const TrackerConfig& config, bool has_gyro)
     : rig_(rig),
-      config_(checked(config)),
+      config_(has_gyro ? checked(config) : without_gyro(checked(config))),
+      has_gyro_(has_gyro),
       focal_px_(rig.cameras[0].fx),
       detector_(config_),
       stereo_matcher_(rig, config_),
@@ -120,6 +133,7 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   std::vector<Step> steps = follow(left, guess);
   drop_crowded(steps);
   const std::optional<SE3> motion = drop_outliers(steps, guess);
+  if (!has_gyro_ && motion) follow_again(left, *motion, steps);
   align(steps, left, motion.value_or(guess));
   const double dt_s = seconds_between(stamp_, frame.stamp);
   velocity_.setZero();
@@ -135,7 +149,9 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   match_right(left, frame);
   previous_left_ = std::move(left);
   stamp_ = frame.stamp;
-  return output();
+  TrackedFrame result = output();
+  result.T_previous_current = motion;
+  return result;
 }
 
 SE3 FeatureTracker::predicted_motion(Stamp stamp, const Eigen::Matrix3d& R_body) const {
@@ -186,15 +202,19 @@ std::vector<FeatureTracker::Step> FeatureTracker::follow(const ImagePyramid& lef
   if (tolerance > 0.0) {
     back = track_klt(left, previous_left_, there.px, from, config_.window_px, 0);
   }
+  std::vector<Track> failed;
+  statistics_.lost = statistics_.backward = 0;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const auto bearing =
         there.found[i] ? rig_.cameras[0].unproject(there.px[i].cast<double>()) : std::nullopt;
     if (!bearing) {
       ++statistics_.lost;
+      failed.push_back(std::move(tracks_[i]));
       continue;
     }
     if (tolerance > 0.0 && !(back.found[i] && (back.px[i] - from[i]).norm() < tolerance)) {
       ++statistics_.backward;
+      failed.push_back(std::move(tracks_[i]));
       continue;
     }
     Step step{std::move(tracks_[i]), {}, {}, depths[i]};
@@ -207,7 +227,17 @@ std::vector<FeatureTracker::Step> FeatureTracker::follow(const ImagePyramid& lef
     step.now.inverse_depth.reset();
     steps.push_back(std::move(step));
   }
+  tracks_ = std::move(failed);
   return steps;
+}
+
+void FeatureTracker::follow_again(const ImagePyramid& left, const SE3& motion,
+                                  std::vector<Step>& steps) {
+  std::vector<Step> found = follow(left, motion);
+  drop_by_motion(found, motion);
+  std::ranges::move(found, std::back_inserter(steps));
+  std::ranges::sort(steps, {}, [](const Step& step) { return step.now.id; });
+  drop_crowded(steps);
 }
 
 void FeatureTracker::align(std::vector<Step>& steps, const ImagePyramid& left,
@@ -317,11 +347,14 @@ std::optional<SE3> FeatureTracker::drop_outliers(std::vector<Step>& steps, const
     if (step.depth_before) pairs.push_back(step.depth_pair());
   }
   constexpr double kNoisePx = 1.0;
-  const std::optional<SE3> motion = estimate_motion(pairs, guess, kNoisePx / focal_px_, rng_);
+  const auto estimate = has_gyro_ ? estimate_motion : estimate_free_motion;
+  const std::optional<SE3> motion = estimate(pairs, guess, kNoisePx / focal_px_, rng_);
   if (motion) {
     drop_by_motion(steps, *motion);
-  } else {
+  } else if (has_gyro_) {
     drop_by_two_points(steps, guess);
+  } else {  // the wrong features are unknown
+    for (Step& step : steps) step.now.inverse_depth = step.depth_before;
   }
   return motion;
 }
@@ -344,7 +377,7 @@ void FeatureTracker::drop_by_motion(std::vector<Step>& steps, const SE3& T_previ
   for (Step& step : steps) {
     if (!disagrees(step)) kept.push_back(std::move(step));
   }
-  statistics_.motion = static_cast<int>(steps.size() - kept.size());
+  statistics_.motion += static_cast<int>(steps.size() - kept.size());
   steps = std::move(kept);
 }
 
@@ -361,7 +394,7 @@ void FeatureTracker::drop_by_two_points(std::vector<Step>& steps, const SE3& gue
     steps[i].now.inverse_depth = steps[i].depth_before;
     kept.push_back(std::move(steps[i]));
   }
-  statistics_.motion = static_cast<int>(steps.size() - kept.size());
+  statistics_.motion += static_cast<int>(steps.size() - kept.size());
   steps = std::move(kept);
 }
 

@@ -48,8 +48,10 @@ struct TrackerStatistics {
 ///    predicts. With an RGB-D rig DepthMatcher computes the observations of a virtual right camera.
 class FeatureTracker {
  public:
-  /// Throws ConfigError, and std::invalid_argument for cameras without size or focal length.
-  FeatureTracker(const StereoRig& rig, const TrackerConfig& config);
+  /// `has_gyro`: a gyroscope measures the rotations of track(). Otherwise they are extrapolated,
+  /// and the tracker searches over larger distances. Throws ConfigError, and std::invalid_argument
+  /// for cameras without size or focal length.
+  FeatureTracker(const StereoRig& rig, const TrackerConfig& config, bool has_gyro = true);
 
   /// The features of `frame`, possibly none. `R_previous_current_body` is the rotation of the body
   /// since the frame before, p_previous = R * p_current; identity if unknown.
@@ -91,7 +93,10 @@ class FeatureTracker {
   [[nodiscard]] double depth_guess(const Track& track) const;
   [[nodiscard]] Eigen::Vector2f predicted_px(const Track& track, double inverse_depth,
                                              const SE3& T_previous_current) const;
+  // Steps of the tracks that KLT finds. The other tracks stay in tracks_.
   [[nodiscard]] std::vector<Step> follow(const ImagePyramid& left, const SE3& guess);
+  // Searches the tracks that follow() did not find where `motion` predicts them.
+  void follow_again(const ImagePyramid& left, const SE3& motion, std::vector<Step>& steps);
   void drop_crowded(std::vector<Step>& steps);
   [[nodiscard]] std::optional<SE3> drop_outliers(std::vector<Step>& steps, const SE3& guess);
   void drop_by_motion(std::vector<Step>& steps, const SE3& T_previous_current);
@@ -105,6 +110,7 @@ class FeatureTracker {
 
   StereoRig rig_;
   TrackerConfig config_;
+  bool has_gyro_;
   double focal_px_;
   FeatureDetector detector_;
   StereoMatcher stereo_matcher_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "modules/core/lie.hpp"
+#include "modules/vio/motion_prior.hpp"
 #include "modules/vio/window.hpp"
 #include "modules/vio/window_optimizer.hpp"
 
@@ -65,6 +66,8 @@ constexpr double kBridgeGyro = 0.5;   // [rad/s/sqrt(Hz)]
 constexpr double kBridgeAccel = 2.0;  // [m/s^2/sqrt(Hz)]
 
 constexpr double kGyroBiasSigma = 0.02;  // around the guess of the start [rad/s]
+// Standard deviation of the angular rate at a start without an inertial sensor [rad/s].
+constexpr double kRateSigma = 3.0;
 
 // Rows of a prior that hold heading and position of a state. The heading is the rotation about the
 // vertical, expressed in the body frame.
@@ -89,7 +92,7 @@ Eigen::Matrix<double, 11, 15> without_gauge(const OdometryState& state) {
 }  // namespace
 
 FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config)
-    : config_(checked(config)), noise_(rig.imu) {
+    : config_(config_for(rig, config)), noise_(rig.imu), has_imu_(rig.has_imu) {
   noise_.gyro_noise_density *= config_.gyro_noise_factor;
   noise_.accel_noise_density *= config_.accel_noise_factor;
   for (std::size_t c = 0; c < 2; ++c)
@@ -101,6 +104,7 @@ FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config
   window_.loss_scale = config_.loss_scale;
   focal_px_ = window_.views[0].weight * config_.noise_px;
   R_cam_body_ = window_.views[0].R_cam_body;
+  T_body_left_ = rig.stereo.cameras[0].T_body_cam;
 }
 
 std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
@@ -171,7 +175,10 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   WindowFrame& newest = window_.frames.back();
   const OdometryState predicted = predict(window_.frames[window_.frames.size() - 2].state,
                                           newest.imu->imu(), config_.gravity_mps2);
-  newest.state = predicted;
+  const bool is_moved = !has_imu_ && frame.tracked.T_previous_current;
+  newest.state = is_moved ? moved_by_images(window_.frames[window_.frames.size() - 2].state,
+                                            frame.tracked, T_body_left_)
+                          : predicted;
   newest.state.stamp = frame.tracked.stamp;
   newest.rests = rests;
   observe(window_, frame.tracked);
@@ -179,7 +186,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   locate_landmarks();
   update.solution = optimize(window_, config_.iterations);
   update.outliers = reject_outliers();
-  if (!newest.imu->rests() && !newest.is_bridged) compare_gyro();
+  if (has_imu_ && !newest.imu->rests() && !newest.is_bridged) compare_gyro();
   update.state = newest.state;
   update.keyframe = newest.keyframe;
   for (const WindowLandmark& landmark : window_.landmarks) {
@@ -224,6 +231,8 @@ bool FixedLagSmoother::set_imu(std::size_t frame) {
   const WindowFrame& before = window_.frames[frame - 1];
   WindowFrame& f = window_.frames[frame];
   ImuNoise noise = noise_;
+  if (!has_imu_)
+    noise = virtual_imu_noise(config_, seconds_between(before.state.stamp, f.state.stamp));
   noise.gyro_noise_density *= gyro_noise_.scale();
   if (f.is_bridged) {
     noise.gyro_noise_density = std::max(noise.gyro_noise_density, kBridgeGyro);
@@ -422,10 +431,14 @@ void FixedLagSmoother::set_first_prior() {
   StatePrior& prior = window_.prior;
   prior.frames = {window_.frames.front().id};
   prior.linearization = {first};
-  prior.J = Eigen::MatrixXd::Zero(10, 15);
+  prior.J = Eigen::MatrixXd::Zero(has_imu_ ? 10 : 15, 15);
   prior.J.topRows<4>() = held_gauge(first);
-  prior.J.block<3, 3>(4, 9).diagonal().setConstant(1.0 / kGyroBiasSigma);
+  prior.J.block<3, 3>(4, 9).diagonal().setConstant(1.0 / (has_imu_ ? kGyroBiasSigma : kRateSigma));
   prior.J.block<3, 3>(7, 12).diagonal().setConstant(1.0 / config_.accel_bias_sigma);
+  if (!has_imu_) {  // nothing determines the tilt, and a single image no velocity
+    prior.J.block<2, 3>(10, 0) = first.T_odom_body.linear().topRows<2>() / kHeldHeading_rad;
+    prior.J.block<3, 3>(12, 6).diagonal().setConstant(1.0 / config_.max_speed_mps);
+  }
   hold_calibration();
 }
 
@@ -503,8 +516,8 @@ void FixedLagSmoother::drop_at_rest(std::size_t frame) {
        window_.landmarks)  // without an observation in a keyframe the distance is undetermined
     if (std::ranges::none_of(landmark.observations, in_keyframe)) landmark.located = false;
   WindowFrame& later = window_.frames[frame];
-  later.imu = ImuFactor::at_rest(
-      noise_, seconds_between(window_.frames[frame - 1].state.stamp, later.state.stamp));
+  const double dt_s = seconds_between(window_.frames[frame - 1].state.stamp, later.state.stamp);
+  later.imu = ImuFactor::at_rest(has_imu_ ? noise_ : virtual_imu_noise(config_, dt_s), dt_s);
 }
 
 }  // namespace km

@@ -127,9 +127,11 @@ class FixedLagSmoother {
 
   VioConfig config_;
   ImuNoise noise_;
+  bool has_imu_;  // False: see motion_prior.hpp.
   GyroNoiseScale gyro_noise_;
   double focal_px_;
   Eigen::Matrix3d R_cam_body_;
+  SE3 T_body_left_;
   Window window_;
   Matrix7 calibration_covariance_;  // Covariance at the start of the window.
   std::uint64_t next_id_ = 0;

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "modules/core/lie.hpp"
+#include "modules/vio/motion_prior.hpp"
 #include "modules/vio/rest_detector.hpp"
 #include "modules/vio/window.hpp"
 
@@ -286,6 +287,21 @@ StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& r
     state.accel_bias = aligned.accel_bias;
   }
   guess.status = StartStatus::kInMotion;
+  return guess;
+}
+
+StartGuess guess_start_by_images(const InertialFrame& frame, const SensorRig& rig) {
+  constexpr std::ptrdiff_t kMinLocatable = 20;
+  StartGuess guess;
+  guess.status = StartStatus::kTooFewFeatures;
+  const auto& features = frame.tracked.features;
+  if (std::ranges::count_if(features, [](const auto& f) { return f.right.has_value(); }) <
+      kMinLocatable)
+    return guess;
+  guess.status = StartStatus::kByImages;
+  OdometryState& state = guess.states.emplace_back();
+  state.stamp = frame.tracked.stamp;
+  state.T_odom_body.linear() = level_with_camera(rig.stereo.cameras[0].T_body_cam);
   return guess;
 }
 

@@ -13,6 +13,7 @@ enum class StartStatus {
   kInMotion,        ///< Motion from stereo, aligned with the inertial data.
   kContinues,       ///< Continues from the last state of an earlier process; not a result of
                     ///< guess_start().
+  kByImages,        ///< From one image, without an inertial sensor.
   kTooFewImages,    ///< Fewer than kMinStartImages.
   kTooFewFeatures,  ///< Too few features with depth, or too few tracked, for motion from stereo.
   kInconsistent,    ///< Stereo and inertial data contradict each other.
@@ -20,7 +21,7 @@ enum class StartStatus {
 
 [[nodiscard]] constexpr bool started(StartStatus status) {
   return status == StartStatus::kAtRest || status == StartStatus::kInMotion ||
-         status == StartStatus::kContinues;
+         status == StartStatus::kContinues || status == StartStatus::kByImages;
 }
 
 /// Guessed states of the first images, for FixedLagSmoother::start(), or the reason why there are
@@ -50,5 +51,9 @@ inline constexpr std::size_t kMinStartImages = 5;
 /// used.
 [[nodiscard]] StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& rig,
                                      const VioConfig& config);
+
+/// Start of odometry by images alone, on one image. The state is at the origin, its attitude that
+/// of level_with_camera(), and its velocity unknown. The image needs features with a depth.
+[[nodiscard]] StartGuess guess_start_by_images(const InertialFrame& frame, const SensorRig& rig);
 
 }  // namespace km

@@ -34,11 +34,15 @@ constexpr double kCoast_s = 1.0;  // time for which a speed persists
 constexpr double kLeastVariance = 1e-12;
 constexpr double kMostVariance = 1e6;
 
-// Covariance of a relative pose [rad], [m] of which gravity determines roll and pitch.
-Matrix6 upright_covariance(double heading, double translation, const Eigen::Vector3d& up_body) {
+// Covariance of a relative pose [rad], [m] of which gravity determines roll and pitch, if the
+// vertical is known.
+Matrix6 upright_covariance(double heading, double translation,
+                           const std::optional<Eigen::Vector3d>& up_body) {
+  Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();  // axes about which the heading turns
+  if (up_body) turned = *up_body * up_body->transpose();
   Matrix6 Sigma = Matrix6::Zero();
   Sigma.topLeftCorner<3, 3>() = kRestartRotation * kRestartRotation * Eigen::Matrix3d::Identity() +
-                                heading * heading * up_body * up_body.transpose();
+                                heading * heading * turned;
   Sigma.bottomRightCorner<3, 3>().diagonal().setConstant(translation * translation);
   return Sigma;
 }
@@ -83,7 +87,7 @@ SE3 chain_of_next_run(const KeyframeOdometry& last) {
       Eigen::Translation3d(last.T_odom_kf.translation() + kApart_m * Eigen::Vector3d::UnitX()));
 }
 
-Matrix6 unknown_step_covariance(const Eigen::Vector3d& up_body) {
+Matrix6 unknown_step_covariance(const std::optional<Eigen::Vector3d>& up_body) {
   return upright_covariance(kMostHeading, kUnknownStep_m, up_body);
 }
 

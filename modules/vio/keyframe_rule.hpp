@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "modules/core/geometry.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/vio/vio_config.hpp"
@@ -21,7 +23,8 @@ namespace km {
 struct UnmeasuredMotion {
   double lasts_s = 0.0;
   double speed_mps = 0.0;  ///< The larger of the speeds before and after the interval.
-  Eigen::Vector3d up_body = Eigen::Vector3d::UnitZ();  ///< Vertical at the end of the interval.
+  /// Vertical at the end of the interval; nullopt without an inertial sensor.
+  std::optional<Eigen::Vector3d> up_body = Eigen::Vector3d::UnitZ();
 };
 
 /// Time for which a body is assumed to continue at its former speed, and then at its later speed,
@@ -32,7 +35,8 @@ struct UnmeasuredMotion {
 [[nodiscard]] double coasting_s(double lasts_s);
 
 /// Covariance of the relative pose across a new start. The covariance grows with the duration
-/// without measurements and with the speed. The heading is more uncertain than roll and pitch.
+/// without measurements and with the speed. The heading is more uncertain than roll and pitch,
+/// unless the vertical is unknown.
 [[nodiscard]] Matrix6 restart_covariance(const UnmeasuredMotion& motion = {});
 
 /// Origin of the odometry of a run in the frame of the published keyframes, if `last` is the last
@@ -41,7 +45,7 @@ struct UnmeasuredMotion {
 [[nodiscard]] SE3 chain_of_next_run(const KeyframeOdometry& last);
 
 /// Covariance of the relative pose between two runs: only the tilt is known. `up_body`: vertical at
-/// the second pose.
-[[nodiscard]] Matrix6 unknown_step_covariance(const Eigen::Vector3d& up_body);
+/// the second pose; nullopt: the tilt is unknown too.
+[[nodiscard]] Matrix6 unknown_step_covariance(const std::optional<Eigen::Vector3d>& up_body);
 
 }  // namespace km

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -14,6 +15,10 @@ namespace km {
 namespace {
 
 constexpr int kSamples = 48;
+// Without a gyroscope: samples, steps for each, and the scale of a loss that weighs nothing down.
+constexpr int kFreeSamples = 48;
+constexpr int kFreeSteps = 5;
+constexpr double kNoLoss = 1e3;
 constexpr double kCoarseSigmas = 6.0;  // Truncation of the cost before the rotation is refined.
 
 // Truncated quadratic cost (MSAC) of the distances of all pairs.
@@ -79,6 +84,47 @@ SE3 refined(std::span<const DepthPair> pairs, const SE3& T, double scale) {
   return T * se3_exp(H.ldlt().solve(g));
 }
 
+// The best of some motions by a truncated cost, refined.
+class MotionSearch {
+ public:
+  MotionSearch(std::span<const DepthPair> pairs, const SE3& guess, double sigma)
+      : pairs_(pairs), sigma_(sigma), best_(guess), best_cost_(coarse_cost(guess)) {}
+
+  void consider(const SE3& T) {
+    const double cost = coarse_cost(T);
+    if (!(cost < best_cost_)) return;
+    best_cost_ = cost;
+    best_ = T;
+  }
+
+  // The best motion, refined; nullopt if fewer than half of the landmarks agree with it.
+  [[nodiscard]] std::optional<SE3> result() const {
+    SE3 best = best_;
+    for (double scale = kCoarseSigmas * sigma_; scale >= sigma_; scale *= 0.7)
+      best = refined(pairs_, best, scale);
+    if (!best.matrix().allFinite()) return std::nullopt;
+    best.linear() = nearest_rotation(best.linear());
+
+    constexpr double kAgreeSigmas = 3.0;
+    const auto agreeing = std::count_if(pairs_.begin(), pairs_.end(), [&](const DepthPair& pair) {
+      return reprojection_distance(pair, best) < kAgreeSigmas * sigma_;
+    });
+    if (2 * static_cast<std::size_t>(agreeing) < pairs_.size()) return std::nullopt;
+    return best;
+  }
+
+ private:
+  [[nodiscard]] double coarse_cost(const SE3& T) const {
+    return cost_of(pairs_, kCoarseSigmas * sigma_,
+                   [&](const DepthPair& pair) { return reprojection_distance(pair, T); });
+  }
+
+  std::span<const DepthPair> pairs_;
+  double sigma_;
+  SE3 best_;
+  double best_cost_;
+};
+
 // Normal of the pair's epipolar plane, which contains the translation; zero without parallax.
 Eigen::Vector3d plane_normal(const BearingPair& pair, const Eigen::Matrix3d& R) {
   return pair.previous.homogeneous().cross(R * pair.current.homogeneous());
@@ -100,36 +146,34 @@ double reprojection_distance(const DepthPair& pair, const SE3& T_previous_curren
 std::optional<SE3> estimate_motion(std::span<const DepthPair> pairs, const SE3& guess, double sigma,
                                    std::mt19937& rng) {
   if (pairs.size() < kMinMotionPairs) return std::nullopt;
-  const double coarse = kCoarseSigmas * sigma;
-  SE3 best = guess;
-  const auto coarse_cost = [&](const SE3& T) {
-    return cost_of(pairs, coarse, [&](const auto& pair) { return reprojection_distance(pair, T); });
-  };
-  double best_cost = coarse_cost(guess);
+  MotionSearch search(pairs, guess, sigma);
   std::uniform_int_distribution<std::size_t> any(0, pairs.size() - 1);
   for (int sample = 0; sample < kSamples; ++sample) {
     const std::size_t i = any(rng);
     const std::size_t j = any(rng);
     if (i == j) continue;
     const std::optional<Eigen::Vector3d> t = translation_of(pairs[i], pairs[j], guess.linear());
-    if (!t) continue;
-    const SE3 T = make_pose(guess.linear(), *t);
-    const double cost = coarse_cost(T);
-    if (cost < best_cost) {
-      best_cost = cost;
-      best = T;
-    }
+    if (t) search.consider(make_pose(guess.linear(), *t));
   }
-  for (double scale = coarse; scale >= sigma; scale *= 0.7) best = refined(pairs, best, scale);
-  if (!best.matrix().allFinite()) return std::nullopt;
-  best.linear() = nearest_rotation(best.linear());
+  return search.result();
+}
 
-  constexpr double kAgreeSigmas = 3.0;
-  const auto agreeing = std::count_if(pairs.begin(), pairs.end(), [&](const DepthPair& pair) {
-    return reprojection_distance(pair, best) < kAgreeSigmas * sigma;
-  });
-  if (2 * static_cast<std::size_t>(agreeing) < pairs.size()) return std::nullopt;
-  return best;
+std::optional<SE3> estimate_free_motion(std::span<const DepthPair> pairs, const SE3& guess,
+                                        double sigma, std::mt19937& rng) {
+  if (pairs.size() < kMinMotionPairs) return std::nullopt;
+  MotionSearch search(pairs, guess, sigma);
+  std::uniform_int_distribution<std::size_t> any(0, pairs.size() - 1);
+  for (int sample = 0; sample < kFreeSamples; ++sample) {
+    const std::size_t i = any(rng);
+    const std::size_t j = any(rng);
+    const std::size_t k = any(rng);
+    if (i == j || j == k || i == k) continue;
+    const std::array<DepthPair, 3> chosen = {pairs[i], pairs[j], pairs[k]};
+    SE3 T = guess;
+    for (int step = 0; step < kFreeSteps; ++step) T = refined(chosen, T, kNoLoss);
+    if (T.matrix().allFinite()) search.consider(T);
+  }
+  return search.result();
 }
 
 double epipolar_distance(const BearingPair& pair, const Eigen::Matrix3d& R,

@@ -42,6 +42,13 @@ struct DepthPair {
                                                  const SE3& guess_T_previous_current, double sigma,
                                                  std::mt19937& rng);
 
+/// estimate_motion() without a gyroscope: samples of three landmarks give rotation and translation,
+/// by Gauss-Newton steps from `guess` (6 equations for 6 unknowns). The guess may be wrong by some
+/// ten degrees.
+[[nodiscard]] std::optional<SE3> estimate_free_motion(std::span<const DepthPair> pairs,
+                                                      const SE3& guess_T_previous_current,
+                                                      double sigma, std::mt19937& rng);
+
 inline constexpr std::size_t kMinMotionPairs = 8;
 
 /// A point seen in two images of one camera; bearings on z = 1.

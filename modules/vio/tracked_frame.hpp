@@ -21,6 +21,8 @@ struct TrackedFeature {
 struct TrackedFrame {
   Stamp stamp = 0;
   std::vector<TrackedFeature> features;  ///< Ascending ids.
+  /// Motion of the left camera since the image before, on which the features agree.
+  std::optional<SE3> T_previous_current = {};
 };
 
 }  // namespace km

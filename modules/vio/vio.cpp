@@ -10,6 +10,7 @@
 #include "modules/core/imu_limits.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/vio/keyframe_rule.hpp"
+#include "modules/vio/motion_prior.hpp"
 
 namespace km {
 namespace {
@@ -46,6 +47,10 @@ double longest_step_s(const std::vector<ImuSample>& samples) {
   return longest_s;
 }
 
+// Without an inertial sensor, the longest time for which the last speeds give the pose while images
+// do not. After it odometry starts again from the last pose.
+constexpr double kLongestCoast_s = 1.0;
+
 constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor is more accurate
 constexpr double kMostTiltSigma = 1.5;    // a larger uncertainty means that the vertical is unknown
 
@@ -54,10 +59,12 @@ constexpr double kMostTiltSigma = 1.5;    // a larger uncertainty means that the
 Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, const VioConfig& config)
     : robot_(robot),
       rig_(rig),
-      config_(checked(config)),
-      tracker_(rig.stereo, tracker),
+      config_(config_for(rig, config)),
+      tracker_(rig.stereo, tracker, rig.has_imu),
       smoother_(rig, config),
-      rest_detector_(config, rig.stereo.cameras[0].fx) {}
+      rest_detector_(config_, rig.stereo.cameras[0].fx) {
+  statistics_.has_imu = rig.has_imu;
+}
 
 void Vio::continue_from(const VioCheckpoint& checkpoint) {
   last_ = checkpoint.state;
@@ -70,7 +77,7 @@ void Vio::continue_from(const VioCheckpoint& checkpoint) {
 
 VioResult Vio::process(const SensorPacket& packet) {
   VioResult result;
-  const int refused = take_samples(packet);
+  const int refused = rig_.has_imu ? take_samples(packet) : 0;
   if (refused > 0) result.problem = VioProblem::kBadSamples;
   statistics_.refused_samples += refused;
   const Frame& frame = packet.frame;
@@ -82,7 +89,10 @@ VioResult Vio::process(const SensorPacket& packet) {
   }
   ++statistics_.images;
   const Stamp before = last_image_.value_or(frame->stamp);
-  Held held{{{}, samples_since(before, frame->stamp)}, frame};
+  if (!rig_.has_imu) samples_ = virtual_samples(before, frame->stamp);
+  Held held;
+  held.frame = frame;
+  held.data.samples = samples_since(before, frame->stamp);
   const double gap_s = longest_step_s(held.data.samples);
   held.data.tracked = tracker_.track(*frame, turn(held.data.samples, before, frame->stamp));
   result.tracking = tracker_.statistics();
@@ -92,7 +102,7 @@ VioResult Vio::process(const SensorPacket& packet) {
   const bool first = !last_image_.has_value();
   last_image_ = frame->stamp;
 
-  held.data.is_bridged = !first && gap_s > config_.max_imu_gap_s;
+  held.data.is_bridged = rig_.has_imu && !first && gap_s > config_.max_imu_gap_s;
   statistics_.gaps += held.data.is_bridged && !in_gap_;
   in_gap_ = held.data.is_bridged;
   if (in_gap_) result.problem = VioProblem::kInertialGap;
@@ -171,6 +181,7 @@ void Vio::continue_at(const Held& held, VioResult& result) {
   ++statistics_.starts;
   result.start = StartStatus::kContinues;
   running_ = true;
+  seen_ = last_->stamp;
   locate(*last_, held.frame, result);
 }
 
@@ -188,13 +199,18 @@ void Vio::try_start(VioResult& result) {
     ++statistics_.images_without_pose;
   }
   if (held_.empty()) return;
+  if (!rig_.has_imu) {
+    statistics_.images_without_pose += static_cast<int>(held_.size()) - 1;
+    held_.erase(held_.begin(), std::prev(held_.end()));
+  }
   const double span_s =
       seconds_between(held_.front().data.tracked.stamp, held_.back().data.tracked.stamp);
-  if (span_s < config_.start_s - 1e-3) return;
+  if (rig_.has_imu && span_s < config_.start_s - 1e-3) return;
   ++statistics_.start_attempts;
   std::vector<InertialFrame> frames;
   for (const Held& held : held_) frames.push_back(held.data);
-  StartGuess guess = guess_start(frames, rig_, config_);
+  StartGuess guess = rig_.has_imu ? guess_start(frames, rig_, config_)
+                                  : guess_start_by_images(frames.back(), rig_);
   result.start = guess.status;
   if (started(guess.status)) {
     continue_from_last_pose(guess.states);
@@ -202,6 +218,7 @@ void Vio::try_start(VioResult& result) {
       ++statistics_.starts;
       result.states = *states;
       running_ = true;
+      seen_ = states->back().stamp;
       continue_or_add_first_keyframe(result);
       locate(states->front(), held_.front().frame, result);
       for (std::size_t k = 1; k < held_.size(); ++k) {
@@ -227,15 +244,15 @@ void Vio::try_start(VioResult& result) {
 }
 
 // A start defines its own first position and heading. The heading of the last pose replaces this
-// heading. The new position follows from the last pose and the velocities before and after the
-// interval without measurements.
+// heading, or without gravity its attitude. The new position follows from the last pose and the
+// velocities before and after the interval without measurements.
 void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
   if (!last_) return;
   const SE3 first = states.front().T_odom_body;
   // Rotation about the vertical that minimises the difference of the two attitudes.
   const Eigen::Matrix3d Q = last_->T_odom_body.linear() * first.linear().transpose();
   const double turn = std::atan2(Q(1, 0) - Q(0, 1), Q(0, 0) + Q(1, 1));
-  const Eigen::Matrix3d R = so3_exp(turn * Eigen::Vector3d::UnitZ());
+  const Eigen::Matrix3d R = rig_.has_imu ? so3_exp(turn * Eigen::Vector3d::UnitZ()) : Q;
   const double coasting = coasting_s(unmeasured_s(states.front().stamp));
   const Eigen::Vector3d way = coasting * (last_->v_odom + R * states.front().v_odom);
   const SE3 T = make_pose(R, last_->T_odom_body.translation() + way - R * first.translation());
@@ -266,6 +283,12 @@ void Vio::advance(const Held& held, VioResult& result) {
     restart(held);
     return;
   }
+  if (is_lost(held.frame->stamp, *result.smoother)) {
+    result.problem = VioProblem::kLost;
+    last_->gyro_bias.setZero();  // the angular rate does not persist
+    restart(held);
+    return;
+  }
   result.states.push_back(result.smoother->state);
   const bool last_chance = last_keyframe_ && smoother_.leaves_next(last_keyframe_->stamp);
   const bool recovered = has_recovered(*held.frame);
@@ -274,6 +297,12 @@ void Vio::advance(const Held& held, VioResult& result) {
     add_keyframe(result.smoother->state, result);
   if (recovered) discard_prior(held, result.smoother->state);
   locate(result.smoother->state, held.frame, result);
+}
+
+// True if the pose would be extrapolated for too long, because there is no inertial sensor.
+bool Vio::is_lost(Stamp now, const SmootherUpdate& update) {
+  if (update.seen >= VisionWatch::kMinLandmarks) seen_ = now;
+  return !rig_.has_imu && seconds_between(seen_, now) > kLongestCoast_s;
 }
 
 bool Vio::has_recovered(const StereoFrame& frame) const {
@@ -386,8 +415,8 @@ void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
   if (last_keyframe_) {  // after a restart of the odometry
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
-    const Eigen::Vector3d up_body =
-        state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ();
+    std::optional<Eigen::Vector3d> up_body;
+    if (rig_.has_imu) up_body = state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ();
     keyframe.covariance =
         last_
             ? restart_covariance({.lasts_s = unmeasured_s(state.stamp),
@@ -408,6 +437,7 @@ void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   keyframe.covariance = relative
                             ? keyframe_covariance(config_, moved_s(state.stamp), relative->Sigma)
                             : restart_covariance();
+  if (!rig_.has_imu) keyframe.covariance += scale_covariance(keyframe.T_previous_kf);
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   publish(keyframe, state, result);
 }

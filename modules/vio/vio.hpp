@@ -29,6 +29,9 @@ enum class VioProblem {
   /// The estimate was implausible or contradicted the images. Odometry starts again from the last
   /// pose.
   kDiverged,
+  /// Without an inertial sensor: images have not determined the pose for a second. Odometry starts
+  /// again from the last pose with the first image that has enough features.
+  kLost,
   kStartTimeout,  ///< No start was possible; the oldest waiting images are dropped without a pose.
 };
 
@@ -54,13 +57,15 @@ struct VioCheckpoint {
   KeyframeOdometry keyframe;  ///< The last published keyframe.
 };
 
-/// Stereo-inertial or RGB-D-inertial odometry: one call per image, a pose for every image.
+/// Stereo-inertial or RGB-D-inertial odometry, or odometry by images alone if the rig has no
+/// inertial sensor (motion_prior.hpp): one call per image, a pose for every image.
 ///
 /// Images of the first VioConfig::start_s are held back. Then all their poses are published at
-/// once, and from there one pose per image. A body that stands still makes no keyframes
-/// (RestDetector). The first keyframe after a rest is measured from the last keyframe before the
-/// rest. Bad input is refused and reported; it does not throw. After an estimate has diverged,
-/// odometry starts again from the last pose. Deterministic; not thread-safe.
+/// once, and from there one pose per image. Images alone start with the first image. A body that
+/// stands still makes no keyframes (RestDetector). The first keyframe after a rest is measured from
+/// the last keyframe before the rest. Bad input is refused and reported; it does not throw. After
+/// an estimate has diverged, odometry starts again from the last pose. Deterministic; not
+/// thread-safe.
 class Vio {
  public:
   /// Throws ConfigError, and std::invalid_argument for an unusable rig.
@@ -102,6 +107,7 @@ class Vio {
   void restart(Held held);
   [[nodiscard]] bool has_recovered(const StereoFrame& frame) const;
   void discard_prior(const Held& held, const OdometryState& state);
+  [[nodiscard]] bool is_lost(Stamp now, const SmootherUpdate& update);
   void watch_vision(Stamp stamp, int features, VioResult& result);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
@@ -135,6 +141,7 @@ class Vio {
   std::vector<Held> held_;  // Images held back; not empty while starting.
   bool running_ = false;
   bool in_gap_ = false;       // The inertial samples have a gap.
+  Stamp seen_ = 0;            // Last image that determined the pose; without an inertial sensor.
   int unlocated_images_ = 0;  // Images in a row with many features and few located landmarks.
   std::optional<OdometryState> last_;  // Last published state.
   std::optional<KeyframeOdometry> last_keyframe_;

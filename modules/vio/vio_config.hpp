@@ -40,6 +40,8 @@ struct VioConfig {
   double tilt_sigma = 1e-2;
   int tilt_keyframes = 120;
   double max_imu_gap_s = 0.1;
+  double motion_accel = 10.0;
+  double motion_turn = 5.0;
   double max_speed_mps = 30.0;
   double max_gyro_bias_radps = 0.5;
   double max_accel_bias_mps2 = 3.0;
@@ -131,6 +133,12 @@ struct VioConfig {
     visitor.field("max_imu_gap_s", max_imu_gap_s, {1e-3, 1.0},
                   "[s] longest gap between inertial samples that is interpolated; over a longer "
                   "one images determine the motion, or odometry starts again");
+    visitor.field("motion_accel", motion_accel, {1e-3, 1e3},
+                  "[m/s^2/sqrt(Hz)] without an inertial sensor: noise density of the acceleration, "
+                  "by which the velocity changes; small: smooth motion, short losses of vision are "
+                  "bridged better");
+    visitor.field("motion_turn", motion_turn, {1e-3, 1e3},
+                  "[rad/s^2/sqrt(Hz)] in the same way for the angular acceleration");
     visitor.field("max_speed_mps", max_speed_mps, {0.1, 1e3},
                   "[m/s] a higher estimated speed shows that the estimate has diverged");
     visitor.field(

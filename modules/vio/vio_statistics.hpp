@@ -4,7 +4,8 @@ namespace km {
 
 /// Counts of one odometry since its construction.
 struct VioStatistics {
-  int images = 0;  ///< Accepted images.
+  bool has_imu = true;  ///< False: odometry by images alone, and z of odom is not the vertical.
+  int images = 0;       ///< Accepted images.
   int refused_images = 0;
   int refused_samples = 0;
   int gaps = 0;

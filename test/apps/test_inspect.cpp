@@ -85,7 +85,9 @@ TEST_CASE("Skipped parts of a recording are reported with their place", "[robot]
 TEST_CASE("A file that is no recording is refused with its name", "[robot]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(inspect_recording(folder.path()),
-                    folder.path().string() + ": neither .db3 or .mcap files nor a EuRoC recording");
+                    folder.path().string() +
+                        ": neither .db3 or .mcap files nor a recording in the layout of EuRoC, "
+                        "KITTI, TUM RGB-D or 7-Scenes");
   CHECK_THROWS_AS(inspect_recording(folder.path() / "missing.bag"), InputFileError);
 }
 

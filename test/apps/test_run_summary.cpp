@@ -69,7 +69,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/pgo/not_joined/0 /pgo/not_joined/1 "
         "/pgo/odometry_rotation_noise /pgo/odometry_translation_noise "
         "/pgo/odometry_breaks "
-        "/odometry/starts /odometry/divergences /odometry/inertial_gaps /odometry/refused_images "
+        "/odometry/inertial_sensor /odometry/starts /odometry/divergences /odometry/inertial_gaps /odometry/refused_images "
         "/odometry/refused_samples /odometry/images_without_pose /odometry/vision_losses "
         "/odometry/blind_seconds "
         "/localization/map /localization/localised /localization/after_s /localization/compared "

@@ -63,17 +63,6 @@ void check_alignment(const CalibrationMap& yaml, const Camera& left) {
     yaml.fail("T_BS", "T_BS: not that of cam0, with which depth must align");
 }
 
-DepthRange read_depth_range(const CalibrationMap& yaml) {
-  DepthRange range;
-  range.max_m = yaml.number("max_range_m", kDepthRange_m, range.max_m);
-  if (!yaml.has("min_range_m")) return range;
-  const std::optional<double> min_m = yaml.number("min_range_m");
-  if (!min_m || *min_m < 0.0 || *min_m >= range.max_m)
-    yaml.fail("min_range_m", "min_range_m is not a number from 0 to below max_range_m");
-  range.min_m = *min_m;
-  return range;
-}
-
 // Moves the cameras from the reference frame of the files to the inertial sensor's frame.
 void move_to_imu(const CalibrationMap& imu, StereoRig& stereo) {
   const SE3 T_imu_reference = extrinsics(imu).inverse();
@@ -94,7 +83,7 @@ StereoRig read_stereo(const std::filesystem::path& mav0, const Camera& left) {
 
 }  // namespace
 
-SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth, bool needs_imu) {
+SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth) {
   SensorRig rig;
   const Camera left = read_euroc_camera(sensor_yaml(mav0, "cam0"));
   const bool rgbd = !is_there(mav0 / "cam1") && is_there(mav0 / "depth0");
@@ -102,12 +91,13 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth, boo
   if (rgbd || with_depth) {
     const CalibrationMap depth = sensor_yaml(mav0, "depth0");
     check_alignment(depth, left);
-    rig.depth = read_depth_range(depth);
+    rig.depth = read_depth_range(depth, DepthRange().max_m);
     if (rgbd)
       rig.stereo =
           rgbd_rig(left, depth.number("baseline_m", kDepthBaseline_m, kDefaultDepthBaseline_m));
   }
-  if (!needs_imu && !is_there(mav0 / "imu0")) return rig;
+  rig.has_imu = is_there(mav0 / "imu0");
+  if (!rig.has_imu) return rig;
   const CalibrationMap imu = sensor_yaml(mav0, "imu0");
   rig.imu = read_imu_noise(imu);
   move_to_imu(imu, rig.stereo);
@@ -116,8 +106,7 @@ SensorRig read_euroc_rig(const std::filesystem::path& mav0, bool with_depth, boo
 
 RigCalibration read_euroc_calibration(const std::filesystem::path& mav0, const RigChoice& choice) {
   RigCalibration calibration;
-  const CalibrationMap imu = sensor_yaml(mav0, "imu0");
-  calibration.rig.imu = read_imu_noise(imu);
+  calibration.rig.has_imu = is_there(mav0 / "imu0");
   const auto camera = [&mav0](std::size_t index) {
     return sensor_yaml(mav0, ("cam" + std::to_string(index)).c_str());
   };
@@ -126,6 +115,9 @@ RigCalibration read_euroc_calibration(const std::filesystem::path& mav0, const R
   if (const auto problem =
           join_cameras(read_euroc_camera(camera(choice.left)), right, choice, calibration.rig))
     camera(*choice.right).fail("T_BS", "T_BS " + *problem);
+  if (!calibration.rig.has_imu) return calibration;
+  const CalibrationMap imu = sensor_yaml(mav0, "imu0");
+  calibration.rig.imu = read_imu_noise(imu);
   move_to_imu(imu, calibration.rig.stereo);
   return calibration;
 }
@@ -136,7 +128,8 @@ double read_depth_scale(const std::filesystem::path& mav0) {
 
 EurocReader open_euroc(const std::filesystem::path& folder, const EurocOptions& options) {
   const std::filesystem::path mav0 = find_mav0(folder);
-  EurocCalibration calibration{.rig = read_euroc_rig(mav0, options.depth, options.imu)};
+  EurocCalibration calibration{.rig = read_euroc_rig(mav0, options.depth)};
+  calibration.rig.has_imu &= options.imu;
   options.correction.apply_to(calibration.rig.stereo);
   if (calibration.rig.depth) calibration.depth_scale_m = read_depth_scale(mav0);
   return EurocReader(folder, std::move(calibration), options);

@@ -1,5 +1,6 @@
 #include "modules/sensors/node/read_camera.hpp"
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -97,6 +98,17 @@ void check_intrinsics(const CalibrationMap& map, const char* key, const Camera& 
 void read_pinhole(const CalibrationMap& map, Camera& camera) {
   read_resolution(map, camera);
   read_intrinsics(map, kProjections[0], camera);
+}
+
+DepthRange read_depth_range(const CalibrationMap& yaml, double max_m) {
+  DepthRange range;
+  range.max_m = yaml.number("max_range_m", kDepthRange_m, max_m);
+  if (!yaml.has("min_range_m")) return range;
+  const std::optional<double> min_m = yaml.number("min_range_m");
+  if (!min_m || *min_m < 0.0 || *min_m >= range.max_m)
+    yaml.fail("min_range_m", "min_range_m is not a number from 0 to below max_range_m");
+  range.min_m = *min_m;
+  return range;
 }
 
 Camera read_camera(const CalibrationMap& map, const char* coefficients_key) {

@@ -23,6 +23,9 @@ namespace km {
 /// Errors as for read_camera().
 void read_pinhole(const CalibrationMap& map, Camera& camera);
 
+/// The optional keys `min_range_m` (0) and `max_range_m` of a depth sensor.
+[[nodiscard]] DepthRange read_depth_range(const CalibrationMap& map, double max_m);
+
 /// The lens of a calibration. If Lens refuses the coefficients, the message contains the place of
 /// `key`.
 [[nodiscard]] Lens lens_of(const CalibrationMap& map, const char* key, LensModel model,

@@ -46,7 +46,7 @@ RigCalibration read_calibration(const std::filesystem::path& path, bool is_inlin
   RigCalibration calibration;
   calibration.has_cameras = calibration.has_extrinsics = calibration.has_pair = false;
   if (choice.depth) calibration.rig.depth = choice.depth->range;
-  if (file.odometry.topic.empty() && !file.odometry.file)
+  if (file.has_imu() && !file.has_odometry())
     calibration.notes.push_back(path.string() +
                                 ": no calibration: noise of the inertial sensor as of EuRoC's");
   return calibration;
@@ -62,6 +62,14 @@ void note_topics(const RigFile& file, const std::string& path, RigCalibration& c
   for (const auto& [calibrated, used] : topics)
     if (!calibrated.empty() && !used.empty() && calibrated != used)
       calibration.notes.push_back(path + ": " + used + " is calibrated as " + calibrated);
+}
+
+// If nothing names a body, it is the left camera.
+void choose_body(const RigFile& file, RigCalibration& calibration) {
+  if (calibration.has_extrinsics || file.has_imu() || file.has_odometry() ||
+      !file.body_frame.empty())
+    return;
+  calibration.has_extrinsics = true;
 }
 
 // Transform from 16 numbers of a 4x4 matrix, row by row; the identity from none.
@@ -84,11 +92,10 @@ void make_absolute(YAML::Node node, const std::filesystem::path& folder) {
 
 }  // namespace
 
-PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
+PartialRig read_rig_file(const std::filesystem::path& path) {
   ConfigProblems problems;
   const ConfigContext context{problems, std::filesystem::absolute(path).parent_path()};
   RigFile file;
-  file.has_poses = has_poses;
   YAML::Node root = load_yaml(path);
   const YAML::Node written = root.IsMap() ? root["calibration"] : YAML::Node();
   const bool is_inline = written && written.IsMap();
@@ -97,6 +104,7 @@ PartialRig read_rig_file(const std::filesystem::path& path, bool has_poses) {
   problems.finish();
   RigCalibration calibration = read_calibration(path, is_inline, file);
   note_topics(file, path.string(), calibration);
+  choose_body(file, calibration);
   const auto info_topic = [](const RigFile::Camera& camera) {
     return camera.info_topic.empty() ? camera_info_beside(camera.topic) : camera.info_topic;
   };

@@ -115,31 +115,29 @@ struct RigFile {
   std::vector<std::filesystem::path> calibration;
   std::string body_frame;
   RigCorrectionFile correction;
-  bool has_poses = false;  ///< True if the file need not name an odometry or inertial sensor.
+
+  [[nodiscard]] bool has_imu() const { return !imu.topic.empty() || !imu.gyro_topic.empty(); }
+  [[nodiscard]] bool has_odometry() const {
+    return !odometry.topic.empty() || odometry.file.has_value();
+  }
 
   void visit_fields(auto& visitor) {
     visitor.section("left", left);
     visitor.section("right", right, "omit it for an RGB-D camera");
     visitor.section("depth", depth);
-    visitor.section("imu", imu);
+    visitor.section("imu", imu, "omit it for odometry by images alone");
     visitor.section("odometry", odometry,
-                    "external odometry of the robot, which replaces stereo-inertial odometry");
+                    "external odometry of the robot, which replaces odometry by images");
     visitor.field("calibration", calibration, Input{},
                   "relative to this file: Kalibr's files ([camchain.yaml, imu.yaml]), one of "
                   "Basalt (.json), a EuRoC folder with the sensor.yaml of cam0, cam1 and imu0, or "
                   "keys as in Kalibr's files; CameraInfo and /tf_static supply missing parts");
     visitor.field("body_frame", body_frame,
                   "frame of the inertial sensor in /tf_static; empty: the frame in its messages, "
-                  "or without an inertial sensor the child frame of the odometry");
+                  "or without an inertial sensor the child frame of the odometry; without "
+                  "either the body is the left camera");
     correction.visit_fields(visitor);
     visitor.required({"left"});
-    visitor.check(
-        !imu.topic.empty() || !imu.gyro_topic.empty() || !odometry.topic.empty() ||
-            odometry.file.has_value() || has_poses,
-        "imu",
-        "is missing: odometry goes by cameras and an inertial sensor; a robot without one "
-        "names the odometry that it has: odometry: {topic: ...} or {file: ...}, or --odometry "
-        "FILE");
     visitor.check(
         !right.topic.empty() || !depth.topic.empty(), "left",
         "is alone: a right camera or depth is needed (one camera does not measure how far "
@@ -147,10 +145,9 @@ struct RigFile {
   }
 };
 
-/// Reads a rig file and its calibration; `has_poses`: an odometry from elsewhere replaces that of
-/// the file. Throws ConfigError with every problem by file and line, and DatasetError for a
-/// calibration that cannot be used.
-[[nodiscard]] PartialRig read_rig_file(const std::filesystem::path& file, bool has_poses = false);
+/// Reads a rig file and its calibration. Throws ConfigError with every problem by file and line,
+/// and DatasetError for a calibration that cannot be used.
+[[nodiscard]] PartialRig read_rig_file(const std::filesystem::path& file);
 
 /// Reads a file with only the keys of RigCorrectionFile, for a recording that contains its own
 /// calibration. Errors as for read_rig_file().

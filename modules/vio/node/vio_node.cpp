@@ -26,6 +26,9 @@ const char* text(VioProblem problem) {
              "starts again";
     case VioProblem::kDiverged:
       return "estimate diverged, starting again from the last pose";
+    case VioProblem::kLost:
+      return "images do not determine the pose, and there is no inertial sensor: starting again "
+             "from the last pose when they do";
     case VioProblem::kStartTimeout:
       return "cannot start, giving up the oldest images held back";
   }
@@ -40,6 +43,8 @@ const char* text(StartStatus status) {
       return "started in motion";
     case StartStatus::kContinues:
       return "continues from the last keyframe";
+    case StartStatus::kByImages:
+      return "started by images alone; gravity is unknown, so z of odom is not the vertical";
     case StartStatus::kTooFewImages:
       return "too few images to start";
     case StartStatus::kTooFewFeatures:
@@ -63,6 +68,7 @@ std::optional<double> tracked_share(const TrackerStatistics& s) {
 VioNode::VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
                  const VioConfig& config, const VioTopics& topics)
     : vio_(robot, rig, tracker, config),
+      has_imu_(rig.has_imu),
       topics_(topics),
       worker_(
           kQueuedPackets, Overflow::kBlock, [this](const auto& packet) { step(*packet); },
@@ -103,7 +109,8 @@ void VioNode::log_event(const VisionEvent& event) const {
   const std::string since = fixed(1e-9 * static_cast<double>(event.since), 3) + " s";
   if (event.is_lost)
     log::warn(name()) << "vision lost since " << since << ", " << event.features
-                      << " features: the pose is by inertial sensing alone";
+                      << " features: the pose is "
+                      << (has_imu_ ? "by inertial sensing alone" : "extrapolated");
   else
     log::info(name()) << "vision lost since " << since << " is back after "
                       << fixed(event.lasted_s, 2) << " s, " << event.features << " features";

@@ -52,6 +52,7 @@ class VioNode final : public Node {
   void log_event(const VisionEvent& event) const;
 
   Vio vio_;
+  const bool has_imu_;
   const VioTopics topics_;
   double blind_s_ = 0.0;
   bool stopped_ = false;

@@ -1,14 +1,16 @@
 // Odometry on EuRoC MH_01_easy as in the table of results: three pieces and 21 starts.
-//   bench_vio DATASET [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS] [flight=SECONDS]
+//   bench_vio DATASET [images] [rgbd] [starts] [black] [resume=SECONDS] [rest=SECONDS]
+//   [flight=SECONDS]
 //             [late=MILLISECONDS] [turned=DEGREES] [KEY=VALUE ...]
 // KEY is a key of the sections vio and tracker.
 //
-// "rgbd" replaces the right images by depth computed from both, and "starts" adds the 21 starts.
-// "black" runs with one second of black images at each of 12 positions. "resume" ends odometry
-// within the first seconds at every keyframe, once or at every n-th, and resumes it there, with the
-// state and without it. "rest" stands still for that time; DATASET is V1_01_easy then. "flight"
-// runs once over the first seconds of a recording. "late" delays the stamps of inertial samples,
-// and "turned" rotates the cameras against the rig's calibration.
+// "images" leaves the inertial sensor out. "rgbd" replaces the right images by depth computed from
+// both, and "starts" adds the 21 starts. "black" runs with one second of black images at each of 12
+// positions. "resume" ends odometry within the first seconds at every keyframe, once or at every
+// n-th, and resumes it there, with the state and without it. "rest" stands still for that time;
+// DATASET is V1_01_easy then. "flight" runs once over the first seconds of a recording. "late"
+// delays the stamps of inertial samples, and "turned" rotates the cameras against the rig's
+// calibration.
 
 #include <algorithm>
 #include <array>
@@ -119,6 +121,18 @@ void print_piece(const char* name, const OdometryRun& run, std::size_t images) {
       run.statistics.starts - 1);
 }
 
+// Error of the last pose relative to the first one, as a share of the path.
+void print_drift(const OdometryRun& run) {
+  double path_m = 0.0;
+  for (std::size_t k = 1; k < run.truth.size(); ++k)
+    path_m += (run.truth[k].translation() - run.truth[k - 1].translation()).norm();
+  const SE3 T = run.states.front().T_odom_body.inverse() * run.states.back().T_odom_body;
+  const SE3 error = T.inverse() * run.truth.front().inverse() * run.truth.back();
+  std::printf("    drift %.3f %% of %.1f m, %.3f deg\n",
+              100.0 * error.translation().norm() / path_m, path_m,
+              angle_of(error.linear()) * 180.0 / std::numbers::pi);
+}
+
 void run_black(const Recording& recording, const TrackerConfig& tracker, const VioConfig& config) {
   for (double from = 1.5; from < 13.0; from += 1.0) {
     const Recording black =
@@ -213,7 +227,7 @@ void run_rest(const Recording& standing, const TrackerConfig& tracker, const Vio
 }
 
 int run(int argc, char** argv) {
-  bool starts = false, black = false, rgbd = false;
+  bool starts = false, black = false, rgbd = false, imu = true;
   double resume_s = 0.0, rest_s = 0.0, flight_s = 0.0, late_ms = 0.0, turned_deg = 0.0;
   const std::map<std::string, double*> numbers = {{"resume", &resume_s},
                                                   {"rest", &rest_s},
@@ -231,6 +245,8 @@ int run(int argc, char** argv) {
       overrides.values[name] = equals + 1;
     else if (std::strcmp(argv[a], "rgbd") == 0)
       rgbd = true;
+    else if (std::strcmp(argv[a], "images") == 0)
+      imu = false;
     else
       (std::strcmp(argv[a], "starts") == 0 ? starts : black) = true;
   }
@@ -250,13 +266,16 @@ int run(int argc, char** argv) {
     return 0;
   }
   const auto read = [&](double to_s) {
-    return disturbed(read_recording(argv[1], 0.0, to_s), 1e-3 * late_ms,
+    return disturbed(read_recording(argv[1], 0.0, to_s, imu), 1e-3 * late_ms,
                      turned_deg * std::numbers::pi / 180.0);
   };
   if (flight_s > 0.0) {
     const Recording flight = read(flight_s);
     const std::size_t images = flight.packets.size();
-    print_piece("flight", run_odometry(flight, 0, images, tracker, config), images);
+    const OdometryRun run = run_odometry(flight, 0, images, tracker, config);
+    print_piece("flight", run, images);
+    print_drift(run);
+    for (const std::size_t steps : {1U, 3U, 8U}) print_consistency(run, steps);
     return 0;
   }
   Recording recording = read(16.0);

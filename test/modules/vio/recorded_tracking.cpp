@@ -11,7 +11,8 @@
 #include "modules/core/lie.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
+#include "modules/sensors/text_file.hpp"
 #include "modules/vio/track_motion.hpp"
 
 namespace km {
@@ -87,19 +88,45 @@ std::vector<View> views_of(const Recording& recording, std::size_t frame,
   return views;
 }
 
+// Poses of the body from poses.txt, whose rows are 3x4 matrices of camera poses. A row belongs to
+// the row of times.txt (KITTI), or begins with the number of the frame at 30 Hz (7-Scenes).
+std::vector<StampedPose> read_camera_poses(const std::filesystem::path& folder,
+                                           const SE3& T_cam_body) {
+  const bool is_kitti = layout_of(folder) == FolderLayout::kKitti;
+  const std::string text = read_file(folder / "poses.txt");
+  const std::string times = is_kitti ? read_file(folder / "times.txt") : "";
+  const std::vector<TextRow> stamps = split_rows(times);
+  std::vector<StampedPose> poses;
+  for (const TextRow& row : split_rows(text)) {
+    const double t_s =
+        is_kitti ? number_in(stamps.at(poses.size()), 0).value() : number_in(row, 0).value() / 30.0;
+    Eigen::Matrix<double, 3, 4, Eigen::RowMajor> T;
+    for (std::size_t i = 0; i < 12; ++i)
+      T.data()[i] = number_in(row, i + (is_kitti ? 0 : 1)).value();
+    poses.push_back(
+        {nanoseconds(t_s), make_pose(nearest_rotation(T.leftCols<3>()), T.col(3)) * T_cam_body});
+  }
+  return poses;
+}
+
 }  // namespace
 
-Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s) {
+Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s,
+                         bool imu) {
   EurocOptions options;
   options.from_s = from_s;
   options.to_s = to_s;
-  EurocReader reader = open_euroc(folder, options);
+  options.imu = imu;
+  const auto reader = open_folder(folder, options);
   Recording result;
-  result.rig = reader.rig();
-  const auto truth = read_trajectory(folder / "mav0/state_groundtruth_estimate0");
+  result.rig = reader->rig();
+  const auto truth =
+      layout_of(folder) == FolderLayout::kEuroc
+          ? read_trajectory(folder / "mav0/state_groundtruth_estimate0")
+          : read_camera_poses(folder, result.rig.stereo.cameras[0].T_body_cam.inverse());
   const Eigen::Matrix4d unknown =
       Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
-  while (auto packet = reader.next()) {
+  while (auto packet = reader->next()) {
     result.T_world_body.push_back(
         pose_at(truth, packet->frame->stamp, 0.1, 0.0).value_or(SE3(unknown)));
     result.packets.push_back(std::move(*packet));

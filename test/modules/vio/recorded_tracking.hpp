@@ -16,8 +16,10 @@ struct Recording {
   std::vector<SE3> T_world_body;  ///< NaN where the truth has a gap.
 };
 
-/// Images of `folder` (EuRoC) from `from_s` to `to_s`, with poses of its groundtruth_tum.txt.
-Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s);
+/// Images of `folder` (see FolderLayout) from `from_s` to `to_s`, with the poses of its
+/// groundtruth_tum.txt or poses.txt. `imu`: with the inertial sensor, if there is one.
+Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s,
+                         bool imu = true);
 
 struct TrackingRun {
   std::vector<TrackedFrame> frames;

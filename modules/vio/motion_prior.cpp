@@ -1,0 +1,74 @@
+#include "modules/vio/motion_prior.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "modules/core/camera_axes.hpp"
+#include "modules/core/lie.hpp"
+
+namespace km {
+namespace {
+
+// Standard deviation of the accelerometer bias at the start [m/s^2], and its random walk
+// [m/s^3/sqrt(Hz)]: far below any acceleration that images show.
+constexpr double kHeldAccel = 1e-4;
+
+// Share of VioConfig::loss_scale without an inertial sensor. Nothing else corrects a few bad
+// tracks.
+constexpr double kLossShare = 1.0 / 3.0;
+
+// Standard deviation of the scale of a motion by images alone. On KITTI's recording it is 0.5 %.
+constexpr double kScaleSigma = 0.01;
+
+}  // namespace
+
+VioConfig config_for(const SensorRig& rig, const VioConfig& config) {
+  VioConfig result = checked(config);
+  if (rig.has_imu) return result;
+  result.gravity_mps2 = 0.0;
+  result.calibrate = false;
+  result.loss_scale *= kLossShare;
+  result.tilt_sigma = 0.0;
+  result.accel_bias_sigma = kHeldAccel;
+  result.gyro_noise_factor = result.accel_noise_factor = 1.0;
+  result.max_gyro_bias_radps = std::numeric_limits<double>::infinity();
+  return result;
+}
+
+ImuNoise virtual_imu_noise(const VioConfig& config, double dt_s) {
+  return {.gyro_noise_density = config.motion_turn * dt_s / std::numbers::sqrt3,
+          .gyro_random_walk = config.motion_turn,
+          .accel_noise_density = config.motion_accel,
+          .accel_random_walk = kHeldAccel};
+}
+
+std::vector<ImuSample> virtual_samples(Stamp from, Stamp to) {
+  return {{.stamp = from}, {.stamp = to}};
+}
+
+OdometryState moved_by_images(const OdometryState& before, const TrackedFrame& tracked,
+                              const SE3& T_body_left) {
+  const SE3 motion = T_body_left * *tracked.T_previous_current * T_body_left.inverse();
+  const double dt_s = seconds_between(before.stamp, tracked.stamp);
+  OdometryState now = before;
+  now.stamp = tracked.stamp;
+  now.T_odom_body = before.T_odom_body * motion;
+  now.T_odom_body.linear() = nearest_rotation(now.T_odom_body.linear());
+  now.v_odom = before.T_odom_body.linear() * motion.translation() / dt_s;
+  now.gyro_bias = -so3_log(motion.linear()) / dt_s;
+  return now;
+}
+
+Matrix6 scale_covariance(const SE3& T_previous_kf) {
+  Vector6 sigma;
+  sigma << Eigen::Vector3d::Constant(kScaleSigma * angle_of(T_previous_kf.linear())),
+      Eigen::Vector3d::Constant(kScaleSigma * T_previous_kf.translation().norm());
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+Eigen::Matrix3d level_with_camera(const SE3& T_body_left) {
+  return body_axes_of_camera() * T_body_left.linear().transpose();
+}
+
+}  // namespace km

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+#include "modules/core/odometry.hpp"
+#include "modules/vio/tracked_frame.hpp"
+#include "modules/vio/vio_config.hpp"
+
+namespace km {
+
+/// Odometry by images alone: a rig without an inertial sensor gets a virtual one.
+///
+/// The prior on the motion is a constant velocity with white noise on the acceleration and on the
+/// angular acceleration. In equations, this prior is an inertial factor of samples that are zero,
+/// without gravity:
+/// - Eq. (45) of Forster et al. with zero samples and zero gravity is p_j = p_i + v_i dt, v_j =
+/// v_i.
+///   The covariance of the preintegration is q^2 [dt, dt^2/2; dt^2/2, dt^3/3] for [v; p], to the
+///   rule by which ImuPreintegration integrates. q is VioConfig::motion_accel.
+/// - A gyroscope that reads zero has a bias of minus the angular rate: R_j = R_i exp(-b_i dt). The
+///   random walk of the bias is the noise of the angular acceleration, VioConfig::motion_turn. The
+///   rotation gets the variance q^2 dt^3/3 of the integrated noise; its correlation with the rate
+///   is left out.
+/// - The accelerometer bias is held at zero.
+///
+/// Smoother, marginalisation, rest and resume are therefore those of stereo-inertial odometry.
+
+/// Checked `config` for odometry with `rig`. Without an inertial sensor there is no gravity, no
+/// calibration of the cameras against it, no vertical, and no bound on the "gyro bias". The loss on
+/// reprojection errors then has a third of the scale.
+/// Throws ConfigError if `config` is out of bounds.
+[[nodiscard]] VioConfig config_for(const SensorRig& rig, const VioConfig& config);
+
+/// Noise of the virtual sensor for a factor over `dt_s`.
+[[nodiscard]] ImuNoise virtual_imu_noise(const VioConfig& config, double dt_s);
+
+/// Samples of the virtual sensor that cover `from` to `to`.
+[[nodiscard]] std::vector<ImuSample> virtual_samples(Stamp from, Stamp to);
+
+/// State at an image without inertial sensor from the state at the image before, by the motion on
+/// which the features agree (TrackedFrame::T_previous_current). Precondition: `tracked` has one.
+[[nodiscard]] OdometryState moved_by_images(const OdometryState& before,
+                                            const TrackedFrame& tracked, const SE3& T_body_left);
+
+/// Covariance that a motion by images alone gets in addition to that of the window, for errors of
+/// the calibration: they scale distances and angles.
+[[nodiscard]] Matrix6 scale_covariance(const SE3& T_previous_kf);
+
+/// Attitude R_odom_body at a start without gravity: x of odom is the viewing direction of the left
+/// camera, z its upward direction.
+[[nodiscard]] Eigen::Matrix3d level_with_camera(const SE3& T_body_left);
+
+}  // namespace km

@@ -1,0 +1,203 @@
+#include "modules/sensors/image_folder.hpp"
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+
+#include "euroc_folder.hpp"
+#include "modules/sensors/node/open_folder.hpp"
+#include "test/support/temporary_folder.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kFrames = 4;
+
+void write_image(const fs::path& file, int type, double value) {
+  fs::create_directories(file.parent_path());
+  REQUIRE(cv::imwrite(file.string(), cv::Mat(24, 32, type, cv::Scalar::all(value))));
+}
+
+const std::string kP0 = "P0: 30 0 16 0 0 30 12 0 0 0 1 0\n";
+const std::string kP1 = "P1: 30 0 16 -15 0 30 12 0 0 0 1 0\n";
+
+// A recording at 10 Hz, with a baseline of half a metre.
+void write_kitti(const TemporaryFolder& folder) {
+  folder.write("calib.txt", kP0 + kP1 + "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n");
+  folder.write("times.txt", "0.0\n1.0e-01\n2.0e-01\n3.0e-01\n");
+  for (int k = 0; k < kFrames; ++k)
+    for (const char* camera : {"image_0", "image_1"})
+      write_image(folder.path() / camera / ("00000" + std::to_string(k) + ".png"), CV_8UC1, 10 * k);
+}
+
+// Depth images come 5 ms after the others; the third one is missing from the list.
+void write_tum(const fs::path& root) {
+  fs::create_directories(root);
+  std::ofstream rgb(root / "rgb.txt"), depth(root / "depth.txt");
+  rgb << "# color images\n# timestamp filename\n";
+  for (int k = 0; k < kFrames; ++k) {
+    const std::string name = std::to_string(k) + ".png";
+    rgb << "1305031102." << k << "00 rgb/" << name << '\n';
+    if (k != 2) depth << "1305031102." << k << "05 depth/" << name << '\n';
+    write_image(root / "rgb" / name, CV_8UC3, 10 * k);
+    write_image(root / "depth" / name, CV_16UC1, 10000);
+  }
+}
+
+TEST_CASE("A folder in KITTI's layout is read with its calibration", "[sensors][folder]") {
+  const TemporaryFolder folder;
+  write_kitti(folder);
+  CHECK(layout_of(folder.path()) == FolderLayout::kKitti);
+  const auto reader = open_folder(folder.path());
+  const StereoRig& rig = reader->rig().stereo;
+  CHECK_FALSE(reader->rig().has_imu);
+  CHECK(rig.baseline_m() == Approx(0.5));
+  CHECK(rig.cameras[0].width == 32);
+  CHECK(rig.cameras[1].fx == 30.0);
+  CHECK(rig.cameras[0].T_body_cam.isApprox(SE3::Identity()));  // the body is the left camera
+  CHECK(rig.cameras[1].T_body_cam.translation().x() == Approx(0.5));
+  const auto packets = packets_of(*reader);
+  REQUIRE(packets.size() == kFrames);
+  CHECK(packets[3].frame->stamp == 300'000'000);
+  CHECK(packets[3].frame->left.pixels[0] == 30);
+  CHECK(packets[3].frame->right.pixels[0] == 30);
+  CHECK(packets[3].imu.empty());
+  CHECK(reader->report().empty());
+  CHECK(open_folder(folder.path(), {.from_s = 0.05, .to_s = 0.25})->pair_count() == 2);
+  CHECK_THROWS_AS(open_folder(folder.path(), {.from_s = 7.0}), DatasetError);
+  CHECK_THROWS_WITH(open_folder(folder.path(), {}, "camera.yaml"),
+                    Catch::Contains("leave --rig out"));
+}
+
+TEST_CASE("A bad row of KITTI's calibration is refused with file, line and value",
+          "[sensors][folder]") {
+  const TemporaryFolder folder;
+  write_kitti(folder);
+  const auto complaint = [&](const std::string& calib) {
+    folder.write("calib.txt", calib);
+    try {
+      (void)open_folder(folder.path());
+    } catch (const DatasetError& error) {
+      return std::string(error.what());
+    }
+    return std::string("none");
+  };
+  using Catch::Contains;
+  CHECK_THAT(complaint(kP0), Contains("calib.txt: no row P1:"));
+  CHECK_THAT(complaint(kP0 + "P1: 30 0 16 nan 0 30 12 0 0 0 1 0\n"),
+             Contains("calib.txt line 2: nan is not a number"));
+  CHECK_THAT(complaint(kP0 + "P1: 30 0 16 -15 0 30\n"),
+             Contains("calib.txt line 2: 6 numbers, expected 12"));
+  CHECK_THAT(complaint("P0: 0 0 16 0 0 0 12 0 0 0 1 0\n" + kP1), Contains("calib.txt line 1: "));
+  CHECK_THAT(complaint(kP0 + "P1: 30 0 16 15 0 30 12 0 0 0 1 0\n"),
+             Contains("calib.txt line 2: P1 ") && Contains("exchange them"));
+  fs::remove(folder.path() / "calib.txt");
+  CHECK_THROWS_WITH(open_folder(folder.path()), Contains("calib.txt: no such file"));
+  fs::remove_all(folder.path() / "image_1");
+  CHECK_THROWS_WITH(open_folder(folder.path()), Contains("image_1: no such folder"));
+}
+
+TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out and counted",
+          "[sensors][folder]") {
+  const TemporaryFolder folder;
+  write_kitti(folder);
+  const auto check = [&](ReaderFault fault, const std::string& example, std::size_t frames) {
+    const auto reader = open_folder(folder.path());
+    const auto packets = packets_of(*reader);
+    CHECK(packets.size() == frames);
+    CHECK(packets.back().frame->left.pixels[0] == 30);  // rows stay with their images
+    const ReaderReport report = reader->report();
+    REQUIRE(report.count(fault) == 1);
+    CHECK_THAT(report.entries().at(fault).first, Catch::Contains(example));
+  };
+  SECTION("NaN") {
+    folder.write("times.txt", "nan\n0.1\n0.2\n0.3\n");
+    check(ReaderFault::kMalformedRow, "times.txt line 1: nan is no time in seconds", 3);
+  }
+  SECTION("out of order") {
+    folder.write("times.txt", "0.0\n0.15\n0.12\n0.3\n");
+    check(ReaderFault::kUnorderedStamp, "times.txt line", 3);
+  }
+  SECTION("an image that is not there") {
+    fs::remove(folder.path() / "image_1/000001.png");
+    check(ReaderFault::kMissingImage, "000001.png", 3);
+  }
+  SECTION("the first image") {
+    fs::remove(folder.path() / "image_0/000000.png");
+    check(ReaderFault::kMissingImage, "000000.png", 3);
+  }
+  SECTION("no time at all") {
+    folder.write("times.txt", "\n");
+    CHECK_THROWS_WITH(open_folder(folder.path()), Catch::Contains("times.txt: no time in it"));
+  }
+}
+
+TEST_CASE("A folder in the layout of TUM RGB-D has the camera of its name", "[sensors][folder]") {
+  const TemporaryFolder folder;
+  const fs::path root = folder.path() / "rgbd_dataset_freiburg2_desk";
+  write_tum(root);
+  CHECK(layout_of(root) == FolderLayout::kTum);
+  CHECK(tum_camera(root / "").value().camera.fx == 520.9);
+  // The images of this test are smaller than those of the benchmark.
+  CHECK(packets_of(*open_folder(root)).empty());
+  CHECK_FALSE(tum_camera(folder.path() / "desk"));
+}
+
+TEST_CASE("The camera of a folder in the layout of TUM RGB-D can be described",
+          "[sensors][folder]") {
+  const TemporaryFolder folder;
+  const fs::path root = folder.path() / "desk";
+  write_tum(root);
+  CHECK_THROWS_WITH(open_folder(root), Catch::Contains("--rig FILE"));
+  const fs::path camera =
+      folder.write("camera.yaml",
+                   "resolution: [32, 24]\ncamera_model: pinhole\nintrinsics: [30, 30, 16, 12]\n"
+                   "distortion_model: none\nmax_range_m: 5\nbaseline_m: 0.075\n");
+  const auto reader = open_folder(root, {}, camera);
+  CHECK_FALSE(reader->rig().has_imu);
+  CHECK(reader->rig().stereo.depth_source == DepthSource::kDepthImage);
+  CHECK(reader->rig().stereo.baseline_m() == Approx(0.075));
+  CHECK(reader->rig().depth->max_m == 5.0);
+  const auto packets = packets_of(*reader);
+  REQUIRE(packets.size() == kFrames);
+  for (std::size_t k = 0; k < packets.size(); ++k) {
+    CHECK(std::abs(packets[k].frame->stamp -
+                   (1305031102'000'000'000 + static_cast<Stamp>(k) * 100'000'000)) < 1000);
+    REQUIRE((packets[k].frame->depth != nullptr) == (k != 2));
+    if (k != 2) CHECK(packets[k].frame->depth->millimetres[0] == 2000);  // 10000 / 5000 m
+  }
+  std::ofstream(root / "rgb.txt") << "1305031102.0 rgb/0.png\n1305031102.1\nnan rgb/2.png\n";
+  const auto faulty = open_folder(root, {}, camera);
+  CHECK(packets_of(*faulty).size() == 1);
+  CHECK_THAT(faulty->report().entries().at(ReaderFault::kMalformedRow).first,
+             Catch::Contains("rgb.txt line 2: 1 fields, expected 2"));
+  CHECK(faulty->report().count(ReaderFault::kMalformedRow) == 2);
+  fs::remove(root / "depth.txt");
+  CHECK_THROWS_WITH(open_folder(root, {}, camera), Catch::Contains("depth.txt: no such file"));
+}
+
+TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][folder]") {
+  const TemporaryFolder folder;
+  folder.write("camera-intrinsics.txt", "30 0 16\n0 30 12\n0 0 1\n");
+  for (const int k : {0, 4, 12}) {
+    const std::string stem = "frame-0000" + std::string(k < 10 ? "0" : "") + std::to_string(k);
+    write_image(folder.path() / (stem + ".color.png"), CV_8UC3, k);
+    write_image(folder.path() / (stem + ".depth.png"), CV_16UC1, 1500);
+  }
+  const auto reader = open_folder(folder.path());
+  const auto packets = packets_of(*reader);
+  REQUIRE(packets.size() == 3);
+  CHECK(packets[2].frame->stamp == 400'000'000);
+  CHECK(packets[2].frame->left.pixels[0] == 12);
+  CHECK(packets[2].frame->depth->millimetres[0] == 1500);
+  folder.write("camera-intrinsics.txt", "30 0 16\n0 30 inf\n0 0 1\n");
+  CHECK_THROWS_WITH(open_folder(folder.path()),
+                    Catch::Contains("camera-intrinsics.txt line 2: inf is not a number"));
+}
+
+}  // namespace
+}  // namespace km

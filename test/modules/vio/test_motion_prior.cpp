@@ -1,0 +1,178 @@
+#include "modules/vio/motion_prior.hpp"
+
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "modules/vio/residuals.hpp"
+#include "recorded_odometry.hpp"
+#include "synthetic_motion.hpp"
+#include "test/support/numeric_jacobian.hpp"
+#include "test/support/shared_data.hpp"
+
+namespace km {
+namespace {
+
+constexpr Stamp kStep = 100'000'000;
+
+VioConfig without_imu() {
+  SensorRig rig;
+  rig.has_imu = false;
+  return config_for(rig, {});
+}
+
+ImuPreintegration virtual_preintegration(Stamp to) {
+  const VioConfig config = without_imu();
+  ImuPreintegration imu(virtual_imu_noise(config, seconds_between(0, to)), Eigen::Vector3d::Zero(),
+                        Eigen::Vector3d::Zero());
+  REQUIRE(imu.add(virtual_samples(0, to), 0, to));
+  return imu;
+}
+
+OdometryState retracted(const OdometryState& state, const Vector15& d) {
+  OdometryState moved = state;
+  moved.T_odom_body = retract(state.T_odom_body, d.head<6>());
+  moved.v_odom += d.segment<3>(6);
+  moved.gyro_bias += d.segment<3>(9);
+  moved.accel_bias += d.segment<3>(12);
+  return moved;
+}
+
+TEST_CASE("A motion at constant velocity and angular rate has no error under the prior",
+          "[vio][images]") {
+  std::mt19937 rng(5);
+  const Eigen::Vector3d rate = random_vector<3>(rng), velocity = 3.0 * random_vector<3>(rng);
+  OdometryState i, j;
+  i.T_odom_body = random_pose(rng);
+  i.v_odom = j.v_odom = velocity;
+  i.gyro_bias = j.gyro_bias = -rate;
+  const double dt = seconds_between(0, kStep);
+  j.T_odom_body = make_pose(i.T_odom_body.linear() * so3_exp(dt * rate),
+                            i.T_odom_body.translation() + dt * velocity);
+  const ImuFactor factor = ImuFactor::of(virtual_preintegration(kStep), 0.0).value();
+  CHECK(factor.error(i, j).norm() < 1e-6);
+  const OdometryState predicted = predict(i, factor.imu(), 0.0);
+  CHECK(predicted.T_odom_body.isApprox(j.T_odom_body, 1e-9));
+  CHECK(predicted.v_odom.isApprox(velocity));
+
+  i = retracted(i, 0.1 * random_vector<15>(rng));
+  const ImuTerm term = factor.linearize(i, j, i, j);
+  const auto by_i = numeric_jacobian<15>(
+      [&](const Vector15& d) -> Eigen::VectorXd { return factor.error(retracted(i, d), j); });
+  const auto by_j = numeric_jacobian<15>(
+      [&](const Vector15& d) -> Eigen::VectorXd { return factor.error(i, retracted(j, d)); });
+  CHECK((term.J_i - by_i).norm() < 1e-5 * by_i.norm());
+  CHECK((term.J_j - by_j).norm() < 1e-5 * by_j.norm());
+}
+
+// Variances of white noise of the acceleration, q^2 [dt, dt^2/2; dt^2/2, dt^3/3].
+TEST_CASE("The uncertainty of the prior grows as that of white noise on the acceleration",
+          "[vio][images]") {
+  const Stamp to = GENERATE(50'000'000, 1'000'000'000);
+  const double dt = seconds_between(0, to);
+  const VioConfig config = without_imu();
+  const Matrix9& Sigma = virtual_preintegration(to).covariance();
+  const double q2 = config.motion_accel * config.motion_accel;
+  CHECK(Sigma(3, 3) == Approx(q2 * dt));
+  CHECK(Sigma(3, 6) == Approx(q2 * dt * dt / 2.0));
+  constexpr double kTwoSteps = 0.07;  // the integration has two steps
+  CHECK(Sigma(6, 6) == Approx(q2 * dt * dt * dt / 3.0).epsilon(kTwoSteps));
+  CHECK(Sigma(0, 0) ==
+        Approx(config.motion_turn * config.motion_turn * dt * dt * dt / 3.0).epsilon(kTwoSteps));
+}
+
+TEST_CASE("Images alone determine the motion from exact tracks", "[vio][images]") {
+  SyntheticWorld world(SyntheticMotion{}, 7);
+  SensorRig rig = synthetic_rig();
+  rig.has_imu = false;
+  FixedLagSmoother smoother(rig, {});
+  std::vector<InertialFrame> frames = world.frames(40);
+  for (std::size_t k = 1; k < frames.size(); ++k)
+    frames[k].samples = virtual_samples(frames[k - 1].tracked.stamp, frames[k].tracked.stamp);
+  frames[0].samples.clear();
+  // The tracker's motion is where the optimisation begins, and no measurement.
+  std::mt19937 rng(11);
+  const SE3 T_body_cam = rig.stereo.cameras[0].T_body_cam;
+  for (std::size_t k = 1; k < frames.size(); ++k) {
+    const auto pose = [&](std::size_t i) {
+      return world.motion().state(frames[i].tracked.stamp).T_odom_body * T_body_cam;
+    };
+    frames[k].tracked.T_previous_current =
+        pose(k - 1).inverse() * pose(k) * se3_exp(2e-3 * random_vector<6>(rng));
+  }
+  OdometryState first = world.motion().state(0);
+  first.v_odom.setZero();  // unknown to odometry
+  REQUIRE(smoother.start({frames.data(), 1}, {&first, 1}));
+  for (std::size_t k = 1; k < frames.size(); ++k) {
+    const SmootherUpdate update = smoother.add(frames[k]);
+    REQUIRE(update.solution.usable);
+    const OdometryState truth = world.motion().state(frames[k].tracked.stamp);
+    const SE3 error = truth.T_odom_body.inverse() * update.state.T_odom_body;
+    CAPTURE(k);
+    CHECK(error.translation().norm() < 2e-3);  // the prior pulls by less
+    CHECK(angle_of(error.linear()) < 1e-3);
+    CHECK(update.state.accel_bias.norm() < 1e-6);
+  }
+}
+
+const Recording* recording(const std::string& name, double to_s) {
+  const auto folder = shared_data(name);
+  if (!folder) return nullptr;
+  static std::map<std::string, Recording> recordings;
+  return &recordings.try_emplace(name, read_recording(*folder, 0.0, to_s, false)).first->second;
+}
+
+TEST_CASE("KITTI: images alone give every image a pose, within a percent of the path",
+          "[vio][images]") {
+  const Recording* const data = recording("kitti_sequence_1", 10.0);
+  if (data == nullptr) return;
+  const OdometryRun run = run_odometry(*data, 0, data->packets.size(), {}, {});
+  REQUIRE(run.states.size() == data->packets.size());
+  CHECK(run.results[0].start == StartStatus::kByImages);
+  CHECK(run.statistics.starts == 1);
+  const SE3& first = run.states.front().T_odom_body;  // x of odom is the viewing direction
+  CHECK((first * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitX()));
+  const SE3 T = run.states.front().T_odom_body.inverse() * run.states.back().T_odom_body;
+  const SE3 truth = run.truth.front().inverse() * run.truth.back();
+  constexpr double kPath_m = 59.9;
+  CHECK((T.translation() - truth.translation()).norm() < 0.01 * kPath_m);
+  REQUIRE(run.keyframes.size() > 10);
+  for (const KeyframeOdometry& keyframe : run.keyframes) {
+    CHECK_FALSE(keyframe.vertical);
+    CHECK_FALSE(keyframe.calibration);
+  }
+}
+
+TEST_CASE("MH_01_easy: images alone give every image a pose, within two centimetres",
+          "[vio][images]") {
+  const Recording* const data = recording("euroc/MH_01_easy", 4.0);
+  if (data == nullptr) return;
+  const OdometryRun run = run_odometry(*data, 0, data->packets.size(), {}, {});
+  REQUIRE(run.states.size() == data->packets.size());
+  const OdometryErrors errors = odometry_errors(run.states, run.truth);
+  CHECK(errors.ate_m < 0.02);
+  CHECK(errors.rpe_deg < 0.3);
+}
+
+TEST_CASE("Images alone: a loss of vision is extrapolated for a second, then odometry starts again",
+          "[vio][images]") {
+  const Recording* const data = recording("euroc/MH_01_easy", 4.0);
+  if (data == nullptr) return;
+  const std::size_t first = 30, last = GENERATE(38, 60);  // 0.4 s and 1.5 s
+  CAPTURE(last);
+  const bool is_long = last == 60;
+  const OdometryRun run =
+      run_odometry(darkened(*data, first, last), 0, data->packets.size(), {}, {});
+  CHECK(run.statistics.vision_losses == 1);
+  CHECK(run.statistics.starts == (is_long ? 2 : 1));
+  CHECK((run.statistics.images_without_pose > 0) == is_long);
+  double largest_m = 0.0;
+  for (const KeyframeOdometry& keyframe : run.keyframes)
+    largest_m = std::max(largest_m, std::sqrt(keyframe.covariance(3, 3)));
+  CHECK(largest_m > (is_long ? 0.5 : 0.05));  // at other times a centimetre
+  for (std::size_t k = 1; k < run.keyframes.size(); ++k)
+    CHECK(run.keyframes[k].id.index == run.keyframes[k - 1].id.index + 1);
+  CHECK(run.states.back().stamp == data->packets.back().frame->stamp);
+}
+
+}  // namespace
+}  // namespace km
