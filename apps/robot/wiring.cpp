@@ -304,7 +304,7 @@ void Robot::add_map_2d(const Map2dConfig& config, const LabelPalette& palette) {
   auto& map = add<Map2dNode>(false, config, palette, *std::exchange(ray_thinner_, std::nullopt),
                              Map2dTopics{.frames = topics_.dense_frames, .maps = topics_.maps_2d});
   topics_.optimized_meshes.subscribe([&map](const auto& optimized) {
-    map.offer({{optimized, &optimized->mesh}, optimized->T_world_odom});
+    map.offer({{optimized, &optimized->mesh}, optimized->T_world_odom, optimized->anchor});
   });
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "modules/core/ids.hpp"
+
 namespace km {
 
 /// A horizontal grid of free and occupied cells, as in nav_msgs/OccupancyGrid. Cell (0, 0) has its
@@ -17,6 +19,8 @@ struct OccupancyGrid {
   int width = 0;                                     ///< [cells] along x
   int height = 0;                                    ///< [cells] along y
   std::vector<std::int8_t> cells;                    ///< Row-major: x + width * y.
+  double z_m = 0.0;    ///< Median height of the floor, in the frame of the map.
+  RobotId anchor = 0;  ///< Robot whose odometry frame is the frame of the map.
 
   [[nodiscard]] bool empty() const { return cells.empty(); }
 

@@ -105,6 +105,16 @@ bool is_step(const CellGrid& grid, const FloorHeights& floor, int x, int y, doub
   });
 }
 
+// Precondition: floor was seen.
+double median_height_m(const FloorHeights& floor) {
+  std::vector<float> seen;
+  for (std::size_t cell = 0; cell < floor.is_seen.size(); ++cell)
+    if (floor.is_seen[cell]) seen.push_back(floor.height_m[cell]);
+  const auto middle = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / 2);
+  std::ranges::nth_element(seen, middle);
+  return static_cast<double>(*middle);
+}
+
 RayCounter count_rays(const Map2dConfig& config, const Map2dInput& input, const CellGrid& grid,
                       const FloorHeights& floor) {
   RayCounter counter(config, grid, floor);
@@ -138,6 +148,7 @@ Map2dResult make_map_2d(const Map2dConfig& config, const Map2dInput& input) {
   result.status = Map2dStatus::kMade;
   OccupancyGrid& map = result.grid;
   map = {grid.resolution_m, grid.origin, grid.width, grid.height, {}};
+  map.z_m = median_height_m(floor);
   map.cells.assign(grid.size(), OccupancyGrid::kUnknown);
   for (int y = 0; y < grid.height; ++y)
     for (int x = 0; x < grid.width; ++x) {

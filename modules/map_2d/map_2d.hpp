@@ -31,7 +31,7 @@ enum class Map2dStatus {
 
 struct [[nodiscard]] Map2dResult {
   Map2dStatus status = Map2dStatus::kEmpty;
-  OccupancyGrid grid;         ///< In the frame of the mesh; empty unless kMade.
+  OccupancyGrid grid;         ///< In the frame of the mesh, without its anchor; empty unless kMade.
   double cells_needed = 0.0;  ///< Cells of the whole mesh.
 };
 

@@ -84,6 +84,7 @@ void Map2dNode::make_map() {
   if (result.status != Map2dStatus::kMade) return;
   log::debug(name()) << result.grid.width << " x " << result.grid.height << " cells from "
                      << views_.size() << " images in " << fixed(end_s - start_s, 3) << " s";
+  result.grid.anchor = surface_->anchor;
   maps_.publish(std::move(result.grid));
 }
 

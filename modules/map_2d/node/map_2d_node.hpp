@@ -25,6 +25,7 @@ namespace km {
 struct CorrectedSurface {
   std::shared_ptr<const LabelledMesh> mesh;  ///< In `world`.
   std::vector<SE3> T_world_odom;             ///< See Map2dInput.
+  RobotId anchor = 0;                        ///< Robot whose odometry frame is `world`.
 };
 
 /// Channels of the node of the 2D map; they must outlive it.

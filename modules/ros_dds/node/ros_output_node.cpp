@@ -32,7 +32,7 @@ RosOccupancyGrid message_of(const OccupancyGrid& grid, const RosHeader& header) 
                            .height = static_cast<std::uint32_t>(grid.height),
                            .origin = {},
                            .data = {grid.cells.begin(), grid.cells.end()}};
-  message.origin.position.head<2>() = grid.origin;
+  message.origin.position << grid.origin, grid.z_m;
   return message;
 }
 

@@ -136,6 +136,12 @@ TEST_CASE("Two floors are free, and the step between them is not", "[map_2d]") {
     CHECK(values(map_of(surfaces, climber), 0.1, 0.1, 9.9, 3.9) == Values{kFree});
 }
 
+TEST_CASE("The height of a map is the median of its floor", "[map_2d]") {
+  Surfaces surfaces;
+  surfaces.level(0, 0, 6, 4, 0.25F, kFloorLabel).level(6, 0, 9, 4, 0.75F, kFloorLabel);
+  CHECK(map_of(surfaces).z_m == Approx(0.25).margin(0.03));  // layers of surface have a thickness
+}
+
 TEST_CASE("Rays through the band free cells, and follow the poses of their keyframes", "[map_2d]") {
   Surfaces surfaces;
   surfaces.level(0, 0, 1, 4, 0, kFloorLabel).wall(2.5F, 4, 2.5F, 0, 0, 2);

@@ -59,7 +59,7 @@ TEST_CASE("The node maps the last mesh and moves the rays with its keyframes", "
   SE3 moved = SE3::Identity();
   moved.translation().y() = 1.5;
   node.offer({mesh, {moved}});
-  node.offer({mesh, {SE3::Identity()}});
+  node.offer({mesh, {SE3::Identity()}, 7});
   node.stop();
   node.stop();
   REQUIRE_FALSE(received.empty());
@@ -67,6 +67,7 @@ TEST_CASE("The node maps the last mesh and moves the rays with its keyframes", "
   CHECK(received.back().at({2.02, 2.02}) == OccupancyGrid::kFree);
   CHECK(received.back().at({2.02, 3.72}) == OccupancyGrid::kUnknown);
   CHECK(received.back().at({2.79, 2.02}) == OccupancyGrid::kOccupied);
+  CHECK(received.back().anchor == 7);
   CHECK(node.timing().count() == received.size());
 }
 

@@ -131,7 +131,8 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   mesh.faces = {{0, 1, 2}};
   node.offer(std::make_shared<const LabelledMesh>(mesh));
-  node.offer(std::make_shared<const OccupancyGrid>(OccupancyGrid{0.5, {-1, 2}, 2, 1, {100, -1}}));
+  node.offer(
+      std::make_shared<const OccupancyGrid>(OccupancyGrid{0.5, {-1, 2}, 2, 1, {100, -1}, 3}));
   node.offer_slice(std::make_shared<const LabelledMesh>(mesh), 1002);
   log::info("vio") << "begins";
   StereoFrame frame{.stamp = 1007, .left = {8, 8, std::vector<std::uint8_t>(64, 9)}, .right = {}};
@@ -156,7 +157,7 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   CHECK(map->width == 2);
   CHECK(map->height == 1);
   CHECK(map->resolution == 0.5F);
-  CHECK(map->origin.position == Eigen::Vector3d(-1, 2, 0));
+  CHECK(map->origin.position == Eigen::Vector3d(-1, 2, 3));
   CHECK(map->data == std::vector<std::uint8_t>{100, 255});
   const auto slice = last<RosPointCloud>(messages, "/bob_3/distance_slice");
   REQUIRE(slice);
