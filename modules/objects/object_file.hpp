@@ -27,4 +27,8 @@ struct NamedObject {
 /// the entry that is unusable.
 [[nodiscard]] std::vector<NamedObject> read_objects(const std::filesystem::path& file);
 
+/// The label, box and robots of each object of objects.json, with the anchor. Throws as
+/// read_objects() does, also for a label or a robot id out of range.
+[[nodiscard]] ObjectList read_object_list(const std::filesystem::path& file);
+
 }  // namespace km

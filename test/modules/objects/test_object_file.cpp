@@ -12,7 +12,7 @@ TEST_CASE("Objects are read as they were written", "[objects]") {
   const auto file = folder.path() / "objects.json";
   const LabelPalette palette({{7, "chair", {1, 2, 3}}});
   const ObjectBox box{{1.0, 2.0, 0.5}, 0.3, {0.8, 0.5, 1.0}};
-  write_file(file, objects_json({.anchor = 0,
+  write_file(file, objects_json({.anchor = 2,
                                  .objects = {{.label = 7, .box = box, .robots = {0, 3}},
                                              {.label = 9, .box = box}}},
                                 palette));
@@ -23,6 +23,25 @@ TEST_CASE("Objects are read as they were written", "[objects]") {
   CHECK(objects[0].box.center == box.center);
   CHECK(objects[0].box.yaw_rad == box.yaw_rad);
   CHECK(objects[0].box.size_m == box.size_m);
+  const ObjectList list = read_object_list(file);
+  CHECK(list.anchor == 2);
+  REQUIRE(list.objects.size() == 2);
+  CHECK(list.objects[0].label == 7);
+  CHECK(list.objects[0].box.center == box.center);
+  CHECK(list.objects[0].robots == std::vector<RobotId>{0, 3});
+}
+
+TEST_CASE("A list of objects with numbers out of range is refused", "[objects]") {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "objects.json";
+  const std::string box = R"("center_m": [0, 0, 0], "yaw_rad": 0, "size_m": [1, 1, 1])";
+  const std::string entry =
+      GENERATE(R"("label": 256, "robots": [])", R"("label": -1, "robots": [])",
+               R"("label": 1, "robots": [65536])", R"("label": 1)");
+  write_file(file, R"({"anchor": 0, "objects": [{)" + entry + ", " + box + "}]}");
+  CHECK_THROWS_WITH(read_object_list(file), Catch::Contains(file.string() + ": entry 0 of"));
+  write_file(file, R"({"anchor": "a", "objects": []})");
+  CHECK_THROWS_WITH(read_object_list(file), Catch::Contains(file.string() + ": \"anchor\""));
 }
 
 TEST_CASE("A file of objects with an unusable entry is refused with its place", "[objects]") {
