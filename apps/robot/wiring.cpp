@@ -652,7 +652,12 @@ void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& cam
                                     .pose_changes = t.pose_changes,
                                     .samples = t.samples,
                                     .restarts = t.closure_restarts,
+                                    .objects = t.joint_objects,
+                                    .maps_2d = t.maps_2d,
                                     .images = t.tracked_images});
+  t.distance_slices.subscribe([this](const auto& slice) {
+    view_->offer_slice({slice, &slice->points});
+  });
   t.optimized_meshes.subscribe([this](const auto& optimized) {
     view_->offer(optimized->anchor, {optimized, &optimized->mesh});
   });

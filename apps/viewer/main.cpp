@@ -28,7 +28,8 @@ constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 constexpr const char* kAbout =
     "Shows a team in a browser, while it runs or afterwards. It prints the address to "
-    "open.\n\nThe page has the map, trajectories and loop closures in 3D, and the state of the "
+    "open.\n\nThe page has the map, objects, trajectories and loop closures in 3D, and the state "
+    "of the "
     "robots:\nwhich robots receive each other, cost, bytes, loads, memory. Its time slider goes "
     "back to any moment "
     "while the run\ncontinues.";
@@ -40,7 +41,8 @@ and small camera images of a robot while a page shows them.
 
 RESULTS is the folder of kimera_multi_team, or of one robot: also of one that runs, or was killed.
 Everything is shown when it became known to the robot, except for the meshes: the page has those of
-the end of the run, each chunk from the time at which the robot saw its surface.
+the end of the run, each chunk from the time at which the robot saw its surface. Objects, 2D map,
+distances and the fused mesh of the team are in the page from the end of the run on.
 
 In the page: drag to turn, right button to move, wheel to zoom; double click on a robot's name to
 follow it; measure: two clicks on the map. Keys: space plays and stops, T from above, F all in view.

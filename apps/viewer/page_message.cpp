@@ -35,8 +35,22 @@ Json json_of(const std::vector<NamedNumber>& numbers) {
   return json;
 }
 
+Json json_of(const Eigen::Vector3f& v) {
+  Json json = Json::array();
+  for (const float x : v) json.push_back(rounded_to(static_cast<double>(x), 1e3));
+  return json;
+}
+
 // By ClosureStatus.
 constexpr std::array kStatusNames = {"candidate", "verified", "rejected", "kept"};
+
+// By RasterKind.
+constexpr std::array kRasterNames = {"map_2d", "distances"};
+
+bool is_of_team(const ViewUpdate& update) {
+  const auto* const chunk = std::get_if<MeshChunk>(&update.content);
+  return chunk != nullptr && chunk->key.robot != update.robot;
+}
 
 // Writes the fields of an update to `json`, and its image, mesh or other bulk data to `data`.
 struct Writer {
@@ -115,6 +129,29 @@ struct Writer {
     append(image.jpeg);
   }
 
+  // Each object: [label, centre, yaw, size, robots].
+  void operator()(const ViewObjects& update) const {
+    json["kind"] = "objects";
+    json["anchor"] = update.anchor;
+    json["left_out"] = update.left_out;
+    json["objects"] = Json::array();
+    for (const ViewObject& one : update.objects)
+      json["objects"].push_back({one.label, json_of(one.center),
+                                 rounded_to(static_cast<double>(one.yaw_rad), 1e4),
+                                 json_of(one.size_m), one.robots});
+  }
+
+  void operator()(const ViewRaster& raster) const {
+    json["kind"] = "raster";
+    json["layer"] = kRasterNames.at(static_cast<std::size_t>(raster.kind));
+    json["anchor"] = raster.anchor;
+    json["resolution_m"] = raster.resolution_m;
+    json["origin"] = raster.origin;
+    json["width"] = raster.width;
+    json["height"] = raster.height;
+    append(raster.runs);
+  }
+
   template <typename T>
   void append(const std::vector<T>& values) const {
     const std::size_t begin = data.size();
@@ -134,10 +171,12 @@ PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
                {"boot", boot.str()}};
   std::string data;
   std::visit(Writer{json, data}, update.content);
+  if (is_of_team(update)) json["team"] = true;
   // Invalid UTF-8 in a robot's name or reason must not end the viewer.
   std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   const bool binary = std::holds_alternative<MeshChunk>(update.content) ||
-                      std::holds_alternative<ViewImage>(update.content);
+                      std::holds_alternative<ViewImage>(update.content) ||
+                      std::holds_alternative<ViewRaster>(update.content);
   if (!binary) return {false, std::move(text)};
   while ((text.size() + sizeof(std::uint32_t)) % 4 != 0) text += ' ';
   const auto length = static_cast<std::uint32_t>(text.size());

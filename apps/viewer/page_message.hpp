@@ -16,11 +16,14 @@ struct PageMessage {
 };
 
 /// An update for the page: an object with n (`number`), t (time of sending [ms since 1970]),
-/// robot, boot (hexadecimal), kind ("state", "pose", "keyframes", "closures", "mesh", "image") and
-/// the members of the content under their names. Poses are [x, y, z, qx, qy, qz, qw] to 0.1 mm and
-/// 1e-5. Meshes and images are binary, little-endian: length of the object [u32], the object,
-/// blanks up to a multiple of 4, then the data. A mesh has offsets (u16), faces (u16) and labels
-/// (u8); an image has features (f32) and JPEG.
+/// robot, boot (hexadecimal), kind, and the members of the content under their names. Kinds are
+/// "state", "pose", "keyframes", "closures", "mesh", "image", "objects", "raster". Poses are [x, y,
+/// z, qx, qy, qz, qw] to 0.1 mm and 1e-5. Meshes, images and rasters are binary, little-endian:
+/// length of the object [u32], the object, blanks up to a multiple of 4, then the data. A mesh has
+/// offsets (u16), faces (u16) and labels (u8); an image has features (f32) and JPEG; a raster has
+/// its runs.
+/// The chunks of the fused mesh of the team have `team`: their key has another robot than the
+/// update (see read_run).
 [[nodiscard]] PageMessage page_message(const ViewUpdate& update, std::uint64_t number);
 
 /// Source of the messages that a page shows.

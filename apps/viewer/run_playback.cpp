@@ -1,7 +1,6 @@
 #include "apps/viewer/run_playback.hpp"
 
 #include <algorithm>
-#include <exception>
 #include <map>
 #include <optional>
 #include <set>
@@ -9,6 +8,8 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
+#include "apps/viewer/optional_file.hpp"
+#include "apps/viewer/run_layers.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/robot_identity.hpp"
 #include "modules/journal/restored_run.hpp"
@@ -33,15 +34,21 @@ class RobotPlayback {
     send(0.0);
   }
 
-  /// All updates, ascending by time. Call once, after the last entry.
+  /// All updates, ascending by time. Call once, after the last entry. Precondition: not empty.
   std::vector<ViewUpdate> finish(const LabelledMesh& map, const LabelledMesh& optimized) {
-    if (!selector_) return {};
     send(ViewSelector::kKeyframePeriod_s);
     add_meshes(map, optimized);
     std::ranges::stable_sort(updates_, {}, &ViewUpdate::sent);
     return std::move(updates_);
   }
+  /// True if no process has begun.
+  [[nodiscard]] bool is_empty() const { return !selector_; }
   [[nodiscard]] RobotId robot() const { return robot_; }
+  /// Robot whose odometry frame is the frame of the results.
+  [[nodiscard]] RobotId anchor() const {
+    return cells_.empty() ? robot_ : cells_.back().second.anchor;
+  }
+  void add_at_end(ViewContent content) { add(time_, std::move(content)); }
 
  private:
   // A resumed process sends what it has restored.
@@ -79,17 +86,17 @@ class RobotPlayback {
   // Adds the chunks of the meshes at the times of the events that state their cells. Chunks whose
   // cells are in no event are added at the end of the run.
   void add_meshes(const LabelledMesh& map, const LabelledMesh& optimized) {
-    const RobotId last = cells_.empty() ? robot_ : cells_.back().second.anchor;
+    const RobotId last = anchor();
     std::set<MeshChunkKey> shown;
-    std::optional<RobotId> anchor;
+    std::optional<RobotId> present;  // anchor of the shown chunks
     const auto show_all = [&](Stamp time, const LabelledMesh& mesh,
                               const std::set<MeshCells::Cell>* cells) {
-      for (MeshChunk& chunk : split_mesh(mesh, robot_, *anchor, ChunkGrid{}).chunks)
+      for (MeshChunk& chunk : split_mesh(mesh, robot_, *present, ChunkGrid{}).chunks)
         if ((cells == nullptr || cells->contains(chunk.key.cell)) && shown.insert(chunk.key).second)
           add(time, std::move(chunk));
     };
     for (const auto& [time, mesh] : cells_) {
-      if (std::exchange(anchor, mesh.anchor) != mesh.anchor)
+      if (std::exchange(present, mesh.anchor) != mesh.anchor)
         for (const MeshChunkKey& key : std::exchange(shown, {})) add(time, MeshChunk{.key = key});
       const std::set<MeshCells::Cell> cells(mesh.cells.begin(), mesh.cells.end());
       if (mesh.anchor == last)
@@ -97,7 +104,7 @@ class RobotPlayback {
       else if (mesh.anchor == robot_)
         show_all(time, map, &cells);
     }
-    if (!anchor) anchor = last;
+    if (!present) present = last;
     show_all(time_, optimized, nullptr);
   }
 
@@ -110,15 +117,6 @@ class RobotPlayback {
   Stamp time_ = 0;  // time of the newest entry
   std::vector<ViewUpdate> updates_;
 };
-
-// The value of an optional file. `notes` states why it cannot be read.
-template <typename Read>
-auto read_if_there(const fs::path& file, std::vector<std::string>& notes, const Read& read) try {
-  return is_there(file) ? read(file) : decltype(read(file))();
-} catch (const std::exception& error) {
-  notes.emplace_back(error.what());
-  return decltype(read(file))();
-}
 
 // Reads the journal of a robot, up to an entry that contradicts the former ones.
 RobotPlayback read_robot(const fs::path& folder, std::vector<std::string>& notes) {
@@ -166,13 +164,20 @@ void shift_and_shorten(Stamp begin, std::vector<ViewUpdate>& updates) {
 
 RunPlayback read_run(const fs::path& folder, Stamp begin) {
   RunPlayback run;
-  std::set<RobotId> robots;
+  std::set<RobotId> robots, fused;  // fused: anchors whose fused mesh is read
   for (const fs::path& one : folders_of_robots(folder)) {
     RobotPlayback robot = read_robot(one, run.notes);
+    if (robot.is_empty()) continue;
     const auto map = read_if_there(one / kMap, run.notes, read_map_file);
     const auto optimized = read_if_there(one / "mesh_optimized.ply", run.notes, read_ply);
+    for (ViewContent& layer : read_layers(one, robot.robot(), robot.anchor(), run.notes))
+      robot.add_at_end(std::move(layer));
+    if (!fused.contains(robot.anchor()))
+      for (MeshChunk& chunk : read_team_mesh(one, robot.robot(), robot.anchor(), run.notes)) {
+        fused.insert(robot.anchor());
+        robot.add_at_end(std::move(chunk));
+      }
     const std::vector<ViewUpdate> updates = robot.finish(map.mesh, optimized);
-    if (updates.empty()) continue;
     if (!robots.insert(robot.robot()).second)
       throw std::runtime_error(folder.string() + ": two folders are of robot " +
                                std::to_string(robot.robot()) + ": give one run");

@@ -162,6 +162,10 @@ class ViewRecorder::Robot {
     mesh_changed_ |= mesh_.add(chunk) == ChunkVerdict::kTaken;
   }
 
+  // Objects, 2D map and distances are only in the robot's own record.
+  void receive(const ViewObjects& /*objects*/) {}
+  void receive(const ViewRaster& /*raster*/) {}
+
   void receive(const ViewImage& image) {
     if (!images_) return;
     images_->put(image_topic_, image.stamp,

@@ -10,12 +10,12 @@ namespace {
 
 // Ranks of messages that may be dropped. The lowest rank is dropped first. The second number of a
 // key is the rank.
-constexpr std::int64_t kImage = 0, kMesh = 1, kKeyframes = 2, kPose = 3, kState = 4;
+constexpr std::int64_t kImage = 0, kMesh = 1, kLayer = 2, kKeyframes = 3, kPose = 4, kState = 5;
 
-// True for mesh chunks and keyframe poses. Robots repeat them unchanged, and the store ignores the
-// repetitions. Poses, states and images are never ignored.
+// True for mesh chunks, objects, rasters and keyframe poses. Robots repeat them unchanged, and the
+// store ignores the repetitions. Poses, states and images are never ignored.
 bool may_be_repetition(const auto& key) {
-  return key && ((*key)[1] == kMesh || (*key)[1] == kKeyframes);
+  return key && ((*key)[1] == kMesh || (*key)[1] == kLayer || (*key)[1] == kKeyframes);
 }
 
 // Hash of the update without its time of sending.
@@ -29,6 +29,9 @@ std::size_t hash_of(ViewUpdate update) {
 std::optional<ViewStore::Key> ViewStore::key_of(const ViewUpdate& update) {
   const std::int64_t robot = update.robot;
   if (std::holds_alternative<ViewImage>(update.content)) return Key{robot, kImage};
+  if (std::holds_alternative<ViewObjects>(update.content)) return Key{robot, kLayer};
+  if (const auto* const raster = std::get_if<ViewRaster>(&update.content))
+    return Key{robot, kLayer, 1 + static_cast<std::int64_t>(raster->kind)};
   if (std::holds_alternative<ViewPose>(update.content)) return Key{robot, kPose};
   if (std::holds_alternative<RobotSample>(update.content)) return Key{robot, kState};
   if (const auto* const chunk = std::get_if<MeshChunk>(&update.content))

@@ -20,9 +20,9 @@ namespace km {
 /// them, so that it can show any time of the past.
 ///
 /// If they exceed the limit, messages are dropped, the oldest of each kind first. The order is
-/// images with a newer image, meshes with a newer version, keyframe poses with a newer version,
-/// poses, past states. Present states and closures are kept. If they alone exceed the limit, new
-/// messages are refused.
+/// images with a newer image, meshes with a newer version, objects and rasters with a newer
+/// version, keyframe poses with a newer version, poses, past states. Present states and closures
+/// are kept. If they alone exceed the limit, new messages are refused.
 ///
 /// When another viewer starts, robots send past messages again. Messages without new content are
 /// ignored. Thread-safe.
@@ -81,7 +81,7 @@ class ViewStore {
   std::map<RobotId, std::uint64_t> boots_;
   std::map<Key, Newest> newest_;
   std::map<RobotId, std::map<ClosureId, ViewClosure>> closures_;  // last received values
-  std::array<std::deque<std::uint64_t>, 5> superseded_;  // superseded updates, in the order in
+  std::array<std::deque<std::uint64_t>, 6> superseded_;  // superseded updates, in the order in
                                                          // which they are dropped
 };
 

@@ -13,6 +13,7 @@ namespace {
 constexpr std::size_t kPoseBytes = 7 * sizeof(float);
 constexpr std::size_t kClosureBytes = 4 + 1 + 1 + 1 + 1;
 constexpr std::size_t kFeatureBytes = 2 * sizeof(float);
+constexpr std::size_t kObjectBytes = 1 + 7 * sizeof(float) + 1;
 constexpr std::size_t kTripleBytes = 3 * sizeof(std::uint16_t);
 
 void describe(auto& archive, As<ViewPose> auto& pose) {
@@ -60,6 +61,23 @@ void describe(auto& archive, As<ViewImage> auto& image) {
   archive.list(image.jpeg, kMaxViewBytes, 1, [&](auto& byte) { archive(byte); });
   archive.list(image.features, kMaxViewBytes, kFeatureBytes,
                [&](auto& feature) { archive(feature[0], feature[1]); });
+}
+
+void describe(auto& archive, As<ViewObjects> auto& update) {
+  archive(update.anchor, update.left_out);
+  archive.list(update.objects, kMaxViewBytes, kObjectBytes, [&](auto& object) {
+    archive(object.label, object.center, object.yaw_rad, object.size_m);
+    archive.require(object.size_m.minCoeff() >= 0.0F);
+    archive.list(object.robots, kMaxViewBytes, 1, [&](auto& robot) { archive(robot); });
+  });
+}
+
+void describe(auto& archive, As<ViewRaster> auto& raster) {
+  archive.choice(raster.kind, RasterKind::kDistances);
+  archive(raster.anchor, raster.resolution_m, raster.width, raster.height);
+  for (auto& x : raster.origin) archive(x);
+  archive.list(raster.runs, kMaxViewBytes, 1, [&](auto& byte) { archive(byte); });
+  archive.require(is_valid(raster));
 }
 
 }  // namespace

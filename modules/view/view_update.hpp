@@ -16,6 +16,8 @@
 #include "modules/core/robot_sample.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
+#include "modules/view/view_objects.hpp"
+#include "modules/view/view_raster.hpp"
 
 namespace km {
 
@@ -56,8 +58,8 @@ struct ViewImage {
   std::vector<std::array<float, 2>> features = {};  ///< Features in the small image [pixel].
 };
 
-using ViewContent =
-    std::variant<RobotSample, ViewPose, ViewKeyframes, ViewClosures, MeshChunk, ViewImage>;
+using ViewContent = std::variant<RobotSample, ViewPose, ViewKeyframes, ViewClosures, MeshChunk,
+                                 ViewImage, ViewObjects, ViewRaster>;
 
 /// Update that a robot sends to viewers; viewers send nothing to robots. Updates of one process and
 /// kind arrive in the order of sending and together contain the full state. When a viewer appears
@@ -70,7 +72,8 @@ struct ViewUpdate {
   ViewContent content;
 };
 
-/// Upper bound for all contents: images are compressed to fit, and lists are split.
+/// Upper bound for all contents: images are compressed to fit, rasters are reduced, and lists are
+/// split or shortened.
 inline constexpr std::size_t kMaxViewBytes = 60000;
 
 /// Little-endian, poses as float32: position [m] and quaternion. Texts are printable ASCII; any
@@ -80,7 +83,7 @@ inline constexpr std::size_t kMaxViewBytes = 60000;
 [[nodiscard]] std::vector<std::uint8_t> encode_view(const ViewContent& content);
 
 /// nullopt for bytes that encode_view() cannot produce: truncated, too long, of an unknown kind,
-/// with numbers that are not finite or with invalid rotations.
+/// with numbers that are not finite or with invalid rotations, boxes or rasters.
 [[nodiscard]] std::optional<ViewContent> decode_view(std::span<const std::uint8_t> bytes);
 
 }  // namespace km

@@ -49,7 +49,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"mesh_deformation", {"mesh"}},
     {"objects", {"mesh", "mesh_deformation"}},
     {"surface_ties", {"mesh"}},
-    {"view", {"images", "mesh"}},
+    {"view", {"images", "mesh", "objects"}},
 };
 
 std::vector<std::string> includes_of(const fs::path& file) {

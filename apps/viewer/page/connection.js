@@ -11,6 +11,8 @@ function parseBinary(buffer) {
     message.positions = new Uint16Array(buffer, begin, 3 * message.vertices);
     message.triangles = new Uint16Array(buffer, faces, 3 * message.faces);
     if (message.labelled) message.labels = new Uint8Array(buffer, labels, message.vertices);
+  } else if (message.kind === 'raster') {
+    message.runs = new Uint8Array(buffer, begin);
   } else {
     const jpeg = begin + 8 * message.features;
     message.pixels = new Float32Array(buffer, begin, 2 * message.features);

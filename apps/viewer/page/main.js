@@ -110,8 +110,12 @@ function show() {
   panels.updateTotals(model, counts);
   for (const verdict of Object.keys(VERDICTS))
     layerButtons[verdict].querySelector('b').textContent = counts[verdict];
+  for (const button of document.querySelectorAll('[data-layer]'))
+    button.hidden = !model.layers.has(button.dataset.layer);
+  const leftOut = model.objectsLeftOut();
+  layerButtons.objects.title = leftOut ? `${leftOut} smaller objects are not sent` : '';
   $('empty').hidden = model.robots.size > 0;
-  if (pointed) showClosure(scene.closureAt(...pointed), ...pointed);
+  if (pointed) showPointed(...pointed);
   drawCamera();
 }
 
@@ -150,12 +154,12 @@ scene.onDrawn = () => {
 
 function drawLegend() {
   const {meshes} = scene;
-  const known = meshes.mode === 'labels' ? [...meshes.labels].sort((a, b) => a - b) : [];
+  const known =
+      ['labels', 'team'].includes(meshes.mode) ? [...meshes.labels].sort((a, b) => a - b) : [];
   const html = known
                    .map((id) => {
-                     const name = meshes.palette.get(id)?.name ?? `label ${id}`;
                      const item = document.createElement('span');
-                     item.textContent = name.replaceAll('_', ' ');
+                     item.textContent = meshes.nameOf(id);
                      return `<span><i style="background:rgb(${
                          meshes.colorOf(id).map(Math.round)})"></i>${item.innerHTML}</span>`;
                    })
@@ -233,6 +237,7 @@ $('measure').onclick = () => {
 const meshModes = {
   labels: 'Labels',
   robots: 'Robots',
+  team: 'Team',
   normals: 'Normals',
   off: 'Off'
 };
@@ -240,6 +245,7 @@ for (const [mode, text] of Object.entries(meshModes)) {
   const button = document.createElement('button');
   button.textContent = text;
   button.className = mode === scene.meshes.mode ? 'on' : '';
+  if (mode === 'team') button.dataset.layer = mode;
   button.onclick = () => {
     scene.meshes.setMode(mode);
     for (const other of $('mesh-modes').querySelectorAll('button'))
@@ -261,11 +267,15 @@ function addLayer(name, text, color) {
       'on', (scene.setLayer(name, !scene.layers[name]), scene.layers[name]));
   layerButtons[name] = button;
   $('layers').append(button);
+  return button;
 }
 addLayer('optimized', 'Optimised');
 addLayer('odometry', 'Odometry');
 addLayer('keyframes', 'Keyframes');
 for (const [verdict, {color, text}] of Object.entries(VERDICTS)) addLayer(verdict, text, color);
+for (const [name, text] of [
+         ['objects', 'Objects'], ['map_2d', '2D map'], ['distances', 'Distances']])
+  addLayer(name, text).dataset.layer = name;
 
 // ---- pointer and keys
 
@@ -276,11 +286,12 @@ const pointer = (event) => {
 $('canvas').addEventListener('pointermove', (event) => {
   if (event.buttons) return;
   pointed = pointer(event);
-  showClosure(scene.closureAt(...pointed), ...pointed);
+  showPointed(...pointed);
 });
 $('canvas').addEventListener('pointerleave', () => {
   pointed = null;
-  showClosure(null);
+  scene.setHovered(null);
+  $('tip').hidden = true;
 });
 
 // A closure of a recorded graph, or of a robot that is not shown, comes without its matches.
@@ -289,22 +300,38 @@ function supportOf({matches, inliers}) {
                                `${inliers} inliers, matches not known`;
 }
 
-function showClosure(found, x, y) {
-  scene.setHovered(found);
-  const tip = $('closure-tip');
-  tip.hidden = !found;
-  if (!found) return;
-  const {closure} = found;
+// Text on a closure: [tag, text, class] of each line, and the colour of the first.
+function closureText({closure}) {
   const of = ([robot, keyframe]) => `${model.name(robot)} keyframe ${keyframe}`;
   const lines = [
     ['b', closure.verdict, ''], ['p', `${of(closure.from)} – ${of(closure.to)}`, ''],
     ['p', supportOf(closure), '']
   ];
   if (closure.reason) lines.push(['p', closure.reason, 'reason']);
+  return {lines, color: VERDICTS[closure.verdict].color};
+}
+
+function objectText({name, color, size, robots}) {
+  const sides = size.map((side) => side.toFixed(2)).join(' × ');
+  const seen = robots.map((robot) => model.name(robot)).join(', ');
+  return {
+    lines: [['b', name, ''], ['p', `${sides} m`, ''], ['p', `seen by ${seen}`, '']],
+    color: `rgb(${color.map(Math.round)})`
+  };
+}
+
+// Shows what is at a point of the scene: a closure, else an object.
+function showPointed(x, y) {
+  const closure = scene.closureAt(x, y), object = closure ? null : scene.objectAt(x, y);
+  scene.setHovered(closure);
+  const tip = $('tip');
+  tip.hidden = !closure && !object;
+  if (tip.hidden) return;
+  const {lines, color} = closure ? closureText(closure) : objectText(object);
   tip.replaceChildren(...lines.map(
       ([tag, text, className]) =>
           Object.assign(document.createElement(tag), {textContent: text, className})));
-  tip.firstChild.style.color = VERDICTS[closure.verdict].color;
+  tip.firstChild.style.color = color;
   const room = $('canvas').clientWidth - tip.offsetWidth - 8;
   tip.style.left = `${Math.min(x + 14, room)}px`;
   tip.style.top = `${Math.min(y + 14, $('canvas').clientHeight - tip.offsetHeight - 8)}px`;
@@ -355,6 +382,8 @@ window.kimera = {
   get closures() { return countClosures(); },
   get faces() { return model.faces(); },
   get drawnFaces() { return scene.meshes.faces; },
+  get objects() { return scene.objects.boxes.length; },
+  get rasters() { return scene.rasters.shown.size; },
   get bytes() { return model.bytes; },
   get delays() { return [...delays]; },
   get frameTimes() {

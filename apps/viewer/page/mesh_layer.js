@@ -48,9 +48,10 @@ function reachOf({positions, origin}) {
 
 export class MeshLayer {
   constructor() {
-    this.batches = new Map();  // by key: {messages, objects, faces, stale, anchor, of}
+    this.batches = new Map();  // by key: {messages, objects, faces, stale, anchor, of, team}
     this.shown = new Map();    // message -> its batch
     this.mode = 'labels';
+    this.usesTeam = false;
     this.palette = new Map();  // label -> {name, color}
     this.labels = new Set();   // labels seen so far
     const lit = (settings) => new THREE.MeshLambertMaterial(settings);
@@ -69,16 +70,19 @@ export class MeshLayer {
 
   colorOf(label) { return this.colors[label]; }
 
-  /** Number of drawn faces. */
+  nameOf(label) { return (this.palette.get(label)?.name ?? `label ${label}`).replaceAll('_', ' '); }
+
+  /** Number of faces of the meshes of the robots, or of the fused mesh in mode 'team'. */
   get faces() {
     let faces = 0;
-    for (const batch of this.batches.values()) faces += batch.faces;
+    for (const batch of this.batches.values())
+      if (batch.team === (this.mode === 'team')) faces += batch.faces;
     return faces;
   }
 
   material(of, labelled) {
     if (this.mode === 'normals') return this.materials.normals;
-    if (this.mode === 'labels' && labelled) return this.materials.labels;
+    if (['labels', 'team'].includes(this.mode) && labelled) return this.materials.labels;
     const {robots} = this.materials;
     if (!robots.has(of)) {
       const color = new THREE.Color(robotColor(of)).lerp(new THREE.Color('#c8ccd2'), 0.35);
@@ -91,17 +95,18 @@ export class MeshLayer {
 
   setMode(mode) {
     this.mode = mode;
+    this.usesTeam ||= mode === 'team';  // The fused mesh is built when it is first shown.
     for (const batch of this.batches.values())
-      for (const object of batch.objects) this.dress(object, batch.of);
+      for (const object of batch.objects) this.dress(object, batch);
   }
 
-  dress(object, of) {
-    object.visible = this.mode !== 'off';
+  dress(object, {of, team}) {
+    object.visible = this.mode !== 'off' && team === (this.mode === 'team');
     if (object.visible) object.material = this.material(of, !!object.geometry.attributes.color);
   }
 
   // One object for chunks with at most MAX_INDEX + 1 vertices together.
-  build(messages, of) {
+  build(messages, batch) {
     const sum = (valueOf) => messages.reduce((all, message) => all + valueOf(message), 0);
     const vertices = sum((m) => m.vertices), labelled = messages.some((m) => m.labels);
     const base = [0, 1, 2].map((axis) => Math.min(...messages.map((m) => m.origin[axis])));
@@ -137,7 +142,7 @@ export class MeshLayer {
     const s = messages[0].step_m;
     object.userData.own =
         new THREE.Matrix4().makeScale(s, s, s).setPosition(...base.map((x) => s * x));
-    this.dress(object, of);
+    this.dress(object, batch);
     return object;
   }
 
@@ -150,7 +155,7 @@ export class MeshLayer {
     batch.faces = 0;
     batch.stale = false;
     let part = [], vertices = 0;
-    const finish = () => part.length && batch.objects.push(this.build(part, batch.of));
+    const finish = () => part.length && batch.objects.push(this.build(part, batch));
     for (const message of batch.messages) {
       if (vertices + message.vertices > MAX_INDEX + 1) {
         finish();
@@ -164,10 +169,11 @@ export class MeshLayer {
     finish();
   }
 
-  batchOf({of, anchor, step_m, cell}) {
-    const key = [of, anchor, step_m, ...cell.map((c) => Math.floor(c / BATCH_CELLS))].join();
+  batchOf({of, team = false, anchor, step_m, cell}) {
+    const key = [of, team, anchor, step_m, ...cell.map((c) => Math.floor(c / BATCH_CELLS))].join();
     if (!this.batches.has(key))
-      this.batches.set(key, {messages: new Set(), objects: [], faces: 0, stale: true, anchor, of});
+      this.batches.set(
+          key, {messages: new Set(), objects: [], faces: 0, stale: true, anchor, of, team});
     return this.batches.get(key);
   }
 
@@ -175,7 +181,8 @@ export class MeshLayer {
   sort(model) {
     const wanted = new Set();
     for (const robot of model.robots.values())
-      for (const message of robot.meshes.values()) wanted.add(message);
+      for (const meshes of this.usesTeam ? [robot.meshes, robot.teamMeshes] : [robot.meshes])
+        for (const message of meshes.values()) wanted.add(message);
     for (const [message, batch] of this.shown) {
       if (wanted.has(message)) continue;
       batch.messages.delete(message);
@@ -214,7 +221,7 @@ export class MeshLayer {
 
   /** Nearest intersection of the ray with a mesh, or null. */
   pick(raycaster) {
-    const hits = this.mode === 'off' ? [] : raycaster.intersectObjects(this.objects());
+    const hits = raycaster.intersectObjects(this.objects().filter((object) => object.visible));
     return hits.length ? hits[0].point : null;
   }
 }

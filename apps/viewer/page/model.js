@@ -38,6 +38,9 @@ export class Robot {
     this.anchor = this.id;  // robot whose odometry frame T_world_kf refers to
     this.closures = new Map();
     this.meshes = new Map();
+    this.teamMeshes = new Map();  // chunks of the fused mesh of the team
+    this.objects = null;
+    this.rasters = new Map();  // by layer
     this.image = null;
     this.lastReceived = null;  // time of its last message [s]
   }
@@ -109,13 +112,27 @@ export class Robot {
   }
 
   apply_mesh(message) {
+    const meshes = message.team ? this.teamMeshes : this.meshes;
     if (message.faces)
-      this.meshes.set(keyOf(message), message);
+      meshes.set(keyOf(message), message);
     else
-      this.meshes.delete(keyOf(message));
+      meshes.delete(keyOf(message));
   }
 
+  apply_objects(message) { this.objects = message; }
+
+  apply_raster(message) { this.rasters.set(message.layer, message); }
+
   apply_image(message) { this.image = message; }
+
+  /** Removes a message from the present state. */
+  drop(message) {
+    const remove = (from, key) => from.get(key) === message && from.delete(key);
+    if (message.kind === 'mesh')
+      remove(message.team ? this.teamMeshes : this.meshes, keyOf(message));
+    if (message.kind === 'raster') remove(this.rasters, message.layer);
+    if (this.objects === message) this.objects = null;
+  }
 }
 
 /** All robots, at all times. */
@@ -125,6 +142,7 @@ export class Model {
   clear() {
     this.robots = new Map();  // by id, ascending
     this.byNumber = new Map();
+    this.layers = new Set();  // layers with content at any time: objects, team, map_2d, distances
     this.start_ms = null;
     this.end = 0;  // [s] since the start
     this.time = 0;
@@ -144,6 +162,9 @@ export class Model {
     message.sent = message.t;  // [ms since 1970]
     message.t = (message.t - this.start_ms) / 1000;
     this.robot(message.robot).add(message);
+    if (message.objects?.length) this.layers.add('objects');
+    if (message.team) this.layers.add('team');
+    if (message.kind === 'raster') this.layers.add(message.layer);
     this.end = Math.max(this.end, message.t);
     this.bytes += message.bytes ?? 0;
     if (message.bytes || message.kind !== 'closures') this.byNumber.set(message.n, message);
@@ -158,11 +179,10 @@ export class Model {
       this.bytes -= message.bytes ?? 0;
       for (const bulk
                of ['positions', 'triangles', 'labels', 'jpeg', 'pixels', 'T_world_kf',
-                   'T_odom_body'])
+                   'T_odom_body', 'runs'])
         delete message[bulk];
       message.gone = true;
-      const {meshes} = this.robots.get(message.robot);
-      if (meshes.get(keyOf(message)) === message) meshes.delete(keyOf(message));
+      this.robots.get(message.robot).drop(message);
     }
   }
 
@@ -216,6 +236,11 @@ export class Model {
     for (const robot of this.robots.values())
       for (const chunk of robot.meshes.values()) faces += chunk.faces;
     return faces;
+  }
+
+  /** Number of objects for which a robot had no room in its message. */
+  objectsLeftOut() {
+    return Math.max(0, ...[...this.robots.values()].map(({objects}) => objects?.left_out ?? 0));
   }
 
   name(id) { return this.robots.get(id)?.state?.name ?? `robot${id}`; }

@@ -1,11 +1,11 @@
 // The 3D view: maps, trajectories, keyframes, closures and robots, in one or several frames.
 import {robotColor} from './charts.js';
 import {MeshLayer} from './mesh_layer.js';
+import {ObjectLayer} from './object_layer.js';
+import {RasterLayer} from './raster_layer.js';
 import * as THREE from './three/build/three.module.js';
 import {OrbitControls} from './three/examples/jsm/controls/OrbitControls.js';
-import {LineMaterial} from './three/examples/jsm/lines/LineMaterial.js';
-import {LineSegments2} from './three/examples/jsm/lines/LineSegments2.js';
-import {LineSegmentsGeometry} from './three/examples/jsm/lines/LineSegmentsGeometry.js';
+import {WideLine} from './wide_line.js';
 
 export const VERDICTS = {
   kept: {color: '#6fdc8c', text: 'Kept'},
@@ -37,33 +37,6 @@ function linesOf(robot, poses, stamps_s, matrix) {
     last = i;
   });
   return points;
-}
-
-// Lines between pairs of points, with a constant width on the screen; the points may change.
-class WideLine {
-  constructor(settings) {
-    this.material = new LineMaterial(settings);
-    this.material.uniforms.opacity.value = settings.opacity ?? 1;
-    this.object = new LineSegments2(undefined, this.material);
-    this.object.frustumCulled = false;
-    this.object.visible = false;
-    this.shown = true;
-  }
-
-  set(positions) {
-    const enough = positions.length >= 6;
-    this.object.visible = enough && this.shown;
-    this.enough = enough;
-    if (!enough) return;
-    this.object.geometry.dispose();
-    this.object.geometry = new LineSegmentsGeometry();
-    this.object.geometry.setPositions(positions);
-  }
-
-  show(shown) {
-    this.shown = shown;
-    this.object.visible = shown && !!this.enough;
-  }
 }
 
 // Objects that show one robot.
@@ -134,7 +107,9 @@ export class Scene {
       line.material.transparent = true;  // transparent: drawn after all opaque objects
       line.object.renderOrder = 1;
     }
-    this.scene.add(this.hovered.object, this.ruler.object);
+    this.objects = new ObjectLayer(overlay, this.resolution);
+    this.rasters = new RasterLayer();
+    this.scene.add(this.hovered.object, this.ruler.object, this.objects.lines.object);
     this.layers = {
       optimized: true,
       odometry: true,
@@ -142,7 +117,10 @@ export class Scene {
       kept: true,
       verified: true,
       candidate: false,
-      rejected: false
+      rejected: false,
+      objects: true,
+      map_2d: false,
+      distances: false
     };
     this.measured = null;  // null: not measuring; else up to two points
     this.follows = null;
@@ -166,7 +144,7 @@ export class Scene {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     for (const figure of this.figures.values()) this.sizeLines(figure.optimized, figure.odometry);
-    this.sizeLines(...Object.values(this.lines), this.hovered, this.ruler);
+    this.sizeLines(...Object.values(this.lines), this.hovered, this.ruler, this.objects.lines);
     this.dirty = true;
   }
 
@@ -186,6 +164,7 @@ export class Scene {
     for (const robot of model.robots.values()) this.updateRobot(robot);
     this.building = this.meshes.sync(model, (anchor, of) => this.place(anchor, of));
     this.updateClosures(model);
+    this.updateLayers();
     this.scene.updateMatrixWorld();
     if (!this.touched && !this.follows) this.fit(false);
     this.dirty = true;
@@ -211,6 +190,21 @@ export class Scene {
     const robot = this.model.robots.get(of);
     const now = robot && this.frames.get(this.frameOf(robot));
     return now ? {group: now.group, T: this.correction(robot)} : {group: this.scene, T: null};
+  }
+
+  // Group and transform for content in the odometry frame of a robot.
+  placeOdometry(id) {
+    const robot = this.model.robots.get(id), frame = this.frames.get(this.frameOf(robot));
+    return {group: frame?.group ?? this.scene, T: this.correction(robot)};
+  }
+
+  updateLayers() {
+    const place = (anchor, of) => this.place(anchor, of);
+    this.objects.sync(this.model, this.layers.objects, place, this.meshes);
+    this.rasters.sync(
+        this.model, this.layers,
+        ({layer, anchor, robot}) =>
+            layer === 'distances' ? this.placeOdometry(robot) : place(anchor, robot));
   }
 
   updateFrames(model) {
@@ -352,6 +346,7 @@ export class Scene {
     this.layers[name] = on;
     for (const figure of this.figures.values()) this.showLayers(figure);
     if (name in this.lines) this.lines[name].show(on);
+    if (this.model) this.updateLayers();
     this.setHovered(null);
     this.dirty = true;
   }
@@ -494,9 +489,21 @@ export class Scene {
       put(this.ruler.label,
           this.measured?.length === 2 ? this.measured[0].clone().lerp(this.measured[1], 0.5) :
                                         null);
+    this.objects.placeLabels((point) => this.onScreen(point));
   }
 
   // ---- pointer
+
+  rayAt(x, y) {
+    const caster = new THREE.Raycaster();
+    caster.setFromCamera(
+        new THREE.Vector2((x / this.resolution.x) * 2 - 1, 1 - (y / this.resolution.y) * 2),
+        this.camera);
+    return caster;
+  }
+
+  /** The nearest object under a point of the screen, or null. */
+  objectAt(x, y) { return this.objects.at(this.rayAt(x, y).ray); }
 
   /** The closure within a few pixels of a point of the screen, or null. */
   closureAt(x, y) {
@@ -524,10 +531,7 @@ export class Scene {
   /** The point of the map under a point of the screen. Outside the map, the point on the floor of
    * the first frame. */
   pick(x, y) {
-    const caster = new THREE.Raycaster();
-    caster.setFromCamera(
-        new THREE.Vector2((x / this.resolution.x) * 2 - 1, 1 - (y / this.resolution.y) * 2),
-        this.camera);
+    const caster = this.rayAt(x, y);
     const hit = this.meshes.pick(caster);
     if (hit) return hit;
     const z = [...this.frames.values()][0]?.corner?.z ?? 0;

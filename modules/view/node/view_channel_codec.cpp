@@ -82,7 +82,9 @@ std::optional<ViewUpdate> update_of(const km_wire_ViewUpdate& wire, ViewChannel 
 }  // namespace
 
 ViewChannel channel_of(const ViewContent& content) {
-  if (std::holds_alternative<MeshChunk>(content)) return ViewChannel::kMesh;
+  if (std::holds_alternative<MeshChunk>(content) || std::holds_alternative<ViewObjects>(content) ||
+      std::holds_alternative<ViewRaster>(content))
+    return ViewChannel::kMesh;
   return std::holds_alternative<ViewImage>(content) ? ViewChannel::kImages : ViewChannel::kView;
 }
 

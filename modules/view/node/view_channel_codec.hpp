@@ -17,7 +17,7 @@ namespace km {
 /// update for late readers, and drop data for slow readers so that no writer waits for them.
 enum class ViewChannel {
   kView,    ///< All small updates.
-  kMesh,    ///< Chunks of the mesh.
+  kMesh,    ///< The map: chunks of the mesh, objects, rasters.
   kImages,  ///< The newest image. Its DDS partition is the robot's id, so subscribing requests the
             ///< images.
 };

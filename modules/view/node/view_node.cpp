@@ -21,6 +21,7 @@ constexpr double kRest_s = 2.0;           // Budget for the end, in seconds of i
 constexpr double kMeshRest_s = 10.0;      // Budget for the mesh at the end, large enough for its
                                           // last correction.
 constexpr double kAcknowledged_s = 0.5;   // Timeout for the acknowledgements of these last updates.
+constexpr double kLayerShare = 0.25;      // Maximum share of the budget of the map for layers.
 constexpr double kCutShare = 1.0 / 30.0;  // Maximum share of the time for splitting the mesh.
 
 ViewWriter writer_on(const DdsParticipant& participant, ViewChannel channel) {
@@ -51,6 +52,7 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
       past_budget_(budget_of(config.past_bytes_per_s)),
       selector_(self_),
       schedule_(mesh.min_move_m),
+      layers_(self_, kLayerShare * config.mesh_bytes_per_s),
       worker_(
           kQueue, Overflow::kDropOldest, [this](const Input& input) { step(input); },
           ViewConfig::kSection),
@@ -66,6 +68,8 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
   topics.pose_changes.subscribe(post);
   topics.samples.subscribe(post);
   topics.restarts.subscribe(post);
+  topics.objects.subscribe(post);
+  topics.maps_2d.subscribe(post);
   if (!camera_ || config_.images_per_s <= 0.0) return;
   topics.images.subscribe([this, post, due_s = 0.0](const auto& image) mutable {
     const double now_s = steady_now_s();
@@ -134,7 +138,7 @@ void ViewNode::take(const Topic<TrackedImage>::Message& image) {
 void ViewNode::send_due(double now_s) {
   are_images_asked_ = on(ViewChannel::kImages).writer.readers() > 0;
   send_view(now_s);
-  send_mesh(now_s);
+  send_map(now_s);
 }
 
 TokenBucket& ViewNode::view_budget() {
@@ -155,20 +159,27 @@ void ViewNode::send_view(double now_s) {
   }
 }
 
-void ViewNode::send_mesh(double now_s) {
+std::optional<ViewContent> ViewNode::next_of_map(double now_s) {
+  if (auto layer = layers_.next(now_s)) return layer;
+  if (auto chunk = schedule_.next()) return *std::move(chunk);
+  return std::nullopt;
+}
+
+void ViewNode::send_map(double now_s) {
   Channel& mesh = on(ViewChannel::kMesh);
   const bool has_newcomers = mesh.writer.newcomers() > 0;
   const bool sent_before = std::exchange(sends_mesh_, mesh.writer.readers() > 0);
   if (has_newcomers || (sent_before && !sends_mesh_)) {
     schedule_.begin_again();
+    layers_.begin_again();
     is_cut_ = mesh_.mesh == nullptr;
     cut_due_s_ = now_s;
   }
   if (!sends_mesh_) return;
   if (!is_cut_ && now_s >= cut_due_s_) cut_mesh(now_s);
   while (mesh.budget.wait_s(0.0, now_s) <= 0.0) {
-    const std::optional<MeshChunk> chunk = schedule_.next();
-    const std::size_t bytes = chunk ? write(mesh, *chunk) : 0;
+    const std::optional<ViewContent> content = next_of_map(now_s);
+    const std::size_t bytes = content ? write(mesh, *content) : 0;
     if (bytes == 0) return;
     mesh.budget.spend(static_cast<double>(bytes), now_s);
   }
@@ -218,9 +229,9 @@ void ViewNode::send_rest() {
     if (!is_cut_) cut_mesh(now_s);
     double bytes = 0.0;
     while (bytes < kMeshRest_s * config_.mesh_bytes_per_s) {
-      const auto chunk = schedule_.next();
-      if (!chunk) break;
-      bytes += static_cast<double>(write(mesh, *chunk));
+      const auto content = next_of_map(kUnlimited);
+      if (!content) break;
+      bytes += static_cast<double>(write(mesh, *content));
     }
     if (schedule_.waiting() > 0)
       log::info(name()) << schedule_.waiting() << " pieces of the last mesh are not sent";

@@ -16,6 +16,7 @@
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/view/node/view_channel_codec.hpp"
 #include "modules/view/view_config.hpp"
+#include "modules/view/view_layers.hpp"
 #include "modules/view/view_selector.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peer_table.hpp"
@@ -37,6 +38,8 @@ struct ViewTopics {
   In<PoseChanges> pose_changes;
   In<RobotSample> samples;
   In<PeerEvent> restarts;
+  In<ObjectList> objects;
+  In<OccupancyGrid> maps_2d;
   In<TrackedImage> images;
 };
 
@@ -47,9 +50,10 @@ struct ViewMesh {
 };
 
 /// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's
-/// domain. It sends the updates of a ViewSelector, the mesh in chunks, and camera images on
-/// request. Images have a rate, other topics a budget. While a topic has no reader, the node only
-/// keeps the newest inputs. No node waits for a viewer; updates that DDS cannot accept are lost.
+/// domain. It sends the updates of a ViewSelector, the mesh in chunks, the updates of ViewLayers,
+/// and camera images on request. Images have a rate, other topics a budget. While a topic has no
+/// reader, the node only keeps the newest inputs. No node waits for a viewer; updates that DDS
+/// cannot accept are lost.
 class ViewNode final : public Node {
  public:
   /// `participant` outlives this. Throws ConfigError if `config` is out of bounds. `camera` belongs
@@ -61,10 +65,13 @@ class ViewNode final : public Node {
   /// Replaces the mesh, given in the frame of the robot `anchor`. Thread-safe; does not wait.
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
 
+  /// Replaces the points of the slice (see DistanceSlice). Thread-safe; does not wait.
+  void offer_slice(std::shared_ptr<const LabelledMesh> points) { worker_.post(std::move(points)); }
+
   std::string_view name() const override { return ViewConfig::kSection; }
   void start() override;
   /// Sends the remaining updates: at most two seconds at ViewConfig::past_bytes_per_s, and ten
-  /// seconds at mesh_bytes_per_s for the mesh.
+  /// seconds at mesh_bytes_per_s for the map.
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
@@ -77,11 +84,13 @@ class ViewNode final : public Node {
     RobotId anchor = 0;
     std::shared_ptr<const LabelledMesh> mesh;
   };
-  using Input = std::variant<Tick, MeshOffer, Topic<OdometryState>::Message,
-                             Topic<KeyframeOdometry>::Message, Topic<ClosureOutcome>::Message,
-                             Topic<Closure>::Message, Topic<ClosureJudgements>::Message,
-                             Topic<PoseChanges>::Message, Topic<RobotSample>::Message,
-                             Topic<PeerEvent>::Message, Topic<TrackedImage>::Message>;
+  using Input =
+      std::variant<Tick, MeshOffer, Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
+                   Topic<ClosureOutcome>::Message, Topic<Closure>::Message,
+                   Topic<ClosureJudgements>::Message, Topic<PoseChanges>::Message,
+                   Topic<RobotSample>::Message, Topic<PeerEvent>::Message,
+                   Topic<ObjectList>::Message, Topic<OccupancyGrid>::Message,
+                   std::shared_ptr<const LabelledMesh>, Topic<TrackedImage>::Message>;
 
   /// Stores an input; a Tick sends the updates that are due by the steady clock. The thread calls
   /// only this.
@@ -105,6 +114,9 @@ class ViewNode final : public Node {
   void take(const Tick& tick);
   void take(const MeshOffer& offer);
   void take(const Topic<PeerEvent>::Message& event);
+  void take(const Topic<ObjectList>::Message& objects) { layers_.add(objects); }
+  void take(const Topic<OccupancyGrid>::Message& map) { layers_.add(map); }
+  void take(const std::shared_ptr<const LabelledMesh>& slice) { layers_.add(slice); }
   void take(const Topic<TrackedImage>::Message& image);
   template <typename T>
   void take(const std::shared_ptr<const T>& message) {
@@ -116,7 +128,8 @@ class ViewNode final : public Node {
   }
   [[nodiscard]] TokenBucket& view_budget();
   void send_view(double now_s);
-  void send_mesh(double now_s);
+  void send_map(double now_s);
+  [[nodiscard]] std::optional<ViewContent> next_of_map(double now_s);
   void cut_mesh(double now_s);
   void send_rest();
   void follow_participant();
@@ -136,6 +149,7 @@ class ViewNode final : public Node {
   double cut_due_s_ = 0.0;
   bool sends_mesh_ = false;  // True if the mesh channel has a reader.
   ChunkSchedule schedule_;
+  ViewLayers layers_;
   std::atomic<bool> are_images_asked_ = false;
   bool stopped_ = false;
   Worker<Input> worker_;

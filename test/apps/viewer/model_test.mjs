@@ -124,6 +124,28 @@ test('the newest verdict on a closure counts, of whichever robot', (model) => {
   assert.deepEqual(verdicts, [['candidate'], ['verified'], ['rejected']]);
 });
 
+test('layers have a time, the newest counts, and the fused mesh is apart', (model) => {
+  const raster = (layer) => ({kind: 'raster', layer, bytes: 9, runs: [1, 0]});
+  add(model, 0, 0, {kind: 'objects', anchor: 0, left_out: 0, objects: [[1], [2]]});
+  add(model, 0, 1, raster('map_2d'));
+  add(model, 0, 2, {kind: 'objects', anchor: 0, left_out: 5, objects: [[1]]});
+  add(model, 0, 2, {...mesh([0, 0, 0], 10), of: 1, team: true});
+  const first = number;
+  add(model, 0, 3, raster('map_2d'));
+  const at = (t) => {
+    model.seek(t);
+    const {objects, rasters} = model.robots.get(0);
+    return [objects.objects.length, model.objectsLeftOut(), rasters.size];
+  };
+  assert.deepEqual(at(0.5), [2, 0, 0]);
+  assert.deepEqual(at(2), [1, 5, 1]);
+  assert.deepEqual([...model.layers], ['objects', 'map_2d', 'team']);
+  assert.equal(model.faces(), 0);
+  at(3);
+  model.forgetNumbers([first]);
+  assert.equal(model.robots.get(0).rasters.size, 0);
+});
+
 test('what the viewer let go of is let go of', (model) => {
   const first = number;
   add(model, 0, 0, mesh([0, 0, 0], 10));

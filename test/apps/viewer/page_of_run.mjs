@@ -5,7 +5,7 @@ import {mkdirSync} from 'node:fs';
 import {join} from 'node:path';
 
 import {Browser} from './browser.mjs';
-import {facesOf, readStages, readSummaries, sum} from './run_files.mjs';
+import {facesOf, objectCounts, readStages, readSummaries, sum} from './run_files.mjs';
 import {Viewer} from './viewer.mjs';
 
 const [program, results, shots] = process.argv.slice(2);
@@ -43,6 +43,28 @@ try {
       new Set(summaries.map((s) => (s.pgo.members.length > 1 ? s.pgo.anchor : s.robot)));
   assert.equal(await page.evaluate('kimera.frames.length'), anchors.size);
   await shoot('finished');
+
+  // Layers: objects as in the files; each layer that is switched on draws something.
+  const counts = objectCounts(results, summaries);
+  const objects = await page.evaluate('kimera.objects');
+  assert.ok(counts.length ? counts.includes(objects) : objects === 0, `${objects} of ${counts}`);
+  const shown = await page.evaluate(
+      `[...document.querySelectorAll('[data-layer]')].filter((b) => !b.hidden).map((b) => b.dataset.layer)`);
+  const calls = () => page.evaluate('kimera.scene.renderer.info.render.calls');
+  for (const layer of ['map_2d', 'distances'].filter((name) => shown.includes(name))) {
+    const before = {calls: await calls(), rasters: await page.evaluate('kimera.rasters')};
+    await page.clickAt(`[data-layer=${layer}]`);
+    await page.until(`kimera.rasters > ${before.rasters} && !kimera.scene.dirty`);
+    assert.ok(await calls() > before.calls);
+    await shoot(layer);
+  }
+  if (shown.includes('team')) {
+    await page.clickAt('[data-layer=team]');
+    await page.until('kimera.ready && kimera.drawnFaces > 0 && !kimera.scene.dirty');
+    await shoot('team');
+    await page.clickAt('#mesh-modes button');
+    await page.until(`kimera.ready && kimera.drawnFaces === ${faces}`);
+  }
 
   // The past: separate frames first, and no later messages; then the end again.
   const end = await page.evaluate('kimera.end');

@@ -39,6 +39,12 @@ export function readStages(folder, robots) {
 /** Faces of all robots' meshes. */
 export const facesOf = (robots) => sum(robots.map((robot) => robot.mapping?.faces ?? 0));
 
+/** The numbers of objects in the robots' files. */
+export const objectCounts = (folder, robots) =>
+    robots.map(({name}) => join(folder, name, 'objects.json'))
+        .filter(existsSync)
+        .map((file) => JSON.parse(readFileSync(file)).objects.length);
+
 /** Faces of the corrected meshes, by the heads of their files. */
 export function facesOfMeshes(folder, robots) {
   const files = robots.map(({name}) => join(folder, name, 'mesh_optimized.ply')).filter(existsSync);

@@ -8,8 +8,10 @@
 #include "apps/result_files.hpp"
 #include "apps/robot/run_summary.hpp"
 #include "modules/journal/journal_file.hpp"
+#include "modules/map_2d/map_server_files.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/ply_file.hpp"
+#include "modules/objects/object_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -86,9 +88,28 @@ class SmallRun {
       mesh.faces.push_back({first, first + 1, first + 2});
     }
     write_ply(of(robot) / "mesh_optimized.ply", mesh);
+    if (robot == 0) write_layers(mesh);
     const std::size_t vertices = mesh.vertices.size();
     write_map_file(of(robot) / kMap,
                    {.mesh = std::move(mesh), .seen_by = std::vector(vertices, std::array{0U, 2U})});
+  }
+
+  // Two objects, a 2D map of 2 x 1 cells, a slice of two points, and the fused mesh of the team.
+  void write_layers(const LabelledMesh& mesh) {
+    ObjectList objects{
+        0, {{.label = 1, .box = {}, .robots = {0}}, {.label = 2, .box = {}, .robots = {0, 1}}}};
+    for (MapObject& object : objects.objects) object.box.size_m = Eigen::Vector3d(2, 1, 1);
+    objects.objects[1].box.center = Eigen::Vector3d(5, 3, 0);
+    folder.write("r0/objects.json", objects_json(objects, {}));
+    const OccupancyGrid map{2.0, {1.0, 0.0}, 2, 1, {OccupancyGrid::kFree, OccupancyGrid::kOccupied},
+                            0.5};
+    folder.write("r0/map.yaml", map_yaml(map, kMap2dImage));
+    folder.write("r0/map.pgm", map_image(map));
+    LabelledMesh slice;
+    slice.vertices = {{0, 0, 1}, {0.5F, 0, 1}};
+    slice.colors = {{255, 0, 0}, {0, 255, 0}};
+    write_ply(of(0) / kDistanceSlice, slice);
+    write_ply(of(0) / kTeamMesh, mesh);
   }
 
   // The results that the report of a team reads.

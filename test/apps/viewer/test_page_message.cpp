@@ -83,6 +83,39 @@ TEST_CASE("A mesh is sent as its arrays, one after the other", "[page_message]")
   CHECK(data.substr(sizeof(numbers)) == "\x09\x08\x07");
 }
 
+TEST_CASE("The chunks of the fused mesh of the team are marked", "[page_message]") {
+  MeshChunk chunk{.key = {3, {0, 0, 0}, 0}};
+  chunk.offsets = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  chunk.faces = {{0, 1, 2}};
+  CHECK_FALSE(parts_of(page_message({3, 1, 0, chunk}, 1)).first.contains("team"));
+  CHECK(parts_of(page_message({2, 1, 0, chunk}, 1)).first["team"] == true);
+}
+
+TEST_CASE("An object is sent with its label, box and robots", "[page_message]") {
+  const ViewObjects objects{
+      .anchor = 2, .objects = {{7, {1, -2, 0.5F}, 0.25F, {2, 1, 1.5F}, {0, 3}}}, .left_out = 4};
+  const json message = text_of({0, 1, 0, objects});
+  CHECK(message["anchor"] == 2);
+  CHECK(message["left_out"] == 4);
+  CHECK(message["objects"] == json::parse("[[7, [1, -2, 0.5], 0.25, [2, 1, 1.5], [0, 3]]]"));
+}
+
+TEST_CASE("A raster is sent as its runs", "[page_message]") {
+  const ViewRaster raster{.kind = RasterKind::kDistances,
+                          .anchor = 2,
+                          .resolution_m = 0.25F,
+                          .origin = {1, 2, 3},
+                          .width = 5,
+                          .height = 1,
+                          .runs = {5, 31}};
+  const auto [object, data] = parts_of(page_message({0, 1, 0, raster}, 1));
+  CHECK(object["layer"] == "distances");
+  CHECK(object["anchor"] == 2);
+  CHECK(object["origin"] == json::parse("[1, 2, 3]"));
+  CHECK(object["width"] == 5);
+  CHECK(data == "\x05\x1f");
+}
+
 TEST_CASE("An image follows its features", "[page_message]") {
   const ViewImage image{0, {0xff, 0xd8}, {{1.5F, 2.5F}}};
   const auto [object, data] = parts_of(page_message({0, 1, 0, image}, 1));

@@ -1,5 +1,7 @@
 #include <catch2/catch.hpp>
 
+#include <array>
+
 #include "apps/viewer/run_playback.hpp"
 #include "test/apps/viewer/small_run.hpp"
 
@@ -83,6 +85,56 @@ TEST_CASE("A mesh chunk is shown in the frame and from the time of its cell", "[
   CHECK(chunks[2].first == Approx(4.6));
   CHECK(chunks[2].second.anchor == 0);
   CHECK(chunks[3].first == Approx(12.0));  // no event names it
+}
+
+TEST_CASE("Objects, maps and the fused mesh of the team are shown at the end of the run",
+          "[run_playback]") {
+  const SmallRun files;
+  const RunPlayback run = read_run(files.folder.path(), kBegin);
+  const auto objects = updates_of<ViewObjects>(run, 0);
+  REQUIRE(objects.size() == 1);
+  CHECK(objects[0].first == Approx(12.0));
+  REQUIRE(objects[0].second.objects.size() == 2);
+  CHECK(objects[0].second.objects[1].robots.size() + objects[0].second.objects[0].robots.size() ==
+        3);
+  const auto rasters = updates_of<ViewRaster>(run, 0);
+  REQUIRE(rasters.size() == 2);
+  const ViewRaster& map = rasters[0].second;
+  CHECK(map.kind == RasterKind::kOccupancy);
+  CHECK(map.anchor == 0);
+  CHECK(map.origin == std::array{1.0F, 0.0F, 0.5F});
+  CHECK(cells_of(map) == std::vector{ViewRaster::kFree, ViewRaster::kOccupied});
+  CHECK(rasters[1].second.kind == RasterKind::kDistances);
+  CHECK(cells_of(rasters[1].second) == std::vector{ViewRaster::kOccupied, ViewRaster::kFarthest});
+  std::size_t fused = 0;
+  for (const auto& [time_s, chunk] : updates_of<MeshChunk>(run, 0))
+    fused += chunk.key.robot != 0 ? chunk.faces.size() : 0;
+  CHECK(fused == 2);
+  CHECK(updates_of<ViewObjects>(run, 1).empty());
+}
+
+TEST_CASE("Damaged layers are noted with their file and left out", "[run_playback]") {
+  const SmallRun files;
+  const auto [name, bytes] = GENERATE(
+      std::pair{"objects.json", R"({"anchor": 0, "objects": [{"label": 1}]})"},
+      std::pair{"objects.json",
+                R"({"anchor": 0, "objects": [{"label": 1, "center_m": [1e300, 0, 0], "yaw_rad": 0,
+                    "size_m": [1, 1, 1], "robots": []}]})"},
+      std::pair{"map.yaml", "resolution: 0.05\n"}, std::pair{"map.yaml", "resolution: [\n"},
+      std::pair{"map.yaml", "resolution: -1\norigin: [0, 0, 0]\n"},
+      std::pair{"map.yaml", "resolution: .inf\norigin: [0, 0, 0]\n"},
+      std::pair{"map.pgm", "P5\n9 9\n255\n."}, std::pair{"distance_field.ply", "ply"},
+      std::pair{"team_mesh.ply",
+                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+                "y\nproperty float z\nelement face 1\nproperty list uchar int "
+                "vertex_indices\nend_header\n1e30 0 0\n3 0 0 0\n"});
+  CAPTURE(name, bytes);
+  const std::size_t all = read_run(files.folder.path(), kBegin).updates.size();
+  files.folder.write(std::string("r0/") + name, bytes);
+  const RunPlayback run = read_run(files.folder.path(), kBegin);
+  REQUIRE(run.notes.size() == 1);
+  CHECK_THAT(run.notes[0], Catch::Contains(std::string("r0/") + name));
+  CHECK(run.updates.size() < all);
 }
 
 TEST_CASE("A closure is shown with each of its stages", "[run_playback]") {

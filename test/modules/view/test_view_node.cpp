@@ -32,6 +32,8 @@ struct Watched {
               .pose_changes = pose_changes,
               .samples = samples,
               .restarts = restarts,
+              .objects = objects,
+              .maps_2d = maps_2d,
               .images = images}) {
     give(RobotSample{.name = "alpha", .phase = "running"});
   }
@@ -88,6 +90,8 @@ struct Watched {
   Topic<PoseChanges> pose_changes;
   Topic<RobotSample> samples;
   Topic<PeerEvent> restarts;
+  Topic<ObjectList> objects;
+  Topic<OccupancyGrid> maps_2d;
   Topic<TrackedImage> images;
   double now_s = 1000.0;
   ViewNode node;
@@ -257,6 +261,12 @@ TEST_CASE("At the end all remaining updates are sent", "[view]") {
   robot.give_keyframes(400);
   robot.give_mesh(150);
   robot.node.start();
+  robot.objects.publish(ObjectList{kSelf, {MapObject{.label = 5, .box = {}}}});
+  robot.maps_2d.publish(OccupancyGrid{0.05, {0, 0}, 1, 1, {OccupancyGrid::kFree}});
+  LabelledMesh slice;
+  slice.vertices = {{0, 0, 1}, {0.1F, 0, 1}};
+  slice.colors = {{255, 0, 0}, {0, 255, 0}};
+  robot.node.offer_slice(std::make_shared<const LabelledMesh>(std::move(slice)));
   robot.node.stop();
   const std::size_t sent = robot.sent();
   robot.node.stop();
@@ -264,6 +274,7 @@ TEST_CASE("At the end all remaining updates are sent", "[view]") {
   CHECK(eventually([&] {
     visitor->receive_all();
     return visitor->watcher.optimized.size() == 400 &&
+           visitor->watcher.objects.objects.size() == 1 && visitor->watcher.rasters.size() == 2 &&
            visitor->faces() == wavy_sheet(150, 0.1).faces.size();
   }));
 }

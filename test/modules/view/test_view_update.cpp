@@ -64,6 +64,23 @@ ViewImage some_image() {
   return {.stamp = -5, .jpeg = {0xFF, 0xD8, 0, 1, 2}, .features = {{0.5F, 479.5F}, {3.0F, 4.0F}}};
 }
 
+ViewObjects some_objects() {
+  return {.anchor = 3,
+          .objects = {{7, {1.0F, -2.0F, 0.5F}, 0.25F, {2.0F, 1.0F, 1.5F}, {0, 300}},
+                      {9, {4.0F, 0.0F, 0.0F}, -1.5F, {0.5F, 0.25F, 0.0F}, {}}},
+          .left_out = 12};
+}
+
+ViewRaster some_raster() {
+  return {.kind = RasterKind::kOccupancy,
+          .anchor = 3,
+          .resolution_m = 0.25F,
+          .origin = {-1.0F, 2.0F, 0.5F},
+          .width = 3,
+          .height = 2,
+          .runs = {3, ViewRaster::kUnknown, 2, ViewRaster::kFree, 1, ViewRaster::kOccupied}};
+}
+
 std::vector<ViewContent> all_kinds() {
   std::mt19937 rng(3);
   return {some_state(),
@@ -72,7 +89,9 @@ std::vector<ViewContent> all_kinds() {
           some_closures(),
           some_chunk(),
           some_image(),
-          ViewKeyframes{.T_world_kf = {random_pose(rng)}, .stamps = {7}}};
+          ViewKeyframes{.T_world_kf = {random_pose(rng)}, .stamps = {7}},
+          some_objects(),
+          some_raster()};
 }
 
 std::vector<Bytes> samples() {
@@ -165,6 +184,28 @@ TEST_CASE("Mesh chunks and images are unchanged by encoding and decoding", "[vie
   CHECK(got.features == some_image().features);
 }
 
+TEST_CASE("Objects and rasters are unchanged by encoding and decoding", "[view]") {
+  const ViewObjects objects = round_trip(some_objects());
+  CHECK(objects.anchor == 3);
+  CHECK(objects.left_out == 12);
+  REQUIRE(objects.objects.size() == 2);
+  const ViewObject& first = objects.objects[0];
+  CHECK(first.label == 7);
+  CHECK(first.center == some_objects().objects[0].center);
+  CHECK(first.yaw_rad == 0.25F);
+  CHECK(first.size_m == some_objects().objects[0].size_m);
+  CHECK(first.robots == std::vector<RobotId>{0, 300});
+
+  const ViewRaster raster = round_trip(some_raster());
+  CHECK(raster.kind == RasterKind::kOccupancy);
+  CHECK(raster.anchor == 3);
+  CHECK(raster.resolution_m == 0.25F);
+  CHECK(raster.origin == some_raster().origin);
+  CHECK(raster.width == 3);
+  CHECK(raster.height == 2);
+  CHECK(raster.runs == some_raster().runs);
+}
+
 TEST_CASE("Texts are encoded in printable ASCII", "[view]") {
   RobotSample state;
   state.name = "a\nb\xC3\xA9";
@@ -181,7 +222,7 @@ TEST_CASE("Truncated and extended updates are refused", "[view]") {
     longer.push_back(0);
     CHECK_FALSE(decode_view(longer));
   }
-  CHECK_FALSE(decode_view(Bytes{6}));
+  CHECK_FALSE(decode_view(Bytes{8}));
   CHECK_FALSE(decode_view(Bytes{255, 0, 0}));
 }
 
@@ -227,6 +268,28 @@ TEST_CASE("Updates with impossible numbers are refused", "[view]") {
     ViewClosures closures = some_closures();
     closures.closures[0].verdict = static_cast<ClosureStatus>(4);
     CHECK_FALSE(is_understood(closures));
+  }
+  SECTION("a box of negative size") {
+    ViewObjects objects = some_objects();
+    objects.objects[1].size_m.y() = -1.0F;
+    CHECK_FALSE(is_understood(objects));
+  }
+  SECTION("a raster whose runs do not have the number of its cells") {
+    ViewRaster raster = some_raster();
+    raster.runs[0] = GENERATE(std::uint8_t{0}, std::uint8_t{2}, std::uint8_t{255});
+    CHECK_FALSE(is_understood(raster));
+  }
+  SECTION("a raster with other values") {
+    ViewRaster raster = some_raster();
+    raster.runs[1] = 2;
+    CHECK_FALSE(is_understood(raster));
+    raster.kind = RasterKind::kDistances;
+    CHECK(is_understood(raster));
+  }
+  SECTION("a raster that is too large") {
+    ViewRaster raster = some_raster();
+    raster.width = raster.height = ViewRaster::kMaxSide;
+    CHECK_FALSE(is_understood(raster));
   }
   SECTION("a face outside") {
     MeshChunk chunk = some_chunk();

@@ -33,6 +33,8 @@ struct Watcher {
   void take(const RobotSample& state) { states.push_back(state); }
   void take(const MeshChunk& chunk) { (void)mesh.add(chunk); }
   void take(const ViewImage& image) { images.push_back(image); }
+  void take(const ViewObjects& update) { objects = update; }
+  void take(const ViewRaster& raster) { rasters[raster.kind] = raster; }
 
   struct Placed {
     RobotId anchor = 0;
@@ -46,6 +48,8 @@ struct Watcher {
   std::vector<RobotSample> states;
   std::vector<ViewImage> images;
   TeamMesh mesh;
+  ViewObjects objects;
+  std::map<RasterKind, ViewRaster> rasters;
 };
 
 }  // namespace km
