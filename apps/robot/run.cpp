@@ -407,9 +407,10 @@ HeldBackSums held_back(Robot& robot) {
 }
 
 // The 2D map of the team is made of the fused mesh alone, so that all robots have the same.
-void write_team_map_2d(const fs::path& folder, const Map2dConfig& config, const Map2dInput& input,
-                       ResultWriter& results) {
-  const Map2dResult map = make_map_2d(config, input);
+void write_team_map_2d(const fs::path& folder, const Map2dConfig& config, const TeamMap& team,
+                       const LabelPalette& palette, ResultWriter& results) {
+  Map2dResult map = make_map_2d(config, {team.mesh, palette});
+  map.grid.anchor = team.anchor;
   if (map.status == Map2dStatus::kMade)
     return write_map_2d(folder, kTeamMap2d, kTeamMap2dImage, map.grid, results);
   log::warn("robot") << "no 2D map of the team: its mesh "
@@ -423,7 +424,7 @@ void write_team_map(const fs::path& folder, const Map2dConfig& config, const Tea
   log::info("robot") << "fusing the map of the team";
   const TeamMap map = node.fuse();
   results.write(folder / kTeamMesh, [&](const auto& file) { write_ply(file, map.mesh); });
-  if (config.enabled) write_team_map_2d(folder, config, {map.mesh, node.palette()}, results);
+  if (config.enabled) write_team_map_2d(folder, config, map, node.palette(), results);
   log::info("robot") << "map of the team: " << map.mesh.faces.size()
                      << " faces, in the frame of robot " << map.anchor;
   if (map.other_frames > 0)

@@ -63,7 +63,7 @@ class MeshCorrector {
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
   [[nodiscard]] std::vector<std::uint32_t> replacements_in(const LabelledMesh& mesh,
                                                            const MapMesh& map) const;
-  [[nodiscard]] MeshOrigin origin() const;  // of optimized_
+  [[nodiscard]] MeshOrigin origin() const;  // Keyframes that saw optimized_.
 
   const double duplicate_voxels_;
   const std::size_t duplicate_faces_;
