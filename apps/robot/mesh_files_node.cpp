@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "apps/robot/results.hpp"
+#include "apps/robot/map_results.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "runtime/thread.hpp"

@@ -13,8 +13,6 @@
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
-#include "modules/map_2d/map_server_files.hpp"
-#include "modules/objects/object_file.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
@@ -211,18 +209,6 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
                 [&](const fs::path& file) { write_g2o(file, graph_of(record)); });
   write("keyframes.csv", write_keyframes, record);
   write("loop_closures.csv", write_closures, record);
-}
-
-void write_objects(const fs::path& folder, const ObjectList& objects, const LabelPalette& palette,
-                   ResultWriter& results) {
-  results.write(folder / kObjectsFile,
-                [&](const auto& file) { write_file(file, objects_json(objects, palette)); });
-}
-
-void write_map_2d(const fs::path& folder, const char* name, const char* image,
-                  const OccupancyGrid& map, ResultWriter& results) {
-  results.write(folder / image, [&](const auto& file) { write_file(file, map_image(map)); });
-  results.write(folder / name, [&](const auto& file) { write_file(file, map_yaml(map, image)); });
 }
 
 std::vector<PublishedClosure> published_closures(const RunRecord& record) {

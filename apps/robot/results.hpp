@@ -4,8 +4,6 @@
 
 #include "apps/result_writer.hpp"
 #include "apps/robot/run_record.hpp"
-#include "modules/core/occupancy_grid.hpp"
-#include "modules/objects/map_object.hpp"
 #include "modules/ros_dds/closure_lines.hpp"
 
 namespace km {
@@ -14,14 +12,6 @@ namespace km {
 /// loop_closures.csv to `folder`.
 void write_results(const std::filesystem::path& folder, const RunRecord& record,
                    ResultWriter& results);
-
-/// Writes objects.json to `folder`.
-void write_objects(const std::filesystem::path& folder, const ObjectList& objects,
-                   const LabelPalette& palette, ResultWriter& results);
-
-/// Writes a 2D map to `folder`, as Nav2's map_server reads it: the YAML file `name`, and its image.
-void write_map_2d(const std::filesystem::path& folder, const char* name, const char* image,
-                  const OccupancyGrid& map, ResultWriter& results);
 
 /// Every candidate of the robot, in the form in which viewers receive it.
 [[nodiscard]] std::vector<PublishedClosure> published_closures(const RunRecord& record);

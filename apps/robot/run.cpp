@@ -17,6 +17,7 @@
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/robot/growing_file.hpp"
+#include "apps/robot/map_results.hpp"
 #include "apps/robot/playing_speed.hpp"
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/reserved_room.hpp"
@@ -28,7 +29,6 @@
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
-#include "modules/mesh/ply_file.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
@@ -404,35 +404,6 @@ HeldBackSums held_back(Robot& robot) {
     add(sums.dropped, topic.held.dropped);
   }
   return sums;
-}
-
-// The 2D map of the team is made of the fused mesh alone, so that all robots have the same.
-void write_team_map_2d(const fs::path& folder, const Map2dConfig& config, const TeamMap& team,
-                       const LabelPalette& palette, ResultWriter& results) {
-  Map2dResult map = make_map_2d(config, {team.mesh, palette});
-  map.grid.anchor = team.anchor;
-  if (map.status == Map2dStatus::kMade)
-    return write_map_2d(folder, kTeamMap2d, kTeamMap2dImage, map.grid, results);
-  log::warn("robot") << "no 2D map of the team: its mesh "
-                     << (map.status == Map2dStatus::kEmpty ? "has no floor"
-                                                           : "needs more than map_2d.max_cells");
-}
-
-// Writes the fused mesh of the team, of the chunks that were received until now.
-void write_team_map(const fs::path& folder, const Map2dConfig& config, const TeamMapNode& node,
-                    ResultWriter& results) {
-  log::info("robot") << "fusing the map of the team";
-  const TeamMap map = node.fuse();
-  results.write(folder / kTeamMesh, [&](const auto& file) { write_ply(file, map.mesh); });
-  if (config.enabled) write_team_map_2d(folder, config, map, node.palette(), results);
-  log::info("robot") << "map of the team: " << map.mesh.faces.size()
-                     << " faces, in the frame of robot " << map.anchor;
-  if (map.other_frames > 0)
-    log::warn("robot") << "the map of the team lacks " << map.other_frames
-                       << " chunks in frames of robots that have not joined";
-  if (map.left_out > 0)
-    log::warn("robot") << "the map of the team lacks " << map.left_out << " boxes of "
-                       << kMaxMapBoxes + map.left_out << ": its voxels are too small";
 }
 
 // Completes the MCAP record with the other results as attachments, among them the closures.

@@ -7,14 +7,11 @@
 #include "apps/result_files.hpp"
 #include "apps/robot/diagnostics.hpp"
 #include "apps/robot/process_usage.hpp"
-#include "apps/robot/results.hpp"
 #include "apps/robot/team_keys_node.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/dense_sensing/node/dense_sensing_node.hpp"
 #include "modules/loop_closure/node/keyframe_features_node.hpp"
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
 #include "modules/loop_closure/node/loop_closure_node.hpp"
-#include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
 #include "modules/objects/node/objects_codec.hpp"
 #include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
@@ -27,8 +24,6 @@
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/ros_dds/node/live_sink.hpp"
-#include "modules/semantic_mapping/node/semantic_mapping_node.hpp"
-#include "modules/surface_ties/node/surface_ties_node.hpp"
 #include "modules/vio/node/external_odometry_node.hpp"
 #include "modules/vio/node/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
@@ -69,14 +64,6 @@ std::optional<KeyframeId> keyframe_of(const KeyframeReply& reply) {
 }
 
 }  // namespace
-
-template <typename NodeType, typename... Arguments>
-NodeType& Robot::add(bool feeds, Arguments&&... arguments) {
-  NodeType& node = supervisor_.emplace<NodeType>(std::forward<Arguments>(arguments)...);
-  if (feeds) feeding_.push_back(&node);
-  nodes_.push_back(&node);
-  return node;
-}
 
 Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput input,
              const std::optional<MappingPlan>& mapping, ResultWriter& results, SignalWatch& signals)
@@ -255,121 +242,6 @@ void Robot::add_fixes(FixInput input) {
                                        .restored_states = topics_.restored_odometry,
                                        .keyframes = topics_.keyframe_odometry,
                                        .fixes = topics_.fixes});
-}
-
-// A mapper that is too slow skips frames. At --rate max no frame is late, and the mapper holds the
-// other nodes up, so that the map does not depend on the machine.
-void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
-                        const MappingPlan& plan, std::optional<ResumedMap> before) {
-  const Overflow overflow = std::isinf(rate) ? Overflow::kBlock : Overflow::kDropOldest;
-  SemanticMappingConfig map = config.semantic_mapping;
-  map.max_range_m =
-      std::min(map.max_range_m, usable_range_m(rig, config.mapping.max_depth_error_m));
-  DenseSensor sensor(rig, plan.sensor);
-  const Camera camera = sensor.camera();
-  add<DenseSensingNode>(true, std::move(sensor), plan.sensor.labels, config.mapping.rate_hz,
-                        overflow,
-                        DenseSensingTopics{.located = topics_.located_frames,
-                                           .load = topics_.shed_load,
-                                           .frames = topics_.dense_frames,
-                                           .progress = topics_.dense_sensing_progress});
-  auto& mapper = add<SemanticMappingNode>(
-      true, map, camera, plan.palette, config.mapping.mesh_interval_s, overflow,
-      SemanticMappingTopics{.frames = topics_.dense_frames,
-                            .superseded = topics_.superseded_surface,
-                            .maps = topics_.maps,
-                            .progress = topics_.mapping_progress,
-                            .space = config.distance_field.enabled
-                                         ? std::optional<Out<SpaceUpdate>>(topics_.space_updates)
-                                         : std::nullopt});
-  if (before) mapper.continue_from(*std::move(before));
-  ray_thinner_.emplace(camera, map.max_range_m);
-  if (config.distance_field.enabled)
-    add<DistanceFieldNode>(
-        true, config.distance_field, map.voxel_size_m,
-        DistanceFieldTopics{.space = topics_.space_updates, .slices = topics_.distance_slices});
-}
-
-void Robot::add_mesh_correction(const RobotConfig& config) {
-  mesh_deformation_ =
-      &add<MeshDeformationNode>(false, config.mesh_deformation, identity_.robot,
-                                MeshDeformationTopics{.maps = topics_.maps,
-                                                      .keyframes = topics_.keyframe_odometry,
-                                                      .trajectory = topics_.trajectory,
-                                                      .optimized = topics_.optimized_meshes,
-                                                      .superseded = topics_.superseded_surface});
-}
-
-void Robot::add_map_2d(const Map2dConfig& config, const LabelPalette& palette) {
-  auto& map = add<Map2dNode>(false, config, palette, *std::exchange(ray_thinner_, std::nullopt),
-                             Map2dTopics{.frames = topics_.dense_frames, .maps = topics_.maps_2d});
-  topics_.optimized_meshes.subscribe([&map](const auto& optimized) {
-    map.offer({{optimized, &optimized->mesh}, optimized->T_world_odom, optimized->anchor});
-  });
-}
-
-// Call after the nodes that it writes for: nodes stop in the order in which they are added.
-void Robot::add_mesh_files(const std::filesystem::path& folder, ResultWriter& results) {
-  mesh_files_ = &add<MeshFilesNode>(false, folder, results,
-                                    MeshFilesTopics{.keyframes = topics_.keyframe_odometry,
-                                                    .trajectory = topics_.trajectory,
-                                                    .maps = topics_.maps,
-                                                    .optimized = topics_.optimized_meshes,
-                                                    .maps_2d = topics_.maps_2d,
-                                                    .slices = topics_.distance_slices});
-}
-
-// A robot without a map only receives the meshes of the others.
-CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& palette) {
-  const MapSharingConfig& config = robot.map;
-  if (config.team == TeamMapMode::kOff) return {.send = false, .receive = false};
-  const bool coarse = config.team == TeamMapMode::kCoarse;
-  const double voxel_m = coarse ? config.coarse_voxel_m : robot.semantic_mapping.voxel_size_m;
-  team_map_ =
-      &add<TeamMapNode>(false, voxel_m, palette, topics_.sent_chunks, topics_.chunks.from_peers());
-  if (mesh_deformation_ == nullptr) return {.send = false, .receive = true};
-  topics_.sent_chunks.subscribe(
-      [to_peers = topics_.chunks.to_peers()](const auto& chunk) { to_peers.publish(chunk); });
-  MeshChunksNode::Reduction reduction;
-  if (coarse) reduction = [voxel_m](const LabelledMesh& mesh) { return resampled(mesh, voxel_m); };
-  chunks_ = &add<MeshChunksNode>(false, config, identity_.robot, topics_.sent_chunks,
-                                 std::move(reduction));
-  if (config.surface_ties) add_surface_ties();
-  // A leaving robot corrects its mesh once more, from scratch. Other robots may have left before,
-  // so all keep the chunks that they have.
-  topics_.optimized_meshes.subscribe([this](const auto& optimized) {
-    if (phase_ == RobotPhase::kLeaving) return;
-    chunks_->offer(optimized->anchor, {optimized, &optimized->mesh},
-                   ties_ != nullptr
-                       ? std::shared_ptr<const MeshOrigin>(optimized, &optimized->origin)
-                       : nullptr);
-  });
-  return {};
-}
-
-void Robot::add_objects(const ObjectsConfig& config, const LabelPalette& palette,
-                        const std::filesystem::path& folder, ResultWriter& results) {
-  objects_ = &add<ObjectsNode>(false, config, identity_.robot, palette,
-                               ObjectsTopics{.meshes = topics_.optimized_meshes,
-                                             .trajectory = topics_.trajectory,
-                                             .received = topics_.objects.from_peers(),
-                                             .own = topics_.objects.to_peers(),
-                                             .joint = topics_.joint_objects});
-  topics_.joint_objects.subscribe([this, folder, &results](const auto& objects) {
-    write_objects(folder, *objects, objects_->palette(), results);
-  });
-}
-
-void Robot::add_surface_ties() {
-  topics_.keyframes.subscribe([this](const auto& keyframe) { chunks_->learn(keyframe->odometry); });
-  ties_ = &add<SurfaceTiesNode>(false, identity_.robot,
-                                SurfaceTiesTopics{.own_chunks = topics_.sent_chunks,
-                                                  .peer_chunks = topics_.chunks.from_peers(),
-                                                  .closures = topics_.closures,
-                                                  .progress = topics_.progress,
-                                                  .restarts = topics_.closure_restarts,
-                                                  .ties = topics_.new_closures,
-                                                  .outcomes = topics_.outcomes});
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {

@@ -285,4 +285,12 @@ class Robot {
       supervisor_;  // last member: stops the nodes before the objects that they use are destroyed
 };
 
+template <typename NodeType, typename... Arguments>
+NodeType& Robot::add(bool feeds, Arguments&&... arguments) {
+  NodeType& node = supervisor_.emplace<NodeType>(std::forward<Arguments>(arguments)...);
+  if (feeds) feeding_.push_back(&node);
+  nodes_.push_back(&node);
+  return node;
+}
+
 }  // namespace km

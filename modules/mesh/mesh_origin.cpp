@@ -6,13 +6,15 @@
 namespace km {
 
 std::map<MeshCells::Cell, KeyframeIndex> keyframes_of_cells(
-    const LabelledMesh& mesh, const std::vector<KeyframeIndex>& keyframe_of_vertex, double cell_m) {
+    const LabelledMesh& mesh, std::span<const std::array<KeyframeIndex, 2>> seen_by,
+    double cell_m) {
   std::map<MeshCells::Cell, std::vector<KeyframeIndex>> seen;
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const auto& [first, last] = seen_by[v];
     const Eigen::Array3d cell = (mesh.vertices[v].cast<double>().array() / cell_m).floor();
     seen[{static_cast<std::int32_t>(cell.x()), static_cast<std::int32_t>(cell.y()),
           static_cast<std::int32_t>(cell.z())}]
-        .push_back(keyframe_of_vertex[v]);
+        .push_back(first + (last - first) / 2);
   }
   std::map<MeshCells::Cell, KeyframeIndex> medians;
   for (auto& [cell, keyframes] : seen) {

@@ -23,7 +23,7 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   if (largest_difference(anchors_, motion.T_after_before, T_result_optimized_, scale_) <= 1.0)
     return std::nullopt;
   T_result_optimized_ = motion.T_after_before;
-  MeshCorrection result{optimized_, seen_by_, report_, false, {}, 0, origin()};
+  MeshCorrection result{optimized_, report_, false, {}, 0, {seen_by_, anchors_}};
   result.mesh.transform(T_result_optimized_);
   for (SE3& pose : result.origin.T_world_kf) pose = T_result_optimized_ * pose;
   return result;
@@ -59,19 +59,11 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   report_ = deformed.report;
   T_result_optimized_ = SE3::Identity();
   return {optimized_,
-          seen_by_,
           report_,
           true,
           named(replacements, input.map.ids),
           deformed.mesh.faces.size() - optimized_.faces.size(),
-          origin()};
-}
-
-MeshOrigin MeshCorrector::origin() const {
-  MeshOrigin origin{{}, anchors_};
-  for (const auto& [first, last] : seen_by_)
-    origin.keyframe_of_vertex.push_back(first + (last - first) / 2);
-  return origin;
+          {seen_by_, anchors_}};
 }
 
 }  // namespace km

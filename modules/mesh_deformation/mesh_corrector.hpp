@@ -29,7 +29,6 @@ struct CorrectionInput {
 
 struct [[nodiscard]] MeshCorrection {
   LabelledMesh mesh;  ///< In the frame of the optimised poses, without superseded surface.
-  std::vector<SeenBy> seen_by;   ///< First and last keyframe that saw each vertex of `mesh`.
   MeshDeformationReport report;  ///< Report of the last optimisation.
   /// False: the result of the last optimisation, moved as a whole.
   bool deformed = true;
@@ -63,7 +62,6 @@ class MeshCorrector {
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
   [[nodiscard]] std::vector<std::uint32_t> replacements_in(const LabelledMesh& mesh,
                                                            const MapMesh& map) const;
-  [[nodiscard]] MeshOrigin origin() const;  // Keyframes that saw optimized_.
 
   const double duplicate_voxels_;
   const std::size_t duplicate_faces_;
@@ -82,9 +80,8 @@ class MeshCorrector {
 /// A robot's mesh, corrected to agree with its optimised trajectory.
 struct OptimizedMesh {
   RobotId robot = 0;
-  RobotId anchor = 0;           ///< Robot whose odometry frame is `world`.
-  LabelledMesh mesh;            ///< In `world`.
-  std::vector<SeenBy> seen_by;  ///< First and last keyframe that saw each vertex of `mesh`.
+  RobotId anchor = 0;                            ///< Robot whose odometry frame is `world`.
+  LabelledMesh mesh;                             ///< In `world`.
   std::shared_ptr<const Trajectory> trajectory;  ///< Poses to which the mesh was corrected.
   MeshDeformationReport report;                  ///< Report of the last optimisation.
   /// False: no optimisation was due, and the former mesh was moved as a whole.
@@ -92,7 +89,7 @@ struct OptimizedMesh {
   double seconds = 0.0;  ///< Duration of the correction.
   /// Faces of the map that are missing because another visit saw them better.
   std::size_t superseded_faces = 0;
-  /// T_world_kf * T_odom_kf^-1 of all keyframes: where the correction moved what they saw.
+  /// T_world_kf * T_odom_kf^-1 of the poses in `origin`: where the correction moved what they saw.
   std::vector<SE3> T_world_odom = {};
   MeshOrigin origin = {};  ///< Keyframes that saw the mesh.
 };

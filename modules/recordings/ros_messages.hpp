@@ -196,12 +196,12 @@ struct RosMarker {
                            ///< id.
   std::int32_t id = 0;
   std::int32_t type = 0;
-  std::int32_t action = 0;                          ///< 0: add or replace, kDelete or kDeleteAll.
-  RosPose pose;                                     ///< Pose of the points in the header's frame.
+  std::int32_t action = 0;  ///< 0: add or replace, kDelete or kDeleteAll.
+  RosPose pose;             ///< Pose of the points in the header's frame.
   Eigen::Vector3d scale =
       Eigen::Vector3d::Ones();  ///< Sides of a cube, width x of lines, height z of text [m].
-  Eigen::Vector4f color = {1, 1, 1, 1};             ///< Red, green, blue, alpha: 0 to 1.
-  std::array<std::uint32_t, 2> lifetime{};          ///< [s], [ns]; 0: no limit.
+  Eigen::Vector4f color = {1, 1, 1, 1};     ///< Red, green, blue, alpha: 0 to 1.
+  std::array<std::uint32_t, 2> lifetime{};  ///< [s], [ns]; 0: no limit.
   bool frame_locked = false;
   std::vector<Eigen::Vector3d> points;  ///< [m]
   std::vector<Eigen::Vector4f> colors;  ///< One colour per point, or empty.

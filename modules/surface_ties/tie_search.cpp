@@ -106,7 +106,6 @@ std::optional<Closure> TieSearch::lay(const Pair& pair) {
   if (own.anchor != peer.anchor) return std::nullopt;
   const SE3 guess = own.keyframe.T_world_kf.inverse() * peer.keyframe.T_world_kf;
   const SurfaceTie tie = tie_surfaces(own.samples, peer.samples, guess, options_);
-  ++results_[tie.status];
   if (tie.status != SurfaceTieStatus::kTied) return std::nullopt;
   if (tie.covariance.bottomRightCorner<3, 3>().trace() > 3.0 * kMaxSigma_m * kMaxSigma_m)
     return std::nullopt;

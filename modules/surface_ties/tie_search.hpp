@@ -51,9 +51,6 @@ class TieSearch {
   /// is false until the next step().
   [[nodiscard]] bool is_done() const { return is_done_; }
 
-  /// Number of registrations so far, by status.
-  [[nodiscard]] const std::map<SurfaceTieStatus, std::size_t>& results() const { return results_; }
-
  private:
   // Pieces of this robot and of another one, by their numbers.
   struct Pair {
@@ -86,7 +83,6 @@ class TieSearch {
   std::set<ClosureId> closures_, ties_;
   std::vector<RobotId> joined_;
   bool is_done_ = true;
-  std::map<SurfaceTieStatus, std::size_t> results_;
 };
 
 }  // namespace km

@@ -15,10 +15,9 @@ namespace km {
 /// The prior on the motion is a constant velocity with white noise on the acceleration and on the
 /// angular acceleration. In equations, this prior is an inertial factor of samples that are zero,
 /// without gravity:
-/// - Eq. (45) of Forster et al. with zero samples and zero gravity is p_j = p_i + v_i dt, v_j =
-/// v_i.
-///   The covariance of the preintegration is q^2 [dt, dt^2/2; dt^2/2, dt^3/3] for [v; p], to the
-///   rule by which ImuPreintegration integrates. q is VioConfig::motion_accel.
+/// - By Eq. (45) of Forster et al., zero samples and zero gravity give v_j = v_i and
+///   p_j = p_i + v_i dt. The covariance of the preintegration is q^2 [dt, dt^2/2; dt^2/2, dt^3/3]
+///   for [v; p], to the rule by which ImuPreintegration integrates. q is VioConfig::motion_accel.
 /// - A gyroscope that reads zero has a bias of minus the angular rate: R_j = R_i exp(-b_i dt). The
 ///   random walk of the bias is the noise of the angular acceleration, VioConfig::motion_turn. The
 ///   rotation gets the variance q^2 dt^3/3 of the integrated noise; its correlation with the rate

@@ -122,9 +122,9 @@ TEST_CASE("A robot that is killed again and again loses no image", "[system][res
     CHECK(line_count(output / "odometry.tum") == line_count(folder.path() / "whole/odometry.tum"));
     const double killed_m = error_m(*dataset, {output / "optimized.tum"}, folder);
     CAPTURE(whole_m, killed_m);
-    // After each kill odometry begins again without the window before it, and other keyframes close
-    // loops. By the moments of the kills the error is 3.9 to 6.4 mm, for 4.0 mm of the whole run. A
-    // pose that is lost or in another frame makes centimetres.
+    // After each kill odometry begins again without the window before it. In 18 runs on a busy
+    // machine the error was 4.0 to 6.4 mm, by the keyframes of the kills (4.0 to 4.1 mm for the
+    // whole run). A pose that is lost or in another frame makes centimetres.
     CHECK(killed_m < 2.0 * whole_m);
   }
 }

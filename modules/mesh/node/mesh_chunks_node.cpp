@@ -99,7 +99,7 @@ void MeshChunksNode::take(const Offer& offer) {
 
 void MeshChunksNode::state_keyframes(std::vector<MeshChunk>& chunks, const Offer& offer) const {
   const MeshOrigin& origin = *offer.origin;
-  const auto of_cell = keyframes_of_cells(*offer.mesh, origin.keyframe_of_vertex, config_.cell_m);
+  const auto of_cell = keyframes_of_cells(*offer.mesh, origin.seen_by, config_.cell_m);
   for (MeshChunk& chunk : chunks) {
     const auto index = of_cell.find(chunk.key.cell);
     if (index == of_cell.end() || index->second >= origin.T_world_kf.size()) continue;

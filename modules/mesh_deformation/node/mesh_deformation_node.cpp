@@ -148,16 +148,15 @@ void MeshDeformationNode::correct() {
   OptimizedMesh result{self_,
                        trajectory_->anchor,
                        std::move(correction->mesh),
-                       std::move(correction->seen_by),
                        trajectory_,
                        correction->report,
                        correction->deformed,
                        end_s - start_s,
                        correction->superseded_faces,
-                       complete(T_odom_kf_, input().T_world_kf),
+                       {},
                        std::move(correction->origin)};
-  for (std::size_t k = 0; k < T_odom_kf_.size(); ++k)
-    result.T_world_odom[k] = result.T_world_odom[k] * T_odom_kf_[k].inverse();
+  for (std::size_t k = 0; k < result.origin.T_world_kf.size(); ++k)
+    result.T_world_odom.push_back(result.origin.T_world_kf[k] * T_odom_kf_[k].inverse());
   if (!correction->superseded.vertices.empty())
     superseded_.publish(std::move(correction->superseded));
   report(result);

@@ -72,8 +72,8 @@ void ObjectsNode::step(const Input& input, double now_s) {
 }
 
 void ObjectsNode::take(const OptimizedMesh& mesh) {
-  const auto objects =
-      merge_objects(extract_objects(mesh.mesh, mesh.seen_by, self_, labels_, config_), config_);
+  const auto objects = merge_objects(
+      extract_objects(mesh.mesh, mesh.origin.seen_by, self_, labels_, config_), config_);
   RobotObjects message = anchored(objects, *mesh.trajectory);
   if (objects.size() > kMaxObjects)
     log::limited(log::Level::kWarn, name(), "too many")

@@ -44,7 +44,7 @@ const char* text(StartStatus status) {
     case StartStatus::kContinues:
       return "continues from the last keyframe";
     case StartStatus::kByImages:
-      return "started by images alone; gravity is unknown, so z of odom is not the vertical";
+      return "started without gravity, so that z of odom is not the vertical,";
     case StartStatus::kTooFewImages:
       return "too few images to start";
     case StartStatus::kTooFewFeatures:

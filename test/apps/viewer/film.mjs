@@ -9,7 +9,7 @@ import {Browser} from './browser.mjs';
 import {Viewer} from './viewer.mjs';
 
 const [program, results, film, pictures = '24'] = process.argv.slice(2);
-const kWidth = 960, kHeight = 600, kPictureMs = 250, kLastPictureMs = 3000, kQuality = 60;
+const kWidth = 1200, kHeight = 720, kPictureMs = 250, kLastPictureMs = 3000, kQuality = 60;
 const kWait_s = 600;  // pages draw by software here
 
 const folder = mkdtempSync(join(tmpdir(), 'km_film_'));

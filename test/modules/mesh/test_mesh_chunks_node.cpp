@@ -110,7 +110,8 @@ TEST_CASE("A chunk states the keyframe in the middle of those that saw it", "[no
     origin.T_world_kf.push_back(T * T);
   }
   for (const auto& vertex : mesh->vertices)
-    origin.keyframe_of_vertex.push_back(vertex.x() < 0.0F ? 1 : 3);
+    origin.seen_by.push_back(vertex.x() < 0.0F ? std::array<KeyframeIndex, 2>{0, 2}
+                                               : std::array<KeyframeIndex, 2>{3, 4});
   node.step({kAnchor, mesh, std::make_shared<const MeshOrigin>(origin)}, 0.0);
   REQUIRE(sent.messages().size() > 1);
   for (const MeshChunk& chunk : sent.messages()) {

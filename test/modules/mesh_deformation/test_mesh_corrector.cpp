@@ -176,7 +176,7 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
     CHECK(first->mesh.labels.size() == first->mesh.vertices.size());
     const auto& seen_by = visits.map.seen_by;  // the second half of the vertices stays
     const auto half = static_cast<std::ptrdiff_t>(seen_by.size() / 2);
-    CHECK(first->seen_by == std::vector(seen_by.begin() + half, seen_by.end()));
+    CHECK(first->origin.seen_by == std::vector(seen_by.begin() + half, seen_by.end()));
     CHECK(first->superseded_faces == visits.one());
     CHECK(first->report.vertices == visits.map.mesh.vertices.size());
     const auto count = static_cast<std::uint64_t>(visits.map.ids.size() / 2);
@@ -190,7 +190,7 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
     REQUIRE(again);
     CHECK_FALSE(again->deformed);
     CHECK(again->mesh.faces == first->mesh.faces);
-    CHECK(again->seen_by == first->seen_by);
+    CHECK(again->origin.seen_by == first->origin.seen_by);
     CHECK(again->superseded.vertices.empty());
   }
   SECTION("with uncorrected poses both stay") {

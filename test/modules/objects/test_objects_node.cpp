@@ -31,9 +31,9 @@ OptimizedMesh mesh_with(const std::vector<ObjectBox>& chairs, RobotId robot) {
   return {.robot = robot,
           .anchor = 3,
           .mesh = map.mesh,
-          .seen_by = map.seen_by,
           .trajectory = poses(robot),
-          .report = {}};
+          .report = {},
+          .origin = {map.seen_by, {}}};
 }
 
 struct NodeTopics {
