@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kKeptSets = 4;  // per peer
+constexpr std::size_t kKeptSets = 4;  // per peer: both robots agree on one of them
 
 // Hash of the used measurements: direction, translation and weights, which the network preserves
 // exactly. It excludes rotations, because as a quaternion a rotation loses its last bit.
@@ -141,13 +141,13 @@ void OwnGraph::forget(RobotId peer) {
 
 void OwnGraph::complete_sets() {
   for (auto& [peer, sets] : sets_)
-    if (sets.changed && complete(sets)) {
+    if (sets.changed && complete(sets, peer == self_ ? 1 : kKeptSets)) {
       sets.changed = false;
       if (peer == self_) ++revision_;
     }
 }
 
-bool OwnGraph::complete(Sets& sets) const {
+bool OwnGraph::complete(Sets& sets, std::size_t kept) const {
   const auto known = [&](const KeyframeId& end) {
     return end.robot != self_ || end.index < keyframes_;
   };
@@ -158,8 +158,8 @@ bool OwnGraph::complete(Sets& sets) const {
     result.edges.push_back(found->second);
   }
   result.id = identify(sets.newest.version, result.edges);
+  if (sets.complete.size() == kept) sets.complete.pop_back();
   sets.complete.insert(sets.complete.begin(), std::move(result));
-  if (sets.complete.size() > kKeptSets) sets.complete.pop_back();
   return true;
 }
 

@@ -18,8 +18,8 @@ namespace km {
 /// the inlier sets, which name the closures to optimise. Closures and inlier sets may arrive in any
 /// order and repeatedly. Once all closures of an inlier set, and the keyframes of this robot on
 /// which they end, have arrived, the set becomes an edge set: the closures with their measurements.
-/// The newest few edge sets of each robot pair are kept, so that both robots can agree on one. Not
-/// thread-safe.
+/// The newest few edge sets of each robot pair are kept, so that both robots can agree on one.
+/// Inside this robot, only the newest set is kept. Not thread-safe.
 ///
 /// A pair of keyframes identifies a closure. The closure counts once, however often and from
 /// whichever end it was measured: of several measurements, the best one by is_better() counts. The
@@ -113,7 +113,7 @@ class OwnGraph {
 
   [[nodiscard]] RobotId peer_of(const ClosureId& id) const;
   void complete_sets();
-  bool complete(Sets& sets) const;
+  bool complete(Sets& sets, std::size_t kept) const;
 
   RobotId self_;
   SE3 T_odom_first_ = SE3::Identity();

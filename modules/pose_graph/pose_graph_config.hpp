@@ -52,12 +52,13 @@ struct PoseGraphConfig {
                   "and with forwarded messages; the next session waits until the bytes of the "
                   "busiest member in the last one fit this rate");
     visitor.field("session_growth", session_growth, {0.0, 100.0},
-                  "relative growth of the number of closures for which the next session waits; a "
-                  "new member, or two seconds without new measurements, also end the wait");
+                  "relative growth of the number of closures between robots for which the next "
+                  "session waits; a new member, or two seconds without new measurements, also end "
+                  "the wait");
     visitor.field("session_wait_s", session_wait_s, {0.0, 3600.0},
                   "[s] longest wait for the next session, whatever exchange_budget_kb_s and "
-                  "session_growth demand; twice as long after a session without a new closure "
-                  "between robots, and four times after two");
+                  "session_growth demand; four times as long while no closure between robots is "
+                  "new");
     visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
                   "rbcd: relative decrease of the team cost in a round below which the session has "
                   "converged");

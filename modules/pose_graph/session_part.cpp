@@ -262,7 +262,31 @@ bool SessionPart::follow(const Session& session) {
   return ends;
 }
 
+void SessionPart::keep_only_results() {
+  if (!solver_) return;
+  results_ = {solver_->state(), solver_->verdicts(), solver_->noise(), solver_->covariances()};
+  committed_ = solver_->poses();
+  solver_.reset();
+  rounds_.clear();
+}
+
+SolverState SessionPart::state() const {
+  if (results_) return results_->state;
+  return solver_ ? solver_->state() : SolverState();
+}
+
+ClosureNoiseRecord SessionPart::noise() const {
+  if (results_) return results_->noise;
+  return solver_ ? solver_->noise() : graph_.noise;
+}
+
+std::vector<Matrix6> SessionPart::covariances() const {
+  if (results_) return results_->covariances;
+  return solver_ ? solver_->covariances() : std::vector<Matrix6>{};
+}
+
 ClosureVerdicts SessionPart::verdicts() const {
+  if (results_) return results_->verdicts;
   if (solver_) return solver_->verdicts();
   ClosureVerdicts known;
   for (const PoseEdge& e : graph_.between)
@@ -272,7 +296,7 @@ ClosureVerdicts SessionPart::verdicts() const {
 }
 
 const std::vector<SE3>& SessionPart::poses() const {
-  if (stage_ == MemberStage::kFailed) return committed_;
+  if (stage_ == MemberStage::kFailed || results_) return committed_;
   return solver_ ? solver_->poses() : graph_.start;
 }
 

@@ -58,6 +58,10 @@ class SessionPart {
   bool follow(const Session& session);
   /// Stores the poses of `round`, which all members have completed, as committed_poses().
   void commit(std::uint32_t round);
+  /// Frees the solver and the poses of the last rounds, which take most of the memory of a session.
+  /// Call once all members have the solution. Afterwards this part only reports the results, and
+  /// committed_poses() is the solution. Precondition: stage() is kSolved.
+  void keep_only_results();
 
   /// nullopt before the robot has entered the frame.
   [[nodiscard]] std::optional<MemberStage> stage() const { return stage_; }
@@ -78,20 +82,16 @@ class SessionPart {
   [[nodiscard]] std::vector<SinglePose> public_poses() const;
   [[nodiscard]] const std::vector<RobotId>& members() const { return place_.members; }
   /// State of the solver; zeros before there is one.
-  [[nodiscard]] SolverState state() const { return solver_ ? solver_->state() : SolverState(); }
+  [[nodiscard]] SolverState state() const;
   /// Before there is a solver: the known decisions on closures to other members when the robot
   /// joined. Afterwards: the verdicts of the solver on all closures that this robot weighs.
   [[nodiscard]] ClosureVerdicts verdicts() const;
-  [[nodiscard]] ClosureNoiseRecord noise() const {
-    return solver_ ? solver_->noise() : graph_.noise;
-  }
+  [[nodiscard]] ClosureNoiseRecord noise() const;
   /// The poses that the solver has last accepted. Before there is a solver: the start. After a
   /// failure: committed_poses(). In the frame of the session once there is a stage.
   [[nodiscard]] const std::vector<SE3>& poses() const;
   /// Covariances of poses() once the session is solved; empty if the solver computes none.
-  [[nodiscard]] std::vector<Matrix6> covariances() const {
-    return solver_ ? solver_->covariances() : std::vector<Matrix6>{};
-  }
+  [[nodiscard]] std::vector<Matrix6> covariances() const;
   /// Poses of the last round that is known to be completed by all members.
   [[nodiscard]] const std::vector<SE3>& committed_poses() const { return committed_; }
   /// Time of the last activity or message of the session [s].
@@ -115,6 +115,14 @@ class SessionPart {
   void fail(const std::string& why);
   void remember_round();
 
+  // Results of a solver that has been freed, except for the poses.
+  struct Results {
+    SolverState state;
+    ClosureVerdicts verdicts;
+    ClosureNoiseRecord noise;
+    std::vector<Matrix6> covariances;
+  };
+
   Session session_;
   TeamPeer self_;
   SessionGraph graph_;  // the solver takes it over
@@ -133,6 +141,7 @@ class SessionPart {
   std::vector<RobotId> refused_;  // senders of early messages that the solver refused
   std::vector<ReliableMessage> to_send_;
   std::unique_ptr<MemberSolver> solver_;
+  std::optional<Results> results_;
   std::optional<MemberStage> stage_;
   std::string failure_;
   std::deque<std::pair<std::uint32_t, std::vector<SE3>>> rounds_;  // poses of the last rounds

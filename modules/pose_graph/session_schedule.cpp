@@ -7,6 +7,8 @@ namespace {
 
 // Time without new measurements after which the team is at rest [s].
 constexpr double kAtRest_s = 2.0;
+// Factor on the longest wait while no closure between robots is new.
+constexpr double kIdle = 4.0;
 
 }  // namespace
 
@@ -15,12 +17,17 @@ bool SessionSchedule::is_within_budget(std::uint64_t bytes, double ended_s, doub
   return now_s - ended_s >= std::min(price_s, config_.session_wait_s);
 }
 
-// The first closures connect the maps; each further closure changes them less. Odometry alone
-// changes nothing, so new odometry can wait until the team is at rest.
+double SessionSchedule::longest_wait_s() const {
+  return (has_new() ? 1.0 : kIdle) * config_.session_wait_s;
+}
+
+// The first closures between robots connect the maps; each further closure changes them less.
+// Closures inside a robot change only its own poses, and a robot that moves at known places finds
+// them all the time, so they can wait. Odometry alone changes nothing, so new odometry can wait
+// until the team is at rest.
 bool SessionSchedule::is_worthwhile(double ended_s, double now_s) const {
-  const bool grown =
-      closures_ != used_ && static_cast<double>(closures_.all()) >=
-                                (1.0 + config_.session_growth) * static_cast<double>(used_.all());
+  const bool grown = has_new() && static_cast<double>(closures_) >=
+                                      (1.0 + config_.session_growth) * static_cast<double>(used_);
   return grown || now_s - changed_s_ >= kAtRest_s || now_s - ended_s >= longest_wait_s();
 }
 

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
 #include "modules/pose_graph/pose_graph_config.hpp"
-#include "modules/pose_graph/team_plan.hpp"
 
 namespace km {
 
@@ -15,18 +13,16 @@ class SessionSchedule {
  public:
   explicit SessionSchedule(const PoseGraphConfig& config) : config_(config) {}
 
-  /// Takes the present plan: whether its graph has changed, and the numbers of its closures.
-  void update(bool graph_changed, const KnownClosures& closures, double now_s) {
+  /// Takes the present plan: whether its graph has changed, and the number of its closures between
+  /// robots.
+  void update(bool graph_changed, std::uint64_t closures, double now_s) {
     if (graph_changed) changed_s_ = now_s;
     closures_ = closures;
   }
   /// Number for the next session; every call returns a new one.
   [[nodiscard]] std::uint32_t take_number() { return ++opened_; }
   /// To be called when a session begins. It has all present closures.
-  void opened() {
-    idle_ = closures_.between == used_.between ? std::min(idle_ + 1, kMostIdle) : 0;
-    used_ = closures_;
-  }
+  void opened() { used_ = closures_; }
 
   /// True if the mean rate of the member that has sent most, `bytes` in the session that ended at
   /// `ended_s`, is within pose_graph.exchange_budget_kb_s by now. Also true after session_wait_s.
@@ -35,16 +31,13 @@ class SessionSchedule {
   [[nodiscard]] bool is_worthwhile(double ended_s, double now_s) const;
 
  private:
-  static constexpr int kMostIdle = 2;
-  /// session_wait_s, doubled for each of the last sessions without a new closure between robots.
-  [[nodiscard]] double longest_wait_s() const { return config_.session_wait_s * (1 << idle_); }
+  [[nodiscard]] bool has_new() const { return closures_ != used_; }
+  [[nodiscard]] double longest_wait_s() const;
 
   PoseGraphConfig config_;
-  double changed_s_ = -1e9;      // time of the last change of the graph
-  KnownClosures closures_ = {};  // in the present plan
-  KnownClosures used_ = {};      // in the last session
-  int idle_ = 0;  // number of the last sessions without a new closure between robots, at most
-                  // kMostIdle
+  double changed_s_ = -1e9;     // time of the last change of the graph
+  std::uint64_t closures_ = 0;  // between robots, in the present plan
+  std::uint64_t used_ = 0;      // between robots, in the last session
   std::uint32_t opened_ = 0;
 };
 

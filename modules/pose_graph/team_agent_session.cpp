@@ -25,7 +25,7 @@ void TeamAgent::make_plan() {
   SessionPlan plan = plan_session(statuses, links_.links, self_.robot);
   // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
   if (frame_.world() && !plan.has_member(frame_.world()->anchor)) frame_.set_world(tied_world());
-  schedule_.update(!same_graph(plan, plan_), closures_known(plan, statuses), now_s_);
+  schedule_.update(!same_graph(plan, plan_), closures_between(plan, statuses), now_s_);
   plan_ = std::move(plan);
   for (const auto& [robot, status] : statuses)
     if (const auto own = datum_of(self_.robot);
@@ -389,6 +389,7 @@ void TeamAgent::leave(bool with_solution) {
   decisions_.set_noise(part_->noise(), part_->members().size() > 1);
   notices_.closures(decisions_.noise());
   reconsider_due_ = part_->state().deferred;
+  part_->keep_only_results();
 }
 
 }  // namespace km

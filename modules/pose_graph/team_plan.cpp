@@ -253,17 +253,13 @@ bool has_lost_member(const SessionPlan& session, const SessionPlan& now) {
   });
 }
 
-KnownClosures closures_known(const SessionPlan& plan,
-                             const std::map<RobotId, TeamStatus>& statuses) {
-  KnownClosures known;
+std::uint64_t closures_between(const SessionPlan& plan,
+                               const std::map<RobotId, TeamStatus>& statuses) {
+  std::uint64_t closures = 0;
   for (const SessionPair& pair : plan.pairs)
     for (const EdgeSetOffer& offer : statuses.at(pair.a).offers)
-      if (offer.peer == pair.b && offer.id == pair.edges) known.between += offer.edges;
-  for (const SessionMember& member : plan.members) {
-    const TeamStatus& status = statuses.at(member.peer.robot);
-    known.inside += status.revision - std::min(status.revision, status.keyframes);
-  }
-  return known;
+      if (offer.peer == pair.b && offer.id == pair.edges) closures += offer.edges;
+  return closures;
 }
 
 RobotId coordinator_of(const SessionPlan& plan) {

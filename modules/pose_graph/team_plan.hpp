@@ -40,18 +40,9 @@ namespace km {
 /// True if a process of `session` is not in the plan `now`.
 [[nodiscard]] bool has_lost_member(const SessionPlan& session, const SessionPlan& now);
 
-/// Numbers of measurements in a session except for odometry.
-struct KnownClosures {
-  std::uint64_t between = 0;  ///< Closures between its robots.
-  std::uint64_t inside = 0;   ///< Changes of the closures inside robots: statuses report no more.
-
-  [[nodiscard]] std::uint64_t all() const { return between + inside; }
-  bool operator==(const KnownClosures&) const = default;
-};
-
-/// Measurements in the session of `plan`, made from `statuses`.
-[[nodiscard]] KnownClosures closures_known(const SessionPlan& plan,
-                                           const std::map<RobotId, TeamStatus>& statuses);
+/// Number of closures between the robots of a session of `plan`, made from `statuses`.
+[[nodiscard]] std::uint64_t closures_between(const SessionPlan& plan,
+                                             const std::map<RobotId, TeamStatus>& statuses);
 
 /// Lowest robot id of the members. Precondition: there is a member.
 [[nodiscard]] RobotId coordinator_of(const SessionPlan& plan);

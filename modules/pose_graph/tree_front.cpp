@@ -96,10 +96,7 @@ TreeFront::EdgeSlot TreeFront::slot_of(const PoseEdge& edge) {
     refuse(graph_.self, "an edge joins pose " + to_string(edge.from) + " with itself");
   EdgeSlot slot;
   const auto node = [&](const KeyframeId& id) {
-    const auto held = graph_.held.find(id);
-    if (held == graph_.held.end()) return add_node(id);
-    slot.T_held = held->second;
-    return -1;
+    return graph_.held.contains(id) ? -1 : add_node(id);
   };
   slot.i = node(edge.from);
   slot.j = node(edge.to);
@@ -107,8 +104,8 @@ TreeFront::EdgeSlot TreeFront::slot_of(const PoseEdge& edge) {
   return slot;
 }
 
-const SE3& TreeFront::pose_of(int node, const EdgeSlot& slot, std::span<const SE3> poses) const {
-  return node < 0 ? slot.T_held : poses[at(node)];
+const SE3& TreeFront::pose_of(int node, const KeyframeId& id, std::span<const SE3> poses) const {
+  return node < 0 ? graph_.held.at(id) : poses[at(node)];
 }
 
 int TreeFront::add_node(const KeyframeId& id) {
@@ -274,8 +271,9 @@ void TreeFront::add_own(std::span<const SE3> poses, Curvature curvature, BlockMa
     const EdgeSlot& p = slots_[k];
     if (p.sent >= 0 || weights_[k] == 0.0) continue;
     const PoseEdge& e = graph_.edges[k];
-    const EdgeModel model = model_edge(e.T_from_to, weighed(e.precision, weights_[k]),
-                                       pose_of(p.i, p, poses), pose_of(p.j, p, poses), curvature);
+    const EdgeModel model =
+        model_edge(e.T_from_to, weighed(e.precision, weights_[k]), pose_of(p.i, e.from, poses),
+                   pose_of(p.j, e.to, poses), curvature);
     if (p.i >= 0) A.diagonal.middleCols<kBlock>(kBlock * p.i) += part(model.H_ii);
     if (p.j >= 0) A.diagonal.middleCols<kBlock>(kBlock * p.j) += part(model.H_jj);
     if (p.pair >= 0) add_coupling(A, p.pair, p.transposed, part(model.H_ij));
@@ -408,8 +406,8 @@ MatrixXd TreeFront::slopes(std::span<const SE3> poses) const {
     if (weights_[k] < kRejected) continue;
     const EdgeSlot& p = slots_[k];
     const PoseEdge& e = graph_.edges[k];
-    set_cost_and_gradient(e.T_from_to, weighed(e.precision, weights_[k]), pose_of(p.i, p, poses),
-                          pose_of(p.j, p, poses), model);
+    set_cost_and_gradient(e.T_from_to, weighed(e.precision, weights_[k]),
+                          pose_of(p.i, e.from, poses), pose_of(p.j, e.to, poses), model);
     subtract(p.i, model.g_i);
     subtract(p.j, model.g_j);
   }
@@ -503,10 +501,11 @@ BlockMatrix TreeFront::inverse(const BlockMatrix& kept) const {
 // The factorisation for Newton steps holds a pose in the middle of the graph: rounds that reuse
 // earlier second derivatives then converge faster. Covariances need a factorisation with the origin
 // held.
-std::optional<BlockMatrix> TreeFront::inverse_about_origin(bool upright) const {
+std::optional<BlockMatrix> TreeFront::inverse_about_origin(bool upright) {
   if (!graph_.free) return factor_->selected_inverse(BlockMatrix::zero(block(), 0, 0));
   std::vector<bool> keep(ids_.size(), false);
   keep[origin_node().value_or(at(graph_.poses / 2))] = true;
+  factor_.reset();
   FrontalCholesky factor(std::make_shared<const EliminationPlan>(std::move(keep), plan_->pairs()));
   if (!factor.factorise(assembled())) return std::nullopt;
   BlockMatrix held = BlockMatrix::zero(block(), 1, 0);
@@ -561,7 +560,8 @@ double TreeFront::cost(std::span<const SE3> poses) const {
   for (std::size_t k = 0; k < slots_.size(); ++k) {
     if (weights_[k] < kRejected) continue;
     const EdgeSlot& p = slots_[k];
-    const double r = residual_of(graph_.edges[k], pose_of(p.i, p, poses), pose_of(p.j, p, poses));
+    const PoseEdge& e = graph_.edges[k];
+    const double r = residual_of(e, pose_of(p.i, e.from, poses), pose_of(p.j, e.to, poses));
     cost += weights_[k] * r * r;
   }
   if (block() == 6)

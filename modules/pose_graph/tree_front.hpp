@@ -110,8 +110,9 @@ class TreeFront {
   /// of the front. `kept` are those of the poses left to the parent, in the order of the system.
   [[nodiscard]] BlockMatrix inverse(const BlockMatrix& kept) const;
   /// At the root: these blocks for errors relative to the origin. nullopt if the equations are
-  /// singular.
-  [[nodiscard]] std::optional<BlockMatrix> inverse_about_origin(bool upright) const;
+  /// singular. Frees the factor first, so that two never take memory at once: of the other
+  /// functions, only inverse_of_child() may be called afterwards.
+  [[nodiscard]] std::optional<BlockMatrix> inverse_about_origin(bool upright);
   /// The part of a child in the result of inverse(), see TreeInverse.
   [[nodiscard]] TreeInverse inverse_of_child(RobotId child, const BlockMatrix& inverse) const;
   /// The inverse at the poses left to the parent, from the message of the parent. Throws
@@ -129,7 +130,6 @@ class TreeFront {
     int pair = -1;
     bool transposed = false;
     int sent = -1;  // index in sent_ if both ends are left to the parent
-    SE3 T_held = SE3::Identity();
   };
   struct Child {
     TreeSystem system;
@@ -147,7 +147,7 @@ class TreeFront {
   int add_node(const KeyframeId& id);
   [[nodiscard]] EdgeSlot slot_of(const PoseEdge& edge);
   [[nodiscard]] std::optional<std::size_t> origin_node() const;
-  [[nodiscard]] const SE3& pose_of(int node, const EdgeSlot& slot,
+  [[nodiscard]] const SE3& pose_of(int node, const KeyframeId& id,
                                    std::span<const SE3> poses) const;
   void plan();
   void place_pairs(const std::vector<NodePair>& pairs);

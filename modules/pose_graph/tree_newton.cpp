@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_cover.hpp"
@@ -54,9 +55,11 @@ TreeNewton::TreeNewton(SessionGraph graph, TreePlace place, const TreeNewtonOpti
     : graph_(std::move(graph)),
       place_(std::move(place)),
       options_(options),
+      inside_(graph_.own.size()),
       accepted_(graph_.start) {
-  for (std::size_t k = 0; k < graph_.own.size(); ++k)
-    known_.push_back({.edge = graph_.own[k], .odometry = k < graph_.odometry});
+  known_.reserve(inside_ + graph_.between.size());
+  for (const PoseEdge& e : std::exchange(graph_.own, {}))
+    known_.push_back({.edge = e, .odometry = known_.size() < graph_.odometry});
   for (const PoseEdge& e : graph_.between) {
     (void)start_of(e.from);
     (void)start_of(e.to);
@@ -119,7 +122,7 @@ bool TreeNewton::reports(const Known& k) const {
 std::vector<SE3> TreeNewton::odometry_poses() const {
   std::vector<SE3> poses{graph_.start.front()};
   for (std::size_t k = 0; k < graph_.odometry; ++k)
-    poses.push_back(poses.back() * graph_.own[k].T_from_to);
+    poses.push_back(poses.back() * known_[k].edge.T_from_to);
   return poses;
 }
 
@@ -225,7 +228,7 @@ void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_
 // All closures of a limited pair have the same factor.
 std::map<RobotId, double> TreeNewton::limits_of_pairs() const {
   std::map<RobotId, Precision> sums;
-  for (std::size_t k = graph_.own.size(); k < known_.size(); ++k) {
+  for (std::size_t k = inside_; k < known_.size(); ++k) {
     if (!takes_part(known_[k])) continue;
     Precision& sum = sums.try_emplace(peer_of(known_[k]), Precision{0.0, 0.0}).first->second;
     sum.kappa += known_[k].edge.precision.kappa;
@@ -253,8 +256,7 @@ void TreeNewton::build_front() {
     if (!takes_part(known_[k]) || !known_[k].own) continue;
     front.edges.push_back(known_[k].edge);
     front_edge_.push_back(k);
-    if (k >= graph_.own.size())
-      known_[k].pair_limit = known_[k].pair_factor = limits.at(peer_of(known_[k]));
+    if (k >= inside_) known_[k].pair_limit = known_[k].pair_factor = limits.at(peer_of(known_[k]));
   }
   front.edges.insert(front.edges.end(), graph_.fixes.begin(), graph_.fixes.end());
   for (const PoseEdge& e : graph_.to_absent) {

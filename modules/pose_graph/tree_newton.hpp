@@ -117,7 +117,8 @@ class TreeNewton final : public MemberSolver {
   SessionGraph graph_;
   TreePlace place_;
   TreeNewtonOptions options_;
-  std::vector<Known> known_;  // SessionGraph::own, then ::between
+  std::size_t inside_ = 0;    // number of edges inside this robot
+  std::vector<Known> known_;  // these edges, then those between robots
   std::optional<TreeFront> front_;
   std::vector<std::size_t> front_edge_;  // index in known_ of each edge of the front
 

@@ -15,6 +15,16 @@ constexpr std::size_t kQueueCapacity = 16384;
 // Standard deviation of an odometry step, per axis, above which its length is unknown.
 constexpr double kLostWay_m = 0.5;
 
+// Number of candidates while a further closure to a known place is due. Two closures are needed,
+// because the noise of closures follows from pairs of them. More tie the keyframe to a place that
+// earlier closures tie already, and each takes memory in every module.
+constexpr std::size_t kDueCandidates = 2;
+
+void keep_due(PlaceNovelty novelty, std::vector<PlaceCandidate>& candidates) {
+  const std::size_t due = novelty == PlaceNovelty::kKnown ? kDueCandidates : 0;
+  if (candidates.size() > due) candidates.resize(due);
+}
+
 bool breaks_odometry(const UncertainPose& before, const UncertainPose& now) {
   const Matrix6 step = between_on_chain(before, now).Sigma;
   return step.bottomRightCorner<3, 3>().trace() > 3.0 * kLostWay_m * kLostWay_m;
@@ -65,7 +75,7 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
     own_.mark_odometry_break();
   CandidateSearch search = own_.search_own(vector, keyframe.stamp);
   const PlaceNovelty novelty = novelty_of(keyframe.odometry, search);
-  if (novelty == PlaceNovelty::kCovered) search.candidates.clear();
+  if (novelty != PlaceNovelty::kNew) keep_due(novelty, search.candidates);
   if (novelty == PlaceNovelty::kNew) {
     // Added before it is published, so that no pair is missed: see the class comment.
     own_.add(std::move(vector), keyframe.stamp);

@@ -50,8 +50,8 @@ struct PlaceRecognitionTopics {
 /// no normaliser, so it occurs only as the match of a candidate.
 ///
 /// An own keyframe that shows a known place (KnownPlaces) is published without words and not
-/// searched by peers: the earlier keyframe of the place stands for it. Its own candidates are
-/// published only while a closure to that place is due.
+/// searched by peers: the earlier keyframe of the place stands for it. While a closure to
+/// that place is due, its two most similar candidates are published, and otherwise none.
 ///
 /// A keyframe index means one keyframe during an incarnation of its robot. After a restart the
 /// history of the robot begins again.

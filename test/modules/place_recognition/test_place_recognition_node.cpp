@@ -160,6 +160,26 @@ TEST_CASE("A keyframe at a known place has no words for the peers and is no matc
   CHECK(robot.candidates.received.size() == (known_places ? 3 : 4));
 }
 
+TEST_CASE("A keyframe at a known place has two candidates if a closure is due, and otherwise none",
+          "[place_recognition][node]") {
+  Robot robot(kSelf, {.min_gap_s = 0.0});
+  const auto view = [](std::uint32_t index) {
+    Keyframe result = keyframe({kSelf, index}, {1, 2, 3, 4});
+    result.features.keypoints.assign(4, {.inverse_depth = 0.25F});
+    return result;
+  };
+  for (std::uint32_t index = 0; index < 5; ++index) robot.node.step(view(index));
+  CHECK(robot.candidates.received.back().query.index == 4);
+  robot.node.step(
+      Closure{.from = view(0).odometry, .to = view(4).odometry, .covariance = Matrix6::Zero()});
+  const std::uint32_t last_fresh = 4 + KnownPlaces::kFreshKeyframes;
+  for (std::uint32_t index = 5; index < last_fresh + 3; ++index) {
+    robot.candidates.received.clear();
+    robot.node.step(view(index));
+    CHECK(robot.candidates.received.size() == (index <= last_fresh ? 0 : 2));
+  }
+}
+
 TEST_CASE("Keyframes before a loss of odometry are candidates at once",
           "[place_recognition][node]") {
   Robot robot(kSelf, {.min_gap_s = 10.0});

@@ -1,3 +1,5 @@
+#include <malloc.h>
+
 #include <catch2/catch.hpp>
 
 #include "modules/pose_graph/tree_messages.hpp"
@@ -310,6 +312,21 @@ TEST_CASE("an interrupted session results in an improvement or the start",
   CAPTURE(steps, whole.cost(start), whole.cost(left));
   REQUIRE(start.size() == 5);
   CHECK(whole.cost(left) <= whole.cost(start) * (1.0 + 1e-9));
+}
+
+// Each keyframe has a step of odometry: 176 bytes, at most twice that with the spare room of a
+// vector. It has a pose in the agent, in the session and in the published trajectory: 128 bytes
+// each. The last two have a covariance: 288 bytes each. The sum is 1136 to 1312 bytes.
+TEST_CASE("a session that has ended leaves less than 1500 bytes for each keyframe",
+          "[pose_graph][network]") {
+  constexpr std::uint32_t kKeyframes = 2000;
+  const TeamProblem problem = problem_of(numbered(2), {{1, 2}}, 12, kKeyframes);
+  TeamNetwork network;
+  const std::size_t before = mallinfo2().uordblks;
+  add_all(network, problem);
+  REQUIRE(settle(network, 60.0));
+  const auto bytes = static_cast<double>(mallinfo2().uordblks - before);
+  CHECK(bytes < 1500.0 * 2.0 * kKeyframes);
 }
 
 TEST_CASE("fifty robots reach the optimum, in a line and with all links", "[pose_graph][network]") {

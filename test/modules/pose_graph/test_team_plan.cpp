@@ -68,17 +68,13 @@ TEST_CASE("two robots agree on the newest edges that both hold", "[pose_graph][s
   CHECK_FALSE(agreed_edges(a, b));
 }
 
-TEST_CASE("closures_known() counts the closures of pairs and the changes inside robots",
+TEST_CASE("closures_between() counts the closures of the pairs of a session",
           "[pose_graph][session]") {
-  TeamStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 7, {3, 30}}, {3, 5, {1, 10}}});
-  TeamStatus b = status_of(2, {{1, 7, {3, 30}}});
-  const TeamStatus c = status_of(3, {});
-  CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 1), by_robot({a, b, c})).all() == 7);
-  b.revision = b.keyframes + 4;
-  CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 1), by_robot({a, b, c})).all() == 11);
-  CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 3), by_robot({a, b, c})).all() == 0);
-  b.revision = 0;  // impossible for a robot, but not for a message
-  CHECK(closures_known(plan_session(by_robot({a, b, c}), {}, 1), by_robot({a, b, c})).all() == 7);
+  const TeamStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 7, {3, 30}}, {3, 5, {1, 10}}});
+  const TeamStatus b = status_of(2, {{1, 7, {3, 30}}});
+  const auto statuses = by_robot({a, b, status_of(3, {})});
+  CHECK(closures_between(plan_session(statuses, {}, 1), statuses) == 7);
+  CHECK(closures_between(plan_session(statuses, {}, 3), statuses) == 0);
 }
 
 TEST_CASE("the plan contains the connected component, best connected robots first",
