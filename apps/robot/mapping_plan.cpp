@@ -94,9 +94,13 @@ std::optional<MappingPlan> plan_mapping(const MappingConfig& config,
   return plan;
 }
 
-double usable_range_m(const StereoRig& rig, double max_error_m) {
+double depth_sigma_per_m(const StereoRig& rig) {
   constexpr double kDisparityError_px = 0.25;
-  return std::sqrt(max_error_m * rig.cameras[0].fx * rig.baseline_m() / kDisparityError_px);
+  return kDisparityError_px / (rig.cameras[0].fx * rig.baseline_m());
+}
+
+double usable_range_m(const StereoRig& rig, double max_error_m) {
+  return std::sqrt(max_error_m / depth_sigma_per_m(rig));
 }
 
 }  // namespace km

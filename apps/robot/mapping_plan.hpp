@@ -45,10 +45,13 @@ struct ImageSources {
                                                       const SegmentationConfig& segmentation,
                                                       const std::optional<ImageSources>& sources);
 
-/// Distance at which the standard deviation of the depth of `rig` is `max_error_m`, if that of a
-/// disparity is a quarter of a pixel: sqrt(max_error_m * f * baseline / 0.25 px). With an RGB-D rig
-/// the baseline is the virtual one, see rgbd_rig(). With stereo cameras, depth images are assumed
-/// to be no better than stereo depth.
+/// Standard deviation of a depth of `rig` over the square of the depth [1/m], if that of a
+/// disparity is a quarter of a pixel: 0.25 px / (f * baseline). With an RGB-D rig the baseline is
+/// the virtual one, see rgbd_rig(). With stereo cameras, depth images are assumed to be no better
+/// than stereo depth.
+[[nodiscard]] double depth_sigma_per_m(const StereoRig& rig);
+
+/// Distance at which the standard deviation of the depth of `rig` is `max_error_m`.
 [[nodiscard]] double usable_range_m(const StereoRig& rig, double max_error_m);
 
 }  // namespace km

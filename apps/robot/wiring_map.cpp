@@ -19,6 +19,7 @@ void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig&
   SemanticMappingConfig map = config.semantic_mapping;
   map.max_range_m =
       std::min(map.max_range_m, usable_range_m(rig, config.mapping.max_depth_error_m));
+  if (!map.depth_sigma_per_m && !plan.reads_depth()) map.depth_sigma_per_m = depth_sigma_per_m(rig);
   DenseSensor sensor(rig, plan.sensor);
   const Camera camera = sensor.camera();
   add<DenseSensingNode>(true, std::move(sensor), plan.sensor.labels, config.mapping.rate_hz,

@@ -66,25 +66,34 @@ const DistanceField::Block* DistanceField::find(const Eigen::Vector3i& position)
   return found == blocks_.end() ? nullptr : found->second.get();
 }
 
-void DistanceField::set(const SpaceChanges& changes) {
+// What replace() has done.
+struct DistanceField::Replaced {
+  std::size_t new_blocks = 0;
+  std::vector<Eigen::Vector3i> touched;       // all blocks
+  std::vector<Eigen::Vector3i> lost_surface;  // blocks that had surface voxels and are erased
+};
+
+DistanceField::Replaced DistanceField::replace(const SpaceChanges& changes) {
+  Replaced replaced;
   for (const BlockSpace& change : changes) {
-    touched_.push_back(change.position);
+    replaced.touched.push_back(change.position);
     if (!any(change.observed)) {
       const auto found = blocks_.find(change.position);
       if (found == blocks_.end()) continue;
-      if (any(found->second->surface)) lost_surface_.push_back(change.position);
+      if (any(found->second->surface)) replaced.lost_surface.push_back(change.position);
       blocks_.erase(found);
       continue;
     }
     auto& block = blocks_[change.position];
     if (block == nullptr) {
       block = std::make_unique<Block>();
-      new_blocks_.push_back(change.position);
+      ++replaced.new_blocks;
     }
     block->observed = change.observed;
     for (std::size_t z = 0; z < change.inside.size(); ++z)
       block->inside[z] = change.inside[z] & change.observed[z];
   }
+  return replaced;
 }
 
 // Voxels behind a surface beside an observed voxel in front of it, by shifted copies of the bits.
@@ -117,9 +126,9 @@ BlockBits DistanceField::surface_of(const Eigen::Vector3i& position, const Block
 
 // Derives the surface voxels of touched blocks and those beside them. Returns the blocks in which
 // they have changed.
-std::vector<Eigen::Vector3i> DistanceField::find_changed_surface() {
+std::vector<Eigen::Vector3i> DistanceField::find_changed_surface(Replaced replaced) {
   std::vector<Eigen::Vector3i> candidates;
-  for (const Eigen::Vector3i& position : touched_) {
+  for (const Eigen::Vector3i& position : replaced.touched) {
     candidates.push_back(position);
     for (int axis = 0; axis < 3; ++axis)
       for (const int step : {-1, 1}) {
@@ -128,8 +137,7 @@ std::vector<Eigen::Vector3i> DistanceField::find_changed_surface() {
       }
   }
   sort_unique(candidates);
-  std::vector<Eigen::Vector3i> changed = std::move(lost_surface_);
-  lost_surface_.clear();
+  std::vector<Eigen::Vector3i> changed = std::move(replaced.lost_surface);
   for (const Eigen::Vector3i& position : candidates) {
     const auto found = blocks_.find(position);
     if (found == blocks_.end()) continue;
@@ -142,32 +150,40 @@ std::vector<Eigen::Vector3i> DistanceField::find_changed_surface() {
   return changed;
 }
 
-DistanceUpdate DistanceField::update() {
-  DistanceUpdate report;
-  const std::vector<Eigen::Vector3i> changed = find_changed_surface();
-  report.changed_blocks = changed.size();
-  // A new block needs distances, too, and so do the blocks within reach of changed surface. Changed
-  // surface that is farther than the largest distance in a block was and is the nearest nowhere.
-  std::vector<Eigen::Vector3i> targets;
-  for (const Eigen::Vector3i& position : new_blocks_)
-    if (find(position) != nullptr) targets.push_back(position);
-  for (const Eigen::Vector3i& position : changed)
+// Outdated are the blocks within reach of changed surface. Changed surface that is farther than the
+// largest distance in a block was and is the nearest nowhere.
+std::size_t DistanceField::set(const SpaceChanges& changes) {
+  Replaced replaced = replace(changes);
+  std::size_t outdated = replaced.new_blocks;
+  for (const Eigen::Vector3i& position : find_changed_surface(std::move(replaced)))
     for (int z = -reach_blocks_; z <= reach_blocks_; ++z)
       for (int y = -reach_blocks_; y <= reach_blocks_; ++y)
-        for (int x = -reach_blocks_; x <= reach_blocks_; ++x)
-          if (const Block* block = find(position + Eigen::Vector3i(x, y, z));
-              block != nullptr && block->largest >= gap_squared({x, y, z}))
-            targets.push_back(position + Eigen::Vector3i(x, y, z));
-  touched_.clear();
-  new_blocks_.clear();
-  sort_unique(targets);
-  report.computed_blocks = targets.size();
-  if (targets.empty()) return report;
+        for (int x = -reach_blocks_; x <= reach_blocks_; ++x) {
+          const auto found = blocks_.find(position + Eigen::Vector3i(x, y, z));
+          if (found == blocks_.end() || found->second->outdated ||
+              found->second->largest < gap_squared({x, y, z}))
+            continue;
+          found->second->outdated = true;
+          ++outdated;
+        }
+  return outdated;
+}
+
+std::size_t DistanceField::update() {
+  std::vector<Eigen::Vector3i> targets;
+  for (const auto& [position, block] : blocks_)
+    if (block->outdated) targets.push_back(position);
+  const std::size_t computed = targets.size();
+  compute(std::move(targets));
+  return computed;
+}
+
+void DistanceField::compute(std::vector<Eigen::Vector3i> targets) {
+  if (targets.empty()) return;
   Box box{targets.front(), targets.front()};
   for (const Eigen::Vector3i& target : targets)
     box = {box.low.cwiseMin(target), box.high.cwiseMax(target)};
   compute_parts({box.low, box.high.array() + 1}, std::move(targets));
-  return report;
 }
 
 // Divides long regions, so that little time and memory goes to the space between distant targets.
@@ -175,7 +191,7 @@ void DistanceField::compute_parts(const Box& box, std::vector<Eigen::Vector3i> t
   if (targets.empty()) return;
   const Eigen::Vector3i side = box.high - box.low;
   Eigen::Index axis = 0;
-  if (side.maxCoeff(&axis) <= kPartBlocks) return compute(box, targets);
+  if (side.maxCoeff(&axis) <= kPartBlocks) return compute_part(box, targets);
   const int middle = (box.low[axis] + box.high[axis]) / 2;
   const auto split =
       std::stable_partition(targets.begin(), targets.end(),
@@ -212,14 +228,15 @@ SurfaceBox DistanceField::surface_near(const Box& box) const {
   return surface;
 }
 
-void DistanceField::compute(const Box& box, const std::vector<Eigen::Vector3i>& positions) {
-  std::vector<DistanceTarget> targets;
-  for (const Eigen::Vector3i& position : positions)
-    targets.push_back({position, &blocks_.at(position)->squared});
-  find_surface_distances(surface_near(box), reach_, targets);
-  for (const Eigen::Vector3i& position : positions) {
-    Block& block = *blocks_.at(position);
+void DistanceField::compute_part(const Box& box, const std::vector<Eigen::Vector3i>& targets) {
+  std::vector<DistanceTarget> outputs;
+  for (const Eigen::Vector3i& target : targets)
+    outputs.push_back({target, &blocks_.at(target)->squared});
+  find_surface_distances(surface_near(box), reach_, outputs);
+  for (const Eigen::Vector3i& target : targets) {
+    Block& block = *blocks_.at(target);
     block.largest = *std::ranges::max_element(block.squared);
+    block.outdated = false;
   }
 }
 
@@ -231,16 +248,17 @@ double DistanceField::signed_distance(const Block& block, int x, int y, int z) c
   return std::clamp((is_inside ? -(d + 0.5) : d - 0.5) * voxel_m_, -max_m_, max_m_);
 }
 
-std::optional<double> DistanceField::at_voxel(const Eigen::Vector3i& voxel) const {
+std::optional<double> DistanceField::at_voxel(const Eigen::Vector3i& voxel) {
   const Eigen::Vector3i position = voxel.unaryExpr([](int v) { return v >> 3; });
   const Block* block = find(position);
   if (block == nullptr) return std::nullopt;
   const Eigen::Vector3i in = voxel - position * kBlockSide;
   if (!bit(block->observed, in.x(), in.y(), in.z())) return std::nullopt;
+  if (block->outdated) compute({position});
   return signed_distance(*block, in.x(), in.y(), in.z());
 }
 
-std::optional<PointDistance> DistanceField::at(const Eigen::Vector3d& point) const {
+std::optional<PointDistance> DistanceField::at(const Eigen::Vector3d& point) {
   const Eigen::Vector3d scaled = point / voxel_m_;
   constexpr double kFarthest = BlockMap::kReach * static_cast<double>(kBlockSide);
   if (!(scaled.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
@@ -265,11 +283,15 @@ std::optional<PointDistance> DistanceField::at(const Eigen::Vector3d& point) con
   return result;
 }
 
-std::vector<DistanceField::SlicePoint> DistanceField::slice(double z_m) const {
+std::vector<DistanceField::SlicePoint> DistanceField::slice(double z_m) {
   const int voxel_z = static_cast<int>(std::lround(z_m / voxel_m_));
-  std::vector<Eigen::Vector3i> positions;
-  for (const auto& entry : blocks_)
-    if (entry.first.z() == voxel_z >> 3) positions.push_back(entry.first);
+  std::vector<Eigen::Vector3i> positions, outdated;
+  for (const auto& [position, block] : blocks_) {
+    if (position.z() != voxel_z >> 3) continue;
+    positions.push_back(position);
+    if (block->outdated) outdated.push_back(position);
+  }
+  compute(std::move(outdated));
   std::ranges::sort(positions, less);
   std::vector<SlicePoint> points;
   for (const Eigen::Vector3i& position : positions)

@@ -25,12 +25,6 @@ struct PointDistance {
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
 };
 
-/// Result of DistanceField::update().
-struct [[nodiscard]] DistanceUpdate {
-  std::size_t changed_blocks = 0;   ///< Blocks with changed surface voxels.
-  std::size_t computed_blocks = 0;  ///< Blocks whose distances were computed again.
-};
-
 /// Euclidean signed distances to the nearest surface, on the voxels of the mapper's TSDF.
 ///
 /// Surface voxels are voxels behind a surface with an observed voxel in front of it beside them
@@ -42,10 +36,13 @@ struct [[nodiscard]] DistanceUpdate {
 ///
 /// Incremental as Voxblox (Oleynikova et al., "Voxblox: Incremental 3D Euclidean Signed Distance
 /// Fields for On-Board MAV Planning", 2017, Sec. IV): only blocks within max_distance of a changed
-/// surface voxel are computed again, and of them only those with a distance that may change.
-/// Voxblox and FIESTA (Han et al., 2019) propagate distances from voxel to voxel in a queue. Here
-/// whole blocks are computed exactly, see find_surface_distances(). So the result equals that of a
+/// surface voxel become outdated, and of them only those with a distance that may change. Voxblox
+/// and FIESTA (Han et al., 2019) propagate distances from voxel to voxel in a queue. Here whole
+/// blocks are computed exactly, see find_surface_distances(). So the result equals that of a
 /// computation from scratch, bit by bit, and no voxel stores its nearest obstacle.
+///
+/// Lazy: set() only marks outdated blocks, and they are computed when a distance in them is asked
+/// for. A block that changes several times before is computed once, one that nobody asks for never.
 ///
 /// Memory: 1.2 kB per observed block of 8^3 voxels. Not thread-safe.
 class DistanceField {
@@ -54,18 +51,20 @@ class DistanceField {
   /// max_distance_m.
   DistanceField(const DistanceFieldConfig& config, double voxel_size_m);
 
-  /// Replaces what is known of these blocks. Distances follow with the next update().
-  void set(const SpaceChanges& changes);
+  /// Replaces what is known of these blocks. Returns the number of blocks that are outdated by it
+  /// and were not before.
+  std::size_t set(const SpaceChanges& changes);
 
-  /// Computes the distances affected by set() since the last call.
-  DistanceUpdate update();
+  /// Computes all outdated blocks at once, which takes less time than one after the other. Returns
+  /// their number.
+  std::size_t update();
 
   /// Distance and gradient at a point of the map's frame, by trilinear interpolation of the eight
   /// voxels around it. nullopt if one of them was never observed: the distance is unknown.
-  [[nodiscard]] std::optional<PointDistance> at(const Eigen::Vector3d& point) const;
+  [[nodiscard]] std::optional<PointDistance> at(const Eigen::Vector3d& point);
 
-  /// Signed distance of a voxel [m], as of the last update(); nullopt if it was never observed.
-  [[nodiscard]] std::optional<double> at_voxel(const Eigen::Vector3i& voxel) const;
+  /// Signed distance of a voxel [m]; nullopt if it was never observed.
+  [[nodiscard]] std::optional<double> at_voxel(const Eigen::Vector3i& voxel);
 
   /// Centres of the observed voxels nearest to the height `z_m`, with their distances: a slice for
   /// viewers. In the order of their positions.
@@ -73,7 +72,7 @@ class DistanceField {
     Eigen::Vector3f point;
     float distance_m;
   };
-  [[nodiscard]] std::vector<SlicePoint> slice(double z_m) const;
+  [[nodiscard]] std::vector<SlicePoint> slice(double z_m);
 
   [[nodiscard]] std::size_t blocks() const { return blocks_.size(); }
   [[nodiscard]] double voxel_size_m() const { return voxel_m_; }
@@ -83,6 +82,7 @@ class DistanceField {
   struct Block {
     BlockBits observed = {}, inside = {};
     BlockBits surface = {};  // surface voxels, derived from the other two
+    bool outdated = true;    // what follows is not valid
     SquaredDistances squared;
     std::uint16_t largest = kBeyondReach;  // The largest of `squared`.
 
@@ -98,18 +98,19 @@ class DistanceField {
 
   [[nodiscard]] const Block* find(const Eigen::Vector3i& position) const;
   [[nodiscard]] BlockBits surface_of(const Eigen::Vector3i& position, const Block& block) const;
-  std::vector<Eigen::Vector3i> find_changed_surface();
+  struct Replaced;
+  Replaced replace(const SpaceChanges& changes);
+  [[nodiscard]] std::vector<Eigen::Vector3i> find_changed_surface(Replaced replaced);
   [[nodiscard]] SurfaceBox surface_near(const Box& box) const;
-  void compute(const Box& box, const std::vector<Eigen::Vector3i>& positions);
+  void compute(std::vector<Eigen::Vector3i> targets);
   void compute_parts(const Box& box, std::vector<Eigen::Vector3i> targets);
+  void compute_part(const Box& box, const std::vector<Eigen::Vector3i>& targets);
   [[nodiscard]] double signed_distance(const Block& block, int x, int y, int z) const;
 
   const double voxel_m_, max_m_;
   const int reach_;         // max_distance in voxels, rounded up
   const int reach_blocks_;  // and in blocks
   std::unordered_map<Eigen::Vector3i, std::unique_ptr<Block>, PositionHash> blocks_;
-  // By set() since the last update(): all blocks, new ones, and erased ones with surface voxels.
-  std::vector<Eigen::Vector3i> touched_, new_blocks_, lost_surface_;
 };
 
 }  // namespace km

@@ -1,6 +1,8 @@
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 namespace km {
 namespace {
@@ -26,7 +28,10 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
   check_usable(closure, a_, b_);
   const ClosureId id = closure.id();
   if (known_.contains(id)) return PcmAddResult::kRepeated;
-  if (known_.size() >= Pcm::kMaxClosures) return PcmAddResult::kFull;
+  if (known_.size() >= Pcm::kMaxClosures) {
+    if (!is_witnessed()) return PcmAddResult::kFull;
+    thin();
+  }
   known_.insert(id);
   const OrientedClosure oriented = test_.orient(closure);
   if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
@@ -35,6 +40,21 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
   const std::size_t before = witnesses();
   if (!is_witnessed()) test(oriented);
   return witnesses() > before ? PcmAddResult::kGrew : PcmAddResult::kAdded;
+}
+
+// Keeps the first closures between the same two stretches of keyframes, which determine how the
+// stretches lie to each other. Stretches grow until half of the closures are dropped. A robot that
+// moves for hours in a known place thus always has room for its newest closures.
+void WitnessedPair::thin() {
+  constexpr int kKept = 2;  // the noise of closures follows from two at one place
+  for (KeyframeIndex stretch = 2 * kNeighbourhood; known_.size() > Pcm::kMaxClosures / 2;
+       stretch *= 2) {
+    std::map<std::pair<KeyframeIndex, KeyframeIndex>, int> seen;
+    std::erase_if(added_, [&](const ClosureId& id) {
+      return ++seen[{id.from.index / stretch, id.to.index / stretch}] > kKept;
+    });
+    known_ = added_;
+  }
 }
 
 void WitnessedPair::test(const OrientedClosure& closure) {

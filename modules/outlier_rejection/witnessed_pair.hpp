@@ -23,12 +23,13 @@ class WitnessedPair {
   WitnessedPair(RobotId a, RobotId b, const PcmConfig& config);
 
   /// Adds one closure. closures() contains it after kAdded and kGrew; after kGrew there are more
-  /// witnesses. At most Pcm::kMaxClosures are accepted. Once there are PcmConfig::min_witnesses, no
-  /// cycle is tested any more. Throws std::invalid_argument if the closure is not between the two
-  /// robots or not is_usable(); the state is then unchanged.
+  /// witnesses. Once there are PcmConfig::min_witnesses, no cycle is tested any more, and before
+  /// there are more than Pcm::kMaxClosures, closures that tie nearly the same keyframes as others
+  /// are dropped. With fewer witnesses, further closures are refused. Throws std::invalid_argument
+  /// if the closure is not between the two robots or not is_usable(); the state is then unchanged.
   [[nodiscard]] PcmAddResult add(const Closure& closure);
 
-  /// All added closures, ascending.
+  /// The added closures without dropped ones, ascending.
   [[nodiscard]] std::vector<ClosureId> closures() const { return {added_.begin(), added_.end()}; }
   /// Number of witnesses found, at most PcmConfig::min_witnesses.
   [[nodiscard]] std::size_t witnesses() const { return clique_.clique().size(); }
@@ -37,6 +38,7 @@ class WitnessedPair {
 
  private:
   void test(const OrientedClosure& closure);
+  void thin();
 
   RobotId a_, b_;
   PcmConfig config_;

@@ -132,7 +132,9 @@ BlockFusion::BlockFusion(const SemanticMappingConfig& config, const DepthView& v
   closest_ = 0.5F * static_cast<float>(std::max(config.min_range_m, 0.01));
   max_weight_ = static_cast<float>(config.max_weight);
   variance_ = static_cast<float>(config.depth_sigma_m * config.depth_sigma_m);
-  quadratic_variance_ = static_cast<float>(config.depth_sigma_per_m * config.depth_sigma_per_m);
+  const double sigma_per_m =
+      config.depth_sigma_per_m.value_or(SemanticMappingConfig::kDepthSigma_per_m);
+  quadratic_variance_ = static_cast<float>(sigma_per_m * sigma_per_m);
 }
 
 Eigen::Vector3f BlockFusion::corner_of(const VoxelBlock& block) const {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "modules/core/config.hpp"
 
 namespace km {
@@ -14,13 +16,16 @@ struct SemanticMappingConfig {
   double max_range_m = 10.0;
   bool carving = true;
   double depth_sigma_m = 0.01;
-  double depth_sigma_per_m = 0.003;
+  std::optional<double> depth_sigma_per_m = {};
   double max_weight = 100.0;
   double min_weight = 0.05;
   double label_confidence = 0.8;
   double min_label_probability = 0.0;
   double window_m = 8.0;
   int max_blocks = 20000;
+
+  /// depth_sigma_per_m if there is none: that of usual RGB-D cameras.
+  static constexpr double kDepthSigma_per_m = 0.003;
 
   void visit_fields(auto& visitor) {
     visitor.field(
@@ -38,9 +43,11 @@ struct SemanticMappingConfig {
     visitor.field("depth_sigma_m", depth_sigma_m, {1e-4, 1.0},
                   "[m] standard deviation of depth z is sqrt(depth_sigma_m^2 + (depth_sigma_per_m "
                   "z^2)^2); a measurement has the weight depth_sigma_m^2 divided by its square");
-    visitor.field("depth_sigma_per_m", depth_sigma_per_m, {0.0, 1.0},
-                  "[1/m] s / (f b) for stereo with focal length f [px], baseline b [m] and a "
-                  "matching error of s px");
+    visitor.field(
+        "depth_sigma_per_m", depth_sigma_per_m, {0.0, 1.0},
+        "[1/m] s / (f b) for stereo with focal length f [px], baseline b [m] and a "
+        "matching error of s px; left out: that of a quarter of a pixel for stereo depth, "
+        "0.003 for depth images");
     visitor.field("max_weight", max_weight, {1.0, 10000.0},
                   "bound on the sum of weights of a voxel; lower values follow changes faster, "
                   "higher values average more");

@@ -63,6 +63,7 @@ TEST_CASE("Depth is used up to the range at which it is accurate enough", "[robo
   const StereoRig rig = rgbd_rig(camera, 0.1);
   const double range_m = usable_range_m(rig, 0.2);
   CHECK(range_m == Approx(6.3246).epsilon(1e-4));
+  CHECK(depth_sigma_per_m(rig) * range_m * range_m == Approx(0.2));
   // A quarter of a pixel further away it is off by 0.2 m, to first order.
   const double disparity_px = 50.0 / range_m;
   CHECK(50.0 / (disparity_px - 0.25) - range_m == Approx(0.2).epsilon(0.05));

@@ -43,8 +43,7 @@ void DistanceFieldNode::stop() noexcept {
 }
 
 void DistanceFieldNode::step(const SpaceUpdate& update) {
-  field_.set(update.changes);
-  (void)field_.update();
+  (void)field_.set(update.changes);
   newest_ = update.stamp;
   camera_z_m_ = update.camera_z_m;
   if (!published_ || seconds_between(*published_, update.stamp) >= kSlice_s) publish_slice();

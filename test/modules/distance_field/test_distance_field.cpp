@@ -74,7 +74,7 @@ class World {
 };
 
 // Compares all voxels with brute force; returns how many were known.
-std::size_t check_all(const World& world, const DistanceField& field) {
+std::size_t check_all(const World& world, DistanceField& field) {
   const std::vector<Voxel> surface = world.surface();
   std::size_t known = 0, wrong = 0;
   for (int z = -1; z <= world.side(); ++z)
@@ -96,6 +96,10 @@ std::size_t check_all(const World& world, const DistanceField& field) {
   return known;
 }
 
+TEST_CASE("A distance of too many voxels is refused", "[distance_field]") {
+  CHECK_THROWS_AS(DistanceField({.max_distance_m = 2.0}, 0.01), ConfigError);
+}
+
 TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_field]") {
   const auto seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
@@ -104,8 +108,7 @@ TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_
   std::uniform_int_distribution<int> any(0, world.side() - 1);
   const double max_distance_m = seed == 1 ? 0.55 : 1.2;
   DistanceField field({.max_distance_m = max_distance_m}, kVoxel_m);
-  field.set(world.all());
-  (void)field.update();
+  (void)field.set(world.all());
   CHECK(*field.at_voxel({0, 0, 0}) == max_distance_m);
   for (int round = 0; round < 6; ++round) {
     std::set<std::tuple<int, int, int>> changed;
@@ -131,12 +134,11 @@ TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_
     }
     SpaceChanges changes;
     for (const auto& [x, y, z] : changed) changes.push_back(world.block({x, y, z}));
-    field.set(changes);
-    (void)field.update();
+    (void)field.set(changes);
     CHECK(check_all(world, field) > 10000);
     DistanceField fresh({.max_distance_m = max_distance_m}, kVoxel_m);
-    fresh.set(world.all());
-    (void)fresh.update();
+    (void)fresh.set(world.all());
+    CHECK(fresh.update() == 27);
     CHECK(check_all(world, fresh) > 10000);
   }
 }
@@ -146,11 +148,9 @@ TEST_CASE("A removed block is unknown, and its surface does not count any more",
   World world(3);
   world.inside.insert({4, 4, 4});
   DistanceField field({.max_distance_m = 1.0}, kVoxel_m);
-  field.set(world.all());
-  (void)field.update();
+  (void)field.set(world.all());
   CHECK(*field.at_voxel({9, 4, 4}) == Approx(0.45));
-  field.set({BlockSpace{.position = {0, 0, 0}}});
-  CHECK(field.update().changed_blocks == 1);
+  (void)field.set({BlockSpace{.position = {0, 0, 0}}});
   CHECK_FALSE(field.at_voxel({4, 4, 4}));
   CHECK(*field.at_voxel({9, 4, 4}) == 1.0);
   CHECK(field.blocks() == 26);
@@ -162,8 +162,7 @@ TEST_CASE("Distance and gradient at a point in front of a wall", "[distance_fiel
     for (int y = 0; y < world.side(); ++y)
       for (int z = 0; z < world.side(); ++z) world.inside.insert({x, y, z});
   DistanceField field({.max_distance_m = 1.0}, kVoxel_m);
-  field.set(world.all());
-  (void)field.update();
+  (void)field.set(world.all());
   for (const double x_m : {0.2, 0.53, 0.91, 1.15, 1.38}) {
     const auto found = field.at({x_m, 0.77, 1.01});
     REQUIRE(found);
@@ -182,17 +181,18 @@ TEST_CASE("Distance and gradient at a point in front of a wall", "[distance_fiel
   }
 }
 
-TEST_CASE("An unchanged block costs nothing, and a distance of too many voxels is refused",
-          "[distance_field]") {
+TEST_CASE("Blocks are computed once when they are asked for", "[distance_field]") {
   World world(2);
   world.inside.insert({4, 4, 4});
   DistanceField field({.max_distance_m = 0.4}, kVoxel_m);
-  CHECK(field.update().computed_blocks == 0);
-  field.set(world.all());
-  CHECK(field.update().computed_blocks == 8);
-  field.set({world.block({0, 0, 0})});
-  CHECK(field.update().computed_blocks == 0);
-  CHECK_THROWS_AS(DistanceField({.max_distance_m = 2.0}, 0.01), ConfigError);
+  CHECK(field.update() == 0);
+  CHECK(field.set(world.all()) == 8);
+  CHECK(field.set(world.all()) == 0);
+  (void)field.at_voxel({0, 0, 0});
+  CHECK(field.slice(0.0).size() == 16U * 16U);
+  CHECK(field.update() == 4);  // the upper blocks
+  CHECK(field.update() == 0);
+  CHECK(field.set({world.block({0, 0, 0})}) == 0);
 }
 
 // A camera in the origin of the odometry frame, whose z axis is that of the camera.
@@ -210,8 +210,7 @@ TEST_CASE("The mapper reports space from which distances to a wall follow", "[di
   DistanceField field({.max_distance_m = 1.0}, kVoxel_m);
   const auto look = [&](const SE3& T_odom_cam, std::uint16_t millimetres, KeyframeIndex keyframe) {
     (void)mapper.integrate(wall_at(millimetres), nullptr, T_odom_cam, keyframe);
-    field.set(mapper.take_space_changes());
-    (void)field.update();
+    (void)field.set(mapper.take_space_changes());
   };
   look(SE3::Identity(), 2050, 0);
   for (const double z_m : {0.9, 1.33, 1.5, 1.9}) {

@@ -1,6 +1,8 @@
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "modules/outlier_rejection/witnessed_pair.hpp"
@@ -81,6 +83,32 @@ TEST_CASE("All true and false closures of a witnessed pair are published", "[wit
   }
   CHECK(pair.is_witnessed());
   CHECK(pair.closures().size() == added);
+}
+
+TEST_CASE("A robot that moves for hours in a known place has room for its newest closure",
+          "[witness]") {
+  constexpr std::size_t kLap = 100, kKeyframes = 3000;
+  Chain robot(0);
+  for (std::size_t i = 1; i < kKeyframes; ++i) robot.step(rotz(0.0, i % kLap == 0 ? -99.0 : 1.0));
+  WitnessedPair pair(0, 0, PcmConfig{});
+  std::size_t most = 0;
+  // Five closures of each keyframe, as far as there are so many laps.
+  for (std::size_t i = kLap; i < kKeyframes; ++i)
+    for (std::size_t back = kLap; back <= std::min(i, 5 * kLap); back += kLap) {
+      const ClosureId added = [&] {
+        const Closure seen = closure(robot.at(i - back), robot.at(i), rotz(0.0, 0.0));
+        (void)pair.add(seen);
+        return seen.id();
+      }();
+      const auto kept = pair.closures();
+      most = std::max(most, kept.size());
+      REQUIRE(std::ranges::binary_search(kept, added));
+    }
+  CHECK(most <= Pcm::kMaxClosures);
+  // All stretches of the run are still tied.
+  std::set<KeyframeIndex> stretches;
+  for (const ClosureId& id : pair.closures()) stretches.insert(id.to.index / 12);
+  CHECK(stretches.size() == (kKeyframes - kLap) / 12 + 1);
 }
 
 TEST_CASE("A witnessed pair refuses closures it cannot weigh and keeps its state", "[witness]") {
