@@ -8,8 +8,10 @@
 
 #include "apps/program_version.hpp"
 #include "apps/publish/euroc_messages.hpp"
+#include "apps/publish/fix_messages.hpp"
 #include "apps/publish/message_player.hpp"
 #include "apps/publish/pose_latency.hpp"
+#include "modules/absolute_fixes/fix_reader.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
@@ -36,6 +38,8 @@ Examples
     kimera_multi_robot --robot 0 --live rig.yaml --output results/a
   Seconds 10 to 40 of it:
     kimera_multi_publish MH_01_easy --wait 1 --from 10 --to 40
+  With the fixes of a receiver:
+    kimera_multi_publish MH_01_easy --wait 1 --fixes fixes.csv --fix-topic /fix
   The same with a bad driver: up to 20 ms late, one message in ten lost:
     kimera_multi_publish recording.bag --jitter 0.02 --drop 0.1
 
@@ -48,6 +52,8 @@ struct Options {
   std::size_t wait = 0;
   double patience_s = 300.0;
   std::string latency;
+  std::filesystem::path fixes;
+  std::string fix_topic = "/fix", fix_type = FixMessages::kGnssType;
 };
 
 Options parse_options(int argc, char** argv) {
@@ -77,6 +83,15 @@ Options parse_options(int argc, char** argv) {
       "--latency", options.latency,
       "Topic of a robot's nav_msgs/Odometry (/robot0/odometry), to measure the time from an image "
       "to its pose");
+  app.add_option("--fixes", options.fixes,
+                 "File of absolute fixes to play on a topic of their own: rows of a stamp and "
+                 "latitude, longitude [deg], altitude [m], or x, y, z [m]; stamps in ns in a .csv "
+                 "file, in s elsewhere")
+      ->check(CLI::ExistingFile);
+  app.add_option("--fix-topic", options.fix_topic, "Topic of --fixes")->capture_default_str();
+  app.add_option("--fix-type", options.fix_type, "Message type of --fixes")
+      ->check(CLI::IsMember({FixMessages::kGnssType, FixMessages::kMotionCaptureType}))
+      ->capture_default_str();
   app.add_flag("--reliable", options.play.reliable,
                "Send lost messages again; otherwise best effort, as drivers of sensors do");
   app.add_option("--delay", options.play.delay_s, "Delay of every message [s]")
@@ -108,12 +123,23 @@ Options parse_options(int argc, char** argv) {
   return options;
 }
 
-std::unique_ptr<BagReader> open(const std::filesystem::path& recording) {
+std::unique_ptr<BagReader> open_recording(const std::filesystem::path& recording) {
   if (may_be_bag(recording)) return open_bag(recording);
   const std::filesystem::path mav0 = find_mav0(recording);
   const bool has_depth = std::filesystem::is_directory(mav0 / "depth0");
   return std::make_unique<EurocMessages>(
       std::make_unique<EurocReader>(open_euroc(recording, {.depth = has_depth})));
+}
+
+std::unique_ptr<BagReader> open(const Options& options) {
+  std::unique_ptr<BagReader> recording = open_recording(options.recording);
+  if (options.fixes.empty()) return recording;
+  FixRows rows = read_fix_rows(options.fixes);
+  if (rows.malformed > 0)
+    log::warn("publish") << options.fixes.string() << ": " << rows.malformed
+                         << " rows without a stamp and three coordinates are left out";
+  return std::make_unique<FixMessages>(std::move(recording), std::move(rows.fixes),
+                                       options.fix_topic, options.fix_type);
 }
 
 std::string table(const std::vector<PlayedTopic>& topics) {
@@ -162,7 +188,7 @@ bool wait_for_readers(const MessagePlayer& player, const Options& options, Signa
 
 void play(const Options& options, SignalWatch& signals) {
   const auto network = std::make_shared<const RosNetwork>(options.ros);
-  MessagePlayer player(open(options.recording), network, options.play);
+  MessagePlayer player(open(options), network, options.play);
   std::optional<PoseLatency> latency;
   if (!options.latency.empty()) {
     latency.emplace(network, options.latency);

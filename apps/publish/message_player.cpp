@@ -32,8 +32,9 @@ std::optional<std::vector<std::uint8_t>> as_published(const BagChannel& channel,
                                                       std::vector<std::uint8_t> bytes) {
   constexpr std::uint8_t kLittleEndian = 1;
   if (channel.encoding == "cdr" && bytes.size() > 4 && bytes[1] == kLittleEndian) return bytes;
-  return as_ros_2<RosImage, RosCompressedImage, RosImu, RosCameraInfo, RosPoseStamped, RosOdometry,
-                  RosPath, RosTransforms, RosPointCloud, RosDiagnostics>(channel, bytes);
+  return as_ros_2<RosImage, RosCompressedImage, RosImu, RosCameraInfo, RosNavSatFix, RosPoseStamped,
+                  RosPoseWithCovarianceStamped, RosTransform, RosOdometry, RosPath, RosTransforms,
+                  RosPointCloud, RosDiagnostics>(channel, bytes);
 }
 
 bool is_known(const BagChannel& channel) {

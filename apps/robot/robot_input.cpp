@@ -165,7 +165,8 @@ RestoredRun datum_keyframe(const AbsoluteFixesConfig& config, RobotId robot) {
 }
 
 FixInput open_fixes(const RobotOptions& options, const AbsoluteFixesConfig& config,
-                    std::shared_ptr<const RosNetwork> ros) {
+                    std::shared_ptr<const RosNetwork> ros,
+                    const std::optional<RestoredRun>& restored) {
   if (!options.localize.empty() || extends(options))
     throw std::invalid_argument(
         "absolute_fixes and --localize or --extend: a run has either the frame of fixes or that of "
@@ -182,6 +183,8 @@ FixInput open_fixes(const RobotOptions& options, const AbsoluteFixesConfig& conf
     const std::string type = is_gnss ? "sensor_msgs/msg/NavSatFix" : config.live_type;
     input.live = std::make_unique<LiveBag>(
         std::move(ros), std::vector<RosTopic>{{config.topic, type, RosQos::kSensorData, kKept}});
+    for (const ReceivedFix& former : restored ? restored->fixes : std::vector<ReceivedFix>())
+      if (const auto fix = input.reader.accept(former)) input.recorded.push_back(*fix);
   } else if (may_be_bag(options.dataset)) {
     input.recorded = input.reader.read(*open_bag(options.dataset));
   } else {
@@ -402,7 +405,7 @@ std::optional<RobotInput> open_robot_input(const RobotOptions& options, const Ro
                       .restored = std::move(restored),
                       .ros = std::move(ros)};
   std::optional<FixInput> fixes;
-  if (absolute.is_on()) fixes = open_fixes(options, absolute, ros);
+  if (absolute.is_on()) fixes = open_fixes(options, absolute, ros, restored);
   auto reader = open_dataset(options, config, mapping, rig, ros, restored, signals);
   if (reader == nullptr) return std::nullopt;
   reader = with_poses(options, rig, std::move(reader));

@@ -84,7 +84,10 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   else
     add_past();
   if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
-  if (input.localize_in) add_localization(config, *std::move(input.localize_in));
+  if (input.localize_in) {
+    map_id_ = input.localize_in->id();
+    add_localization(config, *std::move(input.localize_in));
+  }
   if (input.fixes) add_fixes(*std::move(input.fixes));
   add_loop_closure(config);
   add_journal(options, input, results);
@@ -241,7 +244,9 @@ void Robot::add_fixes(FixInput input) {
                            FixesTopics{.states = topics_.odometry,
                                        .restored_states = topics_.restored_odometry,
                                        .keyframes = topics_.keyframe_odometry,
+                                       .received = topics_.received_fixes,
                                        .fixes = topics_.fixes});
+  topics_.received_fixes.subscribe([this](const auto& fix) { journal_->append(*fix); });
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {
@@ -290,7 +295,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                                  .restored = topics_.restored_inlier_sets,
                                  .inlier_sets = topics_.own_inlier_sets},
                        resume_count(identity_.boot) << kResumeBits);
-  add<TeamNode>(
+  auto& team = add<TeamNode>(
       false, config.pose_graph, TeamPeer{identity_.robot, identity_.boot},
       solver_choice(config.pose_graph), [this] { return overlay_->session_bytes(); },
       TeamTopics{.odometry = topics_.keyframe_odometry,
@@ -308,6 +313,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                  .trajectory = topics_.trajectory,
                  .progress = topics_.progress,
                  .verdicts = topics_.closure_verdicts});
+  team.begin_in_map(map_id_);
 }
 
 void Robot::add_overlay() {
@@ -426,7 +432,9 @@ void Robot::add_records() {
     received_s_[status->robot] = steady_now_s();
   });
   topics_.keyframe_odometry.subscribe([this](const auto& keyframe) {
-    const bool is_of_map = begins_at_origin(restored_from_) && keyframe->id.index == 0;
+    // Keyframe 0 of a map or of fixes has no time of this run, also after --resume.
+    const bool is_of_map = (localization_ != nullptr || fixes_ != nullptr) &&
+                           keyframe->id.index == 0 && keyframe->stamp == 0;
     // A pose graph and a former process have no packets.
     if (!is_of_map) input_time_.reach(keyframe->stamp);
     ++keyframes_;

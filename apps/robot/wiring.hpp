@@ -99,6 +99,7 @@ struct Topics {
   // received ones.
   Topic<Closure> new_closures, own_closures, closures;
   Topic<PositionFix> fixes;
+  Topic<ReceivedFix> received_fixes;
   Topic<InlierSet> own_inlier_sets;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
@@ -264,6 +265,7 @@ class Robot {
   std::size_t restored_images_ = 0;
   RestoreNode* restore_ = nullptr;
   LocalizationNode* localization_ = nullptr;
+  std::uint64_t map_id_ = 0;  // map of --localize, see TeamAgent::begin_in_map()
   FixesNode* fixes_ = nullptr;
   JournalNode* journal_ = nullptr;
   RecorderNode* recorder_ = nullptr;

@@ -70,6 +70,7 @@ class RobotPlayback {
     if (!is_same_incarnation(before, peer.boot)) selector_->restarted(peer.robot);
   }
   void show(const Keyframe& /*features*/) {}
+  void show(const ReceivedFix& /*fix*/) {}
   void show(MeshCells& cells) { cells_.emplace_back(time_, std::move(cells)); }
   void show(const auto& event) { selector_->add(event); }
 

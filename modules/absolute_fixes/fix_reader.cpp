@@ -65,6 +65,20 @@ std::optional<Stamp> stamp_of(const TextRow& row, bool is_csv) {
 
 }  // namespace
 
+FixRows read_fix_rows(const std::filesystem::path& file) {
+  const std::string text = read_input_file(file);
+  FixRows rows;
+  for (const TextRow& row : split_rows(text)) {
+    const auto stamp = stamp_of(row, file.extension() == ".csv");
+    const auto x = number_in(row, 1), y = number_in(row, 2), z = number_in(row, 3);
+    if (stamp && x && y && z)
+      rows.fixes.push_back({*stamp, {*x, *y, *z}});
+    else
+      ++rows.malformed;
+  }
+  return rows;
+}
+
 FixReader::FixReader(const AbsoluteFixesConfig& config) : config_(checked(config)) {
   check(config_);
   if (config_.datum.empty()) return;
@@ -81,8 +95,8 @@ std::uint64_t FixReader::datum_id() const {
   return id;
 }
 
-std::optional<TimedPosition> FixReader::accept(Stamp stamp, const Eigen::Vector3d& coordinates,
-                                               std::optional<double> sigma_m) {
+std::optional<TimedPosition> FixReader::accept(const ReceivedFix& fix) {
+  const auto& [stamp, coordinates, sigma_m] = fix;
   const bool is_gnss = config_.source == FixSource::kGnss;
   const double usual_m = is_gnss ? kUsualSigmaOfGnss_m : kUsualSigmaOfMotionCapture_m;
   const double claimed_m = sigma_m.value_or(config_.sigma_m.value_or(usual_m));
@@ -96,16 +110,16 @@ std::optional<TimedPosition> FixReader::accept(Stamp stamp, const Eigen::Vector3
   if (claimed_m > config_.max_sigma_m) return refuse(counts_.too_uncertain);
   if (last_ && stamp <= *last_) return refuse(counts_.out_of_order);
   last_ = stamp;
-  TimedPosition fix{stamp, coordinates, std::max(claimed_m, config_.min_sigma_m)};
-  if (!is_gnss) return fix;
+  TimedPosition accepted{stamp, coordinates, std::max(claimed_m, config_.min_sigma_m)};
+  if (!is_gnss) return accepted;
   const GeodeticPoint point{coordinates.x(), coordinates.y(), coordinates.z()};
   if (!datum_) enu_.emplace(datum_.emplace(point));
-  fix.p_datum = enu_->position_of(point);
-  return fix;
+  accepted.p_datum = enu_->position_of(point);
+  return accepted;
 }
 
 template <typename Message>
-std::optional<TimedPosition> FixReader::read_as(const BagChannel& channel,
+std::optional<ReceivedFix> FixReader::decode_as(const BagChannel& channel,
                                                 const BagMessage& message) {
   const Decoded<Message> decoded = decode_ros<Message>(channel.encoding, message.bytes);
   if (!decoded.value) {
@@ -118,33 +132,29 @@ std::optional<TimedPosition> FixReader::read_as(const BagChannel& channel,
       ++counts_.without_position;
       return std::nullopt;
     }
-  return accept(fix.header.stamp, coordinates_of(fix), sigma_of(fix));
+  return ReceivedFix{fix.header.stamp, coordinates_of(fix), sigma_of(fix)};
 }
 
-std::optional<TimedPosition> FixReader::read(const BagChannel& channel, const BagMessage& message) {
+std::optional<ReceivedFix> FixReader::decode(const BagChannel& channel, const BagMessage& message) {
   ++counts_.received;
   if (!has_fixes(channel, config_.source)) {
     ++counts_.malformed;
     return std::nullopt;
   }
-  if (is_of_type(channel, RosNavSatFix::kType)) return read_as<RosNavSatFix>(channel, message);
-  if (is_of_type(channel, RosPoseStamped::kType)) return read_as<RosPoseStamped>(channel, message);
-  if (is_of_type(channel, RosTransform::kType)) return read_as<RosTransform>(channel, message);
-  return read_as<RosPoseWithCovarianceStamped>(channel, message);
+  if (is_of_type(channel, RosNavSatFix::kType)) return decode_as<RosNavSatFix>(channel, message);
+  if (is_of_type(channel, RosPoseStamped::kType))
+    return decode_as<RosPoseStamped>(channel, message);
+  if (is_of_type(channel, RosTransform::kType)) return decode_as<RosTransform>(channel, message);
+  return decode_as<RosPoseWithCovarianceStamped>(channel, message);
 }
 
 std::vector<TimedPosition> FixReader::read(const std::filesystem::path& file) {
-  const std::string text = read_input_file(file);
+  const FixRows rows = read_fix_rows(file);
+  counts_.malformed += rows.malformed;
+  counts_.received += rows.malformed + rows.fixes.size();
   std::vector<TimedPosition> fixes;
-  for (const TextRow& row : split_rows(text)) {
-    const auto stamp = stamp_of(row, file.extension() == ".csv");
-    const auto x = number_in(row, 1), y = number_in(row, 2), z = number_in(row, 3);
-    ++counts_.received;
-    if (!stamp || !x || !y || !z)
-      ++counts_.malformed;
-    else if (const auto fix = accept(*stamp, {*x, *y, *z}, std::nullopt))
-      fixes.push_back(*fix);
-  }
+  for (const ReceivedFix& row : rows.fixes)
+    if (const auto fix = accept(row)) fixes.push_back(*fix);
   if (fixes.empty())
     throw InputFileError(file.string() +
                          ": no usable fix in it: rows need a stamp (ns in a .csv file, s "
@@ -157,7 +167,8 @@ std::vector<TimedPosition> FixReader::read(BagReader& bag) {
   while (const auto message = bag.next()) {
     const BagChannel& channel = bag.channels()[message->channel];
     if (channel.topic != config_.topic) continue;
-    if (const auto fix = read(channel, *message)) fixes.push_back(*fix);
+    const auto received = decode(channel, *message);
+    if (const auto fix = received ? accept(*received) : std::nullopt) fixes.push_back(*fix);
   }
   if (counts_.received == 0)
     throw InputFileError("the recording has no message on absolute_fixes.topic " + config_.topic +

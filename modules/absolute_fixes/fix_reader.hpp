@@ -8,6 +8,7 @@
 
 #include "modules/absolute_fixes/absolute_fixes_config.hpp"
 #include "modules/absolute_fixes/geodetic.hpp"
+#include "modules/core/received_fix.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/recordings/bag_reader.hpp"
 
@@ -40,9 +41,12 @@ class FixReader {
   /// another length.
   explicit FixReader(const AbsoluteFixesConfig& config);
 
-  /// nullopt for a message that is counted as unusable.
-  [[nodiscard]] std::optional<TimedPosition> read(const BagChannel& channel,
+  /// The fix of a message; nullopt for a message that is counted as unusable.
+  [[nodiscard]] std::optional<ReceivedFix> decode(const BagChannel& channel,
                                                   const BagMessage& message);
+  /// The fix in the absolute frame; nullopt if it is counted as unusable. The first one is the
+  /// datum unless the configuration has one.
+  [[nodiscard]] std::optional<TimedPosition> accept(const ReceivedFix& fix);
   /// All usable rows of a file. Throws InputFileError if it has none.
   [[nodiscard]] std::vector<TimedPosition> read(const std::filesystem::path& file);
   /// All usable messages of the topic. Throws InputFileError if the recording does not have it.
@@ -56,10 +60,8 @@ class FixReader {
   [[nodiscard]] std::uint64_t datum_id() const;
 
  private:
-  std::optional<TimedPosition> accept(Stamp stamp, const Eigen::Vector3d& coordinates,
-                                      std::optional<double> sigma_m);
   template <typename Message>
-  std::optional<TimedPosition> read_as(const BagChannel& channel, const BagMessage& message);
+  std::optional<ReceivedFix> decode_as(const BagChannel& channel, const BagMessage& message);
 
   AbsoluteFixesConfig config_;
   FixCounts counts_;
@@ -67,6 +69,16 @@ class FixReader {
   std::optional<EnuFrame> enu_;
   std::optional<Stamp> last_;
 };
+
+/// Rows of a file of fixes.
+struct FixRows {
+  std::vector<ReceivedFix> fixes;
+  std::uint64_t malformed = 0;  ///< Number of other rows.
+};
+
+/// Reads a stamp ([ns] in a .csv file, else [s]) and three coordinates of each row. Throws
+/// InputFileError if the file cannot be read.
+[[nodiscard]] FixRows read_fix_rows(const std::filesystem::path& file);
 
 /// True if a robot can read fixes of `source` from messages of this channel.
 [[nodiscard]] bool has_fixes(const BagChannel& channel, FixSource source);

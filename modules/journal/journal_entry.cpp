@@ -90,6 +90,11 @@ void describe(auto& archive, As<MeshCells> auto& mesh) {
   });
 }
 
+void describe(auto& archive, As<ReceivedFix> auto& fix) {
+  archive(fix.stamp, fix.coordinates);
+  archive.optional(fix.sigma_m, [&](auto& sigma_m) { archive(sigma_m); });
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> encode_journal_entry(const JournalEntry& entry) {

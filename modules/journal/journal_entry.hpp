@@ -14,6 +14,7 @@
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_changes.hpp"
 #include "modules/core/pose_graph.hpp"
+#include "modules/core/received_fix.hpp"
 #include "modules/core/robot_sample.hpp"
 
 namespace km {
@@ -33,11 +34,11 @@ struct JournalPeer {
   std::string name;
 };
 
-/// Events of a run, see README. A resumed process restores its state from the first nine; the last
-/// two are for viewers.
+/// Events of a run, see README. A resumed process restores its state from them, except for
+/// RobotSample and MeshCells, which are for viewers.
 using JournalEntry =
     std::variant<JournalStart, OdometryState, KeyframeOdometry, Keyframe, Closure, ClosureOutcome,
-                 JournalPeer, ClosureJudgements, PoseChanges, RobotSample, MeshCells>;
+                 JournalPeer, ClosureJudgements, PoseChanges, RobotSample, MeshCells, ReceivedFix>;
 
 /// Maximum size of an entry [bytes].
 inline constexpr std::size_t kMaxJournalEntry_bytes = std::size_t{1} << 22U;

@@ -222,6 +222,7 @@ RestoredRun alone_as(RobotId robot, RestoredRun run) {
   const RobotId former = std::exchange(run.robot, robot);
   run.peers.clear();
   run.inlier_sets.clear();
+  run.fixes.clear();
   run.solution = {};
   const auto is_shared = [former](const KeyframeId& a, const KeyframeId& b) {
     return a.robot != former || b.robot != former;

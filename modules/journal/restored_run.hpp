@@ -29,6 +29,7 @@ struct RestoredRun {
   std::vector<Closure> closures;  ///< Closures of this robot and of others, each once.
   /// Final outcomes of candidates: those verified whose closures are known, and those refused.
   std::vector<ClosureOutcome> outcomes;
+  std::vector<ReceivedFix> fixes;        ///< Live fixes, in the order of their arrival.
   std::map<RobotId, JournalPeer> peers;  ///< Last known identities.
 
   std::vector<InlierSet> inlier_sets = {};  ///< Selected ones of `closures`, as version 0.
@@ -65,6 +66,7 @@ class RunRestorer {
   void add(const PoseChanges& changes);
   void add(const RobotSample& /*sample*/) {}
   void add(const MeshCells& /*cells*/) {}
+  void add(ReceivedFix fix) { run_.fixes.push_back(fix); }
   template <typename T>
   bool is_next(const KeyframeId& id, const std::vector<T>& before) const;
   void cut_to_full_keyframes();

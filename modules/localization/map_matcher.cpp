@@ -1,9 +1,21 @@
 #include "modules/localization/map_matcher.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <stdexcept>
 #include <utility>
 
+#include "modules/core/bytes.hpp"
+
 namespace km {
+
+std::uint64_t FinishedMap::id() const {
+  std::uint64_t id = kFnv1aBasis;
+  for (const SE3& T : T_map_kf)
+    for (const double x : T.matrix().topRows<3>().reshaped())
+      mix_fnv1a(id, std::bit_cast<std::uint64_t>(x + 0.0));  // -0.0 equals 0.0
+  return std::max<std::uint64_t>(id, 1);
+}
 
 MapMatcher::MapMatcher(const PlaceRecognitionConfig& places, const LoopClosureConfig& closures,
                        std::shared_ptr<const Vocabulary> vocabulary, FinishedMap map)

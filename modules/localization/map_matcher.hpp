@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -17,6 +18,9 @@ namespace km {
 struct FinishedMap {
   std::vector<Keyframe> keyframes;  ///< Ascending stamps.
   std::vector<SE3> T_map_kf;        ///< Poses of the bodies, index i for keyframes[i].
+
+  /// Identity of the map, not 0: a hash of its poses. Equal on all robots with this map.
+  [[nodiscard]] std::uint64_t id() const;
 };
 
 /// Result of one keyframe.

@@ -7,6 +7,8 @@
 namespace km {
 namespace {
 
+constexpr std::uint32_t kPlacesOfDatum = 2;  // the fewest that make a tie certain
+
 // The newest offer of `status` to `peer`; nullptr if there is none.
 const EdgeSetOffer* newest_offer(const TeamStatus& status, RobotId peer) {
   const auto offer = std::ranges::find(status.offers, peer, &EdgeSetOffer::peer);
@@ -34,6 +36,10 @@ std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses) {
   std::vector<RobotTie> ties;
   for (auto one = statuses.begin(); one != statuses.end(); ++one)
     for (auto other = std::next(one); other != statuses.end(); ++other) {
+      if (one->second.datum != 0 && one->second.datum == other->second.datum) {
+        ties.push_back({one->first, other->first, kPlacesOfDatum, false});
+        continue;
+      }
       const EdgeSetOffer* ours = newest_offer(one->second, other->first);
       const EdgeSetOffer* theirs = newest_offer(other->second, one->first);
       if (ours == nullptr || theirs == nullptr) continue;

@@ -10,8 +10,9 @@
 
 namespace km {
 
-/// A tie of two robots: closures between them that are not rejected. `places` is the number of
-/// places of these closures, see find_places().
+/// A tie of two robots: closures between them that are not rejected, or one datum in which both are
+/// located. `places` is the number of places of these closures, see find_places(). A datum counts
+/// as two places.
 struct RobotTie {
   RobotId a = 0;  ///< a < b.
   RobotId b = 0;

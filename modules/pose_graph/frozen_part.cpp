@@ -44,6 +44,7 @@ std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, cons
       add_absent(poses->second, self, *edges, frozen);
   }
   for (const PoseEdge& e : frozen.between) ends.insert(e.end_on(self).index);
+  frozen.datum_ties = datum_ties(plan, self);
   part.public_keyframes.assign(ends.begin(), ends.end());
   frozen.own = graph.own_edges();
   frozen.odometry = graph.keyframes() - 1;

@@ -88,10 +88,6 @@ class OwnGraph {
   [[nodiscard]] const SE3& step_to(std::uint32_t i) const { return odometry_[i - 1].T_from_to; }
   /// First keyframe of every run after the first one, ascending: see is_unknown_step().
   [[nodiscard]] const std::vector<KeyframeIndex>& later_runs() const { return later_runs_; }
-  /// True if keyframe 0 is that of a finished map, and the run begins at keyframe 1.
-  [[nodiscard]] bool begins_in_map() const {
-    return !later_runs_.empty() && later_runs_.front() == 1;
-  }
   /// Closures inside this robot between keyframes before `run` and keyframes from `run` to before
   /// `end`, by the newest edge set.
   [[nodiscard]] std::vector<PoseEdge> closures_across(KeyframeIndex run, KeyframeIndex end) const;

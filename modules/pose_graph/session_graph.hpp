@@ -37,6 +37,9 @@ struct SessionGraph {
   std::map<RobotId, Precision> step_precision = {};
   /// Positions of own keyframes relative to keyframe 0, never weighed: see fix_edges().
   std::vector<PoseEdge> fixes = {};
+  /// Edges to keyframe 0 of other members in the datum of this robot, never weighed: see
+  /// datum_ties(). The robots of both ends know each of them.
+  std::vector<PoseEdge> datum_ties = {};
   std::vector<VerticalPrior> verticals = {};  ///< Priors of own poses; empty unless `upright`.
   bool upright = false;                       ///< All members have verticals: the frame has z up.
   KeyframeId origin = {};                     ///< Covariances are relative to this keyframe.

@@ -109,10 +109,12 @@ bool SessionPart::align(const PublicPoses& published) {
   std::map<KeyframeId, SE3> poses = graph_.public_poses;  // poses of absent robots
   for (const SessionMember& member : session_.plan.members) {
     if (member.peer == self_) break;
-    const bool neighbour = std::any_of(
-        graph_.between.begin(), graph_.between.end(),
-        [&](const PoseEdge& e) { return e.other(self_.robot).robot == member.peer.robot; });
-    if (!neighbour) continue;
+    const auto ends_there = [&](const PoseEdge& e) {
+      return e.other(self_.robot).robot == member.peer.robot;
+    };
+    if (std::ranges::none_of(graph_.between, ends_there) &&
+        std::ranges::none_of(graph_.datum_ties, ends_there))
+      continue;
     const MemberPoses* of_member = poses_of(published, member.peer.robot, MemberStage::kEntered);
     if (of_member == nullptr) return false;
     add_public_poses(*of_member, poses);
@@ -124,9 +126,12 @@ bool SessionPart::align(const PublicPoses& published) {
     const auto decided = graph_.decided.find(e.id());
     if (decided == graph_.decided.end() || decided->second) kept.push_back(e);
   }
-  auto moved = moved_into_frame(graph_.start, self_.robot, kept, poses, tolerance_);
-  if (!moved) moved = moved_into_frame(graph_.start, self_.robot, closures, poses, tolerance_);
+  // A datum tie alone is enough, because several fixes agree on it; closures may all be false.
+  std::optional<std::vector<SE3>> moved;
+  for (const auto* edges : {&graph_.datum_ties, &kept, &closures})
+    if (!moved) moved = moved_into_frame(graph_.start, self_.robot, *edges, poses, tolerance_);
   if (!moved) return false;
+  closures.insert(closures.end(), graph_.datum_ties.begin(), graph_.datum_ties.end());
   graph_.start = closures_may_be_false_
                      ? std::move(*moved)
                      : deformed_to_received(*moved, self_.robot, graph_.own, closures, poses);

@@ -224,25 +224,25 @@ std::optional<World> TeamAgent::world_of(RobotId anchor) const {
   return frame_.world_of(anchor, roster_, graph_.T_odom_first(), part_ && part_->session().upright);
 }
 
-// True if keyframe 0 of this robot and keyframe 0 of the other are the same keyframe of a finished
-// map. Odometries of two robots do not begin at poses that are equal to the last digits.
-bool TeamAgent::shares_map_with(RobotId robot) const {
-  constexpr double kSame = 1e-9;
-  if (robot == self_.robot) return true;
-  const TeamRoster::Peer* peer = roster_.find(robot);
-  return peer != nullptr && peer->status &&
-         (peer->status->T_odom_first.matrix() - graph_.T_odom_first().matrix()).norm() < kSame;
+// Identity of the datum of which keyframe 0 is the origin, located or not; 0: there is none.
+std::uint64_t TeamAgent::own_datum() const {
+  return graph_.fixes().empty() ? map_id_ : graph_.fixes().back().datum;
 }
 
-// Identity of the absolute frame in which the fixes of a robot locate it; 0 if they do not.
+// Identity of the datum in which a robot is located; 0: it is not located.
 std::uint64_t TeamAgent::datum_of(RobotId robot) const {
-  if (robot == self_.robot) return placement_.state.located ? graph_.fixes().back().datum : 0;
+  if (robot == self_.robot) {
+    const std::uint64_t own = own_datum();
+    const bool located =
+        own != 0 && (graph_.fixes().empty() ? is_tied_to_earlier_runs() : placement_.state.located);
+    return located ? own : 0;
+  }
   const TeamRoster::Peer* peer = roster_.find(robot);
   return peer != nullptr && peer->status ? peer->status->datum : 0;
 }
 
-// This robot if its fixes locate it. Otherwise the lowest robot with this property that closures
-// tie to it.
+// This robot if it is located in a datum. Otherwise the lowest robot with this property that
+// closures tie to it.
 std::optional<RobotId> TeamAgent::robot_in_datum() const {
   if (datum_of(self_.robot) != 0) return self_.robot;
   std::optional<RobotId> lowest;
@@ -254,35 +254,36 @@ std::optional<RobotId> TeamAgent::robot_in_datum() const {
   return lowest;
 }
 
-// The absolute frame. Its name is the lowest known robot whose fixes are in it, tied to this robot
-// or not.
-std::optional<World> TeamAgent::absolute_world() const {
+// The frame of the datum. Its name is the lowest known robot in the datum, tied to this robot or
+// not.
+std::optional<World> TeamAgent::world_of_datum() const {
   const auto located = robot_in_datum();
   auto world = located ? world_of(*located) : std::nullopt;
   if (!world) return std::nullopt;
+  const std::uint64_t datum = datum_of(*located);
   for (const auto& [robot, peer] : roster_.peers())
-    if (datum_of(robot) == datum_of(*located)) world->anchor = std::min(world->anchor, robot);
+    if (datum_of(robot) == datum) world->anchor = std::min(world->anchor, robot);
   return world;
 }
 
 // The frame in which this robot publishes. If no closure ties it to the anchor of the session, this
-// is the frame of the lowest robot that closures tie to it. A robot that localises itself publishes
-// in the frame of the map, in which its keyframe 0 is, whether or not the anchor is localised.
+// is the frame of the lowest robot that closures tie to it.
 std::optional<World> TeamAgent::tied_world() const {
   const std::optional<World>& world = frame_.world();
-  if (auto absolute = world ? absolute_world() : std::nullopt) return absolute;
-  if (world && graph_.begins_in_map()) {
-    auto own = world_of(self_.robot);
-    if (own && shares_map_with(world->anchor)) own->anchor = world->anchor;
-    return own;
-  }
+  if (auto of_datum = world ? world_of_datum() : std::nullopt) return of_datum;
   if (!world || !std::ranges::binary_search(ties_.not_joined, world->anchor)) return world;
   return world_of(lowest_tied(self_.robot, plan_, ties_));
 }
 
 bool TeamAgent::is_located() const {
+  return robot_in_datum() || is_tied_to_earlier_runs();
+}
+
+// True if kept closures at two places tie the last run to keyframes before it, or if there is only
+// one run.
+bool TeamAgent::is_tied_to_earlier_runs() const {
+  if (graph_.later_runs().empty()) return true;
   constexpr std::size_t kLeastPlaces = 2;  // one place may be mistaken for another
-  if (graph_.later_runs().empty() || robot_in_datum()) return true;
   std::vector<PoseEdge> across =
       graph_.closures_across(graph_.later_runs().back(), graph_.keyframes());
   std::erase_if(across, [this](const PoseEdge& e) {
@@ -369,7 +370,7 @@ OptimizerProgress TeamAgent::make_progress() const {
 bool TeamAgent::holds_all(const SessionPlan& plan) const {
   const auto self = std::find_if(plan.members.begin(), plan.members.end(),
                                  [&](const SessionMember& member) { return member.peer == self_; });
-  if (self->revision != revision()) return false;
+  if (self->revision != revision() || self->datum != datum_of(self_.robot)) return false;
   std::optional<RobotId> last;
   for (const EdgeSetOffer& offer : graph_.offers()) {
     const bool newest = offer.peer != last;

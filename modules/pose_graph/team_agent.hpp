@@ -71,9 +71,11 @@ struct [[nodiscard]] TeamOutput {
 /// closures at two places tie them to the runs before. Until then, no trajectory is published,
 /// because the poses of these keyframes are unknown.
 ///
-/// Fixes place keyframe 0, the origin of an absolute frame, relative to the other keyframes (see
-/// place_fixes()). Once they determine it, the robot and all members that closures tie to it
-/// publish in that frame. Robots with fixes in one absolute frame share it also without closures.
+/// A datum is a frame outside the run: that of fixes or of a finished map. Keyframe 0 is its
+/// origin. Fixes (see place_fixes()) or closures with the map locate a robot in its datum. The
+/// robot and all members that closures tie to it then publish in the datum. Keyframes 0 of members
+/// in one datum are one pose, see datum_ties(). Robots in one datum share its frame also without
+/// closures.
 ///
 /// If all members have verticals, these are part of the cost, and `world` has z up. Deterministic:
 /// equal inputs in equal order give equal outputs. Not thread-safe.
@@ -93,6 +95,10 @@ class TeamAgent {
   /// poses. Until the other robots return, their poses are held, and decisions are provisional.
   /// Call before all other inputs.
   void restore(const TeamSolution& solution);
+
+  /// Keyframe 0 is the first keyframe of the finished map with this identity; 0: there is no such
+  /// map. Call before all other inputs.
+  void begin_in_map(std::uint64_t map_id) { map_id_ = map_id; }
 
   /// This robot begins or ceases to receive another robot directly.
   void peer_alive(TeamPeer peer);
@@ -198,12 +204,13 @@ class TeamAgent {
   [[nodiscard]] std::optional<World> world_of(RobotId anchor) const;
   [[nodiscard]] std::optional<World> tied_world() const;
   [[nodiscard]] bool is_located() const;
+  [[nodiscard]] bool is_tied_to_earlier_runs() const;
   void place_first_by_fixes(bool upright);
+  [[nodiscard]] std::uint64_t own_datum() const;
   [[nodiscard]] std::uint64_t datum_of(RobotId robot) const;
   [[nodiscard]] std::optional<RobotId> robot_in_datum() const;
-  [[nodiscard]] std::optional<World> absolute_world() const;
+  [[nodiscard]] std::optional<World> world_of_datum() const;
   [[nodiscard]] std::optional<FixesState> fixes_state() const;
-  [[nodiscard]] bool shares_map_with(RobotId robot) const;
   void publish(TeamOutput& output);
   [[nodiscard]] OptimizerProgress make_progress() const;
   [[nodiscard]] bool holds_all(const SessionPlan& plan) const;
@@ -212,6 +219,7 @@ class TeamAgent {
   TeamPeer self_;
   MemberSolverFactory factory_;
   OwnGraph graph_;
+  std::uint64_t map_id_ = 0;           // 0: the run does not begin in a finished map
   std::size_t awaited_keyframes_ = 1;  // nothing is optimised before
   LinksReport links_;
   std::map<RobotId, std::uint64_t> direct_;  // boot ids of the robots that are received directly

@@ -142,6 +142,9 @@ bool TeamAgent::accepts(const Session& session) const {
   // A robot joins a session only once: the other members could not distinguish its new messages
   // from those before it left.
   if (session.id.number <= roster_.find(session.id.coordinator.robot)->joined) return false;
+  // Keyframe 0 of this robot is the origin of its own datum only, whatever the coordinator claims.
+  for (const SessionMember& member : session.plan.members)
+    if (member.peer == self_ && member.datum != 0 && member.datum != own_datum()) return false;
   if (!part_) return true;
   const SessionId& running = part_->session().id;
   if (session.id.coordinator == running.coordinator) return true;

@@ -23,7 +23,7 @@ constexpr std::size_t kMaxOffers = 8 * kMaxTeam;
 // Smallest size of an element of each list [bytes]; it limits the memory that decoding reserves.
 constexpr std::size_t kPeerBytes = 1 + 8;
 constexpr std::size_t kOfferBytes = 1 + 1 + 1 + 8 + 1 + 1;
-constexpr std::size_t kMemberBytes = kPeerBytes + 1 + 1;
+constexpr std::size_t kMemberBytes = kPeerBytes + 1 + 1 + 8;
 constexpr std::size_t kPairBytes = 1 + 1 + 1 + 8;
 constexpr std::size_t kPoseBytes = 1 + 7 * 4;
 constexpr std::size_t kVerdictBytes = 4;
@@ -77,6 +77,7 @@ class MessageWriter {
       put(member.peer);
       out_.varint(member.revision);
       out_.varint(member.parent ? std::uint64_t{*member.parent} + 1 : 0);
+      out_.u64(member.datum);
     }
     out_.varint(plan.pairs.size());
     for (const SessionPair& pair : plan.pairs) {
@@ -225,6 +226,7 @@ class MessageReader {
       member.revision = u32();
       const std::uint64_t parent = in_.varint(std::uint64_t{kLastRobot} + 1);
       if (parent > 0) member.parent = static_cast<RobotId>(parent - 1);
+      member.datum = in_.u64();
       robots.push_back(member.peer.robot);
     }
     std::sort(robots.begin(), robots.end());

@@ -71,7 +71,8 @@ struct TeamStatus {
   /// Odometry pose of its keyframe 0. The frame of odometry is upright, keyframe 0 need not be.
   SE3 T_odom_first = SE3::Identity();
   bool upright = false;  ///< Its keyframes have vertical priors.
-  /// Identity of the absolute frame in which its fixes locate it; 0 if they do not.
+  /// Identity of the datum in which it is located; 0: it is not located. A datum is the frame of
+  /// its fixes or of a finished map. Keyframe 0 of each robot in a datum is the same pose.
   std::uint64_t datum = 0;
 };
 
@@ -86,6 +87,7 @@ struct SessionMember {
   TeamPeer peer;
   std::uint32_t revision = 0;          ///< Revision in its status when the session was planned.
   std::optional<RobotId> parent = {};  ///< Parent in the tree of the session; nullopt: the root.
+  std::uint64_t datum = 0;             ///< Datum in its status when the session was planned.
   bool operator==(const SessionMember&) const = default;
 };
 

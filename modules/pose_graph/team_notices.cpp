@@ -75,9 +75,9 @@ void TeamNotices::closures(const ClosureNoiseRecord& noise) {
 
 void TeamNotices::other_datum(RobotId robot) {
   if (!other_datum_.insert(robot).second) return;
-  add("fixes of robot " + std::to_string(robot) +
-      " are in another absolute frame: give all robots the same absolute_fixes.source and "
-      "absolute_fixes.datum");
+  add("robot " + std::to_string(robot) +
+      " is located in another frame: give all robots the same absolute_fixes.source and "
+      "absolute_fixes.datum, or the same --localize");
 }
 
 void TeamNotices::ties(const FrameTies& ties) {

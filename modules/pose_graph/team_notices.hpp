@@ -32,7 +32,7 @@ class TeamNotices {
   void breaks(std::span<const OdometryBreak> breaks);
   /// Reports pairs of robots whose closures are noisier than those of the team.
   void closures(const ClosureNoiseRecord& noise);
-  /// Reports a robot whose fixes are in another absolute frame than those of this robot.
+  /// Reports a robot that is located in another datum than this robot.
   void other_datum(RobotId robot);
   /// Reports robots whose pose relative to this robot is uncertain, or certain again.
   void ties(const FrameTies& ties);

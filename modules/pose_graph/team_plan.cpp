@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/precision.hpp"
+
 namespace km {
 namespace {
 
@@ -77,7 +79,8 @@ void place_members(SessionPlan& plan, std::set<RobotId> waiting,
   std::set<RobotId> placed;
   const auto place = [&](RobotId robot) {
     const TeamStatus& status = statuses.at(robot);
-    plan.members.push_back({.peer = status.sender, .revision = status.revision});
+    plan.members.push_back(
+        {.peer = status.sender, .revision = status.revision, .datum = status.datum});
     placed.insert(robot);
     waiting.erase(robot);
   };
@@ -211,6 +214,27 @@ SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses, const Te
   return plan;
 }
 
+std::vector<PoseEdge> datum_ties(const SessionPlan& plan, RobotId robot) {
+  constexpr double kRotation_rad = 1e-5, kTranslation_m = 1e-3;
+  constexpr Precision kRigid{.kappa = 0.5 / (kRotation_rad * kRotation_rad),
+                             .tau = 1.0 / (kTranslation_m * kTranslation_m)};
+  std::map<std::uint64_t, RobotId> lowest;
+  for (const SessionMember& member : plan.members) {
+    const auto first = lowest.try_emplace(member.datum, member.peer.robot).first;
+    first->second = std::min(first->second, member.peer.robot);
+  }
+  lowest.erase(0);
+  std::vector<PoseEdge> ties;
+  for (const SessionMember& member : plan.members) {
+    const auto first = lowest.find(member.datum);
+    if (first == lowest.end() || first->second == member.peer.robot) continue;
+    if (first->second == robot || member.peer.robot == robot)
+      ties.push_back({{first->second, 0}, {member.peer.robot, 0}, SE3::Identity(), kRigid});
+  }
+  std::ranges::sort(ties, {}, &PoseEdge::id);
+  return ties;
+}
+
 std::optional<TreePlace> place_in(const SessionPlan& plan, RobotId robot) {
   TreePlace place;
   Tree children;
@@ -240,7 +264,7 @@ std::optional<TreePlace> place_in(const SessionPlan& plan, RobotId robot) {
 
 bool same_graph(const SessionPlan& x, const SessionPlan& y) {
   const auto same = [](const SessionMember& a, const SessionMember& b) {
-    return a.peer == b.peer && a.revision == b.revision;
+    return a.peer == b.peer && a.revision == b.revision && a.datum == b.datum;
   };
   return x.pairs == y.pairs && std::is_permutation(x.members.begin(), x.members.end(),
                                                    y.members.begin(), y.members.end(), same);

@@ -199,7 +199,11 @@ void TreeNewton::find_isolated(double barc) {
   }
 }
 
+// The higher robot of a datum tie has it among its own edges.
 void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by) {
+  std::map<RobotId, std::set<KeyframeIndex>> touched_from;
+  for (const PoseEdge& tie : graph_.datum_ties)
+    if (tie.from.robot == graph_.self) touched_from[tie.to.robot].insert(tie.from.index);
   for (const auto& [peer, indices] : by_peer()) {
     if (peer == graph_.self) continue;
     std::vector<ClosureId> ids;
@@ -209,7 +213,7 @@ void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_
     const auto covered = [&](const KeyframeId& id) {
       return std::binary_search(cover.begin(), cover.end(), id);
     };
-    std::set<KeyframeIndex> theirs;
+    std::set<KeyframeIndex>& theirs = touched_from[peer];
     for (const std::size_t k : indices) {
       Known& known = known_[k];
       const KeyframeId& here = known.edge.end_on(graph_.self);
@@ -218,11 +222,12 @@ void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_
       known.own = both ? graph_.self < peer : !covered(here);
       if (!known.own) theirs.insert(here.index);
     }
+  }
+  for (const auto& [peer, theirs] : touched_from)
     for (const KeyframeIndex index : theirs) {
       auto& robots = touched_by.try_emplace(index, 1).first->second;
       ++robots;
     }
-  }
 }
 
 // All closures of a limited pair have the same factor.
@@ -259,6 +264,10 @@ void TreeNewton::build_front() {
     if (k >= inside_) known_[k].pair_limit = known_[k].pair_factor = limits.at(peer_of(known_[k]));
   }
   front.edges.insert(front.edges.end(), graph_.fixes.begin(), graph_.fixes.end());
+  for (const PoseEdge& tie : graph_.datum_ties) {
+    front.open.insert(tie.end_on(graph_.self).index);
+    if (tie.to.robot == graph_.self) front.edges.push_back(tie);
+  }
   for (const PoseEdge& e : graph_.to_absent) {
     const auto decided = graph_.decided.find(e.id());
     const bool rejected = decided != graph_.decided.end() && !decided->second;
@@ -284,7 +293,7 @@ std::vector<double> TreeNewton::front_weights(bool candidate) const {
                                     : known.weight * known.pair_factor;
     weights.push_back(known.trust == Trust::kOpen ? std::max(weight, kFloor) : weight);
   }
-  weights.resize(front_->graph().edges.size(), 1.0);  // fixes, and edges to held poses
+  weights.resize(front_->graph().edges.size(), 1.0);  // fixes, datum ties, edges to held poses
   return weights;
 }
 

@@ -74,7 +74,7 @@ QuadraticProblem MemberRbcd::make_problem() {
   for (const BlockEdge& fix : block_edges(graph_.fixes)) own.push_back(fix);
   std::vector<PublicEdge> to_others;
   Eigen::Index slots = 0;
-  for (const auto* edges : {&graph_.between, &graph_.to_absent})
+  for (const auto* edges : {&graph_.between, &graph_.datum_ties, &graph_.to_absent})
     for (const PoseEdge& e : *edges) {
       const KeyframeId other = e.other(graph_.self);
       const KeyframeIndex at = e.end_on(graph_.self).index;

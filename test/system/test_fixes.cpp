@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
+#include <cstdio>
 #include <fstream>
 #include <random>
 
+#include "modules/absolute_fixes/geodetic.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
 
-// A robot with positions of a motion capture, on a recording.
+// Robots with positions of GNSS or of a motion capture, on a recording and on live topics.
 
 namespace km {
 namespace {
@@ -19,56 +22,248 @@ namespace fs = std::filesystem;
 
 constexpr double kSigma_m = 0.05;
 
-// Writes ten positions of each second of the truth, with noise. Every fifth is off by 2 m.
-void write_fixes(const std::vector<StampedPose>& truth, const fs::path& file) {
+// Half the distance of a single fix, 1.7 sigmas: some 20 fixes determine six unknowns.
+constexpr double kLargest_m = 0.87 * kSigma_m;
+
+const GeodeticPoint kDatum{47.3977, 8.5456, 488.0};
+
+// The point at `p_enu` [m] about kDatum. Newton steps with the axes of a sphere: the error falls by
+// the flattening of the ellipsoid, 1/300, in each step.
+GeodeticPoint geodetic(const Eigen::Vector3d& p_enu) {
+  constexpr double kEarth_m = 6.37e6, kDegree = M_PI / 180.0;
+  const EnuFrame frame(kDatum);
+  GeodeticPoint point = kDatum;
+  for (int k = 0; k < 10; ++k) {
+    const Eigen::Vector3d off = p_enu - frame.position_of(point);
+    point.longitude_deg += off.x() / (kEarth_m * std::cos(kDatum.latitude_deg * kDegree)) / kDegree;
+    point.latitude_deg += off.y() / kEarth_m / kDegree;
+    point.altitude_m += off.z();
+  }
+  return point;
+}
+
+// Writes ten positions of each second of the truth, with noise. Every fifth, except for the first
+// one, is off by 2 m. The first position.
+Eigen::Vector3d write_fixes(const std::vector<StampedPose>& truth, const fs::path& file,
+                            bool is_gnss = false) {
   std::mt19937 rng(5);
   std::normal_distribution<double> normal;
   std::ofstream out(file);
   out.precision(20);
+  std::optional<Eigen::Vector3d> first;
   for (std::size_t k = 0; k < truth.size(); k += 20) {
     Eigen::Vector3d p = truth[k].T.translation();
     Eigen::Vector3d outlier;
     for (double& c : p) c += kSigma_m * normal(rng);
     for (double& c : outlier) c = normal(rng);
-    if ((k / 20) % 5 == 0) p += 2.0 * outlier.normalized();
+    if (first && (k / 20) % 5 == 0) p += 2.0 * outlier.normalized();
+    if (!first) first = p;
+    const GeodeticPoint point = geodetic(p);
+    if (is_gnss) p = {point.latitude_deg, point.longitude_deg, point.altitude_m};
     out << truth[k].stamp << ", " << p.x() << ", " << p.y() << ", " << p.z() << '\n';
   }
+  return *first;
 }
 
-// Root mean square distance from the truth, without an alignment.
-double error_m(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truth) {
+// Root mean square distance from the truth, without an alignment. `origin` of the estimate in the
+// frame of the truth.
+double error_m(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truth,
+               const Eigen::Vector3d& origin = Eigen::Vector3d::Zero()) {
+  REQUIRE_FALSE(estimate.empty());
   double sum = 0.0;
   for (const StampedPose& pose : estimate) {
     const auto at = std::ranges::lower_bound(truth, pose.stamp, {}, &StampedPose::stamp);
     REQUIRE(at != truth.end());
-    sum += (pose.T.translation() - at->T.translation()).squaredNorm();
+    sum += (pose.T.translation() + origin - at->T.translation()).squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(estimate.size()));
+}
+
+std::vector<StampedPose> truth_of(const fs::path& dataset) {
+  return read_trajectory(dataset / "mav0/state_groundtruth_estimate0/groundtruth_tum.txt");
+}
+
+// A robot on a part of the recording, with the fixes of a motion capture.
+std::vector<std::string> command_of(const fs::path& dataset, int robot, const std::string& part,
+                                    int domain, const TemporaryFolder& folder,
+                                    const std::string& settings = {}) {
+  return words_of(KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot " +
+                  std::to_string(robot) + " --dataset " + dataset.string() + ' ' + part +
+                  " --rate max --domain " + std::to_string(domain) + " --output " +
+                  (folder.path() / robot_name(robot)).string() +
+                  " --set absolute_fixes.source=motion_capture absolute_fixes.sigma_m=" +
+                  std::to_string(kSigma_m) + " absolute_fixes.file=" +
+                  (folder.path() / "fixes.csv").string() + ' ' + settings);
 }
 
 TEST_CASE("fixes of a motion capture place a run in its frame", "[system][fixes]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
-  const auto truth =
-      read_trajectory(*dataset / "mav0/state_groundtruth_estimate0/groundtruth_tum.txt");
+  const auto truth = truth_of(*dataset);
   write_fixes(truth, folder.path() / "fixes.csv");
-  Process robot(words_of(
-      KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset " +
-      dataset->string() + " --to 12 --rate max --domain " + std::to_string(random_domain()) +
-      " --output " + (folder.path() / "run").string() +
-      " --set absolute_fixes.source=motion_capture absolute_fixes.sigma_m=" +
-      std::to_string(kSigma_m) + " absolute_fixes.file=" + (folder.path() / "fixes.csv").string()));
+  Process robot(command_of(*dataset, 0, "--to 12", random_domain(), folder));
   REQUIRE(robot.wait() == 0);
-  const RunSummary summary = read_summary(folder.path() / "run/summary.json");
+  const RunSummary summary = read_summary(folder.path() / "robot0/summary.json");
   REQUIRE(summary.fixes);
   CAPTURE(summary.fixes->used, summary.fixes->rejected, summary.fixes->rotation_sigma_rad);
   CHECK(summary.fixes->located);
   CHECK(summary.fixes->rejected > 0);
   CHECK(summary.fixes->used > 2 * summary.fixes->rejected);
-  const auto estimate = read_trajectory(folder.path() / "run/optimized.tum");
-  // Half the distance of a single fix, 1.7 sigmas: some 20 fixes determine six unknowns.
-  CHECK(error_m(estimate, truth) < 0.87 * kSigma_m);
+  CHECK(error_m(read_trajectory(folder.path() / "robot0/optimized.tum"), truth) < kLargest_m);
+}
+
+// Root mean square distance of the poses that two robots have at the same images of one recording.
+double apart_m(const std::vector<StampedPose>& one, const std::vector<StampedPose>& other) {
+  double sum = 0.0;
+  int common = 0;
+  for (const StampedPose& pose : one) {
+    const auto at = std::ranges::lower_bound(other, pose.stamp, {}, &StampedPose::stamp);
+    if (at == other.end() || at->stamp != pose.stamp) continue;
+    sum += (pose.T.translation() - at->T.translation()).squaredNorm();
+    ++common;
+  }
+  REQUIRE(common > 50);
+  return std::sqrt(sum / common);
+}
+
+TEST_CASE("two robots with fixes are in one frame with and without closures between them",
+          "[system][fixes]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const auto truth = truth_of(*dataset);
+  write_fixes(truth, folder.path() / "fixes.csv");
+  const bool has_closures = GENERATE(false, true);
+  // No keyframes have so many inliers.
+  const std::string closures = has_closures ? "" : "loop_closure.min_inliers=1000";
+  const int domain = random_domain();
+  Process first(command_of(*dataset, 0, "--to 12 --serve-limit 100", domain, folder, closures));
+  Process second(
+      command_of(*dataset, 1, "--from 5 --to 17 --serve-limit 100", domain, folder, closures));
+  REQUIRE(first.wait() == 0);
+  REQUIRE(second.wait() == 0);
+  std::vector<std::vector<StampedPose>> poses;
+  std::uint64_t inliers = 0;
+  for (const int robot : {0, 1}) {
+    const fs::path results = folder.path() / robot_name(robot);
+    const RunSummary summary = read_summary(results / "summary.json");
+    REQUIRE(summary.fixes);
+    CHECK(summary.fixes->located);
+    inliers += summary.closures.inliers;
+    poses.push_back(read_trajectory(results / "optimized.tum"));
+  }
+  CHECK((inliers > 0) == has_closures);
+  const double first_m = error_m(poses[0], truth), second_m = error_m(poses[1], truth);
+  const double between_m = apart_m(poses[0], poses[1]);
+  CAPTURE(has_closures, first_m, second_m, between_m);
+  CHECK(first_m < kLargest_m);
+  CHECK(second_m < kLargest_m);
+  // Without closures the errors of both add up. With closures the robots fit to each other.
+  CHECK(between_m < (has_closures ? 0.5 : M_SQRT2) * kLargest_m);
+}
+
+// A robot on live topics with the names of EuRoC, and fixes on /fix.
+std::vector<std::string> live_command(const fs::path& dataset, const TemporaryFolder& folder,
+                                      int ros_domain, const std::string& output,
+                                      const std::string& settings) {
+  const fs::path rig = folder.write(
+      "rig.yaml",
+      "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\nimu: {topic: /imu0}\n"
+      "calibration: " +
+          fs::absolute(dataset).string() + "\n");
+  return logged(words_of(
+      KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --live " +
+      rig.string() + " --serve-limit 0 --domain " + std::to_string(random_domain()) + ' ' + output +
+      ' ' + (folder.path() / "live").string() +
+      " --set ros.interface=lo sensors.max_lag_s=30 ros.domain=" + std::to_string(ros_domain) +
+      " absolute_fixes.topic=/fix absolute_fixes.sigma_m=" + std::to_string(kSigma_m) + ' ' +
+      settings));
+}
+
+// Plays seconds of the recording more slowly than they were recorded, because the host may be busy.
+std::vector<std::string> driver_command(const fs::path& dataset, int ros_domain,
+                                        const std::string& options) {
+  return words_of(KM_BIN_DIR "/kimera_multi_publish " + dataset.string() +
+                  " --interface lo --wait 1 --reliable --rate 0.5 --domain " +
+                  std::to_string(ros_domain) + ' ' + options);
+}
+
+bool is_near_the_end(const std::string& line) {
+  constexpr double kMost_s = 11.0;
+  double seconds = 0.0;
+  int images = 0;
+  return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && seconds > kMost_s;
+}
+
+TEST_CASE("fixes on live topics place a run in their frame", "[system][fixes][live]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const auto truth = truth_of(*dataset);
+  const bool is_gnss = GENERATE(true, false);
+  CAPTURE(is_gnss);
+  const fs::path fixes = folder.path() / "fixes.csv";
+  write_fixes(truth, fixes, is_gnss);
+  const int ros_domain = random_domain();
+  Process robot(
+      live_command(*dataset, folder, ros_domain, "--output",
+                   is_gnss ? "absolute_fixes.source=gnss absolute_fixes.datum=[47.3977,8.5456,488]"
+                           : "absolute_fixes.source=motion_capture "
+                             "absolute_fixes.live_type=geometry_msgs/msg/PoseStamped"));
+  Process driver(driver_command(*dataset, ros_domain,
+                                "--to 12.5 --fixes " + fixes.string() +
+                                    (is_gnss ? "" : " --fix-type geometry_msgs/msg/PoseStamped")));
+  CHECK(driver.wait() == 0);
+  REQUIRE(robot.wait_until(is_near_the_end));
+  robot.kill(SIGINT);
+  REQUIRE(robot.wait() == 0);
+  const RunSummary summary = read_summary(folder.path() / "live/summary.json");
+  REQUIRE(summary.fixes);
+  CHECK(summary.fixes->located);
+  CHECK(summary.fixes->used > 2 * summary.fixes->rejected);
+  CHECK(error_m(read_trajectory(folder.path() / "live/optimized.tum"), truth) < kLargest_m);
+}
+
+bool is_located(const std::string& line) {
+  return line.find("located after") != line.npos;
+}
+
+// The first fix is the datum, also for the process that receives none, or later ones.
+TEST_CASE("a killed and resumed robot remains located by its live fixes", "[system][fixes][live]") {
+  const auto dataset = shared_data("euroc/MH_01_easy");
+  if (!dataset) return;
+  const TemporaryFolder folder;
+  const auto truth = truth_of(*dataset);
+  const fs::path fixes = folder.path() / "fixes.csv";
+  const Eigen::Vector3d first = write_fixes(truth, fixes, true);
+  const bool has_more_fixes = GENERATE(false, true);
+  CAPTURE(has_more_fixes);
+  const int ros_domain = random_domain();
+  const std::string settings = "absolute_fixes.source=gnss";
+  {
+    Process robot(live_command(*dataset, folder, ros_domain, "--output", settings));
+    Process driver(driver_command(*dataset, ros_domain, "--to 13 --fixes " + fixes.string()));
+    REQUIRE(robot.wait_until(is_located));
+    robot.kill(SIGKILL);
+    robot.wait();
+    driver.kill(SIGINT);
+    CHECK(driver.wait() == 0);
+  }
+  Process robot(live_command(*dataset, folder, ros_domain, "--resume", settings));
+  Process driver(driver_command(*dataset, ros_domain,
+                                "--to 13" + (has_more_fixes ? " --fixes " + fixes.string() : "")));
+  CHECK(driver.wait() == 0);
+  REQUIRE(robot.wait_until(is_near_the_end));
+  robot.kill(SIGINT);
+  REQUIRE(robot.wait() == 0);
+  const RunSummary summary = read_summary(folder.path() / "live/summary.json");
+  REQUIRE(summary.fixes);
+  CHECK(summary.fixes->located);
+  CAPTURE(summary.fixes->used, summary.fixes->rejected, summary.fixes->received);
+  CHECK((summary.fixes->received > 0) == has_more_fixes);
+  const auto estimate = read_trajectory(folder.path() / "live/optimized.tum");
+  CHECK(error_m(estimate, truth, first) < (has_more_fixes ? 1.0 : 2.0) * kLargest_m);
 }
 
 }  // namespace

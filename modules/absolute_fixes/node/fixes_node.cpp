@@ -44,6 +44,7 @@ void FixesNode::receive() {
 
 void FixesNode::step(const Input& input) {
   std::vector<PositionFix> fixes;
+  std::optional<ReceivedFix> received;
   {
     const std::lock_guard lock(mutex_);
     if (const auto* state = std::get_if<Topic<OdometryState>::Message>(&input)) {
@@ -52,11 +53,16 @@ void FixesNode::step(const Input& input) {
       if ((*keyframe)->id.index > 0) association_.add(**keyframe);
     } else {
       const BagMessage& message = *std::get<std::shared_ptr<const BagMessage>>(input);
-      if (const auto fix = reader_.read(live_->channels()[message.channel], message))
+      received = reader_.decode(live_->channels()[message.channel], message);
+      const auto fix = received ? reader_.accept(*received) : std::nullopt;
+      if (fix)
         association_.add(*fix);
+      else
+        received.reset();
     }
     fixes = association_.take(reader_.datum_id());
   }
+  if (received) topics_.received.publish(*received);
   for (PositionFix& fix : fixes) topics_.fixes.publish(std::move(fix));
 }
 

@@ -20,7 +20,7 @@ namespace km {
 /// Fixes of a recording, or the live topic of them.
 struct FixInput {
   FixReader reader;
-  std::vector<TimedPosition> recorded = {};
+  std::vector<TimedPosition> recorded = {};   ///< With a live topic: those of the former process.
   std::unique_ptr<BagReader> live = nullptr;  ///< Null for a recording.
 };
 
@@ -29,6 +29,7 @@ struct FixesTopics {
   In<OdometryState> states;
   In<OdometryState> restored_states;
   In<KeyframeOdometry> keyframes;  ///< Keyframe 0 is the origin of the absolute frame.
+  Out<ReceivedFix> received;       ///< Usable live fixes, for the journal.
   Out<PositionFix> fixes;
 };
 

@@ -49,6 +49,9 @@ class TeamNode final : public Node {
            std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics);
   ~TeamNode() override { stop(); }
 
+  /// See TeamAgent. Call before start().
+  void begin_in_map(std::uint64_t map_id) { agent_.begin_in_map(map_id); }
+
   std::string_view name() const override { return PoseGraphConfig::kSection; }
   void start() override;
   void stop() noexcept override;

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "apps/publish/euroc_messages.hpp"
+#include "apps/publish/fix_messages.hpp"
 #include "apps/publish/message_player.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "runtime/dds/ros_subscription.hpp"
@@ -124,6 +125,40 @@ TEST_CASE("Waiting for readers ends with the topics that have too few", "[publis
   CHECK(result.exit_code == 1);
   CHECK_THAT(result.output, Catch::Contains("still too few readers on ROS domain") &&
                                 Catch::Contains("of /imu0, /cam0/image_raw, /cam1/image_raw: 1"));
+}
+
+TEST_CASE("Fixes are played in the order of time with the messages of the recording", "[publish]") {
+  constexpr Stamp kLast = kFirst + (kMessages - 1) * kPeriod;
+  const auto [type, gnss] = GENERATE(std::pair(FixMessages::kGnssType, true),
+                                     std::pair(FixMessages::kMotionCaptureType, false));
+  FixMessages messages(samples("/i"),
+                       {{kFirst + 5, {47.0, 8.0, 500.0}},
+                        {kFirst - 1, {1.0, 1.0, 1.0}},
+                        {kLast - 5, {48.0, 9.0, 600.0}},
+                        {kLast + 1, {2.0, 2.0, 2.0}}},
+                       "/fix", type);
+  REQUIRE(messages.channels().size() == 2);
+  Stamp last = 0;
+  int count = 0;
+  std::vector<Eigen::Vector3d> fixes;
+  for (; const auto message = messages.next(); ++count) {
+    CHECK(message->log_time >= last);
+    last = message->log_time;
+    if (message->channel != 1) continue;
+    CHECK(decode_ros<RosHeader>("cdr", message->bytes).value->stamp == message->log_time);
+    if (gnss) {
+      const RosNavSatFix fix = *decode_ros<RosNavSatFix>("cdr", message->bytes).value;
+      CHECK(fix.status >= 0);
+      fixes.emplace_back(fix.latitude, fix.longitude, fix.altitude);
+    } else {
+      fixes.push_back(decode_ros<RosPoseStamped>("cdr", message->bytes).value->pose.position);
+    }
+  }
+  CHECK(count == kMessages + 2);
+  REQUIRE(fixes.size() == 2);
+  CHECK(fixes[0] == Eigen::Vector3d(47.0, 8.0, 500.0));
+  CHECK(fixes[1] == Eigen::Vector3d(48.0, 9.0, 600.0));
+  CHECK_THROWS_WITH(FixMessages(samples("/i"), {}, "/i", type), Catch::Contains("--fix-topic"));
 }
 
 TEST_CASE("A EuRoC folder becomes the messages of its drivers", "[publish]") {

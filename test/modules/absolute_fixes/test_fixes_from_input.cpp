@@ -38,7 +38,9 @@ RosNavSatFix nav_sat_fix(Stamp stamp) {
 
 template <typename Message>
 std::optional<TimedPosition> read(FixReader& reader, const Message& message) {
-  return reader.read({"/fix", std::string(Message::kType), "cdr", 0}, {0, 0, encode_ros(message)});
+  const auto fix =
+      reader.decode({"/fix", std::string(Message::kType), "cdr", 0}, {0, 0, encode_ros(message)});
+  return fix ? reader.accept(*fix) : std::nullopt;
 }
 
 // The numbers are those of the tests of pymap3d (github.com/geospace-code/pymap3d).
@@ -168,12 +170,15 @@ TEST_CASE("the node publishes live fixes", "[absolute_fixes]") {
   constexpr Stamp kSecond_ns = 1'000'000'000;
   Topic<OdometryState> states, restored;
   Topic<KeyframeOdometry> keyframes;
+  Topic<ReceivedFix> received;
   Topic<PositionFix> fixes;
+  std::vector<Stamp> journaled;
+  received.subscribe([&](const auto& fix) { journaled.push_back(fix->stamp); });
   std::vector<PositionFix> published;
   fixes.subscribe([&](const auto& fix) { published.push_back(*fix); });
   FixesNode node({.reader = FixReader(motion_capture_config("/pose")),
                   .live = std::make_unique<TwoTopics>(std::vector{pose_stamped(1)})},
-                 {states, restored, keyframes, fixes});
+                 {states, restored, keyframes, received, fixes});
   for (Stamp t = 0; t <= 4; ++t) {
     OdometryState state;
     state.stamp = t * kSecond_ns;
@@ -184,13 +189,16 @@ TEST_CASE("the node publishes live fixes", "[absolute_fixes]") {
     keyframe.stamp = state.stamp;
     node.step(std::make_shared<const KeyframeOdometry>(keyframe));
     const RosPoseStamped pose = pose_stamped(state.stamp + kSecond_ns / 4);
-    node.step(std::make_shared<const BagMessage>(BagMessage{1, 0, encode_ros(pose)}));
+    for (int copy = 0; copy < 2; ++copy)  // the second one is not later than the first
+      node.step(std::make_shared<const BagMessage>(BagMessage{1, 0, encode_ros(pose)}));
   }
   REQUIRE(published.size() >= 3);
   CHECK(published[1].keyframe.index == 2);
   CHECK((published[1].p_datum - Eigen::Vector3d(1.25, 0.0, 0.0)).norm() < 1e-12);
   CHECK((published[1].p_kf - Eigen::Vector3d(0.25, 0.0, 0.0)).norm() < 1e-12);
-  CHECK(node.counts().received == 5);
+  CHECK(node.counts().received == 10);
+  REQUIRE(journaled.size() == 5);
+  CHECK(journaled[1] == kSecond_ns + kSecond_ns / 4);
 }
 
 // A body that turns and moves at constant velocity, with images every 50 ms and a keyframe every

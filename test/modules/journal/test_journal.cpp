@@ -89,6 +89,8 @@ std::vector<JournalEntry> some_run() {
     run.emplace_back(keyframe);
     run.emplace_back(state(keyframe.stamp + 50, rng));
     run.emplace_back(features(i, rng));
+    run.emplace_back(ReceivedFix{keyframe.stamp + 60, random_vector<3>(rng),
+                                 i % 2 == 0 ? std::nullopt : std::optional(0.3)});
     run.emplace_back(closure(i, rng));
     run.emplace_back(outcome({kRobot, i}, {3, 9}, ClosureStage::kVerified));
   }
@@ -470,6 +472,7 @@ TEST_CASE("A run is restored up to its last full keyframe", "[journal]") {
   CHECK(run.final_states() == 9);
   CHECK(run.states[8].stamp == run.odometry.back().stamp);
   CHECK(run.closures.size() == 5);
+  CHECK(run.fixes.size() == 5);
   REQUIRE(run.outcomes.size() == 6);
   CHECK(run.outcomes[2].reason == "too few matches");
 }

@@ -71,6 +71,7 @@ class Run {
   }
   [[nodiscard]] const TeamNetwork::Robot& state() const { return network_.robots.at(robot_); }
   [[nodiscard]] TeamAgent& agent() { return agent_; }
+  [[nodiscard]] RobotId robot() const { return robot_; }
   [[nodiscard]] const SE3& truth(KeyframeIndex i) const { return truth_[i]; }
   // Largest distance of a keyframe from its true position in the absolute frame.
   [[nodiscard]] double error_m() const {
@@ -158,21 +159,29 @@ TEST_CASE("fixes do not locate a robot before it has moved", "[pose_graph][fixes
   CHECK(moving.error_m() < kLargest_m / kSigma_m);
 }
 
+// Gives both robots closures between equal keyframes of two places, off by `error`.
+std::vector<ClosureId> close(Run& low, Run& high, const SE3& error = SE3::Identity(),
+                             const std::vector<KeyframeIndex>& at = {10, 11, 12, 40, 41, 42}) {
+  std::vector<ClosureId> between;
+  for (const KeyframeIndex i : at) {
+    Closure closure;
+    closure.from.id = {low.robot(), i};
+    closure.to.id = {high.robot(), i};
+    closure.T_from_to = low.truth(i).inverse() * high.truth(i) * error;
+    closure.covariance = isotropic(0.005, 0.02);
+    between.push_back(closure.id());
+    for (Run* const run : {&low, &high}) CHECK(run->agent().add(closure));
+  }
+  for (Run* const run : {&low, &high})
+    CHECK(run->agent().add(InlierSet{low.robot(), high.robot(), 1, between}));
+  return between;
+}
+
 TEST_CASE("closures bring a robot without fixes into the absolute frame", "[pose_graph][fixes]") {
   TeamNetwork network;
   Run without(network, 2, 21, false, PgoMethod::kNewton);
   Run with(network, 5, 22, true, PgoMethod::kNewton);
-  std::vector<ClosureId> between;
-  for (const KeyframeIndex i : {10U, 11U, 12U, 40U, 41U, 42U}) {
-    Closure closure;
-    closure.from.id = {2, i};
-    closure.to.id = {5, i};
-    closure.T_from_to = without.truth(i).inverse() * with.truth(i);
-    closure.covariance = isotropic(0.005, 0.02);
-    between.push_back(closure.id());
-    for (Run* const run : {&without, &with}) CHECK(run->agent().add(closure));
-  }
-  for (Run* const run : {&without, &with}) CHECK(run->agent().add(InlierSet{2, 5, 1, between}));
+  close(without, with);
   REQUIRE(settle_again(network));
   CHECK(without.state().trajectory->anchor == 2);
   with.fix_all();
@@ -182,6 +191,69 @@ TEST_CASE("closures bring a robot without fixes into the absolute frame", "[pose
     CHECK(run->state().trajectory->anchor == 5);
     // The poses of the other robot are up to 100 m from the fixes, with 10 mrad of heading.
     CHECK(run->error_m() < kLargest_m + (run == &without ? 1.0 : 0.0));
+  }
+}
+
+// Largest error of the published position of keyframe i of `high`, as seen from keyframe i of
+// `low`.
+double relative_error_m(const Run& low, const Run& high, std::initializer_list<KeyframeIndex> at) {
+  double largest = 0.0;
+  for (const KeyframeIndex i : at) {
+    const SE3 T_low_high =
+        low.state().trajectory->T_world_kf[i].inverse() * high.state().trajectory->T_world_kf[i];
+    const SE3 truth = low.truth(i).inverse() * high.truth(i);
+    largest = std::max(largest, (T_low_high.translation() - truth.translation()).norm());
+  }
+  return largest;
+}
+
+// The mean errors of the fixes of the two robots are 0.2 m apart. The 118 fixes then contradict the
+// closures by a cost of 118 (0.1 m / 0.3 m)^2 = 13, less than that of six rejected closures. With
+// 0.5 m instead of 0.1 m it is 328, and some seeds reject the closures.
+TEST_CASE("fixes of all robots act on one frame if closures tie the robots",
+          "[pose_graph][fixes]") {
+  TeamNetwork network;
+  const unsigned seed = GENERATE(41U, 43U, 45U);
+  CAPTURE(seed);
+  Run low(network, 3, seed, true, PgoMethod::kNewton),
+      high(network, 6, seed + 1, true, PgoMethod::kNewton);
+  const Eigen::Vector3d east(0.1, 0.0, 0.0);
+  const bool is_one_datum = GENERATE(true, false);
+  if (!is_one_datum) high.datum = 78;
+  for (KeyframeIndex i = 1; i < kKeyframes; ++i) {
+    low.fix(i, east);
+    high.fix(i, -east);
+  }
+  close(low, high);
+  REQUIRE(settle_again(network));
+  const double apart_m = relative_error_m(low, high, {10, 11, 12, 40, 41, 42});
+  CAPTURE(low.error_m(), high.error_m(), apart_m);
+  CHECK(high.state().trajectory->anchor == (is_one_datum ? 3 : 6));
+  if (is_one_datum) {
+    CHECK(low.error_m() < kLargest_m);
+    CHECK(high.error_m() < kLargest_m);
+    CHECK(apart_m < 0.1);
+  } else {
+    CHECK(apart_m > 0.1);
+  }
+}
+
+TEST_CASE("false closures between robots in one datum are rejected", "[pose_graph][fixes]") {
+  TeamNetwork network;
+  const unsigned seed = GENERATE(51U, 53U, 55U);
+  CAPTURE(seed);
+  Run low(network, 3, seed, true, PgoMethod::kNewton),
+      high(network, 6, seed + 1, true, PgoMethod::kNewton);
+  for (Run* const run : {&low, &high}) run->fix_all();
+  REQUIRE(settle_again(network));
+  const SE3 error = make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(15.0, 20.0, 0.0));
+  const auto closures = close(low, high, error, {20, 21, 22, 23});
+  REQUIRE(settle_again(network));
+  for (Run* const run : {&low, &high}) {
+    for (const ClosureId& id : closures) CHECK_FALSE(run->agent().decided().at(id));
+    CHECK(run->state().progress.tentative.empty());
+    CHECK(run->state().progress.not_joined.empty());
+    CHECK(run->error_m() < kLargest_m);
   }
 }
 

@@ -34,7 +34,7 @@ Session some_session() {
   std::mt19937 random(2);
   return {.id = {kPeer2, 9},
           .plan = {.frame = kPeer7,
-                   .members = {{kPeer7, 1007, RobotId{2}},
+                   .members = {{kPeer7, 1007, RobotId{2}, 77},
                                {kPeer2, 4, {}},
                                {kPeer60000, 9, RobotId{7}}},
                    .pairs = {{2, 7, {3, 5}}, {2, 60000, {1, 6}}, {7, 60000, {2, 7}}}},

@@ -97,6 +97,30 @@ TEST_CASE("the plan contains the connected component, best connected robots firs
   CHECK_THROWS_AS(plan_session(statuses, {}, 4), std::invalid_argument);
 }
 
+TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph][session]") {
+  auto statuses = chain_of({4, 2, 7, 5, 9}, {3, 3, 3, 3});
+  for (const RobotId robot : {RobotId{4}, RobotId{7}, RobotId{9}}) statuses[robot].datum = 77;
+  statuses[5].datum = 78;
+  const SessionPlan plan = plan_session(statuses, {}, 2);
+  const auto ends_of = [&plan](RobotId robot) {
+    std::vector<ClosureId> ends;
+    for (const PoseEdge& tie : datum_ties(plan, robot)) {
+      CHECK(tie.T_from_to.matrix() == SE3::Identity().matrix());
+      ends.push_back({tie.from, tie.to});
+    }
+    return ends;
+  };
+  const ClosureId to_7{{4, 0}, {7, 0}}, to_9{{4, 0}, {9, 0}};
+  CHECK(ends_of(4) == std::vector{to_7, to_9});
+  CHECK(ends_of(7) == std::vector{to_7});
+  CHECK(ends_of(9) == std::vector{to_9});
+  for (const RobotId robot : {RobotId{2}, RobotId{5}}) CHECK(ends_of(robot).empty());
+  statuses[7].datum = 0;
+  const SessionPlan without_7 = plan_session(statuses, {}, 2);
+  CHECK_FALSE(same_graph(plan, without_7));
+  CHECK(datum_ties(without_7, 7).empty());
+}
+
 TEST_CASE("the frame of most members stays", "[pose_graph][session]") {
   auto statuses =
       by_robot({status_of(1, {{2, 3, {1, 1}}}), status_of(2, {{1, 3, {1, 1}}, {3, 3, {1, 2}}}),
