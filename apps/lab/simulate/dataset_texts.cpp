@@ -58,6 +58,14 @@ void describe_robots(std::ostream& text, const SimulationOptions& options,
           "poses.\n\n";
 }
 
+std::string list_of(const Eigen::MatrixXd& values) {
+  std::string list;
+  for (Eigen::Index row = 0; row < values.rows(); ++row)
+    for (Eigen::Index column = 0; column < values.cols(); ++column)
+      list += (list.empty() ? "" : ", ") + number_text(values(row, column));
+  return '[' + list + ']';
+}
+
 }  // namespace
 
 std::string team_yaml(const SimulationOptions& options) {
@@ -70,7 +78,7 @@ std::string team_yaml(const SimulationOptions& options) {
     settings.push_back(std::string("mapping.mode=") + (options.labels ? "semantic" : "metric"));
   if (options.depth && options.world == WorldKind::kViconRoom)
     settings.push_back("semantic_mapping.voxel_size_m=0.05");
-  if (!options.is_recorded()) {
+  if (!options.is_recorded() && changed_keys(options.effects, 0).empty()) {
     text +=
         "# Simulated sensors are as their calibration states: odometry drifts less than the "
         "default.\n";
@@ -110,7 +118,85 @@ std::string dataset_readme(const SimulationOptions& options, const DatasetRecord
          << static_cast<int>(label.color[0]) << ", " << static_cast<int>(label.color[1]) << ", "
          << static_cast<int>(label.color[2]) << " |\n";
   text << "\nThe same as `label_palette.csv`.\n";
+  if (!changed_keys(options.effects, 0).empty())
+    text << "\n## Effects\n\n`effects.yaml` has the size of every effect. The folder `truth` of a "
+            "robot has what it does not get:\nthe true calibration of its cameras, the errors of "
+            "its inertial sensor and clocks, and the true\ntimes of its images. True states have "
+            "the "
+            "stamps of the robot's clock. `traffic.csv` has the\nposes of cars and people that "
+            "move; they are not in `world.ply`.\n";
   return text.str();
+}
+
+std::string effects_yaml(const Effects& effects) {
+  std::string text = "# All effects; a file of options may contain these sections.\n", section;
+  for (const auto& [key, value] : key_texts(effects)) {
+    const std::size_t dot = key.find('.');
+    if (key.substr(0, dot) != section) text += (section = key.substr(0, dot)) + ":\n";
+    text += "  " + key.substr(dot + 1) + ": " + value + '\n';
+  }
+  return text;
+}
+
+std::string true_errors_yaml(const RobotScenario& robot) {
+  const InertialErrors& e = robot.inertial_errors;
+  std::string text =
+      "# measured = matrix * true + bias + noise + vibration; matrices row by row\ninertial:\n";
+  const auto add = [&text](const char* key, const std::string& value) {
+    text += std::string("  ") + key + ": " + value + '\n';
+  };
+  add("gyro_matrix", list_of(e.gyro_matrix));
+  add("accel_matrix", list_of(e.accel_matrix));
+  add("gyro_vibration_rps", list_of(e.gyro_vibration.transpose()));
+  add("accel_vibration_mps2", list_of(e.accel_vibration.transpose()));
+  add("vibration_hz", number_text(e.vibration_hz));
+  add("vibration_phase_rad", list_of(e.phase.transpose()));
+  add("gyro_warm_rps", list_of(e.gyro_warm.transpose()));
+  add("accel_warm_mps2", list_of(e.accel_warm.transpose()));
+  add("warm_up_s", number_text(e.warm_up_s));
+  text += "clock:\n";
+  add("drift", number_text(robot.clock.value().drift()));
+  add("camera_drift", number_text(robot.clock.value().camera_drift()));
+  std::string jumps;
+  for (const Stamp jump : robot.clock.value().jumps())
+    jumps += (jumps.empty() ? "" : ", ") + std::to_string(jump);
+  add("jumps_at_ns", '[' + jumps + "]  # true times");
+  return text;
+}
+
+std::string traffic_csv(const Traffic& traffic, const std::vector<RobotScenario>& robots) {
+  std::vector<Eigen::AlignedBox3f> boxes;
+  for (const WorldObject& object : traffic.shapes.objects) {
+    Eigen::AlignedBox3f& box = boxes.emplace_back();
+    for (std::size_t t = object.first_triangle; t < object.end_triangle; ++t)
+      for (const std::uint32_t v : traffic.shapes.mesh.triangles[t])
+        box.extend(traffic.shapes.mesh.vertices[v]);
+  }
+  std::string text =
+      "#true time [ns],mover,label,p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z [],"
+      "size_x [m],size_y [m],size_z [m]\n";
+  const std::vector<Stamp>& times = robots.front().images;
+  for (const Stamp time : times) {
+    const std::vector<SE3> poses = traffic.poses(seconds_between(times.front(), time));
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const Eigen::Quaterniond q(poses[i].linear());
+      const Eigen::Vector3d p = poses[i].translation(), size = boxes[i].sizes().cast<double>();
+      text += std::to_string(time) + ',' + std::to_string(i) + ',' +
+              std::to_string(static_cast<int>(traffic.label(i)));
+      for (const double value :
+           {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), size.x(), size.y(), size.z()})
+        text += ',' + number_text(value);
+      text += '\n';
+    }
+  }
+  return text;
+}
+
+std::string true_times_csv(const RobotScenario& robot) {
+  std::string text = "#timestamp [ns],true time [ns]\n";
+  for (std::size_t i = 0; i < robot.images.size(); ++i)
+    text += std::to_string(robot.image_stamps[i]) + ',' + std::to_string(robot.images[i]) + '\n';
+  return text;
 }
 
 }  // namespace km

@@ -8,7 +8,9 @@
 #include "apps/lab/simulation/motion/flight_trajectory.hpp"
 #include "apps/lab/simulation/motion/imu_simulator.hpp"
 #include "apps/lab/simulation/motion/recorded_trajectory.hpp"
+#include "apps/lab/simulation/motion/told_calibration.hpp"
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
+#include "apps/lab/simulation/world/routes.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
 
 namespace km {
@@ -17,7 +19,9 @@ namespace {
 constexpr double kImuLead_s = 1.0;           // inertial data begin this long before the first image
 constexpr double kImuTail_s = 0.1;           // inertial data end this long after the last image
 constexpr Stamp kEpoch = 1'000'000'000'000;  // readers require stamps above 0
-constexpr std::uint64_t kMotion = 1, kImu = 2, kNoise = 3;  // parts of a robot's seed
+// Parts of a robot's seed.
+constexpr std::uint64_t kMotion = 1, kImu = 2, kInertial = 4, kCalibration = 5, kClock = 6,
+                        kDropped = 7;
 
 // First + k / rate, up to `last`.
 std::vector<Stamp> image_stamps(Stamp first, Stamp last, double rate_hz) {
@@ -30,12 +34,25 @@ std::vector<Stamp> image_stamps(Stamp first, Stamp last, double rate_hz) {
   }
 }
 
-std::unique_ptr<const BodyTrajectory> drive(const World& world, std::size_t robot,
+Route route_of(const World& world, std::size_t robot, bool opposite) {
+  const std::vector<Route>& routes = world.routes;
+  if (!opposite) return routes[robot % routes.size()];
+  const Route& shared = routes[robot / 2 % routes.size()];
+  return robot % 2 == 0 ? shared : opposite_route(shared, lane_apart_m(world));
+}
+
+std::unique_ptr<const BodyTrajectory> drive(const World& world, std::size_t robot, bool opposite,
                                             std::uint64_t seed, double duration_s) {
-  const Route& route = world.routes[robot % world.routes.size()];
+  const Route route = route_of(world, robot, opposite);
   VehicleOptions vehicle;
   vehicle.seed = seed;
   vehicle.duration_s = duration_s;
+  if (!world.ground_height) {  // a cart on the level floor of a hall
+    vehicle.rig_height_m = 0.8;
+    vehicle.corner_radius_m = 0.8;
+    vehicle.roughness = 0.0;
+    vehicle.stop_every_m = 20.0;
+  }
   return std::make_unique<SplineTrajectory>(
       make_vehicle_trajectory(route, world.ground_height, vehicle));
 }
@@ -49,6 +66,21 @@ std::unique_ptr<const BodyTrajectory> fly(const World& world, std::uint64_t seed
   return std::make_unique<SplineTrajectory>(make_flight_trajectory(world.flight_volume, flight));
 }
 
+// Gives the scenario the calibration that the robot gets, the stamps of its clocks, and lost
+// images.
+void add_told_values(const SimulationOptions& options, RobotScenario& scenario) {
+  const TimingErrorConfig& timing = options.effects.timing;
+  scenario.told_rig = told_rig(scenario.rig, options.effects.calibration_error,
+                               derived_seed(scenario.seed, kCalibration));
+  scenario.images = without_dropped(scenario.images, timing, derived_seed(scenario.seed, kDropped));
+  const RobotClock& clock =
+      scenario.clock.emplace(timing, scenario.imu.front().stamp, scenario.imu.back().stamp,
+                             derived_seed(scenario.seed, kClock));
+  for (const Stamp at : scenario.images) scenario.image_stamps.push_back(clock.camera(at));
+  for (ImuSample& sample : scenario.imu) sample.stamp = clock.inertial(sample.stamp);
+  for (TrueState& state : scenario.truth) state.stamp = clock.inertial(state.stamp);
+}
+
 RobotScenario simulated_robot(const World& world, const SimulationOptions& options,
                               std::size_t robot) {
   const bool drives = !world.routes.empty();
@@ -60,14 +92,18 @@ RobotScenario simulated_robot(const World& world, const SimulationOptions& optio
       default_rig(drives ? RigKind::kVehicle : RigKind::kFlying, options.width, options.height);
   scenario.epoch = kEpoch;
   const std::uint64_t seed = derived_seed(scenario.seed, kMotion);
-  scenario.trajectory =
-      drives ? drive(world, robot, seed, duration_s) : fly(world, seed, duration_s);
+  scenario.trajectory = drives
+                            ? drive(world, robot, options.effects.places.opposite, seed, duration_s)
+                            : fly(world, seed, duration_s);
   const Stamp first = kEpoch + nanoseconds(kImuLead_s);
   scenario.images =
       image_stamps(first, first + nanoseconds(options.duration_s) - 1, options.rate_hz);
 
+  scenario.inertial_errors =
+      draw_inertial_errors(options.effects.inertial, derived_seed(scenario.seed, kInertial));
   ImuSimulation imu;
   imu.noise = scenario.rig.imu;
+  imu.errors = scenario.inertial_errors;
   imu.seed = derived_seed(scenario.seed, kImu);
   for (const SimulatedImu& at : simulate_imu(*scenario.trajectory, kEpoch, imu)) {
     const BodyMotion motion = scenario.motion(at.sample.stamp);
@@ -75,6 +111,7 @@ RobotScenario simulated_robot(const World& world, const SimulationOptions& optio
     scenario.truth.push_back(
         {at.sample.stamp, motion.T_world_body, motion.velocity_world, at.gyro_bias, at.accel_bias});
   }
+  add_told_values(options, scenario);
   return scenario;
 }
 
@@ -125,6 +162,7 @@ RobotScenario recorded_robot(const RecordedFlight& flight, const SimulationOptio
   scenario.imu =
       part_of(flight.imu, first - nanoseconds(kImuLead_s), last + nanoseconds(kImuTail_s));
   scenario.truth = part_of(flight.truth, first, last);
+  add_told_values(options, scenario);
   return scenario;
 }
 

@@ -1,13 +1,17 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/lab/simulate/recorded_flight.hpp"
 #include "apps/lab/simulate/simulation_options.hpp"
 #include "apps/lab/simulation/dataset/recording_texts.hpp"
+#include "apps/lab/simulation/motion/inertial_errors.hpp"
+#include "apps/lab/simulation/motion/robot_clock.hpp"
 #include "apps/lab/simulation/motion/spline_trajectory.hpp"
 #include "apps/lab/simulation/world/world.hpp"
 #include "modules/core/camera.hpp"
@@ -19,16 +23,24 @@ namespace km {
 struct RobotScenario {
   std::string name;
   std::uint64_t seed = 0;  ///< Seed of its noise.
-  SensorRig rig;
+  SensorRig rig;           ///< The true one.
+  SensorRig told_rig;      ///< The calibration that the robot gets.
+  InertialErrors inertial_errors;
   std::unique_ptr<const BodyTrajectory> trajectory;
   Stamp epoch = 0;  ///< Time 0 of the trajectory.
   std::vector<ImuSample> imu;
   std::vector<TrueState> truth;
-  std::vector<Stamp> images;  ///< Stamps of the images.
+  std::vector<Stamp> images;        ///< True times of the images.
+  std::vector<Stamp> image_stamps;  ///< Stamps of the images by the cameras' clock.
+  std::optional<RobotClock> clock;  ///< Gave the stamps of images, `imu` and `truth`.
 
-  [[nodiscard]] BodyMotion motion(Stamp stamp) const {
-    return trajectory->motion(seconds_between(epoch, stamp));
+  /// A time before or after the trajectory has the motion of its begin or end.
+  [[nodiscard]] BodyMotion motion(Stamp true_time) const {
+    return trajectory->motion(
+        std::clamp(seconds_between(epoch, true_time), trajectory->start_s(), trajectory->end_s()));
   }
+  /// From the first image to the last one.
+  [[nodiscard]] double duration_s() const { return seconds_between(images.front(), images.back()); }
 };
 
 /// The robots that drive or fly through `world`; inertial data start kImuLead_s before the images.

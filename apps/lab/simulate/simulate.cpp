@@ -22,6 +22,9 @@
 #include "apps/lab/simulation/dataset/recording_texts.hpp"
 #include "apps/lab/simulation/motion/default_rig.hpp"
 #include "apps/lab/simulation/motion/depth_sensor.hpp"
+#include "apps/lab/simulation/motion/traffic.hpp"
+#include "apps/lab/simulation/rendering/light_passages.hpp"
+#include "apps/lab/simulation/rendering/moved_surfaces.hpp"
 #include "apps/lab/simulation/rendering/renderer.hpp"
 #include "apps/lab/simulation/rendering/sensor_effects.hpp"
 #include "apps/program_version.hpp"
@@ -34,13 +37,19 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kPoll_s = 0.1;
+// Parts of a robot's seed; robot_scenario.cpp has those below 16, channels have 16 to 20.
+constexpr std::uint64_t kLeftDirt = 32, kRightDirt = 33, kPassages = 34, kRain = 35;
+constexpr std::uint64_t kTraffic = 1000;  // part of the run's seed; robots have those below
 
 World make_world(const SimulationOptions& options) {
   switch (options.world) {
     case WorldKind::kCity:
-      return make_city(options.seed);
+      return options.effects.places.alike ? make_uniform_city(options.seed)
+                                          : make_city(options.seed);
     case WorldKind::kCamp:
       return make_camp(options.seed);
+    case WorldKind::kStore:
+      return make_store(options.seed);
     case WorldKind::kViconRoom:
       break;
   }
@@ -100,9 +109,21 @@ std::vector<ImageChannel> channels_of(const SimulationOptions& options, bool dep
 }
 
 SensorEffectsConfig sensor_effects(const SimulationOptions& options) {
-  SensorEffectsConfig config;
-  config.motion_blur = options.motion_blur;
+  SensorEffectsConfig config = options.effects.sensor;
+  config.motion_blur = config.motion_blur || options.motion_blur;
   return config;
+}
+
+// True if any effect makes the recordings harder than at level 0.
+bool is_disturbed(const SimulationOptions& options) {
+  return !changed_keys(options.effects, 0).empty();
+}
+
+// Files with the truth that a robot does not get.
+std::vector<fs::path> truth_files(const SimulationOptions& options, const std::string& robot) {
+  const fs::path folder = options.output / robot / "truth";
+  return {folder / "cam0.yaml", folder / "cam1.yaml", folder / "errors.yaml",
+          folder / "image_times.csv"};
 }
 
 std::size_t missing_of(const std::vector<fs::path>& files) {
@@ -132,10 +153,12 @@ std::size_t missing_files(const SimulationOptions& options) {
   std::size_t missing =
       missing_of({folder / "README.md", folder / "team.yaml", folder / "label_palette.csv",
                   folder / "world.ply", folder / "objects.json"});
+  if (is_disturbed(options)) missing += missing_of({folder / "effects.yaml"});
   for (const std::string& name : options.names) {
     const RecordingLayout layout(folder / name, options.format);
     missing += missing_of({layout.mav0() / "label_palette.csv", layout.imu() / "data.csv",
                            layout.imu() / "sensor.yaml", layout.truth()});
+    if (is_disturbed(options)) missing += missing_of(truth_files(options, name));
     for (const ImageChannel channel : channels_of(options, options.depth)) {
       missing += missing_images(layout, channel);
       if (channel != ImageChannel::kLabels) missing += missing_of({layout.calibration(channel)});
@@ -148,19 +171,22 @@ std::size_t missing_files(const SimulationOptions& options) {
 // several threads. The bytes of a frame depend only on the scenario.
 class RobotCameras {
  public:
-  // All three outlive this.
+  // All arguments outlive this.
   RobotCameras(const RobotScenario& scenario, const SimulationOptions& options,
-               const Renderer& renderer)
+               const Renderer& renderer, const Traffic& traffic)
       : scenario_(scenario),
         renderer_(renderer),
+        traffic_(traffic),
         options_(options),
         depth_step_(depth_step(options)),
         layout_(options.output / scenario.name, options.format),
         left_(scenario.rig.stereo.cameras[0]),
         right_(scenario.rig.stereo.cameras[1]),
         meter_(shrunk(scenario.rig.stereo.cameras[0], ExposureControl::kMeterShrink)),
-        left_effects_(left_, sensor_effects(options)),
-        right_effects_(right_, sensor_effects(options)),
+        left_effects_(left_, sensor_effects(options), derived_seed(scenario.seed, kLeftDirt)),
+        right_effects_(right_, sensor_effects(options), derived_seed(scenario.seed, kRightDirt)),
+        passages_(sensor_effects(options), scenario.duration_s(),
+                  derived_seed(scenario.seed, kPassages)),
         depth_sensor_(depth_sensor(scenario.rig, options.ideal_depth)) {}
 
   [[nodiscard]] const RecordingLayout& layout() const { return layout_; }
@@ -175,7 +201,7 @@ class RobotCameras {
   [[nodiscard]] std::vector<Stamp> stamps(ImageChannel channel) const {
     std::vector<Stamp> stamps;
     for (std::size_t i = 0; i < frame_count(); ++i)
-      if (contains(channels(i), channel)) stamps.push_back(scenario_.images[i]);
+      if (contains(channels(i), channel)) stamps.push_back(scenario_.image_stamps[i]);
     return stamps;
   }
 
@@ -184,28 +210,34 @@ class RobotCameras {
     return renderer_.render(meter_, scenario_.motion(scenario_.images[i]).T_world_body, {});
   }
 
+  // Factor of the light at frame `i`.
+  [[nodiscard]] double light(std::size_t i) const {
+    return passages_.factor(seconds_between(scenario_.images.front(), scenario_.images[i]));
+  }
+
   // Sets the exposure of every frame, in order; call before the first record().
   void set_exposures(std::vector<Exposure> exposures) { exposures_ = std::move(exposures); }
 
   // Renders frame `i` and writes the images that are missing. Throws RecordingError.
   void record(std::size_t i) const {
-    const Stamp stamp = scenario_.images[i];
+    const Stamp stamp = scenario_.image_stamps[i];
     std::vector<ImageChannel> missing = channels(i);
     std::erase_if(missing, [&](ImageChannel channel) {
       return is_whole_image(layout_.image(channel, stamp));
     });
     if (missing.empty()) return;
 
-    const SE3 T_world_body = scenario_.motion(stamp).T_world_body;
+    const std::unique_ptr<const MovedSurfaces> moved = moved_surfaces(i);
     RenderRequest request = {false, false, false, false};
     if (contains(missing, ImageChannel::kLeft)) request = left_effects_.request(false);
     if (contains(missing, ImageChannel::kColor))
       request = merged(request, left_effects_.request(true));
     request.depth |= contains(missing, ImageChannel::kDepth);
     request.labels |= contains(missing, ImageChannel::kLabels);
-    const RenderedView left = renderer_.render(left_, T_world_body, request);
+    const RenderedView left =
+        renderer_.render(left_, row_poses(i, left_.camera().height), request, moved.get());
     for (const ImageChannel channel : missing)
-      write_whole_file(layout_.image(channel, stamp), encoded(channel, i, left));
+      write_whole_file(layout_.image(channel, stamp), encoded(channel, i, left, moved.get()));
   }
 
  private:
@@ -217,20 +249,45 @@ class RobotCameras {
         motion.T_world_body.linear().transpose() * motion.velocity_world;
     const std::uint64_t camera =
         derived_seed(scenario_.seed, 16 + static_cast<std::uint64_t>(channel));
-    shot.noise_seed = derived_seed(camera, static_cast<std::uint64_t>(scenario_.images[i]));
+    const auto stamp = static_cast<std::uint64_t>(scenario_.images[i]);
+    shot.noise_seed = derived_seed(camera, stamp);
+    shot.light = light(i);
+    if (options_.effects.sensor.glare > 0.0)
+      shot.lights = renderer_.visible_lights(motion.T_world_body);
+    shot.down_body = -motion.T_world_body.linear().row(2).transpose();
+    shot.rain_seed = derived_seed(derived_seed(scenario_.seed, kRain), stamp);
     return shot;
   }
 
+  // Surfaces that move, at frame `i`; null if there are none.
+  [[nodiscard]] std::unique_ptr<const MovedSurfaces> moved_surfaces(std::size_t i) const {
+    if (traffic_.ways.empty()) return nullptr;
+    const double t_s = seconds_between(scenario_.images.front(), scenario_.images[i]);
+    return std::make_unique<const MovedSurfaces>(traffic_.shapes, traffic_.poses(t_s));
+  }
+
+  // Pose of the body for each row of frame `i`; a single one if all rows are seen at once.
+  [[nodiscard]] std::vector<SE3> row_poses(std::size_t i, int height) const {
+    const Stamp stamp = scenario_.images[i];
+    const SensorEffectsConfig& config = options_.effects.sensor;
+    if (config.rolling_shutter_s == 0.0) return {scenario_.motion(stamp).T_world_body};
+    std::vector<SE3> poses;
+    for (int row = 0; row < height; ++row)
+      poses.push_back(
+          scenario_.motion(stamp + nanoseconds(row_delay_s(config, row, height))).T_world_body);
+    return poses;
+  }
+
   [[nodiscard]] std::vector<std::uint8_t> encoded(ImageChannel channel, std::size_t i,
-                                                  const RenderedView& left) const {
+                                                  const RenderedView& left,
+                                                  const MovedSurfaces* moved) const {
     const Shot taken = shot(i, channel);
     switch (channel) {
       case ImageChannel::kLeft:
         return encode_gray(left_effects_.gray(left, taken), options_.format);
       case ImageChannel::kRight: {
-        const SE3 T_world_body = scenario_.motion(scenario_.images[i]).T_world_body;
-        const RenderedView right =
-            renderer_.render(right_, T_world_body, right_effects_.request(false));
+        const RenderedView right = renderer_.render(right_, row_poses(i, right_.camera().height),
+                                                    right_effects_.request(false), moved);
         return encode_gray(right_effects_.gray(right, taken), options_.format);
       }
       case ImageChannel::kDepth:
@@ -248,6 +305,7 @@ class RobotCameras {
 
   const RobotScenario& scenario_;
   const Renderer& renderer_;
+  const Traffic& traffic_;
   const SimulationOptions& options_;
   std::size_t depth_step_ = 0;  // number of frames between depth images, 0: no depth images
   RecordingLayout layout_;
@@ -256,6 +314,7 @@ class RobotCameras {
   PixelRays meter_;
   SensorEffects left_effects_;
   SensorEffects right_effects_;
+  LightPassages passages_;
   DepthSensor depth_sensor_;
   std::vector<Exposure> exposures_;
 };
@@ -326,13 +385,27 @@ class Simulation {
   void place_robots() {
     robots_ = options_.is_recorded() ? recorded_robots(flights_, options_)
                                      : simulated_robots(*world_, options_);
+    place_traffic();
     for (const RobotScenario& robot : robots_) {
-      cameras_.push_back(std::make_unique<RobotCameras>(robot, options_, *renderer_));
+      cameras_.push_back(std::make_unique<RobotCameras>(robot, options_, *renderer_, traffic_));
       for (std::size_t i = 0; i < robot.images.size(); ++i)
         frames_.push_back({cameras_.size() - 1, i});
       remaining_.push_back(std::make_unique<std::atomic<std::size_t>>(robot.images.size()));
     }
     is_finished_.resize(robots_.size(), false);
+  }
+
+  void place_traffic() {
+    std::vector<RobotWay> ways;
+    double duration_s = 0.0;
+    for (const RobotScenario& robot : robots_) {
+      ways.emplace_back([&robot](double t_s) {
+        return robot.motion(robot.images.front() + nanoseconds(t_s)).T_world_body;
+      });
+      duration_s = std::max(duration_s, robot.duration_s());
+    }
+    traffic_ = make_traffic(*world_, options_.effects.traffic, ways, duration_s,
+                            derived_seed(options_.seed, kTraffic));
   }
 
   void write_surroundings() const {
@@ -341,9 +414,14 @@ class Simulation {
     write_whole_file(folder_.path() / "world.ply", world_ply(*world_, simulation_palette()));
     write_whole_file(folder_.path() / "objects.json",
                      true_objects_json(*world_, simulation_palette()));
+    if (is_disturbed(options_))
+      write_whole_file(folder_.path() / "effects.yaml", effects_yaml(options_.effects));
+    if (!traffic_.ways.empty())
+      write_whole_file(folder_.path() / "traffic.csv", traffic_csv(traffic_, robots_));
     for (std::size_t r = 0; r < robots_.size(); ++r) {
       const RecordingLayout& layout = cameras_[r]->layout();
       write_calibration(r);
+      if (is_disturbed(options_)) write_truth(r);
       write_whole_file(layout.mav0() / "label_palette.csv", palette);
       write_whole_file(layout.imu() / "data.csv", imu_csv(robots_[r].imu));
       write_whole_file(layout.truth(), state_csv(robots_[r].truth));
@@ -357,7 +435,7 @@ class Simulation {
       ExposureControl control(sensor_effects(options_), options_.rate_hz);
       std::vector<Exposure> exposures;
       for (std::size_t i = 0; i < cameras.frame_count() && !stopped_; ++i)
-        exposures.push_back(control.next(cameras.meter(i)));
+        exposures.push_back(control.next(cameras.meter(i), cameras.light(i)));
       cameras.set_exposures(std::move(exposures));
     });
     workers.join();
@@ -385,7 +463,7 @@ class Simulation {
 
   void write_calibration(std::size_t r) const {
     const RecordingLayout& layout = cameras_[r]->layout();
-    const SensorRig& rig = robots_[r].rig;
+    const SensorRig& rig = robots_[r].told_rig;
     const Camera& left = rig.stereo.cameras[0];
     const std::string comment = std::string("simulated, world ") + world_->name;
     const auto write = [&](ImageChannel channel, const std::string& text) {
@@ -399,6 +477,17 @@ class Simulation {
     const bool recorded = options_.is_recorded();
     write_whole_file(layout.imu() / "sensor.yaml",
                      imu_yaml(rig.imu, recorded ? "recorded" : "simulated"));
+  }
+
+  // The robot does not get these files.
+  void write_truth(std::size_t r) const {
+    const RobotScenario& robot = robots_[r];
+    const std::vector<fs::path> files = truth_files(options_, robot.name);
+    const std::string comment = "true calibration";
+    write_whole_file(files[0], camera_yaml(robot.rig.stereo.cameras[0], options_.rate_hz, comment));
+    write_whole_file(files[1], camera_yaml(robot.rig.stereo.cameras[1], options_.rate_hz, comment));
+    write_whole_file(files[2], true_errors_yaml(robot));
+    write_whole_file(files[3], true_times_csv(robot));
   }
 
   DepthCameraFigures depth_figures(const SensorRig& rig) const {
@@ -435,6 +524,7 @@ class Simulation {
   std::optional<World> world_;
   std::optional<Renderer> renderer_;
   std::vector<RobotScenario> robots_;
+  Traffic traffic_;
   std::vector<std::unique_ptr<RobotCameras>> cameras_;
   std::vector<Frame> frames_;  // frames of all robots
   std::vector<std::unique_ptr<std::atomic<std::size_t>>> remaining_;

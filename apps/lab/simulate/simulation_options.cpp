@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -64,13 +65,32 @@ std::optional<std::pair<int, int>> parse_resolution(const std::string& text) {
   return std::pair(width, height);
 }
 
+// Removes the values that are maps: the sections of effects.
+std::map<std::string, YAML::Node> take_sections(ConfigSection& options) {
+  std::map<std::string, YAML::Node> sections;
+  for (const auto& [key, value] : options.values)
+    if (value.node.IsMap()) sections.emplace(key, value.node);
+  std::erase_if(options.values, [](const auto& entry) { return entry.second.node.IsMap(); });
+  return sections;
+}
+
 // Reads the file of options if there is one, then overrides it with the command line.
 void read_options(const std::string& file, const ConfigSection& given, SimulationOptions& options) {
   ConfigProblems problems;
   const ConfigContext context{problems};
   ConfigSection section = given;
   if (!file.empty()) section.values.merge(read_section(load_yaml(file), "", file, context).values);
+  EffectLayers layers;
+  layers.file = file;
+  layers.sections = take_sections(section);
   fill_config(section, "", context, options);
+  layers.level = options.difficulty;
+  layers.settings = options.settings;
+  try {
+    options.effects = load_effects(layers);
+  } catch (const ConfigError& error) {
+    problems.others += std::string(error.what()) + '\n';
+  }
   problems.finish();
 }
 
@@ -209,6 +229,9 @@ ParameterList parameters(const SimulationOptions& options) {
   list.emplace_back("color", yes(options.color));
   list.emplace_back("motion-blur", yes(options.motion_blur));
   list.emplace_back("image-format", Choices<ImageFormat>{kFormats}.name_of(options.format));
+  if (options.difficulty > 0) list.emplace_back("difficulty", std::to_string(options.difficulty));
+  for (const auto& [key, value] : changed_keys(options.effects, options.difficulty))
+    list.emplace_back(key, value);
   return list;
 }
 
@@ -216,7 +239,10 @@ std::string command_line(const SimulationOptions& options) {
   std::string text = "kimera_multi_simulate";
   for (const auto& [name, value] : parameters(options)) {
     if (value == "no" || (options.is_recorded() && name == "robots")) continue;
-    text += " --" + name + (value == "yes" ? "" : ' ' + value);
+    if (name.find('.') != std::string::npos)
+      text += " --set " + name + '=' + value;
+    else
+      text += " --" + name + (value == "yes" ? "" : ' ' + value);
   }
   const auto add = [&text](const char* name, const auto& values, const auto& shown) {
     if (values.empty()) return;

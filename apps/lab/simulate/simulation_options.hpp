@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/lab/simulate/effects.hpp"
 #include "apps/lab/simulation/dataset/dataset_record.hpp"
 #include "apps/lab/simulation/dataset/image_encoding.hpp"
 #include "modules/core/camera.hpp"
@@ -14,10 +15,12 @@
 
 namespace km {
 
-enum class WorldKind { kCity, kCamp, kViconRoom };
+enum class WorldKind { kCity, kCamp, kStore, kViconRoom };
 enum class CameraKind { kStereo, kRgbd };
-inline constexpr Choice<WorldKind> kWorlds[] = {
-    {"city", WorldKind::kCity}, {"camp", WorldKind::kCamp}, {"vicon_room", WorldKind::kViconRoom}};
+inline constexpr Choice<WorldKind> kWorlds[] = {{"city", WorldKind::kCity},
+                                                {"camp", WorldKind::kCamp},
+                                                {"store", WorldKind::kStore},
+                                                {"vicon_room", WorldKind::kViconRoom}};
 inline constexpr Choice<CameraKind> kCameras[] = {{"stereo", CameraKind::kStereo},
                                                   {"rgbd", CameraKind::kRgbd}};
 inline constexpr Choice<ImageFormat> kFormats[] = {{"jpg", ImageFormat::kJpeg},
@@ -41,6 +44,8 @@ struct SimulationOptions {
   bool labels = false;
   bool color = false;
   bool motion_blur = false;
+  int difficulty = 0;
+  std::vector<std::string> settings;
   ImageFormat format = ImageFormat::kJpeg;
   std::vector<std::filesystem::path> truths;
   std::vector<std::filesystem::path> imus;
@@ -55,6 +60,7 @@ struct SimulationOptions {
   int width = 752;               ///< [px], from `resolution` or `rig`.
   int height = 480;              ///< [px]
   std::optional<SensorRig> rig;  ///< Rig of the files in `calibrations`.
+  Effects effects;               ///< From the difficulty, the file's sections, the settings.
 
   [[nodiscard]] bool is_recorded() const { return !truths.empty(); }
 
@@ -76,6 +82,11 @@ struct SimulationOptions {
     visitor.field("labels", labels, "Also class ids of the left camera's pixels");
     visitor.field("color", color, "Also colour images of the left camera");
     visitor.field("motion-blur", motion_blur, "Smear images along their motion");
+    visitor.field(
+        "difficulty", difficulty, {0, kHardestLevel},
+        "Level of errors of sensors, clocks and calibration, and of clutter in the world");
+    visitor.field("set", settings,
+                  "Keys of single effects over those of the difficulty: section.key=value");
     visitor.field("image-format", format, kFormats, "jpg: quality 92, as recordings were stored");
     visitor.field("trajectory", truths, Input{},
                   "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV "
@@ -101,8 +112,9 @@ struct SimulationOptions {
   }
 };
 
-/// Adds the options to a command line, and --config for a file of them: a YAML map. The command
-/// line has priority over the file. All errors of both are reported together, by name and line.
+/// Adds the options to a command line, and --config for a file of them: a YAML map, which may have
+/// sections of effects. The command line has priority over the file. All errors of both are
+/// reported together, by name and line.
 void define(CLI::App& app, SimulationOptions& options);
 
 /// Options with derived values filled in: names, the number of robots, the rate of depth images,

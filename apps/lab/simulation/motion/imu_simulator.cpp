@@ -40,6 +40,7 @@ std::vector<SimulatedImu> simulate_imu(const BodyTrajectory& trajectory, Stamp e
                                        const ImuSimulation& options) {
   checked(options);
   const ImuNoise& n = options.noise;
+  const InertialErrors& errors = options.errors;
   const double on = options.ideal ? 0.0 : 1.0;
   SensorError gyro(on * options.initial_gyro_bias, on * n.gyro_noise_density,
                    on * n.gyro_random_walk, n.rate_hz, stream(options, 1));
@@ -56,12 +57,18 @@ std::vector<SimulatedImu> simulate_imu(const BodyTrajectory& trajectory, Stamp e
     const BodyMotion motion = trajectory.motion(t_s);
     SimulatedImu simulated;
     simulated.sample.stamp = epoch + since_epoch;
-    simulated.gyro_bias = gyro.bias();
-    simulated.accel_bias = accel.bias();
-    simulated.sample.gyro = motion.angular_velocity_body + gyro.bias() + gyro.draw_noise();
-    simulated.sample.accel =
-        motion.T_world_body.linear().transpose() * (motion.acceleration_world - gravity) +
-        accel.bias() + accel.draw_noise();
+    const double run_s = t_s - trajectory.start_s();
+    const double warmth = errors.warmth(run_s);
+    const Eigen::Vector3d sway = errors.sway(run_s);
+    simulated.gyro_bias = gyro.bias() + warmth * errors.gyro_warm;
+    simulated.accel_bias = accel.bias() + warmth * errors.accel_warm;
+    simulated.sample.gyro = errors.gyro_matrix * motion.angular_velocity_body +
+                            simulated.gyro_bias + gyro.draw_noise() +
+                            errors.gyro_vibration.cwiseProduct(sway);
+    const Eigen::Vector3d force =
+        motion.T_world_body.linear().transpose() * (motion.acceleration_world - gravity);
+    simulated.sample.accel = errors.accel_matrix * force + simulated.accel_bias +
+                             accel.draw_noise() + errors.accel_vibration.cwiseProduct(sway);
     samples.push_back(simulated);
     gyro.walk();
     accel.walk();

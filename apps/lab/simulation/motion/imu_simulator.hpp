@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "apps/lab/simulation/motion/inertial_errors.hpp"
 #include "apps/lab/simulation/motion/spline_trajectory.hpp"
 #include "modules/core/camera.hpp"
 #include "modules/core/config.hpp"
@@ -16,7 +17,8 @@ namespace km {
 struct ImuSimulation {
   static constexpr const char* kSection = "imu";
 
-  ImuNoise noise;  ///< Its rate_hz is the sampling rate.
+  ImuNoise noise;         ///< Its rate_hz is the sampling rate.
+  InertialErrors errors;  ///< Beyond white noise and bias walk; default: none.
   std::uint64_t seed = 1;
   bool ideal = false;                ///< Neither noise nor bias.
   double initial_gyro_bias = 0.03;   ///< Standard deviation per axis at the start [rad/s].
@@ -36,7 +38,7 @@ struct ImuSimulation {
   }
 };
 
-/// A sample and its biases, which EuRoC's ground-truth state lists.
+/// A sample and its biases with their drift by temperature, which EuRoC's ground-truth state lists.
 struct SimulatedImu {
   ImuSample sample;
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< [rad/s]
@@ -46,7 +48,8 @@ struct SimulatedImu {
 /// Samples of an inertial sensor in the body's origin over the whole of `trajectory`, at epoch + k
 /// / rate for all integers k within the trajectory. Stamps are rounded to nanoseconds, and the
 /// motion is that at the rounded stamp:
-///   gyro = w + b_g + n_g,   accel = R^T (a - g) + b_a + n_a.
+///   gyro = M_g w + b_g + n_g + v_g,   accel = M_a R^T (a - g) + b_a + n_a + v_a,
+/// with the matrices M and vibrations v of `errors`.
 /// White noise and bias walk in discrete time as in Kalibr's IMU noise model: standard deviations
 /// density / sqrt(dt) and walk * sqrt(dt). Throws ConfigError for options out of range.
 [[nodiscard]] std::vector<SimulatedImu> simulate_imu(const BodyTrajectory& trajectory, Stamp epoch,

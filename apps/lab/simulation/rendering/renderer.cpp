@@ -74,18 +74,25 @@ void copy_lane(const SurfaceHits& from, std::size_t lane, SurfaceHits& to, std::
 // One call of Renderer::render(): a ray and a shade per pixel, then more rays in pixels with edges.
 class ViewPass {
  public:
-  ViewPass(const RenderScene& scene, const RenderOptions& options, const PixelRays& rays,
-           const SE3& T_world_body, const RenderRequest& request)
-      : scene_(scene),
+  ViewPass(const SceneView& view, const RenderOptions& options, const PixelRays& rays,
+           std::span<const SE3> T_world_body, const RenderRequest& request)
+      : at_(view),
+        scene_(view.fixed),
+        surfaces_(view.surfaces()),
         options_(options),
         rays_(rays),
         request_(request),
         width_(rays.camera().width),
         height_(rays.camera().height),
         samples_(usable_samples(options.samples_per_pixel)) {
-    const SE3 T_world_cam = T_world_body * rays.camera().T_body_cam;
-    R_world_cam_ = T_world_cam.linear().cast<float>();
-    origin_ = T_world_cam.translation().cast<float>();
+    if (T_world_body.size() != 1 && T_world_body.size() != static_cast<std::size_t>(height_))
+      throw std::invalid_argument("render: " + std::to_string(T_world_body.size()) + " poses for " +
+                                  std::to_string(height_) + " rows");
+    for (const SE3& T : T_world_body) {
+      const SE3 T_world_cam = T * rays.camera().T_body_cam;
+      poses_.push_back(
+          {T_world_cam.linear().cast<float>(), T_world_cam.translation().cast<float>()});
+    }
     view_.width = width_;
     view_.height = height_;
     const std::size_t n = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
@@ -113,6 +120,11 @@ class ViewPass {
   }
 
  private:
+  /// Pose of the camera.
+  struct Pose {
+    Eigen::Matrix3f R_world_cam;
+    Eigen::Vector3f origin;
+  };
   /// Data on a pixel's centre that the second pass needs.
   struct Pixel {
     std::uint32_t triangle = kNoTriangle;
@@ -180,14 +192,21 @@ class ViewPass {
       y[lane] += aim.dx[lane] * right_y[lane] + aim.dy[lane] * down_y[lane];
     }
     const auto rotate = [&](int row, float* direction, Lanes& right, Lanes& down, float* origin) {
-      const float a = R_world_cam_(row, 0);
-      const float b = R_world_cam_(row, 1);
-      const float c = R_world_cam_(row, 2);
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const auto turn = [&](std::size_t lane, float a, float b, float c, float from) {
         direction[lane] = a * x[lane] + b * y[lane] + c;
         right[lane] = a * right_x[lane] + b * right_y[lane];
         down[lane] = a * down_x[lane] + b * down_y[lane];
-        origin[lane] = origin_[row];
+        origin[lane] = from;
+      };
+      if (poses_.size() == 1) {
+        const auto& [R, from] = poses_.front();
+        const float a = R(row, 0), b = R(row, 1), c = R(row, 2), at = from[row];
+        for (std::size_t lane = 0; lane < kLanes; ++lane) turn(lane, a, b, c, at);
+        return;
+      }
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const auto& [R, from] = pose(aim.y[lane]);
+        turn(lane, R(row, 0), R(row, 1), R(row, 2), from[row]);
       }
     };
     rotate(0, hits.rays.ray.dir_x, hits.right.x, hits.down.x, hits.rays.ray.org_x);
@@ -197,7 +216,7 @@ class ViewPass {
     std::fill_n(hits.rays.ray.tfar, kLanes, std::numeric_limits<float>::infinity());
 
     hits.active = aim.active;
-    scene_.tracer.intersect(aim.active, hits.rays);
+    at_.intersect(aim.active, hits.rays);
     hits.surface = 0;
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       hits.surface |= static_cast<LaneMask>(hits.rays.hit.primID[lane] != kNoTriangle) << lane;
@@ -216,9 +235,9 @@ class ViewPass {
     SurfacePoints points;
     LaneMask dark = 0;
     if (request_.radiance || request_.rgb) {
-      locate(scene_.surfaces, hits, points);
+      locate(surfaces_, hits, points);
       if (options_.shadows && scene_.lighting.sun > 0.0F)
-        dark = shadowed(scene_, hits.surface, points);
+        dark = shadowed(at_, hits.surface, points);
     }
     store_block(aim, hits, points, dark);
   }
@@ -237,9 +256,8 @@ class ViewPass {
       const bool is_dark = has_lane(dark, lane);
       pixels_[i] = {hits.rays.hit.primID[lane], depth_m, kSkyMaterial, false, is_dark};
       if (surface) {
-        const SurfaceRecord& record = scene_.surfaces.record(pixels_[i].triangle);
-        pixels_[i].material = record.material;
-        pixels_[i].foliage = scene_.surfaces.material(record).foliage;
+        pixels_[i].material = surfaces_.record(pixels_[i].triangle).material;
+        pixels_[i].foliage = surfaces_.material_of(pixels_[i].triangle).foliage;
       }
       if (request_.radiance) {
         gray_[i] = gray[lane];
@@ -251,9 +269,8 @@ class ViewPass {
       }
       if (request_.depth) view_.depth_m[i] = depth_m;
       if (request_.labels)
-        view_.labels[i] =
-            surface ? scene_.surfaces.material(scene_.surfaces.record(pixels_[i].triangle)).label
-                    : static_cast<LabelId>(SurfaceClass::kSky);
+        view_.labels[i] = surface ? surfaces_.material_of(pixels_[i].triangle).label
+                                  : static_cast<LabelId>(SurfaceClass::kSky);
     }
   }
 
@@ -261,7 +278,8 @@ class ViewPass {
     const std::size_t y = pixel / static_cast<std::size_t>(width_);
     // A row of bearings has one more than a row of pixels.
     const Eigen::Vector2f& bearing = rays_.bearings()[pixel + y];
-    return origin_ + pixels_[pixel].depth_m * (R_world_cam_ * bearing.homogeneous());
+    const auto& [R_world_cam, origin] = pose(static_cast<int>(y));
+    return origin + pixels_[pixel].depth_m * (R_world_cam * bearing.homogeneous());
   }
 
   // True for the same material and nearly one plane.
@@ -270,9 +288,9 @@ class ViewPass {
     const Pixel& at = pixels_[pixel];
     if (at.triangle == triangle) return true;
     if (at.triangle == kNoTriangle || triangle == kNoTriangle) return false;
-    const SurfaceRecord& other = scene_.surfaces.record(triangle);
+    const SurfaceRecord& other = surfaces_.record(triangle);
     if (at.material != other.material) return false;
-    const SurfaceRecord& surface = scene_.surfaces.record(at.triangle);
+    const SurfaceRecord& surface = surfaces_.record(at.triangle);
     constexpr float kLeastCosine = 0.95F;  // 18 degrees
     if (std::abs(surface.normal.dot(other.normal)) < kLeastCosine) return false;
     // The distance from the plane is less than about the size of a pixel.
@@ -337,9 +355,9 @@ class ViewPass {
       if (triangle == pixels_[index(aim.x[lane], aim.y[lane])].triangle) continue;
       const Eigen::Vector3f d(hits.rays.ray.dir_x[lane], hits.rays.ray.dir_y[lane],
                               hits.rays.ray.dir_z[lane]);
-      const Eigen::Vector3f hit = triangle == kNoTriangle
-                                      ? origin_
-                                      : Eigen::Vector3f(origin_ + hits.rays.ray.tfar[lane] * d);
+      const Eigen::Vector3f& origin = pose(aim.y[lane]).origin;
+      const Eigen::Vector3f hit =
+          triangle == kNoTriangle ? origin : Eigen::Vector3f(origin + hits.rays.ray.tfar[lane] * d);
       flag_unlike(aim.x[lane], aim.y[lane], triangle, hit);
     }
   }
@@ -406,7 +424,7 @@ class ViewPass {
     if (std::abs(pixel.depth_m - depth_m) > kDepthShare * depth_m) return false;
     constexpr float kLeastCosine = 0.95F;  // 18 degrees
     return pixel.foliage ||
-           scene_.surfaces.record(pixel.triangle).normal.dot(surface.normal) > kLeastCosine;
+           surfaces_.record(pixel.triangle).normal.dot(surface.normal) > kLeastCosine;
   }
 
   // A pixel whose shade can be used for a sample that hit `triangle`. Candidates are the sample's
@@ -424,7 +442,7 @@ class ViewPass {
     for (const std::size_t other : {nearer, farther, index(side_x, side_y)})
       if (pixels_[other].triangle == triangle && rays_.is_lit(other)) return other;
     if (triangle == kNoTriangle) return std::nullopt;
-    const SurfaceRecord& surface = scene_.surfaces.record(triangle);
+    const SurfaceRecord& surface = surfaces_.record(triangle);
     for (const std::size_t other : {nearer, farther, pixel})
       if (alike(pixels_[other], surface, depth_m)) return other;
     return std::nullopt;
@@ -468,10 +486,9 @@ class ViewPass {
   void light_deferred() {
     const SurfaceHits& hits = deferred_.hits;
     SurfacePoints points;
-    locate(scene_.surfaces, hits, points);
+    locate(surfaces_, hits, points);
     LaneMask dark = 0;
-    if (options_.shadows && scene_.lighting.sun > 0.0F)
-      dark = shadowed(scene_, hits.surface, points);
+    if (options_.shadows && scene_.lighting.sun > 0.0F) dark = shadowed(at_, hits.surface, points);
     if (request_.radiance) mix(points, dark, gray_, view_.radiance);
     if (request_.rgb) mix(points, dark, color_, view_.rgb);
     deferred_ = {};
@@ -497,20 +514,25 @@ class ViewPass {
     image[pixel] += weight * (radiance - lit(shaded[pixel], pixels_[pixel].dark));
   }
 
+  [[nodiscard]] const Pose& pose(int row) const {
+    return poses_.size() == 1 ? poses_.front() : poses_[static_cast<std::size_t>(row)];
+  }
+
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
            static_cast<std::size_t>(x);
   }
 
+  const SceneView at_;
   const RenderScene& scene_;
+  const SurfaceView surfaces_;
   const RenderOptions& options_;
   const PixelRays& rays_;
   const RenderRequest& request_;
   int width_;
   int height_;
-  Eigen::Matrix3f R_world_cam_;
-  Eigen::Vector3f origin_;
-  int samples_;  ///< Per pixel with an edge.
+  std::vector<Pose> poses_;  ///< One, or one for each row.
+  int samples_;              ///< Per pixel with an edge.
 
   RenderedView view_;
   std::vector<Pixel> pixels_;
@@ -574,7 +596,35 @@ Renderer::~Renderer() = default;
 
 RenderedView Renderer::render(const PixelRays& rays, const SE3& T_world_body,
                               const RenderRequest& request) const {
-  return ViewPass(impl_->scene, impl_->options, rays, T_world_body, request).run();
+  return render(rays, std::span(&T_world_body, 1), request);
+}
+
+RenderedView Renderer::render(const PixelRays& rays, std::span<const SE3> T_world_body,
+                              const RenderRequest& request, const MovedSurfaces* moved) const {
+  return ViewPass({impl_->scene, moved}, impl_->options, rays, T_world_body, request).run();
+}
+
+std::vector<LightSource> Renderer::visible_lights(const SE3& T_world_body) const {
+  const Lighting& lighting = impl_->scene.lighting;
+  const Eigen::Vector3f origin = T_world_body.translation().cast<float>();
+  std::vector<LightSource> lights;
+  const auto add_if_visible = [&](const Eigen::Vector3f& to_light, float irradiance, float far) {
+    RayPacket rays;
+    set_ray(rays, 0, origin, to_light, 0.0F, far);
+    if (impl_->scene.tracer.occluded(1U, rays) != 0) return;
+    lights.push_back({T_world_body.linear().transpose() * to_light.cast<double>(),
+                      static_cast<double>(irradiance)});
+  };
+  if (lighting.sun > 0.0F)
+    add_if_visible(lighting.to_sun, lighting.sun, std::numeric_limits<float>::infinity());
+  for (const Lighting::Lamp& lamp : lighting.lamps) {
+    constexpr float kLampRadius_m = 0.3F;  // surfaces of the lamp itself hide nothing
+    const Eigen::Vector3f way = lamp.position - origin;
+    const float distance_m = std::max(way.norm(), 2.0F * kLampRadius_m);
+    add_if_visible(way / distance_m, lamp.intensity / (distance_m * distance_m),
+                   distance_m - kLampRadius_m);
+  }
+  return lights;
 }
 
 RenderedView Renderer::render(const Camera& camera, const SE3& T_world_body,

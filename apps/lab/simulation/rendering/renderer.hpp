@@ -3,8 +3,10 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
+#include "apps/lab/simulation/rendering/shot.hpp"
 #include "apps/lab/simulation/world/world.hpp"
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
@@ -68,6 +70,8 @@ struct RenderOptions {
   bool shadows = true;
 };
 
+class MovedSurfaces;
+
 /// Ray caster over one world. Immutable after construction. render() may be called from several
 /// threads at once and gives the same bytes whatever their number.
 class Renderer {
@@ -79,9 +83,18 @@ class Renderer {
   /// One view through a camera (distortion included), its body at T_world_body.
   [[nodiscard]] RenderedView render(const PixelRays& rays, const SE3& T_world_body,
                                     const RenderRequest& request) const;
+  /// One view whose row y is seen from T_world_body[y], as by a rolling shutter, with the surfaces
+  /// `moved` in addition to the world's. Throws std::invalid_argument unless there is one pose, or
+  /// one for each row.
+  [[nodiscard]] RenderedView render(const PixelRays& rays, std::span<const SE3> T_world_body,
+                                    const RenderRequest& request,
+                                    const MovedSurfaces* moved = nullptr) const;
   /// Renders a single view: computes the camera's rays first.
   [[nodiscard]] RenderedView render(const Camera& camera, const SE3& T_world_body,
                                     const RenderRequest& request) const;
+
+  /// The sun and the lamps that shine on the body at T_world_body without a surface between.
+  [[nodiscard]] std::vector<LightSource> visible_lights(const SE3& T_world_body) const;
 
  private:
   struct Impl;

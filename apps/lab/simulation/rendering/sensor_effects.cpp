@@ -168,15 +168,15 @@ ExposureControl::ExposureControl(const SensorEffectsConfig& config, double rate_
   share_per_frame_ = 1.0 - std::pow(1.0 - config_.adaptation, kConfiguredRate_hz / rate_hz);
 }
 
-Exposure ExposureControl::next(const RenderedView& scene) {
+Exposure ExposureControl::next(const RenderedView& scene, double light) {
   if (scene.radiance.empty())
     throw std::invalid_argument("ExposureControl: a view without radiance");
   if (!started_) {
-    log_gain_ = std::log(solve_gain(scene.radiance, config_));
+    log_gain_ = std::log(solve_gain(scene.radiance, config_) / light);
     started_ = true;
   } else {
     // A step of the integrating controller that steers the mean of a linear image to its target.
-    const double level = mean_level(scene.radiance, std::exp(log_gain_), config_.gamma);
+    const double level = mean_level(scene.radiance, light * std::exp(log_gain_), config_.gamma);
     const double error = std::log(config_.target_level / std::max(level, 1e-3));
     log_gain_ = std::clamp(log_gain_ + share_per_frame_ * config_.gamma * error,
                            std::log(kLeastGain), std::log(kMostGain));
@@ -287,9 +287,11 @@ template std::vector<float> blurred(const std::vector<float>&, int, int,
 template std::vector<Eigen::Vector3f> blurred(const std::vector<Eigen::Vector3f>&, int, int,
                                               const std::vector<Eigen::Vector2f>&);
 
-SensorEffects::SensorEffects(const PixelRays& rays, const SensorEffectsConfig& config)
+SensorEffects::SensorEffects(const PixelRays& rays, const SensorEffectsConfig& config,
+                             std::uint64_t dirt_seed)
     : config_(checked(config)),
       rays_(rays),
+      clutter_(rays.camera(), config, dirt_seed),
       noise_tile_(make_noise_tile(config.noise_correlation_px)) {
   const Camera& camera = rays.camera();
   // The light falls with the fourth power of a cosine: 1 / (1 + k r^2)^2.
@@ -335,12 +337,12 @@ void SensorEffects::require_complete(const RenderedView& view, std::size_t value
 template <typename Value>
 std::vector<Value> SensorEffects::on_sensor(const std::vector<Value>& image,
                                             const RenderedView& view, const Shot& shot) const {
-  const std::vector<Value> seen =
-      lens_blurred(image, view.width, view.height, config_.lens_blur_px);
-  if (!config_.motion_blur || shot.body_velocity.isZero() || !(shot.exposure.time_s > 0.0))
-    return seen;
-  return blurred(seen, view.width, view.height,
-                 image_motion(rays_, view.depth_m, shot.body_velocity, shot.exposure.time_s));
+  std::vector<Value> seen = lens_blurred(image, view.width, view.height, config_.lens_blur_px);
+  if (config_.motion_blur && !shot.body_velocity.isZero() && shot.exposure.time_s > 0.0)
+    seen = blurred(seen, view.width, view.height,
+                   image_motion(rays_, view.depth_m, shot.body_velocity, shot.exposure.time_s));
+  clutter_.add_to(seen, shot);
+  return seen;
 }
 
 std::uint8_t SensorEffects::quantized(float signal) const {
@@ -357,7 +359,7 @@ void SensorEffects::expose(const float* linear, std::size_t stride, const Shot& 
                            std::mt19937& random, std::uint8_t* levels) const {
   const NoiseLevels noise = noise_levels(config_, shot.exposure);
   const TileOffsets offsets = draw_offsets(random);
-  const auto gain = static_cast<float>(shot.exposure.gain);
+  const auto gain = static_cast<float>(shot.exposure.gain * shot.light);
   const auto width = static_cast<std::uint32_t>(rays_.camera().width);
   const auto height = static_cast<std::uint32_t>(rays_.camera().height);
   std::size_t i = 0;

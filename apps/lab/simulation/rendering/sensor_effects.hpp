@@ -5,56 +5,14 @@
 #include <random>
 #include <vector>
 
+#include "apps/lab/simulation/rendering/lens_clutter.hpp"
 #include "apps/lab/simulation/rendering/renderer.hpp"
-#include "modules/core/config.hpp"
+#include "apps/lab/simulation/rendering/sensor_effects_config.hpp"
+#include "apps/lab/simulation/rendering/shot.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/geometry.hpp"
 
 namespace km {
-
-/// Effects of a lens and a sensor on light; visit_fields() describes the fields, which are the keys
-/// below `sensor:`.
-struct SensorEffectsConfig {
-  static constexpr const char* kSection = "sensor";
-
-  double vignetting = 0.2;
-  double lens_blur_px = 0.6;  ///< With this value the Vicon room has the same variance of the
-                              ///< Laplacian as recorded images.
-  double read_noise = 1.0;
-  double photon_noise = 2.0;
-  double noise_correlation_px = 1.2;  ///< Demosaicing, filters and JPEG leave little fine noise.
-  double gamma = 1.0;
-  double target_level = 0.55;
-  double adaptation = 0.02;
-  double unit_exposure_s = 0.005;
-  double max_exposure_s = 0.015;
-  bool motion_blur = true;
-
-  void visit_fields(auto& visitor) {
-    visitor.field("vignetting", vignetting, {0.0, 0.9},
-                  "share of light lost in the corners; it falls as the fourth power of a cosine");
-    visitor.field("lens_blur_px", lens_blur_px, {0.0, 5.0}, "px, standard deviation of a point");
-    visitor.field("read_noise", read_noise, {0.0, 50.0}, "grey levels, in the dark");
-    visitor.field("photon_noise", photon_noise, {0.0, 50.0},
-                  "grey levels just below saturation; it falls with the square root of the light");
-    visitor.field("noise_correlation_px", noise_correlation_px, {0.0, 4.0}, "px; 0: white noise");
-    visitor.field("gamma", gamma, {1.0, 3.0}, "grey = signal^(1 / gamma); 1: linear");
-    visitor.field("target_level", target_level, {0.05, 0.95}, "mean grey, share of saturation");
-    visitor.field("adaptation", adaptation, {0.001, 1.0},
-                  "share of the way to the target, in log exposure, per frame at 20 Hz");
-    visitor.field("unit_exposure_s", unit_exposure_s, {1e-5, 1.0},
-                  "s, shutter time at which a white wall in the sun saturates");
-    visitor.field("max_exposure_s", max_exposure_s, {1e-5, 1.0},
-                  "s; darker scenes are amplified instead, noise included");
-    visitor.field("motion_blur", motion_blur, "smear along the motion while the shutter is open");
-  }
-};
-
-/// Setting of the sensor for one frame.
-struct Exposure {
-  double gain = 1.0;    ///< Radiance 1 / gain saturates the sensor.
-  double time_s = 0.0;  ///< Shutter time, centred on the frame's stamp.
-};
 
 /// Auto-exposure as in recorded cameras: it controls the mean grey level, with a delay.
 ///
@@ -75,9 +33,9 @@ class ExposureControl {
   /// not positive.
   ExposureControl(const SensorEffectsConfig& config, double rate_hz);
 
-  /// Returns the exposure of the frame that sees `scene`, from its `radiance`. The first frame gets
-  /// the target level at once. Throws std::invalid_argument without radiance.
-  [[nodiscard]] Exposure next(const RenderedView& scene);
+  /// Returns the exposure of the frame that sees `scene`, from its `radiance` times `light`. The
+  /// first frame gets the target level at once. Throws std::invalid_argument without radiance.
+  [[nodiscard]] Exposure next(const RenderedView& scene, double light = 1.0);
 
  private:
   SensorEffectsConfig config_;
@@ -85,6 +43,12 @@ class ExposureControl {
   double log_gain_ = 0.0;
   bool started_ = false;
 };
+
+/// Time of row `row` of `height` rows after the frame's stamp [s], which is the middle of the
+/// image.
+[[nodiscard]] inline double row_delay_s(const SensorEffectsConfig& config, int row, int height) {
+  return config.rolling_shutter_s * ((row + 0.5) / height - 0.5);
+}
 
 /// Blur of a sharp image by the lens: a Gaussian of `sigma_px`. Border values continue outwards.
 /// Row-major, width * height. Value: float, Eigen::Vector3f.
@@ -115,20 +79,14 @@ struct ColorImage {
   std::vector<std::uint8_t> pixels;
 };
 
-/// Conditions under which one frame was taken.
-struct Shot {
-  Exposure exposure;
-  Vector6 body_velocity = Vector6::Zero();  ///< [rad/s; m/s] in the body frame, at the stamp.
-  std::uint64_t noise_seed = 0;             ///< Seed of the image; different for left and right
-                                            ///< images.
-};
-
-/// Converts light on the sensor to grey levels: blur of lens and motion, vignetting, exposure,
-/// noise, response, quantisation. Immutable; one per camera, shared by threads.
+/// Converts light on the sensor to grey levels: blur of lens and motion, rain, glare and dirt,
+/// vignetting, exposure, noise, response, quantisation. Immutable; one per camera, shared by
+/// threads.
 class SensorEffects {
  public:
-  /// Throws ConfigError.
-  SensorEffects(const PixelRays& rays, const SensorEffectsConfig& config);
+  /// `dirt_seed`: seed of the spots on this lens. Throws ConfigError.
+  SensorEffects(const PixelRays& rays, const SensorEffectsConfig& config,
+                std::uint64_t dirt_seed = 0);
 
   /// Request to the renderer for gray() or color(): the radiance or rgb, and the depth if there is
   /// motion blur.
@@ -151,6 +109,7 @@ class SensorEffects {
 
   SensorEffectsConfig config_;
   PixelRays rays_;
+  LensClutter clutter_;
   std::vector<float> relative_light_;  ///< 1 at the centre, less in the corners.
   std::vector<float> noise_tile_;      ///< Unit variance, correlated, square; it repeats.
   std::vector<float> response_;        ///< Grey level over the square root of the signal.

@@ -234,9 +234,30 @@ RenderScene::RenderScene(const World& world)
       sky(world.lighting),
       light(world, tracer, surfaces, sky) {}
 
-LaneMask shadowed(const RenderScene& scene, LaneMask wanted, const SurfacePoints& points) {
+void SceneView::intersect(LaneMask active, RayPacket& rays) const {
+  fixed.tracer.intersect(active, rays);
+  if (moved == nullptr) return;
+  RayPacket nearer = rays;  // a ray ends at its hit of a fixed surface
+  moved->tracer().intersect(active, nearer);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!has_lane(active, lane) || nearer.hit.primID[lane] == kNoTriangle) continue;
+    rays.hit.primID[lane] = fixed.surfaces.size() + nearer.hit.primID[lane];
+    rays.hit.u[lane] = nearer.hit.u[lane];
+    rays.hit.v[lane] = nearer.hit.v[lane];
+    rays.ray.tfar[lane] = nearer.ray.tfar[lane];
+  }
+}
+
+LaneMask SceneView::occluded(LaneMask active, RayPacket& rays) const {
+  if (moved == nullptr) return fixed.tracer.occluded(active, rays);
+  RayPacket same = rays;  // hits end rays
+  const LaneMask dark = fixed.tracer.occluded(active, rays);
+  return dark | moved->tracer().occluded(active & ~dark, same);
+}
+
+LaneMask shadowed(const SceneView& scene, LaneMask wanted, const SurfacePoints& points) {
   if (wanted == 0) return 0;
-  const Eigen::Vector3f to_sun = scene.lighting.to_sun;
+  const Eigen::Vector3f to_sun = scene.fixed.lighting.to_sun;
   RayPacket rays;
   Lanes facing;
   run_wide([&] {
@@ -257,7 +278,7 @@ LaneMask shadowed(const RenderScene& scene, LaneMask wanted, const SurfacePoints
   LaneMask dark = 0;
   for (std::size_t i = 0; i < kLanes; ++i)
     if (facing[i] <= 0.0F && !(points.material[i]->transmission > 0.0F)) dark |= 1U << i;
-  return (dark & wanted) | scene.tracer.occluded(wanted & ~dark, rays);
+  return (dark & wanted) | scene.occluded(wanted & ~dark, rays);
 }
 
 template <typename Value>

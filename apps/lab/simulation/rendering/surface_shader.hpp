@@ -4,6 +4,7 @@
 #include <array>
 
 #include "apps/lab/simulation/rendering/light_volume.hpp"
+#include "apps/lab/simulation/rendering/moved_surfaces.hpp"
 #include "apps/lab/simulation/rendering/sky.hpp"
 #include "apps/lab/simulation/rendering/surfaces.hpp"
 #include "apps/lab/simulation/world/world.hpp"
@@ -21,6 +22,20 @@ struct RenderScene {
   const LightVolume light;
 };
 
+/// A scene at one instant.
+struct SceneView {
+  const RenderScene& fixed;
+  const MovedSurfaces* moved = nullptr;  ///< Null: nothing moves.
+
+  [[nodiscard]] SurfaceView surfaces() const {
+    return {fixed.surfaces, moved == nullptr ? nullptr : &moved->surfaces()};
+  }
+  /// Nearest hits, as RayTracer::intersect(); triangles are those of surfaces().
+  void intersect(LaneMask active, RayPacket& rays) const;
+  /// As RayTracer::occluded().
+  [[nodiscard]] LaneMask occluded(LaneMask active, RayPacket& rays) const;
+};
+
 /// Radiance along one ray, split into two parts, of which a shadow removes one. Value is float
 /// (grey) or Eigen::Vector3f (colour).
 template <typename Value>
@@ -31,7 +46,7 @@ struct Shade {
 
 /// Lanes of `wanted` that the sun does not reach: in shadow, or turned away from it. Precondition:
 /// all lanes of `wanted` have been located.
-[[nodiscard]] LaneMask shadowed(const RenderScene& scene, LaneMask wanted,
+[[nodiscard]] LaneMask shadowed(const SceneView& scene, LaneMask wanted,
                                 const SurfacePoints& points);
 
 /// Radiance of each wanted lane, haze included; undefined for the other lanes. Precondition: the

@@ -11,8 +11,7 @@
 namespace km {
 namespace {
 
-void require_indices(const World& world) {
-  const SurfaceMesh& mesh = world.mesh;
+void require_indices(const World& world, const SurfaceMesh& mesh) {
   const auto fail = [&world](const std::string& what) {
     throw std::invalid_argument("world " + world.name + ": " + what);
   };
@@ -95,7 +94,7 @@ Lanes lanes_of(const float* values) {
 }
 
 // Lanes without a surface copy the first lane that has one.
-Gathered gather(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePoints& points) {
+Gathered gather(const SurfaceView& surfaces, const SurfaceHits& hits, SurfacePoints& points) {
   const RTCRay16& ray = hits.rays.ray;
   const RTCHit16& hit = hits.rays.hit;
   Gathered g;
@@ -114,7 +113,7 @@ Gathered gather(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePo
     }
     const std::uint32_t triangle = hit.primID[from];
     const SurfaceRecord& surface = surfaces.record(triangle);
-    points.material[lane] = &surfaces.material(surface);
+    points.material[lane] = &surfaces.material_of(triangle);
     g.plane_normal.set(lane, surface.normal);
     g.normal.set(lane, surface.smooth
                            ? surfaces.interpolated_normal(triangle, hit.u[from], hit.v[from])
@@ -301,8 +300,8 @@ void mean_of_taps(const TextureLanes& textures, const Taps& taps, int most, Lane
 
 }  // namespace
 
-SurfaceTable::SurfaceTable(const World& world) : mesh_(&world.mesh) {
-  require_indices(world);
+SurfaceTable::SurfaceTable(const World& world, const SurfaceMesh& mesh) : mesh_(&mesh) {
+  require_indices(world, mesh);
   materials_.reserve(world.materials.size());
   for (const Material& material : world.materials)
     materials_.push_back(shading_material(world, material));
@@ -311,7 +310,7 @@ SurfaceTable::SurfaceTable(const World& world) : mesh_(&world.mesh) {
     records_.push_back(surface_record(*mesh_, i));
 }
 
-void locate(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePoints& points) {
+void locate(const SurfaceView& surfaces, const SurfaceHits& hits, SurfacePoints& points) {
   if (hits.surface == 0) return;
   const Gathered gathered = gather(surfaces, hits, points);
   run_wide([&] {

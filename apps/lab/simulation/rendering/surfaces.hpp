@@ -51,8 +51,11 @@ struct ShadingMaterial {
 class SurfaceTable {
  public:
   /// `world` must outlive the table. Throws std::invalid_argument for an index out of range.
-  explicit SurfaceTable(const World& world);
+  explicit SurfaceTable(const World& world) : SurfaceTable(world, world.mesh) {}
+  /// Surfaces of `mesh` with the materials of `world`; both must outlive the table.
+  SurfaceTable(const World& world, const SurfaceMesh& mesh);
 
+  [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(records_.size()); }
   [[nodiscard]] const SurfaceRecord& record(std::uint32_t triangle) const {
     return records_[triangle];
   }
@@ -72,6 +75,31 @@ class SurfaceTable {
   const SurfaceMesh* mesh_;
   std::vector<SurfaceRecord> records_;
   std::vector<ShadingMaterial> materials_;
+};
+
+/// The surfaces of a fixed world, followed by those of things that move through it, if there are
+/// any.
+struct SurfaceView {
+  const SurfaceTable& fixed;
+  const SurfaceTable* moved = nullptr;
+
+  SurfaceView(const SurfaceTable& fixed_surfaces,  // NOLINT(google-explicit-constructor)
+              const SurfaceTable* moved_surfaces = nullptr)
+      : fixed(fixed_surfaces), moved(moved_surfaces) {}
+
+  [[nodiscard]] bool is_fixed(std::uint32_t triangle) const { return triangle < fixed.size(); }
+  [[nodiscard]] const SurfaceRecord& record(std::uint32_t triangle) const {
+    return is_fixed(triangle) ? fixed.record(triangle) : moved->record(triangle - fixed.size());
+  }
+  [[nodiscard]] const ShadingMaterial& material_of(std::uint32_t triangle) const {
+    return is_fixed(triangle) ? fixed.material(record(triangle))
+                              : moved->material(record(triangle));
+  }
+  [[nodiscard]] Eigen::Vector3f interpolated_normal(std::uint32_t triangle, float u,
+                                                    float v) const {
+    return is_fixed(triangle) ? fixed.interpolated_normal(triangle, u, v)
+                              : moved->interpolated_normal(triangle - fixed.size(), u, v);
+  }
 };
 
 /// Up to sixteen rays that hit something, and the data to shade and shadow the hit points.
@@ -97,7 +125,7 @@ struct SurfacePoints {
 
 /// Computes positions, normals and texture footprints (exact ray differentials: Igehy, "Tracing Ray
 /// Differentials", 1999) of hits.surface; nothing if that is empty.
-void locate(const SurfaceTable& surfaces, const SurfaceHits& hits, SurfacePoints& points);
+void locate(const SurfaceView& surfaces, const SurfaceHits& hits, SurfacePoints& points);
 
 /// A texture averaged over a pixel's footprint: `count` round samples of width `width_m`, side by
 /// side along its longer axis. In metres on the surface.

@@ -5,6 +5,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "apps/lab/simulation/world/places.hpp"
+#include "apps/lab/simulation/world/streets.hpp"
+
 namespace km {
 namespace {
 
@@ -35,6 +38,16 @@ std::vector<Vector2d> right_hand_lane(std::span<const Vector2d> nodes, double ri
     lane.emplace_back(nodes[i] + right_m / (1.0 + cosine) * (right_of(in) + right_of(out)));
   }
   return lane;
+}
+
+double lane_apart_m(const World& world) {
+  // The tracks of the camp are 0.2 m farther apart than the lanes of the city.
+  return world.ground_height ? 2.0 * static_cast<double>(kLaneOffset_m) : 0.0;
+}
+
+Route opposite_route(const Route& route, double apart_m) {
+  const std::vector<Vector2d> back(route.points.rbegin(), route.points.rend());
+  return {right_hand_lane(back, apart_m), route.speed_mps};
 }
 
 const std::array<std::vector<Crossing>, 4>& crossing_routes() {

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "apps/lab/simulation/world/world.hpp"
+
 namespace km {
 
 /// The closed way `right_m` to the right of the closed centre line through `nodes` in driving
@@ -12,6 +14,9 @@ namespace km {
 /// std::invalid_argument for fewer than three nodes, two neighbours at one place, or a turn back.
 [[nodiscard]] std::vector<Eigen::Vector2d> right_hand_lane(std::span<const Eigen::Vector2d> nodes,
                                                            double right_m);
+
+/// The route in the opposite direction, `apart_m` to the left of `route`.
+[[nodiscard]] Route opposite_route(const Route& route, double apart_m);
 
 /// A crossing in a grid of streets: its column and row.
 using Crossing = std::array<int, 2>;

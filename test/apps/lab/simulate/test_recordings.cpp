@@ -1,11 +1,15 @@
+#include <yaml-cpp/yaml.h>
+
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <map>
 #include <string>
 #include <thread>
 
+#include "modules/core/bytes.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
 #include "test/support/command.hpp"
 #include "test/support/patience.hpp"
@@ -100,6 +104,47 @@ TEST_CASE("The ordinary reader reads a recording, and files that went missing ar
   CHECK(again.exit_code == 0);
   CHECK_THAT(again.output, Catch::Contains(": 12 files are missing"));
   check_equal(contents(folder, "r"), whole);
+}
+
+TEST_CASE("At level 0 a recording has the bytes of a program without effects", "[simulate]") {
+  const TemporaryFolder folder;
+  REQUIRE(simulate(kSmall, folder.path() / "plain").exit_code == 0);
+  REQUIRE(simulate(kSmall + " --difficulty 0", folder.path() / "level").exit_code == 0);
+  check_equal(contents(folder, "plain"), contents(folder, "level"));
+  std::uint64_t hash = kFnv1aBasis;
+  for (const auto& [path, bytes] : contents(folder, "plain/robot1"))
+    for (const char c : path + bytes) mix_fnv1a(hash, std::uint64_t{static_cast<std::uint8_t>(c)});
+  // A program without effects made these bytes, with the image libraries of Debian 12.
+  CHECK(hash == 0xe2a712c2179a0e35ULL);
+  CHECK_FALSE(fs::exists(folder.path() / "plain/effects.yaml"));
+  CHECK_FALSE(fs::exists(folder.path() / "plain/robot0/truth"));
+}
+
+TEST_CASE("At the hardest level the reader reads the recording, and the truth is beside it",
+          "[simulate]") {
+  const TemporaryFolder folder;
+  const std::string hard =
+      kSmall + " --difficulty 4 --set timing.dropped_share=0.4 traffic.people=3 ";
+  REQUIRE(simulate(hard + "--threads 3", folder.path() / "a").exit_code == 0);
+  REQUIRE(simulate(hard + "--threads 1", folder.path() / "b").exit_code == 0);
+  check_equal(contents(folder, "a"), contents(folder, "b"));
+  const fs::path robot = folder.path() / "a/robot1";
+  EurocReader reader = open_euroc(robot);
+  std::size_t frames = 0;
+  while (const auto packet = reader.next()) ++frames;
+  CHECK(frames > 0);
+  CHECK(frames < kFrames);
+  CHECK(frames == file_count(robot / "mav0/cam0/data"));
+  CHECK(reader.report().empty());
+  for (const char* file : {"a/effects.yaml", "a/traffic.csv", "a/robot1/truth/errors.yaml",
+                           "a/robot1/truth/image_times.csv"})
+    CHECK(fs::exists(folder.path() / file));
+  // The level has a focal length that is wrong by 1 %.
+  const auto focal_px = [&](const std::string& file) {
+    return YAML::Load(folder.read("a/robot1/" + file))["intrinsics"][0].as<double>();
+  };
+  const double ratio = focal_px("mav0/cam0/sensor.yaml") / focal_px("truth/cam0.yaml");
+  CHECK(std::abs(ratio - 1.0) == Approx(0.01).epsilon(1e-6));
 }
 
 TEST_CASE("A full disk leaves no incomplete file, and the run continues later", "[simulate]") {
