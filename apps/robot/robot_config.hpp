@@ -9,6 +9,7 @@
 #include "apps/robot/mapping_config.hpp"
 #include "apps/robot/run_config.hpp"
 #include "modules/absolute_fixes/absolute_fixes_config.hpp"
+#include "modules/constellations/constellations_config.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/dense_sensing/segmentation_config.hpp"
 #include "modules/dense_sensing/stereo_depth_config.hpp"
@@ -97,6 +98,7 @@ struct RobotConfig {
   DistanceFieldConfig distance_field;
   MapSharingConfig map;
   ObjectsConfig objects;
+  ConstellationsConfig constellations;
   ViewConfig view;
 
   std::string effective;  ///< YAML text of a file with this configuration.
@@ -107,7 +109,7 @@ struct RobotConfig {
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, absolute_fixes, graph_playback, mapping, stereo_depth,
               segmentation, semantic_mapping, mesh_deformation, map_2d, distance_field, map,
-              objects, view);
+              objects, constellations, view);
   }
 };
 

@@ -21,6 +21,7 @@
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/run_record.hpp"
 #include "modules/absolute_fixes/node/fixes_node.hpp"
+#include "modules/constellations/node/constellations_node.hpp"
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/frame.hpp"
@@ -126,6 +127,7 @@ struct Topics {
   AddressedCrossing<PlacesLanePacket> places_packets;
   Topic<MeshChunk> sent_chunks;  // to the other robots and to the map of the team
   Crossing<MeshChunk> chunks;
+  Topic<RobotObjects> sent_objects;  // to the other robots and to the search for places
   Crossing<RobotObjects> objects;
   Crossing<RobotStatus> status;
 };
@@ -160,9 +162,12 @@ class Robot {
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// Null unless the robots share their map.
   [[nodiscard]] const TeamMapNode* team_map() const { return team_map_; }
-  /// True unless the robot has yet to send a part of its mesh, or to lay received ones on its own.
-  /// Thread-safe.
+  /// True unless the robot has yet to send a part of its mesh, to lay received ones on its own, or
+  /// to compare its objects with received ones. Thread-safe.
   [[nodiscard]] bool has_shared_map() const {
+    if (constellations_ != nullptr &&
+        !(mesh_deformation_->is_current() && constellations_->is_done()))
+      return false;
     return chunks_ == nullptr || (mesh_deformation_->is_current() && chunks_->is_done() &&
                                   (ties_ == nullptr || ties_->is_done()));
   }
@@ -221,6 +226,7 @@ class Robot {
   [[nodiscard]] CrossingEnds share_meshes(const RobotConfig& robot, const LabelPalette& palette);
   void add_objects(const ObjectsConfig& config, const LabelPalette& palette,
                    const std::filesystem::path& folder, ResultWriter& results);
+  void add_constellations(const ConstellationsConfig& config);
   void add_surface_ties();
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
@@ -276,6 +282,7 @@ class Robot {
   SurfaceTiesNode* ties_ = nullptr;
   TeamMapNode* team_map_ = nullptr;
   ObjectsNode* objects_ = nullptr;
+  ConstellationsNode* constellations_ = nullptr;
   PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   RosOutputNode* record_ = nullptr;

@@ -108,11 +108,27 @@ void Robot::add_objects(const ObjectsConfig& config, const LabelPalette& palette
                                ObjectsTopics{.meshes = topics_.optimized_meshes,
                                              .trajectory = topics_.trajectory,
                                              .received = topics_.objects.from_peers(),
-                                             .own = topics_.objects.to_peers(),
+                                             .own = topics_.sent_objects,
                                              .joint = topics_.joint_objects});
+  topics_.sent_objects.subscribe(
+      [to_peers = topics_.objects.to_peers()](const auto& sent) { to_peers.publish(sent); });
   topics_.joint_objects.subscribe([this, folder, &results](const auto& objects) {
     write_objects(folder, *objects, objects_->palette(), results);
   });
+}
+
+// Call after add_objects().
+void Robot::add_constellations(const ConstellationsConfig& config) {
+  topics_.keyframes.subscribe(
+      [this](const auto& keyframe) { objects_->learn(keyframe->odometry); });
+  constellations_ =
+      &add<ConstellationsNode>(false, config, identity_.robot,
+                               ConstellationsTopics{.own_objects = topics_.sent_objects,
+                                                    .peer_objects = topics_.objects.from_peers(),
+                                                    .closures = topics_.closures,
+                                                    .restarts = topics_.closure_restarts,
+                                                    .found = topics_.new_closures,
+                                                    .outcomes = topics_.outcomes});
 }
 
 void Robot::add_surface_ties() {

@@ -6,6 +6,7 @@
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/label_palette.hpp"
+#include "modules/mesh/mesh_chunks.hpp"
 #include "modules/objects/object_box.hpp"
 
 namespace km {
@@ -50,9 +51,14 @@ struct RobotObjects {
   std::uint64_t boot = 0;
   RobotId anchor = 0;  ///< Robot whose odometry frame is the frame of T_world_kf.
   std::vector<AnchoredObject> objects;
+  /// Keyframes of some objects with their odometry, ascending; absent without `constellations.on`.
+  std::vector<SurfaceKeyframe> keyframes = {};
 };
 
 /// Largest number of objects of a robot in a message.
 inline constexpr std::size_t kMaxObjects = 1000;
+
+/// Largest number of keyframes with odometry in a message.
+inline constexpr std::size_t kMaxObjectKeyframes = 200;
 
 }  // namespace km

@@ -43,6 +43,24 @@ RobotObjects anchored(std::span<const MapObject> objects, const Trajectory& traj
   return message;
 }
 
+std::vector<SurfaceKeyframe> keyframes_of(const RobotObjects& objects,
+                                          const std::map<KeyframeIndex, OdometryPose>& odometry) {
+  constexpr KeyframeIndex kLength = 10;
+  std::map<KeyframeIndex, SurfaceKeyframe> chosen;  // by keyframe / kLength
+  for (const AnchoredObject& object : objects.objects) {
+    const auto known = odometry.find(object.keyframe);
+    if (known == odometry.end()) continue;
+    SurfaceKeyframe& first =
+        chosen.try_emplace(object.keyframe / kLength, known->second, object.T_world_kf)
+            .first->second;
+    if (object.keyframe < first.odometry.id.index) first = {known->second, object.T_world_kf};
+  }
+  while (chosen.size() > kMaxObjectKeyframes) chosen.erase(chosen.begin());
+  std::vector<SurfaceKeyframe> keyframes;
+  for (const auto& [number, keyframe] : chosen) keyframes.push_back(keyframe);
+  return keyframes;
+}
+
 bool differ(const RobotObjects& a, const RobotObjects& b, double min_change_m) {
   return a.anchor != b.anchor ||
          !std::ranges::equal(a.objects, b.objects,

@@ -18,6 +18,12 @@ namespace km {
 [[nodiscard]] RobotObjects anchored(std::span<const MapObject> objects,
                                     const Trajectory& trajectory);
 
+/// The keyframes that a message states with their odometry: of every ten consecutive keyframes, the
+/// first one that an object has and that `odometry` has. If these are more than
+/// kMaxObjectKeyframes, the newest ones.
+[[nodiscard]] std::vector<SurfaceKeyframe> keyframes_of(
+    const RobotObjects& objects, const std::map<KeyframeIndex, OdometryPose>& odometry);
+
 /// True if the difference matters to another robot: another frame, number or class of objects, or a
 /// side, centre or keyframe pose that has changed by more than `min_change_m`.
 [[nodiscard]] bool differ(const RobotObjects& a, const RobotObjects& b, double min_change_m);

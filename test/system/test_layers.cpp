@@ -30,6 +30,7 @@ constexpr const char* kLab = "apps/lab/";
 // Modules an algorithm may use beside core and itself.
 const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"absolute_fixes", {"recordings"}},
+    {"constellations", {"objects", "outlier_rejection"}},
     {"dense_sensing", {"images"}},
     {"diagnosis", {"evaluation", "images", "place_recognition", "recordings", "sensors", "vio"}},
     {"loop_closure", {"images", "place_recognition"}},

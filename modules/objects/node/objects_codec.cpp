@@ -31,7 +31,11 @@ Codec<RobotObjects>::Encoded Codec<RobotObjects>::encode(const RobotObjects& obj
                                .views = object.views});
   }
   encoded.wire.anchor = objects.anchor;
+  for (const SurfaceKeyframe& keyframe : objects.keyframes)
+    encoded.keyframes.push_back(
+        {.odometry = to_wire(keyframe.odometry), .T_world_kf = to_wire(keyframe.T_world_kf)});
   borrow(encoded.wire.objects, encoded.objects);
+  borrow(encoded.wire.keyframes, encoded.keyframes);
   return encoded;
 }
 
@@ -39,8 +43,17 @@ Decoded<RobotObjects> Codec<RobotObjects>::decode(const Wire& wire, const TeamPe
   using Result = Decoded<RobotObjects>;
   const auto objects = elements_of(wire.objects, kMaxObjects);
   if (!objects) return Result::refuse("objects are missing or too many");
+  const auto keyframes = elements_of(wire.keyframes, kMaxObjectKeyframes);
+  if (!keyframes) return Result::refuse("keyframes of objects are missing or too many");
   RobotObjects result{
       .robot = writer.robot, .boot = writer.boot, .anchor = wire.anchor, .objects = {}};
+  for (const km_wire_SurfaceKeyframe& keyframe : *keyframes) {
+    const auto odometry = from_wire(keyframe.odometry);
+    const auto T_world_kf = from_wire(keyframe.T_world_kf);
+    if (!odometry || !T_world_kf || odometry->id.robot != writer.robot)
+      return Result::refuse("a keyframe of objects has no pose or is of another robot");
+    result.keyframes.push_back({*odometry, *T_world_kf});
+  }
   for (const km_wire_SceneObject& object : *objects) {
     if (object.layer != static_cast<std::uint8_t>(SceneLayer::kObject)) continue;
     const auto T_kf_box = from_wire(object.T_kf_box);

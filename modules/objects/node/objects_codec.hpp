@@ -11,19 +11,22 @@
 namespace km {
 
 /// A robot sends only its own objects. A message is refused if it has more than kMaxObjects of
-/// them, or if a pose, a size or a surface is not finite, negative or too large. Entries of unknown
+/// them, or if a pose, a size or a surface is not finite, negative or too large. It is also refused
+/// for more than kMaxObjectKeyframes keyframes, or one that is not of its robot. Entries of unknown
 /// layers are left out.
 template <>
 struct Codec<RobotObjects> {
   using Wire = km_wire_RobotObjects;
   static constexpr const char* kTopic = "objects";
-  static constexpr std::uint16_t kVersion = 1;
-  static constexpr std::size_t kMaxBytes = 160 * kMaxObjects;
+  static constexpr std::uint16_t kVersion = 2;
+  static constexpr std::size_t kMaxBytes =
+      160 * kMaxObjects + kSurfaceKeyframeBytes * kMaxObjectKeyframes;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotObjects_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<km_wire_SceneObject> objects;
+    std::vector<km_wire_SurfaceKeyframe> keyframes;
   };
   static MessageKey key_of(const RobotObjects& /*objects*/) { return message_key({}); }
   static Encoded encode(const RobotObjects& objects);

@@ -37,7 +37,7 @@ ObjectsNode::ObjectsNode(const ObjectsConfig& config, RobotId self, const LabelP
           },
           ObjectsConfig::kSection),
       ticks_(
-          std::chrono::seconds(1), [this] { worker_.post({}); }, "objects_tick") {
+          std::chrono::seconds(1), [this] { worker_.post(Tick()); }, "objects_tick") {
   topics.meshes.subscribe([this](const auto& mesh) { latest_mesh_.put(mesh); });
   topics.trajectory.subscribe([this](const auto& newest) { latest_trajectory_.put(newest); });
   topics.received.subscribe([this](const auto& objects) { worker_.post(objects); });
@@ -58,14 +58,17 @@ std::exception_ptr ObjectsNode::error() const {
 }
 
 void ObjectsNode::step(const Input& input, double now_s) {
-  if (input != nullptr) take(*input);
+  const auto* received = std::get_if<Topic<RobotObjects>::Message>(&input);
+  if (received != nullptr) take(**received);
+  if (const auto* keyframe = std::get_if<OdometryPose>(&input))
+    keyframes_.insert_or_assign(keyframe->id.index, *keyframe);
   if (auto trajectory = latest_trajectory_.take()) {
     trajectory_ = std::move(trajectory);
     changed_ = true;
   }
   if (const auto mesh = latest_mesh_.take()) take(*mesh);
   send(now_s);
-  if (input != nullptr || !changed_ || trajectory_ == nullptr)
+  if (!std::holds_alternative<Tick>(input) || !changed_ || trajectory_ == nullptr)
     return;  // published at the next tick
   changed_ = false;
   joint_.publish(team_.joint(*trajectory_));
@@ -80,6 +83,7 @@ void ObjectsNode::take(const OptimizedMesh& mesh) {
         << "the map has " << objects.size() << " objects; the smallest "
         << objects.size() - kMaxObjects << " are left out. objects.min_surface_m2 or "
         << "objects.background exclude more";
+  message.keyframes = keyframes_of(message, keyframes_);
   (void)team_.add(message);
   changed_ = true;
   if (!last_sent_ || differ(message, *last_sent_, kMinChange_m)) to_send_ = std::move(message);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -51,8 +52,12 @@ class ObjectsNode final : public Node {
 
   [[nodiscard]] const LabelPalette& palette() const { return palette_; }
 
-  /// Inputs: a tick of the clock, which is null, or the objects of another robot.
-  using Input = Topic<RobotObjects>::Message;
+  /// Odometry of a keyframe of this robot, so that messages state it. Thread-safe.
+  void learn(const OdometryPose& keyframe) { worker_.post(keyframe); }
+
+  /// Inputs: a tick of the clock, the objects of another robot, or a keyframe of this robot.
+  struct Tick {};
+  using Input = std::variant<Tick, Topic<RobotObjects>::Message, OdometryPose>;
 
   /// Handles one input, and the newest mesh and trajectory, at time `now_s`. The thread calls only
   /// this function; tests can call it too.
@@ -74,6 +79,7 @@ class ObjectsNode final : public Node {
   const Out<RobotObjects> own_;
   const Out<ObjectList> joint_;
   TeamObjects team_;
+  std::map<KeyframeIndex, OdometryPose> keyframes_;
   Topic<Trajectory>::Message trajectory_;
   bool changed_ = false;                 // since the joint objects were published
   std::optional<RobotObjects> to_send_;  // newest own objects that have not been sent

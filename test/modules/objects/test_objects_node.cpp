@@ -78,6 +78,25 @@ TEST_CASE("Objects are sent after changes only, and no faster than configured", 
   CHECK(sent.messages()[2].objects.size() == 1);
 }
 
+TEST_CASE("Messages state the odometry of keyframes that the node has learned", "[node]") {
+  NodeTopics topics;
+  Inbox<RobotObjects> sent(topics.own);
+  ObjectsNode node({}, 4, palette(), topics.ends());
+  topics.trajectory.publish(poses(4));
+  for (KeyframeIndex k = 0; k < 10; ++k) {
+    OdometryPose learned{.id = {4, k}};
+    learned.T_odom_kf.translation().x() = 7.0;
+    node.step(learned, 1.0);
+  }
+  topics.meshes.publish(mesh_with({kSeen}, 4));
+  node.step({}, 100.0);
+  REQUIRE(sent.messages().size() == 1);
+  REQUIRE(sent.messages()[0].keyframes.size() == 1);
+  CHECK(sent.messages()[0].keyframes[0].odometry.id.index ==
+        sent.messages()[0].objects.at(0).keyframe);
+  CHECK(sent.messages()[0].keyframes[0].odometry.T_odom_kf.translation().x() == 7.0);
+}
+
 TEST_CASE("Objects of other robots join those of this one, but not in its name", "[node]") {
   NodeTopics topics;
   Inbox<ObjectList> joint(topics.joint);
@@ -161,6 +180,7 @@ RobotObjects two_objects() {
   const MapObject object{.label = kChair, .box = kSeen, .surface_m2 = 1.5, .views = 4};
   RobotObjects message = anchored(std::vector{object, object}, *poses(70));
   message.boot = 12345;
+  message.keyframes = keyframes_of(message, {{0, {.id = {70, 0}}}});
   return message;
 }
 
@@ -178,7 +198,9 @@ TEST_CASE("Objects are equal after encoding and decoding, with 150 bytes each", 
   CHECK(result.value->boot == 12345);
   CHECK(result.value->objects[1].views == 4);
   const std::size_t bytes = serialize(Codec<RobotObjects>::descriptor(), &encoded.wire).size();
-  CHECK(bytes < 2 * 150 + 32);
+  CHECK(bytes < 2 * 150 + kSurfaceKeyframeBytes + 32);
+  REQUIRE(result.value->keyframes.size() == 1);
+  CHECK(result.value->keyframes == message.keyframes);
 }
 
 TEST_CASE("Entries of unknown layers are left out", "[codec]") {
@@ -191,6 +213,7 @@ TEST_CASE("Entries of unknown layers are left out", "[codec]") {
 TEST_CASE("The largest message of objects is accepted by size", "[codec]") {
   RobotObjects message = two_objects();
   message.objects.resize(kMaxObjects, message.objects[0]);
+  message.keyframes.resize(kMaxObjectKeyframes, message.keyframes[0]);
   const auto encoded = arrived(message);
   CHECK(serialize(Codec<RobotObjects>::descriptor(), &encoded.wire).size() <=
         Codec<RobotObjects>::kMaxBytes);
@@ -201,6 +224,8 @@ TEST_CASE("Impossible objects are refused", "[codec]") {
   const char* const missing = "objects are missing or too many";
   const char* const pose = "a pose of an object is none";
   const char* const size = "an object has no usable size";
+  const char* const keyframes = "keyframes of objects are missing or too many";
+  const char* const odometry = "a keyframe of objects has no pose or is of another robot";
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   check_refusals<RobotObjects>(
       [] { return arrived(two_objects()); },
@@ -212,6 +237,14 @@ TEST_CASE("Impossible objects are refused", "[codec]") {
        {"a negative side", size, [](auto& m) { m.objects[0].size_m[2] = -1.0F; }},
        {"a side that is no number", size, [](auto& m) { m.objects[0].size_m[0] = kNan; }},
        {"a side as long as a planet", size, [](auto& m) { m.objects[0].size_m[1] = 1e7F; }},
+       {"keyframes without end", keyframes,
+        [](auto& m) { m.wire.keyframes._length = 0xffffffffU; }},
+       {"a keyframe of another robot", odometry,
+        [](auto& m) { m.keyframes[0].odometry.keyframe.robot = 71; }},
+       {"a keyframe without odometry", odometry,
+        [](auto& m) { m.keyframes[0].odometry.T_odom_kf.q[3] = 9.0; }},
+       {"a keyframe without a pose", odometry,
+        [](auto& m) { m.keyframes[0].T_world_kf.t[0] = 1e300; }},
        {"no surface", size, [](auto& m) { m.objects[1].surface_m2 = kNan; }}});
 }
 

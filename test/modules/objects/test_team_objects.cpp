@@ -29,6 +29,27 @@ Trajectory trajectory(RobotId robot) {
   return {.robot = robot, .anchor = 0, .T_world_kf = {any_pose(0), any_pose(1), any_pose(2)}};
 }
 
+TEST_CASE("A message states the first known keyframe of every ten that have an object",
+          "[objects]") {
+  RobotObjects message{.robot = 3, .objects = {}};
+  for (const KeyframeIndex k : {17U, 12U, 5U, 11U, 40U})
+    message.objects.push_back({.keyframe = k, .T_world_kf = any_pose(k)});
+  std::map<KeyframeIndex, OdometryPose> odometry;
+  for (const KeyframeIndex k : {17U, 12U, 5U}) odometry[k].id = {3, k};
+  const auto keyframes = keyframes_of(message, odometry);
+  REQUIRE(keyframes.size() == 2);
+  CHECK(keyframes[0].odometry.id.index == 5);
+  CHECK(keyframes[1].odometry.id.index == 12);
+  CHECK(keyframes[1].T_world_kf.isApprox(any_pose(12)));
+  message.objects.clear();
+  for (KeyframeIndex k = 0; k < 10 * (kMaxObjectKeyframes + 5); k += 10) {
+    message.objects.push_back({.keyframe = k});
+    odometry[k].id = {3, k};
+  }
+  REQUIRE(keyframes_of(message, odometry).size() == kMaxObjectKeyframes);
+  CHECK(keyframes_of(message, odometry)[0].odometry.id.index == 50);
+}
+
 TEST_CASE("Noisy copies of an object are one, whatever their order", "[objects]") {
   const auto seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);

@@ -1,0 +1,103 @@
+#include "modules/constellations/node/constellations_node.hpp"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "runtime/clock.hpp"
+#include "runtime/log.hpp"
+#include "runtime/thread.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::size_t kInputs = 4096;
+constexpr double kMatchTick_s = 0.02;
+
+// Pause after a match, as a multiple of the time that it takes.
+constexpr double kMatchPauses = 10.0;
+
+std::string text_of(const ConstellationSearch::Counts& counts) {
+  std::string text;
+  for (const auto& [status, count] : counts)
+    text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + to_string(status);
+  return text;
+}
+
+}  // namespace
+
+ConstellationsNode::ConstellationsNode(const ConstellationsConfig& config, RobotId self,
+                                       const ConstellationsTopics& topics)
+    : found_(topics.found),
+      outcomes_(topics.outcomes),
+      search_(self, config),
+      worker_(
+          kInputs, Overflow::kBlock,
+          [this](const Input& input) {
+            work_in_background();
+            step(input, steady_now_s());
+          },
+          ConstellationsConfig::kSection),
+      ticks_(
+          steady_duration(kMatchTick_s), [this] { worker_.post(Tick()); }, "match_tick") {
+  for (const In<RobotObjects>& objects : {topics.own_objects, topics.peer_objects})
+    objects.subscribe([this](const auto& message) { post(message); });
+  topics.closures.subscribe([this](const auto& closure) { post(closure); });
+  topics.restarts.subscribe([this](const auto& event) { post(event); });
+}
+
+void ConstellationsNode::start() {
+  worker_.start();
+  ticks_.start();
+}
+
+void ConstellationsNode::stop() noexcept {
+  ticks_.stop();
+  worker_.stop();
+}
+
+std::exception_ptr ConstellationsNode::error() const {
+  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
+}
+
+void ConstellationsNode::post(Input input) {
+  ++posted_;
+  worker_.post(std::move(input));
+}
+
+void ConstellationsNode::step(const Input& input, double now_s) {
+  if (std::holds_alternative<Tick>(input)) return search(now_s);
+  if (const auto* objects = std::get_if<Topic<RobotObjects>::Message>(&input))
+    search_.add(**objects, now_s);
+  else if (const auto* closure = std::get_if<Topic<Closure>::Message>(&input))
+    search_.add(**closure);
+  else if (const auto& event = std::get<Topic<PeerEvent>::Message>(input);
+           event->kind == PeerEventKind::kRestarted)
+    search_.forget(event->identity.robot);
+  search_done_ = search_.is_done();
+  ++handled_;
+}
+
+void ConstellationsNode::search(double now_s) {
+  if (now_s < next_s_ || search_.is_done()) return;
+  const double start_s = steady_now_s();
+  const std::optional<Closure> closure = search_.step(now_s);
+  next_s_ = now_s + kMatchPauses * (steady_now_s() - start_s);
+  if (closure) {
+    const double sigma_m = std::sqrt(closure->covariance.bottomRightCorner<3, 3>().trace() / 3.0);
+    log::info(name()) << to_string(closure->from.id) << " and " << to_string(closure->to.id)
+                      << " see " << closure->inliers << " equal objects, standard deviation "
+                      << std::lround(100.0 * sigma_m)
+                      << " cm; searches so far: " << text_of(search_.counts());
+    outcomes_.publish(ClosureOutcome{.id = closure->id(),
+                                     .similarity = 0.0,
+                                     .stage = ClosureStage::kVerified,
+                                     .reason = {},
+                                     .matches = closure->inliers,
+                                     .inliers = closure->inliers});
+    found_.publish(*closure);
+  }
+  search_done_ = search_.is_done();
+}
+
+}  // namespace km

@@ -1,0 +1,230 @@
+#include <catch2/catch.hpp>
+
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "modules/constellations/constellation_match.hpp"
+#include "modules/constellations/constellation_pose.hpp"
+#include "modules/core/lie.hpp"
+#include "test/modules/constellations/scenes.hpp"
+
+namespace km {
+namespace {
+
+// Two maps of one scene, and the true relative pose.
+struct TwoMaps {
+  std::vector<Landmark> a, b;
+  SE3 T_a_b = SE3::Identity();
+};
+
+TwoMaps two_maps(const std::vector<TrueObject>& scene, const MapErrors& errors_a,
+                 const MapErrors& errors_b, std::mt19937& rng) {
+  TwoMaps maps;
+  const SE3 T_scene_a = random_upright(rng);
+  const SE3 T_scene_b = random_upright(rng);
+  maps.a = map_of(scene, T_scene_a, errors_a, rng);
+  maps.b = map_of(scene, T_scene_b, errors_b, rng);
+  maps.T_a_b = T_scene_a.inverse() * T_scene_b;
+  return maps;
+}
+
+// Squared normalised error of yaw and translation, which has 4 degrees of freedom.
+double squared_error(const UncertainPose& estimate, const SE3& truth) {
+  const Vector6 error = se3_log(estimate.T.inverse() * truth);
+  return error.tail<4>().dot(estimate.Sigma.bottomRightCorner<4, 4>().inverse() * error.tail<4>());
+}
+
+}  // namespace
+
+TEST_CASE(
+    "The relative pose is found or refused, never wrong, with any yaw, missing and extra objects",
+    "[constellations]") {
+  const bool is_street = GENERATE(false, true);
+  CAPTURE(is_street);
+  constexpr int kScenes = 60;
+  constexpr double kChi4_0_99999 = 28.5;  // 4 degrees of freedom
+  int found = 0;
+  std::mt19937 rng(5);
+  const MapErrors errors{.found = 0.85, .false_objects = 3};
+  for (int n = 0; n < kScenes; ++n) {
+    CAPTURE(n);
+    const TwoMaps maps = two_maps(is_street ? street(rng) : square(20, rng), errors, errors, rng);
+    const ConstellationMatch match = match_constellations(maps.a, maps.b);
+    if (match.status != ConstellationStatus::kMatched) continue;
+    ++found;
+    CHECK(squared_error(match.T_a_b, maps.T_a_b) < kChi4_0_99999);
+  }
+  CHECK(found >= (is_street ? 40 : 50));
+}
+
+TEST_CASE("A mirrored constellation is not the same place", "[constellations]") {
+  std::mt19937 rng(3);
+  const TwoMaps maps = two_maps(square(15, rng), {}, {}, rng);
+  std::vector<Landmark> mirrored = maps.b;
+  for (Landmark& landmark : mirrored) landmark.center.y() *= -1.0;
+  CHECK(match_constellations(maps.a, maps.b).status == ConstellationStatus::kMatched);
+  CHECK(match_constellations(maps.a, mirrored).status != ConstellationStatus::kMatched);
+}
+
+TEST_CASE("Objects at other heights are not the same place", "[constellations]") {
+  std::mt19937 rng(4);
+  const TwoMaps maps = two_maps(square(15, rng), {}, {}, rng);
+  std::vector<Landmark> tilted = maps.b;
+  for (Landmark& landmark : tilted) landmark.center.z() += drawn(rng, -8.0, 8.0);
+  CHECK(match_constellations(maps.a, tilted).status != ConstellationStatus::kMatched);
+}
+
+TEST_CASE("Labels and sizes are a gate", "[constellations]") {
+  std::mt19937 rng(6);
+  const TwoMaps maps = two_maps(square(15, rng), {}, {}, rng);
+  std::vector<Landmark> others = maps.b;
+  SECTION("labels") {
+    for (Landmark& landmark : others) landmark.label = static_cast<LabelId>(landmark.label + 10);
+  }
+  SECTION("lengths") {
+    for (Landmark& landmark : others) landmark.size_m.x() = 3.0 * landmark.size_m.x() + 1.0;
+  }
+  SECTION("heights") {
+    for (Landmark& landmark : others) landmark.size_m.z() = 3.0 * landmark.size_m.z() + 1.0;
+  }
+  CHECK(match_constellations(maps.a, others).status == ConstellationStatus::kTooFew);
+}
+
+TEST_CASE("A symmetric constellation is ambiguous", "[constellations]") {
+  // Equal objects on a circle at irregular angles, and again half a turn later.
+  std::mt19937 rng(7);
+  std::vector<TrueObject> scene;
+  for (int n = 0; n < 8; ++n) {
+    const double angle = 0.39 * n + drawn(rng, -0.1, 0.1), radius = drawn(rng, 8.0, 18.0);
+    for (const double sign : {-1.0, 1.0})
+      scene.push_back(
+          {1, {sign * radius * std::cos(angle), sign * radius * std::sin(angle), 1.5}, size_of(1)});
+  }
+  const TwoMaps maps = two_maps(scene, {}, {}, rng);
+  const ConstellationMatch match = match_constellations(maps.a, maps.b);
+  CHECK(match.status == ConstellationStatus::kAmbiguous);
+  CHECK(match.second_pairs >= 14);
+}
+
+TEST_CASE("A corridor of equal objects is refused, also if some are missing", "[constellations]") {
+  const auto seed = GENERATE(range(0U, 20U));
+  const auto found = GENERATE(1.0, 0.9, 0.75);
+  CAPTURE(seed, found);
+  std::mt19937 rng(seed);
+  std::vector<TrueObject> scene;
+  for (int n = 0; n < 12; ++n)
+    for (const double side : {-2.0, 2.0}) scene.push_back({1, {3.0 * n, side, 1.5}, size_of(1)});
+  const MapErrors errors{.found = found};
+  const TwoMaps maps = two_maps(scene, errors, errors, rng);
+  CHECK(match_constellations(maps.a, maps.b).status != ConstellationStatus::kMatched);
+}
+
+TEST_CASE("Maps of different random places are never accepted", "[constellations][slow]") {
+  constexpr int kPairs = 1500;
+  const int kind = GENERATE(0, 1, 2);
+  CAPTURE(kind);
+  std::mt19937 rng(8);
+  const auto scene = [&] {
+    if (kind == 2) return street(rng);
+    return kind == 1 ? rows(20, rng) : square(20, rng);
+  };
+  int accepted = 0;
+  for (int n = 0; n < kPairs; ++n) {
+    const auto a = map_of(scene(), random_upright(rng), {}, rng);
+    const auto b = map_of(scene(), random_upright(rng), {}, rng);
+    accepted += match_constellations(a, b).status == ConstellationStatus::kMatched ? 1 : 0;
+  }
+  CHECK(accepted == 0);
+}
+
+TEST_CASE("The covariance is honest for independent errors and for shifts that a map shares",
+          "[constellations]") {
+  constexpr int kCases = 500;
+  const bool is_shifted = GENERATE(false, true);
+  CAPTURE(is_shifted);
+  std::mt19937 rng(9);
+  double sum = 0.0;
+  int matched = 0;
+  for (int n = 0; n < kCases; ++n) {
+    MapErrors a, b;
+    if (is_shifted)
+      for (MapErrors* errors : {&a, &b})
+        for (double& s : errors->shift) s = normal(rng);
+    const TwoMaps maps = two_maps(square(20, rng), a, b, rng);
+    const ConstellationMatch match = match_constellations(maps.a, maps.b);
+    if (match.status != ConstellationStatus::kMatched) continue;
+    ++matched;
+    sum += squared_error(match.T_a_b, maps.T_a_b) / 4.0;
+  }
+  CHECK(matched >= 0.9 * kCases);
+  // Shifts count once as independent and once as shared, so each case alone has less than stated.
+  // The mean of 500 values, of 4 degrees of freedom each, has a standard deviation of 0.03.
+  const double mean = sum / matched;
+  CHECK(mean < 1.1);
+  CHECK(mean > (is_shifted ? 0.3 : 0.05));
+}
+
+TEST_CASE("The covariance of exact weights is that of repeated draws", "[constellations]") {
+  // Without shifts, Eq. (1) has only its first part, which must equal the scatter.
+  std::mt19937 rng(10);
+  const auto scene = square(9, rng);
+  const SE3 T_a_b = random_upright(rng);
+  constexpr int kDraws = 2000;
+  double sum = 0.0;
+  for (int n = 0; n < kDraws; ++n) {
+    std::vector<LandmarkPair> pairs;
+    for (const TrueObject& object : scene) {
+      LandmarkPair pair;
+      pair.b = {.label = 1, .center = object.center, .size_m = {}, .sigma_m = 0.2};
+      pair.a = {.label = 1, .center = T_a_b * object.center, .size_m = {}, .sigma_m = 0.1};
+      for (double& c : pair.b.center) c += 0.2 * normal(rng);
+      for (double& c : pair.a.center) c += 0.1 * normal(rng);
+      pairs.push_back(pair);
+    }
+    sum += squared_error(constellation_pose(pairs, 0.01), T_a_b) / 4.0;
+  }
+  CHECK(sum / kDraws == Approx(1.0).margin(0.06));
+}
+
+TEST_CASE("Equal arguments give equal results, and exchanged maps the inverse",
+          "[constellations]") {
+  std::mt19937 rng(11);
+  const TwoMaps maps = two_maps(square(18, rng), {.found = 0.9}, {.found = 0.9}, rng);
+  const ConstellationMatch ab = match_constellations(maps.a, maps.b);
+  const ConstellationMatch again = match_constellations(maps.a, maps.b);
+  const ConstellationMatch ba = match_constellations(maps.b, maps.a);
+  REQUIRE(ab.status == ConstellationStatus::kMatched);
+  REQUIRE(ba.status == ConstellationStatus::kMatched);
+  CHECK(ab.pairs == again.pairs);
+  CHECK(ab.T_a_b.T.isApprox(again.T_a_b.T, 0.0));
+  CHECK((ab.T_a_b.T * ba.T_a_b.T).isApprox(SE3::Identity(), 0.05));
+}
+
+TEST_CASE("Constellations without objects, and of one place only, are refused",
+          "[constellations]") {
+  CHECK(match_constellations({}, {}).status == ConstellationStatus::kTooFew);
+  const std::vector<Landmark> heap(20, Landmark{.label = 3, .size_m = {4, 2, 2}});
+  CHECK(match_constellations(heap, heap).status == ConstellationStatus::kTooFew);
+}
+
+TEST_CASE("Landmarks that are not finite are refused with their label", "[constellations]") {
+  Landmark good{.label = 7}, bad = good;
+  SECTION("position") {
+    bad.center.y() = std::numeric_limits<double>::quiet_NaN();
+  }
+  SECTION("size") {
+    bad.size_m.z() = std::numeric_limits<double>::infinity();
+  }
+  SECTION("sigma") {
+    bad.sigma_m = 0.0;
+  }
+  SECTION("shift") {
+    bad.side_shift_m = std::numeric_limits<double>::infinity();
+  }
+  const std::vector<Landmark> a = {good}, b = {bad};
+  CHECK_THROWS_WITH(match_constellations(a, b), Catch::Contains("label 7"));
+  CHECK_THROWS_WITH(match_constellations(b, a), Catch::Contains("label 7"));
+}
+
+}  // namespace km
