@@ -363,6 +363,7 @@ void Robot::add_network(CrossingEnds meshes) {
   dds.exchange(t.places_packets, kRequest, kOther, {}, {},
                overlay_->guard_packets<OverlayLane::kPlaces>());
   dds.exchange(t.chunks, kState, kOther, meshes);
+  dds.exchange(t.mesh_poses, kState, kOther, meshes);
   const bool has_objects = objects_ != nullptr;
   dds.exchange(t.objects, kState, kOther, {.send = has_objects, .receive = has_objects});
   dds.exchange(t.status, kStatus, kOther);

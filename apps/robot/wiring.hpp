@@ -125,8 +125,11 @@ struct Topics {
   TeamChannel<InlierSet> shared_inlier_sets;
   AddressedCrossing<TeamLanePacket> team_packets;
   AddressedCrossing<PlacesLanePacket> places_packets;
-  Topic<MeshChunk> sent_chunks;  // to the other robots and to the map of the team
+  // To the other robots and to the map of the team.
+  Topic<MeshChunk> sent_chunks;
+  Topic<MeshPoses> sent_mesh_poses;
   Crossing<MeshChunk> chunks;
+  Crossing<MeshPoses> mesh_poses;
   Topic<RobotObjects> sent_objects;  // to the other robots and to the search for places
   Crossing<RobotObjects> objects;
   Crossing<RobotStatus> status;

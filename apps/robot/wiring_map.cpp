@@ -80,14 +80,20 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   if (config.team == TeamMapMode::kOff) return {.send = false, .receive = false};
   const bool coarse = config.team == TeamMapMode::kCoarse;
   const double voxel_m = coarse ? config.coarse_voxel_m : robot.semantic_mapping.voxel_size_m;
-  team_map_ =
-      &add<TeamMapNode>(false, voxel_m, palette, topics_.sent_chunks, topics_.chunks.from_peers());
+  team_map_ = &add<TeamMapNode>(false, voxel_m, palette,
+                                TeamMapTopics{.own_chunks = topics_.sent_chunks,
+                                              .received_chunks = topics_.chunks.from_peers(),
+                                              .own_poses = topics_.sent_mesh_poses,
+                                              .received_poses = topics_.mesh_poses.from_peers()});
   if (mesh_deformation_ == nullptr) return {.send = false, .receive = true};
   topics_.sent_chunks.subscribe(
       [to_peers = topics_.chunks.to_peers()](const auto& chunk) { to_peers.publish(chunk); });
+  topics_.sent_mesh_poses.subscribe(
+      [to_peers = topics_.mesh_poses.to_peers()](const auto& poses) { to_peers.publish(poses); });
   MeshChunksNode::Reduction reduction;
   if (coarse) reduction = [voxel_m](const LabelledMesh& mesh) { return resampled(mesh, voxel_m); };
-  chunks_ = &add<MeshChunksNode>(false, config, identity_.robot, topics_.sent_chunks,
+  chunks_ = &add<MeshChunksNode>(false, config, identity_.robot,
+                                 MeshChunksTopics{topics_.sent_chunks, topics_.sent_mesh_poses},
                                  std::move(reduction));
   if (config.surface_ties) add_surface_ties();
   // A leaving robot corrects its mesh once more, from scratch. Other robots may have left before,
@@ -95,9 +101,7 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   topics_.optimized_meshes.subscribe([this](const auto& optimized) {
     if (phase_ == RobotPhase::kLeaving) return;
     chunks_->offer(optimized->anchor, {optimized, &optimized->mesh},
-                   ties_ != nullptr
-                       ? std::shared_ptr<const MeshOrigin>(optimized, &optimized->origin)
-                       : nullptr);
+                   {optimized, &optimized->origin});
   });
   return {};
 }
@@ -136,6 +140,8 @@ void Robot::add_surface_ties() {
   ties_ = &add<SurfaceTiesNode>(false, identity_.robot,
                                 SurfaceTiesTopics{.own_chunks = topics_.sent_chunks,
                                                   .peer_chunks = topics_.chunks.from_peers(),
+                                                  .own_poses = topics_.sent_mesh_poses,
+                                                  .peer_poses = topics_.mesh_poses.from_peers(),
                                                   .closures = topics_.closures,
                                                   .progress = topics_.progress,
                                                   .restarts = topics_.closure_restarts,

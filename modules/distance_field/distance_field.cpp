@@ -66,7 +66,7 @@ const DistanceField::Block* DistanceField::find(const Eigen::Vector3i& position)
   return found == blocks_.end() ? nullptr : found->second.get();
 }
 
-// What replace() has done.
+// The result of replace().
 struct DistanceField::Replaced {
   std::size_t new_blocks = 0;
   std::vector<Eigen::Vector3i> touched;       // all blocks

@@ -42,7 +42,7 @@ struct PointDistance {
 /// computation from scratch, bit by bit, and no voxel stores its nearest obstacle.
 ///
 /// Lazy: set() only marks outdated blocks, and they are computed when a distance in them is asked
-/// for. A block that changes several times before is computed once, one that nobody asks for never.
+/// for. A block that changes several times before is computed once.
 ///
 /// Memory: 1.2 kB per observed block of 8^3 voxels. Not thread-safe.
 class DistanceField {
@@ -82,7 +82,7 @@ class DistanceField {
   struct Block {
     BlockBits observed = {}, inside = {};
     BlockBits surface = {};  // surface voxels, derived from the other two
-    bool outdated = true;    // what follows is not valid
+    bool outdated = true;    // the distances are not valid
     SquaredDistances squared;
     std::uint16_t largest = kBeyondReach;  // The largest of `squared`.
 

@@ -1,14 +1,14 @@
 #include "modules/mesh/chunk_schedule.hpp"
 
-#include "modules/mesh/mesh_chunks.hpp"
+#include "modules/mesh/chunk_placement.hpp"
 
 namespace km {
 
-void ChunkSchedule::want(Versions& versions, MeshChunk chunk) {
+void ChunkSchedule::want(Versions& versions, MeshChunk chunk, const MeshPoses* poses) {
   const MeshChunkKey key = chunk.key;
   const bool news = chunk.empty()
                         ? versions.is_out
-                        : versions.sent.empty() || differ(versions.sent, chunk, min_move_m_);
+                        : versions.sent.empty() || differ(versions.sent, chunk, min_move_m_, poses);
   if (news) {
     versions.waiting = std::move(chunk);
     order_.emplace(versions.turn, key);
@@ -18,21 +18,21 @@ void ChunkSchedule::want(Versions& versions, MeshChunk chunk) {
   }
 }
 
-void ChunkSchedule::update(std::vector<MeshChunk> chunks) {
+void ChunkSchedule::update(std::vector<MeshChunk> chunks, const MeshPoses* poses) {
   auto chunk = chunks.begin();
   for (auto known = versions_.begin(); known != versions_.end(); ++known) {
     while (chunk != chunks.end() && chunk->key < known->first) {
       const MeshChunkKey key = chunk->key;
-      want(versions_[key], std::move(*chunk++));  // a new key before `known`
+      want(versions_[key], std::move(*chunk++), poses);  // a new key before `known`
     }
     if (chunk != chunks.end() && chunk->key == known->first)
-      want(known->second, std::move(*chunk++));
+      want(known->second, std::move(*chunk++), poses);
     else
-      want(known->second, MeshChunk{.key = known->first});
+      want(known->second, MeshChunk{.key = known->first}, poses);
   }
   for (; chunk != chunks.end(); ++chunk) {
     const MeshChunkKey key = chunk->key;
-    want(versions_[key], std::move(*chunk));
+    want(versions_[key], std::move(*chunk), poses);
   }
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "modules/mesh/mesh_chunks.hpp"
+#include "modules/mesh/mesh_poses.hpp"
 
 namespace km {
 
@@ -24,8 +25,8 @@ class ChunkSchedule {
   explicit ChunkSchedule(double min_move_m) : min_move_m_(min_move_m) {}
 
   /// Takes the whole current mesh, keys ascending. For each key that it no longer has, an empty
-  /// chunk is sent once.
-  void update(std::vector<MeshChunk> chunks);
+  /// chunk is sent once. `poses` are those with which receivers place the sent chunks, if any.
+  void update(std::vector<MeshChunk> chunks, const MeshPoses* poses = nullptr);
 
   /// Discards the sent chunks, so that the next update() sends the whole mesh to new receivers. For
   /// keys that are missing in that update, empty chunks are sent to receivers with former chunks.
@@ -44,7 +45,7 @@ class ChunkSchedule {
     std::uint64_t turn = 0;  // value of turn_ when it was last sent; 0: never sent
     std::optional<MeshChunk> waiting;
   };
-  void want(Versions& versions, MeshChunk chunk);
+  void want(Versions& versions, MeshChunk chunk, const MeshPoses* poses);
 
   double min_move_m_;
   std::map<MeshChunkKey, Versions> versions_;

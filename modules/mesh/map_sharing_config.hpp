@@ -40,8 +40,10 @@ struct MapSharingConfig {
     visitor.field("position_step_m", position_step_m, {0.001, 0.05},
                   "[m] positions are rounded to multiples of this; cells must be longer, and "
                   "shorter than 21,845 times this (see split_mesh()), which the bounds ensure");
-    visitor.field("min_move_m", min_move_m, {0.0, 100.0},
-                  "[m along an axis] motion of a vertex after which its cell is sent again");
+    visitor.field(
+        "min_move_m", min_move_m, {0.0, 100.0},
+        "[m along an axis] motion of a vertex, beyond that of the keyframes which saw it, after "
+        "which its cell is sent again");
     visitor.field("max_bytes_per_s", max_bytes_per_s, {1000.0, 1e9},
                   "[B/s] average rate of sent chunks; counted once per message, not per receiver");
     visitor.field("surface_ties", surface_ties,

@@ -43,14 +43,103 @@ std::int64_t floor_div(std::int64_t a, std::int64_t b) {
   return a >= 0 ? a / b : -((b - 1 - a) / b);
 }
 
+// Extent of the vertices of a chunk.
+class OffsetRange {
+ public:
+  void extend(const GridPoint& point) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low_[axis] = std::min(low_[axis], point[axis]);
+      high_[axis] = std::max(high_[axis], point[axis]);
+    }
+  }
+  [[nodiscard]] bool fits() const {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (std::int64_t{high_[axis]} - low_[axis] > kMaxOffset) return false;
+    return true;
+  }
+
+ private:
+  static constexpr std::int32_t kLowest = std::numeric_limits<std::int32_t>::min();
+  static constexpr std::int32_t kHighest = std::numeric_limits<std::int32_t>::max();
+  GridPoint low_ = {kHighest, kHighest, kHighest}, high_ = {kLowest, kLowest, kLowest};
+};
+
+// States the views of the vertices of chunks; does nothing without an origin.
+class ChunkViews {
+ public:
+  explicit ChunkViews(const MeshOrigin* origin) : origin_(origin) {
+    if (origin == nullptr) return;
+    keyframes_ = mesh_keyframes(origin->T_world_kf);
+    step_ = mesh_keyframe_step(origin->T_world_kf.size());
+  }
+
+  // Bytes that state() and odometry add at most to a chunk with this number of vertices.
+  [[nodiscard]] std::size_t largest_bytes(std::size_t vertices) const {
+    return kChunkOdometryBytes +
+           (origin_ == nullptr ? 0 : kMaxChunkKeyframes * kMeshKeyframeBytes + 2 * vertices);
+  }
+
+  void state(std::span<const std::uint32_t> vertices, MeshChunk& chunk) const {
+    if (origin_ == nullptr) return;
+    std::size_t spread = 1;  // every spread-th of keyframes_
+    std::vector<std::size_t> used = used_keyframes(vertices, spread);
+    while (used.size() > kMaxChunkKeyframes) used = used_keyframes(vertices, spread *= 2);
+    for (const std::size_t k : used) chunk.keyframes.push_back(keyframes_[k * spread]);
+    for (const std::uint32_t v : vertices) {
+      std::array<MeshChunk::View, 2> views = {};
+      for (std::size_t i = 0; i < 2; ++i) {
+        const Time time = time_of(origin_->seen_by[v][i], spread);
+        const auto slot = std::ranges::lower_bound(used, time.keyframe) - used.begin();
+        views[i] = static_cast<MeshChunk::View>(kViewsPerKeyframe * static_cast<std::size_t>(slot) +
+                                                time.share);
+      }
+      chunk.views.push_back(views);
+    }
+  }
+
+ private:
+  // After keyframes_[spread * keyframe] by this share of the way to the next one.
+  struct Time {
+    std::size_t keyframe = 0;
+    std::size_t share = 0;
+  };
+  // Beyond the last keyframe of keyframes_, that one.
+  [[nodiscard]] Time time_of(KeyframeIndex index, std::size_t spread) const {
+    const std::size_t length = step_ * spread, keyframe = index / length;
+    const bool is_last = (keyframe + 1) * spread >= keyframes_.size();
+    return {keyframe, is_last ? 0 : index % length * kViewsPerKeyframe / length};
+  }
+
+  // Keyframes that the views of these vertices need, ascending.
+  [[nodiscard]] std::vector<std::size_t> used_keyframes(std::span<const std::uint32_t> vertices,
+                                                        std::size_t spread) const {
+    std::set<std::size_t> used;
+    for (const std::uint32_t v : vertices)
+      for (const KeyframeIndex index : origin_->seen_by[v]) {
+        const Time time = time_of(index, spread);
+        used.insert(time.keyframe);
+        if (time.share > 0) used.insert(time.keyframe + 1);
+      }
+    return {used.begin(), used.end()};
+  }
+
+  const MeshOrigin* origin_;
+  std::vector<MeshKeyframe> keyframes_;
+  std::size_t step_ = 1;
+};
+
 // Splits one mesh into chunks.
 class Splitter {
  public:
-  Splitter(const LabelledMesh& mesh, const MeshChunk& blank, const ChunkGrid& grid)
+  Splitter(const LabelledMesh& mesh, const MeshChunk& blank, const ChunkGrid& grid,
+           const MeshOrigin* origin)
       : mesh_(mesh),
         blank_(blank),
+        views_(origin),
         cell_steps_(static_cast<std::int64_t>(std::round(grid.cell_m / grid.step_m))),
         points_(quantise(mesh.vertices, static_cast<double>(blank.step_m))),
+        mapped_(origin == nullptr ? std::vector<GridPoint>()
+                                  : quantise(origin->mapped, static_cast<double>(blank.step_m))),
         part_of_vertex_(mesh.vertices.size(), 0),
         local_index_(mesh.vertices.size(), 0) {}
 
@@ -75,10 +164,11 @@ class Splitter {
   }
 
   [[nodiscard]] GridPoint cell_of(const Face& face) const {
+    const std::vector<GridPoint>& points = mapped_.empty() ? points_ : mapped_;
     GridPoint cell = {};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       std::int64_t sum = 0;
-      for (const std::uint32_t corner : face) sum += points_[corner][axis];
+      for (const std::uint32_t corner : face) sum += points[corner][axis];
       cell[axis] = static_cast<std::int32_t>(floor_div(sum, 3 * cell_steps_));
     }
     return cell;
@@ -118,14 +208,18 @@ class Splitter {
   std::size_t take_faces(const std::vector<Face>& faces, std::size_t begin,
                          std::vector<std::uint32_t>& vertices) {
     ++part_;
+    OffsetRange range;
     std::size_t end = begin;
     for (; end < faces.size(); ++end) {
       std::size_t fresh = 0;
       for (const std::uint32_t v : faces[end]) fresh += part_of_vertex_[v] != part_ ? 1 : 0;
       if (wire_bytes(vertices.size() + fresh, end + 1 - begin, !mesh_.labels.empty()) +
-              kSurfaceKeyframeBytes >
+              views_.largest_bytes(vertices.size() + fresh) >
           kMaxChunkBytes)
         break;
+      // Surfaces of two visits may be in one cell before the deformation, and apart after it.
+      for (const std::uint32_t v : faces[end]) range.extend(points_[v]);
+      if (!range.fits()) break;
       for (const std::uint32_t v : faces[end])
         if (std::exchange(part_of_vertex_[v], part_) != part_) vertices.push_back(v);
     }
@@ -151,19 +245,35 @@ class Splitter {
     }
     for (const auto& [a, b, c] : faces)
       chunk.faces.push_back({local_index_[a], local_index_[b], local_index_[c]});
+    views_.state(vertices, chunk);
     pieces_.chunks.push_back(std::move(chunk));
   }
 
   const LabelledMesh& mesh_;
   const MeshChunk& blank_;
+  const ChunkViews views_;
   std::int64_t cell_steps_;
   std::vector<GridPoint> points_;
+  std::vector<GridPoint> mapped_;  // before the deformation; empty: unknown
   std::map<GridPoint, std::vector<Face>> faces_of_cell_;
   std::vector<std::uint32_t> part_of_vertex_;  // the last part that contains the vertex
   std::uint32_t part_ = 0;
   std::vector<std::uint16_t> local_index_;  // index in that part
   SplitMesh pieces_;
 };
+
+void check(const MeshOrigin& origin, const LabelledMesh& mesh) {
+  const std::size_t vertices = mesh.vertices.size();
+  if (origin.seen_by.size() != vertices || origin.mapped.size() != vertices)
+    throw std::invalid_argument("mesh chunks: an origin of " +
+                                std::to_string(origin.seen_by.size()) + " vertices for " +
+                                std::to_string(vertices));
+  for (const auto& [first, last] : origin.seen_by)
+    if (std::max(first, last) >= origin.T_world_kf.size())
+      throw std::invalid_argument("mesh chunks: a vertex was seen by keyframe " +
+                                  std::to_string(std::max(first, last)) + " of " +
+                                  std::to_string(origin.T_world_kf.size()));
+}
 
 void check(const LabelledMesh& mesh, const ChunkGrid& grid) {
   // Faces extend up to a third of the range of offsets beyond their cell on both sides.
@@ -213,14 +323,18 @@ std::int64_t position(const MeshChunk& chunk, std::size_t vertex, std::size_t ax
   return std::int64_t{chunk.origin[axis]} + chunk.offsets[vertex][axis];
 }
 
-}  // namespace
-
-bool SurfaceKeyframe::operator==(const SurfaceKeyframe& other) const {
-  return odometry.id == other.odometry.id &&
-         odometry.T_odom_kf.matrix() == other.odometry.T_odom_kf.matrix() &&
-         odometry.covariance == other.odometry.covariance &&
-         T_world_kf.matrix() == other.T_world_kf.matrix();
+const char* fault_of_views(const MeshChunk& chunk) {
+  if (chunk.keyframes.size() > kMaxChunkKeyframes) return "too many keyframes";
+  if (chunk.views.size() != (chunk.keyframes.empty() ? 0 : chunk.offsets.size()))
+    return "views do not fit the vertices";
+  for (const auto& views : chunk.views)
+    for (const MeshChunk::View view : views)
+      if ((view + kViewsPerKeyframe - 1) / kViewsPerKeyframe >= chunk.keyframes.size())
+        return "a view between keyframes which do not exist";
+  return nullptr;
 }
+
+}  // namespace
 
 const char* fault_of(const MeshChunk& chunk) {
   const std::size_t vertices = chunk.offsets.size();
@@ -230,20 +344,34 @@ const char* fault_of(const MeshChunk& chunk) {
   for (const MeshChunk::Triple& face : chunk.faces)
     if (std::ranges::max(face) >= vertices) return "a face names a vertex which does not exist";
   if (chunk.faces.empty() != chunk.offsets.empty()) return "vertices without faces";
-  if (chunk.keyframe && chunk.keyframe->odometry.id.robot != chunk.key.robot)
+  if (const char* fault = fault_of(chunk.keyframes)) return fault;
+  if (const char* fault = fault_of_views(chunk)) return fault;
+  if (chunk.odometry && chunk.odometry->id.robot != chunk.key.robot)
     return "a keyframe of another robot";
+  if (chunk.odometry && !find_pose(chunk.keyframes, chunk.odometry->id.index))
+    return "odometry of a keyframe that does not move the chunk";
   if (!are_positions_usable(chunk)) return "positions are not finite or too far away";
   return nullptr;
 }
 
-SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
-                     const ChunkGrid& grid) {
+SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor, const ChunkGrid& grid,
+                     const MeshOrigin* origin) {
   check(mesh, grid);
+  if (origin != nullptr) check(*origin, mesh);
   MeshChunk blank;
   blank.key.robot = robot;
   blank.anchor = anchor;
   blank.step_m = static_cast<float>(grid.step_m);
-  return Splitter(mesh, blank, grid).split();
+  return Splitter(mesh, blank, grid, origin).split();
+}
+
+const MeshKeyframe& middle_keyframe(const MeshChunk& chunk) {
+  std::vector<std::size_t> middles;
+  for (const auto& [first, last] : chunk.views)
+    middles.push_back((std::size_t{first} + last) / 2 / kViewsPerKeyframe);
+  const auto middle = middles.begin() + static_cast<std::ptrdiff_t>(middles.size() / 2);
+  std::ranges::nth_element(middles, middle);
+  return chunk.keyframes[*middle];
 }
 
 std::vector<MeshCells::Cell> occupied_cells(const LabelledMesh& mesh, double cell_m) {
@@ -287,19 +415,6 @@ LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks) {
         mesh.faces.push_back({index[a], index[b], index[c]});
   }
   return mesh;
-}
-
-bool differ(const MeshChunk& a, const MeshChunk& b, double min_move_m) {
-  if (a.anchor != b.anchor || a.step_m != b.step_m ||
-      a.keyframe.has_value() != b.keyframe.has_value() || a.labels != b.labels ||
-      a.faces != b.faces || a.offsets.size() != b.offsets.size())
-    return true;
-  const double limit_steps = min_move_m / static_cast<double>(a.step_m);
-  for (std::size_t v = 0; v < a.offsets.size(); ++v)
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      if (static_cast<double>(std::abs(position(a, v, axis) - position(b, v, axis))) > limit_steps)
-        return true;
-  return false;
 }
 
 }  // namespace km

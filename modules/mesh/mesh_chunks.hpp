@@ -12,7 +12,10 @@
 #include "modules/core/keyframe.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/core/mesh_cells.hpp"
+#include "modules/core/surface_keyframe.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
+#include "modules/mesh/mesh_origin.hpp"
+#include "modules/mesh/mesh_poses.hpp"
 
 namespace km {
 
@@ -24,21 +27,20 @@ struct MeshChunkKey {
   auto operator<=>(const MeshChunkKey&) const = default;
 };
 
-/// A keyframe from which a part of a mesh was seen, and its pose when this part was placed in
-/// `world`. Relative to the keyframe, the part stays where it is when poses are optimised again.
-struct SurfaceKeyframe {
-  OdometryPose odometry;
-  SE3 T_world_kf = SE3::Identity();
-  bool operator==(const SurfaceKeyframe& other) const;
-};
-
 /// A self-contained part of a robot's mesh: a chunk has all vertices of its faces. Their positions
 /// are rounded to a grid that all chunks share, so that a vertex has the same position in all
 /// chunks that contain it: position = step_m * (origin + offset).
 ///
+/// A chunk states the keyframes that move it, with their poses when it was sent. Receivers place it
+/// with the present poses of these keyframes (see place()), so that a correction of the trajectory
+/// does not change chunks.
+///
 /// A chunk without faces means that the mesh no longer has a chunk with its key.
 struct MeshChunk {
   using Triple = std::array<std::uint16_t, 3>;
+  /// A time, as kViewsPerKeyframe * i + j: the share j / kViewsPerKeyframe of the way from
+  /// keyframes[i] to the next one of `keyframes`.
+  using View = std::uint8_t;
 
   MeshChunkKey key;
   std::uint64_t boot = 0;  ///< Boot id of the sender; only set in received chunks.
@@ -48,8 +50,11 @@ struct MeshChunk {
   std::vector<Triple> offsets = {};                ///< Offset of each vertex [step_m].
   std::vector<LabelId> labels = {};                ///< Label of each vertex, or empty.
   std::vector<Triple> faces = {};                  ///< Counter-clockwise seen from free space.
-  /// Keyframe in the middle of those that saw the chunk; absent without `map.surface_ties`.
-  std::optional<SurfaceKeyframe> keyframe = {};
+  std::vector<MeshKeyframe> keyframes = {};        ///< Ascending; empty: the chunk never moves.
+  /// First and last view of each vertex; empty without `keyframes`.
+  std::vector<std::array<View, 2>> views = {};
+  /// Odometry of middle_keyframe(); absent without `map.surface_ties`.
+  std::optional<OdometryPose> odometry = {};
 
   [[nodiscard]] bool empty() const { return faces.empty(); }
   bool operator==(const MeshChunk&) const = default;
@@ -58,18 +63,25 @@ struct MeshChunk {
 /// Largest size of a chunk on the wire, with its envelope.
 inline constexpr std::size_t kMaxChunkBytes = 32000;
 
-/// Bytes of MeshChunk::keyframe on the wire, with padding.
-inline constexpr std::size_t kSurfaceKeyframeBytes = 296;
+/// Number of Views from one keyframe of a chunk to the next.
+inline constexpr std::size_t kViewsPerKeyframe = 4;
 
-/// Upper bound on the bytes of a chunk on the wire, without a keyframe.
+/// Largest number of MeshChunk::keyframes, so that a View has one byte.
+inline constexpr std::size_t kMaxChunkKeyframes = 256 / kViewsPerKeyframe;
+
+/// Bytes of MeshChunk::odometry on the wire, with padding.
+inline constexpr std::size_t kChunkOdometryBytes = kSurfaceKeyframeBytes;
+
+/// Upper bound on the bytes of a chunk on the wire, without keyframes and odometry.
 [[nodiscard]] constexpr std::size_t wire_bytes(std::size_t vertices, std::size_t faces,
                                                bool labelled) {
-  constexpr std::size_t kFixed = 104;  // bytes of all fields that are not sequences, and padding
+  constexpr std::size_t kFixed = 116;  // bytes of all fields that are not sequences, and padding
   return kFixed + (labelled ? 7 : 6) * vertices + 6 * faces;
 }
 [[nodiscard]] inline std::size_t wire_bytes(const MeshChunk& chunk) {
   return wire_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
-         (chunk.keyframe ? kSurfaceKeyframeBytes : 0);
+         kMeshKeyframeBytes * chunk.keyframes.size() + 2 * chunk.views.size() +
+         (chunk.odometry ? kChunkOdometryBytes : 0);
 }
 
 /// The reason why `chunk` cannot be from split_mesh() (a string literal), or null. Received chunks
@@ -89,16 +101,26 @@ struct SplitMesh {
   std::size_t oversized_faces = 0;
 };
 
-/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes, also with a keyframe. Positions
+/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes, also with odometry. Positions
 /// err by up to half a step per axis. Colours, and vertices without faces, are dropped. A face
 /// belongs to the cell of its centroid. An unchanged part of the mesh gives the same chunk if its
 /// vertices are in the same order; the order of faces does not matter.
 ///
+/// With an `origin`, chunks have the keyframes that move them: every mesh_keyframe_step()-th one of
+/// the trajectory, or less if a chunk had more than kMaxChunkKeyframes of them. Cells are then
+/// those of the positions before the deformation, so that a correction moves no face to another
+/// cell.
+///
 /// Throws std::invalid_argument for a grid that is not positive and for cells that are no longer
 /// than a step. Also throws it for a vertex that is not finite or beyond 2^30 steps, and for a face
-/// with a vertex that does not exist. Linear except for sorting the faces of a cell.
+/// with a vertex that does not exist. Also for an origin of another mesh, and as RoundedPose::of().
+/// Linear except for sorting the faces of a cell.
 [[nodiscard]] SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
-                                   const ChunkGrid& grid);
+                                   const ChunkGrid& grid, const MeshOrigin* origin = nullptr);
+
+/// The keyframe in the middle of the views of a chunk: the median of its vertices. Precondition:
+/// the chunk has keyframes and vertices.
+[[nodiscard]] const MeshKeyframe& middle_keyframe(const MeshChunk& chunk);
 
 /// The cells that contain the centroid of a face, ascending. Faces that are not finite, or farther
 /// away than 2^30 cells, are left out. Precondition: corners exist.
@@ -108,9 +130,5 @@ struct SplitMesh {
 /// are merged, and faces that rounding has left without area are removed. The mesh has labels if
 /// any chunk has labels.
 [[nodiscard]] LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks);
-
-/// True if a viewer would show a difference: other faces, labels or frame, or a vertex that moved
-/// by more than `min_move_m` along an axis.
-[[nodiscard]] bool differ(const MeshChunk& a, const MeshChunk& b, double min_move_m);
 
 }  // namespace km

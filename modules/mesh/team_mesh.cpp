@@ -18,14 +18,28 @@ const char* to_string(ChunkVerdict verdict) {
   return "no room";
 }
 
-ChunkVerdict TeamMesh::add(MeshChunk chunk) {
-  Robot& robot = robots_.try_emplace(chunk.key.robot, Robot{.boot = chunk.boot}).first->second;
-  if (robot.earlier_boots.contains(chunk.boot)) return ChunkVerdict::kEarlierBoot;
-  if (chunk.boot != robot.boot) {
+TeamMesh::Robot* TeamMesh::robot_of(RobotId id, std::uint64_t boot) {
+  Robot& robot = robots_.try_emplace(id, Robot{.boot = boot}).first->second;
+  if (robot.earlier_boots.contains(boot)) return nullptr;
+  if (boot != robot.boot) {
     auto earlier = std::move(robot.earlier_boots);
     earlier.insert(robot.boot);
-    robot = {.boot = chunk.boot, .earlier_boots = std::move(earlier)};
+    robot = {.boot = boot, .earlier_boots = std::move(earlier)};
   }
+  return &robot;
+}
+
+ChunkVerdict TeamMesh::add(MeshPoses poses) {
+  Robot* const robot = robot_of(poses.robot, poses.boot);
+  if (robot == nullptr) return ChunkVerdict::kEarlierBoot;
+  robot->poses = std::move(poses);
+  return ChunkVerdict::kTaken;
+}
+
+ChunkVerdict TeamMesh::add(MeshChunk chunk) {
+  Robot* const sender = robot_of(chunk.key.robot, chunk.boot);
+  if (sender == nullptr) return ChunkVerdict::kEarlierBoot;
+  Robot& robot = *sender;
   const auto before = robot.chunks.find(chunk.key);
   std::size_t bytes = robot.bytes;
   if (before != robot.chunks.end()) bytes -= wire_bytes(before->second);
@@ -44,10 +58,11 @@ ChunkVerdict TeamMesh::add(MeshChunk chunk) {
   return ChunkVerdict::kTaken;
 }
 
-std::vector<const MeshChunk*> TeamMesh::chunks() const {
-  std::vector<const MeshChunk*> all;
+std::vector<PlacedChunk> TeamMesh::placed() const {
+  std::vector<PlacedChunk> all;
   for (const auto& [id, robot] : robots_)
-    for (const auto& [key, chunk] : robot.chunks) all.push_back(&chunk);
+    for (const auto& [key, chunk] : robot.chunks)
+      all.push_back(place(chunk, robot.poses ? &*robot.poses : nullptr));
   return all;
 }
 

@@ -3,11 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <vector>
 
+#include "modules/mesh/chunk_placement.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
+#include "modules/mesh/mesh_poses.hpp"
 
 namespace km {
 
@@ -31,8 +34,9 @@ struct RobotMesh {
       0;  ///< Chunks left out of mesh: their anchor robot or step differs from the newest.
 };
 
-/// The meshes of other robots, with the newest chunk of each key. The mesh of a robot that leaves
-/// stays. When a robot restarts, its first chunk replaces its former mesh. Not thread-safe.
+/// The meshes of other robots, with the newest chunk of each key and the newest poses of each
+/// robot. The mesh of a robot that leaves stays. When a robot restarts, its first message replaces
+/// its former mesh. Not thread-safe.
 class TeamMesh {
  public:
   /// About 2 million vertices with their faces; a bound for misbehaving peers.
@@ -42,11 +46,13 @@ class TeamMesh {
       : max_bytes_per_robot_(max_bytes_per_robot) {}
 
   ChunkVerdict add(MeshChunk chunk);
+  /// Takes the poses that place the chunks of a robot, before or after them. Never kNoRoom.
+  ChunkVerdict add(MeshPoses poses);
 
-  /// All chunks, by their keys.
-  [[nodiscard]] std::vector<const MeshChunk*> chunks() const;
+  /// All chunks, by their keys, where the newest poses place them. Valid until the next add().
+  [[nodiscard]] std::vector<PlacedChunk> placed() const;
 
-  /// One mesh per robot, by ascending id.
+  /// One mesh per robot, by ascending id, of the chunks as they were sent.
   [[nodiscard]] std::vector<RobotMesh> snapshot() const;
 
  private:
@@ -55,9 +61,13 @@ class TeamMesh {
     std::set<std::uint64_t> earlier_boots = {};
     RobotId anchor = 0;  // anchor of the newest chunk
     float step_m = 0.0F;
+    std::optional<MeshPoses> poses = {};
     std::map<MeshChunkKey, MeshChunk> chunks = {};
     std::size_t bytes = 0;
   };
+  // The robot after a message of its boot `boot`; null for a message of an earlier boot.
+  [[nodiscard]] Robot* robot_of(RobotId id, std::uint64_t boot);
+
   std::size_t max_bytes_per_robot_;
   std::map<RobotId, Robot> robots_;
 };

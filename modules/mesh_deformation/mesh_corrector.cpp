@@ -23,7 +23,7 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   if (largest_difference(anchors_, motion.T_after_before, T_result_optimized_, scale_) <= 1.0)
     return std::nullopt;
   T_result_optimized_ = motion.T_after_before;
-  MeshCorrection result{optimized_, report_, false, {}, 0, {seen_by_, anchors_}};
+  MeshCorrection result{optimized_, report_, false, {}, 0, {seen_by_, anchors_, mapped_}};
   result.mesh.transform(T_result_optimized_);
   for (SE3& pose : result.origin.T_world_kf) pose = T_result_optimized_ * pose;
   return result;
@@ -55,7 +55,10 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   anchors_ = std::move(anchors);
   optimized_ = without_superseded(deformed.mesh, replacements);
   seen_by_ = input.map.seen_by;
-  keep_elements(seen_by_, remaining_vertices(deformed.mesh, replacements));
+  mapped_ = input.map.mesh.vertices;
+  const std::vector<std::uint32_t> remaining = remaining_vertices(deformed.mesh, replacements);
+  keep_elements(seen_by_, remaining);
+  keep_elements(mapped_, remaining);
   report_ = deformed.report;
   T_result_optimized_ = SE3::Identity();
   return {optimized_,
@@ -63,7 +66,7 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
           true,
           named(replacements, input.map.ids),
           deformed.mesh.faces.size() - optimized_.faces.size(),
-          {seen_by_, anchors_}};
+          {seen_by_, anchors_, mapped_}};
 }
 
 }  // namespace km

@@ -72,7 +72,8 @@ class MeshCorrector {
   std::optional<std::uint64_t> map_version_;
   std::vector<SE3> anchors_;  // complete() of the trajectory
   LabelledMesh optimized_;
-  std::vector<SeenBy> seen_by_;  // keyframes of the vertices of optimized_
+  std::vector<SeenBy> seen_by_;          // keyframes of the vertices of optimized_
+  std::vector<Eigen::Vector3f> mapped_;  // positions of the vertices of optimized_ in the map
   MeshDeformationReport report_;
   SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };

@@ -6,7 +6,7 @@
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/label_palette.hpp"
-#include "modules/mesh/mesh_chunks.hpp"
+#include "modules/core/surface_keyframe.hpp"
 #include "modules/objects/object_box.hpp"
 
 namespace km {

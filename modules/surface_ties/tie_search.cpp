@@ -21,17 +21,27 @@ TieSearch::TieSearch(RobotId self, const SurfaceTieOptions& options)
     : self_(self), options_(options) {}
 
 void TieSearch::add(const MeshChunk& chunk, double now_s) {
-  const RobotId robot = chunk.key.robot;
+  add_to_pieces(chunk.key.robot, chunk.boot, chunk, now_s);
+}
+
+void TieSearch::add(const MeshPoses& poses, double now_s) {
+  add_to_pieces(poses.robot, poses.boot, poses, now_s);
+}
+
+template <typename Message>
+void TieSearch::add_to_pieces(RobotId robot, std::uint64_t boot, const Message& message,
+                              double now_s) {
   if (robot < self_) return;  // that robot makes the ties
-  const auto [boot, is_new] = boots_.try_emplace(robot, chunk.boot);
-  if (boot->second != chunk.boot) {
+  const auto [known, is_new] = boots_.try_emplace(robot, boot);
+  if (known->second != boot) {
     forget(robot);
-    boots_[robot] = chunk.boot;
+    boots_[robot] = boot;
   }
   RigidPieces& pieces = pieces_.try_emplace(robot, options_.spacing_m).first->second;
-  for (const KeyframeIndex number : pieces.add(chunk))
+  for (const KeyframeIndex number : pieces.add(message)) {
     versions_[{robot, number}] = {++changes_, now_s};
-  is_done_ = false;
+    is_done_ = false;
+  }
 }
 
 void TieSearch::add(const ClosureId& closure) {

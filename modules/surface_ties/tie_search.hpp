@@ -37,6 +37,8 @@ class TieSearch {
 
   /// A chunk of this robot or a received one. Precondition: fault_of() finds no fault.
   void add(const MeshChunk& chunk, double now_s);
+  /// Present poses of this robot or received ones.
+  void add(const MeshPoses& poses, double now_s);
   /// Any closure, also ties of a former process.
   void add(const ClosureId& closure);
   /// Discards everything about a restarted robot.
@@ -64,6 +66,8 @@ class TieSearch {
   };
   using PieceId = std::pair<RobotId, KeyframeIndex>;
 
+  template <typename Message>
+  void add_to_pieces(RobotId robot, std::uint64_t boot, const Message& message, double now_s);
   [[nodiscard]] std::vector<Pair> open_pairs() const;
   [[nodiscard]] bool is_open(const Pair& pair) const;
   [[nodiscard]] bool is_calm(const Pair& pair, double now_s) const;

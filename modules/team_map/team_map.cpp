@@ -14,14 +14,9 @@ namespace {
 
 using Box = std::array<std::int32_t, 3>;
 
-std::array<Eigen::Vector3f, 3> corners_of(const MeshChunk& chunk, const MeshChunk::Triple& face) {
-  std::array<Eigen::Vector3f, 3> corners;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      corners[i][static_cast<Eigen::Index>(axis)] = static_cast<float>(
-          static_cast<double>(chunk.step_m) *
-          static_cast<double>(std::int64_t{chunk.origin[axis]} + chunk.offsets[face[i]][axis]));
-  return corners;
+std::array<Eigen::Vector3f, 3> corners_of(const PlacedChunk& placed,
+                                          const MeshChunk::Triple& face) {
+  return {placed.vertices[face[0]], placed.vertices[face[1]], placed.vertices[face[2]]};
 }
 
 // The label of two corners, or else of the first.
@@ -38,20 +33,23 @@ Eigen::AlignedBox3f bounds_of(const std::array<Eigen::Vector3f, 3>& corners, flo
   return {bounds.min() - margin, bounds.max() + margin};
 }
 
-// True for a face that no mapper makes; it could be near any number of boxes.
-bool is_oversized(const Eigen::AlignedBox3f& bounds, const SurfaceFusion& fusion) {
-  return bounds.sizes().maxCoeff() > fusion.side_m() + 2.0F * fusion.reach_m();
+// True for a face that no mapper makes. It could be near any number of boxes, or in a box without a
+// number, because poses that a robot states may stretch its chunks.
+bool is_left_out(const Eigen::AlignedBox3f& bounds, const SurfaceFusion& fusion) {
+  constexpr float kFarthest_m = 1e7F;
+  return bounds.sizes().maxCoeff() > fusion.side_m() + 2.0F * fusion.reach_m() ||
+         !(bounds.min().minCoeff() > -kFarthest_m && bounds.max().maxCoeff() < kFarthest_m);
 }
 
 // Chunks by the boxes that their faces may change, in ascending order of their keys.
-using ChunksOfBoxes = std::map<Box, std::vector<const MeshChunk*>>;
+using ChunksOfBoxes = std::map<Box, std::vector<const PlacedChunk*>>;
 
-void enter(const MeshChunk& chunk, const SurfaceFusion& fusion, ChunksOfBoxes& boxes) {
+void enter(const PlacedChunk& chunk, const SurfaceFusion& fusion, ChunksOfBoxes& boxes) {
   std::pair<Box, Box> last;
   bool is_first = true;
-  for (const MeshChunk::Triple& face : chunk.faces) {
+  for (const MeshChunk::Triple& face : chunk.chunk->faces) {
     const Eigen::AlignedBox3f bounds = bounds_of(corners_of(chunk, face), fusion.reach_m());
-    if (is_oversized(bounds, fusion)) continue;
+    if (is_left_out(bounds, fusion)) continue;
     const std::pair<Box, Box> range{fusion.box_of(bounds.min()), fusion.box_of(bounds.max())};
     // Neighbours in the list are usually neighbours in space.
     if (!std::exchange(is_first, false) && range == last) continue;
@@ -60,26 +58,28 @@ void enter(const MeshChunk& chunk, const SurfaceFusion& fusion, ChunksOfBoxes& b
     for (std::int32_t x = low[0]; x <= high[0]; ++x)
       for (std::int32_t y = low[1]; y <= high[1]; ++y)
         for (std::int32_t z = low[2]; z <= high[2]; ++z) {
-          std::vector<const MeshChunk*>& near = boxes[{x, y, z}];
+          std::vector<const PlacedChunk*>& near = boxes[{x, y, z}];
           if (near.empty() || near.back() != &chunk) near.push_back(&chunk);
         }
   }
 }
 
-std::vector<RobotSurface> surfaces_near(const Box& box, const std::vector<const MeshChunk*>& chunks,
+std::vector<RobotSurface> surfaces_near(const Box& box,
+                                        const std::vector<const PlacedChunk*>& chunks,
                                         const SurfaceFusion& fusion) {
   std::vector<RobotSurface> surfaces;
   const Eigen::Vector3f low =
       fusion.side_m() * Eigen::Vector3i(box[0], box[1], box[2]).cast<float>();
   const Eigen::AlignedBox3f space(low, low + Eigen::Vector3f::Constant(fusion.side_m()));
-  for (const MeshChunk* chunk : chunks) {
-    if (surfaces.empty() || surfaces.back().robot != chunk->key.robot)
-      surfaces.push_back({.robot = chunk->key.robot, .triangles = {}});
-    for (const MeshChunk::Triple& face : chunk->faces) {
-      const auto corners = corners_of(*chunk, face);
+  for (const PlacedChunk* placed : chunks) {
+    const MeshChunk& chunk = *placed->chunk;
+    if (surfaces.empty() || surfaces.back().robot != chunk.key.robot)
+      surfaces.push_back({.robot = chunk.key.robot, .triangles = {}});
+    for (const MeshChunk::Triple& face : chunk.faces) {
+      const auto corners = corners_of(*placed, face);
       const Eigen::AlignedBox3f bounds = bounds_of(corners, fusion.reach_m());
-      if (space.intersects(bounds) && !is_oversized(bounds, fusion))
-        surfaces.back().triangles.push_back({corners, label_of(*chunk, face)});
+      if (space.intersects(bounds) && !is_left_out(bounds, fusion))
+        surfaces.back().triangles.push_back({corners, label_of(chunk, face)});
     }
   }
   return surfaces;
@@ -112,9 +112,9 @@ class BoxJoiner {
 };
 
 // The anchor of most chunks; the lowest of several.
-RobotId anchor_of(const std::vector<const MeshChunk*>& chunks) {
+RobotId anchor_of(const std::vector<PlacedChunk>& chunks) {
   std::map<RobotId, std::size_t> counts;
-  for (const MeshChunk* chunk : chunks) ++counts[chunk->anchor];
+  for (const PlacedChunk& chunk : chunks) ++counts[chunk.anchor];
   const auto most = std::ranges::max_element(
       counts, [](const auto& a, const auto& b) { return a.second < b.second; });
   return most == counts.end() ? RobotId{0} : most->first;
@@ -122,18 +122,18 @@ RobotId anchor_of(const std::vector<const MeshChunk*>& chunks) {
 
 }  // namespace
 
-TeamMap fuse_chunks(const std::vector<const MeshChunk*>& chunks, double voxel_m) {
+TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m) {
   SurfaceFusion fusion(voxel_m);
   TeamMap map{.anchor = anchor_of(chunks), .mesh = {}};
   ChunksOfBoxes boxes;
   bool is_labelled = false;
-  for (const MeshChunk* chunk : chunks) {
-    if (chunk->anchor != map.anchor) {
+  for (const PlacedChunk& chunk : chunks) {
+    if (chunk.anchor != map.anchor) {
       ++map.other_frames;
       continue;
     }
-    enter(*chunk, fusion, boxes);
-    is_labelled = is_labelled || !chunk->labels.empty();
+    enter(chunk, fusion, boxes);
+    is_labelled = is_labelled || !chunk.chunk->labels.empty();
   }
   BoxJoiner joiner(map.mesh);
   std::size_t fused = 0;
@@ -148,8 +148,8 @@ TeamMap fuse_chunks(const std::vector<const MeshChunk*>& chunks, double voxel_m)
 
 LabelledMesh resampled(const LabelledMesh& mesh, double voxel_m) {
   const SplitMesh pieces = split_mesh(mesh, 0, 0, {});
-  std::vector<const MeshChunk*> chunks;
-  for (const MeshChunk& chunk : pieces.chunks) chunks.push_back(&chunk);
+  std::vector<PlacedChunk> chunks;
+  for (const MeshChunk& chunk : pieces.chunks) chunks.push_back(place(chunk, nullptr));
   return fuse_chunks(chunks, voxel_m).mesh;
 }
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "modules/mesh/chunk_placement.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
-#include "modules/mesh/mesh_chunks.hpp"
 
 namespace km {
 
@@ -21,15 +21,15 @@ struct TeamMap {
 /// Largest number of boxes (SurfaceFusion) with surface: a bound for misbehaving peers.
 inline constexpr std::size_t kMaxMapBoxes = std::size_t{1} << 17U;
 
-/// Fuses chunks of any robots, sorted by their keys, each key once. The frame is that of most
-/// chunks; of several such frames it is that of the robot with the lowest id. Faces that are longer
-/// than a box are left out, because no mapper makes them.
+/// Fuses placed chunks of any robots, sorted by their keys, each key once. The frame is that of
+/// most chunks; of several such frames it is that of the robot with the lowest id. Faces that are
+/// longer than a box are left out, because no mapper makes them. So are faces beyond 10,000 km.
 ///
-/// The result depends on the chunks and the voxels alone, bit by bit (on processors with the same
-/// arithmetic). Two robots with the same chunks therefore have the same map.
+/// The result depends on the placed chunks and the voxels alone, bit by bit (on processors with the
+/// same arithmetic). Two robots with the same chunks and poses therefore have the same map.
 ///
 /// Throws std::invalid_argument for a size of voxels that is not positive.
-[[nodiscard]] TeamMap fuse_chunks(const std::vector<const MeshChunk*>& chunks, double voxel_m);
+[[nodiscard]] TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m);
 
 /// A mesh on its own in voxels of another size. Throws under the conditions of split_mesh() and
 /// fuse_chunks().

@@ -70,8 +70,9 @@ MeshChunk some_chunk() {
           .offsets = {{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {0, 0, 9}},
           .labels = {1, 2, 3, 4},
           .faces = {{0, 1, 2}, {0, 2, 3}},
-          .keyframe = SurfaceKeyframe{{{kWriter.robot, 3}, SE3::Identity(), Matrix6::Identity()},
-                                      SE3::Identity()}};
+          .keyframes = mesh_keyframes(std::vector<SE3>(8, SE3::Identity())),
+          .views = {{0, 0}, {0, 3}, {2, 4}, {4, 4}},
+          .odometry = odometry(kWriter.robot, 4)};
 }
 
 template <OverlayLane kLane>
@@ -176,6 +177,9 @@ std::vector<MessageReader> all_messages() {
                          .closures = {{{2, 1}, {5, 2}}, {{2, 1}, {5, 3}}}}}),
       topic<KeyframeBow>({{.id = {kWriter.robot, 4}, .words = {{3, 1}, {900, 4}, {70000, 1}}}}),
       topic<MeshChunk>({some_chunk()}),
+      topic<MeshPoses>({{.robot = kWriter.robot,
+                         .anchor = kReader,
+                         .keyframes = mesh_keyframes(std::vector<SE3>(8, SE3::Identity()))}}),
       topic<RobotObjects>({{.robot = kWriter.robot,
                             .anchor = kReader,
                             .objects = {{.label = 7, .keyframe = 3, .size_m = {2, 1, 1}},

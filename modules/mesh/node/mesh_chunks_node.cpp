@@ -20,6 +20,13 @@ constexpr double kTick_s = 0.1;
 // size of the mesh, the work takes less than a tenth of a processor.
 constexpr double kPauses = 10.0;
 
+// Poses take at most this share of the budget, because each message states all of them.
+constexpr double kPosesShare = 0.1;
+
+// Poses are sent when they move surface by this share of min_move_m. A chunk that was sent with
+// newer poses may lie this far from its neighbours until the next poses.
+constexpr double kPosesMove = 0.5;
+
 // Unused budget is kept for this time.
 constexpr double kBurst_s = 0.5;
 
@@ -29,13 +36,14 @@ TokenBucket full_budget(double bytes_per_s) {
 
 }  // namespace
 
-MeshChunksNode::MeshChunksNode(const MapSharingConfig& config, RobotId self, Out<MeshChunk> chunks,
-                               Reduction reduction)
+MeshChunksNode::MeshChunksNode(const MapSharingConfig& config, RobotId self,
+                               const MeshChunksTopics& topics, Reduction reduction)
     : config_(checked(config)),
       self_(self),
-      chunks_(chunks),
+      topics_(topics),
       reduction_(std::move(reduction)),
       schedule_(config.min_move_m),
+      sent_poses_{.robot = self},
       budget_bytes_(full_budget(config.max_bytes_per_s)),
       worker_(
           kQueue, Overflow::kBlock, [this](const Offer& offer) { step(offer, steady_now_s()); },
@@ -81,42 +89,58 @@ void MeshChunksNode::step(const Offer& offer, double now_s) {
     next_take_s_ = now_s + kPauses * (steady_now_s() - start_s);
   }
   send(now_s);
-  waiting_ = schedule_.waiting();
+  waiting_ = schedule_.waiting() + (waiting_poses_ ? 1 : 0);
   if (is_due) --offers_;
 }
 
 void MeshChunksNode::take(const Offer& offer) {
-  SplitMesh pieces = split_mesh(reduction_ ? reduction_(*offer.mesh) : *offer.mesh, self_,
-                                offer.anchor, {config_.cell_m, config_.position_step_m});
+  SplitMesh pieces = split(offer);
   if (pieces.oversized_faces > 0)
     log::limited(log::Level::kWarn, name(), "oversized")
         << pieces.oversized_faces
         << " faces are too long for map.position_step_m = " << config_.position_step_m
         << " m and are not sent";
-  if (offer.origin != nullptr) state_keyframes(pieces.chunks, offer);
-  schedule_.update(std::move(pieces.chunks));
+  if (reduction_ || offer.origin == nullptr) return schedule_.update(std::move(pieces.chunks));
+  state_odometry(pieces.chunks);
+  const MeshPoses poses{.robot = self_,
+                        .anchor = offer.anchor,
+                        .keyframes = mesh_keyframes(offer.origin->T_world_kf)};
+  schedule_.update(std::move(pieces.chunks), &poses);
+  waiting_poses_.reset();
+  if (has_moved(sent_poses_, poses, kPosesMove * config_.min_move_m)) waiting_poses_ = poses;
 }
 
-void MeshChunksNode::state_keyframes(std::vector<MeshChunk>& chunks, const Offer& offer) const {
-  const MeshOrigin& origin = *offer.origin;
-  const auto of_cell = keyframes_of_cells(*offer.mesh, origin.seen_by, config_.cell_m);
+SplitMesh MeshChunksNode::split(const Offer& offer) const {
+  const ChunkGrid grid{config_.cell_m, config_.position_step_m};
+  if (reduction_) return split_mesh(reduction_(*offer.mesh), self_, offer.anchor, grid);
+  return split_mesh(*offer.mesh, self_, offer.anchor, grid, offer.origin.get());
+}
+
+void MeshChunksNode::state_odometry(std::vector<MeshChunk>& chunks) const {
   for (MeshChunk& chunk : chunks) {
-    const auto index = of_cell.find(chunk.key.cell);
-    if (index == of_cell.end() || index->second >= origin.T_world_kf.size()) continue;
-    const auto keyframe = keyframes_.find(index->second);
-    if (keyframe == keyframes_.end()) continue;
-    chunk.keyframe = {keyframe->second, origin.T_world_kf[index->second]};
+    const auto keyframe = keyframes_.find(middle_keyframe(chunk).index);
+    if (keyframe != keyframes_.end()) chunk.odometry = keyframe->second;
   }
 }
 
-// A chunk is sent while there is no debt. It may cause a debt.
+// A message is sent while there is no debt. It may cause a debt.
 void MeshChunksNode::send(double now_s) {
+  send_poses(now_s);
   while (budget_bytes_.wait_s(0.0, now_s) <= 0.0) {
     std::optional<MeshChunk> chunk = schedule_.next();
     if (!chunk) return;
     budget_bytes_.spend(static_cast<double>(wire_bytes(*chunk)), now_s);
-    chunks_.publish(*std::move(chunk));
+    topics_.chunks.publish(*std::move(chunk));
   }
+}
+
+void MeshChunksNode::send_poses(double now_s) {
+  if (!waiting_poses_ || now_s < next_poses_s_ || budget_bytes_.wait_s(0.0, now_s) > 0.0) return;
+  const auto bytes = static_cast<double>(wire_bytes(*waiting_poses_));
+  budget_bytes_.spend(bytes, now_s);
+  next_poses_s_ = now_s + bytes / (kPosesShare * config_.max_bytes_per_s);
+  sent_poses_ = *std::exchange(waiting_poses_, std::nullopt);
+  topics_.poses.publish(sent_poses_);
 }
 
 }  // namespace km

@@ -12,7 +12,9 @@
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_sharing_config.hpp"
+#include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_origin.hpp"
+#include "modules/mesh/mesh_poses.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/token_bucket.hpp"
@@ -21,9 +23,19 @@
 
 namespace km {
 
+/// Channels of MeshChunksNode; they must outlive it.
+struct MeshChunksTopics {
+  Out<MeshChunk> chunks;
+  Out<MeshPoses> poses;
+};
+
 /// Publishes the robot's mesh in chunks, at most max_bytes_per_s on average. Only chunks that have
 /// changed since they were last sent are sent, each in its newest version. The module that has the
 /// robot's best mesh passes it to offer().
+///
+/// A correction of the trajectory moves chunks by the poses of their keyframes, which take at most
+/// a tenth of the bytes. They are sent when they move some surface by more than half of min_move_m,
+/// and when keyframes were added.
 class MeshChunksNode final : public Node {
  public:
   /// A mesh in the frame `world` of the robot `anchor`, with the keyframes that saw it, if known. A
@@ -38,17 +50,17 @@ class MeshChunksNode final : public Node {
   /// Reduces a mesh before it is sent.
   using Reduction = std::function<LabelledMesh(const LabelledMesh&)>;
 
-  /// Throws ConfigError if `config` is out of bounds. `chunks` are published to the peers. Without
-  /// a reduction the whole mesh is sent.
-  MeshChunksNode(const MapSharingConfig& config, RobotId self, Out<MeshChunk> chunks,
+  /// Throws ConfigError if `config` is out of bounds. Without a reduction the whole mesh is sent.
+  /// The chunks of a reduced mesh have no keyframes, because it has no origin.
+  MeshChunksNode(const MapSharingConfig& config, RobotId self, const MeshChunksTopics& topics,
                  Reduction reduction = {});
   ~MeshChunksNode() override { stop(); }
 
   /// Only the newest mesh counts. Thread-safe; returns at once.
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh,
              std::shared_ptr<const MeshOrigin> origin = {});
-  /// An own keyframe. Chunks of meshes with an origin state the keyframe that saw them, if it is
-  /// known. Thread-safe; returns at once.
+  /// An own keyframe. Chunks of meshes with an origin state the odometry of the keyframe in the
+  /// middle of their views, if it is known. Thread-safe; returns at once.
   void learn(const OdometryPose& keyframe);
 
   std::string_view name() const override { return "mesh_chunks"; }
@@ -58,9 +70,9 @@ class MeshChunksNode final : public Node {
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
-  /// Number of waiting chunks. Thread-safe.
+  /// Number of waiting chunks, and one for waiting poses. Thread-safe.
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
-  /// True once all chunks of the offered meshes are sent. Thread-safe.
+  /// True once all chunks of the offered meshes and their poses are sent. Thread-safe.
   [[nodiscard]] bool is_done() const { return waiting_ == 0 && offers_ == 0; }
 
   /// Handles one offer synchronously at time `now_s`. The thread calls only this function; tests
@@ -69,17 +81,22 @@ class MeshChunksNode final : public Node {
 
  private:
   void take(const Offer& offer);
-  void state_keyframes(std::vector<MeshChunk>& chunks, const Offer& offer) const;
+  [[nodiscard]] SplitMesh split(const Offer& offer) const;
+  void state_odometry(std::vector<MeshChunk>& chunks) const;
   void send(double now_s);
+  void send_poses(double now_s);
 
   const MapSharingConfig config_;
   const RobotId self_;
-  const Out<MeshChunk> chunks_;
+  const MeshChunksTopics topics_;
   const Reduction reduction_;
   std::map<KeyframeIndex, OdometryPose> keyframes_;
   ChunkSchedule schedule_;
+  MeshPoses sent_poses_;
+  std::optional<MeshPoses> waiting_poses_;
+  double next_poses_s_ = 0.0;
   TokenBucket budget_bytes_;
-  std::atomic<std::size_t> waiting_ = 0;  // chunks
+  std::atomic<std::size_t> waiting_ = 0;  // chunks and poses
   std::atomic<int> offers_ = 0;           // meshes that are neither split nor replaced
   Offer newest_;                          // the mesh to be split next, if any
   double next_take_s_ = 0.0;

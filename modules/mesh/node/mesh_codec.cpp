@@ -1,5 +1,7 @@
 #include "modules/mesh/node/mesh_codec.hpp"
 
+#include <array>
+#include <span>
 #include <utility>
 
 #include "runtime/dds/codec.hpp"
@@ -26,6 +28,32 @@ std::vector<Triple> triples(std::span<const std::uint16_t> numbers) {
   return result;
 }
 
+using View = MeshChunk::View;
+
+// Precondition: the number of elements is even.
+std::vector<std::array<View, 2>> pairs(std::span<const View> numbers) {
+  std::vector<std::array<View, 2>> result;
+  result.reserve(numbers.size() / 2);
+  for (std::size_t i = 0; i < numbers.size(); i += 2)
+    result.push_back({numbers[i], numbers[i + 1]});
+  return result;
+}
+
+std::vector<km_wire_MeshKeyframe> to_wire(const std::vector<MeshKeyframe>& keyframes) {
+  std::vector<km_wire_MeshKeyframe> wire;
+  for (const auto& [index, T] : keyframes)
+    wire.push_back(
+        {.keyframe = index, .t = {T.t[0], T.t[1], T.t[2]}, .q = {T.q[0], T.q[1], T.q[2], T.q[3]}});
+  return wire;
+}
+
+std::vector<MeshKeyframe> from_wire(std::span<const km_wire_MeshKeyframe> wire) {
+  std::vector<MeshKeyframe> keyframes;
+  for (const auto& [index, t, q] : wire)
+    keyframes.push_back({index, {{t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}}});
+  return keyframes;
+}
+
 }  // namespace
 
 MessageKey Codec<MeshChunk>::key_of(const MeshChunk& chunk) {
@@ -45,10 +73,17 @@ Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
   wire.anchor = chunk.anchor;
   wire.step_m = chunk.step_m;
   wire.origin = {.x = chunk.origin[0], .y = chunk.origin[1], .z = chunk.origin[2]};
-  if (chunk.keyframe)
-    encoded.keyframe.push_back({.odometry = to_wire(chunk.keyframe->odometry),
-                                .T_world_kf = to_wire(chunk.keyframe->T_world_kf)});
+  for (const auto& views : chunk.views)
+    encoded.views.insert(encoded.views.end(), views.begin(), views.end());
+  encoded.keyframes = to_wire(chunk.keyframes);
+  if (chunk.odometry)
+    encoded.keyframe.push_back(
+        {.odometry = to_wire(*chunk.odometry),
+         .T_world_kf = to_wire(
+             find_pose(chunk.keyframes, chunk.odometry->id.index).value_or(SE3::Identity()))});
   borrow(wire.keyframe, encoded.keyframe);
+  borrow(wire.keyframes, encoded.keyframes);
+  borrow(wire.views, encoded.views);
   borrow(wire.offsets, encoded.offsets);
   borrow(wire.labels, encoded.labels);
   borrow(wire.faces, encoded.faces);
@@ -60,11 +95,14 @@ Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& wr
   const auto offsets = elements_of(wire.offsets, kMaxChunkBytes);
   const auto labels = elements_of(wire.labels, kMaxChunkBytes);
   const auto faces = elements_of(wire.faces, kMaxChunkBytes);
-  const auto keyframes = elements_of(wire.keyframe, 1);
-  if (!offsets || !labels || !faces || !keyframes)
+  const auto odometry = elements_of(wire.keyframe, 1);
+  const auto keyframes = elements_of(wire.keyframes, kMaxChunkKeyframes);
+  const auto views = elements_of(wire.views, kMaxChunkBytes);
+  if (!offsets || !labels || !faces || !odometry || !keyframes || !views)
     return Result::refuse("elements are missing or too many");
   if (offsets->size() % 3 != 0 || faces->size() % 3 != 0)
     return Result::refuse("offsets or faces are not triples");
+  if (views->size() % 2 != 0) return Result::refuse("views are not pairs");
   MeshChunk chunk{.key = {writer.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
                   .boot = writer.boot,
                   .anchor = wire.anchor,
@@ -72,15 +110,36 @@ Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& wr
                   .origin = {wire.origin.x, wire.origin.y, wire.origin.z},
                   .offsets = triples(*offsets),
                   .labels = {labels->begin(), labels->end()},
-                  .faces = triples(*faces)};
-  if (!keyframes->empty()) {
-    const auto odometry = from_wire(keyframes->front().odometry);
-    const auto T_world_kf = from_wire(keyframes->front().T_world_kf);
-    if (!odometry || !T_world_kf) return Result::refuse("a keyframe without a pose");
-    chunk.keyframe = {*odometry, *T_world_kf};
+                  .faces = triples(*faces),
+                  .keyframes = from_wire(*keyframes),
+                  .views = pairs(*views)};
+  if (!odometry->empty()) {
+    chunk.odometry = from_wire(odometry->front().odometry);
+    if (!chunk.odometry) return Result::refuse("a keyframe without a pose");
+    if (chunk.keyframes.empty()) chunk.odometry.reset();
   }
   if (const char* fault = fault_of(chunk)) return Result::refuse(fault);
   return Result::accept(std::move(chunk));
+}
+
+Codec<MeshPoses>::Encoded Codec<MeshPoses>::encode(const MeshPoses& poses) {
+  Encoded encoded;
+  encoded.keyframes = to_wire(poses.keyframes);
+  encoded.wire.anchor = poses.anchor;
+  borrow(encoded.wire.keyframes, encoded.keyframes);
+  return encoded;
+}
+
+Decoded<MeshPoses> Codec<MeshPoses>::decode(const Wire& wire, const TeamPeer& writer) {
+  using Result = Decoded<MeshPoses>;
+  const auto keyframes = elements_of(wire.keyframes, kMaxMeshKeyframes);
+  if (!keyframes) return Result::refuse("elements are missing or too many");
+  MeshPoses poses{.robot = writer.robot,
+                  .boot = writer.boot,
+                  .anchor = wire.anchor,
+                  .keyframes = from_wire(*keyframes)};
+  if (const char* fault = fault_of(poses.keyframes)) return Result::refuse(fault);
+  return Result::accept(std::move(poses));
 }
 
 }  // namespace km

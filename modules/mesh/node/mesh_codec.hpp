@@ -6,30 +6,52 @@
 #include <vector>
 
 #include "modules/mesh/mesh_chunks.hpp"
+#include "modules/mesh/mesh_poses.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {
 
 /// A robot sends only its own mesh. A chunk is refused if it is larger than kMaxChunkBytes, if its
-/// offsets, labels and faces do not match, or if a face names a missing vertex. It is also refused
-/// if positions are not finite or too far away, and for a keyframe that is not one of its robot.
+/// offsets, labels, views and faces do not match, or if a face names a missing vertex. It is also
+/// refused if positions are not finite or too far away, and for keyframes that fault_of() refuses.
+/// A keyframe of a robot that sends version 2 is left out, because no poses follow.
 template <>
 struct Codec<MeshChunk> {
   using Wire = km_wire_MeshChunk;
   static constexpr const char* kTopic = "mesh_chunks";
-  static constexpr std::uint16_t kVersion = 2;
+  static constexpr std::uint16_t kVersion = 3;
   static constexpr std::size_t kMaxBytes = kMaxChunkBytes;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_MeshChunk_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<std::uint16_t> offsets, faces;
-    std::vector<std::uint8_t> labels;
+    std::vector<std::uint8_t> labels, views;
     std::vector<km_wire_SurfaceKeyframe> keyframe;
+    std::vector<km_wire_MeshKeyframe> keyframes;
   };
   static MessageKey key_of(const MeshChunk& chunk);
   static Encoded encode(const MeshChunk& chunk);
   static Decoded<MeshChunk> decode(const Wire& wire, const TeamPeer& writer);
+};
+
+/// A robot states only its own poses. A message is refused if it has more than kMaxMeshKeyframes
+/// poses, if their indices do not ascend, or if a rotation is none.
+template <>
+struct Codec<MeshPoses> {
+  using Wire = km_wire_MeshPoses;
+  static constexpr const char* kTopic = "mesh_poses";
+  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 128 + kMeshKeyframeBytes * kMaxMeshKeyframes;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_MeshPoses_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<km_wire_MeshKeyframe> keyframes;
+  };
+  static MessageKey key_of(const MeshPoses& /*poses*/) { return message_key({}); }
+  static Encoded encode(const MeshPoses& poses);
+  static Decoded<MeshPoses> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 }  // namespace km

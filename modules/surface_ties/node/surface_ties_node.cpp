@@ -37,6 +37,8 @@ SurfaceTiesNode::SurfaceTiesNode(RobotId self, const SurfaceTiesTopics& topics)
           steady_duration(kTick_s), [this] { worker_.post(Tick()); }, "ties tick") {
   for (const In<MeshChunk>& chunks : {topics.own_chunks, topics.peer_chunks})
     chunks.subscribe([this](const auto& chunk) { post(chunk); });
+  for (const In<MeshPoses>& poses : {topics.own_poses, topics.peer_poses})
+    poses.subscribe([this](const auto& newest) { post(newest); });
   topics.closures.subscribe([this](const auto& closure) { post(closure); });
   topics.progress.subscribe([this](const auto& progress) { post(progress); });
   topics.restarts.subscribe([this](const auto& event) { post(event); });
@@ -65,6 +67,8 @@ void SurfaceTiesNode::step(const Input& input, double now_s) {
   if (std::holds_alternative<Tick>(input)) return search(now_s);
   if (const auto* chunk = std::get_if<Topic<MeshChunk>::Message>(&input))
     search_.add(**chunk, now_s);
+  else if (const auto* poses = std::get_if<Topic<MeshPoses>::Message>(&input))
+    search_.add(**poses, now_s);
   else if (const auto* closure = std::get_if<Topic<Closure>::Message>(&input))
     search_.add((*closure)->id());
   else if (const auto* progress = std::get_if<Topic<OptimizerProgress>::Message>(&input))

@@ -21,6 +21,8 @@ namespace km {
 struct SurfaceTiesTopics {
   In<MeshChunk> own_chunks;
   In<MeshChunk> peer_chunks;
+  In<MeshPoses> own_poses;
+  In<MeshPoses> peer_poses;
   In<Closure> closures;            ///< Own and received ones.
   In<OptimizerProgress> progress;  ///< States which robots have joined.
   In<PeerEvent> restarts;          ///< kRestarted, as for PcmNode.
@@ -46,8 +48,9 @@ class SurfaceTiesNode final : public Node {
   [[nodiscard]] bool is_done() const { return handled_ == arrived_ && search_done_; }
 
   struct Tick {};
-  using Input = std::variant<Tick, Topic<MeshChunk>::Message, Topic<Closure>::Message,
-                             Topic<OptimizerProgress>::Message, Topic<PeerEvent>::Message>;
+  using Input = std::variant<Tick, Topic<MeshChunk>::Message, Topic<MeshPoses>::Message,
+                             Topic<Closure>::Message, Topic<OptimizerProgress>::Message,
+                             Topic<PeerEvent>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this function; tests
   /// can call it too.

@@ -8,32 +8,39 @@
 namespace km {
 namespace {
 
-// Larger than the number of chunks that can arrive while a mesh is fused, so that no sender waits.
+// Larger than the number of messages that can arrive while a mesh is fused, so that no sender
+// waits.
 constexpr std::size_t kQueue = 4096;
 
 }  // namespace
 
-TeamMapNode::TeamMapNode(double voxel_m, LabelPalette palette, In<MeshChunk> own,
-                         In<MeshChunk> received)
+TeamMapNode::TeamMapNode(double voxel_m, LabelPalette palette, const TeamMapTopics& topics)
     : voxel_m_(voxel_m),
       palette_(std::move(palette)),
       worker_(
-          kQueue, Overflow::kBlock, [this](const auto& chunk) { take(*chunk); }, "team_map") {
-  for (const In<MeshChunk>& chunks : {own, received})
+          kQueue, Overflow::kBlock, [this](const Input& input) { take(input); }, "team_map") {
+  for (const In<MeshChunk>& chunks : {topics.own_chunks, topics.received_chunks})
     chunks.subscribe([this](const auto& chunk) { worker_.post(chunk); });
+  for (const In<MeshPoses>& poses : {topics.own_poses, topics.received_poses})
+    poses.subscribe([this](const auto& newest) { worker_.post(newest); });
 }
 
-void TeamMapNode::take(const MeshChunk& chunk) {
+void TeamMapNode::take(const Input& input) {
   const std::lock_guard lock(mutex_);
-  const ChunkVerdict verdict = chunks_.add(chunk);
+  const auto* const chunk = std::get_if<Topic<MeshChunk>::Message>(&input);
+  const RobotId robot =
+      chunk != nullptr ? (*chunk)->key.robot : std::get<Topic<MeshPoses>::Message>(input)->robot;
+  const ChunkVerdict verdict =
+      std::visit([this](const auto& message) { return chunks_.add(*message); }, input);
   if (verdict != ChunkVerdict::kTaken)
-    log::limited(log::Level::kWarn, name(), std::to_string(chunk.key.robot))
-        << "a chunk of robot " << chunk.key.robot << "'s mesh is ignored: " << to_string(verdict);
+    log::limited(log::Level::kWarn, name(), std::to_string(robot))
+        << (chunk != nullptr ? "a chunk" : "poses") << " of robot " << robot
+        << "'s mesh ignored: " << to_string(verdict);
 }
 
 TeamMap TeamMapNode::fuse() const {
   const std::lock_guard lock(mutex_);
-  TeamMap map = fuse_chunks(chunks_.chunks(), voxel_m_);
+  TeamMap map = fuse_chunks(chunks_.placed(), voxel_m_);
   if (!palette_.classes().empty() && !map.mesh.labels.empty()) map.mesh.colour_by(palette_);
   return map;
 }

@@ -3,9 +3,11 @@
 #include <exception>
 #include <mutex>
 #include <string_view>
+#include <variant>
 
 #include "modules/core/label_palette.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
+#include "modules/mesh/mesh_poses.hpp"
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/team_map/team_map.hpp"
 #include "runtime/node.hpp"
@@ -14,17 +16,23 @@
 
 namespace km {
 
-/// Stores the chunks of all robots, and fuses them into one mesh when it is asked for.
+/// Channels of TeamMapNode; they must outlive it. `own`: messages that this robot has sent;
+/// `received`: those of the other robots.
+struct TeamMapTopics {
+  In<MeshChunk> own_chunks, received_chunks;
+  In<MeshPoses> own_poses, received_poses;
+};
+
+/// Stores the chunks and poses of all robots, and fuses them into one mesh when it is asked for.
 class TeamMapNode final : public Node {
  public:
-  /// `palette` colours the mesh, if it has classes. `own`: chunks that this robot has sent;
-  /// `received`: those of the other robots.
-  TeamMapNode(double voxel_m, LabelPalette palette, In<MeshChunk> own, In<MeshChunk> received);
+  /// `palette` colours the mesh, if it has classes.
+  TeamMapNode(double voxel_m, LabelPalette palette, const TeamMapTopics& topics);
   ~TeamMapNode() override { stop(); }
 
   std::string_view name() const override { return "team_map"; }
   void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }  ///< Takes the chunks that have arrived.
+  void stop() noexcept override { worker_.stop(); }  ///< Takes the messages that have arrived.
   std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
@@ -36,13 +44,15 @@ class TeamMapNode final : public Node {
   [[nodiscard]] TeamMap fuse() const;
 
  private:
-  void take(const MeshChunk& chunk);
+  using Input = std::variant<Topic<MeshChunk>::Message, Topic<MeshPoses>::Message>;
+
+  void take(const Input& input);
 
   const double voxel_m_;
   const LabelPalette palette_;
   mutable std::mutex mutex_;  // guards chunks_
   TeamMesh chunks_;
-  Worker<Topic<MeshChunk>::Message> worker_;  // last member: stops first
+  Worker<Input> worker_;  // last member: stops first
 };
 
 }  // namespace km

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include "modules/mesh/chunk_placement.hpp"
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/team_mesh.hpp"
@@ -350,6 +351,12 @@ TEST_CASE("The team's mesh has the newest chunk of each robot and cell", "[mesh]
 TEST_CASE("A robot that restarts replaces its mesh", "[mesh]") {
   TeamMesh team;
   add_all(team, chunks_of(5, 77));
+  REQUIRE(team.add(MeshPoses{.robot = 5, .boot = 77}) == ChunkVerdict::kTaken);
+  SECTION("poses come first") {
+    CHECK(team.add(MeshPoses{.robot = 5, .boot = 78}) == ChunkVerdict::kTaken);
+    CHECK(team.placed().empty());
+    CHECK(team.add(MeshPoses{.robot = 5, .boot = 77}) == ChunkVerdict::kEarlierBoot);
+  }
   const std::vector<MeshChunk> fresh = chunks_of(5, 78, 10);
   add_all(team, fresh);
   CHECK(team.snapshot()[0].mesh.vertices.size() == 11 * 11);

@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <string>
@@ -8,6 +11,7 @@
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
+#include "runtime/dds/envelope.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/corrupted_message.hpp"
@@ -33,6 +37,15 @@ std::size_t bytes_of(const std::vector<MeshChunk>& chunks) {
   return bytes;
 }
 
+// Messages of a MeshChunksNode.
+struct SentMesh {
+  Topic<MeshChunk> chunk_topic;
+  Topic<MeshPoses> poses_topic;
+  Inbox<MeshChunk> chunks{chunk_topic};
+  Inbox<MeshPoses> poses{poses_topic};
+  [[nodiscard]] MeshChunksTopics topics() { return {chunk_topic, poses_topic}; }
+};
+
 MapSharingConfig slow() {
   MapSharingConfig config;
   config.max_bytes_per_s = 20000.0;
@@ -40,9 +53,9 @@ MapSharingConfig slow() {
 }
 
 TEST_CASE("Chunks are sent no faster than configured", "[node]") {
-  Topic<MeshChunk> topic;
-  Inbox<MeshChunk> sent(topic);
-  MeshChunksNode node(slow(), 7, topic);
+  SentMesh out;
+  Inbox<MeshChunk>& sent = out.chunks;
+  MeshChunksNode node(slow(), 7, out.topics());
   const auto mesh = sheet(150);
   const std::size_t all = split_mesh(*mesh, 7, kAnchor, {}).chunks.size();
   node.step({kAnchor, mesh}, 1000.0);
@@ -66,9 +79,9 @@ TEST_CASE("Chunks are sent no faster than configured", "[node]") {
 }
 
 TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[node]") {
-  Topic<MeshChunk> topic;
-  Inbox<MeshChunk> sent(topic);
-  MeshChunksNode node(slow(), 7, topic);
+  SentMesh out;
+  Inbox<MeshChunk>& sent = out.chunks;
+  MeshChunksNode node(slow(), 7, out.topics());
   const auto mesh = sheet(100);
   node.step({kAnchor, mesh}, 0.0);
   const std::size_t early = sent.messages().size();
@@ -88,48 +101,83 @@ TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[nod
 }
 
 TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
-  Topic<MeshChunk> topic;
+  SentMesh out;
   MapSharingConfig config;
   config.cell_m = GENERATE(0.1, 20.0);
   config.position_step_m = GENERATE(0.001, 0.05);
-  MeshChunksNode node(config, 7, topic);
+  MeshChunksNode node(config, 7, out.topics());
   CHECK_NOTHROW(node.step({kAnchor, sheet(10)}, 0.0));
   config.cell_m = 0.05;
-  CHECK_THROWS_AS(MeshChunksNode(config, 7, topic), ConfigError);
+  CHECK_THROWS_AS(MeshChunksNode(config, 7, out.topics()), ConfigError);
 }
 
-TEST_CASE("A chunk states the keyframe in the middle of those that saw it", "[node]") {
-  Topic<MeshChunk> topic;
-  Inbox<MeshChunk> sent(topic);
-  MeshChunksNode node(MapSharingConfig(), 7, topic);
-  const auto mesh = sheet(30);
+// A sheet of 3 m whose left half was seen by keyframes 0 to 2 and the right one by 12.
+struct TwoViews {
+  TwoViews() : mesh(sheet(30)) {
+    for (std::uint32_t i = 0; i < 13; ++i)
+      origin.T_world_kf.push_back(make_pose(Eigen::Matrix3d::Identity(), {2.0 * i, 0, 0}));
+    origin.mapped = mesh->vertices;
+    for (const auto& vertex : mesh->vertices)
+      origin.seen_by.push_back(vertex.x() < 0.0F ? std::array<KeyframeIndex, 2>{0, 2}
+                                                 : std::array<KeyframeIndex, 2>{12, 12});
+  }
+  [[nodiscard]] MeshChunksNode::Offer offer() const {
+    return {kAnchor, mesh, std::make_shared<const MeshOrigin>(origin)};
+  }
+  std::shared_ptr<const LabelledMesh> mesh;
   MeshOrigin origin;
-  for (std::uint32_t i = 0; i < 4; ++i) {
-    const SE3 T = make_pose(Eigen::Matrix3d::Identity(), {1.0 * i, 0, 0});
-    node.step({.mesh = nullptr, .keyframe = OdometryPose{{7, i}, T, Matrix6::Identity()}}, 0.0);
-    origin.T_world_kf.push_back(T * T);
+};
+
+TEST_CASE("A chunk states the odometry of the keyframe in the middle of its views", "[node]") {
+  SentMesh out;
+  MeshChunksNode node(MapSharingConfig(), 7, out.topics());
+  for (std::uint32_t i = 0; i < 13; ++i)
+    node.step({.mesh = nullptr,
+               .keyframe = OdometryPose{{7, i},
+                                        make_pose(Eigen::Matrix3d::Identity(), {1.0 * i, 0, 0}),
+                                        Matrix6::Identity()}},
+              0.0);
+  node.step(TwoViews().offer(), 0.0);
+  REQUIRE(out.chunks.messages().size() > 1);
+  for (const MeshChunk& chunk : out.chunks.messages()) {
+    CHECK(fault_of(chunk) == nullptr);
+    REQUIRE(chunk.odometry);
+    const KeyframeIndex expected = chunk.key.cell[0] < 0 ? 0 : 12;
+    CHECK(chunk.odometry->id == KeyframeId{7, expected});
+    CHECK(chunk.odometry->T_odom_kf.translation().x() == Approx(expected));
+    CHECK(find_pose(chunk.keyframes, expected)->translation().x() == Approx(2.0 * expected));
   }
-  for (const auto& vertex : mesh->vertices)
-    origin.seen_by.push_back(vertex.x() < 0.0F ? std::array<KeyframeIndex, 2>{0, 2}
-                                               : std::array<KeyframeIndex, 2>{3, 4});
-  node.step({kAnchor, mesh, std::make_shared<const MeshOrigin>(origin)}, 0.0);
-  REQUIRE(sent.messages().size() > 1);
-  for (const MeshChunk& chunk : sent.messages()) {
-    REQUIRE(chunk.keyframe);
-    const KeyframeIndex expected = chunk.key.cell[0] < 0 ? 1 : 3;
-    CHECK(chunk.keyframe->odometry.id == KeyframeId{7, expected});
-    CHECK(chunk.keyframe->odometry.T_odom_kf.translation().x() == Approx(expected));
-    CHECK(chunk.keyframe->T_world_kf.translation().x() == Approx(2.0 * expected));
+}
+
+TEST_CASE("Poses take at most a tenth of the bytes, and the newest are sent last", "[node]") {
+  SentMesh out;
+  MapSharingConfig config;
+  config.max_bytes_per_s = 1000.0;
+  MeshChunksNode node(config, 7, out.topics());
+  TwoViews views;
+  double now_s = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    for (SE3& pose : views.origin.T_world_kf) pose.translation().z() += 0.1;
+    views.mesh = raised(*views.mesh, 0.1F);
+    node.step(views.offer(), now_s += 1.0);
   }
+  const std::vector<MeshPoses> sent = out.poses.messages();
+  CHECK(static_cast<double>(sent.size() * wire_bytes(sent.front())) < 0.1 * 1000.0 * 302.0);
+  CHECK(sent.size() > 50);
+  for (int i = 0; i < 100; ++i) node.step({}, now_s += 10.0);
+  CHECK(node.waiting() == 0);
+  CHECK(out.poses.messages().back().keyframes == mesh_keyframes(views.origin.T_world_kf));
 }
 
 // A robot with the modules that exchange meshes.
 struct MeshRobot {
   MeshRobot(std::shared_ptr<const DdsDomain> domain, RobotId id)
       : basis(std::move(domain), id),
-        sender(fast(), id, chunks.to_peers()),
-        received(chunks.from_peers()) {
+        sender(fast(), id, {chunks.to_peers(), poses.to_peers()}),
+        received(chunks.from_peers()),
+        received_poses(poses.from_peers()) {
     basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kOther);
+    basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kOther);
   }
   ~MeshRobot() { stop(); }
   static MapSharingConfig fast() {
@@ -166,9 +214,11 @@ struct MeshRobot {
   }
 
   Crossing<MeshChunk> chunks;
+  Crossing<MeshPoses> poses;
   TestRobot basis;
   MeshChunksNode sender;
   Inbox<MeshChunk> received;
+  Inbox<MeshPoses> received_poses;
 };
 
 TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that join later",
@@ -209,9 +259,13 @@ MeshChunk some_chunk() {
   return split_mesh(wavy_sheet(20, 0.1), 700, 3, {}).chunks.at(1);
 }
 
-SurfaceKeyframe some_keyframe(RobotId robot) {
-  return {{{robot, 8}, make_pose(so3_exp({0.1, 0.2, 0.3}), {1, 2, 3}), Matrix6::Identity()},
-          make_pose(Eigen::Matrix3d::Identity(), {4, 5, 6})};
+// States 5 keyframes, all vertices seen from the first to the last, and odometry.
+void state_keyframes(MeshChunk& chunk) {
+  chunk.keyframes = mesh_keyframes(
+      std::vector<SE3>(20, make_pose(so3_exp({0.1, 0.2, 0.3}), {1.5, -2.25, 300.0})));
+  chunk.views.assign(chunk.offsets.size(), {0, 16});
+  chunk.odometry = {
+      {chunk.key.robot, 8}, make_pose(so3_exp({0.1, 0.2, 0.3}), {1, 2, 3}), Matrix6::Identity()};
 }
 
 Arrived<MeshChunk> received(const MeshChunk& chunk) {
@@ -227,8 +281,12 @@ TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
   SECTION("empty because the piece has vanished") {
     chunk = {.key = chunk.key};
   }
-  SECTION("with a keyframe") {
-    chunk.keyframe = some_keyframe(chunk.key.robot);
+  SECTION("with keyframes") {
+    state_keyframes(chunk);
+  }
+  SECTION("with keyframes, without odometry") {
+    state_keyframes(chunk);
+    chunk.odometry.reset();
   }
   SECTION("far away") {
     chunk.origin = {-(1 << 30), 1 << 30, 0};
@@ -241,20 +299,26 @@ TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
 }
 
 TEST_CASE("The largest chunk is equal after encoding and decoding", "[codec]") {
-  const SplitMesh pieces = split_mesh(wavy_sheet(180, 0.01), 1, 1, {});
+  const LabelledMesh mesh = wavy_sheet(180, 0.01);
+  MeshOrigin origin{.seen_by = {}, .T_world_kf = {}, .mapped = mesh.vertices};
+  origin.T_world_kf.assign(2000, SE3::Identity());
+  for (KeyframeIndex v = 0; v < mesh.vertices.size(); ++v)
+    origin.seen_by.push_back({4 * v % 252, 4 * v % 252});
+  const SplitMesh pieces = split_mesh(mesh, 1, 1, {}, &origin);
   std::size_t largest = 0;
   for (MeshChunk chunk : pieces.chunks) {
-    chunk.keyframe = some_keyframe(1);
+    CHECK(chunk.keyframes.size() <= 63);
+    chunk.odometry = {{1, chunk.keyframes.back().index}, SE3::Identity(), Matrix6::Identity()};
     largest = std::max(largest, wire_bytes(chunk));
     CHECK(decoded(received(chunk)).value);
   }
-  CHECK(largest > kMaxChunkBytes - 50);
+  CHECK(largest > kMaxChunkBytes - 75);  // room for another keyframe and for half a face
   CHECK(largest <= kMaxChunkBytes);
 }
 
 TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
   MeshChunk chunk = some_chunk();
-  chunk.keyframe = some_keyframe(chunk.key.robot);
+  state_keyframes(chunk);
   const char* const missing = "elements are missing or too many";
   const char* const no_triples = "offsets or faces are not triples";
   const char* const far = "positions are not finite or too far away";
@@ -280,7 +344,30 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
        {"a keyframe of another robot", "a keyframe of another robot",
         [](auto& m) { ++m.keyframe.front().odometry.keyframe.robot; }},
        {"a keyframe without a pose", "a keyframe without a pose",
-        [](auto& m) { m.keyframe.front().T_world_kf.q[0] = 7.0; }},
+        [](auto& m) { m.keyframe.front().odometry.T_odom_kf.q[0] = 7.0; }},
+       {"odometry of a keyframe that is not listed",
+        "odometry of a keyframe that does not move the chunk",
+        [](auto& m) { ++m.keyframe.front().odometry.keyframe.index; }},
+       {"keyframes not there", missing, [](auto& m) { m.wire.keyframes._buffer = nullptr; }},
+       {"keyframes without end", missing, [](auto& m) { m.wire.keyframes._length = 65; }},
+       {"views not there", missing, [](auto& m) { m.wire.views._buffer = nullptr; }},
+       {"views without end", missing, [](auto& m) { m.wire.views._length = 0xffffffffU; }},
+       {"half a pair of views", "views are not pairs", [](auto& m) { --m.wire.views._length; }},
+       {"a pair of views too few", "views do not fit the vertices",
+        [](auto& m) { m.wire.views._length -= 2; }},
+       {"views of no keyframes", "views do not fit the vertices",
+        [](auto& m) {
+          m.wire.keyframes._length = 0;
+          m.wire.keyframe._length = 0;
+        }},
+       {"a view after the last keyframe", "a view between keyframes which do not exist",
+        [](auto& m) { m.views.back() = 17; }},
+       {"a view of a keyframe outside", "a view between keyframes which do not exist",
+        [](auto& m) { m.views.back() = 255; }},
+       {"a keyframe twice", "keyframes do not ascend",
+        [](auto& m) { m.keyframes[1].keyframe = 0; }},
+       {"no rotation", "a keyframe without a rotation",
+        [](auto& m) { std::ranges::fill(m.keyframes[1].q, std::int16_t{0}); }},
        {"a face outside", "a face names a vertex which does not exist",
         [&](auto& m) { m.faces.back() = static_cast<std::uint16_t>(chunk.offsets.size()); }},
        {"vertices for nothing", "vertices without faces",
@@ -293,6 +380,33 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
        {"steps of light years", far, [](auto& m) { m.wire.step_m = 1e16F; }},
        {"an origin at the end of all numbers", far,
         [](auto& m) { m.wire.origin.y = std::numeric_limits<std::int32_t>::min(); }}});
+}
+
+TEST_CASE("Poses of a mesh are equal after encoding and decoding", "[codec]") {
+  MeshPoses poses{.robot = 700, .anchor = 3};
+  poses.keyframes = mesh_keyframes(
+      std::vector<SE3>(GENERATE(0U, 1U, 4096U), make_pose(so3_exp({0.1, 2.0, 0.3}), {-1e6, 2, 3})));
+  const auto encoded = encoded_by(TeamPeer{700, 12345}, poses);
+  CHECK(serialize(Codec<MeshPoses>::descriptor(), &encoded.wire).size() <=
+        Codec<MeshPoses>::kMaxBytes);
+  const Decoded<MeshPoses> result = decoded(encoded);
+  REQUIRE(result.value);
+  poses.boot = 12345;
+  CHECK(*result.value == poses);
+}
+
+TEST_CASE("Impossible poses of a mesh are refused", "[codec]") {
+  const MeshPoses poses{.keyframes = mesh_keyframes(std::vector<SE3>(20, SE3::Identity()))};
+  const char* const missing = "elements are missing or too many";
+  check_refusals<MeshPoses>(
+      [&] { return encoded_by(RobotId{1}, poses); },
+      {{"keyframes not there", missing, [](auto& m) { m.wire.keyframes._buffer = nullptr; }},
+       {"too many keyframes", missing, [](auto& m) { m.wire.keyframes._length = 1025; }},
+       {"keyframes without end", missing, [](auto& m) { m.wire.keyframes._length = 0xffffffffU; }},
+       {"keyframes in disorder", "keyframes do not ascend",
+        [](auto& m) { m.keyframes[2].keyframe = 1; }},
+       {"a rotation that is none", "a keyframe without a rotation",
+        [](auto& m) { std::ranges::fill(m.keyframes[3].q, std::int16_t{32767}); }}});
 }
 
 }  // namespace

@@ -177,6 +177,8 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
     const auto& seen_by = visits.map.seen_by;  // the second half of the vertices stays
     const auto half = static_cast<std::ptrdiff_t>(seen_by.size() / 2);
     CHECK(first->origin.seen_by == std::vector(seen_by.begin() + half, seen_by.end()));
+    const auto& mapped = visits.map.mesh.vertices;
+    CHECK(first->origin.mapped == std::vector(mapped.begin() + half, mapped.end()));
     CHECK(first->superseded_faces == visits.one());
     CHECK(first->report.vertices == visits.map.mesh.vertices.size());
     const auto count = static_cast<std::uint64_t>(visits.map.ids.size() / 2);

@@ -20,11 +20,19 @@ inline std::vector<MeshChunk> room_chunks(RobotId robot, KeyframeIndex index, co
   mesh.transform(T_error);
   std::vector<MeshChunk> chunks = split_mesh(mesh, robot, 0, {}).chunks;
   const SE3 T_world_odom = make_pose(so3_exp({0, 0, 1.0}), {5, 6, 7});
-  for (MeshChunk& chunk : chunks)
-    chunk.keyframe = {
-        {{robot, index}, T_world_odom.inverse() * pose_in_room(robot, index), Matrix6::Identity()},
-        T_error * pose_in_room(robot, index)};
+  for (MeshChunk& chunk : chunks) {
+    chunk.keyframes = {{index, RoundedPose::of(T_error * pose_in_room(robot, index))}};
+    chunk.views.assign(chunk.offsets.size(), {0, 0});
+    chunk.odometry = {
+        {robot, index}, T_world_odom.inverse() * pose_in_room(robot, index), Matrix6::Identity()};
+  }
   return chunks;
+}
+
+/// Present pose of keyframe `index` of a robot, with this error.
+inline MeshPoses room_poses(RobotId robot, KeyframeIndex index, const SE3& T_error) {
+  return {.robot = robot,
+          .keyframes = {{index, RoundedPose::of(T_error * pose_in_room(robot, index))}}};
 }
 
 }  // namespace km

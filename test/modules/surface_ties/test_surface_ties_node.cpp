@@ -13,6 +13,7 @@ TEST_CASE("The node publishes a tie of two robots' chunks as a closure with its 
           "[node]") {
   constexpr RobotId kSelf = 1, kOther = 2;
   Topic<MeshChunk> own_chunks, peer_chunks;
+  Topic<MeshPoses> own_poses, peer_poses;
   Topic<Closure> closures, ties;
   Topic<OptimizerProgress> progress;
   Topic<PeerEvent> restarts;
@@ -21,6 +22,8 @@ TEST_CASE("The node publishes a tie of two robots' chunks as a closure with its 
   Inbox<ClosureOutcome> reported(outcomes);
   SurfaceTiesNode node(kSelf, {.own_chunks = own_chunks,
                                .peer_chunks = peer_chunks,
+                               .own_poses = own_poses,
+                               .peer_poses = peer_poses,
                                .closures = closures,
                                .progress = progress,
                                .restarts = restarts,

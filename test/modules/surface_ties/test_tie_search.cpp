@@ -88,6 +88,29 @@ TEST_CASE("The robot with the lower id makes the ties of a pair", "[tie_search]"
   CHECK(search.is_done());
 }
 
+TEST_CASE("A tie begins at the present poses of chunks that were sent before", "[tie_search]") {
+  TieSearch search(kOwn);
+  search.set_joined({kOwn, kPeer});
+  const SE3 far = make_pose(so3_exp({0, 0, 1.0}), {100, 0, 0});
+  const bool poses_first = GENERATE(false, true);
+  const auto poses = room_poses(kPeer, 35, kError);
+  for (const MeshChunk& chunk : room_chunks(kOwn, 12, SE3::Identity())) search.add(chunk, 0.0);
+  if (poses_first) search.add(poses, 0.0);
+  for (const MeshChunk& chunk : room_chunks(kPeer, 35, far)) search.add(chunk, 0.0);
+  if (!poses_first) {
+    for (int i = 0; i < 9; ++i) CHECK_FALSE(search.step(kLater_s));
+    CHECK(search.is_done());
+    search.add(poses, kLater_s);
+    CHECK_FALSE(search.is_done());
+  }
+  std::size_t ties = 0;
+  for (int i = 0; i < 20; ++i) ties += search.step(2 * kLater_s) ? 1 : 0;
+  CHECK(ties == 1);
+  const SE3 near = make_pose(kError.linear(), kError.translation() + Eigen::Vector3d(0.02, 0, 0));
+  search.add(room_poses(kPeer, 35, near), 2 * kLater_s);
+  CHECK(search.is_done());
+}
+
 TEST_CASE("The surface of a restarted robot is discarded", "[tie_search]") {
   Search robots;
   robots.search.forget(kPeer);

@@ -40,7 +40,7 @@ std::vector<MeshChunk> chunks_of(const LabelledMesh& mesh, RobotId robot, std::u
 }
 
 LabelledMesh fused(const TeamMesh& team) {
-  return fuse_chunks(team.chunks(), kMapVoxel_m).mesh;
+  return fuse_chunks(team.placed(), kMapVoxel_m).mesh;
 }
 
 void add_all(TeamMesh& team, const std::vector<MeshChunk>& chunks) {
@@ -65,7 +65,7 @@ TEST_CASE("Robots with the same chunks have the same map, in whatever order they
   std::shuffle(chunks.begin(), chunks.end(), rng);
   // Former chunks of the first key are replaced.
   for (MeshChunk former : chunks_of(floor_from(0.0F, 0.3F), 0))
-    if (former.key == first.chunks().front()->key)
+    if (former.key == first.placed().front().chunk->key)
       CHECK(second.add(former) == ChunkVerdict::kTaken);
   add_all(second, chunks);
   CHECK(are_equal(fused(first), fused(second)));
@@ -98,7 +98,7 @@ TEST_CASE("Chunks in another frame than most are left out and counted", "[team_m
   for (TeamMesh* both : {&alone, &team}) add_all(*both, chunks_of(floor_from(0.0F, 0.0F), 1, 1, 1));
   const std::vector<MeshChunk> apart = chunks_of(floor_from(0.0F, 1.0F), 2, 1, 0);
   CHECK(team.add(apart.front()) == ChunkVerdict::kTaken);
-  const TeamMap map = fuse_chunks(team.chunks(), kMapVoxel_m);
+  const TeamMap map = fuse_chunks(team.placed(), kMapVoxel_m);
   CHECK(map.anchor == 1);
   CHECK(map.other_frames == 1);
   CHECK(are_equal(map.mesh, fused(alone)));
@@ -112,7 +112,7 @@ TEST_CASE("A face of a size that no mapper makes is left out", "[team_map]") {
   chunk.step_m = 0.01F;
   chunk.offsets = {{0, 0, 0}, {65535, 0, 0}, {0, 65535, 65535}};
   chunk.faces = {{0, 1, 2}};
-  CHECK(fuse_chunks({&chunk}, kMapVoxel_m).mesh.empty());
+  CHECK(fuse_chunks({place(chunk, nullptr)}, kMapVoxel_m).mesh.empty());
   CHECK(fuse_chunks({}, kMapVoxel_m).mesh.empty());
 }
 
