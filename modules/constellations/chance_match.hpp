@@ -10,8 +10,8 @@ namespace km {
 
 /// Decides how often chance alone gives a match as good as an observed one: the number of false
 /// alarms of the a contrario method (Moisan and Stival, "A Probabilistic Criterion to Detect Rigid
-/// Point Matches Between Two Images and Estimate the Fundamental Matrix", IJCV 2004, Sec. 4), for
-/// landmarks in a plane.
+/// Point Matches Between Two Images and Estimate the Fundamental Matrix", IJCV 2004), for landmarks
+/// in a plane.
 ///
 /// If the places of b are unrelated to those of a, its landmarks are independent of each other. Two
 /// pairs, the base, then determine yaw and translation. Each further landmark of b lies within the

@@ -29,7 +29,7 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
   const ClosureId id = closure.id();
   if (known_.contains(id)) return PcmAddResult::kRepeated;
   if (known_.size() >= Pcm::kMaxClosures) {
-    if (!is_witnessed()) return PcmAddResult::kFull;
+    if (a_ != b_ || !is_witnessed()) return PcmAddResult::kFull;
     thin();
   }
   known_.insert(id);

@@ -23,10 +23,11 @@ class WitnessedPair {
   WitnessedPair(RobotId a, RobotId b, const PcmConfig& config);
 
   /// Adds one closure. closures() contains it after kAdded and kGrew; after kGrew there are more
-  /// witnesses. Once there are PcmConfig::min_witnesses, no cycle is tested any more, and before
-  /// there are more than Pcm::kMaxClosures, closures that tie nearly the same keyframes as others
-  /// are dropped. With fewer witnesses, further closures are refused. Throws std::invalid_argument
-  /// if the closure is not between the two robots or not is_usable(); the state is then unchanged.
+  /// witnesses. Once there are PcmConfig::min_witnesses, no cycle is tested any more. At most
+  /// Pcm::kMaxClosures are kept. Between two robots further ones are refused, because OwnGraph
+  /// keeps no more of a peer. Inside a robot with these witnesses, closures that tie nearly the
+  /// same keyframes as others are dropped instead. Throws std::invalid_argument if the closure is
+  /// not between the two robots or not is_usable(); the state is then unchanged.
   [[nodiscard]] PcmAddResult add(const Closure& closure);
 
   /// The added closures without dropped ones, ascending.

@@ -85,6 +85,16 @@ TEST_CASE("All true and false closures of a witnessed pair are published", "[wit
   CHECK(pair.closures().size() == added);
 }
 
+TEST_CASE("A pair of robots refuses closures beyond those that both keep", "[witness]") {
+  const Aisles aisles(200);
+  WitnessedPair pair(0, 1, PcmConfig{});
+  for (std::size_t k = 0; k < Pcm::kMaxClosures; ++k)
+    REQUIRE(pair.add(aisles.at(k / 100, k % 100)) != PcmAddResult::kFull);
+  CHECK(pair.is_witnessed());
+  CHECK(pair.add(aisles.at(150, 150)) == PcmAddResult::kFull);
+  CHECK(pair.closures().size() == Pcm::kMaxClosures);
+}
+
 TEST_CASE("A robot that moves for hours in a known place has room for its newest closure",
           "[witness]") {
   constexpr std::size_t kLap = 100, kKeyframes = 3000;
