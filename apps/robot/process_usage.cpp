@@ -1,5 +1,6 @@
 #include "apps/robot/process_usage.hpp"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -26,6 +27,10 @@ ProcessUsage process_usage() {
   if (std::ifstream("/proc/self/statm") >> pages >> resident_pages)
     usage.resident_bytes = resident_pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
   return usage;
+}
+
+void return_freed_memory() {
+  malloc_trim(0);
 }
 
 ProcessCsv::ProcessCsv(std::ostream& output, std::string_view former) : output_(output) {

@@ -21,6 +21,10 @@ struct ProcessUsage {
 /// Values from the kernel; resident_bytes is 0 if /proc cannot be read.
 [[nodiscard]] ProcessUsage process_usage();
 
+/// Returns the pages that are free inside the heap to the kernel, see malloc_trim(3). Other threads
+/// wait for their arena meanwhile: some milliseconds.
+void return_freed_memory();
+
 /// Writes process.csv, a row for each sample: time_s, cpu_s, resident_bytes, system_s, page_faults.
 class ProcessCsv {
  public:

@@ -1,7 +1,10 @@
+#include <malloc.h>
 #include <sys/mman.h>
 
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <iostream>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -29,6 +32,25 @@ TEST_CASE("Memory that is taken shows, and processor time does", "[robot]") {
   CHECK(after.resident_bytes > before.resident_bytes + kTaken * 9 / 10);
   CHECK(after.cpu_s >= before.cpu_s);
   CHECK(after.system_s <= after.cpu_s);
+}
+
+TEST_CASE("Free memory between blocks in use returns to the kernel", "[robot]") {
+  constexpr std::size_t kBlock = 1024, kBlocks = 65536;
+  std::vector<std::unique_ptr<char[]>> blocks(kBlocks);
+  for (auto& block : blocks) {
+    block = std::make_unique_for_overwrite<char[]>(kBlock);
+    std::memset(block.get(), 1, kBlock);
+  }
+  const struct mallinfo2 heap = mallinfo2();
+  if (heap.uordblks + heap.hblkhd < kBlock * kBlocks) {
+    std::cout << "SKIPPED: a sanitizer replaces the heap of the C library\n";
+    return;
+  }
+  for (std::size_t k = 0; k < kBlocks; ++k)
+    if (k % 64 != 0) blocks[k].reset();  // one block in 16 pages stays
+  const std::uint64_t before = process_usage().resident_bytes;
+  return_freed_memory();
+  CHECK(process_usage().resident_bytes + kBlock * kBlocks / 2 < before);
 }
 
 TEST_CASE("The growth of memory is measured in the second half of the time", "[robot]") {
