@@ -355,7 +355,7 @@ class Watch {
   double written_s_ = 0.0;
   double logged_s_ = -kInterval_s;
   double sampled_s_ = -kInterval_s;
-  double next_trim_s_ = 0.0;  // at once: reading the vocabulary leaves 150 MB free
+  double next_trim_s_ = 0.0;  // at once: the start frees most of what it takes
   std::optional<double> leaving_since_s_;
   StatusLine status_line_;
 };

@@ -31,9 +31,15 @@ struct AbsoluteFixesConfig {
   std::vector<double> datum = {};
   std::vector<double> lever_arm_m = {0.0, 0.0, 0.0};
   std::optional<double> sigma_m = {};
+  std::optional<double> correlation_s = {};
   double min_sigma_m = 0.01;
   double max_sigma_m = 20.0;
 
+  // The autocorrelation of a single-frequency receiver at rest bends at about one minute
+  // (Wilson, GPS Horizontal Position Accuracy, 2006).
+  [[nodiscard]] double used_correlation_s() const {
+    return correlation_s.value_or(source == FixSource::kGnss ? 60.0 : 0.0);
+  }
   [[nodiscard]] bool is_on() const { return source != FixSource::kNone; }
 
   void visit_fields(auto& visitor) {
@@ -58,6 +64,11 @@ struct AbsoluteFixesConfig {
     visitor.field("sigma_m", sigma_m, Bounds<double>{1e-3, 100.0},
                   "[m] standard deviation on each axis of a fix that states none; none: 3 for "
                   "gnss, 0.02 for motion_capture");
+    visitor.field(
+        "correlation_s", correlation_s, Bounds<double>{0.0, 3600.0},
+        "[s] correlation time of the errors of fixes: fixes that are closer in time weigh "
+        "little more than one; none: 60 for gnss, 0 for motion_capture; 0 suits a "
+        "receiver with corrections (RTK)");
     visitor.field("min_sigma_m", min_sigma_m, {1e-3, 100.0},
                   "[m] smaller standard deviations are increased to this; increase it if most "
                   "fixes are rejected");

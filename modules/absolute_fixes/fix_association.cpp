@@ -43,7 +43,9 @@ std::optional<PositionFix> FixAssociation::nearest_fix(const TimedKeyframe& keyf
     nearest = PositionFix{.keyframe = keyframe.id,
                           .p_datum = fix.p_datum,
                           .p_kf = T_odom_kf->inverse() * (*T_odom_body * p_body_),
-                          .sigma_m = fix.sigma_m};
+                          .sigma_m = fix.sigma_m,
+                          .stamp = fix.stamp,
+                          .correlation_s = correlation_s_};
   }
   if (nearest) --unused_;
   return nearest;

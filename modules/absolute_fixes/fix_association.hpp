@@ -17,8 +17,9 @@ namespace km {
 /// order of time. Not thread-safe.
 class FixAssociation {
  public:
-  /// `p_body`: the antenna or marker in the body frame [m].
-  explicit FixAssociation(const Eigen::Vector3d& p_body) : p_body_(p_body) {}
+  /// `p_body`: the antenna or marker in the body frame [m]. `correlation_s`: see PositionFix.
+  explicit FixAssociation(const Eigen::Vector3d& p_body, double correlation_s = 0.0)
+      : p_body_(p_body), correlation_s_(correlation_s) {}
 
   void add(const OdometryState& state) { states_.push_back(state); }
   void add(const KeyframeOdometry& keyframe) {
@@ -42,6 +43,7 @@ class FixAssociation {
   [[nodiscard]] std::optional<PositionFix> nearest_fix(const TimedKeyframe& keyframe, Stamp end);
 
   Eigen::Vector3d p_body_;
+  double correlation_s_ = 0.0;
   std::deque<OdometryState> states_;
   std::deque<TimedKeyframe> keyframes_;  // not yet decided
   std::deque<TimedPosition> fixes_;      // without a keyframe so far

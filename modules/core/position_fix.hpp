@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "modules/core/ids.hpp"
+#include "modules/core/stamp.hpp"
 
 namespace km {
 
@@ -15,7 +16,11 @@ struct PositionFix {
   /// The same point in the frame of the keyframe [m]: the lever arm, and the motion between
   /// keyframe and measurement.
   Eigen::Vector3d p_kf = Eigen::Vector3d::Zero();
-  double sigma_m = 1.0;     ///< Standard deviation on each axis.
+  double sigma_m = 1.0;  ///< Standard deviation on each axis.
+  Stamp stamp = 0;       ///< Time of the measurement [ns].
+  /// Errors of two fixes of a robot that are dt apart have the correlation exp(-dt / correlation_s)
+  /// [s]; 0: independent.
+  double correlation_s = 0.0;
   std::uint64_t datum = 0;  ///< Identity of the absolute frame; not 0.
 };
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
 
+#include "modules/core/stamp.hpp"
 #include "modules/pose_graph/robust_schedule.hpp"
 
 namespace km {
@@ -21,11 +23,13 @@ constexpr std::size_t kScored = 200;  // fixes that judge a hypothesis
 constexpr std::size_t kLeastKept = 5;
 constexpr double kIndependent = 10.0;  // largest number of fixes that count as independent
 constexpr double kLargestRotationSigma_rad = 0.1;
+constexpr double kSlack = 1.5;  // on bounds that a located robot has passed, so that none flickers
 constexpr double kGrowthOfMu = 1.4;  // Yang et al., RA-L 2020, Remark 5
 // A new hypothesis replaces the known frame if it keeps more fixes by this factor.
 constexpr double kNotablyMore = 1.1;
 
 struct Fixes {
+  std::span<const PositionFix> fixes;
   Points q, p;  // points in the frame of the poses, and as measured
   std::vector<double> sigma_m;
   [[nodiscard]] std::size_t size() const { return q.size(); }
@@ -145,44 +149,72 @@ std::vector<bool> consistent(const Fixes& f, const SE3& T_datum_frame,
   return kept;
 }
 
+// The share of each kept fix in the information of all: 1 over the sum of its correlations with the
+// kept fixes, 0 if it is not kept. The sum of the shares is then the number of independent fixes:
+// the variance of the mean of many equally spaced fixes is sigma^2 over this sum.
+std::vector<double> shares_of(std::span<const PositionFix> fixes, const std::vector<bool>& kept) {
+  const std::size_t n = fixes.size();
+  std::vector<double> sum(n, 0.0);
+  const auto add_earlier = [&](auto index_of) {
+    double earlier = 0.0;  // sum of the correlations of the fix before with itself and earlier ones
+    std::size_t before = n;
+    for (std::size_t step = 0; step < n; ++step) {
+      const std::size_t k = index_of(step);
+      if (!kept[k]) continue;
+      if (before < n && fixes[k].correlation_s > 0.0)
+        earlier *= std::exp(-std::abs(seconds_between(fixes[before].stamp, fixes[k].stamp)) /
+                            fixes[k].correlation_s);
+      else
+        earlier = 0.0;
+      sum[k] += earlier;
+      earlier += 1.0;
+      before = k;
+    }
+  };
+  add_earlier([](std::size_t step) { return step; });
+  add_earlier([n](std::size_t step) { return n - 1 - step; });
+  for (std::size_t k = 0; k < n; ++k) sum[k] = kept[k] ? 1.0 / (1.0 + sum[k]) : 0.0;
+  return sum;
+}
+
 // Information of the rotation between both frames, from the spread of the kept points.
-double rotation_sigma(const Fixes& f, const std::vector<bool>& kept, bool upright) {
+double rotation_sigma(const Fixes& f, std::span<const double> shares, bool upright) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  const auto count = static_cast<double>(std::ranges::count(kept, true));
-  for (std::size_t k = 0; k < f.size(); ++k)
-    if (kept[k]) mean += f.q[k] / count;
+  const double independent = std::accumulate(shares.begin(), shares.end(), 0.0);
+  if (independent == 0.0) return std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < f.size(); ++k) mean += shares[k] / independent * f.q[k];
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   for (std::size_t k = 0; k < f.size(); ++k) {
-    if (!kept[k]) continue;
     const Eigen::Vector3d a = f.q[k] - mean;
-    H += (a.squaredNorm() * Eigen::Matrix3d::Identity() - a * a.transpose()) /
+    H += shares[k] * (a.squaredNorm() * Eigen::Matrix3d::Identity() - a * a.transpose()) /
          (f.sigma_m[k] * f.sigma_m[k]);
   }
-  H *= std::min(1.0, kIndependent / std::max(1.0, count));
+  H *= std::min(1.0, kIndependent / std::max(1.0, independent));
   const double least = upright ? H(2, 2) : H.selfadjointView<Eigen::Lower>().eigenvalues()(0);
   return 1.0 / std::sqrt(std::max(least, 0.0));
 }
 
+// `slack`: factor on the bounds below which the robot is located.
 FixPlacement judge(const Fixes& f, const SE3& T_datum_frame, std::span<const double> walk,
-                   bool upright) {
+                   bool upright, double slack = 1.0) {
   FixPlacement placement{.T_frame_datum = T_datum_frame.inverse(),
                          .kept = consistent(f, T_datum_frame, walk),
                          .state = {}};
   FixesState& state = placement.state;
   state.used = static_cast<std::uint32_t>(std::ranges::count(placement.kept, true));
   state.rejected = static_cast<std::uint32_t>(f.size()) - state.used;
-  state.rotation_sigma_rad = rotation_sigma(f, placement.kept, upright);
-  state.located = state.used >= kLeastKept && state.used > state.rejected &&
-                  state.rotation_sigma_rad <= kLargestRotationSigma_rad;
+  state.rotation_sigma_rad = rotation_sigma(f, shares_of(f.fixes, placement.kept), upright);
+  state.located = state.used >= kLeastKept && slack * state.used > state.rejected &&
+                  state.rotation_sigma_rad <= slack * kLargestRotationSigma_rad;
   return placement;
 }
 
 }  // namespace
 
 FixPlacement place_fixes(std::span<const PositionFix> fixes, std::span<const SE3> T_frame_kf,
-                         const SE3& known, const Precision& step, bool upright) {
+                         const SE3& known, const Precision& step, bool upright, bool was_located) {
   if (fixes.empty()) return {.T_frame_datum = known, .kept = {}, .state = {}};
-  Fixes f;
+  Fixes f{.fixes = fixes, .q = {}, .p = {}, .sigma_m = {}};
   std::vector<double> walk;  // variances
   for (const PositionFix& fix : fixes) {
     f.q.push_back(T_frame_kf[fix.keyframe.index] * fix.p_kf);
@@ -193,7 +225,7 @@ FixPlacement place_fixes(std::span<const PositionFix> fixes, std::span<const SE3
     const double drift_m = kDrift * (f.q.back() - f.q[f.size() - 2]).norm();
     walk.push_back(std::max(1.0, steps) / step.tau + drift_m * drift_m);
   }
-  FixPlacement before = judge(f, known.inverse(), walk, upright);
+  FixPlacement before = judge(f, known.inverse(), walk, upright, was_located ? kSlack : 1.0);
   FixPlacement found = judge(f, best_hypothesis(f, upright), walk, upright);
   for (int repetition = 0; repetition < 2; ++repetition) {
     const std::vector<double> w(found.kept.begin(), found.kept.end());
@@ -206,6 +238,7 @@ FixPlacement place_fixes(std::span<const PositionFix> fixes, std::span<const SE3
 std::vector<PoseEdge> fix_edges(std::span<const PositionFix> fixes, const std::vector<bool>& kept,
                                 std::span<const SE3> T_frame_kf) {
   constexpr double kNoRotation = 1e-9;  // [1/rad^2], positive so that the edge is usable
+  const std::vector<double> shares = shares_of(fixes, kept);
   std::vector<PoseEdge> edges;
   for (std::size_t k = 0; k < fixes.size(); ++k) {
     if (!kept[k]) continue;
@@ -215,7 +248,7 @@ std::vector<PoseEdge> fix_edges(std::span<const PositionFix> fixes, const std::v
     edges.push_back({{fix.keyframe.robot, 0},
                      fix.keyframe,
                      make_pose(R_0_kf, fix.p_datum - R_0_kf * fix.p_kf),
-                     {kNoRotation, 1.0 / (fix.sigma_m * fix.sigma_m)}});
+                     {kNoRotation, shares[k] / (fix.sigma_m * fix.sigma_m)}});
   }
   return edges;
 }

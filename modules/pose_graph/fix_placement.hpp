@@ -28,18 +28,21 @@ struct FixPlacement {
 /// 3. The least-squares transform of the kept fixes.
 ///
 /// The frame is `located` if at least five fixes are kept, more than half of all, and if the
-/// standard deviation of the rotation is at most 0.1 rad. Errors of successive fixes are
-/// correlated, so that more than ten fixes count as ten. A robot that stands still is not located,
+/// standard deviation of the rotation is at most 0.1 rad. Fixes with correlated errors count
+/// less, and more than ten independent ones count as ten. A robot that stands still is not located,
 /// however many fixes it has. `upright`: z of poses and fixes is up, and only the heading is
-/// unknown. `step` has the weights of one step of odometry.
+/// unknown. `step` has the weights of one step of odometry. A robot that `was_located` in the
+/// `known` frame stays located until a bound is exceeded by half.
 [[nodiscard]] FixPlacement place_fixes(std::span<const PositionFix> fixes,
                                        std::span<const SE3> T_frame_kf, const SE3& known,
-                                       const Precision& step, bool upright);
+                                       const Precision& step, bool upright,
+                                       bool was_located = false);
 
 /// The kept fixes as edges from keyframe 0, whose frame is the absolute one. Such an edge measures
-/// the position of a keyframe. The lever arm p_kf turns with the present rotation of the keyframe.
-/// A rotation by d in the session therefore makes an error of d |p_kf|, and the next session uses
-/// the new rotation.
+/// the position of a keyframe. Its weight is 1 / sigma^2 over the sum of the correlations of its
+/// error with those of the kept fixes, so that a common error of near fixes counts once. The lever
+/// arm p_kf turns with the present rotation of the keyframe. A rotation by d in the session
+/// therefore makes an error of d |p_kf|, and the next session uses the new rotation.
 [[nodiscard]] std::vector<PoseEdge> fix_edges(std::span<const PositionFix> fixes,
                                               const std::vector<bool>& kept,
                                               std::span<const SE3> T_frame_kf);

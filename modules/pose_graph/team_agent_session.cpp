@@ -233,7 +233,8 @@ bool TeamAgent::join(const Session& session) {
 void TeamAgent::place_first_by_fixes(bool upright) {
   if (graph_.fixes().empty()) return;
   placement_ = place_fixes(graph_.fixes(), poses_.T_frame_kf(), poses_.T_frame_kf().front(),
-                           graph_.mean_step_precision(), upright && graph_.verticals().size() > 1);
+                           graph_.mean_step_precision(), upright && graph_.verticals().size() > 1,
+                           placement_.state.located);
   if (placement_.state.located) poses_.place_first(placement_.T_frame_datum);
 }
 

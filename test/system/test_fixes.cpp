@@ -222,7 +222,8 @@ TEST_CASE("fixes on live topics place a run in their frame", "[system][fixes][li
   const int ros_domain = random_domain();
   Process robot(
       live_command(*dataset, folder, ros_domain, "--output",
-                   is_gnss ? "absolute_fixes.source=gnss absolute_fixes.datum=[47.3977,8.5456,488]"
+                   is_gnss ? "absolute_fixes.source=gnss absolute_fixes.correlation_s=0 "
+                             "absolute_fixes.datum=[47.3977,8.5456,488]"
                            : "absolute_fixes.source=motion_capture "
                              "absolute_fixes.live_type=geometry_msgs/msg/PoseStamped"));
   Process driver(driver_command(*dataset, ros_domain,
@@ -255,7 +256,7 @@ TEST_CASE("a killed and resumed robot remains located by its live fixes", "[syst
   const bool has_more_fixes = GENERATE(false, true);
   CAPTURE(has_more_fixes);
   const int ros_domain = random_domain();
-  const std::string settings = "absolute_fixes.source=gnss";
+  const std::string settings = "absolute_fixes.source=gnss absolute_fixes.correlation_s=0";
   {
     Process robot(live_command(*dataset, folder, ros_domain, "--output", settings));
     Process driver(driver_command(*dataset, ros_domain, "--to 13 --fixes " + fixes.string()));

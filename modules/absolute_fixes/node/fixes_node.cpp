@@ -13,7 +13,8 @@ constexpr std::size_t kQueue = 4096;  // minutes of images
 
 FixesNode::FixesNode(FixInput input, const FixesTopics& topics)
     : reader_(std::move(input.reader)),
-      association_(Eigen::Vector3d(reader_.config().lever_arm_m.data())),
+      association_(Eigen::Vector3d(reader_.config().lever_arm_m.data()),
+                   reader_.config().used_correlation_s()),
       live_(std::move(input.live)),
       topics_(topics),
       worker_(

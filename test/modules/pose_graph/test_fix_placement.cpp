@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/core/measurement_limits.hpp"
+#include "modules/pose_graph/fix_placement.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/team_network.hpp"
@@ -64,6 +65,8 @@ class Run {
                     .p_datum = T_datum_kf * kAntenna + sigma_m * random_vector<3>(rng_) + error,
                     .p_kf = kAntenna,
                     .sigma_m = sigma_m,
+                    .stamp = 1'000'000'000 * static_cast<Stamp>(at),
+                    .correlation_s = correlation_s,
                     .datum = datum}));
   }
   void fix_all() {
@@ -87,6 +90,7 @@ class Run {
   }
 
   std::uint64_t datum = 77;
+  double correlation_s = 0.0;
 
  private:
   void add(const SE3& T_previous_kf, const Matrix6& covariance) {
@@ -236,6 +240,54 @@ TEST_CASE("fixes of all robots act on one frame if closures tie the robots",
   } else {
     CHECK(apart_m > 0.1);
   }
+}
+
+// The mean errors of the fixes of the two robots are 1 m apart, as those of GNSS on one day may be.
+// As independent errors they would cost 118 (0.5 m / 0.3 m)^2 = 328, enough to reject six true
+// closures. With their correlation time of a minute, 118 fixes count as two.
+TEST_CASE("a common error of the fixes of a robot does not outvote closures",
+          "[pose_graph][fixes]") {
+  TeamNetwork network;
+  const unsigned seed = GENERATE(41U, 43U, 45U, 47U, 49U);
+  CAPTURE(seed);
+  Run low(network, 3, seed, true, PgoMethod::kNewton),
+      high(network, 6, seed + 1, true, PgoMethod::kNewton);
+  const Eigen::Vector3d east(0.5, 0.0, 0.0);
+  for (Run* const run : {&low, &high}) run->correlation_s = 60.0;
+  for (KeyframeIndex i = 1; i < kKeyframes; ++i) {
+    low.fix(i, east);
+    high.fix(i, -east);
+  }
+  const auto closures = close(low, high);
+  REQUIRE(settle_again(network));
+  for (const ClosureId& id : closures) CHECK(low.agent().decided().at(id));
+  CHECK(relative_error_m(low, high, {10, 11, 12, 40, 41, 42}) < 0.1);
+}
+
+// The sum of exp(-|dt| / tau) over equally spaced fixes is coth(dt / (2 tau)) far from the ends,
+// and half of it plus a half at an end.
+TEST_CASE("fixes with correlated errors share their weight", "[pose_graph][fixes]") {
+  constexpr std::size_t kFixes = 1001;
+  constexpr double kCorrelation_s = 20.0;
+  const std::vector<SE3> poses(kFixes, SE3::Identity());
+  std::vector<PositionFix> fixes(kFixes);
+  for (std::size_t k = 0; k < kFixes; ++k) {
+    fixes[k].keyframe = {1, static_cast<KeyframeIndex>(k)};
+    fixes[k].stamp = 1'000'000'000 * static_cast<Stamp>(k);
+    fixes[k].sigma_m = 0.5;
+    fixes[k].correlation_s = kCorrelation_s;
+  }
+  std::vector<bool> kept(kFixes, true);
+  const double sum = 1.0 / std::tanh(0.5 / kCorrelation_s);
+  const auto middle = fix_edges(fixes, kept, poses)[500].precision.tau;
+  CHECK(middle == Approx(4.0 / sum).epsilon(1e-6));
+  CHECK(fix_edges(fixes, kept, poses)[0].precision.tau == Approx(4.0 / (0.5 * sum + 0.5)));
+  // Rejected fixes take no weight from others, and independent ones have all of theirs.
+  for (std::size_t k = 0; k < kFixes; ++k) kept[k] = k % 1000 == 0;
+  CHECK(fix_edges(fixes, kept, poses)[1].precision.tau == Approx(4.0));
+  for (PositionFix& fix : fixes) fix.correlation_s = 0.0;
+  kept.assign(kFixes, true);
+  CHECK(fix_edges(fixes, kept, poses)[500].precision.tau == Approx(4.0));
 }
 
 TEST_CASE("false closures between robots in one datum are rejected", "[pose_graph][fixes]") {
