@@ -218,9 +218,9 @@ TEST_CASE("fixes of all robots act on one frame if closures tie the robots",
           "[pose_graph][fixes]") {
   TeamNetwork network;
   const unsigned seed = GENERATE(41U, 43U, 45U);
-  CAPTURE(seed);
-  Run low(network, 3, seed, true, PgoMethod::kNewton),
-      high(network, 6, seed + 1, true, PgoMethod::kNewton);
+  const auto method = GENERATE(PgoMethod::kNewton, PgoMethod::kRbcd);
+  CAPTURE(seed, method);
+  Run low(network, 3, seed, true, method), high(network, 6, seed + 1, true, method);
   const Eigen::Vector3d east(0.1, 0.0, 0.0);
   const bool is_one_datum = GENERATE(true, false);
   if (!is_one_datum) high.datum = 78;
