@@ -254,8 +254,10 @@ bool TeamAgent::has_failed() const {
 void TeamAgent::advance(TeamOutput& output) {
   if (!in_session()) return;
   const auto stage = part_->stage();
-  for (ReliableMessage& message : part_->advance(roster_.public_poses(), now_s_))
+  for (ReliableMessage& message : part_->advance(roster_.public_poses(), now_s_)) {
+    if (message.bytes) notices_.message(message.bytes->size());
     output.messages.emplace_back(std::move(message));
+  }
   for (const RobotId sender : part_->take_refused())
     refuse("a message of robot " + std::to_string(sender) + " that is of no use");
   output.more |= part_->worked();

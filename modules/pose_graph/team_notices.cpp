@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "modules/core/text_table.hpp"
+#include "modules/pose_graph/team_message_bytes.hpp"
 
 namespace km {
 namespace {
@@ -49,6 +50,18 @@ void TeamNotices::odometry(const OdometryNoise& noise) {
       fixed(noise.translation, 1) + " times in translation than it claims, by " +
       std::to_string(noise.places) +
       " places of loop closures inside this robot; it is weighed accordingly");
+}
+
+void TeamNotices::message(std::size_t bytes) {
+  const auto size = static_cast<double>(bytes);
+  if (bytes <= kMaxTeamMessageBytes || size < kNoticedAgain * static_cast<double>(largest_message_))
+    return;
+  largest_message_ = bytes;
+  add("the equations of this session take " + fixed(1e-6 * size, 1) + " MB, and robots exchange " +
+      fixed(1e-6 * static_cast<double>(kMaxTeamMessageBytes), 1) +
+      " MB at most: the session ends without a solution, and the last solution stays. Too many "
+      "keyframes have closures with other robots: set pose_graph.method=rbcd on all robots, which "
+      "sends no equations");
 }
 
 void TeamNotices::breaks(std::span<const OdometryBreak> breaks) {

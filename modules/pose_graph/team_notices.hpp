@@ -34,6 +34,8 @@ class TeamNotices {
   void closures(const ClosureNoiseRecord& noise);
   /// Reports a robot that is located in another datum than this robot.
   void other_datum(RobotId robot);
+  /// Reports a message of the solver that is too large to be sent.
+  void message(std::size_t bytes);
   /// Reports robots whose pose relative to this robot is uncertain, or certain again.
   void ties(const FrameTies& ties);
 
@@ -50,6 +52,7 @@ class TeamNotices {
   std::map<RobotId, double> closure_factors_;  // in the last notice, by peer
   FrameTies ties_;                             // in the last notice
   std::set<RobotId> other_datum_;              // in a notice
+  std::size_t largest_message_ = 0;            // in the last notice
 };
 
 }  // namespace km

@@ -5,6 +5,7 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
+#include "modules/pose_graph/team_notices.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
@@ -363,6 +364,20 @@ TEST_CASE("Corrupted bytes give a message or a reason", "[pose_graph]") {
     taken += result.value ? 1 : 0;
   }
   CHECK(taken > 1000);  // most of the changed bytes may have any value
+}
+
+TEST_CASE("a solver's message that is too large is reported once, with the way out",
+          "[pose_graph]") {
+  TeamNotices notices(1);
+  notices.message(kMaxTeamMessageBytes);
+  CHECK(notices.take().empty());
+  notices.message(kMaxTeamMessageBytes + 1);
+  const auto reported = notices.take();
+  REQUIRE(reported.size() == 1);
+  CHECK(reported.front().find("16.8 MB") != std::string::npos);
+  CHECK(reported.front().find("pose_graph.method=rbcd") != std::string::npos);
+  notices.message(kMaxTeamMessageBytes + 2);
+  CHECK(notices.take().empty());
 }
 
 }  // namespace
