@@ -10,8 +10,8 @@ endif()
 option(KM_UNITY "Compile the sources of a library or program in groups" ON)
 
 find_package(kimera_multi REQUIRED
-  COMPONENTS charts core evaluation heap images opencv outlier_rejection pose_graph program rbcd
-             recorded_graph runtime sensors_node team_plan)
+  COMPONENTS charts core evaluation heap images loop_closure opencv outlier_rejection place_recognition
+             pose_graph program rbcd recorded_graph runtime sensors_node team_plan)
 
 # Include paths are those of the tree ("apps/lab/pgo/solvers.hpp"). Its root is no include folder,
 # because the headers of modules must be the installed ones.

@@ -13,13 +13,17 @@ struct VocabularyCommand {
   int every = 1;           ///< Use every n-th image.
 
   void define(CLI::App& app) {
+    define_images(app);
+    app.add_option("--json", json, "Also write the results to this file, as JSON");
+  }
+  /// Without --json.
+  void define_images(CLI::App& app) {
     app.add_option("--features", features, "ORB features per image")
         ->check(CLI::Range(1, 100000))
         ->capture_default_str();
     app.add_option("--every", every, "Use every N-th image of an input")
         ->check(CLI::Range(1, 1000000))
         ->capture_default_str();
-    app.add_option("--json", json, "Also write the results to this file, as JSON");
   }
 };
 
@@ -28,5 +32,6 @@ struct VocabularyCommand {
 void add_train(CLI::App& app);
 void add_inspect(CLI::App& app);
 void add_evaluate(CLI::App& app);
+void add_bags(CLI::App& app);
 
 }  // namespace km

@@ -17,5 +17,6 @@ constexpr const char* kAbout =
 
 int main(int argc, char** argv) {
   return km::run_subcommands("kimera_multi_vocabulary", kAbout,
-                             {km::add_train, km::add_inspect, km::add_evaluate}, argc, argv);
+                             {km::add_train, km::add_inspect, km::add_evaluate, km::add_bags}, argc,
+                             argv);
 }

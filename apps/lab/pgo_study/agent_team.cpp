@@ -111,6 +111,7 @@ class AgentTeam {
     OptimizerProgress progress = {};
     std::size_t keyframes = 0;      // played
     std::size_t session_bytes = 0;  // sent
+    AgentCost cost = {};
     bool due = true;
   };
   struct Delivery {
@@ -166,11 +167,18 @@ class AgentTeam {
            std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.waits(); });
   }
 
+  // Calls work(agent) and adds its CPU time to that of the robot.
+  decltype(auto) measure(Member& member, auto&& work) {
+    const CpuStopwatch stopwatch{options_.meter, member.cost.cpu_s};
+    return work(*member.agent);
+  }
+
   // Delivers the messages in flight and steps each robot that is due. True if no robot is due and
   // no message is in flight afterwards.
   bool exchange() {
     for (const Delivery& delivery : std::exchange(in_flight_, {})) {
-      (void)members_[delivery.to].agent->receive(delivery.message);
+      measure(members_[delivery.to],
+              [&](TeamAgent& agent) { (void)agent.receive(delivery.message); });
       members_[delivery.to].due = true;
     }
     for (std::size_t k = 0; k < members_.size(); ++k)
@@ -181,7 +189,8 @@ class AgentTeam {
 
   void step(std::size_t robot) {
     Member& member = members_[robot];
-    TeamOutput output = member.agent->step(now_s_, member.session_bytes);
+    TeamOutput output =
+        measure(member, [&](TeamAgent& agent) { return agent.step(now_s_, member.session_bytes); });
     member.due = output.more;
     changed_ |= output.trajectory.has_value();
     if (output.trajectory) member.trajectory = std::move(output.trajectory);
@@ -205,8 +214,11 @@ class AgentTeam {
       in_flight_.push_back({to, std::move(*decoded.value)});
       const std::size_t sent = kTeamMessageHeadBytes + bytes.size();
       members_[robot].session_bytes += std::holds_alternative<TeamStatus>(message) ? 0 : sent;
+      members_[robot].cost.sent[message.index()] += sent;
+      members_[to].cost.received[message.index()] += sent;
       bytes_ += sent;
     }
+    if (const auto* session = std::get_if<Session>(&message)) sessions_.insert(session->id);
   }
 
   [[nodiscard]] bool settled() const {
@@ -222,7 +234,10 @@ class AgentTeam {
                      .settled = settled,
                      .seconds = seconds,
                      .bytes = bytes_,
+                     .costs = {},
+                     .sessions = sessions_.size(),
                      .notices = notices_};
+    for (const Member& member : members_) run.costs.push_back(member.cost);
     for (std::size_t k = 0; k < members_.size(); ++k) {
       const Member& member = members_[k];
       const auto poses = static_cast<std::size_t>(graph_.poses_of(k));
@@ -259,6 +274,7 @@ class AgentTeam {
   std::vector<Member> members_;
   std::vector<Delivery> in_flight_;
   std::size_t bytes_ = 0;
+  std::set<SessionId> sessions_;
   std::vector<std::string> notices_;
   double now_s_ = 0.0;
   double next_tick_s_ = 0.0;

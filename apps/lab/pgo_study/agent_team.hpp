@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
 
+#include "apps/lab/pgo_study/round_meter.hpp"
 #include "apps/lab/pgo_study/team_graph.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
@@ -16,6 +18,15 @@ struct AgentTeamOptions {
                                  ///< witness.
   double keyframes_per_s = 0.0;  ///< Rate at which robots play their graphs [1/s]; 0: all at once.
   double longest_s = 3600.0;     ///< Limit of the virtual time of the run [s].
+  TeamMeter meter = {};
+};
+
+/// Messages and processor time of one robot of a run.
+struct AgentCost {
+  std::array<std::size_t, 4> sent = {};      ///< Bytes by TeamMessageKind; a message counts once
+                                             ///< per receiver.
+  std::array<std::size_t, 4> received = {};  ///< Bytes by TeamMessageKind.
+  double cpu_s = 0.0;
 };
 
 /// Result of a run.
@@ -29,6 +40,8 @@ struct AgentTeamRun {
   double seconds = 0.0;           ///< Virtual time of the last change [s].
   std::size_t rounds = 0;         ///< Maximum over the robots.
   std::size_t bytes = 0;          ///< Sent by all robots; a message counts once per receiver.
+  std::vector<AgentCost> costs;   ///< By robot.
+  std::size_t sessions = 0;       ///< Number of sessions of the team.
   std::vector<std::string> notices;
 };
 

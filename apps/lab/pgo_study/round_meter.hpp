@@ -13,6 +13,14 @@ struct TeamMeter {
   std::function<double()> cpu_s = [] { return 0.0; };  ///< CPU time of this thread [s].
 };
 
+/// Adds the CPU time of its existence to a sum.
+struct CpuStopwatch {
+  const TeamMeter& meter;
+  double& sum_s;
+  double start_s = meter.cpu_s();
+  ~CpuStopwatch() { sum_s += meter.cpu_s() - start_s; }
+};
+
 /// Work of one round, or sums of it.
 struct TeamWork {
   std::size_t bytes = 0;
@@ -36,13 +44,7 @@ class RoundMeter {
   /// nest.
   template <typename F>
   decltype(auto) run(std::size_t robot, F&& work) {
-    struct Stopwatch {
-      const TeamMeter& meter;
-      double& sum_s;
-      double start_s = meter.cpu_s();
-      ~Stopwatch() { sum_s += meter.cpu_s() - start_s; }
-    };
-    const Stopwatch stopwatch{meter_, cpu_s_[robot]};
+    const CpuStopwatch stopwatch{meter_, cpu_s_[robot]};
     return work();
   }
 

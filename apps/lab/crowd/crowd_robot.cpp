@@ -1,0 +1,104 @@
+#include "apps/lab/crowd/crowd_robot.hpp"
+
+#include <random>
+
+#include "modules/place_recognition/packed_bag.hpp"
+
+namespace km {
+namespace {
+
+// As LoopClosureNode: the first replies to a robot have up to three times the keypoints.
+constexpr std::size_t kFirstReplies = 12;
+constexpr std::size_t kFirstFactor = 3;
+constexpr double kKeyframePeriod_s = 3.0;
+
+// A number in [0, 1) that depends on the pair only.
+double draw(const KeyframeId& a, const KeyframeId& b) {
+  std::seed_seq seed{std::uint32_t{a.robot}, a.index, std::uint32_t{b.robot}, b.index};
+  std::mt19937 random(seed);
+  return static_cast<double>(random()) / 4294967296.0;
+}
+
+}  // namespace
+
+CrowdRobot::CrowdRobot(const CrowdWorld& world, const Vocabulary& vocabulary, RobotId self,
+                       double verified_share, const CrowdMeter& meter)
+    : world_(world),
+      vocabulary_(vocabulary),
+      self_(self),
+      verified_share_(verified_share),
+      meter_(meter),
+      own_(PlaceRecognitionConfig{}, vocabulary.size()),
+      policy_(LoopClosureConfig{}) {}
+
+void CrowdRobot::add_own(const BagOfWords& bag, KeyframeIndex index) {
+  work_.run(meter_, [&] {
+    BowVector vector = vocabulary_.weigh(bag);
+    const Stamp stamp = nanoseconds(kKeyframePeriod_s * index);
+    (void)own_.search_own(vector, stamp);
+    own_.add(std::move(vector), stamp);
+  });
+}
+
+void CrowdRobot::receive(const KeyframeId& keyframe, std::span<const std::uint8_t> packed,
+                         bool stores_bag) {
+  ++findings_.bags;
+  const std::vector<Found> found =
+      work_.run(meter_, [&] { return search(keyframe, packed, stores_bag); });
+  for (const auto& [query, result] : found)
+    for (const PlaceCandidate& candidate : result.candidates) judge(query, candidate);
+}
+
+std::vector<CrowdRobot::Found> CrowdRobot::search(const KeyframeId& keyframe,
+                                                  std::span<const std::uint8_t> packed,
+                                                  bool stores_bag) {
+  const BagOfWords bag = unpack(packed).value();
+  if (stores_bag) stored_[keyframe] = {packed.begin(), packed.end()};
+  std::vector<std::uint32_t> words;
+  words.reserve(bag.size());
+  for (const WordCount& entry : bag) words.push_back(entry.word);
+  words_.put(keyframe, std::move(words));
+  const std::size_t patience = PlaceRecognitionConfig{}.max_waiting_keyframes;
+  PeerHistory& history = peers_.try_emplace(keyframe.robot, patience).first->second;
+  std::vector<Found> found;
+  for (const PeerQuery& query : history.add(keyframe.index, vocabulary_.weigh(bag)))
+    if (CandidateSearch result = own_.search(*query.vector, query.previous.get());
+        !result.candidates.empty())
+      found.push_back({{keyframe.robot, query.index}, std::move(result)});
+  return found;
+}
+
+void CrowdRobot::judge(const KeyframeId& query, const PlaceCandidate& candidate) {
+  const KeyframeId match{self_, static_cast<KeyframeIndex>(candidate.index)};
+  const std::uint32_t place = world_.places(self_)[match.index];
+  const bool is_true = world_.places(query.robot)[query.index] == place;
+  ++(is_true ? findings_.true_candidates : findings_.false_candidates);
+  if (is_true) findings_.found[place].insert(query);
+  if (!requested_.contains(query)) {
+    const auto decision = policy_.decide({.query = query,
+                                          .match = match,
+                                          .similarity = candidate.similarity,
+                                          .support = candidate.support});
+    if (decision != RequestPolicy::Decision::kRequest) return;
+    ++(is_true ? findings_.true_requests : findings_.false_requests);
+    request(query);
+  }
+  ++findings_.verifications;
+  const bool verified = is_true && draw(query, match) < verified_share_;
+  if (verified) {
+    policy_.add_closure({match, query});
+    ++findings_.closures[place];
+    sent_.add(closure_bytes());
+  }
+  policy_.add_result(query, verified);
+}
+
+void CrowdRobot::request(const KeyframeId& query) {
+  requested_.insert(query);
+  const auto keypoints = static_cast<std::size_t>(LoopClosureConfig{}.reply_keypoints);
+  const bool is_first = ++replies_[query.robot] <= kFirstReplies;
+  sent_.add(request_bytes());
+  received_.add(reply_bytes(is_first ? kFirstFactor * keypoints : keypoints));
+}
+
+}  // namespace km
