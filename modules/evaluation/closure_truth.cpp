@@ -91,6 +91,17 @@ class Places {
            overlap(camera_, grid_, T_a_b.inverse(), depth_of(b)) >= options_.min_overlap;
   }
 
+  // Bin of ClosureScores::by_angle. Precondition: both keyframes of the pair are known.
+  std::size_t angle_bin(const ClosureId& pair) const {
+    const auto axis_of = [&](const KeyframeId& id) -> Eigen::Vector3d {
+      return find(id)->T_world_body.linear() * camera_.T_body_cam.linear().col(2);
+    };
+    const double cosine = axis_of(pair.from).dot(axis_of(pair.to));
+    const double angle_deg = kDegrees * std::acos(std::clamp(cosine, -1.0, 1.0));
+    const auto bin = static_cast<std::size_t>(angle_deg / ClosureScores::kAngleBin_deg);
+    return std::min(bin, ClosureScores::kAngleBins - 1);
+  }
+
   // Pairs of keyframes of two robots that see the same place.
   std::set<ClosureId> true_pairs() const {
     std::set<ClosureId> pairs;
@@ -129,6 +140,8 @@ class StageCounter {
     translations_m_.push_back(translation_m);
     rotations_deg_.push_back(rotation_deg);
   }
+
+  const std::set<ClosureId>& found() const { return found_; }
 
   StageScore score() && {
     score_.pairs_found = found_.size();
@@ -198,6 +211,11 @@ ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
   }
   scores.true_pairs = true_pairs.size();
   scores.true_frames = frames_in(true_pairs);
+  for (const ClosureId& pair : true_pairs) {
+    AngleScore& bin = scores.by_angle.at(places.angle_bin(pair));
+    ++bin.true_pairs;
+    bin.pairs_found += inliers.found().contains(pair);
+  }
   scores.candidates = std::move(candidates).score();
   scores.verified = std::move(verified).score();
   scores.inliers = std::move(inliers).score();
@@ -368,12 +386,21 @@ std::string to_table(const ClosureScores& scores) {
 }
 
 void to_json(Json& json, const ClosureScores& scores) {
+  Json by_angle = Json::array();
+  for (const AngleScore& bin : scores.by_angle) {
+    const double from_deg = ClosureScores::kAngleBin_deg * static_cast<double>(by_angle.size());
+    by_angle.push_back({{"from_deg", from_deg},
+                        {"to_deg", from_deg + ClosureScores::kAngleBin_deg},
+                        {"true_pairs", bin.true_pairs},
+                        {"pairs_found", bin.pairs_found}});
+  }
   json = {{"true_pairs", scores.true_pairs},
           {"true_frames", scores.true_frames},
           {"unjudged", scores.unjudged},
           {"candidates", to_json(scores, scores.candidates)},
           {"verified", to_json(scores, scores.verified)},
-          {"inliers", to_json(scores, scores.inliers)}};
+          {"inliers", to_json(scores, scores.inliers)},
+          {"by_angle", std::move(by_angle)}};
 }
 
 }  // namespace km

@@ -72,8 +72,17 @@ struct StageScore {
   [[nodiscard]] double precision() const;  ///< correct / judged; NaN without one.
 };
 
+/// Pairs of keyframes of two robots that see the same place from directions a certain angle apart.
+struct AngleScore {
+  std::size_t true_pairs = 0;
+  std::size_t pairs_found = 0;  ///< Pairs with a true closure of stage kInlier.
+};
+
 /// All closures of a team against the truth.
 struct ClosureScores {
+  static constexpr double kAngleBin_deg = 30.0;
+  static constexpr std::size_t kAngleBins = 6;
+
   StageScore candidates;       ///< All closures; true if both keyframes see the same place.
   StageScore verified;         ///< Stages kVerified and kInlier; judged by the measured pose.
   StageScore inliers;          ///< Stage kInlier; judged by the measured pose.
@@ -81,6 +90,9 @@ struct ClosureScores {
   /// Keyframes that see the same place as some keyframe of another robot.
   std::size_t true_frames = 0;
   std::size_t unjudged = 0;  ///< Closures with a keyframe whose true pose is unknown.
+  /// The true pairs by the angle between the optical axes of their left cameras, in bins of
+  /// kAngleBin_deg from 0 to 180 degrees.
+  std::array<AngleScore, kAngleBins> by_angle = {};
 
   /// Share of the true pairs that a stage found. NaN without a true pair.
   [[nodiscard]] double pair_recall(const StageScore& stage) const;
@@ -141,7 +153,8 @@ struct KeyframeRecord {
 
 /// The scores as one JSON object: {true_pairs, true_frames, unjudged, candidates:
 /// {judged, correct, precision, pairs_found, pair_recall, frames_found, frame_recall,
-/// translation_error_m: {...}, rotation_error_deg: {...}}, verified: {...}, inliers: {...}}.
+/// translation_error_m: {...}, rotation_error_deg: {...}}, verified: {...}, inliers: {...},
+/// by_angle: [{from_deg, to_deg, true_pairs, pairs_found}, ...]}.
 void to_json(Json& json, const ClosureScores& scores);
 
 }  // namespace km

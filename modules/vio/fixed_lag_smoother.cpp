@@ -185,6 +185,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   decide_keyframe();
   locate_landmarks();
   update.solution = optimize(window_, config_.iterations);
+  update.fit = fit_of_newest();
   update.outliers = reject_outliers();
   if (has_imu_ && !newest.imu->rests() && !newest.is_bridged) compare_gyro();
   update.state = newest.state;
@@ -332,6 +333,31 @@ void FixedLagSmoother::locate_landmarks() {
     if (!landmark.located && landmark.observations.size() >= 2)
       locate(window_, images, max_error, landmark);
   }
+}
+
+ImageFit FixedLagSmoother::fit_of_newest() const {
+  const double limit = config_.outlier_px / config_.noise_px;
+  const SE3 T_odom_body = image_poses(window_).back();
+  std::vector<double> squares;
+  Eigen::Vector2d r;
+  for (const WindowLandmark& landmark : window_.landmarks) {
+    if (!landmark.located || !tracked_now(window_, landmark)) continue;
+    for (std::size_t c = 0; c < 2; ++c) {
+      const auto& bearing = landmark.observations.back().bearings[c];
+      if (!bearing) continue;
+      const bool in_front =
+          reprojection_error(window_.views[c], *bearing, T_odom_body, landmark.p_odom, r);
+      squares.push_back(in_front ? r.squaredNorm() : limit * limit + 1.0);
+    }
+  }
+  if (squares.empty()) return {};
+  ImageFit fit{.points = static_cast<int>(squares.size())};
+  fit.contradicting = static_cast<int>(
+      std::ranges::count_if(squares, [&](double square) { return square > limit * limit; }));
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::ranges::nth_element(squares, middle);
+  fit.median_square = *middle;
+  return fit;
 }
 
 int FixedLagSmoother::reject_outliers() {

@@ -6,6 +6,7 @@
 
 #include "modules/core/camera.hpp"
 #include "modules/core/covariance.hpp"
+#include "modules/vio/estimate_watch.hpp"
 #include "modules/vio/gyro_noise_scale.hpp"
 #include "modules/vio/tracked_frame.hpp"
 #include "modules/vio/vio_config.hpp"
@@ -28,6 +29,7 @@ struct SmootherUpdate {
   int landmarks = 0;  ///< Number of landmarks in the optimisation.
   int seen = 0;       ///< Number of these landmarks in the newest image.
   int outliers = 0;   ///< Number of dropped observations.
+  ImageFit fit;       ///< Fit of the newest image.
   WindowSolution solution;
 };
 
@@ -113,6 +115,7 @@ class FixedLagSmoother {
   void compare_gyro();
   void decide_keyframe();
   int reject_outliers();
+  [[nodiscard]] ImageFit fit_of_newest() const;
   void locate_landmarks();
   void clear();
   void set_first_prior();

@@ -268,17 +268,11 @@ void Vio::advance(const Held& held, VioResult& result) {
   statistics_.rests += rests && !rested;
   if (rests) rested_s_ += seconds_between(last_->stamp, held.frame->stamp);
   result.smoother = smoother_.add(held.data, rests);
-  if (locates_points(*held.frame)) {
-    const auto& seen = held.data.tracked.features;
-    const auto locatable =
-        std::ranges::count_if(seen, [](const auto& f) { return f.right.has_value(); });
-    const bool lost = locatable >= kMinStereoFeatures &&
-                      kMaxFeaturesPerLandmark * result.smoother->landmarks < locatable;
-    unlocated_images_ = lost ? unlocated_images_ + 1 : 0;
-  }
-  if (!plausible(*result.smoother) || unlocated_images_ > kMostUnlocatedImages) {
+  const bool contradicted = is_contradicted(*held.frame, held.data.tracked, *result.smoother);
+  if (contradicted || !plausible(*result.smoother)) {
     ++statistics_.divergences;
-    result.problem = VioProblem::kDiverged;
+    statistics_.contradictions += contradicted;
+    result.problem = contradicted ? VioProblem::kContradicted : VioProblem::kDiverged;
     last_->v_odom.setZero();  // unknown after the divergence
     restart(held);
     return;
@@ -334,6 +328,21 @@ void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
   statistics_.blind_s = vision_.lost_s();
 }
 
+// True if images contradict the estimate: by the errors of located landmarks, or because hardly any
+// feature fits a landmark. Images are not judged while the estimate recovers from a loss of vision.
+bool Vio::is_contradicted(const StereoFrame& frame, const TrackedFrame& tracked,
+                          const SmootherUpdate& update) {
+  if (!vision_.is_lost() && !vision_back_since_) estimate_watch_.add(update.fit);
+  if (locates_points(frame)) {
+    const auto locatable = std::ranges::count_if(
+        tracked.features, [](const auto& feature) { return feature.right.has_value(); });
+    const bool is_unlocated =
+        locatable >= kMinStereoFeatures && kMaxFeaturesPerLandmark * update.landmarks < locatable;
+    unlocated_images_ = is_unlocated ? unlocated_images_ + 1 : 0;
+  }
+  return estimate_watch_.is_contradicted() || unlocated_images_ > kMostUnlocatedImages;
+}
+
 bool Vio::plausible(const SmootherUpdate& update) const {
   const OdometryState& s = update.state;
   if (!update.solution.usable || !s.T_odom_body.matrix().allFinite() || !s.v_odom.allFinite())
@@ -348,6 +357,7 @@ void Vio::restart(Held held) {
   statistics_.images_without_pose += static_cast<int>(held_.size());
   running_ = false;
   unlocated_images_ = 0;
+  estimate_watch_ = {};
   held_.clear();
   held_.push_back(std::move(held));
 }
@@ -434,9 +444,10 @@ void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   keyframe.T_previous_kf =
       relative ? relative->T
                : last_keyframe_->T_odom_kf.inverse() * T_chain_odom_ * state.T_odom_body;
-  keyframe.covariance = relative
-                            ? keyframe_covariance(config_, moved_s(state.stamp), relative->Sigma)
-                            : restart_covariance();
+  keyframe.covariance =
+      relative ? keyframe_covariance(config_, moved_s(state.stamp),
+                                     estimate_watch_.variance_factor() * relative->Sigma)
+               : restart_covariance();
   if (!rig_.has_imu) keyframe.covariance += scale_covariance(keyframe.T_previous_kf);
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   publish(keyframe, state, result);
@@ -450,6 +461,7 @@ void Vio::publish(KeyframeOdometry keyframe, const OdometryState& state, VioResu
   keyframe.calibration = known_calibration();
   last_keyframe_ = keyframe;
   rested_s_ = 0.0;
+  estimate_watch_.start_keyframe();
   result.keyframes.push_back(std::move(keyframe));
 }
 

@@ -7,6 +7,7 @@
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/odometry.hpp"
+#include "modules/vio/estimate_watch.hpp"
 #include "modules/vio/feature_tracker.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "modules/vio/initialization.hpp"
@@ -26,9 +27,10 @@ enum class VioProblem {
   /// Gap between inertial samples above VioConfig::max_imu_gap_s. Images alone determine the
   /// motion. If images cannot, odometry starts again from the last pose.
   kInertialGap,
-  /// The estimate was implausible or contradicted the images. Odometry starts again from the last
-  /// pose.
+  /// The estimate was implausible. Odometry starts again from the last pose.
   kDiverged,
+  /// Images contradicted the estimate, see EstimateWatch. Odometry starts again from the last pose.
+  kContradicted,
   /// Without an inertial sensor: images have not determined the pose for a second. Odometry starts
   /// again from the last pose with the first image that has enough features.
   kLost,
@@ -110,6 +112,8 @@ class Vio {
   [[nodiscard]] bool is_lost(Stamp now, const SmootherUpdate& update);
   void watch_vision(Stamp stamp, int features, VioResult& result);
   [[nodiscard]] bool plausible(const SmootherUpdate& update) const;
+  [[nodiscard]] bool is_contradicted(const StereoFrame& frame, const TrackedFrame& tracked,
+                                     const SmootherUpdate& update);
   void continue_from_last_pose(std::vector<OdometryState>& states) const;
   void continue_or_add_first_keyframe(VioResult& result);
   [[nodiscard]] double moved_s(Stamp stamp) const;
@@ -132,6 +136,7 @@ class Vio {
   FixedLagSmoother smoother_;
   RestDetector rest_detector_;
   VisionWatch vision_;
+  EstimateWatch estimate_watch_;
   // Time at which vision returned after a long loss; nullopt once the prior that was formed during
   // the loss is discarded.
   std::optional<Stamp> vision_back_since_;

@@ -9,7 +9,8 @@ struct VioStatistics {
   int refused_images = 0;
   int refused_samples = 0;
   int gaps = 0;
-  int divergences = 0;
+  int divergences = 0;     ///< Includes the contradictions.
+  int contradictions = 0;  ///< Divergences found because images contradicted the estimate.
   int starts = 0;
   int start_attempts = 0;
   int rests = 0;

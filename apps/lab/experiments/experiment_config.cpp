@@ -62,6 +62,38 @@ WorldConfig run_by_pipeline(const WorldConfig& world, const Texts& robot_options
   return other;
 }
 
+// Adds the world of every run to `config.worlds`.
+void add_level_runs(const LevelExperiment& levels, ExperimentConfig& config) {
+  for (const LevelSeeds& level : levels.levels)
+    for (const LevelWorld& world : levels.worlds)
+      for (const unsigned seed : level.seeds) {
+        const std::string number = std::to_string(level.level);
+        WorldConfig run{
+            .name = "level" + number + '-' + world.name + "-seed" + std::to_string(seed),
+            .title = (world.title.empty() ? world.name : world.title) + ", level " + number +
+                     ", seed " + std::to_string(seed),
+            .robots = {},
+            .simulation = {},
+            .simulate = world.simulate,
+            .original_config = {},
+            .team = levels.team,
+            .robot = levels.robot,
+            .seeds = {},
+            .picture = {},
+            .simulate_s = levels.simulate_s,
+            .team_s = levels.team_s};
+        run.recordings = run.name;
+        for (unsigned robot = 0; robot < levels.robots; ++robot)
+          run.robots.push_back("robot" + std::to_string(robot));
+        run.simulate.insert(run.simulate.end(), levels.simulate.begin(), levels.simulate.end());
+        run.simulate.insert(run.simulate.end(),
+                            {"--robots", std::to_string(levels.robots), "--difficulty", number});
+        set_seed(run.simulate, seed);
+        config.level_runs.push_back({level.level, run.name});
+        config.worlds.push_back(std::move(run));
+      }
+}
+
 void read_names(YamlFields& fields, const std::vector<WorldConfig>& worlds, Texts& names) {
   fields.field("worlds", names);
   fields.required({"worlds"});
@@ -130,10 +162,18 @@ ExperimentConfig read_experiments(const fs::path& folder, bool quick) {
        [&](YamlFields& fields) { read_names(fields, config.worlds, config.mesh_worlds); });
   read("semantics.yaml",
        [&](YamlFields& fields) { read_names(fields, config.worlds, config.semantics_worlds); });
+  LevelExperiment levels;
+  read("levels.yaml", [&](YamlFields& fields) {
+    fields.sections("worlds", levels.worlds);
+    fields.sections("levels", levels.levels);
+    levels.visit_fields(fields);
+    fields.required({"worlds", "levels"});
+  });
   problems.finish();
   if (!config.paper_pipeline.empty())
     for (const std::string& name : config.trajectory_worlds)
       config.worlds.push_back(run_by_pipeline(config.world(name), config.paper_pipeline));
+  add_level_runs(levels, config);
   for (PgoMethodConfig& method : config.methods)
     if (method.title.empty()) method.title = method.name;
   for (CosmoSet& set : config.cosmo.sets)

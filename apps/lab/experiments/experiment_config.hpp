@@ -117,6 +117,61 @@ struct SingleRobotExperiment {
   }
 };
 
+/// A world of the levels of difficulty.
+struct LevelWorld {
+  std::string name;
+  std::string title;
+  std::vector<std::string> simulate;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("name", name, "part of the names of steps and folders");
+    visitor.field("title", title, "for people; default: its name");
+    visitor.field("simulate", simulate, "options of kimera_multi_simulate");
+    visitor.required({"name", "simulate"});
+  }
+};
+
+/// A level of difficulty of kimera_multi_simulate.
+struct LevelSeeds {
+  unsigned level = 0;
+  std::vector<unsigned> seeds;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("level", level, {0, 4}, "level of difficulty");
+    visitor.field("seeds", seeds, {0, ~0U}, "seeds of every world");
+    visitor.required({"level", "seeds"});
+  }
+};
+
+/// Worlds that fight back: levels.yaml. Every world is simulated at every level and seed.
+struct LevelExperiment {
+  std::vector<LevelWorld> worlds;
+  std::vector<LevelSeeds> levels;
+  unsigned robots = 2;
+  std::vector<std::string> simulate;
+  std::vector<std::string> team;
+  std::vector<std::string> robot;
+  double simulate_s = 400.0;
+  double team_s = 90.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("robots", robots, {1, 99}, "number of robots in every world");
+    visitor.field("simulate", simulate, "further options of kimera_multi_simulate");
+    visitor.field("team", team, "options of kimera_multi_team");
+    visitor.field("robot", robot, "options of every robot");
+    visitor.field("simulate_s", simulate_s, {1e-3, 1e6},
+                  "[s] approximate time to simulate a world, for the remaining time");
+    visitor.field("team_s", team_s, {1e-3, 1e6},
+                  "[s] approximate time to run a team, for the remaining time");
+  }
+};
+
+/// One run of LevelExperiment.
+struct LevelRun {
+  unsigned level = 0;
+  std::string world;  ///< Name in ExperimentConfig::worlds.
+};
+
 /// A column of the trajectory table.
 struct PgoMethodConfig {
   std::string name;
@@ -136,8 +191,8 @@ struct PgoMethodConfig {
 struct ExperimentConfig {
   bool quick = false;  ///< Small versions of the experiments.
   /// Worlds of worlds.yaml, each followed by its repetitions: WORLD-run2 on the same recordings,
-  /// WORLD-seed2 on those of another seed. WORLD-paper, the run of the
-  /// paper's pipeline, is last.
+  /// WORLD-seed2 on those of another seed. Then follow WORLD-paper, the run of the paper's
+  /// pipeline, and levelN-WORLD-seedN, the worlds of levels.yaml.
   std::vector<WorldConfig> worlds;
   PcmExperiment pcm;
   CosmoExperiment cosmo;
@@ -148,6 +203,7 @@ struct ExperimentConfig {
   std::vector<std::string> resources_worlds;
   std::vector<std::string> mesh_worlds;
   std::vector<std::string> semantics_worlds;
+  std::vector<LevelRun> level_runs;
 
   /// Precondition: a world of that name exists.
   [[nodiscard]] const WorldConfig& world(const std::string& name) const;
@@ -159,9 +215,10 @@ struct ExperimentConfig {
   [[nodiscard]] std::vector<std::string> repetitions(const std::string& world) const;
 };
 
-/// Reads worlds.yaml, pcm.yaml, cosmo.yaml, trajectory.yaml, resources.yaml, mesh.yaml and
-/// semantics.yaml. With `quick` the keys below `quick:` replace those beside it. Throws ConfigError
-/// with every problem of all files, by file and line. Names of worlds must be in worlds.yaml.
+/// Reads worlds.yaml, pcm.yaml, cosmo.yaml, trajectory.yaml, resources.yaml, mesh.yaml,
+/// semantics.yaml and levels.yaml. With `quick` the keys below `quick:` replace those beside it.
+/// Throws ConfigError with every problem of all files, by file and line. Names of worlds must be in
+/// worlds.yaml.
 [[nodiscard]] ExperimentConfig read_experiments(const std::filesystem::path& folder, bool quick);
 
 /// Documentation of the keys of a world, with their defaults.

@@ -335,6 +335,13 @@ std::vector<Step> alone_steps(const ExperimentConfig& config, const ExperimentPa
   return steps;
 }
 
+std::vector<Step> level_steps(const ExperimentConfig& config, const ExperimentPaths& paths) {
+  std::vector<Step> steps;
+  for (const LevelRun& run : config.level_runs)
+    for (Step& step : world_steps(config.world(run.world), paths)) steps.push_back(std::move(step));
+  return steps;
+}
+
 void append_steps(std::vector<Step>& steps, std::vector<Step> more) {
   for (Step& step : more) {
     const auto same = [&](const Step& other) { return other.name == step.name; };
@@ -413,6 +420,7 @@ std::vector<Step> plan_experiment(const std::string& experiment, const Experimen
                                   const ExperimentPaths& paths) {
   if (experiment == "pcm") return pcm_steps(config.pcm, paths);
   if (experiment == "cosmo") return cosmo_steps(config.cosmo, paths);
+  if (experiment == "levels") return level_steps(config, paths);
   const std::vector<std::string>& worlds = experiment == "trajectory"  ? config.trajectory_worlds
                                            : experiment == "resources" ? config.resources_worlds
                                            : experiment == "mesh"      ? config.mesh_worlds

@@ -48,7 +48,8 @@ inline constexpr std::array kExperiments = {
     ExperimentName{"trajectory", "errors and costs of local, distributed and central optimisation"},
     ExperimentName{"resources", "bytes, rounds and seconds; what the robots' processors do"},
     ExperimentName{"mesh", "error of the meshes before and after their correction"},
-    ExperimentName{"semantics", "right labels before and after the correction"}};
+    ExperimentName{"semantics", "right labels before and after the correction"},
+    ExperimentName{"levels", "worlds that fight back: errors and closures by level of difficulty"}};
 
 /// Files of a world, as the steps make them.
 struct WorldFiles {

@@ -222,7 +222,7 @@ int main(int argc, char** argv) try {
   names.emplace_back("all");
   run_command
       ->add_option("NAME", options.names,
-                   "pcm, cosmo, trajectory, resources, mesh, semantics, or all")
+                   "pcm, cosmo, trajectory, resources, mesh, semantics, levels, or all")
       ->required()
       ->check(CLI::IsMember(names));
   run_command->add_flag("--again", options.again, "Also what is done");

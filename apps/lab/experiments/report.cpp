@@ -107,7 +107,8 @@ ReportDocument make_document(ReportInput& input) {
   std::string missing;
   std::vector<ReportSection> sections;
   constexpr std::array kSections = {pcm_section,       cosmo_section, trajectory_section,
-                                    resources_section, mesh_section,  semantics_section};
+                                    resources_section, mesh_section,  semantics_section,
+                                    levels_section};
   static_assert(kSections.size() == kExperiments.size());
   for (std::size_t k = 0; k < kSections.size(); ++k)
     if (auto section = kSections[k](input))

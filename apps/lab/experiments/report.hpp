@@ -52,6 +52,7 @@ struct Spread {
 [[nodiscard]] std::optional<ReportSection> resources_section(ReportInput& input);
 [[nodiscard]] std::optional<ReportSection> mesh_section(ReportInput& input);
 [[nodiscard]] std::optional<ReportSection> semantics_section(ReportInput& input);
+[[nodiscard]] std::optional<ReportSection> levels_section(ReportInput& input);
 
 /// Returns the section of all targets. Precondition: the other sections have been made, because
 /// they collect the targets.

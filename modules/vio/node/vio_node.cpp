@@ -26,6 +26,11 @@ const char* text(VioProblem problem) {
              "starts again";
     case VioProblem::kDiverged:
       return "estimate diverged, starting again from the last pose";
+    case VioProblem::kContradicted:
+      return "images contradict the estimate: the recent poses are wrong, starting again "
+             "from the last pose. If it repeats: check calibration and stamps by "
+             "kimera_multi_doctor, light and exposure, then the keys under 'Odometry is bad' in "
+             "apps/robot/README.md";
     case VioProblem::kLost:
       return "images do not determine the pose, and there is no inertial sensor: starting again "
              "from the last pose when they do";
@@ -83,10 +88,11 @@ void VioNode::stop() noexcept {
   const VioStatistics& s = vio_.statistics();
   log::info(name()) << s.images << " images, " << s.images_without_pose << " without a pose, "
                     << s.starts << " starts in " << s.start_attempts << " attempts, "
-                    << s.divergences << " divergences, " << s.gaps << " inertial gaps, " << s.rests
-                    << " rests, vision lost " << s.vision_losses << " times, for "
-                    << fixed(s.blind_s, 1) << " s; refused " << s.refused_images << " images, "
-                    << s.refused_samples << " samples";
+                    << s.divergences << " divergences, " << s.contradictions
+                    << " of them found by images that contradict the estimate, " << s.gaps
+                    << " inertial gaps, " << s.rests << " rests, vision lost " << s.vision_losses
+                    << " times, for " << fixed(s.blind_s, 1) << " s; refused " << s.refused_images
+                    << " images, " << s.refused_samples << " samples";
 }
 
 void VioNode::step(const SensorPacket& packet) {

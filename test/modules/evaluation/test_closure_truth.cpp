@@ -146,6 +146,34 @@ TEST_CASE("Closures within a robot count for precision and not for recall", "[cl
   CHECK(std::isnan(score_closures(keyframes, {}, camera()).inliers.precision()));
 }
 
+TEST_CASE("True pairs are counted by the angle between the viewing directions", "[closure_truth]") {
+  using enum ClosureStage;
+  // All look at the point 4 m in front of the first one: beside it, from the side, and from the
+  // other side.
+  const SE3 side = at(4.0, -4.0, 90.0), opposite = at(8.0, 0.0, 180.0);
+  const std::vector<TrueKeyframe> keyframes = {{{0, 0}, at(0.0, 0.0), 4.0},
+                                               {{1, 0}, at(0.0, 0.0, 10.0), 4.0},
+                                               {{1, 1}, side, 4.0},
+                                               {{1, 2}, opposite, 4.0}};
+  ClosureTruthOptions options;
+  options.min_overlap = 0.1;
+  const std::vector<ClosureRecord> closures = {
+      closure({0, 0}, {1, 0}, kInlier, at(0.0, 0.0, 10.0)),
+      closure({0, 0}, {1, 1}, kVerified, side),  // true, but not kept
+      closure({0, 0}, {1, 2}, kInlier, opposite)};
+  const ClosureScores scores = score_closures(keyframes, closures, camera(), options);
+  const auto& bins = scores.by_angle;
+  CHECK(bins[0].true_pairs == 1);
+  CHECK(bins[0].pairs_found == 1);
+  CHECK(bins[3].true_pairs == 1);
+  CHECK(bins[3].pairs_found == 0);
+  CHECK(bins[5].true_pairs == 1);
+  CHECK(bins[5].pairs_found == 1);
+  std::size_t sum = 0;
+  for (const AngleScore& bin : bins) sum += bin.true_pairs;
+  CHECK(sum == scores.true_pairs);
+}
+
 TEST_CASE("Invalid closures and options are refused", "[closure_truth]") {
   const auto keyframes = two_rows(2);
   const std::vector<ClosureRecord> none = {

@@ -121,6 +121,34 @@ void print_piece(const char* name, const OdometryRun& run, std::size_t images) {
       run.statistics.starts - 1);
 }
 
+// How often points and images contradict the estimate, see EstimateWatch.
+void print_fit(const OdometryRun& run) {
+  EstimateWatch watch, image;
+  double points = 0.0, contradicting = 0.0, judged = 0.0, images = 0.0, most = 0.0;
+  std::vector<double> factors;
+  for (const VioResult& result : run.results) {
+    if (!result.smoother) continue;
+    const ImageFit& fit = result.smoother->fit;
+    if (fit.points < EstimateWatch::kMinPoints) continue;
+    points += fit.points;
+    contradicting += fit.contradicting;
+    judged += 1.0;
+    images += fit.contradicting > EstimateWatch::kContradictingShare * fit.points;
+    watch.add(fit);
+    most = std::max(most, watch.evidence());
+    if (watch.is_contradicted()) watch = {};
+    image = {};
+    image.add(fit);
+    factors.push_back(image.variance_factor());
+  }
+  std::printf(
+      "    contradicting: %.2f %% of %.0f points, %.2f %% of %.0f images, evidence at most %.1f; "
+      "variance factor median %.2f p95 %.2f max %.2f; %d contradictions\n",
+      100.0 * contradicting / points, points, 100.0 * images / judged, judged, most,
+      quantile(factors, 0.5), quantile(factors, 0.95), quantile(factors, 1.0),
+      run.statistics.contradictions);
+}
+
 // Error of the last pose relative to the first one, as a share of the path.
 void print_drift(const OdometryRun& run) {
   double path_m = 0.0;
@@ -275,6 +303,7 @@ int run(int argc, char** argv) {
     const OdometryRun run = run_odometry(flight, 0, images, tracker, config);
     print_piece("flight", run, images);
     print_drift(run);
+    print_fit(run);
     for (const std::size_t steps : {1U, 3U, 8U}) print_consistency(run, steps);
     return 0;
   }

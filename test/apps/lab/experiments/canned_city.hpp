@@ -52,12 +52,15 @@ class CannedCity {
     for (auto* worlds : {&config_.trajectory_worlds, &config_.resources_worlds,
                          &config_.mesh_worlds, &config_.semantics_worlds})
       *worlds = {"city"};
-    write_recordings();
+    config_.level_runs = {{2, kLevelRun}};
+    for (const char* recordings : {"city", kLevelRun}) write_recordings(recordings);
     for (const char* run : {"city", "city-run2", "city-run3"}) {
       write_run(run);
       for (const PgoMethodConfig& method : config_.methods) write_method(run, method);
     }
     write_run("city-paper", 0.008);
+    write_run(kLevelRun);
+    write_trajectories(kLevelRun);
     write_alone();
     config_.cosmo.sets.resize(1);
     write_cosmo();
@@ -79,6 +82,7 @@ class CannedCity {
 
  private:
   static constexpr int kKeyframes = 4;
+  static constexpr const char* kLevelRun = "level2-city-seed1";
 
   ExperimentPaths paths() const {
     return {.programs = "/programs",
@@ -91,8 +95,8 @@ class CannedCity {
   // y of robot r at x, not linear in x, so that the three paths are not on one line.
   static double sideways(int robot, int x) { return robot + 0.1 * x * x; }
 
-  void write_recordings() const {
-    folder_.write("data/city/simulation.json",
+  void write_recordings(const std::string& world) const {
+    folder_.write("data/" + world + "/simulation.json",
                   R"({"complete": true, "parameters": {"resolution": "376x240", "seed": "7"}})");
     std::string team = "robots:\n";
     for (int r = 0; r < 3; ++r) {
@@ -100,11 +104,28 @@ class CannedCity {
       std::ostringstream truth;
       for (int x = 0; x < kKeyframes; ++x)
         truth << x + 1 << "000000000," << x << ',' << sideways(r, x) << ",0,1,0,0,0\n";
-      folder_.write("data/city/" + name + "/truth.csv", truth.str());
+      folder_.write("data/" + world + '/' + name + "/truth.csv", truth.str());
       team += "  - {id: " + std::to_string(r) + ", name: " + name + ", dataset: " + name +
               ", truth: " + name + "/truth.csv}\n";
     }
-    folder_.write("data/city/team.yaml", team);
+    folder_.write("data/" + world + "/team.yaml", team);
+  }
+
+  // Published keyframes without an error and with standard deviations of 0.1, and odometry in the
+  // frame of each robot that is 10 % too short in x.
+  void write_trajectories(const std::string& world) const {
+    for (int r = 0; r < 3; ++r) {
+      std::ostringstream keyframes, odometry;
+      for (int x = 0; x < kKeyframes; ++x) {
+        keyframes << x + 1 << ' ' << x << ' ' << sideways(r, x) << " 0 0 0 0 1";
+        for (int k = 0; k < 36; ++k) keyframes << (k % 7 == 0 ? " 0.01" : " 0");
+        keyframes << '\n';
+        odometry << x + 1 << ' ' << 0.9 * x << ' ' << sideways(0, x) << " 0 0 0 0 1\n";
+      }
+      const std::string run = "data/" + world + "_res/robot" + std::to_string(r);
+      folder_.write(run + "/optimized_keyframes.tum", keyframes.str());
+      folder_.write(run + "/odometry.tum", odometry.str());
+    }
   }
 
   void write_run(const std::string& world, double published_m = 0.006) const {
@@ -141,6 +162,7 @@ class CannedCity {
     team.closures.emplace();
     team.closures->inliers.judged = 817;
     team.closures->inliers.correct = 816;
+    team.closures->by_angle[2] = {.true_pairs = 10, .pairs_found = 4};
     team.meshes.odometry = canned_meshes(0.08, 9, 10);
     team.meshes.optimized = canned_meshes(0.06, 19, 20);
     folder_.write("results/team-" + world + ".json", json_text(team));

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <string>
 
@@ -40,6 +41,27 @@ TEST_CASE("Quick keys replace those beside them", "[experiments]") {
   CHECK(config.pcm.searches.size() == 3);
   CHECK_FALSE(config.world("v1").flights);
   CHECK(config.trajectory_worlds.size() == 2);
+}
+
+TEST_CASE("Every world has a run at each level and seed", "[experiments]") {
+  const ExperimentConfig config = read_experiments("config/experiments", false);
+  const auto usual = std::ranges::count(config.level_runs, 2U, &LevelRun::level);
+  CHECK(usual == 9);  // three worlds, three seeds
+  for (const LevelRun& run : config.level_runs) {
+    const std::vector<std::string>& options = config.world(run.world).simulate;
+    const auto option = std::ranges::find(options, "--difficulty");
+    REQUIRE(option + 1 < options.end());
+    CHECK(*(option + 1) == std::to_string(run.level));
+  }
+  CHECK(config.world("level2-city-seed3").robots.size() == 2);
+  CHECK(read_experiments("config/experiments", true).level_runs.size() == 1);
+}
+
+TEST_CASE("Levels of difficulty out of range are named", "[experiments]") {
+  const CorruptedConfig config;
+  config.folder.write("experiments/levels.yaml",
+                      "worlds: [{name: city, simulate: []}]\nlevels: [{level: 5, seeds: [1]}]\n");
+  CHECK_THAT(config.problems(), Contains("levels.yaml:2") && Contains("level"));
 }
 
 TEST_CASE("Errors of the configuration are named by file, line and key", "[experiments]") {

@@ -1,0 +1,29 @@
+#include "modules/vio/estimate_watch.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace km {
+
+void EstimateWatch::add(const ImageFit& fit) {
+  if (fit.points < kMinPoints) return;
+  const bool contradicts = fit.contradicting > kContradictingShare * fit.points;
+  const double step = contradicts ? std::log(kTrueRate / kFalseRate)
+                                  : std::log((1.0 - kTrueRate) / (1.0 - kFalseRate));
+  evidence_ = std::max(evidence_ + step, 0.0);
+  constexpr double kMedianSquare = 2.0 * std::numbers::ln2;  // chi-squared, 2 degrees of freedom
+  factors_ += fit.median_square / kMedianSquare;
+  ++images_;
+}
+
+double EstimateWatch::variance_factor() const {
+  return images_ == 0 ? 1.0 : std::max(factors_ / images_, 1.0);
+}
+
+void EstimateWatch::start_keyframe() {
+  factors_ = 0.0;
+  images_ = 0;
+}
+
+}  // namespace km
