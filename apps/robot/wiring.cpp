@@ -364,6 +364,7 @@ void Robot::add_network(CrossingEnds meshes) {
                overlay_->guard_packets<OverlayLane::kPlaces>());
   dds.exchange(t.chunks, kState, kOther, meshes);
   dds.exchange(t.mesh_poses, kState, kOther, meshes);
+  dds.exchange(t.gone_surface, kState, kOther, meshes);
   const bool has_objects = objects_ != nullptr;
   dds.exchange(t.objects, kState, kOther, {.send = has_objects, .receive = has_objects});
   dds.exchange(t.status, kStatus, kOther);

@@ -9,7 +9,6 @@ namespace {
 // Cells at 3 m must not lie between two columns. Rows need less, because rays of all heights in the
 // band free the same cells.
 constexpr double kColumns = 80, kRows = 14;
-constexpr double kMotion_m = 0.3, kMotion_rad = 0.26;  // 15 degrees
 
 }  // namespace
 
@@ -32,13 +31,7 @@ RayThinner::RayThinner(const Camera& camera, double max_range_m)
 std::optional<ViewRays> RayThinner::add(const DenseFrame& frame) {
   if (frame.depth->millimetres.size() != pixels_ || !frame.T_odom_cam.matrix().allFinite())
     return std::nullopt;
-  if (T_odom_last_) {
-    const SE3 motion = T_odom_last_->inverse() * frame.T_odom_cam;
-    if (motion.translation().norm() < kMotion_m &&
-        Eigen::AngleAxisd(motion.linear()).angle() < kMotion_rad)
-      return std::nullopt;
-  }
-  T_odom_last_ = frame.T_odom_cam;
+  if (!spacing_.choose(frame.T_odom_cam)) return std::nullopt;
   ViewRays rays{.keyframe = frame.keyframe,
                 .origin = frame.T_odom_cam.translation().cast<float>(),
                 .ends = {}};

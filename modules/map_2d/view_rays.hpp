@@ -8,6 +8,7 @@
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
+#include "modules/core/pose_spacing.hpp"
 
 namespace km {
 
@@ -40,7 +41,7 @@ class RayThinner {
   std::size_t pixels_ = 0;
   double max_range_m_;
   std::vector<Bearing> bearings_;
-  std::optional<SE3> T_odom_last_;
+  PoseSpacing spacing_;
 };
 
 }  // namespace km

@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "modules/mesh/coarse_view.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {
@@ -24,6 +26,9 @@ struct MapMesh {
   /// Certainty of each vertex: log4 of its weight, rounded down, plus a constant. As long as the
   /// vertices, or empty if all are equal.
   std::vector<std::uint8_t> certainty = {};
+
+  /// How far the camera saw, in order of time; none: unknown.
+  std::vector<std::shared_ptr<const CoarseView>> views = {};
 
   /// Side of the voxels the mesh was made from [m]; 0: unknown.
   double voxel_m = 0.0;

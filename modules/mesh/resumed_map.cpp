@@ -38,6 +38,7 @@ MapMesh ResumedMap::with(const MapMesh& now) const {
   append_elements(both.certainty, first, now.certainty, added);
   for (const std::uint64_t id : now.ids) both.ids.push_back(next_id_ + id);
   if (now.voxel_m > 0.0) both.voxel_m = now.voxel_m;
+  both.views = now.views;
   return both;
 }
 

@@ -24,7 +24,8 @@ struct CorrectionInput {
   const MapMesh& map;
   std::uint64_t map_version = 0;  ///< Changes whenever the map does.
   std::span<const SE3> T_odom_kf;
-  std::span<const SE3> T_world_kf;  ///< May be shorter than T_odom_kf, see optimize().
+  std::span<const SE3> T_world_kf;            ///< May be shorter than T_odom_kf, see optimize().
+  std::span<const Matrix6> covariances = {};  ///< Those of T_world_kf; empty: unknown.
 };
 
 struct [[nodiscard]] MeshCorrection {
@@ -33,7 +34,8 @@ struct [[nodiscard]] MeshCorrection {
   /// False: the result of the last optimisation, moved as a whole.
   bool deformed = true;
   SupersededSurface superseded;      ///< Superseded surface of the map; empty unless deformed.
-  std::size_t superseded_faces = 0;  ///< Number of faces of the map that `mesh` lacks.
+  std::size_t superseded_faces = 0;  ///< Faces of the map that another visit saw better.
+  std::size_t seen_through = 0;      ///< Faces of the map that later views saw through.
   MeshOrigin origin = {};            ///< Keyframes that saw `mesh`.
 };
 
@@ -43,6 +45,11 @@ struct [[nodiscard]] MeshCorrection {
 /// Otherwise, and for a changed map, Local Mesh Optimization deforms the mesh. This removes drift,
 /// so that copies of surface from several visits coincide. Above duplicate_faces, only the best
 /// copy stays (see find_replacements()).
+///
+/// Surface that several later views of the map saw through is left out of the mesh (SightVotes): it
+/// has moved away. The test uses the present poses and their covariances, and is repeated with each
+/// deformation, so that surface returns if a wrong pose was the reason. Without covariances nothing
+/// is left out.
 ///
 /// Not thread-safe.
 class MeshCorrector {
@@ -60,12 +67,14 @@ class MeshCorrector {
 
  private:
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
+  [[nodiscard]] std::size_t remove_gone(const CorrectionInput& input);
   [[nodiscard]] std::vector<std::uint32_t> replacements_in(const LabelledMesh& mesh,
                                                            const MapMesh& map) const;
 
   const double duplicate_voxels_;
   const std::size_t duplicate_faces_;
   const KeyframeIndex max_gap_keyframes_;
+  const int seen_through_views_;
   MotionScale scale_;
   LocalMeshOptimizer optimizer_;
   // State of the last optimisation.
@@ -90,9 +99,13 @@ struct OptimizedMesh {
   double seconds = 0.0;  ///< Duration of the correction.
   /// Faces of the map that are missing because another visit saw them better.
   std::size_t superseded_faces = 0;
+  /// Faces of the map that are missing because later views saw through them.
+  std::size_t seen_through = 0;
   /// T_world_kf * T_odom_kf^-1 of the poses in `origin`: where the correction moved what they saw.
   std::vector<SE3> T_world_odom = {};
   MeshOrigin origin = {};  ///< Keyframes that saw the mesh.
+  /// Views of the map, in the odometry frame.
+  std::vector<std::shared_ptr<const CoarseView>> views = {};
 };
 
 }  // namespace km

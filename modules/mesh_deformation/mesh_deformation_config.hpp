@@ -13,6 +13,7 @@ struct MeshDeformationConfig {
   int time_window_keyframes = 15;
   double duplicate_voxels = 1.0;
   int duplicate_faces = 1'200'000;
+  int seen_through_views = 3;
   int keyframes_per_node = 4;
   double anchor_rotation_rad = 0.001;
   double anchor_translation_m = 0.005;
@@ -40,6 +41,10 @@ struct MeshDeformationConfig {
     visitor.field("duplicate_faces", duplicate_faces, {0, 100'000'000},
                   "number of faces of a mesh up to which all copies stay; together they are closer "
                   "to the true surface than the best of them");
+    visitor.field("seen_through_views", seen_through_views, {0, 1000},
+                  "number of later views that must see through a surface, beyond those that show "
+                  "it again, until it is removed; 0: all surface stays. Needs covariances of the "
+                  "optimised poses (back-end newton)");
     visitor.field("keyframes_per_node", keyframes_per_node, {1, 64},
                   "largest number of keyframes that hold a node");
     visitor.field("anchor_rotation_rad", anchor_rotation_rad, {1e-9, 10.0},

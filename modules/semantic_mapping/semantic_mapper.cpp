@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "modules/mesh/coarse_view.hpp"
 #include "modules/semantic_mapping/block_fusion.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 #include "modules/semantic_mapping/depth_view.hpp"
@@ -23,6 +24,11 @@ LabelModel model_of(const SemanticMappingConfig& config, const LabelPalette& pal
   std::size_t known = 0;
   for (const LabelClass& entry : palette.classes()) known += entry.id != 0 ? 1 : 0;
   return {std::max<std::size_t>(known, 1), config.label_confidence};
+}
+
+DepthNoise noise_of(const SemanticMappingConfig& config) {
+  return {config.depth_sigma_m,
+          config.depth_sigma_per_m.value_or(SemanticMappingConfig::kDepthSigma_per_m)};
 }
 
 bool usable(const SE3& T) {
@@ -67,6 +73,7 @@ struct SemanticMapper::State {
       : config(checked(settings)),
         camera(its_camera),
         views(camera, config.min_range_m, config.max_range_m, palette),
+        coarse_views(camera, noise_of(config), config.min_range_m),
         mesh(config.voxel_size_m, model_of(config, palette), config.min_label_probability,
              config.min_weight) {}
 
@@ -83,6 +90,7 @@ struct SemanticMapper::State {
   SemanticMappingConfig config;
   Camera camera;
   DepthViewMaker views;
+  CoarseViews coarse_views;
   BlockMap map;
   IncrementalMesh mesh;
   MeshUpdateReport unreported;  // counts of blocks that became final, until reported
@@ -223,6 +231,7 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
       (T_odom_cam.translation() - state.camera_at.value_or(T_odom_cam.translation())).norm();
   state.camera_at = T_odom_cam.translation();
   const DepthView& view = state.views.make(depth, labels);
+  state.coarse_views.add(depth, T_odom_cam, keyframe);
   report.pixels = view.with_depth;
   report.off_palette_pixels = view.off_palette_pixels;
 
@@ -259,7 +268,9 @@ SpaceChanges SemanticMapper::take_space_changes() {
 }
 
 MapMesh SemanticMapper::mesh() const {
-  return state_->mesh.snapshot(state_->map, state_->labelled);
+  MapMesh map = state_->mesh.snapshot(state_->map, state_->labelled);
+  map.views = state_->coarse_views.views();
+  return map;
 }
 
 MapSize SemanticMapper::size() const {

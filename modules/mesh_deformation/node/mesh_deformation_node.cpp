@@ -121,8 +121,10 @@ bool MeshDeformationNode::can_correct() const {
 
 CorrectionInput MeshDeformationNode::input() const {
   const auto& T_world_kf = trajectory_->T_world_kf;
+  const auto& covariances = trajectory_->covariances;
   return {*map_, map_version_, T_odom_kf_,
-          std::span(T_world_kf).first(std::min(T_world_kf.size(), T_odom_kf_.size()))};
+          std::span(T_world_kf).first(std::min(T_world_kf.size(), T_odom_kf_.size())),
+          std::span(covariances).first(std::min(covariances.size(), T_odom_kf_.size()))};
 }
 
 void MeshDeformationNode::correct() {
@@ -153,8 +155,10 @@ void MeshDeformationNode::correct() {
                        correction->deformed,
                        end_s - start_s,
                        correction->superseded_faces,
+                       correction->seen_through,
                        {},
-                       std::move(correction->origin)};
+                       std::move(correction->origin),
+                       map_->views};
   for (std::size_t k = 0; k < result.origin.T_world_kf.size(); ++k)
     result.T_world_odom.push_back(result.origin.T_world_kf[k] * T_odom_kf_[k].inverse());
   if (!correction->superseded.vertices.empty())
@@ -173,6 +177,7 @@ void MeshDeformationNode::report(const OptimizedMesh& result) const {
                      << report.new_nodes << " new), " << report.keyframes
                      << " keyframes: " << to_string(report.status) << " after " << report.iterations
                      << " iterations, " << result.superseded_faces << " faces seen again, "
+                     << result.seen_through << " seen through, "
                      << result.seconds << " s";
   if (report.status == DeformationStatus::kFailed)
     log::limited(log::Level::kWarn, name(), "failed")
