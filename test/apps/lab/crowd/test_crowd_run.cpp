@@ -79,8 +79,9 @@ TEST_CASE("Owners find the places that words to everyone find, with fewer messag
 TEST_CASE("With owners, the bytes of a robot do not grow with the team", "[crowd]") {
   const CrowdRun small = SmallTeam(20).owners();
   const CrowdRun large = SmallTeam(80).owners();
-  // Six words have N (1 - (1 - 1 / N)^6) different owners, one of N of which is the robot itself:
-  // 5.0 others of 20 robots and 5.7 of 80, 1.14 times as many. The rest is for chance names.
+  // Six words have N (1 - (1 - 1 / N)^6) different owners. One of N is the robot itself. So there
+  // are 5.0 other owners in a team of 20, and 5.7 in one of 80: 1.14 times as many. The rest of the
+  // bound is for robots that are named by chance.
   CHECK(static_cast<double>(large.received.bytes) <
         1.5 * static_cast<double>(small.received.bytes));
   CHECK(large.sketches < 1.3 * small.sketches);
