@@ -220,12 +220,11 @@ TEST_CASE("fixes on live topics place a run in their frame", "[system][fixes][li
   const fs::path fixes = folder.path() / "fixes.csv";
   write_fixes(truth, fixes, is_gnss);
   const int ros_domain = random_domain();
-  Process robot(
-      live_command(*dataset, folder, ros_domain, "--output",
-                   is_gnss ? "absolute_fixes.source=gnss absolute_fixes.correlation_s=0 "
-                             "absolute_fixes.datum=[47.3977,8.5456,488]"
-                           : "absolute_fixes.source=motion_capture "
-                             "absolute_fixes.live_type=geometry_msgs/msg/PoseStamped"));
+  Process robot(live_command(*dataset, folder, ros_domain, "--output",
+                             is_gnss ? "absolute_fixes.source=gnss absolute_fixes.correlation_s=0 "
+                                       "absolute_fixes.datum=[47.3977,8.5456,488]"
+                                     : "absolute_fixes.source=motion_capture "
+                                       "absolute_fixes.live_type=geometry_msgs/msg/PoseStamped"));
   Process driver(driver_command(*dataset, ros_domain,
                                 "--to 12.5 --fixes " + fixes.string() +
                                     (is_gnss ? "" : " --fix-type geometry_msgs/msg/PoseStamped")));
