@@ -61,7 +61,7 @@ constexpr double kExact = 1e-12;  // [m] for numbers of about one
 const Eigen::Matrix3d kHalfTurn =
     Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 
-SE3 at(double x, double y, double z) {
+SE3 shifted(double x, double y, double z) {
   return make_pose(Eigen::Matrix3d::Identity(), {x, y, z});
 }
 
@@ -69,7 +69,7 @@ constexpr double kDerivative = 1e-5;  // central differences of step 1e-6, value
 
 Eigen::Vector3d rigidity(const SE3& T_a0, const Eigen::Vector3d& p_b0, const SE3& T_a,
                          const Eigen::Vector3d& p_b) {
-  return rigidity_term(T_a, T_a0.inverse() * p_b0, at(p_b.x(), p_b.y(), p_b.z())).residual;
+  return rigidity_term(T_a, T_a0.inverse() * p_b0, shifted(p_b.x(), p_b.y(), p_b.z())).residual;
 }
 
 }  // namespace
@@ -245,7 +245,7 @@ TEST_CASE("Rigidity is the distance of a node from its neighbour's prediction",
   SECTION("a neighbour that was rotated from the start") {
     const SE3 before = make_pose(kHalfTurn, {1, 0, 0});
     CHECK(rigidity(before, {1, 1, 1}, before, {1, 1, 1}).norm() < kExact);
-    CHECK(rigidity(before, {1, 1, 1}, at(1, 0, 0), {1, 1, 1})
+    CHECK(rigidity(before, {1, 1, 1}, shifted(1, 0, 0), {1, 1, 1})
               .isApprox(Eigen::Vector3d(0, -2, 0), kExact));
   }
 }
