@@ -150,7 +150,7 @@ TEST_CASE("True pairs are counted by the angle between the viewing directions", 
   using enum ClosureStage;
   // All look at the point 4 m in front of the first one: beside it, from the side, and from the
   // other side.
-  const SE3 side = at(4.0, -4.0, 90.0), opposite = at(8.0, 0.0, 180.0);
+  const SE3 side = at(4.0, -4.0, 95.0), opposite = at(8.0, 0.0, 180.0);
   const std::vector<TrueKeyframe> keyframes = {{{0, 0}, at(0.0, 0.0), 4.0},
                                                {{1, 0}, at(0.0, 0.0, 10.0), 4.0},
                                                {{1, 1}, side, 4.0},

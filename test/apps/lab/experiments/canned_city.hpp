@@ -111,14 +111,15 @@ class CannedCity {
     folder_.write("data/" + world + "/team.yaml", team);
   }
 
-  // Published keyframes without an error and with standard deviations of 0.1, and odometry in the
-  // frame of each robot that is 10 % too short in x.
+  // Published keyframes have no error, and standard deviations of 0.1 relative to the first one.
+  // Odometry is in the frame of each robot, and 10 % too short in x.
   void write_trajectories(const std::string& world) const {
     for (int r = 0; r < 3; ++r) {
       std::ostringstream keyframes, odometry;
       for (int x = 0; x < kKeyframes; ++x) {
         keyframes << x + 1 << ' ' << x << ' ' << sideways(r, x) << " 0 0 0 0 1";
-        for (int k = 0; k < 36; ++k) keyframes << (k % 7 == 0 ? " 0.01" : " 0");
+        const char* const variance = r == 0 && x == 0 ? " 1e-12" : " 0.01";
+        for (int k = 0; k < 36; ++k) keyframes << (k % 7 == 0 ? variance : " 0");
         keyframes << '\n';
         odometry << x + 1 << ' ' << 0.9 * x << ' ' << sideways(0, x) << " 0 0 0 0 1\n";
       }
