@@ -177,8 +177,7 @@ void MeshDeformationNode::report(const OptimizedMesh& result) const {
                      << report.new_nodes << " new), " << report.keyframes
                      << " keyframes: " << to_string(report.status) << " after " << report.iterations
                      << " iterations, " << result.superseded_faces << " faces seen again, "
-                     << result.seen_through << " seen through, "
-                     << result.seconds << " s";
+                     << result.seen_through << " seen through, " << result.seconds << " s";
   if (report.status == DeformationStatus::kFailed)
     log::limited(log::Level::kWarn, name(), "failed")
         << "the deformation graph of " << report.nodes

@@ -80,8 +80,8 @@ class TwoPasses {
     return MeshCorrector(correction).correct_from_scratch({map, 1, poses, poses, covariances});
   }
 
-  // Number of faces within half a voxel of true surface that the removal takes away. Farther away there
-  // are spurious faces at the borders of near surface, which may go.
+  // Number of faces within half a voxel of true surface that the removal takes away. Farther away
+  // there are spurious faces at the borders of near surface, which may go.
   [[nodiscard]] std::size_t removed() const {
     const MeshCorrection all = run(0), some = run(3);
     CHECK(all.seen_through == 0);
