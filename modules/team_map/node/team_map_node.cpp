@@ -17,8 +17,8 @@ constexpr std::size_t kQueue = 4096;
 
 constexpr double kCompare_s = 1.0;
 
-// Pause after a comparison, as a multiple of its duration: at most a tenth of a processor.
-constexpr double kPause = 10.0;
+// Pause after a comparison, as a multiple of its duration: at most a twentieth of a processor.
+constexpr double kPause = 20.0;
 
 }  // namespace
 
@@ -97,7 +97,9 @@ void TeamMapNode::take_message(const Input& input) {
   }
   if (robot == settings_.self || settings_.seen_through_views == 0) return;
   if (chunk != nullptr) arrivals_.take(**chunk);
-  if (own_ != nullptr && (chunk != nullptr || poses != nullptr)) is_due_ = true;
+  // No view is later than a chunk that has just arrived, so its surface can only end a statement.
+  const bool may_end_one = chunk != nullptr && !sent_.blocks.empty();
+  if (own_ != nullptr && (poses != nullptr || may_end_one)) is_due_ = true;
 }
 
 void TeamMapNode::find_own_gone(double now_s) {
