@@ -21,8 +21,8 @@ struct ProcessUsage {
 /// Values from the kernel; resident_bytes is 0 if /proc cannot be read.
 [[nodiscard]] ProcessUsage process_usage();
 
-/// Returns the pages that are free inside the heap to the kernel, see malloc_trim(3). Other threads
-/// wait for their arena meanwhile: some milliseconds.
+/// Returns the pages that are free inside the heap to the kernel, see malloc_trim(3). Threads that
+/// allocate meanwhile may wait.
 void return_freed_memory();
 
 /// Writes process.csv, a row for each sample: time_s, cpu_s, resident_bytes, system_s, page_faults.

@@ -24,12 +24,13 @@ struct SightPoint {
 /// most once per keyframe. A view that shows surface there takes one away, but not below 0. The
 /// surface is gone if the count ends at the configured number of views or above.
 ///
-/// The count is the log-odds of occupancy with clamps, as in Hornung et al., "OctoMap: An Efficient
-/// Probabilistic 3D Mapping Framework Based on Octrees" (Autonomous Robots, 2013), with steps of
-/// equal size. The sensor model states that a view seems to see through a present surface with
-/// probability 0.15. It sees through free space with 0.9. Both allow for errors of poses and depths
-/// that neighbouring views have in common. A step is log(0.9 / 0.15) = 1.8. From the upper clamp of
-/// OctoMap's source, 3.5 (probability 0.97), three steps lead to -1.9, near its lower clamp of -2.
+/// The count is the log-odds of occupancy. It is clamped where surface is certain, as in Hornung et
+/// al., "OctoMap: An Efficient Probabilistic 3D Mapping Framework Based on Octrees" (Autonomous
+/// Robots, 2013), with steps of equal size. The sensor model states that a view seems to see
+/// through a present surface with probability 0.15. It sees through free space with 0.9. Both allow
+/// for errors of poses and depths that neighbouring views have in common. A step is log(0.9 / 0.15)
+/// = 1.8. From the upper clamp of OctoMap's source, 3.5 (probability 0.97), three steps lead to
+/// -1.9, near its lower clamp of -2.
 class SightVotes {
  public:
   /// `patch_m`: radius of the surface that a vertex stands for.

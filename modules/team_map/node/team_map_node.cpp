@@ -116,6 +116,10 @@ void TeamMapNode::find_own_gone(double now_s) {
     gone.robot = settings_.self;
     if (gone.blocks != sent_.blocks || gone.anchor != sent_.anchor) chunks_.add(gone);
   }
+  if (gone.blocks.size() == kMaxGoneBlocks)
+    log::limited(log::Level::kWarn, name(), "gone blocks")
+        << "surface is seen through in " << kMaxGoneBlocks
+        << " blocks of 8 x 8 x 8 voxels or more: that in further blocks stays in the team's mesh";
   if (gone.blocks != sent_.blocks || (gone.anchor != sent_.anchor && !gone.blocks.empty())) {
     sent_ = gone;
     own_gone_.publish(std::move(gone));
