@@ -7,7 +7,7 @@
 #include "apps/lab/crowd/crowd_robot.hpp"
 #include "apps/lab/crowd/crowd_world.hpp"
 #include "apps/lab/crowd/recorded_place.hpp"
-#include "modules/place_recognition/sketch_index.hpp"
+#include "apps/lab/crowd/sketch_index.hpp"
 
 namespace km {
 

@@ -1,4 +1,4 @@
-#include "modules/place_recognition/sketch_index.hpp"
+#include "apps/lab/crowd/sketch_index.hpp"
 
 #include <algorithm>
 

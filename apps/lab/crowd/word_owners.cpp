@@ -1,9 +1,9 @@
-#include "modules/place_recognition/word_owners.hpp"
+#include "apps/lab/crowd/word_owners.hpp"
 
 #include <algorithm>
 
+#include "apps/lab/crowd/place_sketch.hpp"
 #include "modules/core/bytes.hpp"
-#include "modules/place_recognition/place_sketch.hpp"
 
 namespace km {
 namespace {
