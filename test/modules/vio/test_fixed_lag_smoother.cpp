@@ -527,6 +527,39 @@ TEST_CASE("Wrong observations are dropped and do not increase the error", "[vio]
   CHECK(position_error(run.states.back(), world) < 0.01);
 }
 
+// From the 40th image on, all points are turned by 0.05 rad (23 px), and the gyroscope does not
+// measure a turn. The smoother drops points that contradict its estimate.
+TEST_CASE("Points that contradict the estimate are counted before they are dropped",
+          "[vio][contradiction]") {
+  constexpr std::size_t kFirstWrong = 40;
+  const bool is_wrong = GENERATE(false, true);
+  SyntheticWorld world(SyntheticMotion{}, 9);
+  auto frames = world.frames(60, 0.5);
+  for (std::size_t k = kFirstWrong; is_wrong && k < frames.size(); ++k)
+    for (TrackedFeature& feature : frames[k].tracked.features) {
+      feature.left.x() += 0.05;
+      if (feature.right) feature.right->x() += 0.05;
+    }
+  VioConfig config = gaussian_config();
+  config.loss_scale = 1.5;
+  config.outlier_px = 3.0;
+  const Run run = run_smoother(frames, world, 0.005, config);
+  EstimateWatch watch;
+  std::size_t judged = 0;
+  for (; judged < run.updates.size() && !watch.is_contradicted(); ++judged) {
+    CHECK(run.updates[judged].fit.points > 40);
+    watch.add(run.updates[judged].fit);
+  }
+  if (is_wrong) {
+    CHECK(judged + kStartImages > kFirstWrong);
+    CHECK(judged + kStartImages < kFirstWrong + 10);
+    CHECK(watch.variance_factor() > 2.0);
+  } else {
+    CHECK(watch.evidence() == 0.0);
+    CHECK(watch.variance_factor() < 1.1);
+  }
+}
+
 TEST_CASE("A second without features is bridged by the inertial samples", "[vio]") {
   SyntheticWorld world(SyntheticMotion{}, 7);
   auto frames = world.frames(80, 0.5);
