@@ -1,11 +1,14 @@
+#include <poll.h>
 #include <sched.h>
 #include <sys/mount.h>
 
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <csignal>
 #include <iostream>
 
 #include "apps/robot/run_summary.hpp"
+#include "test/support/patience.hpp"
 #include "test/support/process.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/system/long_run.hpp"
@@ -96,6 +99,14 @@ struct RobotOnSmallDisk {
     const std::string line = (output / file).string() + ": cannot be written: " + why;
     return folder.read("log").find(line) != std::string::npos;
   }
+  [[nodiscard]] bool will_report(const std::string& file, const std::string& why) const {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (!reports(file, why)) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      poll(nullptr, 0, 20);
+    }
+    return true;
+  }
 };
 
 TEST_CASE("On a full or read-only disk a robot continues, names lost results, and ends with 4",
@@ -132,6 +143,8 @@ TEST_CASE("Results that a disk cannot take go to the fallback folder", "[system]
   const fs::path fallback = run.folder.path() / "fallback";
   run.start("--fallback " + fallback.string());
   REQUIRE(run.disk.make_read_only());
+  // On a busy host it takes a while until the journal has anything to write.
+  REQUIRE(run.will_report("run.journal", "Read-only file system"));
   run.robot->kill(SIGTERM);
   CHECK(run.robot->wait() == 4);
   for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "keyframes.csv",
