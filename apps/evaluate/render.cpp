@@ -5,7 +5,6 @@
 #include <iostream>
 #include <limits>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -18,6 +17,7 @@
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/picture/mesh_picture.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
+#include "modules/images/image_codec.hpp"
 #include "modules/mesh/mesh_file.hpp"
 
 namespace km {
@@ -92,8 +92,8 @@ fs::path numbered(const fs::path& file, std::size_t view) {
 }
 
 void write_png(const fs::path& file, const cv::Mat3b& picture) {
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", picture, bytes)) throw std::runtime_error("PNG cannot be encoded");
+  constexpr int kLevel = 6;
+  const std::vector<std::uint8_t> bytes = encode_png(picture, kLevel);
   write_output(file, [&](std::ostream& out) {
     out.write(reinterpret_cast<const char*>(bytes.data()),
               static_cast<std::streamsize>(bytes.size()));

@@ -4,11 +4,12 @@
 #include <array>
 #include <exception>
 #include <functional>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 #include <stdexcept>
 
+#include "modules/core/input_file.hpp"
+#include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
@@ -68,15 +69,22 @@ std::set<KeyframeId> keyframes_to_show(const Kinds& kinds, std::size_t max_closu
 using Wanted = std::map<Stamp, KeyframeId>;
 using Take = std::function<void(const KeyframeId&, const cv::Mat&)>;
 
-void read_folder(const RobotPlan& plan, const Wanted& wanted, const Take& take) {
+// `problems` receives the reason for each image that cannot be read.
+void read_folder(const RobotPlan& plan, const Wanted& wanted, const Take& take,
+                 std::vector<std::string>& problems) {
   const fs::path rig = argument_of(plan, "--rig");
   const bool is_euroc = layout_of(plan.dataset) == FolderLayout::kEuroc;
   const double offset_s = rig.empty() || !is_euroc ? 0.0 : read_rig_correction(rig).offset_s;
   ReaderReport report;
   for (const StereoPairFile& file : is_euroc ? list_euroc_lefts(find_mav0(plan.dataset), report)
                                              : read_image_folder(plan.dataset, rig).frames)
-    if (const auto at = wanted.find(file.stamp + nanoseconds(offset_s)); at != wanted.end())
-      take(at->second, cv::imread(file.left.string(), cv::IMREAD_ANYCOLOR));
+    if (const auto at = wanted.find(file.stamp + nanoseconds(offset_s)); at != wanted.end()) try {
+        take(at->second, decode_pixels(read_input_file(file.left), DecodedPixels::kEightBits));
+      } catch (const InputFileError& error) {
+        problems.emplace_back(error.what());
+      } catch (const ImageCodecError& error) {
+        problems.push_back(file.left.string() + ": " + error.what());
+      }
 }
 
 void read_bag(const RobotPlan& plan, const Wanted& wanted, const Take& take) {
@@ -105,8 +113,7 @@ std::string small_jpeg(const cv::Mat& image, const ClosureImageOptions& options)
   const double scale = std::min(1.0, static_cast<double>(options.width_px) / image.cols);
   cv::Mat small;
   cv::resize(image, small, {}, scale, scale, cv::INTER_AREA);
-  std::vector<unsigned char> bytes;
-  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, options.quality});
+  const std::vector<std::uint8_t> bytes = encode_jpeg(small, options.quality);
   return {bytes.begin(), bytes.end()};
 }
 
@@ -123,14 +130,18 @@ ClosureImages closure_images(const std::vector<RobotResult>& robots,
       if (shown.contains(keyframe.id)) wanted.emplace(keyframe.stamp, keyframe.id);
     if (wanted.empty() || robot.plan.dataset.empty()) continue;
     const Take take = [&](const KeyframeId& keyframe, const cv::Mat& image) {
-      if (!image.empty()) images.jpegs[keyframe] = small_jpeg(image, options);
+      images.jpegs[keyframe] = small_jpeg(image, options);
     };
+    std::vector<std::string> problems;
     try {
       may_be_bag(robot.plan.dataset) ? read_bag(robot.plan, wanted, take)
-                                     : read_folder(robot.plan, wanted, take);
+                                     : read_folder(robot.plan, wanted, take, problems);
     } catch (const std::exception& error) {
       images.notes.push_back(robot.plan.name + ": no images of its closures: " + error.what());
     }
+    if (!problems.empty())
+      images.notes.push_back(robot.plan.name + ": " + std::to_string(problems.size()) +
+                             " images of its closures cannot be read, the first: " + problems[0]);
   }
   return images;
 }

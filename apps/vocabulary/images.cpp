@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cctype>
 #include <iostream>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
+#include "modules/images/image_codec.hpp"
 #include "modules/images/keypoint_extractor.hpp"
 
 namespace km {
@@ -51,6 +51,14 @@ std::vector<fs::path> expand(const fs::path& input) {
   return {input};
 }
 
+cv::Mat gray_pixels(const fs::path& image) {
+  try {
+    return decode_pixels(read_input_file(image), DecodedPixels::kGray);
+  } catch (const ImageCodecError& error) {
+    throw std::runtime_error(image.string() + ": cannot be decoded as an image: " + error.what());
+  }
+}
+
 }  // namespace
 
 std::vector<fs::path> list_images(const std::vector<std::string>& inputs, int stride) {
@@ -79,12 +87,7 @@ Stamp stamp_of_image(const std::filesystem::path& image) {
 }
 
 std::vector<BinaryDescriptor> image_descriptors(const std::filesystem::path& image, int features) {
-  cv::Mat grey;
-  try {
-    grey = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
-  } catch (const cv::Exception&) {  // a header with more pixels than OpenCV accepts
-  }
-  if (grey.empty()) throw std::runtime_error(image.string() + " cannot be decoded as an image");
+  const cv::Mat grey = gray_pixels(image);
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
   make_keypoint_extractor(features)->detectAndCompute(grey, cv::noArray(), keypoints, descriptors);

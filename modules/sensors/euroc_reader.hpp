@@ -40,7 +40,7 @@ struct EurocOptions {
 [[nodiscard]] std::filesystem::path find_mav0(const std::filesystem::path& folder);
 
 /// Reads a EuRoC/ASL folder: mav0/{cam0,cam1,imu0} with data.csv, and images that the csv names, in
-/// any format OpenCV decodes. Without SensorRig::has_imu it does not read imu0. An RGB-D rig has
+/// PNG or JPEG. Without SensorRig::has_imu it does not read imu0. An RGB-D rig has
 /// depth0 in place of cam1: 16-bit images of one channel. Labels are in label0, as 8-bit ids or as
 /// colours of label_palette.csv beside label0. If depth or labels have a lower rate than images,
 /// some frames have none.

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -28,8 +27,7 @@ bool is_truncated(std::string_view bytes) {
   return false;
 }
 
-// The size in the header. A decoder allocates memory for this size before it decodes, and OpenCV
-// throws beyond 2^30 pixels.
+// The size in the header. A decoder allocates memory for this size before it decodes.
 std::optional<cv::Size> stated_size(std::string_view bytes) {
   const auto size = stated_image_size(bytes);
   if (!size) return std::nullopt;
@@ -76,7 +74,7 @@ ReaderFault fault_of(ImageStatus status) {
 }
 
 ImageResult load_gray_image(const std::filesystem::path& file, int width, int height) {
-  LoadedImage<cv::Mat> loaded = decode_image(file, cv::IMREAD_GRAYSCALE, {width, height});
+  LoadedImage<cv::Mat> loaded = decode_image(file, DecodedPixels::kGray, {width, height});
   if (loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(loaded);
   const cv::Mat& decoded = loaded.image;
   return {ImageStatus::kOk, {}, {width, height, {decoded.datastart, decoded.dataend}}};
@@ -93,20 +91,20 @@ LoadedImage<cv::Mat> wrong_size(const std::string& place, const cv::Size& found,
                        text(found) + " px, the calibration states " + text(size));
 }
 
-LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
+LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, DecodedPixels pixels,
                                   const cv::Size& size) {
   if (!is_file(file))
     return image_failure(ImageStatus::kMissing, file.string(),
                          "no such image" + (is_absent(file) ? "" : ": " + problem_of_file(file)));
   try {
-    return decode_image(read_input_file(file, kMaxEncoded_bytes), file.string(), flags, size);
+    return decode_image(read_input_file(file, kMaxEncoded_bytes), file.string(), pixels, size);
   } catch (const InputFileError& error) {
     return {ImageStatus::kUnreadable, error.what(), {}};
   }
 }
 
-LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& place, int flags,
-                                  const cv::Size& size) {
+LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& place,
+                                  DecodedPixels pixels, const cv::Size& size) {
   const auto unreadable = [&place](const std::string& why) {
     return image_failure(ImageStatus::kUnreadable, place, why);
   };
@@ -115,26 +113,18 @@ LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& pla
   if (const auto stated = stated_size(bytes); stated && *stated != size)
     return wrong_size(place, *stated, size);
 
-  const cv::_InputArray encoded(reinterpret_cast<const std::uint8_t*>(bytes.data()),
-                                static_cast<int>(bytes.size()));
-  // IMREAD_UNCHANGED is -1 and includes the orientation: another flag would change the mode.
-  const int mode = flags == cv::IMREAD_UNCHANGED
-                       ? flags
-                       : flags | static_cast<int>(cv::IMREAD_IGNORE_ORIENTATION);
-  cv::Mat decoded;
   try {
-    decoded = cv::imdecode(encoded, mode);
-  } catch (const cv::Exception& error) {
-    return unreadable("cannot be decoded: " + error.err);
+    cv::Mat decoded = decode_pixels(bytes, pixels);
+    if (decoded.size() != size) return wrong_size(place, decoded.size(), size);
+    return {ImageStatus::kOk, {}, std::move(decoded)};
+  } catch (const ImageCodecError& error) {
+    return unreadable(std::string("cannot be decoded: ") + error.what());
   }
-  if (decoded.empty()) return unreadable("not an image that can be decoded");
-  if (decoded.size() != size) return wrong_size(place, decoded.size(), size);
-  return {ImageStatus::kOk, {}, std::move(decoded)};
 }
 
 DepthResult load_depth_image(const std::filesystem::path& file, int width, int height,
                              double scale_m, const DepthRange& range) {
-  return depth_image_of(decode_image(file, cv::IMREAD_UNCHANGED, {width, height}), file.string(),
+  return depth_image_of(decode_image(file, DecodedPixels::kStored, {width, height}), file.string(),
                         scale_m, range);
 }
 
@@ -172,7 +162,7 @@ DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded, const std::strin
 
 LabelResult load_label_image(const std::filesystem::path& file, int width, int height,
                              const LabelPalette& palette) {
-  LoadedImage<cv::Mat> loaded = decode_image(file, cv::IMREAD_UNCHANGED, {width, height});
+  LoadedImage<cv::Mat> loaded = decode_image(file, DecodedPixels::kStored, {width, height});
   if (loaded.status != ImageStatus::kOk) return {failure_of<LabelImage>(loaded), 0};
   const cv::Mat& decoded = loaded.image;
   LabelResult result;

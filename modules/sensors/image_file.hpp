@@ -9,6 +9,7 @@
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/label_palette.hpp"
+#include "modules/images/image_codec.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 
 namespace km {
@@ -27,19 +28,18 @@ struct LoadedImage {
 };
 using ImageResult = LoadedImage<GrayImage>;
 
-/// Reads an image as 8-bit grey in any format that OpenCV decodes (PNG, JPEG and others). PNG and
-/// JPEG files without their end marker count as unreadable, because decoders fill the missing part
-/// of a truncated JPEG with grey and report success.
+/// Reads an image as 8-bit grey (PNG or JPEG). A file without its end marker counts as
+/// unreadable, because decoders fill the missing part of a truncated JPEG with grey and report
+/// success.
 [[nodiscard]] ImageResult load_gray_image(const std::filesystem::path& file, int width, int height);
 
-/// Any image file as OpenCV decodes it with the cv::ImreadModes `flags`; its orientation tag is
-/// ignored. Never kWrongFormat.
-[[nodiscard]] LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, int flags,
-                                                const cv::Size& size);
+/// A PNG or JPEG file. Never kWrongFormat.
+[[nodiscard]] LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file,
+                                                DecodedPixels pixels, const cv::Size& size);
 
 /// Decodes the bytes of an image file, which come from `place`.
 [[nodiscard]] LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& place,
-                                                int flags, const cv::Size& size);
+                                                DecodedPixels pixels, const cv::Size& size);
 
 /// Result for an image that cannot be used; its problem is "PLACE: WHY".
 [[nodiscard]] LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,

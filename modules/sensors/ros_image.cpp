@@ -4,7 +4,6 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 #include <utility>
@@ -108,12 +107,13 @@ std::string_view without_depth_header(std::string_view bytes) {
 }
 
 LoadedImage<cv::Mat> compressed_image(const BagChannel& channel, const BagMessage& message,
-                                      const std::string& place, int flags, const cv::Size& size) {
+                                      const std::string& place, DecodedPixels pixels,
+                                      const cv::Size& size) {
   const auto image = decode_ros<RosCompressedImage>(channel.encoding, message.bytes);
   if (!image.value) return image_failure(ImageStatus::kUnreadable, place, image.refusal);
   const auto& data = image.value->data;
   const std::string_view bytes(reinterpret_cast<const char*>(data.data()), data.size());
-  return decode_image(without_depth_header(bytes), place, flags, size);
+  return decode_image(without_depth_header(bytes), place, pixels, size);
 }
 
 bool is_raw(const BagChannel& channel) {
@@ -136,7 +136,7 @@ ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message
   RawImage raw =
       is_raw(channel)
           ? raw_image(channel, message, place, size)
-          : RawImage{compressed_image(channel, message, place, cv::IMREAD_GRAYSCALE, size)};
+          : RawImage{compressed_image(channel, message, place, DecodedPixels::kGray, size)};
   if (raw.loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(raw.loaded);
   cv::Mat gray = raw.loaded.image;
   if (raw.to_gray != kAsItIs) {
@@ -152,10 +152,10 @@ ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message
 DepthResult depth_of_message(const BagChannel& channel, const BagMessage& message,
                              const std::string& place, const cv::Size& size, double scale_m,
                              const DepthRange& range) {
-  return depth_image_of(is_raw(channel)
-                            ? raw_image(channel, message, place, size).loaded
-                            : compressed_image(channel, message, place, cv::IMREAD_UNCHANGED, size),
-                        place, scale_m, range);
+  return depth_image_of(
+      is_raw(channel) ? raw_image(channel, message, place, size).loaded
+                      : compressed_image(channel, message, place, DecodedPixels::kStored, size),
+      place, scale_m, range);
 }
 
 }  // namespace km

@@ -17,7 +17,7 @@ namespace km {
 
 /// The grey values of an image message. Encodings: mono8, mono16 (its higher byte), bgr8, rgb8,
 /// bgra8, rgba8, bayer_*8, yuv422 (UYVY), yuv422_yuy2, OpenCV's 8UC1, 8UC3, 8UC4 and 16UC1, and
-/// compressed images of any format that OpenCV decodes. kUnreadable: not such a message;
+/// compressed images (PNG or JPEG). kUnreadable: not such a message;
 /// kWrongFormat: another encoding. `place` begins the problem.
 [[nodiscard]] ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message,
                                           const std::string& place, const cv::Size& size);

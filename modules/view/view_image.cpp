@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 
 namespace km {
@@ -16,11 +16,8 @@ constexpr std::size_t kMaxJpegBytes = kMaxViewBytes - 20000;
 constexpr std::size_t kMaxFeatures = 2000;
 
 std::vector<std::uint8_t> jpeg_of(const cv::Mat& image) {
-  std::vector<std::uint8_t> jpeg;
-  for (const int quality : {60, 30, 10}) {
-    cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
-    if (jpeg.size() <= kMaxJpegBytes) return jpeg;
-  }
+  for (const int quality : {60, 30, 10})
+    if (auto jpeg = encode_jpeg(image, quality); jpeg.size() <= kMaxJpegBytes) return jpeg;
   return {};  // Even the smallest quality is too large, as for noise in a tall and narrow image.
 }
 

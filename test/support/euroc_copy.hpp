@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "modules/core/stamp.hpp"
+#include "test/support/image_file.hpp"
 
 namespace km {
 
@@ -98,9 +98,9 @@ class EurocCopy {
   }
 
   static void write_changed(const Image& image, const std::filesystem::path& to) {
-    cv::Mat pixels = cv::imread(image.file.string(), cv::IMREAD_GRAYSCALE);
+    cv::Mat pixels = read_image(image.file, DecodedPixels::kGray);
     pixels.convertTo(pixels, CV_8U, image.gain, image.level);  // saturates
-    cv::imwrite(to.string(), pixels, {cv::IMWRITE_PNG_COMPRESSION, 1});
+    write_png(to, pixels);
   }
 
   std::filesystem::path mav0_;

@@ -39,7 +39,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"pose_graph", {"outlier_rejection"}},
     {"rbcd", {"pose_graph"}},
     {"ros_dds", {"images", "mesh", "objects", "recordings"}},
-    {"sensors", {"recordings"}},
+    {"sensors", {"images", "recordings"}},
     {"pgo_study", {"outlier_rejection", "pose_graph", "rbcd", "recorded_graph"}},
     {"evaluation", {"charts", "images", "mesh", "objects"}},
     {"simulation", {"images", "mesh"}},

@@ -2,12 +2,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "modules/mesh/ply_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/support/command.hpp"
+#include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -113,13 +113,13 @@ TEST_CASE("render draws one picture per view", "[evaluate]") {
   REQUIRE(result.exit_code == 0);
   const std::string second = (meshes.folder.path() / "out_2.png").string();
   CHECK(result.output == meshes.png.string() + '\n' + second + '\n');
-  const cv::Mat3b top = cv::imread(meshes.png.string());
+  const cv::Mat3b top = read_image(meshes.png, DecodedPixels::kEightBits);
   CHECK(top.cols == 320);
   CHECK(top.rows > 240);
   // The floor's red, away from the path; and the picture from within.
   const cv::Vec3b floor = top(60, 100);
   CHECK(static_cast<int>(floor[2]) > 2 * static_cast<int>(floor[1]) + 20);
-  CHECK(cv::imread(second).cols == 320);
+  CHECK(read_image(second, DecodedPixels::kEightBits).cols == 320);
 }
 
 TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]") {
@@ -137,7 +137,7 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
                                     meshes.png.string() + ' ' + arguments);
     CAPTURE(result.output);
     REQUIRE(result.exit_code == 0);
-    return cv::Mat3b(cv::imread(meshes.png.string())).rowRange(0, 240).clone();
+    return cv::Mat3b(read_image(meshes.png, DecodedPixels::kEightBits)).rowRange(0, 240).clone();
   };
   const cv::Mat3b expected =
       top("--mesh " + meshes.truth.string() + " --trajectory " + upright.string());

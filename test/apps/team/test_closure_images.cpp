@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "apps/team/closure_images.hpp"
+#include "modules/images/image_codec.hpp"
 #include "modules/recordings/mcap_writer.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
@@ -33,8 +33,7 @@ ClosureRecord closure(KeyframeId from, KeyframeId to, ClosureStage stage) {
 }
 
 double grey_of(const std::string& jpeg, int width) {
-  const cv::Mat image =
-      cv::imdecode(std::vector<char>(jpeg.begin(), jpeg.end()), cv::IMREAD_GRAYSCALE);
+  const cv::Mat image = decode_pixels(jpeg, DecodedPixels::kGray);
   REQUIRE(image.cols == width);
   return cv::mean(image)[0];
 }

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "modules/sensors/node/euroc_rig.hpp"
+#include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -84,7 +84,7 @@ class EurocFolder {
   }
   void write_pixels(const std::string& relative, const cv::Mat& pixels) const {
     std::filesystem::create_directories((mav0() / relative).parent_path());
-    cv::imwrite((mav0() / relative).string(), pixels);
+    write_png(mav0() / relative, pixels);
   }
 
   static std::string depth_yaml() {

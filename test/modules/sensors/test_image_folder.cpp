@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
 
 #include "euroc_folder.hpp"
 #include "modules/sensors/node/open_folder.hpp"
+#include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -19,7 +19,7 @@ constexpr int kFrames = 4;
 
 void write_image(const fs::path& file, int type, double value) {
   fs::create_directories(file.parent_path());
-  REQUIRE(cv::imwrite(file.string(), cv::Mat(24, 32, type, cv::Scalar::all(value))));
+  write_png(file, cv::Mat(24, 32, type, cv::Scalar::all(value)));
 }
 
 const std::string kP0 = "P0: 30 0 16 0 0 30 12 0 0 0 1 0\n";

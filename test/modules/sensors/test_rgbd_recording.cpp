@@ -164,7 +164,7 @@ TEST_CASE("A depth or label image that cannot be used loses only itself", "[sens
     std::function<void(const fs::path&)> corrupt;
   };
   const auto pixels = [](const cv::Mat& image) {
-    return [image](const fs::path& file) { cv::imwrite(file.string(), image); };
+    return [image](const fs::path& file) { write_png(file, image); };
   };
   using enum ReaderFault;
   const Case c = GENERATE_COPY(
@@ -176,8 +176,8 @@ TEST_CASE("A depth or label image that cannot be used loses only itself", "[sens
       Case{"depth0", kWrongImageFormat,
            "8 bits and 1 channels, depth is an image of 16 bits and one channel",
            pixels(cv::Mat(24, 32, CV_8UC1, cv::Scalar(10)))},
-      Case{"depth0", kWrongImageFormat, "16 bits and 3 channels",
-           pixels(cv::Mat(24, 32, CV_16UC3, cv::Scalar(10, 10, 10)))},
+      Case{"depth0", kWrongImageFormat, "8 bits and 3 channels",
+           pixels(cv::Mat(24, 32, CV_8UC3, cv::Scalar(10, 10, 10)))},
       Case{"label0", kWrongImageFormat, "no label_palette.csv",
            pixels(cv::Mat(24, 32, CV_8UC3, cv::Scalar(1, 2, 3)))},
       Case{"label0", kWrongImageFormat, "labels are 8-bit ids or 8-bit colours",

@@ -2,12 +2,12 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <stdexcept>
 #include <utility>
 
 #include "modules/view/view_image.hpp"
+#include "test/support/image_file.hpp"
 
 namespace km {
 namespace {
@@ -32,7 +32,7 @@ Camera camera_of(int width, int height) {
 }
 
 cv::Mat shown(const ViewImage& image) {
-  return cv::imdecode(image.jpeg, cv::IMREAD_UNCHANGED);
+  return decoded(image.jpeg, DecodedPixels::kStored);
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 #include "apps/lab/simulation/dataset/image_encoding.hpp"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 
 namespace km {
@@ -21,13 +21,8 @@ void require_size(int width, int height, std::size_t pixels) {
 }
 
 std::vector<std::uint8_t> encode(const cv::Mat& image, ImageFormat format) {
-  std::vector<std::uint8_t> bytes;
-  const std::vector<int> options = format == ImageFormat::kJpeg
-                                       ? std::vector<int>{cv::IMWRITE_JPEG_QUALITY, kJpegQuality}
-                                       : std::vector<int>{cv::IMWRITE_PNG_COMPRESSION, kPngLevel};
-  if (!cv::imencode(extension(format), image, bytes, options))
-    throw std::runtime_error("OpenCV cannot encode " + extension(format));
-  return bytes;
+  return format == ImageFormat::kJpeg ? encode_jpeg(image, kJpegQuality)
+                                      : encode_png(image, kPngLevel);
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <string>
 #include <vector>
@@ -18,6 +17,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
+#include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -48,27 +48,26 @@ TEST_CASE("PNG images come back as they were", "[simulation][dataset]") {
   SECTION("grey") {
     const auto pixels = random_values<std::uint8_t>(255);
     const auto bytes = encode_gray({kWidth, kHeight, pixels}, ImageFormat::kPng);
-    const cv::Mat image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
+    const cv::Mat image = decoded(bytes, DecodedPixels::kStored);
     REQUIRE(image.type() == CV_8UC1);
     CHECK(pixels_of<std::uint8_t>(image) == pixels);
   }
   SECTION("depth, 16 bit") {
     const auto pixels = random_values<std::uint16_t>(65535);
-    const cv::Mat image = cv::imdecode(encode_depth(kWidth, kHeight, pixels), cv::IMREAD_UNCHANGED);
+    const cv::Mat image = decoded(encode_depth(kWidth, kHeight, pixels), DecodedPixels::kStored);
     REQUIRE(image.type() == CV_16UC1);
     CHECK(pixels_of<std::uint16_t>(image) == pixels);
   }
   SECTION("labels") {
     const auto pixels = random_values<LabelId>(17);
-    const cv::Mat image =
-        cv::imdecode(encode_labels(kWidth, kHeight, pixels), cv::IMREAD_UNCHANGED);
+    const cv::Mat image = decoded(encode_labels(kWidth, kHeight, pixels), DecodedPixels::kStored);
     REQUIRE(image.type() == CV_8UC1);
     CHECK(pixels_of<std::uint8_t>(image) == pixels);
   }
   SECTION("colour, red first") {
     auto pixels = random_values<std::uint8_t>(255, 3 * kPixels);
-    const cv::Mat image =
-        cv::imdecode(encode_color(kWidth, kHeight, pixels, ImageFormat::kPng), cv::IMREAD_COLOR);
+    const cv::Mat image = decoded(encode_color(kWidth, kHeight, pixels, ImageFormat::kPng),
+                                  DecodedPixels::kEightBits);
     const auto bgr = image.at<cv::Vec3b>(0, 1);
     CHECK(bgr[2] == pixels[3]);
     CHECK(bgr[1] == pixels[4]);
@@ -87,10 +86,9 @@ TEST_CASE("JPEG keeps a smooth image to a grey level", "[simulation][dataset]") 
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
       image.pixels.push_back(static_cast<std::uint8_t>(40 + 2 * x + y));
-  const cv::Mat decoded =
-      cv::imdecode(encode_gray(image, ImageFormat::kJpeg), cv::IMREAD_UNCHANGED);
-  REQUIRE(decoded.type() == CV_8UC1);
-  const auto pixels = pixels_of<std::uint8_t>(decoded);
+  const cv::Mat near = decoded(encode_gray(image, ImageFormat::kJpeg), DecodedPixels::kStored);
+  REQUIRE(near.type() == CV_8UC1);
+  const auto pixels = pixels_of<std::uint8_t>(near);
   int largest = 0;
   for (std::size_t i = 0; i < pixels.size(); ++i)
     largest = std::max(largest, std::abs(pixels[i] - image.pixels[i]));

@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "modules/core/text_rows.hpp"
 #include "modules/evaluation/images/image_statistics.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
+#include "test/support/image_file.hpp"
 #include "test/support/shared_data.hpp"
 
 // The Vicon room, seen from the poses of EuRoC's V1_01_easy: same lens and same motion, furniture
@@ -77,7 +77,7 @@ class RoomCameras {
     shot.noise_seed = camera;
     const RenderedView seen = renderer_.render(rays, T_world_body, effects.request(false));
     const auto bytes = encode_gray(effects.gray(seen, shot), ImageFormat::kJpeg);
-    return gray_image(cv::imdecode(bytes, cv::IMREAD_GRAYSCALE));
+    return gray_image(decoded(bytes, DecodedPixels::kGray));
   }
 
   const RecordedTrajectory& flight_;
@@ -115,8 +115,8 @@ TEST_CASE("Rendered images of the Vicon room are like those recorded in it",
   ImageStatistics rendered(rig, {.stride = 1});
   for (const Stamp stamp : recorded_stamps(keyframes)) {
     const auto image = [&](const char* camera) {
-      return gray_image(cv::imread((keyframes / (std::to_string(stamp) + camera)).string(),
-                                   cv::IMREAD_GRAYSCALE));
+      return gray_image(
+          read_image(keyframes / (std::to_string(stamp) + camera), DecodedPixels::kGray));
     };
     recorded.add({stamp, image("_0.jpg"), image("_1.jpg")});
     rendered.add(cameras.take(stamp));
