@@ -19,7 +19,7 @@ class ImageCodecError : public std::runtime_error {
 };
 
 enum class DecodedPixels {
-  kGray,       ///< CV_8UC1. Of 16 bits the upper 8 stay.
+  kGray,       ///< CV_8UC1. The upper 8 bits of 16 stay.
   kEightBits,  ///< CV_8UC1 or CV_8UC3 (BGR). Transparency is ignored.
   kStored,     ///< CV_8UC1, CV_16UC1, CV_8UC3 (BGR) or CV_8UC4 (BGRA, with transparency).
 };
