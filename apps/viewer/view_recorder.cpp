@@ -95,7 +95,8 @@ class ViewRecorder::Robot {
   }
 
   // From now on messages are written, beginning with those received so far.
-  void begin(const std::string& name, const std::shared_ptr<File>& file, double gone_s,
+  void begin(const std::string& name, const std::shared_ptr<File>& file,
+             const LabelPalette& palette, double gone_s,
              const std::function<std::string(RobotId)>& name_of) {
     images_ = std::make_unique<Sink>(file);
     image_topic_ = images_->open(
@@ -107,6 +108,7 @@ class ViewRecorder::Robot {
                          .id = trajectory.robot,
                          .name_of = name_of,
                          .mesh_points = kMeshPoints,
+                         .objects = palette,
                          .draws = true,
                          .state_bytes_per_s = kState_bytes_per_s,
                          .queue = kQueue},
@@ -162,9 +164,15 @@ class ViewRecorder::Robot {
     mesh_changed_ |= mesh_.add(chunk) == ChunkVerdict::kTaken;
   }
 
-  // Objects, 2D map and distances are only in the robot's own record.
-  void receive(const ViewObjects& /*objects*/) {}
-  void receive(const ViewRaster& /*raster*/) {}
+  void receive(const ViewObjects& objects) { objects_ = objects; }
+
+  void receive(const ViewRaster& raster) {
+    if (raster.kind == RasterKind::kOccupancy)
+      map_2d_ = raster;
+    else if (node_ && newest_)
+      node_->offer_slice(std::make_shared<const LabelledMesh>(distance_points(raster)),
+                         newest_->stamp);
+  }
 
   void receive(const ViewImage& image) {
     if (!images_) return;
@@ -175,6 +183,19 @@ class ViewRecorder::Robot {
   void publish_closures(std::vector<PublishedClosure> now) {
     const std::lock_guard lock(mutex_);
     closures_now_ = std::move(now);
+  }
+
+  // Writes new objects and a new 2D map once the path is in the same frame.
+  void publish_layers() {
+    if (!node_) return;
+    if (objects_ && objects_->anchor == trajectory.anchor) {
+      node_->offer(std::make_shared<const ObjectList>(object_list(*objects_)));
+      objects_.reset();
+    }
+    if (map_2d_ && map_2d_->anchor == trajectory.anchor) {
+      node_->offer(std::make_shared<const OccupancyGrid>(occupancy_grid(*map_2d_)));
+      map_2d_.reset();
+    }
   }
 
   // Writes the present mesh if it has changed and is due.
@@ -194,6 +215,7 @@ class ViewRecorder::Robot {
     if (!node_) return 0;
     mesh_due_s_ = 0.0;
     publish_mesh(palette, steady_now_s());
+    publish_layers();
     node_->stop();
     node_->finish({}, std::exchange(closures_now_, std::nullopt), {});
     return node_->dropped();
@@ -233,6 +255,8 @@ class ViewRecorder::Robot {
   TeamMesh mesh_;
   bool mesh_changed_ = false;
   double mesh_due_s_ = 0.0;
+  std::optional<ViewObjects> objects_;  // not published yet
+  std::optional<ViewRaster> map_2d_;    // not published yet
   std::unique_ptr<Sink> images_;
   std::size_t image_topic_ = 0;
   std::string camera_;
@@ -267,6 +291,7 @@ void ViewRecorder::step(const Input& update) {
     for (auto& [id, robot] : robots_) {
       if (changed) robot->publish_closures(closures_of(*robot));
       robot->publish_mesh(palette_, steady_now_s());
+      robot->publish_layers();
     }
     return;
   }
@@ -278,7 +303,7 @@ void ViewRecorder::step(const Input& update) {
       const std::lock_guard lock(mutex_);
       names_[update->robot] = state->name;
     }
-    robot.begin(state->name, file_, gone_s_, [this](RobotId id) { return name_of(id); });
+    robot.begin(state->name, file_, palette_, gone_s_, [this](RobotId id) { return name_of(id); });
   }
   const auto* const keyframes = std::get_if<ViewKeyframes>(&update->content);
   closures_changed_ |= std::holds_alternative<ViewClosures>(update->content) ||

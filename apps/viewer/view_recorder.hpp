@@ -18,11 +18,10 @@
 namespace km {
 
 /// Writes the messages of the robots for viewers into one MCAP file. For each robot the file has
-/// the topics of the robot's own record (see RosOutputNode) except for log lines, objects, 2D map
-/// and distances. Stamps are those of the sensors of the robot. Values that robots do not send are
-/// computed: velocities from poses, and the far ends of closures from optimised keyframes. The
-/// recorder has threads of its own, so that no page waits for a disk. If the viewer is killed, the
-/// file lacks the last second.
+/// the topics of the robot's own record (see RosOutputNode) except for log lines. Stamps are those
+/// of the sensors of the robot. Values that robots do not send are computed: velocities from poses,
+/// and the far ends of closures from optimised keyframes. The recorder has threads of its own, so
+/// that no page waits for a disk. If the viewer is killed, the file lacks the last second.
 class ViewRecorder {
  public:
   /// The first message replaces `file`. `palette`: colours of meshes. After a robot has left, or

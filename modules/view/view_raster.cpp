@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "modules/core/distance_color.hpp"
 #include "modules/view/view_update.hpp"
 
 namespace km {
@@ -72,13 +73,6 @@ float spacing_of(const std::vector<Eigen::Vector3f>& points) {
   return spacing;
 }
 
-// Inverse of the colours of a DistanceSlice.
-std::uint8_t distance_value(const LabelledMesh::Color& color) {
-  const auto [red, green, blue] = color;
-  if (blue > 0) return ViewRaster::kOccupied;
-  return static_cast<std::uint8_t>((green + 255 - red) * ViewRaster::kFarthest / 510);
-}
-
 }  // namespace
 
 bool is_valid(const ViewRaster& raster) {
@@ -134,13 +128,43 @@ std::optional<ViewRaster> view_raster(const LabelledMesh& slice, RobotId robot) 
     const Eigen::Vector2f at = ((points[k] - low).head<2>() / spacing).array().round();
     cells
         .values[static_cast<std::size_t>(at.x()) + cells.width * static_cast<std::size_t>(at.y())] =
-        distance_value(slice.colors[k]);
+        static_cast<std::uint8_t>(distance_share(slice.colors[k]) * ViewRaster::kFarthest);
   }
   return fitted({.kind = RasterKind::kDistances,
                  .anchor = robot,
                  .resolution_m = spacing,
                  .origin = {low.x() - spacing / 2, low.y() - spacing / 2, low.z()}},
                 std::move(cells));
+}
+
+OccupancyGrid occupancy_grid(const ViewRaster& raster) {
+  OccupancyGrid map{.resolution_m = raster.resolution_m,
+                    .origin = {raster.origin[0], raster.origin[1]},
+                    .width = static_cast<int>(raster.width),
+                    .height = static_cast<int>(raster.height),
+                    .cells = {},
+                    .z_m = raster.origin[2],
+                    .anchor = raster.anchor};
+  for (const std::uint8_t value : cells_of(raster))
+    map.cells.push_back(value == ViewRaster::kUnknown ? OccupancyGrid::kUnknown
+                        : value == ViewRaster::kFree  ? OccupancyGrid::kFree
+                                                      : OccupancyGrid::kOccupied);
+  return map;
+}
+
+LabelledMesh distance_points(const ViewRaster& raster) {
+  LabelledMesh points;
+  const std::vector<std::uint8_t> cells = cells_of(raster);
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    if (cells[k] == ViewRaster::kUnknown) continue;
+    const Eigen::Vector2f cell(static_cast<float>(k % raster.width),
+                               static_cast<float>(k / raster.width));
+    points.vertices.emplace_back(raster.origin[0] + raster.resolution_m * (cell.x() + 0.5F),
+                                 raster.origin[1] + raster.resolution_m * (cell.y() + 0.5F),
+                                 raster.origin[2]);
+    points.colors.push_back(distance_color(static_cast<double>(cells[k]) / ViewRaster::kFarthest));
+  }
+  return points;
 }
 
 }  // namespace km

@@ -1,9 +1,8 @@
 #include "modules/distance_field/node/distance_field_node.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
+#include "modules/core/distance_color.hpp"
 #include "runtime/thread.hpp"
 
 namespace km {
@@ -11,15 +10,6 @@ namespace {
 
 // Updates of a minute at least. Beyond it the mapper waits.
 constexpr std::size_t kQueue = 256;
-
-LabelledMesh::Color color_of(double distance_m, double max_m) {
-  if (distance_m <= 0.0) return {0, 0, 255};
-  const double share = 2.0 * std::min(distance_m / max_m, 1.0);
-  const auto byte = [](double value) {
-    return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(value, 0.0, 1.0)));
-  };
-  return {byte(2.0 - share), byte(share), 0};
-}
 
 }  // namespace
 
@@ -55,7 +45,7 @@ void DistanceFieldNode::publish_slice() {
   for (const DistanceField::SlicePoint& point : field_.slice(camera_z_m_)) {
     slice.points.vertices.push_back(point.point);
     slice.points.colors.push_back(
-        color_of(static_cast<double>(point.distance_m), field_.max_distance_m()));
+        distance_color(static_cast<double>(point.distance_m) / field_.max_distance_m()));
   }
   slices_.publish(std::move(slice));
 }

@@ -55,6 +55,22 @@ std::vector<ViewUpdate> team() {
     add(ViewPose{begin + 5 * kSecond / 2, at(2.5, 0)});
     add(ViewClosures{{{kClosure, ClosureStatus::kKept, 80, 60, ""}}});
     add(ViewImage{.stamp = begin, .jpeg = {0xFF, 0xD8}, .features = {}});
+    add(ViewObjects{.anchor = 0,
+                    .objects = {{5, {1, 0.5F, 0.25F}, 0.0F, {2, 1, 0.5F}, {0, 1}}},
+                    .left_out = 0});
+    add(ViewRaster{.anchor = 0,
+                   .resolution_m = 0.5F,
+                   .origin = {-1, 2, 0},
+                   .width = 2,
+                   .height = 1,
+                   .runs = {1, ViewRaster::kFree, 1, ViewRaster::kOccupied}});
+    add(ViewRaster{.kind = RasterKind::kDistances,
+                   .anchor = robot,
+                   .resolution_m = 0.5F,
+                   .origin = {3, 4, 1},
+                   .width = 1,
+                   .height = 1,
+                   .runs = {1, ViewRaster::kFarthest}});
     LabelledMesh sheet = wavy_sheet(4, 0.1);
     sheet.labels.assign(sheet.vertices.size(), 5);
     for (MeshChunk& chunk : split_mesh(sheet, robot, 0, {}).chunks) add(std::move(chunk));
@@ -112,6 +128,19 @@ TEST_CASE("A viewer's record has the messages of each robot as the robot's own r
   CHECK(lines.points == std::vector<Eigen::Vector3d>{{1, 0, 0}, {2, 2, 0}});
   CHECK(record.last<RosCompressedImage>("/bob/left/image_raw/compressed").data ==
         std::vector<std::uint8_t>{0xFF, 0xD8});
+
+  const auto objects = record.last<RosMarkers>("/bob/objects").markers;
+  REQUIRE(objects.size() == 3);  // the first deletes those before
+  CHECK(objects[1].header.frame == "bob/map");
+  CHECK(objects[1].pose.position == Eigen::Vector3d(1, 0.5, 0.25));
+  CHECK(objects[2].text == "wall");
+  const auto map = record.last<RosOccupancyGrid>("/bob/map_2d");
+  CHECK(map.header.frame == "bob/map");
+  CHECK(map.origin.position == Eigen::Vector3d(-1, 2, 0));
+  CHECK(map.data == std::vector<std::uint8_t>{OccupancyGrid::kFree, OccupancyGrid::kOccupied});
+  const auto slice = record.last<RosPointCloud>("/bob/distance_slice");
+  CHECK(slice.header.frame == "bob/odom");
+  CHECK(slice.width == 1);
 
   std::set<std::pair<std::string, std::string>> links;
   for (const TopicMessage& message : record.messages)

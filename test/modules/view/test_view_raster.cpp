@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "modules/core/distance_color.hpp"
 #include "modules/view/view_objects.hpp"
 #include "modules/view/view_raster.hpp"
 #include "modules/view/view_update.hpp"
@@ -17,13 +18,6 @@ constexpr std::int8_t kUnknownCell = OccupancyGrid::kUnknown, kFreeCell = Occupa
                       kOccupiedCell = OccupancyGrid::kOccupied;
 
 using Values = std::vector<std::uint8_t>;
-
-LabelledMesh::Color color_of(double share) {  // As in DistanceFieldNode.
-  const auto byte = [](double value) {
-    return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(value, 0.0, 1.0)));
-  };
-  return {byte(2.0 - 2.0 * share), byte(2.0 * share), 0};
-}
 
 TEST_CASE("A 2D map that fits is sent cell by cell", "[view]") {
   OccupancyGrid map{0.25, {-1.0, 2.0}, 3, 2, {}};
@@ -38,6 +32,11 @@ TEST_CASE("A 2D map that fits is sent cell by cell", "[view]") {
   CHECK(raster->runs ==
         Values{2, ViewRaster::kFree, 1, ViewRaster::kOccupied, 3, ViewRaster::kUnknown});
   CHECK(cells_of(*raster) == Values{1, 1, 0, 255, 255, 255});
+  const OccupancyGrid again = occupancy_grid(*raster);
+  CHECK(again.cells == map.cells);
+  CHECK(again.origin == map.origin);
+  CHECK(again.z_m == map.z_m);
+  CHECK(again.anchor == map.anchor);
   CHECK_FALSE(view_raster(OccupancyGrid{}));
 }
 
@@ -76,9 +75,9 @@ TEST_CASE("A slice of the distance field has its distances in the cells of its v
       if (x == 8 && y == 0) continue;
       slice.vertices.emplace_back(kVoxel_m * static_cast<float>(x),
                                   kVoxel_m * static_cast<float>(y), 1.2F);
-      slice.colors.push_back(color_of(static_cast<double>(x - 7) / 2.0));
+      slice.colors.push_back(distance_color(static_cast<double>(x - 7) / 2.0));
     }
-  slice.colors[0] = {0, 0, 255};  // Behind a surface.
+  CHECK(slice.colors[0] == LabelledMesh::Color{0, 0, 255});
   const auto raster = view_raster(slice, 6);
   REQUIRE(raster);
   CHECK(is_valid(*raster));
@@ -89,6 +88,14 @@ TEST_CASE("A slice of the distance field has its distances in the cells of its v
   CHECK(raster->origin[1] == Approx(-0.15F));
   CHECK(raster->origin[2] == 1.2F);
   CHECK(cells_of(*raster) == Values{0, 15, 31, 0, 255, 31, 0, 15, 31});
+
+  const LabelledMesh again = distance_points(*raster);
+  REQUIRE(again.vertices.size() == slice.vertices.size());
+  for (std::size_t k = 0; k < slice.vertices.size(); ++k) {
+    CHECK((again.vertices[k] - slice.vertices[k]).norm() < 1e-6F);
+    CHECK(distance_share(again.colors[k]) ==
+          Approx(distance_share(slice.colors[k])).margin(1.0 / ViewRaster::kFarthest));
+  }
 
   slice.colors.pop_back();
   CHECK_FALSE(view_raster(slice, 6));
