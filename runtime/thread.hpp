@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <string>
 #include <thread>
 #include <utility>
@@ -29,11 +30,17 @@ inline void name_this_thread(const std::string& name) {
   if (!name.empty()) pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
 }
 
-/// Lowers the priority of the calling thread. If processors are scarce, Linux gives it about a
-/// tenth of the time of an ordinary thread. For handlers of work that may be late, so that it does
-/// not slow down urgent work. Later calls have no effect.
+/// False in a process whose input waits for it, as a recording does that is played as fast as
+/// possible. None of its work is urgent, so a lower priority would only let other processes pass.
+/// Set it before the first thread of such work starts.
+inline std::atomic<bool> has_urgent_work = true;
+
+/// Lowers the priority of the calling thread if has_urgent_work. If processors are scarce, Linux
+/// gives it about a tenth of the time of an ordinary thread. For handlers of work that may be late,
+/// so that it does not slow down urgent work. Later calls have no effect.
 inline void work_in_background() {
   static thread_local const int outcome = [] {
+    if (!has_urgent_work) return 0;
     constexpr int kNiceness = 10;
     const auto self = static_cast<id_t>(gettid());
     return setpriority(PRIO_PROCESS, self, std::max(kNiceness, getpriority(PRIO_PROCESS, self)));

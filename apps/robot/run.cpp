@@ -34,6 +34,7 @@
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/metrics.hpp"
+#include "runtime/thread.hpp"
 #include "runtime/unblocked_output.hpp"
 
 namespace km {
@@ -558,6 +559,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   log::info("robot") << "kimera_multi_robot " << built_version() << ", commit " << built_commit();
   const std::optional<double> rate = chosen_rate(options, config, mapping, rig, signals);
   options.rate = rate.value_or(options.rate);
+  has_urgent_work = options.is_live || std::isfinite(options.rate);
   const bool continues =
       options.resume && input->restored_from == RestoredFrom::kFormerProcess && input->restored;
   options.record = record_file(options, continues);

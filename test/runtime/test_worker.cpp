@@ -200,6 +200,19 @@ TEST_CASE("Background work lowers the priority of its own thread only", "[runtim
   CHECK(niceness() == ordinary);
 }
 
+TEST_CASE("Without urgent work, background work keeps its priority", "[runtime]") {
+  has_urgent_work = false;
+  const int ordinary = niceness();
+  int during = ordinary + 1;
+  std::thread thread([&] {
+    work_in_background();
+    during = niceness();
+  });
+  thread.join();
+  has_urgent_work = true;
+  CHECK(during == ordinary);
+}
+
 TEST_CASE("Background work of a thread that is lower already does not raise it", "[runtime]") {
   bool lowered = false;
   int during = 0;
