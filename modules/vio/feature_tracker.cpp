@@ -135,6 +135,7 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   const std::optional<SE3> motion = drop_outliers(steps, guess);
   if (!has_gyro_ && motion) follow_again(left, *motion, steps);
   align(steps, left, motion.value_or(guess));
+  const bool is_first = previous_left_.empty();
   const double dt_s = seconds_between(stamp_, frame.stamp);
   velocity_.setZero();
   if (motion && dt_s > 0.0) {
@@ -150,6 +151,7 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   previous_left_ = std::move(left);
   stamp_ = frame.stamp;
   TrackedFrame result = output();
+  if (!is_first && dt_s > 0.0) unroll(motion.value_or(guess), dt_s, result);
   result.T_previous_current = motion;
   return result;
 }
@@ -329,6 +331,29 @@ TrackedFrame FeatureTracker::output() const {
     result.features.push_back({track.id, track.left, track.right, track.length});
   }
   return result;
+}
+
+// Moves the bearings of a rolling shutter to where they are at the stamp, by the image velocity
+// that the motion since the image before gives them. A row is exposed later than the middle row by
+// its share of the readout time.
+void FeatureTracker::unroll(const SE3& T_previous_current, double dt_s, TrackedFrame& frame) const {
+  if (!(config_.readout_s > 0.0)) return;
+  const auto late_s = [this](const Camera& camera, double row) {
+    return config_.readout_s * ((row + 0.5) / camera.height - 0.5);
+  };
+  constexpr double kMinDepthRatio = 0.1;  // Nearly behind the camera: no velocity.
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    const Track& track = tracks_[i];
+    TrackedFeature& feature = frame.features[i];
+    const Eigen::Vector3d before = T_previous_current.linear() * track.left.homogeneous() +
+                                   depth_guess(track) * T_previous_current.translation();
+    if (before.z() < kMinDepthRatio) continue;
+    const Eigen::Vector2d velocity = (track.left - before.hnormalized()) / dt_s;
+    feature.left -= late_s(rig_.cameras[0], track.px.y()) * velocity;
+    if (!feature.right) continue;
+    const auto px = rig_.cameras[1].project(*feature.right);
+    if (px) *feature.right -= late_s(rig_.cameras[1], px->y()) * velocity;
+  }
 }
 
 void FeatureTracker::drop_crowded(std::vector<Step>& steps) {

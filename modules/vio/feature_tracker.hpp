@@ -46,6 +46,7 @@ struct TrackerStatistics {
 /// 4. New corners are added, first in cells without features.
 /// 5. StereoMatcher matches left points to the right image, starting at the depth that the motion
 ///    predicts. With an RGB-D rig DepthMatcher computes the observations of a virtual right camera.
+/// 6. The bearings of a rolling shutter (TrackerConfig::readout_s) are moved to the stamp.
 class FeatureTracker {
  public:
   /// `has_gyro`: a gyroscope measures the rotations of track(). Otherwise they are extrapolated,
@@ -107,6 +108,7 @@ class FeatureTracker {
   void add_corners(const ImagePyramid& left);
   void match_right(const ImagePyramid& left, const StereoFrame& frame);
   [[nodiscard]] TrackedFrame output() const;
+  void unroll(const SE3& T_previous_current, double dt_s, TrackedFrame& frame) const;
 
   StereoRig rig_;
   TrackerConfig config_;

@@ -17,6 +17,7 @@ struct TrackerConfig {
   double max_epipolar_px = 1.5;
   double max_reprojection_px = 1.5;
   double min_depth_m = 0.3;
+  double readout_s = 0.0;
   int seed = 1;
 
   void visit_fields(auto& visitor) {
@@ -45,6 +46,10 @@ struct TrackerConfig {
     visitor.field(
         "min_depth_m", min_depth_m, {0.02, 10.0},
         "[m] smallest depth: of the stereo search, and of values of a depth image that are used");
+    visitor.field(
+        "readout_s", readout_s, {0.0, 0.1},
+        "[s] time from the first to the last row of an image with a rolling shutter, whose "
+        "stamp is that of the middle row; 0: global shutter");
     visitor.field("seed", seed, {0, 2147483647}, "seed of the random samples");
   }
 };

@@ -156,6 +156,62 @@ TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
   CHECK(quantile(errors_px, 0.95) < 0.2);
 }
 
+// Each row is that of an image at its own time, as a rolling shutter makes it.
+GrayImage rolled(const StereoRig& rig, const TexturedPlane& plane, std::size_t side, int frame,
+                 double readout_frames) {
+  constexpr int kBands = 24;  // rows of a band share one pose
+  GrayImage image;
+  for (int band = 0; band < kBands; ++band) {
+    const double late = readout_frames * ((band + 0.5) / kBands - 0.5);
+    const SE3 pose = se3_exp((frame + late) * twist(0, 0, 0, 0.02, 0.01, 0));
+    const StereoFrame at = plane.render(rig, pose, 0);
+    const GrayImage& whole = side == 0 ? at.left : at.right;
+    if (band == 0) image = whole;
+    const auto rows = static_cast<std::size_t>(whole.height / kBands * whole.width);
+    std::copy_n(whole.pixels.begin() + static_cast<std::ptrdiff_t>(band * rows), rows,
+                image.pixels.begin() + static_cast<std::ptrdiff_t>(band * rows));
+  }
+  return image;
+}
+
+TEST_CASE("Bearings of a rolling shutter are moved to the stamp", "[vio]") {
+  const StereoRig rig = test_rig();
+  constexpr double kDepth_m = 2.0, kReadoutFrames = 0.6;
+  const TexturedPlane plane{kDepth_m, 0.06, 3};
+  TrackerConfig config = small_image_config();
+  FeatureTracker as_exposed(rig, config);
+  config.readout_s = kReadoutFrames * 1e-9 * static_cast<double>(kFrameNs);
+  FeatureTracker at_stamp(rig, config);
+  TrackedFrame exposed, moved;
+  constexpr int kLast = 3;
+  for (int i = 0; i <= kLast; ++i) {
+    const StereoFrame frame{i * kFrameNs, rolled(rig, plane, 0, i, kReadoutFrames),
+                            rolled(rig, plane, 1, i, kReadoutFrames)};
+    exposed = as_exposed.track(frame, Eigen::Matrix3d::Identity());
+    moved = at_stamp.track(frame, Eigen::Matrix3d::Identity());
+  }
+  REQUIRE(exposed.features.size() == moved.features.size());
+  std::vector<double> shifts_px, errors_px, right_errors_px;
+  for (std::size_t k = 0; k < moved.features.size(); ++k) {
+    const Eigen::Vector2d& bearing = exposed.features[k].left;
+    const double row = rig.cameras[0].project(bearing).value().y();
+    const double late = kReadoutFrames * ((row + 0.5) / rig.cameras[0].height - 0.5);
+    const SE3 T_world_exposed = se3_exp((kLast + late) * twist(0, 0, 0, 0.02, 0.01, 0));
+    const Eigen::Vector3d p_world = T_world_exposed * (kDepth_m * bearing.homogeneous());
+    const Eigen::Vector3d p_cam = sideways(kLast).inverse() * p_world;
+    const double f = rig.cameras[0].fx;
+    shifts_px.push_back(f * (bearing - p_cam.hnormalized()).norm());
+    errors_px.push_back(f * (moved.features[k].left - p_cam.hnormalized()).norm());
+    if (!moved.features[k].right) continue;
+    const Eigen::Vector3d p_right = p_cam - Eigen::Vector3d(rig.baseline_m(), 0.0, 0.0);
+    right_errors_px.push_back(f * (*moved.features[k].right - p_right.hnormalized()).norm());
+  }
+  REQUIRE(right_errors_px.size() > 40);
+  CHECK(quantile(shifts_px, 0.5) > 0.3);
+  CHECK(quantile(errors_px, 0.95) < 0.1);
+  CHECK(quantile(right_errors_px, 0.5) < 0.15);
+}
+
 TEST_CASE("Features with a motion of their own are dropped", "[vio]") {
   const StereoRig rig = test_rig();
   const TexturedPlane plane;
