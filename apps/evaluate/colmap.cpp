@@ -32,8 +32,7 @@ struct ColmapCommand {
 };
 
 void write_image(const fs::path& file, const GrayImage& image) {
-  constexpr int kLevel = 1;  // higher levels cost five times the time for a tenth of the size
-  const std::vector<std::uint8_t> png = encode_png(view(image), kLevel);
+  const std::vector<std::uint8_t> png = encode_png(view(image));
   write_file(file, {reinterpret_cast<const char*>(png.data()), png.size()});
 }
 

@@ -92,8 +92,7 @@ fs::path numbered(const fs::path& file, std::size_t view) {
 }
 
 void write_png(const fs::path& file, const cv::Mat3b& picture) {
-  constexpr int kLevel = 6;
-  const std::vector<std::uint8_t> bytes = encode_png(picture, kLevel);
+  const std::vector<std::uint8_t> bytes = encode_png(picture);
   write_output(file, [&](std::ostream& out) {
     out.write(reinterpret_cast<const char*>(bytes.data()),
               static_cast<std::streamsize>(bytes.size()));

@@ -8,7 +8,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "modules/core/input_file.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 #include "modules/recordings/open_bag.hpp"
@@ -78,13 +77,13 @@ void read_folder(const RobotPlan& plan, const Wanted& wanted, const Take& take,
   ReaderReport report;
   for (const StereoPairFile& file : is_euroc ? list_euroc_lefts(find_mav0(plan.dataset), report)
                                              : read_image_folder(plan.dataset, rig).frames)
-    if (const auto at = wanted.find(file.stamp + nanoseconds(offset_s)); at != wanted.end()) try {
-        take(at->second, decode_pixels(read_input_file(file.left), DecodedPixels::kEightBits));
-      } catch (const InputFileError& error) {
+    if (const auto at = wanted.find(file.stamp + nanoseconds(offset_s)); at != wanted.end()) {
+      try {
+        take(at->second, read_pixels(file.left, DecodedPixels::kEightBits));
+      } catch (const std::runtime_error& error) {
         problems.emplace_back(error.what());
-      } catch (const ImageCodecError& error) {
-        problems.push_back(file.left.string() + ": " + error.what());
       }
+    }
 }
 
 void read_bag(const RobotPlan& plan, const Wanted& wanted, const Take& take) {

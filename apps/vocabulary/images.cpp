@@ -51,14 +51,6 @@ std::vector<fs::path> expand(const fs::path& input) {
   return {input};
 }
 
-cv::Mat gray_pixels(const fs::path& image) {
-  try {
-    return decode_pixels(read_input_file(image), DecodedPixels::kGray);
-  } catch (const ImageCodecError& error) {
-    throw std::runtime_error(image.string() + ": cannot be decoded as an image: " + error.what());
-  }
-}
-
 }  // namespace
 
 std::vector<fs::path> list_images(const std::vector<std::string>& inputs, int stride) {
@@ -87,7 +79,7 @@ Stamp stamp_of_image(const std::filesystem::path& image) {
 }
 
 std::vector<BinaryDescriptor> image_descriptors(const std::filesystem::path& image, int features) {
-  const cv::Mat grey = gray_pixels(image);
+  const cv::Mat grey = read_pixels(image, DecodedPixels::kGray);
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
   make_keypoint_extractor(features)->detectAndCompute(grey, cv::noArray(), keypoints, descriptors);

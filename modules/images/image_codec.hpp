@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <opencv2/core.hpp>
 #include <stdexcept>
 #include <string_view>
@@ -9,8 +10,8 @@
 namespace km {
 
 // PNG and JPEG files in memory. No other format is decoded: each decoder is code that images from
-// the network can attack. cv::imdecode() offers some twenty, and the libraries of these take 0.2 s
-// of processor time at the start of every program that links them.
+// the network can attack. cv::imdecode() offers many more, and the libraries of these take a tenth
+// of a second of processor time at the start of every program that links them.
 
 /// Says why an image cannot be decoded or encoded.
 class ImageCodecError : public std::runtime_error {
@@ -31,9 +32,16 @@ constexpr int kMaxImageSide_px = 16384;
 /// changes pixels. Throws ImageCodecError.
 [[nodiscard]] cv::Mat decode_pixels(std::string_view file, DecodedPixels pixels);
 
-/// Encodes a CV_8UC1, CV_16UC1, CV_8UC3 (BGR) or CV_8UC4 (BGRA) image without loss. `level` is that
-/// of zlib, 1 (fast) to 9 (small). Throws ImageCodecError.
-[[nodiscard]] std::vector<std::uint8_t> encode_png(const cv::Mat& image, int level);
+/// Decodes a file on disk. what() of its ImageCodecError begins with the file's name. Throws
+/// InputFileError for a file that cannot be read.
+[[nodiscard]] cv::Mat read_pixels(const std::filesystem::path& file, DecodedPixels pixels);
+
+/// The upper 8 bits of a CV_16UC1 image.
+[[nodiscard]] cv::Mat upper_bytes(const cv::Mat& image);
+
+/// Encodes a CV_8UC1, CV_16UC1, CV_8UC3 (BGR) or CV_8UC4 (BGRA) image without loss. Throws
+/// ImageCodecError.
+[[nodiscard]] std::vector<std::uint8_t> encode_png(const cv::Mat& image);
 
 /// Encodes a CV_8UC1 or CV_8UC3 (BGR) image; `quality` is 1 to 100. Colours have half the
 /// resolution of brightness (4:2:0). Throws ImageCodecError.

@@ -98,7 +98,7 @@ class EurocCopy {
   }
 
   static void write_changed(const Image& image, const std::filesystem::path& to) {
-    cv::Mat pixels = read_image(image.file, DecodedPixels::kGray);
+    cv::Mat pixels = read_pixels(image.file, DecodedPixels::kGray);
     pixels.convertTo(pixels, CV_8U, image.gain, image.level);  // saturates
     write_png(to, pixels);
   }

@@ -5,19 +5,14 @@
 #include <string_view>
 #include <vector>
 
-#include "modules/core/input_file.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/images/image_codec.hpp"
 
 namespace km {
 
 inline void write_png(const std::filesystem::path& file, const cv::Mat& pixels) {
-  const std::vector<std::uint8_t> bytes = encode_png(pixels, 1);
+  const std::vector<std::uint8_t> bytes = encode_png(pixels);
   write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-}
-
-inline cv::Mat read_image(const std::filesystem::path& file, DecodedPixels pixels) {
-  return decode_pixels(read_input_file(file), pixels);
 }
 
 inline cv::Mat decoded(const std::vector<std::uint8_t>& file, DecodedPixels pixels) {

@@ -60,7 +60,7 @@ TEST_CASE("colmap writes the keyframes of a run that have images", "[evaluate]")
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
   CHECK_THAT(result.output, Catch::Contains("2 of 3 keyframes have an image"));
-  CHECK(read_image(output / "images/alice/10050000000.png", DecodedPixels::kGray)
+  CHECK(read_pixels(output / "images/alice/10050000000.png", DecodedPixels::kGray)
             .at<std::uint8_t>(5, 5) == 20);
   CHECK(std::filesystem::exists(output / "images/alice/10150000000.png"));
   const std::string images = folder.read("out/sparse/0/images.txt");

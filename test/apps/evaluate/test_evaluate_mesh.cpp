@@ -113,13 +113,13 @@ TEST_CASE("render draws one picture per view", "[evaluate]") {
   REQUIRE(result.exit_code == 0);
   const std::string second = (meshes.folder.path() / "out_2.png").string();
   CHECK(result.output == meshes.png.string() + '\n' + second + '\n');
-  const cv::Mat3b top = read_image(meshes.png, DecodedPixels::kEightBits);
+  const cv::Mat3b top = read_pixels(meshes.png, DecodedPixels::kEightBits);
   CHECK(top.cols == 320);
   CHECK(top.rows > 240);
   // The floor's red, away from the path; and the picture from within.
   const cv::Vec3b floor = top(60, 100);
   CHECK(static_cast<int>(floor[2]) > 2 * static_cast<int>(floor[1]) + 20);
-  CHECK(read_image(second, DecodedPixels::kEightBits).cols == 320);
+  CHECK(read_pixels(second, DecodedPixels::kEightBits).cols == 320);
 }
 
 TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]") {
@@ -137,7 +137,7 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
                                     meshes.png.string() + ' ' + arguments);
     CAPTURE(result.output);
     REQUIRE(result.exit_code == 0);
-    return cv::Mat3b(read_image(meshes.png, DecodedPixels::kEightBits)).rowRange(0, 240).clone();
+    return cv::Mat3b(read_pixels(meshes.png, DecodedPixels::kEightBits)).rowRange(0, 240).clone();
   };
   const cv::Mat3b expected =
       top("--mesh " + meshes.truth.string() + " --trajectory " + upright.string());

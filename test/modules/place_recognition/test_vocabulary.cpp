@@ -404,7 +404,7 @@ TEST_CASE("The tool names unusable input and fails", "[place_recognition]") {
   check_fails("train -o " + at + "/v /nowhere", "/nowhere does not exist");
   check_fails("train -o " + at + "/v " + at, "holds no image");
   folder.write("broken.png", "no image");
-  check_fails("train -o " + at + "/v " + at, "broken.png: cannot be decoded as an image: neither a PNG");
+  check_fails("train -o " + at + "/v " + at, "broken.png: neither a PNG nor a JPEG file");
   check_fails("train -k 1 -o " + at + "/v " + at + "/broken.png", "branching = 1 is outside");
   check_fails("inspect config/vocabulary/README.md", "not a vocabulary");
   check_fails("", "subcommand is required");

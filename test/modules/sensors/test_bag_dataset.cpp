@@ -394,6 +394,20 @@ TEST_CASE("Images of every common encoding become the same grey", "[sensors][bag
   CHECK(gray.image.pixels == std::vector<std::uint8_t>(kWidth * kHeight, 90));
 }
 
+TEST_CASE("The grey of 16 bits is their higher byte", "[sensors][bag]") {
+  RosImage message = image(kFirst, 0);
+  message.encoding = "mono16";
+  message.step = 2 * kWidth;
+  message.data.clear();
+  for (std::size_t k = 0; k < kWidth * kHeight; ++k)
+    message.data.insert(message.data.end(), {0, static_cast<std::uint8_t>(k)});  // k * 256
+  const BagChannel channel{"/left", "sensor_msgs/msg/Image", "cdr", 1};
+  const auto gray =
+      gray_of_message(channel, {0, kFirst, encode_ros(message)}, "here", {kWidth, kHeight});
+  REQUIRE(gray.image.pixels.size() == kWidth * kHeight);
+  for (std::size_t k = 0; k < kWidth * kHeight; ++k) CHECK(gray.image.pixels[k] == k);
+}
+
 TEST_CASE("The name of a Bayer pattern determines the place of its colours", "[sensors][bag]") {
   // A red scene: only red pixels are bright.
   RosImage message = image(kFirst, 0);

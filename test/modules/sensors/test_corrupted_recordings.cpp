@@ -20,7 +20,7 @@ constexpr std::int64_t kDay_ns = 86'400'000'000'000;
 
 // Bytes of a PNG file whose header says `width` x `height`, with too few bytes after it.
 std::string png_of(std::uint32_t width, std::uint32_t height) {
-  const std::vector<std::uint8_t> encoded = encode_png(cv::Mat(24, 32, CV_8UC1, cv::Scalar(7)), 1);
+  const std::vector<std::uint8_t> encoded = encode_png(cv::Mat(24, 32, CV_8UC1, cv::Scalar(7)));
   std::string bytes(encoded.begin(), encoded.end());
   for (std::size_t i = 0; i < 4; ++i) {
     bytes[16 + i] = static_cast<char>(width >> (24 - 8 * i));
@@ -211,8 +211,7 @@ TEST_CASE("A corrupted image gives an image of the right size or none", "[sensor
   CAPTURE(is_jpeg);
   cv::Mat pixels(24, 32, CV_8UC1);
   cv::randu(pixels, 0, 255);
-  const std::vector<std::uint8_t> encoded =
-      is_jpeg ? encode_jpeg(pixels, 95) : encode_png(pixels, 9);
+  const std::vector<std::uint8_t> encoded = is_jpeg ? encode_jpeg(pixels, 95) : encode_png(pixels);
   const TemporaryFolder folder;
   check_corrupted<DatasetError>(
       {encoded.begin(), encoded.end()}, "", [&](const std::string& bytes) {

@@ -10,7 +10,6 @@ namespace km {
 namespace {
 
 constexpr int kJpegQuality = 92;
-constexpr int kPngLevel = 1;  // higher levels cost five times the time for a tenth of the size
 
 void require_size(int width, int height, std::size_t pixels) {
   if (width <= 0 || height <= 0 ||
@@ -21,8 +20,7 @@ void require_size(int width, int height, std::size_t pixels) {
 }
 
 std::vector<std::uint8_t> encode(const cv::Mat& image, ImageFormat format) {
-  return format == ImageFormat::kJpeg ? encode_jpeg(image, kJpegQuality)
-                                      : encode_png(image, kPngLevel);
+  return format == ImageFormat::kJpeg ? encode_jpeg(image, kJpegQuality) : encode_png(image);
 }
 
 }  // namespace

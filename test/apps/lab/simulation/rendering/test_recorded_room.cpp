@@ -116,7 +116,7 @@ TEST_CASE("Rendered images of the Vicon room are like those recorded in it",
   for (const Stamp stamp : recorded_stamps(keyframes)) {
     const auto image = [&](const char* camera) {
       return gray_image(
-          read_image(keyframes / (std::to_string(stamp) + camera), DecodedPixels::kGray));
+          read_pixels(keyframes / (std::to_string(stamp) + camera), DecodedPixels::kGray));
     };
     recorded.add({stamp, image("_0.jpg"), image("_1.jpg")});
     rendered.add(cameras.take(stamp));
