@@ -1,7 +1,6 @@
 #include "modules/vio/window_optimizer.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -208,12 +207,15 @@ void WindowEquations::add_landmark(const WindowLandmark& landmark, bool keyframe
     couplings_.push_back(coupling);
   }
   V.diagonal() *= 1.0 + damping_;
-  V.diagonal().array() += 1e-9;  // a landmark at infinity keeps its distance
-  const Eigen::Matrix3d V_inverse = V.inverse();
-  const Eigen::Vector3d step = V_inverse * b;
+  // A landmark at infinity keeps its distance. The relative part makes V definite where the images
+  // do not determine the distance. The inverse of such a V would be rounding errors, and not its
+  // product with W.
+  V.diagonal().array() += 1e-9 + 1e-12 * V.trace();
+  const Eigen::LLT<Eigen::Matrix3d> llt(V);
+  const Eigen::Vector3d step = llt.solve(b);
   for (std::size_t k = first; k < couplings_.size(); ++k) {
     Coupling& row = couplings_[k];
-    row.Y.noalias() = row.W * V_inverse;
+    row.Y = llt.solve(row.W.transpose()).transpose();
     const auto at = 6 * static_cast<Eigen::Index>(row.frame);
     images_g_.segment<6>(at).noalias() -= row.W * step;
     for (std::size_t m = first; m <= k; ++m)

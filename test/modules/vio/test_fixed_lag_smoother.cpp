@@ -285,6 +285,41 @@ TEST_CASE("Biases and a varied motion are estimated from exact data", "[vio]") {
   CHECK((run.states.back().accel_bias - motion.accel_bias).norm() < 1e-2);
 }
 
+// Two images from one place determine the direction of a near landmark, and not its distance.
+TEST_CASE("A landmark without distance ties the rotations of images, and is no fault", "[vio]") {
+  std::mt19937 rng(11);
+  for (int k = 0; k < 200; ++k) {
+    Window window;
+    window.views[0] = view_model(synthetic_rig().stereo.cameras[0], 0.7);
+    const SE3 T_odom_body = random_pose(rng, 100.0);
+    const Eigen::Vector3d p_cam = 0.1 * (Eigen::Vector3d::UnitZ() + 0.3 * random_vector<3>(rng));
+    WindowLandmark& landmark = window.landmarks.emplace_back();
+    landmark.p_odom = T_odom_body * (synthetic_rig().stereo.cameras[0].T_body_cam * p_cam);
+    landmark.located = true;
+    for (std::size_t frame = 0; frame < 2; ++frame) {
+      window.frames.emplace_back().state.T_odom_body = T_odom_body;
+      window.frames.back().keyframe = true;
+      landmark.observations.push_back({frame, {p_cam.hnormalized(), std::nullopt}});
+    }
+    WindowEquations equations(window, 0.0);
+    equations.add_landmark(landmark, true);
+    equations.add_images();
+    const Eigen::MatrixXd H = equations.H().selfadjointView<Eigen::Lower>();
+    REQUIRE(H.allFinite());
+    const auto information = [&](const Vector6& first, const Vector6& second) {
+      Eigen::VectorXd dx = Eigen::VectorXd::Zero(30);
+      dx.head<6>() = first;
+      dx.segment<6>(15) = second;
+      return dx.dot(H * dx);
+    };
+    const double observed = window.views[0].weight * window.views[0].weight;
+    Vector6 turn = Vector6::Zero();
+    turn.head<3>() = random_vector<3>(rng).normalized();
+    CHECK(information(turn, turn) == Approx(0.0).margin(1e-3 * observed));
+    CHECK(information(turn, -turn) > -1e-3 * observed);
+  }
+}
+
 TEST_CASE("The window stays bounded and its prior covers keyframes only", "[vio]") {
   SyntheticWorld world(SyntheticMotion{}, 3);
   const VioConfig config = gaussian_config();
