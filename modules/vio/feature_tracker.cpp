@@ -18,6 +18,7 @@ namespace {
 
 constexpr float kMinPatchCorrelation = 0.85F;  // Least correlation of a track with its patch.
 constexpr float kMaxCorrectionPx = 2.0F;       // Largest correction of KLT by the patch.
+constexpr double kMinDepthRatio = 0.1;         // Below it a point is nearly behind the camera.
 constexpr int kSearchEvery = 4;  // A feature without a depth is searched in every fourth image.
 constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a propagated depth beyond it is discarded.
 constexpr float kMinSpacing = 0.4F;        // Share of min_distance_px to which tracks may approach.
@@ -179,7 +180,6 @@ double FeatureTracker::depth_guess(const Track& track) const {
 Eigen::Vector2f FeatureTracker::predicted_px(const Track& track, double inverse_depth,
                                              const SE3& T_previous_current) const {
   const Eigen::Vector3d X = transfer({track.left, inverse_depth, track.left}, T_previous_current);
-  constexpr double kMinDepthRatio = 0.1;  // Nearly behind the camera: no prediction.
   if (X.z() < kMinDepthRatio) return track.px;
   const auto px = rig_.cameras[0].project_ray(X);
   return px ? px->cast<float>() : track.px;
@@ -341,12 +341,12 @@ void FeatureTracker::unroll(const SE3& T_previous_current, double dt_s, TrackedF
   const auto late_s = [this](const Camera& camera, double row) {
     return config_.readout_s * ((row + 0.5) / camera.height - 0.5);
   };
-  constexpr double kMinDepthRatio = 0.1;  // Nearly behind the camera: no velocity.
+  const SE3 T_current_previous = T_previous_current.inverse();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const Track& track = tracks_[i];
     TrackedFeature& feature = frame.features[i];
-    const Eigen::Vector3d before = T_previous_current.linear() * track.left.homogeneous() +
-                                   depth_guess(track) * T_previous_current.translation();
+    const Eigen::Vector3d before =
+        transfer({track.left, depth_guess(track), track.left}, T_current_previous);
     if (before.z() < kMinDepthRatio) continue;
     const Eigen::Vector2d velocity = (track.left - before.hnormalized()) / dt_s;
     feature.left -= late_s(rig_.cameras[0], track.px.y()) * velocity;
