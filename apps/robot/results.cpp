@@ -132,7 +132,9 @@ CamerasSummary cameras_of(const UncertainCalibration& known) {
           .translation_x_m = T.translation().x(),
           .translation_y_m = T.translation().y(),
           .translation_z_m = T.translation().z(),
-          .translation_sigma_m = sigma(known.covariance.block<3, 3>(4, 4))};
+          .translation_sigma_m = sigma(known.covariance.block<3, 3>(4, 4)),
+          .readout_s = known.calibration.readout_s,
+          .readout_sigma_s = std::sqrt(known.covariance(7, 7))};
 }
 
 OdometrySummary odometry_of(const VioStatistics& met) {

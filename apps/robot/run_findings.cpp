@@ -316,6 +316,7 @@ void add_cameras(const RunSummary& run, std::vector<Finding>& findings) {
   const CamerasSummary& found = *run.cameras;
   constexpr double kSure = 3.0;  // standard deviations
   constexpr double kOffset_s = 2e-3, kLargeOffset_s = 1e-2, kRotation_rad = 8.7e-3;
+  constexpr double kReadout_s = 3e-3;
   if (std::abs(found.offset_s) > std::max(kOffset_s, kSure * found.offset_sigma_s))
     findings.push_back({.id = "cameras.offset",
                         .severity = std::abs(found.offset_s) < kLargeOffset_s ? Severity::kNote
@@ -326,6 +327,16 @@ void add_cameras(const RunSummary& run, std::vector<Finding>& findings) {
                                 ") off those of the inertial sensor",
                         .means = "it was estimated and made good, but for the start of the run",
                         .to_do = "camera_time_offset_s in the rig file"});
+  if (found.readout_s > std::max(kReadout_s, kSure * found.readout_sigma_s))
+    findings.push_back({.id = "cameras.rolling",
+                        .severity = Severity::kNote,
+                        .what = run.name + ": the rows of an image are exposed over " +
+                                fixed(1e3 * found.readout_s, 1) + " ms (+- " +
+                                fixed(1e3 * found.readout_sigma_s, 1) +
+                                ") more than tracker.readout_s states",
+                        .means = "a rolling shutter; odometry has estimated and corrected it, but "
+                                 "for the start of the run",
+                        .to_do = "add the difference to tracker.readout_s"});
   const double rotation_rad =
       Eigen::Vector3d(found.rotation_x_rad, found.rotation_y_rad, found.rotation_z_rad).norm();
   if (rotation_rad > std::max(kRotation_rad, kSure * found.rotation_sigma_rad))

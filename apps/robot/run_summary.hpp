@@ -150,6 +150,8 @@ struct CamerasSummary {
   double rotation_sigma_rad = 0.0;
   double translation_x_m = 0.0, translation_y_m = 0.0, translation_z_m = 0.0;
   double translation_sigma_m = 0.0;
+  /// Readout time of rolling shutters beyond tracker.readout_s.
+  double readout_s = 0.0, readout_sigma_s = 0.0;
 
   void visit_fields(auto& visitor) {
     visitor.field("offset_s", offset_s);
@@ -162,6 +164,8 @@ struct CamerasSummary {
     visitor.field("translation_y_m", translation_y_m);
     visitor.field("translation_z_m", translation_z_m);
     visitor.field("translation_sigma_m", translation_sigma_m);
+    visitor.field("readout_s", readout_s);
+    visitor.field("readout_sigma_s", readout_sigma_s);
   }
   bool operator==(const CamerasSummary&) const = default;
 };

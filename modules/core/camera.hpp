@@ -27,6 +27,10 @@ struct Camera {
 
   /// Bearing of a distorted pixel [px]; nullopt if no bearing of the lens has that pixel.
   [[nodiscard]] std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
+
+  /// Time by which a rolling shutter exposes row `y` [px] later than the middle row, as a share of
+  /// the readout time: -0.5 .. 0.5 in the image.
+  [[nodiscard]] double row_time(double y) const { return (y + 0.5) / height - 0.5; }
 };
 
 /// Source of the depth of single image points.

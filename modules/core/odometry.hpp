@@ -61,6 +61,10 @@ struct LocatedFrame {
   SE3 T_odom_body = SE3::Identity();
   /// Correction of the rig with which the pose was estimated, see CameraCalibration.
   SE3 T_body_rig = SE3::Identity();
+  /// Time from the first to the last row of the image, as for TrackerConfig::readout_s.
+  double readout_s = 0.0;
+  /// Motion of the body at that time, [rotation; translation] in the body frame [rad/s; m/s].
+  Vector6 twist_body = Vector6::Zero();
 };
 
 }  // namespace km

@@ -33,7 +33,8 @@ void describe(auto& archive, As<KeyframeOdometry> auto& keyframe) {
     archive.require(is_usable(covariance));
   });
   archive.optional(keyframe.calibration, [&](auto& known) {
-    archive(known.calibration.offset_s, known.calibration.T_body_rig, known.covariance);
+    archive(known.calibration.offset_s, known.calibration.T_body_rig, known.calibration.readout_s,
+            known.covariance);
   });
 }
 

@@ -81,7 +81,7 @@ struct DeformationNoise {
 /// Conditions under which solve() ends.
 struct DeformationStop {
   int max_iterations = 30;
-  double energy_tolerance = 1e-7;  ///< A step changed the energy by less than this share.
+  double energy_tolerance = 1e-5;  ///< A step changed the energy by less than this share.
 };
 
 /// Poses of all vertices of the graph.

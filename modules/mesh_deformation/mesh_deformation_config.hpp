@@ -20,7 +20,7 @@ struct MeshDeformationConfig {
   double mesh_edge_m = 0.05;
   double keyframe_edge_m = 0.02;
   int max_iterations = 30;
-  double energy_tolerance = 1e-7;
+  double energy_tolerance = 1e-5;
   double min_move_m = 0.01;
   double min_rotation_rad = 0.005;
   double period_s = 2.0;
@@ -58,7 +58,7 @@ struct MeshDeformationConfig {
     visitor.field("max_iterations", max_iterations, {1, 1000},
                   "largest number of iterations of one solution");
     visitor.field("energy_tolerance", energy_tolerance, {1e-15, 0.1},
-                  "share of the energy; the solver stops after a step that changes less. At 1e-7 "
+                  "share of the energy; the solver stops after a step that changes less. At 1e-5 "
                   "vertices are within a millimetre of the minimum");
     visitor.field("min_move_m", min_move_m, {1e-6, 100.0},
                   "[m] motion of a keyframe relative to the others after which the mesh is "

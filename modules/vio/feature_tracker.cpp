@@ -337,10 +337,6 @@ TrackedFrame FeatureTracker::output() const {
 // that the motion since the image before gives them. A row is exposed later than the middle row by
 // its share of the readout time.
 void FeatureTracker::unroll(const SE3& T_previous_current, double dt_s, TrackedFrame& frame) const {
-  if (!(config_.readout_s > 0.0)) return;
-  const auto late_s = [this](const Camera& camera, double row) {
-    return config_.readout_s * ((row + 0.5) / camera.height - 0.5);
-  };
   const SE3 T_current_previous = T_previous_current.inverse();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const Track& track = tracks_[i];
@@ -349,10 +345,13 @@ void FeatureTracker::unroll(const SE3& T_previous_current, double dt_s, TrackedF
         transfer({track.left, depth_guess(track), track.left}, T_current_previous);
     if (before.z() < kMinDepthRatio) continue;
     const Eigen::Vector2d velocity = (track.left - before.hnormalized()) / dt_s;
-    feature.left -= late_s(rig_.cameras[0], track.px.y()) * velocity;
+    feature.left_by_readout = rig_.cameras[0].row_time(track.px.y()) * velocity;
+    feature.left -= config_.readout_s * feature.left_by_readout;
     if (!feature.right) continue;
     const auto px = rig_.cameras[1].project(*feature.right);
-    if (px) *feature.right -= late_s(rig_.cameras[1], px->y()) * velocity;
+    if (!px) continue;
+    feature.right_by_readout = rig_.cameras[1].row_time(px->y()) * velocity;
+    *feature.right -= config_.readout_s * feature.right_by_readout;
   }
 }
 

@@ -157,7 +157,7 @@ void FixedLagSmoother::set_calibration_prior(const UncertainCalibration& known) 
 // Removes frames, landmarks and prior. Keeps the estimated calibration if it is plausible.
 void FixedLagSmoother::clear() {
   const UncertainCalibration known = calibration();
-  const Vector7 moved = CameraCalibration{}.local_coordinates_to(known.calibration);
+  const CalibrationVector moved = CameraCalibration{}.local_coordinates_to(known.calibration);
   const bool possible =
       known.covariance.llt().info() == Eigen::Success &&
       moved.dot(calibration_prior().llt().solve(moved)) < kMostCalibration * kMostCalibration;
@@ -474,9 +474,10 @@ void FixedLagSmoother::hold_calibration() {
   prior.calibration = window_.calibration;
   if (prior.calibrates) {
     const Eigen::Index rows = prior.J.rows(), columns = prior.J.cols();
-    prior.J.conservativeResizeLike(Eigen::MatrixXd::Zero(rows + 7, columns + 7));
-    prior.J.bottomRightCorner<7, 7>() =
-        calibration_covariance_.llt().matrixL().solve(Matrix7::Identity());
+    prior.J.conservativeResizeLike(
+        Eigen::MatrixXd::Zero(rows + kCalibrationSize, columns + kCalibrationSize));
+    prior.J.bottomRightCorner<kCalibrationSize, kCalibrationSize>() =
+        calibration_covariance_.llt().matrixL().solve(CalibrationMatrix::Identity());
   }
   prior.r = Eigen::VectorXd::Zero(prior.J.rows());
 }
@@ -484,22 +485,23 @@ void FixedLagSmoother::hold_calibration() {
 UncertainCalibration FixedLagSmoother::calibration() const {
   UncertainCalibration result{window_.calibration, calibration_covariance_};
   if (!window_.calibrates || window_.frames.empty()) return result;
-  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(variables(), 7);
-  D_T.bottomRows<7>().setIdentity();
+  Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(variables(), kCalibrationSize);
+  D_T.bottomRows<kCalibrationSize>().setIdentity();
   if (const auto Sigma = covariance_of(std::move(D_T))) result.covariance = *Sigma;
   return result;
 }
 
-Matrix7 FixedLagSmoother::calibration_prior() const {
-  Vector7 sigma;
+CalibrationMatrix FixedLagSmoother::calibration_prior() const {
+  CalibrationVector sigma;
   sigma << config_.calibration_offset_s,
       Eigen::Vector3d::Constant(config_.calibration_rotation_rad),
-      Eigen::Vector3d::Constant(config_.calibration_translation_m);
+      Eigen::Vector3d::Constant(config_.calibration_translation_m), config_.calibration_readout_s;
   return sigma.cwiseAbs2().asDiagonal();
 }
 
 Eigen::Index FixedLagSmoother::variables() const {
-  return 15 * static_cast<Eigen::Index>(window_.frames.size()) + (window_.calibrates ? 7 : 0);
+  return 15 * static_cast<Eigen::Index>(window_.frames.size()) +
+         (window_.calibrates ? kCalibrationSize : 0);
 }
 
 bool FixedLagSmoother::slide(bool rests) {

@@ -122,7 +122,7 @@ class FixedLagSmoother {
   void hold_calibration();
   [[nodiscard]] double first_offset_s(const InertialFrame& frame) const;
   [[nodiscard]] double next_offset_s(const InertialFrame& frame) const;
-  [[nodiscard]] Matrix7 calibration_prior() const;
+  [[nodiscard]] CalibrationMatrix calibration_prior() const;
   [[nodiscard]] Eigen::Index variables() const;
   // Covariance of D times the error of all frames; `D_T` is the transpose of D.
   [[nodiscard]] std::optional<Eigen::MatrixXd> covariance_of(Eigen::MatrixXd D_T) const;
@@ -136,7 +136,7 @@ class FixedLagSmoother {
   Eigen::Matrix3d R_cam_body_;
   SE3 T_body_left_;
   Window window_;
-  Matrix7 calibration_covariance_;  // Covariance at the start of the window.
+  CalibrationMatrix calibration_covariance_;  // Covariance at the start of the window.
   std::uint64_t next_id_ = 0;
 };
 

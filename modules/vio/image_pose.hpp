@@ -14,7 +14,8 @@ struct ImagePose {
   SE3 T_odom_body = SE3::Identity();
   /// Derivative of the rotation by that of the state, and of the translation by that of the state.
   Eigen::Matrix3d by_state = Eigen::Matrix3d::Identity();
-  /// Derivative by the delta of CameraCalibration::retracted(). The images cannot distinguish a
+  /// Derivative by the delta of CameraCalibration::retracted(), except for the readout time, which
+  /// does not move the image. The images cannot distinguish a
   /// motion of the cameras relative to the body from the same motion of the body. The derivative by
   /// the mounting is therefore that by the pose itself, the identity.
   Eigen::Matrix<double, 6, 7> by_calibration;

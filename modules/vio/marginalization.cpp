@@ -70,7 +70,8 @@ Eigen::VectorXd prior_offset(const StatePrior& prior, std::span<const OdometrySt
       dx.segment<9>(6) << states[k]->v_odom - from.v_odom, states[k]->gyro_bias - from.gyro_bias,
           states[k]->accel_bias - from.accel_bias;
   }
-  if (prior.calibrates) dx.tail<7>() = prior.calibration.local_coordinates_to(calibration);
+  if (prior.calibrates)
+    dx.tail<kCalibrationSize>() = prior.calibration.local_coordinates_to(calibration);
   return dx;
 }
 

@@ -26,7 +26,7 @@ struct SquareRootPrior {
                                           Eigen::Index count);
 
 /// Prior of marginalised states on the oldest states of a window, a square-root prior on dx =
-/// [pose_0 (6), motion_0 (9), pose_1 (6), pose_2 (6), ..., calibration (7)]. dx are the retracted
+/// [pose_0 (6), motion_0 (9), pose_1 (6), pose_2 (6), ..., calibration (8)]. dx are the retracted
 /// differences to `linearization` and `calibration`. Only the first state has its velocity and
 /// biases in dx. The calibration is in dx only if `calibrates`.
 struct StatePrior {
@@ -41,7 +41,9 @@ struct StatePrior {
   [[nodiscard]] Eigen::Index states_dimension() const {
     return frames.empty() ? 0 : 9 + 6 * static_cast<Eigen::Index>(frames.size());
   }
-  [[nodiscard]] Eigen::Index dimension() const { return states_dimension() + (calibrates ? 7 : 0); }
+  [[nodiscard]] Eigen::Index dimension() const {
+    return states_dimension() + (calibrates ? kCalibrationSize : 0);
+  }
 };
 
 /// dx of StatePrior for the current `states`, one for each of prior.frames, and calibration.

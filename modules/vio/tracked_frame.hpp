@@ -15,6 +15,10 @@ struct TrackedFeature {
   Eigen::Vector2d left = Eigen::Vector2d::Zero();  ///< Bearing in the left camera.
   std::optional<Eigen::Vector2d> right;            ///< Bearing in the right camera, if matched.
   int length = 1;  ///< Number of images in which it has been tracked.
+  /// Derivative of each bearing by the readout time [1/s]: its image velocity times
+  /// Camera::row_time().
+  Eigen::Vector2d left_by_readout = Eigen::Vector2d::Zero();
+  Eigen::Vector2d right_by_readout = Eigen::Vector2d::Zero();
 };
 
 /// Output of the feature tracker for one image.

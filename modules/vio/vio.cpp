@@ -60,6 +60,7 @@ Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, cons
     : robot_(robot),
       rig_(rig),
       config_(config_for(rig, config)),
+      readout_s_(tracker.readout_s),
       tracker_(rig.stereo, tracker, rig.has_imu),
       smoother_(rig, config),
       rest_detector_(config_, rig.stereo.cameras[0].fx) {
@@ -367,8 +368,16 @@ void Vio::restart(Held held) {
 void Vio::locate(const OdometryState& state, const Frame& frame, VioResult& result) {
   if (const WindowFrame* keyframe = smoother_.frame_at(last_keyframe_->stamp))
     T_chain_odom_ = last_keyframe_->T_odom_kf * keyframe->state.T_odom_body.inverse();
-  result.frames.push_back({frame, last_keyframe_->id.index, T_chain_odom_ * state.T_odom_body,
-                           smoother_.window().calibration.T_body_rig});
+  const CameraCalibration& calibration = smoother_.window().calibration;
+  LocatedFrame& located = result.frames.emplace_back();
+  located.frame = frame;
+  located.keyframe = last_keyframe_->id.index;
+  located.T_odom_body = T_chain_odom_ * state.T_odom_body;
+  located.T_body_rig = calibration.T_body_rig;
+  located.readout_s = readout_s_ + calibration.readout_s;
+  if (const WindowFrame* newest = smoother_.frame_at(state.stamp))
+    located.twist_body << newest->gyro - state.gyro_bias,
+        state.T_odom_body.linear().transpose() * state.v_odom;
 }
 
 bool Vio::locates_points(const StereoFrame& frame) const {

@@ -132,6 +132,7 @@ class Vio {
   RobotId robot_;
   SensorRig rig_;
   VioConfig config_;
+  double readout_s_;  // as stated, without the estimated correction
   FeatureTracker tracker_;
   FixedLagSmoother smoother_;
   RestDetector rest_detector_;

@@ -25,6 +25,7 @@ struct VioConfig {
   double calibration_offset_s = 0.01;
   double calibration_rotation_rad = 0.01;
   double calibration_translation_m = 0.003;
+  double calibration_readout_s = 0.01;
   double start_s = 0.75;
   double start_timeout_s = 3.0;
   double rest_parallax_px = 1.0;
@@ -78,9 +79,10 @@ struct VioConfig {
         "or when at most this share of the features of the last keyframe is still tracked");
     visitor.field("keyframe_interval_s", keyframe_interval_s, {0.05, 5.0},
                   "[s] or when this time has passed");
-    visitor.field("calibrate", calibrate,
-                  "estimates corrections to the stamps and to the mounting of the cameras, common "
-                  "to both cameras");
+    visitor.field(
+        "calibrate", calibrate,
+        "estimates corrections to the stamps, to the mounting and to the readout time of the "
+        "cameras, common to both cameras");
     visitor.field("calibration_offset_s", calibration_offset_s, {1e-9, 1.0},
                   "[s] standard deviation of the correction to the stamps at the start; small: no "
                   "correction");
@@ -90,6 +92,9 @@ struct VioConfig {
     visitor.field(
         "calibration_translation_m", calibration_translation_m, {1e-9, 1.0},
         "[m] standard deviation of the correction to the mounting at the start, each axis");
+    visitor.field("calibration_readout_s", calibration_readout_s, {1e-9, 1.0},
+                  "[s] standard deviation of the correction to tracker.readout_s at the start; "
+                  "small: no correction");
     visitor.field(
         "start_s", start_s, {0.2, 5.0},
         "[s] duration of the images held back for a start; their poses are published after it");

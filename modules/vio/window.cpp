@@ -36,6 +36,12 @@ std::optional<Eigen::Vector3d> nearest_to_rays(const Window& window, std::span<c
   return ldlt.solve(b);
 }
 
+// Moves the bearings to the stamp for a readout time that is longer by `longer_s`.
+void move_by_readout(double longer_s, WindowObservation& observation) {
+  for (std::size_t c = 0; c < 2; ++c)
+    if (observation.bearings[c]) *observation.bearings[c] -= longer_s * observation.by_readout[c];
+}
+
 struct PointEquations {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
@@ -82,6 +88,10 @@ std::vector<FirstEstimate> first_estimates(const Window& window) {
 }
 
 void calibrate(Window& window, const CameraCalibration& calibration) {
+  const double longer_s = calibration.readout_s - window.calibration.readout_s;
+  if (longer_s != 0.0)
+    for (WindowLandmark& landmark : window.landmarks)
+      for (WindowObservation& o : landmark.observations) move_by_readout(longer_s, o);
   window.calibration = calibration;
   const SE3 T_rig_body = calibration.T_body_rig.inverse();
   for (std::size_t c = 0; c < 2; ++c) {
@@ -109,7 +119,10 @@ void observe(Window& window, const TrackedFrame& tracked) {
   auto at = window.landmarks.begin();
   for (const TrackedFeature& feature :
        tracked.features) {  // both lists ascend, so one pass suffices
-    const WindowObservation observation{window.frames.size() - 1, {feature.left, feature.right}};
+    WindowObservation observation{window.frames.size() - 1,
+                                  {feature.left, feature.right},
+                                  {feature.left_by_readout, feature.right_by_readout}};
+    move_by_readout(window.calibration.readout_s, observation);
     while (at != window.landmarks.end() && at->id < feature.id) ++at;
     if (at != window.landmarks.end() && at->id == feature.id)
       at->observations.push_back(observation);

@@ -37,8 +37,11 @@ struct WindowFrame {
 
 /// Bearings of one landmark in one frame of the window.
 struct WindowObservation {
-  std::size_t frame = 0;                                   ///< Index into Window::frames.
-  std::array<std::optional<Eigen::Vector2d>, 2> bearings;  ///< Left, right.
+  std::size_t frame = 0;  ///< Index into Window::frames.
+  /// Left, right, at the stamp of the image: moved by the estimated readout time.
+  std::array<std::optional<Eigen::Vector2d>, 2> bearings;
+  /// See TrackedFeature::left_by_readout.
+  std::array<Eigen::Vector2d, 2> by_readout = {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
 };
 
 struct WindowLandmark {
@@ -68,7 +71,7 @@ struct Window {
 /// First estimates held by the prior, one entry for each frame.
 [[nodiscard]] std::vector<FirstEstimate> first_estimates(const Window& window);
 
-/// Sets the calibration and updates the views.
+/// Sets the calibration, and updates the views and the bearings of all observations.
 void calibrate(Window& window, const CameraCalibration& calibration);
 
 /// Pose of the body when the image of `frame` was taken, for its state `state`.

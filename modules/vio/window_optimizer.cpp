@@ -117,11 +117,12 @@ WindowEquations::WindowEquations(const Window& window, double damping)
   }
   images_ = image_poses(window);
   const auto frames = static_cast<Eigen::Index>(window.frames.size());
-  const auto n = 15 * frames + (window.calibrates ? 7 : 0);
+  const auto n = 15 * frames + (window.calibrates ? kCalibrationSize : 0);
+  const auto images = 6 * frames + (window.calibrates ? 1 : 0);
   H_.setZero(n, n);
   g_.setZero(n);
-  images_H_.setZero(6 * frames, 6 * frames);
-  images_g_.setZero(6 * frames);
+  images_H_.setZero(images, images);
+  images_g_.setZero(images);
   couplings_.reserve(8 * window.landmarks.size());
   eliminated_.reserve(window.landmarks.size());
 }
@@ -143,8 +144,8 @@ void WindowEquations::add_prior() {
                      15 * static_cast<Eigen::Index>(frame_index(window_, prior.frames[k])),
                      k == 0 ? 15 : 6});
   if (prior.calibrates)
-    spans.push_back(
-        {prior.states_dimension(), 15 * static_cast<Eigen::Index>(window_.frames.size()), 7});
+    spans.push_back({prior.states_dimension(),
+                     15 * static_cast<Eigen::Index>(window_.frames.size()), kCalibrationSize});
   for (const Span& row : spans) {
     g_.segment(row.to, row.size) += g.segment(row.from, row.size);
     for (const Span& col : spans)
@@ -175,69 +176,95 @@ void WindowEquations::add_landmark(const WindowLandmark& landmark, bool keyframe
     return !keyframes_only || window_.frames[o.frame].keyframe;
   };
   if (std::count_if(landmark.observations.begin(), landmark.observations.end(), counts) < 2) return;
-  Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  PointTerms point;
   const std::size_t first = couplings_.size();
+  for (const WindowObservation& o : landmark.observations)
+    if (counts(o)) add_observation(o, landmark.p_odom, point);
+  eliminated_.push_back({static_cast<std::size_t>(&landmark - window_.landmarks.data()),
+                         Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), first,
+                         couplings_.size() - first});
+  eliminate(point, eliminated_.back());
+}
+
+void WindowEquations::add_observation(const WindowObservation& o, const Eigen::Vector3d& p_odom,
+                                      PointTerms& point) {
+  const auto at = 6 * static_cast<Eigen::Index>(o.frame), last = images_g_.size() - 1;
+  Coupling coupling{o.frame, Eigen::Matrix<double, 6, 3>::Zero(),
+                    Eigen::Matrix<double, 6, 3>::Zero()};
+  Matrix6 A = Matrix6::Zero();
+  Vector6 a = Vector6::Zero();
   ReprojectionTerm term;
-  for (const WindowObservation& o : landmark.observations) {
-    if (!counts(o)) continue;
-    const SE3& T = images_[o.frame];
-    const SE3& T_linearization = image_linearization_[o.frame].T_odom_body;
-    const auto at = 6 * static_cast<Eigen::Index>(o.frame);
-    Coupling coupling{o.frame, Eigen::Matrix<double, 6, 3>::Zero(),
-                      Eigen::Matrix<double, 6, 3>::Zero()};
-    Matrix6 A = Matrix6::Zero();
-    Vector6 a = Vector6::Zero();
-    for (std::size_t c = 0; c < 2; ++c) {
-      if (!o.bearings[c] || !linearize_reprojection(window_.views[c], *o.bearings[c], T,
-                                                    T_linearization, landmark.p_odom, term))
-        continue;
-      const double s = term.r.squaredNorm();
-      const double w = cauchy_weight(s, window_.loss_scale);
-      cost_ += 0.5 * cauchy(s, window_.loss_scale);
-      const Eigen::Matrix<double, 6, 2> wJ_T = w * term.J_pose.transpose();
-      A.noalias() += wJ_T * term.J_pose;
-      a.noalias() += wJ_T * term.r;
-      coupling.W.noalias() += wJ_T * term.J_point;
-      V.noalias() += w * term.J_point.transpose() * term.J_point;
-      b.noalias() += w * term.J_point.transpose() * term.r;
-    }
-    images_H_.block<6, 6>(at, at) += A;
-    images_g_.segment<6>(at) += a;
-    couplings_.push_back(coupling);
+  for (std::size_t c = 0; c < 2; ++c) {
+    const ViewModel& view = window_.views[c];
+    if (!o.bearings[c] ||
+        !linearize_reprojection(view, *o.bearings[c], images_[o.frame],
+                                image_linearization_[o.frame].T_odom_body, p_odom, term))
+      continue;
+    const double s = term.r.squaredNorm();
+    const double w = cauchy_weight(s, window_.loss_scale);
+    cost_ += 0.5 * cauchy(s, window_.loss_scale);
+    const Eigen::Matrix<double, 6, 2> wJ_T = w * term.J_pose.transpose();
+    A.noalias() += wJ_T * term.J_pose;
+    a.noalias() += wJ_T * term.r;
+    coupling.W.noalias() += wJ_T * term.J_point;
+    point.V.noalias() += w * term.J_point.transpose() * term.J_point;
+    point.b.noalias() += w * term.J_point.transpose() * term.r;
+    if (!window_.calibrates) continue;
+    const Eigen::Vector2d J_readout = view.weight * o.by_readout[c];
+    images_H_.block<1, 6>(last, at) += (wJ_T * J_readout).transpose();
+    images_H_(last, last) += w * J_readout.squaredNorm();
+    images_g_(last) += w * J_readout.dot(term.r);
+    point.by_readout.noalias() += w * term.J_point.transpose() * J_readout;
   }
+  images_H_.block<6, 6>(at, at) += A;
+  images_g_.segment<6>(at) += a;
+  couplings_.push_back(coupling);
+}
+
+void WindowEquations::eliminate(PointTerms& point, Eliminated& landmark) {
+  Eigen::Matrix3d& V = point.V;
   V.diagonal() *= 1.0 + damping_;
   // A landmark at infinity keeps its distance. The relative part makes V definite where the images
   // do not determine the distance. The inverse of such a V would be rounding errors, and not its
   // product with W.
   V.diagonal().array() += 1e-9 + 1e-12 * V.trace();
   const Eigen::LLT<Eigen::Matrix3d> llt(V);
-  const Eigen::Vector3d step = llt.solve(b);
-  for (std::size_t k = first; k < couplings_.size(); ++k) {
+  landmark.step = llt.solve(point.b);
+  const auto last = images_g_.size() - 1;
+  if (window_.calibrates) {
+    landmark.by_readout = llt.solve(point.by_readout);
+    images_H_(last, last) -= landmark.by_readout.dot(point.by_readout);
+    images_g_(last) -= landmark.step.dot(point.by_readout);
+  }
+  for (std::size_t k = landmark.first; k < couplings_.size(); ++k) {
     Coupling& row = couplings_[k];
     row.Y = llt.solve(row.W.transpose()).transpose();
     const auto at = 6 * static_cast<Eigen::Index>(row.frame);
-    images_g_.segment<6>(at).noalias() -= row.W * step;
-    for (std::size_t m = first; m <= k; ++m)
+    images_g_.segment<6>(at).noalias() -= row.W * landmark.step;
+    if (window_.calibrates)
+      images_H_.block<1, 6>(last, at).noalias() -= (row.W * landmark.by_readout).transpose();
+    for (std::size_t m = landmark.first; m <= k; ++m)
       images_H_.block<6, 6>(at, 6 * static_cast<Eigen::Index>(couplings_[m].frame)).noalias() -=
           row.Y * couplings_[m].W.transpose();
   }
-  eliminated_.push_back({static_cast<std::size_t>(&landmark - window_.landmarks.data()), step,
-                         first, couplings_.size() - first});
 }
 
-// The poses at the images follow from states and calibration, dx_image = M dx + B dc.
+// The poses at the images follow from states and calibration, dx_image = M dx + B dc. The readout
+// time, the last row of B, moves bearings and not the images.
 void WindowEquations::add_images() {
   const auto frames = static_cast<Eigen::Index>(window_.frames.size());
   Eigen::MatrixXd H = images_H_.selfadjointView<Eigen::Lower>();
   Eigen::VectorXd& g = images_g_;
   if (window_.calibrates) {
-    Eigen::MatrixXd B(6 * frames, 7);
+    constexpr int kSize = kCalibrationSize;
+    Eigen::MatrixXd B = Eigen::MatrixXd::Zero(6 * frames + 1, kSize);
     for (Eigen::Index k = 0; k < frames; ++k)
-      B.middleRows<6>(6 * k) = image_linearization_[static_cast<std::size_t>(k)].by_calibration;
+      B.block<6, kSize - 1>(6 * k, 0) =
+          image_linearization_[static_cast<std::size_t>(k)].by_calibration;
+    B(6 * frames, kSize - 1) = 1.0;
     Eigen::MatrixXd HB = H * B;
-    H_.bottomRightCorner<7, 7>().noalias() += B.transpose() * HB;
-    g_.tail<7>().noalias() += B.transpose() * g;
+    H_.bottomRightCorner<kSize, kSize>().noalias() += B.transpose() * HB;
+    g_.tail<kSize>().noalias() += B.transpose() * g;
     for (Eigen::Index half = 0; half < 2 * frames; ++half) {
       const Eigen::Matrix3d& M = image_linearization_[static_cast<std::size_t>(half / 2)].by_state;
       HB.middleRows<3>(3 * half) = (M.transpose() * HB.middleRows<3>(3 * half)).eval();
@@ -246,7 +273,7 @@ void WindowEquations::add_images() {
       g.segment<3>(3 * half) = (M.transpose() * g.segment<3>(3 * half)).eval();
     }
     for (Eigen::Index k = 0; k < frames; ++k)
-      H_.block<7, 6>(15 * frames, 15 * k) += HB.middleRows<6>(6 * k).transpose();
+      H_.block<kSize, 6>(15 * frames, 15 * k) += HB.middleRows<6>(6 * k).transpose();
   }
   for (Eigen::Index k = 0; k < frames; ++k) {
     g_.segment<6>(15 * k) += g.segment<6>(6 * k);
@@ -260,7 +287,7 @@ Vector6 WindowEquations::image_step(const Eigen::VectorXd& dx, std::size_t frame
   if (!window_.calibrates) return step;
   const ImagePose& image = image_linearization_[frame];
   step << image.by_state * step.head<3>(), image.by_state * step.tail<3>();
-  return step + image.by_calibration * dx.tail<7>();
+  return step + image.by_calibration * dx.tail<kCalibrationSize>().head<kCalibrationSize - 1>();
 }
 
 void WindowEquations::add_all() {
@@ -282,11 +309,13 @@ Eigen::VectorXd WindowEquations::solve() const {
 void WindowEquations::apply(const Eigen::VectorXd& dx, Window& target) const {
   for (const Eliminated& e : eliminated_) {
     Eigen::Vector3d step = e.step;
+    if (window_.calibrates) step += dx(dx.size() - 1) * e.by_readout;
     for (std::size_t k = e.first; k < e.first + e.count; ++k)
       step.noalias() += couplings_[k].Y.transpose() * image_step(dx, couplings_[k].frame);
     target.landmarks[e.landmark].p_odom -= step;
   }
-  if (target.calibrates) calibrate(target, target.calibration.retracted(dx.tail<7>()));
+  if (target.calibrates)
+    calibrate(target, target.calibration.retracted(dx.tail<kCalibrationSize>()));
   for (std::size_t k = 0; k < target.frames.size(); ++k) {
     const auto at = 15 * static_cast<Eigen::Index>(k);
     OdometryState& state = target.frames[k].state;

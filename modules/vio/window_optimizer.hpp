@@ -11,7 +11,7 @@ namespace km {
 
 /// Gauss-Newton normal equations of a Window, H dx = -g, over its frames, with every landmark
 /// eliminated as it is added (Schur complement). Frame k has the columns 15 k: pose (6), velocity,
-/// gyro bias, accelerometer bias. If the window calibrates, 7 columns of the calibration follow
+/// gyro bias, accelerometer bias. If the window calibrates, 8 columns of the calibration follow
 /// those of the frames. Derivatives by a state that the prior holds are taken at its first
 /// estimate. Reprojection errors have a Cauchy loss, applied as a weight.
 class WindowEquations {
@@ -47,11 +47,13 @@ class WindowEquations {
   void apply(const Eigen::VectorXd& dx, Window& target) const;
 
  private:
-  // An eliminated landmark: dl = -(V_inverse b + sum V_inverse W_k^T dx_k).
+  // An eliminated landmark: dl = -(V_inverse b + sum V_inverse W_k^T dx_k), over the images and the
+  // readout time.
   struct Eliminated {
     std::size_t landmark = 0;
-    Eigen::Vector3d step = Eigen::Vector3d::Zero();  // V_inverse b
-    std::size_t first = 0, count = 0;                // range in couplings_
+    Eigen::Vector3d step = Eigen::Vector3d::Zero();        // V_inverse b
+    Eigen::Vector3d by_readout = Eigen::Vector3d::Zero();  // V_inverse W^T of the readout time
+    std::size_t first = 0, count = 0;                      // range in couplings_
   };
   // Hessian between a landmark and the pose of one image.
   struct Coupling {
@@ -60,6 +62,16 @@ class WindowEquations {
     Eigen::Matrix<double, 6, 3> Y;  // W V_inverse
   };
 
+  // The terms of a landmark that is to be eliminated.
+  struct PointTerms {
+    Eigen::Matrix3d V = Eigen::Matrix3d::Zero();           // Hessian
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();           // gradient
+    Eigen::Vector3d by_readout = Eigen::Vector3d::Zero();  // Hessian with the readout time
+  };
+
+  void add_observation(const WindowObservation& o, const Eigen::Vector3d& p_odom,
+                       PointTerms& point);
+  void eliminate(PointTerms& point, Eliminated& landmark);
   [[nodiscard]] Vector6 image_step(const Eigen::VectorXd& dx, std::size_t frame) const;
 
   const Window& window_;
@@ -67,8 +79,9 @@ class WindowEquations {
   std::vector<OdometryState> linearization_;  // linearisation point of each frame
   std::vector<SE3> images_;                   // pose of the body at the image of each frame
   std::vector<ImagePose> image_linearization_;
-  Eigen::MatrixXd images_H_;  // Hessian over the pose of each image (6 rows each), landmarks
-                              // eliminated
+  // Hessian over the pose of each image (6 rows each) and, if the window calibrates, the readout
+  // time (last row), landmarks eliminated.
+  Eigen::MatrixXd images_H_;
   Eigen::VectorXd images_g_;
   Eigen::MatrixXd H_;
   Eigen::VectorXd g_;

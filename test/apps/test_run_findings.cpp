@@ -223,6 +223,12 @@ TEST_CASE("A finding on a run is reported with its number", "[robot][findings]")
     summary.cameras->offset_sigma_s = 0.002;  // it may be none
     CHECK(findings_of_one(run).empty());
   }
+  SECTION("rolling shutter") {
+    summary.cameras = CamerasSummary{.readout_s = 0.0151, .readout_sigma_s = 0.001};
+    check_finding("cameras.rolling", Severity::kNote, "15.1 ms (+- 1.0)");
+    summary.cameras->readout_sigma_s = 0.006;  // it may be none
+    CHECK(findings_of_one(run).empty());
+  }
   SECTION("cameras turned") {
     summary.cameras = CamerasSummary{.rotation_y_rad = 0.0349, .rotation_sigma_rad = 0.001};
     check_finding("cameras.turned", Severity::kWarning, "2.00 degrees");

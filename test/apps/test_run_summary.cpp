@@ -84,6 +84,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/cameras/offset_s /cameras/offset_sigma_s /cameras/rotation_x_rad /cameras/rotation_y_rad "
         "/cameras/rotation_z_rad /cameras/rotation_sigma_rad /cameras/translation_x_m "
         "/cameras/translation_y_m /cameras/translation_z_m /cameras/translation_sigma_m "
+        "/cameras/readout_s /cameras/readout_sigma_s "
         "/mapping/frames /mapping/dropped_under_load /mapping/skipped_wrong_size "
         "/mapping/skipped_bad_pose "
         "/mapping/skipped_too_late /mapping/without_labels /mapping/label_pixels_outside_palette "

@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "modules/loop_closure/rolling_shutter.hpp"
+
 namespace km {
 namespace {
 
@@ -14,7 +16,8 @@ constexpr std::size_t kFrameQueue = 64;
 KeyframeFeaturesNode::KeyframeFeaturesNode(const KeyframeFeaturesConfig& config,
                                            const StereoRig& rig,
                                            const KeyframeFeaturesTopics& topics)
-    : extractor_(rig, config),
+    : camera_(rig.cameras[0]),
+      extractor_(rig, config),
       keyframes_(topics.keyframes),
       worker_(
           kFrameQueue, Overflow::kBlock,
@@ -48,6 +51,7 @@ void KeyframeFeaturesNode::step(const LocatedFrame& located) {
   if (without_images_.empty() || without_images_.front().stamp != located.frame->stamp) return;
   KeyframeFeatures features = extractor_.extract(*located.frame);
   features.T_body_cam = located.T_body_rig * features.T_body_cam;
+  unroll(camera_, located.readout_s, located.twist_body, features);
   Keyframe keyframe = std::move(without_images_.front());
   without_images_.pop_front();
   keyframe.features = std::move(features);

@@ -49,6 +49,7 @@ class KeyframeFeaturesNode final : public Node {
  private:
   using Input = std::variant<Topic<KeyframeOdometry>::Message, Topic<LocatedFrame>::Message>;
 
+  const Camera camera_;  // left
   const KeyframeFeatureExtractor extractor_;
   const Out<Keyframe> keyframes_;
   std::deque<Keyframe> without_images_;

@@ -12,13 +12,14 @@ CameraCalibration some_calibration(std::mt19937& rng) {
   CameraCalibration calibration;
   calibration.offset_s = 0.03 * random_vector<1>(rng)(0);
   calibration.T_body_rig = retract(SE3::Identity(), 0.3 * random_vector<6>(rng));
+  calibration.readout_s = 0.01 * random_vector<1>(rng)(0);
   return calibration;
 }
 
 TEST_CASE("local_coordinates_to() is the inverse of retracted()", "[calibration]") {
   std::mt19937 rng(1);
   const CameraCalibration calibration = some_calibration(rng);
-  const Vector7 delta = 0.1 * random_vector<7>(rng);
+  const CalibrationVector delta = 0.1 * random_vector<kCalibrationSize>(rng);
   CHECK((calibration.local_coordinates_to(calibration.retracted(delta)) - delta).norm() < 1e-12);
   CHECK(calibration.local_coordinates_to(calibration).norm() < 1e-12);
 }
@@ -36,9 +37,10 @@ TEST_CASE("A calibration on top of a correction moves cameras like both in turn"
   for (std::size_t c = 0; c < 2; ++c)
     CHECK(in_turn.cameras[c].T_body_cam.isApprox(at_once.cameras[c].T_body_cam));
   CHECK(both.offset_s == Approx(found.offset_s + correction.offset_s));
+  CHECK(both.readout_s == Approx(found.readout_s + correction.readout_s));
   CHECK(found.local_coordinates_to(both.without(correction)).norm() < 1e-12);
   // Both have the same covariance.
-  const Vector7 delta = 0.1 * random_vector<7>(rng);
+  const CalibrationVector delta = 0.1 * random_vector<kCalibrationSize>(rng);
   CHECK(
       (both.local_coordinates_to(found.retracted(delta).composed_with(correction)) - delta).norm() <
       1e-12);

@@ -37,9 +37,10 @@ KeyframeOdometry step(KeyframeIndex index, std::mt19937& rng) {
   if (index % 2 == 0) keyframe.vertical = Vertical{random_vector<3>(rng).normalized(), 0.01};
   if (index % 4 > 1) return keyframe;
   UncertainCalibration& known = keyframe.calibration.emplace();
-  known.calibration = {0.1 * random_vector<1>(rng)(0), random_pose(rng)};
-  for (int c = 0; c < 7; ++c) known.covariance.col(c) = random_vector<7>(rng);
-  known.covariance = Matrix7(known.covariance * known.covariance.transpose());
+  known.calibration = {0.1 * random_vector<1>(rng)(0), random_pose(rng), 0.01};
+  for (int c = 0; c < kCalibrationSize; ++c)
+    known.covariance.col(c) = random_vector<kCalibrationSize>(rng);
+  known.covariance = CalibrationMatrix(known.covariance * known.covariance.transpose());
   StateCovariance& covariance = keyframe.state_covariance.emplace();
   for (int c = 0; c < covariance.cols(); ++c) covariance.col(c) = random_vector<11>(rng);
   covariance = StateCovariance(covariance * covariance.transpose());

@@ -57,20 +57,27 @@ TEST_CASE("Derivatives of a reprojection by the calibration agree with differenc
   frame.gyro = motion.sample(1'000'000'000).gyro;
   frame.offset_s = 0.01;
   const Eigen::Vector3d p_odom = frame.state.T_odom_body * Eigen::Vector3d(3.0, 0.2, -0.4);
+  WindowObservation seen;
+  seen.bearings = {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  seen.by_readout = {random_vector<2>(rng), random_vector<2>(rng)};
+  window.landmarks.emplace_back().observations = {seen};
   for (const std::size_t c : {0U, 1U}) {
     const ImagePose image = image_pose(window, frame, frame.state);
     ReprojectionTerm term;
     REQUIRE(linearize_reprojection(window.views[c], Eigen::Vector2d::Zero(), image.T_odom_body,
                                    image.T_odom_body, p_odom, term));
-    const Eigen::MatrixXd numeric = numeric_jacobian<7>([&](const Vector7& d) -> Eigen::VectorXd {
-      Window moved = window;
-      calibrate(moved, calibration.retracted(d));
-      Eigen::Vector2d r;
-      REQUIRE(reprojection_error(moved.views[c], Eigen::Vector2d::Zero(), image_poses(moved)[0],
-                                 p_odom, r));
-      return r;
-    });
-    const Eigen::MatrixXd analytic = term.J_pose * image.by_calibration;
+    const Eigen::MatrixXd numeric =
+        numeric_jacobian<kCalibrationSize>([&](const CalibrationVector& d) -> Eigen::VectorXd {
+          Window moved = window;
+          calibrate(moved, calibration.retracted(d));
+          Eigen::Vector2d r;
+          REQUIRE(reprojection_error(moved.views[c],
+                                     *moved.landmarks[0].observations[0].bearings[c],
+                                     image_poses(moved)[0], p_odom, r));
+          return r;
+        });
+    Eigen::Matrix<double, 2, kCalibrationSize> analytic;
+    analytic << term.J_pose * image.by_calibration, window.views[c].weight * seen.by_readout[c];
     CHECK((analytic - numeric).norm() < 1e-5 * numeric.norm());
   }
 }
@@ -120,6 +127,45 @@ TEST_CASE("A time offset of the stamps is estimated", "[vio][calibration]") {
   CHECK(angle_of(calibration.T_body_rig.linear()) < 2e-3);
 }
 
+// Twelve seconds of a motion, seen by rolling shutters of this readout time.
+std::vector<InertialFrame> rolled_frames(SyntheticWorld& world, double readout_s) {
+  constexpr Stamp kSoon = 1'000'000;
+  auto frames = late_frames(world, 0);
+  for (InertialFrame& frame : frames) {
+    const Stamp stamp = frame.tracked.stamp;
+    std::map<std::uint64_t, TrackedFeature> soon;
+    for (const TrackedFeature& feature : world.frame(stamp, stamp + kSoon).tracked.features)
+      soon[feature.id] = feature;
+    const auto roll = [&](const Eigen::Vector2d& now, const Eigen::Vector2d& then) {
+      const Camera camera = synthetic_rig().stereo.cameras[0];
+      const double share = now.y() * camera.fy / camera.height;
+      return Eigen::Vector2d(share * (then - now) / seconds_between(0, kSoon));
+    };
+    for (TrackedFeature& feature : frame.tracked.features) {
+      const auto then = soon.find(feature.id);
+      if (then == soon.end()) continue;
+      feature.left_by_readout = roll(feature.left, then->second.left);
+      feature.left += readout_s * feature.left_by_readout;
+      if (!feature.right || !then->second.right) continue;
+      feature.right_by_readout = roll(*feature.right, *then->second.right);
+      *feature.right += readout_s * feature.right_by_readout;
+    }
+  }
+  return frames;
+}
+
+TEST_CASE("The readout time of a rolling shutter is estimated", "[vio][calibration]") {
+  const double readout_s = GENERATE(-0.01, 0.0, 0.015, 0.03);
+  CAPTURE(readout_s);
+  SyntheticWorld world(SyntheticMotion{}, 23);
+  const auto [calibration, covariance] =
+      estimated(rolled_frames(world, readout_s), world, synthetic_rig());
+  CHECK(calibration.readout_s == Approx(readout_s).margin(5e-4));
+  CHECK(std::sqrt(covariance(7, 7)) < 1e-3);
+  CHECK(std::abs(calibration.offset_s) < 5e-4);
+  CHECK(angle_of(calibration.T_body_rig.linear()) < 2e-3);
+}
+
 TEST_CASE("A rotation of the cameras is estimated", "[vio][calibration]") {
   const unsigned seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
@@ -142,6 +188,7 @@ TEST_CASE("The calibration of a body without motion does not change", "[vio][cal
   CHECK(std::abs(calibration.offset_s) < 1e-3);
   CHECK(angle_of(calibration.T_body_rig.linear()) < 5e-3);
   CHECK(std::sqrt(covariance(0, 0)) == Approx(VioConfig{}.calibration_offset_s).epsilon(0.1));
+  CHECK(std::sqrt(covariance(7, 7)) == Approx(VioConfig{}.calibration_readout_s).epsilon(0.1));
 }
 
 }  // namespace
