@@ -18,7 +18,7 @@ inline SE3 pose_in_room(RobotId robot, KeyframeIndex index) {
 inline std::vector<MeshChunk> room_chunks(RobotId robot, KeyframeIndex index, const SE3& T_error) {
   LabelledMesh mesh = inside_of_room();
   mesh.transform(T_error);
-  std::vector<MeshChunk> chunks = split_mesh(mesh, robot, 0, {}).chunks;
+  std::vector<MeshChunk> chunks = split_mesh(mesh, robot, 0, {.cell_m = 1.0}).chunks;
   const SE3 T_world_odom = make_pose(so3_exp({0, 0, 1.0}), {5, 6, 7});
   for (MeshChunk& chunk : chunks) {
     chunk.keyframes = {{index, RoundedPose::of(T_error * pose_in_room(robot, index))}};
