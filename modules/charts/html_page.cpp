@@ -35,7 +35,7 @@ std::string module_script(const std::vector<std::string_view>& sources) {
 }
 
 std::string data_uri(std::string_view type, std::string_view bytes) {
-  constexpr const char* kDigits =
+  constexpr const char* kBase64Digits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text = "data:" + std::string(type) + ";base64,";
   text.reserve(text.size() + (bytes.size() + 2) / 3 * 4);
@@ -44,7 +44,7 @@ std::string data_uri(std::string_view type, std::string_view bytes) {
     for (std::size_t k = 0; k < 3; ++k)
       group = (group << 8) | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
     for (std::size_t k = 0; k < 4; ++k)
-      text += i + k > bytes.size() ? '=' : kDigits[(group >> (18 - 6 * k)) & 63];
+      text += i + k > bytes.size() ? '=' : kBase64Digits[(group >> (18 - 6 * k)) & 63];
   }
   return text;
 }

@@ -61,7 +61,7 @@ ChanceMatch::ChanceMatch(std::span<const Landmark> a, std::span<const Landmark> 
     for (std::size_t j = i + 1; j < b.size(); ++j) {
       if (b[i].label != b[j].label) continue;
       const Eigen::Vector2d apart = to_axes * (b[i].center - b[j].center).head<2>();
-      for (const int axis : {0, 1}) apart_[axis].push_back(std::abs(apart(axis)));
+      for (const auto axis : {0U, 1U}) apart_[axis].push_back(std::abs(apart(axis)));
     }
   for (auto& distances : apart_) std::ranges::sort(distances);
   for (const Landmark& landmark : b) {
@@ -80,7 +80,7 @@ ChanceMatch::ChanceMatch(std::span<const Landmark> a, std::span<const Landmark> 
 // state that rows do not exist.
 double ChanceMatch::place_probability(double t_m) const {
   double probability = 1.0;
-  for (const int axis : {0, 1}) {
+  for (const auto axis : {0U, 1U}) {
     const auto& distances = apart_[axis];
     const auto near = std::ranges::upper_bound(distances, t_m) - distances.begin();
     const double share =

@@ -228,7 +228,7 @@ void BlockFusion::update(Row& row, float* distance, float* weight) const {
                                                     (w / (sum > 0.0F ? sum : 1.0F))
                                 : distance[i];
     moved |= mean != distance[i] ? 1U : 0U;
-    near_bits |= observed & (s > -near) & (s < near) ? 1U << i : 0U;
+    near_bits |= (observed & (s > -near) & (s < near)) ? 1U << i : 0U;
     distance[i] = mean;
     weight[i] = sum < max_weight ? sum : max_weight;
     row.observed_weight[i] = w;
@@ -290,7 +290,8 @@ bool BlockFusion::is_empty(const VoxelBlock& block) const {
   const float threshold = 0.75F * truncation_;
   std::uint32_t surface = 0;
   for (std::size_t i = 0; i < kBlockVoxels; ++i)
-    surface |= (block.weight[i] > 0.0F) & (block.distance[i] < threshold) ? 1U : 0U;
+    surface |= static_cast<std::uint32_t>(block.weight[i] > 0.0F) &
+               static_cast<std::uint32_t>(block.distance[i] < threshold);
   return surface == 0;
 }
 

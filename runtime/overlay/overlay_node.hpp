@@ -102,7 +102,7 @@ class OverlayNode final : public Node {
   template <OverlayLane kLane>
   [[nodiscard]] ContentGuard<LanePacket<kLane>> guard_packets() {
     return {.check = [this](const TeamPeer& sender, const auto& packet, auto /*content*/) {
-      return take(sender, packet);
+      return this->take(sender, packet);
     }};
   }
 

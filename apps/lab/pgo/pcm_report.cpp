@@ -35,7 +35,8 @@ double median_ms(Additions additions, double PcmAddition::*member) {
 // Sizes of the graph at which the table has a row: round numbers, and the last size.
 std::vector<std::size_t> row_sizes(std::size_t vertices) {
   std::size_t step = 1;
-  for (const std::size_t next : {2, 5, 10, 20, 50, 100, 250, 500, 1000, 2000, 5000, 10000})
+  for (const std::size_t next :
+       {2U, 5U, 10U, 20U, 50U, 100U, 250U, 500U, 1000U, 2000U, 5000U, 10000U})
     if (step * kRows < vertices) step = next;
   std::vector<std::size_t> sizes;
   for (std::size_t size = step; size < vertices; size += step) sizes.push_back(size);

@@ -126,7 +126,7 @@ void TrackStatistics::append_to(std::vector<ImageFigure>& figures) const {
   };
   add(survival_, "");
   add(strict_survival_, ", 0.5 px");
-  for (const std::size_t age : {10, 20, 40})
+  for (const std::size_t age : {10U, 20U, 40U})
     if (const auto found = survival_.find(age); found != survival_.end())
       survival.add_quantiles(std::to_string(age) + " frames", found->second, {10});
   std::string by_flow = std::to_string(kAgeByFlow);

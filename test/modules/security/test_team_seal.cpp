@@ -15,7 +15,7 @@ TEST_CASE("A message for one robot opens there and only there", "[security]") {
   introduce(a, b);
   introduce(a, c);
   introduce(b, c);
-  const std::size_t size = GENERATE(0, 1, 40, 2000, 30000);
+  const std::size_t size = GENERATE(as<std::size_t>(), 0, 1, 40, 2000, 30000);
   CAPTURE(size);
   const Octets content = toy_content(size);
   const SealContext context = toy_context(a, b.peer());
@@ -37,7 +37,7 @@ TEST_CASE("A message to all opens at every member", "[security]") {
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
   introduce(a, c);
-  const std::size_t size = GENERATE(0, 1, 40, 2000, 30000);
+  const std::size_t size = GENERATE(as<std::size_t>(), 0, 1, 40, 2000, 30000);
   CAPTURE(size);
   const Octets content = toy_content(size);
   const SealContext context = toy_context(a);

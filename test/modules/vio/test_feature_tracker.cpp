@@ -167,9 +167,8 @@ GrayImage rolled(const StereoRig& rig, const TexturedPlane& plane, std::size_t s
     const StereoFrame at = plane.render(rig, pose, 0);
     const GrayImage& whole = side == 0 ? at.left : at.right;
     if (band == 0) image = whole;
-    const auto rows = static_cast<std::size_t>(whole.height / kBands * whole.width);
-    std::copy_n(whole.pixels.begin() + static_cast<std::ptrdiff_t>(band * rows), rows,
-                image.pixels.begin() + static_cast<std::ptrdiff_t>(band * rows));
+    const std::ptrdiff_t rows = whole.height / kBands * whole.width;
+    std::copy_n(whole.pixels.begin() + band * rows, rows, image.pixels.begin() + band * rows);
   }
   return image;
 }

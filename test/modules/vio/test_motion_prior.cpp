@@ -157,7 +157,7 @@ TEST_CASE("Images alone: a loss of vision is extrapolated for a second, then odo
           "[vio][images]") {
   const Recording* const data = recording("euroc/MH_01_easy", 4.0);
   if (data == nullptr) return;
-  const std::size_t first = 30, last = GENERATE(38, 60);  // 0.4 s and 1.5 s
+  const std::size_t first = 30, last = GENERATE(as<std::size_t>(), 38, 60);  // 0.4 s and 1.5 s
   CAPTURE(last);
   const bool is_long = last == 60;
   const OdometryRun run =

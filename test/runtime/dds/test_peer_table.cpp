@@ -374,7 +374,7 @@ TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
                        Case{"it reports that it is older, to one that is not new", 1e6, 11.0,
                             PeerEventKind::kRefused}}));
   CAPTURE(what);
-  const std::uint64_t its_boot = GENERATE(70, 7000);
+  const std::uint64_t its_boot = GENERATE(as<std::uint64_t>(), 70, 7000);
   const auto events = meet_twin(kSelf, {1, "twin", kProtocolVersion, its_boot}, own_s, its_s, 30.0);
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == expected);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "apps/lab/simulation/world/canvas.hpp"
@@ -14,8 +13,6 @@ namespace {
 
 using Eigen::Vector2f;
 using Eigen::Vector3f;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 /// Brightness of each cell of a cell noise, drawn uniformly.
 std::vector<float> shades(int count, float low, float high, SeededRandom& random) {

@@ -304,10 +304,12 @@ void Scene::cylinder(const Vector3f& from, const Vector3f& to, float radius_from
                      int segments, MaterialId material, bool closed) {
   const float length = (to - from).norm();
   const Vector3f axis = (to - from) / length;
-  const auto [x, y] = across(axis);
+  const std::array<Vector3f, 2> sides = across(axis);
+  const Vector3f& x = sides[0];
+  const Vector3f& y = sides[1];
   const float slope = (radius_from - radius_to) / length;
   const float girth = kTwoPi * std::max(radius_from, radius_to);
-  const auto point = [&, x = x, y = y](int row, int column) {
+  const auto point = [&](int row, int column) {
     const float share = static_cast<float>(column) / static_cast<float>(segments);
     const Vector3f out = std::cos(kTwoPi * share) * x + std::sin(kTwoPi * share) * y;
     const float radius = row == 0 ? radius_from : radius_to;
