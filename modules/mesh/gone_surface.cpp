@@ -115,13 +115,20 @@ GoneSurface find_gone(const OwnViews& own, std::span<const TestedChunk> chunks, 
   GoneSurface result{.anchor = own.anchor, .cell_m = static_cast<float>(cell_m)};
   std::vector<SightPoint> points;
   std::vector<RobotId> owners;
+  std::vector<std::pair<RobotId, Eigen::Vector3f>> recent;  // without a later view
+  const KeyframeIndex newest = own.views.empty() ? 0 : own.views.back()->keyframe;
   for (const TestedChunk& chunk : chunks) {
     if (chunk.placed->anchor != own.anchor || chunk.arrived.size() != chunk.placed->vertices.size())
       continue;
     for (std::size_t v = 0; v < chunk.placed->vertices.size(); ++v) {
       if (!has_cell(chunk.placed->vertices[v], result.cell_m)) continue;
+      const RobotId owner = chunk.placed->chunk->key.robot;
+      if (chunk.arrived[v] >= newest) {
+        recent.emplace_back(owner, chunk.placed->vertices[v]);
+        continue;
+      }
       points.push_back({chunk.placed->vertices[v], chunk.arrived[v], 0});
-      owners.push_back(chunk.placed->chunk->key.robot);
+      owners.push_back(owner);
     }
   }
   SightVotes votes(points, cell_m);
@@ -138,9 +145,12 @@ GoneSurface find_gone(const OwnViews& own, std::span<const TestedChunk> chunks, 
               {&relative, 1});
   }
   const std::vector<bool> seen_through = votes.seen_through(least_views);
+  if (std::ranges::find(seen_through, true) == seen_through.end()) return result;
   CellMarks marks;
   for (std::size_t i = 0; i < points.size(); ++i)
     marks.mark(owners[i], place_of(points[i].position, result.cell_m), seen_through[i]);
+  for (const auto& [owner, position] : recent)
+    marks.mark(owner, place_of(position, result.cell_m), false);
   result.blocks = marks.gone();
   return result;
 }

@@ -1,15 +1,16 @@
 #include "modules/mesh/seen_through.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <unordered_map>
+
+#include "modules/mesh/vertex_clustering.hpp"
 
 namespace km {
 namespace {
 
-constexpr float kGroup_patches = 8.0F;  // side of the cell of a group
+constexpr double kGroup_patches = 8.0;  // side of the cell of a group
 
 // True if no part of a sphere is in the view, before its farthest depth.
 bool is_outside(const CoarseView& view, const Eigen::Vector3f& center_cam, float radius_m) {
@@ -32,22 +33,28 @@ Eigen::Array2d variances(const Matrix6& Sigma) {
 
 SightVotes::SightVotes(const std::vector<SightPoint>& points, double patch_m)
     : patch_m_(static_cast<float>(patch_m)), order_(points.size()), votes_(points.size()) {
-  std::vector<std::array<float, 3>> cells;
-  cells.reserve(points.size());
+  std::unordered_map<GridCell, std::uint32_t, GridCellHash> group_of_cell;
+  std::vector<std::uint32_t> group_of_point;
+  group_of_point.reserve(points.size());
   for (const SightPoint& point : points) {
-    const Eigen::Array3f cell = (point.position.array() / (kGroup_patches * patch_m_)).floor();
-    cells.push_back({cell.x(), cell.y(), cell.z()});
+    const GridCell cell = grid_cell(point.position.cast<double>(), kGroup_patches * patch_m);
+    const auto next = static_cast<std::uint32_t>(groups_.size());
+    const auto [group, is_new] = group_of_cell.try_emplace(cell, next);
+    if (is_new) groups_.emplace_back();
+    group_of_point.push_back(group->second);
+    ++groups_[group->second].end;
   }
-  std::iota(order_.begin(), order_.end(), 0U);
-  std::ranges::sort(order_, [&cells](auto a, auto b) {
-    return cells[a] != cells[b] ? cells[a] < cells[b] : a < b;
-  });
-  points_.reserve(points.size());
-  for (const std::uint32_t i : order_) {
-    if (points_.empty() || cells[i] != cells[order_[points_.size() - 1]])
-      groups_.push_back({.begin = points_.size()});
-    points_.push_back(points[i]);
-    groups_.back().end = points_.size();
+  std::size_t begin = 0;
+  for (Group& group : groups_) {
+    const std::size_t count = group.end;
+    group.begin = group.end = begin;
+    begin += count;
+  }
+  points_.resize(points.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const std::size_t place = groups_[group_of_point[i]].end++;
+    order_[place] = i;
+    points_[place] = points[i];
   }
   make_groups();
 }

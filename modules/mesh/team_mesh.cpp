@@ -73,6 +73,14 @@ std::vector<PlacedChunk> TeamMesh::placed() const {
   return all;
 }
 
+std::vector<PlacedChunk> TeamMesh::placed_of_peers(RobotId self) const {
+  std::vector<PlacedChunk> all;
+  for (const auto& [id, robot] : robots_)
+    for (const auto& [key, chunk] : robot.chunks)
+      if (id != self) all.push_back(place(chunk, robot.poses ? &*robot.poses : nullptr));
+  return all;
+}
+
 void TeamMesh::mark_gone(PlacedChunk& chunk) const {
   const RobotId owner = chunk.chunk->key.robot;
   for (const auto& [id, robot] : robots_) {

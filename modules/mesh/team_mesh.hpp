@@ -57,6 +57,10 @@ class TeamMesh {
   /// robots state to be gone. Valid until the next add().
   [[nodiscard]] std::vector<PlacedChunk> placed() const;
 
+  /// The chunks of all robots except for `self`, by their keys, where the newest poses place them.
+  /// Valid until the next add().
+  [[nodiscard]] std::vector<PlacedChunk> placed_of_peers(RobotId self) const;
+
   /// One mesh per robot, by ascending id, of the chunks as they were sent.
   [[nodiscard]] std::vector<RobotMesh> snapshot() const;
 

@@ -1,30 +1,16 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <unordered_map>
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "modules/mesh/seen_by.hpp"
+#include "modules/mesh/vertex_clustering.hpp"
 
 namespace km {
-
-/// First and last keyframe that saw a piece of surface.
-using SeenBy = std::array<KeyframeIndex, 2>;
-
-/// Keyframes between the last one that saw the earlier surface and the first one that saw the later
-/// surface; 0 if the two intervals overlap.
-[[nodiscard]] inline KeyframeIndex keyframe_gap(const SeenBy& a, const SeenBy& b) {
-  if (a[0] > b[1]) return a[0] - b[1];
-  if (b[0] > a[1]) return b[0] - a[1];
-  return 0;
-}
-
-/// Stands for "no node" and "no vertex" in lists of indices.
-inline constexpr std::uint32_t kNoIndex = std::numeric_limits<std::uint32_t>::max();
 
 /// A mesh vertex of the deformation graph: a vertex of the map's mesh that represents the surface
 /// around it.
@@ -35,27 +21,6 @@ struct MeshNode {
   /// Index in the map's mesh; kNoIndex after that vertex was removed.
   std::uint32_t vertex = kNoIndex;
 };
-
-/// A cell of a regular grid.
-using GridCell = std::array<std::int64_t, 3>;
-
-struct GridCellHash {
-  std::size_t operator()(const GridCell& cell) const noexcept {
-    // Large odd factors (of splitmix64 and the like) spread neighbouring cells.
-    const auto [x, y, z] = cell;
-    std::uint64_t h = static_cast<std::uint64_t>(x) * 0x9E3779B97F4A7C15U;
-    h = (h ^ (h >> 29U)) + static_cast<std::uint64_t>(y) * 0xBF58476D1CE4E5B9U;
-    h = (h ^ (h >> 32U)) + static_cast<std::uint64_t>(z) * 0x94D049BB133111EBU;
-    return h ^ (h >> 31U);
-  }
-};
-
-/// The cell of `point` on a grid of this width. Precondition: |point| / width < 2^63.
-[[nodiscard]] inline GridCell grid_cell(const Eigen::Vector3d& point, double width) {
-  const Eigen::Vector3d cell = (point / width).array().floor();
-  return {static_cast<std::int64_t>(cell.x()), static_cast<std::int64_t>(cell.y()),
-          static_cast<std::int64_t>(cell.z())};
-}
 
 /// Nodes by position, for searches within one radius while nodes are added.
 class NodeGrid {

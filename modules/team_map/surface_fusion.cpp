@@ -3,15 +3,18 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace km {
 namespace {
 
 // Vertices keep this distance [voxels] from the ends of their edges, so that no two coincide.
 constexpr float kMargin = 1e-3F;
+
+// Distances [voxels] that differ by less are equal.
+constexpr float kSame_voxels = 1e-4F;
 
 // The nearest point of a triangle (Ericson, "Real-Time Collision Detection", 2005, sec. 5.1.5).
 Eigen::Vector3f nearest_point(const std::array<Eigen::Vector3f, 3>& corners,
@@ -34,6 +37,15 @@ Eigen::Vector3f nearest_point(const std::array<Eigen::Vector3f, 3>& corners,
   if (va <= 0.0F && d4 >= d3 && d5 >= d6) return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
   const float scale = 1.0F / (va + vb + vc);
   return a + vb * scale * ab + vc * scale * ac;
+}
+
+// A sphere with all corners of a triangle. Its radius has a margin for rounding.
+std::pair<Eigen::Vector3f, float> bounding_sphere(const std::array<Eigen::Vector3f, 3>& corners) {
+  const Eigen::Vector3f center = (corners[0] + corners[1] + corners[2]) / 3.0F;
+  float radius2 = 0.0F;
+  for (const Eigen::Vector3f& corner : corners)
+    radius2 = std::max(radius2, (corner - center).squaredNorm());
+  return {center, 1.001F * std::sqrt(radius2)};
 }
 
 std::size_t index_of(int x, int y, int z, int side) {
@@ -82,7 +94,8 @@ void SurfaceFusion::observe(const RobotSurface::Triangle& triangle,
   const float length = across.norm();
   if (!(length > 0.0F)) return;
   const Eigen::Vector3f normal = across / length;
-  const float band_m = kBand_voxels * voxel_m_, same_m = 1e-4F * voxel_m_;
+  const float band_m = kBand_voxels * voxel_m_, same_m = kSame_voxels * voxel_m_;
+  const auto [center, radius_m] = bounding_sphere(triangle.corners);
   std::array<int, 3> low, high;
   for (int axis = 0; axis < 3; ++axis) {
     const auto [least, most] = std::minmax({a[axis], b[axis], c[axis]});
@@ -97,14 +110,17 @@ void SurfaceFusion::observe(const RobotSurface::Triangle& triangle,
     for (int y = low[1]; y <= high[1]; ++y)
       for (int x = low[0]; x <= high[0]; ++x) {
         const Eigen::Vector3f voxel = position(x, y, z);
+        Observation& now = observations[index_of(x, y, z, kCorners)];
+        const float before = std::abs(now.distance_m);
+        // Most triangles are farther away than another one: their bounding sphere shows it.
+        const float farthest = (now.cosine < 0.0F ? band_m : before + same_m) + radius_m;
+        if ((voxel - center).squaredNorm() > farthest * farthest) continue;
         if (std::abs(normal.dot(voxel - a)) > band_m) continue;
         const Eigen::Vector3f offset = voxel - nearest_point(triangle.corners, voxel);
         const float distance = offset.norm();
         if (distance > band_m) continue;
-        Observation& now = observations[index_of(x, y, z, kCorners)];
         const float height = normal.dot(offset);
         const float cosine = distance > same_m ? std::abs(height) / distance : 1.0F;
-        const float before = std::abs(now.distance_m);
         const bool nearer = now.cosine < 0.0F || distance < before - same_m;
         if (!nearer && !(distance <= before + same_m && cosine > now.cosine)) continue;
         now = {std::copysign(distance, height), cosine, normal, triangle.label};
@@ -148,24 +164,25 @@ void SurfaceFusion::blend(std::span<const std::vector<Observation>> robots) {
 
 FusedBox SurfaceFusion::extract() const {
   FusedBox box;
-  std::map<GridEdge, std::uint32_t> vertex_on;
+  constexpr std::uint32_t kNone = 0xFFFFFFFF;
+  std::vector<std::uint32_t> vertex_on(3 * fused_.size(), kNone);  // by voxel and axis
   const auto at = [&](int x, int y, int z) -> const Fused& {
     return fused_[index_of(x, y, z, kCorners)];
   };
   const auto vertex = [&](int x, int y, int z, int axis) {
-    const GridEdge edge{{first_[0] + x, first_[1] + y, first_[2] + z},
-                        static_cast<std::uint8_t>(axis)};
-    const auto [entry, is_new] =
-        vertex_on.try_emplace(edge, static_cast<std::uint32_t>(box.vertices.size()));
-    if (!is_new) return entry->second;
+    std::uint32_t& index =
+        vertex_on[3 * index_of(x, y, z, kCorners) + static_cast<std::size_t>(axis)];
+    if (index != kNone) return index;
+    index = static_cast<std::uint32_t>(box.vertices.size());
     const Fused& near = at(x, y, z);
     const Fused& far = at(x + (axis == 0), y + (axis == 1), z + (axis == 2));
     const float share =
         std::clamp(near.distance_m / (near.distance_m - far.distance_m), kMargin, 1.0F - kMargin);
-    box.edges.push_back(edge);
+    box.edges.push_back(
+        {{first_[0] + x, first_[1] + y, first_[2] + z}, static_cast<std::uint8_t>(axis)});
     box.vertices.push_back(position(x, y, z) + share * voxel_m_ * Eigen::Vector3f::Unit(axis));
     box.labels.push_back(share < 0.5F ? near.label : far.label);
-    return entry->second;
+    return index;
   };
   for (int z = 0; z < kSide; ++z)
     for (int y = 0; y < kSide; ++y)

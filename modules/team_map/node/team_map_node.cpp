@@ -107,11 +107,10 @@ void TeamMapNode::find_own_gone(double now_s) {
   GoneSurface gone;
   {
     const std::lock_guard lock(mutex_);
-    const std::vector<PlacedChunk> placed = chunks_.placed();
+    const std::vector<PlacedChunk> placed = chunks_.placed_of_peers(settings_.self);
     std::vector<TestedChunk> tested;
     for (const PlacedChunk& chunk : placed)
-      if (chunk.chunk->key.robot != settings_.self)
-        tested.push_back({&chunk, arrivals_.of(chunk.chunk->key)});
+      tested.push_back({&chunk, arrivals_.of(chunk.chunk->key)});
     gone = find_gone(*own_, tested, settings_.seen_through_views, settings_.voxel_m);
     gone.robot = settings_.self;
     if (gone.blocks != sent_.blocks || gone.anchor != sent_.anchor) chunks_.add(gone);
