@@ -213,7 +213,7 @@ class Splitter {
     for (; end < faces.size(); ++end) {
       std::size_t fresh = 0;
       for (const std::uint32_t v : faces[end]) fresh += part_of_vertex_[v] != part_ ? 1 : 0;
-      if (wire_bytes(vertices.size() + fresh, end + 1 - begin, !mesh_.labels.empty()) +
+      if (plain_bytes(vertices.size() + fresh, end + 1 - begin, !mesh_.labels.empty()) +
               views_.largest_bytes(vertices.size() + fresh) >
           kMaxChunkBytes)
         break;
@@ -340,7 +340,7 @@ const char* fault_of(const MeshChunk& chunk) {
   const std::size_t vertices = chunk.offsets.size();
   if (!chunk.labels.empty() && chunk.labels.size() != vertices)
     return "labels do not fit the vertices";
-  if (wire_bytes(chunk) > kMaxChunkBytes) return "a chunk that is too large";
+  if (plain_bytes(chunk) > kMaxChunkBytes) return "a chunk that is too large";
   for (const MeshChunk::Triple& face : chunk.faces)
     if (std::ranges::max(face) >= vertices) return "a face names a vertex which does not exist";
   if (chunk.faces.empty() != chunk.offsets.empty()) return "vertices without faces";

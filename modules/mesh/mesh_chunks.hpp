@@ -60,7 +60,7 @@ struct MeshChunk {
   bool operator==(const MeshChunk&) const = default;
 };
 
-/// Largest size of a chunk on the wire, with its envelope.
+/// Largest plain_bytes() of a chunk. On the wire it is packed (chunk_packing.hpp).
 inline constexpr std::size_t kMaxChunkBytes = 32000;
 
 /// Number of Views from one keyframe of a chunk to the next.
@@ -72,14 +72,17 @@ inline constexpr std::size_t kMaxChunkKeyframes = 256 / kViewsPerKeyframe;
 /// Bytes of MeshChunk::odometry on the wire, with padding.
 inline constexpr std::size_t kChunkOdometryBytes = kSurfaceKeyframeBytes;
 
-/// Upper bound on the bytes of a chunk on the wire, without keyframes and odometry.
-[[nodiscard]] constexpr std::size_t wire_bytes(std::size_t vertices, std::size_t faces,
-                                               bool labelled) {
-  constexpr std::size_t kFixed = 116;  // bytes of all fields that are not sequences, and padding
-  return kFixed + (labelled ? 7 : 6) * vertices + 6 * faces;
+/// Bytes of all fields of a chunk that are not sequences, with its envelope and padding: an upper
+/// bound.
+inline constexpr std::size_t kChunkFixedBytes = 116;
+
+/// Bytes of a chunk that is not packed, without keyframes and odometry.
+[[nodiscard]] constexpr std::size_t plain_bytes(std::size_t vertices, std::size_t faces,
+                                                bool labelled) {
+  return kChunkFixedBytes + (labelled ? 7 : 6) * vertices + 6 * faces;
 }
-[[nodiscard]] inline std::size_t wire_bytes(const MeshChunk& chunk) {
-  return wire_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
+[[nodiscard]] inline std::size_t plain_bytes(const MeshChunk& chunk) {
+  return plain_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
          kMeshKeyframeBytes * chunk.keyframes.size() + 2 * chunk.views.size() +
          (chunk.odometry ? kChunkOdometryBytes : 0);
 }

@@ -49,13 +49,13 @@ ChunkVerdict TeamMesh::add(MeshChunk chunk) {
   Robot& robot = *sender;
   const auto before = robot.chunks.find(chunk.key);
   std::size_t bytes = robot.bytes;
-  if (before != robot.chunks.end()) bytes -= wire_bytes(before->second);
+  if (before != robot.chunks.end()) bytes -= plain_bytes(before->second);
   if (chunk.empty()) {
     robot.bytes = bytes;
     if (before != robot.chunks.end()) robot.chunks.erase(before);
     return ChunkVerdict::kTaken;
   }
-  bytes += wire_bytes(chunk);
+  bytes += plain_bytes(chunk);
   if (bytes > max_bytes_per_robot_) return ChunkVerdict::kNoRoom;
   robot.bytes = bytes;
   robot.anchor = chunk.anchor;

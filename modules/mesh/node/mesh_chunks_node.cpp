@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "modules/mesh/chunk_packing.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
@@ -127,10 +128,11 @@ void MeshChunksNode::state_odometry(std::vector<MeshChunk>& chunks) const {
 void MeshChunksNode::send(double now_s) {
   send_poses(now_s);
   while (budget_bytes_.wait_s(0.0, now_s) <= 0.0) {
-    std::optional<MeshChunk> chunk = schedule_.next();
+    const std::optional<MeshChunk> chunk = schedule_.next();
     if (!chunk) return;
-    budget_bytes_.spend(static_cast<double>(wire_bytes(*chunk)), now_s);
-    topics_.chunks.publish(*std::move(chunk));
+    MeshChunk sent = sorted_in_space(*chunk);
+    budget_bytes_.spend(static_cast<double>(wire_bytes(sent)), now_s);
+    topics_.chunks.publish(std::move(sent));
   }
 }
 

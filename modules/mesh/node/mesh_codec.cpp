@@ -1,44 +1,15 @@
 #include "modules/mesh/node/mesh_codec.hpp"
 
 #include <algorithm>
-#include <array>
 #include <span>
 #include <utility>
 
+#include "modules/mesh/chunk_packing.hpp"
 #include "runtime/dds/codec.hpp"
 #include "runtime/dds/wire_pose.hpp"
 
 namespace km {
 namespace {
-
-using Triple = MeshChunk::Triple;
-
-std::vector<std::uint16_t> flat(const std::vector<Triple>& triples) {
-  std::vector<std::uint16_t> numbers;
-  numbers.reserve(3 * triples.size());
-  for (const Triple& triple : triples) numbers.insert(numbers.end(), triple.begin(), triple.end());
-  return numbers;
-}
-
-// Precondition: the number of elements is a multiple of three.
-std::vector<Triple> triples(std::span<const std::uint16_t> numbers) {
-  std::vector<Triple> result;
-  result.reserve(numbers.size() / 3);
-  for (std::size_t i = 0; i < numbers.size(); i += 3)
-    result.push_back({numbers[i], numbers[i + 1], numbers[i + 2]});
-  return result;
-}
-
-using View = MeshChunk::View;
-
-// Precondition: the number of elements is even.
-std::vector<std::array<View, 2>> pairs(std::span<const View> numbers) {
-  std::vector<std::array<View, 2>> result;
-  result.reserve(numbers.size() / 2);
-  for (std::size_t i = 0; i < numbers.size(); i += 2)
-    result.push_back({numbers[i], numbers[i + 1]});
-  return result;
-}
 
 std::vector<km_wire_MeshKeyframe> to_wire(const std::vector<MeshKeyframe>& keyframes) {
   std::vector<km_wire_MeshKeyframe> wire;
@@ -65,17 +36,16 @@ MessageKey Codec<MeshChunk>::key_of(const MeshChunk& chunk) {
 
 Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
   Encoded encoded;
-  encoded.offsets = flat(chunk.offsets);
-  encoded.faces = flat(chunk.faces);
-  encoded.labels = chunk.labels;
+  encoded.content = packed(chunk);
   Wire& wire = encoded.wire;
   wire.cell = {.x = chunk.key.cell[0], .y = chunk.key.cell[1], .z = chunk.key.cell[2]};
   wire.part = chunk.key.part;
   wire.anchor = chunk.anchor;
   wire.step_m = chunk.step_m;
   wire.origin = {.x = chunk.origin[0], .y = chunk.origin[1], .z = chunk.origin[2]};
-  for (const auto& views : chunk.views)
-    encoded.views.insert(encoded.views.end(), views.begin(), views.end());
+  wire.vertices = static_cast<std::uint16_t>(chunk.offsets.size());
+  wire.faces = static_cast<std::uint16_t>(chunk.faces.size());
+  wire.is_labelled = !chunk.labels.empty();
   encoded.keyframes = to_wire(chunk.keyframes);
   if (chunk.odometry)
     encoded.keyframe.push_back(
@@ -84,40 +54,31 @@ Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
              find_pose(chunk.keyframes, chunk.odometry->id.index).value_or(SE3::Identity()))});
   borrow(wire.keyframe, encoded.keyframe);
   borrow(wire.keyframes, encoded.keyframes);
-  borrow(wire.views, encoded.views);
-  borrow(wire.offsets, encoded.offsets);
-  borrow(wire.labels, encoded.labels);
-  borrow(wire.faces, encoded.faces);
+  borrow(wire.content, encoded.content);
   return encoded;
 }
 
 Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& writer) {
   using Result = Decoded<MeshChunk>;
-  const auto offsets = elements_of(wire.offsets, kMaxChunkBytes);
-  const auto labels = elements_of(wire.labels, kMaxChunkBytes);
-  const auto faces = elements_of(wire.faces, kMaxChunkBytes);
+  const auto content = elements_of(wire.content, kMaxBytes);
   const auto odometry = elements_of(wire.keyframe, 1);
   const auto keyframes = elements_of(wire.keyframes, kMaxChunkKeyframes);
-  const auto views = elements_of(wire.views, kMaxChunkBytes);
-  if (!offsets || !labels || !faces || !odometry || !keyframes || !views)
+  if (!content || !odometry || !keyframes)
     return Result::refuse("elements are missing or too many");
-  if (offsets->size() % 3 != 0 || faces->size() % 3 != 0)
-    return Result::refuse("offsets or faces are not triples");
-  if (views->size() % 2 != 0) return Result::refuse("views are not pairs");
   MeshChunk chunk{.key = {writer.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
                   .boot = writer.boot,
                   .anchor = wire.anchor,
                   .step_m = wire.step_m,
                   .origin = {wire.origin.x, wire.origin.y, wire.origin.z},
-                  .offsets = triples(*offsets),
-                  .labels = {labels->begin(), labels->end()},
-                  .faces = triples(*faces),
-                  .keyframes = from_wire(*keyframes),
-                  .views = pairs(*views)};
+                  .keyframes = from_wire(*keyframes)};
+  const ChunkCounts counts{.vertices = wire.vertices,
+                           .faces = wire.faces,
+                           .labelled = wire.is_labelled,
+                           .seen = !chunk.keyframes.empty()};
+  if (!unpack(*content, counts, chunk)) return Result::refuse("a chunk that cannot be unpacked");
   if (!odometry->empty()) {
     chunk.odometry = from_wire(odometry->front().odometry);
     if (!chunk.odometry) return Result::refuse("a keyframe without a pose");
-    if (chunk.keyframes.empty()) chunk.odometry.reset();
   }
   if (const char* fault = fault_of(chunk)) return Result::refuse(fault);
   return Result::accept(std::move(chunk));

@@ -12,22 +12,20 @@
 
 namespace km {
 
-/// A robot sends only its own mesh. A chunk is refused if it is larger than kMaxChunkBytes, if its
-/// offsets, labels, views and faces do not match, or if a face names a missing vertex. It is also
-/// refused if positions are not finite or too far away, and for keyframes that fault_of() refuses.
-/// A keyframe of a robot that sends version 2 is left out, because no poses follow.
+/// A robot sends only its own mesh. A chunk is refused if it cannot be unpacked, if it is larger
+/// than kMaxChunkBytes, or if a face names a missing vertex. It is also refused if positions are
+/// not finite or too far away, and for keyframes that fault_of() refuses.
 template <>
 struct Codec<MeshChunk> {
-  using Wire = km_wire_MeshChunk;
-  static constexpr const char* kTopic = "mesh_chunks";
-  static constexpr std::uint16_t kVersion = 3;
-  static constexpr std::size_t kMaxBytes = kMaxChunkBytes;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_MeshChunk_desc; }
+  using Wire = km_wire_PackedMeshChunk;
+  static constexpr const char* kTopic = "packed_mesh_chunks";
+  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = kMaxChunkBytes + 256;  // incompressible
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_PackedMeshChunk_desc; }
 
   struct Encoded {
     Wire wire{};
-    std::vector<std::uint16_t> offsets, faces;
-    std::vector<std::uint8_t> labels, views;
+    std::vector<std::uint8_t> content;
     std::vector<km_wire_SurfaceKeyframe> keyframe;
     std::vector<km_wire_MeshKeyframe> keyframes;
   };

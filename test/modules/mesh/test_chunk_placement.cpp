@@ -165,7 +165,7 @@ TEST_CASE("A chunk of a long visit has fewer keyframes but keeps its views", "[m
   for (const MeshChunk& chunk : sheet.chunks()) {
     REQUIRE_FALSE(fault_of(chunk));
     CHECK(chunk.keyframes.size() <= kMaxChunkKeyframes);
-    CHECK(wire_bytes(chunk) <= kMaxChunkBytes);
+    CHECK(plain_bytes(chunk) <= kMaxChunkBytes);
     const PlacedChunk before = place(chunk, nullptr), after = place(chunk, &poses);
     for (std::size_t v = 0; v < before.vertices.size(); ++v) {
       // The bend is linear in the number of the keyframe, which is linear in x. At most 64

@@ -106,7 +106,7 @@ TEST_CASE("A cell that is too full is sent in several parts", "[mesh]") {
   const SplitMesh pieces = split_mesh(mesh, 1, 1, kGrid);
   std::map<std::array<std::int32_t, 3>, std::uint16_t> parts;
   for (const MeshChunk& chunk : pieces.chunks) {
-    CHECK(wire_bytes(chunk) <= kMaxChunkBytes);
+    CHECK(plain_bytes(chunk) <= kMaxChunkBytes);
     CHECK(chunk.key.part == parts[chunk.key.cell]++);
   }
   for (const auto& [cell, count] : parts) CHECK(count > 3);
@@ -383,7 +383,7 @@ TEST_CASE("Chunks in the frame of an earlier anchor are dropped until they are s
 
 TEST_CASE("A robot cannot send more than its bound", "[mesh]") {
   MeshChunk chunk = chunks_of(5, 1, 10).front();
-  TeamMesh team(10 * wire_bytes(chunk) + 1);
+  TeamMesh team(10 * plain_bytes(chunk) + 1);
   for (std::int32_t i = 0; i < 10; ++i) {
     chunk.key.cell[0] = i;
     REQUIRE(team.add(chunk) == ChunkVerdict::kTaken);

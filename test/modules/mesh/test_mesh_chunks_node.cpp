@@ -2,15 +2,19 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "modules/core/lie.hpp"
+#include "modules/mesh/chunk_packing.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
+#include "modules/mesh/seen_by.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
@@ -29,6 +33,26 @@ std::shared_ptr<const LabelledMesh> raised(const LabelledMesh& mesh, float heigh
   LabelledMesh result = mesh;
   for (auto& vertex : result.vertices) vertex.z() += height_m;
   return std::make_shared<const LabelledMesh>(std::move(result));
+}
+
+// The whole mesh was seen from keyframe 0.
+MeshOrigin one_view(const LabelledMesh& mesh) {
+  return {.seen_by = std::vector(mesh.vertices.size(), SeenBy{0, 0}),
+          .T_world_kf = {SE3::Identity()},
+          .mapped = mesh.vertices};
+}
+
+MeshChunksNode::Offer seen_once(std::shared_ptr<const LabelledMesh> mesh) {
+  auto origin = std::make_shared<const MeshOrigin>(one_view(*mesh));
+  return {kAnchor, std::move(mesh), std::move(origin)};
+}
+
+// The chunks that a MeshChunksNode sends.
+std::vector<MeshChunk> chunks_of(const LabelledMesh& mesh, RobotId robot) {
+  const MeshOrigin origin = one_view(mesh);
+  std::vector<MeshChunk> chunks = split_mesh(mesh, robot, kAnchor, {}, &origin).chunks;
+  for (MeshChunk& chunk : chunks) chunk = sorted_in_space(chunk);
+  return chunks;
 }
 
 std::size_t bytes_of(const std::vector<MeshChunk>& chunks) {
@@ -57,8 +81,8 @@ TEST_CASE("Chunks are sent no faster than configured", "[node]") {
   Inbox<MeshChunk>& sent = out.chunks;
   MeshChunksNode node(slow(), 7, out.topics());
   const auto mesh = sheet(150);
-  const std::size_t all = split_mesh(*mesh, 7, kAnchor, {}).chunks.size();
-  node.step({kAnchor, mesh}, 1000.0);
+  const std::size_t all = chunks_of(*mesh, 7).size();
+  node.step(seen_once(mesh), 1000.0);
   double now_s = 1000.0;
   const auto within_bounds = [&] {
     // Half a second's budget, and one chunk of overdraft.
@@ -83,13 +107,13 @@ TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[nod
   Inbox<MeshChunk>& sent = out.chunks;
   MeshChunksNode node(slow(), 7, out.topics());
   const auto mesh = sheet(100);
-  node.step({kAnchor, mesh}, 0.0);
+  node.step(seen_once(mesh), 0.0);
   const std::size_t early = sent.messages().size();
   // Later than the pause after a mesh, which depends on the time that it took.
-  node.step({kAnchor, raised(*mesh, 0.5F)}, 1000.0);
+  node.step(seen_once(raised(*mesh, 0.5F)), 1000.0);
   for (double now_s = 1000.1; node.waiting() > 0 && now_s < 2000.0; now_s += 0.1)
     node.step({}, now_s);
-  const std::size_t all = split_mesh(*raised(*mesh, 0.5F), 7, kAnchor, {}).chunks.size();
+  const std::size_t all = chunks_of(*raised(*mesh, 0.5F), 7).size();
   CHECK(sent.messages().size() <= all + 2 * early);  // those sent before, again, or as empty
 
   TeamMesh team;
@@ -108,7 +132,7 @@ TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
   config.cell_m = GENERATE(0.1, 20.0);
   config.position_step_m = GENERATE(0.001, 0.05);
   MeshChunksNode node(config, 7, out.topics());
-  CHECK_NOTHROW(node.step({kAnchor, sheet(10)}, 0.0));
+  CHECK_NOTHROW(node.step(seen_once(sheet(10)), 0.0));
   config.cell_m = 0.05;
   CHECK_THROWS_AS(MeshChunksNode(config, 7, out.topics()), ConfigError);
 }
@@ -195,6 +219,9 @@ struct MeshRobot {
     sender.stop();
     basis.stop();
   }
+  void offer(const std::shared_ptr<const LabelledMesh>& mesh) {
+    sender.offer(kAnchor, mesh, std::make_shared<const MeshOrigin>(one_view(*mesh)));
+  }
   TopicTraffic traffic(Direction direction) {
     for (const TopicTraffic& row : basis.bridge.traffic().topics)
       if (row.topic == Codec<MeshChunk>::kTopic && row.direction == direction) return row;
@@ -232,12 +259,12 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   b.start();
   REQUIRE(b.basis.receives(PeerEventKind::kJoined, 3));
   const auto mesh = sheet(150);
-  a->sender.offer(kAnchor, mesh);
+  a->offer(mesh);
   REQUIRE(b.receives(3, *mesh));
   CHECK(b.team().snapshot()[0].mesh.vertices.size() == mesh->vertices.size());
   CHECK(b.team().snapshot()[0].anchor == kAnchor);
 
-  const std::vector<MeshChunk> chunks = split_mesh(*mesh, 3, kAnchor, {}).chunks;
+  const std::vector<MeshChunk> chunks = chunks_of(*mesh, 3);
   const TopicTraffic out = a->traffic(Direction::kOut);
   CHECK(out.category == TrafficCategory::kOther);
   CHECK(out.count.messages == chunks.size());
@@ -247,7 +274,7 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   CHECK(out.count.bytes > bytes_of(chunks) - 40 * chunks.size());
 
   const auto less = sheet(50);
-  a->sender.offer(kAnchor, less);
+  a->offer(less);
   CHECK(b.receives(3, *less));
   MeshRobot late(domain, 5);
   late.start();
@@ -311,7 +338,7 @@ TEST_CASE("The largest chunk is equal after encoding and decoding", "[codec]") {
   for (MeshChunk chunk : pieces.chunks) {
     CHECK(chunk.keyframes.size() <= 63);
     chunk.odometry = {{1, chunk.keyframes.back().index}, SE3::Identity(), Matrix6::Identity()};
-    largest = std::max(largest, wire_bytes(chunk));
+    largest = std::max(largest, plain_bytes(chunk));
     CHECK(decoded(received(chunk)).value);
   }
   CHECK(largest > kMaxChunkBytes - 75);  // room for another keyframe and for half a face
@@ -322,26 +349,38 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
   MeshChunk chunk = some_chunk();
   state_keyframes(chunk);
   const char* const missing = "elements are missing or too many";
-  const char* const no_triples = "offsets or faces are not triples";
+  const char* const unpacked = "a chunk that cannot be unpacked";
   const char* const far = "positions are not finite or too far away";
+  const auto changed = [&chunk](const std::function<void(MeshChunk&)>& change) {
+    return [&chunk, change](auto& m) {
+      MeshChunk other = chunk;
+      change(other);
+      m = received(other);
+    };
+  };
   check_refusals<MeshChunk>(
       [&] { return received(chunk); },
-      {{"offsets not there", missing, [](auto& m) { m.wire.offsets._buffer = nullptr; }},
-       {"labels not there", missing, [](auto& m) { m.wire.labels._buffer = nullptr; }},
-       {"faces not there", missing, [](auto& m) { m.wire.faces._buffer = nullptr; }},
-       {"offsets without end", missing, [](auto& m) { m.wire.offsets._length = 0xffffffffU; }},
-       {"labels without end", missing, [](auto& m) { m.wire.labels._length = 0xffffffffU; }},
-       {"faces without end", missing, [](auto& m) { m.wire.faces._length = 0xffffffffU; }},
-       {"half a vertex", no_triples, [](auto& m) { --m.wire.offsets._length; }},
-       {"half a face", no_triples, [](auto& m) { --m.wire.faces._length; }},
-       {"a label too few", "labels do not fit the vertices",
-        [](auto& m) { --m.wire.labels._length; }},
-       {"too large", "a chunk that is too large",
-        [&](auto& m) {
-          MeshChunk large = chunk;
-          large.faces.resize(6000, {0, 1, 2});
-          m = received(large);
+      {{"content not there", missing, [](auto& m) { m.wire.content._buffer = nullptr; }},
+       {"content without end", missing, [](auto& m) { m.wire.content._length = 0xffffffffU; }},
+       {"content without its end", unpacked, [](auto& m) { --m.wire.content._length; }},
+       {"no content", unpacked, [](auto& m) { m.wire.content._length = 0; }},
+       {"damaged content", unpacked, [](auto& m) { m.content[0] ^= 1U; }},
+       {"a vertex too few", unpacked, [](auto& m) { --m.wire.vertices; }},
+       {"a face too many", unpacked, [](auto& m) { ++m.wire.faces; }},
+       {"content that is not empty for no vertices", unpacked,
+        [](auto& m) { m.wire.vertices = m.wire.faces = 0; }},
+       {"labels that are not stated", unpacked, [](auto& m) { m.wire.is_labelled = false; }},
+       {"views of no keyframes", unpacked,
+        [](auto& m) {
+          m.wire.keyframes._length = 0;
+          m.wire.keyframe._length = 0;
         }},
+       {"more content than a chunk has", unpacked, changed([](MeshChunk& large) {
+          large.faces.resize(6000, {0, 1, 2});
+        })},
+       {"too large", "a chunk that is too large", changed([](MeshChunk& large) {
+          large.faces.resize((kMaxChunkBytes - 9 * large.offsets.size()) / 6, {0, 1, 2});
+        })},
        {"two keyframes", missing, [](auto& m) { m.wire.keyframe._length = 2; }},
        {"a keyframe of another robot", "a keyframe of another robot",
         [](auto& m) { ++m.keyframe.front().odometry.keyframe.robot; }},
@@ -352,28 +391,20 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
         [](auto& m) { ++m.keyframe.front().odometry.keyframe.index; }},
        {"keyframes not there", missing, [](auto& m) { m.wire.keyframes._buffer = nullptr; }},
        {"keyframes without end", missing, [](auto& m) { m.wire.keyframes._length = 65; }},
-       {"views not there", missing, [](auto& m) { m.wire.views._buffer = nullptr; }},
-       {"views without end", missing, [](auto& m) { m.wire.views._length = 0xffffffffU; }},
-       {"half a pair of views", "views are not pairs", [](auto& m) { --m.wire.views._length; }},
-       {"a pair of views too few", "views do not fit the vertices",
-        [](auto& m) { m.wire.views._length -= 2; }},
-       {"views of no keyframes", "views do not fit the vertices",
-        [](auto& m) {
-          m.wire.keyframes._length = 0;
-          m.wire.keyframe._length = 0;
-        }},
        {"a view after the last keyframe", "a view between keyframes which do not exist",
-        [](auto& m) { m.views.back() = 17; }},
+        changed([](MeshChunk& late) { late.views.back()[1] = 17; })},
        {"a view of a keyframe outside", "a view between keyframes which do not exist",
-        [](auto& m) { m.views.back() = 255; }},
+        changed([](MeshChunk& late) { late.views.back()[1] = 255; })},
        {"a keyframe twice", "keyframes do not ascend",
         [](auto& m) { m.keyframes[1].keyframe = 0; }},
        {"no rotation", "a keyframe without a rotation",
         [](auto& m) { std::ranges::fill(m.keyframes[1].q, std::int16_t{0}); }},
        {"a face outside", "a face names a vertex which does not exist",
-        [&](auto& m) { m.faces.back() = static_cast<std::uint16_t>(chunk.offsets.size()); }},
+        changed([](MeshChunk& outside) {
+          outside.faces.back()[2] = static_cast<std::uint16_t>(outside.offsets.size());
+        })},
        {"vertices for nothing", "vertices without faces",
-        [](auto& m) { m.wire.faces._length = 0; }},
+        changed([](MeshChunk& empty) { empty.faces.clear(); })},
        {"steps that are no number", far,
         [](auto& m) { m.wire.step_m = std::numeric_limits<float>::quiet_NaN(); }},
        {"no steps", far, [](auto& m) { m.wire.step_m = 0.0F; }},
