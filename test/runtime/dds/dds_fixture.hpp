@@ -210,9 +210,9 @@ struct TestRobot {
   }
 
   DdsParticipant participant;
-  Crossing<RobotStatus> statuses{};
-  Crossing<Ping> pings{};
-  AddressedCrossing<Ping> addressed_pings{};
+  Crossing<RobotStatus> statuses;
+  Crossing<Ping> pings;
+  AddressedCrossing<Ping> addressed_pings;
   DdsBridge bridge;
   RobotStatusNode status;
   Inbox<PeerEvent> peer_events;
