@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
-#include <iterator>
 #include <map>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -73,9 +73,9 @@ SplitGraph pair_of_robots() {
 // True if a process runs with `text` on its command line.
 bool is_running(const std::string& text) {
   for (const auto& process : fs::directory_iterator("/proc")) {
-    std::ifstream file(process.path() / "cmdline");
-    const std::string command(std::istreambuf_iterator<char>(file), {});
-    if (command.find(text) != command.npos) return true;
+    std::ostringstream command;
+    command << std::ifstream(process.path() / "cmdline").rdbuf();  // empty if the process has ended
+    if (command.str().find(text) != std::string::npos) return true;
   }
   return false;
 }
