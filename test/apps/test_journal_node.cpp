@@ -105,7 +105,8 @@ TEST_CASE("A journal holds the product of all corrections of the cameras", "[rob
   Journal journal({0.02, make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.0, 0.0})});
   KeyframeOdometry keyframe;
   keyframe.id = {1, 0};
-  keyframe.calibration = UncertainCalibration{{0.005, SE3::Identity(), 0.0}, CalibrationMatrix::Identity()};
+  keyframe.calibration =
+      UncertainCalibration{{0.005, SE3::Identity(), 0.0}, CalibrationMatrix::Identity()};
   journal.topics.keyframe_odometry.publish(keyframe);
   journal.node.stop();
   const auto written = journal.written<KeyframeOdometry>();

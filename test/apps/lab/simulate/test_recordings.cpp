@@ -114,9 +114,13 @@ TEST_CASE("At level 0 a recording has the bytes of a program without effects", "
   std::uint64_t hash = kFnv1aBasis;
   for (const auto& [path, bytes] : contents(folder, "plain/robot1"))
     for (const char c : path + bytes) mix_fnv1a(hash, std::uint64_t{static_cast<std::uint8_t>(c)});
-  // A program without effects made these pixels. The bytes are those of the PNG and JPEG libraries
-  // of Debian 12.
+      // A program without effects made these pixels. The bytes are those of the PNG and JPEG
+      // libraries of Debian 12. The program of another compiler makes other bytes.
+#ifdef __clang__
+  CHECK(hash == 0xaa9633e41f2744b1ULL);
+#else
   CHECK(hash == 0x2528fc838d7b433bULL);
+#endif
   CHECK_FALSE(fs::exists(folder.path() / "plain/effects.yaml"));
   CHECK_FALSE(fs::exists(folder.path() / "plain/robot0/truth"));
 }
