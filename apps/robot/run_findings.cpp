@@ -336,7 +336,8 @@ void add_cameras(const RunSummary& run, std::vector<Finding>& findings) {
                                 ") more than tracker.readout_s states",
                         .means = "a rolling shutter; odometry has estimated and corrected it, but "
                                  "for the start of the run",
-                        .to_do = "add the difference to tracker.readout_s"});
+                        .to_do = "if the readout time is known, state it in tracker.readout_s and "
+                                 "lower vio.calibration_readout_s"});
   const double rotation_rad =
       Eigen::Vector3d(found.rotation_x_rad, found.rotation_y_rad, found.rotation_z_rad).norm();
   if (rotation_rad > std::max(kRotation_rad, kSure * found.rotation_sigma_rad))

@@ -5,7 +5,7 @@
 #include <limits>
 #include <unordered_map>
 
-#include "modules/mesh/vertex_clustering.hpp"
+#include "modules/mesh/grid_cell.hpp"
 
 namespace km {
 namespace {

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <unordered_map>
 #include <utility>
 
-#include "modules/mesh/vertex_clustering.hpp"
 #include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
@@ -156,6 +156,44 @@ void decimate(ManifoldSurface& manifold, std::size_t target, KeyframeIndex max_g
   decimater.decimate(count - target);
 }
 
+// Assigns vertices to clusters, one at a time.
+class Clustering {
+ public:
+  Clustering(double width_m, KeyframeIndex max_gap_keyframes)
+      : width_m_(width_m), max_gap_keyframes_(max_gap_keyframes) {}
+
+  std::uint32_t cluster_of(const Eigen::Vector3d& point, const SeenBy& seen_by) {
+    const auto next = static_cast<std::uint32_t>(seeds_.size());
+    const auto [cell, is_new] = first_in_cell_.try_emplace(grid_cell(point, width_m_), next);
+    if (!is_new) {
+      std::uint32_t cluster = cell->second;
+      while (keyframe_gap(seeds_[cluster].seen_by, seen_by) > max_gap_keyframes_) {
+        if (seeds_[cluster].next_in_cell == kNoIndex) {
+          seeds_[cluster].next_in_cell = next;
+          cluster = next;
+          break;
+        }
+        cluster = seeds_[cluster].next_in_cell;
+      }
+      if (cluster != next) return cluster;
+    }
+    seeds_.push_back({seen_by, kNoIndex});
+    return next;
+  }
+
+  [[nodiscard]] std::size_t count() const { return seeds_.size(); }
+
+ private:
+  struct Seed {
+    SeenBy seen_by;
+    std::uint32_t next_in_cell;
+  };
+  double width_m_;
+  KeyframeIndex max_gap_keyframes_;
+  std::unordered_map<GridCell, std::uint32_t, GridCellHash> first_in_cell_;
+  std::vector<Seed> seeds_;
+};
+
 // For every cluster, the vertex nearest to its centroid.
 std::vector<std::uint32_t> central_vertices(const std::vector<Eigen::Vector3f>& vertices,
                                             const std::vector<std::uint32_t>& cluster_of_vertex,
@@ -175,6 +213,22 @@ std::vector<std::uint32_t> central_vertices(const std::vector<Eigen::Vector3f>& 
     best[c] = v;
   }
   return best;
+}
+
+std::vector<LabelledMesh::Face> cluster_faces(const std::vector<LabelledMesh::Face>& faces,
+                                              const std::vector<std::uint32_t>& cluster_of_vertex) {
+  std::vector<LabelledMesh::Face> result;
+  for (const auto& corners : faces) {
+    LabelledMesh::Face face = {};
+    for (std::size_t i = 0; i < 3; ++i) face[i] = cluster_of_vertex[corners[i]];
+    if (face[0] == face[1] || face[1] == face[2] || face[2] == face[0]) continue;
+    if (std::ranges::find(face, kNoIndex) != face.end()) continue;
+    std::ranges::rotate(face, std::ranges::min_element(face));  // lowest first, same orientation
+    result.push_back(face);
+  }
+  std::ranges::sort(result);
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
 }
 
 constexpr double kClustersPerSpacing = 2.0;
@@ -254,7 +308,7 @@ VertexClusters cluster_vertices(const MapMesh& map, std::span<const std::uint32_
   const auto& vertices = map.mesh.vertices;
   VertexClusters clusters;
   clusters.cluster_of_vertex.assign(vertices.size(), kNoIndex);
-  VertexClustering clustering(width_m, max_gap_keyframes);
+  Clustering clustering(width_m, max_gap_keyframes);
   for (std::size_t v = 0; v < vertices.size(); ++v)
     if (node_of_vertex[v] == kNoIndex)
       clusters.cluster_of_vertex[v] =

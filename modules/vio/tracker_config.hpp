@@ -49,7 +49,8 @@ struct TrackerConfig {
     visitor.field(
         "readout_s", readout_s, {0.0, 0.1},
         "[s] time from the first to the last row of an image with a rolling shutter, whose "
-        "stamp is that of the middle row; 0: global shutter");
+        "stamp is that of the middle row; 0: global shutter, or unknown (see "
+        "vio.calibration_readout_s)");
     visitor.field("seed", seed, {0, 2147483647}, "seed of the random samples");
   }
 };

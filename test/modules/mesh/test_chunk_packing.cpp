@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 #include <cstdint>
 #include <random>
@@ -8,7 +9,6 @@
 #include <vector>
 
 #include "modules/mesh/chunk_packing.hpp"
-#include "modules/mesh/seen_by.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 
 namespace km {
@@ -44,8 +44,9 @@ MeshChunk shuffled_chunk() {
   for (auto& face : mesh.faces)
     for (std::uint32_t& corner : face) corner = place[corner];
   MeshOrigin origin{.seen_by = {}, .T_world_kf = std::vector(9, SE3::Identity()), .mapped = {}};
+  using Seen = std::array<KeyframeIndex, 2>;
   for (const Eigen::Vector3f& p : mesh.vertices)
-    origin.seen_by.push_back(p.x() < 0.0F ? SeenBy{0, 2} : SeenBy{3, 8});
+    origin.seen_by.push_back(p.x() < 0.0F ? Seen{0, 2} : Seen{3, 8});
   for (const Eigen::Vector3f& p : mesh.vertices)
     origin.mapped.emplace_back(p + Eigen::Vector3f::Constant(10.0F));
   return split_mesh(mesh, 1, 0, {.cell_m = 20.0}, &origin).chunks.at(0);

@@ -14,7 +14,6 @@
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
-#include "modules/mesh/seen_by.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
@@ -35,22 +34,9 @@ std::shared_ptr<const LabelledMesh> raised(const LabelledMesh& mesh, float heigh
   return std::make_shared<const LabelledMesh>(std::move(result));
 }
 
-// The whole mesh was seen from keyframe 0.
-MeshOrigin one_view(const LabelledMesh& mesh) {
-  return {.seen_by = std::vector(mesh.vertices.size(), SeenBy{0, 0}),
-          .T_world_kf = {SE3::Identity()},
-          .mapped = mesh.vertices};
-}
-
-MeshChunksNode::Offer seen_once(std::shared_ptr<const LabelledMesh> mesh) {
-  auto origin = std::make_shared<const MeshOrigin>(one_view(*mesh));
-  return {kAnchor, std::move(mesh), std::move(origin)};
-}
-
 // The chunks that a MeshChunksNode sends.
 std::vector<MeshChunk> chunks_of(const LabelledMesh& mesh, RobotId robot) {
-  const MeshOrigin origin = one_view(mesh);
-  std::vector<MeshChunk> chunks = split_mesh(mesh, robot, kAnchor, {}, &origin).chunks;
+  std::vector<MeshChunk> chunks = split_mesh(mesh, robot, kAnchor, {}).chunks;
   for (MeshChunk& chunk : chunks) chunk = sorted_in_space(chunk);
   return chunks;
 }
@@ -82,7 +68,7 @@ TEST_CASE("Chunks are sent no faster than configured", "[node]") {
   MeshChunksNode node(slow(), 7, out.topics());
   const auto mesh = sheet(150);
   const std::size_t all = chunks_of(*mesh, 7).size();
-  node.step(seen_once(mesh), 1000.0);
+  node.step({kAnchor, mesh}, 1000.0);
   double now_s = 1000.0;
   const auto within_bounds = [&] {
     // Half a second's budget, and one chunk of overdraft.
@@ -107,10 +93,10 @@ TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[nod
   Inbox<MeshChunk>& sent = out.chunks;
   MeshChunksNode node(slow(), 7, out.topics());
   const auto mesh = sheet(100);
-  node.step(seen_once(mesh), 0.0);
+  node.step({kAnchor, mesh}, 0.0);
   const std::size_t early = sent.messages().size();
   // Later than the pause after a mesh, which depends on the time that it took.
-  node.step(seen_once(raised(*mesh, 0.5F)), 1000.0);
+  node.step({kAnchor, raised(*mesh, 0.5F)}, 1000.0);
   for (double now_s = 1000.1; node.waiting() > 0 && now_s < 2000.0; now_s += 0.1)
     node.step({}, now_s);
   const std::size_t all = chunks_of(*raised(*mesh, 0.5F), 7).size();
@@ -132,7 +118,7 @@ TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
   config.cell_m = GENERATE(0.1, 20.0);
   config.position_step_m = GENERATE(0.001, 0.05);
   MeshChunksNode node(config, 7, out.topics());
-  CHECK_NOTHROW(node.step(seen_once(sheet(10)), 0.0));
+  CHECK_NOTHROW(node.step({kAnchor, sheet(10)}, 0.0));
   config.cell_m = 0.05;
   CHECK_THROWS_AS(MeshChunksNode(config, 7, out.topics()), ConfigError);
 }
@@ -219,9 +205,6 @@ struct MeshRobot {
     sender.stop();
     basis.stop();
   }
-  void offer(const std::shared_ptr<const LabelledMesh>& mesh) {
-    sender.offer(kAnchor, mesh, std::make_shared<const MeshOrigin>(one_view(*mesh)));
-  }
   TopicTraffic traffic(Direction direction) {
     for (const TopicTraffic& row : basis.bridge.traffic().topics)
       if (row.topic == Codec<MeshChunk>::kTopic && row.direction == direction) return row;
@@ -259,7 +242,7 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   b.start();
   REQUIRE(b.basis.receives(PeerEventKind::kJoined, 3));
   const auto mesh = sheet(150);
-  a->offer(mesh);
+  a->sender.offer(kAnchor, mesh);
   REQUIRE(b.receives(3, *mesh));
   CHECK(b.team().snapshot()[0].mesh.vertices.size() == mesh->vertices.size());
   CHECK(b.team().snapshot()[0].anchor == kAnchor);
@@ -274,7 +257,7 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
   CHECK(out.count.bytes > bytes_of(chunks) - 40 * chunks.size());
 
   const auto less = sheet(50);
-  a->offer(less);
+  a->sender.offer(kAnchor, less);
   CHECK(b.receives(3, *less));
   MeshRobot late(domain, 5);
   late.start();
