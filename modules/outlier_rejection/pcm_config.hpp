@@ -27,6 +27,7 @@ struct PcmConfig {
   ClosureSelection selection = ClosureSelection::kWitness;
   int min_witnesses = 2;
   double witness_wait_s = 30.0;
+  int min_lone_inliers = 40;
   CycleCriterion criterion = CycleCriterion::kMahalanobis;
   double confidence = 0.99;
   double odometry_noise_scale = 1.0;
@@ -51,6 +52,9 @@ struct PcmConfig {
     visitor.field("witness_wait_s", witness_wait_s, {0.0, 1e6},
                   "[s of keyframe stamps since the first closure] witness: time after which a pair "
                   "is joined without witnesses, tentatively");
+    visitor.field("min_lone_inliers", min_lone_inliers, {0, 10000},
+                  "witness: least inliers of the best closure of a pair that is joined without "
+                  "witnesses");
     visitor.field(
         "criterion", criterion,
         {{"mahalanobis", CycleCriterion::kMahalanobis}, {"bounds", CycleCriterion::kBounds}},

@@ -37,6 +37,8 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
   if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
     return PcmAddResult::kAgainstOdometry;
   added_.insert(id);
+  const bool is_stated = closure.inliers != 0;
+  strongest_ = std::max(strongest_, is_stated ? closure.inliers : config_.min_lone_inliers);
   const std::size_t before = witnesses();
   if (!is_witnessed()) test(oriented);
   return witnesses() > before ? PcmAddResult::kGrew : PcmAddResult::kAdded;

@@ -36,6 +36,11 @@ class WitnessedPair {
   [[nodiscard]] std::size_t witnesses() const { return clique_.clique().size(); }
   /// True if there are PcmConfig::min_witnesses.
   [[nodiscard]] bool is_witnessed() const;
+  /// True if a closure has PcmConfig::min_lone_inliers, or does not state its inliers (0, as in
+  /// recorded graphs). Without witnesses, a place with fewer may be one that only looks alike.
+  [[nodiscard]] bool is_strong() const { return strongest_ >= config_.min_lone_inliers; }
+  /// Most inliers of a closure so far.
+  [[nodiscard]] int strongest() const { return strongest_; }
 
  private:
   void test(const OrientedClosure& closure);
@@ -46,6 +51,7 @@ class WitnessedPair {
   CycleTest test_;
   std::set<ClosureId> known_;  // added closures, and those refused by the odometry gate
   std::set<ClosureId> added_;
+  int strongest_ = 0;  // most inliers of an added closure
   std::vector<PreparedClosure> tested_;
   MaxClique clique_;  // over `tested_`; closures that share a neighbourhood are not connected
 };

@@ -147,6 +147,13 @@ bool PcmNode::is_joined(RobotId other, Pair& pair) const {
   if (!pair.since) pair.since = newest_;
   const double waited_s = pair.since ? seconds_between(*pair.since, *newest_) : 0.0;
   if (!no_more_ && waited_s < config_.witness_wait_s) return false;
+  if (!closures.is_strong()) {
+    log::limited(log::Level::kWarn, name(), "weak " + text_of(self_, other))
+        << text_of(self_, other) << "not joined: their best closure has " << closures.strongest()
+        << " inliers of pcm.min_lone_inliers " << config_.min_lone_inliers
+        << ", and none at another place agrees";
+    return false;
+  }
   pair.waited = true;
   const std::size_t places = closures.witnesses();
   log::info(name()) << text_of(self_, other) << "joined by "

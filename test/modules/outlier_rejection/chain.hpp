@@ -40,7 +40,7 @@ inline SE3 rotz(double angle_rad, double x = 0.0, double y = 0.0) {
 /// A closure between two keyframes with isotropic `variance`.
 inline Closure closure(const OdometryPose& from, const OdometryPose& to, const SE3& T_from_to,
                        double variance = 1e-4) {
-  return {from, to, T_from_to, variance * Matrix6::Identity(), 20, 0.8};
+  return {from, to, T_from_to, variance * Matrix6::Identity(), 100, 0.8};
 }
 
 /// Closed cycles may have this error per transform, independent of the covariances.

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <limits>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
@@ -200,6 +201,30 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
   node.publish_changes();  // the wait is over permanently
   REQUIRE(team.sets.messages().size() == 2);
   CHECK(team.sets.messages()[1].closures.size() == 3);
+}
+
+TEST_CASE("A weak closure joins two robots only if one at another place agrees", "[node]") {
+  const bool is_strong = GENERATE(false, true);
+  const RobotId other = is_strong ? 21 : 22;  // a warning for each pair
+  Team team;
+  PcmNode node(PcmConfig{}, 2, team.topics());
+  const CapturedLog log;
+  auto closures = team.agreeing(2, other, 20);
+  for (Closure& closure : closures) closure.inliers = 39;
+  node.step(closures[0]);
+  node.step(closures[1]);  // a neighbour
+  node.expect_no_more();
+  node.publish_changes();
+  node.publish_changes();
+  CHECK(team.sets.messages().empty());
+  CHECK_THAT(log.text(), Catch::Contains("not joined: their best closure has 39 inliers of "
+                                         "pcm.min_lone_inliers 40"));
+  if (is_strong) closures[2].inliers = 40;  // a neighbour, too
+  node.step(closures[is_strong ? 2 : 9]);
+  node.publish_changes();
+  REQUIRE(team.sets.messages().size() == 1);
+  CHECK(team.sets.messages()[0].closures.size() == 3);
+  CHECK((log.text().find("the join is tentative") != std::string::npos) == is_strong);
 }
 
 TEST_CASE("Robots that a former process joined by one place remain joined", "[node]") {
