@@ -272,12 +272,15 @@ void Robot::add_loop_closure(const RobotConfig& config) {
                                          .measured_closures = topics_.measured_closures,
                                          .peer_requests = topics_.requests.received,
                                          .peer_replies = topics_.replies.received,
+                                         .peer_words = topics_.words.received,
+                                         .peer_closures = topics_.shared_closures.received,
                                          .peer_events = topics_.ways,
                                          .restarts = topics_.candidate_restarts,
                                          .peer_bows = topics_.peer_bows,
                                          .restored = topics_.restored_outcomes,
                                          .own_requests = topics_.requests.own,
                                          .own_replies = topics_.replies.own,
+                                         .own_words = topics_.words.own,
                                          .own_closures = topics_.new_closures,
                                          .own_restarts = topics_.new_closure_restarts,
                                          .outcomes = topics_.outcomes},
@@ -336,6 +339,8 @@ void Robot::add_overlay() {
       OverlayStream::kRequest, t.requests.ends(),
       [](const KeyframeRequest& request) { return std::optional(request.keyframe); });
   overlay_->join_calls(OverlayStream::kReply, t.replies.ends(), keyframe_of);
+  overlay_->join_calls(OverlayStream::kWords, t.words.ends(),
+                       [](const KeyframeWords& words) { return std::optional(words.keyframe); });
   overlay_->join_reliable(OverlayStream::kClosure, t.shared_closures.ends());
   overlay_->join_reliable(OverlayStream::kInlierSet, t.shared_inlier_sets.ends());
 }
@@ -356,6 +361,7 @@ void Robot::add_network(CrossingEnds meshes) {
                {.per_second = 30, .burst = 60});
   dds.exchange(t.replies.direct, kRequest, kGeometricVerification, {}, {},
                overlay_->guard<KeyframeReply>(OverlayStream::kReply, keyframe_of));
+  dds.exchange(t.words.direct, kRequest, kGeometricVerification);
   dds.exchange(t.shared_closures.direct, kEvent, kGeometricVerification);
   dds.exchange(t.shared_inlier_sets.direct, kState, kPoseGraphOptimization);
   dds.exchange(t.team_packets, kRequest, kPoseGraphOptimization, {}, {},

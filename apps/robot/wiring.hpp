@@ -121,6 +121,7 @@ struct Topics {
   Crossing<KeyframeBow> bows;
   TeamChannel<KeyframeRequest> requests;
   TeamChannel<KeyframeReply> replies;
+  TeamChannel<KeyframeWords> words;
   TeamChannel<Closure> shared_closures;  // between this robot and others
   TeamChannel<InlierSet> shared_inlier_sets;
   AddressedCrossing<TeamLanePacket> team_packets;

@@ -11,16 +11,24 @@
 
 #include "modules/core/ids.hpp"
 #include "modules/core/keyframe.hpp"
+#include "modules/loop_closure/word_points.hpp"
 
 namespace km {
 
-/// Asks the owner of `keyframe` for its odometry, keypoints and descriptors. The reply prefers
-/// keypoints that keyframe `own` of the requester may also show.
+/// Part of a keyframe that is requested.
+enum class KeyframePart : std::uint8_t {
+  kFeatures,    ///< Odometry, keypoints and descriptors: KeyframeReply.
+  kWordPoints,  ///< WordPoints: KeyframeWords, or KeyframeReply if no words are known.
+};
+
+/// Asks the owner of `keyframe` for a part of it. The reply prefers keypoints that keyframe `own`
+/// of the requester may also show.
 struct KeyframeRequest {
   RobotId requester = 0;
   std::uint32_t number = 0;  ///< Sequence number of the requester.
   KeyframeId keyframe;
   KeyframeIndex own = 0;
+  KeyframePart part = KeyframePart::kFeatures;
 };
 
 /// Reply to a KeyframeRequest. `found` is false if the owner does not have the keyframe (yet); only
@@ -29,6 +37,14 @@ struct KeyframeReply {
   std::uint32_t number = 0;  ///< Number of the request.
   bool found = false;
   Keyframe keyframe;
+};
+
+/// Reply to a KeyframeRequest for KeyframePart::kWordPoints: those points whose words keyframe
+/// KeyframeRequest::own has, too.
+struct KeyframeWords {
+  std::uint32_t number = 0;  ///< Number of the request.
+  KeyframeId keyframe;
+  WordPoints words;
 };
 
 /// Schedules the requests for keyframes of peers. Every wanted keyframe is requested until it

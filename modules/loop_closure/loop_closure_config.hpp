@@ -26,6 +26,8 @@ struct LoopClosureConfig {
   int max_closure_separation = 16;
   int max_request_separation = 2;
   double skips_per_failure = 2.0;
+  int min_word_points = 7;
+  double min_word_share = 0.07;
   int reply_keypoints = 200;
   int full_keyframes = 50;
   int cached_keyframes = 500;
@@ -79,10 +81,15 @@ struct LoopClosureConfig {
     visitor.field("skips_per_failure", skips_per_failure, {0.0, 100.0},
                   "after n failures of similar candidates beyond the first few, this value times n "
                   "such candidates are skipped before one is requested; 0: none");
+    visitor.field("min_word_points", min_word_points, {0, 1000},
+                  "a peer's keyframe is requested as a whole only if so many keypoints agree with "
+                  "an own one by their words and positions, 6 B each, which are requested first; "
+                  "0: request it as a whole at once");
+    visitor.field("min_word_share", min_word_share, {0.0, 1.0},
+                  "least share of those keypoints that must agree");
     visitor.field("reply_keypoints", reply_keypoints, {50, 100000},
                   "maximum number of keypoints of a keyframe sent to a peer, 40 B each: those most "
-                  "likely to correspond, down to a quarter of this number, see chosen_by_words(); "
-                  "up to three times as many in the first dozen replies to a robot");
+                  "likely to correspond, down to a quarter of this number, see chosen_by_words()");
     visitor.field("full_keyframes", full_keyframes, {1, 1000000},
                   "number of newest own keyframes in memory with all keypoints, 48 B each; older "
                   "ones are read from the run's journal when needed, or keep twice reply_keypoints "

@@ -33,7 +33,7 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   if (reach > 0 && any_near(peer.closures, query, own, static_cast<KeyframeIndex>(reach)))
     return Decision::kNearClosure;
   const int beside = std::min(config_.max_request_separation, peer.successes);
-  if (beside > 0 && any_near(peer.requests, query, own, static_cast<KeyframeIndex>(beside)))
+  if (any_near(peer.requests, query, own, static_cast<KeyframeIndex>(beside)))
     return Decision::kNearRequest;
 
   const auto group_index =
@@ -56,6 +56,10 @@ void RequestPolicy::add_closure(const ClosureId& closure) {
   const auto next = peer.closures.lower_bound({closure.to.index, 0});
   if (next == peer.closures.end() || next->first != closure.to.index) ++peer.successes;
   peer.closures.emplace(closure.to.index, closure.from.index);
+}
+
+void RequestPolicy::add_peer_request(RobotId peer, KeyframeIndex peers, KeyframeIndex own) {
+  peers_[peer].requests.emplace(peers, own);
 }
 
 void RequestPolicy::add_result(const KeyframeId& keyframe, bool verified) {

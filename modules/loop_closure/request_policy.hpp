@@ -21,7 +21,7 @@ namespace km {
 /// peer have led to closures, their number replaces max_closure_separation, so that the first
 /// closures may be dense. A candidate is also skipped near a requested candidate, with
 /// max_request_separation in place of max_closure_separation. Before the first closure with a peer,
-/// neither rule skips a candidate.
+/// neither rule skips a candidate, except a pair that the peer itself compares.
 ///
 /// In an environment with similar places most candidates are wrong. Right candidates come in
 /// groups, because the views around the match resemble the query too. Candidates are grouped by
@@ -44,8 +44,13 @@ class RequestPolicy {
   /// After kRequest the candidate counts as requested.
   [[nodiscard]] Decision decide(const LoopCandidate& candidate);
 
-  /// Notes that a closure from an own keyframe to a keyframe of a peer was verified.
+  /// Notes that a closure from an own keyframe to a keyframe of a peer was verified, by this robot
+  /// or, with the ends exchanged, by the peer.
   void add_closure(const ClosureId& closure);
+
+  /// Notes that `peer` requested an own keyframe for its own: it compares this pair, and the pairs
+  /// beside it, so that this robot need not.
+  void add_peer_request(RobotId peer, KeyframeIndex peers, KeyframeIndex own);
 
   /// Discards all about a peer, because its keyframe indices now mean other keyframes.
   void forget(RobotId peer) { peers_.erase(peer); }

@@ -24,6 +24,7 @@ enum class OverlayStream : std::uint8_t {
   kSolver,   ///< Message of a solver; `number` only distinguishes messages on their way.
   kRequest,  ///< Request for keyframe `number` of `to`.
   kReply,    ///< Keyframe `number` of the origin, for `to`.
+  kWords,    ///< Points of keyframe `number` of the origin, for `to` and its request alone.
 
   // Events: every message counts, in any order.
   kBag,      ///< Bag of words for all robots; `number` is the keyframe's index.
@@ -36,7 +37,7 @@ enum class OverlayStream : std::uint8_t {
   return stream >= OverlayStream::kLinks && stream <= OverlayStream::kMemberPoses;
 }
 [[nodiscard]] constexpr bool is_call(OverlayStream stream) {
-  return stream >= OverlayStream::kSolver && stream <= OverlayStream::kReply;
+  return stream >= OverlayStream::kSolver && stream <= OverlayStream::kWords;
 }
 [[nodiscard]] constexpr bool is_reliable(OverlayStream stream) {
   return stream >= OverlayStream::kClosure;

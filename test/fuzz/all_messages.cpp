@@ -167,6 +167,8 @@ std::vector<MessageReader> all_messages() {
   std::vector<MessageReader> all{
       topic<KeyframeRequest>({{kWriter.robot, 1, {kReader, 4}, 17}}),
       topic<KeyframeReply>({some_reply(0), some_reply(12)}),
+      topic<KeyframeWords>({{3, {kWriter.robot, 7}, {450.0, 0.1, {}}},
+                            {3, {kWriter.robot, 7}, {450.0, 0.1, {{{.inverse_depth = 1.0F}, 9}}}}}),
       topic<Closure>({{.from = odometry(kWriter.robot, 1),
                        .to = odometry(kReader, 2),
                        .T_from_to = SE3::Identity(),

@@ -7,9 +7,10 @@
 namespace km {
 namespace {
 
-// As LoopClosureNode: the first replies to a robot have up to three times the keypoints.
-constexpr std::size_t kFirstReplies = 12;
-constexpr std::size_t kFirstFactor = 3;
+constexpr std::size_t kWordPoints = 110;  // median of pairs of EuRoC V1_01
+// Share of the wrong candidates whose common words agree by chance
+// (modules/loop_closure/README.md).
+constexpr double kChance = 0.25;
 constexpr double kKeyframePeriod_s = 3.0;
 
 // A number in [0, 1) that depends on the pair only.
@@ -81,7 +82,7 @@ void CrowdRobot::judge(const KeyframeId& query, const PlaceCandidate& candidate)
                                           .support = candidate.support});
     if (decision != RequestPolicy::Decision::kRequest) return;
     ++(is_true ? findings_.true_requests : findings_.false_requests);
-    request(query);
+    request(query, is_true);
   }
   ++findings_.verifications;
   const bool verified = is_true && draw(query, match) < verified_share_;
@@ -93,12 +94,14 @@ void CrowdRobot::judge(const KeyframeId& query, const PlaceCandidate& candidate)
   policy_.add_result(query, verified);
 }
 
-void CrowdRobot::request(const KeyframeId& query) {
+void CrowdRobot::request(const KeyframeId& query, bool is_true) {
   requested_.insert(query);
   const auto keypoints = static_cast<std::size_t>(LoopClosureConfig{}.reply_keypoints);
-  const bool is_first = ++replies_[query.robot] <= kFirstReplies;
   sent_.add(request_bytes());
-  received_.add(reply_bytes(is_first ? kFirstFactor * keypoints : keypoints));
+  received_.add(words_bytes(kWordPoints));
+  if (!is_true && draw(query, {self_, 0}) >= kChance) return;
+  sent_.add(request_bytes());
+  received_.add(reply_bytes(keypoints));
 }
 
 }  // namespace km

@@ -57,7 +57,7 @@ class CrowdRobot {
   std::vector<Found> search(const KeyframeId& keyframe, std::span<const std::uint8_t> packed,
                             bool stores_bag);
   void judge(const KeyframeId& query, const PlaceCandidate& candidate);
-  void request(const KeyframeId& query);
+  void request(const KeyframeId& query, bool is_true);
 
   const CrowdWorld& world_;
   const Vocabulary& vocabulary_;
@@ -69,7 +69,6 @@ class CrowdRobot {
   PeerWords words_;
   std::map<KeyframeId, std::vector<std::uint8_t>> stored_;
   RequestPolicy policy_;
-  std::map<RobotId, std::size_t> replies_;
   std::set<KeyframeId> requested_;
   CrowdFindings findings_;
   CrowdWork work_;

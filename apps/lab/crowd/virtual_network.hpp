@@ -12,7 +12,10 @@ namespace km {
   return 32 + packed;
 }
 [[nodiscard]] constexpr std::size_t request_bytes() {
-  return 20;
+  return 24;
+}
+[[nodiscard]] constexpr std::size_t words_bytes(std::size_t points) {
+  return 32 + 6 * points;
 }
 [[nodiscard]] constexpr std::size_t reply_bytes(std::size_t keypoints) {
   return 336 + 40 * keypoints;

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "modules/loop_closure/packed_word_points.hpp"
 #include "runtime/dds/codec.hpp"
 #include "runtime/dds/wire_pose.hpp"
 
@@ -113,12 +114,39 @@ Codec<KeyframeRequest>::Encoded Codec<KeyframeRequest>::encode(const KeyframeReq
   encoded.wire.request = request.number;
   encoded.wire.keyframe = to_wire(request.keyframe);
   encoded.wire.own = request.own;
+  encoded.wire.part = static_cast<std::uint8_t>(request.part);
   return encoded;
 }
 
 Decoded<KeyframeRequest> Codec<KeyframeRequest>::decode(const Wire& wire, const TeamPeer& writer) {
-  return Decoded<KeyframeRequest>::accept(
-      {writer.robot, wire.request, from_wire(wire.keyframe), wire.own});
+  if (wire.part > static_cast<std::uint8_t>(KeyframePart::kWordPoints))
+    return Decoded<KeyframeRequest>::refuse("an unknown part of a keyframe");
+  return Decoded<KeyframeRequest>::accept({writer.robot, wire.request, from_wire(wire.keyframe),
+                                           wire.own, static_cast<KeyframePart>(wire.part)});
+}
+
+MessageKey Codec<KeyframeWords>::key_of(const KeyframeWords& words) {
+  return message_key({words.keyframe.index, words.number});
+}
+
+Codec<KeyframeWords>::Encoded Codec<KeyframeWords>::encode(const KeyframeWords& words) {
+  Encoded encoded;
+  encoded.wire.keyframe = to_wire(words.keyframe);
+  encoded.wire.request = words.number;
+  encoded.points = pack(words.words);
+  borrow(encoded.wire.points, encoded.points);
+  return encoded;
+}
+
+Decoded<KeyframeWords> Codec<KeyframeWords>::decode(const Wire& wire, const TeamPeer& writer) {
+  using Result = Decoded<KeyframeWords>;
+  if (wire.keyframe.robot != writer.robot)
+    return Result::refuse("a keyframe of another robot than the writer");
+  const auto bytes = elements_of(wire.points, kMaxBytes);
+  auto points = bytes ? unpack_word_points(*bytes) : std::nullopt;
+  if (!points) return Result::refuse("points are missing, too many, or none of a camera");
+  return Result::accept(
+      {.number = wire.request, .keyframe = from_wire(wire.keyframe), .words = *std::move(points)});
 }
 
 MessageKey Codec<KeyframeReply>::key_of(const KeyframeReply& reply) {

@@ -8,6 +8,7 @@
 
 #include "modules/core/pose_graph.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/loop_closure/packed_word_points.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {
@@ -20,7 +21,7 @@ template <>
 struct Codec<KeyframeRequest> {
   using Wire = km_wire_KeyframeRequest;
   static constexpr const char* kTopic = "keyframe_requests";
-  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::uint16_t kVersion = 2;
   static constexpr std::size_t kMaxBytes = 64;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeRequest_desc; }
 
@@ -49,6 +50,24 @@ struct Codec<KeyframeReply> {
   static MessageKey key_of(const KeyframeReply& reply);
   static Encoded encode(const KeyframeReply& reply);
   static Decoded<KeyframeReply> decode(const Wire& wire, const TeamPeer& writer);
+};
+
+/// Written by the owner of the keyframe.
+template <>
+struct Codec<KeyframeWords> {
+  using Wire = km_wire_KeyframeWords;
+  static constexpr const char* kTopic = "keyframe_words";
+  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::size_t kMaxBytes = 256 + 16 * kMaxWordPoints;
+  static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeWords_desc; }
+
+  struct Encoded {
+    Wire wire{};
+    std::vector<std::uint8_t> points;
+  };
+  static MessageKey key_of(const KeyframeWords& words);
+  static Encoded encode(const KeyframeWords& words);
+  static Decoded<KeyframeWords> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 /// Written by the robot that verified the closure, which owns the keyframe Closure::from.

@@ -22,10 +22,6 @@ namespace {
 // Robots that meet again after a while produce candidates in bursts.
 constexpr std::size_t kQueueCapacity = 16384;
 constexpr std::chrono::milliseconds kTickPeriod(100);
-// The first replies to a robot may contain more keypoints, because the first closures join the maps
-// of the two robots.
-constexpr int kFirstReplies = 12;
-constexpr std::size_t kFirstFactor = 3;
 constexpr std::size_t kLeastPart = 4;  // reply_keypoints over KeypointBudget::least
 
 // Number of keypoints of one image to send.
@@ -74,7 +70,8 @@ KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const Keypoin
 LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
                                  std::shared_ptr<const Vocabulary> vocabulary,
                                  const LoopClosureTopics& topics, ReadKeyframe read_keyframe)
-    : self_(self),
+    : config_(config),
+      self_(self),
       vocabulary_(std::move(vocabulary)),
       topics_(topics),
       verifier_(config),
@@ -97,6 +94,8 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
   topics_.measured_closures.subscribe(queue);
   topics_.peer_requests.subscribe(queue);
   topics_.peer_replies.subscribe(queue);
+  topics_.peer_words.subscribe(queue);
+  topics_.peer_closures.subscribe(queue);
   topics_.peer_events.subscribe([this](const auto& event) {
     if (event->kind != PeerEventKind::kRestarted) worker_.post(event);
   });
@@ -155,9 +154,17 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
         << to_string(request->keyframe);
     return;
   }
+  const KeyframePtr asked = own(request->keyframe);
+  if (asked) policy_.add_peer_request(request->requester, request->own, request->keyframe.index);
+  const std::vector<std::uint32_t>* theirs = words_.find({request->requester, request->own});
+  if (request->part == KeyframePart::kWordPoints && asked && theirs != nullptr)
+    return topics_.own_words.publish(Addressed<KeyframeWords>{
+        request->requester, std::make_shared<const KeyframeWords>(KeyframeWords{
+                                request->number, request->keyframe,
+                                common_word_points(asked->features, *vocabulary_, *theirs)})});
   KeyframeReply reply{.number = request->number, .found = false, .keyframe = {}};
   reply.keyframe.odometry.id = request->keyframe;
-  if (const KeyframePtr asked = own(request->keyframe)) {
+  if (asked) {
     reply.found = true;
     reply.keyframe.odometry = asked->odometry;
     reply.keyframe.stamp = asked->stamp;
@@ -179,6 +186,28 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
   send_due_requests();
 }
 
+void LoopClosureNode::step(const std::shared_ptr<const KeyframeWords>& words) {
+  const KeyframeId& id = words->keyframe;
+  // Ignores the reply to a repeated request, or one without a request.
+  if (promising_.contains(id) || !vocabulary_ || !requests_.arrived(id)) return;
+  const std::vector<Work>& works = waiting_.at(id);
+  if (std::ranges::any_of(works, [&](const Work& work) { return fits(work, words->words); })) {
+    promising_.insert(id);
+    requests_.want(id);
+  } else {
+    for (const Work& work : works)
+      report(work, ClosureStage::kReceived, "common words do not agree on a pose");
+    waiting_.erase(id);
+    policy_.add_result(id, false);
+  }
+  send_due_requests();
+}
+
+void LoopClosureNode::step(const std::shared_ptr<const Closure>& peer_closure) {
+  const KeyframeId &from = peer_closure->from.id, &to = peer_closure->to.id;
+  if (to.robot == self_ && from.robot != self_) policy_.add_closure({to, from});
+}
+
 void LoopClosureNode::step(const std::shared_ptr<const PeerEvent>& event) {
   const RobotId peer = event->identity.robot;
   if (event->kind == PeerEventKind::kRestarted) {
@@ -197,7 +226,7 @@ void LoopClosureNode::forget(RobotId peer) {
   words_.forget(peer);
   requests_.forget(peer);
   policy_.forget(peer);
-  replies_.erase(peer);
+  std::erase_if(promising_, [&](const KeyframeId& id) { return id.robot == peer; });
   std::erase_if(known_, [&](const ClosureId& id) { return touches(id, peer); });
   for (auto& [keyframe, works] : waiting_)
     std::erase_if(works, [&](const Work& work) { return touches(work.id, peer); });
@@ -255,11 +284,10 @@ LoopClosureNode::KeyframePtr LoopClosureNode::own(const KeyframeId& id) const {
 
 KeyframeFeatures LoopClosureNode::select_keypoints(const KeyframeFeatures& features,
                                                    const KeyframeId& to) {
-  const bool is_first = ++replies_[to.robot] <= kFirstReplies;
-  const std::size_t most = is_first ? kFirstFactor * reply_keypoints_ : reply_keypoints_;
   const std::vector<std::uint32_t>* words = words_.find(to);
-  if (words == nullptr) return reduced(features, most);
-  return chosen_by_words(features, {reply_keypoints_ / kLeastPart, most}, *vocabulary_, *words);
+  if (words == nullptr) return reduced(features, reply_keypoints_);
+  return chosen_by_words(features, {reply_keypoints_ / kLeastPart, reply_keypoints_}, *vocabulary_,
+                         *words);
 }
 
 // Completes the work if both keyframes are available; otherwise waits for a keyframe or requests
@@ -296,9 +324,26 @@ void LoopClosureNode::arrived(const KeyframePtr& keyframe) {
   if (found == waiting_.end()) return;
   const std::vector<Work> works = std::move(found->second);
   waiting_.erase(found);
+  promising_.erase(keyframe->odometry.id);
   bool verified = false;
   for (const Work& work : works) verified |= advance(work);
   if (keyframe->odometry.id.robot != self_) policy_.add_result(keyframe->odometry.id, verified);
+}
+
+bool LoopClosureNode::fits(const Work& work, const WordPoints& theirs) const {
+  if (work.measured) return true;
+  const KeyframePtr keyframe = own(work.id.from);
+  return keyframe && may_show_one_place(keyframe->features, *vocabulary_, theirs, config_);
+}
+
+KeyframePart LoopClosureNode::part_to_request(const KeyframeId& keyframe) const {
+  const std::vector<Work>& works = waiting_.at(keyframe);
+  const bool is_measured =
+      std::ranges::any_of(works, [](const Work& work) { return work.measured.has_value(); });
+  return vocabulary_ && config_.min_word_points > 0 && !is_measured &&
+                 !promising_.contains(keyframe)
+             ? KeyframePart::kWordPoints
+             : KeyframePart::kFeatures;
 }
 
 bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Keyframe& to) {
@@ -342,11 +387,12 @@ void LoopClosureNode::report(const Work& work, ClosureStage stage, std::string r
 void LoopClosureNode::send_due_requests() {
   for (const KeyframeId& keyframe : requests_.due(now_s_)) {
     std::vector<Work>& works = waiting_.at(keyframe);
-    auto request = std::make_shared<const KeyframeRequest>(
-        KeyframeRequest{.requester = self_,
-                        .number = next_request_++,
-                        .keyframe = keyframe,
-                        .own = works.front().id.from.index});
+    auto request =
+        std::make_shared<const KeyframeRequest>(KeyframeRequest{.requester = self_,
+                                                                .number = next_request_++,
+                                                                .keyframe = keyframe,
+                                                                .own = works.front().id.from.index,
+                                                                .part = part_to_request(keyframe)});
     topics_.own_requests.publish(Addressed<KeyframeRequest>{keyframe.robot, std::move(request)});
     for (Work& work : works)
       if (!std::exchange(work.requested, true)) report(work, ClosureStage::kRequested);

@@ -35,6 +35,8 @@ struct LoopClosureTopics {
   In<RelativePose> measured_closures;  ///< Closures of a recorded graph that start at this robot.
   In<KeyframeRequest> peer_requests;   ///< Requests of peers for keyframes of this robot.
   In<KeyframeReply> peer_replies;      ///< Replies of peers to requests of this robot.
+  In<KeyframeWords> peer_words;        ///< Replies to requests for word points.
+  In<Closure> peer_closures;           ///< Closures that peers have verified.
   In<PeerEvent> peer_events;           ///< Beginning and end of links to peers.
   In<PeerEvent> restarts;              ///< kRestarted, before the first candidate of the new
                                        ///< incarnation.
@@ -43,6 +45,7 @@ struct LoopClosureTopics {
                                        ///< robot.
   Out<Addressed<KeyframeRequest>> own_requests;
   Out<Addressed<KeyframeReply>> own_replies;
+  Out<Addressed<KeyframeWords>> own_words;
   Out<Closure> own_closures;     ///< Verified closures of this robot.
   Out<PeerEvent> own_restarts;   ///< kRestarted, after the last closure with a keyframe from before
                                  ///< the restart.
@@ -58,13 +61,15 @@ struct LoopClosureTick {
 /// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A). The node
 /// requests the keyframes of peers from their owners, verifies the candidates, and publishes the
 /// closures. A candidate is never dropped because a reply is missing, but not every candidate is
-/// worth a request (see RequestPolicy). Measured closures are processed in the same way, but
-/// without RequestPolicy and without verification: only the odometry of the peer's keyframe is
-/// used. The node also replies to the peers' requests for own keyframes.
+/// worth a request (see RequestPolicy). The first request is for WordPoints, because most
+/// candidates show other places. The features of the keyframe are requested only if these points
+/// agree with an own keyframe. Measured closures are processed in the same way, but without
+/// RequestPolicy and without verification: only the odometry of the peer's keyframe is used. The
+/// node also replies to the peers' requests for own keyframes.
 ///
 /// A closure starts at an own keyframe: `from` is the candidate's match, `to` the candidate's
-/// query. The node verifies each pair once. The other robot may find and verify the pair too, with
-/// the ends exchanged.
+/// query. The node verifies each pair once. The other robot may find the pair too, with the ends
+/// exchanged. It verifies the pair only if both begin at the same time.
 ///
 /// When a robot has restarted, its keyframe indices mean other keyframes. The node then drops all
 /// candidates and measured closures with this robot, and begins again.
@@ -94,6 +99,8 @@ class LoopClosureNode final : public Node {
   void step(const std::shared_ptr<const RelativePose>& measured_closure);
   void step(const std::shared_ptr<const KeyframeRequest>& request);
   void step(const std::shared_ptr<const KeyframeReply>& reply);
+  void step(const std::shared_ptr<const KeyframeWords>& words);
+  void step(const std::shared_ptr<const Closure>& peer_closure);
   void step(const std::shared_ptr<const PeerEvent>& event);
   void step(const std::shared_ptr<const KeyframeBow>& bow);
   void step(const std::shared_ptr<const ClosureOutcome>& restored);
@@ -103,7 +110,8 @@ class LoopClosureNode final : public Node {
   using Input =
       std::variant<std::shared_ptr<const Keyframe>, std::shared_ptr<const LoopCandidate>,
                    std::shared_ptr<const RelativePose>, std::shared_ptr<const KeyframeRequest>,
-                   std::shared_ptr<const KeyframeReply>, std::shared_ptr<const PeerEvent>,
+                   std::shared_ptr<const KeyframeReply>, std::shared_ptr<const KeyframeWords>,
+                   std::shared_ptr<const Closure>, std::shared_ptr<const PeerEvent>,
                    std::shared_ptr<const KeyframeBow>, std::shared_ptr<const ClosureOutcome>,
                    LoopClosureTick>;
   using KeyframePtr = std::shared_ptr<const Keyframe>;
@@ -124,6 +132,8 @@ class LoopClosureNode final : public Node {
   bool advance(const Work& work);
   void request_keyframe(const KeyframeId& missing, const Work& work);
   void arrived(const KeyframePtr& keyframe);
+  [[nodiscard]] bool fits(const Work& work, const WordPoints& theirs) const;
+  [[nodiscard]] KeyframePart part_to_request(const KeyframeId& keyframe) const;
   KeyframePtr find(const KeyframeId& id);
   bool complete(const Work& work, const Keyframe& from, const Keyframe& to);
   void report(const Work& work, ClosureStage stage, std::string reason = {},
@@ -132,19 +142,20 @@ class LoopClosureNode final : public Node {
   [[nodiscard]] KeyframeFeatures select_keypoints(const KeyframeFeatures& features,
                                                   const KeyframeId& to);
 
+  const LoopClosureConfig config_;
   const RobotId self_;
   const std::shared_ptr<const Vocabulary> vocabulary_;
   const LoopClosureTopics topics_;
   const Verifier verifier_;
   const ReadKeyframe read_keyframe_;
   std::map<KeyframeId, KeyframePtr> own_;  // own keyframes; null if stored on the disk
-  std::map<RobotId, int> replies_;         // number of replies sent
   PeerWords words_;
   KeyframeCache peers_;
   KeyframeRequests requests_;
   RequestPolicy policy_;
   const std::size_t reply_keypoints_;
   const KeyframeIndex full_keyframes_;
+  std::set<KeyframeId> promising_;  // requested as a whole, since their word points agree
   std::map<KeyframeId, std::vector<Work>> waiting_;  // work by the keyframe that is missing
   std::set<ClosureId> known_;                        // candidates and measured closures seen
   double now_s_ = 0.0;

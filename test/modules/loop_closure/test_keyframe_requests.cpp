@@ -160,6 +160,21 @@ TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {
   CHECK(policy.decide(candidate(0, 0)) == Decision::kRequest);
 }
 
+TEST_CASE("A pair that the peer compares is not requested, and none beside it after a closure",
+          "[request_policy]") {
+  LoopClosureConfig config;
+  config.max_request_separation = 2;
+  RequestPolicy policy(config);
+  policy.add_peer_request(kPeer, 10, 20);
+  CHECK(policy.decide(candidate(10, 20)) == Decision::kNearRequest);
+  CHECK(policy.decide(candidate(10, 21)) == Decision::kRequest);
+  CHECK(policy.decide(candidate(10, 20, 1, kPeer + 1)) == Decision::kRequest);
+  policy.add_closure({{kSelf, 300}, {kPeer, 300}});
+  policy.add_peer_request(kPeer, 100, 200);
+  CHECK(policy.decide(candidate(101, 199)) == Decision::kNearRequest);
+  CHECK(policy.decide(candidate(102, 200)) == Decision::kRequest);
+}
+
 TEST_CASE("Candidates of a kind that fails are requested less and less often, others are not",
           "[request_policy]") {
   LoopClosureConfig config;

@@ -148,12 +148,43 @@ TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") 
         [](auto& m) { m.wire.similarity = std::nanf(""); }},
        {"absurdly many inliers", "too many inliers", [](auto& m) { m.wire.inliers = ~0U; }}});
 
-  const auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17});
+  using enum KeyframePart;
+  const KeyframePart part = GENERATE(kFeatures, kWordPoints);
+  const auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17, part});
+  check_refusals<KeyframeRequest>(
+      [&] {
+        return encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17, part});
+      },
+      {{"of a part that is none", "an unknown part of a keyframe",
+        [](auto& m) { m.wire.part = 2; }}});
   const auto result = decoded(request).value;
   REQUIRE(result);
   CHECK(result->keyframe == KeyframeId{9, 5});
   CHECK(result->own == 17);
   CHECK(result->requester == kOwner);
+  CHECK(result->part == part);
+}
+
+TEST_CASE("Points of words survive the wire, and hostile ones are refused", "[codec]") {
+  const Keypoint point{.bearing = {0.5F, -0.25F}, .inverse_depth = 0.5F, .octave = 2};
+  const KeyframeWords sent{
+      .number = 12, .keyframe = {kOwner, 7}, .words = {450.0, 0.1, {{point, 3}, {point, 4000}}}};
+  const auto encode = [&] { return encoded_by(kOwner, sent); };
+  const auto encoded = encode();
+  const auto received = decoded(encoded).value;
+  REQUIRE(received);
+  CHECK(received->number == 12);
+  CHECK(received->keyframe == sent.keyframe);
+  REQUIRE(received->words.points.size() == 2);
+  CHECK(received->words.points[1].word == 4000);
+  CHECK(received->words.points[1].keypoint.bearing.isApprox(point.bearing, 1e-3F));
+  constexpr const char* kNone = "points are missing, too many, or none of a camera";
+  check_refusals<KeyframeWords>(
+      encode, {{"written by another robot", "a keyframe of another robot than the writer",
+                [](auto& m) { m.writer.robot = 9; }},
+               {"without a buffer", kNone, [](auto& m) { m.wire.points._buffer = nullptr; }},
+               {"cut off", kNone, [](auto& m) { --m.wire.points._length; }},
+               {"without a focal length", kNone, [](auto& m) { m.points[0] = 0x80; }}});
 }
 
 }  // namespace

@@ -22,18 +22,22 @@ struct Robot {
               .measured_closures = measured,
               .peer_requests = peer_requests,
               .peer_replies = peer_replies,
+              .peer_words = peer_words,
+              .peer_closures = peer_closures,
               .peer_events = peer_events,
               .restarts = restarts,
               .peer_bows = peer_bows,
               .restored = restored,
               .own_requests = own_requests,
               .own_replies = own_replies,
+              .own_words = own_words,
               .own_closures = own_closures,
               .own_restarts = own_restarts,
               .outcomes = outcomes},
              std::move(read_keyframe)) {
     own_requests.subscribe([this](const auto& m) { requests.push_back(*m); });
     own_replies.subscribe([this](const auto& m) { replies.push_back(*m); });
+    own_words.subscribe([this](const auto& m) { words.push_back(*m); });
     own_closures.subscribe([this](const auto& m) { closures.push_back(*m); });
     outcomes.subscribe([this](const auto& m) { reports.push_back(*m); });
   }
@@ -49,15 +53,19 @@ struct Robot {
   Topic<RelativePose> measured;
   Topic<KeyframeRequest> peer_requests;
   Topic<KeyframeReply> peer_replies;
+  Topic<KeyframeWords> peer_words;
+  Topic<Closure> peer_closures;
   Topic<PeerEvent> peer_events, restarts, own_restarts;
   Topic<KeyframeBow> peer_bows;
   Topic<ClosureOutcome> restored;
   Topic<Addressed<KeyframeRequest>> own_requests;
   Topic<Addressed<KeyframeReply>> own_replies;
+  Topic<Addressed<KeyframeWords>> own_words;
   Topic<Closure> own_closures;
   Topic<ClosureOutcome> outcomes;
   std::deque<Addressed<KeyframeRequest>> requests;
   std::deque<Addressed<KeyframeReply>> replies;
+  std::deque<Addressed<KeyframeWords>> words;
   std::vector<Closure> closures;
   std::vector<ClosureOutcome> reports;
   LoopClosureNode node;
@@ -65,12 +73,17 @@ struct Robot {
 
 // Delivers the messages of both robots; a reply may produce further requests.
 void deliver(Robot& a, Robot& b) {
-  while (!a.requests.empty() || !b.requests.empty() || !a.replies.empty() || !b.replies.empty())
+  const auto has_sent = [](const Robot& robot) {
+    return !robot.requests.empty() || !robot.replies.empty() || !robot.words.empty();
+  };
+  while (has_sent(a) || has_sent(b))
     for (auto [from, to] : {std::pair(&a, &b), std::pair(&b, &a)}) {
       const auto requests = std::exchange(from->requests, {});
       for (const auto& request : requests) to->node.step(request.message);
       const auto replies = std::exchange(from->replies, {});
       for (const auto& reply : replies) to->node.step(reply.message);
+      const auto words = std::exchange(from->words, {});
+      for (const auto& points : words) to->node.step(points.message);
     }
 }
 
@@ -188,8 +201,7 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   CAPTURE(has_bow);
   const Scene scene(13);
   constexpr std::uint32_t kSent = 50;
-  constexpr std::size_t kFirst = 12;  // replies, with three times as many
-  Robot robot(kSelf), peer(kPeer, {.reply_keypoints = kSent});
+  Robot robot(kSelf, {.min_word_points = 0}), peer(kPeer, {.reply_keypoints = kSent});
   Keyframe full = scene.peer;
   const auto words = static_cast<std::uint32_t>(full.features.descriptors.size());
   for (std::uint32_t i = 0; i < words; ++i) full.features.descriptors[i] = toy_descriptor(i);
@@ -206,36 +218,26 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   robot.give(scene.candidate());
   REQUIRE(robot.requests.size() == 1);
   CHECK(robot.requests[0].message->own == 0);
-  for (std::size_t reply = 0; reply <= kFirst; ++reply) peer.node.step(robot.requests[0].message);
-  REQUIRE(peer.replies.size() == kFirst + 1);
+  peer.node.step(robot.requests[0].message);
+  REQUIRE(peer.replies.size() == 1);
   std::vector<BinaryDescriptor> expected;  // the strongest come first, none of them without depth
   for (std::uint32_t word = words - kSent; has_bow && word + 1 < words; ++word)
     if (word != 100) expected.push_back(toy_descriptor(word));
   for (std::uint32_t word = 0; !has_bow && word < kSent; ++word)
     expected.push_back(toy_descriptor(word));
-  for (std::size_t reply = 0; reply < kFirst; ++reply)
-    CHECK(peer.replies[reply].message->keyframe.features.descriptors.size() ==
-          (has_bow ? expected.size() : 3 * kSent));
-  const KeyframeFeatures& sent = peer.replies[kFirst].message->keyframe.features;
+  const KeyframeFeatures& sent = peer.replies[0].message->keyframe.features;
   CHECK(sent.descriptors == expected);
   CHECK(sent.keypoints.size() == expected.size());
 }
 
 TEST_CASE("the number of points in a reply depends on the common words", "[loop_closure_node]") {
   constexpr std::uint32_t kSent = 50;
-  constexpr std::size_t kFirst = 12;
-  struct Case {
-    std::uint32_t shared;
-    std::size_t first, later;
-  };
-  const auto [shared, first, later] =
-      GENERATE(Case{0, 12, 12}, Case{5, 12, 12}, Case{30, 30, 30}, Case{90, 90, 50},
-               Case{170, 150, 50});  // for 50 keypoints: at least a quarter, at first at most three
-                                     // times as many
-                                     // many
+  // At least a quarter of `kSent`.
+  const auto [shared, expected] =
+      GENERATE(std::pair(0U, 12U), std::pair(5U, 12U), std::pair(30U, 30U), std::pair(90U, 50U));
   CAPTURE(shared);
   const Scene scene(13);
-  Robot robot(kSelf), peer(kPeer, {.reply_keypoints = kSent});
+  Robot robot(kSelf, {.min_word_points = 0}), peer(kPeer, {.reply_keypoints = kSent});
   constexpr std::uint32_t kPoints = 180;
   Keyframe full = scene.peer;
   full.features.keypoints.resize(kPoints, full.features.keypoints.front());
@@ -250,10 +252,97 @@ TEST_CASE("the number of points in a reply depends on the common words", "[loop_
   peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = toy_vocabulary(200).id(), .words = theirs});
   robot.give(scene.own);
   robot.give(scene.candidate());
-  for (std::size_t reply = 0; reply <= kFirst; ++reply) peer.node.step(robot.requests[0].message);
-  REQUIRE(peer.replies.size() == kFirst + 1);
-  CHECK(peer.replies[0].message->keyframe.features.keypoints.size() == first);
-  CHECK(peer.replies[kFirst].message->keyframe.features.keypoints.size() == later);
+  peer.node.step(robot.requests[0].message);
+  REQUIRE(peer.replies.size() == 1);
+  CHECK(peer.replies[0].message->keyframe.features.keypoints.size() == expected);
+}
+
+// Keypoint i of both keyframes has word i.
+Scene scene_with_words(unsigned seed) {
+  Scene scene(seed);
+  for (std::uint32_t i = 0; i < scene.own.features.descriptors.size(); ++i)
+    scene.own.features.descriptors[i] = scene.peer.features.descriptors[i] = toy_descriptor(i);
+  return scene;
+}
+
+// The peer knows the words of the robot's keyframe.
+void tell_words(Meeting& meeting) {
+  const Vocabulary vocabulary = toy_vocabulary(200);
+  meeting.peer.give(KeyframeBow{.id = meeting.scene.own.odometry.id,
+                                .vocabulary = vocabulary.id(),
+                                .words = vocabulary.count(meeting.scene.own.features.descriptors)});
+}
+
+TEST_CASE("the features of a keyframe are requested once its words agree with an own keyframe",
+          "[loop_closure_node]") {
+  Meeting meeting(scene_with_words(21));
+  tell_words(meeting);
+  auto& [scene, robot, peer] = meeting;
+  robot.give(scene.candidate());
+  REQUIRE(robot.requests.size() == 1);
+  CHECK(robot.requests[0].message->part == KeyframePart::kWordPoints);
+  peer.node.step(std::exchange(robot.requests, {})[0].message);
+  REQUIRE(peer.words.size() == 1);
+  CHECK(peer.words[0].to == kSelf);
+  CHECK(peer.words[0].message->words.points.size() == 150);
+  CHECK(peer.replies.empty());
+  const auto words = std::exchange(peer.words, {})[0].message;
+  robot.node.step(words);
+  robot.node.step(words);  // a late reply to a repeated request
+  REQUIRE(robot.requests.size() == 1);
+  CHECK(robot.requests[0].message->part == KeyframePart::kFeatures);
+  CHECK(robot.closures.empty());
+  deliver(robot, peer);
+  REQUIRE(robot.closures.size() == 1);
+  CHECK(stages_of(robot.reports) == Stages{kCandidate, kRequested, kVerified});
+}
+
+TEST_CASE("no features are requested of a keyframe whose words are elsewhere",
+          "[loop_closure_node]") {
+  Meeting meeting(scene_with_words(22));
+  tell_words(meeting);
+  auto& [scene, robot, peer] = meeting;
+  std::mt19937 rng(23);
+  const KeyframePair other = make_keyframe_pair(rng, 150, {0.7, 0.3}, 1.0);
+  scene.peer.features.keypoints = other.to.keypoints;
+  peer.give(scene.peer);
+  robot.give(scene.candidate());
+  deliver(robot, peer);
+  CHECK(robot.requests.empty());
+  CHECK(robot.closures.empty());
+  REQUIRE(stages_of(robot.reports) == Stages{kCandidate, kRequested, kReceived});
+  CHECK(robot.reports.back().reason == "common words do not agree on a pose");
+  // Another candidate of the keyframe is compared again.
+  robot.give(LoopCandidate{scene.peer.odometry.id, {kSelf, 900}, 0.9});
+  Keyframe again = scene.own;
+  again.odometry.id.index = 900;
+  robot.give(again);
+  robot.tick(1.0);
+  REQUIRE(robot.requests.size() == 1);
+  CHECK(robot.requests[0].message->part == KeyframePart::kWordPoints);
+  CHECK(robot.requests[0].message->own == 900);
+}
+
+TEST_CASE("a robot compares no pair that its peer compares or has verified",
+          "[loop_closure_node]") {
+  Meeting meeting(24);
+  auto& [scene, robot, peer] = meeting;
+  SECTION("compares") {
+    robot.give(KeyframeRequest{.requester = kPeer, .number = 1, .keyframe = {kSelf, 0}, .own = 5});
+    robot.give(scene.candidate());
+    REQUIRE_FALSE(robot.reports.empty());
+    CHECK(robot.reports.back().reason == "not requested: near a requested candidate");
+  }
+  SECTION("has verified") {
+    Closure closure{.from = scene.peer.odometry, .to = scene.own.odometry, .T_from_to = {}};
+    closure.T_from_to.setIdentity();
+    closure.from.id.index = 6;
+    robot.give(closure);
+    robot.give(scene.candidate());
+    REQUIRE_FALSE(robot.reports.empty());
+    CHECK(robot.reports.back().reason == "not requested: near a verified closure");
+  }
+  CHECK(robot.requests.empty());
 }
 
 TEST_CASE("a returned peer is at once asked for its outstanding keyframes", "[loop_closure_node]") {

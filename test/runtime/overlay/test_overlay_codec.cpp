@@ -75,7 +75,7 @@ TEST_CASE("States have one key per origin and stream, other messages one each", 
   CHECK(key(kTeamStatus, kFar, 1) == key(kTeamStatus, kFar, 2));
   CHECK(key(kTeamStatus, kFar, 1) != key(kTeamStatus, kSelf, 1));
   CHECK(key(kTeamStatus, kFar, 1) != key(kSession, kFar, 1));
-  for (const OverlayStream stream : {kSolver, kRequest, kReply, kBag, kClosure}) {
+  for (const OverlayStream stream : {kSolver, kRequest, kReply, kWords, kBag, kClosure}) {
     CHECK(key(stream, kFar, 1) == key(stream, kFar, 1));
     CHECK(key(stream, kFar, 1) != key(stream, kFar, 2));
     CHECK(key(stream, kFar, 1) != key(stream, kFar, 1, 8));
@@ -91,7 +91,7 @@ TEST_CASE("An inconsistent message of the overlay is refused", "[overlay]") {
   OverlayMessage message = message_of(OverlayStream::kReply);
   REQUIRE(refusal_of(message).empty());
   SECTION("stream") {
-    message.stream = static_cast<OverlayStream>(11);
+    message.stream = static_cast<OverlayStream>(static_cast<int>(OverlayStream::kInlierSet) + 1);
     CHECK(refusal_of(message) == "a stream that is not known");
   }
   SECTION("lane") {

@@ -33,6 +33,12 @@ TEST_CASE("The sizes of messages are those of the codecs", "[crowd]") {
   CHECK(padded(content_bytes(Closure{})) == padded(closure_bytes()));
   const std::string name = GENERATE("anna", "robot_9");
   CHECK(padded(content_bytes(RobotStatus{.robot = 1, .name = name})) == padded(status_bytes()));
+  // Words of an image are about 60 apart; the size depends on their gaps.
+  KeyframeWords words{.number = 1, .keyframe = {}, .words = {450.0, 0.1, {}}};
+  for (std::uint32_t i = 1; i <= 110; ++i)
+    words.words.points.push_back({{.bearing = {0.1F, 0.2F}, .inverse_depth = 0.5F}, 60 * i});
+  CHECK(static_cast<double>(content_bytes(words)) ==
+        Approx(static_cast<double>(words_bytes(110))).epsilon(0.1));
   const std::size_t keypoints = GENERATE(1U, 200U, 600U);
   KeyframeReply reply{.number = 1, .found = true, .keyframe = {}};
   reply.keyframe.features.keypoints.resize(keypoints);
