@@ -1,6 +1,7 @@
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -22,6 +23,7 @@ WitnessedPair::WitnessedPair(RobotId a, RobotId b, const PcmConfig& config)
       b_(std::max(a, b)),
       config_(checked(config)),
       test_(config),
+      contest_(config),
       clique_(static_cast<std::uint64_t>(config.max_search_nodes)) {}
 
 PcmAddResult WitnessedPair::add(const Closure& closure) {
@@ -37,6 +39,7 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
   if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
     return PcmAddResult::kAgainstOdometry;
   added_.insert(id);
+  contest_.add(closure);
   const bool is_stated = closure.inliers != 0;
   strongest_ = std::max(strongest_, is_stated ? closure.inliers : config_.min_lone_inliers);
   const std::size_t before = witnesses();
@@ -57,6 +60,14 @@ void WitnessedPair::thin() {
     });
     known_ = added_;
   }
+  contest_.keep(added_);
+}
+
+std::vector<ClosureId> WitnessedPair::closures() const {
+  std::vector<ClosureId> result;
+  std::ranges::copy_if(added_, std::back_inserter(result),
+                       [this](const ClosureId& id) { return !contest_.is_overruled(id); });
+  return result;
 }
 
 void WitnessedPair::test(const OrientedClosure& closure) {

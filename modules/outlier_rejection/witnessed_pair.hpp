@@ -4,6 +4,7 @@
 #include <set>
 #include <vector>
 
+#include "modules/outlier_rejection/local_contest.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 
 namespace km {
@@ -30,8 +31,9 @@ class WitnessedPair {
   /// not between the two robots or not is_usable(); the state is then unchanged.
   [[nodiscard]] PcmAddResult add(const Closure& closure);
 
-  /// The added closures without dropped ones, ascending.
-  [[nodiscard]] std::vector<ClosureId> closures() const { return {added_.begin(), added_.end()}; }
+  /// The added closures without dropped ones and those that stronger ones beside them contradict
+  /// (LocalContest), ascending.
+  [[nodiscard]] std::vector<ClosureId> closures() const;
   /// Number of witnesses found, at most PcmConfig::min_witnesses.
   [[nodiscard]] std::size_t witnesses() const { return clique_.clique().size(); }
   /// True if there are PcmConfig::min_witnesses.
@@ -51,7 +53,8 @@ class WitnessedPair {
   CycleTest test_;
   std::set<ClosureId> known_;  // added closures, and those refused by the odometry gate
   std::set<ClosureId> added_;
-  int strongest_ = 0;  // most inliers of an added closure
+  int strongest_ = 0;     // most inliers of an added closure
+  LocalContest contest_;  // among added closures
   std::vector<PreparedClosure> tested_;
   MaxClique clique_;  // over `tested_`; closures that share a neighbourhood are not connected
 };

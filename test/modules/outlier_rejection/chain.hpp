@@ -37,10 +37,10 @@ inline SE3 rotz(double angle_rad, double x = 0.0, double y = 0.0) {
                    {x, y, 0.0});
 }
 
-/// A closure between two keyframes with isotropic `variance`.
+/// A closure between two keyframes with isotropic `variance`. It does not state its inliers.
 inline Closure closure(const OdometryPose& from, const OdometryPose& to, const SE3& T_from_to,
                        double variance = 1e-4) {
-  return {from, to, T_from_to, variance * Matrix6::Identity(), 100, 0.8};
+  return {from, to, T_from_to, variance * Matrix6::Identity(), 0, 0.8};
 }
 
 /// Closed cycles may have this error per transform, independent of the covariances.
