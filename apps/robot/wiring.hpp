@@ -233,7 +233,7 @@ class Robot {
   void add_objects(const ObjectsConfig& config, const LabelPalette& palette,
                    const std::filesystem::path& folder, ResultWriter& results);
   void add_constellations(const ConstellationsConfig& config);
-  void add_surface_ties();
+  void add_surface_ties(const MeshDeformationConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config);

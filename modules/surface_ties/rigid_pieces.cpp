@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <optional>
+#include <span>
 #include <utility>
+
+#include "modules/surface_ties/chunk_visits.hpp"
 
 namespace km {
 namespace {
@@ -13,36 +16,58 @@ double motion_m(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) {
                   (a.max() - b.max()).cwiseAbs().maxCoeff());
 }
 
+// True if the keyframe is in the middle of the views of a vertex.
+bool is_seen_by(const MeshChunk& chunk, KeyframeIndex keyframe) {
+  return std::ranges::any_of(chunk.views, [&](const auto& views) {
+    const std::size_t middle = (std::size_t{views[0]} + views[1]) / 2 / kViewsPerKeyframe;
+    return chunk.keyframes[middle].index == keyframe;
+  });
+}
+
 }  // namespace
 
 std::set<KeyframeIndex> RigidPieces::add(const MeshChunk& chunk) {
   std::set<KeyframeIndex> changed;
-  if (const auto known = parts_.find(chunk.key); known != parts_.end()) {
+  const auto [begin, end] = parts_.equal_range(chunk.key);
+  for (auto known = begin; known != end; ++known) {
     changed.insert(known->second.piece());
     samples_ -= known->second.samples.size();
-    parts_.erase(known);
   }
-  if (!chunk.empty() && chunk.odometry) {
-    const MeshChunk* const one = &chunk;
-    const SE3 T_world_kf =
-        find_pose(chunk.keyframes, chunk.odometry->id.index).value_or(SE3::Identity());
-    Part part{{*chunk.odometry, T_world_kf},
-              chunk.anchor,
-              {},
-              sample_plane_patches(assemble_mesh(std::span(&one, 1)), spacing_m_)};
-    transform(part.samples, T_world_kf.inverse());
-    move(part);
-    if (!part.samples.empty() && samples_ + part.samples.size() <= kMaxSamples) {
-      samples_ += part.samples.size();
-      changed.insert(part.piece());
-      parts_.emplace(chunk.key, std::move(part));
+  parts_.erase(begin, end);
+  if (!chunk.empty() && !chunk.keyframes.empty())
+    for (const MeshChunk& visit : split_visits(chunk, max_gap_keyframes_)) {
+      std::optional<Part> part = part_of(visit);
+      if (!part || part->samples.empty() || samples_ + part->samples.size() > kMaxSamples) continue;
+      samples_ += part->samples.size();
+      changed.insert(part->piece());
+      parts_.emplace(chunk.key, *std::move(part));
     }
-  }
   for (const KeyframeIndex number : changed) {
     measure(number);
     places_.erase(number);
   }
   return changed;
+}
+
+// Absent if odometry of the surface is unknown.
+std::optional<RigidPieces::Part> RigidPieces::part_of(const MeshChunk& visit) const {
+  std::optional<OdometryPose> odometry;
+  const auto known = odometry_.find(middle_keyframe(visit).index);
+  if (known != odometry_.end())
+    odometry = known->second;
+  else if (visit.odometry && is_seen_by(visit, visit.odometry->id.index))
+    odometry = visit.odometry;
+  if (!odometry) return std::nullopt;
+  const MeshChunk* const one = &visit;
+  Part part{{*odometry, find_pose(visit.keyframes, odometry->id.index).value_or(SE3::Identity())},
+            visit.anchor,
+            {},
+            sample_plane_patches(assemble_mesh(std::span(&one, 1)), spacing_m_)};
+  const SeenBy views = seen_by(visit);
+  for (SurfaceSample& sample : part.samples) sample.seen_by = views;
+  transform(part.samples, part.keyframe.T_world_kf.inverse());
+  move(part);
+  return part;
 }
 
 std::set<KeyframeIndex> RigidPieces::add(const MeshPoses& poses) {

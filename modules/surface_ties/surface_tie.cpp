@@ -59,8 +59,8 @@ class Matcher {
   [[nodiscard]] Pairing match(const SE3& T_a_b) const {
     Pairing result;
     for (const SurfaceSample& sample : b_) {
-      const auto partner =
-          partner_of({T_a_b * sample.point, T_a_b.linear() * sample.normal, sample.label});
+      const auto partner = partner_of(
+          {T_a_b * sample.point, T_a_b.linear() * sample.normal, sample.label, sample.seen_by});
       if (!partner) continue;
       const bool differ =
           partner->label != 0 && sample.label != 0 && partner->label != sample.label;
@@ -72,7 +72,8 @@ class Matcher {
   }
 
  private:
-  // The nearest sample of a that faces the same way and does not lie beside the moved sample of b.
+  // The nearest sample of a that faces the same way, is not of the same visit, and does not lie
+  // beside the moved sample of b.
   [[nodiscard]] std::optional<SurfaceSample> partner_of(const SurfaceSample& moved) const {
     std::array<std::uint32_t, kNeighbours> found{};
     std::array<double, kNeighbours> distances2{};
@@ -81,12 +82,18 @@ class Matcher {
     for (std::size_t i = 0; i < count; ++i) {
       if (distances2[i] > options_.reach_m * options_.reach_m) break;
       const SurfaceSample& candidate = a_[found[i]];
-      if (candidate.normal.dot(moved.normal) < kLeastCosine) continue;
+      if (candidate.normal.dot(moved.normal) < kLeastCosine || is_one_visit(candidate, moved))
+        continue;
       const Eigen::Vector3d offset = moved.point - candidate.point;
       const double along2 = offset.squaredNorm() - std::pow(candidate.normal.dot(offset), 2);
       if (along2 <= options_.spacing_m * options_.spacing_m) return candidate;
     }
     return std::nullopt;
+  }
+
+  [[nodiscard]] bool is_one_visit(const SurfaceSample& a, const SurfaceSample& b) const {
+    return options_.max_gap_keyframes &&
+           keyframe_gap(a.seen_by, b.seen_by) <= *options_.max_gap_keyframes;
   }
 
   const std::vector<SurfaceSample>& a_;

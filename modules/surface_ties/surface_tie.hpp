@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
+#include "modules/core/ids.hpp"
 #include "modules/surface_ties/surface_samples.hpp"
 
 namespace km {
@@ -22,6 +24,9 @@ struct SurfaceTieOptions {
   /// Standard deviation of an offset along the normals that all samples share, for example by a
   /// bias of depth.
   double bias_m = 0.005;
+  /// For two surfaces of one robot, the largest keyframe_gap() of samples of one visit. Such
+  /// samples form no pair. Absent for two robots.
+  std::optional<KeyframeIndex> max_gap_keyframes = {};
 };
 
 enum class SurfaceTieStatus {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "modules/core/covariance.hpp"
+
 namespace km {
 namespace {
 
@@ -15,10 +17,26 @@ double position_variance(const Closure& tie) {
   return tie.covariance.bottomRightCorner<3, 3>().trace();
 }
 
+// The same of the relative pose by odometry, for two keyframes of one robot.
+double odometry_variance(const Closure& tie) {
+  const UncertainPose odometry = between_on_chain({tie.from.T_odom_kf, tie.from.covariance},
+                                                  {tie.to.T_odom_kf, tie.to.covariance});
+  return odometry.Sigma.bottomRightCorner<3, 3>().trace();
+}
+
 }  // namespace
 
-TieSearch::TieSearch(RobotId self, const SurfaceTieOptions& options)
-    : self_(self), options_(options) {}
+TieSearch::TieSearch(RobotId self, KeyframeIndex max_gap_keyframes,
+                     const SurfaceTieOptions& options)
+    : self_(self), max_gap_keyframes_(max_gap_keyframes), options_(options) {}
+
+void TieSearch::learn(const OdometryPose& keyframe) {
+  pieces_of(self_).learn(keyframe);
+}
+
+RigidPieces& TieSearch::pieces_of(RobotId robot) {
+  return pieces_.try_emplace(robot, options_.spacing_m, max_gap_keyframes_).first->second;
+}
 
 void TieSearch::add(const MeshChunk& chunk, double now_s) {
   add_to_pieces(chunk.key.robot, chunk.boot, chunk, now_s);
@@ -37,15 +55,14 @@ void TieSearch::add_to_pieces(RobotId robot, std::uint64_t boot, const Message& 
     forget(robot);
     boots_[robot] = boot;
   }
-  RigidPieces& pieces = pieces_.try_emplace(robot, options_.spacing_m).first->second;
-  for (const KeyframeIndex number : pieces.add(message)) {
+  for (const KeyframeIndex number : pieces_of(robot).add(message)) {
     versions_[{robot, number}] = {++changes_, now_s};
     is_done_ = false;
   }
 }
 
 void TieSearch::add(const ClosureId& closure) {
-  if (closure.from.robot == self_ && closure.to.robot != self_) closures_.insert(closure);
+  if (closure.from.robot == self_) closures_.insert(closure);
 }
 
 void TieSearch::forget(RobotId robot) {
@@ -58,19 +75,31 @@ void TieSearch::forget(RobotId robot) {
     std::erase_if(*ids, [&](const ClosureId& id) { return touches(id, robot); });
 }
 
-// Pairs of pieces near each other that are to be registered now or later.
+bool TieSearch::is_joined(RobotId robot) const {
+  return std::ranges::find(joined_, robot) != joined_.end();
+}
+
+// Pairs of pieces near each other that are to be registered now or later. Those between robots come
+// first, because no odometry knows the relative poses of robots.
 std::vector<TieSearch::Pair> TieSearch::open_pairs() const {
   std::vector<Pair> pairs;
   const auto own = pieces_.find(self_);
   if (own == pieces_.end()) return pairs;
-  for (const auto& [robot, pieces] : pieces_) {
-    if (robot == self_ || std::ranges::find(joined_, robot) == joined_.end()) continue;
-    for (const auto& [a, box_a] : own->second.boxes())
-      for (const auto& [b, box_b] : pieces.boxes())
-        if (box_a.exteriorDistance(box_b) < options_.reach_m && is_open({robot, a, b}))
-          pairs.push_back({robot, a, b});
-  }
+  for (const auto& [robot, pieces] : pieces_)
+    if (robot != self_) add_open_pairs(robot, pieces, pairs);
+  add_open_pairs(self_, own->second, pairs);
   return pairs;
+}
+
+void TieSearch::add_open_pairs(RobotId robot, const RigidPieces& pieces,
+                               std::vector<Pair>& pairs) const {
+  if (!is_joined(robot)) return;
+  for (const auto& [a, box_a] : pieces_.at(self_).boxes())
+    for (const auto& [b, box_b] : pieces.boxes()) {
+      if (robot == self_ && a >= b) continue;
+      if (box_a.exteriorDistance(box_b) < options_.reach_m && is_open({robot, a, b}))
+        pairs.push_back({robot, a, b});
+    }
 }
 
 void TieSearch::set_joined(std::vector<RobotId> robots) {
@@ -114,23 +143,26 @@ std::optional<Closure> TieSearch::lay(const Pair& pair) {
   const RigidPiece own = pieces_.at(self_).piece(pair.own);
   const RigidPiece peer = pieces_.at(pair.other).piece(pair.peer);
   if (own.anchor != peer.anchor) return std::nullopt;
+  SurfaceTieOptions options = options_;
+  if (pair.other == self_) options.max_gap_keyframes = max_gap_keyframes_;
   const SE3 guess = own.keyframe.T_world_kf.inverse() * peer.keyframe.T_world_kf;
-  const SurfaceTie tie = tie_surfaces(own.samples, peer.samples, guess, options_);
+  const SurfaceTie tie = tie_surfaces(own.samples, peer.samples, guess, options);
   if (tie.status != SurfaceTieStatus::kTied) return std::nullopt;
-  if (tie.covariance.bottomRightCorner<3, 3>().trace() > 3.0 * kMaxSigma_m * kMaxSigma_m)
-    return std::nullopt;
-  return Closure{.from = own.keyframe.odometry,
-                 .to = peer.keyframe.odometry,
-                 .T_from_to = tie.T_a_b,
-                 .covariance = tie.covariance,
-                 .inliers = static_cast<int>(tie.pairs)};
+  const Closure closure{.from = own.keyframe.odometry,
+                        .to = peer.keyframe.odometry,
+                        .T_from_to = tie.T_a_b,
+                        .covariance = tie.covariance,
+                        .inliers = static_cast<int>(tie.pairs)};
+  double most = 3.0 * kMaxSigma_m * kMaxSigma_m;
+  if (pair.other == self_) most = std::min(most, odometry_variance(closure));
+  if (position_variance(closure) > most) return std::nullopt;
+  return closure;
 }
 
 // The best tie comes first, so that a small overlap does not exclude a large one.
 std::optional<Closure> TieSearch::take_best() {
   std::erase_if(found_, [&](const auto& entry) {
-    return is_tied(entry.second.id()) ||
-           std::ranges::find(joined_, entry.first.other) == joined_.end();
+    return is_tied(entry.second.id()) || !is_joined(entry.first.other);
   });
   if (found_.empty()) return std::nullopt;
   const auto best = std::ranges::min_element(

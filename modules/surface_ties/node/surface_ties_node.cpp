@@ -26,10 +26,12 @@ std::string text_of(const Closure& tie) {
 
 }  // namespace
 
-SurfaceTiesNode::SurfaceTiesNode(RobotId self, const SurfaceTiesTopics& topics)
-    : ties_(topics.ties),
+SurfaceTiesNode::SurfaceTiesNode(RobotId self, KeyframeIndex max_gap_keyframes,
+                                 const SurfaceTiesTopics& topics)
+    : self_(self),
+      ties_(topics.ties),
       outcomes_(topics.outcomes),
-      search_(self),
+      search_(self, max_gap_keyframes),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
           "surface_ties"),
@@ -65,7 +67,9 @@ void SurfaceTiesNode::post(Input input) {
 
 void SurfaceTiesNode::step(const Input& input, double now_s) {
   if (std::holds_alternative<Tick>(input)) return search(now_s);
-  if (const auto* chunk = std::get_if<Topic<MeshChunk>::Message>(&input))
+  if (const auto* keyframe = std::get_if<OdometryPose>(&input))
+    search_.learn(*keyframe);
+  else if (const auto* chunk = std::get_if<Topic<MeshChunk>::Message>(&input))
     search_.add(**chunk, now_s);
   else if (const auto* poses = std::get_if<Topic<MeshPoses>::Message>(&input))
     search_.add(**poses, now_s);
@@ -83,7 +87,9 @@ void SurfaceTiesNode::step(const Input& input, double now_s) {
 
 void SurfaceTiesNode::take(const OptimizerProgress& progress) {
   std::vector<RobotId> joined = progress.members;
+  // Without a place among the earlier runs, the pose relative to their keyframes is unknown.
   std::erase_if(joined, [&](RobotId robot) {
+    if (robot == self_) return !progress.located;
     return std::ranges::binary_search(progress.tentative, robot) ||
            std::ranges::binary_search(progress.not_joined, robot);
   });

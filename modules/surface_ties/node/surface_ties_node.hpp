@@ -30,12 +30,16 @@ struct SurfaceTiesTopics {
   Out<ClosureOutcome> outcomes;
 };
 
-/// Ties this robot to robots with higher ids by the surfaces in their mesh chunks. Runs a TieSearch
-/// on a thread of its own, which takes less than a tenth of a processor.
+/// Ties this robot to itself and to robots with higher ids by the surfaces in their mesh chunks.
+/// Runs a TieSearch on a thread of its own, which takes less than a tenth of a processor.
 class SurfaceTiesNode final : public Node {
  public:
-  SurfaceTiesNode(RobotId self, const SurfaceTiesTopics& topics);
+  /// `max_gap_keyframes`: see TieSearch.
+  SurfaceTiesNode(RobotId self, KeyframeIndex max_gap_keyframes, const SurfaceTiesTopics& topics);
   ~SurfaceTiesNode() override { stop(); }
+
+  /// An own keyframe; before the chunks that it moves. Thread-safe; returns at once.
+  void learn(const OdometryPose& keyframe) { post(keyframe); }
 
   std::string_view name() const override { return "surface_ties"; }
   void start() override;
@@ -48,9 +52,9 @@ class SurfaceTiesNode final : public Node {
   [[nodiscard]] bool is_done() const { return handled_ == arrived_ && search_done_; }
 
   struct Tick {};
-  using Input = std::variant<Tick, Topic<MeshChunk>::Message, Topic<MeshPoses>::Message,
-                             Topic<Closure>::Message, Topic<OptimizerProgress>::Message,
-                             Topic<PeerEvent>::Message>;
+  using Input = std::variant<Tick, OdometryPose, Topic<MeshChunk>::Message,
+                             Topic<MeshPoses>::Message, Topic<Closure>::Message,
+                             Topic<OptimizerProgress>::Message, Topic<PeerEvent>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this function; tests
   /// can call it too.
@@ -61,6 +65,7 @@ class SurfaceTiesNode final : public Node {
   void take(const OptimizerProgress& progress);
   void search(double now_s);
 
+  const RobotId self_;
   const Out<Closure> ties_;
   const Out<ClosureOutcome> outcomes_;
   TieSearch search_;

@@ -15,14 +15,6 @@
 namespace km {
 namespace {
 
-// Floor and two walls along x.
-LabelledMesh corridor() {
-  LabelledMesh mesh = wall({0, 0, 0}, {8, 0, 0}, {0, 2, 0}, 1);
-  mesh.append(wall({0, 0, 0}, {0, 0, 2}, {8, 0, 0}, 2));
-  mesh.append(wall({0, 2, 0}, {8, 0, 0}, {0, 0, 2}, 3));
-  return mesh;
-}
-
 // Errors of a mapped surface: along the normal of each vertex, equal over patches of half a metre.
 void add_noise(LabelledMesh& mesh, double sigma_m, std::mt19937& random) {
   std::vector<Eigen::Vector3f> normals(mesh.vertices.size(), Eigen::Vector3f::Zero());

@@ -18,15 +18,16 @@ namespace {
 struct Tier {
   Tier(const std::shared_ptr<const DdsDomain>& domain, RobotId robot)
       : basis(domain, robot),
-        ties(robot, {.own_chunks = own_chunks,
-                     .peer_chunks = chunks.from_peers(),
-                     .own_poses = own_poses,
-                     .peer_poses = poses.from_peers(),
-                     .closures = closures.from_peers(),
-                     .progress = progress,
-                     .restarts = restarts,
-                     .ties = made,
-                     .outcomes = outcomes}),
+        ties(robot, kMaxGap,
+             {.own_chunks = own_chunks,
+              .peer_chunks = chunks.from_peers(),
+              .own_poses = own_poses,
+              .peer_poses = poses.from_peers(),
+              .closures = closures.from_peers(),
+              .progress = progress,
+              .restarts = restarts,
+              .ties = made,
+              .outcomes = outcomes}),
         received(closures.from_peers()) {
     basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kOther);
     basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kOther);
@@ -88,15 +89,16 @@ TEST_CASE("The node publishes a tie of two robots' chunks as a closure with its 
   Topic<ClosureOutcome> outcomes;
   Inbox<Closure> made(ties);
   Inbox<ClosureOutcome> reported(outcomes);
-  SurfaceTiesNode node(kSelf, {.own_chunks = own_chunks,
-                               .peer_chunks = peer_chunks,
-                               .own_poses = own_poses,
-                               .peer_poses = peer_poses,
-                               .closures = closures,
-                               .progress = progress,
-                               .restarts = restarts,
-                               .ties = ties,
-                               .outcomes = outcomes});
+  SurfaceTiesNode node(kSelf, kMaxGap,
+                       {.own_chunks = own_chunks,
+                        .peer_chunks = peer_chunks,
+                        .own_poses = own_poses,
+                        .peer_poses = peer_poses,
+                        .closures = closures,
+                        .progress = progress,
+                        .restarts = restarts,
+                        .ties = ties,
+                        .outcomes = outcomes});
   const SE3 T_error = make_pose(so3_exp({0.01, 0.0, 0.0}), {0.03, 0.02, -0.03});
   for (const MeshChunk& chunk : room_chunks(kSelf, 12, SE3::Identity()))
     node.step(std::make_shared<const MeshChunk>(chunk), 0.0);

@@ -31,7 +31,7 @@ struct Search {
       if (auto tie = search.step(now_s)) all.push_back(*tie);
     return all;
   }
-  TieSearch search{kOwn};
+  TieSearch search{kOwn, kMaxGap};
 };
 
 constexpr double kLater_s = 100.0;
@@ -80,7 +80,7 @@ TEST_CASE("Robots whose relative pose is not certain are not tied", "[tie_search
 }
 
 TEST_CASE("The robot with the lower id makes the ties of a pair", "[tie_search]") {
-  TieSearch search(kPeer);
+  TieSearch search(kPeer, kMaxGap);
   search.set_joined({kOwn, kPeer});
   for (const RobotId robot : {kOwn, kPeer})
     for (const MeshChunk& chunk : room_chunks(robot, 12, SE3::Identity())) search.add(chunk, 0.0);
@@ -89,7 +89,7 @@ TEST_CASE("The robot with the lower id makes the ties of a pair", "[tie_search]"
 }
 
 TEST_CASE("A tie begins at the present poses of chunks that were sent before", "[tie_search]") {
-  TieSearch search(kOwn);
+  TieSearch search(kOwn, kMaxGap);
   search.set_joined({kOwn, kPeer});
   const SE3 far = make_pose(so3_exp({0, 0, 1.0}), {100, 0, 0});
   const bool poses_first = GENERATE(false, true);
