@@ -47,9 +47,9 @@ struct MapSharingConfig {
     visitor.field("max_bytes_per_s", max_bytes_per_s, {1000.0, 1e9},
                   "[B/s] average rate of sent chunks; counted once per message, not per receiver");
     visitor.field("surface_ties", surface_ties,
-                  "tie robots to each other where the meshes that they exchange show the same "
-                  "surface and no closure is near; a chunk then states a pose of odometry. Without "
-                  "effect if team is off");
+                  "tie robots to each other, and each robot to its own earlier visits, where their "
+                  "meshes show the same surface and no closure is near; a chunk then states a pose "
+                  "of odometry. Without effect if team is off");
   }
 };
 

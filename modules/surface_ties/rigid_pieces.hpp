@@ -33,7 +33,7 @@ struct RigidPiece {
 class RigidPieces {
  public:
   static constexpr KeyframeIndex kLength = 20;  ///< [keyframes]
-  /// Largest number of stored samples, about 24 MB: a bound for misbehaving peers.
+  /// Largest number of stored samples, about 26 MB: a bound for misbehaving peers.
   static constexpr std::size_t kMaxSamples = 400'000;
 
   /// Motion of a side of a piece's box after which the piece counts as changed. Smaller than the

@@ -17,7 +17,7 @@ double position_variance(const Closure& tie) {
   return tie.covariance.bottomRightCorner<3, 3>().trace();
 }
 
-// The same of the relative pose by odometry, for two keyframes of one robot.
+// Total variance of the position by odometry, for two keyframes of one robot.
 double odometry_variance(const Closure& tie) {
   const UncertainPose odometry = between_on_chain({tie.from.T_odom_kf, tie.from.covariance},
                                                   {tie.to.T_odom_kf, tie.to.covariance});

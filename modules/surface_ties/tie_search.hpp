@@ -27,7 +27,7 @@ namespace km {
 ///
 /// Inside the robot, only surfaces of two visits are laid on each other. The position by the tie
 /// has a smaller variance than that by odometry. Otherwise odometry has drifted by less than the
-/// noise of the surfaces, and the tie adds nothing.
+/// noise of the surfaces, and the tie would add little beside the errors that both share.
 ///
 /// Not thread-safe. The result depends on the order of the calls.
 class TieSearch {
