@@ -79,15 +79,12 @@ bool TieSearch::is_joined(RobotId robot) const {
   return std::ranges::find(joined_, robot) != joined_.end();
 }
 
-// Pairs of pieces near each other that are to be registered now or later. Those between robots come
-// first, because no odometry knows the relative poses of robots.
-std::vector<TieSearch::Pair> TieSearch::open_pairs() const {
+// Pairs of pieces near each other that are to be registered now or later.
+std::vector<TieSearch::Pair> TieSearch::open_pairs(bool inside) const {
   std::vector<Pair> pairs;
-  const auto own = pieces_.find(self_);
-  if (own == pieces_.end()) return pairs;
+  if (!pieces_.contains(self_)) return pairs;
   for (const auto& [robot, pieces] : pieces_)
-    if (robot != self_) add_open_pairs(robot, pieces, pairs);
-  add_open_pairs(self_, own->second, pairs);
+    if ((robot == self_) == inside) add_open_pairs(robot, pieces, pairs);
   return pairs;
 }
 
@@ -160,30 +157,39 @@ std::optional<Closure> TieSearch::lay(const Pair& pair) {
 }
 
 // The best tie comes first, so that a small overlap does not exclude a large one.
-std::optional<Closure> TieSearch::take_best() {
+std::optional<Closure> TieSearch::take_best(bool inside) {
   std::erase_if(found_, [&](const auto& entry) {
     return is_tied(entry.second.id()) || !is_joined(entry.first.other);
   });
-  if (found_.empty()) return std::nullopt;
-  const auto best = std::ranges::min_element(
-      found_, {}, [](const auto& entry) { return position_variance(entry.second); });
+  auto best = found_.end();
+  for (auto found = found_.begin(); found != found_.end(); ++found)
+    if ((found->first.other == self_) == inside &&
+        (best == found_.end() ||
+         position_variance(found->second) < position_variance(best->second)))
+      best = found;
+  if (best == found_.end()) return std::nullopt;
   const Closure tie = best->second;
   found_.erase(best);
   ties_.insert(tie.id());
   return tie;
 }
 
+// Ties between robots come first, because no odometry knows the relative poses of robots.
 std::optional<Closure> TieSearch::step(double now_s) {
   if (is_done_) return std::nullopt;
-  const std::vector<Pair> open = open_pairs();
-  for (const Pair& pair : open) {
-    if (!is_calm(pair, now_s)) continue;
-    if (auto tie = lay(pair)) found_.insert_or_assign(pair, *std::move(tie));
-    return std::nullopt;
+  bool is_any_open = false;
+  for (const bool inside : {false, true}) {
+    const std::vector<Pair> open = open_pairs(inside);
+    for (const Pair& pair : open) {
+      if (!is_calm(pair, now_s)) continue;
+      if (auto tie = lay(pair)) found_.insert_or_assign(pair, *std::move(tie));
+      return std::nullopt;
+    }
+    if (auto tie = take_best(inside)) return tie;
+    is_any_open |= !open.empty();
   }
-  std::optional<Closure> tie = take_best();
-  is_done_ = open.empty() && found_.empty();
-  return tie;
+  is_done_ = !is_any_open;
+  return std::nullopt;
 }
 
 }  // namespace km

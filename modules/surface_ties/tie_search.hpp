@@ -66,6 +66,8 @@ class TieSearch {
   [[nodiscard]] bool is_done() const { return is_done_; }
 
  private:
+  // `inside` stands for the pairs inside this robot, in contrast to those between robots.
+
   // Pieces of this robot and of another one, by their numbers. Inside this robot, `other` is this
   // robot, and `own` < `peer`.
   struct Pair {
@@ -83,14 +85,14 @@ class TieSearch {
   void add_to_pieces(RobotId robot, std::uint64_t boot, const Message& message, double now_s);
   RigidPieces& pieces_of(RobotId robot);
   [[nodiscard]] bool is_joined(RobotId robot) const;
-  [[nodiscard]] std::vector<Pair> open_pairs() const;
+  [[nodiscard]] std::vector<Pair> open_pairs(bool inside) const;
   void add_open_pairs(RobotId robot, const RigidPieces& pieces, std::vector<Pair>& pairs) const;
   [[nodiscard]] bool is_open(const Pair& pair) const;
   [[nodiscard]] bool is_calm(const Pair& pair, double now_s) const;
   [[nodiscard]] std::uint64_t version_of(const Pair& pair) const;
   [[nodiscard]] std::optional<Closure> lay(const Pair& pair);
   [[nodiscard]] bool is_tied(const ClosureId& tie) const;
-  [[nodiscard]] std::optional<Closure> take_best();
+  [[nodiscard]] std::optional<Closure> take_best(bool inside);
 
   const RobotId self_;
   const KeyframeIndex max_gap_keyframes_;

@@ -7,6 +7,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/surface_ties/tie_search.hpp"
 #include "test/modules/surface_ties/chunks.hpp"
+#include "test/modules/surface_ties/visits.hpp"
 
 namespace km {
 namespace {
@@ -85,6 +86,27 @@ TEST_CASE("The robot with the lower id makes the ties of a pair", "[tie_search]"
   for (const RobotId robot : {kOwn, kPeer})
     for (const MeshChunk& chunk : room_chunks(robot, 12, SE3::Identity())) search.add(chunk, 0.0);
   CHECK_FALSE(search.step(kLater_s));
+  CHECK(search.is_done());
+}
+
+TEST_CASE("Ties between robots do not wait for the registrations inside a robot", "[tie_search]") {
+  const DriftingRobot robot;
+  TieSearch search(DriftingRobot::kId, kMaxGap);
+  search.set_joined({DriftingRobot::kId, kPeer});
+  for (const OdometryPose& keyframe : robot.odometry()) search.learn(keyframe);
+  for (const MeshChunk& chunk : room_chunks(kPeer, 35, kError)) search.add(chunk, 0.0);
+  const std::vector<SeenSurface> visits = {{inside_of_room(), {4, 12}},
+                                           {inside_of_room(), {68, 76}}};
+  for (const MeshChunk& chunk : chunks_of(robot, visits)) search.add(chunk, 0.0);
+  std::vector<RobotId> tied;
+  std::vector<int> steps;
+  for (int i = 1; i <= 20; ++i)
+    if (const auto tie = search.step(kLater_s)) {
+      tied.push_back(tie->to.id.robot);
+      steps.push_back(i);
+    }
+  CHECK(tied == std::vector<RobotId>{kPeer, DriftingRobot::kId});
+  CHECK(steps == std::vector<int>{3, 5});  // after two registrations, and after one more
   CHECK(search.is_done());
 }
 

@@ -78,7 +78,7 @@ inline std::vector<MeshChunk> chunks_of(const DriftingRobot& robot,
     origin.seen_by.resize(mesh.vertices.size(), surface.seen_by);
   }
   origin.mapped = mesh.vertices;
-  return split_mesh(mesh, DriftingRobot::kId, DriftingRobot::kId, {.cell_m = 1.0}, &origin).chunks;
+  return split_mesh(mesh, DriftingRobot::kId, 0, {.cell_m = 1.0}, &origin).chunks;
 }
 
 }  // namespace km
