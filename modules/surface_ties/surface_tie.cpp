@@ -238,9 +238,7 @@ void judge(SurfaceTie& tie, const Pairing& pairing, double gate_m,
   }
   tie.free_directions = equations.free_directions();
   tie.status = tie.free_directions == 0 ? SurfaceTieStatus::kTied : SurfaceTieStatus::kSlides;
-  // Neighbouring samples within the correlation length count as one.
-  const double samples_per_error = std::pow(options.correlation_m / options.spacing_m, 2);
-  tie.covariance = equations.covariance(samples_per_error * tie.noise_m * tie.noise_m,
+  tie.covariance = equations.covariance(options.samples_per_error() * tie.noise_m * tie.noise_m,
                                         options.bias_m * options.bias_m);
 }
 

@@ -27,6 +27,11 @@ struct SurfaceTieOptions {
   /// For two surfaces of one robot, the largest keyframe_gap() of samples of one visit. Such
   /// samples form no pair. Absent for two robots.
   std::optional<KeyframeIndex> max_gap_keyframes = {};
+
+  /// Neighbouring samples whose errors count as one: those of a square of side correlation_m.
+  [[nodiscard]] double samples_per_error() const {
+    return correlation_m * correlation_m / (spacing_m * spacing_m);
+  }
 };
 
 enum class SurfaceTieStatus {

@@ -145,11 +145,13 @@ std::optional<Closure> TieSearch::lay(const Pair& pair) {
   const SE3 guess = own.keyframe.T_world_kf.inverse() * peer.keyframe.T_world_kf;
   const SurfaceTie tie = tie_surfaces(own.samples, peer.samples, guess, options);
   if (tie.status != SurfaceTieStatus::kTied) return std::nullopt;
+  const auto independent =
+      static_cast<int>(static_cast<double>(tie.pairs) / options.samples_per_error());
   const Closure closure{.from = own.keyframe.odometry,
                         .to = peer.keyframe.odometry,
                         .T_from_to = tie.T_a_b,
                         .covariance = tie.covariance,
-                        .inliers = static_cast<int>(tie.pairs)};
+                        .inliers = std::max(1, independent)};
   double most = 3.0 * kMaxSigma_m * kMaxSigma_m;
   if (pair.other == self_) most = std::min(most, odometry_variance(closure));
   if (position_variance(closure) > most) return std::nullopt;

@@ -20,7 +20,7 @@ constexpr double kPauses = 10.0;
 std::string text_of(const Closure& tie) {
   const double sigma_m = std::sqrt(tie.covariance.bottomRightCorner<3, 3>().trace() / 3.0);
   return to_string(tie.from.id) + " and " + to_string(tie.to.id) + " by " +
-         std::to_string(tie.inliers) + " samples, standard deviation " +
+         std::to_string(tie.inliers) + " independent samples, standard deviation " +
          std::to_string(std::lround(1e3 * sigma_m)) + " mm";
 }
 
