@@ -17,8 +17,8 @@ inline constexpr std::size_t kMaxWordPoints = 10000;
 /// largest bearing and largest inverse depth come first, as floats, and then the number of points.
 /// The word of a point is stated by the words skipped since the one before (Elias gamma code). Each
 /// axis of its bearing takes 12 bits, its inverse depth 10, and its octave 3. Bearings are rounded
-/// by less than 0.2 px, and inverse depths by a thousandth of the largest. Precondition: every point
-/// has a depth.
+/// by less than 0.2 px, and inverse depths by a thousandth of the largest. Precondition: every
+/// point has a depth.
 [[nodiscard]] std::vector<std::uint8_t> pack(const WordPoints& points);
 
 /// Inverse of pack(). nullopt if the bytes end early or late, or claim more than kMaxWordPoints
