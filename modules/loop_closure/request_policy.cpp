@@ -1,6 +1,7 @@
 #include "modules/loop_closure/request_policy.hpp"
 
 #include <algorithm>
+#include <cstddef>
 
 namespace km {
 namespace {
@@ -9,6 +10,9 @@ using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
 
 // A few wrong candidates must not prevent the first closure of two robots.
 constexpr int kToleratedFailures = 4;
+
+// Bound of what a misbehaving peer can make this robot store, 5 MB.
+constexpr std::size_t kMaxRequests = 100'000;
 
 KeyframeIndex gap(KeyframeIndex a, KeyframeIndex b) {
   return a > b ? a - b : b - a;
@@ -59,7 +63,8 @@ void RequestPolicy::add_closure(const ClosureId& closure) {
 }
 
 void RequestPolicy::add_peer_request(RobotId peer, KeyframeIndex peers, KeyframeIndex own) {
-  peers_[peer].requests.emplace(peers, own);
+  auto& requests = peers_[peer].requests;
+  if (requests.size() < kMaxRequests) requests.emplace(peers, own);
 }
 
 void RequestPolicy::add_result(const KeyframeId& keyframe, bool verified) {

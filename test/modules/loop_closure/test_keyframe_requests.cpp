@@ -175,6 +175,14 @@ TEST_CASE("A pair that the peer compares is not requested, and none beside it af
   CHECK(policy.decide(candidate(102, 200)) == Decision::kRequest);
 }
 
+TEST_CASE("A peer that requests without end is not listened to without end", "[request_policy]") {
+  RequestPolicy policy{LoopClosureConfig{}};
+  for (KeyframeIndex i = 0; i < 100'000; ++i) policy.add_peer_request(kPeer, i, 20);
+  CHECK(policy.decide(candidate(99'999, 20)) == Decision::kNearRequest);
+  policy.add_peer_request(kPeer, 200'000, 20);
+  CHECK(policy.decide(candidate(200'000, 20)) == Decision::kRequest);
+}
+
 TEST_CASE("Candidates of a kind that fails are requested less and less often, others are not",
           "[request_policy]") {
   LoopClosureConfig config;
