@@ -77,7 +77,7 @@ struct LoopClosureConfig {
         "max_request_separation", max_request_separation, {0, 1000},
         "[keyframes] a peer's keyframe is not requested if both keyframes of the candidate "
         "are this near to those of another requested candidate; the distance grows in the "
-        "same way; 0: request all");
+        "same way; 0: request all but the pairs that the peer compares");
     visitor.field("skips_per_failure", skips_per_failure, {0.0, 100.0},
                   "after n failures of similar candidates beyond the first few, this value times n "
                   "such candidates are skipped before one is requested; 0: none");

@@ -40,8 +40,8 @@ void LocalContest::weigh(Entry& added) {
       added.support += entry.inliers;
       entry.support += added.inliers;
     } else {
-      added.against.insert(other->first);
-      entry.against.insert(id);
+      added.against.push_back(other->first);
+      entry.against.push_back(id);
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <set>
+#include <vector>
 
 #include "modules/outlier_rejection/cycle_test.hpp"
 
@@ -43,7 +44,7 @@ class LocalContest {
     PreparedClosure closure;
     double inliers = 0.0;
     double support = 0.0;
-    std::set<ClosureId> against = {};
+    std::vector<ClosureId> against = {};  // closures that contradict it
   };
   void weigh(Entry& added);
 

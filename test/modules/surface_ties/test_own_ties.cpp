@@ -5,9 +5,8 @@
 #include <vector>
 
 #include "modules/rbcd/solver_choice.hpp"
-#include "modules/surface_ties/node/surface_ties_node.hpp"
+#include "test/modules/surface_ties/tied_robot.hpp"
 #include "test/modules/surface_ties/visits.hpp"
-#include "test/support/inbox.hpp"
 #include "test/support/team_network.hpp"
 
 namespace km {
@@ -35,33 +34,15 @@ Closure closure_between(const ClosureId& id) {
 
 // The ties of a node that has received all of this.
 std::vector<Closure> ties_of(const Scene& scene) {
-  Topic<MeshChunk> own_chunks, peer_chunks;
-  Topic<MeshPoses> own_poses, peer_poses;
-  Topic<Closure> closures, ties;
-  Topic<OptimizerProgress> progress;
-  Topic<PeerEvent> restarts;
-  Topic<ClosureOutcome> outcomes;
-  Inbox<Closure> made(ties);
-  SurfaceTiesNode node(kSelf, kMaxGap,
-                       {.own_chunks = own_chunks,
-                        .peer_chunks = peer_chunks,
-                        .own_poses = own_poses,
-                        .peer_poses = peer_poses,
-                        .closures = closures,
-                        .progress = progress,
-                        .restarts = restarts,
-                        .ties = ties,
-                        .outcomes = outcomes});
+  TiedRobot robot(kSelf);
   OptimizerProgress state{.members = {kSelf}};
   state.located = scene.located;
-  node.step(std::make_shared<const OptimizerProgress>(state), 0.0);
-  for (const OdometryPose& keyframe : scene.robot.odometry()) node.step(keyframe, 0.0);
-  for (const ClosureId& id : scene.closures)
-    node.step(std::make_shared<const Closure>(closure_between(id)), 0.0);
-  for (const MeshChunk& chunk : chunks_of(scene.robot, scene.surfaces))
-    node.step(std::make_shared<const MeshChunk>(chunk), 0.0);
-  for (double now_s = 100.0; now_s < 1e9; now_s *= 2.0) node.step(SurfaceTiesNode::Tick(), now_s);
-  return made.messages();
+  robot.give(state);
+  for (const OdometryPose& keyframe : scene.robot.odometry()) robot.node.step(keyframe, 0.0);
+  for (const ClosureId& id : scene.closures) robot.give(closure_between(id));
+  for (const MeshChunk& chunk : chunks_of(scene.robot, scene.surfaces)) robot.give(chunk);
+  robot.run();
+  return robot.made.messages();
 }
 
 SE3 true_pose(const Closure& tie) {
