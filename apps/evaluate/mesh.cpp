@@ -23,6 +23,7 @@ namespace {
 struct MeshCommand {
   std::filesystem::path truth;                   // PLY.
   std::vector<std::filesystem::path> estimates;  // PLY, one file per robot.
+  std::vector<std::filesystem::path> before;     // The same before a correction; may be empty.
   // The robots' poses in the frame of the meshes and in that of the truth. They place the meshes.
   std::vector<std::filesystem::path> trajectories;
   std::vector<std::filesystem::path> true_trajectories;
@@ -46,11 +47,20 @@ constexpr const char* kPlacing =
     "the meshes were taken to lie in the frame of the truth; --trajectory and --trajectory-truth "
     "of their robots place them first";
 
-MeshReport compared(const LabelledMesh& truth, std::span<const MeshInput> inputs,
-                    const MeshErrorOptions& options, StageProgress& progress,
-                    const MeshCommand& command) try {
-  return mesh_error(truth, inputs, options,
-                    [&](std::string_view stage, double share) { progress(stage, share); });
+// Meshes of files, with their names.
+struct MeshFiles {
+  std::deque<LabelledMesh> meshes;  // inputs refer to them
+  std::vector<MeshInput> inputs;
+
+  explicit MeshFiles(const std::vector<std::filesystem::path>& files) {
+    for (const auto& file : files)
+      inputs.push_back({short_name(file), meshes.emplace_back(read_mesh(file))});
+  }
+};
+
+// Calls `compare`. If it finds no common surface, the message states how to place the meshes.
+auto placed(const MeshCommand& command, const auto& compare) try {
+  return compare();
 } catch (const std::invalid_argument& error) {
   const std::string problem = error.what();
   const bool elsewhere = problem.find("in one frame") != problem.npos;
@@ -58,27 +68,41 @@ MeshReport compared(const LabelledMesh& truth, std::span<const MeshInput> inputs
   throw std::invalid_argument(problem + "\nnote: " + kPlacing);
 }
 
+void print(const MeshCommand& command, const MeshReport& report, const LabelPalette& palette) {
+  std::cout << to_table(report, palette);
+  if (command.trajectories.empty() && report.moved_m > kLargeMove_m)
+    std::cout << "note: " << kPlacing << '\n';
+}
+
 void run(const MeshCommand& command) {
   check_output_folder(command.json);
   MeshErrorOptions options = command.options;
   options.T_truth_estimate = placed_by(command);
-  StageProgress progress;
+  StageProgress stages;
+  const MeshProgress progress = [&](std::string_view stage, double share) { stages(stage, share); };
   progress("reading", 0.0);
   const LabelledMesh truth = read_mesh(command.truth);
-  std::deque<LabelledMesh> meshes;  // inputs refer to them
-  std::vector<MeshInput> inputs;
-  for (const auto& file : command.estimates)
-    inputs.push_back({short_name(file), meshes.emplace_back(read_mesh(file))});
+  const MeshFiles estimates(command.estimates), before(command.before);
   std::vector<MeshInput> all = {{command.truth.string(), truth}};
-  for (const MeshInput& input : inputs) all.push_back(input);
+  for (const MeshFiles* files : {&estimates, &before})
+    for (const MeshInput& input : files->inputs) all.push_back(input);
   const LabelPalette palette = read_palette(command.palette, command.truth, all);
 
-  const MeshReport report = compared(truth, inputs, options, progress, command);
-  std::cout << to_table(report, palette);
-  if (command.trajectories.empty() && report.moved_m > kLargeMove_m)
-    std::cout << "note: " << kPlacing << '\n';
-  write_output(command.json,
-               [&](std::ostream& out) { out << json_text(to_json(report, palette)); });
+  Json json;
+  if (before.inputs.empty()) {
+    const MeshReport report =
+        placed(command, [&] { return mesh_error(truth, estimates.inputs, options, progress); });
+    print(command, report, palette);
+    json = to_json(report, palette);
+  } else {
+    const MeshChange change = placed(command, [&] {
+      return mesh_change(truth, before.inputs, estimates.inputs, options, progress);
+    });
+    print(command, change.after, palette);
+    std::cout << '\n' << to_table(change);
+    json = to_json(change, palette);
+  }
+  write_output(command.json, [&](std::ostream& out) { out << json_text(json); });
 }
 
 constexpr const char* kMeshDetails =
@@ -101,8 +125,14 @@ constexpr const char* kMeshDetails =
     "A robot's mesh lies in the frame of its trajectory. If that frame is not that of the truth, "
     "--trajectory\n"
     "and --trajectory-truth place it before ICP.\n\n"
+    "With --before, both states of the meshes are judged on the true points that either of them\n"
+    "shows, after one registration of both together: surface that a correction loses counts as "
+    "far\n"
+    "as --crop.\n\n"
     "Examples:\n"
     "  kimera_multi_evaluate mesh --truth city/world.ply --estimate mesh.ply --json mesh.json\n"
+    "  kimera_multi_evaluate mesh --truth city/world.ply \\\n"
+    "      --before results/robot*/mesh_odometry.ply --estimate results/robot*/mesh_optimized.ply\n"
     "  kimera_multi_evaluate mesh --truth city/world.ply \\\n"
     "      --estimate results/robot0/mesh_optimized.ply results/robot1/mesh_optimized.ply \\\n"
     "      --trajectory results/robot0/optimized.tum results/robot1/optimized.tum \\\n"
@@ -115,6 +145,8 @@ void define(CLI::App& app, MeshCommand& command) {
   app.add_option("--estimate", command.estimates,
                  "Estimated meshes (PLY) in one common frame, one file per robot")
       ->required();
+  app.add_option("--before", command.before,
+                 "The meshes before a correction (PLY), in the order of --estimate");
   app.add_option("--trajectory", command.trajectories,
                  "Estimated poses of the robots in the frame of the meshes, TUM or EuRoC CSV");
   app.add_option("--trajectory-truth", command.true_trajectories,

@@ -138,48 +138,40 @@ std::string traffic_table(const TeamResult& team) {
   return align_columns(rows);
 }
 
-std::string right_labels(const std::optional<MeshReport>& report, const MeshError* error) {
-  if (error == nullptr || !report->has_labels) return "-";
-  return fixed(100.0 * error->seen.labels.total().accuracy(), 1) + '%';
+std::string right_labels(const MeshReport& report, const MeshError& error) {
+  return report.has_labels ? fixed(100.0 * error.seen.labels.total().accuracy(), 1) + '%' : "-";
 }
 
-std::vector<std::string> mesh_row(const std::string& name, const TeamMeshes& meshes,
-                                  const MeshError* before, const MeshError* after) {
-  const auto number = [](const MeshError* error, auto value) {
-    return error != nullptr ? fixed(value(*error), 4) : std::string("-");
-  };
-  const auto mean = [](const MeshError& error) { return error.truth.point.mean_m; };
-  const auto in_front = [](const MeshError& error) { return error.seen.point.mean_m; };
-  const MeshError* const any = after != nullptr ? after : before;
+std::vector<std::string> mesh_row(const std::string& name, const MeshChange& meshes,
+                                  const MeshError& before, const MeshError& after) {
   return {name,
-          any != nullptr ? std::to_string(any->faces) : "-",
-          any != nullptr ? fixed(100.0 * any->coverage, 1) + '%' : "-",
-          number(before, mean),
-          number(before, in_front),
-          right_labels(meshes.odometry, before),
-          number(after, mean),
-          number(after, in_front),
-          right_labels(meshes.optimized, after)};
+          std::to_string(after.faces),
+          fixed(100.0 * after.coverage, 1) + '%',
+          fixed(before.truth.point.mean_m, 4),
+          fixed(before.seen.point.mean_m, 4),
+          right_labels(meshes.before, before),
+          fixed(after.truth.point.mean_m, 4),
+          fixed(after.seen.point.mean_m, 4),
+          right_labels(meshes.after, after)};
 }
 
 // A row per robot and one for all together; empty without comparisons.
 std::string mesh_table(const TeamMeshes& meshes) {
-  const auto& any = meshes.optimized ? meshes.optimized : meshes.odometry;
-  if (!any) return "";
+  if (!meshes.errors) return "";
+  const auto& [before, after] = *meshes.errors;
   Rows rows = {{"mesh", "faces", "covered", "odometry: error [m]", "in front", "labels",
                 "optimized: error [m]", "in front", "labels"}};
-  for (const MeshError& error : (meshes.odometry ? meshes.odometry : any)->robots)
-    rows.push_back(mesh_row(error.name, meshes, find(meshes.odometry, error.name),
-                            find(meshes.optimized, error.name)));
-  rows.push_back(mesh_row("team, one frame", meshes,
-                          meshes.odometry ? &meshes.odometry->merged : nullptr,
-                          meshes.optimized ? &meshes.optimized->merged : nullptr));
+  for (std::size_t k = 0; k < after.robots.size(); ++k)
+    rows.push_back(
+        mesh_row(after.robots[k].name, *meshes.errors, before.robots[k], after.robots[k]));
+  rows.push_back(mesh_row("team, one frame", *meshes.errors, before.merged, after.merged));
   const MeshErrorOptions options;
   return align_columns(rows) +
          "Error: mean distance to the mesh from the points of the true one, " +
-         fixed(any->samples_per_m2, 0) + " a square metre, within " + fixed(options.crop_m, 1) +
-         " m of it\n(covered), after ICP of all together. In front: without those that no robot "
-         "can have seen. Labels: share of\nthese that is right.\n";
+         fixed(after.samples_per_m2, 0) + " a square metre, within " + fixed(options.crop_m, 1) +
+         " m of it\nbefore or after the optimisation, after ICP of all together. Covered: within "
+         "this distance after it.\nIn front: without those that no robot can have seen. Labels: "
+         "share of these that is right.\n";
 }
 
 // Empty unless processors were too slow for the rate.
@@ -274,8 +266,10 @@ void to_json(Json& json, const TeamResult& team) {
   for (const RobotResult& robot : team.robots) json["robots"].push_back(to_json(robot));
   if (team.optimized) json["optimized"] = *team.optimized;
   if (team.closures) json["closures"] = *team.closures;
-  if (team.meshes.odometry) json["meshes"] = to_json(*team.meshes.odometry, {});
-  if (team.meshes.optimized) json["optimized_meshes"] = to_json(*team.meshes.optimized, {});
+  if (team.meshes.errors) {
+    json["meshes"] = to_json(team.meshes.errors->before, {});
+    json["optimized_meshes"] = to_json(team.meshes.errors->after, {});
+  }
   json["notes"] = team.notes;
 }
 

@@ -50,23 +50,35 @@ Meshes read_meshes(const TeamPlan& plan, const char* file, std::vector<std::stri
 // mesh takes more samples.
 constexpr std::size_t kMostSamples = 2'000'000;
 
-std::optional<MeshReport> compare(const LabelledMesh& truth, const Meshes& meshes,
-                                  const SE3& T_truth_team, std::vector<std::string>& notes) {
-  if (meshes.empty()) return std::nullopt;
+std::vector<MeshInput> inputs_of(const Meshes& meshes) {
   std::vector<MeshInput> inputs;
   for (const auto& [name, mesh] : meshes) inputs.push_back({name, mesh});
+  return inputs;
+}
+
+// Removes the robots of `meshes` that `others` lacks, each with a note that ends in `problem`.
+void keep_common(Meshes& meshes, const Meshes& others, const char* problem,
+                 std::vector<std::string>& notes) {
+  std::erase_if(meshes, [&](const auto& mesh) {
+    const bool is_alone =
+        std::ranges::find(others, mesh.first, &Meshes::value_type::first) == others.end();
+    if (is_alone) notes.push_back(mesh.first + problem);
+    return is_alone;
+  });
+}
+
+// Both states on the same points of the truth.
+std::optional<MeshChange> compare(const LabelledMesh& truth, Meshes before, Meshes after,
+                                  const SE3& T_truth_team, std::vector<std::string>& notes) {
+  keep_common(before, after, " left a mesh, but none corrected: not compared", notes);
+  keep_common(after, before, " left a corrected mesh, but no other: not compared", notes);
+  if (before.empty()) return std::nullopt;
   MeshErrorOptions options;
   options.T_truth_estimate = T_truth_team;
   options.max_samples = kMostSamples;
   return attempt(
-      notes, [&] { return mesh_error(truth, inputs, options); }, "meshes are not compared: ");
-}
-
-void note_uncorrected(const Meshes& before, const Meshes& after, std::vector<std::string>& notes) {
-  std::map<std::string, int> corrected;
-  for (const auto& [name, mesh] : after) ++corrected[name];
-  for (const auto& [name, mesh] : before)
-    if (!corrected.contains(name)) notes.push_back(name + " left a mesh, but none corrected");
+      notes, [&] { return mesh_change(truth, inputs_of(before), inputs_of(after), options); },
+      "meshes are not compared: ");
 }
 
 // Left camera of the team: that of the first robot with a camera.
@@ -253,17 +265,15 @@ void find_team_frame(std::vector<RobotResult>& robots) {
 TeamMeshes collect_meshes(const TeamPlan& plan, const SE3& T_truth_team,
                           std::vector<std::string>& notes) {
   TeamMeshes result;
-  const Meshes before = read_meshes(plan, "mesh.ply", notes);
-  const Meshes after = read_meshes(plan, "mesh_optimized.ply", notes);
-  note_uncorrected(before, after, notes);
+  Meshes before = read_meshes(plan, "mesh.ply", notes);
+  Meshes after = read_meshes(plan, "mesh_optimized.ply", notes);
   for (const auto& [name, mesh] : after) result.merged.append(mesh);
   result.merged.transform(T_truth_team);
   if (plan.truth_mesh.empty() || before.empty()) return result;
   std::cerr << "comparing the meshes with " << plan.truth_mesh.string() << " ...\n";
-  if (const auto truth = attempt(notes, [&] { return read_ply(plan.truth_mesh); })) {
-    result.odometry = compare(*truth, before, T_truth_team, notes);
-    result.optimized = compare(*truth, after, T_truth_team, notes);
-  }
+  const auto truth = attempt(notes, [&] { return read_ply(plan.truth_mesh); });
+  if (!truth) return result;
+  result.errors = compare(*truth, std::move(before), std::move(after), T_truth_team, notes);
   return result;
 }
 

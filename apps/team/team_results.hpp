@@ -40,9 +40,9 @@ struct RobotResult {
 
 /// The meshes of a team after the run.
 struct TeamMeshes {
-  std::optional<MeshReport> odometry;  ///< Errors of mesh.ply; absent if the truth is unknown.
-  std::optional<MeshReport>
-      optimized;        ///< Errors of mesh_optimized.ply; absent if the truth is unknown.
+  /// Errors of mesh.ply and of mesh_optimized.ply, of the robots that have both; absent if the
+  /// truth is unknown.
+  std::optional<MeshChange> errors;
   LabelledMesh merged;  ///< All mesh_optimized.ply in the frame of the truth; may be empty.
 };
 

@@ -118,6 +118,24 @@ struct PointMatches {
   }
 };
 
+// The true points that count for one of two states of a mesh: those that either state can show.
+struct SharedPoints {
+  std::vector<bool> near;      // within reach
+  std::vector<bool> in_front;  // see PointMatches
+  std::vector<bool> labelled;  // within the distance at which labels are judged
+
+  void add(const PointMatches& matches, double label_distance_m) {
+    near.resize(matches.point_m.size());
+    in_front.resize(matches.point_m.size());
+    labelled.resize(matches.point_m.size());
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      near[i] = near[i] || std::isfinite(matches.point_m[i]);
+      in_front[i] = in_front[i] || matches.in_front[i];
+      labelled[i] = labelled[i] || static_cast<double>(matches.point_m[i]) <= label_distance_m;
+    }
+  }
+};
+
 // Uses OpenCV's threads; the result does not depend on their number. Calls `progress` with `stage`.
 PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
                           const NearestSurface& nearest_to, double reach_m, std::string_view stage,
@@ -154,30 +172,41 @@ constexpr double kLargeTurn_deg = 3.0;
 
 class Evaluation {
  public:
-  Evaluation(const LabelledMesh& truth, std::span<const MeshInput> inputs,
+  // `inputs`: one or more states, each with `robots` meshes.
+  Evaluation(const LabelledMesh& truth, std::vector<MeshInput> inputs, std::size_t robots,
              const MeshErrorOptions& options, const MeshProgress& progress)
-      : truth_(truth), inputs_(inputs), options_(options), progress_(progress) {
+      : truth_(truth),
+        inputs_(std::move(inputs)),
+        robots_(robots),
+        options_(options),
+        progress_(progress) {
     check(options);
     check_comparable(truth, "truth");
-    if (inputs.empty()) throw std::invalid_argument("no estimated mesh");
+    if (inputs_.empty()) throw std::invalid_argument("no estimated mesh");
     double area = 0.0;
-    for (const MeshInput& input : inputs) {
+    for (const MeshInput& input : inputs_) {
       check_comparable(input.mesh, input.name);
       area += surface_area(input.mesh);
     }
     per_m2_ = std::min(options.samples_per_m2, static_cast<double>(options.max_samples) / area);
   }
 
-  MeshReport run() {
+  // A report for each state.
+  std::vector<MeshReport> run() {
     place(options_.T_truth_estimate);
     report_.registration.T_truth_estimate = options_.T_truth_estimate;
     if (options_.icp) register_estimates();
     sample();
     report_.samples_per_m2 = per_m2_;
     note_labels();
-    compare();
     note_density();
-    return std::move(report_);
+    reports_.assign(inputs_.size() / robots_, report_);
+    describe();
+    compare_truth();
+    compare_estimates();
+    if (robots_ == 1)
+      for (MeshReport& report : reports_) report.merged = report.robots.front();
+    return std::move(reports_);
   }
 
  private:
@@ -288,58 +317,79 @@ class Evaluation {
     if (!report_.has_labels) report_.notes.push_back("labels are not judged: none in " + without);
   }
 
-  void compare() {
-    for (const MeshInput& input : inputs_) {
-      MeshError& error = report_.robots.emplace_back();
-      error.name = input.name;
-      error.area_m2 = surface_area(input.mesh);
-      error.faces = input.mesh.faces.size();
-      report_.merged.area_m2 += error.area_m2;
-      report_.merged.faces += error.faces;
+  void describe() {
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      MeshReport& report = reports_[i / robots_];
+      MeshError& error = report.robots.emplace_back();
+      error.name = inputs_[i].name;
+      error.area_m2 = surface_area(inputs_[i].mesh);
+      error.faces = inputs_[i].mesh.faces.size();
+      report.merged.name = "merged";
+      report.merged.area_m2 += error.area_m2;
+      report.merged.faces += error.faces;
     }
-    report_.merged.name = "merged";
-    compare_truth();
-    compare_estimates();
-    if (inputs_.size() == 1) report_.merged = report_.robots.front();
+  }
+
+  [[nodiscard]] PointMatches matches_of_truth(std::size_t input) const {
+    report_progress("indexing the estimate", 0.0);
+    const NearestSurface nearest(moved_[input], estimates_[input]);
+    return match_points({truth_, true_samples_}, {moved_[input], estimates_[input]}, nearest,
+                        options_.crop_m, "true points to " + inputs_[input].name, progress_);
   }
 
   void compare_truth() {
-    PointMatches nearest_of_all;
-    for (std::size_t i = 0; i < inputs_.size(); ++i) {
-      report_progress("indexing the estimate", 0.0);
-      const NearestSurface nearest(moved_[i], estimates_[i]);
-      PointMatches matches =
-          match_points({truth_, true_samples_}, {moved_[i], estimates_[i]}, nearest,
-                       options_.crop_m, "true points to " + inputs_[i].name, progress_);
-      judge_truth(matches, report_.robots[i]);
-      if (i == 0)
-        nearest_of_all = std::move(matches);
-      else
-        nearest_of_all.keep_nearer(matches);
+    std::vector<PointMatches> merged(reports_.size());
+    for (std::size_t robot = 0; robot < robots_; ++robot) {
+      std::vector<PointMatches> matches;
+      for (std::size_t state = 0; state < reports_.size(); ++state) {
+        matches.push_back(matches_of_truth(state * robots_ + robot));
+        if (robot == 0)
+          merged[state] = matches.back();
+        else
+          merged[state].keep_nearer(matches.back());
+      }
+      judge_truth(
+          matches, [&](MeshReport & report) -> auto& { return report.robots[robot]; });
     }
-    if (inputs_.size() > 1) judge_truth(nearest_of_all, report_.merged);
+    if (robots_ > 1)
+      judge_truth(
+          merged, [](MeshReport & report) -> auto& { return report.merged; });
   }
 
-  void judge_truth(const PointMatches& matches, MeshError& error) const {
-    const auto all = [](std::size_t) { return true; };
-    error.truth = judged(matches, all);
-    error.seen = judged(matches, [&](std::size_t i) { return matches.in_front[i]; });
+  // `matches`: of one mesh, by state.
+  void judge_truth(const std::vector<PointMatches>& matches, const auto& error_of) {
+    SharedPoints points;
+    for (const PointMatches& state : matches) points.add(state, options_.label_distance_m);
     const auto total = static_cast<double>(true_samples_.total);
-    error.coverage = static_cast<double>(error.truth.point.count) / total;
-    error.seen_coverage = static_cast<double>(error.seen.point.count) / total;
+    const auto share = [&](const auto& counts) {
+      return static_cast<double>(std::ranges::count(counts, true)) / total;
+    };
+    for (std::size_t state = 0; state < matches.size(); ++state) {
+      MeshError& error = error_of(reports_[state]);
+      error.truth = judged(matches[state], points, points.near);
+      error.seen = judged(matches[state], points, points.in_front);
+      SharedPoints own;
+      own.add(matches[state], options_.label_distance_m);
+      error.coverage = share(own.near);
+      error.seen_coverage = share(own.in_front);
+    }
   }
 
-  // Comparison from true points that have the estimate within reach and satisfy `counts`.
-  [[nodiscard]] SurfaceComparison judged(const PointMatches& matches, const auto& counts) const {
+  // Comparison from the true points that `counts` has.
+  [[nodiscard]] SurfaceComparison judged(const PointMatches& matches, const SharedPoints& points,
+                                         const std::vector<bool>& counts) const {
+    const auto limit = static_cast<float>(options_.crop_m);
     std::vector<float> point_m;
     std::vector<float> surface_m;
     SurfaceComparison result;
-    for (std::size_t i = 0; i < matches.point_m.size(); ++i) {
-      if (!std::isfinite(matches.point_m[i]) || !counts(i)) continue;
-      point_m.push_back(matches.point_m[i]);
-      surface_m.push_back(matches.surface_m[i]);
-      if (report_.has_labels && static_cast<double>(point_m.back()) <= options_.label_distance_m)
-        result.labels.add(SampledMesh{truth_, true_samples_}.label(i), matches.labels[i]);
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      if (!counts[i]) continue;
+      point_m.push_back(std::min(matches.point_m[i], limit));
+      surface_m.push_back(std::min(matches.surface_m[i], limit));
+      if (!report_.has_labels || !points.labelled[i]) continue;
+      const bool is_near = static_cast<double>(matches.point_m[i]) <= options_.label_distance_m;
+      result.labels.add(SampledMesh{truth_, true_samples_}.label(i),
+                        is_near ? matches.labels[i] : LabelId{0});
     }
     result.point = summary_of(std::move(point_m));
     result.surface = summary_of(std::move(surface_m));
@@ -349,23 +399,29 @@ class Evaluation {
   void compare_estimates() {
     report_progress("indexing the truth", 0.0);
     const NearestSurface nearest(truth_, true_samples_);
+    for (std::size_t state = 0; state < reports_.size(); ++state) compare_estimates(nearest, state);
+  }
+
+  void compare_estimates(const NearestSurface& nearest, std::size_t state) {
+    MeshReport& report = reports_[state];
     std::vector<float> all_point_m;
     std::vector<float> all_surface_m;
-    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    for (std::size_t robot = 0; robot < robots_; ++robot) {
+      const std::size_t i = state * robots_ + robot;
       const SampledMesh estimate{moved_[i], estimates_[i]};
       const PointMatches matches =
           match_points(estimate, {truth_, true_samples_}, nearest, options_.crop_m,
                        inputs_[i].name + " to the truth", progress_);
-      MeshError& error = report_.robots[i];
+      MeshError& error = report.robots[robot];
       error.estimate.labels = labels_of(estimate, matches);
-      report_.merged.estimate.labels.add(error.estimate.labels);
+      report.merged.estimate.labels.add(error.estimate.labels);
       const std::size_t start = all_point_m.size();
       append_clamped(matches.point_m, all_point_m);
       append_clamped(matches.surface_m, all_surface_m);
       judge_estimate(std::span(all_point_m).subspan(start), std::span(all_surface_m).subspan(start),
                      error);
     }
-    if (inputs_.size() > 1) judge_estimate(all_point_m, all_surface_m, report_.merged);
+    if (robots_ > 1) judge_estimate(all_point_m, all_surface_m, report.merged);
   }
 
   void append_clamped(const std::vector<float>& distances_m, std::vector<float>& all_m) const {
@@ -394,14 +450,16 @@ class Evaluation {
   }
 
   const LabelledMesh& truth_;
-  std::span<const MeshInput> inputs_;
+  const std::vector<MeshInput> inputs_;  // by state, then robot
+  const std::size_t robots_;             // meshes of one state
   const MeshErrorOptions& options_;
   const MeshProgress& progress_;
   double per_m2_ = 0.0;
   std::vector<LabelledMesh> moved_;  // the estimates in the truth's frame
   std::vector<SurfaceSamples> estimates_;
   SurfaceSamples true_samples_;
-  MeshReport report_;
+  MeshReport report_;                // what the reports of all states have in common
+  std::vector<MeshReport> reports_;  // by state
 };
 
 }  // namespace
@@ -457,7 +515,22 @@ void check_labels(const LabelledMesh& mesh, const std::string& name, const Label
 
 MeshReport mesh_error(const LabelledMesh& truth, std::span<const MeshInput> estimates,
                       const MeshErrorOptions& options, const MeshProgress& progress) {
-  return Evaluation(truth, estimates, options, progress).run();
+  return Evaluation(truth, {estimates.begin(), estimates.end()}, estimates.size(), options,
+                    progress)
+      .run()
+      .front();
+}
+
+MeshChange mesh_change(const LabelledMesh& truth, std::span<const MeshInput> before,
+                       std::span<const MeshInput> after, const MeshErrorOptions& options,
+                       const MeshProgress& progress) {
+  if (before.size() != after.size())
+    throw std::invalid_argument(std::to_string(before.size()) + " meshes before and " +
+                                std::to_string(after.size()) + " after: one each for a robot");
+  std::vector<MeshInput> all(before.begin(), before.end());
+  for (const MeshInput& input : after) all.push_back(input);
+  std::vector<MeshReport> reports = Evaluation(truth, all, before.size(), options, progress).run();
+  return {std::move(reports[0]), std::move(reports[1])};
 }
 
 }  // namespace km

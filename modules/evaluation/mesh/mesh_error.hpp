@@ -146,6 +146,21 @@ struct [[nodiscard]] MeshReport {
 MeshReport mesh_error(const LabelledMesh& truth, std::span<const MeshInput> estimates,
                       const MeshErrorOptions& options = {}, const MeshProgress& progress = {});
 
+/// Two states of the meshes of the same robots, for instance before and after a correction.
+struct MeshChange {
+  MeshReport before, after;
+};
+
+/// mesh_error() of two states on the same true points. One transform registers both states
+/// together. A true point counts for both states if it is within crop_m of either, and as seen if
+/// either has it in front. The distance to the other state then counts as at most crop_m, and its
+/// label beyond label_distance_m as unknown. A state can therefore not become better by losing
+/// surface. `before` and `after` have one mesh for each robot, in the same order. Throws as
+/// mesh_error().
+MeshChange mesh_change(const LabelledMesh& truth, std::span<const MeshInput> before,
+                       std::span<const MeshInput> after, const MeshErrorOptions& options = {},
+                       const MeshProgress& progress = {});
+
 /// Throws std::invalid_argument, beginning with `name`, for a label that the palette `palette_name`
 /// lacks. The palette may lack the unknown label (0).
 void check_labels(const LabelledMesh& mesh, const std::string& name, const LabelPalette& palette,

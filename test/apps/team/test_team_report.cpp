@@ -267,31 +267,31 @@ TEST_CASE("Meshes are compared with the true one, before and after their correct
     team.leave("b", "mesh_optimized.ply", corner());
     const TeamMeshes meshes = result.meshes = team.meshes();
     CHECK(team.notes.empty());
-    REQUIRE(meshes.odometry.has_value());
-    REQUIRE(meshes.optimized.has_value());
-    REQUIRE(meshes.odometry->robots.size() == 2);
+    REQUIRE(meshes.errors.has_value());
+    const auto& [before, after] = *meshes.errors;
+    REQUIRE(before.robots.size() == 2);
     constexpr double kSampling_m = 0.02;  // points 3 cm apart
-    CHECK(meshes.optimized->merged.truth.point.mean_m < kSampling_m);
+    CHECK(after.merged.truth.point.mean_m < kSampling_m);
     // One transform for both: whatever it is, two meshes 17 cm apart cannot both fit.
-    CHECK(meshes.odometry->robots[0].truth.point.mean_m +
-              meshes.odometry->robots[1].truth.point.mean_m >
-          0.05);
-    CHECK(meshes.optimized->robots[1].truth.labels.total().accuracy() > 0.97);
-    CHECK(meshes.odometry->robots[1].truth.labels.total().accuracy() < 0.4);
+    CHECK(before.robots[0].truth.point.mean_m + before.robots[1].truth.point.mean_m > 0.05);
+    CHECK(after.robots[1].truth.labels.total().accuracy() > 0.97);
+    CHECK(before.robots[1].truth.labels.total().accuracy() < 0.4);
     CHECK(meshes.merged.faces.size() == 2 * corner().faces.size());
     for (std::size_t i = 0; i < corner().vertices.size(); ++i)  // as floats
       CHECK((meshes.merged.vertices[i] - corner().vertices[i]).norm() < 1e-5F);
   }
   SECTION("a corrected one missing") {
     result.meshes = team.meshes();
-    CHECK(team.notes == std::vector<std::string>{"b left a mesh, but none corrected"});
-    REQUIRE(result.meshes.optimized.has_value());
-    CHECK(result.meshes.optimized->robots.size() == 1);
+    CHECK(team.notes ==
+          std::vector<std::string>{"b left a mesh, but none corrected: not compared"});
+    REQUIRE(result.meshes.errors.has_value());
+    CHECK(result.meshes.errors->before.robots.size() == 1);
+    CHECK(result.meshes.errors->after.robots.size() == 1);
   }
   const std::string table = to_table(result);
   const std::string rows = table.substr(table.find("\nmesh "));
-  CHECK_THAT(rows, Contains("odometry: error [m]") && Contains("\na ") && Contains("\nb ") &&
-                       Contains("\nteam, one frame"));
+  CHECK_THAT(rows,
+             Contains("odometry: error [m]") && Contains("\na ") && Contains("\nteam, one frame"));
   CHECK(Json(result)["optimized_meshes"]["merged"]["truth_to_estimate"]["labels"]["accuracy"] >
         0.97);
 }
@@ -309,7 +309,7 @@ TEST_CASE("Meshes without a true one are merged, and broken ones named", "[team]
   team.folder.write("b/mesh_optimized.ply", "ply, or not");
   const TeamMeshes meshes = team.meshes();
   CHECK(meshes.merged.faces.size() == corner().faces.size());
-  CHECK_FALSE(meshes.optimized.has_value());
+  CHECK_FALSE(meshes.errors.has_value());
   REQUIRE(team.notes.size() == 1);
   CHECK_THAT(team.notes[0], Contains("b/mesh_optimized.ply"));
 }

@@ -164,8 +164,7 @@ class CannedCity {
     team.closures->inliers.judged = 817;
     team.closures->inliers.correct = 816;
     team.closures->by_angle[2] = {.true_pairs = 10, .pairs_found = 4};
-    team.meshes.odometry = canned_meshes(0.08, 9, 10);
-    team.meshes.optimized = canned_meshes(0.06, 19, 20);
+    team.meshes.errors = MeshChange{canned_meshes(0.08, 9, 10), canned_meshes(0.06, 19, 20)};
     folder_.write("results/team-" + world + ".json", json_text(team));
   }
 

@@ -172,6 +172,53 @@ TEST_CASE("Several robots are judged separately and merged", "[mesh_error]") {
   CHECK(report.merged.truth.labels.total().accuracy() == Approx(0.5).margin(0.02));
 }
 
+TEST_CASE("Two states of a mesh are judged on the points that either of them shows",
+          "[mesh_error]") {
+  const LabelledMesh truth = rectangle({0, 0, 0}, {10, 0, 0}, {0, 4, 0}, 8, 1);
+  const LabelledMesh part = rectangle({0, 0, 0.05F}, {6, 0, 0}, {0, 4, 0}, 8, 1);
+  const LabelledMesh whole = rectangle({0, 0, 0.02F}, {10, 0, 0}, {0, 4, 0}, 8, 2);
+  const std::vector<MeshInput> first = {{"first", part}}, second = {{"second", whole}};
+  MeshErrorOptions options = in_place();
+  options.crop_m = 0.1;
+  options.label_distance_m = 0.08;
+  const bool gains = GENERATE(true, false);
+  const MeshChange change =
+      mesh_change(truth, gains ? first : second, gains ? second : first, options);
+  const MeshError& of_part = (gains ? change.before : change.after).merged;
+  const MeshError& of_whole = (gains ? change.after : change.before).merged;
+  CHECK(of_part.name == "first");
+  CHECK(of_part.truth.point.count == of_whole.truth.point.count);
+  CHECK(of_part.seen.point.count == of_whole.seen.point.count);
+  CHECK(of_whole.truth.surface.mean_m == Approx(0.02).margin(1e-6));
+  // 6 m at 5 cm, the rest at the crop distance, but for 9 cm beside the rim.
+  CHECK(of_part.truth.surface.mean_m == Approx(0.6 * 0.05 + 0.4 * 0.1).margin(5e-4));
+  CHECK(of_part.coverage == Approx(0.609).margin(0.003));
+  CHECK(of_whole.coverage == 1.0);
+  // Labels are judged at all points; the part is right where it is near.
+  CHECK(of_part.truth.labels.total().points() == of_whole.truth.labels.total().points());
+  CHECK(of_part.truth.labels.total().accuracy() == Approx(0.606).margin(0.003));
+  CHECK(of_whole.truth.labels.total().accuracy() == 0.0);
+}
+
+TEST_CASE("One transform registers both states of a mesh", "[mesh_error]") {
+  const LabelledMesh truth = sphere(1.0F);
+  LabelledMesh before = truth, after = truth;
+  before.transform(make_pose(Eigen::Matrix3d::Identity(), {0.04, 0.0, 0.0}));
+  after.transform(make_pose(Eigen::Matrix3d::Identity(), {0.02, 0.0, 0.0}));
+  const std::vector<MeshInput> first = {{"before", before}}, second = {{"after", after}};
+  const MeshChange change = mesh_change(truth, first, second);
+  const Eigen::Vector3d moved = change.after.registration.T_truth_estimate.translation();
+  CHECK(moved.x() == Approx(-0.03).margin(1e-3));
+  CHECK(change.before.registration.T_truth_estimate.isApprox(
+      change.after.registration.T_truth_estimate));
+}
+
+TEST_CASE("States with different numbers of meshes are refused", "[mesh_error]") {
+  const LabelledMesh mesh = square(1.0F, 0.0F);
+  const std::vector<MeshInput> one = {{"a", mesh}}, two = {{"a", mesh}, {"b", mesh}};
+  CHECK_THROWS_WITH(mesh_change(mesh, one, two), Catch::Contains("1 meshes before and 2 after"));
+}
+
 TEST_CASE("The same arguments give the same report on any number of threads", "[mesh_error]") {
   LabelledMesh estimate = room();
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.02, 0.01, 0.03}));
