@@ -1,8 +1,9 @@
 #include "modules/vio/marginalization.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <utility>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/symmetric_eigen.hpp"
 
 namespace km {
 namespace {
@@ -20,10 +21,9 @@ struct ScaledEigen {
 ScaledEigen decompose(const Eigen::MatrixXd& H) {
   ScaledEigen e;
   e.scale = H.diagonal().unaryExpr([](double h) { return h > 0.0 ? 1.0 / std::sqrt(h) : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(e.scale.asDiagonal() * H *
-                                                              e.scale.asDiagonal());
-  e.V = solver.eigenvectors();
-  e.lambda = solver.eigenvalues();
+  SymmetricEigen eigen = symmetric_eigen(e.scale.asDiagonal() * H * e.scale.asDiagonal());
+  e.V = std::move(eigen.vectors);
+  e.lambda = std::move(eigen.values);
   const double least = kRankTolerance * std::max(e.lambda(e.lambda.size() - 1), 0.0);
   while (e.first < e.lambda.size() && !(e.lambda(e.first) > least)) ++e.first;
   return e;

@@ -1,6 +1,5 @@
 #include "apps/lab/pgo/solvers.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <memory>
 #include <stdexcept>
@@ -10,6 +9,7 @@
 #include "apps/lab/pgo_study/gauss_seidel_team.hpp"
 #include "apps/lab/pgo_study/local_team.hpp"
 #include "apps/lab/pgo_study/odometry_start.hpp"
+#include "modules/core/symmetric_eigen.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
 #include "modules/rbcd/rounding.hpp"
@@ -122,7 +122,7 @@ Eigen::Index numerical_rank(const LiftedPoses& X, int dimension) {
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(X.rows(), X.rows());
   for (Eigen::Index i = 0; i < pose_count(X); ++i)
     gram += X.middleCols<3>(4 * i) * X.middleCols<3>(4 * i).transpose();
-  const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(gram).eigenvalues();
+  const Eigen::VectorXd values = symmetric_eigen(gram).values;
   const double least = kRelative * kRelative * values.maxCoeff();
   return (values.array() > least).count() - (dimension == 2 ? 1 : 0);
 }
