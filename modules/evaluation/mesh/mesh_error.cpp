@@ -458,7 +458,7 @@ class Evaluation {
   std::vector<LabelledMesh> moved_;  // the estimates in the truth's frame
   std::vector<SurfaceSamples> estimates_;
   SurfaceSamples true_samples_;
-  MeshReport report_;                // what the reports of all states have in common
+  MeshReport report_;                // common to the reports of all states
   std::vector<MeshReport> reports_;  // by state
 };
 

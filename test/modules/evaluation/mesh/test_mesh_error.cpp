@@ -190,7 +190,7 @@ TEST_CASE("Two states of a mesh are judged on the points that either of them sho
   CHECK(of_part.truth.point.count == of_whole.truth.point.count);
   CHECK(of_part.seen.point.count == of_whole.seen.point.count);
   CHECK(of_whole.truth.surface.mean_m == Approx(0.02).margin(1e-6));
-  // 6 m at 5 cm, the rest at the crop distance, but for 9 cm beside the rim.
+  // 6 m at 5 cm, and the rest at the crop distance except for 9 cm beside the rim.
   CHECK(of_part.truth.surface.mean_m == Approx(0.6 * 0.05 + 0.4 * 0.1).margin(5e-4));
   CHECK(of_part.coverage == Approx(0.609).margin(0.003));
   CHECK(of_whole.coverage == 1.0);
