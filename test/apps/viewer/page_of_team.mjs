@@ -55,6 +55,8 @@ async function open() {
   return page;
 }
 const all = (what) => `kimera.robots.length > 1 && kimera.robots.every((r) => ${what})`;
+// On a busy machine the run may end while the page shows its past.
+const ended = `(${all(`r.phase === 'leaving'`)})`;
 
 try {
   let page = await open();
@@ -81,11 +83,11 @@ try {
   assert.deepEqual(past.frames, apart.frames);
   const end = await page.evaluate('kimera.end');
   assert.ok(past.time < end - 1);
-  await page.until(`kimera.end > ${end + 1}`);
+  await page.until(`kimera.end > ${end + 1} || ${ended}`);
   assert.deepEqual(await shown(), past);
   await shoot('past');
   await page.clickAt('#live');
-  await page.until(`kimera.time > ${end + 1} && kimera.time === kimera.end`);
+  await page.until(`(kimera.time > ${end + 1} || ${ended}) && kimera.time === kimera.end`);
 
   // Closed and opened again: the page has the past.
   await page.close();
@@ -100,7 +102,7 @@ try {
 
   // The final state is that of the robots' results.
   await demo.finished;
-  await page.until(all(`r.phase === 'leaving'`));
+  await page.until(ended);
   const team = JSON.parse(readFileSync(join(results, 'team.json')));
   await page.until('kimera.ready');
   await shoot('finished');
