@@ -132,7 +132,7 @@ constexpr const char* kMeshDetails =
     "Examples:\n"
     "  kimera_multi_evaluate mesh --truth city/world.ply --estimate mesh.ply --json mesh.json\n"
     "  kimera_multi_evaluate mesh --truth city/world.ply \\\n"
-    "      --before results/robot*/mesh_odometry.ply --estimate results/robot*/mesh_optimized.ply\n"
+    "      --before results/robot*/mesh.ply --estimate results/robot*/mesh_optimized.ply\n"
     "  kimera_multi_evaluate mesh --truth city/world.ply \\\n"
     "      --estimate results/robot0/mesh_optimized.ply results/robot1/mesh_optimized.ply \\\n"
     "      --trajectory results/robot0/optimized.tum results/robot1/optimized.tum \\\n"

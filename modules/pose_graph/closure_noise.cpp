@@ -1,11 +1,11 @@
 #include "modules/pose_graph/closure_noise.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "modules/core/symmetric_eigen.hpp"
 #include "modules/pose_graph/cycle_mixture.hpp"
 
 namespace km {
@@ -196,12 +196,11 @@ NoiseCycle NoiseCycle::of(const Vector6& e, const Matrix6& Sigma_o, const Matrix
   const Eigen::LLT<Eigen::MatrixXd> root(odometry);
   const auto L = root.matrixL();
   const Eigen::MatrixXd half = L.solve(closures);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      Eigen::MatrixXd(L.solve(half.transpose())));
+  const SymmetricEigen eigen = symmetric_eigen(Eigen::MatrixXd(L.solve(half.transpose())));
   const auto whitened = [&](const Vector6& v) {
     std::array<float, 6> white = {};
     Eigen::Map<Eigen::VectorXf>(white.data(), size) =
-        (eigen.eigenvectors().transpose() * L.solve(Eigen::VectorXd(v.segment(first, size))))
+        (eigen.vectors.transpose() * L.solve(Eigen::VectorXd(v.segment(first, size))))
             .cast<float>();
     return white;
   };
@@ -209,7 +208,7 @@ NoiseCycle NoiseCycle::of(const Vector6& e, const Matrix6& Sigma_o, const Matrix
                    .by_length = {whitened(by_length[0]), whitened(by_length[1])}};
   for (Eigen::Index k = 0; k < size; ++k) {
     cycle.variance[static_cast<std::size_t>(k)] =
-        static_cast<float>(std::max(0.0, eigen.eigenvalues()(k)));
+        static_cast<float>(std::max(0.0, eigen.values(k)));
   }
   const double log_root = root.matrixLLT().diagonal().array().log().sum();
   cycle.log_if_false = static_cast<float>(

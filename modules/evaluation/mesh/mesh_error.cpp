@@ -348,12 +348,10 @@ class Evaluation {
         else
           merged[state].keep_nearer(matches.back());
       }
-      judge_truth(
-          matches, [&](MeshReport & report) -> auto& { return report.robots[robot]; });
+      judge_truth(matches, [&](MeshReport& report) -> MeshError& { return report.robots[robot]; });
     }
     if (robots_ > 1)
-      judge_truth(
-          merged, [](MeshReport & report) -> auto& { return report.merged; });
+      judge_truth(merged, [](MeshReport& report) -> MeshError& { return report.merged; });
   }
 
   // `matches`: of one mesh, by state.
@@ -361,17 +359,14 @@ class Evaluation {
     SharedPoints points;
     for (const PointMatches& state : matches) points.add(state, options_.label_distance_m);
     const auto total = static_cast<double>(true_samples_.total);
-    const auto share = [&](const auto& counts) {
-      return static_cast<double>(std::ranges::count(counts, true)) / total;
-    };
+    const auto share = [&](auto count) { return static_cast<double>(count) / total; };
     for (std::size_t state = 0; state < matches.size(); ++state) {
       MeshError& error = error_of(reports_[state]);
       error.truth = judged(matches[state], points, points.near);
       error.seen = judged(matches[state], points, points.in_front);
-      SharedPoints own;
-      own.add(matches[state], options_.label_distance_m);
-      error.coverage = share(own.near);
-      error.seen_coverage = share(own.in_front);
+      error.coverage = share(std::ranges::count_if(
+          matches[state].point_m, [](float distance_m) { return std::isfinite(distance_m); }));
+      error.seen_coverage = share(std::ranges::count(matches[state].in_front, true));
     }
   }
 
