@@ -34,15 +34,16 @@ struct MapMesh {
   double voxel_m = 0.0;
 };
 
-/// A vertex of a robot's map whose surface another visit has mapped better, and the vertex of that
-/// visit that replaces it. Ids are those of MapMesh.
+/// A vertex of a robot's map whose surface other visits have mapped better, and the vertex of one
+/// of these visits that replaces it. The vertex itself if its surface is gone. Ids are those of
+/// MapMesh.
 struct SupersededVertex {
   std::uint64_t id = 0;
   std::uint64_t replacement = 0;
 };
 
-/// Surface that a map contains twice: its mapper may drop the faces whose vertices are all listed.
-/// Each replacement belongs to a face that is not dropped.
+/// Surface that a map need not contain: its mapper may drop the faces whose vertices are all
+/// listed. Each other vertex that replaces one belongs to a face that is not dropped.
 struct SupersededSurface {
   std::vector<SupersededVertex> vertices;  ///< Ascending ids, each once.
 };

@@ -33,7 +33,7 @@ struct [[nodiscard]] MeshCorrection {
   MeshDeformationReport report;  ///< Report of the last optimisation.
   /// False: the result of the last optimisation, moved as a whole.
   bool deformed = true;
-  SupersededSurface superseded;      ///< Superseded surface of the map; empty unless deformed.
+  SupersededSurface superseded;      ///< Surface the mapper may drop; empty unless deformed.
   std::size_t superseded_faces = 0;  ///< Faces of the map that another visit saw better.
   std::size_t seen_through = 0;      ///< Faces of the map that later views saw through.
   MeshOrigin origin = {};            ///< Keyframes that saw `mesh`.
@@ -43,13 +43,14 @@ struct [[nodiscard]] MeshCorrection {
 /// the mesh is corrected only if a keyframe has moved by the configured threshold. If all keyframes
 /// have moved equally, as they do when the origin of `world` changes, one rigid motion suffices.
 /// Otherwise, and for a changed map, Local Mesh Optimization deforms the mesh. This removes drift,
-/// so that copies of surface from several visits coincide. Above duplicate_faces, only the best
-/// copy stays (see find_replacements()).
+/// so that copies of surface from several visits coincide. If a mesh of more than duplicate_faces
+/// has more copies than duplicate_share permits, only the best ones stay (see
+/// find_replacements()).
 ///
 /// Surface that several later views of the map saw through is left out of the mesh (SightVotes): it
 /// has moved away. The test uses the present poses and their covariances, and is repeated with each
-/// deformation, so that surface returns if a wrong pose was the reason. Without covariances nothing
-/// is left out.
+/// deformation, so that surface returns if a wrong pose was the reason. The mapper may drop it when
+/// two successive searches for copies find it gone. Without covariances nothing is left out.
 ///
 /// Not thread-safe.
 class MeshCorrector {
@@ -67,16 +68,25 @@ class MeshCorrector {
 
  private:
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
-  [[nodiscard]] std::size_t remove_gone(const CorrectionInput& input);
-  [[nodiscard]] std::vector<std::uint32_t> replacements_in(const LabelledMesh& mesh,
-                                                           const MapMesh& map) const;
+  [[nodiscard]] std::vector<bool> seen_through(const CorrectionInput& input) const;
+  [[nodiscard]] bool may_have_many_copies(const MapMesh& map) const;
+  [[nodiscard]] std::vector<std::uint32_t> copies_in(const MapMesh& map,
+                                                     const std::vector<std::uint32_t>& kept) const;
+  [[nodiscard]] SupersededSurface droppable(const MapMesh& map,
+                                            const std::vector<std::uint32_t>& kept,
+                                            std::span<const std::uint32_t> replacements);
 
   const double duplicate_voxels_;
   const std::size_t duplicate_faces_;
+  const double duplicate_share_;
+  const std::size_t copies_;
   const KeyframeIndex max_gap_keyframes_;
   const int seen_through_views_;
   MotionScale scale_;
   LocalMeshOptimizer optimizer_;
+  // Result of the last search for copies.
+  std::size_t distinct_faces_ = 0;   // faces that stayed
+  std::vector<std::uint64_t> gone_;  // vertices of the map that had been seen through, ascending
   // State of the last optimisation.
   std::optional<std::uint64_t> map_version_;
   std::vector<SE3> anchors_;  // complete() of the trajectory

@@ -12,7 +12,9 @@ struct MeshDeformationConfig {
   int interpolation_nodes = 4;
   int time_window_keyframes = 15;
   double duplicate_voxels = 1.0;
-  int duplicate_faces = 1'200'000;
+  int duplicate_faces = 100'000;
+  int duplicate_copies = 2;
+  double duplicate_share = 0.5;
   int seen_through_views = 3;
   int keyframes_per_node = 4;
   double anchor_rotation_rad = 0.001;
@@ -35,12 +37,19 @@ struct MeshDeformationConfig {
                   "surface seen further apart in time belongs to different visits; it moves "
                   "independently even if it is close in space");
     visitor.field("duplicate_voxels", duplicate_voxels, {0.0, 8.0},
-                  "[voxels] largest distance of a copy from another visit to the best one, after "
-                  "correction, at which it is dropped permanently from mesh and map, so that "
-                  "memory is bounded; 0: all copies stay");
+                  "[voxels] largest distance of a copy from the best ones, after correction, at "
+                  "which it is dropped permanently from mesh and map, so that memory is bounded; "
+                  "0: all copies stay");
     visitor.field("duplicate_faces", duplicate_faces, {0, 100'000'000},
                   "number of faces of a mesh up to which all copies stay; together they are closer "
                   "to the true surface than the best of them");
+    visitor.field("duplicate_copies", duplicate_copies, {1, 1000},
+                  "number of copies of a surface from several visits that stay; with one, walls "
+                  "have holes");
+    visitor.field(
+        "duplicate_share", duplicate_share, {0.0, 1000.0},
+        "number of faces of further copies, as a share of all other faces, above which they are "
+        "dropped from a larger mesh; memory is proportional to 1 + duplicate_share");
     visitor.field("seen_through_views", seen_through_views, {0, 1000},
                   "number of later views that must see through a surface, beyond those that show "
                   "it again, until it is removed; 0: all surface stays. Needs covariances of the "

@@ -18,6 +18,7 @@ struct SameSurface {
   double distance_m = 0.1;
   double longest_edge_m = 0.2;          ///< Faces with longer edges may be missed.
   KeyframeIndex max_gap_keyframes = 0;  ///< Largest keyframe_gap() within one visit.
+  std::size_t copies = 1;               ///< Number of copies of a surface that stay.
 };
 
 /// MapMesh::seen_by and MapMesh::certainty of the vertices of a mesh. `certainty` may be empty.
@@ -27,18 +28,21 @@ struct SurfaceViews {
 };
 
 /// For each vertex of a corrected mesh the vertex that replaces it, or kNoIndex for a vertex that
-/// stays. The most certain of several copies of a surface stays, or the newest of equally certain
-/// ones.
+/// stays. The most certain copies of a surface stay, or the newest of equally certain ones.
 ///
-/// A vertex has a replacement if a face of another visit stays, has a higher rank (certainty, then
-/// time), and meets three conditions. Its plane is within SameSurface::distance_m of the vertex.
-/// The projection of the vertex onto this plane is inside the triangle, or at most a quarter of
-/// that distance beside it. Its normal differs from that of the vertex by at most 60 degrees,
-/// because the other side of a wall is another surface. The replacement is the nearest corner of
-/// the nearest such face.
+/// A vertex has a replacement if faces of SameSurface::copies other visits stay that have a higher
+/// rank (certainty, then time) and meet three conditions. The plane of the face is within
+/// SameSurface::distance_m of the vertex. The projection of the vertex onto this plane is inside
+/// the triangle, or at most a quarter of that distance beside it. Its normal differs from that of
+/// the vertex by at most 60 degrees, because the other side of a wall is another surface. The
+/// replacement is the nearest corner of the nearest such face.
 ///
-/// A face stays unless all its vertices have replacements, so that surface seen only once, with its
-/// rim, is never lost.
+/// Certainties of neighbours differ by chance. They are compared as averages over the surface
+/// within about six edges, rounded, so that large parts of the same visits stay.
+///
+/// A face stays unless all its vertices have replacements, so that surface seen only once stays
+/// with its rim. Noise leaves scraps of few faces in the middle of a copy with replacements. A
+/// scrap of fewer than eight faces is replaced like the surface around it.
 ///
 /// Faces are judged by descending rank, so that a superseding face stays. `mesh` [m]. n log n.
 [[nodiscard]] std::vector<std::uint32_t> find_replacements(const LabelledMesh& mesh,

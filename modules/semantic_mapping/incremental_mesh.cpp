@@ -326,7 +326,7 @@ SurfaceDrop IncrementalMesh::drop(const SupersededSurface& superseded) {
   });
   faces_ -= dropped.faces;
   for (const std::uint32_t place : maybe_unused_)
-    if (vertices_[place].uses == 0)
+    if (vertices_[place].uses == 0 && replacements[place] != place)
       vertices_[replacements[place]].labels.add(vertices_[place].labels);
   dropped.vertices = remove_unused();
   return dropped;

@@ -47,8 +47,9 @@ class IncrementalMesh {
   MeshUpdateReport finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
 
   /// Drops the final faces whose vertices are all listed, and then the listed vertices without
-  /// other faces. The votes on labels of such a vertex are added to its replacement. A vertex
-  /// counts only if it and its replacement are final; unknown ids are ignored. n log n in the mesh.
+  /// other faces. The votes on labels of such a vertex are added to its replacement, unless that is
+  /// the vertex itself. A vertex counts only if it and its replacement are final; unknown ids are
+  /// ignored. n log n in the mesh.
   SurfaceDrop drop(const SupersededSurface& superseded);
 
   /// All faces and the vertices they use; no labels unless `labelled`.

@@ -104,6 +104,7 @@ class Mapping {
     MeshDeformationConfig config;
     config.duplicate_voxels = task.duplicate_voxels;
     config.duplicate_faces = 0;
+    config.duplicate_copies = 1;
     return config;
   }
   MeshCorrection correct(std::size_t keyframes, bool afresh) {

@@ -137,23 +137,33 @@ struct TwoVisits {
   static constexpr float kDrift_m = 0.6F;
 
   TwoVisits() {
-    const MapMesh once = sheet(kSheet);
-    const auto count = static_cast<KeyframeIndex>(keyframe_count(kSheet));
-    map = once;
+    map = sheet(kSheet);
     map.voxel_m = kSheet.step_m;
+    T_odom_kf = T_world_kf = keyframes_above(kSheet);
+    add_visit();
+  }
+
+  // Adds another visit, which odometry places above the last one.
+  void add_visit() {
+    const MapMesh once = sheet(kSheet);
+    const auto shift = static_cast<KeyframeIndex>(T_odom_kf.size()) + kAway;
+    const double height_m = T_odom_kf.back().translation().z() -
+                            T_world_kf.back().translation().z() + static_cast<double>(kDrift_m);
     LabelledMesh again = once.mesh;
-    for (Eigen::Vector3f& p : again.vertices) p.z() += kDrift_m;
+    for (Eigen::Vector3f& p : again.vertices) p.z() += static_cast<float>(height_m);
     map.mesh.append(again);
     for (const auto& [first, last] : once.seen_by) {
-      map.seen_by.push_back({first + count + kAway, last + count + kAway});
+      map.seen_by.push_back({first + shift, last + shift});
       map.ids.push_back(map.ids.size());
     }
-    for (const SE3& pose : keyframes_above(kSheet)) T_world_kf.push_back(pose);
-    T_world_kf.resize(T_world_kf.size() + kAway, T_world_kf.back());
-    for (const SE3& pose : keyframes_above(kSheet)) T_world_kf.push_back(pose);
-    T_odom_kf = T_world_kf;
-    for (std::size_t i = count; i < T_odom_kf.size(); ++i)
-      T_odom_kf[i].translation().z() += static_cast<double>(kDrift_m);
+    T_world_kf.resize(shift, T_world_kf.back());
+    T_odom_kf.resize(shift, T_odom_kf.back());
+    for (SE3 pose : keyframes_above(kSheet)) {
+      T_world_kf.push_back(pose);
+      pose.translation().z() += height_m;
+      T_odom_kf.push_back(pose);
+    }
+    ++version;
   }
   [[nodiscard]] CorrectionInput input() const { return {map, version, T_odom_kf, T_world_kf}; }
   [[nodiscard]] std::size_t one() const { return map.mesh.faces.size() / 2; }
@@ -168,6 +178,7 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
   TwoVisits visits;
   MeshDeformationConfig config;
   config.duplicate_faces = 0;
+  config.duplicate_copies = 1;
   SECTION("corrected") {
     MeshCorrector corrector(config);
     const auto first = corrector.correct(visits.input());
@@ -212,10 +223,46 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
     --config.duplicate_faces;
     CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == visits.one());
   }
+  SECTION("below the bound on the share of copies both stay") {
+    config.duplicate_share = 1.0;
+    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
+    config.duplicate_share = 0.99;
+    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == visits.one());
+  }
   SECTION("with voxels of unknown size both stay") {
     visits.map.voxel_m = 0.0;
     CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
   }
+}
+
+TEST_CASE("Copies stay until a further visit exceeds their share", "[mesh_deformation]") {
+  TwoVisits visits;
+  MeshDeformationConfig config;
+  config.duplicate_faces = 0;
+  config.duplicate_copies = 1;
+  config.duplicate_share = 1.0;
+  MeshCorrector corrector(config);
+  CHECK(corrector.correct(visits.input())->mesh.faces.size() == 2 * visits.one());
+  const std::size_t one = visits.one();
+  visits.add_visit();
+  const auto result = corrector.correct(visits.input());
+  REQUIRE(result);
+  CHECK(result->superseded_faces == 2 * one);
+  CHECK(result->mesh.faces.size() == one);
+}
+
+TEST_CASE("A correction from scratch searches for copies regardless of earlier corrections",
+          "[mesh_deformation]") {
+  TwoVisits visits;
+  const std::vector<SE3> T_world_kf = visits.T_world_kf;
+  MeshDeformationConfig config;
+  config.duplicate_faces = 0;
+  config.duplicate_copies = 1;
+  MeshCorrector corrector(config);
+  visits.T_world_kf = visits.T_odom_kf;  // with drift the two visits are different surfaces
+  REQUIRE(corrector.correct(visits.input())->superseded_faces == 0);
+  visits.T_world_kf = T_world_kf;
+  CHECK(corrector.correct_from_scratch(visits.input()).superseded_faces == visits.one());
 }
 
 // Repeated visits: the mapper drops superseded surface, and the graph follows.
@@ -225,6 +272,7 @@ TEST_CASE("The deformation graph does not grow in a place visited repeatedly",
   const std::uint64_t count = visits.map.ids.size() / 2;
   MeshDeformationConfig config;
   config.duplicate_faces = 0;
+  config.duplicate_copies = 1;
   MeshCorrector corrector(config);
   std::size_t nodes_at_first = 0, most_nodes = 0;
   for (std::uint64_t visit = 0; visit < 8; ++visit) {

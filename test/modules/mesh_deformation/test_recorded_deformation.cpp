@@ -159,6 +159,8 @@ class Flight {
     MeshDeformationConfig config;
     config.duplicate_voxels = duplicate_voxels;
     config.duplicate_faces = 0;
+    config.duplicate_copies = 1;
+    config.duplicate_share = 0.0;
     return config;
   }
   void correct() {

@@ -57,12 +57,21 @@ class TwoPasses {
   double sigma_m = 0.0;
   double voxel_m = 0.1;
 
-  MeshCorrection run(int seen_through_views) const {
+  struct Recording {
+    MapMesh map;
+    std::vector<SE3> poses;
+    std::vector<Matrix6> covariances;
+
+    [[nodiscard]] CorrectionInput input(std::uint64_t version) const {
+      return {map, version, poses, poses, covariances};
+    }
+  };
+
+  Recording record() const {
     SemanticMappingConfig config = settings(voxel_m);
     config.window_m = 1.0;
     SemanticMapper mapper(config, small_camera(), two_classes());
-    std::vector<SE3> poses;
-    std::vector<Matrix6> covariances;
+    Recording result;
     for (int k = 0; k < 60; ++k) {
       const bool is_first = k < 30;
       const SE3 T = at(-1.5 + kStep_m * (is_first ? k : 59 - k));
@@ -70,14 +79,19 @@ class TwoPasses {
       REQUIRE(integrate(mapper, render(small_camera(), T_true, is_first ? first_ : second_), T,
                         static_cast<KeyframeIndex>(k)));
       mapper.update_mesh();
-      poses.push_back(T);
+      result.poses.push_back(T);
       const double variance = is_first ? 0.0 : sigma_m * sigma_m;
-      covariances.emplace_back(variance * Matrix6::Identity());
+      result.covariances.emplace_back(variance * Matrix6::Identity());
     }
+    result.map = mapper.mesh();
+    return result;
+  }
+
+  MeshCorrection run(int seen_through_views) const {
     MeshDeformationConfig correction;
     correction.seen_through_views = seen_through_views;
-    const MapMesh map = mapper.mesh();
-    return MeshCorrector(correction).correct_from_scratch({map, 1, poses, poses, covariances});
+    const Recording recording = record();
+    return MeshCorrector(correction).correct_from_scratch(recording.input(1));
   }
 
   // Number of faces within half a voxel of true surface that the removal takes away. Farther away
@@ -123,6 +137,39 @@ TEST_CASE("A box that has gone loses its surface, and the wall behind it does no
   CHECK(vertices_in(some.mesh, floor) + 60 > vertices_in(all.mesh, floor));  // the rim of the box
   CHECK(some.origin.seen_by.size() == some.mesh.vertices.size());
   CHECK(some.origin.mapped.size() == some.mesh.vertices.size());
+}
+
+TEST_CASE("The mapper may drop a box that two searches for copies find gone",
+          "[mesh_deformation]") {
+  auto recording = TwoPasses({{kWall, kFloor, kParked}}, {{kWall, kFloor}}).record();
+  MeshDeformationConfig config;
+  config.duplicate_faces = 0;
+  config.duplicate_share = 0.0;
+  MeshCorrector corrector(config);
+  REQUIRE(corrector.correct(recording.input(1))->superseded.vertices.empty());
+
+  MapMesh& map = recording.map;  // one face more lets a second search follow
+  const auto n = static_cast<std::uint32_t>(map.mesh.vertices.size());
+  map.mesh.faces.push_back({n, n + 1, n + 2});
+  for (const float x : {0.0F, 0.1F, 0.2F}) {
+    map.mesh.vertices.emplace_back(x, 10.0F * x, -9.0F);
+    map.mesh.labels.push_back(1);
+    map.seen_by.push_back(map.seen_by.back());
+    map.certainty.push_back(map.certainty.back());
+    map.ids.push_back(map.ids.back() + 1);
+  }
+  const auto second = corrector.correct(recording.input(2));
+  REQUIRE(second);
+  CHECK(second->superseded_faces == 0);
+  const Box around = box({-0.8, -0.7, 1.7}, {0.8, 1.1, 2.9});
+  std::size_t in_box = 0;
+  for (const auto& [id, replacement] : second->superseded.vertices) {
+    CHECK(replacement == id);
+    const auto v = std::ranges::lower_bound(map.ids, id) - map.ids.begin();
+    in_box += around.contains(map.mesh.vertices[static_cast<std::size_t>(v)].cast<double>());
+  }
+  CHECK(in_box > 100);
+  CHECK(in_box > second->superseded.vertices.size() * 9 / 10);
 }
 
 TEST_CASE("Surface that is still there stays", "[mesh_deformation]") {
