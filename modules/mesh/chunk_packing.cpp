@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <numeric>
 
 namespace km {
@@ -63,9 +64,27 @@ void take(std::span<const std::uint8_t>& plain, Triples kind, std::vector<ChunkT
   }
 }
 
+// A byte of each element, less that of the element before.
+void append_differences(const auto& elements, auto byte_of, Bytes& plain) {
+  std::uint8_t before = 0;
+  for (const auto& element : elements) {
+    plain.push_back(static_cast<std::uint8_t>(byte_of(element) - before));
+    before = byte_of(element);
+  }
+}
+
+// Takes a byte of each vertex from the front of `plain`.
+void take_differences(std::span<const std::uint8_t>& plain, auto byte_of,
+                      const ChunkCounts& counts) {
+  std::uint8_t before = 0;
+  for (std::size_t v = 0; v < counts.vertices; ++v)
+    before = byte_of(v) = static_cast<std::uint8_t>(before + plain[v]);
+  plain = plain.subspan(counts.vertices);
+}
+
 // The bytes before compression.
 std::size_t plain_size(const ChunkCounts& counts) {
-  return (6 + (counts.labelled ? 1 : 0) + (counts.seen ? 2 : 0)) * counts.vertices +
+  return (6 + (counts.labelled ? 1 : 0) + (counts.seen ? 3 : 0)) * counts.vertices +
          6 * counts.faces;
 }
 
@@ -94,6 +113,7 @@ MeshChunk sorted_in_space(const MeshChunk& chunk) {
   reorder(sorted.offsets, order);
   reorder(sorted.labels, order);
   reorder(sorted.views, order);
+  reorder(sorted.certainty, order);
   for (ChunkTriple& face : sorted.faces) {
     for (std::uint16_t& corner : face) corner = place[corner];
     std::ranges::rotate(face, std::ranges::min_element(face));  // same orientation
@@ -109,13 +129,9 @@ std::vector<std::uint8_t> packed(const MeshChunk& chunk) {
   append(chunk.offsets, Triples::kOffsets, plain);
   append(chunk.faces, Triples::kFaces, plain);
   plain.insert(plain.end(), chunk.labels.begin(), chunk.labels.end());
-  for (std::size_t i = 0; i < 2; ++i) {
-    MeshChunk::View before = 0;
-    for (const auto& views : chunk.views) {
-      plain.push_back(static_cast<std::uint8_t>(views[i] - before));
-      before = views[i];
-    }
-  }
+  for (std::size_t i = 0; i < 2; ++i)
+    append_differences(chunk.views, [i](const auto& views) { return views[i]; }, plain);
+  append_differences(chunk.certainty, std::identity(), plain);
   // Compression succeeds with a buffer of this size.
   Bytes result(ZSTD_compressBound(plain.size()));
   result.resize(ZSTD_compress(result.data(), result.size(), plain.data(), plain.size(), kFastest));
@@ -140,12 +156,10 @@ bool unpack(std::span<const std::uint8_t> bytes, const ChunkCounts& counts, Mesh
   }
   if (!counts.seen) return true;
   chunk.views.resize(counts.vertices);
-  for (std::size_t i = 0; i < 2; ++i) {
-    MeshChunk::View before = 0;
-    for (std::size_t v = 0; v < counts.vertices; ++v)
-      before = chunk.views[v][i] =
-          static_cast<MeshChunk::View>(before + plain[i * counts.vertices + v]);
-  }
+  chunk.certainty.resize(counts.vertices);
+  for (std::size_t i = 0; i < 2; ++i)
+    take_differences(plain, [&](std::size_t v) -> auto& { return chunk.views[v][i]; }, counts);
+  take_differences(plain, [&](std::size_t v) -> auto& { return chunk.certainty[v]; }, counts);
   return true;
 }
 

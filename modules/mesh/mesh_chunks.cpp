@@ -76,7 +76,7 @@ class ChunkViews {
   // Bytes that state() and odometry add at most to a chunk with this number of vertices.
   [[nodiscard]] std::size_t largest_bytes(std::size_t vertices) const {
     return kChunkOdometryBytes +
-           (origin_ == nullptr ? 0 : kMaxChunkKeyframes * kMeshKeyframeBytes + 2 * vertices);
+           (origin_ == nullptr ? 0 : kMaxChunkKeyframes * kMeshKeyframeBytes + 3 * vertices);
   }
 
   void state(std::span<const std::uint32_t> vertices, MeshChunk& chunk) const {
@@ -94,6 +94,8 @@ class ChunkViews {
                                                 time.share);
       }
       chunk.views.push_back(views);
+      chunk.certainty.push_back(
+          origin_->certainty.empty() ? 0 : std::min(origin_->certainty[v], kMaxCertainty));
     }
   }
 
@@ -264,7 +266,8 @@ class Splitter {
 
 void check(const MeshOrigin& origin, const LabelledMesh& mesh) {
   const std::size_t vertices = mesh.vertices.size();
-  if (origin.seen_by.size() != vertices || origin.mapped.size() != vertices)
+  if (origin.seen_by.size() != vertices || origin.mapped.size() != vertices ||
+      (!origin.certainty.empty() && origin.certainty.size() != vertices))
     throw std::invalid_argument("mesh chunks: an origin of " +
                                 std::to_string(origin.seen_by.size()) + " vertices for " +
                                 std::to_string(vertices));
@@ -327,6 +330,9 @@ const char* fault_of_views(const MeshChunk& chunk) {
   if (chunk.keyframes.size() > kMaxChunkKeyframes) return "too many keyframes";
   if (chunk.views.size() != (chunk.keyframes.empty() ? 0 : chunk.offsets.size()))
     return "views do not fit the vertices";
+  if (chunk.certainty.size() != chunk.views.size()) return "certainties do not fit the vertices";
+  if (!chunk.certainty.empty() && std::ranges::max(chunk.certainty) > kMaxCertainty)
+    return "a certainty above the bound";
   for (const auto& views : chunk.views)
     for (const MeshChunk::View view : views)
       if ((view + kViewsPerKeyframe - 1) / kViewsPerKeyframe >= chunk.keyframes.size())

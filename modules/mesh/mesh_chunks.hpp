@@ -53,6 +53,8 @@ struct MeshChunk {
   std::vector<MeshKeyframe> keyframes = {};        ///< Ascending; empty: the chunk never moves.
   /// First and last view of each vertex; empty without `keyframes`.
   std::vector<std::array<View, 2>> views = {};
+  /// MapMesh::certainty of each vertex, at most kMaxCertainty; empty without `keyframes`.
+  std::vector<std::uint8_t> certainty = {};
   /// Odometry of middle_keyframe(); absent without `map.surface_ties`.
   std::optional<OdometryPose> odometry = {};
 
@@ -69,6 +71,9 @@ inline constexpr std::size_t kViewsPerKeyframe = 4;
 /// Largest number of MeshChunk::keyframes, so that a View has one byte.
 inline constexpr std::size_t kMaxChunkKeyframes = 256 / kViewsPerKeyframe;
 
+/// Largest MeshChunk::certainty, so that weights of 2^certainty can be added.
+inline constexpr std::uint8_t kMaxCertainty = 31;
+
 /// Bytes of MeshChunk::odometry on the wire, with padding.
 inline constexpr std::size_t kChunkOdometryBytes = kSurfaceKeyframeBytes;
 
@@ -84,6 +89,7 @@ inline constexpr std::size_t kChunkFixedBytes = 116;
 [[nodiscard]] inline std::size_t plain_bytes(const MeshChunk& chunk) {
   return plain_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
          kMeshKeyframeBytes * chunk.keyframes.size() + 2 * chunk.views.size() +
+         chunk.certainty.size() +
          (chunk.odometry ? kChunkOdometryBytes : 0);
 }
 

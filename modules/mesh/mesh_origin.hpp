@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
@@ -16,6 +17,8 @@ struct MeshOrigin {
   std::vector<SE3> T_world_kf;  ///< Poses with which the mesh was placed; all of these keyframes.
   /// Position of each vertex before the deformation, in the robot's odometry frame [m].
   std::vector<Eigen::Vector3f> mapped = {};
+  /// MapMesh::certainty of each vertex; empty: unknown.
+  std::vector<std::uint8_t> certainty = {};
 };
 
 }  // namespace km

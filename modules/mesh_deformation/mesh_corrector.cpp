@@ -53,7 +53,7 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   if (largest_difference(anchors_, motion.T_after_before, T_result_optimized_, scale_) <= 1.0)
     return std::nullopt;
   T_result_optimized_ = motion.T_after_before;
-  MeshCorrection result{optimized_, report_, false, {}, 0, 0, {seen_by_, anchors_, mapped_}};
+  MeshCorrection result{optimized_, report_, false, {}, 0, 0, {seen_by_, anchors_, mapped_, certainty_}};
   result.mesh.transform(T_result_optimized_);
   for (SE3& pose : result.origin.T_world_kf) pose = T_result_optimized_ * pose;
   return result;
@@ -153,6 +153,7 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
     }
   }
   seen_by_ = elements_of(map.seen_by, kept);
+  certainty_ = elements_of(map.certainty, kept);
   mapped_ = elements_of(map.mesh.vertices, kept);
   const std::size_t superseded = present - optimized_.faces.size();
   return {optimized_,
@@ -161,7 +162,7 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
           std::move(dropped),
           superseded,
           all - present,
-          {seen_by_, anchors_, mapped_}};
+          {seen_by_, anchors_, mapped_, certainty_}};
 }
 
 }  // namespace km

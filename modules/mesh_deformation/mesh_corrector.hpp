@@ -93,6 +93,7 @@ class MeshCorrector {
   LabelledMesh optimized_;
   std::vector<SeenBy> seen_by_;          // keyframes of the vertices of optimized_
   std::vector<Eigen::Vector3f> mapped_;  // positions of the vertices of optimized_ in the map
+  std::vector<std::uint8_t> certainty_;  // certainty of the vertices of optimized_
   MeshDeformationReport report_;
   SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };

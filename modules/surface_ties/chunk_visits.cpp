@@ -70,6 +70,7 @@ MeshChunk surface_of(const MeshChunk& chunk, const std::vector<std::size_t>& vis
   take(part.offsets);
   take(part.labels);
   take(part.views);
+  take(part.certainty);
   return part;
 }
 

@@ -277,6 +277,7 @@ void state_keyframes(MeshChunk& chunk) {
   chunk.keyframes = mesh_keyframes(
       std::vector<SE3>(20, make_pose(so3_exp({0.1, 0.2, 0.3}), {1.5, -2.25, 300.0})));
   chunk.views.assign(chunk.offsets.size(), {0, 16});
+  chunk.certainty.assign(chunk.offsets.size(), 7);
   chunk.odometry = {
       {chunk.key.robot, 8}, make_pose(so3_exp({0.1, 0.2, 0.3}), {1, 2, 3}), Matrix6::Identity()};
 }
@@ -363,7 +364,7 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
           large.faces.resize(6000, {0, 1, 2});
         })},
        {"too large", "a chunk that is too large", changed([](MeshChunk& large) {
-          large.faces.resize((kMaxChunkBytes - 9 * large.offsets.size()) / 6, {0, 1, 2});
+          large.faces.resize((kMaxChunkBytes - 10 * large.offsets.size()) / 6, {0, 1, 2});
         })},
        {"two keyframes", missing, [](auto& m) { m.wire.keyframe._length = 2; }},
        {"a keyframe of another robot", "a keyframe of another robot",
@@ -379,6 +380,8 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
         changed([](MeshChunk& late) { late.views.back()[1] = 17; })},
        {"a view of a keyframe outside", "a view between keyframes which do not exist",
         changed([](MeshChunk& late) { late.views.back()[1] = 255; })},
+       {"a certainty without bound", "a certainty above the bound",
+        changed([](MeshChunk& sure) { sure.certainty.back() = kMaxCertainty + 1; })},
        {"a keyframe twice", "keyframes do not ascend",
         [](auto& m) { m.keyframes[1].keyframe = 0; }},
        {"no rotation", "a keyframe without a rotation",

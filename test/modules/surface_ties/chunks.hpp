@@ -23,6 +23,7 @@ inline std::vector<MeshChunk> room_chunks(RobotId robot, KeyframeIndex index, co
   for (MeshChunk& chunk : chunks) {
     chunk.keyframes = {{index, RoundedPose::of(T_error * pose_in_room(robot, index))}};
     chunk.views.assign(chunk.offsets.size(), {0, 0});
+    chunk.certainty.assign(chunk.offsets.size(), 0);
     chunk.odometry = {
         {robot, index}, T_world_odom.inverse() * pose_in_room(robot, index), Matrix6::Identity()};
   }
