@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/member_solver.hpp"
 
 namespace km {
@@ -73,17 +72,22 @@ std::optional<ClosureVerdicts> ClosureDecisions::take_verdicts() {
   return result;
 }
 
-void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdge> closures) {
+void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdge> closures,
+                                    std::span<const AlignedOdometry> all) {
   const auto [entry, is_new] = counted_.try_emplace({offer.peer, offer.id}, offer);
   if (is_new) {
     std::vector<PoseEdge> accepted, rejected;
+    std::vector<ClosureId> kept;
     for (const PoseEdge& closure : closures)
       (is_rejected(closure.id()) ? rejected : accepted).push_back(closure);
+    for (const PoseEdge& closure : accepted) kept.push_back(closure.id());
     const std::vector<std::size_t> rivals = find_places(rejected).sizes;
+    const std::size_t places = find_places(accepted).sizes.size();
+    const bool single =
+        places == 1 && !rivals.empty() && *std::ranges::max_element(rivals) >= accepted.size();
     EdgeSetOffer& counted = entry->second;
-    counted.places = static_cast<std::uint32_t>(find_places(accepted).sizes.size());
-    counted.contradicted = counted.places == 1 && !rivals.empty() &&
-                           *std::ranges::max_element(rivals) >= accepted.size();
+    counted.places = static_cast<std::uint32_t>(places);
+    counted.contradicted = single || (places > 1 && count_rival_places(all, kept) >= places);
   }
   offer = entry->second;
 }

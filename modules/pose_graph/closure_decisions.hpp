@@ -11,6 +11,7 @@
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/pose_graph/closure_noise.hpp"
+#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 
@@ -52,8 +53,10 @@ class ClosureDecisions {
   /// All verdicts of the present session, if there are new ones since the last call.
   [[nodiscard]] std::optional<ClosureVerdicts> take_verdicts();
 
-  /// Sets `places` and `contradicted` of an offer of these closures.
-  void count_places(EdgeSetOffer& offer, std::span<const PoseEdge> closures);
+  /// Sets `places` and `contradicted` of an offer of these closures. `all` are all closures with
+  /// the same robot, offered or not.
+  void count_places(EdgeSetOffer& offer, std::span<const PoseEdge> closures,
+                    std::span<const AlignedOdometry> all);
 
  private:
   std::map<ClosureId, bool> decided_;

@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "modules/core/geometry.hpp"
+#include "modules/core/pose_graph.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 
 namespace km {
@@ -23,5 +25,30 @@ struct ClosurePlaces {
 /// Closures may have any order; the first closure of a place is the one with the lowest id. O(n log
 /// n) for n closures if few are near each other.
 [[nodiscard]] ClosurePlaces find_places(std::span<const PoseEdge> closures);
+
+/// The odometry of robots a < b, aligned by a closure between them.
+struct AlignedOdometry {
+  ClosureId closure = {};
+  SE3 T_a_b = SE3::Identity();                    ///< Between the frames of their odometry.
+  Eigen::Vector3d p_b = Eigen::Vector3d::Zero();  ///< End of the closure on robot b [m].
+};
+
+/// Precondition: the closure is between two robots.
+[[nodiscard]] AlignedOdometry align_odometry(const Closure& closure);
+
+/// Number of places at which closures that are not `kept` agree with those of another place.
+///
+/// In a hall of equal aisles, many places are mistaken for others in the same way. The closures of
+/// these places agree on a wrong relative pose of the two robots, as true ones do. Two closures
+/// agree if their transforms differ by at most 0.1 rad, and at the end of one of them by at most
+/// 0.5 m and 2 % of the distance of their ends. If closures of at least two places agree, their
+/// places are counted. A closure that agrees with one of `kept` within 0.1 rad, 1 m and 2 % does
+/// not count, because it may be true and inaccurate.
+///
+/// `all` are the closures between two robots, `kept` some of them, ascending. Drift of odometry
+/// between places hides rivals. If there are more than 500 closures of a kind, an even selection
+/// counts. O(n^2) for n closures.
+[[nodiscard]] std::size_t count_rival_places(std::span<const AlignedOdometry> all,
+                                             std::span<const ClosureId> kept);
 
 }  // namespace km

@@ -53,18 +53,21 @@ std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses) {
 
 FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
                      std::span<const RobotTie> ties) {
+  std::vector<RobotTie> usable;
+  std::ranges::copy_if(ties, std::back_inserter(usable),
+                       [](const RobotTie& tie) { return tie.places == 1 || !tie.contradicted; });
   const auto is_bridge = [&](const RobotTie& bridge) {
     const auto others = [&](const RobotTie& tie) { return tie != bridge; };
-    return !reached(bridge.a, ties, others).contains(bridge.b);
+    return !reached(bridge.a, usable, others).contains(bridge.b);
   };
   std::set<RobotTie> uncertain;
-  for (const RobotTie& tie : ties)
+  for (const RobotTie& tie : usable)
     if (tie.places == 1 && is_bridge(tie)) uncertain.insert(tie);
-  const std::set<RobotId> tied = reached(self, ties, [&](const RobotTie& tie) {
+  const std::set<RobotId> tied = reached(self, usable, [&](const RobotTie& tie) {
     return !tie.contradicted || !uncertain.contains(tie);
   });
   const std::set<RobotId> certain =
-      reached(self, ties, [&](const RobotTie& tie) { return !uncertain.contains(tie); });
+      reached(self, usable, [&](const RobotTie& tie) { return !uncertain.contains(tie); });
   FrameTies result;
   for (const RobotId robot : members) {
     if (!tied.contains(robot))

@@ -17,7 +17,7 @@ struct RobotTie {
   RobotId a = 0;  ///< a < b.
   RobotId b = 0;
   std::uint32_t places = 0;   ///< At least 1.
-  bool contradicted = false;  ///< `places` is 1, and a rejected place has as many closures or more.
+  bool contradicted = false;  ///< See EdgeSetOffer.
   auto operator<=>(const RobotTie&) const = default;
 };
 
@@ -39,7 +39,9 @@ struct FrameTies {
 
 /// Classifies `members` (ascending) relative to the robot `self`. A tie of one place is certain if
 /// other ties connect its two robots, too, because closures that contradict each other along a loop
-/// of robots are rejected. O(ties^2) for robots with one place each.
+/// of robots are rejected. A contradicted tie of several places ties nothing: in a hall of equal
+/// aisles, false closures may agree along such a loop, too. O(ties^2) for robots with one place
+/// each.
 [[nodiscard]] FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
                                    std::span<const RobotTie> ties);
 

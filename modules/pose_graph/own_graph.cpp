@@ -74,6 +74,7 @@ bool OwnGraph::add(const Closure& closure) {
   if (is_full(id)) return false;
   const RobotId peer = peer_of(id);
   const auto [known, is_new] = closures_.try_emplace(id, *edge);
+  if (peer != self_ && is_new) alignments_[peer].push_back(align_odometry(closure));
   if (is_new) {
     ++closures_to_[peer];
   } else {
@@ -85,6 +86,11 @@ bool OwnGraph::add(const Closure& closure) {
   }
   complete_sets();
   return true;
+}
+
+std::span<const AlignedOdometry> OwnGraph::alignments(RobotId peer) const {
+  const auto found = alignments_.find(peer);
+  return found == alignments_.end() ? std::span<const AlignedOdometry>() : found->second;
 }
 
 bool OwnGraph::add(const PositionFix& fix) {
@@ -136,6 +142,7 @@ bool OwnGraph::add(const InlierSet& set) {
 void OwnGraph::forget(RobotId peer) {
   sets_.erase(peer);
   closures_to_.erase(peer);
+  alignments_.erase(peer);
   std::erase_if(closures_, [&](const auto& closure) { return touches(closure.first, peer); });
 }
 

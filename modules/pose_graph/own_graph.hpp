@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <map>
+#include <span>
 #include <vector>
 
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/position_fix.hpp"
+#include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/odometry_judgement.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/team_messages.hpp"
@@ -63,6 +65,9 @@ class OwnGraph {
   [[nodiscard]] const std::vector<PoseEdge>* edges(RobotId peer, const EdgeSetId& id) const;
   /// Edges of the newest complete set with a peer; nullptr if there is none.
   [[nodiscard]] const std::vector<PoseEdge>* newest_edges(RobotId peer) const;
+
+  /// The odometry of this robot and a peer by each known closure between them, selected or not.
+  [[nodiscard]] std::span<const AlignedOdometry> alignments(RobotId peer) const;
 
   /// Finds wrong steps of odometry and estimates its noise again, from the closures inside this
   /// robot. From now on, own_edges() has corrected steps and weights.
@@ -123,6 +128,7 @@ class OwnGraph {
   std::map<ClosureId, PoseEdge> closures_;
   std::map<RobotId, std::size_t> closures_to_;  // number of `closures_` by peer
   std::map<RobotId, Sets> sets_;                // by peer; `self_`: inside this robot
+  std::map<RobotId, std::vector<AlignedOdometry>> alignments_;  // by peer, without `self_`
 };
 
 }  // namespace km

@@ -198,7 +198,8 @@ TeamOutput TeamAgent::step(double now_s, std::uint64_t sent_bytes) {
 TeamStatus TeamAgent::make_status() {
   std::vector<EdgeSetOffer> offers = graph_.offers();
   for (EdgeSetOffer& offer : offers)
-    decisions_.count_places(offer, *graph_.edges(offer.peer, offer.id));
+    decisions_.count_places(offer, *graph_.edges(offer.peer, offer.id),
+                            graph_.alignments(offer.peer));
   return {.sender = self_,
           .frame = frame_.frame(),
           .frame_version = frame_.version(),

@@ -53,7 +53,8 @@ struct EdgeSetOffer {
   EdgeSetId id;
   /// Number of places (see find_places()) of the closures that the sender has not rejected.
   std::uint32_t places = 0;
-  /// There is one such place, and a place with as many closures or more is rejected.
+  /// There is one such place, and a place with as many closures or more is rejected. Or there are
+  /// more places, and as many others or more agree with each other: count_rival_places().
   bool contradicted = false;
   bool operator==(const EdgeSetOffer&) const = default;
 };

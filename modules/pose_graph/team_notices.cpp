@@ -100,7 +100,8 @@ void TeamNotices::ties(const FrameTies& ties) {
         ": closures at a single place tie them to this robot; closures at a second place will "
         "confirm or correct it");
   if (const std::string robots = added(ties.not_joined, ties_.not_joined); !robots.empty())
-    add("no accepted closure ties robots " + robots + " to this robot: they are in another frame");
+    add("no accepted closure ties robots " + robots +
+        " to this robot without a contradiction: they are in another frame");
   std::vector<RobotId> uncertain;
   std::ranges::set_union(ties.tentative, ties.not_joined, std::back_inserter(uncertain));
   if (const std::string robots = added(ties_.tentative, uncertain); !robots.empty())

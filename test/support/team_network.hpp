@@ -419,10 +419,14 @@ inline void feed_odometry(TeamAgent& agent, RobotId robot, const TeamProblem& pr
   }
 }
 
-inline Closure closure_of(const PoseEdge& e) {
+/// A closure; with `problem` its start is the odometry of both ends.
+inline Closure closure_of(const PoseEdge& e, const TeamProblem* problem = nullptr) {
   Closure closure;
   closure.from.id = e.from;
   closure.to.id = e.to;
+  if (problem != nullptr)
+    for (OdometryPose* end : {&closure.from, &closure.to})
+      end->T_odom_kf = problem->start.at(end->id.robot)[end->id.index];
   closure.T_from_to = e.T_from_to;
   closure.covariance = covariance_of(e.precision);
   return closure;
@@ -445,7 +449,7 @@ inline void feed_closures(TeamAgent& agent, RobotId robot, const TeamProblem& pr
   std::set<RobotId> others;
   for (const PoseEdge& e : problem.edges) {
     if (is_step(e) || (e.from.robot != robot && e.to.robot != robot)) continue;
-    (void)agent.add(closure_of(e));
+    (void)agent.add(closure_of(e, &problem));
     others.insert(e.from.robot == robot ? e.to.robot : e.from.robot);
   }
   for (const RobotId other : others) (void)agent.add(inlier_set(problem, robot, other, version));

@@ -40,6 +40,17 @@ TEST_CASE("A single place that another one contradicts ties nothing, unless a ci
   CHECK(frame_ties(0, kMembers, circle) == FrameTies{{}, {3, 4}});
 }
 
+TEST_CASE("Several places that others contradict tie nothing, not even in a circle",
+          "[frame_ties]") {
+  const std::vector<RobotTie> chain{{0, 1, 2}, {1, 2, 4, true}, {2, 3, 2}};
+  CHECK(frame_ties(0, kMembers, chain) == FrameTies{{}, {2, 3, 4}});
+  CHECK(frame_ties(2, kMembers, chain) == FrameTies{{}, {0, 1, 4}});
+  const std::vector<RobotTie> circle{{0, 1, 2, true}, {0, 2, 3, true}, {1, 2, 2, true}};
+  CHECK(frame_ties(0, kMembers, circle) == FrameTies{{}, {1, 2, 3, 4}});
+  const std::vector<RobotTie> detour{{0, 1, 2}, {0, 2, 3}, {1, 2, 2, true}};
+  CHECK(frame_ties(0, kMembers, detour) == FrameTies{{}, {3, 4}});
+}
+
 TEST_CASE("Being tentative is mutual", "[frame_ties]") {
   std::mt19937 rng(1);
   std::uniform_int_distribution<std::uint32_t> places(0, 2);
@@ -51,7 +62,7 @@ TEST_CASE("Being tentative is mutual", "[frame_ties]") {
     for (const RobotId a : kMembers)
       for (RobotId b = a + 1; b < 5; ++b)
         if (const auto count = places(rng) * places(rng) / 2; count > 0)
-          ties.push_back({a, b, count, count == 1 && places(rng) == 0});
+          ties.push_back({a, b, count, places(rng) == 0});
     for (const RobotId a : kMembers)
       for (const RobotId b : kMembers) {
         const FrameTies one = frame_ties(a, kMembers, ties), other = frame_ties(b, kMembers, ties);

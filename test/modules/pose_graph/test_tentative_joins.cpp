@@ -31,10 +31,12 @@ TeamProblem team_of_three(unsigned seed, const std::set<std::uint32_t>& at) {
   return problem;
 }
 
-// Closures of robots 2 and 4 at one place that is mistaken for another.
-std::set<ClosureId> add_false(TeamProblem& problem, std::uint32_t first, std::uint32_t count) {
+// Closures of robots 2 and 4 at one place that is mistaken for another. Places that are mistaken in
+// the same way have the same seed.
+std::set<ClosureId> add_false(TeamProblem& problem, std::uint32_t first, std::uint32_t count,
+                              std::optional<unsigned> seed = std::nullopt) {
   std::set<ClosureId> added;
-  std::mt19937 rng(first);
+  std::mt19937 rng(seed.value_or(first));
   const SE3 off = random_pose(rng, 20.0);
   for (std::uint32_t k = first; k < first + count; ++k) {
     const KeyframeId from{2, k}, to{4, k};
@@ -108,7 +110,7 @@ TEST_CASE(
 
   for (const RobotId robot : {RobotId{2}, RobotId{4}}) {
     for (const PoseEdge& e : all.edges)
-      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e));
+      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e, &all));
     (void)network.agent(robot).add(inlier_set(all, 2, 4, 2));
   }
   const std::uint32_t sessions = network.agent(2).part()->session().id.number;
@@ -139,6 +141,24 @@ TEST_CASE("Robots with two single closures that contradict each other are not jo
   CHECK(progress_of(network, 4).not_joined == Robots{2});
   CHECK(progress_of(network, 4).anchor == 4);
   CHECK(progress_of(network, 4).tentative.empty());
+}
+
+TEST_CASE("Robots are not joined if as many places agree on another relative pose",
+          "[pose_graph][tentative]") {
+  const unsigned seed = GENERATE(range(1U, 7U));
+  const bool alike = GENERATE(true, false);  // the false places agree with each other
+  CAPTURE(seed, alike);
+  TeamProblem problem = team_of_three(seed, {8, 9, 22, 23, 24});
+  for (const std::uint32_t first : {35U, 52U})
+    (void)add_false(problem, first, 2, alike ? std::optional(seed) : std::nullopt);
+  TeamNetwork network(seed);
+  add_robots(network, problem);
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  CHECK(progress_of(network, 2).tentative.empty());
+  CHECK(progress_of(network, 2).not_joined == (alike ? Robots{4, 6} : Robots{}));
+  CHECK(progress_of(network, 4).not_joined == (alike ? Robots{2} : Robots{}));
+  CHECK(progress_of(network, 4).anchor == (alike ? 4 : 2));
 }
 
 TEST_CASE("Robots whose closures are all rejected publish in two frames, until others join them",
