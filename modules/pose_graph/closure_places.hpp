@@ -40,10 +40,10 @@ struct AlignedOdometry {
 ///
 /// In a hall of equal aisles, many places are mistaken for others in the same way. The closures of
 /// these places agree on a wrong relative pose of the two robots, as true ones do. Two closures
-/// agree if their transforms differ by at most 0.1 rad, and at the end of one of them by at most
-/// 0.5 m and 2 % of the distance of their ends. If closures of at least two places agree, their
-/// places are counted. A closure that agrees with one of `kept` within 0.1 rad, 1 m and 2 % does
-/// not count, because it may be true and inaccurate.
+/// agree if their transforms differ by at most 0.1 rad. At the end of one of them the difference
+/// must be at most 0.5 m and 2 % of the distance of their ends. If closures of at least two places
+/// agree, their places are counted. A closure that agrees with one of `kept` within 0.1 rad, 1 m
+/// and 2 % does not count, because it may be true and inaccurate.
 ///
 /// `all` are the closures between two robots, `kept` some of them, ascending. Drift of odometry
 /// between places hides rivals. If there are more than 500 closures of a kind, an even selection
