@@ -89,6 +89,29 @@ NormalEquations linearise(const SE3& T_a_b, std::span<const ImagePair> pairs,
   return sum;
 }
 
+// True if the transfer error of m = a.m exceeds its quantile along one axis. It then exceeds it as
+// a whole: r' Sigma^-1 r is the maximum of (u' r)^2 / (u' Sigma u) over all directions u. Takes a
+// fraction of the time of transfer_error(), and most pairs are far from most models.
+bool is_outlier_along_an_axis(const SE3& T_b_a, const ImagePoint& a, const ImagePoint& b) {
+  const Eigen::Vector3d h = carried(T_b_a, a.m);
+  if (!(h.z() > kLeastDepthRatio)) return true;
+  const double s = 1.0 / h.z();
+  const Eigen::Vector3d at = s * Eigen::Vector3d(h.x(), h.y(), a.m.z());
+  const auto dh_dm = [&T_b_a](int row) -> Eigen::RowVector3d {
+    return {T_b_a(row, 0), T_b_a(row, 1), T_b_a(row, 3)};
+  };
+  const Eigen::RowVector3d dz = dh_dm(2);
+  const int dim = b.has_depth ? 3 : 2;
+  for (int axis = 0; axis < dim; ++axis) {
+    Eigen::RowVector3d g = -at[axis] * dz;
+    g += axis < 2 ? dh_dm(axis) : Eigen::RowVector3d::UnitZ();
+    const double variance = s * s * g.cwiseAbs2().dot(a.variance.transpose()) + b.variance[axis];
+    const double r = at[axis] - b.m[axis];
+    if (r * r > quantile(dim) * variance) return true;
+  }
+  return false;
+}
+
 // Three pairs with depth on both sides. A sample is solved only if the sides of its two triangles
 // have equal lengths.
 class ThreePointProblem {
@@ -124,7 +147,11 @@ class ThreePointProblem {
   }
 
   double error(const SE3& T_a_b, std::size_t i) const {
-    return pair_error(T_a_b, pairs_[i]).relative();
+    constexpr double kOutlier = 2.0;
+    const auto& [a, b] = pairs_[i];
+    const bool is_outlier = a.has_depth ? is_outlier_along_an_axis(T_a_b.inverse(), a, b)
+                                        : is_outlier_along_an_axis(T_a_b, b, a);
+    return is_outlier ? kOutlier : pair_error(T_a_b, pairs_[i]).relative();
   }
 
   std::optional<SE3> polish(const SE3& T_a_b, std::span<const std::size_t> inliers) const {

@@ -144,6 +144,9 @@ TEST_CASE("RANSAC finds the pose and the inliers among 70 % outliers", "[relativ
                                           [](std::size_t i) { return i < kInliers; });
   CHECK(true_inliers >= 27);  // the test keeps 99 % of them
   CHECK(static_cast<std::size_t>(true_inliers) + 3 >= result.inliers.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    CHECK(std::ranges::binary_search(result.inliers, i) ==
+          (pair_error(*result.model, pairs[i]).relative() <= 1.0));
 }
 
 TEST_CASE("RANSAC with the same seed gives the same result", "[relative_pose]") {
