@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <vector>
 
 #include "modules/pose_graph/member_solver.hpp"
@@ -80,7 +81,7 @@ void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdg
     std::vector<ClosureId> kept;
     for (const PoseEdge& closure : closures)
       (is_rejected(closure.id()) ? rejected : accepted).push_back(closure);
-    for (const PoseEdge& closure : accepted) kept.push_back(closure.id());
+    std::ranges::transform(accepted, std::back_inserter(kept), &PoseEdge::id);
     const std::vector<std::size_t> rivals = find_places(rejected).sizes;
     const std::size_t places = find_places(accepted).sizes.size();
     const bool single =

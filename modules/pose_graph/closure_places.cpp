@@ -89,6 +89,7 @@ std::size_t count_rival_places(std::span<const AlignedOdometry> all,
   std::size_t places = 0;
   for (const std::vector<AlignedOdometry>& group : groups) {
     std::vector<PoseEdge> closures;
+    closures.reserve(group.size());
     for (const AlignedOdometry& x : group)
       closures.push_back({.from = x.closure.from, .to = x.closure.to});
     if (const std::size_t count = find_places(closures).sizes.size(); count > 1) places += count;
