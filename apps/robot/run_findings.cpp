@@ -79,9 +79,8 @@ Finding not_joined(const ClosureTally& tally, const PcmConfig& pcm, bool has_one
     finding.means = "what joined them, if they were joined before, ended with it";
     finding.to_do =
         "see its log; if it was killed, --resume continues it; out of reach, bring it back";
-  } else if (tally.rejected >= tally.inliers) {
-    finding.what = verified + std::to_string(tally.inliers) + " kept, " +
-                   std::to_string(tally.rejected) + " rejected by the optimiser";
+  } else if (tally.verified >= 2 * tally.inliers) {
+    finding.what = verified + std::to_string(tally.inliers) + " kept, which the others contradict";
     finding.means = "places look alike, so that closures agree on more than one relative pose";
     finding.to_do = "let both see a place that looks like no other one";
   } else {
