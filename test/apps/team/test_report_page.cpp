@@ -170,7 +170,7 @@ TEST_CASE("The report needs no other file and no network", "[report_page]") {
   CHECK(references_of_page(page) == 0);
 }
 
-TEST_CASE("The report opens in a browser and shows its charts", "[report_page]") {
+TEST_CASE("The report opens in a browser and shows its charts", "[report_page][slow]") {
   if (const std::string why = missing_page_program(); !why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;

@@ -12,7 +12,8 @@ namespace {
 
 const std::string kViewer = KM_BIN_DIR "/kimera_multi_viewer";
 
-TEST_CASE("The page has the content of the files of a run, at any time of the run", "[page]") {
+TEST_CASE("The page has the content of the files of a run, at any time of the run",
+          "[page][slow]") {
   if (const std::string why = missing_page_program(); !why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;
