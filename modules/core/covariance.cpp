@@ -1,8 +1,7 @@
 #include "modules/core/covariance.hpp"
 
-#include <Eigen/Eigenvalues>
-
 #include "modules/core/lie.hpp"
+#include "modules/core/symmetric_eigen.hpp"
 
 namespace km {
 namespace {
@@ -31,9 +30,10 @@ UncertainPose between_on_chain(const UncertainPose& T_a_b, const UncertainPose& 
   const SE3 T_b_c = T_a_b.T.inverse() * T_a_c.T;
   const Matrix6 Ad_c_b = adjoint(T_b_c.inverse());
   const Matrix6 added = T_a_c.Sigma - Ad_c_b * T_a_b.Sigma * Ad_c_b.transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(0.5 * (added + added.transpose()));
-  const Vector6 clipped = eigen.eigenvalues().cwiseMax(0.0);
-  return {T_b_c, eigen.eigenvectors() * clipped.asDiagonal() * eigen.eigenvectors().transpose()};
+  const SymmetricEigen eigen = symmetric_eigen(0.5 * (added + added.transpose()));
+  const Vector6 clipped = eigen.values.cwiseMax(0.0);
+  const Matrix6 V = eigen.vectors;
+  return {T_b_c, V * clipped.asDiagonal() * V.transpose()};
 }
 
 Matrix6 along_fixed_axes(const UncertainPose& T_a_b) {
@@ -50,8 +50,7 @@ bool is_covariance(const Matrix6& Sigma) {
   if (!Sigma.allFinite()) return false;
   const double scale = Sigma.cwiseAbs().maxCoeff();
   if ((Sigma - Sigma.transpose()).cwiseAbs().maxCoeff() > 1e-6 * scale) return false;
-  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(Sigma, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues().minCoeff() >= -1e-9 * scale;
+  return symmetric_eigen(Sigma).values.minCoeff() >= -1e-9 * scale;
 }
 
 bool is_usable(const StateCovariance& Sigma) {
@@ -60,8 +59,7 @@ bool is_usable(const StateCovariance& Sigma) {
     return false;
   const Eigen::Matrix<double, 11, 1> scale = Sigma.diagonal().cwiseSqrt().cwiseInverse();
   const StateCovariance correlations = scale.asDiagonal() * Sigma * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<StateCovariance> eigen(correlations, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues().minCoeff() >= 1e-9;
+  return symmetric_eigen(correlations).values.minCoeff() >= 1e-9;
 }
 
 }  // namespace km

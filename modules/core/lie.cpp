@@ -94,7 +94,12 @@ Vector6 local_coordinates(const SE3& from, const SE3& to) {
 }
 
 Eigen::Matrix3d rotation_to_z(const Eigen::Vector3d& up) {
-  return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Vector3d u = up.normalized();
+  const double across2 = u.head<2>().squaredNorm();
+  if (across2 == 0.0 && u.z() < 0.0) return Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+  // The quaternion (1 + u^T z, u x z), with 1 + u_z written without cancellation.
+  const double w = u.z() > 0.0 ? 1.0 + u.z() : across2 / (1.0 - u.z());
+  return Eigen::Quaterniond(w, u.y(), -u.x(), 0.0).normalized().toRotationMatrix();
 }
 
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M) {

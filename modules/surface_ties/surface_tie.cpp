@@ -1,7 +1,6 @@
 #include "modules/surface_ties/surface_tie.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <optional>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/symmetric_eigen.hpp"
 
 namespace km {
 namespace {
@@ -138,12 +138,12 @@ class NormalEquations {
       g_ += weights[i] * pairing.residuals[i] * J;
       sum_ += weights[i] * J;
     }
-    solver_.compute(H_);
+    eigen_ = symmetric_eigen(H_);
   }
 
   [[nodiscard]] double weight() const { return weight_; }
   [[nodiscard]] bool is_free(int direction) const {
-    return solver_.eigenvalues()[direction] < kOpen * weight_;
+    return eigen_.values[direction] < kOpen * weight_;
   }
   [[nodiscard]] int free_directions() const {
     int count = 0;
@@ -189,8 +189,9 @@ class NormalEquations {
   // Inverse of H, with the eigenvalue `free` along free directions.
   [[nodiscard]] Matrix6 inverse(double free) const {
     Vector6 values;
-    for (int i = 0; i < 6; ++i) values[i] = is_free(i) ? free : 1.0 / solver_.eigenvalues()[i];
-    return solver_.eigenvectors() * values.asDiagonal() * solver_.eigenvectors().transpose();
+    for (int i = 0; i < 6; ++i) values[i] = is_free(i) ? free : 1.0 / eigen_.values[i];
+    const Matrix6 V = eigen_.vectors;
+    return V * values.asDiagonal() * V.transpose();
   }
 
   double weight_ = 0.0;
@@ -199,7 +200,7 @@ class NormalEquations {
   Matrix6 H_ = Matrix6::Zero();
   Vector6 g_ = Vector6::Zero();
   Vector6 sum_ = Vector6::Zero();  // gradient of an offset that all residuals share
-  Eigen::SelfAdjointEigenSolver<Matrix6> solver_;
+  SymmetricEigen eigen_;           // eigenvalues and eigenvectors of H
 };
 
 // The share of the pairs within the gate, in the direction in which it is smallest: the smallest
@@ -215,8 +216,8 @@ double fitting_share(const Pairing& pairing, const SE3& T_a_b, const Matrix6& fr
   }
   // In directions in which the surfaces slide, nothing is to be compared.
   const Matrix6 floor = kOpen * static_cast<double>(pairing.pairs.size()) * Matrix6::Identity();
-  return Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6>(fitting + floor, all + floor)
-      .eigenvalues()[0];
+  const Matrix6 L_inverse = (all + floor).llt().matrixL().solve(Matrix6::Identity());
+  return symmetric_eigen(L_inverse * (fitting + floor) * L_inverse.transpose()).values[0];
 }
 
 // Fills in what follows from the pairs at the registered pose. Those within the gate fit.

@@ -1,8 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <random>
+
+#include "modules/core/symmetric_eigen.hpp"
 
 namespace km {
 
@@ -35,14 +36,13 @@ LanczosResult largest_eigenpair(const Operator& apply, Eigen::Index n, int max_p
     for (int pass = 0; pass < 2; ++pass)
       w -= V.leftCols(k + 1) * (V.leftCols(k + 1).transpose() * w).eval();
     beta(k) = w.norm();
-    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
-    ritz.computeFromTridiagonal(alpha.head(k + 1), beta.head(k));
-    result.value = ritz.eigenvalues()(k);
+    const SymmetricEigen ritz = tridiagonal_eigen(alpha.head(k + 1), beta.head(k));
+    result.value = ritz.values(k);
     result.products = static_cast<int>(k) + 1;
-    const double residual = beta(k) * std::abs(ritz.eigenvectors()(k, k));
+    const double residual = beta(k) * std::abs(ritz.vectors(k, k));
     result.converged = residual <= tolerance * std::abs(result.value);
     if (result.converged || k + 1 == m || !(beta(k) > 0.0)) {
-      result.vector = (V.leftCols(k + 1) * ritz.eigenvectors().col(k)).normalized();
+      result.vector = (V.leftCols(k + 1) * ritz.vectors.col(k)).normalized();
       break;
     }
     V.col(k + 1) = w / beta(k);

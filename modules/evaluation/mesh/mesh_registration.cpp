@@ -1,6 +1,5 @@
 #include "modules/evaluation/mesh/mesh_registration.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/symmetric_eigen.hpp"
 
 namespace km {
 namespace {
@@ -121,12 +121,12 @@ Step step_of(const std::vector<Pair>& pairs) {
     H += J * J.transpose();
     g += J * pair.offset_m;
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(H);
+  const SymmetricEigen eigen = symmetric_eigen(H);
   Step step;
   Vector6 x = Vector6::Zero();
   for (int i = 0; i < 6; ++i) {
-    const double value = solver.eigenvalues()[i];
-    const Vector6 direction = solver.eigenvectors().col(i);
+    const double value = eigen.values[i];
+    const Vector6 direction = eigen.vectors.col(i);
     if (value < kOpen * static_cast<double>(pairs.size()))
       ++step.free_directions;
     else

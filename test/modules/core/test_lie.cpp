@@ -29,6 +29,24 @@ TEST_CASE("A rotation by 90 degrees about z maps x to y", "[core]") {
   CHECK((R * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm() < 1e-15);
 }
 
+TEST_CASE("The rotation to z is the shortest one, also near the opposite direction", "[core]") {
+  const double angle = GENERATE(0.0, 1e-9, 0.3, 2.0, std::numbers::pi - 1e-6,
+                                std::numbers::pi - 1e-9, std::numbers::pi);
+  CAPTURE(angle);
+  const Eigen::Vector3d u = so3_exp(angle * Eigen::Vector3d(0.6, -0.8, 0.0)).col(2);
+  const Eigen::Matrix3d R = rotation_to_z(9.81 * u);
+  CHECK((R * u - Eigen::Vector3d::UnitZ()).norm() < 1e-14);
+  CHECK((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-14);
+  CHECK(R.determinant() == Approx(1.0));
+  CHECK(so3_log(R).norm() == Approx(angle).margin(1e-8));
+}
+
+TEST_CASE("A direction opposite to z is turned by a half turn", "[core]") {
+  const Eigen::Matrix3d R = rotation_to_z({0.0, 0.0, -2.0});
+  CHECK(R * Eigen::Vector3d(0.0, 0.0, -2.0) == Eigen::Vector3d(0.0, 0.0, 2.0));
+  CHECK(R.determinant() == 1.0);
+}
+
 TEST_CASE("The right Jacobian is the derivative of the exponential", "[core]") {
   const double angle = GENERATE(0.0, 1e-6, 1e-3, 0.5, 2.5);
   CAPTURE(angle);

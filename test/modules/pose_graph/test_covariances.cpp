@@ -1,7 +1,7 @@
-#include <Eigen/Eigenvalues>
 #include <catch2/catch.hpp>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/symmetric_eigen.hpp"
 #include "modules/pose_graph/edge_model.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
 #include "test/support/solver_team.hpp"
@@ -69,11 +69,11 @@ MatrixXd hessian(const TeamProblem& problem, const Stacked& team) {
 
 // Twice the pseudoinverse of H, which leaves out the common motions of the team.
 MatrixXd covariance_of_all(const MatrixXd& H) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(H);
-  const double least = 1e-9 * eigen.eigenvalues().maxCoeff();
+  const SymmetricEigen eigen = symmetric_eigen(H);
+  const double least = 1e-9 * eigen.values.maxCoeff();
   const Eigen::VectorXd inverse =
-      eigen.eigenvalues().unaryExpr([&](double x) { return x > least ? 2.0 / x : 0.0; });
-  return eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
+      eigen.values.unaryExpr([&](double x) { return x > least ? 2.0 / x : 0.0; });
+  return eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
 }
 
 // Subtracts from the error of every pose the common motion that carries the first pose to its
