@@ -28,7 +28,7 @@ constexpr double kStartYaw =
     std::numbers::pi / 4.0;  // largest angle between the start yaw and the direction to the middle
 constexpr int kTries = 20;
 
-[[noreturn]] void refuse(const std::string& problem) {
+[[noreturn]] void refuse_flight(const std::string& problem) {
   throw std::invalid_argument("flight trajectory: " + problem);
 }
 
@@ -36,10 +36,10 @@ void check(const Eigen::AlignedBox3d& volume, const FlightOptions& options) {
   checked(options);
   if (volume.isEmpty() || !(volume.sizes().minCoeff() >= kSmallestVolume_m) ||
       !volume.sizes().allFinite())
-    refuse("the volume is not at least 1 m in every direction");
+    refuse_flight("the volume is not at least 1 m in every direction");
   const Eigen::Matrix3d& R = options.R_vehicle_body;
   if (!((R * R.transpose()).isIdentity(1e-6) && R.determinant() > 0.0))
-    refuse("R_vehicle_body is no rotation");
+    refuse_flight("R_vehicle_body is no rotation");
 }
 
 Eigen::Vector3d random_point(const Eigen::AlignedBox3d& box, SeededRandom& random) {

@@ -28,7 +28,7 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-[[noreturn]] void refuse(const std::string& problem) {
+[[noreturn]] void refuse_route(const std::string& problem) {
   throw std::invalid_argument("route: " + problem);
 }
 
@@ -36,11 +36,12 @@ Points without_repeats(const Points& points) {
   Points kept;
   for (const Eigen::Vector2d& point : points) {
     if (!point.allFinite())
-      refuse("point " + std::to_string(&point - points.data()) + " is not finite");
+      refuse_route("point " + std::to_string(&point - points.data()) + " is not finite");
     if (kept.empty() || (point - kept.back()).norm() > kSamePoint_m) kept.push_back(point);
   }
   while (kept.size() > 1 && (kept.front() - kept.back()).norm() <= kSamePoint_m) kept.pop_back();
-  if (kept.size() < 3) refuse(std::to_string(kept.size()) + " different points, at least 3 needed");
+  if (kept.size() < 3)
+    refuse_route(std::to_string(kept.size()) + " different points, at least 3 needed");
   return kept;
 }
 
@@ -133,7 +134,8 @@ UniformSpline<2> closed_spline(const Route& route, double radius_m) {
   const Points corners = without_repeats(route.points);
   const double length = closed_length(corners);
   if (length < kShortest_m)
-    refuse(std::to_string(length) + " m long, at least " + std::to_string(kShortest_m) + " needed");
+    refuse_route(std::to_string(length) + " m long, at least " + std::to_string(kShortest_m) +
+                 " needed");
   const Points arcs = rounded(corners, radius_m);
   const auto count = static_cast<std::size_t>(std::ceil(closed_length(arcs) / kSpacing_m));
   const Points eased = smoothed(resampled(arcs, count), kEasing_m / kSpacing_m);
@@ -145,7 +147,7 @@ UniformSpline<2> closed_spline(const Route& route, double radius_m) {
 
 double checked_radius(double radius_m) {
   if (!(radius_m >= 0.5 && radius_m <= 100.0))
-    refuse("corner radius " + std::to_string(radius_m) + " m is outside [0.5, 100]");
+    refuse_route("corner radius " + std::to_string(radius_m) + " m is outside [0.5, 100]");
   return radius_m;
 }
 

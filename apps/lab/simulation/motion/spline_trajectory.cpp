@@ -66,29 +66,29 @@ constexpr double kMaxLength = 2.0;
 constexpr double kMinCosine =
     0.70710678118;  // smallest cosine of half the angle between neighbours
 
-[[noreturn]] void refuse(const std::string& problem) {
+[[noreturn]] void refuse_spline(const std::string& problem) {
   throw std::invalid_argument("spline trajectory: " + problem);
 }
 
 // Controls with the signs of quaternions aligned. q and -q are the same rotation, but not the same
 // control.
 std::vector<Control> aligned(std::vector<Control> controls, double start_s, double interval_s) {
-  if (!std::isfinite(start_s)) refuse("start " + std::to_string(start_s) + " s");
+  if (!std::isfinite(start_s)) refuse_spline("start " + std::to_string(start_s) + " s");
   if (!(interval_s > 0.0) || !std::isfinite(interval_s))
-    refuse("interval " + std::to_string(interval_s) + " s is not positive");
+    refuse_spline("interval " + std::to_string(interval_s) + " s is not positive");
   if (controls.size() < QuinticBasis::kOrder)
-    refuse(std::to_string(controls.size()) + " controls, at least 6 are needed");
+    refuse_spline(std::to_string(controls.size()) + " controls, at least 6 are needed");
   for (std::size_t k = 0; k < controls.size(); ++k) {
     auto q = controls[k].tail<4>();
     const double length = q.norm();
     if (!controls[k].allFinite() || length < kMinLength || length > kMaxLength)
-      refuse("control " + std::to_string(k) + " is no pose");
+      refuse_spline("control " + std::to_string(k) + " is no pose");
     if (k == 0) continue;
     const auto previous = controls[k - 1].tail<4>();
     const double cosine = q.dot(previous) / (length * previous.norm());
     if (std::abs(cosine) < kMinCosine)
-      refuse("more than 90 degrees between controls " + std::to_string(k - 1) + " and " +
-             std::to_string(k));
+      refuse_spline("more than 90 degrees between controls " + std::to_string(k - 1) + " and " +
+                    std::to_string(k));
     if (cosine < 0.0) q = -q.eval();
   }
   return controls;

@@ -187,7 +187,7 @@ void set_footprints(const Gathered& g, SurfacePoints& points) {
 
 // Coordinates on a tile in units of 2^-30; higher bits wrap.
 constexpr int kTileBits = 30;
-constexpr std::uint32_t kTileMask = (1U << kTileBits) - 1U;
+constexpr std::uint32_t kPositionMask = (1U << kTileBits) - 1U;
 constexpr int kWeightBits = 16;  // bits of the weight from a texel to the next
 
 // One texture per lane.
@@ -247,12 +247,12 @@ void add_level(const TextureLanes& textures, const IntLanes& level, const BitLan
   for (std::size_t i = 0; i < kLanes; ++i) {
     const auto log_n = static_cast<std::uint32_t>(textures.log_size[i] - level[i]);
     const std::uint32_t half_texel = 1U << (kTileBits - 1) >> log_n;
-    const std::uint32_t at_u = (u[i] - half_texel) & kTileMask;
-    const std::uint32_t at_v = (v[i] - half_texel) & kTileMask;
+    const std::uint32_t at_u = (u[i] - half_texel) & kPositionMask;
+    const std::uint32_t at_v = (v[i] - half_texel) & kPositionMask;
     const std::uint32_t column = at_u >> (kTileBits - log_n);
     const std::uint32_t row = at_v >> (kTileBits - log_n);
-    x[i] = static_cast<std::int32_t>((at_u << log_n & kTileMask) >> (kTileBits - kWeightBits));
-    y[i] = static_cast<std::int32_t>((at_v << log_n & kTileMask) >> (kTileBits - kWeightBits));
+    x[i] = static_cast<std::int32_t>((at_u << log_n & kPositionMask) >> (kTileBits - kWeightBits));
+    y[i] = static_cast<std::int32_t>((at_v << log_n & kPositionMask) >> (kTileBits - kWeightBits));
     // The levels before this one: a sum of powers of four, (4^k - 1) / 3 each.
     constexpr std::uint32_t kThird = 0x55555555U;
     const std::uint32_t begin =

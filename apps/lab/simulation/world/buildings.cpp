@@ -16,7 +16,7 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
 
-constexpr SurfaceClass kLabel = SurfaceClass::kBuilding;
+constexpr SurfaceClass kBuildingLabel = SurfaceClass::kBuilding;
 constexpr float kBar = 0.055F;  // width of a window's bars [m]
 
 /// A hole in a wall in the plane y = 0 [m].
@@ -32,7 +32,7 @@ struct Opening {
 
 MaterialId glass(Scene& scene, SeededRandom& random) {
   const float depth = 0.03F + 0.02F * static_cast<float>(random.below(3));
-  return scene.plain(kLabel, {depth, 1.1F * depth, 1.25F * depth}, 0.45F);
+  return scene.plain(kBuildingLabel, {depth, 1.1F * depth, 1.25F * depth}, 0.45F);
 }
 
 void add_reveals(Scene& scene, const Opening& o, float depth, MaterialId wall) {
@@ -64,7 +64,8 @@ void add_frame(Scene& scene, const Opening& o, float y, float bar, MaterialId fr
 void add_blinds(Scene& scene, const Opening& o, float y, SeededRandom& random) {
   const float front = y - 0.012F;
   const float shade = 0.45F + 0.1F * static_cast<float>(random.below(4));
-  const auto cloth = scene.paint(kLabel, kCurtain, {shade, 0.97F * shade, 0.9F * shade}, 0.5F);
+  const auto cloth =
+      scene.paint(kBuildingLabel, kCurtain, {shade, 0.97F * shade, 0.9F * shade}, 0.5F);
   const int kind = random.below(6);
   if (kind == 0) {  // a roller blind
     add_pane(scene, o.x0 + kBar, o.x1 - kBar, o.z1 - random.uniform(0.25F, 0.8F) * o.height(), o.z1,
@@ -105,7 +106,7 @@ void add_shutters(Scene& scene, const Opening& o, const FacadeStyle& style) {
 /// Display of a shop: goods on two shelves and a print, flat before the pane at y, which is opaque.
 void add_display(Scene& scene, const Opening& o, float y, SeededRandom& random) {
   const float shelf = o.z0 + 0.42F * o.height();
-  const auto board = scene.plain(kLabel, {0.16F, 0.13F, 0.1F});
+  const auto board = scene.plain(kBuildingLabel, {0.16F, 0.13F, 0.1F});
   const bool two_shelves = random.chance(0.6);
   if (two_shelves)
     scene.box({o.x0, y - 0.045F, shelf - 0.04F}, {o.x1, y, shelf}, board, kSidesNoBack);
@@ -119,14 +120,14 @@ void add_display(Scene& scene, const Opening& o, float y, SeededRandom& random) 
       const float green = 0.5F * (red + level());  // muted colours
       const float blue = 0.5F * (green + level());
       scene.box({x, y - 0.04F, bottom}, {std::min(x + width, o.x1), y, bottom + height},
-                scene.plain(kLabel, {red, green, blue}), kSidesNoBack);
+                scene.plain(kBuildingLabel, {red, green, blue}), kSidesNoBack);
     }
   }
   if (!random.chance(0.45) || o.width() < 0.9F) return;
   const float x = random.uniform(o.x0, o.x1 - 0.75F);
   const auto frame = scene.at({x, y - 0.05F, o.z0 + 0.5F});
   scene.set_uv_offset({static_cast<float>(random.below(4)), static_cast<float>(random.below(4))});
-  add_pane(scene, 0.0F, 0.7F, 0.0F, 0.95F, 0.0F, scene.paint(kLabel, kPosters));
+  add_pane(scene, 0.0F, 0.7F, 0.0F, 0.95F, 0.0F, scene.paint(kBuildingLabel, kPosters));
   scene.set_uv_offset(Eigen::Vector2f::Zero());
 }
 
@@ -188,7 +189,7 @@ void add_door(Scene& scene, const Opening& o, const FacadeStyle& style, SeededRa
                 kSidesNoBack);
     }
   }
-  const auto brass = scene.plain(kLabel, {0.55F, 0.45F, 0.2F}, 0.3F);
+  const auto brass = scene.plain(kBuildingLabel, {0.55F, 0.45F, 0.2F}, 0.3F);
   scene.ellipsoid({o.x1 - 0.2F, y - 0.07F, o.z0 + 1.02F}, {0.035F, 0.035F, 0.035F}, 8, brass);
   scene.box({o.x0 - 0.15F, -0.45F, o.z0 - 0.16F}, {o.x1 + 0.15F, 0.02F, o.z0}, style.trim,
             kSidesNoBottom);
@@ -200,7 +201,7 @@ void add_garage_door(Scene& scene, const Opening& o, const FacadeStyle& style,
   const float y = style.recess_m + 0.15F;
   add_reveals(scene, o, y, style.base);
   const float shade = random.uniform(0.35F, 0.7F);
-  const auto leaf = scene.paint(kLabel, kPaintedMetal, {shade, shade, 0.97F * shade}, 1.0F);
+  const auto leaf = scene.paint(kBuildingLabel, kPaintedMetal, {shade, shade, 0.97F * shade}, 1.0F);
   const int slats = static_cast<int>(o.height() / 0.35F);
   const float pitch = o.height() / static_cast<float>(slats);
   for (int i = 0; i < slats; ++i) {
@@ -270,7 +271,7 @@ void add_balcony(Scene& scene, float middle, float z, float width, const FacadeS
   const float x1 = middle + 0.5F * width;
   const float depth = 0.95F;
   scene.box({x0, -depth, z - 0.18F}, {x1, 0.0F, z}, style.trim, kSidesNoBack);
-  const auto iron = scene.plain(kLabel, {0.04F, 0.045F, 0.05F});
+  const auto iron = scene.plain(kBuildingLabel, {0.04F, 0.045F, 0.05F});
   const float top = z + 1.0F;
   const auto rail = [&](const Vector3f& low, const Vector3f& high) {
     scene.box(low, high, iron, kSidesAll);
@@ -294,11 +295,11 @@ void add_awning(Scene& scene, float x0, float x1, float z, SeededRandom& random)
   const float out = 1.1F;
   const float drop = 0.45F;
   const float hue = random.uniform(0.0F, 1.0F);
-  const auto plain = scene.paint(kLabel, kCanvas, {0.75F, 0.72F, 0.65F});
+  const auto plain = scene.paint(kBuildingLabel, kCanvas, {0.75F, 0.72F, 0.65F});
   const Eigen::Vector3f tint = hue < 0.4F   ? Eigen::Vector3f(0.5F, 0.07F, 0.05F)
                                : hue < 0.7F ? Eigen::Vector3f(0.05F, 0.25F, 0.12F)
                                             : Eigen::Vector3f(0.08F, 0.15F, 0.4F);
-  const auto coloured = scene.paint(kLabel, kCanvas, tint);
+  const auto coloured = scene.paint(kBuildingLabel, kCanvas, tint);
   const int stripes = std::max(2, static_cast<int>((x1 - x0) / 0.3F));
   for (int i = 0; i < stripes; ++i) {
     const float a = x0 + (x1 - x0) * static_cast<float>(i) / static_cast<float>(stripes);
@@ -341,7 +342,7 @@ void add_ground_floor(Scene& scene, const FacadeStyle& style, const Bays& bays, 
     } else if (style.ground_floor == FacadeStyle::GroundFloor::kShops) {
       add_shop_front(scene, o, style, bay % 2 == 0, random);
       if (random.chance(0.75))
-        add_sign_board(scene, o.x0, top - 0.8F, o.width(), 0.55F, kLabel, random);
+        add_sign_board(scene, o.x0, top - 0.8F, o.width(), 0.55F, kBuildingLabel, random);
       if (random.chance(0.4)) add_awning(scene, o.x0, o.x1, top - 0.85F, random);
     } else if (style.ground_floor == FacadeStyle::GroundFloor::kGarages) {
       add_garage_door(scene, o, style, random);
@@ -387,7 +388,7 @@ void add_cornice(Scene& scene, const FacadeStyle& style, float width_m) {
 }
 
 void add_downpipe(Scene& scene, const FacadeStyle& style) {
-  const auto zinc = scene.plain(kLabel, {0.3F, 0.32F, 0.33F}, 0.05F);
+  const auto zinc = scene.plain(kBuildingLabel, {0.3F, 0.32F, 0.33F}, 0.05F);
   const float top = height_m(style) - 0.3F;
   scene.cylinder({0.22F, -0.1F, -0.2F}, {0.22F, -0.1F, top}, 0.055F, 0.055F, 8, zinc, false);
   for (float z = 1.0F; z < top; z += 2.0F)
@@ -446,7 +447,7 @@ void add_flat_roof(Scene& scene, const Building& b, SeededRandom& random) {
   const float z = height_m(b.style);
   scene.quad({0, 0, z}, {b.width_m, 0, z}, {b.width_m, b.depth_m, z}, {0, b.depth_m, z}, b.roofing);
   add_parapet(scene, b, z);
-  const auto metal = scene.paint(kLabel, kPaintedMetal, {0.5F, 0.5F, 0.5F});
+  const auto metal = scene.paint(kBuildingLabel, kPaintedMetal, {0.5F, 0.5F, 0.5F});
   const int machines = 1 + random.below(3);
   for (int i = 0; i < machines; ++i) {
     const float x = random.uniform(1.0F, std::max(1.1F, b.width_m - 3.0F));
@@ -461,8 +462,8 @@ void add_flat_roof(Scene& scene, const Building& b, SeededRandom& random) {
 }
 
 void add_chimney(Scene& scene, const Building& b, float x, float ridge) {
-  const auto brick = scene.paint(kLabel, kBrick);
-  const auto pot = scene.plain(kLabel, {0.4F, 0.18F, 0.1F});
+  const auto brick = scene.paint(kBuildingLabel, kBrick);
+  const auto pot = scene.plain(kBuildingLabel, {0.4F, 0.18F, 0.1F});
   const float y = 0.5F * b.depth_m + 0.4F;
   scene.box({x, y, ridge - 1.5F}, {x + 0.9F, y + 0.6F, ridge + 0.9F}, brick, kSidesNoBottom);
   for (const float dx : {0.25F, 0.65F}) {
@@ -478,7 +479,7 @@ void add_dormer(Scene& scene, const Building& b, float x, float z, float slope) 
   const float top = base + 1.5F;
   const float back = y + 1.5F / slope;
   const auto& style = b.style;
-  const auto glass = scene.plain(kLabel, {0.05F, 0.055F, 0.06F}, 0.45F);
+  const auto glass = scene.plain(kBuildingLabel, {0.05F, 0.055F, 0.06F}, 0.45F);
   scene.quad({x - half, y, base}, {x + half, y, base}, {x + half, y, top}, {x - half, y, top},
              style.trim);
   scene.quad({x - 0.5F, y - 0.01F, base + 0.25F}, {x + 0.5F, y - 0.01F, base + 0.25F},
@@ -507,7 +508,7 @@ void add_ridge_roof(Scene& scene, const Building& b, SeededRandom& random) {
              b.style.trim);  // soffit
   scene.triangle({0, d, z}, {0, 0, z}, {0, middle, ridge}, b.style.wall);
   scene.triangle({w, 0, z}, {w, d, z}, {w, middle, ridge}, b.style.wall);
-  const auto zinc = scene.plain(kLabel, {0.3F, 0.32F, 0.33F}, 0.05F);
+  const auto zinc = scene.plain(kBuildingLabel, {0.3F, 0.32F, 0.33F}, 0.05F);
   scene.cylinder({0, -eave - 0.06F, low}, {w, -eave - 0.06F, low}, 0.08F, 0.08F, 8, zinc);
   add_chimney(scene, b, random.uniform(0.1F, 0.8F) * w, ridge);
   if (random.chance(0.6)) {
@@ -530,21 +531,21 @@ void choose_walls(Scene& scene, FacadeStyle& style, SeededRandom& random) {
   const float light = 0.1F * static_cast<float>(random.below(3));
   if (kind <= 2) {
     const float red = 0.8F + light;
-    style.wall = scene.paint(kLabel, kBrick, {red, 0.9F * red, 0.85F * red});
-    style.base = random.chance(0.4) ? scene.paint(kLabel, kStoneBlocks) : style.wall;
+    style.wall = scene.paint(kBuildingLabel, kBrick, {red, 0.9F * red, 0.85F * red});
+    style.base = random.chance(0.4) ? scene.paint(kBuildingLabel, kStoneBlocks) : style.wall;
   } else if (kind <= 7) {
     const Vector3f tints[] = {{0.72F, 0.6F, 0.36F}, {0.7F, 0.68F, 0.62F}, {0.62F, 0.38F, 0.28F},
                               {0.45F, 0.5F, 0.42F}, {0.42F, 0.5F, 0.58F}, {0.74F, 0.66F, 0.55F},
                               {0.52F, 0.5F, 0.48F}, {0.68F, 0.5F, 0.42F}};
-    style.wall = scene.paint(kLabel, kPlaster, random.pick(tints));
-    style.base = random.chance(0.5)
-                     ? scene.paint(kLabel, kPlaster, {0.4F + light, 0.38F + light, 0.36F + light})
-                     : style.wall;
+    style.wall = scene.paint(kBuildingLabel, kPlaster, random.pick(tints));
+    style.base = random.chance(0.5) ? scene.paint(kBuildingLabel, kPlaster,
+                                                  {0.4F + light, 0.38F + light, 0.36F + light})
+                                    : style.wall;
   } else if (kind == 8) {
-    style.wall = scene.paint(kLabel, kStoneBlocks, {0.9F, 0.88F, 0.82F});
+    style.wall = scene.paint(kBuildingLabel, kStoneBlocks, {0.9F, 0.88F, 0.82F});
     style.base = style.wall;
   } else {
-    style.wall = scene.paint(kLabel, kConcrete, {1.0F, 1.0F, 0.97F});
+    style.wall = scene.paint(kBuildingLabel, kConcrete, {1.0F, 1.0F, 0.97F});
     style.base = style.wall;
   }
 }
@@ -576,15 +577,15 @@ Building random_building(Scene& scene, std::uint64_t seed) {
   style.seed = seed;
   choose_walls(scene, style, random);
   const float stone = random.uniform(0.0F, 1.0F) < 0.6F ? 0.9F : 0.6F;
-  style.trim = scene.paint(kLabel, kConcrete, {stone, 0.98F * stone, 0.93F * stone});
-  style.frame = random.chance(0.7) ? scene.plain(kLabel, {0.75F, 0.75F, 0.72F})
-                                   : scene.plain(kLabel, {0.16F, 0.1F, 0.06F});
+  style.trim = scene.paint(kBuildingLabel, kConcrete, {stone, 0.98F * stone, 0.93F * stone});
+  style.frame = random.chance(0.7) ? scene.plain(kBuildingLabel, {0.75F, 0.75F, 0.72F})
+                                   : scene.plain(kBuildingLabel, {0.16F, 0.1F, 0.06F});
   const Vector3f doors[] = {{0.1F, 0.2F, 0.12F},
                             {0.25F, 0.06F, 0.05F},
                             {0.08F, 0.12F, 0.25F},
                             {0.28F, 0.17F, 0.09F},
                             {0.2F, 0.22F, 0.24F}};
-  style.shutter = scene.paint(kLabel, kPaintedMetal, random.pick(doors));
+  style.shutter = scene.paint(kBuildingLabel, kPaintedMetal, random.pick(doors));
   style.floors = 3 + random.below(3);
   style.ground_floor_m = random.uniform(3.5F, 4.2F);
   style.floor_m = random.uniform(2.9F, 3.3F);
@@ -605,8 +606,8 @@ Building random_building(Scene& scene, std::uint64_t seed) {
   style.cornice = random.chance(0.7);
   style.downpipe = random.chance(0.8);
   b.ridge = random.chance(0.55);
-  b.roofing = b.ridge ? scene.paint(kLabel, kRoofTiles, {0.8F + 0.2F * stone, 0.9F, 0.9F})
-                      : scene.paint(kLabel, kGravel, {0.8F, 0.8F, 0.8F});
+  b.roofing = b.ridge ? scene.paint(kBuildingLabel, kRoofTiles, {0.8F + 0.2F * stone, 0.9F, 0.9F})
+                      : scene.paint(kBuildingLabel, kGravel, {0.8F, 0.8F, 0.8F});
   return b;
 }
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -19,8 +18,6 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 /// Adds an object to a scene.
 using Add = void (*)(Scene&, SeededRandom&);

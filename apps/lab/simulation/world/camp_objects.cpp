@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "apps/lab/simulation/world/objects.hpp"
 #include "apps/lab/simulation/world/terrain.hpp"
@@ -13,12 +12,10 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
-constexpr SurfaceClass kLabel = SurfaceClass::kObject;
+constexpr SurfaceClass kObjectLabel = SurfaceClass::kObject;
 constexpr SurfaceClass kPole = SurfaceClass::kPole;
 
-MaterialId wood(Scene& scene, SurfaceClass label = kLabel) {
+MaterialId wood(Scene& scene, SurfaceClass label = kObjectLabel) {
   return scene.paint(label, kWoodPlanks, {0.85F, 0.75F, 0.6F});
 }
 
@@ -65,7 +62,7 @@ void add_corrugated_wall(Scene& scene, float half_x, float y, float side, float 
 void add_watch_tower(Scene& scene) {
   const Scene::Object object(scene);
   const auto beam = wood(scene);
-  const auto roof = scene.paint(kLabel, kCorrugatedMetal, {0.5F, 0.5F, 0.48F});
+  const auto roof = scene.paint(kObjectLabel, kCorrugatedMetal, {0.5F, 0.5F, 0.48F});
   for (const float x : {-1.2F, 1.2F}) {
     for (const float y : {-1.2F, 1.2F})
       scene.box({x - 0.09F, y - 0.09F, -0.4F}, {x + 0.09F, y + 0.09F, 6.0F}, beam);
@@ -140,8 +137,8 @@ void add_container(Scene& scene, SeededRandom& random) {
                             {0.55F, 0.53F, 0.48F}, {0.5F, 0.42F, 0.26F}, {0.1F, 0.24F, 0.16F}};
   const Vector3f tint = random.pick(tints);
   const bool bland = random.chance(0.25);
-  const auto skin = scene.paint(kLabel, bland ? kPlain : kPaintedMetal, tint);
-  const auto steel = scene.paint(kLabel, kPaintedMetal, 0.7F * tint);
+  const auto skin = scene.paint(kObjectLabel, bland ? kPlain : kPaintedMetal, tint);
+  const auto steel = scene.paint(kObjectLabel, kPaintedMetal, 0.7F * tint);
   const Vector3f half(3.03F, 1.22F, 1.295F);
   const float top = 2.0F * half.z();
   for (const float side : {-1.0F, 1.0F}) {
@@ -166,14 +163,15 @@ void add_container(Scene& scene, SeededRandom& random) {
   add_container_doors(scene, half.x() - 0.03F, half, skin, steel);
   if (random.chance(0.5)) {  // the owner's mark
     scene.at({-1.2F, -half.y() - 0.0F, 0.0F})
-        .add(add_sign_board, 0.0F, 1.55F, 2.0F, 0.42F, kLabel, random);
+        .add(add_sign_board, 0.0F, 1.55F, 2.0F, 0.42F, kObjectLabel, random);
   }
 }
 
 void add_crates(Scene& scene, SeededRandom& random) {
   const Scene::Object object(scene);
-  const auto boards =
-      random.chance(0.5) ? wood(scene) : scene.paint(kLabel, kWoodPlanks, {0.38F, 0.42F, 0.26F});
+  const auto boards = random.chance(0.5)
+                          ? wood(scene)
+                          : scene.paint(kObjectLabel, kWoodPlanks, {0.38F, 0.42F, 0.26F});
   const auto batten = wood(scene);
   const int count = 2 + random.below(4);
   for (int i = 0; i < count; ++i) {
@@ -200,7 +198,7 @@ void add_barrels(Scene& scene, SeededRandom& random) {
       {0.06F, 0.16F, 0.36F}, {0.22F, 0.24F, 0.13F}, {0.45F, 0.1F, 0.05F}, {0.3F, 0.3F, 0.3F}};
   const int count = 2 + random.below(5);
   for (int i = 0; i < count; ++i) {
-    const auto skin = scene.paint(kLabel, kPaintedMetal, random.pick(tints));
+    const auto skin = scene.paint(kObjectLabel, kPaintedMetal, random.pick(tints));
     const auto frame = scene.at({0.66F * static_cast<float>(i % 3) + random.uniform(-0.03F, 0.03F),
                                  0.64F * static_cast<float>(i / 3), 0.0F},
                                 random.uniform(0.0F, 6.0F));
@@ -215,7 +213,7 @@ void add_barrels(Scene& scene, SeededRandom& random) {
 
 void add_sandbags(Scene& scene, float length_m, SeededRandom& random) {
   const Scene::Object object(scene);
-  const auto cloth = scene.paint(kLabel, kCanvas, {0.5F, 0.42F, 0.28F}, 0.3F);
+  const auto cloth = scene.paint(kObjectLabel, kCanvas, {0.5F, 0.42F, 0.28F}, 0.3F);
   const int bags = std::max(1, static_cast<int>(length_m / 0.5F));
   for (int layer = 0; layer < 5; ++layer) {
     for (int bag = 0; bag < bags; ++bag) {
@@ -254,7 +252,7 @@ void add_rock(Scene& scene, float size_m, SeededRandom& random) {
 
 void add_barrier(Scene& scene) {
   const Scene::Object object(scene);
-  const auto concrete = scene.paint(kLabel, kConcrete, Vector3f::Ones(), 0.6F);
+  const auto concrete = scene.paint(kObjectLabel, kConcrete, Vector3f::Ones(), 0.6F);
   const Vector2f outline[] = {{-0.3F, -0.2F}, {0.3F, -0.2F},   {0.3F, 0.1F},   {0.1F, 0.35F},
                               {0.08F, 0.82F}, {-0.08F, 0.82F}, {-0.1F, 0.35F}, {-0.3F, 0.1F}};
   // The section is in the plane (y, z): the extrusion's axis becomes x.
@@ -266,24 +264,26 @@ void add_barrier(Scene& scene) {
 
 void add_generator(Scene& scene, SeededRandom& random) {
   const Scene::Object object(scene);
-  const auto skin = random.chance(0.5) ? scene.paint(kLabel, kPaintedMetal, {0.6F, 0.42F, 0.05F})
-                                       : scene.paint(kLabel, kPaintedMetal, {0.2F, 0.22F, 0.12F});
-  const auto dark = scene.plain(kLabel, {0.03F, 0.03F, 0.03F});
+  const auto skin = random.chance(0.5)
+                        ? scene.paint(kObjectLabel, kPaintedMetal, {0.6F, 0.42F, 0.05F})
+                        : scene.paint(kObjectLabel, kPaintedMetal, {0.2F, 0.22F, 0.12F});
+  const auto dark = scene.plain(kObjectLabel, {0.03F, 0.03F, 0.03F});
   scene.box({-1.3F, -0.55F, 0.12F}, {1.3F, 0.55F, 1.5F}, skin);
   scene.box({-1.35F, -0.5F, -0.2F}, {1.35F, 0.5F, 0.12F}, dark);
   for (float slat = 0; slat < 8; ++slat) {
     const float z = 0.45F + 0.1F * slat;
     scene.box({-1.1F, -0.56F, z}, {-0.2F, -0.54F, z + 0.05F}, dark);
   }
-  scene.box({0.2F, -0.565F, 0.7F}, {1.0F, -0.55F, 1.2F}, scene.plain(kLabel, {0.6F, 0.6F, 0.58F}));
+  scene.box({0.2F, -0.565F, 0.7F}, {1.0F, -0.55F, 1.2F},
+            scene.plain(kObjectLabel, {0.6F, 0.6F, 0.58F}));
   scene.cylinder({0.9F, 0.2F, 1.5F}, {0.9F, 0.2F, 1.95F}, 0.06F, 0.06F, 10, dark);
 }
 
 void add_toilet_cabin(Scene& scene, SeededRandom& random) {
   const Scene::Object object(scene);
-  const auto skin = random.chance(0.6) ? scene.plain(kLabel, {0.06F, 0.2F, 0.36F})
-                                       : scene.plain(kLabel, {0.1F, 0.28F, 0.14F});
-  const auto light = scene.plain(kLabel, {0.72F, 0.72F, 0.7F});
+  const auto skin = random.chance(0.6) ? scene.plain(kObjectLabel, {0.06F, 0.2F, 0.36F})
+                                       : scene.plain(kObjectLabel, {0.1F, 0.28F, 0.14F});
+  const auto light = scene.plain(kObjectLabel, {0.72F, 0.72F, 0.7F});
   scene.box({-0.55F, -0.55F, -0.15F}, {0.55F, 0.55F, 2.15F}, skin, kSidesNoBottom);
   scene.box({-0.6F, -0.6F, 2.15F}, {0.6F, 0.6F, 2.28F}, light);
   scene.box({-0.42F, -0.575F, 0.1F}, {0.42F, -0.55F, 2.02F}, skin);
@@ -296,9 +296,9 @@ void add_toilet_cabin(Scene& scene, SeededRandom& random) {
 void add_water_tank(Scene& scene, SeededRandom& random) {
   const Scene::Object object(scene);
   const auto skin =
-      scene.paint(kLabel, kPaintedMetal,
+      scene.paint(kObjectLabel, kPaintedMetal,
                   random.chance(0.5) ? Vector3f(0.22F, 0.24F, 0.14F) : Vector3f(0.5F, 0.5F, 0.48F));
-  const auto dark = scene.plain(kLabel, {0.04F, 0.04F, 0.04F});
+  const auto dark = scene.plain(kObjectLabel, {0.04F, 0.04F, 0.04F});
   scene.cylinder({-1.5F, 0, 1.35F}, {1.5F, 0, 1.35F}, 0.75F, 0.75F, 22, skin);
   for (const float x : {-1.2F, 0.0F, 1.2F})
     scene.cylinder({x - 0.03F, 0, 1.35F}, {x + 0.03F, 0, 1.35F}, 0.77F, 0.77F, 22, dark);
@@ -310,7 +310,7 @@ void add_water_tank(Scene& scene, SeededRandom& random) {
 
 void add_log_pile(Scene& scene, SeededRandom& random) {
   const Scene::Object object(scene);
-  const auto bark = scene.paint(kLabel, kBark);
+  const auto bark = scene.paint(kObjectLabel, kBark);
   constexpr float kRadius = 0.16F;
   for (int layer = 0; layer < 4; ++layer) {
     for (int i = 0; i < 6 - layer; ++i) {

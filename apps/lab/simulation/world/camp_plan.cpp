@@ -14,12 +14,12 @@ namespace {
 
 using Eigen::Vector2f;
 
-constexpr int kColumns = 4;
-constexpr int kRows = 3;
+constexpr int kTrackColumns = 4;
+constexpr int kTrackRows = 3;
 constexpr float kPitchX_m = 50.0F;
 constexpr float kPitchY_m = 46.0F;
-constexpr int kPieces = 6;  // pieces of a track
-constexpr double kCruise_mps = 7.5;
+constexpr int kTrackPieces = 6;  // pieces of a track
+constexpr double kTrackSpeed_mps = 7.5;
 
 constexpr float kNearCell_m = 0.5F;
 constexpr float kFarCell_m = 4.0F;
@@ -58,8 +58,8 @@ CampPlan::CampPlan(std::uint64_t seed)
 
 void CampPlan::lay_tracks(std::uint64_t seed) {
   SeededRandom random = SeededRandom::stream(seed, 50);
-  for (int i = 0; i < kColumns; ++i) {
-    for (int j = 0; j < kRows; ++j) {
+  for (int i = 0; i < kTrackColumns; ++i) {
+    for (int j = 0; j < kTrackRows; ++j) {
       const float x = kPitchX_m * (static_cast<float>(i) - 1.5F) + random.uniform(-3.0F, 3.0F);
       const float y = kPitchY_m * (static_cast<float>(j) - 1.0F) + random.uniform(-3.0F, 3.0F);
       crossings_[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = {x, y};
@@ -70,23 +70,23 @@ void CampPlan::lay_tracks(std::uint64_t seed) {
     const float bow = random.uniform(-2.2F, 2.2F);
     const float sway = random.uniform(-1.2F, 1.2F);
     Track track;
-    for (float k = 0; k <= kPieces; ++k) {
-      const float t = k / kPieces;
+    for (float k = 0; k <= kTrackPieces; ++k) {
+      const float t = k / kTrackPieces;
       const float phase = std::numbers::pi_v<float> * t;
       track.emplace_back(a + t * (b - a) +
                          (bow * std::sin(phase) + sway * std::sin(2.0F * phase)) * across);
     }
     tracks_.push_back(std::move(track));
   };
-  for (std::size_t i = 0; i + 1 < kColumns; ++i)
-    for (std::size_t j = 0; j < kRows; ++j) wind(crossings_[i][j], crossings_[i + 1][j]);
-  for (std::size_t i = 0; i < kColumns; ++i)
-    for (std::size_t j = 0; j + 1 < kRows; ++j) wind(crossings_[i][j], crossings_[i][j + 1]);
+  for (std::size_t i = 0; i + 1 < kTrackColumns; ++i)
+    for (std::size_t j = 0; j < kTrackRows; ++j) wind(crossings_[i][j], crossings_[i + 1][j]);
+  for (std::size_t i = 0; i < kTrackColumns; ++i)
+    for (std::size_t j = 0; j + 1 < kTrackRows; ++j) wind(crossings_[i][j], crossings_[i][j + 1]);
 }
 
 const Track& CampPlan::track_between(int column, int row, bool along_x) const {
-  const int index =
-      along_x ? column * kRows + row : (kColumns - 1) * kRows + column * (kRows - 1) + row;
+  const int index = along_x ? column * kTrackRows + row
+                            : (kTrackColumns - 1) * kTrackRows + column * (kTrackRows - 1) + row;
   return tracks_[static_cast<std::size_t>(index)];
 }
 
@@ -98,13 +98,13 @@ void CampPlan::lay_routes() {
       const auto& [i1, j1] = crossings[(k + 1) % crossings.size()];
       const Track& track = track_between(std::min(i0, i1), std::min(j0, j1), j0 == j1);
       const bool forward = i1 > i0 || j1 > j0;
-      for (int piece = 0; piece < kPieces; ++piece) {
-        const int at = forward ? piece : kPieces - piece;
+      for (int piece = 0; piece < kTrackPieces; ++piece) {
+        const int at = forward ? piece : kTrackPieces - piece;
         nodes.emplace_back(track[static_cast<std::size_t>(at)].cast<double>());
       }
     }
-    std::ranges::rotate(nodes, nodes.begin() + kPieces / 2);  // start between two crossings
-    routes_.push_back({right_hand_lane(nodes, kTrackLane_m), kCruise_mps});
+    std::ranges::rotate(nodes, nodes.begin() + kTrackPieces / 2);  // start between two crossings
+    routes_.push_back({right_hand_lane(nodes, kTrackLane_m), kTrackSpeed_mps});
   }
 }
 

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "apps/lab/simulation/world/buildings.hpp"
@@ -17,8 +16,6 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 constexpr float kGate_m = 4.0F;
 constexpr float kPath_m = 2.6F;
@@ -110,7 +107,7 @@ void add_park(Scene& scene, const Eigen::AlignedBox2f& kerb, SeededRandom& rando
   }
 }
 
-constexpr float kDepth_m = 11.0F;  // depth of the houses on the long sides
+constexpr float kHouseDepth_m = 11.0F;  // depth of the houses on the long sides
 constexpr int kParkColumn = 1;
 constexpr int kParkRow = 1;
 
@@ -140,7 +137,7 @@ void add_row(Scene& scene, const StreetSide& side, bool open_ends, bool terrace,
   for (std::size_t i = 0; i < widths.size(); ++i) {
     Building house = random_building(scene, terrace ? seed : seed + 1000 * (i + 1));
     house.width_m = widths[i];
-    house.depth_m = kDepth_m;
+    house.depth_m = kHouseDepth_m;
     const bool first = i == 0;
     const bool last = i + 1 == widths.size();
     house.walls = {WallKind::kRich, last && open_ends ? WallKind::kRich : WallKind::kBlind,
@@ -177,8 +174,8 @@ void add_garden(Scene& scene, const StreetSide& side, SeededRandom& random) {
 
 /// A short side between the two rows of a block: a house or a garden.
 void add_short_side(Scene& scene, StreetSide side, bool garden, std::uint64_t seed) {
-  side.T_world_side = side.T_world_side * standing_at({kDepth_m, 0.0F, 0.0F});
-  side.length_m -= 2.0F * kDepth_m;
+  side.T_world_side = side.T_world_side * standing_at({kHouseDepth_m, 0.0F, 0.0F});
+  side.length_m -= 2.0F * kHouseDepth_m;
   if (garden) {
     SeededRandom random = SeededRandom::stream(seed, 21);
     add_garden(scene, side, random);
@@ -263,15 +260,15 @@ void add_parked_vehicles(Scene& scene, const StreetSide& side, SeededRandom& ran
 }
 
 void add_small_object(Scene& scene, SeededRandom& random) {
-  using Add = void (*)(Scene&, SeededRandom&);
-  constexpr Add kNothing = [](Scene&, SeededRandom&) {};
-  constexpr Add kBollard = [](Scene& s, SeededRandom&) { add_bollard(s); };
-  constexpr Add kHydrant = [](Scene& s, SeededRandom&) { add_hydrant(s); };
-  constexpr Add kTurnedSign = [](Scene& s, SeededRandom& r) {
+  using AddObject = void (*)(Scene&, SeededRandom&);
+  constexpr AddObject kNothing = [](Scene&, SeededRandom&) {};
+  constexpr AddObject kBollard = [](Scene& s, SeededRandom&) { add_bollard(s); };
+  constexpr AddObject kHydrant = [](Scene& s, SeededRandom&) { add_hydrant(s); };
+  constexpr AddObject kTurnedSign = [](Scene& s, SeededRandom& r) {
     s.at(Vector3f::Zero(), 0.5F * kPi).add(add_traffic_sign, r);
   };
-  constexpr Add kObjects[] = {add_bin,  kHydrant,    add_mail_box, add_planter, kBollard,
-                              kBollard, kTurnedSign, kNothing,     kNothing};
+  constexpr AddObject kObjects[] = {add_bin,  kHydrant,    add_mail_box, add_planter, kBollard,
+                                    kBollard, kTurnedSign, kNothing,     kNothing};
   random.pick(kObjects)(scene, random);
 }
 

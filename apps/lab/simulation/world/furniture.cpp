@@ -13,8 +13,6 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
 /// A rectangle around the origin with rounded corners, counter-clockwise.
 std::vector<Vector2f> rounded_rectangle(float width, float depth, float radius) {
   constexpr int kSteps = 4;

@@ -9,7 +9,7 @@ namespace {
 using Eigen::Vector3f;
 using enum Recipe;
 
-constexpr SurfaceClass kLabel = SurfaceClass::kPerson;
+constexpr SurfaceClass kPersonLabel = SurfaceClass::kPerson;
 
 struct Clothes {
   MaterialId skin = 0;
@@ -25,14 +25,14 @@ Clothes random_clothes(Scene& scene, SeededRandom& random) {
   const Vector3f cloths[] = {{0.5F, 0.06F, 0.06F},  {0.06F, 0.1F, 0.3F},  {0.65F, 0.63F, 0.58F},
                              {0.05F, 0.05F, 0.06F}, {0.1F, 0.25F, 0.14F}, {0.6F, 0.42F, 0.08F},
                              {0.3F, 0.3F, 0.32F},   {0.25F, 0.16F, 0.1F}, {0.2F, 0.35F, 0.5F}};
-  const auto cloth = [&] { return scene.paint(kLabel, kCanvas, random.pick(cloths), 0.3F); };
+  const auto cloth = [&] { return scene.paint(kPersonLabel, kCanvas, random.pick(cloths), 0.3F); };
   Clothes clothes;
-  clothes.skin = scene.plain(kLabel, random.pick(skins));
-  clothes.hair = random.chance(0.6) ? scene.plain(kLabel, {0.04F, 0.03F, 0.025F})
-                                    : scene.plain(kLabel, {0.3F, 0.2F, 0.1F});
+  clothes.skin = scene.plain(kPersonLabel, random.pick(skins));
+  clothes.hair = random.chance(0.6) ? scene.plain(kPersonLabel, {0.04F, 0.03F, 0.025F})
+                                    : scene.plain(kPersonLabel, {0.3F, 0.2F, 0.1F});
   clothes.coat = cloth();
   clothes.trousers = cloth();
-  clothes.shoes = scene.plain(kLabel, {0.05F, 0.04F, 0.035F});
+  clothes.shoes = scene.plain(kPersonLabel, {0.05F, 0.04F, 0.035F});
   return clothes;
 }
 

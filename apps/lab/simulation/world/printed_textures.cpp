@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+
+#include "apps/lab/simulation/world/scene.hpp"
 
 namespace km {
 namespace {
 
 using Eigen::Vector2f;
 using Eigen::Vector3f;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 Vector2f anywhere(SeededRandom& random) {
   const float u = random.uniform(0.0F, 1.0F);

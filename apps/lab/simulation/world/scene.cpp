@@ -15,8 +15,6 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kTwoPi = 2.0F * std::numbers::pi_v<float>;
-
 constexpr float kLeastHeight_m =
     1e-4F;  // smallest height of a triangle; at 300 m a float resolves 3e-5 m
 

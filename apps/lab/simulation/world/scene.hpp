@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <utility>
@@ -14,6 +15,9 @@
 #include "apps/lab/simulation/world/world.hpp"
 
 namespace km {
+
+inline constexpr float kPi = std::numbers::pi_v<float>;
+inline constexpr float kTwoPi = 2.0F * kPi;
 
 /// Index into World::materials.
 using MaterialId = std::uint16_t;

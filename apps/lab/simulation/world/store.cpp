@@ -18,7 +18,7 @@ constexpr float kAisle_m = 2.4F;    // from one row of shelves to the next
 constexpr float kRow_m = 0.8F;      // depth of two shelves, back to back
 constexpr float kLength_m = 14.0F;  // length of a row, along x
 constexpr float kEnd_m = 3.0F;      // free space beyond the ends of rows
-constexpr float kHeight_m = 4.0F;
+constexpr float kCeiling_m = 4.0F;
 constexpr float kUnit_m = 2.0F;  // width of a shelf
 constexpr double kPace_mps = 1.2;
 
@@ -26,25 +26,25 @@ constexpr float aisle_y(int aisle) {
   return (static_cast<float>(aisle) + 0.5F) * kAisle_m + static_cast<float>(aisle) * kRow_m;
 }
 
-constexpr float kDepth_m = aisle_y(kAisles - 1) + 0.5F * kAisle_m;
+constexpr float kHallDepth_m = aisle_y(kAisles - 1) + 0.5F * kAisle_m;
 
 void add_hall(Scene& scene) {
-  const Vector3f low(-kEnd_m, 0.0F, 0.0F), high(kLength_m + kEnd_m, kDepth_m, kHeight_m);
+  const Vector3f low(-kEnd_m, 0.0F, 0.0F), high(kLength_m + kEnd_m, kHallDepth_m, kCeiling_m);
   const auto floor = scene.paint(SurfaceClass::kFloor, kConcrete, {0.75F, 0.75F, 0.72F});
   const auto wall = scene.paint(SurfaceClass::kWall, kPlaster, {0.8F, 0.8F, 0.76F});
   const auto ceiling = scene.paint(SurfaceClass::kCeiling, kPlaster);
   scene.quad({low.x(), low.y(), 0}, {high.x(), low.y(), 0}, {high.x(), high.y(), 0},
              {low.x(), high.y(), 0}, floor);
-  scene.quad({low.x(), high.y(), kHeight_m}, {high.x(), high.y(), kHeight_m},
-             {high.x(), low.y(), kHeight_m}, {low.x(), low.y(), kHeight_m}, ceiling);
-  scene.quad({low.x(), low.y(), 0}, {low.x(), high.y(), 0}, {low.x(), high.y(), kHeight_m},
-             {low.x(), low.y(), kHeight_m}, wall);
-  scene.quad({high.x(), high.y(), 0}, {high.x(), low.y(), 0}, {high.x(), low.y(), kHeight_m},
-             {high.x(), high.y(), kHeight_m}, wall);
-  scene.quad({high.x(), low.y(), 0}, {low.x(), low.y(), 0}, {low.x(), low.y(), kHeight_m},
-             {high.x(), low.y(), kHeight_m}, wall);
-  scene.quad({low.x(), high.y(), 0}, {high.x(), high.y(), 0}, {high.x(), high.y(), kHeight_m},
-             {low.x(), high.y(), kHeight_m}, wall);
+  scene.quad({low.x(), high.y(), kCeiling_m}, {high.x(), high.y(), kCeiling_m},
+             {high.x(), low.y(), kCeiling_m}, {low.x(), low.y(), kCeiling_m}, ceiling);
+  scene.quad({low.x(), low.y(), 0}, {low.x(), high.y(), 0}, {low.x(), high.y(), kCeiling_m},
+             {low.x(), low.y(), kCeiling_m}, wall);
+  scene.quad({high.x(), high.y(), 0}, {high.x(), low.y(), 0}, {high.x(), low.y(), kCeiling_m},
+             {high.x(), high.y(), kCeiling_m}, wall);
+  scene.quad({high.x(), low.y(), 0}, {low.x(), low.y(), 0}, {low.x(), low.y(), kCeiling_m},
+             {high.x(), low.y(), kCeiling_m}, wall);
+  scene.quad({low.x(), high.y(), 0}, {high.x(), high.y(), 0}, {high.x(), high.y(), kCeiling_m},
+             {low.x(), high.y(), kCeiling_m}, wall);
 }
 
 // Both sides of a row; each shelf has the same goods in the same order.
@@ -78,7 +78,7 @@ World make_store(std::uint64_t seed) {
   world.lighting.ambient = 0.35F;
   for (const float x : {0.2F, 0.8F})
     for (int aisle = 0; aisle < kAisles; ++aisle)
-      world.lighting.lamps.push_back({{x * kLength_m, aisle_y(aisle), kHeight_m - 0.3F}, 2.5F});
+      world.lighting.lamps.push_back({{x * kLength_m, aisle_y(aisle), kCeiling_m - 0.3F}, 2.5F});
   world.routes = {loop(0, 1), loop(1, 2), loop(3, 1), loop(4, 2)};
   return world;
 }

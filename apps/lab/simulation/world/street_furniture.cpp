@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "apps/lab/simulation/world/objects.hpp"
@@ -12,8 +11,6 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 MaterialId iron(Scene& scene, SurfaceClass label) {
   return scene.plain(label, {0.06F, 0.065F, 0.07F}, 0.05F);

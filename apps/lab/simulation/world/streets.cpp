@@ -20,9 +20,7 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
-constexpr double kCruise_mps = 8.0;
+constexpr double kStreetSpeed_mps = 8.0;
 
 /// The lane through the crossings. It starts half-way along the first street, where a vehicle may
 /// stand.
@@ -34,7 +32,7 @@ Route route_over(const CityPlan& plan, std::span<const Crossing> crossings) {
   Route route;
   route.points = right_hand_lane(nodes, kLaneOffset_m);
   std::rotate(route.points.begin(), route.points.begin() + 1, route.points.end());
-  route.speed_mps = kCruise_mps;
+  route.speed_mps = kStreetSpeed_mps;
   return route;
 }
 
@@ -92,11 +90,11 @@ std::vector<StreetSide> CityPlan::outer_pieces() const {
 }
 
 double CityPlan::ground(double px, double py) const {
-  constexpr double kTwoPi = 2.0 * std::numbers::pi;
-  return 0.32 * std::sin(kTwoPi * px / 128.0 + phases[0]) +
-         0.28 * std::sin(kTwoPi * py / 104.0 + phases[1]) +
-         0.06 * std::sin(kTwoPi * (px + py) / 41.0 + phases[2]) +
-         0.05 * std::sin(kTwoPi * (px - 1.3 * py) / 37.0 + phases[3]);
+  constexpr double kCycle = 2.0 * std::numbers::pi;
+  return 0.32 * std::sin(kCycle * px / 128.0 + phases[0]) +
+         0.28 * std::sin(kCycle * py / 104.0 + phases[1]) +
+         0.06 * std::sin(kCycle * (px + py) / 41.0 + phases[2]) +
+         0.05 * std::sin(kCycle * (px - 1.3 * py) / 37.0 + phases[3]);
 }
 
 CityPlan make_city_plan(std::uint64_t seed) {

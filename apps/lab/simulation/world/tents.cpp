@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "apps/lab/simulation/world/objects.hpp"
@@ -13,9 +12,7 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
-constexpr SurfaceClass kLabel = SurfaceClass::kTent;
+constexpr SurfaceClass kTentLabel = SurfaceClass::kTent;
 
 struct TentPaints {
   MaterialId cloth = 0;
@@ -25,9 +22,9 @@ struct TentPaints {
 };
 
 TentPaints tent_paints(Scene& scene, const Vector3f& cloth) {
-  return {scene.paint(kLabel, kCanvas, cloth), scene.plain(kLabel, {0.03F, 0.03F, 0.028F}),
-          scene.plain(kLabel, {0.55F, 0.52F, 0.45F}),
-          scene.paint(kLabel, kWoodPlanks, {0.7F, 0.6F, 0.45F})};
+  return {scene.paint(kTentLabel, kCanvas, cloth), scene.plain(kTentLabel, {0.03F, 0.03F, 0.028F}),
+          scene.plain(kTentLabel, {0.55F, 0.52F, 0.45F}),
+          scene.paint(kTentLabel, kWoodPlanks, {0.7F, 0.6F, 0.45F})};
 }
 
 /// A rope from the cloth to a peg in the ground.
@@ -162,7 +159,7 @@ void add_tunnel_shelter(Scene& scene, float length_m, const Vector3f& cloth) {
   add_gable(scene, profile, 0.03F, true, paints.cloth);
   add_gable(scene, profile, length_m - 0.03F, false, paints.cloth);
   add_door(scene, 0.03F, 2.2F, 2.3F, paints);
-  const auto dark = scene.plain(kLabel, {0.07F, 0.07F, 0.06F});
+  const auto dark = scene.plain(kTentLabel, {0.07F, 0.07F, 0.06F});
   for (int rib = 0; rib <= ribs; ++rib) {
     const float y = length_m * static_cast<float>(rib) / static_cast<float>(ribs);
     for (int i = 0; i < kPieces; ++i) {
@@ -177,7 +174,7 @@ void add_tunnel_shelter(Scene& scene, float length_m, const Vector3f& cloth) {
 void add_dome_tent(Scene& scene, float radius_m, const Vector3f& cloth) {
   const Scene::Object object(scene);
   const TentPaints paints = tent_paints(scene, cloth);
-  const auto second = scene.paint(kLabel, kCanvas, 0.72F * cloth);
+  const auto second = scene.paint(kTentLabel, kCanvas, 0.72F * cloth);
   constexpr int kPanels = 10;
   for (int panel = 0; panel < kPanels; ++panel) {
     const auto point = [&](float row, float column) {

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "apps/lab/simulation/world/objects.hpp"
@@ -12,9 +11,7 @@ namespace {
 using Eigen::Vector3f;
 using enum Recipe;
 
-constexpr float kTwoPi = 2.0F * std::numbers::pi_v<float>;
-
-constexpr SurfaceClass kLabel = SurfaceClass::kVegetation;
+constexpr SurfaceClass kPlantLabel = SurfaceClass::kVegetation;
 
 MaterialId foliage(Scene& scene, SeededRandom& random) {
   const Vector3f tints[] = {{1.0F, 1.0F, 1.0F},
@@ -22,7 +19,7 @@ MaterialId foliage(Scene& scene, SeededRandom& random) {
                             {1.25F, 1.15F, 0.8F},
                             {0.75F, 0.85F, 0.9F},
                             {1.15F, 1.25F, 0.95F}};
-  return scene.paint(kLabel, kLeaves, random.pick(tints));
+  return scene.paint(kPlantLabel, kLeaves, random.pick(tints));
 }
 
 /// A limb that bends a little twice on its way; returns its end.
@@ -47,7 +44,7 @@ Vector3f add_limb(Scene& scene, const Vector3f& from, const Vector3f& along, flo
 }  // namespace
 
 void add_tree(Scene& scene, const TreeShape& shape, SeededRandom& random) {
-  const auto bark = scene.paint(kLabel, kBark);
+  const auto bark = scene.paint(kPlantLabel, kBark);
   const auto leaves = foliage(scene, random);
   const float trunk_radius = 0.016F * shape.height_m + 0.03F;
   const float crown_bottom = shape.clear_m;
@@ -89,8 +86,8 @@ void add_tree(Scene& scene, const TreeShape& shape, SeededRandom& random) {
 }
 
 void add_conifer(Scene& scene, float height_m, SeededRandom& random) {
-  const auto bark = scene.paint(kLabel, kBark, {0.8F, 0.75F, 0.7F});
-  const auto needles = scene.paint(kLabel, kLeaves, {0.55F, 0.7F, 0.65F}, 0.6F);
+  const auto bark = scene.paint(kPlantLabel, kBark, {0.8F, 0.75F, 0.7F});
+  const auto needles = scene.paint(kPlantLabel, kLeaves, {0.55F, 0.7F, 0.65F}, 0.6F);
   scene.cylinder({0, 0, -0.2F}, {0, 0, 0.95F * height_m}, 0.03F * height_m, 0.02F, 8, bark, false);
   const int tiers = static_cast<int>(height_m / 0.42F);
   for (int tier = 0; tier < tiers; ++tier) {
@@ -131,7 +128,7 @@ void add_bush(Scene& scene, float radius_m, SeededRandom& random) {
 }
 
 void add_hedge(Scene& scene, float length_m, float depth_m, float height_m, SeededRandom& random) {
-  const auto leaves = scene.paint(kLabel, kLeaves, {0.85F, 0.95F, 0.85F});
+  const auto leaves = scene.paint(kPlantLabel, kLeaves, {0.85F, 0.95F, 0.85F});
   scene.box({0.04F, 0.06F, -0.1F}, {length_m - 0.04F, depth_m - 0.06F, height_m - 0.05F}, leaves,
             kSidesNoBottom);
   const int pieces = std::max(1, static_cast<int>(length_m / 0.8F));
@@ -148,7 +145,7 @@ void add_hedge(Scene& scene, float length_m, float depth_m, float height_m, Seed
 }
 
 void add_tuft(Scene& scene, float height_m, SeededRandom& random) {
-  const auto blades = scene.paint(kLabel, kGrass, {1.0F, 1.0F, 0.9F});
+  const auto blades = scene.paint(kPlantLabel, kGrass, {1.0F, 1.0F, 0.9F});
   const int count = 9 + random.below(6);
   for (int i = 0; i < count; ++i) {
     const float angle = random.uniform(0.0F, kTwoPi);

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <span>
 #include <vector>
 
@@ -13,8 +12,6 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 /// A cross-section of a car's body. From one to the next, nose to tail, the skin is stretched.
 struct BodyStation {
@@ -37,7 +34,7 @@ struct VehiclePaints {
   MaterialId red = 0;
 };
 
-constexpr SurfaceClass kLabel = SurfaceClass::kVehicle;
+constexpr SurfaceClass kVehicleLabel = SurfaceClass::kVehicle;
 constexpr int kSectionPoints = 13;
 
 /// The section from the right sill over the roof to the left one.
@@ -83,11 +80,11 @@ Eigen::Isometry3f side_view() {
 
 VehiclePaints vehicle_paints(Scene& scene, MaterialId body) {
   return {body,
-          scene.plain(kLabel, {0.025F, 0.028F, 0.03F}, 0.4F),
-          scene.plain(kLabel, {0.025F, 0.025F, 0.027F}),
-          scene.plain(kLabel, {0.45F, 0.46F, 0.47F}, 0.25F),
-          scene.plain(kLabel, {0.8F, 0.8F, 0.78F}, 0.1F),
-          scene.plain(kLabel, {0.45F, 0.02F, 0.02F}, 0.1F)};
+          scene.plain(kVehicleLabel, {0.025F, 0.028F, 0.03F}, 0.4F),
+          scene.plain(kVehicleLabel, {0.025F, 0.025F, 0.027F}),
+          scene.plain(kVehicleLabel, {0.45F, 0.46F, 0.47F}, 0.25F),
+          scene.plain(kVehicleLabel, {0.8F, 0.8F, 0.78F}, 0.1F),
+          scene.plain(kVehicleLabel, {0.45F, 0.02F, 0.02F}, 0.1F)};
 }
 
 /// The skin over the stations, closed at both ends and below.
@@ -327,20 +324,21 @@ MaterialId car_paint(Scene& scene, SeededRandom& random) {
                              {0.14F, 0.15F, 0.17F}, {0.42F, 0.04F, 0.03F},  {0.03F, 0.08F, 0.28F},
                              {0.05F, 0.16F, 0.1F},  {0.5F, 0.44F, 0.33F},   {0.12F, 0.28F, 0.42F},
                              {0.6F, 0.6F, 0.61F},   {0.55F, 0.3F, 0.04F}};
-  return scene.plain(kLabel, random.pick(paints), 0.14F);
+  return scene.plain(kVehicleLabel, random.pick(paints), 0.14F);
 }
 
 VehiclePaints army_paints(Scene& scene, SeededRandom& random) {
   const float shade = 1.0F + 0.15F * static_cast<float>(random.below(3));
-  return vehicle_paints(
-      scene, scene.paint(kLabel, kPaintedMetal, {0.17F * shade, 0.18F * shade, 0.1F * shade}));
+  return vehicle_paints(scene, scene.paint(kVehicleLabel, kPaintedMetal,
+                                           {0.17F * shade, 0.18F * shade, 0.1F * shade}));
 }
 
 /// Hoops under canvas over a load bed from x0 to x1.
 void add_canvas_cover(Scene& scene, float x0, float x1, float half, float bed, float eave,
                       float top, SeededRandom& random) {
   const float shade = 0.9F + 0.1F * static_cast<float>(random.below(3));
-  const auto canvas = scene.paint(kLabel, kCanvas, {0.24F * shade, 0.24F * shade, 0.14F * shade});
+  const auto canvas =
+      scene.paint(kVehicleLabel, kCanvas, {0.24F * shade, 0.24F * shade, 0.14F * shade});
   const Eigen::Vector2f arch[] = {
       {-half, bed}, {-half, eave}, {-0.7F * half, top - 0.06F}, {0.7F * half, top - 0.06F},
       {half, eave}, {half, bed}};
@@ -352,7 +350,7 @@ void add_canvas_cover(Scene& scene, float x0, float x1, float half, float bed, f
     return Vector3f(x, sag * p.x(), p.y() > bed ? bed + sag * (p.y() - bed) : bed);
   };
   scene.sheet(kHoops, 5, point, canvas);
-  const auto inside = scene.plain(kLabel, {0.02F, 0.02F, 0.018F});
+  const auto inside = scene.plain(kVehicleLabel, {0.02F, 0.02F, 0.018F});
   for (int i = 0; i + 1 < 6; ++i) {
     const Vector3f front(x1, 0.0F, bed);
     const Vector3f back(x0, 0.0F, bed);

@@ -1,7 +1,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <vector>
 
 #include "apps/lab/simulation/world/objects.hpp"
@@ -16,8 +15,6 @@ using Eigen::Isometry3f;
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 using enum Recipe;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 /// Adds a flat plate, centred at the origin, with side faces.
 void add_flat(Scene& scene, const Vector2f& size, float z, MaterialId material) {
@@ -360,7 +357,7 @@ std::vector<Vector3f> add_ceiling(Scene& scene, float width_m, float depth_m, fl
 // The flights of V1_01 to V2_03 fill x -3.79 to 2.30, y -2.45 to 3.47, z 0.63 to 2.92 m. Walls
 // stand at least 0.8 m off; what is higher than 0.5 m keeps to the outer 0.55 m.
 constexpr float kEdge_m = 8.0F;
-constexpr float kHeight_m = 4.0F;
+constexpr float kRoomHeight_m = 4.0F;
 const Vector3f kCorner(-4.6F, -3.5F, 0.0F);
 constexpr float kHalf_m = 0.5F * kEdge_m;
 
@@ -372,7 +369,7 @@ Isometry3f at_wall(float x) {
 /// Mattresses on both sides of a window, a radiator below it, a checkerboard.
 void furnish_mattress_wall(Scene& scene, SeededRandom& random) {
   const WallWindow window{random.uniform(1.6F, 1.9F), 1.5F, 0.9F, 2.9F};
-  add_wall(scene, kEdge_m, kHeight_m, &window, random);
+  add_wall(scene, kEdge_m, kRoomHeight_m, &window, random);
   scene.at(at_wall(window.center_m)).add(add_radiator, 1.3F);
   for (float x = -2.9F; x < 0.8F; x += random.uniform(1.05F, 1.2F)) {
     scene.at(at_wall(x))
@@ -387,7 +384,7 @@ void furnish_mattress_wall(Scene& scene, SeededRandom& random) {
 
 /// A sheet with a print of boards, foam, a leaning mattress, a shelf.
 void furnish_plank_wall(Scene& scene, SeededRandom& random) {
-  add_wall(scene, kEdge_m, kHeight_m, nullptr, random);
+  add_wall(scene, kEdge_m, kRoomHeight_m, nullptr, random);
   scene.at(at_wall(random.uniform(-0.3F, 0.3F))).add(add_plank_sheet, 3.3F, 2.5F);
   scene.at(at_wall(2.5F)).add(add_foam_panel, 1.0F, 1.15F);
   scene.at(at_wall(-2.6F)).add(add_leaning_mattress, Vector3f(1.5F, 0.17F, 0.9F), 0.2F, random);
@@ -402,7 +399,7 @@ void furnish_plank_wall(Scene& scene, SeededRandom& random) {
 /// A window behind a mattress, a ladder, posters, a heavy curtain.
 void furnish_window_wall(Scene& scene, SeededRandom& random) {
   const WallWindow window{random.uniform(0.9F, 1.3F), 1.7F, 0.9F, 2.95F};
-  add_wall(scene, kEdge_m, kHeight_m, &window, random);
+  add_wall(scene, kEdge_m, kRoomHeight_m, &window, random);
   scene.at(at_wall(window.center_m))
       .add(add_leaning_mattress, Vector3f(2.0F, 0.17F, 0.95F), 0.25F, random);
   scene.at(at_wall(2.7F)).add(add_leaning_mattress, Vector3f(0.9F, 0.17F, 1.95F), 0.2F, random);
@@ -416,7 +413,7 @@ void furnish_window_wall(Scene& scene, SeededRandom& random) {
 
 /// Desks, chairs, cartons and a cabinet: where the operators sit.
 void furnish_desk_wall(Scene& scene, SeededRandom& random) {
-  add_wall(scene, kEdge_m, kHeight_m, nullptr, random);
+  add_wall(scene, kEdge_m, kRoomHeight_m, nullptr, random);
   scene.at(at_wall(-2.6F)).add(add_desk, random);
   scene.at(at_wall(random.uniform(0.4F, 0.7F))).add(add_table, 1.5F, 0.5F, 6, random);
   scene.at(at_wall(2.4F)).add(add_shelf, 1.2F, 1.9F, random);
@@ -466,7 +463,7 @@ World make_vicon_room(std::uint64_t seed) {
   {
     const auto room = scene.at(T_world_room);
     add_room_floor(scene, kEdge_m, kEdge_m, random);
-    for (const Vector3f& lamp : add_ceiling(scene, kEdge_m, kEdge_m, kHeight_m, random))
+    for (const Vector3f& lamp : add_ceiling(scene, kEdge_m, kEdge_m, kRoomHeight_m, random))
       world.lighting.lamps.push_back({T_world_room * lamp, 1.3F});
     furnish_middle(scene, random);
   }

@@ -17,8 +17,6 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
 double area_m2(const SurfaceMesh& mesh) {
   double area = 0.0;
   for (const auto& [a, b, c] : mesh.triangles) {
