@@ -23,6 +23,23 @@
 
 namespace km {
 
+/// Difference, relative to the cost, up to which a team's solution is the optimum.
+inline constexpr double kCostTolerance = 1e-6;
+
+/// Covariance of a pose with these standard deviations about and along each axis.
+[[nodiscard]] inline Matrix6 isotropic(double rotation_rad, double translation_m) {
+  Matrix6 Sigma = Matrix6::Zero();
+  Sigma.diagonal().head<3>().setConstant(rotation_rad * rotation_rad);
+  Sigma.diagonal().tail<3>().setConstant(translation_m * translation_m);
+  return Sigma;
+}
+
+/// The problem except for these closures.
+[[nodiscard]] inline TeamProblem without(TeamProblem problem, const std::set<ClosureId>& closures) {
+  std::erase_if(problem.edges, [&](const PoseEdge& e) { return closures.contains(e.id()); });
+  return problem;
+}
+
 /// A link between two robots, the same in both directions.
 struct NetworkLink {
   bool up = true;

@@ -13,20 +13,13 @@
 namespace km {
 namespace {
 
-constexpr KeyframeIndex kKeyframes = 60;
+constexpr KeyframeIndex kRunKeyframes = 60;
 constexpr double kSigma_m = 0.3;
 const Eigen::Vector3d kAntenna(0.3, -0.2, 0.4);
 // 30 fixes along 30 m determine the position to 0.06 m on each axis. They determine the heading to
 // 7 mrad, 0.3 m / (8 m * sqrt(30)), which is 0.1 m at the ends. The rotation noise of odometry
 // bends the ends by 0.27 m, 0.5 m * 2 mrad * sqrt(60^3 / 3). Three sigmas of the sum.
 constexpr double kLargest_m = 0.9;
-
-Matrix6 isotropic(double rotation_rad, double translation_m) {
-  Matrix6 Sigma = Matrix6::Zero();
-  Sigma.diagonal().head<3>().setConstant(rotation_rad * rotation_rad);
-  Sigma.diagonal().tail<3>().setConstant(translation_m * translation_m);
-  return Sigma;
-}
 
 SE3 level_pose(std::mt19937& rng) {
   const double heading = 3.0 * random_vector<1>(rng).x();
@@ -48,7 +41,7 @@ class Run {
       truth_.push_back(level_pose(rng_));
       add(level_pose(rng_), isotropic(2.0, kUnknownStep_m));
     }
-    while (truth_.size() < kKeyframes) {
+    while (truth_.size() < kRunKeyframes) {
       const SE3 step = se3_exp(Vector6{0.0, 0.0, 0.03, step_m, 0.0, 0.1 * step_m});
       truth_.push_back(truth_.back() * step);
       Vector6 noise = random_vector<6>(rng_);
@@ -71,7 +64,7 @@ class Run {
                     .datum = datum}));
   }
   void fix_all() {
-    for (KeyframeIndex i = 1; i < kKeyframes; ++i) fix(i);
+    for (KeyframeIndex i = 1; i < kRunKeyframes; ++i) fix(i);
   }
   [[nodiscard]] const TeamNetwork::Robot& state() const { return network_.robots.at(robot_); }
   [[nodiscard]] TeamAgent& agent() { return agent_; }
@@ -80,7 +73,7 @@ class Run {
   // Largest distance of a keyframe from its true position in the absolute frame.
   [[nodiscard]] double error_m() const {
     double largest = 0.0;
-    for (KeyframeIndex i = 0; i < kKeyframes; ++i)
+    for (KeyframeIndex i = 0; i < kRunKeyframes; ++i)
       largest = std::max(
           largest,
           (state().trajectory->T_world_kf[i].translation() - truth_[i].translation()).norm());
@@ -112,7 +105,7 @@ class Run {
   std::size_t next_ = 0;
 };
 
-bool settle_again(TeamNetwork& network) {
+bool each_settles_again(TeamNetwork& network) {
   (void)network.run(1.0);  // progress is reported once per status
   return network.run(60.0, [&] {
     return std::ranges::all_of(network.robots,
@@ -126,7 +119,7 @@ TEST_CASE("fixes with 30 % outliers and a biased block place a run in the absolu
   const auto method = GENERATE(PgoMethod::kNewton, PgoMethod::kRbcd);
   Run run(network, 4, GENERATE(1U, 2U, 3U, 4U, 5U), true, method);
   std::uint32_t outliers = 0;
-  for (KeyframeIndex i = 1; i < kKeyframes; ++i) {
+  for (KeyframeIndex i = 1; i < kRunKeyframes; ++i) {
     const bool is_in_block = i >= 20 && i < 32;
     const bool is_outlier = is_in_block || i % 10 < 3;
     outliers += is_outlier ? 1 : 0;
@@ -134,14 +127,14 @@ TEST_CASE("fixes with 30 % outliers and a biased block place a run in the absolu
                : is_outlier ? run.random_outlier()
                             : Eigen::Vector3d::Zero());
   }
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   REQUIRE(run.state().progress.located);
   REQUIRE(run.state().trajectory);
   CHECK(run.error_m() < kLargest_m);
   const FixesState& fixes = *run.state().progress.fixes;
   CHECK(fixes.rejected >= outliers);
   CHECK(fixes.rejected <= outliers + 1);  // one of 1000 true fixes is farther than four sigmas
-  CHECK(fixes.used + fixes.rejected == kKeyframes - 1);
+  CHECK(fixes.used + fixes.rejected == kRunKeyframes - 1);
   CHECK(fixes.residual_m < 2.0 * kSigma_m);  // 1.7 sigmas are the root mean square in three axes
 }
 
@@ -151,13 +144,13 @@ TEST_CASE("fixes do not locate a robot before it has moved", "[pose_graph][fixes
       moving(network, 5, 12, true, PgoMethod::kNewton);
   still.fix_all();
   for (KeyframeIndex i = 1; i < 8; ++i) moving.fix(i, Eigen::Vector3d::Zero(), 1.0);
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   for (const Run* const run : {&still, &moving}) {
     CHECK_FALSE(run->state().progress.located);
     CHECK_FALSE(run->state().trajectory);
   }
-  for (KeyframeIndex i = 8; i < kKeyframes; ++i) moving.fix(i, Eigen::Vector3d::Zero(), 1.0);
-  REQUIRE(settle_again(network));
+  for (KeyframeIndex i = 8; i < kRunKeyframes; ++i) moving.fix(i, Eigen::Vector3d::Zero(), 1.0);
+  REQUIRE(each_settles_again(network));
   CHECK_FALSE(still.state().progress.located);
   CHECK(moving.state().progress.located);
   REQUIRE(moving.state().trajectory);
@@ -187,10 +180,10 @@ TEST_CASE("closures bring a robot without fixes into the absolute frame", "[pose
   Run without(network, 2, 21, false, PgoMethod::kNewton);
   Run with(network, 5, 22, true, PgoMethod::kNewton);
   close(without, with);
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   CHECK(without.state().trajectory->anchor == 2);
   with.fix_all();
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   for (const Run* const run : {&without, &with}) {
     REQUIRE(run->state().trajectory);
     CHECK(run->state().trajectory->anchor == 5);
@@ -226,12 +219,12 @@ TEST_CASE("fixes of all robots act on one frame if closures tie the robots",
   const Eigen::Vector3d east(0.1, 0.0, 0.0);
   const bool is_one_datum = GENERATE(true, false);
   if (!is_one_datum) high.datum = 78;
-  for (KeyframeIndex i = 1; i < kKeyframes; ++i) {
+  for (KeyframeIndex i = 1; i < kRunKeyframes; ++i) {
     low.fix(i, east);
     high.fix(i, -east);
   }
   close(low, high);
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   const double apart_m = relative_error_m(low, high, {10, 11, 12, 40, 41, 42});
   CAPTURE(low.error_m(), high.error_m(), apart_m);
   CHECK(high.state().trajectory->anchor == (is_one_datum ? 3 : 6));
@@ -256,12 +249,12 @@ TEST_CASE("a common error of the fixes of a robot does not outvote closures",
       high(network, 6, seed + 1, true, PgoMethod::kNewton);
   const Eigen::Vector3d east(0.5, 0.0, 0.0);
   for (Run* const run : {&low, &high}) run->correlation_s = 60.0;
-  for (KeyframeIndex i = 1; i < kKeyframes; ++i) {
+  for (KeyframeIndex i = 1; i < kRunKeyframes; ++i) {
     low.fix(i, east);
     high.fix(i, -east);
   }
   const auto closures = close(low, high);
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   for (const ClosureId& id : closures) CHECK(low.agent().decided().at(id));
   CHECK(relative_error_m(low, high, {10, 11, 12, 40, 41, 42}) < 0.1);
 }
@@ -299,10 +292,10 @@ TEST_CASE("false closures between robots in one datum are rejected", "[pose_grap
   Run low(network, 3, seed, true, PgoMethod::kNewton),
       high(network, 6, seed + 1, true, PgoMethod::kNewton);
   for (Run* const run : {&low, &high}) run->fix_all();
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   const SE3 error = make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(15.0, 20.0, 0.0));
   const auto closures = close(low, high, error, {20, 21, 22, 23});
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   for (Run* const run : {&low, &high}) {
     for (const ClosureId& id : closures) CHECK_FALSE(run->agent().decided().at(id));
     CHECK(run->state().progress.tentative.empty());
@@ -318,7 +311,7 @@ TEST_CASE("robots share an absolute frame without closures if they have one datu
   const bool is_one_datum = GENERATE(true, false);
   if (!is_one_datum) high.datum = 78;
   for (Run* const run : {&low, &high}) run->fix_all();
-  REQUIRE(settle_again(network));
+  REQUIRE(each_settles_again(network));
   REQUIRE(low.state().trajectory);
   REQUIRE(high.state().trajectory);
   CHECK(low.state().trajectory->anchor == 3);

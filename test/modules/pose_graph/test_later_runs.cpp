@@ -11,18 +11,11 @@
 namespace km {
 namespace {
 
-constexpr KeyframeIndex kKeyframes = 60;
+constexpr KeyframeIndex kLaterKeyframes = 60;
 // 20 steps before the first closure have a standard deviation of 0.07 m on each axis. The noise of
 // translation gives 0.01 m times the root of 20, that of rotation 0.001 m times the root of 20^3
 // / 3.
 constexpr double kDrift_m = 0.3;
-
-Matrix6 isotropic(double rotation_rad, double translation_m) {
-  Matrix6 Sigma = Matrix6::Zero();
-  Sigma.diagonal().head<3>().setConstant(rotation_rad * rotation_rad);
-  Sigma.diagonal().tail<3>().setConstant(translation_m * translation_m);
-  return Sigma;
-}
 
 class LaterRun {
  public:
@@ -38,7 +31,7 @@ class LaterRun {
     add({.id = {robot_, 0}}, truth_.front(), Matrix6::Zero());
     truth_.push_back(random_pose(rng_, 100.0));
     add({.id = {robot_, 1}}, random_pose(rng_, 5.0), isotropic(2.0, kUnknownStep_m));
-    for (KeyframeIndex i = 2; i < kKeyframes; ++i) {
+    for (KeyframeIndex i = 2; i < kLaterKeyframes; ++i) {
       const SE3 step = se3_exp(Vector6{0.01, 0.0, 0.1, 0.5, 0.1, 0.0});
       truth_.push_back(truth_.back() * step);
       add({.id = {robot_, i}}, step * noise(0.002, 0.01), isotropic(0.002, 0.01));
@@ -68,7 +61,7 @@ class LaterRun {
   [[nodiscard]] double error_m() const {
     const Trajectory& found = *network_.robots.at(robot_).trajectory;
     double largest = 0.0;
-    for (KeyframeIndex i = 1; i < kKeyframes; ++i)
+    for (KeyframeIndex i = 1; i < kLaterKeyframes; ++i)
       largest =
           std::max(largest, (found.T_world_kf[i].translation() - truth_[i].translation()).norm());
     return largest;

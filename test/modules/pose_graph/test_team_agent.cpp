@@ -7,8 +7,6 @@
 namespace km {
 namespace {
 
-constexpr double kTolerance = 1e-6;  // relative to the cost
-
 const std::vector<RobotId> kIds{7, 33, 50, 1200};
 const std::vector<std::pair<RobotId, RobotId>> kRing{{7, 33}, {33, 50}, {50, 1200}, {7, 1200}};
 
@@ -31,7 +29,7 @@ TeamProblem without_33_50(TeamProblem problem) {
   return problem;
 }
 
-void check_optimal(const TeamNetwork& network, const TeamProblem& problem) {
+void check_optimum(const TeamNetwork& network, const TeamProblem& problem) {
   for (const auto& [id, robot] : network.robots) {
     CAPTURE(id);
     REQUIRE(robot.trajectory);
@@ -39,7 +37,7 @@ void check_optimal(const TeamNetwork& network, const TeamProblem& problem) {
   }
   const CentralProblem whole(problem);
   CHECK(whole.cost(network.trajectories()) ==
-        Approx(whole.optimum(problem.start)).epsilon(kTolerance));
+        Approx(whole.optimum(problem.start)).epsilon(kCostTolerance));
 }
 
 }  // namespace
@@ -51,7 +49,7 @@ TEST_CASE("one robot alone solves its own graph", "[pose_graph][agent]") {
   TeamNetwork network;
   feed(network.add({4, 1}, config, gather()), 4, problem);
   REQUIRE(settle(network, 5.0));
-  check_optimal(network, problem);
+  check_optimum(network, problem);
   CHECK(network.robots.at(4).bytes == 0);
 }
 
@@ -73,7 +71,7 @@ TEST_CASE("the frame at the end is the odometry frame of the lowest robot", "[po
     feed(agent, id, problem);
   }
   REQUIRE(settle(network));
-  check_optimal(network, problem);
+  check_optimum(network, problem);
   CHECK(network.robots.at(7).trajectory->T_world_kf[0].isApprox(T_odom_first, 1e-6));
 }
 
@@ -91,7 +89,7 @@ TEST_CASE("inputs may come in any order and at any time", "[pose_graph][agent]")
     (void)network.run(0.7);
   }
   REQUIRE(settle(network));
-  check_optimal(network, problem);
+  check_optimum(network, problem);
 }
 
 TEST_CASE("a resumed robot takes part again with its known closures", "[pose_graph][agent]") {
@@ -109,7 +107,7 @@ TEST_CASE("a resumed robot takes part again with its known closures", "[pose_gra
   feed(network.add({resumed, next_boot(boot)}, {}, gather()), resumed, problem);
   (void)network.run(1.0);
   REQUIRE(settle(network));
-  check_optimal(network, problem);
+  check_optimum(network, problem);
 }
 
 TEST_CASE("a robot resumed without its team continues from the last solution",
@@ -164,7 +162,7 @@ TEST_CASE("the data of a restarted robot is discarded, and it takes part again",
   feed_closures(network.agent(restarted), restarted, problem, 3);
   (void)network.run(1.0);
   REQUIRE(settle(network));
-  check_optimal(network, problem);
+  check_optimum(network, problem);
 }
 
 TEST_CASE("measurements of a robot before its restart are not optimised", "[pose_graph][agent]") {
@@ -210,7 +208,7 @@ TEST_CASE("decisions on closures are valid for both robots and carry over", "[po
     (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
   (void)network.run(1.0);
   REQUIRE(settle(network));
-  check_optimal(network, problem);
+  check_optimum(network, problem);
 }
 
 TEST_CASE("a graph that cannot be solved ends the session for all, with a notice",
@@ -258,7 +256,7 @@ TEST_CASE("sessions wait until their bytes are paid for", "[pose_graph][agent]")
   if (budget_kb_s > 1.0) CHECK(waited_s < 5.0);  // two seconds at rest, and the session
   if (budget_kb_s <= 1.0) CHECK(waited_s > 5.0);
   CHECK(waited_s < 35.0);
-  check_optimal(network, problem);
+  check_optimum(network, problem);
 }
 
 TEST_CASE("the member that has sent most determines the wait for the next session",
@@ -417,7 +415,7 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
   network.disappear(33, 666);
   (void)network.run(5.0);
   REQUIRE(settle(network, 120.0));
-  check_optimal(network, problem);
+  check_optimum(network, problem);
 }
 
 TEST_CASE("verdicts on unknown closures, or from robots outside the session, decide nothing",
@@ -527,7 +525,7 @@ TEST_CASE("every message may arrive late, twice and in any order", "[pose_graph]
   }
   (void)network.run(5.0);
   REQUIRE(settle(network));
-  check_optimal(network, problem);
+  check_optimum(network, problem);
 }
 
 }  // namespace km

@@ -11,25 +11,23 @@
 namespace km {
 namespace {
 
-constexpr double kTolerance = 1e-6;  // relative to the cost
-
 using Pairs = std::vector<std::pair<RobotId, RobotId>>;
 
 const std::vector<RobotId> kFour{2, 3, 5, 9};
-const Pairs kRing{{2, 3}, {3, 5}, {5, 9}, {2, 9}};
-constexpr std::uint32_t kKeyframes = 20;
+const Pairs kSquare{{2, 3}, {3, 5}, {5, 9}, {2, 9}};
+constexpr std::uint32_t kSquareKeyframes = 20;
 
 TeamProblem problem_of(unsigned seed) {
   return random_team_problem({.robots = kFour,
-                              .pairs = kRing,
-                              .keyframes = kKeyframes,
+                              .pairs = kSquare,
+                              .keyframes = kSquareKeyframes,
                               .closures = 10,
                               .start_sigma = 0.0},
                              seed);
 }
 
-void add_all(TeamNetwork& network, const TeamProblem& problem,
-             const MemberSolverFactory& factory = solver_choice({})) {
+void add_four(TeamNetwork& network, const TeamProblem& problem,
+              const MemberSolverFactory& factory = solver_choice({})) {
   for (const auto& [robot, start] : problem.start)
     feed(network.add({robot, 100U + robot}, {}, factory), robot, problem);
 }
@@ -45,11 +43,11 @@ std::set<ClosureId> add_random_false(TeamProblem& problem, double part, unsigned
   std::mt19937 rng(seed);
   std::set<ClosureId> known, added;
   for (const PoseEdge& e : problem.edges) known.insert(e.id());
-  Pairs pairs = kRing;
+  Pairs pairs = kSquare;
   for (const RobotId robot : kFour) pairs.emplace_back(robot, robot);
   const auto count =
       static_cast<std::size_t>(part / (1.0 - part) * static_cast<double>(closures_of(problem)));
-  std::uniform_int_distribution<std::uint32_t> any(0, kKeyframes - 1);
+  std::uniform_int_distribution<std::uint32_t> any(0, kSquareKeyframes - 1);
   while (added.size() < count) {
     const auto& [a, b] = pairs[added.size() % pairs.size()];
     const KeyframeId from{a, any(rng)};
@@ -59,11 +57,6 @@ std::set<ClosureId> add_random_false(TeamProblem& problem, double part, unsigned
     problem.edges.push_back({from, to, random_pose(rng, 5.0), problem.edges.back().precision});
   }
   return added;
-}
-
-TeamProblem without(TeamProblem problem, const std::set<ClosureId>& closures) {
-  std::erase_if(problem.edges, [&](const PoseEdge& e) { return closures.contains(e.id()); });
-  return problem;
 }
 
 // Consecutive false closures with one common error, as between places that look alike.
@@ -101,7 +94,7 @@ void check_ends_agree(const TeamNetwork& network) {
 void check_cost(const TeamNetwork& network, const TeamProblem& problem) {
   const CentralProblem whole(problem);
   CHECK(whole.cost(network.trajectories()) ==
-        Approx(whole.optimum(problem.start)).epsilon(kTolerance));
+        Approx(whole.optimum(problem.start)).epsilon(kCostTolerance));
 }
 
 }  // namespace
@@ -114,7 +107,7 @@ TEST_CASE("random false closures are rejected and leave the optimum of the true 
   const std::set<ClosureId> wrong = add_random_false(problem, 0.3, seed);
   TeamNetwork network(seed);
   network.usual = {.max_delay_s = 0.05, .lost = 0.05, .duplicated = 0.05};
-  add_all(network, problem);
+  add_four(network, problem);
   network.wire({{2, 3}, {3, 5}, {5, 9}});
   REQUIRE(settle(network));
   CHECK(rejected(network) == wrong);
@@ -131,7 +124,7 @@ TEST_CASE("false closures that agree with each other are rejected if others cont
   const std::set<ClosureId> wrong = add_cluster(problem, count, seed);
   TeamNetwork network(seed);
   network.usual = {.max_delay_s = 0.05, .lost = 0.05};
-  add_all(network, problem);
+  add_four(network, problem);
   REQUIRE(settle(network));
   CHECK(rejected(network) == wrong);
   check_ends_agree(network);
@@ -149,7 +142,7 @@ TEST_CASE("a wrong step of odometry is corrected, and closures are kept",
     if (is_step(e) && e.from == KeyframeId{2, 30})
       e.T_from_to = e.T_from_to * make_pose(so3_exp({0.0, 0.8, 1.6}), {5.0, -3.0, 1.0});
   TeamNetwork network(seed);
-  add_all(network, problem);
+  add_four(network, problem);
   REQUIRE(settle(network));
   // The step is known up to the nearest ends of closures, so closures between may be rejected.
   CHECK(rejected(network).size() <= 3);
@@ -174,7 +167,7 @@ TEST_CASE("a session after new closures takes few rounds and keeps earlier decis
       later.insert(e.id());
   REQUIRE(later.size() == 3);
   TeamNetwork network(seed);
-  add_all(network, without(all, later));
+  add_four(network, without(all, later));
   REQUIRE(settle(network));
   REQUIRE(rejected(network) == wrong);
   const std::uint32_t first = network.agent(2).part()->state().round;
@@ -245,7 +238,7 @@ TEST_CASE("both robots of a closure enter every session with equal decisions",
   std::map<std::pair<SessionId, ClosureId>, Entered> entered;
   std::size_t differ = 0, known = 0;
   const MemberSolverFactory newton = solver_choice({});
-  add_all(network, problem, [&](const Session& session, SessionGraph graph, TreePlace place) {
+  add_four(network, problem, [&](const Session& session, SessionGraph graph, TreePlace place) {
     for (const PoseEdge& e : graph.between) {
       const auto decided = graph.decided.find(e.id());
       std::optional<bool> here;
@@ -260,7 +253,7 @@ TEST_CASE("both robots of a closure enter every session with equal decisions",
   // Outages of links interrupt sessions, and one pair receives its closures late.
   std::mt19937 rng(seed);
   for (double at_s = 2.0; at_s < 60.0; at_s += 4.0) {
-    const auto [a, b] = kRing[rng() % kRing.size()];
+    const auto [a, b] = kSquare[rng() % kSquare.size()];
     network.at(at_s, [&network, a = a, b = b] { network.cut(a, b); });
     network.at(at_s + 3.5, [&network, a = a, b = b] { network.restore(a, b); });
     network.at(at_s, [&, version = static_cast<std::uint32_t>(2.0 + at_s)] {
@@ -297,7 +290,7 @@ TEST_CASE("deferred closures that fit are weighed in up to two more sessions",
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
-  add_all(network, problem, factory);
+  add_four(network, problem, factory);
   REQUIRE(settle(network));
   (void)network.run(30.0);
   REQUIRE(settle(network));
@@ -325,7 +318,7 @@ TEST_CASE("decisions made with held poses hold until these robots return",
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
-  add_all(network, problem, factory);
+  add_four(network, problem, factory);
   REQUIRE(settle(network));
   const auto check_kept = [&](bool kept) {
     for (const RobotId robot : {RobotId{2}, RobotId{3}})
@@ -433,7 +426,7 @@ TEST_CASE("eight robots in tunnels decide nearly as one session without earlier 
   const TeamProblem problem = recorded_team(*folder, 8);
   TeamNetwork network;
   network.usual = {.min_delay_s = 0.002, .max_delay_s = 0.01};
-  add_all(network, problem);
+  add_four(network, problem);
   REQUIRE(settle(network));
   check_ends_agree(network);
   const std::set<ClosureId> out = rejected(network);
