@@ -15,11 +15,11 @@ namespace fs = std::filesystem;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 // A team of three and a folder for its files of links.
-struct Team {
+struct LinkedTeam {
   TemporaryFolder folder;
   TeamPlan plan;
 
-  Team() {
+  LinkedTeam() {
     for (const char* name : {"a", "b", "c"}) {
       RobotPlan robot;
       robot.name = name;
@@ -47,7 +47,7 @@ std::pair<double, double> trace(const LinkPlan& link, double time_s) {
 }  // namespace
 
 TEST_CASE("An empty file of links makes perfect ones", "[links]") {
-  LinkScript script = Team().script("");
+  LinkScript script = LinkedTeam().script("");
   CHECK(script.robots == 3);
   REQUIRE(script.links.size() == 9);
   CHECK_FALSE(script.link(0, 1).trace.has_limit());
@@ -59,7 +59,7 @@ TEST_CASE("An empty file of links makes perfect ones", "[links]") {
 }
 
 TEST_CASE("Keys of a pair override keys of all links", "[links]") {
-  LinkScript script = Team().script(
+  LinkScript script = LinkedTeam().script(
       "seed: 7\nloss: 0.1\ndelay_s: 0.02\njitter_s: 0.01\nrate_bytes_per_s: 1000\n"
       "queue_bytes: 5000\noutages:\n  - {from_s: 1, to_s: 2}\n"
       "pairs:\n"
@@ -81,7 +81,7 @@ TEST_CASE("Keys of a pair override keys of all links", "[links]") {
 }
 
 TEST_CASE("A trace takes the place of rate and delay, and they of it", "[links]") {
-  const Team team;
+  const LinkedTeam team;
   team.folder.write("radio.csv", "0,100,0.5\n10,300,0.7\n");
   LinkScript script = team.script(
       "trace: radio.csv\ndelay_s: 0.1\npairs:\n  - {from: a, to: b, rate_bytes_per_s: 50}\n");
@@ -93,7 +93,7 @@ TEST_CASE("A trace takes the place of rate and delay, and they of it", "[links]"
 
 TEST_CASE("A recording takes the place of the rate, and the rate of a pair takes its place",
           "[links]") {
-  const Team team;
+  const LinkedTeam team;
   const fs::path up = team.folder.write("radio.up", "10\n20\n");
   LinkScript script = team.script(
       "packets: radio.up\ndelay_s: 0.1\npairs:\n  - {from: a, to: b, rate_bytes_per_s: 50}\n");
@@ -112,7 +112,7 @@ TEST_CASE("A recording takes the place of the rate, and the rate of a pair takes
 }
 
 TEST_CASE("Robots that no group of a partition names are a group", "[links]") {
-  const LinkScript script = Team().script(
+  const LinkScript script = LinkedTeam().script(
       "partitions:\n  - {from_s: 3, to_s: 4, groups: [[b]]}\n  - {from_s: 9, groups: [[a, c], "
       "[b]]}\n");
   REQUIRE(script.partitions.size() == 2);
@@ -127,7 +127,7 @@ TEST_CASE("Robots that no group of a partition names are a group", "[links]") {
 }
 
 TEST_CASE("Range follows the true poses at the rate of the run", "[links]") {
-  Team team;
+  LinkedTeam team;
   for (RobotPlan& robot : team.plan.robots)
     robot.truth = team.folder.write(robot.name + ".tum", "100 0 0 0 0 0 0 1\n110 8 0 0 0 0 0 1\n");
   team.plan.rate = "2.0";
@@ -148,7 +148,7 @@ TEST_CASE("Range follows the true poses at the rate of the run", "[links]") {
 }
 
 TEST_CASE("Every problem of a file of links is reported with its line", "[links]") {
-  const std::string problems = Team().problems(
+  const std::string problems = LinkedTeam().problems(
       "loss: 1.5\n"
       "latency: 3\n"
       "trace: none.csv\n"
@@ -175,7 +175,7 @@ TEST_CASE("Every problem of a file of links is reported with its line", "[links]
 }
 
 TEST_CASE("A corrupted file of links is refused by name, or makes a script", "[links]") {
-  const Team team;
+  const LinkedTeam team;
   check_corrupted<ConfigError>(
       "seed: 3\nloss: 0.1\nrate_bytes_per_s: 1000\nqueue_bytes: 5000\noutages:\n"
       "  - {from_s: 1, to_s: 2}\npairs:\n  - {from: a, to: b, loss: 0.5}\n"
@@ -187,7 +187,7 @@ TEST_CASE("A corrupted file of links is refused by name, or makes a script", "[l
 }
 
 TEST_CASE("The files of links that are shipped can be read", "[links]") {
-  Team team;
+  LinkedTeam team;
   for (RobotPlan& robot : team.plan.robots)
     robot.truth = team.folder.write("truth.tum", "0 0 0 0 0 0 0 1\n");
   std::size_t files = 0;

@@ -41,11 +41,11 @@ std::string robot_script(const std::string& end) {
          end + '\n';
 }
 
-struct Team {
+struct ScriptedTeam {
   TemporaryFolder folder;
   std::string command;
 
-  explicit Team(const std::string& end) {
+  explicit ScriptedTeam(const std::string& end) {
     const fs::path script = folder.write("robot", robot_script(end));
     fs::permissions(script, fs::perms::owner_all);
     folder.write("summary.json", json_text(finished_summary()));
@@ -63,7 +63,7 @@ struct Team {
 }  // namespace
 
 TEST_CASE("A team runs its robots, shows their lines and prints the table", "[team]") {
-  const Team team("exit 0");
+  const ScriptedTeam team("exit 0");
   const std::string json = (team.folder.path() / "out/team.json").string();
   const auto result =
       run_command(team.command + " --rate max --domain 5 --json " + json + " -- --set a.b=1");
@@ -79,7 +79,7 @@ TEST_CASE("A team runs its robots, shows their lines and prints the table", "[te
 }
 
 TEST_CASE("Robots of a team can be watched only with --view", "[team]") {
-  const Team team("exit 0");
+  const ScriptedTeam team("exit 0");
   CHECK_THAT(run_command(team.command).output, !Catch::Contains("--view"));
   const auto watched = run_command(team.command + " --view");
   CAPTURE(watched.output);
@@ -89,7 +89,7 @@ TEST_CASE("Robots of a team can be watched only with --view", "[team]") {
 }
 
 TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
-  const Team team(
+  const ScriptedTeam team(
       "[ $name = bob ] && { echo 'out of luck'; echo '  or of fuel'; } >&2 && exit 9; exit 0");
   const auto result = run_command(team.command);
   CAPTURE(result.output);
@@ -100,7 +100,7 @@ TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
 }
 
 TEST_CASE("Robots that all fail at once leave no empty tables", "[team]") {
-  const Team team("rm \"$out/summary.json\"; echo 'no such key' >&2; exit 1");
+  const ScriptedTeam team("rm \"$out/summary.json\"; echo 'no such key' >&2; exit 1");
   const auto result = run_command(team.command);
   CAPTURE(result.output);
   CHECK(result.exit_code == 3);
@@ -110,7 +110,7 @@ TEST_CASE("Robots that all fail at once leave no empty tables", "[team]") {
 }
 
 TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[team]") {
-  const Team team("[ $name = bob ] && { rm \"$out/summary.json\"; exit 1; }; exit 0");
+  const ScriptedTeam team("[ $name = bob ] && { rm \"$out/summary.json\"; exit 1; }; exit 0");
   for (const char* file : {"summary.json", "optimized.tum", "exit_code"})
     team.folder.write(std::string("out/bob/") + file, "{\"frames\": 4711}");
   for (const char* file : {"out/team_mesh.ply", "out/label_palette.csv"})
@@ -129,7 +129,7 @@ TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[te
 }
 
 TEST_CASE("The domain is drawn once for the whole team", "[team]") {
-  const Team team("exit 0");
+  const ScriptedTeam team("exit 0");
   const std::string output = run_command(team.command).output;
   CAPTURE(output);
   CHECK_THAT(output, !Catch::Contains("in place of"));
@@ -142,7 +142,7 @@ TEST_CASE("The domain is drawn once for the whole team", "[team]") {
 }
 
 TEST_CASE("An interrupt is passed on once and the table still printed", "[team]") {
-  const Team team(
+  const ScriptedTeam team(
       "trap 'echo \"$name interrupted\"; exit 0' INT\n"
       "touch \"$out/ready\"\n"
       "while [ $name = alice ] && [ ! -e \"$out/../bob/ready\" ]; do :; done\n"
@@ -157,7 +157,7 @@ TEST_CASE("An interrupt is passed on once and the table still printed", "[team]"
 }
 
 TEST_CASE("Robots die with a team program that is killed", "[team]") {
-  const Team team(
+  const ScriptedTeam team(
       "echo $$ > \"$out/pid.new\"; mv \"$out/pid.new\" \"$out/pid\"\n"
       "while :; do sleep 0.05; done");
   sigset_t none;
@@ -182,7 +182,7 @@ TEST_CASE("Robots die with a team program that is killed", "[team]") {
 }
 
 TEST_CASE("With bad links each robot is in a network of its own", "[team][namespaces]") {
-  const Team team(
+  const ScriptedTeam team(
       "echo $name has $(grep -o '10[.]77[.]0[.][1-9]' /proc/net/fib_trie | sort -u) on "
       "$(grep : /proc/net/dev | cut -d: -f1)");
   const std::string links = team.folder.write("links.yaml", "loss: 0.5\n").string();
@@ -198,7 +198,7 @@ TEST_CASE("With bad links each robot is in a network of its own", "[team][namesp
 }
 
 TEST_CASE("A robot whose interface is down loses frames and nothing else", "[team][namespaces]") {
-  const Team team(
+  const ScriptedTeam team(
       "cd \"$out/..\"\n"
       "if [ $name = alice ]; then\n"
       "  ip link set eth0 down; touch down; while [ ! -e sent ]; do sleep 0.05; done\n"
@@ -218,7 +218,7 @@ TEST_CASE("A robot whose interface is down loses frames and nothing else", "[tea
 TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][namespaces]") {
   const int signal = GENERATE(0, SIGINT, SIGKILL);
   CAPTURE(signal);
-  const Team team(
+  const ScriptedTeam team(
       "readlink /proc/self/ns/net > \"$out/network.new\"\n"
       "mv \"$out/network.new\" \"$out/network\"\n" +
       std::string(signal == 0 ? "exit 0" : "trap 'exit 0' INT; while :; do sleep 0.05; done"));
@@ -247,7 +247,7 @@ TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][
 }
 
 TEST_CASE("If networks are not allowed, a team with bad links does not start", "[team]") {
-  const Team team("echo started");
+  const ScriptedTeam team("echo started");
   const std::string links = team.folder.write("links.yaml", "").string();
   const std::string forbid =
       "unshare --user --map-root-user sh -c "
@@ -267,7 +267,7 @@ TEST_CASE("If networks are not allowed, a team with bad links does not start", "
 }
 
 TEST_CASE("A time limit asks the robots to end", "[team]") {
-  const Team team("trap 'exit 0' INT; while :; do sleep 0.05; done");
+  const ScriptedTeam team("trap 'exit 0' INT; while :; do sleep 0.05; done");
   CHECK(run_command(team.command + " --time-limit 2").exit_code == 0);
 }
 
@@ -299,7 +299,7 @@ TEST_CASE("How a robot ended elsewhere is read from its folder", "[team]") {
 }
 
 TEST_CASE("A report starts no robot and fails if one of the run did", "[team]") {
-  const Team team("exit 0");
+  const ScriptedTeam team("exit 0");
   const std::string command = team.command + " --report";
   team.folder.write("out/alice/summary.json", json_text(finished_summary()));
   const CommandResult half = run_command(command);
@@ -316,7 +316,7 @@ TEST_CASE("A report starts no robot and fails if one of the run did", "[team]") 
 }
 
 TEST_CASE("Input that cannot be run is refused with code 1", "[team]") {
-  const Team team("exit 0");
+  const ScriptedTeam team("exit 0");
   CHECK(run_command(team.command + " --robot-binary /nowhere/robot").exit_code == 1);
   const auto fast = run_command(team.command + " --rate fast");
   CHECK(fast.exit_code == 1);

@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr Stamp kSecond = 1'000'000'000;
-constexpr Stamp kBegin = 100 * kSecond;
+constexpr Stamp kRecordBegin = 100 * kSecond;
 
 SE3 at(double x, double y) {
   SE3 T = SE3::Identity();
@@ -43,7 +43,7 @@ std::vector<ViewUpdate> team() {
   std::vector<ViewUpdate> all;
   for (const RobotId robot : {RobotId{0}, RobotId{1}}) {
     const auto add = [&](ViewContent content) { all.push_back({robot, 9, 0, std::move(content)}); };
-    const Stamp begin = kBegin + robot * 10 * kSecond;
+    const Stamp begin = kRecordBegin + robot * 10 * kSecond;
     add(RobotSample{.name = robot == 0 ? "alice" : "bob", .phase = "running"});
     add(ViewKeyframes{false,
                       robot,
@@ -111,10 +111,10 @@ TEST_CASE("A viewer's record has the messages of each robot as the robot's own r
   const auto path = record.last<RosPath>("/bob/path");
   CHECK(path.header.frame == "bob/map");
   REQUIRE(path.poses.size() == 3);
-  CHECK(path.poses[1].header.stamp == kBegin + 11 * kSecond);
+  CHECK(path.poses[1].header.stamp == kRecordBegin + 11 * kSecond);
   CHECK(path.poses[1].pose.position == Eigen::Vector3d(1, 2, 0));
   const auto pose = record.last<RosPoseWithCovarianceStamped>("/bob/pose");  // corrected
-  CHECK(pose.header.stamp == kBegin + 25 * kSecond / 2);
+  CHECK(pose.header.stamp == kRecordBegin + 25 * kSecond / 2);
   CHECK(pose.pose.position == Eigen::Vector3d(2.5, 2, 0));
   CHECK(record.count("/bob/odometry") == 4);  // three keyframes, one pose
   CHECK(record.last<RosOdometry>("/bob/odometry").linear_velocity == Eigen::Vector3d(1, 0, 0));
@@ -187,7 +187,7 @@ TEST_CASE("A robot that was started again begins its path from scratch", "[viewe
   ViewRecorder recorder(file, {});
   for (const ViewUpdate& update : team()) recorder.add(update);
   recorder.add({1, 10, 0, RobotSample{.name = "bob", .phase = "running"}});
-  recorder.add({1, 10, 0, ViewKeyframes{false, 1, 0, {at(0, 0)}, {kBegin + 60 * kSecond}}});
+  recorder.add({1, 10, 0, ViewKeyframes{false, 1, 0, {at(0, 0)}, {kRecordBegin + 60 * kSecond}}});
   recorder.add({1, 10, 0, ViewKeyframes{true, 1, 0, {at(7, 0)}}});
   recorder.finish();
   const auto path = Record(file).last<RosPath>("/bob/path");
