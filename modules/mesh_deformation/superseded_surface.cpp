@@ -183,6 +183,11 @@ class ReplacementSearch {
   }
 
  private:
+  struct PlacedFace {
+    Eigen::Vector3f centroid;
+    std::uint32_t face;
+  };
+
   void compute_normals() {
     normals_.assign(mesh_.vertices.size(), Eigen::Vector3f::Zero());
     for (const auto& [a, b, c] : mesh_.faces) {
@@ -217,7 +222,7 @@ class ReplacementSearch {
     const auto& [a, b, c] = mesh_.faces[face];
     const Eigen::Vector3f centroid =
         (mesh_.vertices[a] + mesh_.vertices[b] + mesh_.vertices[c]) / 3.0F;
-    cells_[cell_of(centroid)].push_back(face);
+    cells_[cell_of(centroid)].push_back({centroid, face});
   }
 
   [[nodiscard]] std::uint32_t replacement_of(std::uint32_t v) const {
@@ -234,10 +239,11 @@ class ReplacementSearch {
   }
 
   // Adds the faces of a cell that show the surface of this vertex and have a higher rank.
-  void add_copies(const std::vector<std::uint32_t>& faces, std::uint32_t v, Copies& copies) const {
+  void add_copies(const std::vector<PlacedFace>& faces, std::uint32_t v, Copies& copies) const {
     const std::uint64_t own_rank = rank(certainty_[v], seen_by_[v][1]);
-    for (const std::uint32_t face : faces) {
+    for (const auto& [centroid, face] : faces) {
       if (rank_[face] <= own_rank) break;  // and so have all following faces
+      if ((centroid - mesh_.vertices[v]).squaredNorm() > reach_ * reach_) continue;
       if (keyframe_gap(face_seen_by_[face], seen_by_[v]) <= window_) continue;
       copies.add(face, face_seen_by_[face], distance_to(face, v));
     }
@@ -279,7 +285,7 @@ class ReplacementSearch {
   std::vector<std::uint32_t> replacements_;
   std::vector<char> is_judged_;
   // Faces that stay, by descending rank, in the cells of their centroids.
-  std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells_;
+  std::unordered_map<GridCell, std::vector<PlacedFace>, GridCellHash> cells_;
 };
 
 }  // namespace
