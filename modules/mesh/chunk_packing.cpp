@@ -130,7 +130,8 @@ std::vector<std::uint8_t> packed(const MeshChunk& chunk) {
   append(chunk.faces, Triples::kFaces, plain);
   plain.insert(plain.end(), chunk.labels.begin(), chunk.labels.end());
   for (std::size_t i = 0; i < 2; ++i)
-    append_differences(chunk.views, [i](const auto& views) { return views[i]; }, plain);
+    append_differences(
+        chunk.views, [i](const auto& views) { return views[i]; }, plain);
   append_differences(chunk.certainty, std::identity(), plain);
   // Compression succeeds with a buffer of this size.
   Bytes result(ZSTD_compressBound(plain.size()));
@@ -158,8 +159,10 @@ bool unpack(std::span<const std::uint8_t> bytes, const ChunkCounts& counts, Mesh
   chunk.views.resize(counts.vertices);
   chunk.certainty.resize(counts.vertices);
   for (std::size_t i = 0; i < 2; ++i)
-    take_differences(plain, [&](std::size_t v) -> auto& { return chunk.views[v][i]; }, counts);
-  take_differences(plain, [&](std::size_t v) -> auto& { return chunk.certainty[v]; }, counts);
+    take_differences(
+        plain, [&](std::size_t v) -> auto& { return chunk.views[v][i]; }, counts);
+  take_differences(
+      plain, [&](std::size_t v) -> auto& { return chunk.certainty[v]; }, counts);
   return true;
 }
 

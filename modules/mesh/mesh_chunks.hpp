@@ -89,8 +89,7 @@ inline constexpr std::size_t kChunkFixedBytes = 116;
 [[nodiscard]] inline std::size_t plain_bytes(const MeshChunk& chunk) {
   return plain_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
          kMeshKeyframeBytes * chunk.keyframes.size() + 2 * chunk.views.size() +
-         chunk.certainty.size() +
-         (chunk.odometry ? kChunkOdometryBytes : 0);
+         chunk.certainty.size() + (chunk.odometry ? kChunkOdometryBytes : 0);
 }
 
 /// The reason why `chunk` cannot be from split_mesh() (a string literal), or null. Received chunks

@@ -53,7 +53,8 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   if (largest_difference(anchors_, motion.T_after_before, T_result_optimized_, scale_) <= 1.0)
     return std::nullopt;
   T_result_optimized_ = motion.T_after_before;
-  MeshCorrection result{optimized_, report_, false, {}, 0, 0, {seen_by_, anchors_, mapped_, certainty_}};
+  MeshCorrection result{
+      optimized_, report_, false, {}, 0, 0, {seen_by_, anchors_, mapped_, certainty_}};
   result.mesh.transform(T_result_optimized_);
   for (SE3& pose : result.origin.T_world_kf) pose = T_result_optimized_ * pose;
   return result;

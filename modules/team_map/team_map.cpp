@@ -91,7 +91,8 @@ std::vector<RobotSurface> surfaces_near(const Box& box,
       const auto corners = corners_of(*placed, face);
       const Eigen::AlignedBox3f bounds = bounds_of(corners, fusion.reach_m());
       if (space.intersects(bounds) && !is_left_out(bounds, fusion))
-        surfaces.back().triangles.push_back({corners, label_of(chunk, face), weight_of(chunk, face)});
+        surfaces.back().triangles.push_back(
+            {corners, label_of(chunk, face), weight_of(chunk, face)});
     }
   }
   return surfaces;
