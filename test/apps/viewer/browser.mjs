@@ -110,8 +110,8 @@ class Page {
     return result.value;
   }
 
-  /** Waits until an expression is true. */
-  async until(expression, seconds = 60) {
+  /** Waits until an expression is true. On a busy machine a page is drawn late. */
+  async until(expression, seconds = 180) {
     const end = Date.now() + 1000 * seconds;
     while (Date.now() < end) {
       const value =
