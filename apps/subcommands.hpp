@@ -6,6 +6,7 @@
 #include <iostream>
 #include <string>
 
+#include "apps/command_line_error.hpp"
 #include "apps/program_version.hpp"
 
 namespace km {
@@ -24,12 +25,7 @@ inline int run_subcommands(const std::string& program, const char* about,
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    // An unknown word is often the reason why another one is missing.
-    const auto unknown = app.remaining(true);
-    const bool missing = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
-    missing && !unknown.empty() ? app.exit(CLI::ExtrasError(app.get_name(), unknown))
-                                : app.exit(error);
+    if (explain(app, error) == 0) return 0;
     if (app.get_subcommands().empty()) {
       std::cerr << program << ": the first word must be a subcommand:\n";
       for (const CLI::App* one : app.get_subcommands(nullptr)) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
+#include "apps/command_line_error.hpp"
 #include "apps/doctor/examine_live.hpp"
 #include "apps/doctor/examine_recording.hpp"
 #include "apps/doctor/examine_results.hpp"
@@ -100,7 +101,7 @@ Options parse_options(int argc, char** argv) {
     if (robot.from_s && robot.to_s && *robot.from_s >= *robot.to_s)
       throw CLI::ValidationError("--from is not before --to");
   } catch (const CLI::ParseError& error) {
-    std::exit(app.exit(error) == 0 ? 0 : kUnusable);
+    std::exit(explain(app, error) == 0 ? 0 : kUnusable);
   }
   return options;
 }

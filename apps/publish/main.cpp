@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "apps/command_line_error.hpp"
 #include "apps/program_version.hpp"
 #include "apps/publish/euroc_messages.hpp"
 #include "apps/publish/fix_messages.hpp"
@@ -118,7 +119,7 @@ Options parse_options(int argc, char** argv) {
     if (options.play.from_s >= options.play.to_s)
       throw CLI::ValidationError("--from is not before --to");
   } catch (const CLI::ParseError& error) {
-    std::exit(app.exit(error) == 0 ? 0 : kBadCommandLine);
+    std::exit(explain(app, error) == 0 ? 0 : kBadCommandLine);
   }
   return options;
 }

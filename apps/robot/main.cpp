@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "apps/command_line_error.hpp"
 #include "apps/program_version.hpp"
 #include "apps/robot/inspect.hpp"
 #include "apps/robot/robot_config.hpp"
@@ -266,7 +267,7 @@ RobotOptions parse_options(int argc, char** argv) {
     check_window(options);
     check_localize(options);
   } catch (const CLI::ParseError& error) {
-    std::exit(app.exit(error) == 0 ? 0 : kBadCommandLine);
+    std::exit(explain(app, error) == 0 ? 0 : kBadCommandLine);
   }
   if (options.name.empty()) options.name = "robot" + std::to_string(options.robot);
   return options;

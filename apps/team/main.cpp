@@ -4,6 +4,7 @@
 #include <iostream>
 #include <random>
 
+#include "apps/command_line_error.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_folder.hpp"
 #include "apps/program_version.hpp"
@@ -257,7 +258,7 @@ int main(int argc, char** argv) try {
                  "  kimera_multi_team --config team.yaml -- --set mapping.mode=off\n";
     return 1;
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
+    return explain(app, error) == 0 ? 0 : 1;
   }
   return run(options);
 } catch (const std::exception& error) {

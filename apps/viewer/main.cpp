@@ -7,6 +7,7 @@
 #include <set>
 #include <thread>
 
+#include "apps/command_line_error.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_version.hpp"
 #include "apps/viewer/page_message.hpp"
@@ -237,7 +238,7 @@ int main(int argc, char** argv) try {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : km::kBadCommandLine;
+    return km::explain(app, error) == 0 ? 0 : km::kBadCommandLine;
   }
   km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));

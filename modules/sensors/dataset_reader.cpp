@@ -20,6 +20,8 @@ const char* to_string(ReaderFault fault) {
       return "left images without a right one";
     case ReaderFault::kRightWithoutLeft:
       return "right images without a left one";
+    case ReaderFault::kImageWithoutTime:
+      return "images without a time";
     case ReaderFault::kMissingImage:
       return "missing images";
     case ReaderFault::kUnreadableImage:

@@ -26,6 +26,7 @@ enum class ReaderFault {
   kJumpingStamp,       ///< A stamp more than an hour away from most rows.
   kLeftWithoutRight,   ///< A left image without a right image within the tolerance.
   kRightWithoutLeft,   ///< A right image without a left image within the tolerance.
+  kImageWithoutTime,   ///< An image after the last row of the list of times.
   kMissingImage,       ///< An image that is listed, but not on disk.
   kUnreadableImage,    ///< A truncated or corrupt image, or one of an unknown format.
   kWrongImageSize,     ///< An image without the resolution of the calibration.

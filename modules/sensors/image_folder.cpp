@@ -214,6 +214,14 @@ std::string to_string(FolderLayout layout) {
   return "a folder";
 }
 
+// Counts the images whose numbers follow that of the last row of the times.
+void count_images_without_time(const fs::path& images, ImageFolder& recording) {
+  int number = recording.frames.back().line;  // numbers begin at 0, lines at 1
+  for (fs::path image; is_file(image = image_file(images, six_digits(number))); ++number)
+    recording.report.add(ReaderFault::kImageWithoutTime,
+                         image.string() + ": no row in " + recording.list.string());
+}
+
 ImageFolder read_kitti_folder(const fs::path& folder) {
   const bool is_gray = is_folder(folder / "image_0");
   const std::array<std::string, 2> numbers = {is_gray ? "0" : "2", is_gray ? "1" : "3"};
@@ -233,6 +241,7 @@ ImageFolder read_kitti_folder(const fs::path& folder) {
                              .depth = {},
                              .labels = {}});
   }
+  count_images_without_time(images[0], result);
   const fs::path calib = folder / "calib.txt";
   const std::array<ListedProjection, 2> P = {read_projection(calib, "P" + numbers[0]),
                                              read_projection(calib, "P" + numbers[1])};

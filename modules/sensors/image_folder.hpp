@@ -47,7 +47,8 @@ struct ImageFolder {
 /// KITTI odometry. Row k of times.txt is the time [s] of image k in image_0 and image_1, whose name
 /// has six digits (image_2 and image_3 without a folder image_0). calib.txt has the projections of
 /// the rectified cameras: `P0: ` and 12 numbers, row by row. Throws DatasetError with file, line
-/// and value for a calibration or list that cannot be used. Faulty rows of times.txt are counted.
+/// and value for a calibration or list that cannot be used. Faulty rows of times.txt are counted,
+/// and images after the last row.
 [[nodiscard]] ImageFolder read_kitti_folder(const std::filesystem::path& folder);
 
 /// TUM RGB-D. Rows of rgb.txt and depth.txt are `time [s], file`. An image has the depth image that

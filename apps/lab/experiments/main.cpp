@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "apps/command_line_error.hpp"
 #include "apps/lab/experiments/report.hpp"
 #include "apps/lab/experiments/run_inputs.hpp"
 #include "apps/lab/experiments/run_steps.hpp"
@@ -230,7 +231,7 @@ int main(int argc, char** argv) try {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
+    return explain(app, error) == 0 ? 0 : 1;
   }
   const Setup setup = setup_of(options, run_command->parsed());
   const km::ExperimentConfig config = km::read_experiments(setup.config, setup.quick);

@@ -2,6 +2,7 @@
 #include <exception>
 #include <iostream>
 
+#include "apps/command_line_error.hpp"
 #include "apps/lab/simulate/simulate.hpp"
 #include "apps/program_version.hpp"
 
@@ -40,7 +41,7 @@ int main(int argc, char** argv) try {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 1;
+    return km::explain(app, error) == 0 ? 0 : 1;
   }
   options = km::completed(options);
   km::SignalWatch signals;

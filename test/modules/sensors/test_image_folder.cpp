@@ -130,6 +130,13 @@ TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out an
     fs::remove(folder.path() / "image_0/000000.png");
     check(ReaderFault::kMissingImage, "000000.png", 3);
   }
+  SECTION("images without a time") {
+    folder.write("times.txt", "0.0\n0.1\n0.2\n");
+    const ReaderReport report = open_folder(folder.path())->report();
+    REQUIRE(report.count(ReaderFault::kImageWithoutTime) == 1);
+    CHECK_THAT(report.entries().at(ReaderFault::kImageWithoutTime).first,
+               Catch::Contains("image_0/000003.png: no row in") && Catch::Contains("times.txt"));
+  }
   SECTION("no time at all") {
     folder.write("times.txt", "\n");
     CHECK_THROWS_WITH(open_folder(folder.path()), Catch::Contains("times.txt: no time in it"));
