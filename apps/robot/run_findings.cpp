@@ -253,7 +253,8 @@ void add_images_alone(const RunSummary& run, std::vector<Finding>& findings) {
                       .severity = Severity::kNote,
                       .what = run.name + ": odometry by images alone, without an inertial sensor",
                       .means = "gravity is unknown: z of poses and maps is the upward direction of "
-                               "the camera at the first image, not the vertical, and no pose is "
+                               "the camera at the first image, not the vertical (map.yaml needs a "
+                               "level camera there), and no pose is "
                                "known while vision is lost for more than a second",
                       .to_do = ""});
 }

@@ -258,7 +258,7 @@ int main(int argc, char** argv) try {
                  "  kimera_multi_team --config team.yaml -- --set mapping.mode=off\n";
     return 1;
   } catch (const CLI::ParseError& error) {
-    return explain(app, error) == 0 ? 0 : 1;
+    return km::explain(app, error) == 0 ? 0 : 1;
   }
   return run(options);
 } catch (const std::exception& error) {

@@ -342,6 +342,15 @@ std::map<KeyframeId, SE3> TeamAgent::held_poses(const SE3& T_world_frame) const 
   return held;
 }
 
+// That of the last session until the present one has evaluated its own.
+TeamAgent::Objective TeamAgent::objective() const {
+  if (!part_) return objective_before_;
+  const Session& session = part_->session();
+  if (session.finished) return {session.cost, session.gradient};
+  const auto& state = part_->state();
+  return state.cost > 0.0 ? Objective{state.cost, state.gradient} : objective_before_;
+}
+
 OptimizerProgress TeamAgent::make_progress() const {
   const auto world = tied_world();
   OptimizerProgress progress{.anchor = world ? world->anchor : self_.robot,
@@ -352,6 +361,9 @@ OptimizerProgress TeamAgent::make_progress() const {
   progress.fixes = fixes_state();
   progress.odometry_breaks = static_cast<std::uint32_t>(graph_.odometry_breaks().size());
   progress.round = rounds_before_;
+  const Objective objective = this->objective();
+  progress.cost = objective.cost;
+  progress.gradient_norm = objective.gradient;
   progress.seconds = optimising_s_;
   if (!part_) return progress;
   const Session& session = part_->session();
@@ -361,8 +373,6 @@ OptimizerProgress TeamAgent::make_progress() const {
     progress.not_joined = ties_.not_joined;
   }
   progress.round += part_->state().round;
-  progress.cost = session.finished ? session.cost : part_->state().cost;
-  progress.gradient_norm = session.finished ? session.gradient : part_->state().gradient;
   progress.seconds += part_->last_activity_s() - part_->started_s();
   progress.settled = !in_session() && session.finished && !publish_due_ && holds_all(session.plan);
   return progress;

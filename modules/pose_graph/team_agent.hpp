@@ -136,6 +136,11 @@ class TeamAgent {
   }
 
  private:
+  struct Objective {
+    double cost = 0.0;
+    double gradient = 0.0;
+  };
+
   enum class SessionState {
     kNone,  // there has been no session
     kRunning,
@@ -212,6 +217,7 @@ class TeamAgent {
   [[nodiscard]] std::optional<World> world_of_datum() const;
   [[nodiscard]] std::optional<FixesState> fixes_state() const;
   void publish(TeamOutput& output);
+  [[nodiscard]] Objective objective() const;
   [[nodiscard]] OptimizerProgress make_progress() const;
   [[nodiscard]] bool holds_all(const SessionPlan& plan) const;
 
@@ -239,6 +245,7 @@ class TeamAgent {
   std::optional<SessionPart> part_;
   SessionState state_ = SessionState::kNone;  // state of the session of part_
   bool reconsider_due_ = false;               // once all members have sent the solution
+  Objective objective_before_;                // in the session before
   std::uint32_t rounds_before_ = 0;           // rounds of earlier sessions
   double optimising_s_ = 0.0;                 // in earlier sessions
   std::uint64_t sent_bytes_ = 0;              // for sessions

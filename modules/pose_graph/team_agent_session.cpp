@@ -206,6 +206,7 @@ bool TeamAgent::join(const Session& session) {
   const bool alone = session.plan.members.size() == 1;
   decisions_.begin_session(!alone);
   if (part_) {
+    objective_before_ = objective();
     rounds_before_ += part_->state().round;
     optimising_s_ += part_->last_activity_s() - part_->started_s();
   }

@@ -221,7 +221,12 @@ TEST_CASE("the others complete a session when a member stops, and it catches up 
     packets += std::holds_alternative<TeamStatus>(*packet.message) ? 0 : 1;
   };
   std::map<RobotId, std::vector<SessionId>> sessions;
+  std::map<RobotId, double> costs;
   network.on_step = [&](const TeamNetwork::Robot& robot) {
+    // A session that begins states the cost of the one before.
+    double& cost = costs[robot.peer.robot];
+    if (cost > 0.0) CHECK(robot.progress.cost > 0.0);
+    cost = robot.progress.cost;
     std::vector<SessionId>& of_robot = sessions[robot.peer.robot];
     const SessionId& id = robot.agent->part()->session().id;
     if (of_robot.empty() || of_robot.back() != id) of_robot.push_back(id);
