@@ -231,7 +231,7 @@ int main(int argc, char** argv) try {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return explain(app, error) == 0 ? 0 : 1;
+    return km::explain(app, error) == 0 ? 0 : 1;
   }
   const Setup setup = setup_of(options, run_command->parsed());
   const km::ExperimentConfig config = km::read_experiments(setup.config, setup.quick);
