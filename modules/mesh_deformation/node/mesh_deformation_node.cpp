@@ -142,8 +142,10 @@ void MeshDeformationNode::correct() {
   const double start_s = steady_now_s();
   std::optional<MeshCorrection> correction =
       ended_ ? corrector_.correct_from_scratch(input()) : corrector_.correct(input());
-  corrected_ = handled_;
-  if (!correction) return;
+  if (!correction) {
+    corrected_ = handled_;
+    return;
+  }
   const double end_s = steady_now_s();
   next_s_ = end_s + config_.period_s;
   timing_.add(end_s - start_s);
@@ -165,6 +167,7 @@ void MeshDeformationNode::correct() {
     superseded_.publish(std::move(correction->superseded));
   report(result);
   optimized_.publish(std::move(result));
+  corrected_ = handled_;  // whoever sees this finds the mesh published
 }
 
 void MeshDeformationNode::report(const OptimizedMesh& result) const {
