@@ -48,13 +48,13 @@ std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& inpu
   check_trajectories(input.T_odom_kf, input.T_world_kf);
   std::vector<SE3> anchors = complete(input.T_odom_kf, input.T_world_kf);
   if (input.map_version != map_version_) return deform(input, std::move(anchors));
-  const KeyframeMotion motion = keyframe_motion(anchors_, anchors, scale_);
+  const KeyframeMotion motion = keyframe_motion(origin_.T_world_kf, anchors, scale_);
   if (motion.non_rigid > 1.0) return deform(input, std::move(anchors));
-  if (largest_difference(anchors_, motion.T_after_before, T_result_optimized_, scale_) <= 1.0)
+  if (largest_difference(origin_.T_world_kf, motion.T_after_before, T_result_optimized_, scale_) <=
+      1.0)
     return std::nullopt;
   T_result_optimized_ = motion.T_after_before;
-  MeshCorrection result{
-      optimized_, report_, false, {}, 0, 0, {seen_by_, anchors_, mapped_, certainty_}};
+  MeshCorrection result{optimized_, report_, false, {}, 0, 0, origin_};
   result.mesh.transform(T_result_optimized_);
   for (SE3& pose : result.origin.T_world_kf) pose = T_result_optimized_ * pose;
   return result;
@@ -71,7 +71,7 @@ MeshCorrection MeshCorrector::correct_from_scratch(const CorrectionInput& input)
 // For each vertex of optimized_, which are those of the map, whether later views saw through it.
 std::vector<bool> MeshCorrector::seen_through(const CorrectionInput& input) const {
   const std::vector<Eigen::Vector3f>& vertices = optimized_.vertices;
-  const std::size_t known = std::min(input.covariances.size(), anchors_.size());
+  const std::size_t known = std::min(input.covariances.size(), origin_.T_world_kf.size());
   if (seen_through_views_ == 0 || known == 0 || input.map.voxel_m <= 0.0)
     return std::vector(vertices.size(), false);
   std::vector<SightPoint> points;
@@ -87,7 +87,7 @@ std::vector<bool> MeshCorrector::seen_through(const CorrectionInput& input) cons
     if (view->keyframe >= known) break;
     if (std::exchange(keyframe, view->keyframe) != view->keyframe)
       sigmas = relative_sigmas(input.covariances.first(known), keyframe);
-    const SE3 T_world_odom = anchors_[keyframe] * input.T_odom_kf[keyframe].inverse();
+    const SE3 T_world_odom = origin_.T_world_kf[keyframe] * input.T_odom_kf[keyframe].inverse();
     votes.add(*view, T_world_odom * view->T_odom_cam, view->keyframe, sigmas);
   }
   return votes.seen_through(seen_through_views_);
@@ -96,7 +96,7 @@ std::vector<bool> MeshCorrector::seen_through(const CorrectionInput& input) cons
 // True if a search for copies is due. It takes long, and follows the growth of the mesh. All
 // vertices stay if the config keeps all copies, or if the map has an unknown voxel size or no ids,
 // by which the mapper drops vertices.
-bool MeshCorrector::may_have_many_copies(const MapMesh& map) const {
+bool MeshCorrector::has_many_copies(const MapMesh& map) const {
   const std::size_t faces = map.mesh.faces.size();
   return duplicate_voxels_ > 0.0 && map.voxel_m > 0.0 && !map.ids.empty() &&
          faces > duplicate_faces_ &&
@@ -134,7 +134,7 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   const MapMesh& map = input.map;
   DeformedMesh deformed = optimizer_.optimize(map, input.T_odom_kf, input.T_world_kf);
   map_version_ = input.map_version;
-  anchors_ = std::move(anchors);
+  origin_.T_world_kf = std::move(anchors);
   optimized_ = std::move(deformed.mesh);
   report_ = deformed.report;
   T_result_optimized_ = SE3::Identity();
@@ -142,28 +142,22 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   std::vector<std::uint32_t> kept = remove_seen_through(optimized_, seen_through(input));
   const std::size_t present = optimized_.faces.size();
   SupersededSurface dropped;
-  if (may_have_many_copies(map)) {
+  if (has_many_copies(map)) {
     const std::vector<std::uint32_t> replacements = copies_in(map, kept);
     dropped = droppable(map, kept, replacements);
     distinct_faces_ = faces_after(map, dropped);
-    if (may_have_many_copies(map)) {
+    if (has_many_copies(map)) {
       keep_elements(kept, remaining_vertices(optimized_, replacements));
       optimized_ = without_superseded(optimized_, replacements);
     } else {
       dropped = {};
     }
   }
-  seen_by_ = elements_of(map.seen_by, kept);
-  certainty_ = elements_of(map.certainty, kept);
-  mapped_ = elements_of(map.mesh.vertices, kept);
+  origin_.seen_by = elements_of(map.seen_by, kept);
+  origin_.mapped = elements_of(map.mesh.vertices, kept);
+  origin_.certainty = elements_of(map.certainty, kept);
   const std::size_t superseded = present - optimized_.faces.size();
-  return {optimized_,
-          report_,
-          true,
-          std::move(dropped),
-          superseded,
-          all - present,
-          {seen_by_, anchors_, mapped_, certainty_}};
+  return {optimized_, report_, true, std::move(dropped), superseded, all - present, origin_};
 }
 
 }  // namespace km

@@ -69,7 +69,7 @@ class MeshCorrector {
  private:
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
   [[nodiscard]] std::vector<bool> seen_through(const CorrectionInput& input) const;
-  [[nodiscard]] bool may_have_many_copies(const MapMesh& map) const;
+  [[nodiscard]] bool has_many_copies(const MapMesh& map) const;
   [[nodiscard]] std::vector<std::uint32_t> copies_in(const MapMesh& map,
                                                      const std::vector<std::uint32_t>& kept) const;
   [[nodiscard]] SupersededSurface droppable(const MapMesh& map,
@@ -89,11 +89,8 @@ class MeshCorrector {
   std::vector<std::uint64_t> gone_;  // vertices of the map that had been seen through, ascending
   // State of the last optimisation.
   std::optional<std::uint64_t> map_version_;
-  std::vector<SE3> anchors_;  // complete() of the trajectory
   LabelledMesh optimized_;
-  std::vector<SeenBy> seen_by_;          // keyframes of the vertices of optimized_
-  std::vector<Eigen::Vector3f> mapped_;  // positions of the vertices of optimized_ in the map
-  std::vector<std::uint8_t> certainty_;  // certainty of the vertices of optimized_
+  MeshOrigin origin_;  // of optimized_; its poses are complete() of the trajectory
   MeshDeformationReport report_;
   SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };

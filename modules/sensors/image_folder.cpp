@@ -219,7 +219,7 @@ void count_images_without_time(const fs::path& images, ImageFolder& recording) {
   int number = recording.frames.back().line;  // numbers begin at 0, lines at 1
   for (fs::path image; is_file(image = image_file(images, six_digits(number))); ++number)
     recording.report.add(ReaderFault::kImageWithoutTime,
-                         image.string() + ": no row in " + recording.list.string());
+                         image.string() + ": no time in " + recording.list.string());
 }
 
 ImageFolder read_kitti_folder(const fs::path& folder) {

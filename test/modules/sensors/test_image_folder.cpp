@@ -135,7 +135,7 @@ TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out an
     const ReaderReport report = open_folder(folder.path())->report();
     REQUIRE(report.count(ReaderFault::kImageWithoutTime) == 1);
     CHECK_THAT(report.entries().at(ReaderFault::kImageWithoutTime).first,
-               Catch::Contains("image_0/000003.png: no row in") && Catch::Contains("times.txt"));
+               Catch::Contains("image_0/000003.png: no time in") && Catch::Contains("times.txt"));
   }
   SECTION("no time at all") {
     folder.write("times.txt", "\n");
