@@ -90,7 +90,7 @@ class MeshCorrector {
   // State of the last optimisation.
   std::optional<std::uint64_t> map_version_;
   LabelledMesh optimized_;
-  MeshOrigin origin_;  // of optimized_; its poses are complete() of the trajectory
+  MeshOrigin origin_;  // that of optimized_; its poses are complete() of the trajectory
   MeshDeformationReport report_;
   SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
 };

@@ -167,7 +167,7 @@ void MeshDeformationNode::correct() {
     superseded_.publish(std::move(correction->superseded));
   report(result);
   optimized_.publish(std::move(result));
-  corrected_ = handled_;  // whoever sees this finds the mesh published
+  corrected_ = handled_;  // not before the mesh is published
 }
 
 void MeshDeformationNode::report(const OptimizedMesh& result) const {
