@@ -315,6 +315,7 @@ TEST_CASE("Messages to a robot reach its resumed process and not its next incarn
   }
   REQUIRE(a.receives(PeerEventKind::kLeft, 4));
   a.ping_one(4, 1);  // while it is away
+  REQUIRE(eventually([&] { return a.traffic(Direction::kOut, true).count.messages == 2; }));
 
   TestRobot second(domain, next, nullptr, TopicKind::kEvent, TopicKind::kEvent);
   second.start();
