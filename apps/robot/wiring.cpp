@@ -356,7 +356,7 @@ void Robot::add_network(CrossingEnds meshes) {
                overlay_->guard<KeyframeBow>(OverlayStream::kBag, [](const KeyframeBow& bow) {
                  return std::optional(bow.id);
                }));
-  // The reply to a request of 60 bytes has up to 9 kB.
+  // The reply to a request of 60 bytes has up to 4 kB.
   dds.exchange(t.requests.direct, kRequest, kGeometricVerification, {},
                {.per_second = 30, .burst = 60});
   dds.exchange(t.replies.direct, kRequest, kGeometricVerification, {}, {},

@@ -12,8 +12,8 @@ struct LoopClosureConfig {
 
   double keypoint_noise_px = 0.7;
   double disparity_noise_px = 0.3;
-  double max_match_ratio = 0.85;
-  int max_match_distance = 64;
+  double max_match_ratio = 0.88;
+  int max_match_distance = 24;
   int max_ransac_iterations = 2000;
   int min_consensus = 12;
   int min_inliers = 15;
@@ -41,8 +41,8 @@ struct LoopClosureConfig {
                   "[px] standard deviation of the disparity of a keypoint's stereo match");
     visitor.field("max_match_ratio", max_match_ratio, {0.1, 1.0},
                   "largest ratio of the best to the second best descriptor distance of a match");
-    visitor.field("max_match_distance", max_match_distance, {1, 256},
-                  "[bit of 256] largest descriptor distance of a match");
+    visitor.field("max_match_distance", max_match_distance, {1, 96},
+                  "[bit of 96] largest descriptor distance of a match");
     visitor.field("max_ransac_iterations", max_ransac_iterations, {10, 1000000},
                   "maximum number of samples; more samples find poses among more wrong matches, "
                   "and take longer");
@@ -88,7 +88,7 @@ struct LoopClosureConfig {
     visitor.field("min_word_share", min_word_share, {0.0, 1.0},
                   "least share of those keypoints that must agree");
     visitor.field("reply_keypoints", reply_keypoints, {50, 100000},
-                  "maximum number of keypoints of a keyframe sent to a peer, 40 B each: those most "
+                  "maximum number of keypoints of a keyframe sent to a peer, 17 B each: those most "
                   "likely to correspond, down to a quarter of this number, see chosen_by_words()");
     visitor.field("full_keyframes", full_keyframes, {1, 1000000},
                   "number of newest own keyframes in memory with all keypoints, 48 B each; older "

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <tuple>
@@ -12,20 +13,40 @@
 namespace km {
 namespace {
 
+// The matched bytes of a descriptor, as machine words.
+struct MatchedBits {
+  std::uint64_t low = 0;
+  std::uint32_t high = 0;
+};
+static_assert(kMatchedBytes == sizeof(MatchedBits::low) + sizeof(MatchedBits::high));
+
+MatchedBits matched_bits(const BinaryDescriptor& descriptor) {
+  MatchedBits bits;
+  std::memcpy(&bits.low, descriptor.data(), sizeof bits.low);
+  std::memcpy(&bits.high, descriptor.data() + sizeof bits.low, sizeof bits.high);
+  return bits;
+}
+
+[[gnu::always_inline]] inline std::uint32_t distance_of(const MatchedBits& a,
+                                                        const MatchedBits& b) {
+  return static_cast<std::uint32_t>(__builtin_popcountll(a.low ^ b.low) +
+                                    __builtin_popcount(a.high ^ b.high));
+}
+
 struct Nearest {
   std::uint32_t index = 0;
   std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
 };
 
-[[gnu::always_inline]] inline std::vector<Match> match_all(const std::vector<DescriptorBits>& a,
-                                                           const std::vector<DescriptorBits>& b,
+[[gnu::always_inline]] inline std::vector<Match> match_all(const std::vector<MatchedBits>& a,
+                                                           const std::vector<MatchedBits>& b,
                                                            const MatchRules& rules) {
   std::vector<Match> matches;
   std::vector<Nearest> nearest_of_b(b.size());
   for (std::uint32_t i = 0; i < a.size(); ++i) {
     Nearest best, second;
     for (std::uint32_t j = 0; j < b.size(); ++j) {
-      const std::uint32_t distance = hamming_distance(a[i], b[j]);
+      const std::uint32_t distance = distance_of(a[i], b[j]);
       if (distance < nearest_of_b[j].distance) nearest_of_b[j] = {i, distance};
       if (distance >= second.distance) continue;
       second = {j, distance};
@@ -39,23 +60,23 @@ struct Nearest {
   return matches;
 }
 
-std::vector<Match> match_portable(const std::vector<DescriptorBits>& a,
-                                  const std::vector<DescriptorBits>& b, const MatchRules& rules) {
+std::vector<Match> match_portable(const std::vector<MatchedBits>& a,
+                                  const std::vector<MatchedBits>& b, const MatchRules& rules) {
   return match_all(a, b, rules);
 }
 
 #if defined(__x86_64__)
-[[gnu::target("popcnt")]] std::vector<Match> match_popcount(const std::vector<DescriptorBits>& a,
-                                                            const std::vector<DescriptorBits>& b,
+[[gnu::target("popcnt")]] std::vector<Match> match_popcount(const std::vector<MatchedBits>& a,
+                                                            const std::vector<MatchedBits>& b,
                                                             const MatchRules& rules) {
   return match_all(a, b, rules);
 }
 #endif
 
-std::vector<DescriptorBits> bits_of(std::span<const BinaryDescriptor> descriptors) {
-  std::vector<DescriptorBits> bits;
+std::vector<MatchedBits> bits_of(std::span<const BinaryDescriptor> descriptors) {
+  std::vector<MatchedBits> bits;
   bits.reserve(descriptors.size());
-  for (const BinaryDescriptor& descriptor : descriptors) bits.push_back(to_bits(descriptor));
+  for (const BinaryDescriptor& descriptor : descriptors) bits.push_back(matched_bits(descriptor));
   return bits;
 }
 
@@ -134,7 +155,7 @@ std::optional<Candidate> best_near(const Projection& projection, const BinaryDes
                                    const GuidedMatchRules& rules) {
   // Several octaves show one corner, so a keypoint this close to the best one is no second best.
   constexpr double kSameCorner_px = 3.0;
-  const DescriptorBits query = to_bits(descriptor);
+  const MatchedBits query = matched_bits(descriptor);
   const double disparity_scale = features.focal_px * features.baseline_m;
   std::vector<Candidate> near;
   grid.near(projection.pixel, [&](std::uint32_t i) {
@@ -142,7 +163,7 @@ std::optional<Candidate> best_near(const Projection& projection, const BinaryDes
     const Keypoint& keypoint = features.keypoints[i];
     const double off = static_cast<double>(keypoint.inverse_depth) - projection.inverse_depth;
     if (keypoint.has_depth() && std::abs(off) * disparity_scale > rules.radius_px) return;
-    const unsigned bits = hamming_distance(query, to_bits(features.descriptors[i]));
+    const std::uint32_t bits = distance_of(query, matched_bits(features.descriptors[i]));
     near.push_back({i, static_cast<int>(bits)});
   });
   const auto best = std::min_element(near.begin(), near.end(), [](const auto& l, const auto& r) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,19 +10,25 @@
 
 namespace km {
 
+/// Descriptors are matched by their first bytes: 96 of 256 tests. The tests of ORB are sorted by a
+/// greedy search for tests of high variance that are independent of those before (Rublee et al.,
+/// "ORB", ICCV 2011, Sec. 4.3), so the first ones distinguish points best. Words need all tests.
+/// The module's README compares numbers of bytes.
+inline constexpr std::size_t kMatchedBytes = 12;
+
 /// Keypoint `a` of one keyframe and similar keypoint `b` of another.
 struct Match {
   std::uint32_t a = 0;
   std::uint32_t b = 0;
-  int distance = 0;  ///< Hamming distance of the descriptors, 0 to 256.
+  int distance = 0;  ///< Hamming distance of the matched bytes, 0 to 96.
 
   auto operator<=>(const Match&) const = default;
 };
 
 /// Conditions for a pair of descriptors to be a match.
 struct MatchRules {
-  double max_ratio = 0.85;  ///< Best distance over second best, as seen from a.
-  int max_distance = 64;    ///< [bit]
+  double max_ratio = 0.88;  ///< Best distance over second best, as seen from a.
+  int max_distance = 24;    ///< [bit]
 };
 
 /// Pairs that are each other's nearest descriptor and pass `rules` (the ratio is that of Lowe,
@@ -36,7 +43,7 @@ struct MatchRules {
 struct GuidedMatchRules {
   double radius_px = 8.0;  ///< Around the projection, at the finest level.
   double max_ratio = 0.9;  ///< Best distance over second best inside the radius.
-  int max_distance = 64;   ///< [bit]
+  int max_distance = 24;   ///< [bit]
 };
 
 /// Matches under a known pose. Every point with depth of either keyframe is projected into the

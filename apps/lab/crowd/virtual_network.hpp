@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cstddef>
 
 namespace km {
@@ -18,7 +19,8 @@ namespace km {
   return 32 + 6 * points;
 }
 [[nodiscard]] constexpr std::size_t reply_bytes(std::size_t keypoints) {
-  return 336 + 40 * keypoints;
+  const std::size_t number_bits = 2 * static_cast<std::size_t>(std::bit_width(keypoints + 1)) - 1;
+  return 332 + (number_bits + 133 * keypoints + 7) / 8;
 }
 [[nodiscard]] constexpr std::size_t closure_bytes() {
   return 700;

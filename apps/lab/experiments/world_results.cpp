@@ -50,25 +50,7 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-constexpr double kKeypointBytes = 40.0;  // idl/loop_closure.idl
-
-// Sums of traffic.csv grow with time, so the last row of each peer counts.
-std::optional<double> mean_keyframe_bytes(const fs::path& traffic) {
-  const std::string text = text_of(traffic);
-  std::map<std::string, std::pair<double, double>> per_peer;  // messages, bytes
-  for (const TextRow& row : split_rows(text)) {
-    if (row.fields.size() < 7 || row.fields[1] != "out" || row.fields[2] != "keyframe_replies")
-      continue;
-    per_peer[std::string(row.fields[4])] = {parse_double(row.fields[5]).value_or(0.0),
-                                            parse_double(row.fields[6]).value_or(0.0)};
-  }
-  double messages = 0.0, bytes = 0.0;
-  for (const auto& [peer, sums] : per_peer) {
-    messages += sums.first;
-    bytes += sums.second;
-  }
-  return messages > 0.0 ? std::optional<double>(bytes / messages) : std::nullopt;
-}
+constexpr double kKeypointBytes = 40.0;  // 8 of position and 32 of descriptor
 
 std::map<std::string, double> module_seconds(const fs::path& timing) {
   const std::string text = text_of(timing);
@@ -114,9 +96,8 @@ RobotNumbers read_robot(const Json& team, const RobotPlan& plan, const fs::path&
     if (bytes.is_number()) robot.sent_bytes[category] = bytes.get<double>();
   add_process(run / plan.name, summary, robot);
   const double keypoints = number_at(summary, "/keypoints").value_or(0.0);
-  robot.keyframe_bytes = keypoints > 0.0 && keyframes > 0.0
-                             ? keypoints * kKeypointBytes / keyframes
-                             : mean_keyframe_bytes(run / plan.name / "traffic.csv");
+  if (keypoints > 0.0 && keyframes > 0.0)
+    robot.keyframe_bytes = keypoints * kKeypointBytes / keyframes;
   robot.mesh = mesh_of(team, plan.name);
   return robot;
 }

@@ -2,10 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
-#include <span>
 #include <utility>
 
+#include "modules/loop_closure/packed_features.hpp"
 #include "modules/loop_closure/packed_word_points.hpp"
 #include "runtime/dds/codec.hpp"
 #include "runtime/dds/wire_pose.hpp"
@@ -13,95 +12,12 @@
 namespace km {
 namespace {
 
-constexpr float kBearingSteps = 32767.0F;
-constexpr float kDepthSteps = 65535.0F;
-constexpr float kMaxBearing = 100.0F;     // 89.4 degrees off the optical axis
-constexpr float kMaxInverseDepth = 1e4F;  // [1/m]: 0.1 mm before the lens
-constexpr double kMaxBaseline_m = 1e3;
-constexpr double kMaxFocal_px = 1e6;
-constexpr std::uint8_t kMaxOctave = 31;
 constexpr std::uint32_t kMaxInliers = 1U << 20U;
 constexpr float kMaxSimilarity = 1e6F;
 
 bool in_range(float value, float max) {
   return value >= 0.0F && value <= max;
 }  // false for NaN
-
-// Quantisation steps, chosen so that the largest value uses the full range.
-struct Steps {
-  float bearing = 0.0F;
-  float inverse_depth = 0.0F;
-};
-
-Steps steps_of(const KeyframeFeatures& features) {
-  Steps largest;
-  for (const Keypoint& point : features.keypoints) {
-    largest.bearing = std::max(largest.bearing, point.bearing.cwiseAbs().maxCoeff());
-    largest.inverse_depth = std::max(largest.inverse_depth, point.inverse_depth);
-  }
-  return {largest.bearing / kBearingSteps, largest.inverse_depth / kDepthSteps};
-}
-
-static_assert(sizeof(km_wire_Keypoint::descriptor) == kDescriptorBytes, "see idl/loop_closure.idl");
-
-km_wire_Keypoint to_wire(const Keypoint& point, const BinaryDescriptor& descriptor,
-                         const Steps& steps) {
-  const auto bearing = [&](float value) {
-    return static_cast<std::int16_t>(steps.bearing > 0.0F ? std::lround(value / steps.bearing)
-                                                          : 0L);
-  };
-  km_wire_Keypoint wire{};
-  wire.bearing[0] = bearing(point.bearing.x());
-  wire.bearing[1] = bearing(point.bearing.y());
-  // Rounding must not turn a known depth into 0, which means unknown.
-  if (point.has_depth())
-    wire.inverse_depth = static_cast<std::uint16_t>(
-        std::max(1L, std::lround(point.inverse_depth / steps.inverse_depth)));
-  wire.octave = point.octave;
-  std::copy(descriptor.begin(), descriptor.end(), wire.descriptor);
-  return wire;
-}
-
-Keypoint from_wire(const km_wire_Keypoint& wire, const Steps& steps) {
-  Keypoint point;
-  point.bearing = steps.bearing * Eigen::Vector2f(wire.bearing[0], wire.bearing[1]);
-  point.inverse_depth = steps.inverse_depth * static_cast<float>(wire.inverse_depth);
-  point.octave = wire.octave;
-  return point;
-}
-
-using WireKeypoints = std::span<const km_wire_Keypoint>;
-
-// Reason why the features of a reply cannot be used, or nullptr.
-const char* refusal(const km_wire_KeyframeReply& wire, WireKeypoints keypoints) {
-  if (!in_range(wire.bearing_step, kMaxBearing / kBearingSteps)) return "bearings out of range";
-  if (!in_range(wire.inverse_depth_step, kMaxInverseDepth / kDepthSteps))
-    return "depths out of range";
-  if (!in_range(wire.focal_px, kMaxFocal_px)) return "focal length out of range";
-  if (!in_range(wire.baseline_m, kMaxBaseline_m)) return "baseline out of range";
-  if (!keypoints.empty() && !(wire.focal_px > 0.0F && wire.baseline_m > 0.0F))
-    return "keypoints without focal length or baseline";
-  for (const km_wire_Keypoint& point : keypoints)
-    if (point.octave > kMaxOctave) return "octave out of range";
-  return nullptr;
-}
-
-KeyframeFeatures features_of(const km_wire_KeyframeReply& wire, WireKeypoints keypoints,
-                             const SE3& T_body_cam) {
-  KeyframeFeatures features;
-  features.T_body_cam = T_body_cam;
-  features.focal_px = static_cast<double>(wire.focal_px);
-  features.baseline_m = static_cast<double>(wire.baseline_m);
-  features.keypoints.reserve(keypoints.size());
-  features.descriptors.reserve(keypoints.size());
-  const Steps steps{wire.bearing_step, wire.inverse_depth_step};
-  for (const km_wire_Keypoint& point : keypoints) {
-    features.keypoints.push_back(from_wire(point, steps));
-    std::copy(std::begin(point.descriptor), std::end(point.descriptor),
-              features.descriptors.emplace_back().begin());
-  }
-  return features;
-}
 
 }  // namespace
 
@@ -157,22 +73,14 @@ Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& 
   Encoded encoded;
   Wire& wire = encoded.wire;
   const Keyframe& keyframe = reply.keyframe;
-  const KeyframeFeatures& features = keyframe.features;
   wire.keyframe = to_wire(keyframe.odometry.id);
   wire.request = reply.number;
   wire.found = reply.found;
   wire.odometry = to_wire(keyframe.odometry);
   wire.stamp = keyframe.stamp;
-  wire.T_body_cam = to_wire(features.T_body_cam);
-  wire.focal_px = static_cast<float>(features.focal_px);
-  wire.baseline_m = static_cast<float>(features.baseline_m);
-  const Steps steps = steps_of(features);
-  wire.bearing_step = steps.bearing;
-  wire.inverse_depth_step = steps.inverse_depth;
-  encoded.keypoints.reserve(features.keypoints.size());
-  for (std::size_t i = 0; i < features.keypoints.size(); ++i)
-    encoded.keypoints.push_back(to_wire(features.keypoints[i], features.descriptors[i], steps));
-  borrow(wire.keypoints, encoded.keypoints);
+  wire.T_body_cam = to_wire(keyframe.features.T_body_cam);
+  if (reply.found) encoded.features = pack(keyframe.features);
+  borrow(wire.features, encoded.features);
   return encoded;
 }
 
@@ -190,12 +98,13 @@ Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire, const Team
     return Result::refuse("odometry of another keyframe");
   const auto T_body_cam = from_wire(wire.T_body_cam);
   if (!T_body_cam) return Result::refuse("the camera's place is not a pose");
-  const auto keypoints = elements_of(wire.keypoints, kMaxKeypoints);
-  if (!keypoints) return Result::refuse("keypoints are missing or too many");
-  if (const char* why = refusal(wire, *keypoints)) return Result::refuse(why);
+  const auto bytes = elements_of(wire.features, kMaxBytes);
+  auto features = bytes ? unpack_features(*bytes) : std::nullopt;
+  if (!features) return Result::refuse("keypoints are missing, too many, or none of a camera");
   reply.keyframe.odometry = *odometry;
   reply.keyframe.stamp = wire.stamp;
-  reply.keyframe.features = features_of(wire, *keypoints, *T_body_cam);
+  reply.keyframe.features = *std::move(features);
+  reply.keyframe.features.T_body_cam = *T_body_cam;
   return Result::accept(std::move(reply));
 }
 

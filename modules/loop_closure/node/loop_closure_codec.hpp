@@ -8,13 +8,11 @@
 
 #include "modules/core/pose_graph.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/loop_closure/packed_features.hpp"
 #include "modules/loop_closure/packed_word_points.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {
-
-/// Largest number of keypoints of a keyframe; a message that claims more is refused.
-inline constexpr std::size_t kMaxKeypoints = 10000;
 
 /// Written by the requester.
 template <>
@@ -33,19 +31,18 @@ struct Codec<KeyframeRequest> {
   static Decoded<KeyframeRequest> decode(const Wire& wire, const TeamPeer& writer);
 };
 
-/// Written by the owner of the keyframe. Bearings and inverse depths are sent as 16-bit numbers,
-/// scaled by the largest value. Rounding is below 0.01 px, see idl/loop_closure.idl.
+/// Written by the owner of the keyframe.
 template <>
 struct Codec<KeyframeReply> {
   using Wire = km_wire_KeyframeReply;
   static constexpr const char* kTopic = "keyframe_replies";
   static constexpr std::uint16_t kVersion = 1;
-  static constexpr std::size_t kMaxBytes = 1024 + 48 * kMaxKeypoints;
+  static constexpr std::size_t kMaxBytes = 1024 + 17 * kMaxKeypoints;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeReply_desc; }
 
   struct Encoded {
     Wire wire{};
-    std::vector<km_wire_Keypoint> keypoints;
+    std::vector<std::uint8_t> features;
   };
   static MessageKey key_of(const KeyframeReply& reply);
   static Encoded encode(const KeyframeReply& reply);

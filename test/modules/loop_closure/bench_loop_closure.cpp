@@ -41,7 +41,7 @@ struct PairResult {
 bool overlap(const RecordedKeyframe& from, const RecordedKeyframe& to) {
   const SE3 T_from_to = from.T_world_body.inverse() * to.T_world_body;
   const SE3 T_a_b = from.features.T_body_cam.inverse() * T_from_to * to.features.T_body_cam;
-  const GuidedMatchRules rules{kOverlapRadius_px, 0.9, 64};
+  const GuidedMatchRules rules{kOverlapRadius_px, 0.9, 24};
   return match_guided(T_a_b, from.features, to.features, rules).size() >= kOverlap;
 }
 

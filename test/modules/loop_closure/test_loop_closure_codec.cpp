@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include <cmath>
-#include <limits>
 
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
 #include "test/support/corrupted_message.hpp"
@@ -36,43 +35,19 @@ KeyframeReply random_reply(std::mt19937& rng, int points) {
   return reply;
 }
 
-TEST_CASE("A keyframe survives the wire to a hundredth of a pixel", "[codec]") {
+TEST_CASE("A keyframe survives the wire", "[codec]") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   const KeyframeReply sent = random_reply(rng, 1000);
   const auto encoded = encoded_by(kOwner, sent);
   const auto result = decoded(encoded);
   REQUIRE(result.value.has_value());
-  const KeyframeFeatures& a = sent.keyframe.features;
-  const KeyframeFeatures& b = result.value->keyframe.features;
-  REQUIRE(b.keypoints.size() == a.keypoints.size());
-  CHECK(b.descriptors == a.descriptors);
-  const double max_px = 0.01;
-  for (std::size_t i = 0; i < a.keypoints.size(); ++i) {
-    const Keypoint& p = a.keypoints[i];
-    const Keypoint& q = b.keypoints[i];
-    CHECK(q.octave == p.octave);
-    CHECK(q.has_depth() == p.has_depth());
-    CHECK(a.focal_px * static_cast<double>((q.bearing - p.bearing).norm()) < max_px);
-    const auto disparity_error = static_cast<double>(std::abs(q.inverse_depth - p.inverse_depth));
-    CHECK(a.focal_px * a.baseline_m * disparity_error < max_px);
-  }
+  const Keyframe &a = sent.keyframe, &b = result.value->keyframe;
   CHECK(result.value->number == 12);
-  CHECK(result.value->keyframe.stamp == sent.keyframe.stamp);
-  CHECK((result.value->keyframe.odometry.T_odom_kf.matrix() -
-         sent.keyframe.odometry.T_odom_kf.matrix())
-            .norm() < 1e-12);
-  CHECK(result.value->keyframe.odometry.covariance == sent.keyframe.odometry.covariance);
-}
-
-TEST_CASE("The smallest known depth does not become unknown on the wire", "[codec]") {
-  std::mt19937 rng(5);
-  KeyframeReply reply = random_reply(rng, 2);
-  reply.keyframe.features.keypoints[0].inverse_depth = 1e-9F;
-  reply.keyframe.features.keypoints[1].inverse_depth = 5.0F;
-  const auto encoded = encoded_by(kOwner, reply);
-  const auto result = decoded(encoded);
-  REQUIRE(result.value.has_value());
-  CHECK(result.value->keyframe.features.keypoints[0].has_depth());
+  CHECK(b.stamp == a.stamp);
+  CHECK((b.odometry.T_odom_kf.matrix() - a.odometry.T_odom_kf.matrix()).norm() < 1e-12);
+  CHECK(b.odometry.covariance == a.odometry.covariance);
+  CHECK((b.features.T_body_cam.matrix() - a.features.T_body_cam.matrix()).norm() < 1e-12);
+  CHECK(pack(b.features) == pack(a.features));
 }
 
 TEST_CASE("A keyframe without points, or not found, survives the wire", "[codec]") {
@@ -92,6 +67,7 @@ TEST_CASE("Hostile replies are refused with a reason", "[codec]") {
   std::mt19937 rng(7);
   const KeyframeReply reply = random_reply(rng, 20);
   const char* const no_pose = "odometry is not a pose with a covariance";
+  const char* const no_features = "keypoints are missing, too many, or none of a camera";
   check_refusals<KeyframeReply>(
       [&] { return encoded_by(kOwner, reply); },
       {{"another robot's keyframe", "a keyframe of another robot than the writer",
@@ -104,16 +80,12 @@ TEST_CASE("Hostile replies are refused with a reason", "[codec]") {
         [](auto& m) { m.wire.odometry.covariance.upper[0] = -1.0; }},
        {"a position that is not a number", "the camera's place is not a pose",
         [](auto& m) { m.wire.T_body_cam.t[1] = std::nan(""); }},
-       {"an infinite step", "bearings out of range",
-        [](auto& m) { m.wire.bearing_step = std::numeric_limits<float>::infinity(); }},
-       {"a negative step", "depths out of range",
-        [](auto& m) { m.wire.inverse_depth_step = -1e-3F; }},
-       {"a focal length that is not a number", "focal length out of range",
-        [](auto& m) { m.wire.focal_px = std::nanf(""); }},
-       {"more points than any image has", "keypoints are missing or too many",
-        [](auto& m) { m.wire.keypoints._length = 1U << 30U; }},
-       {"points without a buffer", "keypoints are missing or too many",
-        [](auto& m) { m.wire.keypoints._buffer = nullptr; }}});
+       {"keypoints without a buffer", no_features,
+        [](auto& m) { m.wire.features._buffer = nullptr; }},
+       {"keypoints that are cut off", no_features, [](auto& m) { --m.wire.features._length; }},
+       {"a length beyond every message", no_features,
+        [](auto& m) { m.wire.features._length = 1U << 30U; }},
+       {"a negative focal length", no_features, [](auto& m) { m.features[0] |= 0x80; }}});
 }
 
 TEST_CASE("A closure survives the wire exactly", "[codec]") {

@@ -10,7 +10,7 @@ namespace {
 
 int bits_apart(const BinaryDescriptor& a, const BinaryDescriptor& b) {
   int bits = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
+  for (std::size_t i = 0; i < kMatchedBytes; ++i)
     bits += std::popcount(static_cast<unsigned>(a[i] ^ b[i]));
   return bits;
 }
@@ -55,7 +55,7 @@ TEST_CASE("matching agrees with its definition", "[matching]") {
   for (int i = 0; i < 60; ++i) a.push_back(random_descriptor(rng));
   for (int i = 0; i < 90; ++i)  // near copies of a, some of them twice
     b.push_back(altered(a[static_cast<std::size_t>(i * 7 % 60)], i, rng));
-  const MatchRules rules{0.85, 64};
+  const MatchRules rules{0.88, 24};
   const std::vector<Match> matches = match_descriptors(a, b, rules);
   CHECK(matches == by_definition(a, b, rules));
   CHECK_FALSE(matches.empty());
@@ -68,6 +68,20 @@ TEST_CASE("a frame matched to itself pairs every descriptor with itself", "[matc
   const std::vector<Match> matches = match_descriptors(a, a, {});
   REQUIRE(matches.size() == a.size());
   for (std::uint32_t i = 0; i < matches.size(); ++i) CHECK(matches[i] == Match{i, i, 0});
+}
+
+TEST_CASE("descriptors match by their first 96 bits", "[matching]") {
+  std::mt19937 rng(2);
+  std::vector<BinaryDescriptor> a, b;
+  for (int i = 0; i < 50; ++i) a.push_back(random_descriptor(rng));
+  b = a;
+  for (BinaryDescriptor& descriptor : b)
+    for (std::size_t i = kMatchedBytes; i < descriptor.size(); ++i) descriptor[i] = 0;
+  CHECK(match_descriptors(a, b, {}) == match_descriptors(a, a, {}));
+  for (BinaryDescriptor& descriptor : b)  // 25 other bits
+    for (std::size_t i = 0; i < 25; ++i)
+      descriptor[i / 8] = static_cast<std::uint8_t>(descriptor[i / 8] ^ (1U << (i % 8)));
+  CHECK(match_descriptors(a, b, {}).empty());
 }
 
 TEST_CASE("without a second descriptor there is no ratio and no match", "[matching]") {

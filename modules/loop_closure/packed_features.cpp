@@ -1,0 +1,57 @@
+#include "modules/loop_closure/packed_features.hpp"
+
+#include "modules/loop_closure/matching.hpp"
+#include "modules/loop_closure/packed_keypoints.hpp"
+
+namespace km {
+namespace {
+
+void write(const BinaryDescriptor& descriptor, BitWriter& writer) {
+  for (std::size_t i = 0; i < kMatchedBytes; ++i) writer.bits(descriptor[i], 8);
+}
+
+std::optional<BinaryDescriptor> read_descriptor(BitReader& reader) {
+  BinaryDescriptor descriptor{};
+  for (std::size_t i = 0; i < kMatchedBytes; ++i) {
+    const auto byte = reader.bits(8);
+    if (!byte) return std::nullopt;
+    descriptor[i] = static_cast<std::uint8_t>(*byte);
+  }
+  return descriptor;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> pack(const KeyframeFeatures& features) {
+  KeypointScale scale{.focal_px = static_cast<float>(features.focal_px),
+                      .baseline_m = static_cast<float>(features.baseline_m)};
+  for (const Keypoint& keypoint : features.keypoints) scale.include(keypoint);
+  BitWriter writer;
+  write(scale, writer);
+  writer.gamma(features.keypoints.size() + 1);
+  for (std::size_t i = 0; i < features.keypoints.size(); ++i) {
+    write(features.keypoints[i], scale, writer);
+    write(features.descriptors[i], writer);
+  }
+  return writer.take();
+}
+
+std::optional<KeyframeFeatures> unpack_features(std::span<const std::uint8_t> bytes) {
+  BitReader reader(bytes);
+  const auto scale = read_scale(reader);
+  const auto count = scale ? reader.gamma() : std::nullopt;
+  if (!count || *count > kMaxKeypoints + 1) return std::nullopt;
+  KeyframeFeatures features;
+  features.focal_px = static_cast<double>(scale->focal_px);
+  features.baseline_m = static_cast<double>(scale->baseline_m);
+  for (std::uint64_t i = 1; i < *count; ++i) {
+    const auto keypoint = read_keypoint(*scale, reader);
+    const auto descriptor = keypoint ? read_descriptor(reader) : std::nullopt;
+    if (!descriptor) return std::nullopt;
+    features.keypoints.push_back(*keypoint);
+    features.descriptors.push_back(*descriptor);
+  }
+  return reader.ended() ? std::optional(std::move(features)) : std::nullopt;
+}
+
+}  // namespace km

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "modules/core/keyframe.hpp"
+
+namespace km {
+
+/// Largest number of keypoints of a keyframe; bytes that claim more are refused.
+inline constexpr std::size_t kMaxKeypoints = 10000;
+
+/// Encodes keypoints and the part of their descriptors by which keyframes are matched, in 16.6
+/// bytes a keypoint. The scale comes first, then the number of keypoints, the keypoints, and
+/// kMatchedBytes of each descriptor. T_body_cam is not part of it.
+[[nodiscard]] std::vector<std::uint8_t> pack(const KeyframeFeatures& features);
+
+/// Inverse of pack(). The other bytes of each descriptor are zero, and T_body_cam is the identity.
+/// nullopt if the bytes end early or late, claim more than kMaxKeypoints keypoints, or state a
+/// scale of no camera (see read_scale()).
+[[nodiscard]] std::optional<KeyframeFeatures> unpack_features(std::span<const std::uint8_t> bytes);
+
+}  // namespace km

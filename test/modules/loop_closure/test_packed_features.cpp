@@ -1,0 +1,85 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+
+#include "modules/loop_closure/matching.hpp"
+#include "modules/loop_closure/packed_features.hpp"
+#include "test/modules/loop_closure/synthetic_keyframes.hpp"
+
+namespace km {
+namespace {
+
+KeyframeFeatures random_features(unsigned seed, int points) {
+  std::mt19937 rng(seed);
+  KeyframeFeatures features = make_keyframe_pair(rng, points, {0.7, 0.3}, 1.0).to;
+  for (std::size_t i = 0; i < features.keypoints.size(); ++i) {
+    features.keypoints[i].octave = static_cast<std::uint8_t>(i % 8);
+    if (i % 4 == 0) features.keypoints[i].inverse_depth = 0.0F;
+  }
+  return features;
+}
+
+TEST_CASE("Features are packed in 17 bytes a keypoint, rounded by less than their noise",
+          "[packed_features]") {
+  KeyframeFeatures sent = random_features(GENERATE(1U, 2U), 500);
+  sent.keypoints[1].inverse_depth = 1e-9F;
+  const std::vector<std::uint8_t> bytes = pack(sent);
+  CHECK(bytes.size() < 17 * sent.keypoints.size());
+  const auto received = unpack_features(bytes);
+  REQUIRE(received);
+  CHECK(received->focal_px == kFocal_px);
+  CHECK(received->baseline_m == Approx(kBaseline_m));
+  REQUIRE(received->keypoints.size() == sent.keypoints.size());
+  REQUIRE(received->descriptors.size() == sent.keypoints.size());
+  for (std::size_t i = 0; i < sent.keypoints.size(); ++i) {
+    const Keypoint &p = sent.keypoints[i], &q = received->keypoints[i];
+    CHECK(q.octave == p.octave);
+    CHECK(q.has_depth() == p.has_depth());
+    CHECK(kFocal_px * static_cast<double>((p.bearing - q.bearing).cwiseAbs().maxCoeff()) < 0.2);
+    CHECK(kFocal_px * kBaseline_m *
+              static_cast<double>(std::abs(p.inverse_depth - q.inverse_depth)) <
+          0.05);
+    BinaryDescriptor matched = sent.descriptors[i];
+    std::fill(matched.begin() + kMatchedBytes, matched.end(), std::uint8_t{0});
+    CHECK(received->descriptors[i] == matched);
+  }
+  CHECK(pack(*received) == bytes);
+}
+
+TEST_CASE("Features without keypoints are packed", "[packed_features]") {
+  KeyframeFeatures none = random_features(3, 10);
+  none.keypoints.clear();
+  none.descriptors.clear();
+  const auto received = unpack_features(pack(none));
+  REQUIRE(received);
+  CHECK(received->keypoints.empty());
+}
+
+TEST_CASE("Features that end early or late, or state what no camera has, are refused",
+          "[packed_features]") {
+  const KeyframeFeatures features = random_features(4, 12);
+  std::vector<std::uint8_t> bytes = pack(features);
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    CHECK_FALSE(unpack_features(std::span(bytes).first(size)));
+  bytes.push_back(0);
+  CHECK_FALSE(unpack_features(bytes));
+
+  for (const double wrong : {std::nan(""), -1.0, std::numeric_limits<double>::infinity()}) {
+    KeyframeFeatures hostile = features;
+    hostile.focal_px = wrong;
+    CHECK_FALSE(unpack_features(pack(hostile)));
+    hostile = features;
+    hostile.baseline_m = wrong;
+    CHECK_FALSE(unpack_features(pack(hostile)));
+  }
+  KeyframeFeatures near = features;
+  near.keypoints[0].inverse_depth = 1e5F;
+  CHECK_FALSE(unpack_features(pack(near)));
+  KeyframeFeatures many = features;
+  many.keypoints.assign(kMaxKeypoints + 1, features.keypoints[0]);
+  many.descriptors.resize(many.keypoints.size());
+  CHECK_FALSE(unpack_features(pack(many)));
+}
+
+}  // namespace
+}  // namespace km
