@@ -18,7 +18,7 @@ struct LoopClosureConfig {
   int min_consensus = 12;
   int min_inliers = 15;
   double max_position_sigma_m = 0.12;
-  double max_rotation_sigma_rad = 0.05;
+  double max_rotation_sigma_rad = 0.035;
   double systematic_rotation_rad = 0.003;
   double systematic_translation_m = 0.008;
   double request_timeout_s = 2.0;

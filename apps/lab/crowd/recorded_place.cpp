@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "modules/place_recognition/bag_file.hpp"
+#include "modules/place_recognition/place_recognition_config.hpp"
+#include "modules/place_recognition/place_sketch.hpp"
 
 namespace km {
 
@@ -16,6 +18,8 @@ RecordedPlace read_recorded_place(const std::filesystem::path& file, const Vocab
   if (half < 2) throw std::runtime_error(file.string() + ": fewer than four keyframes");
   if (!std::ranges::all_of(bags, [&](const BagOfWords& bag) { return vocabulary.knows(bag); }))
     throw std::runtime_error(file.string() + ": has words that the vocabulary does not know");
+  constexpr auto kSentWords = static_cast<std::size_t>(PlaceRecognitionConfig{}.max_words);
+  for (BagOfWords& bag : bags) bag = sketch_of(bag, vocabulary.weigh(bag), kSentWords);
   const auto end = bags.begin() + static_cast<std::ptrdiff_t>(half);
   return {.first = {bags.begin(), end},
           .second = {bags.end() - static_cast<std::ptrdiff_t>(half), bags.end()}};

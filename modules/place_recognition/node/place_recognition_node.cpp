@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "modules/core/median_depth.hpp"
+#include "modules/place_recognition/place_sketch.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -68,7 +69,7 @@ void PlaceRecognitionNode::step(const Topic<PeerEvent>::Message& event) {
 
 void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   const KeyframeId id = keyframe.odometry.id;
-  BagOfWords words = vocabulary_->count(keyframe.features.descriptors);
+  BagOfWords words = words_of(keyframe.features);
   BowVector vector = vocabulary_->weigh(words);
   const UncertainPose chain{keyframe.odometry.T_odom_kf, keyframe.odometry.covariance};
   if (const auto before = std::exchange(chain_, chain); before && breaks_odometry(*before, chain))
@@ -113,6 +114,11 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
   if (peer_bow.words.empty()) publish(id, {});
   for (const PeerQuery& query : history.add(id.index, vocabulary_->weigh(peer_bow.words)))
     publish({id.robot, query.index}, own_.search(*query.vector, query.previous.get()));
+}
+
+BagOfWords PlaceRecognitionNode::words_of(const KeyframeFeatures& features) const {
+  const BagOfWords all = vocabulary_->count(features.descriptors);
+  return sketch_of(all, vocabulary_->weigh(all), static_cast<std::size_t>(config_.max_words));
 }
 
 PlaceNovelty PlaceRecognitionNode::novelty_of(const OdometryPose& keyframe,

@@ -82,6 +82,7 @@ class PlaceRecognitionNode final : public Node {
 
   void handle(const Input& input);
 
+  [[nodiscard]] BagOfWords words_of(const KeyframeFeatures& features) const;
   [[nodiscard]] PlaceNovelty novelty_of(const OdometryPose& keyframe,
                                         const CandidateSearch& search) const;
   void publish(const KeyframeId& query, CandidateSearch search) const;

@@ -80,6 +80,17 @@ TEST_CASE("Every own keyframe is published as its words", "[place_recognition][n
   CHECK(sent.words == BagOfWords{{2, 1}, {5, 2}});
 }
 
+TEST_CASE("The heaviest words of a keyframe are published and compared",
+          "[place_recognition][node]") {
+  Robot robot(kSelf, {.max_words = 2, .min_gap_s = 0.0});
+  robot.node.step(keyframe({kSelf, 0}, {5, 5, 2, 7, 7}));
+  CHECK(robot.own_bows.received.at(0).words == BagOfWords{{5, 2}, {7, 2}});
+  robot.node.step(bow({kPeer, 0}, {5, 7}));
+  robot.node.step(bow({kPeer, 1}, {5, 7}));
+  REQUIRE(robot.candidates.received.size() == 1);
+  CHECK(robot.candidates.received[0].similarity == Approx(1.0));
+}
+
 TEST_CASE("A peer's view of a known place is a candidate, through the thread",
           "[place_recognition][node]") {
   Robot robot(kSelf);
