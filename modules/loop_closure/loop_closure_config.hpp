@@ -12,13 +12,13 @@ struct LoopClosureConfig {
 
   double keypoint_noise_px = 0.7;
   double disparity_noise_px = 0.3;
-  double max_match_ratio = 0.88;
+  double max_match_ratio = 0.85;
   int max_match_distance = 24;
   int max_ransac_iterations = 2000;
   int min_consensus = 12;
   int min_inliers = 15;
   double max_position_sigma_m = 0.12;
-  double max_rotation_sigma_rad = 0.035;
+  double max_rotation_sigma_rad = 0.03;
   double systematic_rotation_rad = 0.003;
   double systematic_translation_m = 0.008;
   double request_timeout_s = 2.0;

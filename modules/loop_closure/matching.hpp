@@ -27,7 +27,7 @@ struct Match {
 
 /// Conditions for a pair of descriptors to be a match.
 struct MatchRules {
-  double max_ratio = 0.88;  ///< Best distance over second best, as seen from a.
+  double max_ratio = 0.85;  ///< Best distance over second best, as seen from a.
   int max_distance = 24;    ///< [bit]
 };
 
