@@ -1,10 +1,10 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <ostream>
 #include <string>
 
+#include "apps/command_line.hpp"
 #include "apps/output_file.hpp"
 #include "modules/charts/chart_page.hpp"
 
@@ -16,10 +16,10 @@ struct ReportFiles {
 
   /// Defines --json and --plot, and describes their content. A plot is a page: other file names are
   /// refused.
-  void define(CLI::App& app, const std::string& in_json, const std::string& in_plot) {
+  void define(Command app, const std::string& in_json, const std::string& in_plot) {
     app.add_option("--json", json, "Also write " + in_json + " to this file, as JSON");
     app.add_option("--plot", plot, "Also draw " + in_plot + ", as a page for a browser: *.html")
-        ->check([](const std::string& file) {
+        .check([](const std::string& file) {
           return file.ends_with(".html") ? std::string()
                                          : file +
                                                ": --plot writes *.html (its charts can be saved "

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
@@ -153,39 +152,39 @@ constexpr const char* kClosuresDetails =
     "      --truth room/robot{0,1}/mav0/state_groundtruth_estimate0/data.csv \\\n"
     "      --results results/robot{0,1}";
 
-void define(CLI::App& app, ClosuresCommand& command) {
+void define(Command app, ClosuresCommand& command) {
   app.add_option("--truth", command.truths,
                  "True poses in one common world: one file for each of --results, or one for "
                  "all, where they are parts of one recording")
-      ->required();
+      .required();
   app.add_option(
          "--results", command.results,
          "Results folders of all robots of the run, or records (MCAP) of robots or of the team")
-      ->required();
+      .required();
   app.add_option("--dataset", command.dataset, "EuRoC/ASL folder: its left camera is the robots'")
-      ->required();
+      .required();
   ClosureTruthOptions& options = command.options;
   app.add_option("--max-translation", options.max_translation_m,
                  "Error of a true pose, at most [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option("--max-rotation", options.max_rotation_deg, "Error of a true pose, at most [deg]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option("--min-overlap", options.min_overlap, "Share of the image that is seen by both")
-      ->check(CLI::Range(0.01, 1.0))
-      ->capture_default_str();
+      .within(0.01, 1.0)
+      .show_default();
   app.add_option("--default-depth", options.default_depth_m,
                  "Depth of the scene where a keyframe does not know it [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
 }
 
 }  // namespace
 
-void add_closures(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("closures", kClosuresDetails);
+void add_closures(Command parent) {
+  const Command app = parent.add_subcommand("closures", kClosuresDetails);
   const auto command = std::make_shared<ClosuresCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

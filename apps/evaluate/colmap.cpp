@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
@@ -115,17 +114,17 @@ constexpr const char* kColmapDetails =
 
 }  // namespace
 
-void add_colmap(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("colmap", kColmapDetails);
+void add_colmap(Command parent) {
+  const Command app = parent.add_subcommand("colmap", kColmapDetails);
   const auto command = std::make_shared<ColmapCommand>();
-  app.add_option("--results", command->results, "Results folder of each robot")->required();
+  app.add_option("--results", command->results, "Results folder of each robot").required();
   app.add_option("--dataset", command->datasets, "Recording of each robot (EuRoC/ASL folder)")
-      ->required();
+      .required();
   app.add_option("--mesh", command->meshes, "Meshes (PLY) in the frame of the poses");
   app.add_option("--max-points", command->max_points,
                  "Largest number of points; beyond it evenly chosen vertices are written")
-      ->capture_default_str();
-  app.add_option("--output", command->output, "Folder to write")->required();
+      .show_default();
+  app.add_option("--output", command->output, "Folder to write").required();
   app.callback([command] { run(*command); });
 }
 

@@ -1,6 +1,5 @@
 #include "modules/evaluation/consistency.hpp"
 
-#include <CLI/CLI.hpp>
 #include <deque>
 #include <filesystem>
 #include <iostream>
@@ -120,13 +119,12 @@ constexpr const char* kDetails =
 
 }  // namespace
 
-void add_consistency(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("consistency", kDetails);
+void add_consistency(Command parent) {
+  const Command app = parent.add_subcommand("consistency", kDetails);
   const auto command = std::make_shared<ConsistencyCommand>();
   app.add_option("--truth", command->truths, "True poses: one file for all robots or one for each")
-      ->required();
-  app.add_option("--results", command->results, "Folders of the results, one per robot")
-      ->required();
+      .required();
+  app.add_option("--results", command->results, "Folders of the results, one per robot").required();
   app.add_flag("--upright", command->upright,
                "Both frames have z up: runs with inertial sensing, and a truth with z up");
   app.add_option("--json", command->json, "Also write the numbers to this file");

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <deque>
 #include <filesystem>
 #include <iostream>
@@ -53,14 +52,14 @@ constexpr const char* kCopiesDetails =
 
 }  // namespace
 
-void add_copies(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("copies", kCopiesDetails);
+void add_copies(Command parent) {
+  const Command app = parent.add_subcommand("copies", kCopiesDetails);
   const auto command = std::make_shared<CopiesCommand>();
   app.add_option("--mesh", command->meshes, "Meshes (PLY) in one frame, one file per robot")
-      ->required();
+      .required();
   app.add_option("--reach", command->options.reach_m, "Largest distance of two copies [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.callback([command] { run(*command); });
 }
 

@@ -1,6 +1,5 @@
 #include "modules/evaluation/exports/glb_file.hpp"
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -39,13 +38,13 @@ constexpr const char* kGlbDetails =
 
 }  // namespace
 
-void add_glb(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("glb", kGlbDetails);
+void add_glb(Command parent) {
+  const Command app = parent.add_subcommand("glb", kGlbDetails);
   const auto command = std::make_shared<GlbCommand>();
-  app.add_option("--mesh", command->meshes, "Meshes (PLY) in one frame")->required();
+  app.add_option("--mesh", command->meshes, "Meshes (PLY) in one frame").required();
   app.add_option("--palette", command->palette,
                  "Names of the labels (CSV); default: label_palette.csv beside the first mesh");
-  app.add_option("--output", command->output, "File to write")->required();
+  app.add_option("--output", command->output, "File to write").required();
   app.callback([command] { run(*command); });
 }
 

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -103,11 +102,11 @@ constexpr const char* kImagesDetails =
     "  kimera_multi_evaluate images --dataset MH_01_easy --to 15 --still-from 21 --still-to 25.5\n"
     "  kimera_multi_evaluate images --dataset V1_01_easy --compare simulated --compare-from 5";
 
-void define(CLI::App& app, ImagesCommand& command) {
-  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder with stereo images")->required();
+void define(Command app, ImagesCommand& command) {
+  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder with stereo images").required();
   app.add_option("--compare", command.compare, "Another one: its figures beside, and the ratios");
   app.add_option("--from", command.part.from_s, "Look from here on [s since the first stereo pair]")
-      ->capture_default_str();
+      .show_default();
   app.add_option("--to", command.part.to_s, "Look up to here [s]; default: the end");
   app.add_option("--compare-from", command.compare_from_s,
                  "Look at the other from here on [s]; default: the window of --from and --to");
@@ -118,15 +117,15 @@ void define(CLI::App& app, ImagesCommand& command) {
   app.add_option("--still-to", command.still_to_s, "Also look for standing still up to here [s]");
   app.add_option("--stride", command.options.stride,
                  "Interval of the pairs at which ORB and stereo are matched and KLT tracks start")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option("--json", command.json, "Also write the figures to this file, as JSON");
 }
 
 }  // namespace
 
-void add_images(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("images", kImagesDetails);
+void add_images(Command parent) {
+  const Command app = parent.add_subcommand("images", kImagesDetails);
   const auto command = std::make_shared<ImagesCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

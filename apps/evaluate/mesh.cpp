@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <deque>
 #include <filesystem>
@@ -139,12 +138,12 @@ constexpr const char* kMeshDetails =
     "      --trajectory-truth city/robot0/mav0/state_groundtruth_estimate0/data.csv \\\n"
     "                         city/robot1/mav0/state_groundtruth_estimate0/data.csv";
 
-void define(CLI::App& app, MeshCommand& command) {
+void define(Command app, MeshCommand& command) {
   MeshErrorOptions& options = command.options;
-  app.add_option("--truth", command.truth, "The true mesh (PLY)")->required();
+  app.add_option("--truth", command.truth, "The true mesh (PLY)").required();
   app.add_option("--estimate", command.estimates,
                  "Estimated meshes (PLY) in one common frame, one file per robot")
-      ->required();
+      .required();
   app.add_option("--before", command.before,
                  "The meshes before a correction (PLY), in the order of --estimate");
   app.add_option("--trajectory", command.trajectories,
@@ -152,23 +151,23 @@ void define(CLI::App& app, MeshCommand& command) {
   app.add_option("--trajectory-truth", command.true_trajectories,
                  "Their true poses: one file for all or one for each");
   app.add_option("--samples-per-m2", options.samples_per_m2, "Samples per square metre")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option("--max-samples", options.max_samples,
                  "Largest number for the estimate, and for the truth: beyond it the density is "
                  "reduced, with a note")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--seed", options.seed, "Seed of the samples")->capture_default_str();
+      .positive()
+      .show_default();
+  app.add_option("--seed", options.seed, "Seed of the samples").show_default();
   app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
   app.add_option("--crop", options.crop_m,
                  "True points further from the estimate are not judged [m]; errors count up to it")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option("--max-distance", options.label_distance_m,
                  "Labels are judged up to this distance [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option("--palette", command.palette,
                  "Names of the labels (CSV); default: label_palette.csv beside the truth");
   app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
@@ -176,8 +175,8 @@ void define(CLI::App& app, MeshCommand& command) {
 
 }  // namespace
 
-void add_mesh(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("mesh", kMeshDetails);
+void add_mesh(Command parent) {
+  const Command app = parent.add_subcommand("mesh", kMeshDetails);
   const auto command = std::make_shared<MeshCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

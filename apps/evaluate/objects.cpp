@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -75,19 +74,19 @@ constexpr const char* kObjectsDetails =
     "      --trajectory-truth city/robot0/mav0/state_groundtruth_estimate0/data.csv \\\n"
     "                         city/robot1/mav0/state_groundtruth_estimate0/data.csv";
 
-void define(CLI::App& app, ObjectsCommand& command) {
-  app.add_option("--truth", command.truth, "The true objects (objects.json)")->required();
+void define(Command app, ObjectsCommand& command) {
+  app.add_option("--truth", command.truth, "The true objects (objects.json)").required();
   app.add_option("--estimate", command.estimate, "The objects of a robot (objects.json)")
-      ->required();
+      .required();
   app.add_option("--mesh", command.meshes, "Meshes of all robots in the frame of the objects");
   app.add_option("--mapped", command.mapped_m2,
                  "Mapped surface from which a true object counts [m^2]")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      .not_negative()
+      .show_default();
   app.add_option("--min-overlap", command.min_overlap,
                  "Smallest intersection over union of a match")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
+      .within(0.0, 1.0)
+      .show_default();
   app.add_option("--trajectory", command.trajectories,
                  "Estimated poses of the robots in the frame of the objects, TUM or EuRoC CSV");
   app.add_option("--trajectory-truth", command.true_trajectories,
@@ -97,8 +96,8 @@ void define(CLI::App& app, ObjectsCommand& command) {
 
 }  // namespace
 
-void add_objects(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("objects", kObjectsDetails);
+void add_objects(Command parent) {
+  const Command app = parent.add_subcommand("objects", kObjectsDetails);
   const auto command = std::make_shared<ObjectsCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

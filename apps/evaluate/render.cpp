@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
@@ -153,12 +152,12 @@ constexpr const char* kRenderDetails =
     "  kimera_multi_evaluate render --mesh room/world.ply --view=-2,1,1.7,20,-10 --output "
     "inside.png";
 
-void define(CLI::App& app, RenderCommand& command) {
-  app.add_option("--mesh", command.meshes, "Meshes (PLY) in one frame")->required();
+void define(Command app, RenderCommand& command) {
+  app.add_option("--mesh", command.meshes, "Meshes (PLY) in one frame").required();
   app.add_option("--output", command.output, "PNG; the file of the second view is NAME_2.png")
-      ->required();
+      .required();
   app.add_option("--view", command.views, "Viewpoint, see above; several give a picture each")
-      ->capture_default_str();
+      .show_default();
   app.add_option("--trajectory", command.trajectories,
                  "Poses drawn on top (TUM, EuRoC CSV, or a record: see trajectory)");
   app.add_option("--reference", command.references,
@@ -167,10 +166,9 @@ void define(CLI::App& app, RenderCommand& command) {
   app.add_option("--color", command.color,
                  "Colours by label, of the vertices, none, or one per mesh; auto: by label if "
                  "there are labels")
-      ->check(CLI::IsMember({"auto", "label", "own", "shade", "robot"}))
-      ->capture_default_str();
-  app.add_option("--size", command.size, "WIDTHxHEIGHT without the legend [px]")
-      ->capture_default_str();
+      .one_of({"auto", "label", "own", "shade", "robot"})
+      .show_default();
+  app.add_option("--size", command.size, "WIDTHxHEIGHT without the legend [px]").show_default();
   app.add_option("--cut", command.above_m, "Leave out all above this height [m]");
   app.add_flag("--both-sides", command.both_sides, "Also draw faces that are seen from behind");
   app.add_option(
@@ -180,8 +178,8 @@ void define(CLI::App& app, RenderCommand& command) {
 
 }  // namespace
 
-void add_render(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("render", kRenderDetails);
+void add_render(Command parent) {
+  const Command app = parent.add_subcommand("render", kRenderDetails);
   const auto command = std::make_shared<RenderCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <deque>
 #include <filesystem>
@@ -88,31 +87,31 @@ constexpr const char* kTrajectoryDetails =
     "  kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum\n"
     "  kimera_multi_evaluate trajectory --truth data.csv --estimate team.mcap";
 
-void define(CLI::App& app, TrajectoryCommand& command) {
+void define(Command app, TrajectoryCommand& command) {
   app.add_option("--truth", command.truths,
                  "True poses: one file for all estimates or one for each")
-      ->required();
+      .required();
   app.add_option("--estimate", command.estimates,
                  "Estimated poses, one file per robot, or a record")
-      ->required();
+      .required();
   app.add_flag("--sim3", command.options.with_scale, "Align by a similarity: the scale is free");
   app.add_option("--from", command.from_s,
                  "Judge from here on [s since the truth's first pose; above 1e6: a stamp]");
   app.add_option("--to", command.to_s, "Judge up to here, as --from");
   app.add_option("--delta", command.options.rpe_delta_s, "Time of the relative error [s]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option("--coverage-gap", command.options.max_coverage_gap_s,
                  "Poses further apart leave the time between uncovered [s]")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      .not_negative()
+      .show_default();
   command.files.define(app, "the numbers", "truth and estimates from above");
 }
 
 }  // namespace
 
-void add_trajectory(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("trajectory", kTrajectoryDetails);
+void add_trajectory(Command parent) {
+  const Command app = parent.add_subcommand("trajectory", kTrajectoryDetails);
   const auto command = std::make_shared<TrajectoryCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

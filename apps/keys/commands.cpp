@@ -90,18 +90,18 @@ void revoke(const KeysCommand& command) {
             << "\ninto the folder of keys on every robot that stays.\n";
 }
 
-void define_robots(CLI::App& app, KeysCommand& command) {
-  app.add_option("TEAM", command.team, "Folder of the team")->required();
+void define_robots(Command app, KeysCommand& command) {
+  app.add_option("TEAM", command.team, "Folder of the team").required();
   app.add_option("--robots", command.robots,
                  "name:id of each robot, separated by commas; or how many, which are named robot0, "
                  "robot1, ... Names and ids are what the robots are started with (--name, --robot)")
-      ->required()
-      ->delimiter(',');
+      .required()
+      .delimiter(',');
   app.add_option("--days", command.days,
                  "How long the certificates hold. They hold from the day before, for clocks that "
                  "are behind; robots without a clock must get the time before they start")
-      ->check(CLI::Range(1, 36500))
-      ->capture_default_str();
+      .within(1, 36500)
+      .show_default();
 }
 
 }  // namespace
@@ -112,19 +112,19 @@ std::int64_t now_s() {
       .count();
 }
 
-void add_make(CLI::App& parent) {
-  CLI::App& app =
-      *parent.add_subcommand("make",
-                             "Make a team: its authority, and a folder of keys for each robot.\n"
-                             "  kimera_multi_keys make survey --robots alpha:0,beta:1\n"
-                             "  kimera_multi_keys make survey --robots 3 --days 30");
+void add_make(Command parent) {
+  const Command app =
+      parent.add_subcommand("make",
+                            "Make a team: its authority, and a folder of keys for each robot.\n"
+                            "  kimera_multi_keys make survey --robots alpha:0,beta:1\n"
+                            "  kimera_multi_keys make survey --robots 3 --days 30");
   const auto command = std::make_shared<KeysCommand>();
   define_robots(app, *command);
   app.callback([command] { make(*command); });
 }
 
-void add_add(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
+void add_add(Command parent) {
+  const Command app = parent.add_subcommand(
       "add",
       "Add robots to a team, or give new keys to one whose certificate is revoked or has expired.\n"
       "Robots that run already accept them: nothing has to be copied to those.\n"
@@ -134,15 +134,15 @@ void add_add(CLI::App& parent) {
   app.callback([command] { add(*command); });
 }
 
-void add_revoke(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
+void add_revoke(Command parent) {
+  const Command app = parent.add_subcommand(
       "revoke",
       "Take a robot's certificates back, for a robot that is lost or whose secret was read. The\n"
       "new list must reach the other robots: until then they still accept the robot.\n"
       "  kimera_multi_keys revoke survey beta");
   const auto command = std::make_shared<KeysCommand>();
-  app.add_option("TEAM", command->team, "Folder of the team")->required();
-  app.add_option("ROBOT", command->revoked, "Name or id of the robot")->required();
+  app.add_option("TEAM", command->team, "Folder of the team").required();
+  app.add_option("ROBOT", command->revoked, "Name or id of the robot").required();
   app.callback([command] { revoke(*command); });
 }
 

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <atomic>
 #include <cstdlib>
 #include <exception>
@@ -6,8 +5,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "apps/command_line_error.hpp"
-#include "apps/program_version.hpp"
+#include "apps/command_line.hpp"
 #include "apps/publish/euroc_messages.hpp"
 #include "apps/publish/fix_messages.hpp"
 #include "apps/publish/message_player.hpp"
@@ -59,27 +57,27 @@ struct Options {
 
 Options parse_options(int argc, char** argv) {
   Options options;
-  CLI::App app{kAbout};
-  app.set_version_flag("--version", version_text("kimera_multi_publish"));
+  CommandLine line("kimera_multi_publish", kAbout);
+  const Command app = line.command();
   app.footer(kFooter);
-  app.add_option("RECORDING", options.recording)->required()->check(CLI::ExistingPath);
+  app.add_option("RECORDING", options.recording).required().existing_path();
   app.add_option("--rate", options.play.rate, "Speed: 1 real time, 2 twice as fast")
-      ->check(CLI::Range(1e-3, 1e3))
-      ->capture_default_str();
+      .within(1e-3, 1e3)
+      .show_default();
   app.add_option("--from", options.play.from_s,
                  "Start of the part to play [s since the first message]")
-      ->check(CLI::NonNegativeNumber);
+      .not_negative();
   app.add_option("--to", options.play.to_s, "End of the part to play [s since the first message]")
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--topics", options.play.topics, "Topics to play; by default all")->delimiter(',');
+      .not_negative();
+  app.add_option("--topics", options.play.topics, "Topics to play; by default all").delimiter(',');
   app.add_option("--wait", options.wait,
                  "Number of readers of each topic of images and inertial samples to wait for "
                  "before playing")
-      ->capture_default_str();
+      .show_default();
   app.add_option("--patience", options.patience_s,
                  "Longest wait for these readers [s]; then the program ends")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .positive()
+      .show_default();
   app.add_option(
       "--latency", options.latency,
       "Topic of a robot's nav_msgs/Odometry (/robot0/odometry), to measure the time from an image "
@@ -88,39 +86,36 @@ Options parse_options(int argc, char** argv) {
                  "File of absolute fixes to play on a topic of their own: rows of a stamp and "
                  "latitude, longitude [deg], altitude [m], or x, y, z [m]; stamps in ns in a .csv "
                  "file, in s elsewhere")
-      ->check(CLI::ExistingFile);
-  app.add_option("--fix-topic", options.fix_topic, "Topic of --fixes")->capture_default_str();
+      .existing_file();
+  app.add_option("--fix-topic", options.fix_topic, "Topic of --fixes").show_default();
   app.add_option("--fix-type", options.fix_type, "Message type of --fixes")
-      ->check(CLI::IsMember({FixMessages::kGnssType, FixMessages::kMotionCaptureType}))
-      ->capture_default_str();
+      .one_of({FixMessages::kGnssType, FixMessages::kMotionCaptureType})
+      .show_default();
   app.add_flag("--reliable", options.play.reliable,
                "Send lost messages again; otherwise best effort, as drivers of sensors do");
-  app.add_option("--delay", options.play.delay_s, "Delay of every message [s]")
-      ->check(CLI::Range(0., 60.));
+  app.add_option("--delay", options.play.delay_s, "Delay of every message [s]").within(0., 60.);
   app.add_option("--jitter", options.play.jitter_s,
                  "Additional random delay, uniform from 0 to this [s]")
-      ->check(CLI::Range(0., 60.));
+      .within(0., 60.);
   app.add_option("--drop", options.play.drop_share, "Share of messages that are lost, at random")
-      ->check(CLI::Range(0., 1.));
-  app.add_option("--seed", options.play.seed, "Seed of the random numbers")->capture_default_str();
+      .within(0., 1.);
+  app.add_option("--seed", options.play.seed, "Seed of the random numbers").show_default();
   const char* const domain = std::getenv("ROS_DOMAIN_ID");
   options.ros.domain = domain != nullptr ? std::atoi(domain) : 0;
   app.add_option(
          "--domain", options.ros.domain,
          "ROS_DOMAIN_ID, by default that of the environment. A robot receives it with --set "
          "ros.domain=N (--domain of a robot is the domain of the team)")
-      ->check(CLI::Range(0, 230))
-      ->capture_default_str();
+      .within(0, 230)
+      .show_default();
   app.add_option("--interface", options.ros.interface, "Network interface, e.g. lo");
   app.add_option("--peers", options.ros.peers, "Addresses of other hosts, where multicast is off")
-      ->delimiter(',');
-  try {
-    app.parse(argc, argv);
+      .delimiter(',');
+  app.callback([&options] {
     if (options.play.from_s >= options.play.to_s)
-      throw CLI::ValidationError("--from is not before --to");
-  } catch (const CLI::ParseError& error) {
-    std::exit(explain(app, error) == 0 ? 0 : kBadCommandLine);
-  }
+      throw CommandLineError("--from is not before --to");
+  });
+  if (const auto exit_code = line.parse(argc, argv, kBadCommandLine)) std::exit(*exit_code);
   return options;
 }
 

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
@@ -6,8 +5,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
-#include "apps/command_line_error.hpp"
-#include "apps/program_version.hpp"
+#include "apps/command_line.hpp"
 #include "apps/robot/inspect.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run.hpp"
@@ -64,7 +62,7 @@ double parse_rate(const std::string& text) {
   constexpr Bounds<double> kRate{1e-3,
                                  1e6};  // beyond these bounds waiting times overflow the clock
   if (end == text.c_str() || *end != '\0' || !kRate.contains(rate))
-    throw CLI::ValidationError(
+    throw CommandLineError(
         "--rate", text + " is neither a positive number nor max nor auto (" + kRate.text() + ")");
   return rate;
 }
@@ -73,79 +71,77 @@ void print_config(const RobotOptions& options) {
   try {
     std::cout << load_robot_config(options).effective;
   } catch (const ConfigError& error) {
-    throw CLI::ValidationError("--print-config", error.what());
+    throw CommandLineError("--print-config", error.what());
   }
-  throw CLI::Success();
+  throw CommandLineDone();
 }
 
 // Prints the topics of --inspect RECORDING [RIG], or of --inspect --live [RIG], and writes the rig
 // file.
-void print_topics(const RobotOptions& options, const CLI::App& app,
-                  const std::vector<std::string>& paths) {
-  const CLI::Option& live = *app.get_option("--live");
-  if (live.count() > 0) {
-    if (!paths[0].empty()) throw CLI::ValidationError("--inspect", "name a recording or --live");
-    std::cout << inspect_live(load_robot_config(options).ros, live.results()[0]);
+void print_topics(const RobotOptions& options, Command app, const std::vector<std::string>& paths) {
+  const std::vector<std::string> live = app.values("--live");
+  if (!live.empty()) {
+    if (!paths[0].empty()) throw CommandLineError("--inspect", "name a recording or --live");
+    std::cout << inspect_live(load_robot_config(options).ros, live[0]);
   } else if (paths[0].empty()) {
-    throw CLI::ValidationError("--inspect", "a recording or --live is needed");
+    throw CommandLineError("--inspect", "a recording or --live is needed");
   } else {
     std::cout << (paths.size() == 1 ? inspect_recording(paths[0])
                                     : inspect_recording(paths[0], paths[1]));
   }
-  throw CLI::Success();
+  throw CommandLineDone();
 }
 
-void add_input(CLI::App& app, RobotOptions& options) {
-  auto* group = app.add_option_group("Input", "What the robot perceives");
+void add_input(Command app, RobotOptions& options) {
+  const Command group = app.add_choice_group("Input", "What the robot perceives");
   group
-      ->add_option("--dataset", options.dataset,
-                   "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/; a folder of KITTI "
-                   "odometry, TUM RGB-D or 7-Scenes; or with --rig a bag of ROS 1 (.bag) or ROS 2 "
-                   "(folder, .db3, .mcap)")
-      ->check(CLI::ExistingPath);
+      .add_option("--dataset", options.dataset,
+                  "EuRoC/ASL folder: cam0, cam1 (or depth0), imu0, or mav0/; a folder of KITTI "
+                  "odometry, TUM RGB-D or 7-Scenes; or with --rig a bag of ROS 1 (.bag) or ROS 2 "
+                  "(folder, .db3, .mcap)")
+      .existing_path();
   group
-      ->add_option_function<std::vector<std::string>>(
+      .add_option_function<std::vector<std::string>>(
           "--live",
           [&options](const std::vector<std::string>& rig) {
             if (rig[0].empty())
-              throw CLI::ValidationError(
-                  "--live", "a rig file is needed; --inspect --live rig.yaml writes one");
+              throw CommandLineError("--live",
+                                     "a rig file is needed; --inspect --live rig.yaml writes one");
             options.rig = rig[0];
             options.is_live = true;
           },
           "Rig file: its topics are those of drivers that run now, on ROS 2 (see ros: in "
           "config/robot.yaml); until Ctrl-C")
-      ->expected(0, 1)  // --inspect --live needs none
-      ->type_name("RIG")
-      ->check(CLI::ExistingFile);
+      .expected(0, 1)  // --inspect --live needs none
+      .type_name("RIG")
+      .existing_file();
   group
-      ->add_option("--graph", options.graph,
-                   "Recorded pose graph of one robot (.g2o or .csv), or of a team (.jrl)")
-      ->check(CLI::ExistingFile);
+      .add_option("--graph", options.graph,
+                  "Recorded pose graph of one robot (.g2o or .csv), or of a team (.jrl)")
+      .existing_file();
   group
-      ->add_option("--session", options.session,
-                   "Results of a finished run: its robot stands still, and the others localise "
-                   "themselves in its map")
-      ->check(CLI::ExistingDirectory);
-  group->require_option(1);
+      .add_option("--session", options.session,
+                  "Results of a finished run: its robot stands still, and the others localise "
+                  "themselves in its map")
+      .existing_folder();
   app.add_option("--localize", options.localize,
                  "Results of a finished run: this run localises itself in its map, which stays as "
                  "it is, and all poses are in its frame")
-      ->check(CLI::ExistingDirectory);
+      .existing_folder();
   app.add_option("--extend", options.extend,
                  "Results of a finished run of this robot: the results of this run hold both, and "
                  "all poses are optimised together")
-      ->check(CLI::ExistingDirectory);
+      .existing_folder();
   app.add_option(
          "--rig", options.rig,
          "For a bag: file that states which topics are the sensors, and their calibration; for a "
          "EuRoC folder, what its calibration is off by (rig_estimated.yaml of a run); for a TUM "
          "RGB-D folder, its camera")
-      ->check(CLI::ExistingFile);
+      .existing_file();
   app.add_option("--odometry", options.odometry,
                  "Poses of the body by another odometry (TUM: t[s] x y z qx qy qz qw), in place of "
                  "the own one; images still give features and depth")
-      ->check(CLI::ExistingFile);
+      .existing_file();
   app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
   app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
   app.add_option_function<std::string>(
@@ -156,7 +152,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
          },
          "Speed of playing: 1.0 real time, 2 twice as fast, max as fast as it can, auto 1.0 or "
          "what this computer can do beside its other work, which takes 2 s to find out")
-      ->default_str("1.0");
+      .default_text("1.0");
 }
 
 // Runs before the dataset is opened, so that the error names the options.
@@ -164,28 +160,28 @@ void check_window(const RobotOptions& options) {
   if (!options.from_s || !options.to_s || *options.from_s < *options.to_s) return;
   std::ostringstream message;
   message << "--from " << *options.from_s << " s is not before --to " << *options.to_s << " s";
-  throw CLI::ValidationError(message.str());
+  throw CommandLineError(message.str());
 }
 
 void check_localize(const RobotOptions& options) {
   if (options.localize.empty() && options.extend.empty()) return;
   if (!options.localize.empty() && !options.extend.empty())
-    throw CLI::ValidationError(
+    throw CommandLineError(
         "--localize leaves the map as it is, and --extend does not: give one of them");
   if (!options.graph.empty() || !options.session.empty())
-    throw CLI::ValidationError(
+    throw CommandLineError(
         "--localize and --extend compare images: give --dataset or --live, not --graph or "
         "--session");
 }
 
-void add_network(CLI::App& app, RobotOptions& options) {
+void add_network(Command app, RobotOptions& options) {
   app.add_option(
          "--domain", options.domain,
          "DDS domain of the team: its robots use the same; drivers of ROS are on ros.domain")
-      ->check(CLI::Range(0, 230));
+      .within(0, 230);
   app.add_option("--link", options.link, "Link profile: wired, wifi, intermittent, or a file");
   app.add_option("--peers", options.peers, "Addresses of the other hosts, where multicast is off")
-      ->delimiter(',');
+      .delimiter(',');
   app.add_option("--interface", options.interface_name, "Network interface, e.g. wlan0");
   app.add_flag(
       "--view", options.view,
@@ -193,14 +189,14 @@ void add_network(CLI::App& app, RobotOptions& options) {
   app.add_option("--security", options.security,
                  "Folder of this robot's keys (kimera_multi_keys): only robots of the team can "
                  "read and send messages")
-      ->check(CLI::ExistingDirectory);
+      .existing_folder();
 }
 
-void add_output(CLI::App& app, RobotOptions& options) {
-  auto* group = app.add_option_group("Output", "Where the results go");
-  group->add_option("--output", options.output, "Folder of the results, made if absent");
+void add_output(Command app, RobotOptions& options) {
+  const Command group = app.add_choice_group("Output", "Where the results go");
+  group.add_option("--output", options.output, "Folder of the results, made if absent");
   group
-      ->add_option_function<std::string>(
+      .add_option_function<std::string>(
           "--resume",
           [&options](const std::string& folder) {
             options.output = folder;
@@ -209,45 +205,46 @@ void add_output(CLI::App& app, RobotOptions& options) {
           "In place of --output: the folder of a run that was killed; continues where it ended "
           "(all "
           "other options as before)")
-      ->check([](const std::string& folder) {
+      .check([](const std::string& folder) {
         return std::filesystem::is_directory(folder)
                    ? ""
                    : folder + ": there is no such folder, so no run to continue; --output " +
                          folder + " begins one there";
       });
-  group->require_option(1);
   app.add_option("--fallback", options.fallback,
                  "Folder, on another disk, for results that cannot be written to --output");
   app.add_option_function<std::vector<std::string>>(
          "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
          "Also write what happens to an MCAP file, for Foxglove, Lichtblick, Rerun, PlotJuggler "
          "(default: record.mcap in the folder of the results)")
-      ->expected(0, 1)
-      ->type_name("[FILE.mcap]");
+      .expected(0, 1)
+      .type_name("[FILE.mcap]");
   app.add_flag("--record-images", options.record_images, "With --record: the left images, too");
 }
 
 // Prints --help or the error of a wrong command line, and exits the process in both cases.
 RobotOptions parse_options(int argc, char** argv) {
   RobotOptions options;
-  CLI::App app{"One robot of the team: odometry, place recognition, and the team's pose graph."};
-  app.set_version_flag("--version", version_text("kimera_multi_robot"));
+  CommandLine line(
+      "kimera_multi_robot",
+      "One robot of the team: odometry, place recognition, and the team's pose graph.");
+  const Command app = line.command();
   app.footer(kFooter);
   app.add_option("--config", options.configs,
                  "Configuration files; a later file overrides earlier ones")
-      ->check(CLI::ExistingFile);
+      .existing_file();
   app.add_option("--set", options.settings, "One setting over all files: section.key=value");
   app.add_option("--robot", options.robot, "Id of this robot, any number, unique in the team")
-      ->check(CLI::Range(0, 65535))
-      ->required();
+      .within(0, 65535)
+      .required();
   app.add_option("--name", options.name, "Name shown to people (default robot<id>)");
   add_input(app, options);
   add_network(app, options);
   add_output(app, options);
   app.add_option("--serve-limit", options.serve_limit_s,
                  "Longest time [s] to serve peers after the own input has ended")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
+      .within(0.0, 1e6)
+      .show_default();
   app.add_flag_callback(
       "--print-config", [&options] { print_config(options); },
       "Print the configuration that the options before this one make, with bounds, and exit");
@@ -257,18 +254,16 @@ RobotOptions parse_options(int argc, char** argv) {
          "Print what is in a recording and exit: a bag of ROS 1 (.bag), one of ROS 2 (folder or "
          ".db3), an MCAP file (.mcap), or a folder of images; with a second file, write a rig file "
          "to it. --inspect --live [RIG]: the same for the topics that drivers publish now")
-      ->expected(0, 2)
-      ->type_name("[RECORDING] [RIG]");
+      .expected(0, 2)
+      .type_name("[RECORDING] [RIG]");
   app.add_option("--log", options.log_level, "error, warn, info or debug")
-      ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
-      ->capture_default_str();
-  try {
-    app.parse(argc, argv);
+      .one_of({"error", "warn", "info", "debug"})
+      .show_default();
+  app.callback([&options] {
     check_window(options);
     check_localize(options);
-  } catch (const CLI::ParseError& error) {
-    std::exit(explain(app, error) == 0 ? 0 : kBadCommandLine);
-  }
+  });
+  if (const auto exit_code = line.parse(argc, argv, kBadCommandLine)) std::exit(*exit_code);
   if (options.name.empty()) options.name = "robot" + std::to_string(options.robot);
   return options;
 }

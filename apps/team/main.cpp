@@ -1,13 +1,11 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
 #include <iostream>
 #include <random>
 
-#include "apps/command_line_error.hpp"
+#include "apps/command_line.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_folder.hpp"
-#include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/team/links_file.hpp"
@@ -59,50 +57,50 @@ struct TeamOptions {
   bool report = false;
 };
 
-void define(CLI::App& app, TeamOptions& options) {
+void define(km::Command app, TeamOptions& options) {
   app.footer("Keys of a team file, paths relative to it:\n" + km::team_file_keys() +
              "\nKeys of a file of links, likewise; all but seed, pairs and partitions are those of "
              "every\nlink, and in pairs of some:\n" +
              km::links_file_keys());
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
-  app.add_option("--config", options.config, "Team file")->required();
+  app.add_option("--config", options.config, "Team file").required();
   app.add_option("--dataset", options.dataset, "Value of ${DATASET} in the team file");
   app.add_option(
          "--rate", options.rate,
          "Times real time, max, or auto, see kimera_multi_robot --help (default: the file's, 1.0)")
-      ->check([](const std::string& text) {
+      .check([](const std::string& text) {
         return km::is_rate(text) ? "" : text + " is neither a positive number nor max nor auto";
       });
   app.add_option("--domain", options.domain, "DDS domain (default: the file's, or random)")
-      ->check(CLI::Range(0, 230));
+      .within(0, 230);
   app.add_option("--output", options.output, "Results, one folder per robot (default: the file's)");
   app.add_option("--security", options.security,
                  "Team folder of kimera_multi_keys: each robot uses the keys in its folder there")
-      ->check(CLI::ExistingDirectory);
-  app.add_option("--links", options.links,
-                 "File of bad links, see below and config/links, or a link recorded by Mahimahi "
-                 "(.up, .down): "
-                 "each robot gets a network of its own")
-      ->check(CLI::ExistingFile);
+      .existing_folder();
+  const km::CommandOption links = app.add_option(
+      "--links", options.links,
+      "File of bad links, see below and config/links, or a link recorded by Mahimahi "
+      "(.up, .down): "
+      "each robot gets a network of its own");
+  links.existing_file();
   app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's")
-      ->check(CLI::ExistingPath);
+      .existing_path();
   app.add_option("--time-limit", options.time_limit_s, "Ask the robots to end after this [s]")
-      ->check(CLI::NonNegativeNumber);
+      .not_negative();
   app.add_option("--json", options.json, "Also write the results to this file, as JSON");
-  app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
-      ->capture_default_str();
+  app.add_option("--robot-binary", options.robot_binary, "Program of a robot").show_default();
   app.add_option_function<std::vector<std::string>>(
          "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
          "Each robot writes record.mcap, for Foxglove, Lichtblick, Rerun, PlotJuggler, and at the "
          "end they become one file (default: team.mcap in the folder of the results)")
-      ->expected(0, 1)
-      ->type_name("[FILE.mcap]");
+      .expected(0, 1)
+      .type_name("[FILE.mcap]");
   app.add_flag(
       "--view", options.view,
       "Robots allow every program in the domain to watch them: kimera_multi_viewer --domain N");
   app.add_flag("--report", options.report,
                "Start nothing: the tables of a run that has ended, from its folders in --output")
-      ->excludes("--links");
+      .excludes(links);
   app.add_option("arguments", options.arguments, "After --: more arguments of every robot");
 }
 
@@ -242,24 +240,18 @@ int run(const TeamOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  CLI::App app(kAbout);
-  app.set_version_flag("--version", km::version_text("kimera_multi_team"));
+  km::CommandLine line("kimera_multi_team", kAbout);
   TeamOptions options;
-  define(app, options);
-  try {
-    // CLI11 takes "--" after --record only as the end of its values.
-    char** const robots = std::find(argv, argv + argc, std::string_view("--"));
-    app.parse(static_cast<int>(robots - argv), argv);
-    if (robots != argv + argc)
-      options.arguments.insert(options.arguments.end(), robots + 1, argv + argc);
-  } catch (const CLI::ExtrasError& error) {
-    app.exit(error);
-    std::cerr << "Options of the robots come after --, as in\n"
-                 "  kimera_multi_team --config team.yaml -- --set mapping.mode=off\n";
-    return 1;
-  } catch (const CLI::ParseError& error) {
-    return km::explain(app, error) == 0 ? 0 : 1;
-  }
+  define(line.command(), options);
+  line.hint_for_unknown(
+      "Options of the robots come after --, as in\n"
+      "  kimera_multi_team --config team.yaml -- --set mapping.mode=off\n");
+  // The parser takes "--" after --record only as the end of its values.
+  char** const robots = std::find(argv, argv + argc, std::string_view("--"));
+  if (const auto exit_code = line.parse(static_cast<int>(robots - argv), argv, 1))
+    return *exit_code;
+  if (robots != argv + argc)
+    options.arguments.insert(options.arguments.end(), robots + 1, argv + argc);
   return run(options);
 } catch (const std::exception& error) {
   km::unblocked_stderr() << "kimera_multi_team: " << error.what() << std::endl;

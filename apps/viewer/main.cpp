@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -7,9 +6,8 @@
 #include <set>
 #include <thread>
 
-#include "apps/command_line_error.hpp"
+#include "apps/command_line.hpp"
 #include "apps/output_file.hpp"
-#include "apps/program_version.hpp"
 #include "apps/viewer/page_message.hpp"
 #include "apps/viewer/page_server.hpp"
 #include "apps/viewer/run_playback.hpp"
@@ -75,58 +73,61 @@ struct ViewerOptions {
 void split_port(PageServerOptions& server) {
   const std::size_t colon = server.address.find(':');
   if (colon == std::string::npos || colon != server.address.rfind(':')) return;
-  std::string port = server.address.substr(colon + 1);
-  if (!CLI::Range(0, 65535)(port).empty())
-    throw CLI::ValidationError("--listen", server.address + ": the port is not from 0 to 65535");
-  server.port = std::stoi(port);
+  const char* const end = server.address.data() + server.address.size();
+  std::uint16_t port = 0;
+  const auto [rest, error] = std::from_chars(server.address.data() + colon + 1, end, port);
+  if (error != std::errc() || rest != end)
+    throw CommandLineError("--listen", server.address + ": the port is not from 0 to 65535");
+  server.port = port;
   server.address.resize(colon);
 }
 
-void define(CLI::App& app, ViewerOptions& options) {
+void define(Command app, ViewerOptions& options) {
   app.footer(kFooter);
-  auto* const results = app.add_option("RESULTS", options.results, "Results of a run");
-  auto* const rate =
+  const CommandOption results = app.add_option("RESULTS", options.results, "Results of a run");
+  const CommandOption rate =
       app.add_option("--rate", options.rate, "Play as if live: 1 as it was, 2 twice as fast");
-  rate->check(CLI::Range(1e-3, 1e3))->needs(results);
-  auto* const domain = app.add_option("--domain", options.dds.domain,
-                                      "DDS domain of the team, whose robots run with --view");
-  domain->check(CLI::Range(0, 230))->excludes(results);
-  app.add_option("--team", options.dds.team, "Its dds.team")->needs(domain)->capture_default_str();
-  app.add_option("--interface", options.dds.interface, "Network interface, e.g. lo")->needs(domain);
+  rate.within(1e-3, 1e3).needs(results);
+  const CommandOption domain = app.add_option(
+      "--domain", options.dds.domain, "DDS domain of the team, whose robots run with --view");
+  domain.within(0, 230).excludes(results);
+  app.add_option("--team", options.dds.team, "Its dds.team").needs(domain).show_default();
+  app.add_option("--interface", options.dds.interface, "Network interface, e.g. lo").needs(domain);
   app.add_option("--peers", options.dds.peers, "Addresses of its hosts, where multicast is off")
-      ->delimiter(',')
-      ->needs(domain);
-  auto* const record = app.add_option("--record", options.record,
-                                      "Write the messages of the robots to this MCAP file, "
-                                      "replacing it: the topics of a robot's own record");
-  record->needs(domain);
+      .delimiter(',')
+      .needs(domain);
+  const CommandOption record = app.add_option("--record", options.record,
+                                              "Write the messages of the robots to this MCAP file, "
+                                              "replacing it: the topics of a robot's own record");
+  record.needs(domain);
   app.add_flag("--record-images", options.record_images,
                "And all their camera images, small; else those that a page shows")
-      ->needs(record);
+      .needs(record);
   app.add_option(
          "--palette", options.palette,
          "label_palette.csv with names and colours of the labels (default: that of RESULTS)")
-      ->check(CLI::ExistingFile);
+      .existing_file();
   app.add_option("--port", options.server.port, "Port of the page; 0: any free port")
-      ->check(CLI::Range(0, 65535))
-      ->capture_default_str();
+      .within(0, 65535)
+      .show_default();
   app.add_option(
          "--listen", options.server.address,
          "Address of this host to listen on, 0.0.0.0 for all, also ADDRESS:PORT; other than "
          "loopback, the URL has a token")
-      ->capture_default_str();
+      .show_default();
   app.add_option("--memory", options.memory_MB,
                  "Memory for messages [MB]: beyond it, images, then superseded meshes are dropped, "
                  "the oldest first")
-      ->check(CLI::Range(10.0, 1e6))
-      ->capture_default_str();
+      .within(10.0, 1e6)
+      .show_default();
   app.add_option("--page", options.server.page_folder,
                  "Serve the page's files from this folder, for work on them")
-      ->check(CLI::ExistingDirectory);
+      .existing_folder();
   app.callback([&options, results, domain] {
     split_port(options.server);
-    if (results->empty() && domain->empty())
-      throw CLI::RequiredError("--domain of a team that runs, or RESULTS of one that has ended");
+    if (!results.is_given() && !domain.is_given())
+      throw CommandLineError(
+          "--domain of a team that runs, or RESULTS of one that has ended is required");
   });
 }
 
@@ -231,15 +232,10 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
 }  // namespace km
 
 int main(int argc, char** argv) try {
-  CLI::App app(km::kAbout);
-  app.set_version_flag("--version", km::version_text("kimera_multi_viewer"));
+  km::CommandLine line("kimera_multi_viewer", km::kAbout);
   km::ViewerOptions options;
-  km::define(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return km::explain(app, error) == 0 ? 0 : km::kBadCommandLine;
-  }
+  km::define(line.command(), options);
+  if (const auto exit_code = line.parse(argc, argv, km::kBadCommandLine)) return *exit_code;
   km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));
   (options.results.empty() ? km::show_team : km::show_run)(options, store, signals);

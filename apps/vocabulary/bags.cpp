@@ -15,10 +15,10 @@ struct BagsCommand : VocabularyCommand {
   std::string output;
 };
 
-void define(CLI::App& app, BagsCommand& command) {
-  app.add_option("vocabulary", command.vocabulary, "Vocabulary file")->required();
-  app.add_option("images", command.images, "IMAGES, in the order of the bags")->required();
-  app.add_option("-o,--output", command.output, "File of the bags, one line per image")->required();
+void define(Command app, BagsCommand& command) {
+  app.add_option("vocabulary", command.vocabulary, "Vocabulary file").required();
+  app.add_option("images", command.images, "IMAGES, in the order of the bags").required();
+  app.add_option("-o,--output", command.output, "File of the bags, one line per image").required();
   command.define_images(app);
 }
 
@@ -35,9 +35,9 @@ void run(const BagsCommand& command) {
 
 }  // namespace
 
-void add_bags(CLI::App& parent) {
-  CLI::App& app =
-      *parent.add_subcommand("bags", "Write the words of images to a file, for kimera_multi_crowd");
+void add_bags(Command parent) {
+  const Command app =
+      parent.add_subcommand("bags", "Write the words of images to a file, for kimera_multi_crowd");
   const auto command = std::make_shared<BagsCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

@@ -1,4 +1,4 @@
-#include "apps/subcommands.hpp"
+#include "apps/command_line.hpp"
 #include "apps/vocabulary/commands.hpp"
 
 namespace {

@@ -19,22 +19,18 @@ struct BackEndCommand {
   AgentTeamOptions team = {};
 };
 
-void define(CLI::App& app, BackEndCommand& command) {
+void define(Command app, BackEndCommand& command) {
   CrowdGraphOptions& graph = command.graph;
-  app.add_option("--robots", command.robots, "Sizes of the team")
-      ->delimiter(',')
-      ->capture_default_str();
-  app.add_option("--keyframes", graph.keyframes, "Keyframes of a robot")->capture_default_str();
-  app.add_option("--partners", graph.partners, "Robots that each robot meets, even")
-      ->capture_default_str();
-  app.add_option("--closures", graph.closures, "Closures between two such robots")
-      ->capture_default_str();
-  app.add_option("--seed", graph.seed, "Seed of the noise")->capture_default_str();
+  app.add_option("--robots", command.robots, "Sizes of the team").delimiter(',').show_default();
+  app.add_option("--keyframes", graph.keyframes, "Keyframes of a robot").show_default();
+  app.add_option("--partners", graph.partners, "Robots that each robot meets, even").show_default();
+  app.add_option("--closures", graph.closures, "Closures between two such robots").show_default();
+  app.add_option("--seed", graph.seed, "Seed of the noise").show_default();
   app.add_option("--rate", command.team.keyframes_per_s,
                  "Keyframes per second at which robots play their graphs; 0: all at once")
-      ->capture_default_str();
+      .show_default();
   app.add_option("--longest", command.team.longest_s, "Limit of the virtual time [s]")
-      ->capture_default_str();
+      .show_default();
 }
 
 double mean_received(const AgentTeamRun& run, TeamMessageKind kind) {
@@ -94,8 +90,8 @@ void run(BackEndCommand& command) {
 
 }  // namespace
 
-void add_back_end_study(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
+void add_back_end_study(Command parent) {
+  const Command app = parent.add_subcommand(
       "back-end", "Sessions of the robots' own back-end: bytes and processor time of a robot");
   const auto command = std::make_shared<BackEndCommand>();
   define(app, *command);

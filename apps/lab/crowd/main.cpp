@@ -1,5 +1,5 @@
+#include "apps/command_line.hpp"
 #include "apps/lab/crowd/commands.hpp"
-#include "apps/subcommands.hpp"
 
 namespace {
 

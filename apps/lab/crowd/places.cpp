@@ -20,12 +20,12 @@ struct RecordedInput {
   std::string vocabulary;
   std::vector<std::string> files;
 
-  void define(CLI::App& app) {
-    app.add_option("vocabulary", vocabulary, "Vocabulary file")->required();
+  void define(Command app) {
+    app.add_option("vocabulary", vocabulary, "Vocabulary file").required();
     app.add_option("bags", files,
                    "Recorded sequences that revisit their beginning, from kimera_multi_vocabulary "
                    "bags")
-        ->required();
+        .required();
   }
   [[nodiscard]] std::vector<RecordedPlace> read(const Vocabulary& words) const {
     std::vector<RecordedPlace> places;
@@ -47,39 +47,35 @@ struct PlacesCommand {
   bool no_everyone = false;
 };
 
-void define(CLI::App& app, PlacesCommand& command) {
+void define(Command app, PlacesCommand& command) {
   command.input.define(app);
   CrowdOptions& world = command.world;
-  app.add_option("--robots", command.robots, "Sizes of the team")
-      ->delimiter(',')
-      ->capture_default_str();
+  app.add_option("--robots", command.robots, "Sizes of the team").delimiter(',').show_default();
   app.add_option("--keyframes", world.keyframes, "Keyframes of a robot, one every 3 s")
-      ->capture_default_str();
-  app.add_option("--partners", world.partners, "Robots that each robot meets, even")
-      ->capture_default_str();
+      .show_default();
+  app.add_option("--partners", world.partners, "Robots that each robot meets, even").show_default();
   app.add_option("--meetings", world.meetings, "Places that two such robots have in common")
-      ->capture_default_str();
-  app.add_option("--seed", world.seed, "Seed of the runs")->capture_default_str();
+      .show_default();
+  app.add_option("--seed", world.seed, "Seed of the runs").show_default();
   app.add_option("--owners", command.owners, "Numbers of words whose owners get a sketch")
-      ->delimiter(',')
-      ->capture_default_str();
+      .delimiter(',')
+      .show_default();
   app.add_option("--sketch", command.sketches, "Numbers of words of a sketch")
-      ->delimiter(',')
-      ->capture_default_str();
-  app.add_option("--score", command.bounds.min_score, "Least score of two sketches")
-      ->capture_default_str();
+      .delimiter(',')
+      .show_default();
+  app.add_option("--score", command.bounds.min_score, "Least score of two sketches").show_default();
   app.add_option("--named", command.bounds.max_robots, "Robots that an owner names at most")
-      ->capture_default_str();
+      .show_default();
   app.add_option("--window", command.window,
                  "A bag goes to a robot named twice within so many keyframes; 0: named once")
-      ->capture_default_str();
+      .show_default();
   app.add_option("--observed", command.observed, "Robots whose searches are simulated")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+      .within(1, 1000)
+      .show_default();
   app.add_option("--verified", command.verified_share,
                  "Share of the candidates at the same place that are verified")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
+      .within(0.0, 1.0)
+      .show_default();
   app.add_flag("--no-everyone", command.no_everyone, "Simulate owners only");
 }
 
@@ -208,16 +204,16 @@ void run_statistics(const RecordedInput& input, std::size_t sketch) {
 
 }  // namespace
 
-void add_places(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
+void add_places(Command parent) {
+  const Command app = parent.add_subcommand(
       "places", "Words to everyone, or sketches to the owners of words: costs and places found");
   const auto command = std::make_shared<PlacesCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });
 }
 
-void add_statistics(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
+void add_statistics(Command parent) {
+  const Command app = parent.add_subcommand(
       "statistics", "Similarities inside recordings, and of the places made of them");
   const auto input = std::make_shared<RecordedInput>();
   const auto sketch = std::make_shared<std::size_t>(kMaxBagWords);

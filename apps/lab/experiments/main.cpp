@@ -1,16 +1,14 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
 #include <filesystem>
 #include <iostream>
 
-#include "apps/command_line_error.hpp"
+#include "apps/command_line.hpp"
 #include "apps/lab/experiments/report.hpp"
 #include "apps/lab/experiments/run_inputs.hpp"
 #include "apps/lab/experiments/run_steps.hpp"
 #include "apps/lab/experiments/step_record.hpp"
 #include "apps/program_folder.hpp"
-#include "apps/program_version.hpp"
 #include "modules/core/text_table.hpp"
 
 namespace {
@@ -59,7 +57,7 @@ std::vector<std::string> all_names() {
   return names;
 }
 
-void define(CLI::App& app, Options& options) {
+void define(km::Command app, Options& options) {
   app.footer(
       "Keys of a world in worlds.yaml, paths relative to it; those below quick: replace them "
       "with --quick:\n" +
@@ -69,14 +67,13 @@ void define(CLI::App& app, Options& options) {
   app.add_option("--results", options.results,
                  "Numbers, logs and the report (default: experiments_results)");
   app.add_option("--graphs", options.graphs, "Recorded pose graphs (default: the folder of --data)")
-      ->check(CLI::ExistingDirectory);
-  app.add_option("--euroc", options.euroc, "EuRoC's recordings, see above")
-      ->check(CLI::ExistingDirectory);
+      .existing_folder();
+  app.add_option("--euroc", options.euroc, "EuRoC's recordings, see above").existing_folder();
   app.add_option("--config", options.config, "Folder of the experiments' configuration")
-      ->check(CLI::ExistingDirectory);
+      .existing_folder();
   app.add_option("--programs", options.programs,
                  "Folder of the other programs (default: this one's)")
-      ->check(CLI::ExistingDirectory);
+      .existing_folder();
   app.add_flag("--quick", options.quick,
                "Small versions of all: other data and results, in quick/ below the folders");
 }
@@ -210,34 +207,30 @@ void report(const km::ExperimentConfig& config, const km::ExperimentPaths& paths
 }  // namespace
 
 int main(int argc, char** argv) try {
-  CLI::App app(kAbout);
-  app.set_version_flag("--version", km::version_text("kimera_multi_experiments"));
+  km::CommandLine line("kimera_multi_experiments", kAbout);
+  const km::Command app = line.command();
   Options options;
   define(app, options);
-  app.require_subcommand(1);
-  app.fallthrough();
-  auto* const list_command =
+  app.require_subcommand(true);
+  const km::Command list_command =
       app.add_subcommand("list", "Shows the experiments, their steps, and what is done");
-  auto* const run_command = app.add_subcommand("run", "Does what is not done yet, then reports");
+  const km::Command run_command =
+      app.add_subcommand("run", "Does what is not done yet, then reports");
   std::vector<std::string> names = all_names();
   names.emplace_back("all");
   run_command
-      ->add_option("NAME", options.names,
-                   "pcm, cosmo, trajectory, resources, mesh, semantics, levels, or all")
-      ->required()
-      ->check(CLI::IsMember(names));
-  run_command->add_flag("--again", options.again, "Also what is done");
+      .add_option("NAME", options.names,
+                  "pcm, cosmo, trajectory, resources, mesh, semantics, levels, or all")
+      .required()
+      .one_of(names);
+  run_command.add_flag("--again", options.again, "Also what is done");
   app.add_subcommand("report", "Writes report.html and report.md of what there is");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return km::explain(app, error) == 0 ? 0 : 1;
-  }
-  const Setup setup = setup_of(options, run_command->parsed());
+  if (const auto exit_code = line.parse(argc, argv, 1)) return *exit_code;
+  const Setup setup = setup_of(options, run_command.is_parsed());
   const km::ExperimentConfig config = km::read_experiments(setup.config, setup.quick);
-  if (list_command->parsed())
+  if (list_command.is_parsed())
     list(config, setup.paths);
-  else if (run_command->parsed())
+  else if (run_command.is_parsed())
     return run(options, setup, config);
   else
     report(config, setup.paths);

@@ -9,15 +9,15 @@
 
 namespace km {
 
-void GraphInput::define(CLI::App& app) {
+void GraphInput::define(Command app) {
   app.add_option(
          "FILE", file,
          "Pose graph (*.g2o), a team's (*.jrl), or a folder with one file per robot, or a team's\n"
          "results")
-      ->required()
-      ->check(CLI::ExistingPath);
+      .required()
+      .existing_path();
   app.add_option("--robots", robots, "Number of robots among which a single file is divided")
-      ->check(CLI::Range(1, 65535));
+      .within(1, 65535);
   app.add_option("--partition", partition,
                  "contiguous: runs of equal length; or a file with rows \"vertex robot\"");
   app.add_flag("--keep-steps", keep_steps,
@@ -25,7 +25,7 @@ void GraphInput::define(CLI::App& app) {
                "closures alone join robots in the field");
 }
 
-LabelledTeamGraph GraphInput::read(const CLI::App& app) const {
+LabelledTeamGraph GraphInput::read(Command app) const {
   const bool folder = is_folder(file);
   const bool of_a_team = folder || file.extension() == ".jrl";
   const bool contiguous = partition == "contiguous";

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -17,6 +16,7 @@
 #include "apps/stage_progress.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/json.hpp"
+#include "modules/core/text_rows.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/statistics.hpp"
 
@@ -224,17 +224,16 @@ struct OutliersCommand {
 
 // Parses "A:B".
 std::pair<double, double> two_numbers(const std::string& text) {
-  const std::size_t colon = text.find(':');
-  double first = 0.0, second = 0.0;
-  if (colon == std::string::npos || !CLI::detail::lexical_cast(text.substr(0, colon), first) ||
-      !CLI::detail::lexical_cast(text.substr(colon + 1), second) || !(first >= 0.0) ||
-      !(second >= 0.0))
-    throw CLI::ValidationError(text + " is not two numbers with a colon between");
-  return {first, second};
+  const std::size_t colon = std::min(text.find(':'), text.size());
+  const auto first = parse_double(text.substr(0, colon));
+  const auto second = parse_double(text.substr(std::min(colon + 1, text.size())));
+  if (!(first >= 0.0) || !(second >= 0.0))
+    throw CommandLineError(text + " is not two numbers with a colon between");
+  return {*first, *second};
 }
 
 std::size_t whole_number(double number) {
-  if (number != std::floor(number)) throw CLI::ValidationError("not a whole number");
+  if (number != std::floor(number)) throw CommandLineError("not a whole number");
   return static_cast<std::size_t>(number);
 }
 
@@ -242,39 +241,39 @@ Clusters clusters_of(const std::string& text) {
   if (text.find(':') == std::string::npos) return clusters_of(text + ":5");
   const auto [places, size] = two_numbers(text);
   if (places > 10000.0 || size < 1.0 || size > 1000.0)
-    throw CLI::ValidationError(text + ": at most 10000 clusters of 1 to 1000 closures");
+    throw CommandLineError(text + ": at most 10000 clusters of 1 to 1000 closures");
   return {whole_number(places), whole_number(size)};
 }
 
-void define(CLI::App& app, OutliersCommand& command) {
+void define(Command app, OutliersCommand& command) {
   OutlierStudyOptions& study = command.study;
   std::vector<std::string> methods = kRejections;
   methods.insert(methods.end(), kScenarioMethods.begin(), kScenarioMethods.end());
   app.add_option("--shares", study.shares_percent,
                  "False closures for every 100 true ones [%]; a scenario takes one share")
-      ->check(CLI::Range(0.0, 10000.0))
-      ->delimiter(',');
+      .within(0.0, 10000.0)
+      .delimiter(',');
   app.add_option("--methods", study.methods,
                  "See below. For scenarios: robots,trust-all,pcm,gnc,reference")
-      ->check(CLI::IsMember(methods).description(""))
-      ->delimiter(',');
+      .one_of_unlisted(methods)
+      .delimiter(',');
   app.add_option("--seeds", study.seeds,
                  "Seeds of the false closures, one run each. Scenarios have the default 1 to 10")
-      ->delimiter(',');
+      .delimiter(',');
   app.add_option("--outlier-range", study.half_side_m,
                  "Translations of false closures are at most this along every axis [m]; 0: half\n"
                  "the longest side of the map")
-      ->check(CLI::NonNegativeNumber);
+      .not_negative();
   app.add_option(
          "--barc", study.barc,
          "newton: largest residual [sigma] of an edge that is kept; 0: the team estimates it")
-      ->check(CLI::NonNegativeNumber);
+      .not_negative();
   app.add_option("--confidence", study.pcm.confidence,
                  "pcm: share of true cycles that pass the test")
-      ->check(CLI::Range(0.01, 1.0 - 1e-12));
+      .within(0.01, 1.0 - 1e-12);
   app.add_option("--pcm-sigmas", study.pcm_sigmas,
                  "pcm: sigmas of all edges, in multiples of the file's")
-      ->check(CLI::Range(0.01, 1000.0));
+      .within(0.01, 1000.0);
   app.add_option_function<std::string>(
          "--clusters",
          [&command](const std::string& text) {
@@ -284,15 +283,14 @@ void define(CLI::App& app, OutliersCommand& command) {
          },
          "N:SIZE: N false places of SIZE successive keyframes (5 without :SIZE) between two\n"
          "robots, whose closures agree with each other")
-      ->type_name("N:SIZE");
-  app.add_option("--rounds", study.max_rounds, "Largest number of rounds")
-      ->check(CLI::Range(1, 1000000));
+      .type_name("N:SIZE");
+  app.add_option("--rounds", study.max_rounds, "Largest number of rounds").within(1, 1000000);
 }
 
 // Adds an option that changes the scenario.
 template <typename T>
-CLI::Option* change(CLI::App& app, OutliersCommand& command, const std::string& name,
-                    std::function<void(Scenario&, const T&)> set, const std::string& says) {
+CommandOption change(Command app, OutliersCommand& command, const std::string& name,
+                     std::function<void(Scenario&, const T&)> set, const std::string& says) {
   return app.add_option_function<T>(
       name,
       [&command, set](const T& value) {
@@ -301,7 +299,7 @@ CLI::Option* change(CLI::App& app, OutliersCommand& command, const std::string& 
       says);
 }
 
-void change_factors(CLI::App& app, OutliersCommand& command, const std::string& name,
+void change_factors(Command app, OutliersCommand& command, const std::string& name,
                     std::vector<RobotFactor> Scenario::*factors, const std::string& says) {
   change<std::vector<std::string>>(
       app, command, name,
@@ -313,11 +311,11 @@ void change_factors(CLI::App& app, OutliersCommand& command, const std::string& 
         }
       },
       says)
-      ->type_name("ROBOT:K")
-      ->delimiter(',');
+      .type_name("ROBOT:K")
+      .delimiter(',');
 }
 
-void change_sigma(CLI::App& app, OutliersCommand& command, const std::string& name,
+void change_sigma(Command app, OutliersCommand& command, const std::string& name,
                   std::optional<NoiseSigma> Scenario::*sigma, const std::string& says) {
   change<std::string>(
       app, command, name,
@@ -326,22 +324,21 @@ void change_sigma(CLI::App& app, OutliersCommand& command, const std::string& na
         s.*sigma = NoiseSigma{rotation_rad, translation_m};
       },
       says)
-      ->type_name("RAD:M");
+      .type_name("RAD:M");
 }
 
-void define_scenario(CLI::App& app, OutliersCommand& command) {
+void define_scenario(Command app, OutliersCommand& command) {
   std::vector<std::string> names;
   for (const Scenario& scenario : scenarios()) names.push_back(scenario.name);
-  app.option_defaults()->group("Scenarios");
-  app.add_option("--scenario", command.scenario, "See below")
-      ->check(CLI::IsMember(names).description(""));
+  app.group("Scenarios");
+  app.add_option("--scenario", command.scenario, "See below").one_of_unlisted(names);
   change<std::size_t>(
       app, command, "--first", [](Scenario& s, std::size_t n) { s.first_poses = n; },
       "Number of poses of the graph to use, from its first; 0: all");
   change<double>(
       app, command, "--step-length", [](Scenario& s, double m) { s.step_length_m = m; },
       "Scale the truth so that steps of odometry have this mean length [m]; 0: no scaling")
-      ->check(CLI::NonNegativeNumber);
+      .not_negative();
   change_sigma(app, command, "--step-noise", &Scenario::step_sigma,
                "Sigma of a step of odometry on each axis, in place of the file's");
   change_sigma(app, command, "--closure-sigma", &Scenario::closure_sigma,
@@ -360,15 +357,15 @@ void define_scenario(CLI::App& app, OutliersCommand& command) {
       app, command, "--place-bias", [](Scenario& s, double sigma) { s.place_bias = sigma; },
       "Closures of one place (both ends within the same ten keyframes) share an error with this\n"
       "multiple of their sigmas")
-      ->check(CLI::NonNegativeNumber);
+      .not_negative();
   change<double>(
       app, command, "--closure-share", [](Scenario& s, double share) { s.closure_share = share; },
       "Probability with which each closure of the graph is kept")
-      ->check(CLI::Range(0.0, 1.0));
+      .within(0.0, 1.0);
   change<double>(
       app, command, "--inside-share", [](Scenario& s, double share) { s.inside_share = share; },
       "Further probability with which a closure inside a robot is kept")
-      ->check(CLI::Range(0.0, 1.0));
+      .within(0.0, 1.0);
   change<std::size_t>(
       app, command, "--closures-per-pair",
       [](Scenario& s, std::size_t n) { s.closures_per_pair = n; },
@@ -380,22 +377,22 @@ void define_scenario(CLI::App& app, OutliersCommand& command) {
         s.cluster_robots = {whole_number(a), whole_number(b)};
       },
       "All clusters are between these two robots. By default each cluster draws its two robots")
-      ->type_name("A:B");
+      .type_name("A:B");
   app.add_option("--keyframes-per-s", command.keyframes_per_s,
                  "robots: keyframes that each robot plays per second of virtual time; 0: all at\n"
                  "once")
-      ->check(CLI::NonNegativeNumber);
+      .not_negative();
   app.add_option(
          "--thresholds", command.thresholds,
          "robots, pcm, gnc: one run with each largest residual of a kept closure [sigma of\n"
          "the claimed noise], for ROC curves; 0: the default of the method")
-      ->check(CLI::NonNegativeNumber)
-      ->delimiter(',');
+      .not_negative()
+      .delimiter(',');
   app.add_option("--csv", command.csv, "Also write every run to this file");
 }
 
 // --clusters belongs to both studies, so it alone does not select a scenario.
-bool is_scenario(const CLI::App& app, const OutliersCommand& command) {
+bool is_scenario(Command app, const OutliersCommand& command) {
   return command.changes.size() > app.count("--clusters") || app.count("--scenario") > 0;
 }
 
@@ -406,7 +403,7 @@ void check_methods(const std::vector<std::string>& methods, const std::vector<st
       throw std::runtime_error("--methods " + method + " is not for " + which);
 }
 
-Scenario scenario_asked(const CLI::App& app, const OutliersCommand& command) {
+Scenario scenario_asked(Command app, const OutliersCommand& command) {
   Scenario scenario = command.scenario.empty() ? Scenario{} : scenario_of(command.scenario);
   for (const auto& change : command.changes) change(scenario);
   const bool cut = !is_folder(command.input.file) && command.input.partition == "contiguous";
@@ -422,7 +419,7 @@ Scenario scenario_asked(const CLI::App& app, const OutliersCommand& command) {
   return scenario;
 }
 
-void run_scenario(const CLI::App& app, const OutliersCommand& command) {
+void run_scenario(Command app, const OutliersCommand& command) {
   for (const char* option : {"--outlier-range", "--barc", "--pcm-sigmas", "--rounds"})
     if (app.count(option) > 0)
       throw std::runtime_error(std::string(option) + " is not for scenarios");
@@ -463,7 +460,7 @@ TeamGraph true_graph(const LabelledTeamGraph& input, const std::string& file) {
   return std::move(parts.front().graph);
 }
 
-void run(const CLI::App& app, const OutliersCommand& command) {
+void run(Command app, const OutliersCommand& command) {
   command.files.check();
   if (is_scenario(app, command)) return run_scenario(app, command);
   for (const char* option : {"--keyframes-per-s", "--thresholds", "--csv"})
@@ -488,19 +485,19 @@ void run(const CLI::App& app, const OutliersCommand& command) {
 
 }  // namespace
 
-void add_outliers(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
+void add_outliers(Command parent) {
+  const Command app = parent.add_subcommand(
       "outliers",
       "Adds false closures, or noise that is not as claimed, and compares what keeps them out");
   app.footer(details());
-  app.option_defaults()->always_capture_default();
+  app.show_defaults();
   const auto command = std::make_shared<OutliersCommand>();
   command->input.define(app);
   define(app, *command);
   define_scenario(app, *command);
-  app.option_defaults()->group("Options");
+  app.group("Options");
   command->files.define(app, "every run", "error, closures and time");
-  app.callback([&app, command] { run(app, *command); });
+  app.callback([app, command] { run(app, *command); });
 }
 
 }  // namespace km

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
 #include <memory>
@@ -60,45 +59,47 @@ struct PcmCommand {
   PcmConfig config{.odometry_gate = true};
 };
 
-void define_closures(CLI::App& app, ClosureChoice& selection) {
+void define_closures(Command app, ClosureChoice& selection) {
   app.add_option("--outliers", selection.outliers, "Random false closures to add")
-      ->check(CLI::Range(0, kMostClosures));
+      .within(0, kMostClosures);
   app.add_option("--closures", selection.keep,
                  "Number of the file's closures to use, drawn at random; 0: all")
-      ->check(CLI::Range(0, kMostClosures));
+      .within(0, kMostClosures);
   app.add_option("--outlier-range", selection.outlier_half_side_m,
                  "Translations of the random closures are at most this along every axis [m]")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--seed", selection.seed, "Seed of all random draws")->capture_default_str();
+      .positive();
+  app.add_option("--seed", selection.seed, "Seed of all random draws").show_default();
   app.add_flag_callback(
       "--file-order", [&] { selection.shuffle = false; },
       "Add the closures in the order of the file, random ones last, not shuffled");
 }
 
-void define_search(CLI::App& app, PcmCommand& command) {
+void define_search(Command app, PcmCommand& command) {
+  std::vector<std::string> names;
+  for (const auto& [name, method] : kSearches) names.push_back(name);
   app.add_option("--search", command.searches, "exact, incremental or batch; several are compared")
-      ->check(CLI::IsMember(kSearches).description(""));
+      .one_of_unlisted(names);
   app.add_option("--max-search-nodes", command.config.max_search_nodes,
                  "Exact search: largest number of tree nodes in one addition")
-      ->check(CLI::Range(1, 1000000000));
+      .within(1, 1000000000);
 }
 
-void define_checks(CLI::App& app, PcmConfig& config) {
+void define_checks(Command app, PcmConfig& config) {
   app.add_option("--confidence", config.confidence, "Share of true cycles that pass the test")
-      ->check(CLI::Range(0.01, 1.0 - 1e-12));
+      .within(0.01, 1.0 - 1e-12);
   app.add_option("--odometry-noise-scale", config.odometry_noise_scale,
                  "Factor on the standard deviations of odometry")
-      ->check(CLI::Range(0.01, 1000.0));
+      .within(0.01, 1000.0);
   app.add_option("--closure-noise-scale", config.closure_noise_scale,
                  "Factor on the standard deviations of closures")
-      ->check(CLI::Range(0.01, 1000.0));
+      .within(0.01, 1000.0);
   app.add_flag_callback(
       "--keep-contradicting", [&] { config.odometry_gate = false; },
       "Keep closures that contradict odometry alone");
 }
 
 // Refuses options on closures if the file is a consistency graph, which has no closures.
-void check(const CLI::App& app, const PcmCommand& command) {
+void check(Command app, const PcmCommand& command) {
   command.files.check();
   if (command.file.extension() == ".g2o") return;
   if (command.file.extension() != ".txt")
@@ -156,21 +157,21 @@ std::vector<PcmRun> run_file(const PcmCommand& command) {
 
 }  // namespace
 
-void add_pcm(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
+void add_pcm(Command parent) {
+  const Command app = parent.add_subcommand(
       "pcm", "Adds loop closures one at a time and follows the largest set that agrees");
   app.footer(kPcmDetails);
-  app.option_defaults()->always_capture_default();
+  app.show_defaults();
   const auto command = std::make_shared<PcmCommand>();
   app.add_option("FILE", command->file, "Pose graph (*.g2o) or consistency graph (*.txt)")
-      ->required()
-      ->check(CLI::ExistingFile);
+      .required()
+      .existing_file();
   define_search(app, *command);
   define_closures(app, command->selection);
   define_checks(app, command->config);
   command->files.define(app, "every addition (an array for several searches)",
                         "time and size of the clique against vertices");
-  app.callback([&app, command] {
+  app.callback([app, command] {
     check(app, *command);
     const std::vector<PcmRun> runs = run_file(*command);
     command->files.write([&](std::ostream& out) { write_pcm_json(out, runs); },

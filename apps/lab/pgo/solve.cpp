@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
 #include <iostream>
@@ -105,58 +104,62 @@ std::vector<Takers> takers() {
           {"--links", {"newton", "newton --trust-all", "rbcd"}}};
 }
 
-void define_method(CLI::App& app, SolveCommand& command) {
+void define_method(Command app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
-  app.add_option("--method", solver.method, "See below")
-      ->check(CLI::IsMember(kMethods).description(""));
+  app.add_option("--method", solver.method, "See below").one_of_unlisted(kMethods);
   app.add_flag("--no-vertical", command.no_vertical, "Leave out the verticals of the files");
-  app.add_option("--rounds", solver.run.max_rounds, "Largest number of rounds")
-      ->check(CLI::Range(0, 1000000));
+  app.add_option("--rounds", solver.run.max_rounds, "Largest number of rounds").within(0, 1000000);
   app.add_option("--gradient", solver.run.gradient_tolerance,
                  "Stop once the norm of the Riemannian gradient is at most this")
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--rank", solver.rank, "rbcd: rank of the relaxation")->check(CLI::Range(3, 10));
+      .not_negative();
+  app.add_option("--rank", solver.rank, "rbcd: rank of the relaxation").within(3, 10);
   app.add_option("--over-relaxation", solver.over_relaxation,
                  "rbcd: largest step of a robot, relative to that to the minimum of its block")
-      ->check(CLI::Range(1.0, 1.99));
+      .within(1.0, 1.99);
   app.add_option_function<std::string>(
          "--links",
          [&solver](const std::string& shape) {
            solver.shape = shape == "chain" ? TeamShape::kChain : TeamShape::kAll;
          },
          "newton, rbcd: links of the robots: all, or chain (robot k to k - 1 and k + 1)")
-      ->check(CLI::IsMember({"all", "chain"}))
-      ->default_str("all");
+      .one_of({"all", "chain"})
+      .default_text("all");
   app.add_option("--instants", command.instants,
                  "JRL: number of times at which the graph known so far is solved, with the ATE")
-      ->check(CLI::Range(1, 10000));
+      .within(1, 10000);
   app.add_option("--optimum", command.optimum, "The optimum, if known, so that it is not computed")
-      ->check(CLI::PositiveNumber);
+      .positive();
 }
 
-void define_newton(CLI::App& app, SolveCommand& command) {
+void define_newton(Command app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
-  app.option_defaults()->group("newton");
+  app.group("newton");
   app.add_flag("--trust-all", solver.trust_all, "Treat all closures as true");
   app.add_option(
          "--barc", solver.barc,
          "Largest residual [sigma] of a closure that is kept, sqrt of its cost; 0: exceeded by\n"
          "one in a million Gaussian residuals, times the noise scale that the team estimates")
-      ->check(CLI::NonNegativeNumber);
+      .not_negative();
   app.add_flag("--share-private", solver.share_private,
                "Also send private poses to other robots if that saves bytes");
   app.add_flag("--reject-odometry", solver.reject_odometry,
                "Also reject false steps of odometry inside a robot");
 }
 
-void check(const CLI::App& app, SolveCommand& command) {
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+void check(Command app, SolveCommand& command) {
   if (command.solver.trust_all && command.solver.method != "newton")
     throw std::runtime_error("--trust-all is for --method newton only");
   const std::string method = command.solver.name();
   for (const auto& [option, methods] : takers())
     if (app.count(option) > 0 && std::find(methods.begin(), methods.end(), method) == methods.end())
-      throw std::runtime_error(std::string(option) + " is for --method " +
-                               CLI::detail::join(methods, ", ") + " only, not for " + method);
+      throw std::runtime_error(std::string(option) + " is for --method " + listed(methods) +
+                               " only, not for " + method);
   command.files.check();
   check_output_folder(command.output);
 }
@@ -190,7 +193,7 @@ std::vector<bool> kept_by(const Solution& solution) {
   return solution.run.decision ? solution.run.decision->kept : std::vector<bool>();
 }
 
-void run(const CLI::App& app, SolveCommand& command) {
+void run(Command app, SolveCommand& command) {
   check(app, command);
   LabelledTeamGraph team = command.input.read(app);
   TeamGraph& graph = team.graph;
@@ -220,25 +223,25 @@ void run(const CLI::App& app, SolveCommand& command) {
 
 }  // namespace
 
-void add_solve(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("solve", "Optimises a pose graph by a team of robots");
+void add_solve(Command parent) {
+  const Command app = parent.add_subcommand("solve", "Optimises a pose graph by a team of robots");
   app.footer(kSolveDetails);
-  app.option_defaults()->always_capture_default();
+  app.show_defaults();
   const auto command = std::make_shared<SolveCommand>();
   command->input.define(app);
   define_method(app, *command);
   define_newton(app, *command);
-  app.option_defaults()->group("Output");
+  app.group("Output");
   command->files.define(app, "every round",
                         "the gap against rounds, bytes and time (not newton without --trust-all)");
   app.add_option("--output", command->output,
                  "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o")
-      ->check([](const std::string& file) {
+      .check([](const std::string& file) {
         return file.ends_with(".tum") || file.ends_with(".g2o")
                    ? std::string()
                    : file + ": --output writes *.tum or *.g2o";
       });
-  app.callback([&app, command] { run(app, *command); });
+  app.callback([app, command] { run(app, *command); });
 }
 
 }  // namespace km

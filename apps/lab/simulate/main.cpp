@@ -1,10 +1,8 @@
-#include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
 
-#include "apps/command_line_error.hpp"
+#include "apps/command_line.hpp"
 #include "apps/lab/simulate/simulate.hpp"
-#include "apps/program_version.hpp"
 
 namespace {
 
@@ -34,15 +32,10 @@ constexpr const char* kAbout =
 }  // namespace
 
 int main(int argc, char** argv) try {
-  CLI::App app(kAbout);
-  app.set_version_flag("--version", km::version_text("kimera_multi_simulate"));
+  km::CommandLine line("kimera_multi_simulate", kAbout);
   km::SimulationOptions options;
-  km::define(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return km::explain(app, error) == 0 ? 0 : 1;
-  }
+  km::define(line.command(), options);
+  if (const auto exit_code = line.parse(argc, argv, 1)) return *exit_code;
   options = km::completed(options);
   km::SignalWatch signals;
   km::Progress progress;

@@ -11,12 +11,11 @@ namespace km {
 namespace {
 
 SimulationOptions parsed_effects(std::vector<std::string> arguments) {
-  CLI::App app;
+  CommandLine line("kimera_multi_simulate", "");
   SimulationOptions options;
-  define(app, options);
+  define(line.command(), options);
   arguments.insert(arguments.end(), {"--world", "city", "--output", "x"});
-  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants it
-  app.parse(arguments);
+  line.parse_words(std::move(arguments));
   return completed(options);
 }
 

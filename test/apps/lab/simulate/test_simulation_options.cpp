@@ -9,11 +9,10 @@ namespace km {
 namespace {
 
 SimulationOptions parse(std::vector<std::string> arguments) {
-  CLI::App app;
+  CommandLine line("kimera_multi_simulate", "");
   SimulationOptions options;
-  define(app, options);
-  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants it
-  app.parse(arguments);
+  define(line.command(), options);
+  line.parse_words(std::move(arguments));
   return completed(options);
 }
 
