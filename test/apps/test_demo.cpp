@@ -10,6 +10,7 @@
 #include "modules/mesh/ply_file.hpp"
 #include "modules/sensors/text_file.hpp"
 #include "test/support/command.hpp"
+#include "test/support/demo_world.hpp"
 #include "test/support/nav2_map.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -69,7 +70,7 @@ void check_map_2d(const std::filesystem::path& robot, const std::filesystem::pat
 
 }  // namespace
 
-TEST_CASE("The demo joins three robots of a simulated world into one frame", "[demo][slow]") {
+TEST_CASE("The demo joins three robots of a simulated world into one frame", "[demo][demo_world]") {
   constexpr std::size_t kFrames = 80;  // 8 s at 10 Hz
   constexpr double kMaxError_m = 0.3;  // robots in frames of their own are a metre off and more
   const TemporaryFolder folder;
@@ -77,6 +78,7 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
                                 folder.path().string());
   CAPTURE(demo.output);
   REQUIRE(demo.exit_code == 0);
+  keep_demo_world(folder.path() / "world_short");
   CHECK_THAT(demo.output, Catch::Contains("240 of 240 frames, 100 %") &&
                               Catch::Contains("8 s of recording each, as fast as this") &&
                               Catch::Contains("team, one frame") &&

@@ -6,6 +6,7 @@
 #include "test/apps/viewer/page_programs.hpp"
 #include "test/apps/viewer/small_run.hpp"
 #include "test/support/command.hpp"
+#include "test/support/demo_world.hpp"
 
 namespace km {
 namespace {
@@ -26,7 +27,7 @@ TEST_CASE("The page has the content of the files of a run, at any time of the ru
 }
 
 TEST_CASE("The page follows a team that runs, shows its past, and knows how it ended",
-          "[page][slow]") {
+          "[page][demo_world]") {
   std::string why = missing_page_program();
   if (!std::filesystem::exists(KM_BIN_DIR "/kimera_multi_simulate")) why = "no simulator (Embree)";
   if (!why.empty()) {
@@ -34,6 +35,9 @@ TEST_CASE("The page follows a team that runs, shows its past, and knows how it e
     return;
   }
   const TemporaryFolder folder;
+  if (std::filesystem::exists(kDemoWorld))  // otherwise the demo renders it
+    std::filesystem::copy(kDemoWorld, folder.path() / "world_short",
+                          std::filesystem::copy_options::recursive);
   const CommandResult result =
       run_command("node test/apps/viewer/page_of_team.mjs " KM_BIN_DIR " " +
                   folder.path().string() + " '' --short --rate 0.3");
