@@ -23,6 +23,7 @@ std::optional<BinaryDescriptor> read_descriptor(BitReader& reader) {
 }  // namespace
 
 std::vector<std::uint8_t> pack(const KeyframeFeatures& features) {
+  if (features.keypoints.empty()) return {};
   KeypointScale scale{.focal_px = static_cast<float>(features.focal_px),
                       .baseline_m = static_cast<float>(features.baseline_m)};
   for (const Keypoint& keypoint : features.keypoints) scale.include(keypoint);
@@ -37,6 +38,7 @@ std::vector<std::uint8_t> pack(const KeyframeFeatures& features) {
 }
 
 std::optional<KeyframeFeatures> unpack_features(std::span<const std::uint8_t> bytes) {
+  if (bytes.empty()) return KeyframeFeatures();
   BitReader reader(bytes);
   const auto scale = read_scale(reader);
   const auto count = scale ? reader.gamma() : std::nullopt;

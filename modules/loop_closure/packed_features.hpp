@@ -15,7 +15,8 @@ inline constexpr std::size_t kMaxKeypoints = 10000;
 
 /// Encodes keypoints and the part of their descriptors by which keyframes are matched, in 16.6
 /// bytes a keypoint. The scale comes first, then the number of keypoints, the keypoints, and
-/// kMatchedBytes of each descriptor. T_body_cam is not part of it.
+/// kMatchedBytes of each descriptor. T_body_cam is not part of it. Without keypoints there are no
+/// bytes.
 [[nodiscard]] std::vector<std::uint8_t> pack(const KeyframeFeatures& features);
 
 /// Inverse of pack(). The other bytes of each descriptor are zero, and T_body_cam is the identity.

@@ -79,7 +79,7 @@ Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& 
   wire.odometry = to_wire(keyframe.odometry);
   wire.stamp = keyframe.stamp;
   wire.T_body_cam = to_wire(keyframe.features.T_body_cam);
-  if (reply.found) encoded.features = pack(keyframe.features);
+  encoded.features = pack(keyframe.features);
   borrow(wire.features, encoded.features);
   return encoded;
 }

@@ -46,11 +46,9 @@ TEST_CASE("Features are packed in 17 bytes a keypoint, rounded by less than thei
   CHECK(pack(*received) == bytes);
 }
 
-TEST_CASE("Features without keypoints are packed", "[packed_features]") {
-  KeyframeFeatures none = random_features(3, 10);
-  none.keypoints.clear();
-  none.descriptors.clear();
-  const auto received = unpack_features(pack(none));
+TEST_CASE("Features without keypoints need no camera and no bytes", "[packed_features]") {
+  CHECK(pack(KeyframeFeatures()).empty());
+  const auto received = unpack_features({});
   REQUIRE(received);
   CHECK(received->keypoints.empty());
 }
@@ -59,7 +57,7 @@ TEST_CASE("Features that end early or late, or state what no camera has, are ref
           "[packed_features]") {
   const KeyframeFeatures features = random_features(4, 12);
   std::vector<std::uint8_t> bytes = pack(features);
-  for (std::size_t size = 0; size < bytes.size(); ++size)
+  for (std::size_t size = 1; size < bytes.size(); ++size)
     CHECK_FALSE(unpack_features(std::span(bytes).first(size)));
   bytes.push_back(0);
   CHECK_FALSE(unpack_features(bytes));
