@@ -1,8 +1,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <tuple>
@@ -15,23 +17,44 @@
 namespace km {
 
 /// Smooth noise in [0, 1] with value 0.5 on average: a random number at each corner of a grid of
-/// unit cells, blended by a cubic.
-inline double smooth_noise(double x, double y, std::uint32_t seed) {
-  const auto corner = [seed](double cx, double cy) {
-    std::uint32_t h = static_cast<std::uint32_t>(static_cast<std::int64_t>(cx)) * 0x9E3779B1U ^
-                      static_cast<std::uint32_t>(static_cast<std::int64_t>(cy)) * 0x85EBCA77U ^
-                      seed * 0xC2B2AE3DU;
+/// unit cells, blended by a cubic. It keeps the corners of the last cell, because neighbouring
+/// pixels are mostly in one cell.
+class SmoothNoise {
+ public:
+  explicit SmoothNoise(std::uint32_t seed) : seed_(seed) {}
+
+  [[nodiscard]] double at(double x, double y) {
+    const double x0 = std::floor(x);
+    const double y0 = std::floor(y);
+    if (x0 != x0_ || y0 != y0_) enter(x0, y0);
+    const auto blend = [](double t) { return t * t * (3.0 - 2.0 * t); };
+    const double u = blend(x - x0);
+    const double v = blend(y - y0);
+    return (1 - v) * ((1 - u) * corners_[0] + u * corners_[1]) +
+           v * ((1 - u) * corners_[2] + u * corners_[3]);
+  }
+
+ private:
+  [[nodiscard]] double corner(double x, double y) const {
+    std::uint32_t h = static_cast<std::uint32_t>(static_cast<std::int64_t>(x)) * 0x9E3779B1U ^
+                      static_cast<std::uint32_t>(static_cast<std::int64_t>(y)) * 0x85EBCA77U ^
+                      seed_ * 0xC2B2AE3DU;
     h = (h ^ (h >> 15)) * 0x2C1B3C6DU;
     h = (h ^ (h >> 12)) * 0x297A2D39U;
     return static_cast<double>((h ^ (h >> 15)) & 0xFFFFU) / 65535.0;
-  };
-  const double x0 = std::floor(x);
-  const double y0 = std::floor(y);
-  const auto blend = [](double t) { return t * t * (3.0 - 2.0 * t); };
-  const double u = blend(x - x0);
-  const double v = blend(y - y0);
-  return (1 - v) * ((1 - u) * corner(x0, y0) + u * corner(x0 + 1, y0)) +
-         v * ((1 - u) * corner(x0, y0 + 1) + u * corner(x0 + 1, y0 + 1));
+  }
+  void enter(double x0, double y0) {
+    x0_ = x0, y0_ = y0;
+    corners_ = {corner(x0, y0), corner(x0 + 1, y0), corner(x0, y0 + 1), corner(x0 + 1, y0 + 1)};
+  }
+
+  std::uint32_t seed_;
+  double x0_ = std::numeric_limits<double>::quiet_NaN(), y0_ = x0_;  // lower corner of the cell
+  std::array<double, 4> corners_{};
+};
+
+inline double smooth_noise(double x, double y, std::uint32_t seed) {
+  return SmoothNoise(seed).at(x, y);
 }
 
 /// Two equal cameras side by side, x right, with the distortion of a wide lens.
@@ -82,8 +105,10 @@ struct TexturedPlane {
   [[nodiscard]] GrayImage render(const Camera& camera, const SE3& T_world_body) const {
     GrayImage image{camera.width, camera.height, {}};
     const SE3 T_world_cam = T_world_body * camera.T_body_cam;
+    SmoothNoise fine(seed), coarse(seed + 1);
     for (const auto& bearing : bearings_of(camera))
-      image.pixels.push_back(bearing ? level(T_world_cam, *bearing) : std::uint8_t{0});
+      image.pixels.push_back(bearing ? level(meet(T_world_cam, *bearing) / cell_m, fine, coarse)
+                                     : std::uint8_t{0});
     return image;
   }
 
@@ -115,11 +140,11 @@ struct TexturedPlane {
   }
 
  private:
-  [[nodiscard]] std::uint8_t level(const SE3& T_world_cam, const Eigen::Vector2d& bearing) const {
-    const Eigen::Vector3d p = meet(T_world_cam, bearing) / cell_m;
-    const double value = 0.7 * smooth_noise(p.x(), p.y(), seed) +
-                         0.3 * smooth_noise(0.37 * p.x(), 0.37 * p.y(), seed + 1);
-    return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(value, 0.0, 1.0)));
+  // `p` is in cells.
+  [[nodiscard]] static std::uint8_t level(const Eigen::Vector3d& p, SmoothNoise& fine,
+                                          SmoothNoise& coarse) {
+    const double value = 0.7 * fine.at(p.x(), p.y()) + 0.3 * coarse.at(0.37 * p.x(), 0.37 * p.y());
+    return static_cast<std::uint8_t>(255.0 * std::clamp(value, 0.0, 1.0) + 0.5);
   }
 };
 
