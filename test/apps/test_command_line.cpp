@@ -73,6 +73,7 @@ void add_failure(Command parent) {
 Parsed run_program(std::vector<std::string> words) {
   words.insert(words.begin(), "program");
   std::vector<char*> argv;
+  argv.reserve(words.size());
   for (std::string& word : words) argv.push_back(word.data());
   const CapturedErrors errors;
   const int exit_code = run_subcommands("program", "About it.", {add_count, add_failure},
