@@ -208,11 +208,15 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
   else
     add_odometry<VioNode>(rig, config.tracker, config.vio, odometry);
   if (mapping) add_mapping(config, rate, rig.stereo, *mapping, std::move(map));
+  std::optional<ImageDescriber> describer;
+  if (const std::string& network = config.place_recognition.network; !network.empty())
+    describer.emplace(find_shipped_file(network));
   auto& features =
       add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
                                 KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,
                                                        .frames = topics_.located_frames,
-                                                       .keyframes = topics_.new_keyframes});
+                                                       .keyframes = topics_.new_keyframes},
+                                std::move(describer));
   topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
   if (restored_) features.continue_from(restored_->keyframes.back().odometry);
 }

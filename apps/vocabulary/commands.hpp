@@ -34,5 +34,6 @@ void add_train(Command app);
 void add_inspect(Command app);
 void add_evaluate(Command app);
 void add_bags(Command app);
+void add_describe(Command app);
 
 }  // namespace km

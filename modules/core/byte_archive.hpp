@@ -88,6 +88,7 @@ class ArchiveWriter {
  private:
   void put(bool value) { out_.u8(value ? 1 : 0); }
   void put(std::uint8_t value) { out_.u8(value); }
+  void put(std::int8_t value) { out_.u8(static_cast<std::uint8_t>(value)); }
   void put(std::unsigned_integral auto value) { out_.varint(value); }
   void put(int value) { out_.u32(static_cast<std::uint32_t>(value)); }
   void put(Stamp value) { out_.u64(static_cast<std::uint64_t>(value)); }
@@ -182,6 +183,7 @@ class ArchiveReader {
     value = byte == 1;
   }
   void get(std::uint8_t& value) { value = in_.u8(); }
+  void get(std::int8_t& value) { value = static_cast<std::int8_t>(in_.u8()); }
   template <std::unsigned_integral T>
   void get(T& value) {
     value = in_.varint_as<T>();

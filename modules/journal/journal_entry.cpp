@@ -53,6 +53,9 @@ void describe(auto& archive, As<Keyframe> auto& keyframe) {
     for (auto& byte : descriptor) archive(byte);
   });
   archive.require(features.descriptors.size() == features.keypoints.size());
+  archive(keyframe.image.network);
+  archive.list(keyframe.image.values, kMaxImageDescriptorBytes, 1,
+               [&](auto& value) { archive(value); });
 }
 
 void describe(auto& archive, As<Closure> auto& closure) {

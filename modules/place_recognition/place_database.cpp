@@ -24,28 +24,40 @@ void count_support(std::vector<PlaceCandidate>& candidates) {
 PlaceDatabase::PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words)
     : config_(checked(config)), database_(words) {}
 
-std::size_t PlaceDatabase::add(BowVector vector, Stamp stamp) {
+std::size_t PlaceDatabase::add(BowVector vector, Stamp stamp, ImageDescriptor image) {
   if (!stamps_.empty() && stamp < stamps_.back())
     throw std::invalid_argument("PlaceDatabase::add: stamp " + std::to_string(stamp) +
                                 " is before " + std::to_string(stamps_.back()));
   const std::size_t index = database_.add(vector);
+  images_.add(std::move(image));
   stamps_.push_back(stamp);
   last_ = std::move(vector);
   return index;
 }
 
-CandidateSearch PlaceDatabase::search(const BowVector& query, const BowVector* previous) const {
-  return search_among(query, previous, stamps_.size());
+CandidateSearch PlaceDatabase::search(const BowVector& query, const BowVector* previous,
+                                      const ImageDescriptor& image) const {
+  return search_among(query, previous, image, stamps_.size());
 }
 
-CandidateSearch PlaceDatabase::search_own(const BowVector& query, Stamp stamp) const {
+CandidateSearch PlaceDatabase::search_own(const BowVector& query, Stamp stamp,
+                                          const ImageDescriptor& image) const {
   const Stamp newest = stamp - nanoseconds(config_.min_gap_s);
   const auto end = std::upper_bound(stamps_.begin(), stamps_.end(), newest);
-  return search_among(query, stamps_.empty() ? nullptr : &last_,
+  return search_among(query, stamps_.empty() ? nullptr : &last_, image,
                       std::max(static_cast<std::size_t>(end - stamps_.begin()), known_from_));
 }
 
 CandidateSearch PlaceDatabase::search_among(const BowVector& query, const BowVector* previous,
+                                            const ImageDescriptor& image, std::size_t count) const {
+  CandidateSearch result = search_words(query, previous, count);
+  for (const auto& [index, cosine] : images_.search(image, config_.image_similarity, count))
+    choose({.index = index, .similarity = cosine, .by_image = true}, result.candidates);
+  count_support(result.candidates);
+  return result;
+}
+
+CandidateSearch PlaceDatabase::search_words(const BowVector& query, const BowVector* previous,
                                             std::size_t count) const {
   CandidateSearch result;
   if (previous == nullptr) {
@@ -62,24 +74,22 @@ CandidateSearch PlaceDatabase::search_among(const BowVector& query, const BowVec
   result.compared = matches.compared;
   result.above = matches.above;
   result.best_similarity = static_cast<double>(matches.best_score) / result.normalizer;
-  result.candidates = choose(matches.best, result.normalizer);
+  for (const BowMatch& match : matches.best)
+    choose(
+        {.index = match.index, .similarity = static_cast<double>(match.score) / result.normalizer},
+        result.candidates);
   return result;
 }
 
-std::vector<PlaceCandidate> PlaceDatabase::choose(const std::vector<BowMatch>& matches,
-                                                  double normalizer) const {
-  std::vector<PlaceCandidate> chosen;
-  for (const BowMatch& match : matches) {
-    if (chosen.size() == static_cast<std::size_t>(config_.max_candidates)) break;
-    const bool is_new_place = std::all_of(chosen.begin(), chosen.end(), [&](const auto& other) {
-      return std::abs(seconds_between(stamps_[other.index], stamps_[match.index])) >=
-             config_.candidate_separation_s;
-    });
-    if (is_new_place)
-      chosen.push_back({match.index, static_cast<double>(match.score) / normalizer});
-  }
-  count_support(chosen);
-  return chosen;
+// Adds a keyframe to the chosen ones if there is room, and if it is far enough from them in time.
+void PlaceDatabase::choose(const PlaceCandidate& found, std::vector<PlaceCandidate>& chosen) const {
+  if (chosen.size() == static_cast<std::size_t>(config_.max_candidates)) return;
+  const bool is_new = std::ranges::all_of(chosen, [&](const PlaceCandidate& other) {
+    return other.index != found.index &&
+           std::abs(seconds_between(stamps_[other.index], stamps_[found.index])) >=
+               config_.candidate_separation_s;
+  });
+  if (is_new) chosen.push_back(found);
 }
 
 }  // namespace km

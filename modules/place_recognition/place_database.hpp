@@ -6,6 +6,7 @@
 #include "modules/core/ids.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/place_recognition/bow_database.hpp"
+#include "modules/place_recognition/descriptor_database.hpp"
 #include "modules/place_recognition/place_recognition_config.hpp"
 
 namespace km {
@@ -13,9 +14,10 @@ namespace km {
 /// A keyframe that may show the same place as the query.
 struct PlaceCandidate {
   std::size_t index = 0;    ///< In order of add().
-  double similarity = 0.0;  ///< Normalised, see PlaceDatabase.
+  double similarity = 0.0;  ///< Normalised, see PlaceDatabase; if by_image, a cosine.
   int support = 1;          ///< Number of the query's candidates within 3 keyframes of this
                             ///< candidate, including itself.
+  bool by_image = false;    ///< Found by the descriptor of the image, and not by words.
 };
 
 enum class SearchStatus {
@@ -31,7 +33,8 @@ struct CandidateSearch {
   std::size_t compared = 0;      ///< Number of keyframes that share a word with the query.
   std::size_t above = 0;         ///< Number of these at or above the threshold.
   double best_similarity = 0.0;  ///< Best similarity of all compared keyframes.
-  std::vector<PlaceCandidate> candidates;  ///< By descending similarity; at most max_candidates.
+  std::vector<PlaceCandidate> candidates;  ///< At most max_candidates: those of words, then those
+                                           ///< of the image, each by descending similarity.
 };
 
 /// The keyframes of one robot, in order of time, and the search for earlier visits of a place.
@@ -40,21 +43,26 @@ struct CandidateSearch {
 /// that of the query and the keyframe before it: eta = s(v_t, v_j) / s(v_t, v_(t-1)). One threshold
 /// then suits all places (Galvez-Lopez and Tardos, TRO 2012; threshold 0.5 in Chang et al.,
 /// "Kimera-Multi", Sec. III-A). Deviation from the first paper: candidates need no temporal
-/// consistency, because geometric verification and outlier rejection follow. Const members are
-/// thread-safe.
+/// consistency, because geometric verification and outlier rejection follow.
+///
+/// If images have descriptors by a network, keyframes of similar descriptors become candidates too,
+/// as far as words leave room. They need no normaliser. Const members are thread-safe.
 class PlaceDatabase {
  public:
   /// For vectors of a vocabulary of `words` words. Throws ConfigError if `config` is out of bounds.
   PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words);
 
   /// Candidates among all keyframes for the keyframe `query` of another robot. `previous`: the
-  /// other robot's keyframe before it, or null.
-  CandidateSearch search(const BowVector& query, const BowVector* previous) const;
+  /// other robot's keyframe before it, or null. `image`: the descriptor of the query's image, or an
+  /// empty one.
+  CandidateSearch search(const BowVector& query, const BowVector* previous,
+                         const ImageDescriptor& image = {}) const;
 
   /// Candidates for a keyframe of this robot taken at `stamp`, not yet added. The search covers the
   /// keyframes that are at least min_gap_s older or were added before mark_odometry_break(). The
   /// keyframe added last normalises the score.
-  CandidateSearch search_own(const BowVector& query, Stamp stamp) const;
+  CandidateSearch search_own(const BowVector& query, Stamp stamp,
+                             const ImageDescriptor& image = {}) const;
 
   /// States that odometry hardly determines the pose of the next keyframe relative to the keyframe
   /// added last. All keyframes added so far then count as other places, whatever their age.
@@ -62,7 +70,7 @@ class PlaceDatabase {
 
   /// Adds a keyframe and returns its index. Throws std::invalid_argument if `stamp` is before the
   /// last stamp, or if BowDatabase::add() does. The state is then unchanged.
-  std::size_t add(BowVector vector, Stamp stamp);
+  std::size_t add(BowVector vector, Stamp stamp, ImageDescriptor image = {});
 
   /// Takes a keyframe that is not added: it only normalises the score of the next one.
   void pass(BowVector vector) { last_ = std::move(vector); }
@@ -70,12 +78,15 @@ class PlaceDatabase {
   std::size_t size() const { return stamps_.size(); }
 
  private:
-  CandidateSearch search_among(const BowVector& query, const BowVector* previous,
+  CandidateSearch search_words(const BowVector& query, const BowVector* previous,
                                std::size_t count) const;
-  std::vector<PlaceCandidate> choose(const std::vector<BowMatch>& matches, double normalizer) const;
+  CandidateSearch search_among(const BowVector& query, const BowVector* previous,
+                               const ImageDescriptor& image, std::size_t count) const;
+  void choose(const PlaceCandidate& found, std::vector<PlaceCandidate>& chosen) const;
 
   PlaceRecognitionConfig config_;
   BowDatabase database_;
+  DescriptorDatabase images_;
   std::vector<Stamp> stamps_;  // ascending
   std::size_t known_from_ = 0;
   BowVector last_;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "modules/core/config.hpp"
 
 namespace km {
@@ -16,6 +18,8 @@ struct PlaceRecognitionConfig {
   double candidate_separation_s = 0.0;
   int max_waiting_keyframes = 10;
   bool known_places = true;
+  std::string network = {};
+  double image_similarity = 0.8;
 
   void visit_fields(auto& visitor) {
     visitor.field("max_words", max_words, {1, 100000},
@@ -42,6 +46,13 @@ struct PlaceRecognitionConfig {
         "neither send nor search the words of keyframes at places that earlier keyframes "
         "of this robot show from nearly the same pose; false: a robot that moves at known "
         "places sends and keeps as much as at new ones");
+    visitor.field("network", network,
+                  "ONNX file that describes whole images, beside the words; one for all robots; "
+                  "input: 1 x 1 or 3 x height x width, output: up to 128 numbers; "
+                  "networks/places.onnx comes with the program; empty: none");
+    visitor.field("image_similarity", image_similarity, {0.0, 1.0},
+                  "least cosine of two descriptors by the network for a candidate that words do "
+                  "not find; lower: more candidates, more work for verification");
   }
 };
 

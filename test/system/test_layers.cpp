@@ -34,6 +34,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"dense_sensing", {"images"}},
     {"diagnosis", {"evaluation", "images", "place_recognition", "recordings", "sensors", "vio"}},
     {"loop_closure", {"images", "place_recognition"}},
+    {"place_recognition", {"images"}},
     {"localization", {"loop_closure", "place_recognition"}},
     {"vio", {"images"}},
     {"pose_graph", {"outlier_rejection"}},

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <exception>
+#include <optional>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "modules/core/covariance.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
+#include "modules/place_recognition/image_describer.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -22,13 +24,15 @@ struct KeyframeFeaturesTopics {
   Out<Keyframe> keyframes;
 };
 
-/// Adds to the keyframes of odometry their features and the covariance accumulated along the chain.
+/// Adds to the keyframes of odometry their features, the descriptor of their image, and the
+/// covariance accumulated along the chain.
 class KeyframeFeaturesNode final : public Node {
  public:
-  /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
-  /// rectified.
+  /// Without `describer` images have no descriptor. Throws ConfigError if `config` is out of
+  /// bounds, std::invalid_argument if the rig cannot be rectified.
   KeyframeFeaturesNode(const KeyframeFeaturesConfig& config, const StereoRig& rig,
-                       const KeyframeFeaturesTopics& topics);
+                       const KeyframeFeaturesTopics& topics,
+                       std::optional<ImageDescriber> describer = {});
 
   /// Continues after the keyframe `last` of an earlier process. The odometry of keyframes up to
   /// `last` is ignored. Call before start().
@@ -51,6 +55,7 @@ class KeyframeFeaturesNode final : public Node {
 
   const Camera camera_;  // left
   const KeyframeFeatureExtractor extractor_;
+  std::optional<ImageDescriber> describer_;
   const Out<Keyframe> keyframes_;
   std::deque<Keyframe> without_images_;
   UncertainPose chain_;  // from the first keyframe's odometry frame to the latest keyframe

@@ -23,6 +23,9 @@ Codec<KeyframeBow>::Encoded Codec<KeyframeBow>::encode(const KeyframeBow& messag
   wire.stamp = message.stamp;
   wire.vocabulary = message.vocabulary;
   borrow(wire.bag, encoded.bag);
+  wire.network = message.image.network;
+  encoded.image.assign(message.image.values.begin(), message.image.values.end());
+  borrow(wire.image, encoded.image);
   return encoded;
 }
 
@@ -33,10 +36,15 @@ Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire, const TeamPeer
   if (!packed) return Decoded<KeyframeBow>::refuse("words are missing or too many");
   std::optional<BagOfWords> words = unpack(*packed);
   if (!words) return Decoded<KeyframeBow>::refuse("the words cannot be decoded");
+  const auto image = elements_of(wire.image, kMaxImageDescriptorBytes);
+  if (!image) return Decoded<KeyframeBow>::refuse("the image's descriptor is missing or too long");
+  if ((wire.network == 0) != image->empty())
+    return Decoded<KeyframeBow>::refuse("the image's descriptor has no network or no values");
   return Decoded<KeyframeBow>::accept({.id = {wire.keyframe.robot, wire.keyframe.index},
                                        .stamp = wire.stamp,
                                        .vocabulary = wire.vocabulary,
-                                       .words = *std::move(words)});
+                                       .words = *std::move(words),
+                                       .image = {wire.network, {image->begin(), image->end()}}});
 }
 
 }  // namespace km

@@ -64,6 +64,8 @@ void PlaceRecognitionNode::step(const Closure& closure) {
 void PlaceRecognitionNode::step(const Topic<PeerEvent>::Message& event) {
   if (event->kind != PeerEventKind::kRestarted) return;
   peers_.erase(event->identity.robot);
+  std::erase_if(images_,
+                [&](const auto& entry) { return entry.first.robot == event->identity.robot; });
   topics_.restarts.publish(event);
 }
 
@@ -74,22 +76,25 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   const UncertainPose chain{keyframe.odometry.T_odom_kf, keyframe.odometry.covariance};
   if (const auto before = std::exchange(chain_, chain); before && breaks_odometry(*before, chain))
     own_.mark_odometry_break();
-  CandidateSearch search = own_.search_own(vector, keyframe.stamp);
+  CandidateSearch search = own_.search_own(vector, keyframe.stamp, keyframe.image);
   const PlaceNovelty novelty = novelty_of(keyframe.odometry, search);
   if (novelty != PlaceNovelty::kNew) keep_due(novelty, search.candidates);
   if (novelty == PlaceNovelty::kNew) {
     // Added before it is published, so that no pair is missed: see the class comment.
-    own_.add(std::move(vector), keyframe.stamp);
+    own_.add(std::move(vector), keyframe.stamp, keyframe.image);
+    if (keyframe.image.network != 0) network_ = keyframe.image.network;
     own_ids_.push_back(id);
     known_.add_view(keyframe.odometry, median_depth_m(keyframe.features).value_or(0.0));
   } else {
     own_.pass(std::move(vector));
     words.clear();
   }
+  const bool is_sent = novelty == PlaceNovelty::kNew;
   topics_.own_bows.publish(KeyframeBow{.id = id,
                                        .stamp = keyframe.stamp,
                                        .vocabulary = vocabulary_->id(),
-                                       .words = std::move(words)});
+                                       .words = std::move(words),
+                                       .image = is_sent ? keyframe.image : ImageDescriptor()});
   publish(id, std::move(search));
 }
 
@@ -112,8 +117,25 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
   PeerHistory& history = peers_.try_emplace(id.robot, patience).first->second;
   if (history.has(id.index)) return publish_refusal(id, PlaceQueryStatus::kRepeated);
   if (peer_bow.words.empty()) publish(id, {});
-  for (const PeerQuery& query : history.add(id.index, vocabulary_->weigh(peer_bow.words)))
-    publish({id.robot, query.index}, own_.search(*query.vector, query.previous.get()));
+  keep_image(peer_bow);
+  for (const PeerQuery& query : history.add(id.index, vocabulary_->weigh(peer_bow.words))) {
+    const KeyframeId searched{id.robot, query.index};
+    const auto image = images_.extract(searched);
+    publish(searched, own_.search(*query.vector, query.previous.get(),
+                                  image ? image.mapped() : ImageDescriptor()));
+  }
+}
+
+// Keeps the descriptor of a peer's image until PeerHistory releases its words.
+void PlaceRecognitionNode::keep_image(const KeyframeBow& peer_bow) {
+  const auto& [network, values] = peer_bow.image;
+  if (values.empty() || peer_bow.words.empty()) return;
+  images_[peer_bow.id] = peer_bow.image;
+  if (network_ != 0 && network_ != network)
+    log::limited(log::Level::kWarn, name(), "network of " + std::to_string(peer_bow.id.robot))
+        << "robot " << peer_bow.id.robot << " describes images by another network ("
+        << fingerprint_text(network) << ", here " << fingerprint_text(network_)
+        << "): only words are compared; set one place_recognition.network";
 }
 
 BagOfWords PlaceRecognitionNode::words_of(const KeyframeFeatures& features) const {

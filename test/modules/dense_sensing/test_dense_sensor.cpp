@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "modules/dense_sensing/dense_sensor.hpp"
-#include "onnx_model.hpp"
 #include "test/modules/vio/textured_plane.hpp"
+#include "test/support/onnx_model.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {

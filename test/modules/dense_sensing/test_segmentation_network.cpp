@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/dense_sensing/segmentation_network.hpp"
-#include "onnx_model.hpp"
+#include "test/support/onnx_model.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {

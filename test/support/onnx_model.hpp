@@ -39,8 +39,8 @@ class ProtobufBytes {
 /// every `stride`th pixel, as an ONNX file (onnx.proto, operator set 11).
 struct PointwiseNetwork {
   int channels = 1, height = 8, width = 16, stride = 1;
-  std::vector<std::vector<float>> weights;  ///< By class.
-  std::vector<float> biases;
+  std::vector<std::vector<float>> weights = {};  ///< By class.
+  std::vector<float> biases = {};
 
   [[nodiscard]] std::string onnx() const {
     const auto classes = static_cast<std::uint64_t>(weights.size());
