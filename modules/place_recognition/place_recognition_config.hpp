@@ -19,7 +19,7 @@ struct PlaceRecognitionConfig {
   int max_waiting_keyframes = 10;
   bool known_places = true;
   std::string network = {};
-  double image_similarity = 0.8;
+  double image_similarity = 0.35;
 
   void visit_fields(auto& visitor) {
     visitor.field("max_words", max_words, {1, 100000},

@@ -2,12 +2,17 @@
 #include <cmath>
 
 #include "modules/core/config.hpp"
+#include "modules/images/image_codec.hpp"
+#include "modules/place_recognition/descriptor_database.hpp"
 #include "modules/place_recognition/image_describer.hpp"
 #include "test/support/onnx_model.hpp"
+#include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
+
+constexpr const char* kShipped = "config/networks/places.onnx";
 
 // Gives the image itself: its pixels at mean 0 and deviation 1, times `weight`.
 PointwiseNetwork copying(int channels = 1, float weight = 1.0F) {
@@ -26,6 +31,16 @@ GrayImage halves(int width, int height, std::uint8_t low, std::uint8_t high) {
   GrayImage image{width, height, {}};
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) image.pixels.push_back(x < width / 2 ? low : high);
+  return image;
+}
+
+GrayImage load(const std::filesystem::path& file) {
+  const cv::Mat grey = read_pixels(file, DecodedPixels::kGray);
+  return {grey.cols, grey.rows, {grey.begin<std::uint8_t>(), grey.end<std::uint8_t>()}};
+}
+
+GrayImage darker(GrayImage image) {
+  for (std::uint8_t& pixel : image.pixels) pixel = static_cast<std::uint8_t>(pixel / 2 + 5);
   return image;
 }
 
@@ -75,6 +90,40 @@ TEST_CASE("A network that does not fit is refused with its file, the reason and 
                                               Catch::Contains(file.string()) &&
                                               Catch::Contains("place_recognition.network"));
   CHECK_THROWS_WITH(ImageDescriber(folder.path() / "none.onnx"), Catch::Contains("none.onnx"));
+}
+
+TEST_CASE("The shipped network gives the numbers of its training", "[image_describer]") {
+  GrayImage image{160, 120, {}};
+  for (int y = 0; y < 120; ++y)
+    for (int x = 0; x < 160; ++x)
+      image.pixels.push_back(static_cast<std::uint8_t>((x * x / 40 + 3 * y) % 256));
+  const ImageDescriptor found = ImageDescriber(kShipped).describe(image);
+  REQUIRE(found.values.size() == 128);
+  // First values by torch, as apps/lab/places/train.py prints them; rounding may differ by one.
+  const std::vector<int> expected = {-48, -70, -2,  7,   -25, -6, -20, -16,
+                                     30,  42,  -20, -38, -3,  30, 6,   -42};
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    CHECK(std::abs(int{found.values[i]} - expected[i]) <= 1);
+}
+
+TEST_CASE("A recorded image at half the light is nearer to itself than to any other keyframe",
+          "[image_describer]") {
+  const auto folder = shared_data("euroc/V1_01_easy/keyframes");
+  if (!folder) return;
+  ImageDescriber describer(kShipped);
+  DescriptorDatabase database;
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(*folder))
+    if (entry.path().string().ends_with("_0.jpg")) files.push_back(entry.path());
+  REQUIRE(files.size() == 100);
+  for (const auto& file : files) database.add(describer.describe(load(file)));
+  std::size_t nearest = 0;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto matches = database.search(describer.describe(darker(load(files[i]))), 0.9, 100);
+    REQUIRE_FALSE(matches.empty());
+    nearest += matches.front().index == i ? 1 : 0;
+  }
+  CHECK(nearest == files.size());
 }
 
 }  // namespace
