@@ -59,7 +59,7 @@ class PlaceNetwork(nn.Module):
 
 
 def normalized(images):
-    """Mean 0 and deviation 1 of each image, as image_descriptor.hpp does it."""
+    """Mean 0 and deviation 1 of each image, as image_describer.hpp does it."""
     centered = images - images.mean((1, 2, 3), keepdim=True)
     return centered / centered.pow(2).mean((1, 2, 3), keepdim=True).sqrt().clamp(min=1e-3)
 
