@@ -7,6 +7,7 @@
 #include "apps/result_files.hpp"
 #include "apps/robot/diagnostics.hpp"
 #include "apps/robot/process_usage.hpp"
+#include "apps/robot/results.hpp"
 #include "apps/robot/team_keys_node.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/loop_closure/node/keyframe_features_node.hpp"

@@ -10,7 +10,7 @@ namespace km {
 
 /// Content of messages: XCDR2.
 [[nodiscard]] constexpr std::size_t bag_bytes(std::size_t packed) {
-  return 32 + packed;
+  return 44 + packed;
 }
 [[nodiscard]] constexpr std::size_t request_bytes() {
   return 24;
