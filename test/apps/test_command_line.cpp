@@ -107,7 +107,7 @@ TEST_CASE("An invalid command line gives the exit code and a message with the op
       {{"a", "--number"}, "--number"},
       {{"a", "--number", "1", "--ratio", "-1"}, "--ratio: Value -1 not in range"},
       {{"a", "--ratio", "1"}, "--ratio requires --number"},
-      {{}, "NAME is required"},
+      {std::vector<const char*>(), "NAME is required"},
       {{"a", "--nmber", "1"}, "--nmber"},
   }));
   Program program;
@@ -136,7 +136,7 @@ TEST_CASE("The hint for unknown words follows their names", "[program]") {
 
 TEST_CASE("Exactly one option of a choice group is given", "[program]") {
   const auto [words, is_valid] =
-      GENERATE(table<std::vector<const char*>, bool>({{{}, false},
+      GENERATE(table<std::vector<const char*>, bool>({{std::vector<const char*>(), false},
                                                       {{"--a", "1"}, true},
                                                       {{"--b", "1"}, true},
                                                       {{"--a", "1", "--b", "1"}, false}}));
