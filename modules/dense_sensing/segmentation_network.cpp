@@ -4,14 +4,13 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <opencv2/dnn.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
-#include "modules/images/image_view.hpp"
+#include "modules/images/network.hpp"
 
 namespace km {
 namespace {
@@ -41,30 +40,14 @@ SegmentationConfig checked_network(SegmentationConfig config) {
   return config;
 }
 
-// The reason of an error without the place in OpenCV's sources.
-std::string reason(const cv::Exception& error) {
-  std::string text = error.err.empty() ? error.what() : error.err;
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  return text;
-}
-
 cv::dnn::Net read_network(const std::string& file) {
   if (!is_file(file)) throw ConfigError("segmentation.network: no such file: " + file + "\n");
   try {
-    cv::dnn::Net net = cv::dnn::readNetFromONNX(file);
-    net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-    net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
-    return net;
+    return read_onnx(read_input_file(file, kMaxNetworkBytes));
   } catch (const cv::Exception& error) {
     throw ConfigError("segmentation.network: " + file +
-                      " cannot be read as ONNX: " + reason(error) + "\n");
+                      " cannot be read as ONNX: " + reason_of(error) + "\n");
   }
-}
-
-std::string shape_text(const cv::Mat& blob) {
-  std::string text;
-  for (int i = 0; i < blob.dims; ++i) text += (i > 0 ? " x " : "") + std::to_string(blob.size[i]);
-  return text;
 }
 
 // A network's output as one plane of scores per class, or a single plane of class numbers.
@@ -114,12 +97,8 @@ struct SegmentationNetwork::State {
         net(read_network(config.network)) {}
 
   cv::Mat run(const GrayImage& image) {
-    const cv::Mat grey = view(image);
-    cv::Mat resized;
-    cv::resize(grey, resized, {config.width_px, config.height_px}, 0.0, 0.0,
-               grey.cols > config.width_px ? cv::INTER_AREA : cv::INTER_LINEAR);
-    cv::Mat input = resized;
-    if (config.channels == 3) cv::cvtColor(resized, input, cv::COLOR_GRAY2BGR);
+    cv::Mat input = resized(image, {config.width_px, config.height_px});
+    if (config.channels == 3) cv::cvtColor(input, input, cv::COLOR_GRAY2BGR);
     net.setInput(cv::dnn::blobFromImage(input, config.scale, {}, cv::Scalar::all(config.mean)));
     return net.forward();
   }
@@ -143,12 +122,13 @@ SegmentationNetwork::SegmentationNetwork(const SegmentationConfig& config)
   try {
     const cv::Mat output = state_->run({c.width_px, c.height_px, std::vector<std::uint8_t>(size)});
     if (!planes_of(output))
-      throw ConfigError(place + "its output is " + shape_text(output) +
+      throw ConfigError(place + "its output is " +
+                        shape_text({output.size.p, static_cast<std::size_t>(output.dims)}) +
                         ", not 1 x classes x height x width\n");
   } catch (const cv::Exception& error) {
     throw ConfigError(place + "does not run on an image of " + std::to_string(c.width_px) + " x " +
                       std::to_string(c.height_px) + " px with " + std::to_string(c.channels) +
-                      " channels: " + reason(error) + "\n");
+                      " channels: " + reason_of(error) + "\n");
   }
 }
 

@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/dnn.hpp>
-#include <opencv2/imgproc.hpp>
 #include <span>
 #include <string>
 #include <utility>
@@ -14,12 +12,11 @@
 #include "modules/core/bytes.hpp"
 #include "modules/core/config.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/images/image_view.hpp"
+#include "modules/images/network.hpp"
 
 namespace km {
 namespace {
 
-constexpr std::uintmax_t kMaxNetwork_bytes = 1U << 28U;
 constexpr int kMaxInput_px = 4096;
 constexpr double kLeastDeviation = 0.5;  // [grey levels] below it the image shows nothing
 constexpr float kLargestByte = 127.0F;
@@ -30,12 +27,6 @@ constexpr const char* kWayOut =
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& reason) {
   throw ConfigError("place_recognition.network: " + file.string() + ": " + reason + kWayOut + "\n");
-}
-
-std::string shape_text(const cv::dnn::MatShape& shape) {
-  std::string text;
-  for (const int size : shape) text += (text.empty() ? "" : " x ") + std::to_string(size);
-  return text.empty() ? "unknown" : text;
 }
 
 using Bytes = std::span<const std::uint8_t>;
@@ -115,9 +106,7 @@ struct ImageDescriber::State {
     mix_fnv1a(network, model);
     network = std::max<std::uint64_t>(network, 1);
     try {
-      net = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
-      net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-      net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
+      net = read_onnx(bytes);
       input = input_shape(model);
       if (!is_usable_input(input))
         refuse(file, "its input is " + shape_text(input) + ", not 1 x 1 or 3 x height x width");
@@ -127,13 +116,13 @@ struct ImageDescriber::State {
         refuse(file, "its output has " + std::to_string(output.total()) + " numbers, not 1 to " +
                          std::to_string(kMaxImageDescriptorBytes));
     } catch (const cv::Exception& error) {
-      refuse(file, "cannot be run as ONNX: " + (error.err.empty() ? error.what() : error.err));
+      refuse(file, "cannot be run as ONNX: " + reason_of(error));
     }
   }
 
   static std::string read_network(const std::filesystem::path& file) {
     try {
-      return read_input_file(file, kMaxNetwork_bytes);
+      return read_input_file(file, kMaxNetworkBytes);
     } catch (const std::runtime_error& error) {
       throw ConfigError("place_recognition.network: " + std::string(error.what()) + kWayOut + "\n");
     }
@@ -165,13 +154,12 @@ std::uint64_t ImageDescriber::network() const {
 
 ImageDescriptor ImageDescriber::describe(const GrayImage& image) {
   const cv::Size size(state_->input[3], state_->input[2]);
-  cv::Mat resized, plane;
-  cv::resize(view(image), resized, size, 0.0, 0.0,
-             image.width > size.width ? cv::INTER_AREA : cv::INTER_LINEAR);
+  const cv::Mat input = resized(image, size);
+  cv::Mat plane;
   cv::Scalar mean, deviation;
-  cv::meanStdDev(resized, mean, deviation);
+  cv::meanStdDev(input, mean, deviation);
   if (deviation[0] < kLeastDeviation) return {};
-  resized.convertTo(plane, CV_32F, 1.0 / deviation[0], -mean[0] / deviation[0]);
+  input.convertTo(plane, CV_32F, 1.0 / deviation[0], -mean[0] / deviation[0]);
   const cv::Mat output = state_->run(plane);
   std::vector<std::int8_t> values = bytes_of({output.ptr<float>(), output.total()});
   if (values.empty()) return {};
