@@ -6,24 +6,27 @@
 
 namespace km {
 
-std::vector<PeerQuery> PeerHistory::add(std::uint32_t index, BowVector vector) {
+std::vector<PeerQuery> PeerHistory::add(std::uint32_t index, BowVector vector,
+                                        ImageDescriptor image) {
   std::vector<PeerQuery> released;
   const auto [added, is_new] = keyframes_.try_emplace(index, nullptr);
   if (!is_new) return released;
   added->second = std::make_shared<const BowVector>(std::move(vector));
   kept_.insert(index);
-  deadlines_[index] = keyframes_.size() + max_waiting_;
+  waiting_[index] = {keyframes_.size() + max_waiting_, std::move(image)};
 
-  for (auto waiting = deadlines_.begin(); waiting != deadlines_.end();) {
+  for (auto waiting = waiting_.begin(); waiting != waiting_.end();) {
     const auto keyframe = keyframes_.find(waiting->first);
-    const bool overdue = keyframes_.size() >= waiting->second && waiting->first != index;
+    const bool overdue = keyframes_.size() >= waiting->second.deadline && waiting->first != index;
     if (!overdue && !follows_its_predecessor(keyframe)) {
       ++waiting;
       continue;
     }
-    waiting = deadlines_.erase(waiting);
+    ImageDescriptor described = std::move(waiting->second.image);
+    waiting = waiting_.erase(waiting);
     const bool has_words = !is_empty(keyframe);
     PeerQuery query = release(keyframe);
+    query.image = std::move(described);
     if (has_words) released.push_back(std::move(query));
   }
   forget_oldest_gaps();
@@ -34,12 +37,12 @@ bool PeerHistory::follows_its_predecessor(Keyframes::const_iterator keyframe) co
   if (keyframe->first == 0) return true;  // nothing to wait for
   if (keyframe == keyframes_.begin()) return false;
   const auto before = std::prev(keyframe);
-  const bool has_normalizer = !is_empty(before) || !deadlines_.contains(before->first);
+  const bool has_normalizer = !is_empty(before) || !waiting_.contains(before->first);
   return before->first + 1 == keyframe->first && has_normalizer;
 }
 
 PeerQuery PeerHistory::release(Keyframes::iterator keyframe) {
-  PeerQuery query{keyframe->first, keyframe->second, nullptr};
+  PeerQuery query{keyframe->first, keyframe->second, nullptr, {}};
   if (keyframe != keyframes_.begin()) {
     // The nearest earlier keyframe still has its vector, unless there are too many gaps, because
     // only its successor releases the vector.
@@ -55,8 +58,7 @@ PeerQuery PeerHistory::release(Keyframes::iterator keyframe) {
 void PeerHistory::forget_if_done(Keyframes::iterator keyframe) {
   const auto after = std::next(keyframe);
   const bool successor_is_known = after != keyframes_.end() && follows_its_predecessor(after);
-  if (!successor_is_known || deadlines_.contains(keyframe->first) ||
-      deadlines_.contains(after->first))
+  if (!successor_is_known || waiting_.contains(keyframe->first) || waiting_.contains(after->first))
     return;
   keyframe->second.reset();
   kept_.erase(keyframe->first);
@@ -66,8 +68,8 @@ void PeerHistory::forget_if_done(Keyframes::iterator keyframe) {
 // Waiting keyframes keep their vectors. Their number is bounded.
 void PeerHistory::forget_oldest_gaps() {
   for (auto oldest = kept_.begin();
-       kept_.size() > kMaxGaps + deadlines_.size() && oldest != kept_.end();) {
-    if (deadlines_.contains(*oldest)) {
+       kept_.size() > kMaxGaps + waiting_.size() && oldest != kept_.end();) {
+    if (waiting_.contains(*oldest)) {
       ++oldest;
       continue;
     }

@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "modules/core/keyframe.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
 
 namespace km {
@@ -17,6 +18,7 @@ struct PeerQuery {
   std::shared_ptr<const BowVector> vector;
   std::shared_ptr<const BowVector> previous;  ///< Vector of the keyframe that normalises the score;
                                               ///< null if there is none.
+  ImageDescriptor image = {};
 };
 
 /// Finds the normaliser of each keyframe of one peer.
@@ -28,7 +30,8 @@ struct PeerQuery {
 /// the end of its wait, nor one after a gap that has been removed. A keyframe without words shows a
 /// known place: it is no query, and the keyframe before it normalises the one after it. Memory
 /// holds the vectors that may still be needed: of the waiting keyframes, of the newest keyframe,
-/// and of the keyframe before each of the kMaxGaps newest gaps.
+/// and of the keyframe before each of the kMaxGaps newest gaps. It also holds the descriptors of the
+/// waiting keyframes' images.
 class PeerHistory {
  public:
   static constexpr std::size_t kMaxGaps = 1000;
@@ -37,17 +40,21 @@ class PeerHistory {
 
   /// Adds keyframe `index`, unless it has been added before. Returns the queries that became
   /// possible, by ascending index. Each keyframe is returned once.
-  std::vector<PeerQuery> add(std::uint32_t index, BowVector vector);
+  std::vector<PeerQuery> add(std::uint32_t index, BowVector vector, ImageDescriptor image = {});
 
   /// True if keyframe `index` has been added.
   bool has(std::uint32_t index) const { return keyframes_.contains(index); }
 
   /// Number of keyframes that wait for their predecessor.
-  std::size_t waiting() const { return deadlines_.size(); }
+  std::size_t waiting() const { return waiting_.size(); }
 
  private:
   using Vector = std::shared_ptr<const BowVector>;
   using Keyframes = std::map<std::uint32_t, Vector>;
+  struct Waiting {
+    std::size_t deadline = 0;  // the size of keyframes_ at which the wait ends
+    ImageDescriptor image;
+  };
   PeerQuery release(Keyframes::iterator keyframe);
   void forget_if_done(Keyframes::iterator keyframe);
   void forget_oldest_gaps();
@@ -59,8 +66,7 @@ class PeerHistory {
   std::size_t max_waiting_;
   Keyframes keyframes_;           // null once the keyframe and its successor are released
   std::set<std::uint32_t> kept_;  // indices of the keyframes_ that are not null
-  // For each waiting keyframe, the size of keyframes_ at which its wait ends.
-  std::map<std::uint32_t, std::size_t> deadlines_;
+  std::map<std::uint32_t, Waiting> waiting_;
 };
 
 }  // namespace km

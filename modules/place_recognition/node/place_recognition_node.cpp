@@ -64,8 +64,6 @@ void PlaceRecognitionNode::step(const Closure& closure) {
 void PlaceRecognitionNode::step(const Topic<PeerEvent>::Message& event) {
   if (event->kind != PeerEventKind::kRestarted) return;
   peers_.erase(event->identity.robot);
-  std::erase_if(images_,
-                [&](const auto& entry) { return entry.first.robot == event->identity.robot; });
   topics_.restarts.publish(event);
 }
 
@@ -79,7 +77,10 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   CandidateSearch search = own_.search_own(vector, keyframe.stamp, keyframe.image);
   const PlaceNovelty novelty = novelty_of(keyframe.odometry, search);
   if (novelty != PlaceNovelty::kNew) keep_due(novelty, search.candidates);
+  KeyframeBow bow{.id = id, .stamp = keyframe.stamp, .vocabulary = vocabulary_->id(), .words = {}};
   if (novelty == PlaceNovelty::kNew) {
+    bow.words = std::move(words);
+    bow.image = keyframe.image;
     // Added before it is published, so that no pair is missed: see the class comment.
     own_.add(std::move(vector), keyframe.stamp, keyframe.image);
     if (keyframe.image.network != 0) network_ = keyframe.image.network;
@@ -87,14 +88,8 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
     known_.add_view(keyframe.odometry, median_depth_m(keyframe.features).value_or(0.0));
   } else {
     own_.pass(std::move(vector));
-    words.clear();
   }
-  const bool is_sent = novelty == PlaceNovelty::kNew;
-  topics_.own_bows.publish(KeyframeBow{.id = id,
-                                       .stamp = keyframe.stamp,
-                                       .vocabulary = vocabulary_->id(),
-                                       .words = std::move(words),
-                                       .image = is_sent ? keyframe.image : ImageDescriptor()});
+  topics_.own_bows.publish(std::move(bow));
   publish(id, std::move(search));
 }
 
@@ -117,30 +112,21 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
   PeerHistory& history = peers_.try_emplace(id.robot, patience).first->second;
   if (history.has(id.index)) return publish_refusal(id, PlaceQueryStatus::kRepeated);
   if (peer_bow.words.empty()) publish(id, {});
-  keep_image(peer_bow);
-  for (const PeerQuery& query : history.add(id.index, vocabulary_->weigh(peer_bow.words))) {
-    const KeyframeId searched{id.robot, query.index};
-    const auto image = images_.extract(searched);
-    publish(searched, own_.search(*query.vector, query.previous.get(),
-                                  image ? image.mapped() : ImageDescriptor()));
-  }
-}
-
-// Keeps the descriptor of a peer's image until PeerHistory releases its words.
-void PlaceRecognitionNode::keep_image(const KeyframeBow& peer_bow) {
-  const auto& [network, values] = peer_bow.image;
-  if (values.empty() || peer_bow.words.empty()) return;
-  images_[peer_bow.id] = peer_bow.image;
-  if (network_ != 0 && network_ != network)
-    log::limited(log::Level::kWarn, name(), "network of " + std::to_string(peer_bow.id.robot))
-        << "robot " << peer_bow.id.robot << " describes images by another network ("
+  const std::uint64_t network = peer_bow.image.network;
+  if (network != 0 && network_ != 0 && network != network_)
+    log::limited(log::Level::kWarn, name(), "network of " + std::to_string(id.robot))
+        << "robot " << id.robot << " describes images by another network ("
         << fingerprint_text(network) << ", here " << fingerprint_text(network_)
         << "): only words are compared; set one place_recognition.network";
+  for (const PeerQuery& query :
+       history.add(id.index, vocabulary_->weigh(peer_bow.words), peer_bow.image))
+    publish({id.robot, query.index}, own_.search(*query.vector, query.previous.get(), query.image));
 }
 
 BagOfWords PlaceRecognitionNode::words_of(const KeyframeFeatures& features) const {
-  const BagOfWords all = vocabulary_->count(features.descriptors);
-  return sketch_of(all, vocabulary_->weigh(all), static_cast<std::size_t>(config_.max_words));
+  BagOfWords all = vocabulary_->count(features.descriptors);
+  const auto most = static_cast<std::size_t>(config_.max_words);
+  return all.size() <= most ? all : sketch_of(all, vocabulary_->weigh(all), most);
 }
 
 PlaceNovelty PlaceRecognitionNode::novelty_of(const OdometryPose& keyframe,

@@ -81,7 +81,6 @@ class PlaceRecognitionNode final : public Node {
                              Topic<Closure>::Message, Topic<PeerEvent>::Message>;
 
   void handle(const Input& input);
-  void keep_image(const KeyframeBow& peer_bow);
 
   [[nodiscard]] BagOfWords words_of(const KeyframeFeatures& features) const;
   [[nodiscard]] PlaceNovelty novelty_of(const OdometryPose& keyframe,
@@ -99,8 +98,7 @@ class PlaceRecognitionNode final : public Node {
   std::vector<KeyframeId> own_ids_;     // ids of the keyframes in own_, in the same order
   std::uint64_t network_ = 0;           // network of the newest own descriptor
   std::map<RobotId, PeerHistory> peers_;
-  std::map<KeyframeId, ImageDescriptor> images_;  // those of keyframes that wait in peers_
-  Worker<Input> worker_;                          // last member: stops first
+  Worker<Input> worker_;  // last member: stops first
 };
 
 }  // namespace km
