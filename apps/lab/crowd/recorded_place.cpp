@@ -7,8 +7,6 @@
 #include <utility>
 
 #include "modules/place_recognition/bag_file.hpp"
-#include "modules/place_recognition/place_recognition_config.hpp"
-#include "modules/place_recognition/place_sketch.hpp"
 
 namespace km {
 
@@ -18,8 +16,6 @@ RecordedPlace read_recorded_place(const std::filesystem::path& file, const Vocab
   if (half < 2) throw std::runtime_error(file.string() + ": fewer than four keyframes");
   if (!std::ranges::all_of(bags, [&](const BagOfWords& bag) { return vocabulary.knows(bag); }))
     throw std::runtime_error(file.string() + ": has words that the vocabulary does not know");
-  const auto sent_words = static_cast<std::size_t>(PlaceRecognitionConfig{}.max_words);
-  for (BagOfWords& bag : bags) bag = sketch_of(bag, vocabulary.weigh(bag), sent_words);
   const auto end = bags.begin() + static_cast<std::ptrdiff_t>(half);
   return {.first = {bags.begin(), end},
           .second = {bags.end() - static_cast<std::ptrdiff_t>(half), bags.end()}};

@@ -10,7 +10,7 @@
 
 namespace km {
 
-/// Two visits of a recorded place, as the words that robots send of their keyframes, equally many.
+/// Two visits of a recorded place, as the bags of words of their keyframes, equally many.
 struct RecordedPlace {
   std::vector<BagOfWords> first;
   std::vector<BagOfWords> second;
