@@ -70,6 +70,9 @@ TEST_CASE("Features that end early or late, or state what no camera has, are ref
     hostile.baseline_m = wrong;
     CHECK_FALSE(unpack_features(pack(hostile)));
   }
+  KeyframeFeatures aside = features;
+  aside.keypoints[0].bearing.y() = -101.0F;
+  CHECK_FALSE(unpack_features(pack(aside)));
   KeyframeFeatures near = features;
   near.keypoints[0].inverse_depth = 1e5F;
   CHECK_FALSE(unpack_features(pack(near)));
