@@ -30,8 +30,8 @@ struct PeerQuery {
 /// the end of its wait, nor one after a gap that has been removed. A keyframe without words shows a
 /// known place: it is no query, and the keyframe before it normalises the one after it. Memory
 /// holds the vectors that may still be needed: of the waiting keyframes, of the newest keyframe,
-/// and of the keyframe before each of the kMaxGaps newest gaps. It also holds the descriptors of the
-/// waiting keyframes' images.
+/// and of the keyframe before each of the kMaxGaps newest gaps. It also holds the descriptors of
+/// the waiting keyframes' images.
 class PeerHistory {
  public:
   static constexpr std::size_t kMaxGaps = 1000;
