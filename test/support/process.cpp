@@ -17,6 +17,10 @@
 namespace km {
 namespace {
 
+// Time to read what a process has printed before its end. A process that it has started may still
+// print, so that there is a limit.
+constexpr std::chrono::seconds kLastLines(3);
+
 std::array<int, 2> make_pipe() {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0)
@@ -144,6 +148,8 @@ std::optional<int> Process::wait_within(std::chrono::seconds patience) {
 
 void Process::keep_result(int status) {
   result_ = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, kLastLines, [&] { return ended_; });
 }
 
 void Process::read_lines() {

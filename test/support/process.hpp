@@ -64,7 +64,8 @@ class Process {
 
   void kill(int signal) const;
 
-  /// Waits for its end: the exit code, or minus the signal that killed it.
+  /// Waits for its end: the exit code, or minus the signal that killed it. All that it has printed
+  /// is then in lines().
   int wait();
 
   /// As wait(); nullopt if it still runs after `patience`.
