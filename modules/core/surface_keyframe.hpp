@@ -24,6 +24,6 @@ struct SurfaceKeyframe {
 };
 
 /// Bytes of a SurfaceKeyframe on the wire, with padding.
-inline constexpr std::size_t kSurfaceKeyframeBytes = 296;
+inline constexpr std::size_t kSurfaceKeyframeBytes = 188;
 
 }  // namespace km

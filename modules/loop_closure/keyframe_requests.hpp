@@ -17,8 +17,9 @@ namespace km {
 
 /// Part of a keyframe that is requested.
 enum class KeyframePart : std::uint8_t {
-  kFeatures,    ///< Odometry, keypoints and descriptors: KeyframeReply.
-  kWordPoints,  ///< WordPoints: KeyframeWords, or KeyframeReply if no words are known.
+  kFeatures,     ///< Odometry, keypoints and descriptors: KeyframeReply.
+  kWordPoints,   ///< WordPoints: KeyframeWords, or KeyframeReply if no words are known.
+  kDescriptors,  ///< As kFeatures, where the requester has the WordPoints.
 };
 
 /// Asks the owner of `keyframe` for a part of it. The reply prefers keypoints that keyframe `own`
@@ -37,6 +38,10 @@ struct KeyframeReply {
   std::uint32_t number = 0;  ///< Number of the request.
   bool found = false;
   Keyframe keyframe;
+  /// Reply to kDescriptors: descriptors of the WordPoints, in their order. `keyframe` has further
+  /// keypoints if these are few. Empty if the owner does not know the words any more: `keyframe`
+  /// has all keypoints.
+  std::vector<BinaryDescriptor> descriptors = {};
 };
 
 /// Reply to a KeyframeRequest for KeyframePart::kWordPoints: those points whose words keyframe

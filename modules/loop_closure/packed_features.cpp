@@ -1,5 +1,7 @@
 #include "modules/loop_closure/packed_features.hpp"
 
+#include <algorithm>
+
 #include "modules/loop_closure/matching.hpp"
 #include "modules/loop_closure/packed_keypoints.hpp"
 
@@ -54,6 +56,24 @@ std::optional<KeyframeFeatures> unpack_features(std::span<const std::uint8_t> by
     features.descriptors.push_back(*descriptor);
   }
   return reader.ended() ? std::optional(std::move(features)) : std::nullopt;
+}
+
+std::vector<std::uint8_t> pack(std::span<const BinaryDescriptor> descriptors) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(kMatchedBytes * descriptors.size());
+  for (const BinaryDescriptor& descriptor : descriptors)
+    bytes.insert(bytes.end(), descriptor.begin(), descriptor.begin() + kMatchedBytes);
+  return bytes;
+}
+
+std::optional<std::vector<BinaryDescriptor>> unpack_descriptors(
+    std::span<const std::uint8_t> bytes) {
+  if (bytes.size() % kMatchedBytes != 0 || bytes.size() > kMatchedBytes * kMaxKeypoints)
+    return std::nullopt;
+  std::vector<BinaryDescriptor> descriptors(bytes.size() / kMatchedBytes);
+  for (std::size_t i = 0; i < descriptors.size(); ++i)
+    std::ranges::copy(bytes.subspan(kMatchedBytes * i, kMatchedBytes), descriptors[i].begin());
+  return descriptors;
 }
 
 }  // namespace km

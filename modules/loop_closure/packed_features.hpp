@@ -24,4 +24,12 @@ inline constexpr std::size_t kMaxKeypoints = 10000;
 /// scale of no camera (see read_scale()).
 [[nodiscard]] std::optional<KeyframeFeatures> unpack_features(std::span<const std::uint8_t> bytes);
 
+/// The part of each descriptor by which keyframes are matched: kMatchedBytes.
+[[nodiscard]] std::vector<std::uint8_t> pack(std::span<const BinaryDescriptor> descriptors);
+
+/// Inverse of pack(). The other bytes of each descriptor are zero. nullopt if the bytes are not a
+/// whole number of descriptors, or more than kMaxKeypoints.
+[[nodiscard]] std::optional<std::vector<BinaryDescriptor>> unpack_descriptors(
+    std::span<const std::uint8_t> bytes);
+
 }  // namespace km

@@ -23,15 +23,33 @@ PointsOfWords with_depth(const KeyframeFeatures& features, const Vocabulary& voc
   return result;
 }
 
+PointsOfWords common(const KeyframeFeatures& features, const Vocabulary& vocabulary,
+                     std::span<const std::uint32_t> theirs) {
+  PointsOfWords result = with_depth(features, vocabulary);
+  std::erase_if(result, [&](const auto& entry) {
+    return entry.second.size() > kMaxWordRepeats ||
+           !std::ranges::binary_search(theirs, entry.first);
+  });
+  return result;
+}
+
 }  // namespace
+
+std::vector<std::size_t> common_word_places(const KeyframeFeatures& features,
+                                            const Vocabulary& vocabulary,
+                                            std::span<const std::uint32_t> theirs) {
+  std::vector<std::size_t> places;
+  for (const auto& [word, points] : common(features, vocabulary, theirs))
+    places.insert(places.end(), points.begin(), points.end());
+  return places;
+}
 
 WordPoints common_word_points(const KeyframeFeatures& features, const Vocabulary& vocabulary,
                               std::span<const std::uint32_t> theirs) {
   WordPoints result{features.focal_px, features.baseline_m, {}};
-  for (const auto& [word, points] : with_depth(features, vocabulary))
-    if (points.size() <= kMaxWordRepeats && std::ranges::binary_search(theirs, word))
-      for (const std::size_t point : points)
-        result.points.push_back({features.keypoints[point], word});
+  for (const auto& [word, points] : common(features, vocabulary, theirs))
+    for (const std::size_t point : points)
+      result.points.push_back({features.keypoints[point], word});
   return result;
 }
 

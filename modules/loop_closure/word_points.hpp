@@ -29,8 +29,13 @@ struct WordPoints {
 /// A word that more keypoints of an image have is no help for finding corresponding points.
 inline constexpr std::size_t kMaxWordRepeats = 4;
 
-/// The keypoints of `features` with a known depth and a word in `theirs` (ascending), except words
-/// of more than kMaxWordRepeats such keypoints. Ascending by word.
+/// Places in `features` of the keypoints with a known depth and a word in `theirs` (ascending),
+/// except words of more than kMaxWordRepeats such keypoints. Ascending by word, then by place.
+[[nodiscard]] std::vector<std::size_t> common_word_places(const KeyframeFeatures& features,
+                                                          const Vocabulary& vocabulary,
+                                                          std::span<const std::uint32_t> theirs);
+
+/// The keypoints at common_word_places(), in their order.
 [[nodiscard]] WordPoints common_word_points(const KeyframeFeatures& features,
                                             const Vocabulary& vocabulary,
                                             std::span<const std::uint32_t> theirs);

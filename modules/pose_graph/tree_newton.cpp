@@ -28,9 +28,22 @@ constexpr double kMaxDistance_m = 1e15;
 // smaller, so that one robot cannot dominate the estimate.
 constexpr std::size_t kEnoughLengths = 300;
 constexpr std::size_t kShareOfLengths = 60;
+constexpr std::size_t kWorthIt = 2;
 
 bool is_within_limits(const SE3& T) {
   return T.matrix().allFinite() && T.translation().norm() <= kMaxDistance_m;
+}
+
+// The ends of `closures` on `child` if they are at most kWorthIt times as many as `cover`,
+// otherwise `cover`. With these ends the parent weighs all closures to the child. The child then
+// sends its second derivatives once, where those with weights that change are sent again and again.
+std::vector<KeyframeId> ends_if_few(std::span<const ClosureId> closures, RobotId child,
+                                    std::vector<KeyframeId> cover) {
+  std::set<KeyframeId> ends;
+  for (const ClosureId& closure : closures)
+    ends.insert(closure.from.robot == child ? closure.from : closure.to);
+  if (ends.size() > kWorthIt * cover.size()) return cover;
+  return {ends.begin(), ends.end()};
 }
 
 SolverMessage message_to(RobotId to, std::vector<std::uint8_t> bytes) {
@@ -135,7 +148,10 @@ void TreeNewton::share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_
     std::vector<ClosureId> ids;
     for (const std::size_t k : indices)
       if (takes_part(known_[k])) ids.push_back(known_[k].edge.id());
-    const std::vector<KeyframeId> cover = cover_closures(ids);
+    std::vector<KeyframeId> cover = cover_closures(ids);
+    const bool is_child = std::ranges::binary_search(place_.children, peer);
+    if (is_child || place_.parent == peer)
+      cover = ends_if_few(ids, is_child ? peer : graph_.self, std::move(cover));
     const auto covered = [&](const KeyframeId& id) {
       return std::binary_search(cover.begin(), cover.end(), id);
     };

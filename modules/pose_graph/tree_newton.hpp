@@ -37,9 +37,10 @@ namespace km {
 /// again, except for the rejected ones. A closure to a held pose is left out if an earlier session
 /// has rejected it, and otherwise has weight 1.
 ///
-/// Exactly one of two robots weighs a closure between them. One end of each closure is chosen by a
-/// vertex cover per pair, equal on both robots. The robot of the other end has the closure among
-/// its own edges; the system up the tree contains the chosen pose.
+/// Exactly one of two robots weighs a closure between them and has it among its own edges. The
+/// system up the tree contains the pose at the other end. Between a parent and its child the parent
+/// weighs, so that the second derivatives of the child do not change with weights. In other pairs
+/// one end of each closure is chosen by a vertex cover, equal on both robots.
 ///
 /// The last pass down carries the blocks of the inverse of the second derivatives that each front
 /// needs for the covariances of its poses.

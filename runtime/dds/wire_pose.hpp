@@ -2,10 +2,12 @@
 
 #include <common.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "modules/core/covariance.hpp"
+#include "modules/core/covariance_root.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/keyframe.hpp"
@@ -68,15 +70,22 @@ inline std::optional<Matrix6> from_wire(const km_wire_Covariance& wire) {
 }
 
 inline km_wire_OdometryPose to_wire(const OdometryPose& pose) {
-  return {.keyframe = to_wire(pose.id),
-          .T_odom_kf = to_wire(pose.T_odom_kf),
-          .covariance = to_wire(pose.covariance)};
+  const Eigen::Quaternionf q = Eigen::Quaterniond(pose.T_odom_kf.linear()).cast<float>();
+  const Eigen::Vector3d& t = pose.T_odom_kf.translation();
+  km_wire_OdometryPose wire{.keyframe = to_wire(pose.id),
+                            .q = {q.x(), q.y(), q.z(), q.w()},
+                            .t = {t.x(), t.y(), t.z()},
+                            .root = {}};
+  std::ranges::copy(covariance_root(pose.covariance), wire.root);
+  return wire;
 }
 
 inline std::optional<OdometryPose> from_wire(const km_wire_OdometryPose& wire) {
-  const std::optional<SE3> T_odom_kf = from_wire(wire.T_odom_kf);
-  const std::optional<Matrix6> covariance = from_wire(wire.covariance);
-  if (!T_odom_kf || !covariance) return std::nullopt;
+  const Eigen::Vector4d q = Eigen::Vector4f(wire.q).cast<double>();
+  const std::optional<SE3> T_odom_kf = from_wire(
+      km_wire_Pose{.q = {q[0], q[1], q[2], q[3]}, .t = {wire.t[0], wire.t[1], wire.t[2]}});
+  const std::optional<Matrix6> covariance = covariance_of(wire.root);
+  if (!T_odom_kf || !covariance || covariance->maxCoeff() > kMaxWireVariance) return std::nullopt;
   return OdometryPose{from_wire(wire.keyframe), *T_odom_kf, *covariance};
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <random>
 #include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -357,6 +358,7 @@ class SolverTeam {
   }  ///< Refused messages, copies included.
 
   std::function<void(RobotId, const MemberSolver&)> after_advance = {};
+  std::function<void(RobotId, std::span<const std::uint8_t>)> on_sent = {};  ///< From, bytes.
 
  private:
   struct Delivery {
@@ -366,6 +368,7 @@ class SolverTeam {
 
   void send(RobotId from, SolverMessage message) {
     bytes_[from] += message.bytes->size();
+    if (on_sent) on_sent(from, *message.bytes);
     const int copies = std::bernoulli_distribution(faults_.duplicated)(rng_) ? 2 : 1;
     for (int copy = 0; copy < copies; ++copy) {
       const int delay = std::uniform_int_distribution<int>(0, faults_.max_delay)(rng_);

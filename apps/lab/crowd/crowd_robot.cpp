@@ -96,12 +96,11 @@ void CrowdRobot::judge(const KeyframeId& query, const PlaceCandidate& candidate)
 
 void CrowdRobot::request(const KeyframeId& query, bool is_true) {
   requested_.insert(query);
-  const auto keypoints = static_cast<std::size_t>(LoopClosureConfig{}.reply_keypoints);
   sent_.add(request_bytes());
   received_.add(words_bytes(kWordPoints));
   if (!is_true && draw(query, {self_, 0}) >= kChance) return;
   sent_.add(request_bytes());
-  received_.add(reply_bytes(keypoints));
+  received_.add(reply_bytes(kWordPoints));
 }
 
 }  // namespace km

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <bit>
 #include <cstddef>
 
 namespace km {
@@ -18,12 +17,12 @@ namespace km {
 [[nodiscard]] constexpr std::size_t words_bytes(std::size_t points) {
   return 32 + 6 * points;
 }
-[[nodiscard]] constexpr std::size_t reply_bytes(std::size_t keypoints) {
-  const std::size_t number_bits = 2 * static_cast<std::size_t>(std::bit_width(keypoints + 1)) - 1;
-  return 332 + (number_bits + 133 * keypoints + 7) / 8;
+/// Descriptors of the points whose words were sent.
+[[nodiscard]] constexpr std::size_t reply_bytes(std::size_t points) {
+  return 220 + 12 * points;
 }
 [[nodiscard]] constexpr std::size_t closure_bytes() {
-  return 700;
+  return 500;
 }
 /// Status of a robot with a name of 4 to 7 characters, while all robots receive each other. It goes
 /// to all others twice a second (kStatusPeriod_s).

@@ -35,7 +35,7 @@ Codec<KeyframeRequest>::Encoded Codec<KeyframeRequest>::encode(const KeyframeReq
 }
 
 Decoded<KeyframeRequest> Codec<KeyframeRequest>::decode(const Wire& wire, const TeamPeer& writer) {
-  if (wire.part > static_cast<std::uint8_t>(KeyframePart::kWordPoints))
+  if (wire.part > static_cast<std::uint8_t>(KeyframePart::kDescriptors))
     return Decoded<KeyframeRequest>::refuse("an unknown part of a keyframe");
   return Decoded<KeyframeRequest>::accept({writer.robot, wire.request, from_wire(wire.keyframe),
                                            wire.own, static_cast<KeyframePart>(wire.part)});
@@ -81,6 +81,8 @@ Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& 
   wire.T_body_cam = to_wire(keyframe.features.T_body_cam);
   encoded.features = pack(keyframe.features);
   borrow(wire.features, encoded.features);
+  encoded.descriptors = pack(reply.descriptors);
+  borrow(wire.descriptors, encoded.descriptors);
   return encoded;
 }
 
@@ -101,6 +103,10 @@ Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire, const Team
   const auto bytes = elements_of(wire.features, kMaxBytes);
   auto features = bytes ? unpack_features(*bytes) : std::nullopt;
   if (!features) return Result::refuse("keypoints are missing, too many, or none of a camera");
+  const auto descriptor_bytes = elements_of(wire.descriptors, kMaxBytes);
+  auto descriptors = descriptor_bytes ? unpack_descriptors(*descriptor_bytes) : std::nullopt;
+  if (!descriptors) return Result::refuse("descriptors are missing, cut off, or too many");
+  reply.descriptors = *std::move(descriptors);
   reply.keyframe.odometry = *odometry;
   reply.keyframe.stamp = wire.stamp;
   reply.keyframe.features = *std::move(features);

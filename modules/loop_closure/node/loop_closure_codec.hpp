@@ -8,6 +8,7 @@
 
 #include "modules/core/pose_graph.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "modules/loop_closure/matching.hpp"
 #include "modules/loop_closure/packed_features.hpp"
 #include "modules/loop_closure/packed_word_points.hpp"
 #include "runtime/dds/codec.hpp"
@@ -37,12 +38,13 @@ struct Codec<KeyframeReply> {
   using Wire = km_wire_KeyframeReply;
   static constexpr const char* kTopic = "keyframe_replies";
   static constexpr std::uint16_t kVersion = 1;
-  static constexpr std::size_t kMaxBytes = 1024 + 17 * kMaxKeypoints;
+  static constexpr std::size_t kMaxBytes = 1024 + (17 + kMatchedBytes) * kMaxKeypoints;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeReply_desc; }
 
   struct Encoded {
     Wire wire{};
     std::vector<std::uint8_t> features;
+    std::vector<std::uint8_t> descriptors;
   };
   static MessageKey key_of(const KeyframeReply& reply);
   static Encoded encode(const KeyframeReply& reply);

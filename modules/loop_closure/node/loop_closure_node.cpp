@@ -65,6 +65,21 @@ KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const Keypoin
   return chosen;
 }
 
+// `features` without the keypoints at `places`.
+KeyframeFeatures without(const KeyframeFeatures& features, std::span<const std::size_t> places) {
+  std::vector<bool> is_left(features.keypoints.size(), true);
+  for (const std::size_t i : places) is_left[i] = false;
+  KeyframeFeatures rest = features;
+  rest.keypoints.clear();
+  rest.descriptors.clear();
+  for (std::size_t i = 0; i < is_left.size(); ++i) {
+    if (!is_left[i]) continue;
+    rest.keypoints.push_back(features.keypoints[i]);
+    rest.descriptors.push_back(features.descriptors[i]);
+  }
+  return rest;
+}
+
 }  // namespace
 
 LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
@@ -164,14 +179,30 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
                                 common_word_points(asked->features, *vocabulary_, *theirs)})});
   KeyframeReply reply{.number = request->number, .found = false, .keyframe = {}};
   reply.keyframe.odometry.id = request->keyframe;
-  if (asked) {
-    reply.found = true;
-    reply.keyframe.odometry = asked->odometry;
-    reply.keyframe.stamp = asked->stamp;
-    reply.keyframe.features = select_keypoints(asked->features, {request->requester, request->own});
-  }
+  if (asked) reply = reply_to(*request, *asked, theirs);
   topics_.own_replies.publish(Addressed<KeyframeReply>{
       request->requester, std::make_shared<const KeyframeReply>(std::move(reply))});
+}
+
+// `theirs` are the words of the requester's keyframe, null if unknown.
+KeyframeReply LoopClosureNode::reply_to(const KeyframeRequest& request, const Keyframe& asked,
+                                        const std::vector<std::uint32_t>* theirs) const {
+  const KeyframeFeatures& features = asked.features;
+  KeyframeReply reply{.number = request.number, .found = true, .keyframe = {}};
+  reply.keyframe.odometry = asked.odometry;
+  reply.keyframe.stamp = asked.stamp;
+  const KeypointBudget budget{reply_keypoints_ / kLeastPart, reply_keypoints_};
+  if (theirs == nullptr) {
+    reply.keyframe.features = reduced(features, budget.most);
+  } else if (request.part != KeyframePart::kDescriptors) {
+    reply.keyframe.features = chosen_by_words(features, budget, *vocabulary_, *theirs);
+  } else {
+    const std::vector<std::size_t> points = common_word_places(features, *vocabulary_, *theirs);
+    for (const std::size_t point : points) reply.descriptors.push_back(features.descriptors[point]);
+    reply.keyframe.features =
+        reduced(without(features, points), budget.least - std::min(budget.least, points.size()));
+  }
+  return reply;
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
@@ -179,11 +210,31 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
   if (!reply->found) return requests_.absent(id, now_s_);
   // Ignores the reply to a repeated request, or one without a request.
   if (!requests_.arrived(id)) return;
-  // A copy is stored, because a referenced message counts as queued.
-  const auto keyframe = std::make_shared<const Keyframe>(reply->keyframe);
-  peers_.put(keyframe);
-  arrived(keyframe);
+  if (const KeyframePtr keyframe = received(*reply)) {
+    peers_.put(keyframe);
+    arrived(keyframe);
+  } else {
+    promising_[id] = {};
+    requests_.want(id);
+  }
   send_due_requests();
+}
+
+// The keyframe of `reply` with the points that were received before; null if they are not those of
+// the reply. A copy, because a referenced message counts as queued.
+LoopClosureNode::KeyframePtr LoopClosureNode::received(const KeyframeReply& reply) const {
+  auto keyframe = std::make_shared<Keyframe>(reply.keyframe);
+  if (reply.descriptors.empty()) return keyframe;
+  const auto before = promising_.find(keyframe->odometry.id);
+  if (before == promising_.end() || before->second.points.size() != reply.descriptors.size())
+    return nullptr;
+  KeyframeFeatures& features = keyframe->features;
+  features.focal_px = before->second.focal_px;
+  features.baseline_m = before->second.baseline_m;
+  for (const WordPoint& point : before->second.points) features.keypoints.push_back(point.keypoint);
+  features.descriptors.insert(features.descriptors.end(), reply.descriptors.begin(),
+                              reply.descriptors.end());
+  return keyframe;
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const KeyframeWords>& words) {
@@ -192,7 +243,7 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeWords>& words) {
   if (promising_.contains(id) || !vocabulary_ || !requests_.arrived(id)) return;
   const std::vector<Work>& works = waiting_.at(id);
   if (std::ranges::any_of(works, [&](const Work& work) { return fits(work, words->words); })) {
-    promising_.insert(id);
+    promising_.emplace(id, words->words);
     requests_.want(id);
   } else {
     for (const Work& work : works)
@@ -226,7 +277,7 @@ void LoopClosureNode::forget(RobotId peer) {
   words_.forget(peer);
   requests_.forget(peer);
   policy_.forget(peer);
-  std::erase_if(promising_, [&](const KeyframeId& id) { return id.robot == peer; });
+  std::erase_if(promising_, [&](const auto& entry) { return entry.first.robot == peer; });
   std::erase_if(known_, [&](const ClosureId& id) { return touches(id, peer); });
   for (auto& [keyframe, works] : waiting_)
     std::erase_if(works, [&](const Work& work) { return touches(work.id, peer); });
@@ -282,14 +333,6 @@ LoopClosureNode::KeyframePtr LoopClosureNode::own(const KeyframeId& id) const {
   return keyframe;
 }
 
-KeyframeFeatures LoopClosureNode::select_keypoints(const KeyframeFeatures& features,
-                                                   const KeyframeId& to) {
-  const std::vector<std::uint32_t>* words = words_.find(to);
-  if (words == nullptr) return reduced(features, reply_keypoints_);
-  return chosen_by_words(features, {reply_keypoints_ / kLeastPart, reply_keypoints_}, *vocabulary_,
-                         *words);
-}
-
 // Completes the work if both keyframes are available; otherwise waits for a keyframe or requests
 // it. True if the work led to a closure.
 bool LoopClosureNode::advance(const Work& work) {
@@ -340,10 +383,10 @@ KeyframePart LoopClosureNode::part_to_request(const KeyframeId& keyframe) const 
   const std::vector<Work>& works = waiting_.at(keyframe);
   const bool is_measured =
       std::ranges::any_of(works, [](const Work& work) { return work.measured.has_value(); });
-  return vocabulary_ && config_.min_word_points > 0 && !is_measured &&
-                 !promising_.contains(keyframe)
-             ? KeyframePart::kWordPoints
-             : KeyframePart::kFeatures;
+  if (const auto found = promising_.find(keyframe); found != promising_.end())
+    return found->second.points.empty() ? KeyframePart::kFeatures : KeyframePart::kDescriptors;
+  return vocabulary_ && config_.min_word_points > 0 && !is_measured ? KeyframePart::kWordPoints
+                                                                    : KeyframePart::kFeatures;
 }
 
 bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Keyframe& to) {

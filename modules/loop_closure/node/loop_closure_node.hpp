@@ -62,7 +62,7 @@ struct LoopClosureTick {
 /// requests the keyframes of peers from their owners, verifies the candidates, and publishes the
 /// closures. A candidate is never dropped because a reply is missing, but not every candidate is
 /// worth a request (see RequestPolicy). The first request is for WordPoints, because most
-/// candidates show other places. The features of the keyframe are requested only if these points
+/// candidates show other places. The descriptors of these points are requested only if the points
 /// agree with an own keyframe. Measured closures are processed in the same way, but without
 /// RequestPolicy and without verification: only the odometry of the peer's keyframe is used. The
 /// node also replies to the peers' requests for own keyframes.
@@ -132,6 +132,7 @@ class LoopClosureNode final : public Node {
   bool advance(const Work& work);
   void request_keyframe(const KeyframeId& missing, const Work& work);
   void arrived(const KeyframePtr& keyframe);
+  [[nodiscard]] KeyframePtr received(const KeyframeReply& reply) const;
   [[nodiscard]] bool fits(const Work& work, const WordPoints& theirs) const;
   [[nodiscard]] KeyframePart part_to_request(const KeyframeId& keyframe) const;
   KeyframePtr find(const KeyframeId& id);
@@ -139,8 +140,8 @@ class LoopClosureNode final : public Node {
   void report(const Work& work, ClosureStage stage, std::string reason = {},
               const Verification& numbers = {}) const;
   void send_due_requests();
-  [[nodiscard]] KeyframeFeatures select_keypoints(const KeyframeFeatures& features,
-                                                  const KeyframeId& to);
+  [[nodiscard]] KeyframeReply reply_to(const KeyframeRequest& request, const Keyframe& asked,
+                                       const std::vector<std::uint32_t>* theirs) const;
 
   const LoopClosureConfig config_;
   const RobotId self_;
@@ -155,7 +156,8 @@ class LoopClosureNode final : public Node {
   RequestPolicy policy_;
   const std::size_t reply_keypoints_;
   const KeyframeIndex full_keyframes_;
-  std::set<KeyframeId> promising_;  // requested as a whole, since their word points agree
+  // Keyframes whose word points agree: their features are requested. Without points: as a whole.
+  std::map<KeyframeId, WordPoints> promising_;
   std::map<KeyframeId, std::vector<Work>> waiting_;  // work by the keyframe that is missing
   std::set<ClosureId> known_;                        // candidates and measured closures seen
   double now_s_ = 0.0;

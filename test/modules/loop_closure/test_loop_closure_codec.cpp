@@ -37,17 +37,21 @@ KeyframeReply random_reply(std::mt19937& rng, int points) {
 
 TEST_CASE("A keyframe survives the wire", "[codec]") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
-  const KeyframeReply sent = random_reply(rng, 1000);
+  KeyframeReply sent = random_reply(rng, 1000);
+  sent.descriptors = {sent.keyframe.features.descriptors[5]};
   const auto encoded = encoded_by(kOwner, sent);
   const auto result = decoded(encoded);
   REQUIRE(result.value.has_value());
   const Keyframe &a = sent.keyframe, &b = result.value->keyframe;
   CHECK(result.value->number == 12);
   CHECK(b.stamp == a.stamp);
-  CHECK((b.odometry.T_odom_kf.matrix() - a.odometry.T_odom_kf.matrix()).norm() < 1e-12);
-  CHECK(b.odometry.covariance == a.odometry.covariance);
+  CHECK(b.odometry.T_odom_kf.isApprox(a.odometry.T_odom_kf, 1e-6));
+  CHECK(b.odometry.covariance.isApprox(a.odometry.covariance, 1e-6));
   CHECK((b.features.T_body_cam.matrix() - a.features.T_body_cam.matrix()).norm() < 1e-12);
   CHECK(pack(b.features) == pack(a.features));
+  REQUIRE(result.value->descriptors.size() == 1);
+  CHECK(std::equal(sent.descriptors[0].begin(), sent.descriptors[0].begin() + kMatchedBytes,
+                   result.value->descriptors[0].begin()));
 }
 
 TEST_CASE("A keyframe without points, or not found, survives the wire", "[codec]") {
@@ -66,8 +70,10 @@ TEST_CASE("A keyframe without points, or not found, survives the wire", "[codec]
 
 TEST_CASE("Hostile replies are refused with a reason", "[codec]") {
   std::mt19937 rng(7);
-  const KeyframeReply reply = random_reply(rng, 20);
+  KeyframeReply reply = random_reply(rng, 20);
+  reply.descriptors.resize(3);
   const char* const no_pose = "odometry is not a pose with a covariance";
+  const char* const no_descriptors = "descriptors are missing, cut off, or too many";
   const char* const no_features = "keypoints are missing, too many, or none of a camera";
   check_refusals<KeyframeReply>(
       [&] { return encoded_by(kOwner, reply); },
@@ -75,10 +81,13 @@ TEST_CASE("Hostile replies are refused with a reason", "[codec]") {
         [](auto& m) { m.writer.robot = 3; }},
        {"odometry of another keyframe", "odometry of another keyframe",
         [](auto& m) { m.wire.odometry.keyframe.index = 8; }},
-       {"a quaternion that is none", no_pose,
-        [](auto& m) { m.wire.odometry.T_odom_kf.q[0] = 4.0; }},
-       {"a negative variance", no_pose,
-        [](auto& m) { m.wire.odometry.covariance.upper[0] = -1.0; }},
+       {"a quaternion that is none", no_pose, [](auto& m) { m.wire.odometry.q[0] = 4.0F; }},
+       {"a variance that is not a number", no_pose,
+        [](auto& m) { m.wire.odometry.root[0] = std::nanf(""); }},
+       {"a descriptor that is cut off", no_descriptors,
+        [](auto& m) { --m.wire.descriptors._length; }},
+       {"descriptors without a buffer", no_descriptors,
+        [](auto& m) { m.wire.descriptors._buffer = nullptr; }},
        {"a position that is not a number", "the camera's place is not a pose",
         [](auto& m) { m.wire.T_body_cam.t[1] = std::nan(""); }},
        {"keypoints without a buffer", no_features,
@@ -122,14 +131,14 @@ TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") 
        {"absurdly many inliers", "too many inliers", [](auto& m) { m.wire.inliers = ~0U; }}});
 
   using enum KeyframePart;
-  const KeyframePart part = GENERATE(kFeatures, kWordPoints);
+  const KeyframePart part = GENERATE(kFeatures, kWordPoints, kDescriptors);
   const auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17, part});
   check_refusals<KeyframeRequest>(
       [&] {
         return encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17, part});
       },
       {{"of a part that is none", "an unknown part of a keyframe",
-        [](auto& m) { m.wire.part = 2; }}});
+        [](auto& m) { m.wire.part = 3; }}});
   const auto result = decoded(request).value;
   REQUIRE(result);
   CHECK(result->keyframe == KeyframeId{9, 5});

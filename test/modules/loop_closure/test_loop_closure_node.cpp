@@ -290,11 +290,58 @@ TEST_CASE("the features of a keyframe are requested once its words agree with an
   robot.node.step(words);
   robot.node.step(words);  // a late reply to a repeated request
   REQUIRE(robot.requests.size() == 1);
-  CHECK(robot.requests[0].message->part == KeyframePart::kFeatures);
+  CHECK(robot.requests[0].message->part == KeyframePart::kDescriptors);
   CHECK(robot.closures.empty());
+  peer.node.step(std::exchange(robot.requests, {})[0].message);
+  REQUIRE(peer.replies.size() == 1);
+  CHECK(peer.replies[0].message->descriptors == scene.peer.features.descriptors);
+  CHECK(peer.replies[0].message->keyframe.features.keypoints.empty());
   deliver(robot, peer);
   REQUIRE(robot.closures.size() == 1);
+  CHECK(robot.closures[0].inliers > 100);
   CHECK(stages_of(robot.reports) == Stages{kCandidate, kRequested, kVerified});
+}
+
+TEST_CASE("descriptors of other points than those of the words are replaced by the whole keyframe",
+          "[loop_closure_node]") {
+  Meeting meeting(scene_with_words(25));
+  tell_words(meeting);
+  auto& [scene, robot, peer] = meeting;
+  robot.give(scene.candidate());
+  peer.node.step(std::exchange(robot.requests, {})[0].message);
+  SECTION("the owner has a keypoint less") {
+    robot.node.step(std::exchange(peer.words, {})[0].message);
+    Keyframe less = scene.peer;
+    less.features.keypoints.pop_back();
+    less.features.descriptors.pop_back();
+    peer.give(less);
+  }
+  SECTION("a peer sends descriptors before its points") {
+    robot.give(KeyframeReply{.number = 0,
+                             .found = true,
+                             .keyframe = scene.peer,
+                             .descriptors = scene.peer.features.descriptors});
+    REQUIRE(robot.requests.size() == 1);
+    CHECK(robot.requests[0].message->part == KeyframePart::kFeatures);
+  }
+  deliver(robot, peer);
+  REQUIRE(robot.closures.size() == 1);
+  CHECK(robot.closures[0].inliers > 100);
+}
+
+TEST_CASE("a keyframe with few common words is completed by other keypoints",
+          "[loop_closure_node]") {
+  Meeting meeting(scene_with_words(26));
+  auto& [scene, robot, peer] = meeting;
+  BagOfWords few;
+  for (std::uint32_t word = 0; word < 20; ++word) few.push_back({word, 1});
+  peer.give(KeyframeBow{
+      .id = scene.own.odometry.id, .vocabulary = toy_vocabulary(200).id(), .words = few});
+  robot.give(scene.candidate());
+  deliver(robot, peer);
+  REQUIRE(robot.closures.size() == 1);
+  CHECK(robot.closures[0].inliers > 40);  // a quarter of 200 keypoints are sent
+  CHECK(robot.closures[0].inliers <= 50);
 }
 
 TEST_CASE("no features are requested of a keyframe whose words are elsewhere",

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
@@ -80,6 +81,21 @@ TEST_CASE("Features that end early or late, or state what no camera has, are ref
   many.keypoints.assign(kMaxKeypoints + 1, features.keypoints[0]);
   many.descriptors.resize(many.keypoints.size());
   CHECK_FALSE(unpack_features(pack(many)));
+}
+
+TEST_CASE("Descriptors keep the bytes by which they are matched", "[packed_features]") {
+  const std::vector<BinaryDescriptor> sent = random_features(5, 12).descriptors;
+  std::vector<std::uint8_t> bytes = pack(sent);
+  CHECK(bytes.size() == sent.size() * kMatchedBytes);
+  const auto received = unpack_descriptors(bytes);
+  REQUIRE(received);
+  REQUIRE(received->size() == sent.size());
+  for (std::size_t i = 0; i < sent.size(); ++i)
+    CHECK(std::equal(sent[i].begin(), sent[i].begin() + kMatchedBytes, (*received)[i].begin()));
+  CHECK(unpack_descriptors({}) == std::vector<BinaryDescriptor>{});
+  bytes.push_back(0);
+  CHECK_FALSE(unpack_descriptors(bytes));
+  CHECK_FALSE(unpack_descriptors(std::vector<std::uint8_t>(kMatchedBytes * (kMaxKeypoints + 1))));
 }
 
 }  // namespace

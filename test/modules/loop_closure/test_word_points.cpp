@@ -61,6 +61,8 @@ TEST_CASE("Only points with depth whose words the other keyframe has are sent", 
   for (const WordPoint& point : common_word_points(pair.to, vocabulary(), theirs).points)
     words.push_back(point.word);
   CHECK(words == std::vector<std::uint32_t>{3, 9, 170, 170, 170, 170});
+  CHECK(common_word_places(pair.to, vocabulary(), theirs) ==
+        std::vector<std::size_t>{3, 9, 30, 31, 32, 33});
 }
 
 TEST_CASE("No points, and points that no keypoint can pair with, agree with nothing",

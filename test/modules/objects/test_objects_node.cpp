@@ -242,7 +242,7 @@ TEST_CASE("Impossible objects are refused", "[codec]") {
        {"a keyframe of another robot", odometry,
         [](auto& m) { m.keyframes[0].odometry.keyframe.robot = 71; }},
        {"a keyframe without odometry", odometry,
-        [](auto& m) { m.keyframes[0].odometry.T_odom_kf.q[3] = 9.0; }},
+        [](auto& m) { m.keyframes[0].odometry.q[3] = 9.0F; }},
        {"a keyframe without a pose", odometry,
         [](auto& m) { m.keyframes[0].T_world_kf.t[0] = 1e300; }},
        {"no surface", size, [](auto& m) { m.objects[1].surface_m2 = kNan; }}});

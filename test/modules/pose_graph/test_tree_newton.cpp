@@ -48,6 +48,35 @@ TEST_CASE("Late, duplicate and reordered messages change nothing", "[pose_graph]
       CHECK(late.poses().at(robot)[k].matrix() == poses[k].matrix());
 }
 
+TEST_CASE("Weights of closures to the parent change no second derivatives of the child",
+          "[pose_graph]") {
+  TeamProblem problem =
+      random_team_problem({.robots = {0, 2}, .pairs = {{0, 2}}, .closures = 20}, 5);
+  int false_closures = 0;
+  for (PoseEdge& e : problem.edges)
+    if (e.from.robot == e.to.robot)
+      problem.decided[e.id()] = true;
+    else if (++false_closures <= 5)
+      e.T_from_to.translation().x() += 10.0;
+  const std::size_t root = GENERATE(0U, 1U);
+  SolverTeam team = solver_team(problem, star(problem.members(), root), {}, newton({}));
+  int messages = 0, systems = 0;
+  team.on_sent = [&](RobotId, std::span<const std::uint8_t> bytes) {
+    const auto up = decode_up(bytes);
+    messages += up ? 1 : 0;
+    systems += up && up->system ? 1 : 0;
+  };
+  REQUIRE(team.run());
+  int kept = 0;
+  for (const RobotId robot : problem.members())
+    for (const WeighedClosure& closure : team.member(robot).verdicts().closures)
+      kept += closure.id.from.robot != closure.id.to.robot && closure.kept ? 1 : 0;
+  CHECK(kept >= 12);
+  CHECK(kept <= 15);
+  CHECK(messages > 6);  // steps with weights that change
+  CHECK(systems <= 3);  // at the start, if a step is undone, and full ones at the end
+}
+
 TEST_CASE("Verticals are part of the cost", "[pose_graph]") {
   const TeamProblem problem =
       random_team_problem({.robots = {1, 2, 3}, .pairs = {{1, 2}, {2, 3}}, .tilt_sigma = 0.01}, 4);

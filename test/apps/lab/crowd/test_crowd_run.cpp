@@ -39,11 +39,10 @@ TEST_CASE("The sizes of messages are those of the codecs", "[crowd]") {
     words.words.points.push_back({{.bearing = {0.1F, 0.2F}, .inverse_depth = 0.5F}, 60 * i});
   CHECK(static_cast<double>(content_bytes(words)) ==
         Approx(static_cast<double>(words_bytes(110))).epsilon(0.1));
-  const std::size_t keypoints = GENERATE(1U, 200U, 600U);
+  const std::size_t points = GENERATE(1U, 200U, 600U);
   KeyframeReply reply{.number = 1, .found = true, .keyframe = {}};
-  reply.keyframe.features.keypoints.resize(keypoints);
-  reply.keyframe.features.descriptors.resize(keypoints);
-  CHECK(padded(content_bytes(reply)) == padded(reply_bytes(keypoints)));
+  reply.descriptors.resize(points);
+  CHECK(padded(content_bytes(reply)) == padded(reply_bytes(points)));
 }
 
 // Robots of a small team, and what robot 0 finds.
