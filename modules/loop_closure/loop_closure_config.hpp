@@ -87,9 +87,11 @@ struct LoopClosureConfig {
                   "0: request it as a whole at once");
     visitor.field("min_word_share", min_word_share, {0.0, 1.0},
                   "least share of those keypoints that must agree");
-    visitor.field("reply_keypoints", reply_keypoints, {50, 100000},
-                  "maximum number of keypoints of a keyframe sent to a peer, 17 B each: those most "
-                  "likely to correspond, down to a quarter of this number, see chosen_by_words()");
+    visitor.field(
+        "reply_keypoints", reply_keypoints, {50, 100000},
+        "maximum number of keypoints of a keyframe sent to a peer: those most likely to "
+        "correspond, down to a quarter of this number. 6 B each at first and 12 B more if "
+        "these agree; 17 B where the words of the peer are unknown");
     visitor.field("full_keyframes", full_keyframes, {1, 1000000},
                   "number of newest own keyframes in memory with all keypoints, 48 B each; older "
                   "ones are read from the run's journal when needed, or keep twice reply_keypoints "

@@ -1,6 +1,7 @@
 #include "modules/loop_closure/word_points.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <random>
 #include <set>
@@ -23,13 +24,26 @@ PointsOfWords with_depth(const KeyframeFeatures& features, const Vocabulary& voc
   return result;
 }
 
+// The keypoint after the first `most` keypoints in `points`.
+std::size_t end_of_first(const PointsOfWords& points, std::size_t most) {
+  std::vector<std::size_t> all;
+  for (const auto& [word, of_word] : points) all.insert(all.end(), of_word.begin(), of_word.end());
+  if (all.size() <= most) return std::numeric_limits<std::size_t>::max();
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(most);
+  std::nth_element(all.begin(), end, all.end());
+  return *end;
+}
+
 PointsOfWords common(const KeyframeFeatures& features, const Vocabulary& vocabulary,
-                     std::span<const std::uint32_t> theirs) {
+                     std::span<const std::uint32_t> theirs, std::size_t most) {
   PointsOfWords result = with_depth(features, vocabulary);
   std::erase_if(result, [&](const auto& entry) {
     return entry.second.size() > kMaxWordRepeats ||
            !std::ranges::binary_search(theirs, entry.first);
   });
+  const std::size_t end = end_of_first(result, most);
+  for (auto& [word, points] : result)
+    std::erase_if(points, [&](std::size_t point) { return point >= end; });
   return result;
 }
 
@@ -37,17 +51,18 @@ PointsOfWords common(const KeyframeFeatures& features, const Vocabulary& vocabul
 
 std::vector<std::size_t> common_word_places(const KeyframeFeatures& features,
                                             const Vocabulary& vocabulary,
-                                            std::span<const std::uint32_t> theirs) {
+                                            std::span<const std::uint32_t> theirs,
+                                            std::size_t most) {
   std::vector<std::size_t> places;
-  for (const auto& [word, points] : common(features, vocabulary, theirs))
+  for (const auto& [word, points] : common(features, vocabulary, theirs, most))
     places.insert(places.end(), points.begin(), points.end());
   return places;
 }
 
 WordPoints common_word_points(const KeyframeFeatures& features, const Vocabulary& vocabulary,
-                              std::span<const std::uint32_t> theirs) {
+                              std::span<const std::uint32_t> theirs, std::size_t most) {
   WordPoints result{features.focal_px, features.baseline_m, {}};
-  for (const auto& [word, points] : common(features, vocabulary, theirs))
+  for (const auto& [word, points] : common(features, vocabulary, theirs, most))
     for (const std::size_t point : points)
       result.points.push_back({features.keypoints[point], word});
   return result;

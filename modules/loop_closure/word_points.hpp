@@ -30,15 +30,18 @@ struct WordPoints {
 inline constexpr std::size_t kMaxWordRepeats = 4;
 
 /// Places in `features` of the keypoints with a known depth and a word in `theirs` (ascending),
-/// except words of more than kMaxWordRepeats such keypoints. Ascending by word, then by place.
+/// except words of more than kMaxWordRepeats such keypoints. At most `most` places, those of the
+/// first keypoints. Ascending by word, then by place.
 [[nodiscard]] std::vector<std::size_t> common_word_places(const KeyframeFeatures& features,
                                                           const Vocabulary& vocabulary,
-                                                          std::span<const std::uint32_t> theirs);
+                                                          std::span<const std::uint32_t> theirs,
+                                                          std::size_t most);
 
 /// The keypoints at common_word_places(), in their order.
 [[nodiscard]] WordPoints common_word_points(const KeyframeFeatures& features,
                                             const Vocabulary& vocabulary,
-                                            std::span<const std::uint32_t> theirs);
+                                            std::span<const std::uint32_t> theirs,
+                                            std::size_t most);
 
 /// Number of points of `theirs` that are where `own` has points of the same words, under the
 /// relative pose of the cameras with which most agree (ransac_pose()). Points are pairs if they

@@ -174,9 +174,10 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
   const std::vector<std::uint32_t>* theirs = words_.find({request->requester, request->own});
   if (request->part == KeyframePart::kWordPoints && asked && theirs != nullptr)
     return topics_.own_words.publish(Addressed<KeyframeWords>{
-        request->requester, std::make_shared<const KeyframeWords>(KeyframeWords{
-                                request->number, request->keyframe,
-                                common_word_points(asked->features, *vocabulary_, *theirs)})});
+        request->requester,
+        std::make_shared<const KeyframeWords>(KeyframeWords{
+            request->number, request->keyframe,
+            common_word_points(asked->features, *vocabulary_, *theirs, reply_keypoints_)})});
   KeyframeReply reply{.number = request->number, .found = false, .keyframe = {}};
   reply.keyframe.odometry.id = request->keyframe;
   if (asked) reply = reply_to(*request, *asked, theirs);
@@ -197,7 +198,8 @@ KeyframeReply LoopClosureNode::reply_to(const KeyframeRequest& request, const Ke
   } else if (request.part != KeyframePart::kDescriptors) {
     reply.keyframe.features = chosen_by_words(features, budget, *vocabulary_, *theirs);
   } else {
-    const std::vector<std::size_t> points = common_word_places(features, *vocabulary_, *theirs);
+    const std::vector<std::size_t> points =
+        common_word_places(features, *vocabulary_, *theirs, budget.most);
     for (const std::size_t point : points) reply.descriptors.push_back(features.descriptors[point]);
     reply.keyframe.features =
         reduced(without(features, points), budget.least - std::min(budget.least, points.size()));

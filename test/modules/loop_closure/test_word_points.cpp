@@ -17,6 +17,8 @@ const Vocabulary& vocabulary() {
   return toy;
 }
 
+constexpr std::size_t kAll = 1000;  // more than any keyframe here has
+
 std::vector<std::uint32_t> all_words() {
   std::vector<std::uint32_t> words(200);
   for (std::uint32_t word = 0; word < words.size(); ++word) words[word] = word;
@@ -39,7 +41,7 @@ TEST_CASE("Points of common words agree where the keyframes see one place", "[wo
   const std::size_t common = GENERATE(0U, 20U, 60U, 150U);
   CAPTURE(common);
   const KeyframePair pair = two_views(rng, common);
-  const WordPoints sent = common_word_points(pair.to, vocabulary(), all_words());
+  const WordPoints sent = common_word_points(pair.to, vocabulary(), all_words(), kAll);
   REQUIRE(sent.points.size() == 150);
   const std::size_t agreeing = agreeing_word_points(pair.from, vocabulary(), sent, {});
   // 99 % of the right pairs are inliers by the noise, and a few wrong ones are by chance.
@@ -58,18 +60,21 @@ TEST_CASE("Only points with depth whose words the other keyframe has are sent", 
     pair.to.descriptors[i] = toy_descriptor(170);
   const std::vector<std::uint32_t> theirs = {3, 7, 9, 160, 170};
   std::vector<std::uint32_t> words;
-  for (const WordPoint& point : common_word_points(pair.to, vocabulary(), theirs).points)
+  for (const WordPoint& point : common_word_points(pair.to, vocabulary(), theirs, kAll).points)
     words.push_back(point.word);
   CHECK(words == std::vector<std::uint32_t>{3, 9, 170, 170, 170, 170});
-  CHECK(common_word_places(pair.to, vocabulary(), theirs) ==
+  CHECK(common_word_places(pair.to, vocabulary(), theirs, kAll) ==
         std::vector<std::size_t>{3, 9, 30, 31, 32, 33});
+  CHECK(common_word_places(pair.to, vocabulary(), theirs, 4) ==
+        std::vector<std::size_t>{3, 9, 30, 31});
+  CHECK(common_word_places(pair.to, vocabulary(), theirs, 0).empty());
 }
 
 TEST_CASE("No points, and points that no keypoint can pair with, agree with nothing",
           "[word_points]") {
   std::mt19937 rng(5);
   const KeyframePair pair = two_views(rng, 150);
-  WordPoints points = common_word_points(pair.to, vocabulary(), all_words());
+  WordPoints points = common_word_points(pair.to, vocabulary(), all_words(), kAll);
   for (WordPoint& point : points.points) point.word = 4'000'000'000;
   CHECK(agreeing_word_points(pair.from, vocabulary(), points, {}) == 0);
   points.points.clear();
@@ -80,7 +85,7 @@ TEST_CASE("No points, and points that no keypoint can pair with, agree with noth
 TEST_CASE("Both bounds must be reached", "[word_points]") {
   std::mt19937 rng(6);
   const KeyframePair pair = two_views(rng, 60);
-  const WordPoints sent = common_word_points(pair.to, vocabulary(), all_words());
+  const WordPoints sent = common_word_points(pair.to, vocabulary(), all_words(), kAll);
   LoopClosureConfig config;
   const auto agreeing = agreeing_word_points(pair.from, vocabulary(), sent, config);
   const auto may = [&] { return may_show_one_place(pair.from, vocabulary(), sent, config); };
@@ -102,7 +107,7 @@ TEST_CASE("Packed points are rounded by less than a fifth of a pixel", "[word_po
   for (std::size_t i = 0; i < 150; ++i)
     pair.to.keypoints[i].octave = static_cast<std::uint8_t>(i % 8);
   pair.to.keypoints[0].inverse_depth = 1e-9F;
-  const WordPoints sent = common_word_points(pair.to, vocabulary(), all_words());
+  const WordPoints sent = common_word_points(pair.to, vocabulary(), all_words(), kAll);
   const std::vector<std::uint8_t> bytes = pack(sent);
   CHECK(bytes.size() < 6 * sent.points.size());
   const auto received = unpack_word_points(bytes);
@@ -132,7 +137,7 @@ TEST_CASE("Bytes that end early or late, or state what no camera has, are refuse
   std::mt19937 rng(8);
   const KeyframePair pair = two_views(rng, 150);
   const WordPoints points =
-      common_word_points(pair.to, vocabulary(), std::vector<std::uint32_t>{3, 9, 27});
+      common_word_points(pair.to, vocabulary(), std::vector<std::uint32_t>{3, 9, 27}, kAll);
   std::vector<std::uint8_t> bytes = pack(points);
   for (std::size_t size = 0; size < bytes.size(); ++size)
     CHECK_FALSE(unpack_word_points(std::span(bytes).first(size)));

@@ -296,11 +296,13 @@ TEST_CASE("False closures of the pair with most closures do not place the robots
 
 // Measured: 29, 26, 25 rounds with places of 2 closures, 46, 30, 28 with places of 10.
 TEST_CASE("Many false closures that agree cost less than twice the rounds of few", "[pgo_study]") {
-  const unsigned seed = GENERATE(1U, 2U, 3U);
-  CAPTURE(seed);
-  const std::uint32_t few = check_false_closures(kGarage, 3, {.places = kPlaces, .size = 2}, seed);
-  const std::uint32_t many =
-      check_false_closures(kGarage, 3, {.places = kPlaces, .size = 10}, seed);
+  // The sum of three seeds, because a single team may need one more session than another.
+  std::uint32_t few = 0, many = 0;
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    few += check_false_closures(kGarage, 3, {.places = kPlaces, .size = 2}, seed);
+    many += check_false_closures(kGarage, 3, {.places = kPlaces, .size = 10}, seed);
+  }
+  CAPTURE(few, many);
   CHECK((many < 2 * few || few == 0));  // 0: no data
 }
 
