@@ -28,6 +28,10 @@ class TreeWriter : public ByteWriter {
   void doubles(const auto& values) {
     for (Index k = 0; k < values.size(); ++k) f64(values.reshaped()(k));
   }
+  void singles(const Eigen::VectorXd& values) {
+    varint(static_cast<std::uint64_t>(values.size()));
+    for (const double x : values) f32(static_cast<float>(x));
+  }
 };
 
 class TreeReader : public ByteReader {
@@ -64,9 +68,9 @@ class TreeReader : public ByteReader {
     if (std::abs(T.q.norm() - 1.0F) > 1e-3F) fail();
     return T;
   }
-  Eigen::VectorXd doubles() {
-    Eigen::VectorXd values(static_cast<Index>(count(kMaxElements, sizeof(double))));
-    for (double& x : values) x = number();
+  Eigen::VectorXd singles() {
+    Eigen::VectorXd values(static_cast<Index>(count(kMaxElements, sizeof(float))));
+    for (double& x : values) x = static_cast<double>(small_number());
     return values;
   }
 };
@@ -295,8 +299,7 @@ std::vector<std::uint8_t> encode(const UpMessage& message) {
   w.varint(message.round);
   w.u8(message.failed ? 1 : 0);
   write(w, message.sums);
-  w.varint(static_cast<std::uint64_t>(message.reduced.size()));
-  w.doubles(message.reduced);
+  w.singles(message.reduced);
   w.u8(message.system ? 1 : 0);
   if (message.system) write(w, *message.system);
   w.varint(message.weights.size());
@@ -313,7 +316,7 @@ std::optional<UpMessage> decode_up(std::span<const std::uint8_t> bytes) {
   UpMessage message{.round = r.varint_as<std::uint32_t>(), .sums = {}};
   message.failed = r.flag();
   message.sums = read_sums(r);
-  message.reduced = r.doubles();
+  message.reduced = r.singles();
   if (r.flag()) message.system = read_system(r);
   for (std::size_t n = r.count(kMaxElements, 5); n > 0; --n) {
     const auto edge = r.varint_as<std::uint32_t>();
@@ -340,8 +343,7 @@ std::vector<std::uint8_t> encode(const DownMessage& message) {
     w.varint(robot);
     w.single(T);
   }
-  w.varint(static_cast<std::uint64_t>(message.step.size()));
-  w.doubles(message.step);
+  w.singles(message.step);
   w.varint(message.inverse.size());
   for (const float x : message.inverse) w.f32(x);
   return w.release();
@@ -375,7 +377,7 @@ std::optional<DownMessage> decode_down(std::span<const std::uint8_t> bytes) {
     const auto robot = r.varint_as<RobotId>();
     v.moves.emplace_back(robot, r.single());
   }
-  message.step = r.doubles();
+  message.step = r.singles();
   message.inverse.resize(r.count(kMaxElements, sizeof(float)));
   for (float& x : message.inverse) x = r.small_number();
   return r.done() ? std::optional(std::move(message)) : std::nullopt;

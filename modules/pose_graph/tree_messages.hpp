@@ -85,7 +85,7 @@ struct UpMessage {
   std::uint32_t round = 0;
   TreeSums sums;
   bool failed = false;  ///< The subtree cannot continue.
-  /// Reduced right-hand side, 3 or 6 rows per variable.
+  /// Reduced right-hand side, 3 or 6 rows per variable, in single precision.
   Eigen::VectorXd reduced = {};
   /// Empty: as in the round before, except for `weights`.
   std::optional<TreeSystem> system = {};
@@ -139,8 +139,9 @@ struct TreeVerdict {
 /// From a robot to a child, once per round.
 struct DownMessage {
   TreeVerdict verdict;
-  Eigen::VectorXd step = {};  ///< Step of the variables of the child; kStep only.
-  TreeInverse inverse = {};   ///< For the variables of the child; kDone only, empty if unknown.
+  /// Step of the variables of the child, in single precision; kStep only.
+  Eigen::VectorXd step = {};
+  TreeInverse inverse = {};  ///< For the variables of the child; kDone only, empty if unknown.
 };
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const UpMessage& message);

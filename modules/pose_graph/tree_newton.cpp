@@ -46,6 +46,11 @@ std::vector<KeyframeId> ends_if_few(std::span<const ClosureId> closures, RobotId
   return {ends.begin(), ends.end()};
 }
 
+// Rounding a gradient or a step by its last digits does not slow down Newton's method.
+MatrixXd in_single_precision(const MatrixXd& X) {
+  return X.cast<float>().cast<double>();
+}
+
 SolverMessage message_to(RobotId to, std::vector<std::uint8_t> bytes) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))};
 }
@@ -329,7 +334,7 @@ UpMessage TreeNewton::equations() {
   }
   if (!factorised_) return message;
   front_->reduce(present_, reduced);
-  message.reduced = front_->reduced();
+  message.reduced = in_single_precision(front_->reduced());
   message.sums.decrement = front_->decrement();
   message.failed = !message.reduced.allFinite() || !std::isfinite(message.sums.decrement);
   return message;
@@ -433,7 +438,8 @@ void TreeNewton::accept() {
 
 void TreeNewton::take_step(const VectorXd& step, const TreeVerdict& verdict,
                            std::map<RobotId, VectorXd>& children) {
-  const MatrixXd steps = front_->substitute_back(step);
+  // The robots of one pose move it by one step, to the last bit.
+  const MatrixXd steps = in_single_precision(front_->substitute_back(step));
   for (const RobotId child : place_.children) children[child] = front_->step_of_child(child, steps);
   step_ = steps.leftCols(static_cast<Index>(front_->followed()));
   const Eigen::Map<const Eigen::Vector3d> w(verdict.drift.data());

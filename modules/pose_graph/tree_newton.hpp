@@ -20,7 +20,7 @@ namespace km {
 /// A round is one pass up and one pass down. The pass up carries the equations at the present
 /// poses, eliminated onto the poses that other robots use, and the sums of cost and residuals. The
 /// root solves and decides, and the pass down carries the steps of the poses sent. One round is one
-/// Newton step of the whole team, exact except for edges that are sent in single precision. A step
+/// Newton step of the whole team, exact except for what is sent in single precision. A step
 /// is accepted once the next pass up has brought its cost to the root. If the cost has risen, the
 /// step is shortened; while weights change, the cost may rise by half, twice in a row. Only the
 /// root decides.

@@ -4,14 +4,13 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <span>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "modules/core/keyframe.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
+#include "modules/loop_closure/keyframe_reply.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
@@ -22,63 +21,6 @@ namespace {
 // Robots that meet again after a while produce candidates in bursts.
 constexpr std::size_t kQueueCapacity = 16384;
 constexpr std::chrono::milliseconds kTickPeriod(100);
-constexpr std::size_t kLeastPart = 4;  // reply_keypoints over KeypointBudget::least
-
-// Number of keypoints of one image to send.
-struct KeypointBudget {
-  std::size_t least = 0;  // lower bound, if there are enough keypoints
-  std::size_t most = 0;
-};
-
-// The keypoints of `features` for a robot whose own image of the place has the words `theirs`,
-// ascending. Keypoints with a known depth whose word is in `theirs` come first, up to budget.most.
-// If there are fewer than budget.least, other keypoints follow, those with depth first. The shared
-// words indicate corresponding points and cost no bytes, because bags of words are published anyway
-// (Galvez-Lopez and Tardos, TRO 2012, use the same association to save comparisons). If few words
-// are shared, the two images seldom show one place. On EuRoC V1_01, 400 keypoints with depth verify
-// 229 pairs. With 200 keypoints, 183 of these pairs are verified if words decide, and 135
-// otherwise.
-KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const KeypointBudget& budget,
-                                 const Vocabulary& vocabulary,
-                                 std::span<const std::uint32_t> theirs) {
-  if (features.keypoints.size() <= budget.least) return features;
-  const std::vector<std::uint32_t> words = vocabulary.words(features.descriptors);
-  std::vector<int> rank;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    const bool shared = std::binary_search(theirs.begin(), theirs.end(), words[i]);
-    rank.push_back((features.keypoints[i].has_depth() ? 2 : 0) + (shared ? 1 : 0));
-  }
-  std::vector<std::size_t> order(words.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return rank[a] > rank[b]; });
-  constexpr int kBest = 3;  // rank of a keypoint with depth and a shared word
-  const auto best = static_cast<std::size_t>(std::count(rank.begin(), rank.end(), kBest));
-  order.resize(std::min(order.size(), std::clamp(best, budget.least, budget.most)));
-  KeyframeFeatures chosen = features;
-  chosen.keypoints.clear();
-  chosen.descriptors.clear();
-  for (const std::size_t i : order) {
-    chosen.keypoints.push_back(features.keypoints[i]);
-    chosen.descriptors.push_back(features.descriptors[i]);
-  }
-  return chosen;
-}
-
-// `features` without the keypoints at `places`.
-KeyframeFeatures without(const KeyframeFeatures& features, std::span<const std::size_t> places) {
-  std::vector<bool> is_left(features.keypoints.size(), true);
-  for (const std::size_t i : places) is_left[i] = false;
-  KeyframeFeatures rest = features;
-  rest.keypoints.clear();
-  rest.descriptors.clear();
-  for (std::size_t i = 0; i < is_left.size(); ++i) {
-    if (!is_left[i]) continue;
-    rest.keypoints.push_back(features.keypoints[i]);
-    rest.descriptors.push_back(features.descriptors[i]);
-  }
-  return rest;
-}
 
 }  // namespace
 
@@ -171,40 +113,20 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
   }
   const KeyframePtr asked = own(request->keyframe);
   if (asked) policy_.add_peer_request(request->requester, request->own, request->keyframe.index);
-  const std::vector<std::uint32_t>* theirs = words_.find({request->requester, request->own});
-  if (request->part == KeyframePart::kWordPoints && asked && theirs != nullptr)
+  std::optional<WordsOfRequester> words;
+  if (const auto* theirs = words_.find({request->requester, request->own}))
+    words.emplace(*vocabulary_, *theirs);
+  if (request->part == KeyframePart::kWordPoints && asked && words)
     return topics_.own_words.publish(Addressed<KeyframeWords>{
-        request->requester,
-        std::make_shared<const KeyframeWords>(KeyframeWords{
-            request->number, request->keyframe,
-            common_word_points(asked->features, *vocabulary_, *theirs, reply_keypoints_)})});
+        request->requester, std::make_shared<const KeyframeWords>(KeyframeWords{
+                                request->number, request->keyframe,
+                                common_word_points(asked->features, words->vocabulary, words->words,
+                                                   reply_keypoints_)})});
   KeyframeReply reply{.number = request->number, .found = false, .keyframe = {}};
   reply.keyframe.odometry.id = request->keyframe;
-  if (asked) reply = reply_to(*request, *asked, theirs);
+  if (asked) reply = reply_to(*request, *asked, words, reply_keypoints_);
   topics_.own_replies.publish(Addressed<KeyframeReply>{
       request->requester, std::make_shared<const KeyframeReply>(std::move(reply))});
-}
-
-// `theirs` are the words of the requester's keyframe, null if unknown.
-KeyframeReply LoopClosureNode::reply_to(const KeyframeRequest& request, const Keyframe& asked,
-                                        const std::vector<std::uint32_t>* theirs) const {
-  const KeyframeFeatures& features = asked.features;
-  KeyframeReply reply{.number = request.number, .found = true, .keyframe = {}};
-  reply.keyframe.odometry = asked.odometry;
-  reply.keyframe.stamp = asked.stamp;
-  const KeypointBudget budget{reply_keypoints_ / kLeastPart, reply_keypoints_};
-  if (theirs == nullptr) {
-    reply.keyframe.features = reduced(features, budget.most);
-  } else if (request.part != KeyframePart::kDescriptors) {
-    reply.keyframe.features = chosen_by_words(features, budget, *vocabulary_, *theirs);
-  } else {
-    const std::vector<std::size_t> points =
-        common_word_places(features, *vocabulary_, *theirs, budget.most);
-    for (const std::size_t point : points) reply.descriptors.push_back(features.descriptors[point]);
-    reply.keyframe.features =
-        reduced(without(features, points), budget.least - std::min(budget.least, points.size()));
-  }
-  return reply;
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
@@ -212,7 +134,10 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
   if (!reply->found) return requests_.absent(id, now_s_);
   // Ignores the reply to a repeated request, or one without a request.
   if (!requests_.arrived(id)) return;
-  if (const KeyframePtr keyframe = received(*reply)) {
+  const auto before = promising_.find(id);
+  if (auto complete = keyframe_of(*reply, before == promising_.end() ? nullptr : &before->second)) {
+    // A copy is stored, because a referenced message counts as queued.
+    const auto keyframe = std::make_shared<const Keyframe>(*std::move(complete));
     peers_.put(keyframe);
     arrived(keyframe);
   } else {
@@ -220,23 +145,6 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeReply>& reply) {
     requests_.want(id);
   }
   send_due_requests();
-}
-
-// The keyframe of `reply` with the points that were received before; null if they are not those of
-// the reply. A copy, because a referenced message counts as queued.
-LoopClosureNode::KeyframePtr LoopClosureNode::received(const KeyframeReply& reply) const {
-  auto keyframe = std::make_shared<Keyframe>(reply.keyframe);
-  if (reply.descriptors.empty()) return keyframe;
-  const auto before = promising_.find(keyframe->odometry.id);
-  if (before == promising_.end() || before->second.points.size() != reply.descriptors.size())
-    return nullptr;
-  KeyframeFeatures& features = keyframe->features;
-  features.focal_px = before->second.focal_px;
-  features.baseline_m = before->second.baseline_m;
-  for (const WordPoint& point : before->second.points) features.keypoints.push_back(point.keypoint);
-  features.descriptors.insert(features.descriptors.end(), reply.descriptors.begin(),
-                              reply.descriptors.end());
-  return keyframe;
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const KeyframeWords>& words) {

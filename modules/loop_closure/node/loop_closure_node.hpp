@@ -132,7 +132,6 @@ class LoopClosureNode final : public Node {
   bool advance(const Work& work);
   void request_keyframe(const KeyframeId& missing, const Work& work);
   void arrived(const KeyframePtr& keyframe);
-  [[nodiscard]] KeyframePtr received(const KeyframeReply& reply) const;
   [[nodiscard]] bool fits(const Work& work, const WordPoints& theirs) const;
   [[nodiscard]] KeyframePart part_to_request(const KeyframeId& keyframe) const;
   KeyframePtr find(const KeyframeId& id);
@@ -140,8 +139,6 @@ class LoopClosureNode final : public Node {
   void report(const Work& work, ClosureStage stage, std::string reason = {},
               const Verification& numbers = {}) const;
   void send_due_requests();
-  [[nodiscard]] KeyframeReply reply_to(const KeyframeRequest& request, const Keyframe& asked,
-                                       const std::vector<std::uint32_t>* theirs) const;
 
   const LoopClosureConfig config_;
   const RobotId self_;

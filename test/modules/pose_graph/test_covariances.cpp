@@ -199,7 +199,7 @@ TEST_CASE("Covariances do not change the poses, except for rounding", "[pose_gra
   CHECK(without.member(1).covariances().empty());
   for (const auto& [robot, poses] : with.poses())
     for (std::size_t k = 0; k < poses.size(); ++k)
-      CHECK(without.poses().at(robot)[k].isApprox(poses[k], 1e-9));
+      CHECK(without.poses().at(robot)[k].isApprox(poses[k], 1e-7));  // steps are rounded to floats
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ TreeSystem some_system(std::mt19937& rng, Index block) {
 UpMessage some_up_message(Index block, bool with_system) {
   std::mt19937 rng(5);
   UpMessage message{.round = 70000, .sums = some_sums(), .failed = false};
-  message.reduced = some_numbers(rng, 4 * block);
+  message.reduced = some_numbers(rng, 4 * block).cast<float>().cast<double>();
   if (with_system)
     message.system = some_system(rng, block);
   else
@@ -108,7 +108,7 @@ DownMessage some_down_message(TreeVerdict::Next next, TreeVerdict::Weighing weig
                      .cost = 1687.0,
                      .gradient = 1e-9,
                      .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
-  message.step = some_numbers(rng, 12);
+  message.step = some_numbers(rng, 12).cast<float>().cast<double>();
   return message;
 }
 
