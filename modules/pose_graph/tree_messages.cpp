@@ -82,7 +82,8 @@ bool below(const PairVote& x, const PairVote& y) {
 void write(TreeWriter& w, const TreeSums& s) {
   for (const double x : {s.base_cost, s.cost, s.decrement}) w.f64(x);
   w.f32(s.largest);
-  for (const std::uint32_t n : {s.open, s.changed, s.fractional, s.isolated, s.fixed, s.poses})
+  for (const std::uint32_t n :
+       {s.open, s.changed, s.fractional, s.kept, s.isolated, s.fixed, s.poses})
     w.varint(n);
   w.varint(s.lengths.size());
   for (const auto& [bin, n] : s.lengths) {
@@ -108,7 +109,8 @@ TreeSums read_sums(TreeReader& r) {
   TreeSums s;
   for (double* x : {&s.base_cost, &s.cost, &s.decrement}) *x = r.number();
   s.largest = r.small_number();
-  for (std::uint32_t* n : {&s.open, &s.changed, &s.fractional, &s.isolated, &s.fixed, &s.poses})
+  for (std::uint32_t* n :
+       {&s.open, &s.changed, &s.fractional, &s.kept, &s.isolated, &s.fixed, &s.poses})
     *n = r.varint_as<std::uint32_t>();
   for (std::size_t n = r.count(kMaxElements, 2); n > 0; --n) {
     const auto bin = r.varint_as<std::uint16_t>();
@@ -277,6 +279,7 @@ void TreeSums::add(const TreeSums& other) {
   open += other.open;
   changed += other.changed;
   fractional += other.fractional;
+  kept += other.kept;
   isolated += other.isolated;
   fixed += other.fixed;
   poses += other.poses;

@@ -71,6 +71,7 @@ struct TreeSums {
   std::uint32_t open = 0;  ///< Number of closures that may be rejected.
   std::uint32_t changed = 0;     ///< Open closures whose weight has changed.
   std::uint32_t fractional = 0;  ///< Open closures with a weight between 0 and 1.
+  std::uint32_t kept = 0;        ///< Closures with a weight above one half.
   std::uint32_t isolated = 0;    ///< Deferred closures, see Corroboration.
   std::uint32_t fixed = 0;       ///< Number of edges to held poses.
   std::uint32_t poses = 0;
@@ -119,9 +120,9 @@ struct TreeVerdict {
   bool free = true;       ///< kStart: nothing holds the frame of the team.
   Weighing weighing = Weighing::kDecided;
   double scale = 1.0;
-  double mu = 0.0;    ///< For the next weights.
-  double barc = 0.0;  ///< Largest residual of an inlier [sigma].
-  double noise_scale = 1.0;
+  double mu = 0.0;           ///< For the next weights.
+  double barc = 0.0;         ///< Largest residual of an inlier [sigma].
+  double noise_scale = 1.0;  ///< kDone: at most what the cost of the solution allows.
   double usual_noise = 1.0;  ///< kStart: see usual_pair_noise().
   /// kCount, kStart: first these robots are moved as a whole, see better_placement(). Ascending.
   std::vector<std::pair<RobotId, SinglePose>> moves = {};

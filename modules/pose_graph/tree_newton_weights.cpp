@@ -114,7 +114,10 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
   for (const std::size_t k : front_edge_) {
     Known& known = known_[k];
     known.candidate = known.weight;
-    if (known.trust != Trust::kOpen) continue;
+    if (known.trust != Trust::kOpen) {
+      sums.kept += known.odometry ? 0 : 1;
+      continue;
+    }
     const double r = residual_of(known.edge, pose_at(known.edge.from, present_),
                                  pose_at(known.edge.to, present_));
     const double least = known.odometry ? kRejectedStepWeight : 0.0;
@@ -125,6 +128,7 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
     sums.largest = std::max(sums.largest, static_cast<float>(r));
     if ((decided ? weight : known.candidate) != known.weight) ++sums.changed;
     if (known.candidate != least && known.candidate != 1.0) ++sums.fractional;
+    sums.kept += !known.odometry && known.candidate > 0.5 ? 1 : 0;
   }
   limit_candidates(decided);
 }

@@ -69,6 +69,22 @@ double usual_pair_noise(const std::vector<PairVote>& votes) {
   return static_cast<double>(*middle);
 }
 
+// The noise scale that the solution allows, at most `scale`. False closures that agree roughly with
+// each other look like noisy ones at first, and are rejected later. `cost` is at least that of the
+// kept closures. With closures s times noisier than stated, it is s^2 times a chi-squared variable
+// of their cycles. The result is the upper end of the one-sided interval for s of 99 % (quantile by
+// Wilson and Hilferty, PNAS 1931), and at least 1.
+double noise_allowed(double scale, double cost, std::uint32_t kept, std::size_t members,
+                     int dimension) {
+  constexpr double kQuantile = -2.326;  // quantile of the normal distribution at 1 %
+  const double cycles = static_cast<double>(kept) - static_cast<double>(members - 1);
+  if (scale <= 1.0 || cycles < 1.0) return scale;
+  const double freedom = (dimension == 2 ? 3.0 : 6.0) * cycles;
+  const double v = 2.0 / (9.0 * freedom);
+  const double quantile = freedom * std::pow(1.0 - v + kQuantile * std::sqrt(v), 3.0);
+  return std::clamp(std::sqrt(cost / quantile), 1.0, scale);
+}
+
 std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>& votes) {
   std::vector<std::pair<RobotId, SinglePose>> moves;
   for (const auto& [robot, T] : better_placement(motions_of(votes)))
@@ -198,8 +214,11 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   weighing_ = decided                 ? Weighing::kDecided
               : schedule_.unweighed() ? Weighing::kUnweighed
                                       : Weighing::kWeigh;
-  if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds)
+  if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds) {
+    noise_scale_ =
+        noise_allowed(noise_scale_, cost_, sums.kept, members_.size(), options_.dimension);
     return answer(Next::kDone);
+  }
   // Gauss-Newton steps rarely lead to the minimum of the decided weights, so full second
   // derivatives are needed in any case.
   if (decided && (worth_refreshing(decrement_) || (newly_decided && !full_))) {

@@ -179,6 +179,37 @@ TEST_CASE("Errors of the poses are as large as their covariances say", "[pose_gr
   CHECK(sum / count == Approx(1.0).margin(0.1));
 }
 
+// Five closures inside robot 2 from keyframes 3 to 7 to a place 50 m off. They agree with each
+// other up to `spread_m`.
+void add_false_closures(TeamProblem& problem, double spread_m, std::mt19937& rng) {
+  const std::vector<SE3>& truth = problem.truth.at(2);
+  for (std::uint32_t k = 3; k < 8; ++k) {
+    SE3 T = truth[k].inverse() * truth[k + 10];
+    T.translation() += Eigen::Vector3d(50.0, 0.0, 0.0) + spread_m * random_vector<3>(rng);
+    problem.edges.push_back({{2, k}, {2, k + 10}, T, problem.edges.front().precision});
+  }
+  problem.edges = in_order(problem.edges);
+}
+
+TEST_CASE("Rejected closures that agree roughly do not increase the covariances", "[pose_graph]") {
+  TeamProblem problem = random_team_problem({.robots = {1, 2}, .pairs = {{1, 2}}}, 8);
+  std::erase_if(problem.edges,
+                [](const PoseEdge& e) { return e.from.robot == e.to.robot && !is_step(e); });
+  SolverTeam honest = solver_team(problem, star(problem.members()), {}, newton({.robust = false}));
+  std::mt19937 rng(9);
+  add_false_closures(problem, 0.8, rng);  // 40 times the standard deviation
+  SolverTeam team = solver_team(problem, star(problem.members()), {}, newton({}));
+  REQUIRE(honest.run());
+  REQUIRE(team.run());
+  std::size_t rejected = 0;
+  for (const RobotId robot : problem.members())
+    rejected += team.member(robot).verdicts().rejected();
+  CHECK(rejected == 5);
+  const double expected = honest.member(2).covariances().back().trace();
+  CHECK(team.member(2).covariances().back().trace() > 0.5 * expected);
+  CHECK(team.member(2).covariances().back().trace() < 3.0 * expected);
+}
+
 TEST_CASE("The origin has no covariance", "[pose_graph]") {
   const TeamProblem problem = random_team_problem({.robots = {1, 2}, .pairs = {{1, 2}}}, 6);
   SolverTeam team = solver_team(problem, star(problem.members(), 1), {}, newton({}));

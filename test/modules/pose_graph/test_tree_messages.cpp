@@ -24,6 +24,7 @@ TreeSums some_sums() {
                 .open = 300,
                 .changed = 7,
                 .fractional = 1,
+                .kept = 5,
                 .isolated = 2,
                 .fixed = 0,
                 .poses = 4'000'000'000U,
@@ -126,6 +127,7 @@ void check_same(const TreeSums& a, const TreeSums& b) {
   CHECK(a.open == b.open);
   CHECK(a.changed == b.changed);
   CHECK(a.fractional == b.fractional);
+  CHECK(a.kept == b.kept);
   CHECK(a.isolated == b.isolated);
   CHECK(a.fixed == b.fixed);
   CHECK(a.poses == b.poses);
