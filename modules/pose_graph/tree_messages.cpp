@@ -68,6 +68,11 @@ class TreeReader : public ByteReader {
     if (std::abs(T.q.norm() - 1.0F) > 1e-3F) fail();
     return T;
   }
+  Eigen::VectorXd doubles() {
+    Eigen::VectorXd values(static_cast<Index>(count(kMaxElements, sizeof(double))));
+    for (double& x : values) x = number();
+    return values;
+  }
   Eigen::VectorXd singles() {
     Eigen::VectorXd values(static_cast<Index>(count(kMaxElements, sizeof(float))));
     for (double& x : values) x = static_cast<double>(small_number());
@@ -302,7 +307,8 @@ std::vector<std::uint8_t> encode(const UpMessage& message) {
   w.varint(message.round);
   w.u8(message.failed ? 1 : 0);
   write(w, message.sums);
-  w.singles(message.reduced);
+  w.varint(static_cast<std::uint64_t>(message.reduced.size()));
+  w.doubles(message.reduced);
   w.u8(message.system ? 1 : 0);
   if (message.system) write(w, *message.system);
   w.varint(message.weights.size());
@@ -319,7 +325,7 @@ std::optional<UpMessage> decode_up(std::span<const std::uint8_t> bytes) {
   UpMessage message{.round = r.varint_as<std::uint32_t>(), .sums = {}};
   message.failed = r.flag();
   message.sums = read_sums(r);
-  message.reduced = r.singles();
+  message.reduced = r.doubles();
   if (r.flag()) message.system = read_system(r);
   for (std::size_t n = r.count(kMaxElements, 5); n > 0; --n) {
     const auto edge = r.varint_as<std::uint32_t>();

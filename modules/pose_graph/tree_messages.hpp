@@ -86,7 +86,7 @@ struct UpMessage {
   std::uint32_t round = 0;
   TreeSums sums;
   bool failed = false;  ///< The subtree cannot continue.
-  /// Reduced right-hand side, 3 or 6 rows per variable, in single precision.
+  /// Reduced right-hand side, 3 or 6 rows per variable.
   Eigen::VectorXd reduced = {};
   /// Empty: as in the round before, except for `weights`.
   std::optional<TreeSystem> system = {};

@@ -46,7 +46,8 @@ std::vector<KeyframeId> ends_if_few(std::span<const ClosureId> closures, RobotId
   return {ends.begin(), ends.end()};
 }
 
-// Rounding a gradient or a step by its last digits does not slow down Newton's method.
+// Rounding a step, which vanishes at the optimum, does not slow down Newton's method. Right-hand
+// sides of a part of the team do not vanish there: their rounding would remain in the solution.
 MatrixXd in_single_precision(const MatrixXd& X) {
   return X.cast<float>().cast<double>();
 }
@@ -334,7 +335,7 @@ UpMessage TreeNewton::equations() {
   }
   if (!factorised_) return message;
   front_->reduce(present_, reduced);
-  message.reduced = in_single_precision(front_->reduced());
+  message.reduced = front_->reduced();
   message.sums.decrement = front_->decrement();
   message.failed = !message.reduced.allFinite() || !std::isfinite(message.sums.decrement);
   return message;

@@ -81,7 +81,7 @@ TreeSystem some_system(std::mt19937& rng, Index block) {
 UpMessage some_up_message(Index block, bool with_system) {
   std::mt19937 rng(5);
   UpMessage message{.round = 70000, .sums = some_sums(), .failed = false};
-  message.reduced = some_numbers(rng, 4 * block).cast<float>().cast<double>();
+  message.reduced = some_numbers(rng, 4 * block);
   if (with_system)
     message.system = some_system(rng, block);
   else
