@@ -24,6 +24,7 @@ using Weighing = TreeVerdict::Weighing;
 constexpr double kFloor = 1e-10;
 // Largest distance of a pose from the origin; beyond it, single precision overflows.
 constexpr double kMaxDistance_m = 1e15;
+constexpr double kLongestStep = 1e30;
 // Maximum number of cycles per robot pair in the noise estimate. With four or more robots it is
 // smaller, so that one robot cannot dominate the estimate.
 constexpr std::size_t kEnoughLengths = 300;
@@ -47,9 +48,10 @@ std::vector<KeyframeId> ends_if_few(std::span<const ClosureId> closures, RobotId
 }
 
 // Rounding a step, which vanishes at the optimum, does not slow down Newton's method. Right-hand
-// sides of a part of the team do not vanish there: their rounding would remain in the solution.
+// sides of a part of the team do not vanish there: their rounding would remain in the solution. The
+// step of a robot whose equations are singular to rounding may be too long for a float.
 MatrixXd in_single_precision(const MatrixXd& X) {
-  return X.cast<float>().cast<double>();
+  return X.cwiseMax(-kLongestStep).cwiseMin(kLongestStep).cast<float>().cast<double>();
 }
 
 SolverMessage message_to(RobotId to, std::vector<std::uint8_t> bytes) {

@@ -115,7 +115,7 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
   if (asked) policy_.add_peer_request(request->requester, request->own, request->keyframe.index);
   std::optional<WordsOfRequester> words;
   if (const auto* theirs = words_.find({request->requester, request->own}))
-    words.emplace(*vocabulary_, *theirs);
+    words.emplace(WordsOfRequester{*vocabulary_, *theirs});
   if (request->part == KeyframePart::kWordPoints && asked && words)
     return topics_.own_words.publish(Addressed<KeyframeWords>{
         request->requester, std::make_shared<const KeyframeWords>(KeyframeWords{

@@ -31,8 +31,8 @@ TEST_CASE("A covariance with lever arms keeps its smallest variances", "[covaria
   const auto received = covariance_of(covariance_root(Sigma));
   REQUIRE(received);
   CHECK(is_covariance(*received));
-  // In every direction the variance is right to a millionth: the eigenvalues of Sigma^-1 * received
-  // are 1.
+  // In every direction the variance is right to a thousandth: the eigenvalues of Sigma^-1 *
+  // received are 1.
   const Matrix6 L = Sigma.llt().matrixL();
   const Matrix6 whitened = L.inverse() * *received * L.inverse().transpose();
   CHECK(symmetric_eigen(whitened).values.minCoeff() == Approx(1.0).margin(1e-3));
