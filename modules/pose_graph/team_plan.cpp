@@ -1,7 +1,6 @@
 #include "modules/pose_graph/team_plan.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "modules/core/precision.hpp"
+#include "modules/pose_graph/team_tree.hpp"
 
 namespace km {
 namespace {
@@ -94,89 +94,11 @@ void place_members(SessionPlan& plan, std::set<RobotId> waiting,
   }
 }
 
-using Tree = std::map<RobotId, std::vector<RobotId>>;  // neighbours
-
-struct TreeEdge {
-  std::size_t hops = 1;
-  std::uint32_t edges = 0;
-  RobotId a = 0;
-  RobotId b = 0;
-  [[nodiscard]] bool before(const TreeEdge& other) const {
-    return std::tie(hops, other.edges, a, b) < std::tie(other.hops, edges, other.a, other.b);
-  }
-};
-
-// Candidate edges of the tree between linked members, or also between members without a link; best
-// first.
-std::vector<TreeEdge> possible_tree_edges(const std::set<RobotId>& members,
-                                          const Agreements& agreements, const TeamLinks& links,
-                                          bool linked_only) {
-  constexpr std::size_t kNoPath = std::numeric_limits<std::size_t>::max();
-  std::vector<TreeEdge> possible;
-  for (const RobotId a : members) {
-    std::map<RobotId, std::size_t> distances;
-    if (!linked_only) distances = links.distances(a);
-    for (auto b = members.upper_bound(a); b != members.end(); ++b) {
-      const bool linked = links.linked(a, *b);
-      if (linked_only && !linked) continue;
-      const auto distance = distances.find(*b);
-      const auto agreed = agreements.find({a, *b});
-      possible.push_back({.hops = linked                        ? 1
-                                  : distance == distances.end() ? kNoPath
-                                                                : distance->second,
-                          .edges = agreed == agreements.end() ? 0 : agreed->second.edges,
-                          .a = a,
-                          .b = *b});
-    }
-  }
-  std::sort(possible.begin(), possible.end(),
-            [](const TreeEdge& x, const TreeEdge& y) { return x.before(y); });
-  return possible;
-}
-
-Tree spanning_tree(const std::set<RobotId>& members, const Agreements& agreements,
-                   const TeamLinks& links) {
-  std::map<RobotId, RobotId> part_of;  // a part is identified by one of its robots
-  for (const RobotId robot : members) part_of[robot] = robot;
-  Tree tree;
-  std::size_t parts = members.size();
-  for (const bool linked_only : {true, false}) {
-    if (parts == 1) break;
-    for (const TreeEdge& e : possible_tree_edges(members, agreements, links, linked_only)) {
-      const RobotId absorbed = part_of.at(e.a);
-      const RobotId into = part_of.at(e.b);
-      if (absorbed == into) continue;
-      for (auto& [robot, part] : part_of)
-        if (part == absorbed) part = into;
-      tree[e.a].push_back(e.b);
-      tree[e.b].push_back(e.a);
-      --parts;
-    }
-  }
-  return tree;
-}
-
-// Parents of all robots connected to `root`, in order of their depth.
-std::vector<std::pair<RobotId, RobotId>> parents_below(RobotId root, const Tree& tree) {
-  std::vector<std::pair<RobotId, RobotId>> parents;
-  std::vector<std::pair<RobotId, RobotId>> open{{root, root}};
-  for (std::size_t k = 0; k < open.size(); ++k) {
-    const auto [robot, parent] = open[k];
-    if (k > 0) parents.emplace_back(robot, parent);
-    const auto neighbours = tree.find(robot);
-    if (neighbours == tree.end()) continue;
-    for (const RobotId neighbour : neighbours->second)
-      if (neighbour != parent || k == 0) open.emplace_back(neighbour, robot);
-  }
-  return parents;
-}
-
-std::size_t depth_below(RobotId root, const Tree& tree) {
-  std::map<RobotId, std::size_t> depth{{root, 0}};
-  std::size_t deepest = 0;
-  for (const auto& [robot, parent] : parents_below(root, tree))
-    deepest = std::max(deepest, depth[robot] = depth.at(parent) + 1);
-  return deepest;
+PairClosures closures_of(const std::set<RobotId>& members, const Agreements& agreements) {
+  PairClosures closures;
+  for (const auto& [pair, offer] : agreements)
+    if (members.contains(pair.first)) closures[pair] = offer.edges;
+  return closures;
 }
 
 }  // namespace
@@ -203,10 +125,8 @@ SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses, const Te
   for (const auto& [pair, offer] : agreements)
     if (members.contains(pair.first)) plan.pairs.push_back({pair.first, pair.second, offer.id});
   place_members(plan, members, statuses, agreements);
-  const Tree tree = spanning_tree(members, agreements, links);
-  std::map<std::size_t, RobotId> root_of_depth;
-  for (const RobotId robot : members) root_of_depth.try_emplace(depth_below(robot, tree), robot);
-  const auto parents = parents_below(root_of_depth.begin()->second, tree);
+  const RobotTree tree = choose_tree(members, closures_of(members, agreements), links);
+  const auto parents = parents_below(centre_of(members, tree), tree);
   const std::map<RobotId, RobotId> parent_of(parents.begin(), parents.end());
   for (SessionMember& member : plan.members)
     if (const auto parent = parent_of.find(member.peer.robot); parent != parent_of.end())
@@ -237,7 +157,7 @@ std::vector<PoseEdge> datum_ties(const SessionPlan& plan, RobotId robot) {
 
 std::optional<TreePlace> place_in(const SessionPlan& plan, RobotId robot) {
   TreePlace place;
-  Tree children;
+  RobotTree children;
   std::size_t roots = 0;
   for (const SessionMember& member : plan.members) {
     place.members.push_back(member.peer.robot);

@@ -24,10 +24,8 @@ namespace km {
 /// lowest robot). Robots that are in this frame come first in the order of alignment. The next
 /// robot is always the one with the most edges to the robots before it.
 ///
-/// The tree is a maximum spanning tree of the members over links, weighted by agreed edges
-/// (Kruskal's algorithm; ties: lowest ids). If direct links do not connect the members, paths with
-/// the fewest hops over other robots connect them. The root is the centre of the tree, the lower id
-/// if there are two. Throws std::invalid_argument if there is no status of `self`.
+/// The tree is that of choose_tree(), weighted by agreed edges. Its root is the centre_of() it.
+/// Throws std::invalid_argument if there is no status of `self`.
 [[nodiscard]] SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses,
                                        const TeamLinks& links, RobotId self);
 
