@@ -11,7 +11,7 @@
 namespace km {
 
 /// Largest number of robots in a team.
-inline constexpr std::size_t kMaxTeam = 64;
+inline constexpr std::size_t kMaxTeam = 128;
 
 /// Graph of the links in a team, from the reports of its robots. A link counts if both ends report
 /// that they receive the other one. Robots with equal reports see the same graph. Not thread-safe.

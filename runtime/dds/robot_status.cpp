@@ -6,6 +6,8 @@
 #include <cstring>
 #include <utility>
 
+#include "runtime/dds/status_pace.hpp"
+
 namespace km {
 
 const char* to_string(RobotPhase phase) {
@@ -71,12 +73,20 @@ RobotStatusNode::RobotStatusNode(std::function<RobotStatus()> provider,
     : periodic_(
           std::chrono::duration_cast<std::chrono::nanoseconds>(
               std::chrono::duration<double>(kStatusPeriod_s)),
-          [provider = std::move(provider), own = topics.own] { own.publish(provider()); },
+          [this, provider = std::move(provider), own = topics.own, pace = StatusPace()]() mutable {
+            const RobotStatus status = provider();
+            if (pace.is_due(status, heard_robots())) own.publish(status);
+          },
           "robot_status") {
   topics.peers.subscribe([this](const Topic<RobotStatus>::Message& status) {
     const std::lock_guard lock(mutex_);
     latest_[status->robot] = *status;
   });
+}
+
+std::size_t RobotStatusNode::heard_robots() const {
+  const std::lock_guard lock(mutex_);
+  return latest_.size();
 }
 
 std::vector<RobotStatus> RobotStatusNode::peers() const {

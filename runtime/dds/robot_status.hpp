@@ -25,7 +25,7 @@ enum class RobotPhase { kRunning, kFinished, kSettled, kLeaving };
 /// "running", "finished", "settled", "leaving".
 const char* to_string(RobotPhase phase);
 
-/// State that a robot sends to the others a few times a second.
+/// State that a robot sends to the others twice a second, in teams of more than 11 less often.
 struct RobotStatus {
   RobotId robot = 0;
   std::string name;
@@ -40,7 +40,7 @@ struct RobotStatus {
   OverlaySummary overlay = {};
 };
 
-/// Interval between statuses [s].
+/// Shortest interval between statuses [s]: see StatusPace.
 inline constexpr double kStatusPeriod_s = 0.5;
 
 /// Largest value of settled_links, which also stands for larger numbers of links.
@@ -70,7 +70,7 @@ struct RobotStatusTopics {
   In<RobotStatus> peers;
 };
 
-/// Publishes this robot's status every kStatusPeriod_s and keeps the latest of each peer. Both
+/// Publishes this robot's status at the StatusPace and keeps the latest of each peer. Both
 /// topics cross as kStatus: they carry the presence of the robots.
 class RobotStatusNode final : public Node {
  public:
@@ -86,6 +86,8 @@ class RobotStatusNode final : public Node {
   std::exception_ptr error() const override { return periodic_.error(); }
 
  private:
+  [[nodiscard]] std::size_t heard_robots() const;
+
   mutable std::mutex mutex_;  // guards latest_
   std::map<RobotId, RobotStatus> latest_;
   Periodic periodic_;  // last member: stops first

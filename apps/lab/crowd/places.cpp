@@ -10,6 +10,7 @@
 #include "modules/core/text_table.hpp"
 #include "modules/place_recognition/packed_bag.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
+#include "runtime/dds/status_pace.hpp"
 
 namespace km {
 namespace {
@@ -143,12 +144,14 @@ CrowdObservers observers_of(const PlacesCommand& command, std::size_t robots) {
 // Bags divided among the owners of their words, and statuses to all robots.
 std::vector<std::string> sizes_only(const CrowdWorld& world, const PlaceDisguise& disguise,
                                     const CrowdOptions& options) {
-  constexpr std::size_t kSample = 12;  // keyframes of each robot
-  constexpr std::size_t kStatusesInAnHour = 7200;
+  constexpr std::size_t kSample = 12;         // keyframes of each robot
+  constexpr std::size_t kStatusTicks = 7200;  // one hour, every kStatusPeriod_s
   const CrowdTraffic sample = divided_bags(world, disguise, kSample);
   const std::size_t factor = options.keyframes / kSample;
+  StatusPace pace;
   CrowdTraffic statuses;
-  statuses.add(status_bytes(), kStatusesInAnHour * (options.robots - 1));
+  for (std::size_t tick = 0; tick < kStatusTicks; ++tick)
+    if (pace.is_due({}, options.robots - 1)) statuses.add(status_bytes(), options.robots - 1);
   return {std::to_string(options.robots), std::to_string(sample.messages * factor),
           bytes_text(static_cast<double>(sample.bytes * factor)),
           bytes_text(static_cast<double>(statuses.bytes))};

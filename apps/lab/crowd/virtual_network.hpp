@@ -25,7 +25,7 @@ namespace km {
   return 500;
 }
 /// Status of a robot with a name of 4 to 7 characters, while all robots receive each other. It goes
-/// to all others twice a second (kStatusPeriod_s).
+/// to all others at the StatusPace.
 [[nodiscard]] constexpr std::size_t status_bytes() {
   return 64;
 }

@@ -65,7 +65,10 @@ WorldConfig run_by_pipeline(const WorldConfig& world, const Texts& robot_options
 // Adds the world of every run to `config.worlds`.
 void add_level_runs(const LevelExperiment& levels, ExperimentConfig& config) {
   for (const LevelSeeds& level : levels.levels)
-    for (const LevelWorld& world : levels.worlds)
+    for (const LevelWorld& world : levels.worlds) {
+      if (!world.levels.empty() &&
+          std::ranges::find(world.levels, level.level) == world.levels.end())
+        continue;
       for (const unsigned seed : level.seeds) {
         const std::string number = std::to_string(level.level);
         WorldConfig run{
@@ -89,9 +92,10 @@ void add_level_runs(const LevelExperiment& levels, ExperimentConfig& config) {
         run.simulate.insert(run.simulate.end(),
                             {"--robots", std::to_string(levels.robots), "--difficulty", number});
         set_seed(run.simulate, seed);
-        config.level_runs.push_back({level.level, run.name});
+        config.level_runs.push_back({level.level, run.name, world.length});
         config.worlds.push_back(std::move(run));
       }
+    }
 }
 
 void read_names(YamlFields& fields, const std::vector<WorldConfig>& worlds, Texts& names) {

@@ -122,11 +122,16 @@ struct LevelWorld {
   std::string name;
   std::string title;
   std::vector<std::string> simulate;
+  std::string length;
+  std::vector<unsigned> levels;
 
   void visit_fields(auto& visitor) {
     visitor.field("name", name, "part of the names of steps and folders");
     visitor.field("title", title, "for people; default: its name");
     visitor.field("simulate", simulate, "options of kimera_multi_simulate");
+    visitor.field("length", length,
+                  "for people, for worlds that are judged apart from the others of their level");
+    visitor.field("levels", levels, {0, 4}, "levels of this world; default: all");
     visitor.required({"name", "simulate"});
   }
 };
@@ -143,7 +148,8 @@ struct LevelSeeds {
   }
 };
 
-/// Worlds that fight back: levels.yaml. Every world is simulated at every level and seed.
+/// Worlds that fight back: levels.yaml. Every world is simulated at each of its levels and each
+/// seed.
 struct LevelExperiment {
   std::vector<LevelWorld> worlds;
   std::vector<LevelSeeds> levels;
@@ -169,7 +175,8 @@ struct LevelExperiment {
 /// One run of LevelExperiment.
 struct LevelRun {
   unsigned level = 0;
-  std::string world;  ///< Name in ExperimentConfig::worlds.
+  std::string world;        ///< Name in ExperimentConfig::worlds.
+  std::string length = {};  ///< See LevelWorld.
 };
 
 /// A column of the trajectory table.

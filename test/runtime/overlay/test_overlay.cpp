@@ -406,10 +406,10 @@ TEST_CASE("A new robot takes the place of the one that has been lost for longest
     return overlay.robots().receives(robot);
   };
   for (RobotId robot = 1; robot <= kMaxTeam; ++robot) REQUIRE(connect(robot, 0.0));
-  CHECK_FALSE(connect(100, 1.0));
+  CHECK_FALSE(connect(kMaxTeam + 1, 1.0));
   overlay.lost(20, 2.0);
   overlay.lost(10, 3.0);
-  CHECK(connect(100, 4.0));
+  CHECK(connect(kMaxTeam + 1, 4.0));
   CHECK_FALSE(overlay.robots().process(20));
   CHECK(connect(10, 5.0));
   CHECK_FALSE(connect(20, 6.0));

@@ -45,8 +45,14 @@ TEST_CASE("Quick keys replace those beside them", "[experiments]") {
 
 TEST_CASE("Every world has a run at each level and seed", "[experiments]") {
   const ExperimentConfig config = read_experiments("config/experiments", false);
-  const auto usual = std::ranges::count(config.level_runs, 2U, &LevelRun::level);
-  CHECK(usual == 9);  // three worlds, three seeds
+  const auto runs = [&](unsigned level, const std::string& length) {
+    return std::ranges::count_if(config.level_runs, [&](const LevelRun& run) {
+      return run.level == level && run.length == length;
+    });
+  };
+  CHECK(runs(2, "") == 9);  // three worlds, three seeds
+  CHECK(runs(2, "long") == 9);
+  CHECK(runs(3, "long") == 0);
   for (const LevelRun& run : config.level_runs) {
     const std::vector<std::string>& options = config.world(run.world).simulate;
     const auto option = std::ranges::find(options, "--difficulty");

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "runtime/dds/robot_status.hpp"
+
+namespace km {
+
+/// Decides at each tick, every kStatusPeriod_s, whether a robot sends its status. In a team with
+/// N other robots it is due every ceil(N / kFullRate) ticks. The statuses that a robot receives in
+/// a second then do not grow with the team. A status is also due at once if the phase or
+/// settled_links has changed, because other robots wait for them. In the first kNew_s every status
+/// is due: a process with the same robot id reads the uptime from their number, see
+/// PeerTable::twin_received(). Not thread-safe.
+class StatusPace {
+ public:
+  static constexpr std::size_t kFullRate = 10;  ///< Other robots up to which each tick is used.
+  static constexpr double kNew_s = 10.0;
+
+  /// To be called once per tick. `others`: number of other robots whose statuses have arrived.
+  [[nodiscard]] bool is_due(const RobotStatus& status, std::size_t others);
+
+ private:
+  std::size_t ticks_ = 0;
+  std::size_t since_sent_ = 0;  // ticks
+  std::optional<RobotPhase> phase_;
+  std::uint8_t settled_links_ = 0;
+};
+
+}  // namespace km
