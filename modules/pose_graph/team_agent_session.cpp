@@ -22,7 +22,7 @@ bool same_members(const SessionPlan& x, const SessionPlan& y) {
 
 void TeamAgent::make_plan() {
   const std::map<RobotId, TeamStatus> statuses = roster_.statuses(make_status());
-  SessionPlan plan = plan_session(statuses, links_.links, self_.robot);
+  SessionPlan plan = plan_session(statuses, self_.robot);
   // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
   if (frame_.world() && !plan.has_member(frame_.world()->anchor)) frame_.set_world(tied_world());
   schedule_.update(!same_graph(plan, plan_), closures_between(plan, statuses), now_s_);
@@ -110,6 +110,7 @@ bool TeamAgent::should_open() const {
 
 void TeamAgent::open_session(TeamOutput& output) {
   Session session{.id = {self_, schedule_.take_number()}, .plan = plan_};
+  plan_tree(session.plan, roster_.statuses(make_status()), links_.links);
   session.method = config_.method;
   session.upright = all_upright(plan_);
   session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);

@@ -31,33 +31,32 @@ Agreements find_agreements(const std::map<RobotId, TeamStatus>& statuses) {
   return agreements;
 }
 
-std::set<RobotId> component_of(RobotId self, const Agreements& agreements) {
+// The robots that each robot agrees with, and the number of edges.
+using Partners = std::map<RobotId, std::vector<std::pair<RobotId, std::uint32_t>>>;
+
+Partners partners_of(const Agreements& agreements) {
+  Partners partners;
+  for (const auto& [pair, offer] : agreements) {
+    partners[pair.first].emplace_back(pair.second, offer.edges);
+    partners[pair.second].emplace_back(pair.first, offer.edges);
+  }
+  return partners;
+}
+
+std::set<RobotId> component_of(RobotId self, Partners& partners) {
   std::set<RobotId> component{self};
-  for (bool grown = true; grown;) {
-    grown = false;
-    for (const auto& [pair, offer] : agreements)
-      if (component.contains(pair.first) != component.contains(pair.second)) {
-        component.insert({pair.first, pair.second});
-        grown = true;
-      }
+  std::vector<RobotId> open{self};
+  while (!open.empty()) {
+    const RobotId robot = open.back();
+    open.pop_back();
+    for (const auto& [other, edges] : partners[robot])
+      if (component.insert(other).second) open.push_back(other);
   }
   return component;
 }
 
-// Number of edges between `robot` and the robots of `others`.
-std::uint64_t edges_to(RobotId robot, const std::set<RobotId>& others,
-                       const Agreements& agreements) {
-  std::uint64_t edges = 0;
-  for (const auto& [pair, offer] : agreements)
-    if ((pair.first == robot && others.contains(pair.second)) ||
-        (pair.second == robot && others.contains(pair.first)))
-      edges += offer.edges;
-  return edges;
-}
-
 TeamFrame choose_frame(const std::set<RobotId>& members,
-                       const std::map<RobotId, TeamStatus>& statuses,
-                       const Agreements& agreements) {
+                       const std::map<RobotId, TeamStatus>& statuses, Partners& partners) {
   struct Support {
     std::uint64_t robots = 0;
     std::uint64_t edges = 0;
@@ -66,7 +65,7 @@ TeamFrame choose_frame(const std::set<RobotId>& members,
   for (const RobotId robot : members) {
     Support& of_frame = support[statuses.at(robot).frame];
     ++of_frame.robots;
-    of_frame.edges += edges_to(robot, members, agreements);
+    for (const auto& [other, edges] : partners[robot]) of_frame.edges += edges;
   }
   const auto less = [](const auto& x, const auto& y) {
     return std::tie(x.second.robots, x.second.edges) < std::tie(y.second.robots, y.second.edges);
@@ -75,29 +74,29 @@ TeamFrame choose_frame(const std::set<RobotId>& members,
 }
 
 void place_members(SessionPlan& plan, std::set<RobotId> waiting,
-                   const std::map<RobotId, TeamStatus>& statuses, const Agreements& agreements) {
-  std::set<RobotId> placed;
+                   const std::map<RobotId, TeamStatus>& statuses, Partners& partners) {
+  std::map<RobotId, std::uint64_t> to_placed;  // edges to the robots that are placed
   const auto place = [&](RobotId robot) {
     const TeamStatus& status = statuses.at(robot);
     plan.members.push_back(
         {.peer = status.sender, .revision = status.revision, .datum = status.datum});
-    placed.insert(robot);
+    for (const auto& [other, edges] : partners[robot]) to_placed[other] += edges;
     waiting.erase(robot);
   };
   for (const auto& [robot, status] : statuses)
     if (waiting.contains(robot) && status.frame == plan.frame) place(robot);
   while (!waiting.empty()) {
-    const auto fewer = [&](RobotId x, RobotId y) {
-      return edges_to(x, placed, agreements) < edges_to(y, placed, agreements);
-    };
+    const auto fewer = [&](RobotId x, RobotId y) { return to_placed[x] < to_placed[y]; };
     place(*std::max_element(waiting.begin(), waiting.end(), fewer));
   }
 }
 
-PairClosures closures_of(const std::set<RobotId>& members, const Agreements& agreements) {
+// Number of closures of each pair of a session of `plan`, made from `statuses`.
+PairClosures closures_of(const SessionPlan& plan, const std::map<RobotId, TeamStatus>& statuses) {
   PairClosures closures;
-  for (const auto& [pair, offer] : agreements)
-    if (members.contains(pair.first)) closures[pair] = offer.edges;
+  for (const SessionPair& pair : plan.pairs)
+    for (const EdgeSetOffer& offer : statuses.at(pair.a).offers)
+      if (offer.peer == pair.b && offer.id == pair.edges) closures[{pair.a, pair.b}] = offer.edges;
   return closures;
 }
 
@@ -115,23 +114,30 @@ std::optional<EdgeSetOffer> agreed_edges(const TeamStatus& a, const TeamStatus& 
   return agreed;
 }
 
-SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses, const TeamLinks& links,
-                         RobotId self) {
+SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses, RobotId self) {
   if (!statuses.contains(self))
     throw std::invalid_argument("plan_session: no status of robot " + std::to_string(self));
   const Agreements agreements = find_agreements(statuses);
-  const std::set<RobotId> members = component_of(self, agreements);
-  SessionPlan plan{choose_frame(members, statuses, agreements), {}, {}};
+  Partners partners = partners_of(agreements);
+  const std::set<RobotId> members = component_of(self, partners);
+  SessionPlan plan{choose_frame(members, statuses, partners), {}, {}};
   for (const auto& [pair, offer] : agreements)
     if (members.contains(pair.first)) plan.pairs.push_back({pair.first, pair.second, offer.id});
-  place_members(plan, members, statuses, agreements);
-  const RobotTree tree = choose_tree(members, closures_of(members, agreements), links);
+  place_members(plan, members, statuses, partners);
+  return plan;
+}
+
+void plan_tree(SessionPlan& plan, const std::map<RobotId, TeamStatus>& statuses,
+               const TeamLinks& links) {
+  std::set<RobotId> members;
+  for (const SessionMember& member : plan.members) members.insert(member.peer.robot);
+  const RobotTree tree = choose_tree(members, closures_of(plan, statuses), links);
   const auto parents = parents_below(centre_of(members, tree), tree);
   const std::map<RobotId, RobotId> parent_of(parents.begin(), parents.end());
-  for (SessionMember& member : plan.members)
-    if (const auto parent = parent_of.find(member.peer.robot); parent != parent_of.end())
-      member.parent = parent->second;
-  return plan;
+  for (SessionMember& member : plan.members) {
+    const auto parent = parent_of.find(member.peer.robot);
+    member.parent = parent == parent_of.end() ? std::nullopt : std::optional(parent->second);
+  }
 }
 
 std::vector<PoseEdge> datum_ties(const SessionPlan& plan, RobotId robot) {
@@ -200,9 +206,7 @@ bool has_lost_member(const SessionPlan& session, const SessionPlan& now) {
 std::uint64_t closures_between(const SessionPlan& plan,
                                const std::map<RobotId, TeamStatus>& statuses) {
   std::uint64_t closures = 0;
-  for (const SessionPair& pair : plan.pairs)
-    for (const EdgeSetOffer& offer : statuses.at(pair.a).offers)
-      if (offer.peer == pair.b && offer.id == pair.edges) closures += offer.edges;
+  for (const auto& [pair, count] : closures_of(plan, statuses)) closures += count;
   return closures;
 }
 

@@ -53,7 +53,7 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
   take_poses();
 }
 
-// Places in the tree that the robots' own plan_session() computes.
+// Places in the tree that the robots' own plan_tree() computes.
 std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
   std::map<RobotId, TeamStatus> statuses;
   TeamLinks links;
@@ -71,7 +71,8 @@ std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
     }
     links.report(part.self, received);
   }
-  const SessionPlan plan = plan_session(statuses, links, 0);
+  SessionPlan plan = plan_session(statuses, 0);
+  plan_tree(plan, statuses, links);
   if (plan.members.size() != parts_.size())
     throw std::invalid_argument("MemberTeam: the graph does not join all robots");
   std::map<std::size_t, TreePlace> places;

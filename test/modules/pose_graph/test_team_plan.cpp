@@ -55,6 +55,13 @@ std::map<RobotId, TeamStatus> chain_of(const std::vector<RobotId>& robots,
   return by_robot(statuses);
 }
 
+SessionPlan planned(const std::map<RobotId, TeamStatus>& statuses, const TeamLinks& links,
+                    RobotId self) {
+  SessionPlan plan = plan_session(statuses, self);
+  plan_tree(plan, statuses, links);
+  return plan;
+}
+
 }  // namespace
 
 TEST_CASE("two robots agree on the newest edges that both hold", "[pose_graph][session]") {
@@ -73,8 +80,8 @@ TEST_CASE("closures_between() counts the closures of the pairs of a session",
   const TeamStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 7, {3, 30}}, {3, 5, {1, 10}}});
   const TeamStatus b = status_of(2, {{1, 7, {3, 30}}});
   const auto statuses = by_robot({a, b, status_of(3, {})});
-  CHECK(closures_between(plan_session(statuses, {}, 1), statuses) == 7);
-  CHECK(closures_between(plan_session(statuses, {}, 3), statuses) == 0);
+  CHECK(closures_between(plan_session(statuses, 1), statuses) == 7);
+  CHECK(closures_between(plan_session(statuses, 3), statuses) == 0);
 }
 
 TEST_CASE("the plan contains the connected component, best connected robots first",
@@ -85,23 +92,23 @@ TEST_CASE("the plan contains the connected component, best connected robots firs
                 status_of(8, {{3, 10, {1, 1}}, {5, 2, {1, 3}}}),
                 status_of(5, {{3, 7, {1, 2}}, {8, 2, {1, 3}}}), status_of(20, {{21, 4, {1, 4}}}),
                 status_of(21, {{20, 4, {1, 4}}}), status_of(30, {{3, 99, {1, 5}}})});
-  const SessionPlan plan = plan_session(statuses, {}, 5);
+  const SessionPlan plan = plan_session(statuses, 5);
   CHECK(order_of(plan) == std::vector<RobotId>{3, 8, 5});
   CHECK(plan.frame == TeamFrame{3, 9});
   CHECK(coordinator_of(plan) == 3);
   CHECK(plan.pairs == std::vector<SessionPair>{{3, 5, {1, 2}}, {3, 8, {1, 1}}, {5, 8, {1, 3}}});
   for (const RobotId member : {RobotId{3}, RobotId{8}})
-    CHECK(plan_session(statuses, {}, member) == plan);
-  CHECK(order_of(plan_session(statuses, {}, 21)) == std::vector<RobotId>{20, 21});
-  CHECK(order_of(plan_session(statuses, {}, 30)) == std::vector<RobotId>{30});
-  CHECK_THROWS_AS(plan_session(statuses, {}, 4), std::invalid_argument);
+    CHECK(plan_session(statuses, member) == plan);
+  CHECK(order_of(plan_session(statuses, 21)) == std::vector<RobotId>{20, 21});
+  CHECK(order_of(plan_session(statuses, 30)) == std::vector<RobotId>{30});
+  CHECK_THROWS_AS(plan_session(statuses, 4), std::invalid_argument);
 }
 
 TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph][session]") {
   auto statuses = chain_of({4, 2, 7, 5, 9}, {3, 3, 3, 3});
   for (const RobotId robot : {RobotId{4}, RobotId{7}, RobotId{9}}) statuses[robot].datum = 77;
   statuses[5].datum = 78;
-  const SessionPlan plan = plan_session(statuses, {}, 2);
+  const SessionPlan plan = plan_session(statuses, 2);
   const auto ends_of = [&plan](RobotId robot) {
     std::vector<ClosureId> ends;
     for (const PoseEdge& tie : datum_ties(plan, robot)) {
@@ -116,7 +123,7 @@ TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph]
   CHECK(ends_of(9) == std::vector{to_9});
   for (const RobotId robot : {RobotId{2}, RobotId{5}}) CHECK(ends_of(robot).empty());
   statuses[7].datum = 0;
-  const SessionPlan without_7 = plan_session(statuses, {}, 2);
+  const SessionPlan without_7 = plan_session(statuses, 2);
   CHECK_FALSE(same_graph(plan, without_7));
   CHECK(datum_ties(without_7, 7).empty());
 }
@@ -126,7 +133,7 @@ TEST_CASE("the frame of most members stays", "[pose_graph][session]") {
       by_robot({status_of(1, {{2, 3, {1, 1}}}), status_of(2, {{1, 3, {1, 1}}, {3, 3, {1, 2}}}),
                 status_of(3, {{2, 3, {1, 2}}})});
   statuses[3].frame = statuses[2].frame;
-  const SessionPlan plan = plan_session(statuses, {}, 1);
+  const SessionPlan plan = plan_session(statuses, 1);
   CHECK(plan.frame == TeamFrame{2, 9});
   CHECK(order_of(plan) == std::vector<RobotId>{2, 3, 1});
   CHECK(coordinator_of(plan) == 1);
@@ -136,23 +143,23 @@ TEST_CASE("the tree follows links with the most agreed edges, its root in the mi
           "[pose_graph][session]") {
   const auto statuses = chain_of({1, 2, 3, 4, 5}, {5, 5, 5, 5});
   SECTION("a line") {
-    const auto plan = plan_session(statuses, links_of({{1, 2}, {2, 3}, {3, 4}, {4, 5}}), 1);
+    const auto plan = planned(statuses, links_of({{1, 2}, {2, 3}, {3, 4}, {4, 5}}), 1);
     CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 2}, {2, 3}, {4, 3}, {5, 4}});
   }
   SECTION("a line of links without closures") {
-    const auto plan = plan_session(statuses, links_of({{1, 3}, {3, 5}, {5, 2}, {2, 4}}), 1);
+    const auto plan = planned(statuses, links_of({{1, 3}, {3, 5}, {5, 2}, {2, 4}}), 1);
     CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 3}, {3, 5}, {2, 5}, {4, 2}});
   }
   SECTION("a star") {
-    const auto plan = plan_session(statuses, links_of({{1, 5}, {2, 5}, {3, 5}, {4, 5}}), 1);
+    const auto plan = planned(statuses, links_of({{1, 5}, {2, 5}, {3, 5}, {4, 5}}), 1);
     CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 5}, {2, 5}, {3, 5}, {4, 5}});
   }
   SECTION("an intermediate robot that is not a member") {
-    const auto plan = plan_session(statuses, links_of({{1, 2}, {2, 9}, {9, 3}, {3, 4}, {4, 5}}), 1);
+    const auto plan = planned(statuses, links_of({{1, 2}, {2, 9}, {9, 3}, {3, 4}, {4, 5}}), 1);
     CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 2}, {2, 3}, {4, 3}, {5, 4}});
   }
   SECTION("unknown links") {
-    const auto plan = plan_session(statuses, {}, 1);
+    const auto plan = planned(statuses, {}, 1);
     CHECK(parents_of(plan).size() == 4);
   }
 }
@@ -161,7 +168,7 @@ TEST_CASE("the link with the fewest edges of a cycle is not in the tree", "[pose
   auto statuses = chain_of({1, 2, 3}, {4, 9});
   statuses[1].offers.push_back({3, 6, {2, 2}});
   statuses[3].offers.push_back({1, 6, {2, 2}});
-  const auto plan = plan_session(statuses, links_of({{1, 2}, {2, 3}, {1, 3}}), 2);
+  const auto plan = planned(statuses, links_of({{1, 2}, {2, 3}, {1, 3}}), 2);
   CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 3}, {2, 3}});
   const auto place = place_in(plan, 3);
   REQUIRE(place);
@@ -173,7 +180,7 @@ TEST_CASE("the link with the fewest edges of a cycle is not in the tree", "[pose
 }
 
 TEST_CASE("parents that do not form a tree give no place", "[pose_graph][session]") {
-  SessionPlan plan = plan_session(chain_of({1, 2, 3}, {1, 1}), links_of({{1, 2}, {2, 3}}), 1);
+  SessionPlan plan = planned(chain_of({1, 2, 3}, {1, 1}), links_of({{1, 2}, {2, 3}}), 1);
   REQUIRE(place_in(plan, 1));
   CHECK_FALSE(place_in(plan, 7));
   const SessionPlan good = plan;
@@ -194,8 +201,8 @@ TEST_CASE("parents that do not form a tree give no place", "[pose_graph][session
 TEST_CASE("plans with different trees and frames can have the same graph",
           "[pose_graph][session]") {
   const auto statuses = chain_of({1, 2, 3}, {1, 1});
-  const SessionPlan x = plan_session(statuses, links_of({{1, 2}, {2, 3}}), 1);
-  SessionPlan y = plan_session(statuses, links_of({{1, 3}, {2, 3}}), 1);
+  const SessionPlan x = planned(statuses, links_of({{1, 2}, {2, 3}}), 1);
+  SessionPlan y = planned(statuses, links_of({{1, 3}, {2, 3}}), 1);
   y.frame = {3, 9};
   CHECK_FALSE(x == y);
   CHECK(same_graph(x, y));
