@@ -37,7 +37,7 @@ foreach(header apps/command_line.hpp apps/descriptor.hpp apps/output_file.hpp ap
                apps/program_version.hpp apps/report_files.hpp apps/stage_progress.hpp
                apps/team/robot_process.hpp apps/team/team_file.hpp
                runtime/clock.hpp runtime/config_layers.hpp runtime/config_text.hpp
-               runtime/signal_watch.hpp runtime/yaml_config.hpp)
+               runtime/dds/status_pace.hpp runtime/signal_watch.hpp runtime/yaml_config.hpp)
   get_filename_component(folder ${header} DIRECTORY)
   install(FILES ${header} DESTINATION include/kimera_multi/${folder})
 endforeach()

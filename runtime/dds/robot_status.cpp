@@ -6,9 +6,15 @@
 #include <cstring>
 #include <utility>
 
-#include "runtime/dds/status_pace.hpp"
-
 namespace km {
+namespace {
+
+// The phase and settled_links, for which other robots wait, as one number.
+std::uint32_t awaited_of(const RobotStatus& status) {
+  return 256U * static_cast<std::uint32_t>(status.phase) + status.settled_links;
+}
+
+}  // namespace
 
 const char* to_string(RobotPhase phase) {
   switch (phase) {
@@ -75,7 +81,7 @@ RobotStatusNode::RobotStatusNode(std::function<RobotStatus()> provider,
               std::chrono::duration<double>(kStatusPeriod_s)),
           [this, provider = std::move(provider), own = topics.own, pace = StatusPace()]() mutable {
             const RobotStatus status = provider();
-            if (pace.is_due(status, heard_robots())) own.publish(status);
+            if (pace.is_due(awaited_of(status), heard_robots())) own.publish(status);
           },
           "robot_status") {
   topics.peers.subscribe([this](const Topic<RobotStatus>::Message& status) {

@@ -10,6 +10,7 @@
 #include "modules/core/ids.hpp"
 #include "modules/core/team_links.hpp"
 #include "runtime/dds/codec.hpp"
+#include "runtime/dds/status_pace.hpp"
 #include "runtime/node.hpp"
 #include "runtime/overlay/overlay_summary.hpp"
 #include "runtime/periodic.hpp"
@@ -39,9 +40,6 @@ struct RobotStatus {
   std::uint64_t boot = 0;  ///< Boot id of the sending process.
   OverlaySummary overlay = {};
 };
-
-/// Shortest interval between statuses [s]: see StatusPace.
-inline constexpr double kStatusPeriod_s = 0.5;
 
 /// Largest value of settled_links, which also stands for larger numbers of links.
 inline constexpr std::uint8_t kMaxSettledLinks = 255;

@@ -1,31 +1,32 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
-
-#include "runtime/dds/robot_status.hpp"
 
 namespace km {
 
+/// Shortest interval between statuses of a robot [s].
+inline constexpr double kStatusPeriod_s = 0.5;
+
 /// Decides at each tick, every kStatusPeriod_s, whether a robot sends its status. In a team with
 /// N other robots it is due every ceil(N / kFullRate) ticks. The statuses that a robot receives in
-/// a second then do not grow with the team. A status is also due at once if the phase or
-/// settled_links has changed, because other robots wait for them. In the first kNew_s every status
-/// is due: a process with the same robot id reads the uptime from their number, see
-/// PeerTable::twin_received(). Not thread-safe.
+/// a second then do not grow with the team. A status is also due at once if what other robots wait
+/// for has changed. In the first kNew_s every status is due: a process with the same robot id reads
+/// the uptime from their number, see PeerTable::twin_received(). Not thread-safe.
 class StatusPace {
  public:
   static constexpr std::size_t kFullRate = 10;  ///< Other robots up to which each tick is used.
   static constexpr double kNew_s = 10.0;
 
-  /// To be called once per tick. `others`: number of other robots whose statuses have arrived.
-  [[nodiscard]] bool is_due(const RobotStatus& status, std::size_t others);
+  /// To be called once per tick. `awaited`: any number that changes with what others wait for.
+  /// `others`: number of other robots whose statuses have arrived.
+  [[nodiscard]] bool is_due(std::uint32_t awaited, std::size_t others);
 
  private:
   std::size_t ticks_ = 0;
   std::size_t since_sent_ = 0;  // ticks
-  std::optional<RobotPhase> phase_;
-  std::uint8_t settled_links_ = 0;
+  std::optional<std::uint32_t> awaited_;
 };
 
 }  // namespace km

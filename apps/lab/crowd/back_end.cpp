@@ -81,6 +81,7 @@ void run(BackEndCommand& command) {
       {"robots", "joined", "sessions", "rounds", "end [s]", "received", "statuses", "sessions'",
        "poses", "solver", "most sent", "most received", "CPU [s]", "most CPU [s]"}};
   for (const std::size_t robots : command.robots) {
+    std::cerr << "team of " << robots << " robots ...\n";
     command.graph.robots = robots;
     table.push_back(row_of(robots, run_agent_team(crowd_graph(command.graph), command.team)));
   }

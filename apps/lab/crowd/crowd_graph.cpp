@@ -5,11 +5,13 @@
 #include <numbers>
 #include <random>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/core/precision.hpp"
+#include "modules/core/team_links.hpp"
 
 namespace km {
 namespace {
@@ -18,6 +20,7 @@ constexpr double kStep_m = 0.5;
 constexpr double kRadius_m = 20.0;
 constexpr double kCentres_m = 15.0;
 constexpr double kNear_m = 2.0;  // farthest ends of a closure
+constexpr std::size_t kLeastKeyframes = 150;
 
 // Noise of a measurement per axis.
 struct CrowdNoise {
@@ -109,10 +112,18 @@ class Builder {
 }  // namespace
 
 TeamGraph crowd_graph(const CrowdGraphOptions& options) {
-  if (options.partners % 2 != 0 || options.partners >= options.robots)
-    throw std::invalid_argument(
-        "crowd_graph: the number of partners must be even and below that "
-        "of the robots");
+  const auto refuse = [](const std::string& option, std::size_t value, const std::string& why) {
+    throw std::invalid_argument(option + ' ' + std::to_string(value) + ": " + why);
+  };
+  if (options.partners % 2 != 0) refuse("--partners", options.partners, "must be even");
+  if (options.robots <= options.partners)
+    refuse("--robots", options.robots,
+           "must be more than --partners " + std::to_string(options.partners));
+  if (options.robots > kMaxTeam)
+    refuse("--robots", options.robots, "a team has at most " + std::to_string(kMaxTeam));
+  if (options.keyframes < kLeastKeyframes)
+    refuse("--keyframes", options.keyframes,
+           "robots meet from " + std::to_string(kLeastKeyframes) + " on, after half a lap");
   return Builder(options).build();
 }
 

@@ -151,7 +151,7 @@ std::vector<std::string> sizes_only(const CrowdWorld& world, const PlaceDisguise
   StatusPace pace;
   CrowdTraffic statuses;
   for (std::size_t tick = 0; tick < kStatusTicks; ++tick)
-    if (pace.is_due({}, options.robots - 1)) statuses.add(status_bytes(), options.robots - 1);
+    if (pace.is_due(0, options.robots - 1)) statuses.add(status_bytes(), options.robots - 1);
   return {std::to_string(options.robots), std::to_string(sample.messages * factor),
           bytes_text(static_cast<double>(sample.bytes * factor)),
           bytes_text(static_cast<double>(statuses.bytes))};

@@ -93,7 +93,11 @@ TEST_CASE("Worlds out of bounds are refused", "[crowd]") {
   CHECK_THROWS_AS(CrowdWorld({}, {}), std::invalid_argument);
   CHECK_THROWS_AS(CrowdWorld(recordings, {.robots = 4, .partners = 4}), std::invalid_argument);
   CHECK_THROWS_AS(CrowdWorld(recordings, {.robots = 10, .partners = 3}), std::invalid_argument);
-  CHECK_THROWS_AS(crowd_graph({.robots = 4, .partners = 4}), std::invalid_argument);
+  using Catch::Contains;
+  CHECK_THROWS_WITH(crowd_graph({.robots = 4, .partners = 4}), Contains("--robots 4"));
+  CHECK_THROWS_WITH(crowd_graph({.partners = 3}), Contains("--partners 3"));
+  CHECK_THROWS_WITH(crowd_graph({.robots = 129}), Contains("--robots 129") && Contains("128"));
+  CHECK_THROWS_WITH(crowd_graph({.keyframes = 100}), Contains("--keyframes 100"));
 }
 
 TEST_CASE("The pose graph of a crowd joins each robot to its neighbours on the ring", "[crowd]") {
