@@ -61,15 +61,20 @@ std::uint32_t closures_over(RobotId robot, const Parents& parents, const PairClo
 
 TEST_CASE("closures join only ancestors and descendants in an elimination tree",
           "[pose_graph][session]") {
-  std::mt19937 random(3);
-  for (int trial = 0; trial < 50; ++trial) {
-    const std::set<RobotId> robots = first_robots(2 + trial % 20);
+  std::mt19937 generator(3);
+  const auto random_below = [&](RobotId count) {
+    return std::uniform_int_distribution<RobotId>(0, static_cast<RobotId>(count - 1))(generator);
+  };
+  for (RobotId trial = 0; trial < 50; ++trial) {
+    const auto count = static_cast<RobotId>(2 + trial % 20);
+    const std::set<RobotId> robots = first_robots(count);
     PairClosures closures;
+    const auto add = [&](RobotId a, RobotId b) {
+      if (a != b) closures[{std::min(a, b), std::max(a, b)}] = 1U + random_below(30);
+    };
     for (const RobotId robot : robots) {
-      if (robot > 0) closures[{static_cast<RobotId>(random() % robot), robot}] = 1 + random() % 30;
-      const auto other = static_cast<RobotId>(random() % robots.size());
-      if (other != robot)
-        closures[std::pair(std::min(robot, other), std::max(robot, other))] = 1 + random() % 30;
+      if (robot > 0) add(random_below(robot), robot);
+      add(random_below(count), robot);
     }
     const RobotTree tree = elimination_tree(robots, closures);
     // A root from which no closure joins two branches: there is one, the robot eliminated last.
@@ -107,11 +112,12 @@ TEST_CASE("the tree keeps to links if detours cost more than closures", "[pose_g
   TeamLinks links;
   for (const RobotId robot : robots) {
     std::set<RobotId> beside;
-    if (robot > 0) beside.insert(robot - 1);
-    if (robot < 7) beside.insert(robot + 1);
+    const auto next = static_cast<RobotId>(robot + 1);
+    if (robot > 0) beside.insert(static_cast<RobotId>(robot - 1));
+    if (robot < 7) beside.insert(next);
     (void)links.report(robot, beside);
-    if (robot < 7) closures[{robot, robot + 1}] = 5;
-    if (robot < 6) closures[{robot, robot + 2}] = 5;
+    if (robot < 7) closures[{robot, next}] = 5;
+    if (robot < 6) closures[{robot, static_cast<RobotId>(robot + 2)}] = 5;
   }
   for (const auto& [robot, parent] : parents_of(robots, choose_tree(robots, closures, links)))
     CHECK(links.linked(robot, parent));
@@ -121,8 +127,9 @@ TEST_CASE("the root is in the middle of the tree", "[pose_graph][session]") {
   const auto row = [](RobotId count) {
     RobotTree tree;
     for (RobotId robot = 1; robot < count; ++robot) {
-      tree[robot].push_back(robot - 1);
-      tree[robot - 1].push_back(robot);
+      const auto before = static_cast<RobotId>(robot - 1);
+      tree[robot].push_back(before);
+      tree[before].push_back(robot);
     }
     return centre_of(first_robots(count), tree);
   };
