@@ -41,7 +41,8 @@ constexpr std::array<RobotId, 5> kTeam{kVictim, kFlooder, kLowFlooder, kFriend, 
 constexpr std::uint32_t kWalk = 5000;  // keyframes of the victim
 
 constexpr double kMaxGrowth_MB = 64.0;
-// The surface of one robot may fill its chunks, and twice as much in the fused map.
+// The surface of one robot may take kMaxBytesPerRobot as chunks. With all that a robot makes of
+// it, its process grows by 132 MB in the long form.
 constexpr double kMaxSurfaceGrowth_MB =
     4.0 * static_cast<double>(TeamMesh::kMaxBytesPerRobot) / (1U << 20U);
 constexpr double kMaxOutPerIn = 10.0;

@@ -20,7 +20,6 @@ constexpr double kStep_m = 0.5;
 constexpr double kRadius_m = 20.0;
 constexpr double kCentres_m = 15.0;
 constexpr double kNear_m = 2.0;  // farthest ends of a closure
-constexpr std::size_t kLeastKeyframes = 150;
 
 // Noise of a measurement per axis.
 struct CrowdNoise {
@@ -73,6 +72,10 @@ class Builder {
     for (Eigen::Index i = graph_.first[a]; i < graph_.first[a + 1]; ++i)
       for (Eigen::Index j = a == b ? i + kApart : graph_.first[b]; j < graph_.first[b + 1]; ++j)
         if ((position(i) - position(j)).norm() <= kNear_m) pairs.emplace_back(i, j);
+    if (a != b && pairs.empty())
+      throw std::invalid_argument("--keyframes " + std::to_string(options_.keyframes) +
+                                  ", --partners " + std::to_string(options_.partners) +
+                                  ": the laps of two partners do not meet");
     std::ranges::shuffle(pairs, random_);
     pairs.resize(std::min(count, pairs.size()));
     for (const auto& [i, j] : pairs) measure(i, j, kClosureNoise);
@@ -121,9 +124,6 @@ TeamGraph crowd_graph(const CrowdGraphOptions& options) {
            "must be more than --partners " + std::to_string(options.partners));
   if (options.robots > kMaxTeam)
     refuse("--robots", options.robots, "a team has at most " + std::to_string(kMaxTeam));
-  if (options.keyframes < kLeastKeyframes)
-    refuse("--keyframes", options.keyframes,
-           "robots meet from " + std::to_string(kLeastKeyframes) + " on, after half a lap");
   return Builder(options).build();
 }
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <map>
 #include <string>
-#include <string_view>
+#include <utility>
 
 #include "apps/lab/experiments/level_results.hpp"
 #include "apps/lab/experiments/report.hpp"
@@ -11,24 +11,27 @@ namespace km {
 namespace {
 
 constexpr int kMetreDecimals = 3;
-constexpr std::string_view kUsualLevel = "2";  // a usual robot: the level with numbers to reach
-constexpr double kWantedJointShare = 0.5;      // share of the median odometry ATE
+constexpr unsigned kUsualLevel = 2;        // a usual robot: the level with numbers to reach
+constexpr double kWantedJointShare = 0.5;  // share of the median odometry ATE
 
 // Results of a run with its name.
 struct JudgedRun {
   const WorldConfig* world;
   LevelResults results;
 };
-using RunsByLevel = std::map<std::string, std::vector<JudgedRun>>;
+using Level = std::pair<unsigned, std::string>;  // and LevelWorld::length
+using RunsByLevel = std::map<Level, std::vector<JudgedRun>>;
+
+std::string name_of(const Level& level) {
+  return std::to_string(level.first) + (level.second.empty() ? "" : ", " + level.second);
+}
 
 RunsByLevel runs_by_level(ReportInput& input) {
   RunsByLevel levels;
   for (const LevelRun& run : input.config().level_runs) {
     if (!input.has("team-" + run.world)) continue;
     const WorldConfig& world = input.config().world(run.world);
-    const std::string length = run.length.empty() ? "" : ", " + run.length;
-    levels[std::to_string(run.level) + length].push_back(
-        {&world, read_level_results(world, input.paths())});
+    levels[{run.level, run.length}].push_back({&world, read_level_results(world, input.paths())});
   }
   return levels;
 }
@@ -87,7 +90,7 @@ ReportTable numbers_table(const RunsByLevel& levels) {
       .columns = {"level", "joined", "odometry ATE [m]", "before", "after", "all", "false",
                   "NEES, median", "divergences"}};
   for (const auto& [level, runs] : levels) {
-    table.rows.push_back(numbers_row(level, runs));
+    table.rows.push_back(numbers_row(name_of(level), runs));
     for (const JudgedRun& run : runs) table.rows.push_back(numbers_row(run.world->title, {run}));
   }
   table.note =
@@ -108,7 +111,7 @@ ReportTable angle_table(const RunsByLevel& levels) {
   }
   for (const auto& [level, runs] : levels) {
     std::vector<ReportCell>& row = table.rows.emplace_back();
-    row.push_back({level});
+    row.push_back({name_of(level)});
     for (std::size_t k = 0; k < ClosureScores::kAngleBins; ++k) {
       const std::size_t pairs =
           sum_over(runs, [k](const LevelResults& r) { return r.by_angle[k].true_pairs; });
@@ -124,9 +127,8 @@ ReportTable angle_table(const RunsByLevel& levels) {
   return table;
 }
 
-void add_level_targets(const std::string& level, const std::vector<JudgedRun>& runs,
-                       ReportInput& input) {
-  const std::string where = "level " + level;
+void add_level_targets(const Level& level, const std::vector<JudgedRun>& runs, ReportInput& input) {
+  const std::string where = "level " + name_of(level);
   const auto of_all = [&](std::size_t count) {
     return std::to_string(count) + " of " + std::to_string(runs.size());
   };
@@ -157,7 +159,7 @@ std::optional<ReportSection> levels_section(ReportInput& input) {
   section.add(numbers_table(levels));
   section.add(angle_table(levels));
   for (const auto& [level, runs] : levels)
-    if (level.starts_with(kUsualLevel)) add_level_targets(level, runs, input);
+    if (level.first == kUsualLevel) add_level_targets(level, runs, input);
   return section;
 }
 

@@ -48,7 +48,7 @@ bool is_above(RobotId above, RobotId robot, const Parents& parents) {
   return false;
 }
 
-// The robots on the side of `robot` of the edge to its parent have closures to the other side.
+// Number of closures that cross the edge from `robot` to its parent.
 std::uint32_t closures_over(RobotId robot, const Parents& parents, const PairClosures& closures) {
   const auto below = [&](RobotId x) { return x == robot || is_above(robot, x, parents); };
   std::uint32_t sum = 0;
@@ -101,7 +101,7 @@ TEST_CASE("closures over an edge of the tree do not grow with a ring of robots",
     std::uint32_t most = 0;
     for (const RobotId robot : robots)
       if (parents.contains(robot)) most = std::max(most, closures_over(robot, parents, closures));
-    CHECK(most <= 240);  // ten of the pairs; in the spanning tree it is the number of robots
+    CHECK(most <= 240);  // those of ten pairs, whatever the ring
   }
 }
 

@@ -98,6 +98,7 @@ TEST_CASE("Worlds out of bounds are refused", "[crowd]") {
   CHECK_THROWS_WITH(crowd_graph({.partners = 3}), Contains("--partners 3"));
   CHECK_THROWS_WITH(crowd_graph({.robots = 129}), Contains("--robots 129") && Contains("128"));
   CHECK_THROWS_WITH(crowd_graph({.keyframes = 100}), Contains("--keyframes 100"));
+  CHECK_THROWS_WITH(crowd_graph({.robots = 40, .partners = 6}), Contains("--partners 6"));
 }
 
 TEST_CASE("The pose graph of a crowd joins each robot to its neighbours on the ring", "[crowd]") {
