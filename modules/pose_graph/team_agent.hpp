@@ -210,6 +210,7 @@ class TeamAgent {
   [[nodiscard]] std::optional<World> tied_world() const;
   [[nodiscard]] bool is_located() const;
   [[nodiscard]] bool is_tied_to_earlier_runs() const;
+  [[nodiscard]] std::map<KeyframeId, SE3> known_poses(const TeamFrame& frame) const;
   void place_first_by_fixes(bool upright);
   [[nodiscard]] std::uint64_t own_datum() const;
   [[nodiscard]] std::uint64_t datum_of(RobotId robot) const;

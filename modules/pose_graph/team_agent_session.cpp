@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "modules/pose_graph/lone_solution.hpp"
 #include "modules/pose_graph/team_agent.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 
@@ -222,6 +223,9 @@ bool TeamAgent::join(const Session& session) {
   part->graph.start = poses_.T_frame_kf();
   part->graph.decided = decisions_.decided();
   part->graph.noise = decisions_.noise();
+  if (!alone && expects_false())
+    part->graph.start =
+        relaxed_start(part->graph, known_poses(session.plan.frame), {.barc = config_.barc});
   part_.emplace(session, self_, std::move(*part), factory_, tolerance(), config_.status_period_s,
                 now_s_);
   if (roster_.find(session.id.coordinator.robot) != nullptr)
@@ -229,6 +233,16 @@ bool TeamAgent::join(const Session& session) {
   state_ = SessionState::kRunning;
   reconsider_due_ = false;
   return true;
+}
+
+// The poses that other robots have last sent in `frame`, if this robot is in it as well.
+std::map<KeyframeId, SE3> TeamAgent::known_poses(const TeamFrame& frame) const {
+  std::map<KeyframeId, SE3> known;
+  if (frame_.frame() != frame) return known;
+  for (const auto& [robot, poses] : roster_.public_poses())
+    for (std::size_t k = 0; poses.frame == frame && k < poses.keyframes.size(); ++k)
+      known[{robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
+  return known;
 }
 
 // Until the fixes determine the absolute frame, keyframe 0 stays, and no fix is an edge.

@@ -18,6 +18,7 @@ using Eigen::VectorXd;
 // Ratio of weights from which on old second derivatives mislead a step: the stiffness of an edge is
 // half or twice its correct value. Weights below kNoWeight are negligible compared to odometry.
 constexpr double kWeightRatio = 2.0;
+constexpr double kDecidedRatio = 1.01;  // for covariances too
 constexpr double kNoWeight = 0.02;
 // An edge with a weight below this is rejected. It has no cost and no gradient; its stiffness only
 // keeps the system regular.
@@ -30,9 +31,9 @@ constexpr double kDamping = 1e-9;
   throw std::invalid_argument("TreeFront of robot " + std::to_string(robot) + ": " + what);
 }
 
-bool differs(double weight, double before) {
+bool differs(double weight, double before, bool decided) {
   const auto [less, more] = std::minmax(weight, before);
-  return more > kNoWeight && more > kWeightRatio * less;
+  return more > kNoWeight && more > (decided ? kDecidedRatio : kWeightRatio) * less;
 }
 
 std::size_t at(Index k) {
@@ -60,6 +61,24 @@ Precision weighed(const Precision& precision, double weight) {
 bool is_usable(const PoseEdge& e) {
   const auto& [kappa, tau] = e.precision;
   return e.T_from_to.matrix().allFinite() && kappa > 0.0 && tau > 0.0 && std::isfinite(kappa + tau);
+}
+
+// Standard deviations of the variables whose covariances are `triangles`, one column each, times
+// the square root of the unit of a correlation.
+MatrixXd units_of_correlations(std::span<const float> triangles, Index block) {
+  const Index size = block * (block + 1) / 2;
+  MatrixXd units(block, static_cast<Index>(triangles.size()) / size);
+  for (Index k = 0; k < units.cols(); ++k)
+    for (Index row = 0, next = k * size; row < block; next += block - row, ++row)
+      units(row, k) = std::sqrt(TreeInverse::kCorrelation *
+                                std::max(0.0, static_cast<double>(triangles[at(next)])));
+  return units;
+}
+
+std::int16_t correlation_of(double covariance, double unit) {
+  constexpr double kMost = 1.0 / TreeInverse::kCorrelation;
+  if (!(unit > 0.0)) return 0;
+  return static_cast<std::int16_t>(std::lround(std::clamp(covariance / unit, -kMost, kMost)));
 }
 
 NodePair ordered(int i, int j) {
@@ -133,14 +152,15 @@ std::optional<std::size_t> TreeFront::origin_node() const {
   return foreign == foreign_.end() ? std::nullopt : std::optional(at(foreign->second));
 }
 
-void TreeFront::weigh(const std::vector<double>& weights) {
+void TreeFront::weigh(const std::vector<double>& weights, bool decided) {
   weights_ = weights;
+  decided_ = decided;
 }
 
 bool TreeFront::stale() const {
   if (linearised_weights_.empty()) return true;
   for (std::size_t k = 0; k < weights_.size(); ++k)
-    if (slots_[k].sent < 0 && differs(weights_[k], linearised_weights_[k])) return true;
+    if (slots_[k].sent < 0 && differs(weights_[k], linearised_weights_[k], decided_)) return true;
   return false;
 }
 
@@ -387,7 +407,7 @@ std::vector<UpMessage::NewWeight> TreeFront::changed_weights() {
   std::vector<UpMessage::NewWeight> changes;
   for (std::size_t k = 0; k < sent_.size(); ++k) {
     const float weight = weight_of(sent_[k]);
-    if (!differs(weight, sent_[k].sent)) continue;
+    if (!differs(weight, sent_[k].sent, decided_)) continue;
     sent_[k].sent = weight;
     changes.push_back({static_cast<std::uint32_t>(k), weight});
   }
@@ -520,38 +540,49 @@ std::optional<BlockMatrix> TreeFront::inverse_about_origin(bool upright) {
 // factor, so the child does not need them.
 TreeInverse TreeFront::inverse_of_child(RobotId name, const BlockMatrix& inverse) const {
   const Child& child = children_.at(name);
-  TreeInverse blocks;
+  TreeInverse sent;
   for (const int node : child.node)
     for (Index c = 0; c < block(); ++c)
       for (Index row = c; row < block(); ++row)
-        blocks.push_back(static_cast<float>(inverse.at(node)(row, c)));
+        sent.diagonal.push_back(static_cast<float>(inverse.at(node)(row, c)));
+  const MatrixXd units = units_of_correlations(sent.diagonal, block());
   for (std::size_t p = 0; p < child.pair.size(); ++p) {
-    if (child.system.schur.between(static_cast<int>(p)).isZero(0.0)) continue;
+    if (!is_sent(child.system.schur, child.system.pairs[p], static_cast<int>(p))) continue;
     MatrixXd values = inverse.between(child.pair[p]);
     if (child.transposed[p]) values.transposeInPlace();
-    for (const double x : values.reshaped()) blocks.push_back(static_cast<float>(x));
+    const auto& [i, j] = child.system.pairs[p];
+    for (Index c = 0; c < block(); ++c)
+      for (Index row = 0; row < block(); ++row)
+        sent.correlations.push_back(correlation_of(values(row, c), units(row, i) * units(c, j)));
   }
-  return blocks;
+  return sent;
 }
 
-BlockMatrix TreeFront::inverse_from_parent(const TreeInverse& blocks) const {
-  const BlockMatrix& schur = factor_->schur();
-  BlockMatrix inverse =
-      BlockMatrix::zero(block(), plan_->kept().size(), plan_->kept_pairs().size());
-  std::size_t next = 0;
-  const auto number = [&] {
-    if (next >= blocks.size()) refuse(graph_.self, "receives an inverse of another size");
-    return static_cast<double>(blocks[next++]);
-  };
+BlockMatrix TreeFront::inverse_from_parent(const TreeInverse& sent) const {
+  const std::vector<NodePair>& pairs = plan_->kept_pairs();
+  const Index B = block();
+  BlockMatrix inverse = BlockMatrix::zero(B, plan_->kept().size(), pairs.size());
+  std::vector<int> coupled;
+  for (int p = 0; p < static_cast<int>(pairs.size()); ++p)
+    if (is_sent(factor_->schur(), pairs[at(p)], p)) coupled.push_back(p);
+  if (sent.diagonal.size() != plan_->kept().size() * at(B * (B + 1) / 2) ||
+      sent.correlations.size() != coupled.size() * at(B * B))
+    refuse(graph_.self, "receives an inverse of another size");
+  auto variance = sent.diagonal.begin();
   for (std::size_t k = 0; k < plan_->kept().size(); ++k) {
     auto values = inverse.at(static_cast<int>(k));
-    for (Index c = 0; c < block(); ++c)
-      for (Index row = c; row < block(); ++row) values(row, c) = values(c, row) = number();
+    for (Index c = 0; c < B; ++c)
+      for (Index row = c; row < B; ++row) values(row, c) = values(c, row) = *variance++;
   }
-  for (std::size_t p = 0; p < plan_->kept_pairs().size(); ++p)
-    if (!schur.between(static_cast<int>(p)).isZero(0.0))
-      for (double& x : inverse.between(static_cast<int>(p)).reshaped()) x = number();
-  if (next != blocks.size()) refuse(graph_.self, "receives an inverse of another size");
+  const MatrixXd units = units_of_correlations(sent.diagonal, B);
+  auto correlation = sent.correlations.begin();
+  for (const int p : coupled) {
+    auto values = inverse.between(p);
+    const auto& [i, j] = pairs[at(p)];
+    for (Index c = 0; c < B; ++c)
+      for (Index row = 0; row < B; ++row)
+        values(row, c) = *correlation++ * units(row, i) * units(c, j);
+  }
   return inverse;
 }
 

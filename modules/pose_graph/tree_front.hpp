@@ -55,9 +55,10 @@ class TreeFront {
   [[nodiscard]] const FrontGraph& graph() const { return graph_; }
   [[nodiscard]] Eigen::Index block() const { return graph_.dimension == 2 ? 3 : 6; }
 
-  /// Sets the weights in [0, 1] of the edges.
-  void weigh(const std::vector<double>& weights);
-  /// True if the present weights would change the second derivatives much.
+  /// Sets the weights in [0, 1] of the edges. `decided`: they hardly change any more.
+  void weigh(const std::vector<double>& weights, bool decided);
+  /// True if the present weights would change the second derivatives much; if they are decided, at
+  /// all.
   [[nodiscard]] bool stale() const;
 
   /// Adds or replaces the system of a child. Throws std::invalid_argument if it does not fit.
@@ -173,8 +174,9 @@ class TreeFront {
   std::vector<KeyframeId> ids_;
   std::map<KeyframeId, int> foreign_;  // nodes of poses of other robots
   std::size_t followed_ = 0;
-  std::vector<EdgeSlot> slots_;             // one for each edge of the graph
-  std::vector<double> weights_;             // one for each edge of the graph
+  std::vector<EdgeSlot> slots_;  // one for each edge of the graph
+  std::vector<double> weights_;  // one for each edge of the graph
+  bool decided_ = false;
   std::vector<double> linearised_weights_;  // weights of edges that are not in sent_
   std::map<RobotId, Child> children_;
   std::shared_ptr<const EliminationPlan> plan_;

@@ -48,10 +48,21 @@ struct TreeSystem {
   std::vector<SentEdge> edges = {};
 };
 
+/// True if the coupling of this pair, between these two variables, is sent: it does not round to
+/// zero.
+[[nodiscard]] bool is_sent(const BlockMatrix& schur, const NodePair& ends, int pair);
+
 /// The inverse of the second derivatives of the team at the variables of a TreeSystem, column by
-/// column. The lower triangles of the diagonal blocks come first. The couplings follow that are not
-/// zero in the Schur complement of the system.
-using TreeInverse = std::vector<float>;
+/// column.
+struct TreeInverse {
+  std::vector<float> diagonal = {};  ///< Lower triangles of the diagonal blocks.
+  /// The couplings that the system was sent with, as correlations in units of kCorrelation. The
+  /// error of a covariance is then at most 1.6e-5 of the product of its standard deviations.
+  std::vector<std::int16_t> correlations = {};
+  static constexpr double kCorrelation = 1.0 / 32767.0;
+
+  [[nodiscard]] bool empty() const { return diagonal.empty(); }
+};
 
 /// Two robots, and the closures between them.
 struct PairVote {
@@ -72,6 +83,7 @@ struct TreeSums {
   std::uint32_t changed = 0;     ///< Open closures whose weight has changed.
   std::uint32_t fractional = 0;  ///< Open closures with a weight between 0 and 1.
   std::uint32_t kept = 0;        ///< Closures with a weight above one half.
+  std::uint32_t rejected = 0;    ///< Open closures between robots with a lower weight.
   std::uint32_t isolated = 0;    ///< Deferred closures, see Corroboration.
   std::uint32_t fixed = 0;       ///< Number of edges to held poses.
   std::uint32_t poses = 0;
@@ -104,7 +116,7 @@ struct TreeVerdict {
     kShorten,  ///< The new poses are not accepted: take the last step times `scale`.
     kRefresh,  ///< Return to the accepted poses, with new second derivatives.
     kStart,    ///< At the beginning: set the weights and send the equations.
-    kCount,    ///< Before kStart: defer closures that stand alone, count again.
+    kCount,    ///< Before kStart: decide the closures inside this robot alone, count again.
     kDone,     ///< The new poses are accepted; this was the last round.
     kStop,     ///< The new poses are not accepted; the accepted ones are the result.
   };
@@ -116,8 +128,10 @@ struct TreeVerdict {
   Next next = Next::kStep;
   bool accept = false;    ///< kRefresh: the new poses are accepted.
   bool full = false;      ///< Send full second derivatives from now on.
-  bool deferred = false;  ///< kStart: closures that stand alone remain deferred.
+  bool deferred = false;  ///< kCount: defer closures that stand alone. kStart: they remain so.
   bool free = true;       ///< kStart: nothing holds the frame of the team.
+  /// kStart, kRefresh: also weigh the closures that robots have decided alone.
+  bool weigh_all = false;
   Weighing weighing = Weighing::kDecided;
   double scale = 1.0;
   double mu = 0.0;           ///< For the next weights.

@@ -9,6 +9,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_cover.hpp"
 #include "modules/pose_graph/corroboration.hpp"
+#include "modules/pose_graph/lone_solution.hpp"
 
 namespace km {
 namespace {
@@ -127,6 +128,31 @@ bool TreeNewton::reports(const Known& k) const {
   return graph_.self <= std::min(k.edge.from.robot, k.edge.to.robot);
 }
 
+// Decides the closures inside this robot without the team, which costs no bytes. Their weights then
+// do not change from round to round, nor do the second derivatives that this robot sends.
+void TreeNewton::settle_alone() {
+  if (place_.members.size() < 2) return;
+  SessionGraph alone = graph_;
+  for (std::size_t k = 0; k < inside_; ++k) alone.own.push_back(known_[k].edge);
+  TreeNewtonOptions options = options_;
+  options.barc = verdict_.barc;
+  const std::map<ClosureId, bool> decided = decide_alone(std::move(alone), options);
+  for (std::size_t k = graph_.odometry; k < inside_; ++k) {
+    Known& known = known_[k];
+    const auto decision = decided.find(known.edge.id());
+    if (decision == decided.end() || known.trust != Trust::kOpen) continue;
+    known.settled = true;
+    known.weight = known.candidate = decision->second ? 1.0 : 0.0;
+  }
+}
+
+void TreeNewton::unsettle() {
+  for (Known& k : known_) {
+    if (k.settled && !front_) k.weight = k.candidate = 1.0;
+    k.settled = false;
+  }
+}
+
 // The own poses by odometry alone, from the first one.
 std::vector<SE3> TreeNewton::odometry_poses() const {
   std::vector<SE3> poses{graph_.start.front()};
@@ -237,7 +263,7 @@ void TreeNewton::count_closures(TreeSums& sums) const {
     if (!reports(k)) continue;
     if (k.deferred) ++sums.isolated;
     if (!takes_part(k)) continue;
-    if (k.trust == Trust::kOpen) {
+    if (k.trust == Trust::kOpen && !k.settled) {
       ++sums.open;
       sums.largest = std::max(
           sums.largest,
@@ -312,11 +338,12 @@ const SE3& TreeNewton::pose_at(const KeyframeId& id, const std::vector<SE3>& pos
 
 UpMessage TreeNewton::equations() {
   UpMessage message{.round = round_, .sums = {}};
-  front_->weigh(front_weights(false));
+  const bool decided = verdict_.weighing == Weighing::kDecided;
+  front_->weigh(front_weights(false), decided);
   message.sums.base_cost = front_->cost(base_);
   message.sums.cost = front_->cost(present_);
   weigh_candidates(message.sums);
-  front_->weigh(front_weights(true));
+  front_->weigh(front_weights(true), decided);
   if (refresh_ || front_->stale())
     front_->linearise(present_, verdict_.full ? Curvature::kFull : Curvature::kGaussNewton);
   refresh_ = false;
@@ -468,13 +495,15 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
     }
   };
   verdict_ = v;
+  if (v.weigh_all) unsettle();
   if (!front_) {
     weigh_by_noise();
     move_robots(v.moves);
   }
   switch (v.next) {
     case Next::kCount:
-      find_isolated(default_threshold(options_.dimension) * v.noise_scale);
+      settle_alone();
+      if (v.deferred) find_isolated(default_threshold(options_.dimension) * v.noise_scale);
       break;
     case Next::kStart:
       weigh_by_usual_noise();

@@ -25,9 +25,9 @@ namespace km {
 /// step is shortened; while weights change, the cost may rise by half, twice in a row. Only the
 /// root decides.
 ///
-/// Second derivatives hardly change (see edge_model.hpp). They are sent again only when the old
-/// ones slow down convergence (Shamanskii's variant of Newton's method). The first ones are those
-/// of Gauss-Newton, which cannot be indefinite.
+/// Second derivatives hardly change (see edge_model.hpp). They are sent again only when the weights
+/// of their edges change, or when the old ones slow down convergence (Shamanskii's variant of
+/// Newton's method). The first ones are those of Gauss-Newton, which cannot be indefinite.
 ///
 /// Every closure has a weight: graduated non-convexity with truncated least squares (Yang et al.,
 /// RA-L 2020) sets the weights between two steps. The result is the plain optimum of the closures
@@ -36,6 +36,11 @@ namespace km {
 /// Decisions of earlier sessions persist. A pair of robots with new closures weighs its closures
 /// again, except for the rejected ones. A closure to a held pose is left out if an earlier session
 /// has rejected it, and otherwise has weight 1.
+///
+/// Each robot first decides the closures inside it alone (see decide_alone()), so that its second
+/// derivatives change with the weights of fewer edges. The team weighs such a closure only if the
+/// solution contradicts the decision. It weighs all closures together if they are mostly between
+/// robots, or if several closures between robots are rejected.
 ///
 /// Exactly one of two robots weighs a closure between them and has it among its own edges. The
 /// system up the tree contains the pose at the other end. Between a parent and its child the parent
@@ -68,6 +73,9 @@ class TreeNewton final : public MemberSolver {
     PoseEdge edge;
     Trust trust = Trust::kFixed;
     bool deferred = false;  ///< Stands alone: deferred in this session.
+    /// Decided by this robot alone: open, but not weighed unless the solution contradicts it.
+    bool settled = false;
+    bool contradicted = false;  ///< The present poses contradict its decided weight.
     bool odometry = false;
     bool own = true;           ///< This robot weighs it.
     double weight = 1.0;       ///< Weight at the accepted poses.
@@ -94,6 +102,8 @@ class TreeNewton final : public MemberSolver {
   void weaken(std::span<const std::size_t> closures, double factor);
   void find_isolated(double barc);
   [[nodiscard]] std::map<RobotId, double> limits_of_pairs() const;
+  void settle_alone();
+  void unsettle();
   void build_front();
   void share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by);
   [[nodiscard]] const SE3& pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const;

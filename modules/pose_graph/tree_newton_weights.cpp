@@ -84,7 +84,7 @@ void TreeNewton::find_isolated(double barc) {
       Known& known = known_[open[k]];
       const bool fits =
           residual_of(known.edge, pose(known.edge.from), pose(known.edge.to)) <= verdict_.barc;
-      known.deferred = isolated[k] && known.trust == Trust::kOpen && !fits;
+      known.deferred = isolated[k] && known.trust == Trust::kOpen && !known.settled && !fits;
     }
   }
 }
@@ -123,12 +123,21 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
     const double least = known.odometry ? kRejectedStepWeight : 0.0;
     const double weight =
         std::max(least, robust_weight(r * r, c2, decided ? kLargestMu : verdict_.mu));
-    if (verdict_.weighing == Weighing::kWeigh) known.candidate = weight;
+    const bool weighs = verdict_.weighing == Weighing::kWeigh;
+    if (weighs && known.contradicted) known.settled = false;
+    known.contradicted = known.settled && decided && weight != known.weight;
+    if (known.settled) {
+      sums.kept += known.weight > 0.5 ? 1 : 0;
+      sums.changed += known.contradicted ? 1 : 0;
+      continue;
+    }
+    if (weighs) known.candidate = weight;
     ++sums.open;
     sums.largest = std::max(sums.largest, static_cast<float>(r));
     if ((decided ? weight : known.candidate) != known.weight) ++sums.changed;
     if (known.candidate != least && known.candidate != 1.0) ++sums.fractional;
     sums.kept += !known.odometry && known.candidate > 0.5 ? 1 : 0;
+    sums.rejected += k >= inside_ && known.candidate <= 0.5 ? 1 : 0;
   }
   limit_candidates(decided);
 }

@@ -35,6 +35,14 @@ constexpr std::uint32_t kFewOpen = 32;  // closures; so few false ones do no har
 // Closures per pose below which the deferred closures are needed from the start.
 constexpr double kClosuresPerPose = 0.25;
 
+// Share of closures inside robots below which these do not decide them alone, because the second
+// derivatives change with the weights of the others anyway.
+constexpr double kWorthDeciding = 0.1;
+// From this many rejected closures between robots on, and this share of the open ones, closures
+// inside robots are weighed as well.
+constexpr std::uint32_t kLeastRejected = 2;
+constexpr double kMostRejected = 0.03;
+
 constexpr std::size_t kEnoughPairs = 3;  // for the noise of the usual pair
 
 // True if pairs with closures in use connect all robots.
@@ -140,10 +148,12 @@ DownMessage TreeRoot::retreat(std::uint32_t round) {
 
 DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   round_ = round;
-  if (first_) {  // closures that stand alone are deferred
+  if (first_) {
+    const double all = first_->open, left = all - sums.isolated;
+    alone_ = alone_ && left - sums.open >= kWorthDeciding * all;
+    if (!may_defer_) return start(false, alone_ ? sums : *first_);
     usual_noise_ = usual_pair_noise(sums.votes);
-    const std::uint32_t left = sums.open;
-    const bool enough = static_cast<double>(left) >= kClosuresPerPose * sums.poses;
+    const bool enough = left >= kClosuresPerPose * sums.poses;
     const bool deferred = sums.isolated > kFewOpen && enough && joined(members_, sums.votes);
     return start(deferred, deferred ? sums : *first_);
   }
@@ -153,8 +163,10 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   if (noise) noise_scale_ = noise->scale;
   const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
   barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
-  const bool count = noise && noise->consistent >= kMostlyConsistent && sums.open > kFewOpen;
-  DownMessage message = count ? answer(Next::kCount) : start(false, sums);
+  may_defer_ = noise && noise->consistent >= kMostlyConsistent && sums.open > kFewOpen;
+  alone_ = options_.robust && members_.size() > 1 && sums.open > 0;
+  DownMessage message = may_defer_ || alone_ ? answer(Next::kCount) : start(false, sums);
+  if (message.verdict.next == Next::kCount) message.verdict.deferred = may_defer_;
   if (options_.robust && free_ && sums.open > 0) message.verdict.moves = moves_of(sums.votes);
   return message;
 }
@@ -168,6 +180,7 @@ DownMessage TreeRoot::start(bool deferred, const TreeSums& sums) {
                                       : Weighing::kWeigh;
   DownMessage message = answer(Next::kStart);
   message.verdict.deferred = deferred;
+  message.verdict.weigh_all = !alone_;
   return message;
 }
 
@@ -204,12 +217,14 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
   // Weights are decided before the poses have converged. If the converged poses contradict them,
   // closures are weighed again.
+  const bool contradicts = alone_ && sums.rejected >= kLeastRejected &&
+                           sums.rejected > kMostRejected * static_cast<double>(sums.open);
+  if (schedule_.decided() && contradicts) return weigh_all(sums);
   if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
     last_decrement_.reset();
   // If the weights were decided before this pass up, its equations are the final ones, unless pairs
   // were still limited.
   const bool decided = schedule_.decided();
-  const bool newly_decided = decided && weighing_ != Weighing::kDecided;
   const bool unlimited = weighing_ == Weighing::kDecided || usual_pair_.tau >= kUnlimited.tau;
   weighing_ = decided                 ? Weighing::kDecided
               : schedule_.unweighed() ? Weighing::kUnweighed
@@ -219,9 +234,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
         noise_allowed(noise_scale_, cost_, sums.kept, members_.size(), options_.dimension);
     return answer(Next::kDone);
   }
-  // Gauss-Newton steps rarely lead to the minimum of the decided weights, so full second
-  // derivatives are needed in any case.
-  if (decided && (worth_refreshing(decrement_) || (newly_decided && !full_))) {
+  if (decided && worth_refreshing(decrement_)) {
     full_ = true;
     convex_ = false;
     return refresh(true, weighing_);
@@ -235,6 +248,16 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
     message.verdict.drift = drift_against(
         poses, front.substitute_back(root.kept).leftCols(static_cast<Index>(poses.size())),
         upright_);
+  return message;
+}
+
+// Closures between robots cannot bend a robot as far if those inside it have their full weight from
+// the start. If some are rejected, this may be why, and all are weighed together.
+DownMessage TreeRoot::weigh_all(const TreeSums& sums) {
+  alone_ = false;
+  schedule_.start(sums.largest, sums.open, barc_, 0);
+  DownMessage message = refresh(true, Weighing::kWeigh);
+  message.verdict.weigh_all = true;
   return message;
 }
 

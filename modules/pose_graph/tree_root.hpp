@@ -56,12 +56,15 @@ class TreeRoot {
   [[nodiscard]] DownMessage go_back();
   [[nodiscard]] DownMessage refresh(bool accept, TreeVerdict::Weighing weighing);
   [[nodiscard]] bool worth_refreshing(double decrement);
+  [[nodiscard]] DownMessage weigh_all(const TreeSums& sums);
 
   std::vector<RobotId> members_;
   TreeNewtonOptions options_;
   bool upright_;
   RobustSchedule schedule_;
-  std::optional<TreeSums> first_;  // sums before any closure was deferred
+  std::optional<TreeSums> first_;  // sums before any closure was deferred or decided
+  bool alone_ = false;             // robots have decided the closures inside them alone
+  bool may_defer_ = false;         // closures that stand alone are probably false
   std::uint32_t round_ = 0;
   double barc_ = 0.0;
   double noise_scale_ = 1.0;

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "apps/lab/pgo_study/odometry_start.hpp"
+#include "modules/pose_graph/lone_solution.hpp"
 #include "modules/pose_graph/odometry_judgement.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/precision_limits.hpp"
@@ -46,7 +48,10 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
     throw std::invalid_argument("MemberTeam: " + std::to_string(start.size()) +
                                 " start poses for " + std::to_string(graph.poses()));
   for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
-  if (as_robots) weigh_as_robots(parts_);
+  if (as_robots) {
+    weigh_as_robots(parts_);
+    solve_alone_first(start);
+  }
   places_ = places(shape);
   announce_starts(std::move(start));
   open_session();
@@ -79,6 +84,16 @@ std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
   for (std::size_t k = 0; k < parts_.size(); ++k)
     places[k] = place_in(plan, static_cast<RobotId>(k)).value();
   return places;
+}
+
+void MemberTeam::solve_alone_first(std::vector<SE3>& start) {
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    SessionGraph alone = parts_[k];
+    const auto begin = start.begin() + graph_.first[k];
+    alone.start.assign(begin, start.begin() + graph_.first[k + 1]);
+    std::ranges::copy(relaxed_start(std::move(alone), {}, {.dimension = graph_.dimension}), begin);
+  }
+  start = placed_by_closures(graph_, std::move(start));
 }
 
 // Sends all public poses to all robots in single precision, as MemberPoses does.

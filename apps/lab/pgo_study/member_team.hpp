@@ -29,7 +29,8 @@ class MemberTeam final : public TeamSolver {
   using Factory = std::function<std::unique_ptr<MemberSolver>(SessionGraph, TreePlace)>;
 
   /// `start`: one pose for each pose of the graph. `as_robots`: weights are corrected as robots do
-  /// that expect false closures, see judge_odometry() and limit_precisions(). Throws
+  /// that expect false closures, see judge_odometry() and limit_precisions(), and each robot first
+  /// solves its own edges alone, see relaxed_start(). Throws
   /// std::invalid_argument if the number of poses differs, and what `make` throws.
   MemberTeam(const TeamGraph& graph, Eigen::Index rank, std::vector<SE3> start, Factory make,
              TeamShape shape = TeamShape::kAll, bool as_robots = false);
@@ -57,6 +58,7 @@ class MemberTeam final : public TeamSolver {
   };
 
   [[nodiscard]] std::map<std::size_t, TreePlace> places(TeamShape shape) const;
+  void solve_alone_first(std::vector<SE3>& start);
   void announce_starts(std::vector<SE3> start);
   void open_session();
   bool reconsider();

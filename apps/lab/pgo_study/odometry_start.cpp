@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "modules/pose_graph/frame_alignment.hpp"
 
@@ -89,6 +90,11 @@ std::vector<SE3> odometry_start(const TeamGraph& graph) {
     const std::vector<SE3> own = chained(graph, odometry, k);
     poses.insert(poses.end(), own.begin(), own.end());
   }
+  return placed_by_closures(graph, std::move(poses));
+}
+
+std::vector<SE3> placed_by_closures(const TeamGraph& graph, std::vector<SE3> poses) {
+  const std::vector<bool> odometry = odometry_edges(graph);
   std::vector<bool> placed(graph.robots(), false);
   placed[0] = true;
   for (std::size_t n = 1; n < graph.robots(); ++n) {

@@ -15,4 +15,8 @@ namespace km {
 /// a robot's poses. Throws std::invalid_argument if a robot's own edges do not reach all its poses.
 [[nodiscard]] std::vector<SE3> odometry_start(const TeamGraph& graph);
 
+/// Moves each robot as a whole, as odometry_start() does; `poses` has one pose for each of the
+/// graph. Throws std::invalid_argument if the graph does not join all robots.
+[[nodiscard]] std::vector<SE3> placed_by_closures(const TeamGraph& graph, std::vector<SE3> poses);
+
 }  // namespace km

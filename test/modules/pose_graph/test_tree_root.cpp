@@ -25,7 +25,31 @@ TreeVerdict start_with(const std::vector<float>& noise) {
   return message.verdict;
 }
 
+// The start of a team of two with `open` closures, of which robots have decided `alone` alone.
+TreeVerdict start_after(std::uint32_t open, std::uint32_t alone) {
+  TreeRoot root({0, 1}, {}, false);
+  REQUIRE(root.decide_start({.open = open, .poses = 100}, 0).verdict.next ==
+          TreeVerdict::Next::kCount);
+  const DownMessage message = root.decide_start({.open = open - alone, .poses = 100}, 1);
+  REQUIRE(message.verdict.next == TreeVerdict::Next::kStart);
+  return message.verdict;
+}
+
 }  // namespace
+
+TEST_CASE("Robots decide closures alone if these are a tenth of all", "[tree_root]") {
+  CHECK_FALSE(start_after(100, 100).weigh_all);
+  CHECK_FALSE(start_after(100, 10).weigh_all);
+  CHECK(start_after(100, 9).weigh_all);
+  CHECK(start_after(100, 0).weigh_all);
+}
+
+TEST_CASE("A robot alone, or a team that trusts closures, starts at once", "[tree_root]") {
+  TreeRoot alone({3}, {}, false), trusting({0, 1}, {.robust = false}, false);
+  for (TreeRoot* root : {&alone, &trusting})
+    CHECK(root->decide_start({.open = 100, .poses = 100}, 0).verdict.next ==
+          TreeVerdict::Next::kStart);
+}
 
 TEST_CASE("The usual noise of a pair is reached by most pairs", "[tree_root]") {
   CHECK(start_with({3.0F, 2.5F, 2.0F, 1.0F, 1.0F}).usual_noise == 2.0);
