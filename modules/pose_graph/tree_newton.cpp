@@ -454,7 +454,9 @@ std::vector<SolverMessage> TreeNewton::go_up() {
   state_.failed = message.failed;
   if (message.failed) return go_down(root_->stop(round_));
   if (!front_) return go_down(root_->decide_start(message.sums, round_));
-  return go_down(root_->decide(message.sums, round_, *front_, present_, factorised_));
+  const DownMessage decision = root_->decide(message.sums, round_, *front_, present_, factorised_);
+  state_.failed = decision.verdict.next == Next::kStop && !factorised_;
+  return go_down(decision);
 }
 
 void TreeNewton::accept() {

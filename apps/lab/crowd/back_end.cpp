@@ -61,6 +61,7 @@ std::vector<std::string> row_of(std::size_t robots, const AgentTeamRun& run) {
   const auto kind = [&](TeamMessageKind one) { return bytes_text(mean_received(run, one)); };
   return {std::to_string(robots),
           std::to_string(joined),
+          std::to_string(std::ranges::count(run.kept, false)),
           std::to_string(run.sessions),
           std::to_string(run.rounds),
           fixed(run.seconds, 0),
@@ -78,14 +79,15 @@ std::vector<std::string> row_of(std::size_t robots, const AgentTeamRun& run) {
 void run(BackEndCommand& command) {
   command.team.meter.cpu_s = thread_cpu_s;
   std::vector<std::vector<std::string>> table{
-      {"robots", "joined", "sessions", "rounds", "end [s]", "received", "statuses", "sessions'",
-       "poses", "solver", "most sent", "most received", "CPU [s]", "most CPU [s]"}};
+      {"robots", "joined", "lost", "sessions", "rounds", "end [s]", "received", "statuses",
+       "sessions'", "poses", "solver", "most sent", "most received", "CPU [s]", "most CPU [s]"}};
   for (const std::size_t robots : command.robots) {
     std::cerr << "team of " << robots << " robots ...\n";
     command.graph.robots = robots;
     table.push_back(row_of(robots, run_agent_team(crowd_graph(command.graph), command.team)));
   }
-  std::cout << "Of one robot, the mean unless said; content of messages, once per receiver\n"
+  std::cout << "Of one robot, the mean unless said; content of messages, once per receiver. Lost: "
+               "closures of the team, all true, that are rejected\n"
             << align_columns(table);
 }
 
