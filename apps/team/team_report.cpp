@@ -121,6 +121,24 @@ std::string closure_table(const TeamResult& team) {
   return align_columns(rows);
 }
 
+// The bytes that a server would receive, as the centralised system of the paper does. Empty if
+// the robots sent nothing.
+std::string centralised_remark(const TeamResult& team) {
+  constexpr double kKeypoints = 1000.0, kBytesOfKeypoint = 40.0;  // position and ORB descriptor
+  double keyframes = 0.0, sent = 0.0;
+  for (const RobotResult& robot : team.robots) {
+    const RunSummary summary = robot.summary.value_or(RunSummary{});
+    keyframes += static_cast<double>(summary.keyframes);
+    for (const auto& [category, bytes] : summary.traffic) sent += static_cast<double>(bytes);
+  }
+  const double centralised = keyframes * kKeypoints * kBytesOfKeypoint;
+  if (!(sent > 0.0 && centralised > 0.0)) return "";
+  return "A server that receives " + fixed(kKeypoints, 0) + " keypoints of " +
+         fixed(kBytesOfKeypoint, 0) + " bytes of each keyframe would receive " +
+         bytes_text(centralised) + ". The robots send\n" + fixed(100.0 * sent / centralised, 1) +
+         " % of that.\n";
+}
+
 std::string traffic_table(const TeamResult& team) {
   Rows rows = {{"sent", "place recognition", "geometric verification", "distributed PGO", "other"}};
   std::map<std::string, std::uint64_t> sums;
@@ -135,7 +153,7 @@ std::string traffic_table(const TeamResult& team) {
     add(robot.plan.name, summary.traffic);
   }
   add("team", sums);
-  return align_columns(rows);
+  return align_columns(rows) + centralised_remark(team);
 }
 
 std::string right_labels(const MeshReport& report, const MeshError& error) {

@@ -21,15 +21,15 @@ struct [[nodiscard]] LoneSolution {
 LoneSolution solve_alone(SessionGraph graph, TreeNewtonOptions options);
 
 /// The closures inside this robot, kept or rejected, if it weighs them alone, with nothing but its
-/// own edges. Empty if `options` trust closures, or if the own edges have no solution. Throws
-/// std::invalid_argument as TreeNewton does.
+/// own edges. Empty if `options` trust closures, if the own edges have no solution, or if the robot
+/// would reject more than 3 %. Throws std::invalid_argument as TreeNewton does.
 [[nodiscard]] std::map<ClosureId, bool> decide_alone(SessionGraph graph, TreeNewtonOptions options);
 
 /// `graph.start`, moved to the solution of the edges that this robot has before a session: its own
 /// ones, and closures that earlier sessions have kept to poses in `known`. New closures inside the
 /// robot are weighed. From a start that contradicts them, the first steps of a session would lead
 /// far away, while closures between robots are weighed. The start does not move if there are no
-/// closures inside this robot, or if there is no solution.
+/// closures inside this robot, if there is no solution, or if it rejects more than 3 % of them.
 [[nodiscard]] std::vector<SE3> relaxed_start(SessionGraph graph,
                                              const std::map<KeyframeId, SE3>& known,
                                              const TreeNewtonOptions& options);

@@ -130,7 +130,8 @@ struct TreeVerdict {
   bool full = false;      ///< Send full second derivatives from now on.
   bool deferred = false;  ///< kCount: defer closures that stand alone. kStart: they remain so.
   bool free = true;       ///< kStart: nothing holds the frame of the team.
-  /// kStart, kRefresh: also weigh the closures that robots have decided alone.
+  /// kStart, kRefresh: also weigh the closures that robots have decided alone. kRefresh: the start
+  /// poses are the accepted ones again.
   bool weigh_all = false;
   Weighing weighing = Weighing::kDecided;
   double scale = 1.0;

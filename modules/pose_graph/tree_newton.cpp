@@ -148,8 +148,8 @@ void TreeNewton::settle_alone() {
 
 void TreeNewton::unsettle() {
   for (Known& k : known_) {
-    if (k.settled && !front_) k.weight = k.candidate = 1.0;
     k.settled = false;
+    k.weight = k.candidate = 1.0;
   }
 }
 
@@ -239,10 +239,15 @@ void TreeNewton::build_front() {
   if (options_.share_private)
     for (KeyframeIndex k = 0; k < graph_.start.size(); ++k) front.open.insert(k);
   front_.emplace(std::move(front));
-  base_.clear();
-  for (std::size_t v = 0; v < front_->followed(); ++v) base_.push_back(start_of(front_->id(v)));
+  return_to_start();
   present_ = base_;
   refresh_ = true;
+}
+
+void TreeNewton::return_to_start() {
+  accepted_ = graph_.start;
+  base_.clear();
+  for (std::size_t v = 0; v < front_->followed(); ++v) base_.push_back(start_of(front_->id(v)));
 }
 
 std::vector<double> TreeNewton::front_weights(bool candidate) const {
@@ -523,6 +528,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       break;
     case Next::kRefresh:
       if (v.accept) accept();
+      if (v.weigh_all) return_to_start();
       present_ = base_;
       refresh_ = true;
       break;

@@ -105,6 +105,7 @@ class TreeNewton final : public MemberSolver {
   void settle_alone();
   void unsettle();
   void build_front();
+  void return_to_start();
   void share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by);
   [[nodiscard]] const SE3& pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const;
   [[nodiscard]] std::vector<double> front_weights(bool candidate) const;

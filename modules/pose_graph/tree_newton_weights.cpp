@@ -84,7 +84,8 @@ void TreeNewton::find_isolated(double barc) {
       Known& known = known_[open[k]];
       const bool fits =
           residual_of(known.edge, pose(known.edge.from), pose(known.edge.to)) <= verdict_.barc;
-      known.deferred = isolated[k] && known.trust == Trust::kOpen && !known.settled && !fits;
+      const bool kept_alone = known.settled && known.weight > 0.5;
+      known.deferred = isolated[k] && known.trust == Trust::kOpen && !kept_alone && !fits;
     }
   }
 }

@@ -219,7 +219,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   // closures are weighed again.
   const bool contradicts = alone_ && sums.rejected >= kLeastRejected &&
                            sums.rejected > kMostRejected * static_cast<double>(sums.open);
-  if (schedule_.decided() && contradicts) return weigh_all(sums);
+  if (schedule_.decided() && contradicts) return weigh_all();
   if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
     last_decrement_.reset();
   // If the weights were decided before this pass up, its equations are the final ones, unless pairs
@@ -252,11 +252,12 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
 }
 
 // Closures between robots cannot bend a robot as far if those inside it have their full weight from
-// the start. If some are rejected, this may be why, and all are weighed together.
-DownMessage TreeRoot::weigh_all(const TreeSums& sums) {
+// the start. If some are rejected, this may be why. All are then weighed together, from the start.
+DownMessage TreeRoot::weigh_all() {
   alone_ = false;
-  schedule_.start(sums.largest, sums.open, barc_, 0);
-  DownMessage message = refresh(true, Weighing::kWeigh);
+  schedule_.start(first_->largest, first_->open, barc_, 0);
+  rises_ = backtracks_ = 0;
+  DownMessage message = refresh(false, Weighing::kWeigh);
   message.verdict.weigh_all = true;
   return message;
 }

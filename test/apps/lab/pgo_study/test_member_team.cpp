@@ -398,10 +398,9 @@ TEST_CASE("Weighing true closures costs few bytes", "[pgo_study]") {
   CHECK(weighed < 1.5 * trusted);
 }
 
-// The robots have drifted, and few closures join them. Robots that decide the closures inside them
-// alone are too stiff at first, and four of the true closures between them are rejected.
-TEST_CASE("Closures inside robots are weighed with those between them if some contradict",
-          "[pgo_study]") {
+// The robots have drifted, and few closures join them. Robots that decide all closures inside them
+// alone are too stiff, and reject four of the true closures between them.
+TEST_CASE("Robots that have drifted keep the few closures between them", "[pgo_study]") {
   const auto file = shared_data("cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl");
   if (!file) return;
   const TeamGraph graph = labelled_team(read_jrl(*file), file->string()).graph;
