@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
-#include <random>
 
 #include "apps/command_line.hpp"
 #include "apps/output_file.hpp"
@@ -17,6 +16,7 @@
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/ply_file.hpp"
 #include "runtime/dds/dds_config.hpp"
+#include "runtime/dds/domain_draw.hpp"
 #include "runtime/unblocked_output.hpp"
 
 namespace {
@@ -71,7 +71,8 @@ void define(km::Command app, TeamOptions& options) {
       .check([](const std::string& text) {
         return km::is_rate(text) ? "" : text + " is neither a positive number nor max nor auto";
       });
-  app.add_option("--domain", options.domain, "DDS domain (default: the file's, or random)")
+  app.add_option("--domain", options.domain,
+                 "DDS domain (default: the file's, or one that no other team here has)")
       .within(0, 230);
   app.add_option("--output", options.output, "Results, one folder per robot (default: the file's)");
   app.add_option("--security", options.security,
@@ -113,9 +114,7 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   if (options.time_limit_s) plan.time_limit_s = options.time_limit_s;
   if (!plan.domain) {
     // Teams on one host must not meet. The lower half remains for domains chosen by people.
-    std::random_device device;
-    plan.domain = std::uniform_int_distribution<std::uint32_t>(km::kLastQuietDomain / 2 + 1,
-                                                               km::kLastQuietDomain)(device);
+    plan.domain = km::draw_domain(km::kLastQuietDomain / 2 + 1, km::kLastQuietDomain);
   }
   plan.record = options.record.has_value();
   plan.view = options.view;

@@ -11,8 +11,8 @@ namespace km {
 /// Poses that one robot computes alone.
 struct [[nodiscard]] LoneSolution {
   std::vector<SE3> poses;  ///< The last accepted ones; the start if no step was accepted.
-  bool converged =
-      false;  ///< False: the rounds did not suffice, or the equations have no solution.
+  double barc = 0.0;       ///< Largest residual of a closure that is kept [sigma].
+  bool converged = false;  ///< False: the rounds did not suffice, or there is no solution.
 };
 
 /// Solves `graph` by TreeNewton as a session of one member. `graph` has no closures to members. New
@@ -20,16 +20,11 @@ struct [[nodiscard]] LoneSolution {
 /// std::invalid_argument as TreeNewton does.
 LoneSolution solve_alone(SessionGraph graph, TreeNewtonOptions options);
 
-/// The closures inside this robot, kept or rejected, if it weighs them alone, with nothing but its
-/// own edges. Empty if `options` trust closures, if the own edges have no solution, or if the robot
-/// would reject more than 3 %. Throws std::invalid_argument as TreeNewton does.
-[[nodiscard]] std::map<ClosureId, bool> decide_alone(SessionGraph graph, TreeNewtonOptions options);
-
 /// `graph.start`, moved to the solution of the edges that this robot has before a session: its own
 /// ones, and closures that earlier sessions have kept to poses in `known`. New closures inside the
 /// robot are weighed. From a start that contradicts them, the first steps of a session would lead
 /// far away, while closures between robots are weighed. The start does not move if there are no
-/// closures inside this robot, if there is no solution, or if it rejects more than 3 % of them.
+/// closures inside this robot, if there is no solution, or if these do not mostly_fit() it.
 [[nodiscard]] std::vector<SE3> relaxed_start(SessionGraph graph,
                                              const std::map<KeyframeId, SE3>& known,
                                              const TreeNewtonOptions& options);

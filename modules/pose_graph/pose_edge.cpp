@@ -1,5 +1,6 @@
 #include "modules/pose_graph/pose_edge.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <tuple>
@@ -43,6 +44,14 @@ double residual_of(const PoseEdge& edge, const SE3& T_world_from, const SE3& T_w
   return std::sqrt(edge.precision.kappa * (T_world_to.linear() - predicted.linear()).squaredNorm() +
                    edge.precision.tau *
                        (T_world_to.translation() - predicted.translation()).squaredNorm());
+}
+
+bool mostly_fit(std::span<const PoseEdge> closures, const std::vector<SE3>& poses, double barc) {
+  constexpr double kMostMisfits = 0.03;
+  const auto misfits = std::ranges::count_if(closures, [&](const PoseEdge& e) {
+    return residual_of(e, poses[e.from.index], poses[e.to.index]) > barc;
+  });
+  return static_cast<double>(misfits) <= kMostMisfits * static_cast<double>(closures.size());
 }
 
 }  // namespace km

@@ -9,7 +9,6 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_cover.hpp"
 #include "modules/pose_graph/corroboration.hpp"
-#include "modules/pose_graph/lone_solution.hpp"
 
 namespace km {
 namespace {
@@ -128,21 +127,19 @@ bool TreeNewton::reports(const Known& k) const {
   return graph_.self <= std::min(k.edge.from.robot, k.edge.to.robot);
 }
 
-// Decides the closures inside this robot without the team, which costs no bytes. Their weights then
-// do not change from round to round, nor do the second derivatives that this robot sends.
-void TreeNewton::settle_alone() {
+// Decides the closures inside this robot by its start, see relaxed_start(). Their weights then do
+// not change from round to round, nor do the second derivatives that this robot sends.
+void TreeNewton::settle() {
   if (place_.members.size() < 2) return;
-  SessionGraph alone = graph_;
-  for (std::size_t k = 0; k < inside_; ++k) alone.own.push_back(known_[k].edge);
-  TreeNewtonOptions options = options_;
-  options.barc = verdict_.barc;
-  const std::map<ClosureId, bool> decided = decide_alone(std::move(alone), options);
+  std::vector<PoseEdge> open;
+  for (std::size_t k = graph_.odometry; k < inside_; ++k)
+    if (known_[k].trust == Trust::kOpen) open.push_back(known_[k].edge);
+  if (!mostly_fit(open, graph_.start, verdict_.barc)) return;
   for (std::size_t k = graph_.odometry; k < inside_; ++k) {
     Known& known = known_[k];
-    const auto decision = decided.find(known.edge.id());
-    if (decision == decided.end() || known.trust != Trust::kOpen) continue;
-    known.settled = true;
-    known.weight = known.candidate = decision->second ? 1.0 : 0.0;
+    known.settled = known.trust == Trust::kOpen;
+    const double r = residual_of(known.edge, start_of(known.edge.from), start_of(known.edge.to));
+    if (known.settled) known.weight = known.candidate = r <= verdict_.barc ? 1.0 : 0.0;
   }
 }
 
@@ -239,15 +236,11 @@ void TreeNewton::build_front() {
   if (options_.share_private)
     for (KeyframeIndex k = 0; k < graph_.start.size(); ++k) front.open.insert(k);
   front_.emplace(std::move(front));
-  return_to_start();
-  present_ = base_;
-  refresh_ = true;
-}
-
-void TreeNewton::return_to_start() {
   accepted_ = graph_.start;
   base_.clear();
   for (std::size_t v = 0; v < front_->followed(); ++v) base_.push_back(start_of(front_->id(v)));
+  present_ = base_;
+  refresh_ = true;
 }
 
 std::vector<double> TreeNewton::front_weights(bool candidate) const {
@@ -502,17 +495,17 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
     }
   };
   verdict_ = v;
-  if (v.weigh_all) unsettle();
   if (!front_) {
     weigh_by_noise();
     move_robots(v.moves);
   }
   switch (v.next) {
     case Next::kCount:
-      settle_alone();
+      settle();
       if (v.deferred) find_isolated(default_threshold(options_.dimension) * v.noise_scale);
       break;
     case Next::kStart:
+      if (v.weigh_all) unsettle();
       weigh_by_usual_noise();
       if (!v.deferred)
         for (Known& k : known_) k.deferred = false;
@@ -528,7 +521,6 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       break;
     case Next::kRefresh:
       if (v.accept) accept();
-      if (v.weigh_all) return_to_start();
       present_ = base_;
       refresh_ = true;
       break;

@@ -37,10 +37,10 @@ namespace km {
 /// again, except for the rejected ones. A closure to a held pose is left out if an earlier session
 /// has rejected it, and otherwise has weight 1.
 ///
-/// Each robot first decides the closures inside it alone (see decide_alone()), so that its second
-/// derivatives change with the weights of fewer edges. The team weighs such a closure only if the
-/// solution contradicts the decision. It weighs all closures together if they are mostly between
-/// robots, or if several closures between robots are rejected.
+/// If closures inside a robot mostly_fit() its start, the start decides them. The second
+/// derivatives of the robot then change with the weights of fewer edges. The team weighs such a
+/// closure only if the solution contradicts the decision, and all together if nine of ten are
+/// between robots.
 ///
 /// Exactly one of two robots weighs a closure between them and has it among its own edges. The
 /// system up the tree contains the pose at the other end. Between a parent and its child the parent
@@ -73,7 +73,7 @@ class TreeNewton final : public MemberSolver {
     PoseEdge edge;
     Trust trust = Trust::kFixed;
     bool deferred = false;  ///< Stands alone: deferred in this session.
-    /// Decided by this robot alone: open, but not weighed unless the solution contradicts it.
+    /// Decided by the start: open, but not weighed unless the solution contradicts it.
     bool settled = false;
     bool contradicted = false;  ///< The present poses contradict its decided weight.
     bool odometry = false;
@@ -102,10 +102,9 @@ class TreeNewton final : public MemberSolver {
   void weaken(std::span<const std::size_t> closures, double factor);
   void find_isolated(double barc);
   [[nodiscard]] std::map<RobotId, double> limits_of_pairs() const;
-  void settle_alone();
+  void settle();
   void unsettle();
   void build_front();
-  void return_to_start();
   void share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by);
   [[nodiscard]] const SE3& pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const;
   [[nodiscard]] std::vector<double> front_weights(bool candidate) const;

@@ -56,14 +56,13 @@ class TreeRoot {
   [[nodiscard]] DownMessage go_back();
   [[nodiscard]] DownMessage refresh(bool accept, TreeVerdict::Weighing weighing);
   [[nodiscard]] bool worth_refreshing(double decrement);
-  [[nodiscard]] DownMessage weigh_all();
 
   std::vector<RobotId> members_;
   TreeNewtonOptions options_;
   bool upright_;
   RobustSchedule schedule_;
   std::optional<TreeSums> first_;  // sums before any closure was deferred or decided
-  bool alone_ = false;             // robots have decided the closures inside them alone
+  bool alone_ = false;             // robots have decided the closures inside them
   bool may_defer_ = false;         // closures that stand alone are probably false
   std::uint32_t round_ = 0;
   double barc_ = 0.0;

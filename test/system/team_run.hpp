@@ -1,7 +1,5 @@
 #pragma once
 
-#include <fcntl.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
@@ -9,13 +7,13 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "apps/robot/run_summary.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "runtime/dds/dds_config.hpp"
+#include "runtime/dds/domain_draw.hpp"
 #include "test/support/command.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/split_graph.hpp"
@@ -26,16 +24,8 @@ namespace km {
 /// A DDS domain that no other test uses while this process runs: tests run side by side, and robots
 /// of two tests with one id are twins.
 inline int random_domain() {
-  constexpr int kLastDomain = kLastQuietDomain / 2;  // kimera_multi_team draws those above
-  std::random_device device;
-  for (;;) {
-    const int domain = std::uniform_int_distribution<int>(1, kLastDomain)(device);
-    const auto name = "km_test_domain_" + std::to_string(domain);
-    const auto file = std::filesystem::temp_directory_path() / name;
-    const int lock = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
-    if (lock < 0 || flock(lock, LOCK_EX | LOCK_NB) == 0) return domain;  // kept to the end
-    close(lock);
-  }
+  constexpr unsigned kLastDomain = kLastQuietDomain / 2;  // kimera_multi_team draws those above
+  return static_cast<int>(draw_domain(1, kLastDomain));
 }
 
 /// Lines of a file; 0 if there is none.

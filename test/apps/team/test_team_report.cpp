@@ -146,6 +146,16 @@ TEST_CASE("A robot without results is reported by its last words only", "[team]"
   CHECK(to_table(team) == "a, b failed, exit code 1; their last words:\n  no such key\n");
 }
 
+TEST_CASE(
+    "The bytes of robots are compared with a server that receives 1000 keypoints of a keyframe",
+    "[team]") {
+  TeamResult team = HalfTeam().collect();
+  team.robots[0].summary->keyframes = 1000;  // each has 40 kB, and the robot has sent 3 MB
+  CHECK_THAT(to_table(team), Contains("would receive 40.0 MB. The robots send\n7.5 % of that."));
+  team.robots[0].summary->keyframes = 0;
+  CHECK_THAT(to_table(team), !Contains("A server"));
+}
+
 TEST_CASE("A robot that skipped many frames is reported", "[team]") {
   TeamResult team = HalfTeam().collect();
   CHECK_THAT(to_table(team), !Contains("of its frames"));

@@ -1,0 +1,48 @@
+#include "runtime/dds/domain_draw.hpp"
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <numeric>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace km {
+namespace {
+
+// Takes the domain by an abstract socket address. Such an address belongs to one network namespace,
+// as the ports of a domain do. The kernel frees it with the last process that has the socket.
+bool take_domain(unsigned domain) {
+  const std::string name = "kimera_multi/domain/" + std::to_string(domain);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path + 1, name.data(), name.size());
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+  const int taken = socket(AF_UNIX, SOCK_DGRAM, 0);
+  if (taken < 0) return false;
+  if (bind(taken, reinterpret_cast<const sockaddr*>(&address), size) == 0) return true;
+  close(taken);
+  return false;
+}
+
+}  // namespace
+
+unsigned draw_domain(unsigned first, unsigned last) {
+  std::vector<unsigned> domains(last + 1 - first);
+  std::iota(domains.begin(), domains.end(), first);
+  std::shuffle(domains.begin(), domains.end(), std::random_device());
+  const auto drawn = std::find_if(domains.begin(), domains.end(), take_domain);
+  if (drawn == domains.end())
+    throw std::runtime_error("all DDS domains from " + std::to_string(first) + " to " +
+                             std::to_string(last) +
+                             " are taken by programs on this host: choose one with --domain");
+  return *drawn;
+}
+
+}  // namespace km

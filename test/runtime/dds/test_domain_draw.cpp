@@ -1,0 +1,57 @@
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <csignal>
+#include <set>
+
+#include "runtime/dds/domain_draw.hpp"
+
+namespace km {
+namespace {
+
+// Numbers that no other run of these tests draws at this time.
+unsigned own_number() {
+  return 1000 + static_cast<unsigned>(getpid()) * 16;
+}
+
+TEST_CASE("No domain is drawn twice, and a host without a free domain is reported",
+          "[domain_draw]") {
+  const unsigned first = own_number();
+  std::set<unsigned> drawn;
+  for (unsigned i = 0; i < 5; ++i) drawn.insert(draw_domain(first, first + 4));
+  CHECK(drawn.size() == 5);
+  CHECK(*drawn.begin() == first);
+  CHECK(*drawn.rbegin() == first + 4);
+  CHECK_THROWS_WITH(draw_domain(first, first + 4),
+                    Catch::Contains("are taken") && Catch::Contains("--domain"));
+}
+
+TEST_CASE("A domain stays taken until the children of the process that drew it have ended",
+          "[domain_draw]") {
+  const unsigned domain = own_number() + 8;
+  const pid_t team = fork();
+  if (team == 0) {
+    setpgid(0, 0);  // the group outlives the team, and is killed below
+    static_cast<void>(draw_domain(domain, domain));
+    if (fork() == 0) pause();
+    _exit(0);
+  }
+  int status = 0;
+  REQUIRE(waitpid(team, &status, 0) == team);
+  CHECK_THROWS(draw_domain(domain, domain));
+  REQUIRE(kill(-team, SIGKILL) == 0);
+  const auto drawn_again = [&] {
+    try {
+      return draw_domain(domain, domain) == domain;
+    } catch (const std::runtime_error&) {
+      return false;
+    }
+  };
+  int attempts = 0;
+  while (!drawn_again() && ++attempts < 10000) usleep(1000);
+  CHECK(attempts < 10000);
+}
+
+}  // namespace
+}  // namespace km
