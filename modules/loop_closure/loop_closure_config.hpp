@@ -19,6 +19,7 @@ struct LoopClosureConfig {
   int min_inliers = 15;
   double max_position_sigma_m = 0.12;
   double max_rotation_sigma_rad = 0.03;
+  double max_own_rotation_sigma_rad = 0.02;
   double systematic_rotation_rad = 0.003;
   double systematic_translation_m = 0.008;
   double request_timeout_s = 2.0;
@@ -58,6 +59,9 @@ struct LoopClosureConfig {
     visitor.field(
         "max_rotation_sigma_rad", max_rotation_sigma_rad, {1e-4, 3.0},
         "[rad] largest standard deviation of a closure's rotation, computed in the same way");
+    visitor.field("max_own_rotation_sigma_rad", max_own_rotation_sigma_rad, {1e-4, 3.0},
+                  "[rad] bound for a closure inside a robot, in place of max_rotation_sigma_rad if "
+                  "it is smaller: odometry and other closures join such keyframes, too");
     visitor.field("systematic_rotation_rad", systematic_rotation_rad, {0.0, 1.0},
                   "[rad per axis] error that does not average out over points (calibration, "
                   "shutter), added to every covariance");

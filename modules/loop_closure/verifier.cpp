@@ -98,8 +98,8 @@ const char* to_string(VerificationStatus status) {
       "matches do not agree on a pose",
       "matches leave the pose undetermined",
       "too few inliers",
-      "pose hangs on a few inliers: without them its sigma exceeds max_position_sigma_m or "
-      "max_rotation_sigma_rad"};
+      "pose hangs on a few inliers: without them its sigma exceeds max_position_sigma_m, "
+      "max_rotation_sigma_rad or, inside a robot, max_own_rotation_sigma_rad"};
   return kWords[static_cast<std::size_t>(status)];
 }
 

@@ -29,7 +29,7 @@ constexpr double kLongestStep = 1e30;
 // smaller, so that one robot cannot dominate the estimate.
 constexpr std::size_t kEnoughLengths = 300;
 constexpr std::size_t kShareOfLengths = 60;
-constexpr std::size_t kWorthIt = 2;
+constexpr double kWorthIt = 1.5;
 
 bool is_within_limits(const SE3& T) {
   return T.matrix().allFinite() && T.translation().norm() <= kMaxDistance_m;
@@ -43,7 +43,7 @@ std::vector<KeyframeId> ends_if_few(std::span<const ClosureId> closures, RobotId
   std::set<KeyframeId> ends;
   for (const ClosureId& closure : closures)
     ends.insert(closure.from.robot == child ? closure.from : closure.to);
-  if (ends.size() > kWorthIt * cover.size()) return cover;
+  if (static_cast<double>(ends.size()) > kWorthIt * static_cast<double>(cover.size())) return cover;
   return {ends.begin(), ends.end()};
 }
 

@@ -312,6 +312,9 @@ bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Key
     closure.covariance = work.measured->covariance;
   } else {
     numbers = verifier_.verify(from.features, to.features);
+    if (to.odometry.id.robot == self_ &&
+        numbers.rotation_sigma_rad > config_.max_own_rotation_sigma_rad)
+      numbers.status = VerificationStatus::kUncertainPose;
     if (numbers.status != VerificationStatus::kAccepted) {
       report(work, ClosureStage::kReceived, to_string(numbers.status), numbers);
       return false;

@@ -532,6 +532,27 @@ TEST_CASE("candidates inside one robot need no request, in whatever order things
   CHECK(robot.closures.size() == 1);  // the same pair from the other side
 }
 
+TEST_CASE("a closure inside a robot must be more certain than one between robots",
+          "[loop_closure_node]") {
+  LoopClosureConfig config;
+  config.max_own_rotation_sigma_rad = 1e-4;
+  const Scene inside = scene_of_one_robot();
+  Robot robot(kSelf, config);
+  robot.give(inside.own);
+  robot.give(inside.peer);
+  robot.give(inside.candidate());
+  CHECK(robot.closures.empty());
+  CHECK_THAT(robot.reports.back().reason, Catch::Contains("max_own_rotation_sigma_rad"));
+
+  const Scene between(8);
+  Robot one(kSelf, config), other(kPeer, config);
+  one.give(between.own);
+  other.give(between.peer);
+  one.give(between.candidate());
+  deliver(one, other);
+  CHECK(one.closures.size() == 1);
+}
+
 TEST_CASE("an old keyframe of the robot itself keeps a part of its keypoints",
           "[loop_closure_node]") {
   const Scene scene = scene_of_one_robot();
