@@ -115,7 +115,7 @@ void write(TreeWriter& w, const TreeSums& s) {
   for (const double x : {s.base_cost, s.cost, s.decrement}) w.f64(x);
   w.f32(s.largest);
   for (const std::uint32_t n :
-       {s.open, s.changed, s.fractional, s.kept, s.isolated, s.fixed, s.poses})
+       {s.open, s.changed, s.fractional, s.kept, s.rejected, s.isolated, s.fixed, s.poses})
     w.varint(n);
   w.varint(s.lengths.size());
   for (const auto& [bin, n] : s.lengths) {
@@ -142,7 +142,7 @@ TreeSums read_sums(TreeReader& r) {
   for (double* x : {&s.base_cost, &s.cost, &s.decrement}) *x = r.number();
   s.largest = r.small_number();
   for (std::uint32_t* n :
-       {&s.open, &s.changed, &s.fractional, &s.kept, &s.isolated, &s.fixed, &s.poses})
+       {&s.open, &s.changed, &s.fractional, &s.kept, &s.rejected, &s.isolated, &s.fixed, &s.poses})
     *n = r.varint_as<std::uint32_t>();
   for (std::size_t n = r.count(kMaxElements, 2); n > 0; --n) {
     const auto bin = r.varint_as<std::uint16_t>();
@@ -327,6 +327,7 @@ void TreeSums::add(const TreeSums& other) {
   changed += other.changed;
   fractional += other.fractional;
   kept += other.kept;
+  rejected += other.rejected;
   isolated += other.isolated;
   fixed += other.fixed;
   poses += other.poses;

@@ -83,6 +83,7 @@ struct TreeSums {
   std::uint32_t changed = 0;     ///< Open closures whose weight has changed.
   std::uint32_t fractional = 0;  ///< Open closures with a weight between 0 and 1.
   std::uint32_t kept = 0;        ///< Closures with a weight above one half.
+  std::uint32_t rejected = 0;    ///< Open closures between robots with a lower weight.
   std::uint32_t isolated = 0;    ///< Deferred closures, see Corroboration.
   std::uint32_t fixed = 0;       ///< Number of edges to held poses.
   std::uint32_t poses = 0;
@@ -125,11 +126,13 @@ struct TreeVerdict {
 
   std::uint32_t round = 0;  ///< Round to which this is the answer.
   Next next = Next::kStep;
-  bool accept = false;     ///< kRefresh: the new poses are accepted.
-  bool full = false;       ///< Send full second derivatives from now on.
-  bool deferred = false;   ///< kCount: defer closures that stand alone. kStart: they remain so.
-  bool free = true;        ///< kStart: nothing holds the frame of the team.
-  bool weigh_all = false;  ///< kStart: also weigh the closures that robots have decided.
+  bool accept = false;    ///< kRefresh: the new poses are accepted.
+  bool full = false;      ///< Send full second derivatives from now on.
+  bool deferred = false;  ///< kCount: defer closures that stand alone. kStart: they remain so.
+  bool free = true;       ///< kStart: nothing holds the frame of the team.
+  /// kStart, kRefresh: also weigh the closures that robots have decided. kRefresh: the start
+  /// poses are the accepted ones again.
+  bool weigh_all = false;
   Weighing weighing = Weighing::kDecided;
   double scale = 1.0;
   double mu = 0.0;           ///< For the next weights.

@@ -236,11 +236,15 @@ void TreeNewton::build_front() {
   if (options_.share_private)
     for (KeyframeIndex k = 0; k < graph_.start.size(); ++k) front.open.insert(k);
   front_.emplace(std::move(front));
+  return_to_start();
+  present_ = base_;
+  refresh_ = true;
+}
+
+void TreeNewton::return_to_start() {
   accepted_ = graph_.start;
   base_.clear();
   for (std::size_t v = 0; v < front_->followed(); ++v) base_.push_back(start_of(front_->id(v)));
-  present_ = base_;
-  refresh_ = true;
 }
 
 std::vector<double> TreeNewton::front_weights(bool candidate) const {
@@ -495,6 +499,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
     }
   };
   verdict_ = v;
+  if (v.weigh_all) unsettle();
   if (!front_) {
     weigh_by_noise();
     move_robots(v.moves);
@@ -505,7 +510,6 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       if (v.deferred) find_isolated(default_threshold(options_.dimension) * v.noise_scale);
       break;
     case Next::kStart:
-      if (v.weigh_all) unsettle();
       weigh_by_usual_noise();
       if (!v.deferred)
         for (Known& k : known_) k.deferred = false;
@@ -521,6 +525,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       break;
     case Next::kRefresh:
       if (v.accept) accept();
+      if (v.weigh_all) return_to_start();
       present_ = base_;
       refresh_ = true;
       break;

@@ -39,8 +39,8 @@ namespace km {
 ///
 /// If closures inside a robot mostly_fit() its start, the start decides them. The second
 /// derivatives of the robot then change with the weights of fewer edges. The team weighs such a
-/// closure only if the solution contradicts the decision, and all together if nine of ten are
-/// between robots.
+/// closure only if the solution contradicts the decision. It weighs all closures together if nine
+/// of ten are between robots, or if several closures between robots are rejected.
 ///
 /// Exactly one of two robots weighs a closure between them and has it among its own edges. The
 /// system up the tree contains the pose at the other end. Between a parent and its child the parent
@@ -105,6 +105,7 @@ class TreeNewton final : public MemberSolver {
   void settle();
   void unsettle();
   void build_front();
+  void return_to_start();
   void share_closures(std::map<KeyframeIndex, std::uint32_t>& touched_by);
   [[nodiscard]] const SE3& pose_at(const KeyframeId& id, const std::vector<SE3>& poses) const;
   [[nodiscard]] std::vector<double> front_weights(bool candidate) const;

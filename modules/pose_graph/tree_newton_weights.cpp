@@ -138,6 +138,7 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
     if ((decided ? weight : known.candidate) != known.weight) ++sums.changed;
     if (known.candidate != least && known.candidate != 1.0) ++sums.fractional;
     sums.kept += !known.odometry && known.candidate > 0.5 ? 1 : 0;
+    sums.rejected += k >= inside_ && known.candidate <= 0.5 ? 1 : 0;
   }
   limit_candidates(decided);
 }

@@ -38,6 +38,11 @@ constexpr double kClosuresPerPose = 0.25;
 // Share of closures inside robots below which these do not decide them alone, because the second
 // derivatives change with the weights of the others anyway.
 constexpr double kWorthDeciding = 0.1;
+// From this many rejected closures between robots on, and this share of the open ones, closures
+// inside robots are weighed as well.
+constexpr std::uint32_t kLeastRejected = 2;
+constexpr double kMostRejected = 0.03;
+
 constexpr std::size_t kEnoughPairs = 3;  // for the noise of the usual pair
 
 // True if pairs with closures in use connect all robots.
@@ -212,6 +217,9 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
   // Weights are decided before the poses have converged. If the converged poses contradict them,
   // closures are weighed again.
+  const bool contradicts = alone_ && sums.rejected >= kLeastRejected &&
+                           sums.rejected > kMostRejected * static_cast<double>(sums.open);
+  if (schedule_.decided() && contradicts) return weigh_all();
   if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
     last_decrement_.reset();
   // If the weights were decided before this pass up, its equations are the final ones, unless pairs
@@ -240,6 +248,17 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
     message.verdict.drift = drift_against(
         poses, front.substitute_back(root.kept).leftCols(static_cast<Index>(poses.size())),
         upright_);
+  return message;
+}
+
+// Closures between robots cannot bend a robot as far if those inside it have their full weight from
+// the start. If some are rejected, this may be why. All are then weighed together, from the start.
+DownMessage TreeRoot::weigh_all() {
+  alone_ = false;
+  schedule_.start(first_->largest, first_->open, barc_, 0);
+  rises_ = backtracks_ = 0;
+  DownMessage message = refresh(false, Weighing::kWeigh);
+  message.verdict.weigh_all = true;
   return message;
 }
 

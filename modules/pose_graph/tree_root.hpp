@@ -56,6 +56,7 @@ class TreeRoot {
   [[nodiscard]] DownMessage go_back();
   [[nodiscard]] DownMessage refresh(bool accept, TreeVerdict::Weighing weighing);
   [[nodiscard]] bool worth_refreshing(double decrement);
+  [[nodiscard]] DownMessage weigh_all();
 
   std::vector<RobotId> members_;
   TreeNewtonOptions options_;

@@ -26,6 +26,7 @@ TreeSums some_sums() {
                 .changed = 7,
                 .fractional = 1,
                 .kept = 5,
+                .rejected = 900,
                 .isolated = 2,
                 .fixed = 0,
                 .poses = 4'000'000'000U,
@@ -131,6 +132,7 @@ void check_same(const TreeSums& a, const TreeSums& b) {
   CHECK(a.changed == b.changed);
   CHECK(a.fractional == b.fractional);
   CHECK(a.kept == b.kept);
+  CHECK(a.rejected == b.rejected);
   CHECK(a.isolated == b.isolated);
   CHECK(a.fixed == b.fixed);
   CHECK(a.poses == b.poses);

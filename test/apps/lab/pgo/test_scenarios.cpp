@@ -404,9 +404,12 @@ TEST_CASE("Odometry that is 20 times as noisy as it claims costs no true closure
   if (!file) return;
   Scenario scenario = scenario_of("noisy-odometry");
   scenario.odometry_noise = {{1, 20.0}};
+  // With seed 10, robots whose closures inside are not weighed again lose 9 of 37 between robots.
+  const unsigned seed = GENERATE(2U, 10U);
+  CAPTURE(seed);
   const ScenarioStudy study = run_scenario_study(
       partition_contiguously(read_g2o(*file), 1, "sphere2500"),
-      {.scenario = scenario, .methods = {"robots", "reference"}, .seeds = {2U}}, {});
+      {.scenario = scenario, .methods = {"robots", "reference"}, .seeds = {seed}}, {});
   CHECK(study.results.at(0).true_lost == 0);
   CHECK(study.results.at(0).rms_m <= 1.1 * study.results.at(1).rms_m);
 }
