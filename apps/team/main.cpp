@@ -112,10 +112,9 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   if (!options.output.empty()) plan.output = options.output;
   if (options.domain) plan.domain = options.domain;
   if (options.time_limit_s) plan.time_limit_s = options.time_limit_s;
-  if (!plan.domain) {
-    // Teams on one host must not meet. The lower half remains for domains chosen by people.
+  // Teams on one host must not meet. The lower half remains for domains chosen by people.
+  if (!plan.domain && !options.report)
     plan.domain = km::draw_domain(km::kLastQuietDomain / 2 + 1, km::kLastQuietDomain);
-  }
   plan.record = options.record.has_value();
   plan.view = options.view;
   if (!options.security.empty()) plan.security = options.security;

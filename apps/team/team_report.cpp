@@ -121,22 +121,25 @@ std::string closure_table(const TeamResult& team) {
   return align_columns(rows);
 }
 
-// The bytes that the robots have sent, as a share of those that the server of the centralised
-// system of the paper would receive. Empty without keyframes.
-std::string centralised_remark(std::uint64_t sent, std::uint64_t keyframes) {
+// The bytes that the robots have sent, by category, as a share of those that the server of the
+// centralised system of the paper would receive. Empty without keyframes.
+std::string centralised_remark(const std::map<std::string, std::uint64_t>& traffic,
+                               std::uint64_t keyframes) {
   constexpr double kKeypoints = 1000.0, kBytesOfKeypoint = 40.0;  // position and ORB descriptor
   const double centralised = static_cast<double>(keyframes) * kKeypoints * kBytesOfKeypoint;
-  if (sent == 0 || keyframes == 0) return "";
+  double sent = 0.0;
+  for (const auto& [category, bytes] : traffic) sent += static_cast<double>(bytes);
+  if (sent == 0.0 || keyframes == 0) return "";
   return "A server that receives " + fixed(kKeypoints, 0) + " keypoints of " +
          fixed(kBytesOfKeypoint, 0) + " bytes of each keyframe would receive " +
-         bytes_text(centralised) + ". The robots send\n" +
-         fixed(100.0 * static_cast<double>(sent) / centralised, 1) + " % of that.\n";
+         bytes_text(centralised) + ". The robots send\n" + fixed(100.0 * sent / centralised, 1) +
+         " % of that.\n";
 }
 
 std::string traffic_table(const TeamResult& team) {
   Rows rows = {{"sent", "place recognition", "geometric verification", "distributed PGO", "other"}};
   std::map<std::string, std::uint64_t> sums;
-  std::uint64_t sent = 0, keyframes = 0;
+  std::uint64_t keyframes = 0;
   const auto add = [&](const std::string& name, std::map<std::string, std::uint64_t> bytes) {
     rows.push_back({name});
     for (const char* category : kTraffic)
@@ -145,14 +148,11 @@ std::string traffic_table(const TeamResult& team) {
   for (const RobotResult& robot : team.robots) {
     const RunSummary summary = robot.summary.value_or(RunSummary{});
     keyframes += summary.keyframes;
-    for (const auto& [category, bytes] : summary.traffic) {
-      sums[category] += bytes;
-      sent += bytes;
-    }
+    for (const auto& [category, bytes] : summary.traffic) sums[category] += bytes;
     add(robot.plan.name, summary.traffic);
   }
   add("team", sums);
-  return align_columns(rows) + centralised_remark(sent, keyframes);
+  return align_columns(rows) + centralised_remark(sums, keyframes);
 }
 
 std::string right_labels(const MeshReport& report, const MeshError& error) {

@@ -5,12 +5,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstddef>
 #include <cstring>
 #include <numeric>
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 namespace km {
@@ -25,7 +27,8 @@ bool take_domain(unsigned domain) {
   std::memcpy(address.sun_path + 1, name.data(), name.size());
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
   const int taken = socket(AF_UNIX, SOCK_DGRAM, 0);
-  if (taken < 0) return false;
+  if (taken < 0)
+    throw std::system_error(errno, std::generic_category(), "cannot take a DDS domain");
   if (bind(taken, reinterpret_cast<const sockaddr*>(&address), size) == 0) return true;
   close(taken);
   return false;
