@@ -188,10 +188,12 @@ void write_keyframe_poses(std::ostream& out, const RunRecord& record) {
   const std::vector<StampedPose> poses = record.optimized_keyframes();
   for (std::size_t k = 0; k < poses.size(); ++k) {
     write_pose(out, poses[k]);
-    const std::vector<Matrix6>& covariances = record.trajectory()->covariances;
-    if (k < covariances.size())
-      for (const double x : along_fixed_axes({poses[k].T, covariances[k]}).reshaped())
-        out << ' ' << rounded(x, 9);
+    const Trajectory& solved = *record.trajectory();
+    if (k < solved.covariances.size()) {
+      const UncertainPose pose =
+          with_scale_error({poses[k].T, solved.covariances[k]}, solved.scale_sigma);
+      for (const double x : along_fixed_axes(pose).reshaped()) out << ' ' << rounded(x, 9);
+    }
     out << '\n';
   }
 }

@@ -46,6 +46,13 @@ Matrix6 from_fixed_axes(const SE3& T_a_b, const Matrix6& fixed) {
   return to_pose * fixed * to_pose.transpose();
 }
 
+UncertainPose with_scale_error(UncertainPose T_a_b, double scale_sigma) {
+  const Eigen::Vector3d error =
+      scale_sigma * (T_a_b.T.linear().transpose() * T_a_b.T.translation());
+  T_a_b.Sigma.bottomRightCorner<3, 3>() += error * error.transpose();
+  return T_a_b;
+}
+
 bool is_covariance(const Matrix6& Sigma) {
   if (!Sigma.allFinite()) return false;
   const double scale = Sigma.cwiseAbs().maxCoeff();

@@ -35,6 +35,11 @@ struct UncertainPose {
 /// Inverse of along_fixed_axes(): covariance of the pose T_a_b.
 [[nodiscard]] Matrix6 from_fixed_axes(const SE3& T_a_b, const Matrix6& fixed);
 
+/// The pose T_a_b with the covariance of a wrong scale added: all distances from a are wrong by one
+/// factor, whose standard deviation is `scale_sigma`. So the position p errs by this share of p:
+/// scale_sigma^2 p p^T is added to its covariance.
+[[nodiscard]] UncertainPose with_scale_error(UncertainPose T_a_b, double scale_sigma);
+
 /// True if every element is finite, the matrix symmetric to 1e-6 of its largest element, and no
 /// eigenvalue below -1e-9 of the largest. For untrusted matrices.
 [[nodiscard]] bool is_covariance(const Matrix6& Sigma);

@@ -94,6 +94,9 @@ struct Trajectory {
   /// Covariances of T_world_kf relative to the first keyframe of the anchor, see covariance.hpp;
   /// empty while they are unknown.
   std::vector<Matrix6> covariances = {};
+  /// Standard deviation of the factor by which all distances in `world` may be wrong, not contained
+  /// in `covariances`: see with_scale_error().
+  double scale_sigma = 0.0;
   /// Last known public poses of other robots, T_world_kf.
   std::map<KeyframeId, SE3> public_poses = {};
 };

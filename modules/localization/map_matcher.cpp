@@ -31,7 +31,7 @@ MapMatcher::MapMatcher(const PlaceRecognitionConfig& places, const LoopClosureCo
 
 MapMatch MapMatcher::match(const Keyframe& keyframe) {
   BowVector words = vocabulary_->transform(keyframe.features.descriptors);
-  const CandidateSearch search = places_.search(words, previous_ ? &*previous_ : nullptr);
+  const CandidateSearch search = places_.search(words, score(words, previous_));
   previous_ = std::move(words);
   MapMatch result{.candidates = search.candidates.size()};
   for (const PlaceCandidate& candidate : search.candidates) {

@@ -57,7 +57,7 @@ class MapMatcher {
   std::shared_ptr<const Vocabulary> vocabulary_;
   PlaceDatabase places_;
   Verifier verifier_;
-  std::optional<BowVector> previous_;  // words of the keyframe before
+  BowVector previous_;  // words of the keyframe before; empty at first
 };
 
 }  // namespace km

@@ -25,46 +25,54 @@ PlaceDatabase::PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t w
     : config_(checked(config)), database_(words) {}
 
 std::size_t PlaceDatabase::add(BowVector vector, Stamp stamp, ImageDescriptor image) {
-  if (!stamps_.empty() && stamp < stamps_.back())
-    throw std::invalid_argument("PlaceDatabase::add: stamp " + std::to_string(stamp) +
-                                " is before " + std::to_string(stamps_.back()));
+  expect_order(stamp);
   const std::size_t index = database_.add(vector);
   images_.add(std::move(image));
   stamps_.push_back(stamp);
+  newest_ = stamp;
+  view_ = vector;
   last_ = std::move(vector);
   return index;
 }
 
-CandidateSearch PlaceDatabase::search(const BowVector& query, const BowVector* previous,
+void PlaceDatabase::pass(BowVector vector, Stamp stamp) {
+  expect_order(stamp);
+  newest_ = stamp;
+  last_ = std::move(vector);
+}
+
+void PlaceDatabase::expect_order(Stamp stamp) const {
+  if (!stamps_.empty() && stamp < newest_)
+    throw std::invalid_argument("PlaceDatabase: stamp " + std::to_string(stamp) + " is before " +
+                                std::to_string(newest_));
+}
+
+CandidateSearch PlaceDatabase::search(const BowVector& query, double normalizer,
                                       const ImageDescriptor& image) const {
-  return search_among(query, previous, image, stamps_.size());
+  return search_among(query, normalizer, image, stamps_.size());
 }
 
 CandidateSearch PlaceDatabase::search_own(const BowVector& query, Stamp stamp,
                                           const ImageDescriptor& image) const {
   const Stamp newest = stamp - nanoseconds(config_.min_gap_s);
   const auto end = std::upper_bound(stamps_.begin(), stamps_.end(), newest);
-  return search_among(query, stamps_.empty() ? nullptr : &last_, image,
+  return search_among(query, score(query, last_), image,
                       std::max(static_cast<std::size_t>(end - stamps_.begin()), known_from_));
 }
 
-CandidateSearch PlaceDatabase::search_among(const BowVector& query, const BowVector* previous,
+CandidateSearch PlaceDatabase::search_among(const BowVector& query, double normalizer,
                                             const ImageDescriptor& image, std::size_t count) const {
-  CandidateSearch result = search_words(query, previous, count);
+  CandidateSearch result = search_words(query, normalizer, count);
   for (const auto& [index, cosine] : images_.search(image, config_.image_similarity, count))
     choose({.index = index, .similarity = cosine, .by_image = true}, result.candidates);
   count_support(result.candidates);
   return result;
 }
 
-CandidateSearch PlaceDatabase::search_words(const BowVector& query, const BowVector* previous,
+CandidateSearch PlaceDatabase::search_words(const BowVector& query, double normalizer,
                                             std::size_t count) const {
   CandidateSearch result;
-  if (previous == nullptr) {
-    result.status = SearchStatus::kNoPrevious;
-    return result;
-  }
-  result.normalizer = score(query, *previous);
+  result.normalizer = normalizer;
   if (result.normalizer <= 0.0 || result.normalizer < config_.min_normalizer) {
     result.status = SearchStatus::kLowNormalizer;
     return result;

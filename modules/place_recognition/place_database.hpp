@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -22,14 +23,13 @@ struct PlaceCandidate {
 
 enum class SearchStatus {
   kSearched,
-  kNoPrevious,     ///< The query has no predecessor, and so no normaliser.
-  kLowNormalizer,  ///< The query is too dissimilar to its predecessor.
+  kLowNormalizer,  ///< The query has no predecessor, or is too dissimilar to it.
 };
 
 /// Result of one query.
 struct CandidateSearch {
   SearchStatus status = SearchStatus::kSearched;
-  double normalizer = 0.0;       ///< s(query, keyframe before it).
+  double normalizer = 0.0;       ///< s(query, keyframe before it); 0 if there is none.
   std::size_t compared = 0;      ///< Number of keyframes that share a word with the query.
   std::size_t above = 0;         ///< Number of these at or above the threshold.
   double best_similarity = 0.0;  ///< Best similarity of all compared keyframes.
@@ -37,7 +37,7 @@ struct CandidateSearch {
                                            ///< of the image, each by descending similarity.
 };
 
-/// The keyframes of one robot, in order of time, and the search for earlier visits of a place.
+/// The views of one robot, in order of time, and the search for earlier visits of a place.
 ///
 /// The score of two images depends on their amount of texture. The score is therefore divided by
 /// that of the query and the keyframe before it: eta = s(v_t, v_j) / s(v_t, v_(t-1)). One threshold
@@ -45,51 +45,72 @@ struct CandidateSearch {
 /// "Kimera-Multi", Sec. III-A). Deviation from the first paper: candidates need no temporal
 /// consistency, because geometric verification and outlier rejection follow.
 ///
+/// A keyframe is a view if it shows more than the view before it: s(v_t, v_view) is below
+/// new_view_score. Other robots need only the views of a robot, and search only these. The first
+/// kFirstViews views may be more similar (kFirstScore), because robots often start together and see
+/// common places only then.
+///
 /// If images have descriptors by a network, keyframes of similar descriptors become candidates too,
 /// as far as words leave room. They need no normaliser. Const members are thread-safe.
 class PlaceDatabase {
  public:
+  static constexpr std::size_t kFirstViews = 12;
+  static constexpr double kFirstScore = 0.3;
+
   /// For vectors of a vocabulary of `words` words. Throws ConfigError if `config` is out of bounds.
   PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words);
 
-  /// Candidates among all keyframes for the keyframe `query` of another robot. `previous`: the
-  /// other robot's keyframe before it, or null. `image`: the descriptor of the query's image, or an
-  /// empty one.
-  CandidateSearch search(const BowVector& query, const BowVector* previous,
+  /// Candidates among all keyframes for the keyframe `query` of another robot, with the normaliser
+  /// that this robot has sent. `image`: the descriptor of the query's image, or an empty one.
+  CandidateSearch search(const BowVector& query, double normalizer,
                          const ImageDescriptor& image = {}) const;
 
   /// Candidates for a keyframe of this robot taken at `stamp`, not yet added. The search covers the
   /// keyframes that are at least min_gap_s older or were added before mark_odometry_break(). The
-  /// keyframe added last normalises the score.
+  /// keyframe that was added or passed last normalises the score.
   CandidateSearch search_own(const BowVector& query, Stamp stamp,
                              const ImageDescriptor& image = {}) const;
 
   /// States that odometry hardly determines the pose of the next keyframe relative to the keyframe
-  /// added last. All keyframes added so far then count as other places, whatever their age.
-  void mark_odometry_break() { known_from_ = stamps_.size(); }
+  /// before it. All keyframes added so far then count as other places, whatever their age, and the
+  /// next keyframe is a view.
+  void mark_odometry_break() {
+    known_from_ = stamps_.size();
+    view_ = {};
+  }
+
+  /// Whether a keyframe of this robot, not yet added, is a view.
+  [[nodiscard]] bool is_view(const BowVector& keyframe) const {
+    const double most = size() < kFirstViews ? std::max(kFirstScore, config_.new_view_score)
+                                             : config_.new_view_score;
+    return view_.words.empty() || score(keyframe, view_) < most;
+  }
 
   /// Adds a keyframe and returns its index. Throws std::invalid_argument if `stamp` is before the
   /// last stamp, or if BowDatabase::add() does. The state is then unchanged.
   std::size_t add(BowVector vector, Stamp stamp, ImageDescriptor image = {});
 
-  /// Takes a keyframe that is not added: it only normalises the score of the next one.
-  void pass(BowVector vector) { last_ = std::move(vector); }
+  /// Takes a keyframe that is not added: it only normalises the score of the next one. Throws
+  /// std::invalid_argument if `stamp` is before the last stamp.
+  void pass(BowVector vector, Stamp stamp);
 
   std::size_t size() const { return stamps_.size(); }
 
  private:
-  CandidateSearch search_words(const BowVector& query, const BowVector* previous,
-                               std::size_t count) const;
-  CandidateSearch search_among(const BowVector& query, const BowVector* previous,
+  CandidateSearch search_words(const BowVector& query, double normalizer, std::size_t count) const;
+  CandidateSearch search_among(const BowVector& query, double normalizer,
                                const ImageDescriptor& image, std::size_t count) const;
+  void expect_order(Stamp stamp) const;
   void choose(const PlaceCandidate& found, std::vector<PlaceCandidate>& chosen) const;
 
   PlaceRecognitionConfig config_;
   BowDatabase database_;
   DescriptorDatabase images_;
   std::vector<Stamp> stamps_;  // ascending
+  Stamp newest_ = 0;           // stamp of the keyframe added or passed last
   std::size_t known_from_ = 0;
-  BowVector last_;
+  BowVector last_;  // the keyframe added or passed last
+  BowVector view_;  // the keyframe added last
 };
 
 /// Result of the place recognition node for one keyframe.

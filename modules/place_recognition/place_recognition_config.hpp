@@ -16,7 +16,7 @@ struct PlaceRecognitionConfig {
   int max_candidates = 5;
   double min_gap_s = 10.0;
   double candidate_separation_s = 0.0;
-  int max_waiting_keyframes = 10;
+  double new_view_score = 0.22;
   bool known_places = true;
   std::string network = {};
   double image_similarity = 0.35;
@@ -38,9 +38,10 @@ struct PlaceRecognitionConfig {
                   "[s] smallest time between two keyframes of one robot for a candidate");
     visitor.field("candidate_separation_s", candidate_separation_s, {0.0, 1e6},
                   "[s] smallest time between the candidates of a query; 0: no limit");
-    visitor.field("max_waiting_keyframes", max_waiting_keyframes, {0, 10000},
-                  "maximum number of keyframes of a peer that wait for their predecessor; beyond "
-                  "it the nearest earlier keyframe replaces the predecessor");
+    visitor.field("new_view_score", new_view_score, {0.0, 2.0},
+                  "the words of a keyframe are sent and searched if its score against the last "
+                  "keyframe so sent is below this; otherwise it shows nearly the view of that one; "
+                  "lower: fewer bytes and fewer closures between robots; 2: send all");
     visitor.field(
         "known_places", known_places,
         "neither send nor search the words of keyframes at places that earlier keyframes "

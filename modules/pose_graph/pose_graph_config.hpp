@@ -16,6 +16,7 @@ struct PoseGraphConfig {
   double barc = 0.0;
   bool share_private = false;
   bool covariances = true;
+  double scale_sigma = 0.003;
   int rank = 5;
   int max_rounds = 0;
   double exchange_budget_kb_s = 20.0;
@@ -43,6 +44,11 @@ struct PoseGraphConfig {
                   "robots can then derive parts of the trajectory of this robot");
     visitor.field("covariances", covariances,
                   "newton: compute the covariances of the optimised poses at the end of a session");
+    visitor.field(
+        "scale_sigma", scale_sigma, {0.0, 1.0},
+        "standard deviation of the scale of the map, which calibration limits: published "
+        "covariances contain this share of the distance from the origin of the frame; not "
+        "with fixes or a finished map, which determine the scale");
     visitor.field("rank", rank, {3, 10}, "rbcd: rank r of the relaxation; equal on all robots");
     visitor.field("max_rounds", max_rounds, {0, 1000000},
                   "rounds after which a session ends even if it has not converged; the paper stops "

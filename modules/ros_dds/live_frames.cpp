@@ -36,11 +36,13 @@ UncertainPose LiveFrames::T_map_body(const SE3& T_odom_body) const {
   UncertainPose T_kf_body;
   if (!T_odom_kf_.empty() && T_odom_kf_.back())
     T_kf_body.T = T_odom_kf_.back()->inverse() * T_odom_body;
-  return {T_map_odom_ * T_odom_body,
-          compose({SE3::Identity(), newest_covariance_}, T_kf_body).Sigma};
+  return with_scale_error(
+      {T_map_odom_ * T_odom_body, compose({SE3::Identity(), newest_covariance_}, T_kf_body).Sigma},
+      scale_sigma_);
 }
 
 void LiveFrames::add(const Trajectory& trajectory) {
+  scale_sigma_ = trajectory.scale_sigma;
   if (const auto solved = std::min(trajectory.covariances.size(), steps_.size()); solved > 0) {
     UncertainPose newest{SE3::Identity(), trajectory.covariances[solved - 1]};
     for (std::size_t k = solved; k < steps_.size(); ++k) newest = compose(newest, steps_[k]);

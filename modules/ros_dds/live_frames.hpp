@@ -24,7 +24,8 @@ class LiveFrames {
   [[nodiscard]] const SE3& T_map_odom() const { return T_map_odom_; }
 
   /// The pose of the body in `map`. Its covariance is that of the newest keyframe: the covariance
-  /// of the last optimised keyframe plus that of the steps of odometry after it.
+  /// of the last optimised keyframe plus that of the steps of odometry after it. The error of the
+  /// map's scale is added (Trajectory::scale_sigma).
   [[nodiscard]] UncertainPose T_map_body(const SE3& T_odom_body) const;
 
   /// Stamps of the keyframes by index; 0 for keyframes that have not been added.
@@ -39,6 +40,7 @@ class LiveFrames {
   std::vector<std::optional<SE3>> T_odom_kf_;    // poses from live odometry
   std::vector<UncertainPose> steps_;             // T_previous_kf of each keyframe
   Matrix6 newest_covariance_ = Matrix6::Zero();  // covariance of the newest keyframe
+  double scale_sigma_ = 0.0;
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();
   SE3 T_map_odom_ = SE3::Identity();
 };

@@ -181,6 +181,7 @@ std::vector<MessageReader> all_messages() {
       topic<KeyframeBow>({{.id = {kWriter.robot, 4}, .words = {{3, 1}, {900, 4}, {70000, 1}}},
                           {.id = {kWriter.robot, 5},
                            .words = {{3, 1}},
+                           .normalizer = 0.25,
                            .image = {12, std::vector<std::int8_t>(128, -3)}}}),
       topic<MeshChunk>({some_chunk()}),
       topic<MeshPoses>({{.robot = kWriter.robot,

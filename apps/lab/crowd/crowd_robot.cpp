@@ -42,31 +42,22 @@ void CrowdRobot::add_own(const BagOfWords& bag, KeyframeIndex index) {
 }
 
 void CrowdRobot::receive(const KeyframeId& keyframe, std::span<const std::uint8_t> packed,
-                         bool stores_bag) {
+                         double normalizer, bool stores_bag) {
   ++findings_.bags;
-  const std::vector<Found> found =
-      work_.run(meter_, [&] { return search(keyframe, packed, stores_bag); });
-  for (const auto& [query, result] : found)
-    for (const PlaceCandidate& candidate : result.candidates) judge(query, candidate);
+  const CandidateSearch result =
+      work_.run(meter_, [&] { return search(keyframe, packed, normalizer, stores_bag); });
+  for (const PlaceCandidate& candidate : result.candidates) judge(keyframe, candidate);
 }
 
-std::vector<CrowdRobot::Found> CrowdRobot::search(const KeyframeId& keyframe,
-                                                  std::span<const std::uint8_t> packed,
-                                                  bool stores_bag) {
+CandidateSearch CrowdRobot::search(const KeyframeId& keyframe, std::span<const std::uint8_t> packed,
+                                   double normalizer, bool stores_bag) {
   const BagOfWords bag = unpack(packed).value();
   if (stores_bag) stored_[keyframe] = {packed.begin(), packed.end()};
   std::vector<std::uint32_t> words;
   words.reserve(bag.size());
   for (const WordCount& entry : bag) words.push_back(entry.word);
   words_.put(keyframe, std::move(words));
-  const std::size_t patience = PlaceRecognitionConfig{}.max_waiting_keyframes;
-  PeerHistory& history = peers_.try_emplace(keyframe.robot, patience).first->second;
-  std::vector<Found> found;
-  for (const PeerQuery& query : history.add(keyframe.index, vocabulary_.weigh(bag)))
-    if (CandidateSearch result = own_.search(*query.vector, query.previous.get());
-        !result.candidates.empty())
-      found.push_back({{keyframe.robot, query.index}, std::move(result)});
-  return found;
+  return own_.search(vocabulary_.weigh(bag), normalizer);
 }
 
 void CrowdRobot::judge(const KeyframeId& query, const PlaceCandidate& candidate) {

@@ -13,7 +13,6 @@
 #include "apps/lab/crowd/virtual_network.hpp"
 #include "modules/loop_closure/peer_words.hpp"
 #include "modules/loop_closure/request_policy.hpp"
-#include "modules/place_recognition/peer_history.hpp"
 #include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 
@@ -42,9 +41,10 @@ class CrowdRobot {
 
   /// Adds the own keyframe `index`.
   void add_own(const BagOfWords& bag, KeyframeIndex index);
-  /// Takes the packed bag of a peer's keyframe, searches, and requests keyframes. `stores_bag`: the
-  /// bag is kept for robots out of reach, as the overlay does.
-  void receive(const KeyframeId& keyframe, std::span<const std::uint8_t> packed, bool stores_bag);
+  /// Takes the packed bag of a peer's keyframe and its normaliser, searches, and requests
+  /// keyframes. `stores_bag`: the bag is kept for robots out of reach, as the overlay does.
+  void receive(const KeyframeId& keyframe, std::span<const std::uint8_t> packed, double normalizer,
+               bool stores_bag);
 
   [[nodiscard]] const CrowdFindings& findings() const { return findings_; }
   [[nodiscard]] const CrowdWork& work() const { return work_; }
@@ -53,9 +53,8 @@ class CrowdRobot {
   [[nodiscard]] const CrowdTraffic& verification_received() const { return received_; }
 
  private:
-  using Found = std::pair<KeyframeId, CandidateSearch>;  // query and result
-  std::vector<Found> search(const KeyframeId& keyframe, std::span<const std::uint8_t> packed,
-                            bool stores_bag);
+  CandidateSearch search(const KeyframeId& keyframe, std::span<const std::uint8_t> packed,
+                         double normalizer, bool stores_bag);
   void judge(const KeyframeId& query, const PlaceCandidate& candidate);
   void request(const KeyframeId& query, bool is_true);
 
@@ -65,7 +64,6 @@ class CrowdRobot {
   const double verified_share_;
   const CrowdMeter& meter_;
   PlaceDatabase own_;
-  std::map<RobotId, PeerHistory> peers_;
   PeerWords words_;
   std::map<KeyframeId, std::vector<std::uint8_t>> stored_;
   RequestPolicy policy_;

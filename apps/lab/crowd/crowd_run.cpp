@@ -75,13 +75,9 @@ class OwnerTeam {
     for (const RobotId named : ask({robot, keyframe}, routed)) {
       ++named_;
       if (!member.names.add(named, keyframe)) continue;
-      if (const auto last = member.sent.find(named);
-          keyframe > 0 && (last == member.sent.end() || last->second + 1 != keyframe))
-        send_bag({robot, keyframe - 1}, member.previous_bag, named);
-      send_bag({robot, keyframe}, routed.bag, named);
-      member.sent[named] = keyframe;
+      send_bag({robot, keyframe}, routed, score(routed.image, member.previous), named);
     }
-    member.previous_bag = std::move(routed.bag);
+    member.previous = std::move(routed.image);
     ++keyframes_;
   }
 
@@ -110,12 +106,12 @@ class OwnerTeam {
   struct Member {
     SketchIndex index;
     RepeatedNames names;
-    Packed previous_bag = {};
-    std::map<RobotId, KeyframeIndex> sent = {};  // newest keyframe whose bag a robot has
+    BowVector previous = {};  // words of the keyframe before
     CrowdTraffic sent_traffic = {};
     CrowdTraffic received_traffic = {};
   };
   struct Routed {
+    BowVector image;
     Packed bag;
     Packed sketch;
     std::vector<RobotId> owners;
@@ -129,9 +125,10 @@ class OwnerTeam {
   }
 
   [[nodiscard]] Routed route(const BagOfWords& bag) const {
-    const BowVector image = vocabulary_.weigh(bag);
+    BowVector image = vocabulary_.weigh(bag);
     const BagOfWords sketch = sketch_of(bag, image, routing_.sketch);
-    return {pack(bag), pack(sketch), owners_of(image, routing_.owners, robots_)};
+    std::vector<RobotId> owners = owners_of(image, routing_.owners, robots_);
+    return {std::move(image), pack(bag), pack(sketch), std::move(owners)};
   }
 
   std::set<RobotId> ask(const KeyframeId& keyframe, const Routed& routed) {
@@ -150,9 +147,9 @@ class OwnerTeam {
     return named;
   }
 
-  void send_bag(const KeyframeId& keyframe, const Packed& bag, RobotId to) {
-    transfer(keyframe.robot, to, bag_bytes(bag.size()));
-    if (CrowdRobot* robot = observed(to)) robot->receive(keyframe, bag, false);
+  void send_bag(const KeyframeId& keyframe, const Routed& routed, double normalizer, RobotId to) {
+    transfer(keyframe.robot, to, bag_bytes(routed.bag.size()));
+    if (CrowdRobot* robot = observed(to)) robot->receive(keyframe, routed.bag, normalizer, false);
   }
 
   void transfer(RobotId from, RobotId to, std::size_t content) {
@@ -182,12 +179,17 @@ CrowdRun send_to_everyone(const CrowdWorld& world, const Vocabulary& vocabulary,
   const std::size_t others = world.robots() - 1;
   std::vector<CrowdRobot> observed = make_observed(world, vocabulary, observers, meter);
   CrowdTraffic all;
+  std::map<RobotId, BowVector> previous;
   play(world, disguise, [&](RobotId robot, KeyframeIndex keyframe, const BagOfWords& bag) {
     const std::vector<std::uint8_t> packed = pack(bag);
     all.add(bag_bytes(packed.size()));
+    BowVector image = vocabulary.weigh(bag);
+    const double normalizer = score(image, previous[robot]);
+    previous[robot] = std::move(image);
     for (std::size_t i = 0; i < observed.size(); ++i)
-      observers.robots[i] == robot ? observed[i].add_own(bag, keyframe)
-                                   : observed[i].receive({robot, keyframe}, packed, true);
+      observers.robots[i] == robot
+          ? observed[i].add_own(bag, keyframe)
+          : observed[i].receive({robot, keyframe}, packed, normalizer, true);
   });
   const std::size_t own_messages = all.messages / world.robots();
   run.broadcast = all.bytes / world.robots();

@@ -9,7 +9,7 @@ namespace km {
 
 /// Content of messages: XCDR2.
 [[nodiscard]] constexpr std::size_t bag_bytes(std::size_t packed) {
-  return 44 + packed;
+  return 48 + packed;
 }
 [[nodiscard]] constexpr std::size_t request_bytes() {
   return 24;

@@ -50,6 +50,8 @@ World make_world(const SimulationOptions& options) {
       return make_camp(options.seed);
     case WorldKind::kStore:
       return make_store(options.seed);
+    case WorldKind::kHall:
+      return make_hall(options.seed);
     case WorldKind::kViconRoom:
       break;
   }

@@ -15,12 +15,13 @@
 
 namespace km {
 
-enum class WorldKind { kCity, kCamp, kStore, kViconRoom };
+enum class WorldKind { kCity, kCamp, kStore, kViconRoom, kHall };
 enum class CameraKind { kStereo, kRgbd };
 inline constexpr Choice<WorldKind> kWorlds[] = {{"city", WorldKind::kCity},
                                                 {"camp", WorldKind::kCamp},
                                                 {"store", WorldKind::kStore},
-                                                {"vicon_room", WorldKind::kViconRoom}};
+                                                {"vicon_room", WorldKind::kViconRoom},
+                                                {"hall", WorldKind::kHall}};
 inline constexpr Choice<CameraKind> kCameras[] = {{"stereo", CameraKind::kStereo},
                                                   {"rgbd", CameraKind::kRgbd}};
 inline constexpr Choice<ImageFormat> kFormats[] = {{"jpg", ImageFormat::kJpeg},

@@ -8,6 +8,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMaxPackedBytes = 16 * kMaxBagWords;  // two 64-bit numbers per word
+constexpr float kMaxScore = 1.001F;                         // 1, and its rounding
 
 }  // namespace
 
@@ -23,6 +24,7 @@ Codec<KeyframeBow>::Encoded Codec<KeyframeBow>::encode(const KeyframeBow& messag
   wire.stamp = message.stamp;
   wire.vocabulary = message.vocabulary;
   borrow(wire.bag, encoded.bag);
+  wire.normalizer = static_cast<float>(message.normalizer);
   wire.network = message.image.network;
   encoded.image.assign(message.image.values.begin(), message.image.values.end());
   borrow(wire.image, encoded.image);
@@ -36,6 +38,8 @@ Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire, const TeamPeer
   if (!packed) return Decoded<KeyframeBow>::refuse("words are missing or too many");
   std::optional<BagOfWords> words = unpack(*packed);
   if (!words) return Decoded<KeyframeBow>::refuse("the words cannot be decoded");
+  if (!(wire.normalizer >= 0.0F && wire.normalizer <= kMaxScore))
+    return Decoded<KeyframeBow>::refuse("the normaliser is no score");
   const auto image = elements_of(wire.image, kMaxImageDescriptorBytes);
   if (!image) return Decoded<KeyframeBow>::refuse("the image's descriptor is missing or too long");
   if ((wire.network == 0) != image->empty())
@@ -44,6 +48,7 @@ Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire, const TeamPeer
                                        .stamp = wire.stamp,
                                        .vocabulary = wire.vocabulary,
                                        .words = *std::move(words),
+                                       .normalizer = double{wire.normalizer},
                                        .image = {wire.network, {image->begin(), image->end()}}});
 }
 

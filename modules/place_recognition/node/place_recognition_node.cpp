@@ -63,7 +63,7 @@ void PlaceRecognitionNode::step(const Closure& closure) {
 // released.
 void PlaceRecognitionNode::step(const Topic<PeerEvent>::Message& event) {
   if (event->kind != PeerEventKind::kRestarted) return;
-  peers_.erase(event->identity.robot);
+  searched_.erase(event->identity.robot);
   topics_.restarts.publish(event);
 }
 
@@ -78,8 +78,9 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   const PlaceNovelty novelty = novelty_of(keyframe.odometry, search);
   if (novelty != PlaceNovelty::kNew) keep_due(novelty, search.candidates);
   KeyframeBow bow{.id = id, .stamp = keyframe.stamp, .vocabulary = vocabulary_->id(), .words = {}};
-  if (novelty == PlaceNovelty::kNew) {
+  if (novelty == PlaceNovelty::kNew && own_.is_view(vector)) {
     bow.words = std::move(words);
+    bow.normalizer = search.normalizer;
     bow.image = keyframe.image;
     // Added before it is published, so that no pair is missed: see the class comment.
     own_.add(std::move(vector), keyframe.stamp, keyframe.image);
@@ -87,7 +88,7 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
     own_ids_.push_back(id);
     known_.add_view(keyframe.odometry, median_depth_m(keyframe.features).value_or(0.0));
   } else {
-    own_.pass(std::move(vector));
+    own_.pass(std::move(vector), keyframe.stamp);
   }
   topics_.own_bows.publish(std::move(bow));
   publish(id, std::move(search));
@@ -108,19 +109,16 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
         << "keyframe " << to_string(id) << " has words beyond the vocabulary: not used";
     return publish_refusal(id, PlaceQueryStatus::kUnknownWords);
   }
-  const auto patience = static_cast<std::size_t>(config_.max_waiting_keyframes);
-  PeerHistory& history = peers_.try_emplace(id.robot, patience).first->second;
-  if (history.has(id.index)) return publish_refusal(id, PlaceQueryStatus::kRepeated);
-  if (peer_bow.words.empty()) publish(id, {});
+  if (!searched_[id.robot].insert(id.index).second)
+    return publish_refusal(id, PlaceQueryStatus::kRepeated);
+  if (peer_bow.words.empty()) return publish(id, {});
   const std::uint64_t network = peer_bow.image.network;
   if (network != 0 && network_ != 0 && network != network_)
     log::limited(log::Level::kWarn, name(), "network of " + std::to_string(id.robot))
         << "robot " << id.robot << " describes images by another network ("
         << fingerprint_text(network) << ", here " << fingerprint_text(network_)
         << "): only words are compared; set one place_recognition.network";
-  for (const PeerQuery& query :
-       history.add(id.index, vocabulary_->weigh(peer_bow.words), peer_bow.image))
-    publish({id.robot, query.index}, own_.search(*query.vector, query.previous.get(), query.image));
+  publish(id, own_.search(vocabulary_->weigh(peer_bow.words), peer_bow.normalizer, peer_bow.image));
 }
 
 BagOfWords PlaceRecognitionNode::words_of(const KeyframeFeatures& features) const {

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -13,7 +14,6 @@
 #include "modules/core/pose_graph.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/known_places.hpp"
-#include "modules/place_recognition/peer_history.hpp"
 #include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/dds/peer_table.hpp"
@@ -31,7 +31,7 @@ struct PlaceRecognitionTopics {
                               ///< are used.
   In<PeerEvent> peer_events;  ///< Only kRestarted is used: the peer's indices begin again at 0.
   Out<KeyframeBow> own_bows;  ///< Words and image descriptor of every own keyframe, for the peers;
-                              ///< none if it shows a known place.
+                              ///< none if it is no view or shows a known place.
   Out<LoopCandidate> candidates;
   Out<PeerEvent> restarts;  ///< kRestarted, after the last candidate with a keyframe from before
                             ///< the restart.
@@ -49,9 +49,10 @@ struct PlaceRecognitionTopics {
 /// Receivers of candidates must therefore accept a pair from either side. Keyframe 0 of a robot has
 /// no normaliser, so it occurs only as the match of a candidate.
 ///
-/// An own keyframe that shows a known place (KnownPlaces) is published without words and not
-/// searched by peers: the earlier keyframe of the place stands for it. While a closure to
-/// that place is due, its two most similar candidates are published, and otherwise none.
+/// An own keyframe that is no view (PlaceDatabase), or shows a known place (KnownPlaces), is
+/// published without words and not searched by peers: an earlier keyframe stands for it. At a known
+/// place, while a closure to it is due, its two most similar candidates are published, and
+/// otherwise none.
 ///
 /// A keyframe index means one keyframe during an incarnation of its robot. After a restart the
 /// history of the robot begins again.
@@ -97,8 +98,8 @@ class PlaceRecognitionNode final : public Node {
   std::optional<UncertainPose> chain_;  // odometry of the newest own keyframe
   std::vector<KeyframeId> own_ids_;     // ids of the keyframes in own_, in the same order
   std::uint64_t network_ = 0;           // network of the newest own descriptor
-  std::map<RobotId, PeerHistory> peers_;
-  Worker<Input> worker_;  // last member: stops first
+  std::map<RobotId, std::set<KeyframeIndex>> searched_;  // keyframes of peers
+  Worker<Input> worker_;                                 // last member: stops first
 };
 
 }  // namespace km

@@ -46,6 +46,17 @@ TEST_CASE("Inverting twice gives the original pose and covariance", "[core]") {
   CHECK((again.T.matrix() - a.T.matrix()).norm() < 1e-12);
 }
 
+TEST_CASE("A wrong scale moves positions along their own direction", "[core]") {
+  std::mt19937 rng(11);
+  const UncertainPose a{random_pose(rng), random_covariance(rng, 0.1)};
+  const UncertainPose scaled = with_scale_error(a, 0.02);
+  CHECK(scaled.T.isApprox(a.T, 0.0));
+  const Eigen::Vector3d p = a.T.translation();
+  Matrix6 expected = along_fixed_axes(a);  // position first
+  expected.topLeftCorner<3, 3>() += 0.02 * 0.02 * p * p.transpose();
+  CHECK((along_fixed_axes(scaled) - expected).norm() < 1e-12);
+}
+
 TEST_CASE("Matrices that are no covariance are refused", "[core]") {
   CHECK(is_covariance(Matrix6::Identity()));
   CHECK(is_covariance(Matrix6::Zero()));

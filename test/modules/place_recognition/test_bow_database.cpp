@@ -178,10 +178,10 @@ TEST_CASE("The same view seen by two robots is found once", "[place_recognition]
   PlaceDatabase robot_0({}, kWords);
   const BowVector view = toy_vector({1, 2, 3, 4});
   robot_0.add(view, at_s(0));
-  const CandidateSearch first = robot_0.search(view, nullptr);  // robot 1, pose 0
-  CHECK(first.status == SearchStatus::kNoPrevious);
+  const CandidateSearch first = robot_0.search(view, 0.0);  // robot 1, pose 0
+  CHECK(first.status == SearchStatus::kLowNormalizer);
   CHECK(first.candidates.empty());
-  const CandidateSearch second = robot_0.search(view, &view);  // robot 1, pose 1
+  const CandidateSearch second = robot_0.search(view, score(view, view));  // robot 1, pose 1
   CHECK(second.normalizer == Approx(1.0));
   REQUIRE(second.candidates.size() == 1);
   CHECK(second.candidates[0].index == 0);
@@ -194,7 +194,7 @@ TEST_CASE("The threshold applies to the ratio of scores", "[place_recognition]")
   filter.add(toy_vector({1, 50, 51, 52, 53, 54, 55, 56}), at_s(1));  // score 0.125
   const BowVector query = toy_vector({1, 2, 3, 4, 5, 6, 7, 8});
   const BowVector previous = toy_vector({5, 6, 7, 8, 60, 61, 62, 63});  // score 0.5
-  const CandidateSearch search = filter.search(query, &previous);
+  const CandidateSearch search = filter.search(query, score(query, previous));
   CHECK(search.normalizer == Approx(0.5));
   REQUIRE(search.candidates.size() == 1);  // 0.25 / 0.5 reaches it, 0.125 / 0.5 does not
   CHECK(search.candidates[0].index == 0);
@@ -209,31 +209,30 @@ TEST_CASE("A query unlike the keyframe before it is not used", "[place_recogniti
   const BowVector query = toy_vector({1, 2, 3, 4});
   filter.add(query, at_s(0));
   const BowVector unlike = toy_vector({4, 5, 6, 7});  // score 0.25
-  const CandidateSearch search = filter.search(query, &unlike);
+  const CandidateSearch search = filter.search(query, score(query, unlike));
   CHECK(search.status == SearchStatus::kLowNormalizer);
   CHECK(search.normalizer == Approx(0.25));
   CHECK(search.candidates.empty());
   const BowVector like = toy_vector({3, 4, 5, 6});
-  CHECK(filter.search(query, &like).status == SearchStatus::kSearched);
+  CHECK(filter.search(query, score(query, like)).status == SearchStatus::kSearched);
 }
 
 TEST_CASE("A normaliser of zero is refused even where no minimum is set", "[place_recognition]") {
   PlaceDatabase filter({.min_normalizer = 0.0}, kWords);
   filter.add(toy_vector({1}), at_s(0));
-  const BowVector unlike = toy_vector({2});
-  CHECK(filter.search(toy_vector({1}), &unlike).status == SearchStatus::kLowNormalizer);
-  CHECK(filter.search({}, &unlike).status == SearchStatus::kLowNormalizer);
+  CHECK(filter.search(toy_vector({1}), 0.0).status == SearchStatus::kLowNormalizer);
+  CHECK(filter.search({}, 0.0).status == SearchStatus::kLowNormalizer);
 }
 
 TEST_CASE("Neighbours in time inside one robot are no candidates", "[place_recognition]") {
   PlaceDatabase filter({.max_candidates = 100, .min_gap_s = 10.0}, kWords);
   const BowVector view = toy_vector({1, 2, 3});
-  CHECK(filter.search_own(view, at_s(0)).status == SearchStatus::kNoPrevious);
+  CHECK(filter.search_own(view, at_s(0)).status == SearchStatus::kLowNormalizer);
   for (int i = 0; i <= 12; ++i) filter.add(view, at_s(i));
   CHECK(filter.search_own(view, at_s(9.5)).candidates.empty());
   CHECK(filter.search_own(view, at_s(10)).candidates.size() == 1);  // the gap itself counts
   CHECK(filter.search_own(view, at_s(13)).candidates.size() == 4);
-  CHECK(filter.search(view, &view).candidates.size() == 13);  // another robot: no such rule
+  CHECK(filter.search(view, 1.0).candidates.size() == 13);  // another robot: no such rule
   filter.mark_odometry_break();
   CHECK(filter.search_own(view, at_s(13)).candidates.size() == 13);
   filter.add(view, at_s(13));
@@ -250,7 +249,7 @@ TEST_CASE("The best candidates are kept, one per place", "[place_recognition]") 
   filter.add(part, at_s(2));
   filter.add(part, at_s(3));
   filter.add(part, at_s(50));
-  const CandidateSearch search = filter.search(view, &view);
+  const CandidateSearch search = filter.search(view, 1.0);
   CHECK(search.above == 5);
   std::vector<std::size_t> indices;
   for (const PlaceCandidate& candidate : search.candidates) indices.push_back(candidate.index);
@@ -266,9 +265,29 @@ TEST_CASE("Candidates support each other when they are neighbours", "[place_reco
   const BowVector other = toy_vector({7, 8});
   for (int i = 0; i < 12; ++i) filter.add(i == 1 || i == 7 || i == 10 ? view : other, at_s(i));
   std::map<std::size_t, int> support;
-  for (const PlaceCandidate& candidate : filter.search(view, &view).candidates)
+  for (const PlaceCandidate& candidate : filter.search(view, 1.0).candidates)
     support[candidate.index] = candidate.support;
   CHECK(support == std::map<std::size_t, int>{{1, 1}, {7, 2}, {10, 2}});
+}
+
+TEST_CASE("A keyframe is a view if it differs from the view before it, the first ones less",
+          "[place_recognition]") {
+  PlaceDatabase views({.new_view_score = 0.2}, kWords);
+  const BowVector view = toy_vector({1, 2, 3, 4});
+  const BowVector quarter = toy_vector({1, 5, 6, 7});  // score 0.25 with the view
+  CHECK(views.is_view(view));
+  for (std::size_t i = 0; i < PlaceDatabase::kFirstViews; ++i) {
+    if (i > 0) CHECK(views.is_view(quarter));
+    views.add(view, at_s(0));
+    CHECK_FALSE(views.is_view(toy_vector({1, 2, 5, 6})));  // score 0.5
+  }
+  CHECK_FALSE(views.is_view(quarter));
+  views.pass(quarter, at_s(1));
+  CHECK_THROWS_AS(views.pass(view, at_s(0.5)), std::invalid_argument);
+  CHECK_THROWS_AS(views.add(view, at_s(0.5)), std::invalid_argument);
+  CHECK(views.is_view(toy_vector({5, 6, 7, 8})));  // like the keyframe before, which is no view
+  views.mark_odometry_break();
+  CHECK(views.is_view(view));
 }
 
 TEST_CASE("The filter refuses invalid input and is unchanged", "[place_recognition]") {

@@ -64,8 +64,14 @@ Keyframe keyframe(KeyframeId id, std::initializer_list<std::uint32_t> words) {
   return result;
 }
 
-KeyframeBow bow(KeyframeId id, std::initializer_list<std::uint32_t> words) {
-  KeyframeBow message{.id = id, .stamp = 0, .vocabulary = toy_vocabulary(100).id(), .words = {}};
+// `normalizer`: score with the keyframe before it.
+KeyframeBow bow(KeyframeId id, std::initializer_list<std::uint32_t> words,
+                double normalizer = 1.0) {
+  KeyframeBow message{.id = id,
+                      .stamp = 0,
+                      .vocabulary = toy_vocabulary(100).id(),
+                      .words = {},
+                      .normalizer = normalizer};
   for (const std::uint32_t word : words) message.words.push_back({word, 1});
   return message;
 }
@@ -78,6 +84,32 @@ TEST_CASE("Every own keyframe is published as its words", "[place_recognition][n
   CHECK(sent.id == KeyframeId{kSelf, 0});
   CHECK(sent.vocabulary == toy_vocabulary(100).id());
   CHECK(sent.words == BagOfWords{{2, 1}, {5, 2}});
+  CHECK(sent.normalizer == 0.0);
+}
+
+TEST_CASE("Keyframes that differ from the one sent before are sent with words and a normaliser",
+          "[place_recognition][node]") {
+  Robot robot(kSelf, {.min_gap_s = 0.0, .new_view_score = 0.6});
+  constexpr auto kFirst = static_cast<std::uint32_t>(PlaceDatabase::kFirstViews);
+  for (std::uint32_t i = 0; i + 1 < kFirst; ++i) robot.node.step(keyframe({kSelf, i}, {i + 20}));
+  robot.node.step(keyframe({kSelf, kFirst - 1}, {1, 2, 3, 4}));
+  robot.node.step(keyframe({kSelf, kFirst}, {1, 2, 3, 5}));      // score 0.75 with the one before
+  robot.node.step(keyframe({kSelf, kFirst + 1}, {1, 2, 5, 6}));  // 0.5 with the last view
+  REQUIRE(robot.own_bows.received.size() == kFirst + 2);
+  CHECK(robot.own_bows.received[kFirst].words.empty());
+  CHECK(robot.own_bows.received[kFirst].normalizer == 0.0);
+  CHECK(robot.own_bows.received[kFirst + 1].words.size() == 4);
+  CHECK(robot.own_bows.received[kFirst + 1].normalizer == Approx(0.75));
+  // A peer finds the views, and the robot itself compares each keyframe with its views.
+  robot.node.step(bow({kPeer, 7}, {1, 2, 5, 6}));
+  std::vector<std::pair<KeyframeId, KeyframeIndex>> pairs;
+  for (const LoopCandidate& found : robot.candidates.received)
+    pairs.emplace_back(found.query, found.match.index);
+  CHECK(pairs ==
+        std::vector<std::pair<KeyframeId, KeyframeIndex>>{{{kSelf, kFirst}, kFirst - 1},
+                                                          {{kSelf, kFirst + 1}, kFirst - 1},
+                                                          {{kPeer, 7}, kFirst + 1},
+                                                          {{kPeer, 7}, kFirst - 1}});
 }
 
 TEST_CASE("The heaviest words of a keyframe are published and compared",
@@ -85,7 +117,6 @@ TEST_CASE("The heaviest words of a keyframe are published and compared",
   Robot robot(kSelf, {.max_words = 2, .min_gap_s = 0.0});
   robot.node.step(keyframe({kSelf, 0}, {5, 5, 2, 7, 7}));
   CHECK(robot.own_bows.received.at(0).words == BagOfWords{{5, 2}, {7, 2}});
-  robot.node.step(bow({kPeer, 0}, {5, 7}));
   robot.node.step(bow({kPeer, 1}, {5, 7}));
   REQUIRE(robot.candidates.received.size() == 1);
   CHECK(robot.candidates.received[0].similarity == Approx(1.0));
@@ -97,8 +128,8 @@ TEST_CASE("A peer's view of a known place is a candidate, through the thread",
   robot.node.start();
   robot.keyframes.publish(keyframe({kSelf, 0}, {1, 2, 3, 4}));
   robot.keyframes.publish(keyframe({kSelf, 1}, {11, 12, 13, 14}));
-  robot.peer_bows.publish(bow({kPeer, 0}, {1, 2, 3, 4}));
-  robot.peer_bows.publish(bow({kPeer, 1}, {1, 2, 3, 5}));
+  robot.peer_bows.publish(bow({kPeer, 0}, {1, 2, 3, 4}, 0.0));
+  robot.peer_bows.publish(bow({kPeer, 1}, {1, 2, 3, 5}, 0.75));
   robot.node.stop();
   CHECK(robot.node.error() == nullptr);
   REQUIRE(robot.candidates.received.size() == 1);  // keyframe 0 of the peer has no normaliser
@@ -114,16 +145,16 @@ TEST_CASE("The keyframes of a restarted peer are searched again and those of a r
   Robot robot(kSelf);
   robot.node.step(keyframe({kSelf, 0}, {1, 2, 3, 4}));
   robot.node.step(keyframe({kSelf, 1}, {11, 12, 13, 14}));
-  robot.node.step(bow({kPeer, 0}, {1, 2, 3, 4}));
-  robot.node.step(bow({kPeer, 1}, {1, 2, 3, 5}));
+  robot.node.step(bow({kPeer, 0}, {1, 2, 3, 4}, 0.0));
+  robot.node.step(bow({kPeer, 1}, {1, 2, 3, 5}, 0.75));
   REQUIRE(robot.candidates.received.size() == 1);
   PeerEvent event{kind, {}, {}};
   event.identity.robot = kPeer;
   robot.node.step(std::make_shared<const PeerEvent>(event));
   const bool restarted = kind == PeerEventKind::kRestarted;
   CHECK(robot.restarts.received.size() == (restarted ? 1 : 0));  // before the outputs below
-  robot.node.step(bow({kPeer, 0}, {11, 12, 13, 14}));
-  robot.node.step(bow({kPeer, 1}, {11, 12, 13, 15}));
+  robot.node.step(bow({kPeer, 0}, {11, 12, 13, 14}, 0.0));
+  robot.node.step(bow({kPeer, 1}, {11, 12, 13, 15}, 0.75));
   REQUIRE(robot.candidates.received.size() == (restarted ? 2 : 1));
   if (restarted) CHECK(robot.candidates.received[1].match == KeyframeId{kSelf, 1});
 }
@@ -143,7 +174,7 @@ TEST_CASE("A return to a place after the gap is a candidate inside one robot",
 TEST_CASE("A keyframe at a known place has no words for the peers and is no match",
           "[place_recognition][node]") {
   const bool known_places = GENERATE(true, false);
-  Robot robot(kSelf, {.min_gap_s = 0.0, .known_places = known_places});
+  Robot robot(kSelf, {.min_gap_s = 0.0, .new_view_score = 2.0, .known_places = known_places});
   const auto view = [](std::uint32_t index) {
     Keyframe result = keyframe({kSelf, index}, {1, 2, 3, 4});
     result.features.keypoints.assign(4, {.inverse_depth = 0.25F});
@@ -166,14 +197,13 @@ TEST_CASE("A keyframe at a known place has no words for the peers and is no matc
   REQUIRE(robot.own_bows.received.size() == 4);
   CHECK(robot.own_bows.received[3].words.empty() == known_places);
   robot.candidates.received.clear();
-  robot.node.step(bow({kPeer, 0}, {1, 2, 3, 4}));
   robot.node.step(bow({kPeer, 1}, {1, 2, 3, 4}));
   CHECK(robot.candidates.received.size() == (known_places ? 3 : 4));
 }
 
 TEST_CASE("A keyframe at a known place has two candidates if a closure is due, and otherwise none",
           "[place_recognition][node]") {
-  Robot robot(kSelf, {.min_gap_s = 0.0});
+  Robot robot(kSelf, {.min_gap_s = 0.0, .new_view_score = 2.0});
   const auto view = [](std::uint32_t index) {
     Keyframe result = keyframe({kSelf, index}, {1, 2, 3, 4});
     result.features.keypoints.assign(4, {.inverse_depth = 0.25F});
@@ -193,7 +223,7 @@ TEST_CASE("A keyframe at a known place has two candidates if a closure is due, a
 
 TEST_CASE("Keyframes before a loss of odometry are candidates at once",
           "[place_recognition][node]") {
-  Robot robot(kSelf, {.min_gap_s = 10.0});
+  Robot robot(kSelf, {.min_gap_s = 10.0, .new_view_score = 2.0});
   for (std::uint32_t i = 0; i < 3; ++i) robot.node.step(keyframe({kSelf, i}, {1, 2, 3, 4}));
   CHECK(robot.candidates.received.empty());
   Keyframe after = keyframe({kSelf, 3}, {1, 2, 3, 4});
@@ -209,12 +239,12 @@ TEST_CASE("Keyframes before a loss of odometry are candidates at once",
 TEST_CASE("A history that arrives backwards gives the candidates of one in order",
           "[place_recognition][node]") {
   const auto candidates_of = [](bool backwards) {
-    Robot robot(kSelf, {.similarity_threshold = 0.2, .max_waiting_keyframes = 100});
+    Robot robot(kSelf, {.similarity_threshold = 0.2, .new_view_score = 2.0});
     for (std::uint32_t i = 0; i < 20; ++i)
       robot.node.step(keyframe({kSelf, i}, {i, i + 1, i + 2, i + 3}));
     for (std::uint32_t k = 0; k < 30; ++k) {
       const std::uint32_t i = backwards ? 29 - k : k;
-      robot.node.step(bow({kPeer, i}, {i, i + 1, i + 2, i + 3}));
+      robot.node.step(bow({kPeer, i}, {i, i + 1, i + 2, i + 3}, 0.75));
     }
     std::map<std::pair<KeyframeId, KeyframeId>, double> found;
     for (const LoopCandidate& c : robot.candidates.received)
@@ -244,7 +274,7 @@ TEST_CASE("Keyframes that cannot be compared are reported and change nothing",
   other.vocabulary = toy_vocabulary(100, 2.0F).id();
   CHECK(status_after(other) == PlaceQueryStatus::kOtherVocabulary);
   CHECK(status_after(bow({kPeer, 0}, {1, 100})) == PlaceQueryStatus::kUnknownWords);
-  CHECK(status_after(bow({kPeer, 0}, {1, 2, 3, 4})) == PlaceQueryStatus::kSearched);
+  CHECK(status_after(bow({kPeer, 0}, {1, 2, 3, 4}, 0.0)) == PlaceQueryStatus::kSearched);
   CHECK(status_after(bow({kPeer, 0}, {1, 2, 3, 4})) == PlaceQueryStatus::kRepeated);
   CHECK(status_after(bow({kPeer, 1}, {})) == PlaceQueryStatus::kSearched);
   CHECK(robot.candidates.received.empty());
@@ -270,12 +300,9 @@ TEST_CASE("The image's descriptor finds places that words do not, and none of an
     robot.node.step(own);
     CHECK(robot.own_bows.received[i].image == own.image);
   }
-  robot.node.step(bow({kPeer, 0}, {80, 81}));
-  KeyframeBow query = bow({kPeer, 2}, {31, 32});  // waits for its predecessor
+  KeyframeBow query = bow({kPeer, 2}, {31, 32});
   query.image = seen(1, network);
   robot.node.step(query);
-  CHECK(robot.candidates.received.empty());
-  robot.node.step(bow({kPeer, 1}, {31, 32, 90}));
   std::vector<KeyframeIndex> found;
   for (const LoopCandidate& candidate : robot.candidates.received)
     if (candidate.query == query.id) found.push_back(candidate.match.index);
@@ -289,7 +316,7 @@ TEST_CASE("Keyframe 0 of a peer, which words cannot compare, is found by its ima
   Keyframe own = keyframe({kSelf, 0}, {1, 2});
   own.image = seen(3);
   robot.node.step(own);
-  KeyframeBow query = bow({kPeer, 0}, {5, 6});
+  KeyframeBow query = bow({kPeer, 0}, {5, 6}, 0.0);
   query.image = seen(3);
   robot.node.step(query);
   REQUIRE(robot.candidates.received.size() == 1);
@@ -304,7 +331,7 @@ TEST_CASE("No pair of keyframes of two robots is missed in any order of delivery
   CAPTURE(seed);
   std::mt19937 rng(seed);
   constexpr std::uint32_t kKeyframes = 12;
-  const PlaceRecognitionConfig config{.max_candidates = 1000, .max_waiting_keyframes = 100};
+  const PlaceRecognitionConfig config{.max_candidates = 1000, .new_view_score = 2.0};
   Robot a(1, config);
   Robot b(2, config);
   // Each action: a new keyframe of one robot, or one delivery, links being ordered.
@@ -438,6 +465,7 @@ TEST_CASE("A keyframe's words survive the wire", "[place_recognition]") {
                             .stamp = 1403636584763555584,
                             .vocabulary = 0xFEDCBA9876543210ULL,
                             .words = {{3, 1}, {900, 4}},
+                            .normalizer = 0.25,
                             .image = {.network = 12, .values = {-128, -1, 0, 1, 127}}};
   auto encoded = encoded_by(700, message);
   const auto moved = std::move(encoded);  // the wire type points into its owner
@@ -447,7 +475,18 @@ TEST_CASE("A keyframe's words survive the wire", "[place_recognition]") {
   CHECK(result.value->stamp == message.stamp);
   CHECK(result.value->vocabulary == message.vocabulary);
   CHECK(result.value->words == message.words);
+  CHECK(result.value->normalizer == message.normalizer);
   CHECK(result.value->image == message.image);
+}
+
+TEST_CASE("A normaliser that is no score is refused with the reason", "[place_recognition]") {
+  using Message = Arrived<KeyframeBow>;
+  const auto make = [] { return encoded_by<KeyframeBow>(7, {.id = {7, 1}, .words = {{3, 1}}}); };
+  constexpr const char* kReason = "the normaliser is no score";
+  check_refusals<KeyframeBow>(
+      make, {{"negative", kReason, [](Message& m) { m.wire.normalizer = -0.1F; }},
+             {"above one", kReason, [](Message& m) { m.wire.normalizer = 1.1F; }},
+             {"not a number", kReason, [](Message& m) { m.wire.normalizer = NAN; }}});
 }
 
 TEST_CASE("A hostile descriptor of an image is refused with the reason", "[place_recognition]") {

@@ -182,11 +182,13 @@ TEST_CASE("closures bring a robot without fixes into the absolute frame", "[pose
   close(without, with);
   REQUIRE(each_settles_again(network));
   CHECK(without.state().trajectory->anchor == 2);
+  CHECK(without.state().trajectory->scale_sigma == PoseGraphConfig{}.scale_sigma);
   with.fix_all();
   REQUIRE(each_settles_again(network));
   for (const Run* const run : {&without, &with}) {
     REQUIRE(run->state().trajectory);
     CHECK(run->state().trajectory->anchor == 5);
+    CHECK(run->state().trajectory->scale_sigma == 0.0);
     // The poses of the other robot are up to 100 m from the fixes, with 10 mrad of heading.
     CHECK(run->error_m() < kLargest_m + (run == &without ? 1.0 : 0.0));
   }

@@ -67,6 +67,18 @@ TEST_CASE("The pose in the map has the covariance of the trajectory and of the s
   CHECK(frames.T_map_body(T_odom_body).Sigma.isApprox(compose(solved, step).Sigma, 1e-12));
 }
 
+TEST_CASE("The pose in the map has the error of the map's scale", "[ros_dds]") {
+  LiveFrames frames;
+  frames.add(state_at(0));
+  frames.add(keyframe_at(0, 0));
+  Trajectory trajectory{3, 3, {make_pose(Eigen::Matrix3d::Identity(), {300.0, 400.0, 0.0})}};
+  trajectory.covariances = {Matrix6::Zero()};
+  trajectory.scale_sigma = 0.01;
+  frames.add(trajectory);
+  const UncertainPose pose = frames.T_map_body(state_at(0).T_odom_body);
+  CHECK(along_fixed_axes(pose).topLeftCorner<3, 3>().trace() == Approx(5.0 * 5.0));
+}
+
 TEST_CASE("Keyframes of an earlier incarnation do not correct odometry", "[ros_dds]") {
   LiveFrames frames;
   frames.add(state_at(0));

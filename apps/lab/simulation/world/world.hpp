@@ -119,4 +119,8 @@ struct World {
 /// frame: the recorded flights of V1 and V2 stay clear of everything in it.
 [[nodiscard]] World make_vicon_room(std::uint64_t seed);
 
+/// The Vicon room four times as large, 32 x 32 x 16 m, with textures of the size that they have
+/// there. The recorded flights MH_02 to MH_05 of EuRoC stay clear of everything in it.
+[[nodiscard]] World make_hall(std::uint64_t seed);
+
 }  // namespace km

@@ -244,6 +244,27 @@ std::vector<Vector3f> flight(const std::filesystem::path& file, std::size_t keep
   return positions;
 }
 
+void append(std::vector<Vector3f>& positions, const std::vector<Vector3f>& more) {
+  positions.insert(positions.end(), more.begin(), more.end());
+}
+
+/// Smallest distance of the positions to the surface, if it is at most 1 m.
+float clearance_m(const World& world, const std::vector<Vector3f>& positions) {
+  AlignedBox3f reach;
+  for (const Vector3f& p : positions) reach.extend(p);
+  reach = AlignedBox3f(reach.min() - Vector3f::Ones(), reach.max() + Vector3f::Ones());
+  float nearest = 1.0F;
+  for (std::size_t i = 0; i < world.mesh.triangles.size(); ++i) {
+    const Corners t = corners_of(world.mesh, i);
+    const AlignedBox3f box = bounds(t);
+    if (!box.intersects(reach)) continue;
+    for (const Vector3f& p : positions)
+      if (box.squaredExteriorDistance(p) < nearest * nearest)
+        nearest = std::min(nearest, distance(p, t));
+  }
+  return nearest;
+}
+
 }  // namespace
 
 TEST_CASE(
@@ -296,38 +317,47 @@ TEST_CASE(
 }
 
 TEST_CASE("The recorded flights stay clear of everything in the Vicon room", "[simulation][room]") {
-  constexpr float kClear_m = 0.25F;
+  const auto euroc = shared_data("euroc");
+  if (!euroc) return;
+  // 20 to 200 rows a second at up to 2.5 m/s: no flight gets 3 cm nearer between two samples.
+  std::vector<Vector3f> positions =
+      flight(*euroc / "V1_01_easy/mav0/state_groundtruth_estimate0/data.csv", 1);
+  for (const std::string name :
+       {"V1_02_medium", "V1_03_difficult", "V2_01_easy", "V2_02_medium", "V2_03_difficult"})
+    append(positions, flight(*euroc / ("groundtruth_only/" + name + ".csv.gz"), 4));
+  REQUIRE(positions.size() > 20000);
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    CAPTURE(seed);
+    CHECK(clearance_m(make_vicon_room(seed), positions) >= 0.25F);
+  }
+}
+
+TEST_CASE("The recorded flights of the machine hall stay clear of everything in the hall",
+          "[simulation][room]") {
   const auto euroc = shared_data("euroc");
   if (!euroc) return;
   std::vector<Vector3f> positions;
-  // 20 to 200 rows a second at up to 2.5 m/s: no flight gets 3 cm nearer between two samples.
-  const auto add = [&](const std::string& file, std::size_t keep_every) {
-    const std::vector<Vector3f> more = flight(*euroc / file, keep_every);
-    positions.insert(positions.end(), more.begin(), more.end());
-  };
-  add("V1_01_easy/mav0/state_groundtruth_estimate0/data.csv", 1);
   for (const std::string name :
-       {"V1_02_medium", "V1_03_difficult", "V2_01_easy", "V2_02_medium", "V2_03_difficult"})
-    add("groundtruth_only/" + name + ".csv.gz", 4);
+       {"MH_02_easy.tum.txt", "MH_03_medium.tum.txt", "MH_04_difficult.csv", "MH_05_difficult.csv"})
+    append(positions, flight(*euroc / ("groundtruth_only/" + name + ".gz"), 4));
   REQUIRE(positions.size() > 20000);
-  AlignedBox3f reach;
-  for (const Vector3f& p : positions) reach.extend(p);
-  reach = AlignedBox3f(reach.min() - Vector3f::Constant(kClear_m),
-                       reach.max() + Vector3f::Constant(kClear_m));
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     CAPTURE(seed);
-    const World world = make_vicon_room(seed);
-    float nearest = std::numeric_limits<float>::infinity();
-    for (std::size_t i = 0; i < world.mesh.triangles.size(); ++i) {
-      const Corners t = corners_of(world.mesh, i);
-      const AlignedBox3f box = bounds(t);
-      if (!box.intersects(reach)) continue;
-      for (const Vector3f& p : positions)
-        if (box.squaredExteriorDistance(p) < nearest * nearest)
-          nearest = std::min(nearest, distance(p, t));
-    }
-    CHECK(nearest >= kClear_m);
+    CHECK(clearance_m(make_hall(seed), positions) >= 0.5F);
   }
+}
+
+TEST_CASE("The hall is the Vicon room four times as large, closed, and as bright",
+          "[simulation][room]") {
+  const World room = make_vicon_room(1);
+  const World hall = make_hall(1);
+  check_sound(hall);
+  CHECK(hall.mesh.triangles == room.mesh.triangles);
+  const Vector3f a = room.mesh.vertices[0] - room.mesh.vertices[5];
+  CHECK((hall.mesh.vertices[0] - hall.mesh.vertices[5]).isApprox(4.0F * a, 1e-5F));
+  CHECK(hall.flight_volume.volume() == Approx(64.0 * room.flight_volume.volume()).epsilon(1e-5));
+  REQUIRE(hall.lighting.lamps.size() == room.lighting.lamps.size());
+  CHECK(hall.lighting.lamps[0].intensity == Approx(16.0F * room.lighting.lamps[0].intensity));
 }
 
 TEST_CASE("The palette of the built-in worlds names every class in a colour of its own",
