@@ -35,6 +35,13 @@ std::size_t PlaceDatabase::add(BowVector vector, Stamp stamp, ImageDescriptor im
   return index;
 }
 
+bool PlaceDatabase::is_view(const BowVector& keyframe) const {
+  if (keyframe.words.empty()) return false;
+  const double most =
+      size() < kFirstViews ? std::max(kFirstScore, config_.new_view_score) : config_.new_view_score;
+  return view_.words.empty() || score(keyframe, view_) < most;
+}
+
 void PlaceDatabase::pass(BowVector vector, Stamp stamp) {
   expect_order(stamp);
   newest_ = stamp;
@@ -42,7 +49,7 @@ void PlaceDatabase::pass(BowVector vector, Stamp stamp) {
 }
 
 void PlaceDatabase::expect_order(Stamp stamp) const {
-  if (!stamps_.empty() && stamp < newest_)
+  if (stamp < newest_)
     throw std::invalid_argument("PlaceDatabase: stamp " + std::to_string(stamp) + " is before " +
                                 std::to_string(newest_));
 }

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "modules/core/ids.hpp"
@@ -79,12 +79,8 @@ class PlaceDatabase {
     view_ = {};
   }
 
-  /// Whether a keyframe of this robot, not yet added, is a view.
-  [[nodiscard]] bool is_view(const BowVector& keyframe) const {
-    const double most = size() < kFirstViews ? std::max(kFirstScore, config_.new_view_score)
-                                             : config_.new_view_score;
-    return view_.words.empty() || score(keyframe, view_) < most;
-  }
+  /// Whether a keyframe of this robot, not yet added, is a view. One without words is none.
+  [[nodiscard]] bool is_view(const BowVector& keyframe) const;
 
   /// Adds a keyframe and returns its index. Throws std::invalid_argument if `stamp` is before the
   /// last stamp, or if BowDatabase::add() does. The state is then unchanged.
@@ -106,8 +102,8 @@ class PlaceDatabase {
   PlaceRecognitionConfig config_;
   BowDatabase database_;
   DescriptorDatabase images_;
-  std::vector<Stamp> stamps_;  // ascending
-  Stamp newest_ = 0;           // stamp of the keyframe added or passed last
+  std::vector<Stamp> stamps_;                         // ascending
+  Stamp newest_ = std::numeric_limits<Stamp>::min();  // stamp of the keyframe added or passed last
   std::size_t known_from_ = 0;
   BowVector last_;  // the keyframe added or passed last
   BowVector view_;  // the keyframe added last

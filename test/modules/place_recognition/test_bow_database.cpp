@@ -276,6 +276,7 @@ TEST_CASE("A keyframe is a view if it differs from the view before it, the first
   const BowVector view = toy_vector({1, 2, 3, 4});
   const BowVector quarter = toy_vector({1, 5, 6, 7});  // score 0.25 with the view
   CHECK(views.is_view(view));
+  CHECK_FALSE(views.is_view({}));
   for (std::size_t i = 0; i < PlaceDatabase::kFirstViews; ++i) {
     if (i > 0) CHECK(views.is_view(quarter));
     views.add(view, at_s(0));

@@ -6,12 +6,11 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr float kScale = 4.0F;
-const Vector3f kRoomCorner(-4.6F, -3.5F, 0.0F);
-// The recorded flights begin on machines, some meters above the floor.
-const Vector3f kHallCorner(-8.0F, -11.5F, -5.0F);
+// The recorded flights begin on machines, some meters above the floor, and far from the middle.
+const Vector3f kOffset(10.4F, 2.5F, -5.0F);
 
 Vector3f in_hall(const Vector3f& in_room) {
-  return kHallCorner + kScale * (in_room - kRoomCorner);
+  return kScale * in_room + kOffset;
 }
 
 }  // namespace
