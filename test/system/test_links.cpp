@@ -184,7 +184,7 @@ TEST_CASE("A robot that some robots do not receive joins", "[system][namespaces]
 TEST_CASE("Robots with a budget come to one frame and send no more than that", "[system]") {
   const SplitGraph graph = random_team(22, {0, 1}, 40, {{0, 1}});
   const TemporaryFolder folder;
-  constexpr double kRate = 6000.0;
+  constexpr double kRate = 3000.0;
   const TeamRun run = run_team(write_team(graph, folder), folder.path(), folder, {},
                                "--set budget.bytes_per_s=" + std::to_string(kRate));
   CAPTURE(run.result.output);
