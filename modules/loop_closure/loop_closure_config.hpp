@@ -26,7 +26,7 @@ struct LoopClosureConfig {
   int max_outstanding_requests = 8;
   int max_closure_separation = 16;
   int max_request_separation = 2;
-  double skips_per_failure = 2.0;
+  double min_closure_probability = 0.5;
   int min_word_points = 7;
   double min_word_share = 0.07;
   int reply_keypoints = 200;
@@ -82,9 +82,10 @@ struct LoopClosureConfig {
         "[keyframes] a peer's keyframe is not requested if both keyframes of the candidate "
         "are this near to those of another requested candidate; the distance grows in the "
         "same way; 0: request all but the pairs that the peer compares");
-    visitor.field("skips_per_failure", skips_per_failure, {0.0, 100.0},
-                  "after n failures of similar candidates beyond the first few, this value times n "
-                  "such candidates are skipped before one is requested; 0: none");
+    visitor.field("min_closure_probability", min_closure_probability, {0.0, 1.0},
+                  "a peer's keyframe is requested if the candidate leads to a closure with this "
+                  "probability, which is learned from the results of others; less probable ones "
+                  "are requested in proportion to their probability; 0: request all");
     visitor.field("min_word_points", min_word_points, {0, 1000},
                   "a peer's keyframe is requested as a whole only if so many keypoints agree with "
                   "an own one by their words and positions, 6 B each, which are requested first; "

@@ -1,6 +1,7 @@
 #include "modules/loop_closure/request_policy.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 
 namespace km {
@@ -8,8 +9,8 @@ namespace {
 
 using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
 
-// A few wrong candidates must not prevent the first closure of two robots.
-constexpr int kToleratedFailures = 4;
+// Two robots that have this number of keyframes with closures have mostly joined their maps.
+constexpr int kJoined = 3;
 
 // Bound of what a misbehaving peer can make this robot store, 5 MB.
 constexpr std::size_t kMaxRequests = 100'000;
@@ -40,25 +41,27 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   if (any_near(peer.requests, query, own, static_cast<KeyframeIndex>(beside)))
     return Decision::kNearRequest;
 
-  const auto group_index =
-      std::min<std::size_t>(static_cast<std::size_t>(candidate.support), peer.groups.size() - 1);
-  SupportGroup& group = peer.groups[group_index];
-  if (peer.last_skipped != query) ++group.skipped;  // once per query
-  const int failures = std::max(0, group.failures - kToleratedFailures);
-  if (group.skipped <= config_.skips_per_failure * failures) {
-    peer.last_skipped = query;
-    return Decision::kLowYield;
+  const double probability = peer.odds.probability(candidate);
+  if (probability < config_.min_closure_probability) {
+    // A query counts once, with its most probable candidate.
+    if (peer.last_query != query) peer.last_share = 0.0;
+    peer.last_query = query;
+    const double share = std::max(peer.last_share, probability / config_.min_closure_probability);
+    peer.credit += share - peer.last_share;
+    peer.last_share = share;
+    if (peer.credit < 1.0) return Decision::kImprobable;
+    peer.credit -= 1.0;
   }
-  group.skipped = 0;
   peer.requests.emplace(query, own);
-  peer.group_of[query] = group_index;
+  peer.requested.emplace(query, candidate);
   return Decision::kRequest;
 }
 
 void RequestPolicy::add_closure(const ClosureId& closure) {
   Peer& peer = peers_[closure.to.robot];
   const auto next = peer.closures.lower_bound({closure.to.index, 0});
-  if (next == peer.closures.end() || next->first != closure.to.index) ++peer.successes;
+  if (next == peer.closures.end() || next->first != closure.to.index)
+    if (++peer.successes == kJoined) peer.credit = std::min(peer.credit, 1.0);
   peer.closures.emplace(closure.to.index, closure.from.index);
 }
 
@@ -69,10 +72,10 @@ void RequestPolicy::add_peer_request(RobotId peer, KeyframeIndex peers, Keyframe
 
 void RequestPolicy::add_result(const KeyframeId& keyframe, bool verified) {
   Peer& peer = peers_[keyframe.robot];
-  const auto group = peer.group_of.find(keyframe.index);
-  if (group == peer.group_of.end()) return;
-  if (!verified) ++peer.groups[group->second].failures;
-  peer.group_of.erase(group);
+  const auto candidate = peer.requested.find(keyframe.index);
+  if (candidate == peer.requested.end()) return;
+  peer.odds.add(candidate->second, verified);
+  peer.requested.erase(candidate);
 }
 
 const char* to_string(RequestPolicy::Decision decision) {

@@ -1,12 +1,11 @@
 #pragma once
 
-#include <array>
 #include <map>
-#include <optional>
 #include <set>
 #include <utility>
 
 #include "modules/core/pose_graph.hpp"
+#include "modules/loop_closure/closure_odds.hpp"
 #include "modules/loop_closure/loop_closure_config.hpp"
 
 namespace km {
@@ -23,10 +22,12 @@ namespace km {
 /// max_request_separation in place of max_closure_separation. Before the first closure with a peer,
 /// neither rule skips a candidate, except a pair that the peer itself compares.
 ///
-/// In an environment with similar places most candidates are wrong. Right candidates come in
-/// groups, because the views around the match resemble the query too. Candidates are grouped by
-/// peer and by their support. After n + 4 failures in a group, n times skips_per_failure queries
-/// are skipped before the next request, so a group that never succeeds costs less and less.
+/// In an environment with similar places most candidates are wrong. A candidate is requested if
+/// the probability p that it leads to a closure (ClosureOdds, one for each peer) is at least
+/// min_closure_probability. Among queries with less probable candidates, a share of
+/// p / min_closure_probability is requested. So the share falls where candidates fail, and the
+/// robot still learns from them. Until three keyframes of a peer have led to closures, ten further
+/// improbable queries are requested, because robots with few places in common need each of them.
 ///
 /// Deterministic, no randomness. Not thread-safe.
 class RequestPolicy {
@@ -35,7 +36,7 @@ class RequestPolicy {
     kRequest,
     kNearClosure,  ///< Near a verified closure.
     kNearRequest,  ///< Near a requested candidate.
-    kLowYield,     ///< Too many candidates of the group have failed.
+    kImprobable,   ///< Similar candidates have mostly failed.
   };
 
   explicit RequestPolicy(const LoopClosureConfig& config);
@@ -59,22 +60,21 @@ class RequestPolicy {
   void add_result(const KeyframeId& keyframe, bool verified);
 
  private:
-  /// Candidates of one peer with about equal support.
-  struct SupportGroup {
-    int failures = 0;
-    int skipped = 0;  ///< Queries since a candidate of this group was requested.
-  };
+  // Ten requests of 1.1 kB are few beside a map that is never joined.
+  static constexpr double kFirstRequests = 10.0;
+
   struct Peer {
     std::set<std::pair<KeyframeIndex, KeyframeIndex>> closures;  ///< Pairs (keyframe of the peer,
                                                                  ///< own keyframe).
     std::set<std::pair<KeyframeIndex, KeyframeIndex>>
-        requests;                        ///< Such pairs that were requested.
-    int successes = 0;                   ///< Number of different peer keyframes in `closures`.
-    std::array<SupportGroup, 6> groups;  ///< Indexed by support; supports of 5 and more
-                                         ///< share a group.
-    std::map<KeyframeIndex, std::size_t> group_of;  ///< Index into `groups` of requested keyframes.
-    std::optional<KeyframeIndex> last_skipped;      ///< Query of the last candidate with decision
-                                                    ///< kLowYield.
+        requests;       ///< Such pairs that were requested.
+    int successes = 0;  ///< Number of different peer keyframes in `closures`.
+    ClosureOdds odds;
+    double credit = kFirstRequests;  ///< kFirstRequests and the sum of p / min_closure_probability
+                                     ///< of the improbable queries, less the requests among them.
+    KeyframeIndex last_query = 0;    ///< The query that `credit` counts last,
+    double last_share = 0.0;         ///< and what it has added.
+    std::map<KeyframeIndex, LoopCandidate> requested;  ///< By query; without a result so far.
   };
 
   LoopClosureConfig config_;

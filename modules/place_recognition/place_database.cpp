@@ -37,9 +37,7 @@ std::size_t PlaceDatabase::add(BowVector vector, Stamp stamp, ImageDescriptor im
 
 bool PlaceDatabase::is_view(const BowVector& keyframe) const {
   if (keyframe.words.empty()) return false;
-  const double most =
-      size() < kFirstViews ? std::max(kFirstScore, config_.new_view_score) : config_.new_view_score;
-  return view_.words.empty() || score(keyframe, view_) < most;
+  return view_.words.empty() || score(keyframe, view_) < config_.new_view_score;
 }
 
 void PlaceDatabase::pass(BowVector vector, Stamp stamp) {

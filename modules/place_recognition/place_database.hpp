@@ -46,17 +46,12 @@ struct CandidateSearch {
 /// consistency, because geometric verification and outlier rejection follow.
 ///
 /// A keyframe is a view if it shows more than the view before it: s(v_t, v_view) is below
-/// new_view_score. Other robots need only the views of a robot, and search only these. The first
-/// kFirstViews views may be more similar (kFirstScore), because robots often start together and see
-/// common places only then.
+/// new_view_score. Other robots need only the views of a robot, and search only these.
 ///
 /// If images have descriptors by a network, keyframes of similar descriptors become candidates too,
 /// as far as words leave room. They need no normaliser. Const members are thread-safe.
 class PlaceDatabase {
  public:
-  static constexpr std::size_t kFirstViews = 12;
-  static constexpr double kFirstScore = 0.3;
-
   /// For vectors of a vocabulary of `words` words. Throws ConfigError if `config` is out of bounds.
   PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words);
 

@@ -16,7 +16,7 @@ struct PlaceRecognitionConfig {
   int max_candidates = 5;
   double min_gap_s = 10.0;
   double candidate_separation_s = 0.0;
-  double new_view_score = 0.25;
+  double new_view_score = 0.24;
   bool known_places = true;
   std::string network = {};
   double image_similarity = 0.35;

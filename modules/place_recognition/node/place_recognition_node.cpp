@@ -141,7 +141,8 @@ void PlaceRecognitionNode::publish(const KeyframeId& query, CandidateSearch sear
     topics_.candidates.publish(LoopCandidate{.query = query,
                                              .match = own_ids_[found.index],
                                              .similarity = found.similarity,
-                                             .support = found.support});
+                                             .support = found.support,
+                                             .by_image = found.by_image});
   topics_.queries.publish(PlaceQuery{query, PlaceQueryStatus::kSearched, std::move(search)});
 }
 

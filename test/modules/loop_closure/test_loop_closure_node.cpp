@@ -98,7 +98,7 @@ struct Scene {
     peer.odometry = {{kPeer, 5}, random_pose(rng), random_covariance(rng, 0.1)};
     peer.features = pair.to;
   }
-  LoopCandidate candidate() const { return {peer.odometry.id, own.odometry.id, 0.75}; }
+  LoopCandidate candidate() const { return {peer.odometry.id, own.odometry.id, 1.5}; }
 
   SE3 T_own_peer;
   Keyframe own, peer;
@@ -137,7 +137,7 @@ TEST_CASE("a candidate becomes a closure by one request and one reply", "[loop_c
   REQUIRE(robot.closures.size() == 1);
   const Closure& closure = robot.closures[0];
   CHECK(closure.id() == ClosureId{scene.own.odometry.id, scene.peer.odometry.id});
-  CHECK(closure.similarity == 0.75);
+  CHECK(closure.similarity == 1.5);
   CHECK(closure.inliers > 100);
   CHECK(closure.to.T_odom_kf.isApprox(scene.peer.odometry.T_odom_kf));
   CHECK(closure.from.covariance == scene.own.odometry.covariance);
@@ -159,7 +159,7 @@ TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once"
   Keyframe second = scene.own;  // another own keyframe against the same one of the peer
   second.odometry.id.index = 1;
   robot.give(second);
-  robot.give(LoopCandidate{scene.peer.odometry.id, second.odometry.id, 0.6});
+  robot.give(LoopCandidate{scene.peer.odometry.id, second.odometry.id, 1.4});
   CHECK(robot.requests.empty());
   CHECK(robot.closures.size() == 2);
 }
@@ -360,7 +360,7 @@ TEST_CASE("no features are requested of a keyframe whose words are elsewhere",
   REQUIRE(stages_of(robot.reports) == Stages{kCandidate, kRequested, kReceived});
   CHECK(robot.reports.back().reason == "common words do not agree on a pose");
   // Another candidate of the keyframe is compared again.
-  robot.give(LoopCandidate{scene.peer.odometry.id, {kSelf, 900}, 0.9});
+  robot.give(LoopCandidate{scene.peer.odometry.id, {kSelf, 900}, 1.5});
   Keyframe again = scene.own;
   again.odometry.id.index = 900;
   robot.give(again);

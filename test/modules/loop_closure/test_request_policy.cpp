@@ -1,0 +1,160 @@
+#include "modules/loop_closure/request_policy.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+namespace km {
+namespace {
+
+using Decision = RequestPolicy::Decision;
+
+constexpr RobotId kSelf = 1;
+constexpr RobotId kPeer = 2;
+
+// So similar that it is requested, whatever has failed before.
+LoopCandidate candidate(KeyframeIndex query, KeyframeIndex own, int support = 1,
+                        RobotId peer = kPeer) {
+  return {{peer, query}, {kSelf, own}, 2.0, support};
+}
+
+// Asks for `query`, which then leads to a closure with `own`.
+void succeed(RequestPolicy& policy, KeyframeIndex query, KeyframeIndex own) {
+  REQUIRE(policy.decide(candidate(query, own)) == Decision::kRequest);
+  policy.add_closure({{kSelf, own}, {kPeer, query}});
+  policy.add_result({kPeer, query}, true);
+}
+
+TEST_CASE("No keyframe near a closure is requested and the distance grows with successes",
+          "[request_policy]") {
+  LoopClosureConfig config;
+  config.max_closure_separation = 3;
+  config.max_request_separation = 0;
+  RequestPolicy policy(config);
+  for (KeyframeIndex reach = 1; reach <= 5; ++reach) {
+    const KeyframeIndex query = 100 * reach;
+    succeed(policy, query, 50);
+    const KeyframeIndex covered = std::min<KeyframeIndex>(reach, 3);
+    for (const int sign : {-1, 1}) {
+      const auto beside = [&](KeyframeIndex d) {
+        return query + static_cast<KeyframeIndex>(sign) * d;
+      };
+      CHECK(policy.decide(candidate(beside(covered), 50)) == Decision::kNearClosure);
+      CHECK(policy.decide(candidate(query, 50 + static_cast<KeyframeIndex>(sign) * covered)) ==
+            Decision::kNearClosure);
+      CHECK(policy.decide(candidate(beside(covered + 1), 50)) == Decision::kRequest);
+      CHECK(policy.decide(candidate(query, 50 + static_cast<KeyframeIndex>(sign) *
+                                                    (covered + 1))) == Decision::kRequest);
+    }
+  }
+  CHECK(policy.decide(candidate(100, 50, 1, kPeer + 1)) == Decision::kRequest);  // another robot
+}
+
+TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {
+  LoopClosureConfig config;
+  config.max_request_separation = 2;
+  RequestPolicy policy(config);
+  REQUIRE(policy.decide(candidate(10, 20)) == Decision::kRequest);
+  CHECK(policy.decide(candidate(12, 18)) == Decision::kRequest);  // no closure yet
+  for (const KeyframeIndex query : {100U, 200U}) {
+    policy.add_closure({{kSelf, query}, {kPeer, query}});
+    REQUIRE(policy.decide(candidate(query, 300)) == Decision::kRequest);
+    policy.add_result({kPeer, query}, true);
+  }
+  CHECK(policy.decide(candidate(12, 19)) == Decision::kNearRequest);
+  CHECK(policy.decide(candidate(15, 20)) == Decision::kRequest);
+  CHECK(policy.decide(candidate(10, 30)) == Decision::kRequest);  // another place
+  CHECK(policy.decide(candidate(0, 0)) == Decision::kRequest);
+}
+
+TEST_CASE("A pair that the peer compares is not requested, and none beside it after a closure",
+          "[request_policy]") {
+  LoopClosureConfig config;
+  config.max_request_separation = 2;
+  RequestPolicy policy(config);
+  policy.add_peer_request(kPeer, 10, 20);
+  CHECK(policy.decide(candidate(10, 20)) == Decision::kNearRequest);
+  CHECK(policy.decide(candidate(10, 21)) == Decision::kRequest);
+  CHECK(policy.decide(candidate(10, 20, 1, kPeer + 1)) == Decision::kRequest);
+  policy.add_closure({{kSelf, 300}, {kPeer, 300}});
+  policy.add_peer_request(kPeer, 100, 200);
+  CHECK(policy.decide(candidate(101, 199)) == Decision::kNearRequest);
+  CHECK(policy.decide(candidate(102, 200)) == Decision::kRequest);
+}
+
+TEST_CASE("A peer that requests without end is not listened to without end", "[request_policy]") {
+  RequestPolicy policy{LoopClosureConfig{}};
+  for (KeyframeIndex i = 0; i < 100'000; ++i) policy.add_peer_request(kPeer, i, 20);
+  CHECK(policy.decide(candidate(99'999, 20)) == Decision::kNearRequest);
+  policy.add_peer_request(kPeer, 200'000, 20);
+  CHECK(policy.decide(candidate(200'000, 20)) == Decision::kRequest);
+}
+
+// Candidates that all fail.
+int requests_among(RequestPolicy& policy, KeyframeIndex first, KeyframeIndex last) {
+  int requests = 0;
+  for (KeyframeIndex query = first; query < last; ++query) {
+    const Decision decision = policy.decide({{kPeer, query}, {kSelf, 7}, 0.8, 3});
+    CHECK((decision == Decision::kRequest || decision == Decision::kImprobable));
+    if (decision != Decision::kRequest) continue;
+    ++requests;
+    policy.add_result({kPeer, query}, false);
+  }
+  return requests;
+}
+
+TEST_CASE("Candidates that fail are requested less and less often, more probable ones are not",
+          "[request_policy]") {
+  LoopClosureConfig config;
+  config.max_request_separation = 0;
+  RequestPolicy policy(config);
+  // After m failures p is about log(m) / m, so n queries cost about sqrt(n log(n)) requests.
+  const int first = requests_among(policy, 0, 100);
+  const int second = requests_among(policy, 100, 10'000);
+  CHECK(first > 14);
+  CHECK(second < 15 * first);
+  CHECK(policy.decide({{kPeer, 10'000}, {kSelf, 7}, 1.4, 5}) == Decision::kRequest);
+}
+
+TEST_CASE("The candidates of one query count once, with the most probable one",
+          "[request_policy]") {
+  LoopClosureConfig config;
+  config.max_request_separation = 0;
+  config.min_closure_probability = 1.0;
+  RequestPolicy policy(config);
+  const auto decide = [&](KeyframeIndex query, KeyframeIndex own, double similarity) {
+    return policy.decide({{kPeer, query}, {kSelf, own}, similarity, 2});
+  };
+  constexpr double kEven = 11.81 / 11.7;  // probability 0.5 before the first result
+  KeyframeIndex query = 0;
+  while (decide(query, 7, kEven) == Decision::kRequest) ++query;
+  // Half of a request is left. Further candidates of this query add nothing.
+  for (KeyframeIndex own = 100; own < 110; ++own)
+    CHECK(decide(query, own, 0.5) == Decision::kImprobable);
+  CHECK(decide(query + 1, 7, kEven) == Decision::kRequest);
+}
+
+TEST_CASE("The first improbable candidates are requested until the robots have closures",
+          "[request_policy]") {
+  LoopClosureConfig config;
+  config.max_closure_separation = config.max_request_separation = 0;
+  RequestPolicy policy(config);
+  CHECK(requests_among(policy, 0, 5) == 5);
+  for (KeyframeIndex query = 100; query < 103; ++query) succeed(policy, query, query);
+  CHECK(policy.decide({{kPeer, 200}, {kSelf, 7}, 0.1, 1}) == Decision::kRequest);  // the last one
+  CHECK(policy.decide({{kPeer, 201}, {kSelf, 7}, 0.1, 1}) == Decision::kImprobable);
+}
+
+TEST_CASE("With all bounds at 0 every candidate is requested", "[request_policy]") {
+  LoopClosureConfig config;
+  config.max_closure_separation = config.max_request_separation = 0;
+  config.min_closure_probability = 0.0;
+  RequestPolicy policy(config);
+  succeed(policy, 1, 1);
+  for (KeyframeIndex query = 2; query < 20; ++query) {
+    CHECK(policy.decide(candidate(query, 1)) == Decision::kRequest);
+    policy.add_result({kPeer, query}, false);
+  }
+}
+
+}  // namespace
+}  // namespace km
