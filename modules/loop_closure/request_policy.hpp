@@ -26,7 +26,7 @@ namespace km {
 /// the probability p that it leads to a closure (ClosureOdds, one for each peer) is at least
 /// min_closure_probability. Among queries with less probable candidates, a share of
 /// p / min_closure_probability is requested. So the share falls where candidates fail, and the
-/// robot still learns from them. Until three keyframes of a peer have led to closures, ten further
+/// robot still learns from them. Until three keyframes of a peer have led to closures, six further
 /// improbable queries are requested, because robots with few places in common need each of them.
 ///
 /// Deterministic, no randomness. Not thread-safe.
@@ -60,8 +60,8 @@ class RequestPolicy {
   void add_result(const KeyframeId& keyframe, bool verified);
 
  private:
-  // Ten requests of 1.1 kB are few beside a map that is never joined.
-  static constexpr double kFirstRequests = 10.0;
+  // Six requests of 1.1 kB are few beside a map that is never joined.
+  static constexpr double kFirstRequests = 6.0;
 
   struct Peer {
     std::set<std::pair<KeyframeIndex, KeyframeIndex>> closures;  ///< Pairs (keyframe of the peer,
