@@ -12,6 +12,9 @@ using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
 // Two robots that have this number of keyframes with closures have mostly joined their maps.
 constexpr int kJoined = 3;
 
+// Robots that are not joined need closures more than they need to save bytes.
+constexpr double kShareBeforeJoining = 0.1;
+
 // Bound of what a misbehaving peer can make this robot store, 5 MB.
 constexpr std::size_t kMaxRequests = 100'000;
 
@@ -42,11 +45,13 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
     return Decision::kNearRequest;
 
   const double probability = peer.odds.probability(candidate);
-  if (probability < config_.min_closure_probability) {
+  const double enough =
+      (peer.successes < kJoined ? kShareBeforeJoining : 1.0) * config_.min_closure_probability;
+  if (probability < enough) {
     // A query counts once, with its most probable candidate.
     if (peer.last_query != query) peer.last_share = 0.0;
     peer.last_query = query;
-    const double share = std::max(peer.last_share, probability / config_.min_closure_probability);
+    const double share = std::max(peer.last_share, probability / enough);
     peer.credit += share - peer.last_share;
     peer.last_share = share;
     if (peer.credit < 1.0) return Decision::kImprobable;

@@ -26,8 +26,9 @@ namespace km {
 /// the probability p that it leads to a closure (ClosureOdds, one for each peer) is at least
 /// min_closure_probability. Among queries with less probable candidates, a share of
 /// p / min_closure_probability is requested. So the share falls where candidates fail, and the
-/// robot still learns from them. Until three keyframes of a peer have led to closures, six further
-/// improbable queries are requested, because robots with few places in common need each of them.
+/// robot still learns from them. Until three keyframes of a peer have led to closures, a tenth of
+/// min_closure_probability suffices. Six further improbable queries are then requested, too,
+/// because robots with few places in common need each of them.
 ///
 /// Deterministic, no randomness. Not thread-safe.
 class RequestPolicy {

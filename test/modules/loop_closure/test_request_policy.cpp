@@ -118,30 +118,38 @@ TEST_CASE("Candidates that fail are requested less and less often, more probable
 TEST_CASE("The candidates of one query count once, with the most probable one",
           "[request_policy]") {
   LoopClosureConfig config;
-  config.max_request_separation = 0;
+  config.max_closure_separation = config.max_request_separation = 0;
   config.min_closure_probability = 1.0;
   RequestPolicy policy(config);
   const auto decide = [&](KeyframeIndex query, KeyframeIndex own, double similarity) {
     return policy.decide({{kPeer, query}, {kSelf, own}, similarity, 2});
   };
   constexpr double kEven = 11.81 / 11.7;  // probability 0.5 before the first result
-  KeyframeIndex query = 0;
-  while (decide(query, 7, kEven) == Decision::kRequest) ++query;
+  for (KeyframeIndex query = 100; query < 103; ++query) succeed(policy, query, query);
+  KeyframeIndex query = 200;
+  while (query < 300 && decide(query, 7, kEven) == Decision::kRequest) ++query;
   // Half of a request is left. Further candidates of this query add nothing.
   for (KeyframeIndex own = 100; own < 110; ++own)
     CHECK(decide(query, own, 0.5) == Decision::kImprobable);
   CHECK(decide(query + 1, 7, kEven) == Decision::kRequest);
 }
 
-TEST_CASE("The first improbable candidates are requested until the robots have closures",
-          "[request_policy]") {
+TEST_CASE("Robots without closures request less probable candidates", "[request_policy]") {
   LoopClosureConfig config;
   config.max_closure_separation = config.max_request_separation = 0;
   RequestPolicy policy(config);
-  CHECK(requests_among(policy, 0, 5) == 5);
+  const auto decide = [&](KeyframeIndex query, double similarity) {
+    return policy.decide({{kPeer, query}, {kSelf, 7}, similarity, 1});
+  };
+  constexpr double kTenth = 10.7 / 11.7;  // probability 0.1 before the first result
+  for (KeyframeIndex query = 0; query < 50; ++query)
+    CHECK(decide(query, kTenth) == Decision::kRequest);
+  for (KeyframeIndex query = 50; query < 56; ++query)
+    CHECK(decide(query, 0.1) == Decision::kRequest);
+  CHECK(decide(56, 0.1) == Decision::kImprobable);
   for (KeyframeIndex query = 100; query < 103; ++query) succeed(policy, query, query);
-  CHECK(policy.decide({{kPeer, 200}, {kSelf, 7}, 0.1, 1}) == Decision::kRequest);  // the last one
-  CHECK(policy.decide({{kPeer, 201}, {kSelf, 7}, 0.1, 1}) == Decision::kImprobable);
+  for (KeyframeIndex query = 200; query < 204; ++query)
+    CHECK(decide(query, kTenth) == Decision::kImprobable);
 }
 
 TEST_CASE("With all bounds at 0 every candidate is requested", "[request_policy]") {
