@@ -229,6 +229,7 @@ RunSummary summary_of(const RunRecord& record) {
   summary.robot = record.robot();
   summary.keyframes = record.keyframes().size();
   summary.keypoints = record.keypoints();
+  summary.peer_keyframes = record.peer_keyframes();
   for (const auto& [peer, counts] : record.closures_per_peer()) {
     summary.closures.candidates += counts.candidates;
     summary.closures.verified += counts.verified;

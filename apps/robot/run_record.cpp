@@ -55,6 +55,12 @@ void RunRecord::add(const Keyframe& keyframe) {
     median_depths_m_[keyframe.odometry.id.index] = *depth_m;
 }
 
+void RunRecord::add(const KeyframeReply& reply) {
+  if (!reply.found) return;
+  ++peer_keyframes_.keyframes;
+  peer_keyframes_.keypoints += reply.keyframe.features.keypoints.size() + reply.descriptors.size();
+}
+
 void RunRecord::add(const Closure& closure) {
   ++activity_;
   if (closure.from.id.robot != robot_ && closure.to.id.robot != robot_) return;

@@ -21,6 +21,7 @@
 #include "modules/core/team_solution.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/journal/journal_entry.hpp"
+#include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/place_recognition/place_database.hpp"
@@ -43,7 +44,8 @@ class RunRecord {
   void add(const OdometryState& state);  ///< Replaces states of this and later stamps.
   void add(const KeyframeOdometry& keyframe);
   void add(const VioStatistics& statistics) { odometry_statistics_ = statistics; }
-  void add(const Keyframe& keyframe);  ///< Keyframe of this robot, for the depth that it sees.
+  void add(const Keyframe& keyframe);    ///< Keyframe of this robot, for the depth that it sees.
+  void add(const KeyframeReply& reply);  ///< Counts what a peer sends.
   void add(const Closure& closure);
   void add(const InlierSet& set);  ///< Kept if newer than the last set of the pair.
   void add(const ClosureOutcome& outcome);
@@ -89,6 +91,8 @@ class RunRecord {
 
   /// Number of keypoints in all keyframes.
   [[nodiscard]] std::size_t keypoints() const { return keypoints_; }
+
+  [[nodiscard]] const PeerKeyframeCounts& peer_keyframes() const { return peer_keyframes_; }
 
   /// Statistics of the last event; absent with an external odometry.
   [[nodiscard]] const std::optional<VioStatistics>& odometry_statistics() const {
@@ -158,6 +162,7 @@ class RunRecord {
   std::optional<VioStatistics> odometry_statistics_;
   std::map<std::uint32_t, double> median_depths_m_;  // median depth of each keyframe
   std::size_t keypoints_ = 0;
+  PeerKeyframeCounts peer_keyframes_;
   std::map<ClosureId, RelativePose> closures_;
   std::map<RobotId, std::size_t> closures_to_;  // number of entries in `closures_` by the other
                                                 // robot

@@ -27,6 +27,21 @@ struct ClosureCounts {
   bool operator==(const ClosureCounts&) const = default;
 };
 
+/// Bytes of a keypoint in a centralised system: 8 of position and 32 of ORB descriptor.
+inline constexpr double kKeypointBytes = 40.0;
+
+/// Keyframes of peers whose features this robot received, with the keypoints of all of them.
+struct PeerKeyframeCounts {
+  std::uint64_t keyframes = 0;
+  std::uint64_t keypoints = 0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("keyframes", keyframes);
+    visitor.field("keypoints", keypoints);
+  }
+  bool operator==(const PeerKeyframeCounts&) const = default;
+};
+
 /// State of the team's optimiser, as this robot knows it.
 struct OptimizerSummary {
   std::uint64_t rounds = 0;
@@ -276,6 +291,7 @@ struct RunSummary {
   double paused_s = 0.0;  ///< Time for which the recording's clock paused for the same reason.
   /// By kind, the number of faults of the recording or the live topics: see ReaderFault.
   std::map<std::string, std::uint64_t> sensor_faults;
+  PeerKeyframeCounts peer_keyframes;
   ClosureCounts closures;  ///< Closures found by this robot.
   OptimizerSummary pgo;
   std::optional<OdometrySummary> odometry;          ///< Absent with an external odometry.
@@ -311,6 +327,7 @@ struct RunSummary {
     visitor.field("rate", rate);
     visitor.field("paused_s", paused_s);
     visitor.field("sensor_faults", sensor_faults);
+    visitor.field("peer_keyframes", peer_keyframes);
     visitor.field("closures", closures);
     visitor.field("pgo", pgo);
     visitor.field("odometry", odometry);

@@ -414,6 +414,7 @@ void Robot::add_records() {
   recorder_->record(topics_.keyframe_odometry);
   recorder_->record(topics_.odometry_statistics);
   recorder_->record(topics_.keyframes);
+  recorder_->record(topics_.replies.received);
   recorder_->record(topics_.closure_restarts);
   recorder_->record(topics_.closures);
   recorder_->record(topics_.outcomes);

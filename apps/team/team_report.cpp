@@ -121,25 +121,37 @@ std::string closure_table(const TeamResult& team) {
   return align_columns(rows);
 }
 
-// The bytes that the robots have sent, by category, as a share of those that the server of the
-// centralised system of the paper would receive. Empty without keyframes.
+// The bytes that the robots have sent, by category, as shares of those that the server of a
+// centralised system would receive. It receives as many keypoints of a keyframe as the paper's
+// system, or as many as the robots. Empty without keyframes.
 std::string centralised_remark(const std::map<std::string, std::uint64_t>& traffic,
-                               std::uint64_t keyframes) {
-  constexpr double kKeypoints = 1000.0, kBytesOfKeypoint = 40.0;  // position and ORB descriptor
-  const double centralised = static_cast<double>(keyframes) * kKeypoints * kBytesOfKeypoint;
+                               std::uint64_t keyframes, const PeerKeyframeCounts& received) {
+  constexpr double kKeypointsOfPaper = 1000.0;
   double sent = 0.0;
   for (const auto& [category, bytes] : traffic) sent += static_cast<double>(bytes);
   if (sent == 0.0 || keyframes == 0) return "";
-  return "A server that receives " + fixed(kKeypoints, 0) + " keypoints of " +
-         fixed(kBytesOfKeypoint, 0) + " bytes of each keyframe would receive " +
-         bytes_text(centralised) + ". The robots send\n" + fixed(100.0 * sent / centralised, 1) +
-         " % of that.\n";
+  const auto share = [&](double keypoints) {
+    const double bytes = static_cast<double>(keyframes) * keypoints * kKeypointBytes;
+    return bytes_text(bytes) + ", of which the robots send " + fixed(100.0 * sent / bytes, 1) +
+           " %";
+  };
+  std::string remark = "A server that receives each keyframe with " + fixed(kKeypointsOfPaper, 0) +
+                       " keypoints of " + fixed(kKeypointBytes, 0) + " bytes would receive\n" +
+                       share(kKeypointsOfPaper) + ".";
+  if (received.keypoints > 0) {
+    const double keypoints =
+        static_cast<double>(received.keypoints) / static_cast<double>(received.keyframes);
+    remark += " With " + fixed(keypoints, 0) + ", the mean of a keyframe that a robot receives,\n" +
+              "it would receive " + share(keypoints) + ".";
+  }
+  return remark + "\n";
 }
 
 std::string traffic_table(const TeamResult& team) {
   Rows rows = {{"sent", "place recognition", "geometric verification", "distributed PGO", "other"}};
   std::map<std::string, std::uint64_t> sums;
   std::uint64_t keyframes = 0;
+  PeerKeyframeCounts received;
   const auto add = [&](const std::string& name, std::map<std::string, std::uint64_t> bytes) {
     rows.push_back({name});
     for (const char* category : kTraffic)
@@ -148,11 +160,13 @@ std::string traffic_table(const TeamResult& team) {
   for (const RobotResult& robot : team.robots) {
     const RunSummary summary = robot.summary.value_or(RunSummary{});
     keyframes += summary.keyframes;
+    received.keyframes += summary.peer_keyframes.keyframes;
+    received.keypoints += summary.peer_keyframes.keypoints;
     for (const auto& [category, bytes] : summary.traffic) sums[category] += bytes;
     add(robot.plan.name, summary.traffic);
   }
   add("team", sums);
-  return align_columns(rows) + centralised_remark(sums, keyframes);
+  return align_columns(rows) + centralised_remark(sums, keyframes, received);
 }
 
 std::string right_labels(const MeshReport& report, const MeshError& error) {

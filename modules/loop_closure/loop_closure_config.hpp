@@ -24,8 +24,8 @@ struct LoopClosureConfig {
   double systematic_translation_m = 0.008;
   double request_timeout_s = 2.0;
   int max_outstanding_requests = 8;
-  int max_closure_separation = 16;
-  int max_request_separation = 2;
+  int max_closure_separation = 64;
+  int max_request_separation = 4;
   double min_closure_probability = 0.5;
   int min_word_points = 7;
   double min_word_share = 0.07;

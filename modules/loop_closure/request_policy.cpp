@@ -13,7 +13,7 @@ using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
 constexpr int kJoined = 3;
 
 // Robots that are not joined need closures more than they need to save bytes.
-constexpr double kShareBeforeJoining = 0.1;
+constexpr double kShareBeforeJoining = 0.2;
 
 // Bound of what a misbehaving peer can make this robot store, 5 MB.
 constexpr std::size_t kMaxRequests = 100'000;

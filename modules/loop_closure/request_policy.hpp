@@ -26,7 +26,7 @@ namespace km {
 /// the probability p that it leads to a closure (ClosureOdds, one for each peer) is at least
 /// min_closure_probability. Among queries with less probable candidates, a share of
 /// p / min_closure_probability is requested. So the share falls where candidates fail, and the
-/// robot still learns from them. Until three keyframes of a peer have led to closures, a tenth of
+/// robot still learns from them. Until three keyframes of a peer have led to closures, a fifth of
 /// min_closure_probability suffices. Six further improbable queries are then requested, too,
 /// because robots with few places in common need each of them.
 ///

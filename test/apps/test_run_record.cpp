@@ -51,6 +51,20 @@ TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accept
   CHECK(record.inlier_closures().size() == 2);
 }
 
+TEST_CASE("the keypoints of received keyframes are counted, descriptors of word points included",
+          "[robot]") {
+  RunRecord record(1);
+  KeyframeReply whole{.number = 1, .found = true, .keyframe = {}};
+  whole.keyframe.features.keypoints.resize(120);
+  KeyframeReply completed{.number = 2, .found = true, .keyframe = {}};
+  completed.keyframe.features.keypoints.resize(20);
+  completed.descriptors.resize(30);
+  record.add(whole);
+  record.add(completed);
+  record.add(KeyframeReply{.number = 3, .found = false, .keyframe = {}});
+  CHECK(summary_of(record).peer_keyframes == PeerKeyframeCounts{2, 170});
+}
+
 TEST_CASE("changes of decisions, poses and cells become events, each once", "[robot]") {
   const ClosureId kept{{1, 2}, {2, 3}}, doubted{{1, 4}, {2, 5}};
   RunRecord record(1);

@@ -62,7 +62,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
   CHECK(keys ==
         "/robot /name /version /commit "
         "/keyframes /keypoints /frames /frames_skipped /rate /paused_s "
-        "/sensor_faults/x "
+        "/sensor_faults/x /peer_keyframes/keyframes /peer_keyframes/keypoints "
         "/closures/candidates /closures/verified /closures/inliers "
         "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "
         "/pgo/members/0 /pgo/members/1 /pgo/tentative/0 /pgo/tentative/1 "

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "apps/lab/experiments/world_results.hpp"
 #include "apps/team/team_file.hpp"
 #include "modules/core/json.hpp"
 #include "modules/evaluation/association.hpp"
@@ -81,6 +82,9 @@ LevelResults read_level_results(const WorldConfig& world, const ExperimentPaths&
     const Json summary = read_json(files.run / robot.name / "summary.json");
     results.divergences += number_at(summary, "/odometry/divergences").value_or(0.0);
   }
+  const WorldResults sent = read_world_results(world, paths);
+  results.sent_mb = sent.sent_mb();
+  results.equal_keypoints_mb = sent.equal_keypoints_mb();
   const double judged = number_at(team, "/closures/inliers/judged").value_or(0.0);
   const double correct = number_at(team, "/closures/inliers/correct").value_or(0.0);
   results.closures_kept = static_cast<std::size_t>(judged);

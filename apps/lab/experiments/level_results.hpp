@@ -22,7 +22,9 @@ struct LevelResults {
   std::optional<double> nees;
   std::size_t closures_kept = 0, false_kept = 0;
   std::array<AngleScore, ClosureScores::kAngleBins> by_angle = {};
-  double divergences = 0.0;  ///< Divergences of all odometries, which their logs report.
+  double sent_mb = 0.0;             ///< Sent in the whole run, of every kind.
+  double equal_keypoints_mb = 0.0;  ///< See WorldResults.
+  double divergences = 0.0;         ///< Divergences of all odometries, which their logs report.
 
   [[nodiscard]] bool joined() const { return robots > 0 && in_team_frame == robots; }
 };

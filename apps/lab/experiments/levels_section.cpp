@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "apps/lab/experiments/level_results.hpp"
+#include "apps/lab/experiments/paper_results.hpp"
 #include "apps/lab/experiments/report.hpp"
 #include "modules/core/text_table.hpp"
 
@@ -64,6 +65,11 @@ Spread spread_of_known(const std::vector<JudgedRun>& runs, const auto& value) {
 
 const auto kBefore = [](const LevelResults& r) { return r.joint_before_m; };
 const auto kAfter = [](const LevelResults& r) { return r.joint_after_m; };
+const auto kShare_percent = [](const LevelResults& r) {
+  return r.equal_keypoints_mb > 0.0
+             ? std::optional<double>(100.0 * r.sent_mb / r.equal_keypoints_mb)
+             : std::nullopt;
+};
 const auto kNees = [](const LevelResults& r) { return r.nees; };
 
 std::vector<ReportCell> numbers_row(const std::string& name, const std::vector<JudgedRun>& runs) {
@@ -80,15 +86,17 @@ std::vector<ReportCell> numbers_row(const std::string& name, const std::vector<J
           {std::to_string(sum_over(runs, kept))},
           {std::to_string(sum_over(runs, wrong))},
           spread_cell(spread_of_known(runs, kNees), 2),
+          spread_cell(spread_of_known(runs, kShare_percent), 0),
           {std::to_string(sum_over(runs, divergences))}};
 }
 
 ReportTable numbers_table(const RunsByLevel& levels) {
   ReportTable table{
       .caption = "Levels of difficulty: medians, and ranges over robots and runs",
-      .groups = {{"", 2}, {"", 1}, {"joint ATE [m]", 2}, {"closures kept", 2}, {"", 1}, {"", 1}},
+      .groups =
+          {{"", 2}, {"", 1}, {"joint ATE [m]", 2}, {"closures kept", 2}, {"", 1}, {"", 1}, {"", 1}},
       .columns = {"level", "joined", "odometry ATE [m]", "before", "after", "all", "false",
-                  "NEES, median", "divergences"}};
+                  "NEES, median", "bytes [%]", "divergences"}};
   for (const auto& [level, runs] : levels) {
     table.rows.push_back(numbers_row(name_of(level), runs));
     for (const JudgedRun& run : runs) table.rows.push_back(numbers_row(run.world->title, {run}));
@@ -96,7 +104,10 @@ ReportTable numbers_table(const RunsByLevel& levels) {
   table.note =
       "Joint ATE: RMSE of all robots under one alignment, of runs in which all robots joined. "
       "Before: odometry, placed by the first optimised keyframe of each robot. NEES: of the "
-      "published keyframes, over the median of its distribution; 1 is right. Divergences: found "
+      "published keyframes, over the median of its distribution; 1 is right. Bytes: sent in the "
+      "whole run, as a share of those of a server that "
+      "receives each keyframe with as many keypoints as the robots receive of a keyframe in the "
+      "mean. Divergences: found "
       "and logged by the robots.";
   return table;
 }
@@ -135,6 +146,12 @@ void add_level_targets(const Level& level, const std::vector<JudgedRun>& runs, R
   const std::size_t joined = joined_of(runs);
   input.add_target({"runs in which all robots joined", where, of_all(runs.size()), of_all(joined),
                     joined == runs.size(), true});
+  const Spread share_percent = spread_of_known(runs, kShare_percent);
+  if (share_percent.count > 0)
+    input.add_target({"communication over as many keypoints as robots receive, worst run", where,
+                      "at most " + fixed(kPaperMostShare_percent, 0) + " %",
+                      fixed(share_percent.highest, 0) + " %",
+                      share_percent.highest <= kPaperMostShare_percent, true});
   const std::size_t wrong = sum_over(runs, [](const LevelResults& r) { return r.false_kept; });
   input.add_target({"false closures kept", where, "0", std::to_string(wrong), wrong == 0, true});
   const double odometry_m = spread_of(odometry_of(runs)).median;

@@ -33,6 +33,9 @@ struct PaperLabels {
   std::array<double, 4> before_percent, after_percent;
 };
 
+/// Largest share of the bytes of all keypoints that the paper's robots send in a world, Table II.
+inline constexpr double kPaperMostShare_percent = 38.0;
+
 /// nullptr for a world that is not in the paper.
 [[nodiscard]] const PaperWorld* paper_world(const std::string& world);
 [[nodiscard]] const PaperLabels* paper_labels(const std::string& world);

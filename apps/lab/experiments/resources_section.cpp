@@ -11,17 +11,22 @@ namespace {
 
 constexpr double kBytesPerPixel =
     2.0;  // two cameras with one byte per pixel, as in the paper's numbers
-constexpr double kMostShare_percent = 38.0, kAimedShare_percent = 10.0;
+constexpr double kAimedShare_percent = 10.0;
 
 // Megabytes of one world, counted as in the paper: one solve of the final graph.
 struct Communication {
   double place_recognition = 0.0, verification = 0.0, pgo = 0.0, newton_pgo = 0.0, live_pgo = 0.0;
   double images = 0.0, keypoints = 0.0;
+  double all_sent = 0.0;  // in the whole run, of every kind
+  double equal_keypoints = 0.0;
 
   double total() const { return place_recognition + verification + pgo; }
   double whole_run() const { return place_recognition + verification + live_pgo; }
   double of_keypoints_percent(double sent) const {
-    return 100.0 * sent / std::max(1e-9, keypoints);
+    return keypoints > 0.0 ? 100.0 * sent / keypoints : NAN;
+  }
+  double of_equal_keypoints_percent() const {
+    return equal_keypoints > 0.0 ? 100.0 * all_sent / equal_keypoints : NAN;
   }
 };
 
@@ -35,6 +40,8 @@ Communication communication(ReportInput& input, const ReportInput::World& world)
   mb.place_recognition = results.sent_mb("place_recognition");
   mb.verification = results.sent_mb("geometric_verification");
   mb.live_pgo = results.sent_mb("pgo");
+  mb.all_sent = results.sent_mb();
+  mb.equal_keypoints = results.equal_keypoints_mb();
   mb.pgo = of_method(input, world, "rbcd", megabytes);
   mb.newton_pgo = of_method(input, world, "newton", megabytes);
   mb.images =
@@ -85,16 +92,22 @@ ReportTable live_table(ReportInput& input, const std::vector<ReportInput::World>
   ReportTable table{
       .caption = "Optimisation: what one solve sends, and what the running team sent [MB]",
       .columns = {"world", "RBCD", "Newton, the default", "during the whole run",
-                  "all of the run / keypoints [%]"}};
+                  "all of the run / keypoints [%]", "of every kind",
+                  "of every kind / as many keypoints [%]"}};
   for (const auto& world : worlds) {
     const Communication mb = communication(input, world);
     table.rows.push_back({{world.config->title},
                           {fixed(mb.pgo, 2)},
                           {fixed(mb.newton_pgo, 2)},
                           {fixed(mb.live_pgo, 2)},
-                          {fixed(mb.of_keypoints_percent(mb.whole_run()), 0)}});
+                          {fixed(mb.of_keypoints_percent(mb.whole_run()), 0)},
+                          {fixed(mb.all_sent, 2)},
+                          {fixed(mb.of_equal_keypoints_percent(), 0)}});
   }
-  table.note = "The running team solves again as closures come; the paper's solves once.";
+  table.note =
+      "The running team solves again as closures come; the paper's solves once. The last share is "
+      "that of a server that receives each keyframe with as many keypoints as the robots receive "
+      "of a keyframe in the mean.";
   return table;
 }
 
@@ -167,20 +180,21 @@ ReportTable resource_spread_table(ReportInput& input,
 // The paper counts one solve. The bytes that the team actually sent have the same target.
 void add_targets(ReportInput& input, const ReportInput::World& world) {
   const std::vector<Communication> runs = of_all_runs(input, world);
-  const auto add = [&](const char* what, const std::string& wanted, const auto& sent) {
-    const Spread percent = spread_over(runs, [&](const Communication& mb) {
-      return mb.keypoints > 0.0 ? mb.of_keypoints_percent(sent(mb)) : NAN;
-    });
+  const std::string most = "at most " + fixed(kPaperMostShare_percent, 0) + " %";
+  const std::string aim = most + ", aim " + fixed(kAimedShare_percent, 0) + " %";
+  const auto add = [&](const char* what, const std::string& wanted, const auto& share_percent) {
+    const Spread percent = spread_over(runs, share_percent);
     if (percent.count == 0) return;
-    input.add_target({std::string("communication over all keypoints sent, ") + what,
-                      world.config->title, wanted,
+    input.add_target({std::string("communication over ") + what, world.config->title, wanted,
                       fixed(percent.median, 0) + " %" + range_text(percent, 0),
-                      percent.median <= kMostShare_percent, true});
+                      percent.median <= kPaperMostShare_percent, true});
   };
-  const std::string most = "at most " + fixed(kMostShare_percent, 0) + " %";
-  add("one solve, as the paper counts", most + ", aim " + fixed(kAimedShare_percent, 0) + " %",
-      [](auto& mb) { return mb.total(); });
-  add("all solves of the run", most, [](auto& mb) { return mb.whole_run(); });
+  add("all keypoints sent, one solve, as the paper counts", aim,
+      [](const Communication& mb) { return mb.of_keypoints_percent(mb.total()); });
+  add("all keypoints sent, all solves of the run", most,
+      [](const Communication& mb) { return mb.of_keypoints_percent(mb.whole_run()); });
+  add("as many keypoints as robots receive, all of the run", aim,
+      [](const Communication& mb) { return mb.of_equal_keypoints_percent(); });
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "apps/robot/run_summary.hpp"
 #include "apps/team/team_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
@@ -49,8 +50,6 @@ std::string text_of(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
-
-constexpr double kKeypointBytes = 40.0;  // 8 of position and 32 of descriptor
 
 std::map<std::string, double> module_seconds(const fs::path& timing) {
   const std::string text = text_of(timing);
@@ -98,6 +97,8 @@ RobotNumbers read_robot(const Json& team, const RobotPlan& plan, const fs::path&
   const double keypoints = number_at(summary, "/keypoints").value_or(0.0);
   if (keypoints > 0.0 && keyframes > 0.0)
     robot.keyframe_bytes = keypoints * kKeypointBytes / keyframes;
+  robot.peer_keyframes = number_at(summary, "/peer_keyframes/keyframes").value_or(0.0);
+  robot.peer_keypoints = number_at(summary, "/peer_keyframes/keypoints").value_or(0.0);
   robot.mesh = mesh_of(team, plan.name);
   return robot;
 }
@@ -132,6 +133,23 @@ double WorldResults::sent_mb(const std::string& category) const {
     if (const auto found = robot.sent_bytes.find(category); found != robot.sent_bytes.end())
       bytes += found->second;
   return 1e-6 * bytes;
+}
+
+double WorldResults::sent_mb() const {
+  double bytes = 0.0;
+  for (const RobotNumbers& robot : robots)
+    for (const auto& [category, sent] : robot.sent_bytes) bytes += sent;
+  return 1e-6 * bytes;
+}
+
+double WorldResults::equal_keypoints_mb() const {
+  double received = 0.0, keypoints = 0.0;
+  for (const RobotNumbers& robot : robots) {
+    received += robot.peer_keyframes;
+    keypoints += robot.peer_keypoints;
+  }
+  if (received == 0.0) return 0.0;
+  return 1e-6 * kKeypointBytes * (keypoints / received) * static_cast<double>(keyframes());
 }
 
 RobotNumbers read_lone_robot(const fs::path& run) {

@@ -35,6 +35,7 @@ struct RobotNumbers {
                                                               ///< (RMSE).
   std::map<std::string, double> sent_bytes;                   ///< Sent bytes by category.
   std::optional<double> keyframe_bytes;                       ///< Mean size with all its keypoints.
+  double peer_keyframes = 0.0, peer_keypoints = 0.0;          ///< See PeerKeyframeCounts.
   std::optional<double> processor_s;                          ///< CPU time of the whole robot.
   std::optional<double> peak_memory_mb;
   std::map<std::string, double> module_s;  ///< Time in the steps of each module, waiting excluded.
@@ -53,6 +54,11 @@ struct WorldResults {
   [[nodiscard]] std::size_t keyframes() const;
   /// Sum over the robots [MB]; nothing for a category that no robot sent.
   [[nodiscard]] double sent_mb(const std::string& category) const;
+  /// Sum over the robots and all categories [MB].
+  [[nodiscard]] double sent_mb() const;
+  /// Bytes of each keyframe at a server [MB], with as many keypoints as the robots receive of a
+  /// keyframe in the mean. 0 if they received none.
+  [[nodiscard]] double equal_keypoints_mb() const;
 };
 
 /// Length of the recording, processor time, memory and modules of a robot that ran alone, from its

@@ -146,12 +146,14 @@ TEST_CASE("A robot without results is reported by its last words only", "[team]"
   CHECK(to_table(team) == "a, b failed, exit code 1; their last words:\n  no such key\n");
 }
 
-TEST_CASE(
-    "The bytes of robots are compared with a server that receives 1000 keypoints of a keyframe",
-    "[team]") {
+TEST_CASE("The bytes of robots are compared with a server that receives all keyframes", "[team]") {
   TeamResult team = HalfTeam().collect();
   team.robots[0].summary->keyframes = 1000;  // each has 40 kB, and the robot has sent 3 MB
-  CHECK_THAT(to_table(team), Contains("would receive 40.0 MB. The robots send\n7.5 % of that."));
+  CHECK_THAT(to_table(team), Contains("would receive\n40.0 MB, of which the robots send 7.5 %.\n"));
+  team.robots[0].summary->peer_keyframes = {.keyframes = 10, .keypoints = 1500};
+  CHECK_THAT(to_table(team),
+             Contains("With 150, the mean of a keyframe that a robot receives,\nit would receive "
+                      "6.0 MB, of which the robots send 50.0 %.\n"));
   team.robots[0].summary->keyframes = 0;
   CHECK_THAT(to_table(team), !Contains("A server"));
 }

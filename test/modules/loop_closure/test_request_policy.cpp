@@ -141,7 +141,7 @@ TEST_CASE("Robots without closures request less probable candidates", "[request_
   const auto decide = [&](KeyframeIndex query, double similarity) {
     return policy.decide({{kPeer, query}, {kSelf, 7}, similarity, 1});
   };
-  constexpr double kTenth = 10.7 / 11.7;  // probability 0.1 before the first result
+  constexpr double kTenth = 10.71 / 11.7;  // probability 0.1 before the first result
   for (KeyframeIndex query = 0; query < 50; ++query)
     CHECK(decide(query, kTenth) == Decision::kRequest);
   for (KeyframeIndex query = 50; query < 56; ++query)

@@ -143,6 +143,7 @@ class CannedCity {
       RunSummary summary;
       summary.keyframes = kKeyframes;
       summary.keypoints = 1000 * kKeyframes;
+      summary.peer_keyframes = {.keyframes = 2, .keypoints = 400};
       summary.traffic = {
           {"place_recognition", 1000000}, {"geometric_verification", 2000000}, {"pgo", 9000000}};
       summary.process.cpu_s = 2.4;

@@ -46,7 +46,7 @@ TEST_CASE("The report has errors, closures and recall by angle of the levels of 
   // Odometry errs by 0.1 x: 0.1118 m rms about its mean, and 0.1085 m after the best rotation of
   // all robots together.
   CHECK_THAT(text, Contains("| City, level 2, seed 1 | 1 of 1 | 0.012 (0.012 to 0.012) | 0.108 | "
-                            "0.006 | 817 | 1 | 0.00 | 0 |"));
+                            "0.006 | 817 | 1 | 0.00 | 37500 | 0 |"));
   CHECK_THAT(text, Contains("| level | 0 to 30 degrees |") &&
                        Contains("| 2 | - | - | 40.0% of 10 | - | - | - |"));
   CHECK_THAT(text, Contains("| false closures kept | level 2 | 0 | **1** |") &&
@@ -111,7 +111,10 @@ TEST_CASE("The report has every table with our values and the paper's", "[experi
       Contains("keypoints sent, one solve, as the paper counts | City | at most 38 %, aim 10 % | "
                "**2775 % (2775 to 2775 in 3 runs)** |") &&
           Contains("keypoints sent, all solves of the run | City | at most 38 % | **7500 % (7500 "
-                   "to 7500 in 3 runs)** |"));
+                   "to 7500 in 3 runs)** |") &&
+          // Keyframes with 200 keypoints have a fifth of the bytes.
+          Contains("as many keypoints as robots receive, all of the run | City | at most 38 %, aim "
+                   "10 % | **37500 % (37500 to 37500 in 3 runs)** |"));
 }
 
 TEST_CASE("A robot that never met the others is named", "[experiments]") {
