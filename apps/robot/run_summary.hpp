@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "modules/core/ids.hpp"
@@ -26,6 +27,9 @@ struct ClosureCounts {
   }
   bool operator==(const ClosureCounts&) const = default;
 };
+
+/// Category of the traffic of meshes and objects.
+inline constexpr std::string_view kMapTraffic = "map";
 
 /// Bytes of a keypoint in a centralised system: 8 of position and 32 of ORB descriptor.
 inline constexpr double kKeypointBytes = 40.0;

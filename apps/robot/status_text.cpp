@@ -88,8 +88,8 @@ std::string status_text(double dataset_time_s, const RunRecord& record,
          optimizer_text(record.progress()) + map_text(record.mapping()) + " | out: place " +
          sent(TrafficCategory::kPlaceRecognition) + ", verify " +
          sent(TrafficCategory::kGeometricVerification) + ", pgo " +
-         sent(TrafficCategory::kPoseGraphOptimization) + ", other " +
-         sent(TrafficCategory::kOther) + waiting_text(traffic) + " | " +
+         sent(TrafficCategory::kPoseGraphOptimization) + ", map " + sent(TrafficCategory::kMap) +
+         ", other " + sent(TrafficCategory::kOther) + waiting_text(traffic) + " | " +
          fixed(1e-6 * static_cast<double>(resident_bytes), 0) + " MB";
 }
 

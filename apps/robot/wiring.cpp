@@ -373,11 +373,11 @@ void Robot::add_network(CrossingEnds meshes) {
                overlay_->guard_packets<OverlayLane::kTeam>());
   dds.exchange(t.places_packets, kRequest, kOther, {}, {},
                overlay_->guard_packets<OverlayLane::kPlaces>());
-  dds.exchange(t.chunks, kState, kOther, meshes);
-  dds.exchange(t.mesh_poses, kState, kOther, meshes);
-  dds.exchange(t.gone_surface, kState, kOther, meshes);
+  dds.exchange(t.chunks, kState, kMap, meshes);
+  dds.exchange(t.mesh_poses, kState, kMap, meshes);
+  dds.exchange(t.gone_surface, kState, kMap, meshes);
   const bool has_objects = objects_ != nullptr;
-  dds.exchange(t.objects, kState, kOther, {.send = has_objects, .receive = has_objects});
+  dds.exchange(t.objects, kState, kMap, {.send = has_objects, .receive = has_objects});
   dds.exchange(t.status, kStatus, kOther);
   // Closures and inlier sets are sent only to the robots that they connect.
   t.own_closures.subscribe(
@@ -573,7 +573,7 @@ std::map<std::string, std::uint64_t> Robot::sent_bytes() const {
   const TrafficSnapshot traffic = bridge_->traffic();
   std::map<std::string, std::uint64_t> bytes;
   for (const auto category :
-       {kPlaceRecognition, kGeometricVerification, kPoseGraphOptimization, kOther})
+       {kPlaceRecognition, kGeometricVerification, kPoseGraphOptimization, kMap, kOther})
     bytes[to_string(category)] = traffic.bytes(Direction::kOut, category);
   return bytes;
 }

@@ -19,7 +19,8 @@ using Rows = std::vector<std::vector<std::string>>;
 
 constexpr double kManySkipped = 0.05;  // share of the frames above which odometry loses accuracy
 
-constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", "other"};
+constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", "map",
+                                 "other"};
 
 // Absolute error, drift and covered share of the recording; "-" for missing values.
 std::vector<std::string> error_cells(const TrajectoryError* error) {
@@ -123,12 +124,14 @@ std::string closure_table(const TeamResult& team) {
 
 // The bytes that the robots have sent, by category, as shares of those that the server of a
 // centralised system would receive. It receives as many keypoints of a keyframe as the paper's
-// system, or as many as the robots. Empty without keyframes.
+// system, or as many as the robots. The map is not counted, because keypoints do not show it. Empty
+// without keyframes.
 std::string centralised_remark(const std::map<std::string, std::uint64_t>& traffic,
                                std::uint64_t keyframes, const PeerKeyframeCounts& received) {
   constexpr double kKeypointsOfPaper = 1000.0;
   double sent = 0.0;
-  for (const auto& [category, bytes] : traffic) sent += static_cast<double>(bytes);
+  for (const auto& [category, bytes] : traffic)
+    if (category != kMapTraffic) sent += static_cast<double>(bytes);
   if (sent == 0.0 || keyframes == 0) return "";
   const auto share = [&](double keypoints) {
     const double bytes = static_cast<double>(keyframes) * keypoints * kKeypointBytes;
@@ -148,7 +151,8 @@ std::string centralised_remark(const std::map<std::string, std::uint64_t>& traff
 }
 
 std::string traffic_table(const TeamResult& team) {
-  Rows rows = {{"sent", "place recognition", "geometric verification", "distributed PGO", "other"}};
+  Rows rows = {
+      {"sent", "place recognition", "geometric verification", "distributed PGO", "map", "other"}};
   std::map<std::string, std::uint64_t> sums;
   std::uint64_t keyframes = 0;
   PeerKeyframeCounts received;

@@ -84,7 +84,8 @@ struct PoseGraphConfig {
                   "[s] shortest time between published trajectories during a session");
     visitor.field("status_period_s", status_period_s, {0.01, 60.0},
                   "[s] period of the messages of a coordinator; a status is sent when it has "
-                  "changed, at most twice per period");
+                  "changed, at most twice per period, and once if only the robot's own graph has "
+                  "grown");
   }
 };
 

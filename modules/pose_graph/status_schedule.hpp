@@ -6,8 +6,9 @@
 
 namespace km {
 
-/// When a robot sends its status: when it has changed, but at most twice per period. Not
-/// thread-safe.
+/// When a robot sends its status: when it has changed, but at most twice per period. It is sent
+/// only once per period if nothing but keyframes and closures inside the robot are new, because
+/// these open no session before the team is at rest. Not thread-safe.
 class StatusSchedule {
  public:
   explicit StatusSchedule(double period_s) : period_s_(period_s) {}
@@ -22,7 +23,7 @@ class StatusSchedule {
  private:
   double period_s_;
   std::optional<TeamStatus> sent_;
-  double last_s_ = -1e9;
+  double last_s_ = -1e9;  // time of the last status or progress
 };
 
 }  // namespace km

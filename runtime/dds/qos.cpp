@@ -19,6 +19,8 @@ const char* to_string(TrafficCategory category) {
       return "geometric_verification";
     case TrafficCategory::kPoseGraphOptimization:
       return "pgo";
+    case TrafficCategory::kMap:
+      return "map";
     case TrafficCategory::kOther:
       break;
   }

@@ -17,15 +17,17 @@ enum class TopicKind {
   kStatus,   ///< Newest wins, may be lost, and carries the liveliness of the robot.
 };
 
-/// Category under which bytes are counted: the split of the Kimera-Multi paper.
+/// Category under which bytes are counted: the split of the Kimera-Multi paper, whose robots do not
+/// exchange maps, and two more.
 enum class TrafficCategory {
   kPlaceRecognition,
   kGeometricVerification,
   kPoseGraphOptimization,
+  kMap,  ///< Meshes and objects.
   kOther
 };
 
-/// "place_recognition", "geometric_verification", "pgo", "other".
+/// "place_recognition", "geometric_verification", "pgo", "map", "other".
 const char* to_string(TrafficCategory category);
 
 /// Quality of service of a writer, or reader, of a topic of this kind. Samples of the own

@@ -29,6 +29,7 @@ inline constexpr std::size_t kSendPriorities = 7;
       return kind == TopicKind::kEvent ? SendPriority::kClosures : SendPriority::kVerification;
     case TrafficCategory::kPoseGraphOptimization:
       return SendPriority::kPoses;
+    case TrafficCategory::kMap:
     case TrafficCategory::kOther:
       break;
   }

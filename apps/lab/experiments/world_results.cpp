@@ -138,7 +138,8 @@ double WorldResults::sent_mb(const std::string& category) const {
 double WorldResults::sent_mb() const {
   double bytes = 0.0;
   for (const RobotNumbers& robot : robots)
-    for (const auto& [category, sent] : robot.sent_bytes) bytes += sent;
+    for (const auto& [category, sent] : robot.sent_bytes)
+      if (category != kMapTraffic) bytes += sent;
   return 1e-6 * bytes;
 }
 

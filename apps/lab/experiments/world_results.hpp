@@ -54,7 +54,7 @@ struct WorldResults {
   [[nodiscard]] std::size_t keyframes() const;
   /// Sum over the robots [MB]; nothing for a category that no robot sent.
   [[nodiscard]] double sent_mb(const std::string& category) const;
-  /// Sum over the robots and all categories [MB].
+  /// Sum over the robots and all categories but the map [MB].
   [[nodiscard]] double sent_mb() const;
   /// Bytes of each keyframe at a server [MB], with as many keypoints as the robots receive of a
   /// keyframe in the mean. 0 if they received none.

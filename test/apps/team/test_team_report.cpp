@@ -98,8 +98,10 @@ struct HalfTeam : Team {
     summary.frames = 150;
     summary.closures = {9, 5, 4};
     summary.pgo.rounds = 33;
-    summary.traffic = {
-        {"place_recognition", 2000}, {"geometric_verification", 3000000}, {"pgo", 400}};
+    summary.traffic = {{"place_recognition", 2000},
+                       {"geometric_verification", 3000000},
+                       {"pgo", 400},
+                       {"map", 7000000}};
     summary.exit_reason = "done";
     leave("a", summary, 0.5);
   }

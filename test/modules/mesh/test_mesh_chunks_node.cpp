@@ -190,8 +190,8 @@ struct MeshRobot {
         sender(fast(), id, {chunks.to_peers(), poses.to_peers()}),
         received(chunks.from_peers()),
         received_poses(poses.from_peers()) {
-    basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kOther);
-    basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kOther);
+    basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kMap);
+    basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kMap);
   }
   ~MeshRobot() { stop(); }
   static MapSharingConfig fast() {
@@ -251,7 +251,7 @@ TEST_CASE("A robot's mesh arrives at its peers in chunks, also at those that joi
 
   const std::vector<MeshChunk> chunks = chunks_of(*mesh, 3);
   const TopicTraffic out = a->traffic(Direction::kOut);
-  CHECK(out.category == TrafficCategory::kOther);
+  CHECK(out.category == TrafficCategory::kMap);
   CHECK(out.count.messages == chunks.size());
   CHECK(b.traffic(Direction::kIn).count == out.count);
   CHECK(b.traffic(Direction::kIn).refused.empty());

@@ -129,7 +129,7 @@ struct ObjectRobot {
               .received = objects.from_peers(),
               .own = objects.to_peers(),
               .joint = joint}) {
-    basis.bridge.exchange(objects, TopicKind::kState, TrafficCategory::kOther);
+    basis.bridge.exchange(objects, TopicKind::kState, TrafficCategory::kMap);
     trajectory.publish(poses(id));
   }
   ~ObjectRobot() {

@@ -30,8 +30,8 @@ struct Tier {
               .ties = made,
               .outcomes = outcomes}),
         received(closures.from_peers()) {
-    basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kOther);
-    basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kOther);
+    basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kMap);
+    basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kMap);
     basis.bridge.exchange(closures, TopicKind::kEvent, TrafficCategory::kGeometricVerification);
     own_chunks.subscribe([this](const auto& chunk) { chunks.to_peers().publish(chunk); });
     made.subscribe([this](const auto& tie) {

@@ -34,9 +34,9 @@ struct Mapper {
              .received_poses = poses.from_peers(),
              .own_gone = sent_gone,
              .received_gone = gone.from_peers()}) {
-    basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kOther);
-    basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kOther);
-    basis.bridge.exchange(gone, TopicKind::kState, TrafficCategory::kOther);
+    basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kMap);
+    basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kMap);
+    basis.bridge.exchange(gone, TopicKind::kState, TrafficCategory::kMap);
     sent_gone.subscribe([this](const auto& seen) { gone.to_peers().publish(seen); });
     sent.subscribe([this](const auto& chunk) { chunks.to_peers().publish(chunk); });
     sent_poses.subscribe([this](const auto& newest) { poses.to_peers().publish(newest); });
