@@ -105,10 +105,9 @@ ReportTable numbers_table(const RunsByLevel& levels) {
       "Joint ATE: RMSE of all robots under one alignment, of runs in which all robots joined. "
       "Before: odometry, placed by the first optimised keyframe of each robot. NEES: of the "
       "published keyframes, over the median of its distribution; 1 is right. Bytes: sent in the "
-      "whole run, as a share of those of a server that "
-      "receives each keyframe with as many keypoints as the robots receive of a keyframe in the "
-      "mean. Divergences: found "
-      "and logged by the robots.";
+      "whole run, as a share of those of a server that receives each keyframe with as many "
+      "keypoints as the robots receive of a keyframe in the mean. Divergences: found and logged by "
+      "the robots.";
   return table;
 }
 
