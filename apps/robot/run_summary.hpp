@@ -5,7 +5,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "modules/core/ids.hpp"
@@ -27,12 +26,6 @@ struct ClosureCounts {
   }
   bool operator==(const ClosureCounts&) const = default;
 };
-
-/// Category of the traffic of meshes and objects.
-inline constexpr std::string_view kMapTraffic = "map";
-
-/// Bytes of a keypoint in a centralised system: 8 of position and 32 of ORB descriptor.
-inline constexpr double kKeypointBytes = 40.0;
 
 /// Keyframes of peers whose features this robot received, with the keypoints of all of them.
 struct PeerKeyframeCounts {

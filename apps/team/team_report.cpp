@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include "apps/centralised_system.hpp"
 #include "apps/output_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"

@@ -6,7 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "apps/robot/run_summary.hpp"
+#include "apps/centralised_system.hpp"
 #include "apps/team/team_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
