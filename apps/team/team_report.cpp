@@ -130,12 +130,10 @@ std::string closure_table(const TeamResult& team) {
 std::string centralised_remark(const std::map<std::string, std::uint64_t>& traffic,
                                std::uint64_t keyframes, const PeerKeyframeCounts& received) {
   constexpr double kKeypointsOfPaper = 1000.0;
-  double sent = 0.0;
-  for (const auto& [category, bytes] : traffic)
-    if (category != kMapTraffic) sent += static_cast<double>(bytes);
+  const double sent = counted_bytes(traffic);
   if (sent == 0.0 || keyframes == 0) return "";
   const auto share = [&](double keypoints) {
-    const double bytes = static_cast<double>(keyframes) * keypoints * kKeypointBytes;
+    const double bytes = server_bytes(static_cast<double>(keyframes), keypoints);
     return bytes_text(bytes) + ", of which the robots send " + fixed(100.0 * sent / bytes, 1) +
            " %";
   };

@@ -4,7 +4,9 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "apps/centralised_system.hpp"
 #include "apps/robot/run_summary.hpp"
+#include "runtime/dds/qos.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -53,6 +55,10 @@ TEST_CASE("A summary with all possible values is read as it was written", "[robo
   CHECK(read_summary(folder.write("full.json", json_text(full))) == full);
   CHECK(read_summary(folder.write("default.json", json_text(RunSummary{}))) == RunSummary{});
   CHECK(read_summary(folder.write("empty.json", "{}")) == RunSummary{});
+}
+
+TEST_CASE("The category of the map has one name", "[robot][summary]") {
+  CHECK(to_string(TrafficCategory::kMap) == kMapTraffic);
 }
 
 TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {

@@ -71,27 +71,25 @@ LevelResults read_level_results(const WorldConfig& world, const ExperimentPaths&
   const WorldFiles files = world_files(world, paths);
   const TeamPlan plan = read_team_file(files.team_file, {});
   const Json team = read_json(files.team_json);
+  const WorldResults run = read_world_results(world, paths);
   LevelResults results;
-  for (const Json& robot : team.value("robots", Json::array())) {
+  for (const RobotNumbers& robot : run.robots) {
     ++results.robots;
-    results.in_team_frame += robot.value("in_team_frame", true);
-    if (const auto error_m = number_at(robot, "/odometry/position_m/rmse"))
-      results.odometry_m.push_back(*error_m);
+    results.in_team_frame += robot.in_team_frame;
+    if (robot.odometry_error_m) results.odometry_m.push_back(*robot.odometry_error_m);
   }
   for (const RobotPlan& robot : plan.robots) {
     const Json summary = read_json(files.run / robot.name / "summary.json");
     results.divergences += number_at(summary, "/odometry/divergences").value_or(0.0);
   }
-  const WorldResults sent = read_world_results(world, paths);
-  results.sent_mb = sent.sent_mb();
-  results.equal_keypoints_mb = sent.equal_keypoints_mb();
-  const double judged = number_at(team, "/closures/inliers/judged").value_or(0.0);
-  const double correct = number_at(team, "/closures/inliers/correct").value_or(0.0);
-  results.closures_kept = static_cast<std::size_t>(judged);
-  results.false_kept = static_cast<std::size_t>(judged - correct);
+  results.counted_mb = run.counted_mb();
+  results.equal_keypoints_mb = run.equal_keypoints_mb();
+  const double kept = run.closures.value_or(0.0);
+  results.closures_kept = static_cast<std::size_t>(kept);
+  results.false_kept = static_cast<std::size_t>(kept - run.true_closures.value_or(0.0));
   add_angles(team, results);
   if (!results.joined()) return results;
-  results.joint_after_m = number_at(team, "/optimized/joint/position_m/rmse");
+  results.joint_after_m = run.joint_error_m;
   add_joint(plan, files, results);
   return results;
 }

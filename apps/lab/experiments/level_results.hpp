@@ -22,7 +22,7 @@ struct LevelResults {
   std::optional<double> nees;
   std::size_t closures_kept = 0, false_kept = 0;
   std::array<AngleScore, ClosureScores::kAngleBins> by_angle = {};
-  double sent_mb = 0.0;             ///< Sent in the whole run, except for the map.
+  double counted_mb = 0.0;          ///< Sent in the whole run, except for the map.
   double equal_keypoints_mb = 0.0;  ///< See WorldResults.
   double divergences = 0.0;         ///< Divergences of all odometries, which their logs report.
 

@@ -67,7 +67,7 @@ const auto kBefore = [](const LevelResults& r) { return r.joint_before_m; };
 const auto kAfter = [](const LevelResults& r) { return r.joint_after_m; };
 const auto kShare_percent = [](const LevelResults& r) {
   return r.equal_keypoints_mb > 0.0
-             ? std::optional<double>(100.0 * r.sent_mb / r.equal_keypoints_mb)
+             ? std::optional<double>(100.0 * r.counted_mb / r.equal_keypoints_mb)
              : std::nullopt;
 };
 const auto kNees = [](const LevelResults& r) { return r.nees; };

@@ -40,7 +40,7 @@ Communication communication(ReportInput& input, const ReportInput::World& world)
   mb.place_recognition = results.sent_mb("place_recognition");
   mb.verification = results.sent_mb("geometric_verification");
   mb.live_pgo = results.sent_mb("pgo");
-  mb.all_sent = results.sent_mb();
+  mb.all_sent = results.counted_mb();
   mb.equal_keypoints = results.equal_keypoints_mb();
   mb.pgo = of_method(input, world, "rbcd", megabytes);
   mb.newton_pgo = of_method(input, world, "newton", megabytes);

@@ -135,11 +135,9 @@ double WorldResults::sent_mb(const std::string& category) const {
   return 1e-6 * bytes;
 }
 
-double WorldResults::sent_mb() const {
+double WorldResults::counted_mb() const {
   double bytes = 0.0;
-  for (const RobotNumbers& robot : robots)
-    for (const auto& [category, sent] : robot.sent_bytes)
-      if (category != kMapTraffic) bytes += sent;
+  for (const RobotNumbers& robot : robots) bytes += counted_bytes(robot.sent_bytes);
   return 1e-6 * bytes;
 }
 
@@ -150,7 +148,7 @@ double WorldResults::equal_keypoints_mb() const {
     keypoints += robot.peer_keypoints;
   }
   if (received == 0.0) return 0.0;
-  return 1e-6 * kKeypointBytes * (keypoints / received) * static_cast<double>(keyframes());
+  return 1e-6 * server_bytes(static_cast<double>(keyframes()), keypoints / received);
 }
 
 RobotNumbers read_lone_robot(const fs::path& run) {

@@ -55,8 +55,8 @@ struct WorldResults {
   /// Sum over the robots [MB]; nothing for a category that no robot sent.
   [[nodiscard]] double sent_mb(const std::string& category) const;
   /// Sum over the robots and all categories but the map [MB].
-  [[nodiscard]] double sent_mb() const;
-  /// Bytes of each keyframe at a server [MB], with as many keypoints as the robots receive of a
+  [[nodiscard]] double counted_mb() const;
+  /// Bytes of all keyframes at a server [MB], with as many keypoints as the robots receive of a
   /// keyframe in the mean. 0 if they received none.
   [[nodiscard]] double equal_keypoints_mb() const;
 };
