@@ -212,12 +212,15 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
   std::optional<ImageDescriber> describer;
   if (const std::string& network = config.place_recognition.network; !network.empty())
     describer.emplace(find_shipped_file(network));
+  std::optional<KeypointDescriber> keypoint_describer;
+  if (const std::string& network = config.keyframe_features.network; !network.empty())
+    keypoint_describer.emplace(find_shipped_file(network));
   auto& features =
       add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
                                 KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,
                                                        .frames = topics_.located_frames,
                                                        .keyframes = topics_.new_keyframes},
-                                std::move(describer));
+                                std::move(describer), std::move(keypoint_describer));
   topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
   if (restored_) features.continue_from(restored_->keyframes.back().odometry);
 }

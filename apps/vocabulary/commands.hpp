@@ -35,5 +35,6 @@ void add_inspect(Command app);
 void add_evaluate(Command app);
 void add_bags(Command app);
 void add_describe(Command app);
+void add_patches(Command app);
 
 }  // namespace km

@@ -14,8 +14,15 @@ namespace km {
 /// Bytes of the descriptor of a keypoint. Messages, journals and vocabularies contain as many.
 inline constexpr std::size_t kDescriptorBytes = 32;
 
-/// Binary descriptor of a keypoint, compared by Hamming distance: see make_keypoint_extractor().
+/// Binary descriptor of a keypoint by ORB: see make_keypoint_extractor(). Its word is found by it.
 using BinaryDescriptor = std::array<std::uint8_t, kDescriptorBytes>;
+
+/// Bytes of the descriptor by which keypoints of two keyframes are matched.
+inline constexpr std::size_t kMatchedBytes = 12;
+
+/// Descriptor by which keypoints of two keyframes are matched: the first tests of ORB (see
+/// orb_bits()), or numbers of a network in 4 bits each (see KeypointDescriber).
+using MatchedDescriptor = std::array<std::uint8_t, kMatchedBytes>;
 
 /// An image point of the left camera with its depth if stereo measured it.
 struct Keypoint {
@@ -31,13 +38,17 @@ struct Keypoint {
 };
 
 /// Features with which another robot aligns itself to a keyframe: points, descriptors, and the
-/// properties of the rig that determine their noise. keypoints and descriptors have equal length.
+/// properties of the rig that determine their noise. An own keyframe has as many descriptors as
+/// keypoints, and those of a network or none in `matched`. A keyframe of a peer has only those in
+/// `matched`. See matched_by().
 struct KeyframeFeatures {
   SE3 T_body_cam = SE3::Identity();  ///< Pose of the left camera.
   double focal_px = 0.0;
   double baseline_m = 0.0;
   std::vector<Keypoint> keypoints;
   std::vector<BinaryDescriptor> descriptors;
+  std::vector<MatchedDescriptor> matched;
+  std::uint16_t network = 0;  ///< Identity of the network of `matched`; 0: ORB.
 };
 
 /// Global descriptor of an image by a network (see ImageDescriber). The cosine of the angle between

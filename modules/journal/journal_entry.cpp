@@ -53,6 +53,12 @@ void describe(auto& archive, As<Keyframe> auto& keyframe) {
     for (auto& byte : descriptor) archive(byte);
   });
   archive.require(features.descriptors.size() == features.keypoints.size());
+  archive(features.network);
+  archive.list(features.matched, kMostKeypoints, sizeof(MatchedDescriptor), [&](auto& descriptor) {
+    for (auto& byte : descriptor) archive(byte);
+  });
+  archive.require(features.matched.size() ==
+                  (features.network == 0 ? 0 : features.keypoints.size()));
   archive(keyframe.image.network);
   archive.list(keyframe.image.values, kMaxImageDescriptorBytes, 1,
                [&](auto& value) { archive(value); });

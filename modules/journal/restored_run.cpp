@@ -104,6 +104,7 @@ void RunRestorer::add(Keyframe keyframe) {
     Keyframe lost = keyframe;
     lost.features.keypoints.clear();
     lost.features.descriptors.clear();
+    lost.features.matched.clear();
     for (; run_.keyframes.size() < keyframe.odometry.id.index; ++run_.lost_keyframes) {
       lost.odometry.id.index = static_cast<KeyframeIndex>(run_.keyframes.size());
       run_.keyframes.push_back(lost);

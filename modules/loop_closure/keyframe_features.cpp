@@ -1,117 +1,40 @@
 #include "modules/loop_closure/keyframe_features.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <numeric>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "modules/core/depth_lookup.hpp"
 #include "modules/images/image_view.hpp"
-#include "modules/images/keypoint_extractor.hpp"
+#include "modules/images/spread_keypoints.hpp"
 
 namespace km {
-namespace {
-
-// Candidate corners per kept corner. With more candidates the corners are more evenly spread, and
-// the extraction takes longer.
-constexpr int kCandidatesPerKeypoint = 4;
-
-// Sorts by descending response, then by position, so that the order does not depend on that of the
-// detector.
-void sort_by_response(std::vector<cv::KeyPoint>& corners) {
-  std::sort(corners.begin(), corners.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
-    if (a.response != b.response) return a.response > b.response;
-    if (a.pt.y != b.pt.y) return a.pt.y < b.pt.y;
-    return a.pt.x < b.pt.x;
-  });
-}
-
-// The corners, sorted by response, without those that are closer than `radius` to a stronger corner
-// of the same octave. The radius grows with the octave. Cells of half the radius make the test
-// cheap.
-std::vector<cv::KeyPoint> suppressed(const std::vector<cv::KeyPoint>& corners, double radius,
-                                     cv::Size size) {
-  std::vector<cv::KeyPoint> kept;
-  std::vector<std::vector<std::uint8_t>> covered(kPyramidLevels);
-  for (const cv::KeyPoint& corner : corners) {
-    const double cell = 0.5 * radius * std::pow(static_cast<float>(kPyramidScale), corner.octave);
-    const int columns = static_cast<int>(size.width / cell) + 1;
-    const int rows = static_cast<int>(size.height / cell) + 1;
-    auto& cells = covered[static_cast<std::size_t>(corner.octave)];
-    cells.resize(static_cast<std::size_t>(columns * rows), 0);
-    const int cx = static_cast<int>(corner.pt.x / cell);
-    const int cy = static_cast<int>(corner.pt.y / cell);
-    if (cells[static_cast<std::size_t>(cy * columns + cx)] != 0) continue;
-    kept.push_back(corner);
-    for (int y = std::max(cy - 2, 0); y <= std::min(cy + 2, rows - 1); ++y)
-      for (int x = std::max(cx - 2, 0); x <= std::min(cx + 2, columns - 1); ++x)
-        cells[static_cast<std::size_t>(y * columns + x)] = 1;
-  }
-  return kept;
-}
-
-// At most `count` corners, evenly spread: suppressed() with the smallest radius that leaves at most
-// `count` corners, found by bisection (Bailo et al., "Efficient adaptive non-maximal suppression
-// algorithms for homogeneous spatial keypoint distribution", 2018).
-std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> corners, std::size_t count,
-                                 cv::Size size) {
-  sort_by_response(corners);
-  if (corners.size() <= count) return corners;
-  double low = 1.0;
-  double high = 0.25 * std::hypot(size.width, size.height);
-  std::vector<cv::KeyPoint> best = suppressed(corners, high, size);
-  for (int i = 0; i < 10; ++i) {
-    const double radius = 0.5 * (low + high);
-    std::vector<cv::KeyPoint> kept = suppressed(corners, radius, size);
-    if (kept.size() > count) {
-      low = radius;
-    } else {
-      high = radius;
-      best = std::move(kept);
-    }
-  }
-  return best;
-}
-
-std::vector<int> by_response(const std::vector<cv::KeyPoint>& corners) {
-  std::vector<int> order(corners.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-    return corners[static_cast<std::size_t>(a)].response >
-           corners[static_cast<std::size_t>(b)].response;
-  });
-  return order;
-}
-
-}  // namespace
 
 KeyframeFeatureExtractor::KeyframeFeatureExtractor(const StereoRig& rig,
-                                                   const KeyframeFeaturesConfig& config)
-    : config_(checked(config)), rig_(rig) {
+                                                   const KeyframeFeaturesConfig& config,
+                                                   std::optional<KeypointDescriber> describer)
+    : config_(checked(config)), rig_(rig), describer_(std::move(describer)) {
   if (rig.depth_source == DepthSource::kRightImage) stereo_.emplace(rig, config);
 }
 
-KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) const {
+KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) {
   if (!fits(frame, rig_))
     throw std::invalid_argument("KeyframeFeatureExtractor: images of another size than the rig's");
-  const cv::Mat image = view(frame.left);
-  const auto extractor =
-      make_keypoint_extractor(kCandidatesPerKeypoint * config_.max_keypoints, config_.min_contrast);
-  std::vector<cv::KeyPoint> corners;
-  extractor->detect(image, corners);
-  corners =
-      spread(std::move(corners), static_cast<std::size_t>(config_.max_keypoints), image.size());
-  cv::Mat descriptors;
-  extractor->compute(image, corners, descriptors);  // drops keypoints that are too near the border
+  const SpreadKeypoints spread =
+      spread_keypoints(view(frame.left), config_.max_keypoints, config_.min_contrast);
 
   KeyframeFeatures features;
   features.T_body_cam = rig_.cameras[0].T_body_cam;
   features.focal_px = 0.5 * (rig_.cameras[0].fx + rig_.cameras[0].fy);
   features.baseline_m = rig_.baseline_m();
+  std::vector<MatchedDescriptor> by_network;
+  if (describer_) {
+    features.network = describer_->network();
+    by_network = describer_->describe(view(frame.left), spread.corners);
+  }
   std::vector<Eigen::Vector2f> pixels, bearings;
-  for (const int i : by_response(corners)) {  // OpenCV has sorted them by octave
-    const cv::KeyPoint& corner = corners[static_cast<std::size_t>(i)];
+  for (std::size_t i = 0; i < spread.corners.size(); ++i) {
+    const cv::KeyPoint& corner = spread.corners[i];
     const std::optional<Eigen::Vector2d> bearing =
         rig_.cameras[0].unproject({corner.pt.x, corner.pt.y});
     if (!bearing) continue;
@@ -120,7 +43,8 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) con
     features.keypoints.push_back({.bearing = bearings.back(),
                                   .inverse_depth = 0.0F,
                                   .octave = static_cast<std::uint8_t>(corner.octave)});
-    features.descriptors.push_back(descriptor_of_row(descriptors, i));
+    features.descriptors.push_back(spread.descriptors[i]);
+    if (describer_) features.matched.push_back(by_network[i]);
   }
   const std::vector<float> depths = inverse_depths(frame, pixels, bearings);
   for (std::size_t i = 0; i < depths.size(); ++i) features.keypoints[i].inverse_depth = depths[i];
@@ -143,18 +67,27 @@ std::vector<float> KeyframeFeatureExtractor::inverse_depths(
   return result;
 }
 
+KeyframeFeatures selected(const KeyframeFeatures& features, std::span<const std::size_t> places) {
+  KeyframeFeatures result = features;
+  const auto select = [&](auto& values) {
+    if (values.empty()) return;
+    const auto all = std::exchange(values, {});
+    values.reserve(places.size());
+    for (const std::size_t i : places) values.push_back(all[i]);
+  };
+  select(result.keypoints);
+  select(result.descriptors);
+  select(result.matched);
+  return result;
+}
+
 KeyframeFeatures reduced(const KeyframeFeatures& features, std::size_t count) {
   if (features.keypoints.size() <= count) return features;
-  KeyframeFeatures result = features;
-  result.keypoints.clear();
-  result.descriptors.clear();
+  std::vector<std::size_t> places;
   for (const bool with_depth : {true, false})
-    for (std::size_t i = 0; i < features.keypoints.size() && result.keypoints.size() < count; ++i) {
-      if ((features.keypoints[i].inverse_depth > 0.0F) != with_depth) continue;
-      result.keypoints.push_back(features.keypoints[i]);
-      result.descriptors.push_back(features.descriptors[i]);
-    }
-  return result;
+    for (std::size_t i = 0; i < features.keypoints.size() && places.size() < count; ++i)
+      if (features.keypoints[i].has_depth() == with_depth) places.push_back(i);
+  return selected(features, places);
 }
 
 }  // namespace km

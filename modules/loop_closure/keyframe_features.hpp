@@ -10,22 +10,25 @@
 #include "modules/core/keyframe.hpp"
 #include "modules/loop_closure/epipolar_matcher.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
+#include "modules/loop_closure/keypoint_describer.hpp"
 
 namespace km {
 
 /// Extracts the features of a frame for place recognition and verification: evenly spread ORB
 /// keypoints of the left image, the strongest first (Rublee et al., "ORB: an efficient alternative
 /// to SIFT or SURF", ICCV 2011). Keypoints have a depth if the right image or the depth image
-/// yields one. Const members are safe to call from several threads.
+/// yields one. With a KeypointDescriber its descriptors are those by which keyframes are matched.
+/// Not thread-safe.
 class KeyframeFeatureExtractor {
  public:
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument if the rig cannot be
   /// rectified.
-  KeyframeFeatureExtractor(const StereoRig& rig, const KeyframeFeaturesConfig& config);
+  KeyframeFeatureExtractor(const StereoRig& rig, const KeyframeFeaturesConfig& config,
+                           std::optional<KeypointDescriber> describer = {});
 
   /// Features of `frame`, at most max_keypoints. An image without corners gives none. Throws
   /// std::invalid_argument if the frame does not fit the rig (see fits()).
-  [[nodiscard]] KeyframeFeatures extract(const StereoFrame& frame) const;
+  [[nodiscard]] KeyframeFeatures extract(const StereoFrame& frame);
 
  private:
   [[nodiscard]] std::vector<float> inverse_depths(const StereoFrame& frame,
@@ -35,7 +38,12 @@ class KeyframeFeatureExtractor {
   KeyframeFeaturesConfig config_;
   StereoRig rig_;
   std::optional<EpipolarMatcher> stereo_;  // absent with an RGB-D rig
+  std::optional<KeypointDescriber> describer_;
 };
+
+/// The keypoints of `features` at `places`, in their order.
+[[nodiscard]] KeyframeFeatures selected(const KeyframeFeatures& features,
+                                        std::span<const std::size_t> places);
 
 /// At most `count` keypoints: first those with a known depth, each group in the order of
 /// `features`.

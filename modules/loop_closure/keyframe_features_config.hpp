@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "modules/core/config.hpp"
 
 namespace km {
@@ -13,6 +15,7 @@ struct KeyframeFeaturesConfig {
   double min_depth_m = 0.4;
   double max_depth_m = 40.0;
   double min_stereo_correlation = 0.8;
+  std::string network = {};
 
   void visit_fields(auto& visitor) {
     visitor.field("max_keypoints", max_keypoints, {50, 4000},
@@ -26,6 +29,11 @@ struct KeyframeFeaturesConfig {
     visitor.field("max_depth_m", max_depth_m, {1.0, 1000.0}, "[m] largest depth that is used");
     visitor.field("min_stereo_correlation", min_stereo_correlation, {0.0, 0.99},
                   "least zero-normalised cross-correlation of left and right patch");
+    visitor.field(
+        "network", network,
+        "ONNX file of a network that describes keypoints, by which keyframes of two robots "
+        "are then matched; all robots of a team need the same; networks/keypoints.onnx "
+        "comes with the program; empty: ORB");
   }
 };
 

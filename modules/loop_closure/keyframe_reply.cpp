@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "modules/loop_closure/keyframe_features.hpp"
+#include "modules/loop_closure/matching.hpp"
 
 namespace km {
 namespace {
@@ -16,14 +17,11 @@ struct KeypointBudget {
   std::size_t most = 0;
 };
 
-KeyframeFeatures at_places(const KeyframeFeatures& features, std::span<const std::size_t> places) {
+// As the requester compares it: by its network if that is also ours, otherwise by ORB.
+KeyframeFeatures comparable(const KeyframeFeatures& features, std::uint16_t network) {
   KeyframeFeatures result = features;
-  result.keypoints.clear();
-  result.descriptors.clear();
-  for (const std::size_t i : places) {
-    result.keypoints.push_back(features.keypoints[i]);
-    result.descriptors.push_back(features.descriptors[i]);
-  }
+  result.network = network == features.network ? network : 0;
+  result.matched = matched_by(result.network, features);
   return result;
 }
 
@@ -42,7 +40,7 @@ KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const Keypoin
   constexpr int kBest = 3;  // rank of a keypoint with depth and a shared word
   const auto best = static_cast<std::size_t>(std::ranges::count(rank, kBest));
   order.resize(std::min(order.size(), std::clamp(best, budget.least, budget.most)));
-  return at_places(features, order);
+  return selected(features, order);
 }
 
 KeyframeFeatures without(const KeyframeFeatures& features, std::span<const std::size_t> places) {
@@ -51,14 +49,14 @@ KeyframeFeatures without(const KeyframeFeatures& features, std::span<const std::
   std::vector<std::size_t> rest;
   for (std::size_t i = 0; i < is_left.size(); ++i)
     if (is_left[i]) rest.push_back(i);
-  return at_places(features, rest);
+  return selected(features, rest);
 }
 
 }  // namespace
 
 KeyframeReply reply_to(const KeyframeRequest& request, const Keyframe& asked,
                        const std::optional<WordsOfRequester>& words, std::size_t most) {
-  const KeyframeFeatures& features = asked.features;
+  const KeyframeFeatures features = comparable(asked.features, request.network);
   const KeypointBudget budget{most / 4, most};
   KeyframeReply reply{.number = request.number, .found = true, .keyframe = {}};
   reply.keyframe.odometry = asked.odometry;
@@ -70,10 +68,11 @@ KeyframeReply reply_to(const KeyframeRequest& request, const Keyframe& asked,
   } else {
     const std::vector<std::size_t> points =
         common_word_places(features, words->vocabulary, words->words, budget.most);
-    for (const std::size_t point : points) reply.descriptors.push_back(features.descriptors[point]);
+    for (const std::size_t point : points) reply.descriptors.push_back(features.matched[point]);
     reply.keyframe.features =
         reduced(without(features, points), budget.least - std::min(budget.least, points.size()));
   }
+  reply.keyframe.features.descriptors.clear();
   return reply;
 }
 
@@ -85,8 +84,8 @@ std::optional<Keyframe> keyframe_of(const KeyframeReply& reply, const WordPoints
   features.focal_px = points->focal_px;
   features.baseline_m = points->baseline_m;
   for (const WordPoint& point : points->points) features.keypoints.push_back(point.keypoint);
-  features.descriptors.insert(features.descriptors.end(), reply.descriptors.begin(),
-                              reply.descriptors.end());
+  features.matched.insert(features.matched.end(), reply.descriptors.begin(),
+                          reply.descriptors.end());
   return keyframe;
 }
 

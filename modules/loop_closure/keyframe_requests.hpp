@@ -30,6 +30,7 @@ struct KeyframeRequest {
   KeyframeId keyframe;
   KeyframeIndex own = 0;
   KeyframePart part = KeyframePart::kFeatures;
+  std::uint16_t network = 0;  ///< KeyframeFeatures::network of `own`.
 };
 
 /// Reply to a KeyframeRequest. `found` is false if the owner does not have the keyframe (yet); only
@@ -41,7 +42,7 @@ struct KeyframeReply {
   /// Reply to kDescriptors: descriptors of the WordPoints, in their order. `keyframe` has further
   /// keypoints if these are few. Empty if the owner does not know the words any more: `keyframe`
   /// has all keypoints.
-  std::vector<BinaryDescriptor> descriptors = {};
+  std::vector<MatchedDescriptor> descriptors = {};
 };
 
 /// Reply to a KeyframeRequest for KeyframePart::kWordPoints: those points whose words keyframe

@@ -1,6 +1,7 @@
 #include "modules/loop_closure/matching.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -8,29 +9,50 @@
 #include <tuple>
 #include <utility>
 
+#include "modules/loop_closure/matched_numbers.hpp"
 #include "modules/place_recognition/hamming.hpp"
 
 namespace km {
 namespace {
 
-// The matched bytes of a descriptor, as machine words.
-struct MatchedBits {
+// Tests of ORB as machine words.
+struct Bits {
+  static constexpr double kUnit = 1.0;  // distance of 1 bit
   std::uint64_t low = 0;
   std::uint32_t high = 0;
+
+  explicit Bits(const MatchedDescriptor& descriptor) {
+    std::memcpy(&low, descriptor.data(), sizeof low);
+    std::memcpy(&high, descriptor.data() + sizeof low, sizeof high);
+  }
 };
-static_assert(kMatchedBytes == sizeof(MatchedBits::low) + sizeof(MatchedBits::high));
+static_assert(kMatchedBytes == sizeof(Bits::low) + sizeof(Bits::high));
 
-MatchedBits matched_bits(const BinaryDescriptor& descriptor) {
-  MatchedBits bits;
-  std::memcpy(&bits.low, descriptor.data(), sizeof bits.low);
-  std::memcpy(&bits.high, descriptor.data() + sizeof bits.low, sizeof bits.high);
-  return bits;
-}
-
-[[gnu::always_inline]] inline std::uint32_t distance_of(const MatchedBits& a,
-                                                        const MatchedBits& b) {
+[[gnu::always_inline]] inline std::uint32_t distance_of(const Bits& a, const Bits& b) {
   return static_cast<std::uint32_t>(__builtin_popcountll(a.low ^ b.low) +
                                     __builtin_popcount(a.high ^ b.high));
+}
+
+// Numbers of a network.
+struct Numbers {
+  static constexpr double kUnit = kMaxMatchDistance / kMaxNumberDistance;
+  std::array<std::int16_t, kMatchedNumbers> values;
+
+  explicit Numbers(const MatchedDescriptor& descriptor) : values(numbers_of(descriptor)) {}
+};
+
+[[gnu::always_inline]] inline std::uint32_t distance_of(const Numbers& a, const Numbers& b) {
+  std::int32_t sum = 0;
+  for (std::size_t i = 0; i < kMatchedNumbers; ++i) {
+    const std::int32_t off = a.values[i] - b.values[i];
+    sum += off * off;
+  }
+  return static_cast<std::uint32_t>(sum);
+}
+
+template <typename Prepared>
+std::vector<Prepared> prepared(std::span<const MatchedDescriptor> descriptors) {
+  return {descriptors.begin(), descriptors.end()};
 }
 
 struct Nearest {
@@ -38,8 +60,9 @@ struct Nearest {
   std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
 };
 
-[[gnu::always_inline]] inline std::vector<Match> match_all(const std::vector<MatchedBits>& a,
-                                                           const std::vector<MatchedBits>& b,
+template <typename Prepared>
+[[gnu::always_inline]] inline std::vector<Match> match_all(const std::vector<Prepared>& a,
+                                                           const std::vector<Prepared>& b,
                                                            const MatchRules& rules) {
   std::vector<Match> matches;
   std::vector<Nearest> nearest_of_b(b.size());
@@ -52,32 +75,28 @@ struct Nearest {
       second = {j, distance};
       if (second.distance < best.distance) std::swap(best, second);
     }
-    const auto distance = static_cast<int>(best.distance);
-    if (distance <= rules.max_distance && distance < rules.max_ratio * second.distance)
+    const double distance = Prepared::kUnit * best.distance;
+    if (distance <= rules.max_distance && best.distance < rules.max_ratio * second.distance)
       matches.push_back({i, best.index, distance});
   }
   std::erase_if(matches, [&](const Match& m) { return nearest_of_b[m.b].index != m.a; });
   return matches;
 }
 
-std::vector<Match> match_portable(const std::vector<MatchedBits>& a,
-                                  const std::vector<MatchedBits>& b, const MatchRules& rules) {
-  return match_all(a, b, rules);
-}
-
 #if defined(__x86_64__)
-[[gnu::target("popcnt")]] std::vector<Match> match_popcount(const std::vector<MatchedBits>& a,
-                                                            const std::vector<MatchedBits>& b,
+[[gnu::target("popcnt")]] std::vector<Match> match_popcount(const std::vector<Bits>& a,
+                                                            const std::vector<Bits>& b,
                                                             const MatchRules& rules) {
   return match_all(a, b, rules);
 }
 #endif
 
-std::vector<MatchedBits> bits_of(std::span<const BinaryDescriptor> descriptors) {
-  std::vector<MatchedBits> bits;
-  bits.reserve(descriptors.size());
-  for (const BinaryDescriptor& descriptor : descriptors) bits.push_back(matched_bits(descriptor));
-  return bits;
+std::vector<Match> match_bits(const std::vector<Bits>& a, const std::vector<Bits>& b,
+                              const MatchRules& rules) {
+#if defined(__x86_64__)
+  if (has_popcount()) return match_popcount(a, b, rules);
+#endif
+  return match_all(a, b, rules);
 }
 
 // Keypoints of one image in square cells, to find the keypoints near a position.
@@ -144,71 +163,105 @@ std::optional<Projection> project(const SE3& T_to_from, const Keypoint& keypoint
   return Projection{focal_px * h.hnormalized(), rho / h.z()};
 }
 
-struct Candidate {
-  std::uint32_t index;
-  int distance;
+// A keyframe with its prepared descriptors and the grid to find keypoints.
+template <typename Prepared>
+struct Compared {
+  const KeyframeFeatures& features;
+  std::vector<Prepared> descriptors;
+  KeypointGrid grid;
+
+  Compared(const KeyframeFeatures& keyframe, std::uint16_t network, double cell_px)
+      : features(keyframe),
+        descriptors(prepared<Prepared>(matched_by(network, keyframe))),
+        grid(keyframe, cell_px) {}
 };
 
 // The best match of one descriptor among the keypoints near its projection.
-std::optional<Candidate> best_near(const Projection& projection, const BinaryDescriptor& descriptor,
-                                   const KeyframeFeatures& features, const KeypointGrid& grid,
-                                   const GuidedMatchRules& rules) {
+template <typename Prepared>
+std::optional<Nearest> best_near(const Projection& projection, const Prepared& query,
+                                 const Compared<Prepared>& others, const GuidedMatchRules& rules) {
   // Several octaves show one corner, so a keypoint this close to the best one is no second best.
   constexpr double kSameCorner_px = 3.0;
-  const MatchedBits query = matched_bits(descriptor);
+  const auto& [features, descriptors, grid] = others;
   const double disparity_scale = features.focal_px * features.baseline_m;
-  std::vector<Candidate> near;
+  std::vector<Nearest> near;
   grid.near(projection.pixel, [&](std::uint32_t i) {
     if ((grid.pixel(i) - projection.pixel).norm() > rules.radius_px) return;
     const Keypoint& keypoint = features.keypoints[i];
     const double off = static_cast<double>(keypoint.inverse_depth) - projection.inverse_depth;
     if (keypoint.has_depth() && std::abs(off) * disparity_scale > rules.radius_px) return;
-    const std::uint32_t bits = distance_of(query, matched_bits(features.descriptors[i]));
-    near.push_back({i, static_cast<int>(bits)});
+    near.push_back({i, distance_of(query, descriptors[i])});
   });
   const auto best = std::min_element(near.begin(), near.end(), [](const auto& l, const auto& r) {
     return l.distance < r.distance;
   });
-  if (best == near.end() || best->distance > rules.max_distance) return std::nullopt;
-  for (const Candidate& rival : near)
+  if (best == near.end() || Prepared::kUnit * best->distance > rules.max_distance)
+    return std::nullopt;
+  for (const Nearest& rival : near)
     if ((grid.pixel(rival.index) - grid.pixel(best->index)).norm() > kSameCorner_px &&
         best->distance > rules.max_ratio * rival.distance)
       return std::nullopt;
   return *best;
 }
 
+// Matches of the points with depth of either keyframe. One keypoint may occur several times.
+template <typename Prepared>
+std::vector<Match> matches_near(const SE3& T_a_b, const Compared<Prepared>& a,
+                                const Compared<Prepared>& b, const GuidedMatchRules& rules) {
+  std::vector<Match> found;
+  if (a.descriptors.empty() || b.descriptors.empty()) return found;
+  const auto search = [&](const SE3& T_to_from, const auto& from, const auto& to, auto&& add) {
+    for (std::uint32_t i = 0; i < from.features.keypoints.size(); ++i) {
+      const Keypoint& keypoint = from.features.keypoints[i];
+      if (!keypoint.has_depth()) continue;
+      const auto projection = project(T_to_from, keypoint, to.features.focal_px);
+      if (!projection) continue;
+      if (const auto best = best_near(*projection, from.descriptors[i], to, rules))
+        add(i, best->index, Prepared::kUnit * best->distance);
+    }
+  };
+  search(T_a_b.inverse(), a, b, [&](auto i, auto j, double d) { found.push_back({i, j, d}); });
+  search(T_a_b, b, a, [&](auto j, auto i, double d) { found.push_back({i, j, d}); });
+  return found;
+}
+
+template <typename Prepared>
+std::vector<Match> matches_near(const SE3& T_a_b, const KeyframeFeatures& a,
+                                const KeyframeFeatures& b, const GuidedMatchRules& rules) {
+  const std::uint16_t network = common_network(a, b);
+  return matches_near(T_a_b, Compared<Prepared>(a, network, rules.radius_px),
+                      Compared<Prepared>(b, network, rules.radius_px), rules);
+}
+
 }  // namespace
 
-std::vector<Match> match_descriptors(std::span<const BinaryDescriptor> a,
-                                     std::span<const BinaryDescriptor> b, const MatchRules& rules) {
-  if (b.size() < 2) return {};
-#if defined(__x86_64__)
-  if (has_popcount()) return match_popcount(bits_of(a), bits_of(b), rules);
-#endif
-  return match_portable(bits_of(a), bits_of(b), rules);
+std::vector<MatchedDescriptor> orb_bits(std::span<const BinaryDescriptor> descriptors) {
+  std::vector<MatchedDescriptor> bits(descriptors.size());
+  for (std::size_t i = 0; i < bits.size(); ++i)
+    std::copy_n(descriptors[i].begin(), kMatchedBytes, bits[i].begin());
+  return bits;
+}
+
+std::vector<MatchedDescriptor> matched_by(std::uint16_t network, const KeyframeFeatures& features) {
+  const bool has_own_tests = network == 0 && !features.descriptors.empty();
+  if (has_own_tests) return orb_bits(features.descriptors);
+  return network == features.network ? features.matched : std::vector<MatchedDescriptor>();
+}
+
+std::vector<Match> match_descriptors(const KeyframeFeatures& a, const KeyframeFeatures& b,
+                                     const MatchRules& rules) {
+  const std::uint16_t network = common_network(a, b);
+  const auto own = matched_by(network, a), theirs = matched_by(network, b);
+  if (theirs.size() < 2) return {};
+  if (network == 0) return match_bits(prepared<Bits>(own), prepared<Bits>(theirs), rules);
+  return match_all(prepared<Numbers>(own), prepared<Numbers>(theirs), rules);
 }
 
 std::vector<Match> match_guided(const SE3& T_a_b, const KeyframeFeatures& a,
                                 const KeyframeFeatures& b, const GuidedMatchRules& rules) {
-  std::vector<Match> found;
-  if (a.keypoints.empty() || b.keypoints.empty()) return found;
-  const KeypointGrid grid_a(a, rules.radius_px);
-  const KeypointGrid grid_b(b, rules.radius_px);
-  const SE3 T_b_a = T_a_b.inverse();
-  for (std::uint32_t i = 0; i < a.keypoints.size(); ++i) {
-    if (!a.keypoints[i].has_depth()) continue;
-    const std::optional<Projection> projection = project(T_b_a, a.keypoints[i], b.focal_px);
-    if (!projection) continue;
-    const auto best = best_near(*projection, a.descriptors[i], b, grid_b, rules);
-    if (best) found.push_back({i, best->index, best->distance});
-  }
-  for (std::uint32_t j = 0; j < b.keypoints.size(); ++j) {
-    if (!b.keypoints[j].has_depth()) continue;
-    const std::optional<Projection> projection = project(T_a_b, b.keypoints[j], a.focal_px);
-    if (!projection) continue;
-    const auto best = best_near(*projection, b.descriptors[j], a, grid_a, rules);
-    if (best) found.push_back({best->index, j, best->distance});
-  }
+  if (a.keypoints.empty() || b.keypoints.empty()) return {};
+  std::vector<Match> found = common_network(a, b) == 0 ? matches_near<Bits>(T_a_b, a, b, rules)
+                                                       : matches_near<Numbers>(T_a_b, a, b, rules);
 
   // Each keypoint once, the most similar pairs first.
   std::sort(found.begin(), found.end(), [](const Match& l, const Match& r) {

@@ -10,40 +10,57 @@
 
 namespace km {
 
-/// Descriptors are matched by their first bytes: 96 of 256 tests. The tests of ORB are sorted by a
-/// greedy search for tests of high variance that are independent of those before (Rublee et al.,
-/// "ORB", ICCV 2011, Sec. 4.3), so the first ones distinguish points best. Words need all tests.
-/// The module's README compares numbers of bytes.
-inline constexpr std::size_t kMatchedBytes = 12;
+/// The first 96 of the 256 tests of each descriptor. The tests of ORB are sorted by a greedy search
+/// for tests of high variance that are independent of those before (Rublee et al., "ORB", ICCV
+/// 2011, Sec. 4.3), so the first ones distinguish points best. The module's README compares numbers
+/// of bytes.
+[[nodiscard]] std::vector<MatchedDescriptor> orb_bits(
+    std::span<const BinaryDescriptor> descriptors);
+
+/// The descriptors of `features` by `network`, where 0 stands for orb_bits(). Empty if they are
+/// unknown.
+[[nodiscard]] std::vector<MatchedDescriptor> matched_by(std::uint16_t network,
+                                                        const KeyframeFeatures& features);
+
+/// The network by which two keyframes are compared: that of both, otherwise 0.
+[[nodiscard]] inline std::uint16_t common_network(const KeyframeFeatures& a,
+                                                  const KeyframeFeatures& b) {
+  return a.network == b.network ? a.network : 0;
+}
 
 /// Keypoint `a` of one keyframe and similar keypoint `b` of another.
 struct Match {
   std::uint32_t a = 0;
   std::uint32_t b = 0;
-  int distance = 0;  ///< Hamming distance of the matched bytes, 0 to 96.
+  double distance = 0.0;  ///< 0 to 96: see match_descriptors().
 
   auto operator<=>(const Match&) const = default;
 };
 
+/// Largest distance of a match.
+inline constexpr double kMaxMatchDistance = 8.0 * kMatchedBytes;
+
 /// Conditions for a pair of descriptors to be a match.
 struct MatchRules {
-  double max_ratio = 0.85;  ///< Best distance over second best, as seen from a.
-  int max_distance = 24;    ///< [bit]
+  double max_ratio = 0.85;     ///< Best distance over second best, as seen from a.
+  double max_distance = 24.0;  ///< At most kMaxMatchDistance.
 };
 
-/// Pairs that are each other's nearest descriptor and pass `rules` (the ratio is that of Lowe,
+/// Pairs of keypoints that are each other's nearest and pass `rules` (the ratio is that of Lowe,
 /// "Distinctive Image Features from Scale-Invariant Keypoints", IJCV 2004), in ascending order of
-/// `a`. The first of equally near descriptors counts. With fewer than two descriptors in `b` there
-/// is no ratio, and so no match. O(|a| |b|).
-[[nodiscard]] std::vector<Match> match_descriptors(std::span<const BinaryDescriptor> a,
-                                                   std::span<const BinaryDescriptor> b,
+/// `a`. They are compared by common_network(): tests of ORB by their Hamming distance, numbers of a
+/// network by the square of their Euclidean distance, as 96 parts of the largest one. The first of
+/// equally near keypoints counts. With fewer than two keypoints in `b` there is no ratio, and so no
+/// match. O(|a| |b|).
+[[nodiscard]] std::vector<Match> match_descriptors(const KeyframeFeatures& a,
+                                                   const KeyframeFeatures& b,
                                                    const MatchRules& rules);
 
 /// Conditions for a match when the pose is roughly known.
 struct GuidedMatchRules {
-  double radius_px = 8.0;  ///< Around the projection, at the finest level.
-  double max_ratio = 0.9;  ///< Best distance over second best inside the radius.
-  int max_distance = 24;   ///< [bit]
+  double radius_px = 8.0;      ///< Around the projection, at the finest level.
+  double max_ratio = 0.9;      ///< Best distance over second best inside the radius.
+  double max_distance = 24.0;  ///< At most kMaxMatchDistance.
 };
 
 /// Matches under a known pose. Every point with depth of either keyframe is projected into the

@@ -8,16 +8,16 @@
 namespace km {
 namespace {
 
-void write(const BinaryDescriptor& descriptor, BitWriter& writer) {
-  for (std::size_t i = 0; i < kMatchedBytes; ++i) writer.bits(descriptor[i], 8);
+void write(const MatchedDescriptor& descriptor, BitWriter& writer) {
+  for (const std::uint8_t byte : descriptor) writer.bits(byte, 8);
 }
 
-std::optional<BinaryDescriptor> read_descriptor(BitReader& reader) {
-  BinaryDescriptor descriptor{};
-  for (std::size_t i = 0; i < kMatchedBytes; ++i) {
+std::optional<MatchedDescriptor> read_descriptor(BitReader& reader) {
+  MatchedDescriptor descriptor{};
+  for (std::uint8_t& value : descriptor) {
     const auto byte = reader.bits(8);
     if (!byte) return std::nullopt;
-    descriptor[i] = static_cast<std::uint8_t>(*byte);
+    value = static_cast<std::uint8_t>(*byte);
   }
   return descriptor;
 }
@@ -34,7 +34,7 @@ std::vector<std::uint8_t> pack(const KeyframeFeatures& features) {
   writer.gamma(features.keypoints.size() + 1);
   for (std::size_t i = 0; i < features.keypoints.size(); ++i) {
     write(features.keypoints[i], scale, writer);
-    write(features.descriptors[i], writer);
+    write(features.matched[i], writer);
   }
   return writer.take();
 }
@@ -53,24 +53,24 @@ std::optional<KeyframeFeatures> unpack_features(std::span<const std::uint8_t> by
     const auto descriptor = keypoint ? read_descriptor(reader) : std::nullopt;
     if (!descriptor) return std::nullopt;
     features.keypoints.push_back(*keypoint);
-    features.descriptors.push_back(*descriptor);
+    features.matched.push_back(*descriptor);
   }
   return reader.ended() ? std::optional(std::move(features)) : std::nullopt;
 }
 
-std::vector<std::uint8_t> pack(std::span<const BinaryDescriptor> descriptors) {
+std::vector<std::uint8_t> pack(std::span<const MatchedDescriptor> descriptors) {
   std::vector<std::uint8_t> bytes;
   bytes.reserve(kMatchedBytes * descriptors.size());
-  for (const BinaryDescriptor& descriptor : descriptors)
-    bytes.insert(bytes.end(), descriptor.begin(), descriptor.begin() + kMatchedBytes);
+  for (const MatchedDescriptor& descriptor : descriptors)
+    bytes.insert(bytes.end(), descriptor.begin(), descriptor.end());
   return bytes;
 }
 
-std::optional<std::vector<BinaryDescriptor>> unpack_descriptors(
+std::optional<std::vector<MatchedDescriptor>> unpack_descriptors(
     std::span<const std::uint8_t> bytes) {
   if (bytes.size() % kMatchedBytes != 0 || bytes.size() > kMatchedBytes * kMaxKeypoints)
     return std::nullopt;
-  std::vector<BinaryDescriptor> descriptors(bytes.size() / kMatchedBytes);
+  std::vector<MatchedDescriptor> descriptors(bytes.size() / kMatchedBytes);
   for (std::size_t i = 0; i < descriptors.size(); ++i)
     std::ranges::copy(bytes.subspan(kMatchedBytes * i, kMatchedBytes), descriptors[i].begin());
   return descriptors;

@@ -56,7 +56,7 @@ struct Support {
 
 std::optional<Support> gather_support(const PoseFit& start, const KeyframeFeatures& from,
                                       const KeyframeFeatures& to, const ImageNoise& noise,
-                                      int max_distance) {
+                                      double max_distance) {
   Support support{start, {}, {}};
   const auto refine = [&] {
     support.inliers = inliers_of(support.fit.T_a_b, support.pairs);
@@ -112,9 +112,9 @@ Verification Verifier::verify(const KeyframeFeatures& from, const KeyframeFeatur
     return result;
   };
   const ImageNoise noise{config_.keypoint_noise_px, config_.disparity_noise_px};
-  const MatchRules rules{config_.max_match_ratio, config_.max_match_distance};
+  const MatchRules rules{config_.max_match_ratio, static_cast<double>(config_.max_match_distance)};
   const std::vector<ImagePair> pairs =
-      pairs_of(match_descriptors(from.descriptors, to.descriptors, rules), from, to, noise);
+      pairs_of(match_descriptors(from, to, rules), from, to, noise);
   result.matches = static_cast<int>(pairs.size());
   if (result.matches < config_.min_consensus) return refused(VerificationStatus::kTooFewMatches);
 

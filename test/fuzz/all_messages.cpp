@@ -60,7 +60,7 @@ KeyframeReply some_reply(std::size_t points) {
     point.bearing = {0.01F * static_cast<float>(i), -0.2F};
     point.inverse_depth = 0.5F;
     features.keypoints.push_back(point);
-    features.descriptors.emplace_back().fill(static_cast<std::uint8_t>(i));
+    features.matched.emplace_back().fill(static_cast<std::uint8_t>(i));
   }
   return reply;
 }

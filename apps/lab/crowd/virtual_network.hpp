@@ -19,7 +19,7 @@ namespace km {
 }
 /// Descriptors of the points whose words were sent.
 [[nodiscard]] constexpr std::size_t reply_bytes(std::size_t points) {
-  return 220 + 12 * points;
+  return 224 + 12 * points;
 }
 [[nodiscard]] constexpr std::size_t closure_bytes() {
   return 500;

@@ -7,6 +7,7 @@ different recordings are negatives. The loss is that of supervised contrastive l
 """
 import argparse
 import pathlib
+import time
 
 import numpy as np
 import onnx

@@ -16,9 +16,10 @@ constexpr std::size_t kFrameQueue = 64;
 KeyframeFeaturesNode::KeyframeFeaturesNode(const KeyframeFeaturesConfig& config,
                                            const StereoRig& rig,
                                            const KeyframeFeaturesTopics& topics,
-                                           std::optional<ImageDescriber> describer)
+                                           std::optional<ImageDescriber> describer,
+                                           std::optional<KeypointDescriber> keypoint_describer)
     : camera_(rig.cameras[0]),
-      extractor_(rig, config),
+      extractor_(rig, config, std::move(keypoint_describer)),
       describer_(std::move(describer)),
       keyframes_(topics.keyframes),
       worker_(

@@ -28,11 +28,13 @@ struct KeyframeFeaturesTopics {
 /// covariance accumulated along the chain.
 class KeyframeFeaturesNode final : public Node {
  public:
-  /// Without `describer` images have no descriptor. Throws ConfigError if `config` is out of
+  /// Without `describer` images have no descriptor, and without `keypoint_describer` keypoints only
+  /// that of ORB. Throws ConfigError if `config` is out of
   /// bounds, std::invalid_argument if the rig cannot be rectified.
   KeyframeFeaturesNode(const KeyframeFeaturesConfig& config, const StereoRig& rig,
                        const KeyframeFeaturesTopics& topics,
-                       std::optional<ImageDescriber> describer = {});
+                       std::optional<ImageDescriber> describer = {},
+                       std::optional<KeypointDescriber> keypoint_describer = {});
 
   /// Continues after the keyframe `last` of an earlier process. The odometry of keyframes up to
   /// `last` is ignored. Call before start().
@@ -54,7 +56,7 @@ class KeyframeFeaturesNode final : public Node {
   using Input = std::variant<Topic<KeyframeOdometry>::Message, Topic<LocatedFrame>::Message>;
 
   const Camera camera_;  // left
-  const KeyframeFeatureExtractor extractor_;
+  KeyframeFeatureExtractor extractor_;
   std::optional<ImageDescriber> describer_;
   const Out<Keyframe> keyframes_;
   std::deque<Keyframe> without_images_;

@@ -30,6 +30,7 @@ Codec<KeyframeRequest>::Encoded Codec<KeyframeRequest>::encode(const KeyframeReq
   encoded.wire.request = request.number;
   encoded.wire.keyframe = to_wire(request.keyframe);
   encoded.wire.own = request.own;
+  encoded.wire.network = request.network;
   encoded.wire.part = static_cast<std::uint8_t>(request.part);
   return encoded;
 }
@@ -38,7 +39,8 @@ Decoded<KeyframeRequest> Codec<KeyframeRequest>::decode(const Wire& wire, const 
   if (wire.part > static_cast<std::uint8_t>(KeyframePart::kDescriptors))
     return Decoded<KeyframeRequest>::refuse("an unknown part of a keyframe");
   return Decoded<KeyframeRequest>::accept({writer.robot, wire.request, from_wire(wire.keyframe),
-                                           wire.own, static_cast<KeyframePart>(wire.part)});
+                                           wire.own, static_cast<KeyframePart>(wire.part),
+                                           wire.network});
 }
 
 MessageKey Codec<KeyframeWords>::key_of(const KeyframeWords& words) {
@@ -78,6 +80,7 @@ Codec<KeyframeReply>::Encoded Codec<KeyframeReply>::encode(const KeyframeReply& 
   wire.found = reply.found;
   wire.odometry = to_wire(keyframe.odometry);
   wire.stamp = keyframe.stamp;
+  wire.network = keyframe.features.network;
   wire.T_body_cam = to_wire(keyframe.features.T_body_cam);
   encoded.features = pack(keyframe.features);
   borrow(wire.features, encoded.features);
@@ -111,6 +114,7 @@ Decoded<KeyframeReply> Codec<KeyframeReply>::decode(const Wire& wire, const Team
   reply.keyframe.stamp = wire.stamp;
   reply.keyframe.features = *std::move(features);
   reply.keyframe.features.T_body_cam = *T_body_cam;
+  reply.keyframe.features.network = wire.network;
   return Result::accept(std::move(reply));
 }
 

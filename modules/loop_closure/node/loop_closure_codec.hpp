@@ -20,7 +20,7 @@ template <>
 struct Codec<KeyframeRequest> {
   using Wire = km_wire_KeyframeRequest;
   static constexpr const char* kTopic = "keyframe_requests";
-  static constexpr std::uint16_t kVersion = 2;
+  static constexpr std::uint16_t kVersion = 3;
   static constexpr std::size_t kMaxBytes = 64;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeRequest_desc; }
 
@@ -37,7 +37,7 @@ template <>
 struct Codec<KeyframeReply> {
   using Wire = km_wire_KeyframeReply;
   static constexpr const char* kTopic = "keyframe_replies";
-  static constexpr std::uint16_t kVersion = 1;
+  static constexpr std::uint16_t kVersion = 2;
   static constexpr std::size_t kMaxBytes = 1024 + (17 + kMatchedBytes) * kMaxKeypoints;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeReply_desc; }
 

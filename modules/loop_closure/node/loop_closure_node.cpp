@@ -91,8 +91,6 @@ void LoopClosureNode::evict_before(KeyframeIndex newest) {
   if (read_keyframe_ && read_keyframe_(old->first.index) != nullptr) return old->second.reset();
   auto thinned = std::make_shared<Keyframe>(*old->second);
   thinned->features = reduced(thinned->features, 2 * reply_keypoints_);
-  thinned->features.keypoints.shrink_to_fit();
-  thinned->features.descriptors.shrink_to_fit();
   old->second = std::move(thinned);
 }
 
@@ -115,6 +113,11 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
     return;
   }
   const KeyframePtr asked = own(request->keyframe);
+  if (asked && request->network != asked->features.network)
+    log::limited(log::Level::kWarn, name(), "network of " + std::to_string(request->requester))
+        << "robot " << request->requester
+        << " describes keypoints by another network: keyframes are matched by ORB; set one "
+           "keyframe_features.network";
   if (asked) policy_.add_peer_request(request->requester, request->own, request->keyframe.index);
   std::optional<WordsOfRequester> words;
   if (const auto* theirs = words_.find({request->requester, request->own}))
@@ -347,12 +350,14 @@ void LoopClosureNode::report(const Work& work, ClosureStage stage, std::string r
 void LoopClosureNode::send_due_requests() {
   for (const KeyframeId& keyframe : requests_.due(now_s_)) {
     std::vector<Work>& works = waiting_.at(keyframe);
-    auto request =
-        std::make_shared<const KeyframeRequest>(KeyframeRequest{.requester = self_,
-                                                                .number = next_request_++,
-                                                                .keyframe = keyframe,
-                                                                .own = works.front().id.from.index,
-                                                                .part = part_to_request(keyframe)});
+    const KeyframePtr compared = own(works.front().id.from);
+    auto request = std::make_shared<const KeyframeRequest>(
+        KeyframeRequest{.requester = self_,
+                        .number = next_request_++,
+                        .keyframe = keyframe,
+                        .own = works.front().id.from.index,
+                        .part = part_to_request(keyframe),
+                        .network = compared ? compared->features.network : std::uint16_t{0}});
     topics_.own_requests.publish(Addressed<KeyframeRequest>{keyframe.robot, std::move(request)});
     for (Work& work : works)
       if (!std::exchange(work.requested, true)) report(work, ClosureStage::kRequested);

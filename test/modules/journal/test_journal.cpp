@@ -51,12 +51,17 @@ Keyframe features(KeyframeIndex index, std::mt19937& rng) {
   Keyframe keyframe;
   keyframe.odometry = some_pose({kRobot, index}, rng);
   keyframe.stamp = 1000 + 100 * static_cast<Stamp>(index);
-  keyframe.features = {random_pose(rng), 450.0, 0.11, {}, {}};
+  keyframe.features.T_body_cam = random_pose(rng);
+  keyframe.features.focal_px = 450.0;
+  keyframe.features.baseline_m = 0.11;
+  keyframe.features.network = index % 2 == 0 ? 0 : 40123;
   for (int i = 0; i < 20; ++i) {
     keyframe.features.keypoints.push_back(
         {random_vector<2>(rng).cast<float>(), 0.5F, static_cast<std::uint8_t>(i % 8)});
     BinaryDescriptor& descriptor = keyframe.features.descriptors.emplace_back();
     for (std::uint8_t& byte : descriptor) byte = static_cast<std::uint8_t>(rng());
+    if (keyframe.features.network != 0)
+      keyframe.features.matched.emplace_back().fill(static_cast<std::uint8_t>(rng()));
   }
   keyframe.image = {.network = 7, .values = {-128, -1, 0, 127}};
   return keyframe;

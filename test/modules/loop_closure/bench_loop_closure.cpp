@@ -152,6 +152,29 @@ void print_sweep(const std::vector<PairResult>& pairs) {
 }
 
 // KIMERA_MULTI_VOCABULARY names the vocabulary; by default the shipped one.
+// Pairs across the split, where the later keyframe is reduced as in a reply.
+void print_descriptors(const char* title, std::vector<RecordedKeyframe> keyframes,
+                       std::size_t split) {
+  for (std::size_t j = split; j < keyframes.size(); ++j)
+    keyframes[j].features = reduced(keyframes[j].features, 200);
+  print_table(title, verify_pairs(keyframes, split, true));
+}
+
+TEST_CASE("Keypoints by ORB and by the shipped network", "[loop_closure][!benchmark]") {
+  const auto v1 = shared_data("euroc/V1_01_easy");
+  const auto mh = shared_data("euroc/MH_01_easy");
+  if (!v1 || !mh) return;
+  for (const char* network : {"", "config/networks/keypoints.onnx"}) {
+    std::printf("network: '%s'\n", network);
+    KeyframeFeaturesConfig config;
+    config.network = network;
+    print_descriptors("V1_01, 200 keypoints", load_v1_01(*v1, config), 35);
+    auto hall = load_mh_01(*mh, config);
+    const std::size_t half = hall.size() / 2;
+    print_descriptors("MH_01, 200 keypoints", std::move(hall), half);
+  }
+}
+
 TEST_CASE("Precision and recall over the similarity", "[loop_closure][!benchmark]") {
   const auto v1 = shared_data("euroc/V1_01_easy");
   if (!v1) return;
@@ -195,19 +218,29 @@ TEST_CASE("Speed of verification", "[loop_closure][!benchmark]") {
     return verify_next(refused);
   };
   BENCHMARK("match descriptors, 1000 x 1000") {
-    return match_descriptors(keyframes[0].features.descriptors, keyframes[50].features.descriptors,
-                             {});
+    return match_descriptors(keyframes[0].features, keyframes[50].features, {});
   };
+}
+
+TEST_CASE("Speed of the features of a keyframe", "[loop_closure][!benchmark]") {
+  const auto v1 = shared_data("euroc/V1_01_easy");
+  if (!v1) return;
+  cv::setNumThreads(1);
   const SensorRig rig = read_euroc_rig(*v1 / "mav0");
-  const KeyframeFeatureExtractor extractor(rig.stereo, {});
   ReaderReport report;
   const auto files = list_keyframe_pairs(*v1 / "keyframes", report);
   std::vector<StereoFrame> frames;
   for (std::size_t i = 0; i < files.size(); i += 10)
     frames.push_back(load_stereo_pair(files[i], rig.stereo).frame);
-  BENCHMARK("features of a stereo pair, another each time") {
-    return extractor.extract(frames[next++ % frames.size()]);
-  };
+  std::size_t next = 0;
+  for (const char* network : {"", "config/networks/keypoints.onnx"}) {
+    KeyframeFeaturesConfig config;
+    config.network = network;
+    KeyframeFeatureExtractor extractor(rig.stereo, config, describer_of(config));
+    BENCHMARK(std::string("another stereo pair each time, network '") + network + "'") {
+      return extractor.extract(frames[next++ % frames.size()]);
+    };
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -20,8 +21,13 @@ struct RecordedKeyframe {
   KeyframeFeatures features;
 };
 
+inline std::optional<KeypointDescriber> describer_of(const KeyframeFeaturesConfig& config) {
+  if (config.network.empty()) return std::nullopt;
+  return KeypointDescriber(config.network);
+}
+
 inline RecordedKeyframe record_of(const StereoPairFile& files, const SensorRig& rig,
-                                  const KeyframeFeatureExtractor& extractor,
+                                  KeyframeFeatureExtractor& extractor,
                                   const std::vector<StampedPose>& truth) {
   const StereoPairResult pair = load_stereo_pair(files, rig.stereo);
   if (pair.status != ImageStatus::kOk) throw std::runtime_error(pair.problem);
@@ -34,7 +40,7 @@ inline std::vector<RecordedKeyframe> load_v1_01(const std::filesystem::path& seq
                                                 const KeyframeFeaturesConfig& config,
                                                 std::size_t every = 1) {
   const SensorRig rig = read_euroc_rig(sequence / "mav0");
-  const KeyframeFeatureExtractor extractor(rig.stereo, config);
+  KeyframeFeatureExtractor extractor(rig.stereo, config, describer_of(config));
   const auto truth = read_trajectory(sequence / "mav0/state_groundtruth_estimate0");
   ReaderReport report;
   const auto files = list_keyframe_pairs(sequence / "keyframes", report);
@@ -48,7 +54,7 @@ inline std::vector<RecordedKeyframe> load_v1_01(const std::filesystem::path& seq
 inline std::vector<RecordedKeyframe> load_mh_01(const std::filesystem::path& sequence,
                                                 const KeyframeFeaturesConfig& config) {
   const SensorRig rig = read_euroc_rig(sequence / "mav0");
-  const KeyframeFeatureExtractor extractor(rig.stereo, config);
+  KeyframeFeatureExtractor extractor(rig.stereo, config, describer_of(config));
   const auto truth = read_trajectory(sequence / "mav0/state_groundtruth_estimate0");
   ReaderReport report;
   std::vector<RecordedKeyframe> keyframes;

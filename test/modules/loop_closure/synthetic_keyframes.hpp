@@ -34,8 +34,9 @@ struct KeyframePair {
   KeyframeFeatures from, to;
 };
 
-inline BinaryDescriptor random_descriptor(std::mt19937& rng) {
-  BinaryDescriptor descriptor;
+template <typename Descriptor = BinaryDescriptor>
+Descriptor random_descriptor(std::mt19937& rng) {
+  Descriptor descriptor;
   for (std::uint8_t& byte : descriptor) byte = static_cast<std::uint8_t>(rng());
   return descriptor;
 }

@@ -67,7 +67,7 @@ TEST_CASE("Descriptors are the rows of the extractor", "[loop_closure]") {
 
 TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel", "[loop_closure]") {
   const StereoRig rig = rgbd_rig(test_camera(), 0.08);
-  const KeyframeFeatureExtractor extractor(rig, {});
+  KeyframeFeatureExtractor extractor(rig, {});
   StereoFrame frame{0, checkered(rig.cameras[0]), {}};
   frame.depth = plane_depth(rig.cameras[0]);
   const KeyframeFeatures features = extractor.extract(frame);
@@ -122,7 +122,7 @@ TEST_CASE("keypoints without a trusted depth have none", "[loop_closure]") {
   KeyframeFeaturesConfig config;
   config.min_depth_m = 3.0;
   config.max_depth_m = 4.0;
-  const KeyframeFeatureExtractor extractor(rig, config);
+  KeyframeFeatureExtractor extractor(rig, config);
   StereoFrame frame{0, checkered(rig.cameras[0]), {}};
   for (const Keypoint& keypoint : extractor.extract(frame).keypoints)
     CHECK_FALSE(keypoint.has_depth());

@@ -28,17 +28,17 @@ KeyframeReply random_reply(std::mt19937& rng, int points) {
     point.inverse_depth = i % 4 == 0 ? 0.0F : 1.0F / depth(rng);
     point.octave = static_cast<std::uint8_t>(i % 8);
     features.keypoints.push_back(point);
-    BinaryDescriptor descriptor;
+    MatchedDescriptor& descriptor = features.matched.emplace_back();
     for (auto& byte : descriptor) byte = static_cast<std::uint8_t>(rng());
-    features.descriptors.push_back(descriptor);
   }
+  features.network = 40123;
   return reply;
 }
 
 TEST_CASE("A keyframe survives the wire", "[codec]") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   KeyframeReply sent = random_reply(rng, 1000);
-  sent.descriptors = {sent.keyframe.features.descriptors[5]};
+  sent.descriptors = {sent.keyframe.features.matched[5]};
   const auto encoded = encoded_by(kOwner, sent);
   const auto result = decoded(encoded);
   REQUIRE(result.value.has_value());
@@ -49,9 +49,8 @@ TEST_CASE("A keyframe survives the wire", "[codec]") {
   CHECK(b.odometry.covariance.isApprox(a.odometry.covariance, 1e-6));
   CHECK((b.features.T_body_cam.matrix() - a.features.T_body_cam.matrix()).norm() < 1e-12);
   CHECK(pack(b.features) == pack(a.features));
-  REQUIRE(result.value->descriptors.size() == 1);
-  CHECK(std::equal(sent.descriptors[0].begin(), sent.descriptors[0].begin() + kMatchedBytes,
-                   result.value->descriptors[0].begin()));
+  CHECK(b.features.network == a.features.network);
+  CHECK(result.value->descriptors == sent.descriptors);
 }
 
 TEST_CASE("A keyframe without points, or not found, survives the wire", "[codec]") {
@@ -132,10 +131,10 @@ TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") 
 
   using enum KeyframePart;
   const KeyframePart part = GENERATE(kFeatures, kWordPoints, kDescriptors);
-  const auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17, part});
+  const auto request = encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17, part, 40123});
   check_refusals<KeyframeRequest>(
       [&] {
-        return encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17, part});
+        return encoded_by<KeyframeRequest>(kOwner, {kOwner, 1, {9, 5}, 17, part, 40123});
       },
       {{"of a part that is none", "an unknown part of a keyframe",
         [](auto& m) { m.wire.part = 3; }}});
@@ -145,6 +144,7 @@ TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") 
   CHECK(result->own == 17);
   CHECK(result->requester == kOwner);
   CHECK(result->part == part);
+  CHECK(result->network == 40123);
 }
 
 TEST_CASE("Points of words survive the wire, and hostile ones are refused", "[codec]") {

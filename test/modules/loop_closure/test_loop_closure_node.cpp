@@ -2,6 +2,7 @@
 #include <deque>
 #include <memory>
 
+#include "modules/loop_closure/matching.hpp"
 #include "modules/loop_closure/node/loop_closure_node.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
@@ -226,7 +227,7 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   for (std::uint32_t word = 0; !has_bow && word < kSent; ++word)
     expected.push_back(toy_descriptor(word));
   const KeyframeFeatures& sent = peer.replies[0].message->keyframe.features;
-  CHECK(sent.descriptors == expected);
+  CHECK(sent.matched == orb_bits(expected));
   CHECK(sent.keypoints.size() == expected.size());
 }
 
@@ -294,7 +295,7 @@ TEST_CASE("the features of a keyframe are requested once its words agree with an
   CHECK(robot.closures.empty());
   peer.node.step(std::exchange(robot.requests, {})[0].message);
   REQUIRE(peer.replies.size() == 1);
-  CHECK(peer.replies[0].message->descriptors == scene.peer.features.descriptors);
+  CHECK(peer.replies[0].message->descriptors == orb_bits(scene.peer.features.descriptors));
   CHECK(peer.replies[0].message->keyframe.features.keypoints.empty());
   deliver(robot, peer);
   REQUIRE(robot.closures.size() == 1);
@@ -320,7 +321,7 @@ TEST_CASE("descriptors of other points than those of the words are replaced by t
     robot.give(KeyframeReply{.number = 0,
                              .found = true,
                              .keyframe = scene.peer,
-                             .descriptors = scene.peer.features.descriptors});
+                             .descriptors = orb_bits(scene.peer.features.descriptors)});
     REQUIRE(robot.requests.size() == 1);
     CHECK(robot.requests[0].message->part == KeyframePart::kFeatures);
   }

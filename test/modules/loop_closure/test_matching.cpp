@@ -1,23 +1,37 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <catch2/catch.hpp>
+#include <cmath>
 
+#include "modules/loop_closure/matched_numbers.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 
 namespace km {
 namespace {
 
-int bits_apart(const BinaryDescriptor& a, const BinaryDescriptor& b) {
-  int bits = 0;
-  for (std::size_t i = 0; i < kMatchedBytes; ++i)
-    bits += std::popcount(static_cast<unsigned>(a[i] ^ b[i]));
-  return bits;
+// As matching.hpp defines it, where network 0 stands for the tests of ORB.
+double distance(const MatchedDescriptor& a, const MatchedDescriptor& b, std::uint16_t network) {
+  double sum = 0.0;
+  for (std::size_t i = 0; network == 0 && i < kMatchedBytes; ++i)
+    sum += std::popcount(static_cast<unsigned>(a[i] ^ b[i]));
+  const auto x = numbers_of(a), y = numbers_of(b);
+  for (std::size_t i = 0; network != 0 && i < kMatchedNumbers; ++i)
+    sum += std::pow(x[i] - y[i], 2) * 96.0 / (4.0 * 24.0 * 3.5 * 3.5);
+  return sum;
+}
+
+KeyframeFeatures features_of(std::vector<MatchedDescriptor> descriptors, std::uint16_t network) {
+  KeyframeFeatures features;
+  features.matched = std::move(descriptors);
+  features.network = network;
+  return features;
 }
 
 // A copy of `descriptor` with about `flips` bits changed.
-BinaryDescriptor altered(BinaryDescriptor descriptor, int flips, std::mt19937& rng) {
-  std::uniform_int_distribution<std::size_t> bit(0, 255);
+MatchedDescriptor altered(MatchedDescriptor descriptor, int flips, std::mt19937& rng) {
+  std::uniform_int_distribution<std::size_t> bit(0, 95);
   for (int i = 0; i < flips; ++i) {
     const std::size_t k = bit(rng);
     descriptor[k / 8] = static_cast<std::uint8_t>(descriptor[k / 8] ^ (1U << (k % 8)));
@@ -25,22 +39,22 @@ BinaryDescriptor altered(BinaryDescriptor descriptor, int flips, std::mt19937& r
   return descriptor;
 }
 
-std::vector<Match> by_definition(const std::vector<BinaryDescriptor>& a,
-                                 const std::vector<BinaryDescriptor>& b, const MatchRules& rules) {
-  const auto nearest = [](const BinaryDescriptor& to, const std::vector<BinaryDescriptor>& among) {
+std::vector<Match> by_definition(const KeyframeFeatures& a, const KeyframeFeatures& b,
+                                 const MatchRules& rules) {
+  const auto nearest = [&](const MatchedDescriptor& to, const auto& among) {
     std::size_t best = 0;
     for (std::size_t i = 1; i < among.size(); ++i)
-      if (bits_apart(to, among[i]) < bits_apart(to, among[best])) best = i;
+      if (distance(to, among[i], a.network) < distance(to, among[best], a.network)) best = i;
     return best;
   };
   std::vector<Match> matches;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::vector<int> distances;
-    for (const BinaryDescriptor& d : b) distances.push_back(bits_apart(a[i], d));
-    const std::size_t j = nearest(a[i], b);
+  for (std::size_t i = 0; i < a.matched.size(); ++i) {
+    std::vector<double> distances;
+    for (const auto& d : b.matched) distances.push_back(distance(a.matched[i], d, a.network));
+    const std::size_t j = nearest(a.matched[i], b.matched);
     std::sort(distances.begin(), distances.end());
     if (distances[0] > rules.max_distance || distances[0] >= rules.max_ratio * distances[1] ||
-        nearest(b[j], a) != i)
+        nearest(b.matched[j], a.matched) != i)
       continue;
     matches.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j), distances[0]});
   }
@@ -49,44 +63,98 @@ std::vector<Match> by_definition(const std::vector<BinaryDescriptor>& a,
 
 TEST_CASE("matching agrees with its definition", "[matching]") {
   const auto seed = GENERATE(range(1U, 11U));
-  CAPTURE(seed);
+  const auto network = GENERATE(as<std::uint16_t>(), 0, 7);
+  CAPTURE(seed, network);
   std::mt19937 rng(seed);
-  std::vector<BinaryDescriptor> a, b;
-  for (int i = 0; i < 60; ++i) a.push_back(random_descriptor(rng));
+  std::vector<MatchedDescriptor> a, b;
+  for (int i = 0; i < 60; ++i) a.push_back(random_descriptor<MatchedDescriptor>(rng));
   for (int i = 0; i < 90; ++i)  // near copies of a, some of them twice
     b.push_back(altered(a[static_cast<std::size_t>(i * 7 % 60)], i, rng));
   const MatchRules rules{0.88, 24};
-  const std::vector<Match> matches = match_descriptors(a, b, rules);
-  CHECK(matches == by_definition(a, b, rules));
+  const KeyframeFeatures from = features_of(a, network), to = features_of(b, network);
+  const std::vector<Match> matches = match_descriptors(from, to, rules);
+  const std::vector<Match> expected = by_definition(from, to, rules);
+  REQUIRE(matches.size() == expected.size());
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    CHECK(matches[i].a == expected[i].a);
+    CHECK(matches[i].b == expected[i].b);
+    CHECK(matches[i].distance == Approx(expected[i].distance));
+  }
   CHECK_FALSE(matches.empty());
 }
 
 TEST_CASE("a frame matched to itself pairs every descriptor with itself", "[matching]") {
   std::mt19937 rng(1);
-  std::vector<BinaryDescriptor> a;
-  for (int i = 0; i < 200; ++i) a.push_back(random_descriptor(rng));
+  std::vector<MatchedDescriptor> descriptors;
+  for (int i = 0; i < 200; ++i) descriptors.push_back(random_descriptor<MatchedDescriptor>(rng));
+  const KeyframeFeatures a = features_of(descriptors, GENERATE(as<std::uint16_t>(), 0, 7));
   const std::vector<Match> matches = match_descriptors(a, a, {});
-  REQUIRE(matches.size() == a.size());
-  for (std::uint32_t i = 0; i < matches.size(); ++i) CHECK(matches[i] == Match{i, i, 0});
+  REQUIRE(matches.size() == descriptors.size());
+  for (std::uint32_t i = 0; i < matches.size(); ++i) CHECK(matches[i] == Match{i, i, 0.0});
 }
 
-TEST_CASE("descriptors match by their first 96 bits", "[matching]") {
+TEST_CASE("numbers of a network are rounded to a fourteenth of their range", "[matching]") {
+  std::mt19937 rng(6);
+  std::normal_distribution<float> normal;
+  std::array<float, kMatchedNumbers> numbers{};
+  for (float& x : numbers) x = normal(rng);
+  double squares = 0.0;
+  for (const float x : numbers) squares += static_cast<double>(x * x);
+  const double rms = std::sqrt(squares / kMatchedNumbers);
+  const auto steps = numbers_of(descriptor_of_numbers(numbers));
+  for (std::size_t i = 0; i < kMatchedNumbers; ++i) {
+    const double exact = std::clamp(static_cast<double>(numbers[i]) / rms, -2.0, 2.0);
+    CHECK(std::abs(steps[i] / kNumberSteps - exact) <= 0.5 / kNumberSteps + 1e-6);
+  }
+  for (float& x : numbers) x *= 17.0F;  // only the direction counts
+  CHECK(numbers_of(descriptor_of_numbers(numbers)) == steps);
+  for (const int zero : numbers_of(descriptor_of_numbers(std::array<float, kMatchedNumbers>{})))
+    CHECK(zero == 0);
+}
+
+TEST_CASE("opposite vectors of equal numbers have the largest distance", "[matching]") {
+  std::array<float, kMatchedNumbers> up{}, down{};
+  up.fill(1.0F);
+  down.fill(-1.0F);
+  const auto a = descriptor_of_numbers(up), b = descriptor_of_numbers(down);
+  // 3.5 steps are rounded to 4.
+  CHECK(distance(a, b, 7) == Approx(96.0 * 64.0 / 49.0));
+}
+
+TEST_CASE("without a network, descriptors match by the first 96 bits of ORB", "[matching]") {
   std::mt19937 rng(2);
-  std::vector<BinaryDescriptor> a, b;
-  for (int i = 0; i < 50; ++i) a.push_back(random_descriptor(rng));
-  b = a;
-  for (BinaryDescriptor& descriptor : b)
-    for (std::size_t i = kMatchedBytes; i < descriptor.size(); ++i) descriptor[i] = 0;
-  CHECK(match_descriptors(a, b, {}) == match_descriptors(a, a, {}));
-  for (BinaryDescriptor& descriptor : b)  // 25 other bits
-    for (std::size_t i = 0; i < 25; ++i)
-      descriptor[i / 8] = static_cast<std::uint8_t>(descriptor[i / 8] ^ (1U << (i % 8)));
-  CHECK(match_descriptors(a, b, {}).empty());
+  KeyframePair pair = make_keyframe_pair(rng, 50, {}, 0.0);
+  const auto bits = orb_bits(pair.from.descriptors);
+  for (std::size_t i = 0; i < bits.size(); ++i)
+    CHECK(std::equal(bits[i].begin(), bits[i].end(), pair.from.descriptors[i].begin()));
+  CHECK(matched_by(0, pair.from) == bits);
+  CHECK(matched_by(7, pair.from).empty());
+}
+
+TEST_CASE("keyframes are compared by the network of both, otherwise by ORB", "[matching]") {
+  std::mt19937 rng(3);
+  KeyframePair pair = make_keyframe_pair(rng, 3, {}, 0.0);
+  for (int i = 0; i < 3; ++i)
+    pair.from.matched.push_back(random_descriptor<MatchedDescriptor>(rng));
+  pair.from.network = 7;
+  CHECK(common_network(pair.from, pair.to) == 0);
+  CHECK(matched_by(0, pair.from) == orb_bits(pair.from.descriptors));
+  CHECK(matched_by(7, pair.from) == pair.from.matched);
+  KeyframeFeatures received;  // has no tests of ORB
+  received.matched = pair.from.matched;
+  CHECK(matched_by(0, received) == received.matched);
+  received.network = 7;
+  CHECK(common_network(pair.from, received) == 7);
+  CHECK(matched_by(7, received) == received.matched);
+  received.network = 8;
+  CHECK(common_network(pair.from, received) == 0);
+  CHECK(matched_by(0, received).empty());
 }
 
 TEST_CASE("without a second descriptor there is no ratio and no match", "[matching]") {
-  const std::vector<BinaryDescriptor> none, one(1),
-      two = {BinaryDescriptor{}, BinaryDescriptor{255}};
+  const auto network = GENERATE(as<std::uint16_t>(), 0, 7);
+  const auto none = features_of({}, network), one = features_of({{}}, network),
+             two = features_of({{}, {255}}, network);
   CHECK(match_descriptors(two, none, {}).empty());
   CHECK(match_descriptors(two, one, {}).empty());
   CHECK(match_descriptors(none, two, {}).empty());
@@ -99,7 +167,7 @@ TEST_CASE("guided matching distinguishes equal descriptors by their place", "[ma
   // Descriptors alone cannot match: there is only one.
   for (auto* descriptors : {&pair.from.descriptors, &pair.to.descriptors})
     for (BinaryDescriptor& descriptor : *descriptors) descriptor = {};
-  REQUIRE(match_descriptors(pair.from.descriptors, pair.to.descriptors, {}).empty());
+  REQUIRE(match_descriptors(pair.from, pair.to, {}).empty());
   // Far enough apart in the image not to compete.
   KeyframePair sparse = pair;
   for (KeyframeFeatures* features : {&sparse.from, &sparse.to}) features->keypoints.clear();
@@ -121,6 +189,14 @@ TEST_CASE("guided matching distinguishes equal descriptors by their place", "[ma
   const std::vector<Match> matches = match_guided(T_a_b, sparse.from, sparse.to, {});
   CHECK(matches.size() == count);
   for (const Match& match : matches) CHECK(match.a == match.b);
+
+  for (KeyframeFeatures* features : {&sparse.from, &sparse.to}) {
+    features->matched.resize(count);
+    features->network = 7;
+  }
+  CHECK(match_guided(T_a_b, sparse.from, sparse.to, {}) == matches);
+  sparse.to.network = 8;  // compared by ORB
+  CHECK(match_guided(T_a_b, sparse.from, sparse.to, {}) == matches);
 }
 
 TEST_CASE("guided matching survives keypoints from anywhere", "[matching]") {

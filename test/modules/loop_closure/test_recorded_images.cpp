@@ -29,7 +29,7 @@ TEST_CASE("recorded stereo pairs verify with the true relative pose", "[verifier
   const auto calibration = shared_data("euroc/V1_01_easy/mav0");  // the same rig
   if (!folder || !calibration) return;
   const SensorRig rig = read_euroc_rig(*calibration);
-  const KeyframeFeatureExtractor extractor(rig.stereo, {});
+  KeyframeFeatureExtractor extractor(rig.stereo, {});
   const auto features = [&](int i) {
     const std::string name = "_img_" + std::to_string(i) + ".png";
     return extractor.extract(load_frame(*folder / ("left" + name), *folder / ("right" + name)));
@@ -126,7 +126,7 @@ TEST_CASE("closures of an RGB-D recording are in the right place", "[verifier]")
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
   RecordedKitchen kitchen(*folder);
-  const KeyframeFeatureExtractor extractor(kitchen.rig(), {});
+  KeyframeFeatureExtractor extractor(kitchen.rig(), {});
   std::vector<RecordedKeyframe> keyframes[2];
   for (int i = 0; const auto frame = kitchen.next(); i += 6, kitchen.skip(5))
     keyframes[i / 125].push_back(
@@ -155,7 +155,7 @@ TEST_CASE("an image without corners has no features, one of another size is refu
           "[features]") {
   const auto calibration = shared_data("euroc/V1_01_easy/mav0");
   if (!calibration) return;
-  const KeyframeFeatureExtractor extractor(read_euroc_rig(*calibration).stereo, {});
+  KeyframeFeatureExtractor extractor(read_euroc_rig(*calibration).stereo, {});
   const GrayImage flat{752, 480, std::vector<std::uint8_t>(752 * 480, 100)};
   CHECK(extractor.extract({0, flat, flat}).keypoints.empty());
   const GrayImage small{320, 240, std::vector<std::uint8_t>(320 * 240, 100)};

@@ -1,0 +1,100 @@
+#include "modules/images/configured_network.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "modules/core/bytes.hpp"
+#include "modules/core/config.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/images/network.hpp"
+
+namespace km {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+// The values of field `wanted` of a protobuf message (protobuf.dev: encoding). A number is its
+// value and has no bytes; a message or text is its bytes. Ends at the first byte that is none of
+// these.
+std::vector<std::pair<std::uint64_t, Bytes>> values_of(Bytes message, std::uint64_t wanted) {
+  constexpr std::uint64_t kVarint = 0, k64Bits = 1, kBytes = 2, k32Bits = 5;  // wire types
+  std::vector<std::pair<std::uint64_t, Bytes>> values;
+  ByteReader in(message);
+  while (in.left() > 0) {
+    const std::uint64_t tag = in.varint();
+    const std::uint64_t kind = tag & 7U;
+    const std::uint64_t number = kind == kVarint || kind == kBytes ? in.varint() : 0;
+    const std::uint64_t size = kind == kBytes    ? number
+                               : kind == k64Bits ? 8
+                               : kind == k32Bits ? 4
+                                                 : 0;
+    const Bytes bytes = in.bytes(size);
+    if (in.failed() || kind == 3 || kind == 4 || kind > k32Bits) return {};
+    if (tag >> 3U == wanted) values.emplace_back(number, bytes);
+  }
+  return values;
+}
+
+// Shape of the first input of an ONNX file (onnx.proto), which OpenCV reads but does not state.
+// Empty if there is none; a size that is not fixed is 0.
+cv::dnn::MatShape shape_of_input(Bytes model) {
+  constexpr std::array<std::uint64_t, 5> kPath = {7, 11, 2, 1,
+                                                  2};  // graph, input, type, tensor, shape
+  for (const std::uint64_t field : kPath) {
+    const auto values = values_of(model, field);
+    if (values.empty()) return {};
+    model = values.front().second;
+  }
+  cv::dnn::MatShape shape;
+  for (const auto& [number, dimension] : values_of(model, 1)) {
+    const auto size = values_of(dimension, 1);
+    shape.push_back(size.empty() ? 0
+                                 : static_cast<int>(std::min<std::uint64_t>(
+                                       size.front().first, std::numeric_limits<int>::max())));
+  }
+  return shape;
+}
+
+std::string way_out(const NetworkKey& key) {
+  return std::string("; use ") + key.shipped + ", which comes with the program, or leave " +
+         key.key + " empty\n";
+}
+
+std::string read_network(const std::filesystem::path& file, const NetworkKey& key) {
+  try {
+    return read_input_file(file, kMaxNetworkBytes);
+  } catch (const std::runtime_error& error) {
+    throw ConfigError(std::string(key.key) + ": " + error.what() + way_out(key));
+  }
+}
+
+}  // namespace
+
+ConfiguredNetwork::ConfiguredNetwork(std::filesystem::path file, const NetworkKey& key)
+    : file_(std::move(file)), key_(key), fingerprint_(kFnv1aBasis) {
+  const std::string bytes = read_network(file_, key_);
+  const Bytes model(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+  mix_fnv1a(fingerprint_, model);
+  fingerprint_ = std::max<std::uint64_t>(fingerprint_, 1);
+  try {
+    net_ = read_onnx(bytes);
+  } catch (const cv::Exception& error) {
+    refuse("cannot be run as ONNX: " + reason_of(error));
+  }
+  input_ = shape_of_input(model);
+}
+
+void ConfiguredNetwork::refuse(const std::string& reason) const {
+  throw ConfigError(std::string(key_.key) + ": " + file_.string() + ": " + reason + way_out(key_));
+}
+
+cv::Mat ConfiguredNetwork::run(const cv::Mat& blob) {
+  net_.setInput(blob);
+  return net_.forward();
+}
+
+}  // namespace km

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/dnn.hpp>
+#include <string>
+
+namespace km {
+
+/// The place of a network in the configuration, for messages.
+struct NetworkKey {
+  const char* key;      ///< "place_recognition.network"
+  const char* shipped;  ///< The file that comes with the program: "networks/places.onnx".
+};
+
+/// A network in ONNX format whose file the configuration names. It is run by OpenCV's dnn module on
+/// the processor. Not thread-safe.
+class ConfiguredNetwork {
+ public:
+  /// Throws ConfigError that names the key, the file and the reason if it cannot be read.
+  ConfiguredNetwork(std::filesystem::path file, const NetworkKey& key);
+
+  /// Throws ConfigError with `reason`, the key, the file, and the way out.
+  [[noreturn]] void refuse(const std::string& reason) const;
+
+  /// Identity of the network: 64-bit FNV-1a of the file, never 0.
+  [[nodiscard]] std::uint64_t fingerprint() const { return fingerprint_; }
+
+  /// Shape of the first input; a size that is not fixed is 0. Empty if the file states none.
+  [[nodiscard]] const cv::dnn::MatShape& input_shape() const { return input_; }
+
+  /// The first output for `blob`. Throws cv::Exception if the network does not take it.
+  [[nodiscard]] cv::Mat run(const cv::Mat& blob);
+
+ private:
+  std::filesystem::path file_;
+  NetworkKey key_;
+  std::uint64_t fingerprint_;
+  cv::dnn::Net net_;
+  cv::dnn::MatShape input_;
+};
+
+}  // namespace km
