@@ -15,7 +15,7 @@ struct KeyframeFeaturesConfig {
   double min_depth_m = 0.4;
   double max_depth_m = 40.0;
   double min_stereo_correlation = 0.8;
-  std::string network = {};
+  std::string network = "networks/keypoints.onnx";
 
   void visit_fields(auto& visitor) {
     visitor.field("max_keypoints", max_keypoints, {50, 4000},

@@ -98,7 +98,7 @@ struct LoopClosureConfig {
         "correspond, down to a quarter of this number. 6 B each at first and 12 B more if "
         "these agree; 17 B where the words of the peer are unknown");
     visitor.field("full_keyframes", full_keyframes, {1, 1000000},
-                  "number of newest own keyframes in memory with all keypoints, 48 B each; older "
+                  "number of newest own keyframes in memory with all keypoints, 60 B each; older "
                   "ones are read from the run's journal when needed, or keep twice reply_keypoints "
                   "if the journal is not on the disk");
     visitor.field("cached_keyframes", cached_keyframes, {1, 1000000},

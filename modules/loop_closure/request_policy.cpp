@@ -12,6 +12,9 @@ using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
 // Two robots that have this number of keyframes with closures have mostly joined their maps.
 constexpr int kJoined = 3;
 
+// Each keyframe of a peer that leads to closures moves the next one so much further away.
+constexpr int kReachPerSuccess = 4;  // [keyframes]
+
 // Robots that are not joined need closures more than they need to save bytes.
 constexpr double kShareBeforeJoining = 0.2;
 
@@ -37,7 +40,7 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   Peer& peer = peers_[candidate.query.robot];
   const KeyframeIndex query = candidate.query.index;
   const KeyframeIndex own = candidate.match.index;
-  const int reach = std::min(config_.max_closure_separation, peer.successes);
+  const int reach = std::min(config_.max_closure_separation, kReachPerSuccess * peer.successes);
   if (reach > 0 && any_near(peer.closures, query, own, static_cast<KeyframeIndex>(reach)))
     return Decision::kNearClosure;
   const int beside = std::min(config_.max_request_separation, peer.successes);

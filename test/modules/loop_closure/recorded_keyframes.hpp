@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "modules/core/lie.hpp"
@@ -21,11 +22,6 @@ struct RecordedKeyframe {
   KeyframeFeatures features;
 };
 
-inline std::optional<KeypointDescriber> describer_of(const KeyframeFeaturesConfig& config) {
-  if (config.network.empty()) return std::nullopt;
-  return KeypointDescriber(config.network);
-}
-
 inline RecordedKeyframe record_of(const StereoPairFile& files, const SensorRig& rig,
                                   KeyframeFeatureExtractor& extractor,
                                   const std::vector<StampedPose>& truth) {
@@ -38,9 +34,10 @@ inline RecordedKeyframe record_of(const StereoPairFile& files, const SensorRig& 
 /// Every n-th of the 100 stereo keyframes of EuRoC V1_01_easy; n is `every`.
 inline std::vector<RecordedKeyframe> load_v1_01(const std::filesystem::path& sequence,
                                                 const KeyframeFeaturesConfig& config,
-                                                std::size_t every = 1) {
+                                                std::size_t every = 1,
+                                                std::optional<KeypointDescriber> describer = {}) {
   const SensorRig rig = read_euroc_rig(sequence / "mav0");
-  KeyframeFeatureExtractor extractor(rig.stereo, config, describer_of(config));
+  KeyframeFeatureExtractor extractor(rig.stereo, config, std::move(describer));
   const auto truth = read_trajectory(sequence / "mav0/state_groundtruth_estimate0");
   ReaderReport report;
   const auto files = list_keyframe_pairs(sequence / "keyframes", report);
@@ -52,9 +49,10 @@ inline std::vector<RecordedKeyframe> load_v1_01(const std::filesystem::path& seq
 
 /// Stereo pairs of the first 15 s of EuRoC MH_01_easy, where the vehicle moves, at 2 Hz.
 inline std::vector<RecordedKeyframe> load_mh_01(const std::filesystem::path& sequence,
-                                                const KeyframeFeaturesConfig& config) {
+                                                const KeyframeFeaturesConfig& config,
+                                                std::optional<KeypointDescriber> describer = {}) {
   const SensorRig rig = read_euroc_rig(sequence / "mav0");
-  KeyframeFeatureExtractor extractor(rig.stereo, config, describer_of(config));
+  KeyframeFeatureExtractor extractor(rig.stereo, config, std::move(describer));
   const auto truth = read_trajectory(sequence / "mav0/state_groundtruth_estimate0");
   ReaderReport report;
   std::vector<RecordedKeyframe> keyframes;

@@ -1,5 +1,8 @@
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
 #include <string>
+#include <vector>
 
 #include "modules/core/config.hpp"
 #include "modules/images/keypoint_patches.hpp"
@@ -79,6 +82,23 @@ TEST_CASE("A network of another input or output is refused with its file and the
   CHECK_THROWS_WITH(KeypointDescriber(file), Catch::Contains(reason) &&
                                                  Catch::Contains(file.string()) &&
                                                  Catch::Contains("keyframe_features.network"));
+}
+
+TEST_CASE("The shipped network gives the numbers of its training", "[keypoint_describer]") {
+  cv::Mat image(240, 240, CV_8U);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x)
+      image.at<std::uint8_t>(y, x) =
+          cv::saturate_cast<std::uint8_t>(128.0 + 60.0 * std::sin(0.12 * (x - 120)) +
+                                          50.0 * std::cos(0.09 * (y - 120) + 0.05 * (x - 120)));
+  const auto found = KeypointDescriber("config/networks/keypoints.onnx")
+                         .describe(image, std::vector{cv::KeyPoint(120, 120, 31, 0, 1, 0)});
+  REQUIRE(found.size() == 1);
+  // As apps/lab/places/train_keypoints.py prints them, without the smoothing of the image.
+  const std::vector<int> expected = {0,  -5, 2, 7, 4,  1,  1,  -2, 2,  4,  -1, -1,
+                                     -4, 0,  1, 1, -4, -6, -5, 3,  -2, -2, 2,  1};
+  const auto numbers = numbers_of(found[0]);
+  for (std::size_t i = 0; i < expected.size(); ++i) CHECK(std::abs(numbers[i] - expected[i]) <= 1);
 }
 
 }  // namespace
