@@ -22,6 +22,13 @@ namespace km {
 [[nodiscard]] std::vector<MatchedDescriptor> matched_by(std::uint16_t network,
                                                         const KeyframeFeatures& features);
 
+/// `features` of an own keyframe, to be compared by ORB.
+[[nodiscard]] inline KeyframeFeatures without_network(KeyframeFeatures features) {
+  features.matched.clear();
+  features.network = 0;
+  return features;
+}
+
 /// The network by which two keyframes are compared: that of both, otherwise 0.
 [[nodiscard]] inline std::uint16_t common_network(const KeyframeFeatures& a,
                                                   const KeyframeFeatures& b) {

@@ -36,12 +36,17 @@ bool any_near(const Pairs& pairs, KeyframeIndex peers, KeyframeIndex own, Keyfra
 
 RequestPolicy::RequestPolicy(const LoopClosureConfig& config) : config_(config) {}
 
+bool RequestPolicy::Peer::is_near_closure(KeyframeIndex peers, KeyframeIndex own,
+                                          int max_separation) const {
+  const int reach = std::min(max_separation, kReachPerSuccess * successes);
+  return reach > 0 && any_near(closures, peers, own, static_cast<KeyframeIndex>(reach));
+}
+
 RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   Peer& peer = peers_[candidate.query.robot];
   const KeyframeIndex query = candidate.query.index;
   const KeyframeIndex own = candidate.match.index;
-  const int reach = std::min(config_.max_closure_separation, kReachPerSuccess * peer.successes);
-  if (reach > 0 && any_near(peer.closures, query, own, static_cast<KeyframeIndex>(reach)))
+  if (peer.is_near_closure(query, own, config_.max_closure_separation))
     return Decision::kNearClosure;
   const int beside = std::min(config_.max_request_separation, peer.successes);
   if (any_near(peer.requests, query, own, static_cast<KeyframeIndex>(beside)))
@@ -63,6 +68,16 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   peer.requests.emplace(query, own);
   peer.requested.emplace(query, candidate);
   return Decision::kRequest;
+}
+
+bool RequestPolicy::is_near_closure(const ClosureId& pair) const {
+  const auto peer = peers_.find(pair.to.robot);
+  return peer != peers_.end() && peer->second.is_near_closure(pair.to.index, pair.from.index,
+                                                              config_.max_closure_separation);
+}
+
+void RequestPolicy::withdraw(const KeyframeId& keyframe) {
+  peers_[keyframe.robot].requested.erase(keyframe.index);
 }
 
 void RequestPolicy::add_closure(const ClosureId& closure) {

@@ -21,6 +21,7 @@ namespace km {
 /// smaller, so that the first closures may be dense. A candidate is also skipped near a requested
 /// candidate, with max_request_separation and the number itself. Before the first closure with a
 /// peer, neither rule skips a candidate, except a pair that the peer itself compares.
+/// Candidates wait for earlier requests, so is_near_closure() tests them again.
 ///
 /// In an environment with similar places most candidates are wrong. A candidate is requested if
 /// the probability p that it leads to a closure (ClosureOdds, one for each peer) is at least
@@ -45,6 +46,13 @@ class RequestPolicy {
   /// Decides about a candidate whose query is a peer's keyframe that this robot does not have.
   /// After kRequest the candidate counts as requested.
   [[nodiscard]] Decision decide(const LoopCandidate& candidate);
+
+  /// True if decide() would now skip the candidate `pair` near a verified closure. `pair` starts at
+  /// an own keyframe.
+  [[nodiscard]] bool is_near_closure(const ClosureId& pair) const;
+
+  /// Notes that a keyframe is not requested after all.
+  void withdraw(const KeyframeId& keyframe);
 
   /// Notes that a closure from an own keyframe to a keyframe of a peer was verified, by this robot
   /// or, with the ends exchanged, by the peer.
@@ -76,6 +84,9 @@ class RequestPolicy {
     KeyframeIndex last_query = 0;    ///< The query that `credit` counts last,
     double last_share = 0.0;         ///< and what it has added.
     std::map<KeyframeIndex, LoopCandidate> requested;  ///< By query; without a result so far.
+
+    [[nodiscard]] bool is_near_closure(KeyframeIndex peers, KeyframeIndex own,
+                                       int max_separation) const;
   };
 
   LoopClosureConfig config_;

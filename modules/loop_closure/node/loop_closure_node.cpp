@@ -11,6 +11,7 @@
 #include "modules/core/keyframe.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "modules/loop_closure/keyframe_reply.hpp"
+#include "modules/loop_closure/matching.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
@@ -157,6 +158,7 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeWords>& words) {
   const KeyframeId& id = words->keyframe;
   // Ignores the reply to a repeated request, or one without a request.
   if (promising_.contains(id) || !vocabulary_ || !requests_.arrived(id)) return;
+  if (withdraw_near_closures(id)) return send_due_requests();
   const std::vector<Work>& works = waiting_.at(id);
   if (std::ranges::any_of(works, [&](const Work& work) { return fits(work, words->words); })) {
     promising_.emplace(id, words->words);
@@ -279,6 +281,23 @@ void LoopClosureNode::request_keyframe(const KeyframeId& missing, const Work& wo
   requests_.want(missing);
 }
 
+// Removes the candidates that wait for a keyframe of a peer and are near a closure that was
+// verified meanwhile. True if none is left.
+bool LoopClosureNode::withdraw_near_closures(const KeyframeId& missing) {
+  std::vector<Work>& works = waiting_.at(missing);
+  std::erase_if(works, [&](const Work& work) {
+    if (work.measured || !policy_.is_near_closure(work.id)) return false;
+    report(work, work.requested ? ClosureStage::kRequested : ClosureStage::kCandidate,
+           to_string(RequestPolicy::Decision::kNearClosure));
+    return true;
+  });
+  if (!works.empty()) return false;
+  waiting_.erase(missing);
+  promising_.erase(missing);
+  policy_.withdraw(missing);
+  return true;
+}
+
 void LoopClosureNode::arrived(const KeyframePtr& keyframe) {
   const auto found = waiting_.find(keyframe->odometry.id);
   if (found == waiting_.end()) return;
@@ -318,9 +337,13 @@ bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Key
     closure.T_from_to = work.measured->T_from_to;
     closure.covariance = work.measured->covariance;
   } else {
-    numbers = verifier_.verify(from.features, to.features);
-    if (to.odometry.id.robot == self_ &&
-        numbers.rotation_sigma_rad > config_.max_own_rotation_sigma_rad)
+    // A robot sees many places like each other, and learned descriptors distinguish these less than
+    // ORB does. Between robots, the words of ORB have agreed before.
+    const bool is_inside = to.odometry.id.robot == self_;
+    numbers = is_inside
+                  ? verifier_.verify(without_network(from.features), without_network(to.features))
+                  : verifier_.verify(from.features, to.features);
+    if (is_inside && numbers.rotation_sigma_rad > config_.max_own_rotation_sigma_rad)
       numbers.status = VerificationStatus::kUncertainPose;
     if (numbers.status != VerificationStatus::kAccepted) {
       report(work, ClosureStage::kReceived, to_string(numbers.status), numbers);
@@ -349,6 +372,10 @@ void LoopClosureNode::report(const Work& work, ClosureStage stage, std::string r
 
 void LoopClosureNode::send_due_requests() {
   for (const KeyframeId& keyframe : requests_.due(now_s_)) {
+    if (withdraw_near_closures(keyframe)) {
+      (void)requests_.arrived(keyframe);
+      continue;
+    }
     std::vector<Work>& works = waiting_.at(keyframe);
     const KeyframePtr compared = own(works.front().id.from);
     auto request = std::make_shared<const KeyframeRequest>(

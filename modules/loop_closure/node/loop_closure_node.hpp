@@ -133,6 +133,7 @@ class LoopClosureNode final : public Node {
   bool advance(const Work& work);
   void request_keyframe(const KeyframeId& missing, const Work& work);
   void arrived(const KeyframePtr& keyframe);
+  bool withdraw_near_closures(const KeyframeId& missing);
   [[nodiscard]] bool fits(const Work& work, const WordPoints& theirs) const;
   [[nodiscard]] KeyframePart part_to_request(const KeyframeId& keyframe) const;
   KeyframePtr find(const KeyframeId& id);

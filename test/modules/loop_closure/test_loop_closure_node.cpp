@@ -117,6 +117,22 @@ struct Meeting {
   Robot robot{kSelf}, peer{kPeer};
 };
 
+// Keypoint i of both keyframes has word i.
+Scene scene_with_words(unsigned seed) {
+  Scene scene(seed);
+  for (std::uint32_t i = 0; i < scene.own.features.descriptors.size(); ++i)
+    scene.own.features.descriptors[i] = scene.peer.features.descriptors[i] = toy_descriptor(i);
+  return scene;
+}
+
+// The peer knows the words of the robot's keyframe.
+void tell_words(Meeting& meeting) {
+  const Vocabulary vocabulary = toy_vocabulary(200);
+  meeting.peer.give(KeyframeBow{.id = meeting.scene.own.odometry.id,
+                                .vocabulary = vocabulary.id(),
+                                .words = vocabulary.count(meeting.scene.own.features.descriptors)});
+}
+
 std::vector<ClosureStage> stages_of(const std::vector<ClosureOutcome>& reports) {
   std::vector<ClosureStage> stages;
   for (const ClosureOutcome& report : reports) stages.push_back(report.stage);
@@ -145,6 +161,61 @@ TEST_CASE("a candidate becomes a closure by one request and one reply", "[loop_c
   CHECK(se3_log(closure.T_from_to.inverse() * scene.T_own_peer).norm() < 0.03);  // [m], [rad]
   CHECK(stages_of(robot.reports) == Stages{kCandidate, kRequested, kVerified});
   CHECK(robot.reports.back().inliers == closure.inliers);
+}
+
+TEST_CASE("a candidate that waits is not requested near a closure that was verified meanwhile",
+          "[loop_closure_node]") {
+  const int separation = GENERATE(0, 64);
+  const Scene scene(30);
+  Robot robot(kSelf, {.max_outstanding_requests = 1,
+                      .max_closure_separation = separation,
+                      .max_request_separation = 0,
+                      .min_word_points = 0});
+  Robot peer(kPeer);
+  robot.give(scene.own);
+  peer.give(scene.peer);
+  Keyframe next = scene.peer;
+  next.odometry.id.index = 6;
+  peer.give(next);
+  robot.give(scene.candidate());
+  robot.give(LoopCandidate{next.odometry.id, scene.own.odometry.id, 1.5});
+  REQUIRE(robot.requests.size() == 1);
+  deliver(robot, peer);
+  for (const double now_s : {0.1, 0.2, 5.0}) {
+    robot.tick(now_s);
+    deliver(robot, peer);
+  }
+  REQUIRE_FALSE(robot.reports.empty());
+  if (separation == 0) {
+    CHECK(robot.closures.size() == 2);
+  } else {
+    CHECK(robot.closures.size() == 1);
+    CHECK(robot.reports.back().id.to == next.odometry.id);
+    CHECK(robot.reports.back().stage == kCandidate);
+    CHECK(robot.reports.back().reason == "not requested: near a verified closure");
+  }
+}
+
+TEST_CASE("words that arrive near a closure that was verified meanwhile lead to no further request",
+          "[loop_closure_node]") {
+  Meeting meeting(scene_with_words(31));
+  tell_words(meeting);
+  auto& [scene, robot, peer] = meeting;
+  Keyframe next = scene.peer;
+  next.odometry.id.index = 6;
+  peer.give(next);
+  robot.give(scene.candidate());
+  robot.give(LoopCandidate{next.odometry.id, scene.own.odometry.id, 1.5});
+  REQUIRE(robot.requests.size() == 2);
+  peer.node.step(robot.requests[1].message);
+  const auto late = std::exchange(peer.words, {})[0].message;
+  robot.requests.pop_back();
+  deliver(robot, peer);
+  REQUIRE(robot.closures.size() == 1);
+  robot.node.step(late);
+  CHECK(robot.requests.empty());
+  CHECK(robot.reports.back().stage == kRequested);
+  CHECK(robot.reports.back().reason == "not requested: near a verified closure");
 }
 
 TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once",
@@ -256,22 +327,6 @@ TEST_CASE("the number of points in a reply depends on the common words", "[loop_
   peer.node.step(robot.requests[0].message);
   REQUIRE(peer.replies.size() == 1);
   CHECK(peer.replies[0].message->keyframe.features.keypoints.size() == expected);
-}
-
-// Keypoint i of both keyframes has word i.
-Scene scene_with_words(unsigned seed) {
-  Scene scene(seed);
-  for (std::uint32_t i = 0; i < scene.own.features.descriptors.size(); ++i)
-    scene.own.features.descriptors[i] = scene.peer.features.descriptors[i] = toy_descriptor(i);
-  return scene;
-}
-
-// The peer knows the words of the robot's keyframe.
-void tell_words(Meeting& meeting) {
-  const Vocabulary vocabulary = toy_vocabulary(200);
-  meeting.peer.give(KeyframeBow{.id = meeting.scene.own.odometry.id,
-                                .vocabulary = vocabulary.id(),
-                                .words = vocabulary.count(meeting.scene.own.features.descriptors)});
 }
 
 TEST_CASE("the features of a keyframe are requested once its words agree with an own keyframe",
