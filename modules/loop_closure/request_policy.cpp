@@ -12,9 +12,6 @@ using Pairs = std::set<std::pair<KeyframeIndex, KeyframeIndex>>;
 // Two robots that have this number of keyframes with closures have mostly joined their maps.
 constexpr int kJoined = 3;
 
-// Each keyframe of a peer that leads to closures moves the next one so much further away.
-constexpr int kReachPerSuccess = 4;  // [keyframes]
-
 // Robots that are not joined need closures more than they need to save bytes.
 constexpr double kShareBeforeJoining = 0.2;
 
@@ -38,7 +35,7 @@ RequestPolicy::RequestPolicy(const LoopClosureConfig& config) : config_(config) 
 
 bool RequestPolicy::Peer::is_near_closure(KeyframeIndex peers, KeyframeIndex own,
                                           int max_separation) const {
-  const int reach = std::min(max_separation, kReachPerSuccess * successes);
+  const int reach = std::min(max_separation, successes);
   return reach > 0 && any_near(closures, peers, own, static_cast<KeyframeIndex>(reach));
 }
 

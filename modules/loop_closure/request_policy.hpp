@@ -16,11 +16,11 @@ namespace km {
 /// Two robots that share a street or a room produce a candidate with every keyframe. The first
 /// closures join their maps, and further closures near them add little. A candidate is therefore
 /// skipped near a verified closure of the same two robots: both keyframes of the candidate are
-/// within max_closure_separation keyframes of those of the closure. Four times the number of
-/// keyframes of this peer that have led to closures replaces max_closure_separation while it is
-/// smaller, so that the first closures may be dense. A candidate is also skipped near a requested
-/// candidate, with max_request_separation and the number itself. Before the first closure with a
-/// peer, neither rule skips a candidate, except a pair that the peer itself compares.
+/// within max_closure_separation keyframes of those of the closure. While fewer keyframes of this
+/// peer have led to closures, their number replaces max_closure_separation, so that the first
+/// closures may be dense. A candidate is also skipped near a requested candidate, with
+/// max_request_separation in place of max_closure_separation. Before the first closure with a peer,
+/// neither rule skips a candidate, except a pair that the peer itself compares.
 /// Candidates wait for earlier requests, so is_near_closure() tests them again.
 ///
 /// In an environment with similar places most candidates are wrong. A candidate is requested if

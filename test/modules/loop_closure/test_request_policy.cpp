@@ -27,13 +27,13 @@ void succeed(RequestPolicy& policy, KeyframeIndex query, KeyframeIndex own) {
 TEST_CASE("No keyframe near a closure is requested and the distance grows with successes",
           "[request_policy]") {
   LoopClosureConfig config;
-  config.max_closure_separation = 10;
+  config.max_closure_separation = 3;
   config.max_request_separation = 0;
   RequestPolicy policy(config);
-  for (KeyframeIndex successes = 1; successes <= 4; ++successes) {
+  for (KeyframeIndex successes = 1; successes <= 5; ++successes) {
     const KeyframeIndex query = 100 * successes;
     succeed(policy, query, 50);
-    const KeyframeIndex covered = std::min<KeyframeIndex>(4 * successes, 10);
+    const KeyframeIndex covered = std::min<KeyframeIndex>(successes, 3);
     for (const int sign : {-1, 1}) {
       const auto beside = [&](KeyframeIndex d) {
         return query + static_cast<KeyframeIndex>(sign) * d;
