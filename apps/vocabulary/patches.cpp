@@ -1,7 +1,5 @@
-#include <cstring>
 #include <iostream>
 #include <memory>
-#include <string_view>
 
 #include "apps/output_file.hpp"
 #include "apps/vocabulary/commands.hpp"
@@ -68,8 +66,12 @@ void run(const PatchesCommand& command) {
   check_output_folder(command.output);
   const auto images = list_images(command.images, command.every);
   std::string records;
-  for (std::uint32_t i = 0; i < images.size(); ++i)
+  for (std::uint32_t i = 0; i < images.size(); ++i) {
     records += records_of(images[i], i, command.features);
+    constexpr std::uint32_t kReported = 50;
+    if ((i + 1) % kReported == 0 || i + 1 == images.size())
+      std::cerr << "patches: " << i + 1 << " of " << images.size() << " images\n";
+  }
   constexpr std::size_t kRecord = 16 + kDescriptorBytes + kPatchSide * kPatchSide;
   const std::size_t count = records.size() / kRecord;
   write_output(command.output, [&](std::ostream& out) { out << npy_header(count) << records; });

@@ -31,9 +31,9 @@ struct KeyframeFeaturesConfig {
                   "least zero-normalised cross-correlation of left and right patch");
     visitor.field(
         "network", network,
-        "ONNX file of a network that describes keypoints, by which keyframes of two robots "
-        "are then matched; all robots of a team need the same; networks/keypoints.onnx "
-        "comes with the program; empty: ORB");
+        "ONNX file of a network that describes keypoints, by which keyframes of two robots are "
+        "matched if both have this file, otherwise by ORB; networks/keypoints.onnx comes with the "
+        "program; empty: ORB");
   }
 };
 
