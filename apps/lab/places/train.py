@@ -17,6 +17,7 @@ from onnx import numpy_helper
 from PIL import Image
 from torch import nn
 
+import training
 import views
 from views import OTHER, SAME
 
@@ -174,38 +175,26 @@ def known_values(network):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", help="at least four")
-    parser.add_argument("--output", type=pathlib.Path, required=True, help="the ONNX file")
-    parser.add_argument("--cache", type=pathlib.Path, required=True, help="folder of images and overlaps, made once")
-    parser.add_argument("--steps", type=int, default=600)
+    training.define_options(parser, steps=600)
     parser.add_argument("--start", type=pathlib.Path,
                         help="begin with this file; with --steps 0 only the last layer is fitted")
     parser.add_argument("--pairs", type=int, default=48, help="pairs in a batch")
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    torch.set_num_threads(options.threads)
-    torch.manual_seed(options.seed)
-    random = np.random.default_rng(options.seed)
-    options.cache.mkdir(parents=True, exist_ok=True)
+    random = training.prepare(options)
     places = [Place(recording, options.cache) for recording in options.recordings]
     places = [place for place in places if place.pairs]
     print(len(places), "places,", sum(len(place.images) for place in places), "images", flush=True)
     network = PlaceNetwork()
     if options.start:
         network.load(options.start)
-    optimizer = torch.optim.AdamW(network.parameters(), lr=2e-3, weight_decay=1e-3)
-    mean = None
-    for step in range(options.steps):
-        for group in optimizer.param_groups:  # warm up, then down along a cosine
-            group["lr"] = 2e-3 * min(1, (step + 1) / 50) * 0.5 * (1 + np.cos(np.pi * step / options.steps))
+
+    def loss_of_batch():
         images, overlaps = batch_of(places, options.pairs, random)
-        loss = contrastive_loss(network(augmented(images, random)), overlaps, 0.1)
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        mean = loss.item() if mean is None else 0.98 * mean + 0.02 * loss.item()
-        if (step + 1) % 50 == 0:
-            print(f"{step + 1} steps, {time.process_time():.0f} s of a core, loss {mean:.3f}", flush=True)
+        return contrastive_loss(network(augmented(images, random)), overlaps, 0.1)
+
+    for step, loss in training.optimized(network, options, 2e-3, loss_of_batch):
+        if step % 50 == 0:
+            print(f"{step} steps, {time.process_time():.0f} s of a core, loss {loss:.3f}", flush=True)
             export(network, options.output)
             network.train()
     fit_last_layer(network, places, random)

@@ -16,6 +16,7 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
+import training
 import views
 
 SIDE = 24  # as in keypoint_patches.hpp
@@ -228,37 +229,25 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+")
     parser.add_argument("--judged", nargs="*", default=[], help="recordings whose matches are counted at the end")
-    parser.add_argument("--output", type=pathlib.Path, required=True, help="the ONNX file")
-    parser.add_argument("--cache", type=pathlib.Path, required=True, help="folder of patches and pairs, made once")
+    training.define_options(parser, steps=14000)
     parser.add_argument("--programs", type=pathlib.Path, default=pathlib.Path("build/bin"))
     parser.add_argument("--features", type=int, default=500, help="keypoints of an image")
     parser.add_argument("--view-pairs", type=int, default=1500, help="most pairs of views of a recording")
     parser.add_argument("--width", type=int, default=8, help="maps of the first layer")
-    parser.add_argument("--steps", type=int, default=14000)
     parser.add_argument("--batch", type=int, default=8, help="pairs of views in a batch")
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    torch.set_num_threads(options.threads)
-    torch.manual_seed(options.seed)
-    random = np.random.default_rng(options.seed)
-    options.cache.mkdir(parents=True, exist_ok=True)
+    random = training.prepare(options)
     recordings = [Recording(recording, options) for recording in options.recordings]
     network = KeypointNetwork(options.width)
-    optimizer = torch.optim.AdamW(network.parameters(), lr=3e-3, weight_decay=1e-3)
-    mean = None
-    for step in range(options.steps):
-        for group in optimizer.param_groups:  # warm up, then down along a cosine
-            group["lr"] = 3e-3 * min(1, (step + 1) / 50) * 0.5 * (1 + np.cos(np.pi * step / options.steps))
+
+    def loss_of_batch():
         a, b, near = batch_of(recordings, options.batch, random)
         numbers = network(torch.cat([augmented(a, random), augmented(b, random)]))
-        loss = contrastive_loss(rounded(numbers[:len(a)]), rounded(numbers[len(a):]), near)
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        mean = loss.item() if mean is None else 0.98 * mean + 0.02 * loss.item()
-        if (step + 1) % 100 == 0:
-            print(f"{step + 1} steps, loss {mean:.3f}", flush=True)
+        return contrastive_loss(rounded(numbers[:len(a)]), rounded(numbers[len(a):]), near)
+
+    for step, loss in training.optimized(network, options, 3e-3, loss_of_batch):
+        if step % 100 == 0:
+            print(f"{step} steps, loss {loss:.3f}", flush=True)
     export(network, options.output)
     print("known steps:", known_steps(network))
     print(sum(p.numel() for p in network.parameters()), "parameters,", options.output.stat().st_size, "bytes")

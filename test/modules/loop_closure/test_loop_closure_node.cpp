@@ -1,146 +1,9 @@
 #include <catch2/catch.hpp>
-#include <deque>
-#include <memory>
 
-#include "modules/loop_closure/matching.hpp"
-#include "modules/loop_closure/node/loop_closure_node.hpp"
-#include "test/modules/loop_closure/synthetic_keyframes.hpp"
-#include "test/modules/place_recognition/toy_vocabulary.hpp"
+#include "test/modules/loop_closure/loop_closure_robots.hpp"
 
 namespace km {
 namespace {
-
-constexpr RobotId kSelf = 3;
-constexpr RobotId kPeer = 9;
-
-// A robot's node with its channels; its messages are kept.
-struct Robot {
-  explicit Robot(RobotId self, const LoopClosureConfig& config = {},
-                 LoopClosureNode::ReadKeyframe read_keyframe = {})
-      : node(config, self, std::make_shared<const Vocabulary>(toy_vocabulary(200)),
-             {.keyframes = keyframes,
-              .candidates = candidates,
-              .measured_closures = measured,
-              .peer_requests = peer_requests,
-              .peer_replies = peer_replies,
-              .peer_words = peer_words,
-              .peer_closures = peer_closures,
-              .peer_events = peer_events,
-              .restarts = restarts,
-              .peer_bows = peer_bows,
-              .restored = restored,
-              .own_requests = own_requests,
-              .own_replies = own_replies,
-              .own_words = own_words,
-              .own_closures = own_closures,
-              .own_restarts = own_restarts,
-              .outcomes = outcomes},
-             std::move(read_keyframe)) {
-    own_requests.subscribe([this](const auto& m) { requests.push_back(*m); });
-    own_replies.subscribe([this](const auto& m) { replies.push_back(*m); });
-    own_words.subscribe([this](const auto& m) { words.push_back(*m); });
-    own_closures.subscribe([this](const auto& m) { closures.push_back(*m); });
-    outcomes.subscribe([this](const auto& m) { reports.push_back(*m); });
-  }
-
-  template <typename T>
-  void give(T message) {
-    node.step(std::make_shared<const T>(std::move(message)));
-  }
-  void tick(double now_s) { node.step(LoopClosureTick{now_s}); }
-
-  Topic<Keyframe> keyframes;
-  Topic<LoopCandidate> candidates;
-  Topic<RelativePose> measured;
-  Topic<KeyframeRequest> peer_requests;
-  Topic<KeyframeReply> peer_replies;
-  Topic<KeyframeWords> peer_words;
-  Topic<Closure> peer_closures;
-  Topic<PeerEvent> peer_events, restarts, own_restarts;
-  Topic<KeyframeBow> peer_bows;
-  Topic<ClosureOutcome> restored;
-  Topic<Addressed<KeyframeRequest>> own_requests;
-  Topic<Addressed<KeyframeReply>> own_replies;
-  Topic<Addressed<KeyframeWords>> own_words;
-  Topic<Closure> own_closures;
-  Topic<ClosureOutcome> outcomes;
-  std::deque<Addressed<KeyframeRequest>> requests;
-  std::deque<Addressed<KeyframeReply>> replies;
-  std::deque<Addressed<KeyframeWords>> words;
-  std::vector<Closure> closures;
-  std::vector<ClosureOutcome> reports;
-  LoopClosureNode node;
-};
-
-// Delivers the messages of both robots; a reply may produce further requests.
-void deliver(Robot& a, Robot& b) {
-  const auto has_sent = [](const Robot& robot) {
-    return !robot.requests.empty() || !robot.replies.empty() || !robot.words.empty();
-  };
-  while (has_sent(a) || has_sent(b))
-    for (auto [from, to] : {std::pair(&a, &b), std::pair(&b, &a)}) {
-      const auto requests = std::exchange(from->requests, {});
-      for (const auto& request : requests) to->node.step(request.message);
-      const auto replies = std::exchange(from->replies, {});
-      for (const auto& reply : replies) to->node.step(reply.message);
-      const auto words = std::exchange(from->words, {});
-      for (const auto& points : words) to->node.step(points.message);
-    }
-}
-
-// Keyframe 0 of the robot and 5 of its peer see the same place.
-struct Scene {
-  explicit Scene(unsigned seed) {
-    std::mt19937 rng(seed);
-    const KeyframePair pair = make_keyframe_pair(rng, 150, {0.7, 0.3}, 1.0);
-    T_own_peer = pair.T_from_to;
-    own.odometry = {{kSelf, 0}, random_pose(rng), random_covariance(rng, 0.1)};
-    own.features = pair.from;
-    peer.odometry = {{kPeer, 5}, random_pose(rng), random_covariance(rng, 0.1)};
-    peer.features = pair.to;
-  }
-  LoopCandidate candidate() const { return {peer.odometry.id, own.odometry.id, 1.5}; }
-
-  SE3 T_own_peer;
-  Keyframe own, peer;
-};
-
-// Both robots with the keyframes of a scene, before one of them knows of a candidate.
-struct Meeting {
-  explicit Meeting(const Scene& two_views) : scene(two_views) {
-    robot.give(scene.own);
-    peer.give(scene.peer);
-  }
-  explicit Meeting(unsigned seed) : Meeting(Scene(seed)) {}
-
-  Scene scene;
-  Robot robot{kSelf}, peer{kPeer};
-};
-
-// Keypoint i of both keyframes has word i.
-Scene scene_with_words(unsigned seed) {
-  Scene scene(seed);
-  for (std::uint32_t i = 0; i < scene.own.features.descriptors.size(); ++i)
-    scene.own.features.descriptors[i] = scene.peer.features.descriptors[i] = toy_descriptor(i);
-  return scene;
-}
-
-// The peer knows the words of the robot's keyframe.
-void tell_words(Meeting& meeting) {
-  const Vocabulary vocabulary = toy_vocabulary(200);
-  meeting.peer.give(KeyframeBow{.id = meeting.scene.own.odometry.id,
-                                .vocabulary = vocabulary.id(),
-                                .words = vocabulary.count(meeting.scene.own.features.descriptors)});
-}
-
-std::vector<ClosureStage> stages_of(const std::vector<ClosureOutcome>& reports) {
-  std::vector<ClosureStage> stages;
-  for (const ClosureOutcome& report : reports) stages.push_back(report.stage);
-  return stages;
-}
-
-using enum ClosureStage;
-using Stages = std::vector<ClosureStage>;
 
 TEST_CASE("a candidate becomes a closure by one request and one reply", "[loop_closure_node]") {
   Meeting meeting(1);
@@ -196,28 +59,6 @@ TEST_CASE("a candidate that waits is not requested near a closure that was verif
   }
 }
 
-TEST_CASE("words that arrive near a closure that was verified meanwhile lead to no further request",
-          "[loop_closure_node]") {
-  Meeting meeting(scene_with_words(31));
-  tell_words(meeting);
-  auto& [scene, robot, peer] = meeting;
-  Keyframe next = scene.peer;
-  next.odometry.id.index = 6;
-  peer.give(next);
-  robot.give(scene.candidate());
-  robot.give(LoopCandidate{next.odometry.id, scene.own.odometry.id, 1.5});
-  REQUIRE(robot.requests.size() == 2);
-  peer.node.step(robot.requests[1].message);
-  const auto late = std::exchange(peer.words, {})[0].message;
-  robot.requests.pop_back();
-  deliver(robot, peer);
-  REQUIRE(robot.closures.size() == 1);
-  robot.node.step(late);
-  CHECK(robot.requests.empty());
-  CHECK(robot.reports.back().stage == kRequested);
-  CHECK(robot.reports.back().reason == "not requested: near a verified closure");
-}
-
 TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once",
           "[loop_closure_node]") {
   Meeting meeting(2);
@@ -265,165 +106,6 @@ TEST_CASE("both answers of a repeated request give one closure", "[loop_closure_
   CHECK(robot.requests[0].message->number != robot.requests[1].message->number);
   deliver(robot, peer);
   CHECK(robot.closures.size() == 1);
-}
-
-TEST_CASE("a reply contains the points whose words the requester's own keyframe has",
-          "[loop_closure_node]") {
-  const bool has_bow = GENERATE(true, false);
-  CAPTURE(has_bow);
-  const Scene scene(13);
-  constexpr std::uint32_t kSent = 50;
-  Robot robot(kSelf, {.min_word_points = 0}), peer(kPeer, {.reply_keypoints = kSent});
-  Keyframe full = scene.peer;
-  const auto words = static_cast<std::uint32_t>(full.features.descriptors.size());
-  for (std::uint32_t i = 0; i < words; ++i) full.features.descriptors[i] = toy_descriptor(i);
-  full.features.keypoints[100].inverse_depth = 0.0F;
-  peer.give(full);
-  BagOfWords theirs;  // words of the last points except for the very last
-  for (std::uint32_t word = words - kSent; word + 1 < words; ++word) theirs.push_back({word, 1});
-  const Vocabulary vocabulary = toy_vocabulary(200);
-  if (has_bow)
-    peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = vocabulary.id(), .words = theirs});
-  peer.give(KeyframeBow{.id = {kSelf, 1}, .vocabulary = vocabulary.id(), .words = {{3, 1}}});
-  peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = 1, .words = {{4, 1}}});
-  robot.give(scene.own);
-  robot.give(scene.candidate());
-  REQUIRE(robot.requests.size() == 1);
-  CHECK(robot.requests[0].message->own == 0);
-  peer.node.step(robot.requests[0].message);
-  REQUIRE(peer.replies.size() == 1);
-  std::vector<BinaryDescriptor> expected;  // the strongest come first, none of them without depth
-  for (std::uint32_t word = words - kSent; has_bow && word + 1 < words; ++word)
-    if (word != 100) expected.push_back(toy_descriptor(word));
-  for (std::uint32_t word = 0; !has_bow && word < kSent; ++word)
-    expected.push_back(toy_descriptor(word));
-  const KeyframeFeatures& sent = peer.replies[0].message->keyframe.features;
-  CHECK(sent.matched == orb_bits(expected));
-  CHECK(sent.keypoints.size() == expected.size());
-}
-
-TEST_CASE("the number of points in a reply depends on the common words", "[loop_closure_node]") {
-  constexpr std::uint32_t kSent = 50;
-  // At least a quarter of `kSent`.
-  const auto [shared, expected] =
-      GENERATE(std::pair(0U, 12U), std::pair(5U, 12U), std::pair(30U, 30U), std::pair(90U, 50U));
-  CAPTURE(shared);
-  const Scene scene(13);
-  Robot robot(kSelf, {.min_word_points = 0}), peer(kPeer, {.reply_keypoints = kSent});
-  constexpr std::uint32_t kPoints = 180;
-  Keyframe full = scene.peer;
-  full.features.keypoints.resize(kPoints, full.features.keypoints.front());
-  full.features.descriptors.resize(kPoints);
-  for (std::uint32_t i = 0; i < kPoints; ++i) {
-    full.features.descriptors[i] = toy_descriptor(i);
-    full.features.keypoints[i].inverse_depth = 0.2F;
-  }
-  peer.give(full);
-  BagOfWords theirs;
-  for (std::uint32_t word = 0; word < shared; ++word) theirs.push_back({word, 1});
-  peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = toy_vocabulary(200).id(), .words = theirs});
-  robot.give(scene.own);
-  robot.give(scene.candidate());
-  peer.node.step(robot.requests[0].message);
-  REQUIRE(peer.replies.size() == 1);
-  CHECK(peer.replies[0].message->keyframe.features.keypoints.size() == expected);
-}
-
-TEST_CASE("the features of a keyframe are requested once its words agree with an own keyframe",
-          "[loop_closure_node]") {
-  Meeting meeting(scene_with_words(21));
-  tell_words(meeting);
-  auto& [scene, robot, peer] = meeting;
-  robot.give(scene.candidate());
-  REQUIRE(robot.requests.size() == 1);
-  CHECK(robot.requests[0].message->part == KeyframePart::kWordPoints);
-  peer.node.step(std::exchange(robot.requests, {})[0].message);
-  REQUIRE(peer.words.size() == 1);
-  CHECK(peer.words[0].to == kSelf);
-  CHECK(peer.words[0].message->words.points.size() == 150);
-  CHECK(peer.replies.empty());
-  const auto words = std::exchange(peer.words, {})[0].message;
-  robot.node.step(words);
-  robot.node.step(words);  // a late reply to a repeated request
-  REQUIRE(robot.requests.size() == 1);
-  CHECK(robot.requests[0].message->part == KeyframePart::kDescriptors);
-  CHECK(robot.closures.empty());
-  peer.node.step(std::exchange(robot.requests, {})[0].message);
-  REQUIRE(peer.replies.size() == 1);
-  CHECK(peer.replies[0].message->descriptors == orb_bits(scene.peer.features.descriptors));
-  CHECK(peer.replies[0].message->keyframe.features.keypoints.empty());
-  deliver(robot, peer);
-  REQUIRE(robot.closures.size() == 1);
-  CHECK(robot.closures[0].inliers > 100);
-  CHECK(stages_of(robot.reports) == Stages{kCandidate, kRequested, kVerified});
-}
-
-TEST_CASE("descriptors of other points than those of the words are replaced by the whole keyframe",
-          "[loop_closure_node]") {
-  Meeting meeting(scene_with_words(25));
-  tell_words(meeting);
-  auto& [scene, robot, peer] = meeting;
-  robot.give(scene.candidate());
-  peer.node.step(std::exchange(robot.requests, {})[0].message);
-  SECTION("the owner has a keypoint less") {
-    robot.node.step(std::exchange(peer.words, {})[0].message);
-    Keyframe less = scene.peer;
-    less.features.keypoints.pop_back();
-    less.features.descriptors.pop_back();
-    peer.give(less);
-  }
-  SECTION("a peer sends descriptors before its points") {
-    robot.give(KeyframeReply{.number = 0,
-                             .found = true,
-                             .keyframe = scene.peer,
-                             .descriptors = orb_bits(scene.peer.features.descriptors)});
-    REQUIRE(robot.requests.size() == 1);
-    CHECK(robot.requests[0].message->part == KeyframePart::kFeatures);
-  }
-  deliver(robot, peer);
-  REQUIRE(robot.closures.size() == 1);
-  CHECK(robot.closures[0].inliers > 100);
-}
-
-TEST_CASE("a keyframe with few common words is completed by other keypoints",
-          "[loop_closure_node]") {
-  Meeting meeting(scene_with_words(26));
-  auto& [scene, robot, peer] = meeting;
-  BagOfWords few;
-  for (std::uint32_t word = 0; word < 20; ++word) few.push_back({word, 1});
-  peer.give(KeyframeBow{
-      .id = scene.own.odometry.id, .vocabulary = toy_vocabulary(200).id(), .words = few});
-  robot.give(scene.candidate());
-  deliver(robot, peer);
-  REQUIRE(robot.closures.size() == 1);
-  CHECK(robot.closures[0].inliers > 40);  // a quarter of 200 keypoints are sent
-  CHECK(robot.closures[0].inliers <= 50);
-}
-
-TEST_CASE("no features are requested of a keyframe whose words are elsewhere",
-          "[loop_closure_node]") {
-  Meeting meeting(scene_with_words(22));
-  tell_words(meeting);
-  auto& [scene, robot, peer] = meeting;
-  std::mt19937 rng(23);
-  const KeyframePair other = make_keyframe_pair(rng, 150, {0.7, 0.3}, 1.0);
-  scene.peer.features.keypoints = other.to.keypoints;
-  peer.give(scene.peer);
-  robot.give(scene.candidate());
-  deliver(robot, peer);
-  CHECK(robot.requests.empty());
-  CHECK(robot.closures.empty());
-  REQUIRE(stages_of(robot.reports) == Stages{kCandidate, kRequested, kReceived});
-  CHECK(robot.reports.back().reason == "common words do not agree on a pose");
-  // Another candidate of the keyframe is compared again.
-  robot.give(LoopCandidate{scene.peer.odometry.id, {kSelf, 900}, 1.5});
-  Keyframe again = scene.own;
-  again.odometry.id.index = 900;
-  robot.give(again);
-  robot.tick(1.0);
-  REQUIRE(robot.requests.size() == 1);
-  CHECK(robot.requests[0].message->part == KeyframePart::kWordPoints);
-  CHECK(robot.requests[0].message->own == 900);
 }
 
 TEST_CASE("a robot compares no pair that its peer compares or has verified",
@@ -586,6 +268,19 @@ TEST_CASE("candidates inside one robot need no request, in whatever order things
   CHECK(robot.closures[0].id() == ClosureId{{kSelf, 0}, {kSelf, 50}});
   robot.give(LoopCandidate{scene.own.odometry.id, scene.peer.odometry.id, 0.7});
   CHECK(robot.closures.size() == 1);  // the same pair from the other side
+}
+
+TEST_CASE("inside one robot keyframes are matched by ORB alone", "[loop_closure_node]") {
+  Scene scene = scene_of_one_robot();
+  describe(scene, 7, 7);
+  const bool has_orb = GENERATE(true, false);
+  for (BinaryDescriptor& descriptor : scene.peer.features.descriptors)
+    if (!has_orb) descriptor = {};
+  Robot robot(kSelf);
+  robot.give(scene.own);
+  robot.give(scene.peer);
+  robot.give(scene.candidate());
+  CHECK(robot.closures.size() == (has_orb ? 1 : 0));
 }
 
 TEST_CASE("a closure inside a robot must be more certain than one between robots",
