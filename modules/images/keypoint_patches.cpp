@@ -15,15 +15,22 @@ double scale_of(int octave) {
   return std::pow(kPyramidScale, octave);
 }
 
-cv::Mat smoothed_level(const cv::Mat& image, int octave) {
+// The first `octaves` levels of the image's pyramid, smoothed. A level is made from the one before,
+// because making it from the image takes longer.
+std::vector<cv::Mat> smoothed_levels(const cv::Mat& image, int octaves) {
+  std::vector<cv::Mat> levels;
   cv::Mat level = image;
-  if (octave > 0)
-    cv::resize(image, level,
-               {cvRound(image.cols / scale_of(octave)), cvRound(image.rows / scale_of(octave))},
-               0.0, 0.0, cv::INTER_AREA);
-  cv::Mat smooth;
-  cv::GaussianBlur(level, smooth, {5, 5}, 1.0);
-  return smooth;
+  for (int octave = 0; octave < octaves; ++octave) {
+    if (octave > 0) {
+      const double scale = scale_of(octave);
+      const cv::Size size(cvRound(image.cols / scale), cvRound(image.rows / scale));
+      cv::Mat smaller;
+      cv::resize(level, smaller, size, 0.0, 0.0, cv::INTER_LINEAR);
+      level = smaller;
+    }
+    cv::GaussianBlur(level, levels.emplace_back(), {5, 5}, 1.0);
+  }
+  return levels;
 }
 
 void sample(const cv::Mat& level, const cv::KeyPoint& corner, std::uint8_t* patch) {
@@ -55,14 +62,13 @@ void sample(const cv::Mat& level, const cv::KeyPoint& corner, std::uint8_t* patc
 
 cv::Mat keypoint_patches(const cv::Mat& image, std::span<const cv::KeyPoint> corners) {
   CV_Assert(image.type() == CV_8U);
-  std::vector<cv::Mat> levels;
+  int octaves = 0;
+  for (const cv::KeyPoint& corner : corners) octaves = std::max(octaves, corner.octave + 1);
+  const std::vector<cv::Mat> levels = smoothed_levels(image, octaves);
   cv::Mat patches(static_cast<int>(corners.size()), kPatchSide * kPatchSide, CV_8U);
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const auto octave = static_cast<std::size_t>(corners[i].octave);
-    if (levels.size() <= octave) levels.resize(octave + 1);
-    if (levels[octave].empty()) levels[octave] = smoothed_level(image, corners[i].octave);
-    sample(levels[octave], corners[i], patches.ptr(static_cast<int>(i)));
-  }
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    sample(levels[static_cast<std::size_t>(corners[i].octave)], corners[i],
+           patches.ptr(static_cast<int>(i)));
   return patches;
 }
 

@@ -39,11 +39,19 @@ class KeypointNetwork(nn.Module):
         for inputs, outputs in ((1, width), (width, 2 * width), (2 * width, 4 * width)):
             layers += [nn.Conv2d(inputs, outputs, 3, 2, 1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU()]
         # Without scale and shift: all numbers have one range, because they are rounded to the same steps.
-        layers += [nn.Conv2d(4 * width, NUMBERS, 3, 1, 0, bias=False), nn.BatchNorm2d(NUMBERS, affine=False)]
+        layers += [nn.Flatten(), nn.Linear(4 * width * 9, NUMBERS, bias=False), nn.BatchNorm1d(NUMBERS, affine=False)]
         self.layers = nn.Sequential(*layers)
 
     def forward(self, patches):
         return self.layers(patches)
+
+    def folded(self):
+        """The network for use, with the last normalization in the last layer: OpenCV runs that faster."""
+        linear, norm = self.layers[-2:]
+        scale = (norm.running_var + norm.eps).rsqrt()
+        last = nn.Linear(linear.in_features, NUMBERS)
+        last.weight.data, last.bias.data = scale[:, None] * linear.weight.data, -scale * norm.running_mean
+        return nn.Sequential(*self.layers[:-2], last).eval()
 
 
 def normalized(patches):
@@ -157,7 +165,7 @@ def batch_of(recordings, count, random):
 
 def rounded(numbers):
     """Directions in steps, as matched_numbers.hpp rounds them, over the steps of 1; gradients are those without rounding."""
-    direction = F.normalize(numbers.flatten(1), dim=1) * NUMBERS**0.5
+    direction = F.normalize(numbers, dim=1) * NUMBERS**0.5
     steps = (STEPS * direction).clamp(-LARGEST, LARGEST).round()
     return direction + (steps / STEPS - direction).detach()
 
@@ -171,7 +179,7 @@ def contrastive_loss(a, b, near):
 
 def export(network, path):
     network.eval()
-    torch.onnx.export(network, torch.zeros(1, 1, SIDE, SIDE), path, opset_version=11, input_names=["patches"],
+    torch.onnx.export(network.folded(), torch.zeros(1, 1, SIDE, SIDE), path, opset_version=11, input_names=["patches"],
                       output_names=["numbers"], dynamic_axes={"patches": {0: "n"}, "numbers": {0: "n"}})
 
 
