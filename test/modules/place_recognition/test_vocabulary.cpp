@@ -10,14 +10,11 @@
 #include <set>
 #include <string>
 
-#include "modules/place_recognition/bag_file.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/place_recognition/vocabulary_training.hpp"
 #include "test/modules/place_recognition/synthetic_orb.hpp"
-#include "test/support/command.hpp"
 #include "test/support/corrupted_input.hpp"
-#include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -329,85 +326,19 @@ TEST_CASE("A missing file is named", "[place_recognition]") {
                     Contains("cannot be written"));
 }
 
-namespace fs = std::filesystem;
-
-constexpr std::size_t kMaxShippedBytes = 1'500'000;
-
-CommandResult run_tool(const std::string& arguments) {
-  return run_command(std::string(KM_BIN_DIR) + "/kimera_multi_vocabulary " + arguments);
-}
-
 TEST_CASE("The shipped vocabulary loads, is the documented one, and is small",
           "[place_recognition]") {
-  const fs::path file = "config/vocabulary/indoor.kmvoc";
+  constexpr std::size_t kMaxShippedBytes = 1'500'000;
+  const std::filesystem::path file = "config/vocabulary/indoor.kmvoc";
   const Vocabulary vocabulary = load_vocabulary(file);
   std::ifstream readme("config/vocabulary/README.md");
   const std::string text(std::istreambuf_iterator<char>(readme), {});
   CHECK_THAT(text, Contains(fingerprint_text(vocabulary.id())));
-  CHECK(fs::file_size(file) < kMaxShippedBytes);
+  CHECK(std::filesystem::file_size(file) < kMaxShippedBytes);
   SyntheticOrb world(2, 1);
   const auto image = world.image(100, 5);
   CHECK(score(vocabulary.transform(image), vocabulary.transform(image)) ==
         Approx(1.0).margin(1e-5));
-}
-
-// checks.md L5 on real images, through the tool.
-TEST_CASE("The tool trains on real images and distinguishes the two places",
-          "[place_recognition]") {
-  const auto images = shared_data("kimera_vio_lcd");
-  if (!images) return;
-  const TemporaryFolder folder;
-  const auto left = [&](int i) {
-    return (*images / ("left_img_" + std::to_string(i) + ".png")).string();
-  };
-  const std::string vocabulary = (folder.path() / "v.kmvoc").string();
-  const CommandResult trained = run_tool("train -k 9 -L 3 -o " + vocabulary + " " + left(0) + " " +
-                                         left(1) + " " + left(2) + " " + left(3));
-  INFO(trained.output);
-  REQUIRE(trained.exit_code == 0);
-  CHECK_THAT(trained.output, Contains("of 4 images"));
-
-  const auto score_of = [&](int i, int k) {
-    const fs::path json = folder.path() / "score.json";
-    const CommandResult run = run_tool("inspect " + vocabulary + " --pair " + left(i) + " " +
-                                       left(k) + " --json " + json.string());
-    REQUIRE(run.exit_code == 0);
-    const std::string text = folder.read("score.json");
-    const std::string key = "\"pair_score\":";
-    return std::stod(text.substr(text.find(key) + key.size()));
-  };
-  CHECK(score_of(2, 2) == Approx(1.0).margin(1e-5));
-  // 0, 1 and 2, 3 are pairs of one place each.
-  CHECK(score_of(0, 1) > score_of(0, 2));
-  CHECK(score_of(2, 3) > score_of(1, 3));
-
-  const std::string bags = (folder.path() / "bags.txt").string();
-  const CommandResult written = run_tool("bags " + vocabulary + " " + left(0) + " " + left(0) +
-                                         " " + left(2) + " -o " + bags);
-  INFO(written.output);
-  REQUIRE(written.exit_code == 0);
-  const std::vector<BagOfWords> read = read_bags(bags);
-  REQUIRE(read.size() == 3);
-  CHECK(!read[0].empty());
-  CHECK(read[0] == read[1]);
-  CHECK(read[0] != read[2]);
-}
-
-TEST_CASE("The tool names unusable input and fails", "[place_recognition]") {
-  const TemporaryFolder folder;
-  const auto check_fails = [&](const std::string& arguments, const char* reason) {
-    const CommandResult run = run_tool(arguments);
-    CHECK(run.exit_code != 0);
-    CHECK_THAT(run.output, Contains(reason));
-  };
-  const std::string at = folder.path().string();
-  check_fails("train -o " + at + "/v /nowhere", "/nowhere does not exist");
-  check_fails("train -o " + at + "/v " + at, "holds no image");
-  folder.write("broken.png", "no image");
-  check_fails("train -o " + at + "/v " + at, "broken.png: neither a PNG nor a JPEG file");
-  check_fails("train -k 1 -o " + at + "/v " + at + "/broken.png", "branching = 1 is outside");
-  check_fails("inspect config/vocabulary/README.md", "not a vocabulary");
-  check_fails("", "subcommand is required");
 }
 
 }  // namespace
