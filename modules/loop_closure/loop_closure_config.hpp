@@ -18,7 +18,7 @@ struct LoopClosureConfig {
   int min_consensus = 12;
   int min_inliers = 15;
   double max_position_sigma_m = 0.12;
-  double max_rotation_sigma_rad = 0.03;
+  double max_rotation_sigma_rad = 0.025;
   double max_own_rotation_sigma_rad = 0.015;
   double systematic_rotation_rad = 0.003;
   double systematic_translation_m = 0.008;
