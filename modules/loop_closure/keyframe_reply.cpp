@@ -11,12 +11,6 @@
 namespace km {
 namespace {
 
-// Number of keypoints to send.
-struct KeypointBudget {
-  std::size_t least = 0;  // lower bound, if there are enough keypoints
-  std::size_t most = 0;
-};
-
 // As the requester compares it: by its network if that is also ours, otherwise by ORB.
 KeyframeFeatures comparable(const KeyframeFeatures& features, std::uint16_t network) {
   KeyframeFeatures result = features;
@@ -25,9 +19,11 @@ KeyframeFeatures comparable(const KeyframeFeatures& features, std::uint16_t netw
   return result;
 }
 
-KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const KeypointBudget& budget,
+// The first `most` keypoints by rank: with depth before without, and then of the requester's words
+// before others.
+KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, std::size_t most,
                                  const WordsOfRequester& theirs) {
-  if (features.keypoints.size() <= budget.least) return features;
+  if (features.keypoints.size() <= most) return features;
   const std::vector<std::uint32_t> words = theirs.vocabulary.words(features.descriptors);
   std::vector<int> rank;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -37,9 +33,7 @@ KeyframeFeatures chosen_by_words(const KeyframeFeatures& features, const Keypoin
   std::vector<std::size_t> order(words.size());
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return rank[a] > rank[b]; });
-  constexpr int kBest = 3;  // rank of a keypoint with depth and a shared word
-  const auto best = static_cast<std::size_t>(std::ranges::count(rank, kBest));
-  order.resize(std::min(order.size(), std::clamp(best, budget.least, budget.most)));
+  order.resize(most);
   return selected(features, order);
 }
 
@@ -57,20 +51,19 @@ KeyframeFeatures without(const KeyframeFeatures& features, std::span<const std::
 KeyframeReply reply_to(const KeyframeRequest& request, const Keyframe& asked,
                        const std::optional<WordsOfRequester>& words, std::size_t most) {
   const KeyframeFeatures features = comparable(asked.features, request.network);
-  const KeypointBudget budget{most / 4, most};
   KeyframeReply reply{.number = request.number, .found = true, .keyframe = {}};
   reply.keyframe.odometry = asked.odometry;
   reply.keyframe.stamp = asked.stamp;
   if (!words) {
-    reply.keyframe.features = reduced(features, budget.most);
+    reply.keyframe.features = reduced(features, most);
   } else if (request.part != KeyframePart::kDescriptors) {
-    reply.keyframe.features = chosen_by_words(features, budget, *words);
+    reply.keyframe.features = chosen_by_words(features, most, *words);
   } else {
     const std::vector<std::size_t> points =
-        common_word_places(features, words->vocabulary, words->words, budget.most);
+        common_word_places(features, words->vocabulary, words->words, most_word_points(most));
     for (const std::size_t point : points) reply.descriptors.push_back(features.matched[point]);
     reply.keyframe.features =
-        reduced(without(features, points), budget.least - std::min(budget.least, points.size()));
+        chosen_by_words(without(features, points), most - points.size(), *words);
   }
   reply.keyframe.features.descriptors.clear();
   return reply;

@@ -10,7 +10,7 @@ namespace km {
 struct PlaceRecognitionConfig {
   static constexpr const char* kSection = "place_recognition";
 
-  int max_words = 2000;
+  int word_keypoints = 350;
   double similarity_threshold = 0.5;
   double min_normalizer = 0.05;
   int max_candidates = 5;
@@ -22,10 +22,9 @@ struct PlaceRecognitionConfig {
   double image_similarity = 0.35;
 
   void visit_fields(auto& visitor) {
-    visitor.field("max_words", max_words, {1, 100000},
-                  "maximum number of words of a keyframe that are compared and sent, about 1 B "
-                  "each: those of the largest weight; an image has at most 1000 by default, 500 "
-                  "save bytes and find fewer closures");
+    visitor.field("word_keypoints", word_keypoints, {50, 4000},
+                  "number of keypoints of a keyframe, the strongest, whose words are compared and "
+                  "sent, about 0.8 B each");
     visitor.field("similarity_threshold", similarity_threshold, {0.0, 10.0},
                   "least similarity of a candidate: its score over the query's score against the "
                   "keyframe before it; lower: more candidates, more work for verification");

@@ -13,8 +13,7 @@ namespace km {
 [[nodiscard]] std::vector<std::uint32_t> heaviest_words(const BowVector& image, std::size_t count);
 
 /// The words of `bag` that are among the heaviest `count` of `image`, the weighed vector of the
-/// bag. Such a sketch is a bag of words of a fraction of the size. Robots send each other sketches
-/// of PlaceRecognitionConfig::max_words.
+/// bag. Such a sketch is a bag of words of a fraction of the size.
 [[nodiscard]] BagOfWords sketch_of(const BagOfWords& bag, const BowVector& image,
                                    std::size_t count);
 

@@ -128,7 +128,7 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
         request->requester, std::make_shared<const KeyframeWords>(KeyframeWords{
                                 request->number, request->keyframe,
                                 common_word_points(asked->features, words->vocabulary, words->words,
-                                                   reply_keypoints_)})});
+                                                   most_word_points(reply_keypoints_))})});
   KeyframeReply reply{.number = request->number, .found = false, .keyframe = {}};
   reply.keyframe.odometry.id = request->keyframe;
   if (asked) reply = reply_to(*request, *asked, words, reply_keypoints_);

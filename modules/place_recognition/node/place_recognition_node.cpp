@@ -1,10 +1,11 @@
 #include "modules/place_recognition/node/place_recognition_node.hpp"
 
+#include <algorithm>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "modules/core/median_depth.hpp"
-#include "modules/place_recognition/place_sketch.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -122,9 +123,9 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
 }
 
 BagOfWords PlaceRecognitionNode::words_of(const KeyframeFeatures& features) const {
-  BagOfWords all = vocabulary_->count(features.descriptors);
-  const auto most = static_cast<std::size_t>(config_.max_words);
-  return all.size() <= most ? all : sketch_of(all, vocabulary_->weigh(all), most);
+  const auto most = static_cast<std::size_t>(config_.word_keypoints);
+  const std::span all(features.descriptors);  // the strongest first
+  return vocabulary_->count(all.first(std::min(most, all.size())));
 }
 
 PlaceNovelty PlaceRecognitionNode::novelty_of(const OdometryPose& keyframe,

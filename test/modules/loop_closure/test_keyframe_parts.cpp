@@ -55,21 +55,21 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   CHECK(robot.requests[0].message->own == 0);
   peer.node.step(robot.requests[0].message);
   REQUIRE(peer.replies.size() == 1);
-  std::vector<BinaryDescriptor> expected;  // the strongest come first, none of them without depth
+  // Those of the words, then the strongest others, none of them without depth.
+  std::vector<BinaryDescriptor> expected;
   for (std::uint32_t word = words - kSent; has_bow && word + 1 < words; ++word)
     if (word != 100) expected.push_back(toy_descriptor(word));
-  for (std::uint32_t word = 0; !has_bow && word < kSent; ++word)
+  for (std::uint32_t word = 0; expected.size() < kSent; ++word)
     expected.push_back(toy_descriptor(word));
   const KeyframeFeatures& sent = peer.replies[0].message->keyframe.features;
   CHECK(sent.matched == orb_bits(expected));
   CHECK(sent.keypoints.size() == expected.size());
 }
 
-TEST_CASE("the number of points in a reply depends on the common words", "[loop_closure_node]") {
+TEST_CASE("a reply has as many keypoints as it may, however few words are common",
+          "[loop_closure_node]") {
   constexpr std::uint32_t kSent = 50;
-  // At least a quarter of `kSent`.
-  const auto [shared, expected] =
-      GENERATE(std::pair(0U, 12U), std::pair(5U, 12U), std::pair(30U, 30U), std::pair(90U, 50U));
+  const std::uint32_t shared = GENERATE(0U, 5U, 30U, 90U);
   CAPTURE(shared);
   const Scene scene(13);
   Robot robot(kSelf, {.min_word_points = 0}), peer(kPeer, {.reply_keypoints = kSent});
@@ -83,13 +83,19 @@ TEST_CASE("the number of points in a reply depends on the common words", "[loop_
   }
   peer.give(full);
   BagOfWords theirs;
-  for (std::uint32_t word = 0; word < shared; ++word) theirs.push_back({word, 1});
+  for (std::uint32_t word = kPoints - shared; word < kPoints; ++word) theirs.push_back({word, 1});
   peer.give(KeyframeBow{.id = {kSelf, 0}, .vocabulary = toy_vocabulary(200).id(), .words = theirs});
   robot.give(scene.own);
   robot.give(scene.candidate());
   peer.node.step(robot.requests[0].message);
   REQUIRE(peer.replies.size() == 1);
-  CHECK(peer.replies[0].message->keyframe.features.keypoints.size() == expected);
+  const auto& sent = peer.replies[0].message->keyframe.features.matched;
+  REQUIRE(sent.size() == kSent);
+  const std::uint32_t first_shared = kPoints - shared;
+  for (std::uint32_t i = 0; i < kSent; ++i) {
+    const std::uint32_t word = i < shared ? first_shared + i : i - shared;
+    CHECK(sent[i] == orb_bits(std::vector{toy_descriptor(word)})[0]);
+  }
 }
 
 TEST_CASE("the features of a keyframe are requested once its words agree with an own keyframe",
@@ -103,7 +109,7 @@ TEST_CASE("the features of a keyframe are requested once its words agree with an
   peer.node.step(std::exchange(robot.requests, {})[0].message);
   REQUIRE(peer.words.size() == 1);
   CHECK(peer.words[0].to == kSelf);
-  CHECK(peer.words[0].message->words.points.size() == 150);
+  CHECK(peer.words[0].message->words.points.size() == 100);  // half of 200
   CHECK(peer.replies.empty());
   const auto words = std::exchange(peer.words, {})[0].message;
   robot.node.step(words);
@@ -113,8 +119,10 @@ TEST_CASE("the features of a keyframe are requested once its words agree with an
   CHECK(robot.closures.empty());
   peer.node.step(std::exchange(robot.requests, {})[0].message);
   REQUIRE(peer.replies.size() == 1);
-  CHECK(peer.replies[0].message->descriptors == orb_bits(scene.peer.features.descriptors));
-  CHECK(peer.replies[0].message->keyframe.features.keypoints.empty());
+  const std::span all(scene.peer.features.descriptors);
+  REQUIRE(all.size() == 150);
+  CHECK(peer.replies[0].message->descriptors == orb_bits(all.first(100)));
+  CHECK(peer.replies[0].message->keyframe.features.matched == orb_bits(all.subspan(100)));
   deliver(robot, peer);
   REQUIRE(robot.closures.size() == 1);
   CHECK(robot.closures[0].inliers > 100);
@@ -159,8 +167,7 @@ TEST_CASE("a keyframe with few common words is completed by other keypoints",
   robot.give(scene.candidate());
   deliver(robot, peer);
   REQUIRE(robot.closures.size() == 1);
-  CHECK(robot.closures[0].inliers > 40);  // a quarter of 200 keypoints are sent
-  CHECK(robot.closures[0].inliers <= 50);
+  CHECK(robot.closures[0].inliers > 100);
 }
 
 TEST_CASE("no features are requested of a keyframe whose words are elsewhere",

@@ -55,7 +55,7 @@ struct Robot {
               .queries = queries.topic}) {}
 };
 
-Keyframe keyframe(KeyframeId id, std::initializer_list<std::uint32_t> words) {
+Keyframe keyframe(KeyframeId id, const std::vector<std::uint32_t>& words) {
   Keyframe result;
   result.odometry.id = id;
   result.stamp = nanoseconds(0.5 * id.index);
@@ -107,14 +107,18 @@ TEST_CASE("Keyframes that differ from the one sent before are sent with words an
                      {{kSelf, 1}, 0}, {{kSelf, 2}, 0}, {{kPeer, 7}, 2}, {{kPeer, 7}, 0}});
 }
 
-TEST_CASE("The heaviest words of a keyframe are published and compared",
+TEST_CASE("The words of the strongest keypoints are published and compared",
           "[place_recognition][node]") {
-  Robot robot(kSelf, {.max_words = 2, .min_gap_s = 0.0});
-  robot.node.step(keyframe({kSelf, 0}, {5, 5, 2, 7, 7}));
-  CHECK(robot.own_bows.received.at(0).words == BagOfWords{{5, 2}, {7, 2}});
+  Robot robot(kSelf, {.word_keypoints = 50, .min_gap_s = 0.0});
+  std::vector<std::uint32_t> words(50, 5);  // that of the strongest keypoint first
+  words[10] = 7;
+  words.insert(words.end(), {2, 3});
+  robot.node.step(keyframe({kSelf, 0}, words));
+  CHECK(robot.own_bows.received.at(0).words == BagOfWords{{5, 49}, {7, 1}});
   robot.node.step(bow({kPeer, 1}, {5, 7}));
   REQUIRE(robot.candidates.received.size() == 1);
-  CHECK(robot.candidates.received[0].similarity == Approx(1.0));
+  robot.node.step(bow({kPeer, 2}, {2, 3}));
+  CHECK(robot.candidates.received.size() == 1);
 }
 
 TEST_CASE("A peer's view of a known place is a candidate, through the thread",

@@ -190,24 +190,38 @@ TEST_CASE("A run that is stopped continues to the same bytes", "[simulate]") {
   check_equal(contents(folder, "stopped"), contents(folder, "whole"));
 }
 
-TEST_CASE("One signal ends the preparation in order, and a second one ends it at once",
-          "[simulate]") {
-  const TemporaryFolder folder;
-  Process program({kProgram, "--world", "city", "--robots", "1", "--duration", "60", "--output",
-                   (folder.path() / "city").string()});
-  REQUIRE(program.wait_for_prefix("Preparing world city ..."));
-  program.kill(SIGINT);
-  REQUIRE(program.wait_for_prefix("Stopping after this step"));
-  SECTION("one signal") {
-    CHECK(program.wait() == 130);
-    CHECK(program.lines("Stopped; the same command continues").size() == 1);
-    CHECK(program.lines("0 of ").empty());
-  }
-  SECTION("two signals") {
+// A simulation that has received one signal while it prepares its world.
+struct InterruptedPreparation {
+  TemporaryFolder folder;
+  Process program{{kProgram, "--world", "city", "--robots", "1", "--duration", "60", "--output",
+                   (folder.path() / "city").string()}};
+
+  InterruptedPreparation() {
+    REQUIRE(program.wait_for_prefix("Preparing world city ..."));
     program.kill(SIGINT);
-    CHECK(program.wait() == -SIGINT);  // which shells call 130
-    CHECK(program.lines("Stopped").empty());
+    REQUIRE(program.wait_for_prefix("Stopping after this step"));
   }
+};
+
+TEST_CASE("A signal ends the preparation in order", "[simulate]") {
+  InterruptedPreparation preparation;
+  Process& program = preparation.program;
+  CHECK(program.wait() == 130);
+  CHECK(program.lines("Stopped; the same command continues").size() == 1);
+  CHECK(program.lines("0 of ").empty());
+}
+
+TEST_CASE("A second signal ends the preparation at once", "[simulate]") {
+  bool ended_by_signal = false;
+  // On a busy computer the step may end before the second signal arrives.
+  for (int attempt = 0; attempt < 5 && !ended_by_signal; ++attempt) {
+    InterruptedPreparation preparation;
+    Process& program = preparation.program;
+    program.kill(SIGINT);
+    ended_by_signal = program.wait() == -SIGINT;  // which shells call 130
+    CHECK(program.lines("Stopped").empty() == ended_by_signal);
+  }
+  CHECK(ended_by_signal);
 }
 
 TEST_CASE("Recordings with other parameters are refused", "[simulate]") {
